@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from kinacc.tables.history_tables import FIRST, HISTORY, HOLDS, OPEN, RECALIBRATE
+from kinacc.tables.allowed import FIRST, HOLDS, OPEN, RECALIBRATE
+from kinacc.tables.contract import ARTEFACTS
 
 
 def history(
@@ -18,7 +19,7 @@ def history(
     rng = np.random.default_rng(3)
     rows, in_force = [], ""
     for number, day in enumerate(map(str, months)):
-        row = dict.fromkeys((each.name for each in HISTORY.columns), np.nan)
+        row = dict.fromkeys((each.name for each in ARTEFACTS["history"].columns), np.nan)
         held_out, moves = 0.3 + 0.01 * rng.normal(), number == changed
         row |= {"series": f"tracker-{day}", "date": day, "digest": "0" * 64, "model": "vec"}
         row |= {"base": "same", "tool": "same", "rows": 120, "configurations": 100}
@@ -41,7 +42,7 @@ def history(
         each.name: np.array(
             [row[each.name] for row in rows], dtype=object if each.kind == "text" else float
         )
-        for each in HISTORY.columns
+        for each in ARTEFACTS["history"].columns
     }
 
 

@@ -18,8 +18,8 @@ from kinacc.deployment import drift
 from kinacc.deployment.record import Calibration
 from kinacc.geometry import Pose, compose
 from kinacc.kinematics import robot as robots
+from kinacc.tables.allowed import MOVED, SAME
 from kinacc.tables.columns import Columns
-from kinacc.tables.history_tables import MOVED, SAME
 
 WEIGHT_MM_PER_RAD = 500.0
 POSES = 50

@@ -25,8 +25,8 @@ from kinacc.synthetic import plan, tracker
 from kinacc.synthetic.accepted import accepted_draw
 from kinacc.synthetic.draw import physical_robot
 from kinacc.synthetic.physical import Visits
+from kinacc.tables.allowed import MOVED, SAME
 from kinacc.tables.columns import Columns
-from kinacc.tables.history_tables import MOVED, SAME
 
 WEIGHT = 500.0
 POSES = 60

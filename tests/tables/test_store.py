@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 import tempfile
 from pathlib import Path
 
@@ -17,7 +14,7 @@ from hypothesis import strategies as st
 
 from kinacc.errors import InputError
 from kinacc.tables import store
-from kinacc.tables.atomic import replacing, sweep
+from kinacc.tables.atomic import replacing
 from kinacc.tables.contract import PROVENANCE_KEYS, columns_of
 
 PROVENANCE = {
@@ -174,29 +171,6 @@ def test_writers_of_one_number_on_two_machines_do_not_meet(tmp_path):
             quick.write_text("quick")
         assert path.read_text() == "quick"
     assert path.read_text() == "slow"
-
-
-def test_what_a_killed_process_began_is_removed_and_what_is_being_written_is_not(tmp_path):
-    path = tmp_path / "results" / "fig1.svg"
-    path.parent.mkdir()
-    begun = f"""
-import os, signal
-from kinacc.tables.atomic import replacing
-with replacing([{str(path)!r}]) as (part,):
-    part.write_text("half")
-    os.kill(os.getpid(), signal.SIGKILL)
-"""
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
-    subprocess.run([sys.executable, "-c", begun], env=environment, check=False)
-    (half,) = path.parent.iterdir()
-    older = path.with_name(".fig2.svg.4711.partial")  # of versions that named no machine
-    older.write_text("half")
-    with replacing([path]) as (part,):
-        part.write_text("whole")
-        sweep(tmp_path)
-        assert [*path.parent.iterdir()] == [part]
-    assert not half.exists()
-    assert path.read_text() == "whole"
 
 
 def test_unreadable_files_are_named(tmp_path):

@@ -14,10 +14,9 @@ from kinacc.kinematics import robot
 from kinacc.measurements.reader import UNCERTAINTY, excluded_lines, read_excluded
 from kinacc.measurements.row_names import RowNames
 from kinacc.tables.columns import Columns
-from kinacc.tables.contract import columns_of
-from kinacc.tables.data_check_tables import EXCLUDED_ROWS
+from kinacc.tables.contract import ARTEFACTS, columns_of
 
-_STATED = tuple(each.name for each in EXCLUDED_ROWS.columns if not each.may_be_absent)
+_STATED = tuple(each.name for each in ARTEFACTS["excluded_rows"].columns if not each.may_be_absent)
 
 
 def run(inputs: Mapping, settings: Mapping) -> dict[str, Columns]:

@@ -11,7 +11,7 @@ from kinacc.campaign.journal import PLAN
 from kinacc.cli.sheet import Field, Sheet
 from kinacc.config.values import nearest
 from kinacc.errors import InputError, Problem, first_few
-from kinacc.tables import assessment_tables, store, sums
+from kinacc.tables import store, sums
 from kinacc.tables.columns import texts
 from kinacc.tables.contract import ARTEFACTS
 
@@ -199,5 +199,5 @@ def _short(meaning: str) -> str:
 
 def _command(name: str) -> str:
     """The command that makes a table of the workflow."""
-    studied = any(name == each.name for each in assessment_tables.ALL)
+    studied = name in ARTEFACTS and ARTEFACTS[name].topic == "assessment"
     return "kinacc study" if studied else "kinacc calibrate"

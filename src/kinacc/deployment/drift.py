@@ -32,8 +32,8 @@ from kinacc.geometry import Pose, compose
 from kinacc.kinematics import robot as robots
 from kinacc.kinematics.robot import carried
 from kinacc.measurements.folds import configurations
+from kinacc.tables.allowed import FIRST, HOLDS, OPEN, RECALIBRATE, SAME
 from kinacc.tables.columns import Columns
-from kinacc.tables.history_tables import FIRST, HOLDS, OPEN, RECALIBRATE, SAME
 
 LEVEL = 0.05 / 12  # of a decision: monthly calibrations raise a false alarm in 1 year of 20
 ENOUGH = 0.5  # of the readings, in the joint ranges of the series in force

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from kinacc.tables.history_tables import FIRST, HOLDS, RECALIBRATE
+from kinacc.tables.allowed import FIRST, HOLDS, RECALIBRATE
 
 
 def sentence(history: Mapping, row: int = -1) -> str:

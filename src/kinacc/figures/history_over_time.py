@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 
 from kinacc.figures import style
 from kinacc.figures.columns import floats, require, texts
+from kinacc.tables.allowed import FIRST, HOLDS, OPEN, RECALIBRATE
 from kinacc.tables.columns import Columns
-from kinacc.tables.history_tables import FIRST, HOLDS, OPEN, RECALIBRATE
 
 COLUMNS = (
     *("date", "verdict", "joint", "moved_mm", "chance_mm", "temperature_c", "tolerance_mm"),

@@ -19,9 +19,9 @@ from kinacc.gate import chance
 from kinacc.gate.outcome import FAILED, PASSED, UNDECIDED, WARNED, Outcome
 from kinacc.gate.values import SELECTED, RunTables
 from kinacc.tables import sums
+from kinacc.tables.allowed import MOVED, OPEN, RECALIBRATE, SAME
 from kinacc.tables.atomic import unfinished, write_whole
 from kinacc.tables.comparison import compare_tables
-from kinacc.tables.history_tables import MOVED, OPEN, RECALIBRATE, SAME
 
 NOTE = "accepted.json"
 CONFIDENCE = 0.99

@@ -6,13 +6,15 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import pandas as pd
+
 from kinacc.config.schema import defaults
 from kinacc.errors import InputError, Problem, first_few
 from kinacc.gate.accepted import compared
 from kinacc.gate.conformity import check_file
 from kinacc.gate.gates import judged
 from kinacc.gate.outcome import FAILED, PASSED, WARNED, CheckReport, Outcome
-from kinacc.tables import campaign_tables, store, sums
+from kinacc.tables import store, sums
 from kinacc.tables.contract import ARTEFACTS
 
 _NEEDED = ("measurements", "robot", "vec_model", "dh_model", "frames", "residuals", "pose_errors")
@@ -43,7 +45,7 @@ def check_results(
     InputError
         Where there is no such folder or data set.
     """
-    if (results / f"{campaign_tables.ALL[0].name}.parquet").is_file():
+    if (results / "campaign_points.parquet").is_file():
         return CheckReport(str(results), "", (check_campaign(results),))
     names = list(datasets) or sorted({*configurations, *data_sets_in(results)})
     if not names:
@@ -73,7 +75,7 @@ def check_campaign(folder: Path) -> Outcome:
     problems: list[Problem] = []
     tables: dict[str, Any] = {}
     marks = []
-    for artefact in campaign_tables.ALL:
+    for artefact in filter(lambda each: each.topic == "campaign", ARTEFACTS.values()):
         path = folder / artefact.file_name
         if not path.is_file():
             problems.append(Problem(str(path), "missing"))
@@ -84,9 +86,29 @@ def check_campaign(folder: Path) -> Outcome:
             marks.append(store.read_metadata(path))
     if any(each != marks[0] for each in marks):
         problems.append(Problem(str(folder), "tables of different states of a campaign"))
-    problems = problems or campaign_tables.contradictions(tables)
+    problems = problems or _contradictions(**tables)
     says = "tables fit their schemas and each other"
     return _files(folder, problems, says, len(tables), "run `kinacc campaign report` again")
+
+
+def _contradictions(
+    campaign_points: pd.DataFrame, campaign_readings: pd.DataFrame, campaign_bounds: pd.DataFrame
+) -> list[Problem]:
+    """What the three tables of one campaign state of each other that cannot be."""
+    used = campaign_readings[campaign_readings["used"].notna()]
+    problems = []
+    counts = used["point"].value_counts()
+    for name, count in zip(campaign_points["point"], campaign_points["readings"], strict=True):
+        if counts.get(name, 0) != count:
+            what = f"{count} readings, {counts.get(name, 0)} in campaign_readings"
+            problems.append(Problem(f"campaign_points, point {name}", what))
+    if unknown := sorted({*campaign_readings["point"]} - {*campaign_points["point"]}):
+        what = f"points that are no candidates: {', '.join(unknown[:5])}"
+        problems.append(Problem("campaign_readings", what))
+    if (last := int(campaign_bounds["readings"].max())) != len(used):
+        what = f"ends at {last} readings, {len(used)} were used"
+        problems.append(Problem("campaign_bounds", what))
+    return problems
 
 
 def check_files(folder: Path) -> Outcome:

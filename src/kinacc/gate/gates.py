@@ -17,8 +17,7 @@ from kinacc.gate import chance
 from kinacc.gate.outcome import FAILED, PASSED, UNDECIDED, WARNED, Outcome
 from kinacc.gate.values import RunTables, figure, sample
 from kinacc.tables import sums
-from kinacc.tables.allowed import FINDING_LEVELS, LEFT_OUT
-from kinacc.tables.history_tables import FIRST, HOLDS, RECALIBRATE
+from kinacc.tables.allowed import FINDING_LEVELS, FIRST, HOLDS, LEFT_OUT, RECALIBRATE
 
 Gate = Mapping[str, Any]
 _ROUNDING = 1e-9

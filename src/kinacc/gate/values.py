@@ -19,7 +19,8 @@ from kinacc.config.gate_rules import COMPARED, units
 from kinacc.errors import InputError, Problem
 from kinacc.gate.chance import STATISTICS, Sample
 from kinacc.measurements.folds import configurations_of
-from kinacc.tables import assessment_tables, store
+from kinacc.tables import store
+from kinacc.tables.contract import ARTEFACTS
 
 SELECTED = "selected"
 FEWEST_OF_QUANTILE = 100  # rows of which 1 % is one: with fewer, the 99 % quantile is the largest
@@ -60,7 +61,7 @@ class RunTables(dict[str, pd.DataFrame]):
     def __missing__(self, artefact: str) -> pd.DataFrame:
         path = self.folder / f"{artefact}.parquet"
         if not path.is_file():
-            studied = any(artefact == each.name for each in assessment_tables.ALL)
+            studied = artefact in ARTEFACTS and ARTEFACTS[artefact].topic == "assessment"
             fix = f"kinacc {'study' if studied else 'calibrate'} FILE.yaml makes it"
             if artefact == "history":
                 fix = "give the data set a series (docs/history.md) and calibrate it"

@@ -13,8 +13,8 @@ from kinacc.kinematics.robot import Robot
 from kinacc.report import pictures
 from kinacc.report.page import Part, Picture, records
 from kinacc.report.pictures import BLUE, GREEN, GREY, ORANGE, VERMILION
+from kinacc.tables.allowed import FIRST, HOLDS, OPEN, RECALIBRATE
 from kinacc.tables.columns import Columns
-from kinacc.tables.history_tables import FIRST, HOLDS, OPEN, RECALIBRATE
 
 _LOOKS = {
     FIRST: ("square", BLUE),

@@ -23,3 +23,6 @@ COVARIANCES = ("r", "sqrt_r")
 SEARCHES = ("from_above", "from_below", "bisection")
 EXAMPLES = ("rejected", "rejected_larger_eta", "not_rejected")
 VERDICTS = ("agrees", "differs", "not comparable")
+# What becomes of a calibration by the next line of a series, and of base and tool since the line.
+FIRST, HOLDS, RECALIBRATE, OPEN = "first", "holds", "recalibrate", "cannot be told"
+SAME, MOVED = "same", "moved"

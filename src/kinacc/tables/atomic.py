@@ -7,7 +7,7 @@ import fcntl
 import os
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from kinacc.errors import and_more, refused
@@ -22,21 +22,6 @@ def unfinished(path: Path | str) -> Path:
     """
     by = f"{os.uname().nodename[:40]}.{os.getpid()}.{os.urandom(4).hex()}"
     return Path(path).with_name(f".{Path(path).name}.{by}{_ENDING}")
-
-
-@contextmanager
-def held(path: Path) -> Iterator[int]:
-    """Make a file, and hold it until the block or this process ends; yields its descriptor.
-
-    That it is held tells ``sweep`` that somebody is writing it.
-    """
-    handle = os.open(path, os.O_WRONLY | os.O_CREAT, 0o666)
-    try:
-        with suppress(OSError):  # a file system without locks
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        yield handle
-    finally:
-        os.close(handle)
 
 
 def taken(handle: int, how: int, patience_s: float | None = None) -> bool:
@@ -58,29 +43,6 @@ def taken(handle: int, how: int, patience_s: float | None = None) -> bool:
         time.sleep(0.05)
 
 
-def abandoned(path: Path) -> bool:
-    """Whether nobody holds a file that was ``held``; not known on a file system without locks."""
-    try:
-        handle = os.open(path, os.O_RDWR | os.O_NOFOLLOW | os.O_NONBLOCK)
-    except OSError:
-        return False
-    try:
-        return taken(handle, fcntl.LOCK_EX, 0.0)
-    except OSError:
-        return False
-    finally:
-        os.close(handle)
-
-
-def sweep(folder: Path | str) -> None:
-    """Remove what processes that have ended had begun to write in a folder and those below."""
-    for within, _, names in os.walk(folder):
-        for name in names:
-            path = Path(within, name)
-            if name.startswith(".") and name.endswith(_ENDING) and abandoned(path):
-                path.unlink(missing_ok=True)
-
-
 @contextmanager
 def replacing(paths: Sequence[Path | str], on_disk: bool = False) -> Iterator[list[Path]]:
     """Temporary paths beside ``paths``; renamed to them on success, removed on any failure.
@@ -93,33 +55,22 @@ def replacing(paths: Sequence[Path | str], on_disk: bool = False) -> Iterator[li
     try:
         for path in targets:
             path.parent.mkdir(parents=True, exist_ok=True)
-        with ExitStack() as writing:
-            for source in temporary:
-                writing.enter_context(held(source))
-            yield temporary
-            for source in temporary if on_disk else ():
-                synchronise(source)
-            for source, target in zip(temporary, targets, strict=True):
-                os.replace(source, target)
+        yield temporary
+        for source in temporary if on_disk else ():
+            synchronise(source)
+        for source, target in zip(temporary, targets, strict=True):
+            os.replace(source, target)
         for folder in {target.parent for target in targets} if on_disk else ():
             synchronise(folder)
     except OSError as error:
-        raise refused(error, _refused(error, targets, temporary), "cannot be written") from None
+        by_name = dict(zip(map(str, temporary), targets, strict=True))
+        place = by_name.get(str(error.filename), error.filename)
+        where = place or f"{targets[0]}{and_more(len(targets) - 1)}"
+        raise refused(error, where, "cannot be written") from None
     finally:
         for source in temporary:
             with suppress(OSError):
                 source.unlink(missing_ok=True)
-
-
-def _refused(error: OSError, targets: Sequence[Path], temporary: Sequence[Path]) -> str:
-    """Which file the system did not take: what it names, else what was begun last."""
-    by_name = dict(zip(map(str, temporary), map(str, targets), strict=True))
-    if error.filename is not None:
-        return by_name.get(str(error.filename), str(error.filename))
-    begun = [
-        name for part, name in by_name.items() if os.path.exists(part) and os.path.getsize(part)
-    ]
-    return begun[-1] if begun else str(targets[0]) + and_more(len(targets) - 1)
 
 
 def write_whole(path: Path | str, content: bytes, on_disk: bool = False) -> None:
@@ -131,7 +82,11 @@ def write_together(contents: Mapping[Path | str, bytes], on_disk: bool = False) 
     """Write files so that all of them appear or none; see ``replacing``."""
     with replacing([*contents], on_disk) as temporary:
         for content, part in zip(contents.values(), temporary, strict=True):
-            part.write_bytes(content)
+            try:
+                part.write_bytes(content)
+            except OSError as error:
+                error.filename = str(part)  # which the system does not name for a full disk
+                raise
 
 
 def synchronise(path: Path) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -12,6 +11,7 @@ if TYPE_CHECKING:
 
 Columns = dict[str, "np.ndarray"]  # a table in memory: a null number is NaN, a null text None
 JOINTS_MIN, JOINTS_MAX = 4, 7
+SLIDES = "mm where it slides"  # of a joint's position
 # Two runs of one work may differ by so much, by the unit of a column: rounding differs from machine
 # to machine. What an arm is sure of begins at 1e-3 mm; 1e-9 rad is 1e-6 mm at a metre. Pure numbers
 # are held to as much as radians, which are pure numbers too.
@@ -98,6 +98,7 @@ class Artefact:
     """One table: its columns in order, and the columns that together name a row only once."""
 
     name: str
+    topic: str
     meaning: str
     columns: tuple[Column, ...]
     key: tuple[str, ...]
@@ -153,92 +154,3 @@ def joint_count(artefact: Artefact, names: Iterable[str]) -> int:
     while f"{starred.name[:-1]}{joints + 1}" in present:
         joints += 1
     return joints
-
-
-def real(
-    name: str,
-    unit: str,
-    meaning: str,
-    low: float | None = None,
-    high: float | None = None,
-    nullable: bool = False,
-) -> Column:
-    return Column(name, "float", unit, meaning, nullable, low, high)
-
-
-def whole(
-    name: str,
-    meaning: str,
-    low: float | None = 0,
-    high: float | None = None,
-    nullable: bool = False,
-    choices: tuple[int, ...] = (),
-) -> Column:
-    return Column(name, "int", "1", meaning, nullable, low, high, choices)
-
-
-def text(
-    name: str,
-    meaning: str,
-    choices: Iterable[str] = (),
-    pattern: str = "",
-    nullable: bool = False,
-) -> Column:
-    return Column(name, "text", "", meaning, nullable, None, None, tuple(choices), pattern)
-
-
-def unstated(columns: Iterable[Column]) -> tuple[Column, ...]:
-    """The columns as ones a table may leave out, which makes them null."""
-    return tuple(replace(column, optional=True, nullable=True) for column in columns)
-
-
-def absent_if_unstated(*columns: Column) -> tuple[Column, ...]:
-    """The columns as ones that a file has only where a table states them."""
-    return tuple(replace(column, may_be_absent=True) for column in unstated(columns))
-
-
-def same(within: float | str, *columns: Column) -> tuple[Column, ...]:
-    """The columns as ones of which two runs may differ by so much, or that are held to that."""
-    return tuple(replace(column, same=within) for column in columns)
-
-
-def length(name: str, meaning: str, limit: float, nullable: bool = False) -> Column:
-    return real(name, "mm", meaning, -limit, limit, nullable)
-
-
-def magnitude(name: str, unit: str, meaning: str, high: float, nullable: bool = False) -> Column:
-    return real(name, unit, meaning, 0.0, high, nullable)
-
-
-REACH_MM = 1.0e5  # no laser tracker sees further than 100 m
-ERROR_MM = 1.0e3
-ERROR_MRAD = 4.0e3  # beyond half a turn, pi rad, an orientation error has no meaning
-TURN_RAD = 4.0 * math.pi
-TRAVEL_MM = 2.0e4  # of a joint that slides; joints that turn are held to TURN_RAD by a rule
-SLIDES = "mm where it slides"
-
-JOINTS = (
-    real("q*", "rad", f"reported position of each joint, {SLIDES}", -TRAVEL_MM, TRAVEL_MM),
-    Column(
-        "s*",
-        "int8",
-        "1",
-        "travel direction of each joint on arrival: -1, +1, or 0 where unknown",
-        choices=(-1, 0, 1),
-    ),
-)
-
-ROW_NAME = absent_if_unstated(
-    text("pose_name", "the measured file's name of the pose, where it does not only number them"),
-    text("file", "file that the line is of, where joints and points come from two"),
-    text(
-        "row_kind", "what the line is, where it is none of a text file: a row of a sheet", ("row",)
-    ),
-)
-
-
-def error_vector(of: str) -> tuple[Column, ...]:
-    return tuple(
-        length(f"e{axis}_mm", f"{axis} component of {of}, robot base frame", ERROR_MM)
-        for axis in "xyz"
-    )

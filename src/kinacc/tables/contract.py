@@ -1,49 +1,49 @@
-"""Every table kinacc leaves behind, as data: columns, units, meaning, limits and row keys.
+"""Every table kinacc leaves behind: columns, units, meaning, limits and row keys.
 
-Import costs nothing but the standard library: the configuration, the stages, the documentation and
-the check of a finished results folder all read this one description.
-
-A column named with an asterisk (``q*``) stands for one column per joint: ``q1`` .. ``qk``.
-A value that does not apply is null, never zero. After a change run
-``python tools/document_artifacts.py``, which rewrites docs/artifacts.md.
+They stand in ``schemas/<topic>.yaml``; the stages, the documentation and the check of a finished
+results folder all read this one description. A column named with an asterisk (``q*``) stands for
+one column per joint: ``q1`` .. ``qk``. A value that does not apply is null, never zero. Names of
+lists as ``choices`` are those of ``allowed.py``; a column that may be ``absent`` is in a file only
+where a table states it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
-from kinacc.tables import (
-    assessment_tables,
-    calibration_tables,
-    campaign_tables,
-    data_check_tables,
-    history_tables,
-    model_comparison_tables,
-    robot_table,
-    summary_table,
-)
-from kinacc.tables.columns import Artefact, Columns, joint_count, texts
+import numpy as np
+import yaml
+
+from kinacc.tables import allowed
+from kinacc.tables.columns import Artefact, Column, Columns, joint_count, texts
 
 # What all tables of a stage are marked with.
 PROVENANCE_KEYS = ("kinacc_version", "config_hash", "seed")
+TOPICS = ("calibration", "history", "assessment", "campaign")
+_UNITS = {"text": "", "int": "1", "int8": "1", "bool": "1"}
+_LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
-ARTEFACTS: dict[str, Artefact] = {
-    artefact.name: artefact
-    for artefact in (
-        *calibration_tables.ALL,
-        robot_table.ROBOT,
-        data_check_tables.DATA_CHECK,
-        data_check_tables.EXCLUDED_ROWS,
-        model_comparison_tables.MODEL_SELECTION,
-        model_comparison_tables.JOINT_BIAS,
-        model_comparison_tables.WORST_ROWS,
-        summary_table.SUMMARY,
-        history_tables.HISTORY,
-        *assessment_tables.ALL,
-        *campaign_tables.ALL,
-    )
-}
+
+def _column(name: str, told: dict[str, Any]) -> Column:
+    kind, choices = told.pop("kind", "float"), told.pop("choices", ())
+    choices = getattr(allowed, choices) if isinstance(choices, str) else tuple(choices)
+    absent = told.pop("absent", False)
+    told["optional"] = told.get("optional", absent)
+    told["nullable"] = told.get("nullable", told["optional"])
+    unit = told.pop("unit", None) or _UNITS[kind]
+    return Column(name, kind, unit, may_be_absent=absent, choices=choices, **told)
+
+
+def _artefacts(topic: str) -> Iterable[Artefact]:
+    path = Path(__file__).parent / "schemas" / f"{topic}.yaml"
+    for name, told in yaml.load(path.read_text(encoding="utf-8"), Loader=_LOADER).items():
+        columns = tuple(_column(*each) for each in told.pop("columns").items())
+        yield Artefact(name, topic, columns=columns, key=tuple(told.pop("key")), **told)
+
+
+ARTEFACTS = {each.name: each for topic in TOPICS for each in _artefacts(topic)}
 
 
 def columns_of(artefact: str, rows: Iterable[Mapping[str, Any] | Sequence[Any]]) -> Columns:
@@ -52,22 +52,19 @@ def columns_of(artefact: str, rows: Iterable[Mapping[str, Any] | Sequence[Any]])
     A row holds its values by column name, or one after the other as the contract has its columns.
     Whole numbers that may be null are held as floats. Without rows the columns are empty.
     """
-    import numpy as np
-
     given: list[Any] = list(rows)
     contract = ARTEFACTS[artefact]
+    names = [column.name for column in contract.columns]
     if given and isinstance(given[0], Mapping):
         names = list(given[0])
         given = [[row[name] for name in names] for row in given]
-    else:
-        names = [column.name for column in contract.columns]
     known = {column.name: column for column in contract.for_joints(joint_count(contract, names))}
     kinds = {"float": np.float64, "int": np.int64, "int8": np.int8, "bool": np.bool_}
     columns: Columns = {}
     for place, name in enumerate(names):
         kind, cells = known[name].kind, [row[place] for row in given]
-        if kind == "text":
-            columns[name] = texts(cells)
-        else:
-            columns[name] = np.array(cells, kinds["float" if known[name].nullable else kind])
+        is_real = known[name].nullable
+        columns[name] = (
+            texts(cells) if kind == "text" else np.array(cells, kinds["float" if is_real else kind])
+        )
     return columns
