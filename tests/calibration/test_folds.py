@@ -118,11 +118,7 @@ def test_a_label_with_enough_rows_outside_each_fold_is_held_out():
     assert [each.value for each in found] == ["b"]
 
 
-@pytest.mark.parametrize("looked_at", [50, -1])
-def test_neighbours_are_found_however_they_are_searched_and_across_a_full_turn(
-    monkeypatch, looked_at
-):
-    monkeypatch.setattr(folds, "MOST_LOOKED_AT", looked_at)
+def test_neighbours_are_found_across_a_full_turn():
     rng = np.random.default_rng(5)
     near = 2.0 * np.pi * rng.integers(0, 3, (60, 3)) / 3.0 + rng.normal(0.0, 0.02, (60, 3))
     apart = np.abs(np.mod(near[:, None] - near[None] + np.pi, 2.0 * np.pi) - np.pi)

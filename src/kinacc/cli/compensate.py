@@ -25,10 +25,11 @@ def compensate(
 ) -> None:
     """Find the joints at which the calibrated arm puts its tool where it is wanted.
 
-    FOLDER is the results folder of a data set. POSES is a CSV, Parquet or JSON file with x_mm,
-    y_mm, z_mm and qw, qx, qy, qz (or rvx_deg .. a rotation vector, or rx_deg .. intrinsic XYZ
-    angles). Columns q1_deg and so on, where the file has them, say near which joints the posture is
-    wanted; without them the posture nearest to zero is taken.
+    FOLDER is the results folder of a data set. POSES is a file with x_mm, y_mm,
+    z_mm and qw, qx, qy, qz (or rvx_deg .. a rotation vector, or rx_deg .. intrinsic XYZ angles),
+    or in any form that kinacc init reads: X, Y, Z, A, B, C of KUKA, W, P, R of FANUC. Columns
+    q1_deg and so on, where the file has them, say near which joints the posture is wanted; without
+    them the posture nearest to zero is taken.
 
     Joints are given only where the forward model was seen to come back to the pose within 1e-6 mm;
     every other row says in words why it has none. Exit code 1 if a row has none. An arm of four or

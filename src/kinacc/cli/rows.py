@@ -17,7 +17,7 @@ from kinacc.config.names import of_csv
 from kinacc.errors import InputError, Problem, first_few, refuse
 from kinacc.geometry import Pose, exp_so3, rotation_from_quaternion
 from kinacc.kinematics.robot import Robot, outside_limits
-from kinacc.measurements.files import EXCEL, PARQUET, load
+from kinacc.measurements.files import EXCEL, PARQUET, load, refuse_other_files
 from kinacc.measurements.layout import (
     ANGLE,
     LENGTH,
@@ -39,7 +39,11 @@ if TYPE_CHECKING:
 
 _DIGITS = 15  # a whole number of more is no count
 _UNIT_QUATERNION = 1e-3
-_OWN_JOINT = re.compile(r"(?<![^\s,;\"'])q1_(?:deg|rad|mm|m)(?![^\s,;\"'])")
+_OWN_NAMES = {  # what a file under our names has where the need is for it
+    "joints": re.compile(r"(?<![^\s,;\"'])q1_(?:deg|rad|mm|m)(?![^\s,;\"'])"),
+    "points": re.compile(r"(?<![^\s,;\"'])(?:x|ex)_(?:mm|m)(?![^\s,;\"'])"),
+    "poses": re.compile(r"(?<![^\s,;\"'])(?:qw|rv?x_(?:deg|rad))(?![^\s,;\"'])"),
+}
 _HEAD = 1_000_000  # characters of a line looked at
 
 
@@ -61,7 +65,13 @@ class Rows:
     payload: np.ndarray | None = None
 
 
-def read(path: str | Path, robot: Robot, joints: bool = True, pose: bool = False) -> Rows:
+def read(
+    path: str | Path,
+    robot: Robot,
+    joints: bool = True,
+    pose: bool = False,
+    answers: Mapping | None = None,
+) -> Rows:
     """Rows of a file, as ``open_table`` reads it; it must have ``joints`` or ``pose`` if asked for.
 
     Poses are not looked for where they are not asked for.
@@ -73,7 +83,7 @@ def read(path: str | Path, robot: Robot, joints: bool = True, pose: bool = False
     """
     slides = robot.dh.prismatic
     names = [f"q{i + 1}" for i in range(len(slides))]
-    table = open_table(path)
+    table = open_table(path, "poses" if pose else "joints", answers)
     table = _answered(table, names, "joints") if joints else table
     table = _answered(table, ["x", "y", "z"], "a pose") if pose else table
     reader = Quantities(table)
@@ -87,7 +97,7 @@ def read(path: str | Path, robot: Robot, joints: bool = True, pose: bool = False
     label = table.line
     if "pose" in table.columns:
         reader.used.add("pose")
-        label = np.array([str(cell) for cell in table.columns["pose"]], dtype=object)
+        label = np.array([e.removesuffix(".0") for e in table.texts("pose")], dtype=object)
     refuse(reader.problems, f"{table.path} cannot be used")
     unused = tuple(name for name in table.columns if name not in reader.used)
     return Rows(len(table), label, q_rad, directions, wanted, unused, payload)
@@ -125,46 +135,16 @@ def of_arguments(texts: tuple[str, ...], unit: str, robot: Robot, option: str) -
     return np.array(rows) * np.where(slides, 1.0, ANGLE[unit])
 
 
-def joints_of(path: str, robot: Robot, answers: Mapping | None = None) -> Rows:
-    """Joints of a file, in whatever form ``kinacc init`` reads.
-
-    ``answers`` to what the file leaves open, by option. Raises InputError where joints are not
-    found, and where the file can be read in more than one way.
-    """
-    return read(path, robot) if _has_own_names(Path(path)) else _of_any_form(path, robot, answers)
-
-
 def candidates(path: str, robot: Robot, most: int, answers: Mapping | None = None) -> Rows:
-    """Joints of a file to choose from, as ``joints_of`` reads them.
+    """Joints of a file to choose from, as ``read`` reads them.
 
     Raises InputError outside the limits and for more than ``most``, too.
     """
-    given = joints_of(path, robot, answers)
+    given = read(path, robot, answers=answers)
     require_within_limits(robot, given, path, "Candidates")
     if given.count > most:
         raise InputError(Problem(path, f"{given.count} candidates", f"at most {most}"))
     return given
-
-
-def _has_own_names(path: Path) -> bool:
-    """Whether a file is written as the commands write: its names state q1 and a unit."""
-    if not path.is_file() or path.suffix.lower() in (".json", *PARQUET):
-        return True
-    if path.suffix.lower() in EXCEL:
-        return False
-    with path.open(encoding="utf-8-sig", errors="replace") as file:
-        return bool(_OWN_JOINT.search(file.readline(_HEAD)))
-
-
-def _of_any_form(path: str, robot: Robot, answers: Mapping | None) -> Rows:
-    """Joints of a file as others write it; how it was read is told on the error stream."""
-    from kinacc.measurements.intake import joint_files
-
-    given = {key: value for key, value in (answers or {}).items() if value}
-    found = joint_files.read(path, robot.dh.prismatic, given)
-    for line in found.told:
-        click.echo(f"{path}: {line}", err=True)
-    return Rows(len(found.joints), found.label, found.joints, None, None, ())
 
 
 def require_within_limits(robot: Robot, given: Rows, where: str, what: str = "Joints") -> None:
@@ -290,32 +270,37 @@ class Quantities:
         return Pose(rotation, position)
 
 
-def open_table(path: str | Path) -> RawTable:
-    """The file with the delimiter its first line shows: , or ; (decimal comma) or tab.
+def open_table(path: str | Path, need: str = "points", answers: Mapping | None = None) -> RawTable:
+    """A file of ``need`` (joints, points or poses) under our names.
 
-    What commands write is read as well: JSON, units that stand in the description of a Parquet
-    column, and text of a CSV with the apostrophe that keeps it from being a formula.
+    A file of others' names is read as ``kinacc init`` reads it; how is told on the error stream.
+    ``answers`` to what it leaves open, by option. What commands write is read as well: JSON, units
+    that stand in the description of a Parquet column, and text of a CSV with the apostrophe that
+    keeps it from being a formula.
     """
     path = Path(path)
-    if not path.is_file():
-        raise InputError(Problem(str(path), "no such file", "a CSV, Excel, Parquet or JSON file"))
-    kind = path.suffix.lower()
-    if kind == ".json":
+    refuse_other_files(path)
+    if path.suffix.lower() == ".json":
         return _of_json(path)
-    if kind in (".parquet", ".pq"):
+    if path.suffix.lower() in PARQUET:
         return _with_units(load(path))
-    if kind in EXCEL:
-        return load(path)
-    delimiter, decimal = ",", "."
-    with path.open(encoding="utf-8-sig", errors="replace") as file:
-        head, first = file.readline(_HEAD), file.readline(_HEAD)
-    if ";" in head:
-        delimiter = ";"
-        decimal = "," if "," in first and "." not in first else "."
-    elif "\t" in head:
-        delimiter = "\t"
-    table = load(path, Layout(delimiter, decimal))
-    return replace(table, columns=table.columns.map(of_csv))
+    if path.suffix.lower() not in EXCEL:
+        with path.open(encoding="utf-8-sig", errors="replace") as file:
+            head, first = file.readline(_HEAD), file.readline(_HEAD)
+        if _OWN_NAMES[need].search(head):
+            delimiter = next((mark for mark in ";\t" if mark in head), ",")
+            comma = delimiter == ";" and "," in first and "." not in first
+            table = load(path, Layout(delimiter, "," if comma else "."))
+            return replace(table, columns=table.columns.map(of_csv))
+    elif _OWN_NAMES[need].search(" ".join((table := load(path)).columns)):
+        return table
+    from kinacc.measurements.intake import own_names
+
+    given = {key: value for key, value in (answers or {}).items() if value}
+    table, told = own_names.read(path, given, need)
+    for line in told:
+        click.echo(f"{path}: {line}", err=True)
+    return table
 
 
 def _of_json(path: Path) -> RawTable:

@@ -42,7 +42,7 @@ def given_joints(
         what = "no joints are given" if not any(sources) else "joints are given more than once"
         raise InputError(Problem("joints", what, "a file, --joints-deg or --joints-rad"))
     if path is not None:
-        given = rows.joints_of(path, robot, answers)
+        given = rows.read(path, robot, answers=answers)
     else:
         unit = "deg" if in_deg else "rad"
         joints = rows.of_arguments(in_deg or in_rad, unit, robot, f"--joints-{unit}")

@@ -54,7 +54,7 @@ def poses(
         if frame != "base":
             what = "a program speaks of the robot's own base"
             raise InputError(Problem("--frame", what, "base"))
-        given = rows.read(program, calibration.robot)
+        given = rows.read(program, calibration.robot, answers={})
         given = replace(given, pose=programmed(calibration, given.joints, point))
     elif path is not None:
         given = rows.read(path, calibration.robot, joints=False, pose=True)

@@ -7,13 +7,16 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
+import pandas as pd
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 from kinacc.measurements.reader import UNCERTAINTY
 from kinacc.tables.columns import Columns
 
 TIME_BLOCK = "time_block"
 LEAST_ROWS = 3  # that place a base or a target
-MOST_LOOKED_AT = 50  # pairs a row, alike in one joint
 SAME_CONFIGURATION_RAD = np.deg2rad(0.1)  # joints this close are one configuration visited again
 
 
@@ -38,40 +41,10 @@ def configurations(
 
 def neighbours(q_rad: np.ndarray, tolerance_rad: float = SAME_CONFIGURATION_RAD) -> np.ndarray:
     """Pairs (m, 2) of rows whose joints (n, k) agree within ``tolerance_rad``, full turns apart."""
-    turn = 2.0 * np.pi
-    wrapped = np.mod(q_rad, turn)
-    wrapped[wrapped >= turn] = 0.0
-    found = _beside(wrapped, tolerance_rad)
-    if found is not None:
-        return found
-    from scipy.spatial import cKDTree  # 0.2 s of a start; few series need it
-
-    return cKDTree(wrapped, boxsize=turn).query_pairs(
-        tolerance_rad, p=np.inf, output_type="ndarray"
-    )
-
-
-def _beside(wrapped: np.ndarray, tolerance_rad: float) -> np.ndarray | None:
-    """Neighbours by sorting one joint; None where that leaves too many pairs to look at."""
-    turn, count = 2.0 * np.pi, len(wrapped)
-    if not count:
-        return np.zeros((0, 2), dtype=np.int64)
-    joint = wrapped[:, np.argmax([len(np.unique(each)) for each in wrapped.T])]
-    order = np.argsort(joint, kind="stable")
-    # Those just above 0 come again one turn on.
-    again = order[: np.searchsorted(joint[order], tolerance_rad, side="right")]
-    along = np.concatenate([joint[order], joint[again] + turn])
-    row = np.concatenate([order, again])
-    after = np.searchsorted(along, along[:count] + tolerance_rad, side="right")
-    sizes = after - np.arange(count) - 1
-    if sizes.sum() > MOST_LOOKED_AT * count:
-        return None
-    first = np.repeat(np.arange(count), sizes)
-    second = first + 1 + np.arange(len(first)) - np.repeat(np.cumsum(sizes) - sizes, sizes)
-    pairs = np.stack([row[first], row[second]], axis=1)
-    apart = np.abs(wrapped[pairs[:, 0]] - wrapped[pairs[:, 1]])
-    close = np.all(np.minimum(apart, turn - apart) <= tolerance_rad, axis=1)
-    return pairs[close & (pairs[:, 0] != pairs[:, 1])]
+    wrapped = np.mod(q_rad, 2.0 * np.pi)
+    wrapped[wrapped >= 2.0 * np.pi] = 0.0
+    tree = cKDTree(wrapped, boxsize=2.0 * np.pi)
+    return tree.query_pairs(tolerance_rad, p=np.inf, output_type="ndarray")
 
 
 def configurations_among(rows: np.ndarray, pose: np.ndarray, pairs: np.ndarray) -> np.ndarray:
@@ -80,28 +53,13 @@ def configurations_among(rows: np.ndarray, pose: np.ndarray, pairs: np.ndarray) 
     ``pairs``: the ``neighbours`` of all rows, found once for many selections of them.
     """
     place = np.full(len(pose), -1)
-    place[rows] = np.arange(len(rows))
-    pairs, pose = place[pairs], pose[rows]
-    pairs = pairs[np.all(pairs >= 0, axis=1)]
-    first_of_pose = np.unique(pose, return_index=True)[1]
-    if not len(pairs) and len(first_of_pose) == len(pose):
-        return np.arange(len(pose))
-    same_pose = np.stack([np.arange(len(pose)), first_of_pose[_ranks(pose)]], axis=1)
-    return _by_appearance(_joined(np.concatenate([pairs.reshape(-1, 2), same_pose]), len(pose)))
-
-
-def _joined(links: np.ndarray, count: int) -> np.ndarray:
-    """First (count,) of all that are joined with each, directly or by others; ``links`` (m, 2)."""
-    first = np.arange(count)
-    while True:
-        ends = first[links]
-        least = ends.min(axis=1)
-        if np.array_equal(ends[:, 0], ends[:, 1]):
-            return first
-        for side in ends.T:
-            np.minimum.at(first, side, least)
-        while not np.array_equal(first, above := first[first]):
-            first = above
+    place[rows] = np.arange(count := len(rows))
+    pairs = place[pairs].reshape(-1, 2)
+    _, first, rank = np.unique(pose[rows], return_index=True, return_inverse=True)
+    same_pose = np.stack([np.arange(count), first[rank]], axis=1)
+    links = np.concatenate([pairs[(pairs >= 0).all(axis=1)], same_pose])
+    joined = coo_array((np.ones(len(links)), links.T), shape=(count, count))
+    return pd.factorize(connected_components(joined, directed=False)[1])[0]
 
 
 def assign(configuration: np.ndarray, folds: int, seed: int) -> np.ndarray:
@@ -127,12 +85,11 @@ def blocks(configuration: np.ndarray, folds: int) -> np.ndarray:
     Whole configurations in the order of their first rows, cut into ``folds`` runs of sizes as even
     as they allow; a configuration that is visited again stays in the block of its first visit.
     """
-    _, inverse, sizes = np.unique(
-        _by_appearance(configuration), return_inverse=True, return_counts=True
-    )
+    number = pd.factorize(configuration)[0]
+    sizes = np.bincount(number)
     middle = np.cumsum(sizes) - 0.5 * sizes
     fold_of = np.minimum((middle * folds / len(configuration)).astype(np.int64), folds - 1)
-    return fold_of[inverse]
+    return fold_of[number]
 
 
 class Trained(NamedTuple):
@@ -153,34 +110,14 @@ def always_trained(
     """
     found = []
     for kind, label in labels.items():
-        names = [str(each) for each in label]
-        values = _scarce(fold, np.array(names)) if len(set(names)) > 1 else []
-        for value in values:
-            own = configuration[np.array(names) == value]
-            found.append(Trained(kind, value, np.isin(configuration, own)))
+        names, number = np.unique([str(each) for each in label], return_inverse=True)
+        table = pd.crosstab(number, fold)
+        # Too few rows outside one of its folds.
+        scarce = (table.gt(0) & table.rsub(table.sum(axis=1), axis=0).lt(LEAST_ROWS)).any(axis=1)
+        for each in table.index[scarce] if len(names) > 1 else ():
+            own = configuration[number == each]
+            found.append(Trained(kind, str(names[each]), np.isin(configuration, own)))
     return found
-
-
-def _scarce(fold: np.ndarray, label: np.ndarray) -> list[str]:
-    """Values of ``label`` (n,) that leave too few rows outside one of their folds."""
-    names, number = np.unique(label, return_inverse=True)
-    total = np.bincount(number)
-    found = set()
-    for each in np.unique(fold):
-        inside = np.bincount(number[fold == each], minlength=len(names))
-        found |= set(np.flatnonzero((inside > 0) & (total - inside < LEAST_ROWS)))
-    return [str(names[i]) for i in sorted(found)]
-
-
-def _ranks(values: np.ndarray) -> np.ndarray:
-    return np.unique(values, return_inverse=True)[1]
-
-
-def _by_appearance(labels: np.ndarray) -> np.ndarray:
-    _, first, inverse = np.unique(labels, return_index=True, return_inverse=True)
-    rank = np.empty(len(first), dtype=np.int64)
-    rank[np.argsort(first)] = np.arange(len(first))
-    return rank[inverse]
 
 
 def split(columns: Mapping, settings: Mapping) -> Columns:

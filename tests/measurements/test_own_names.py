@@ -1,0 +1,98 @@
+"""Files that commands are given, in forms of other makers: joints, points and poses."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from kinacc.cli import rows
+from kinacc.errors import InputError
+from kinacc.kinematics import robot
+from kinacc.measurements.intake.choices import Undecided
+
+ARM = robot.load("ur10")
+Q_DEG = np.random.default_rng(2).uniform(-120, 120, (6, 6)).round(3)
+POSE = robot.forward(ARM, np.deg2rad(Q_DEG))
+TURNED = Rotation.from_matrix(POSE.rotation)
+
+
+def table(folder, names, *columns, mark=",", decimal=".", name="poses.csv"):
+    values = np.hstack([np.asarray(each, dtype=float) for each in columns])
+    lines = [mark.join(names), *(mark.join(f"{v:.7f}" for v in row) for row in values)]
+    lines[1:] = [line.replace(".", decimal) for line in lines[1:]]
+    path = folder / name
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return path
+
+
+def kuka(folder):
+    rows_ = [f"DECL E6AXIS XP{n}={{{','.join(f'A{a} {v}' for a, v in enumerate(q, 1))},E1 0.0}}"
+             for n, q in enumerate(Q_DEG)]  # fmt: skip
+    path = folder / "program.dat"
+    path.write_text("DEFDAT PROGRAM\n" + "\n".join(rows_) + "\nENDDAT\n")
+    return path
+
+
+PROGRAMS = {
+    "E6AXIS": kuka,
+    "A1..A6": lambda folder: table(folder, [f"A{n} [°]" for n in range(1, 7)], Q_DEG, mark=";",
+                                   decimal=","),
+    "ours": lambda folder: table(folder, [f"q{n}_deg" for n in range(1, 7)], Q_DEG),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", PROGRAMS)
+def test_joints_of_a_program_in_any_form(case, tmp_path):
+    found = rows.read(PROGRAMS[case](tmp_path), ARM)
+    np.testing.assert_allclose(np.rad2deg(found.joints), Q_DEG, atol=1e-6)
+
+
+CONVENTIONS = {
+    "KUKA": (["A", "B", "C"], "ZYX"),
+    "FANUC": (["W", "P", "R"], "xyz"),
+    "roll, pitch, yaw": (["Roll [deg]", "Pitch [deg]", "Yaw [deg]"], "xyz"),
+    "ours": (["rx_deg", "ry_deg", "rz_deg"], "XYZ"),
+    "about X, Y, Z": (["Rx [deg]", "Ry [deg]", "Rz [deg]"], "XYZ"),
+}
+
+
+@pytest.mark.parametrize("case", CONVENTIONS)
+@pytest.mark.parametrize("unit", ["mm", "inch"])
+def test_wanted_poses_in_every_convention(case, unit, tmp_path):
+    names, convention = CONVENTIONS[case]
+    axes = ["x_mm", "y_mm", "z_mm"] if names[0] == "rx_deg" else [f"{a} [{unit}]" for a in "XYZ"]
+    factor = 25.4 if axes[0] == "X [inch]" else 1.0
+    angles = TURNED.as_euler(convention, degrees=True)
+    path = table(tmp_path, [*axes, *names], POSE.position_mm / factor, angles)
+    found = rows.read(path, ARM, joints=False, pose=True).pose
+    np.testing.assert_allclose(found.position_mm, POSE.position_mm, atol=1e-5)
+    np.testing.assert_allclose(found.rotation, POSE.rotation, atol=1e-6)
+
+
+def test_nominal_poses_are_those_wanted_and_a_quaternion_may_have_its_scalar_first(tmp_path):
+    names = [*(f"Soll {a} (m)" for a in "XYZ"), *(f"Soll q{n}" for n in range(1, 5))]
+    turned = TURNED.as_quat(scalar_first=True)
+    path = table(tmp_path, names, POSE.position_mm / 1000.0, turned)
+    found = rows.read(path, ARM, joints=False, pose=True).pose
+    np.testing.assert_allclose(found.position_mm, POSE.position_mm, atol=1e-3)
+    np.testing.assert_allclose(found.rotation, POSE.rotation, atol=1e-6)
+
+
+def test_readings_of_points_are_those_measured(tmp_path):
+    names = [*(f"Nominal {a} [mm]" for a in "XYZ"), *(f"Measured {a} [mm]" for a in "XYZ")]
+    path = table(tmp_path, names, POSE.position_mm + 1.0, POSE.position_mm)
+    found = rows.Quantities(rows.open_table(path)).group(["x", "y", "z"], [rows.LENGTH] * 3, True)
+    np.testing.assert_allclose(found, POSE.position_mm, atol=1e-6)
+
+
+def test_what_is_open_is_asked_about(tmp_path):
+    small = table(tmp_path, [f"J{n}" for n in range(1, 7)], Q_DEG / 100.0)
+    with pytest.raises(Undecided, match="--joint-unit"):
+        rows.read(small, ARM)
+    two = table(tmp_path, [f"{side}_j{n}_deg" for side in ("left", "right") for n in range(1, 7)],
+                Q_DEG, Q_DEG + 1.0)  # fmt: skip
+    with pytest.raises(InputError, match="--take left_j1_deg or --take right_j1_deg"):
+        rows.read(two, ARM)
+    found = rows.read(two, ARM, answers={"take": ["right_j1_deg"]}).joints
+    np.testing.assert_allclose(np.rad2deg(found), Q_DEG + 1.0, atol=1e-6)
