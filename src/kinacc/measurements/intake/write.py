@@ -32,8 +32,8 @@ def dataset_text(name: str, robot: str, guess: Guess, configurations: int, note:
     file["orientation"] = {key: turn[key] for key in ("kind", *wanted)}
     if "joints" in section:
         spare = () if section["joints"]["by"] == "time" else ("clock_offset_s", "within_s")
-        file["joints"] = {k: v for k, v in section["joints"].items()
-                          if v is not None and k not in spare and v != _AS_USUAL.get(k)}  # fmt: skip
+        joints = {k: v for k, v in section["joints"].items() if v not in (None, _AS_USUAL.get(k))}
+        file["joints"] = {k: v for k, v in joints.items() if k not in spare}
     if not file["columns"]:
         del file["columns"]
     few = configurations < _FEW_POSES  # one configuration held out at a time
