@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import json
 import os
+from datetime import date
 from pathlib import Path
 
 import pytest
 from command_line import call
 
 from kinacc.checks.contradictions import load
-from kinacc.config.series_text import with_line
+from kinacc.config.edit import with_added
+from kinacc.errors import InputError
 
 ROOT = Path(__file__).parents[2]
 MEASURED = ROOT / "examples" / "data" / "ur10_tmac" / "series_B.csv"
@@ -58,12 +60,10 @@ def test_a_second_file_makes_a_series_of_the_first_and_comments_stay(cell):
     done = added("june.csv", *JUNE, "--first-date", "2026-03-01")
     assert done.exit_code == 0, done.output
     text = Path("tracker.yaml").read_text()
-    assert text == HERE.replace("        path: data/march.csv  # the first\n", "").replace(
-        "      folds: 2\n",
-        "      folds: 2\n"
-        "    series: # the first\n"
+    assert text == HERE.replace("        path: data/march.csv  # the first\n", "") + (
+        "    series:\n"
         "      - {path: data/march.csv, date: 2026-03-01}\n"
-        "      - {path: june.csv, date: 2026-06-02, base: moved, tool: same}\n",
+        "      - {path: june.csv, date: 2026-06-02, base: moved, tool: same}\n"
     )
     assert [*load(["tracker.yaml"])] == ["tracker", "tracker-2026-03-01", "tracker-2026-06-02"]
 
@@ -196,6 +196,11 @@ def test_a_file_that_cannot_be_changed_safely_is_left_and_the_line_is_told(cell)
     ],
 )
 def test_a_line_goes_where_the_others_stand_however_they_are_written(before, after):
-    new = {"path": "june 2.csv", "date": "2026-06-02", "base": "same", "tool": "moved"}
-    told = '{path: "june 2.csv", date: 2026-06-02, base: same, tool: moved}'
-    assert with_line(before, "t", [new]) == (after and after.replace("NEW", told))
+    new = {"path": "june 2.csv", "date": date(2026, 6, 2), "base": "same", "tool": "moved"}
+    where = ("datasets", "t", "series")
+    if after is None:
+        with pytest.raises(InputError, match="add by hand"):
+            with_added(before, where, [new], "own.yaml")
+        return
+    told = "{path: june 2.csv, date: 2026-06-02, base: same, tool: moved}"
+    assert with_added(before, where, [new], "own.yaml") == after.replace("NEW", told)

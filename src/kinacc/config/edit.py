@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from copy import deepcopy
 from typing import Any
 
 import yaml
 
+from kinacc.config.schema import plain
 from kinacc.errors import InputError, Problem
 
 Path = Sequence[str]
 
 
-def with_added(text: str, path: Path, value: Any, name: str) -> str:
+def with_added(text: str, path: Path, value: Any, name: str, without: Path = ()) -> str:
     """The text with ``value`` joined to the list or mapping at a path of keys.
 
     Parameters
@@ -26,6 +26,8 @@ def with_added(text: str, path: Path, value: Any, name: str) -> str:
         A list or mapping: its items come after those that are there.
     name
         Name of the file in messages.
+    without
+        Keys that lead to a value which is left out, with its line.
 
     Raises
     ------
@@ -33,87 +35,92 @@ def with_added(text: str, path: Path, value: Any, name: str) -> str:
         Where the text cannot be changed without changing more than that.
     """
     try:
-        data = yaml.safe_load(text)
-        node: Any = yaml.compose(text, Loader=yaml.SafeLoader)
-        wanted = _joined(data, path, value)
-        changed = _changed(text, node, path, value, wanted)
-        if yaml.safe_load(changed) == wanted:
+        changed, wanted = text, plain(yaml.safe_load(text))
+        if without:
+            changed = _without(changed, wanted, without)
+        changed = _joined(changed, wanted, path, value)
+        if plain(yaml.safe_load(changed)) == wanted:
             return changed
     except (yaml.YAMLError, TypeError, AttributeError, KeyError):
         pass
     what = f"cannot be changed safely at {'.'.join(path)}"
-    fix = f"add by hand: {_flow(_nested(path, value))}"
+    instead = f", in place of {'.'.join(without)}" if without else ""
+    items = [value] if isinstance(value, Mapping) else value
+    fix = f"add by hand{instead}: {' '.join(f'- {flow(each)}' for each in items)}"
     raise InputError(Problem(name, what, fix=fix))
 
 
-def _joined(data: Any, path: Path, value: Any) -> Any:
-    whole = deepcopy(data)
-    place = whole
-    for key in path[:-1]:
-        if place.get(key) is None:
-            place[key] = {}
-        place = place[key]
-    before = place.get(path[-1])
-    both = {**(before or {}), **value} if isinstance(value, Mapping) else [*(before or []), *value]
-    place[path[-1]] = both
-    return whole
+def flow(value: Any) -> str:
+    """A value as YAML in one line: ``{path: june.csv, base: moved}``."""
+    text = yaml.safe_dump(value, default_flow_style=True, allow_unicode=True, sort_keys=False,
+                          width=10_000)  # fmt: skip
+    return text.removesuffix("\n").removesuffix("\n...")
 
 
-def _changed(text: str, node: Any, path: Path, value: Any, wanted: Any) -> str:
-    """The text with the value put behind the last entry of the deepest part that is there."""
-    depth = 0
-    while depth < len(path):
-        found = {key.value: each for key, each in node.value}.get(path[depth])
-        if found is None or not isinstance(found, yaml.CollectionNode):
-            break
-        node, depth = found, depth + 1
+def _without(text: str, data: Any, path: Path) -> str:
+    """The text without the value at a path; ``data``, its values, lose it too."""
+    *above, key = path
+    parent, node, _ = _deepest(text, data, above)
+    del parent[key]
+    if node.flow_style:
+        return text[: node.start_mark.index] + flow(parent) + text[node.end_mark.index :]
+    begin, end = next((k.start_mark, v.end_mark) for k, v in node.value if k.value == key)
+    if not parent:  # what is left is null
+        holder, _, _ = _deepest(text, data, above[:-1])
+        holder[above[-1]] = None
+    return text[: begin.index - begin.column] + text[_line_end(text, end.index) :]
+
+
+def _joined(text: str, data: Any, path: Path, value: Any) -> str:
+    """The text with a value behind what is at a path; ``data``, its values, get it too."""
+    own, node, depth = _deepest(text, data, path)
     rest = path[depth:]
-    if node.flow_style or not node.value:
-        own = wanted
-        for key in path[:depth]:
-            own = own[key]
-        return text[: node.start_mark.index] + _flow(own) + text[node.end_mark.index :]
+    for key in rest[:-1]:
+        own[key] = own.get(key) or {}
+        own = own[key]
+    if rest:
+        before = own.get(rest[-1]) or type(value)()
+        own[rest[-1]] = {**before, **value} if isinstance(value, Mapping) else [*before, *value]
+    elif isinstance(own, dict):
+        own.update(value)
+    else:
+        own.extend(value)
     present = {key.value: each for key, each in node.value} if rest else {}
+    whole, _, _ = _deepest(text, data, path[:depth])
+    if node.flow_style or not node.value:
+        return text[: node.start_mark.index] + flow(whole) + text[node.end_mark.index :]
     if rest and rest[0] in present:  # null: its place takes the value
         each = present[rest[0]]
-        inner = wanted
-        for key in path[: depth + 1]:
-            inner = inner[key]
-        return text[: each.start_mark.index] + " " + _flow(inner) + text[each.end_mark.index :]
-    line = _last_line(node)
-    indent = " " * node.start_mark.column
-    lines = text.splitlines(keepends=True)
-    if not lines[line].endswith("\n"):
-        lines[line] += "\n"
-    lines.insert(line + 1, _block(rest, value, indent))
-    return "".join(lines)
-
-
-def _last_line(node: yaml.Node) -> int:
-    """Line of the last scalar or flow collection of a node: block nodes end at what follows."""
-    while isinstance(node, yaml.CollectionNode) and not node.flow_style and node.value:
-        last = node.value[-1]
-        node = last[1] if isinstance(last, tuple) else last
-    return node.end_mark.line
-
-
-def _block(rest: Path, value: Any, indent: str) -> str:
-    """Lines of the missing keys and the value, each of whose items has a line."""
-    lines = []
+        end = text[each.end_mark.index :]
+        return f"{text[: each.start_mark.index]} {flow(whole[rest[0]])}{end}"
+    newline = "\r\n" if "\r\n" in text else "\n"
+    indent, lines = " " * node.start_mark.column, []
     for key in rest:
         lines.append(f"{indent}{key}:")
         indent += "  "
     if isinstance(value, Mapping):
-        lines += [f"{indent}{_flow(key)}: {_flow(each)}" for key, each in value.items()]
+        lines += [f"{indent}{flow(key)}: {flow(each)}" for key, each in value.items()]
     else:
-        lines += [f"{indent}- {_flow(each)}" for each in value]
-    return "".join(f"{line}\n" for line in lines)
+        lines += [f"{indent}- {flow(each)}" for each in value]
+    while isinstance(node, yaml.CollectionNode) and not node.flow_style and node.value:
+        last = node.value[-1]  # block nodes end at what follows: their last value does not
+        node = last[1] if isinstance(last, tuple) else last
+    stop = _line_end(text, node.end_mark.index)
+    gap = "" if text[stop - 1] == "\n" else newline
+    return text[:stop] + gap + "".join(f"{line}{newline}" for line in lines) + text[stop:]
 
 
-def _nested(path: Path, value: Any) -> Any:
-    return {path[0]: _nested(path[1:], value)} if path else value
+def _deepest(text: str, data: Any, path: Path) -> tuple[Any, Any, int]:
+    """Values and YAML node of the deepest list or mapping on a path, and how deep it is."""
+    node: Any = yaml.compose(text, Loader=yaml.SafeLoader)
+    for depth, key in enumerate(path):
+        found = {each.value: inner for each, inner in node.value}.get(key)
+        if not isinstance(found, yaml.CollectionNode):
+            return data, node, depth
+        node, data = found, data[key]
+    return data, node, len(path)
 
 
-def _flow(value: Any) -> str:
-    text = yaml.safe_dump(value, default_flow_style=True, allow_unicode=True, width=10_000)
-    return text.removesuffix("\n").removesuffix("\n...")
+def _line_end(text: str, place: int) -> int:
+    """Where the line of a place ends, its line feed included."""
+    return text.find("\n", place) + 1 or len(text)

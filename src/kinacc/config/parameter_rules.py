@@ -18,21 +18,16 @@ from typing import Any
 from kinacc.errors import Problem
 
 FREE, FIXED = "free", "fixed"
-_PARAMETERS = {
-    "theta": "theta_offset_rad",
-    "theta_offset": "theta_offset_rad",
-    "d": "d_mm",
-    "a": "a_mm",
-    "alpha": "alpha_rad",
-    "beta": "beta_rad",
-}
+_PARAMETERS = {name: f"{name}_rad" for name in ("theta_offset", "alpha", "beta")}
+_PARAMETERS |= {"theta": "theta_offset_rad", "d": "d_mm", "a": "a_mm"}
 _COMPONENTS = {name: f"{name}_mm" for name in "xyz"}
 _COMPONENTS |= {f"r{name}": f"r{name}_rad" for name in "xyz"}
 _UNITS = {"mm": ("mm", 1.0), "rad": ("rad", 1.0), "mrad": ("rad", 1e-3)}
 _UNITS["deg"] = ("rad", math.pi / 180.0)
 _LARGEST = 1e100  # beyond, squares overflow
-_JOINT = re.compile(r"(?:joint ?|j)(\d{1,9})(?:[ .](\w+))?")
-_SUBJECT = ("joint", "frame", "parameter")
+_JOINT = re.compile(r"(?:joint ?|j)(\d{1,9})(?:[ .](\w+?)(?:_mm|_rad)?)?")
+_FRAME = re.compile(r"([^ .]+)(?:[ .]+(r?[xyz])(?:_mm|_rad)?)?")
+_SAID = re.compile("(value|prior_std)_(mm|rad|mrad|deg)")
 JOINTS, FRAMES = "joints", "frames"
 KEYS = {JOINTS: "calibration.dh.parameters", FRAMES: "calibration.frames"}
 _NAMES = {
@@ -70,24 +65,25 @@ def rules(
 
     ``place`` words where a name is. What an arm has is not asked here: see ``strangers``.
     """
-    found: list[Rule] = []
+    found: dict[tuple[Any, ...], Rule] = {}
     problems: list[Problem] = []
     for name, says in content.items():
         subject = _subject(name)
         if subject is None or (subject[1] is not None) != (about == FRAMES):
-            what = f"{name!r} is no parameter of {about}"
             other = KEYS[JOINTS if about == FRAMES else FRAMES]
-            fix = f"it belongs in {other}" if subject and _is_known(subject) else ""
+            # Any word could be the name of a frame.
+            is_known = subject and (subject[1] in (None, "base", "tool") or subject[2])
+            fix = f"it belongs in {other}" if is_known else ""
+            what = f"{name!r} is no parameter of {about}"
             problems.append(Problem(place(name), what, _NAMES[about], fix))
             continue
         free, value, std, faults = _said(says, subject[2])
         problems += [Problem(place(name), what, _SAYS) for what in faults]
-        rule = Rule(str(name), *subject, free, value, std)
-        same = [each.name for each in found if _same(each, rule)]
-        if same:
-            problems.append(Problem(place(name), f"is said again; first as {same[0]!r}"))
-        found.append(rule)
-    return found, problems
+        if subject in found:
+            what = f"is said again; first as {found[subject].name!r}"
+            problems.append(Problem(place(name), what))
+        found[subject] = Rule(str(name), *subject, free, value, std)
+    return [*found.values()], problems
 
 
 def strangers(
@@ -128,28 +124,17 @@ def unit(parameter: str) -> str:
 
 def _subject(name: Any) -> tuple[int | None, str | None, str | None] | None:
     """Joint, frame and parameter a name stands for; None where it stands for none."""
-    if not isinstance(name, str) or not name.strip():
-        return None
-    words = " ".join(name.split())
-    plain = words.lower().removesuffix("_mm").removesuffix("_rad")
-    if plain in _PARAMETERS:
-        return None, None, _PARAMETERS[plain]
-    match = _JOINT.fullmatch(plain)
-    if match:
-        joint, parameter = int(match.group(1)), match.group(2)
-        if parameter is None:
-            return joint, None, None
-        return (joint, None, _PARAMETERS[parameter]) if parameter in _PARAMETERS else None
-    head, _, tail = words.replace(".", " ").rpartition(" ")
-    tail = tail.lower().removesuffix("_mm").removesuffix("_rad")
-    if head and tail in _COMPONENTS and " " not in head:
-        return None, head, _COMPONENTS[tail]
-    return (None, words, None) if " " not in words and "." not in words else None
-
-
-def _is_known(subject: tuple[int | None, str | None, str | None]) -> bool:
-    """Whether a subject is surely one of the other mapping: any word could be a frame's name."""
-    return subject[1] is None or subject[2] is not None or subject[1] in ("base", "tool")
+    words = " ".join(str(name).split())
+    lower = words.lower().removesuffix("_mm").removesuffix("_rad")
+    if lower in _PARAMETERS:
+        return None, None, _PARAMETERS[lower]
+    if match := _JOINT.fullmatch(words.lower()):
+        joint, parameter = int(match[1]), match[2]
+        known = parameter is None or parameter in _PARAMETERS
+        return (joint, None, _PARAMETERS.get(parameter)) if known else None
+    if match := _FRAME.fullmatch(words):
+        return None, match[1], _COMPONENTS.get(match[2])
+    return None
 
 
 def _said(
@@ -160,30 +145,26 @@ def _said(
         return says == FREE, {}, {}, []
     if not isinstance(says, Mapping) or not says:
         return True, {}, {}, [f"{says!r} is not understood"]
-    value: dict[str, float] = {}
-    std: dict[str, float] = {}
+    found: dict[str, dict[str, float]] = {"value": {}, "prior_std": {}}
     faults: list[str] = []
     for key, number in says.items():
-        head, _, ending = str(key).rpartition("_")
-        if head not in ("value", "prior_std") or ending not in _UNITS:
+        match = _SAID.fullmatch(str(key))
+        if match is None:
             faults.append(f"unknown key {key!r}")
             continue
+        kind, factor = _UNITS[match[2]]
+        into = found[match[1]]
         if isinstance(number, bool) or not isinstance(number, (int, float)):
             faults.append(f"{key}: {number!r} is not a number")
             continue
-        kind, factor = _UNITS[ending]
-        into = value if head == "value" else std
         if kind in into:
             faults.append(f"{key} is stated in two units")
-        if not abs(number) < _LARGEST or (head == "prior_std" and number <= 0.0):
-            faults.append(f"{key}: {number!r} is not {'positive' if into is std else 'finite'}")
+        if not abs(number) < _LARGEST or (match[1] == "prior_std" and number <= 0.0):
+            needed = "finite" if match[1] == "value" else "positive"
+            faults.append(f"{key}: {number!r} is not {needed}")
         if parameter and unit(parameter) != kind:
             faults.append(f"{key}: {parameter} is in {unit(parameter)}")
-        if head == "value" and parameter is None:
+        if match[1] == "value" and parameter is None:
             faults.append(f"{key}: a value needs the name of one parameter")
         into[kind] = factor * number
-    return bool(std), value, std, faults
-
-
-def _same(one: Rule, other: Rule) -> bool:
-    return all(getattr(one, name) == getattr(other, name) for name in _SUBJECT)
+    return bool(found["prior_std"]), found["value"], found["prior_std"], faults

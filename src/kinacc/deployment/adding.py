@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime
 import os
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
@@ -12,9 +13,9 @@ from typing import Any
 
 from kinacc.calibration import delivered
 from kinacc.checks.contradictions import load
+from kinacc.config.edit import flow, with_added
 from kinacc.config.reading import read
 from kinacc.config.series import FLAGS, MOVED, SAME
-from kinacc.config.series_text import as_text, with_line
 from kinacc.deployment.shared_readings import known_rows
 from kinacc.errors import InputError, Problem, first_few, gathered, refuse
 from kinacc.kinematics import robot
@@ -176,15 +177,12 @@ def placed(
         old = {"path": arm.first, "date": first_date}
         lines = sorted((old, new), key=lambda line: line["date"])
         lines[1] = lines[1] | _flags(moved)
-    told = [as_text(each) for each in lines]
+    dated = [{**each, "date": datetime.date.fromisoformat(each["date"])} for each in lines]
     mark = _MARK if arm.text.startswith(_MARK) else ""
-    text = with_line(arm.text.removeprefix(_MARK), arm.name, lines)
-    if text is None:
-        what = f"datasets.{arm.name} is written in a way that cannot be changed safely"
-        place = "series:" if arm.is_series else "series:, in place of measurements.file.path:"
-        fix = f"add by hand to {place} {' '.join(f'- {each}' for each in told)}"
-        raise InputError(Problem(arm.config, what, fix=fix))
-    return mark + text, told
+    where = ("datasets", arm.name, "series")
+    only = () if arm.is_series else (*where[:2], "measurements", "file", "path")
+    text = with_added(arm.text.removeprefix(_MARK), where, dated, arm.config, only)
+    return mark + text, [flow(each) for each in dated]
 
 
 def _flags(moved: Mapping[str, str | None]) -> dict[str, str]:
