@@ -1,22 +1,23 @@
 """Reference poses that are read again by plan: what they find, how often, and what corrects it."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from kinacc.assess.change_shapes import shapes_of
+from kinacc.assess.adaptive import Candidates
 from kinacc.assess.reference_poses import (
     FALSE_ALARMS,
     Readings,
-    alarms,
+    _thresholds,
     found,
     schedule,
     schedule_faults,
     stages,
 )
+from kinacc.assess.search_and_confirm import SearchAndConfirm
+from kinacc.assess.statement import CANDIDATES
 
 SLANTED = np.array([[4.0, 1.0, 0.5], [1.0, 2.0, 0.3], [0.5, 0.3, 1.0]]) * 1e-2
 
@@ -29,7 +30,9 @@ def read(plan, rng, change_mm=lambda time: 0.0, covariance=None, errors=5.0):
     way = rng.normal(size=3)
     way /= np.linalg.norm(way)
     vectors = (rng.normal(size=(plan.poses, 3)) * errors)[row]
-    vectors = vectors + np.array([change_mm(time) for time in plan.time(place)])[..., None] * way
+    vectors = (
+        vectors + np.array([change_mm(time) for time in place / plan.measurements])[..., None] * way
+    )
     vectors += rng.multivariate_normal(np.zeros(3), covariance, len(place))
     return Readings(place, row, vectors, np.tile(covariance, (len(place), 1, 1)))
 
@@ -105,8 +108,7 @@ def test_references_without_a_change_alarm_as_rarely_as_stated(freedom):
             within = ((vectors[:, :count] @ left) ** 2).sum(axis=1).reshape(3, reps).sum(axis=0)
             square /= (within + total)[:, None]
             degrees += 3.0 * (count - 5)
-        shapes = shapes_of(tuple(place[:count] / 200.0), tuple(row[:count]), (1.0,) * count)
-        alarm |= (square > shapes.thresholds(error, degrees)).any(axis=1)
+        alarm |= (square > _thresholds(len(apart), error, degrees)).any(axis=1)
     assert_allclose(sum(error for _, error in stages(plan)), FALSE_ALARMS)
     spread = math.sqrt(FALSE_ALARMS / reps)
     assert 0.6 * FALSE_ALARMS < alarm.mean() < FALSE_ALARMS + 3.0 * spread
@@ -125,17 +127,10 @@ def test_a_drift_or_step_of_three_deviations_is_said(change, freedom):
 def test_a_moved_tripod_is_said_as_a_step_between_two_readings():
     plan, rng = schedule(200, 180, 20), np.random.default_rng(8)
     change = found(plan, read(plan, rng, lambda time: 8.0 * (time >= 0.6)))
-    (why,) = alarms(change)
-    assert why.code == "step"
-    assert why.numbers["after"] <= 120 < why.numbers["before"]
-    assert abs(why.numbers["size"] - 8.0) < 3.0 * why.numbers["deviation"]
-
-
-def test_a_drift_withholds_bounds():
-    plan, rng = schedule(200, 180, 20), np.random.default_rng(9)
-    change = found(plan, read(plan, rng, lambda time: 6.0 * time))
-    assert [each.code for each in alarms(change)] == ["drift"]
-    assert alarms(None) == ()
+    assert change.is_found
+    assert change.reason.code == "step"
+    assert change.reason.numbers["after"] <= 120 < change.reason.numbers["before"]
+    assert abs(change.size_mm - 8.0) < 3.0 * change.deviation_mm
 
 
 def test_the_drift_that_may_go_unseen_is_found_half_of_the_time():
@@ -150,7 +145,7 @@ def test_noise_larger_than_stated_is_seldom_taken_for_a_change():
     said = []
     for _ in range(300):
         readings = read(plan, rng, covariance=2.25 * np.eye(3))
-        stated = replace(readings, covariance_mm2=readings.covariance_mm2 / 2.25)
+        stated = readings._replace(covariance_mm2=readings.covariance_mm2 / 2.25)
         said.append(found(plan, stated).is_found)
     assert np.mean(said) < 0.06  # of a quarter, by the noise stated alone
 
@@ -181,3 +176,73 @@ def test_a_noisier_instrument_on_some_visits_costs_no_false_alarms():
         noise = [rng.multivariate_normal(np.zeros(3), each) for each in covariance]
         said += found(plan, Readings(place, row, np.array(noise), covariance)).is_found
     assert said <= 6  # 1.5 are expected at most
+
+
+POINTS, BUDGET = 40, 110
+
+
+def errors(rng):
+    """One pose far out of 40, noise 1 mm."""
+    way = rng.normal(size=(POINTS, 3))
+    way /= np.linalg.norm(way, axis=1)[:, None]
+    size = np.abs(rng.normal(size=POINTS))
+    size[rng.integers(POINTS)] = 12.0
+    return way * size[:, None]
+
+
+def run(rng, errors_mm, change_mm=lambda time: 0.0 * time, **settings):
+    """A campaign of 110 readings, its change along a random direction; rows in the order read."""
+    campaign = SearchAndConfirm(BUDGET, **settings).begin(
+        Candidates(np.tile(np.eye(3), (POINTS, 1, 1)))
+    )
+    way = rng.normal(size=3)
+    way /= np.linalg.norm(way)
+    rows = []
+    while (row := campaign.next()) is not None:
+        seen = errors_mm[row] + rng.normal(size=3)
+        campaign.record(row, seen + change_mm(len(rows) / BUDGET) * way)
+        rows.append(row)
+    return campaign, rows
+
+
+def said(campaign):
+    return next(each for each in campaign.statements() if each.target == CANDIDATES)
+
+
+def test_reference_poses_are_read_in_their_places_within_the_budget():
+    rng = np.random.default_rng(1)
+    campaign, rows = run(rng, errors(rng), references=20)
+    assert len(rows) == BUDGET
+    assert rows[:10] == [0, 1, 2, 3, 4] * 2
+    assert rows[-5:] == [0, 1, 2, 3, 4]
+    assert tuple(rows[: len(campaign.visit())]) == campaign.visit()
+    assert set(campaign.visit()) == set(range(POINTS))
+    assert [campaign.ledger.count[row] >= 5 for row in range(5)] == [True] * 5
+
+
+@pytest.mark.parametrize(
+    ("change", "code", "size"),
+    [(lambda time: 8.0 * time, "drift", 8.0), (lambda time: 9.0 * (time > 0.55), "step", 9.0)],
+    ids=["drift", "moved tripod"],
+)
+def test_a_campaign_that_drifted_or_was_moved_states_no_bounds_and_says_why(change, code, size):
+    rng = np.random.default_rng(2)
+    campaign, _ = run(rng, errors(rng), change, references=20)
+    answer = said(campaign)
+    assert answer.withheld.code == code
+    assert math.isnan(answer.upper_mm)
+    assert math.isnan(answer.lower_mm)
+    assert answer.value_mm > 0.0
+    numbers = answer.withheld.numbers
+    assert abs(numbers["size"] - size) < 3.0 * numbers["deviation"]
+    assert code == "drift" or numbers["after"] <= 0.55 * BUDGET < numbers["before"]
+
+
+def test_uncorrected_bounds_fail_where_nobody_looks_for_a_drift():
+    rng, missed = np.random.default_rng(4), 0
+    for _ in range(40):
+        sizes = errors(rng)
+        campaign, _ = run(rng, sizes, lambda time: 4.0 * time)
+        largest = float(np.linalg.norm(sizes, axis=1).max())
+        missed += not said(campaign).lower_mm <= largest <= said(campaign).upper_mm
+    assert missed > 20

@@ -9,7 +9,7 @@ import numpy as np
 from kinacc.assess.adaptive import Candidates, LedgerCampaign
 from kinacc.assess.looks import EARLY, Looks, boundary, look_counts
 from kinacc.assess.lower_average import SHARE, LowerAverage, direction_of
-from kinacc.assess.noise_taken import AS_STATED, NoisePlan
+from kinacc.assess.noise import NoisePlan
 from kinacc.assess.reference_poses import schedule
 from kinacc.assess.wrong_readings import at_most_wrong
 
@@ -34,11 +34,12 @@ class ConfirmingCampaign(LedgerCampaign):
         settings,
         candidates: Candidates,
         first: int,
-        noise: NoisePlan = AS_STATED,
+        noise: NoisePlan | None = None,
         wrong_rate: float = 0.0,
         references: int = 0,
     ) -> None:
         super().__init__(settings, candidates)
+        noise = noise or NoisePlan()
         self.first, self.noise_plan, self.factor = first, noise, noise.margin
         self.wrong_rate = wrong_rate
         self.plan = schedule(settings.measurements, candidates.points, references)

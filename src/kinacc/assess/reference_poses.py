@@ -3,7 +3,12 @@
 The first rows of the random order are the reference poses. They are read first, and again at
 places of the sequence that are fixed beforehand: at its start, evenly between and at its end. Only
 differences between readings of one pose are looked at, so nothing has to be known of its error.
-Proofs: docs/drift-and-steps.md.
+
+A change has one of a number of shapes over the readings: linear in time, or a step at one of the
+gaps between them. Each shape is centred pose by pose, so that the errors of the poses drop out.
+What a shape explains is a square of three standard normal components where nothing changed; where
+the noise is known up to a factor only, it is taken as a part of the square of all that is left of
+the readings. Proofs: docs/drift-and-steps.md.
 """
 
 from __future__ import annotations
@@ -11,12 +16,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
+import scipy
 
 from kinacc.assess.adaptive import Ledger
-from kinacc.assess.change_shapes import Shapes, half_found, likelier, shapes_of
 from kinacc.assess.statement import Reason
 from kinacc.errors import Problem
 
@@ -25,6 +30,7 @@ FALSE_ALARMS = 0.005  # of campaigns without drift or step, all stages together
 _EARLIER = 0.2  # of these, spent on the stages before the last
 _LEAST_FREEDOM = 6.0  # of readings that have to tell a change and their noise
 _BESIDE = 5.0  # times a stage's false alarms, where the readings say their noise themselves
+_OF_DRIFT = 0.6  # of the false alarms of a stage, for the linear drift; steps share the rest
 _LEAST_ROUNDS = 3  # readings of every reference pose before the first look
 
 
@@ -43,10 +49,6 @@ class Schedule:
     def left(self, taken: int) -> int:
         """Planned readings that are still to come after so many."""
         return sum(place >= taken for place in self.row_at)
-
-    def time(self, place: int | np.ndarray) -> float | np.ndarray:
-        """Place in the sequence over its length: 0 at the start, below 1."""
-        return place / self.measurements
 
     def visit(self, first: int) -> tuple[int, ...]:
         """Rows in the order in which they are read whatever is read, ``first`` rows being visited.
@@ -97,8 +99,7 @@ def schedule_faults(measurements: int, references: int) -> list[Problem]:
     return []
 
 
-@dataclass(frozen=True)
-class Readings:
+class Readings(NamedTuple):
     """Readings of reference poses in their order: place, pose, vector (n, 3), covariance."""
 
     place: np.ndarray
@@ -107,29 +108,8 @@ class Readings:
     covariance_mm2: np.ndarray
 
     def head(self, count: int) -> Readings:
-        """The first readings."""
-        each = (self.place, self.row, self.vector_mm, self.covariance_mm2)
-        return Readings(*(column[:count] for column in each))
-
-    @cached_property
-    def root_mm(self) -> np.ndarray:
-        """Root (3, 3) of the mean covariance of the readings."""
-        return np.linalg.cholesky(self.covariance_mm2.mean(axis=0))
-
-    @cached_property
-    def whitened(self) -> np.ndarray:
-        """Readings (n, 3) in units of that root."""
-        return np.linalg.solve(self.root_mm, self.vector_mm.T).T
-
-    @cached_property
-    def weight(self) -> np.ndarray:
-        """Weights (n,): a reading's covariance is at most the mean one divided by its weight.
-
-        Equal where covariances are in proportion to each other; less weight than due otherwise.
-        """
-        inverse = np.linalg.inv(self.root_mm)
-        relative = inverse @ self.covariance_mm2 @ inverse.T
-        return np.round(1.0 / np.linalg.eigvalsh(relative)[:, -1], 9)
+        """Return the first readings."""
+        return Readings(*(column[:count] for column in self))
 
 
 def planned_readings(plan: Schedule, ledger: Ledger) -> Readings:
@@ -173,11 +153,6 @@ class Change:
         return Reason("step", numbers | {"after": self.between[0], "before": self.between[1]})
 
 
-def alarms(change: Change | None) -> tuple[Reason, ...]:
-    """Why no bounds are stated: a drift or step that is found."""
-    return (change.reason,) if change is not None and change.is_found else ()
-
-
 def stages(plan: Schedule) -> tuple[tuple[int, float], ...]:
     """Numbers of reference readings at which they are looked at, each with its false alarms."""
     total = len(plan.row_at)
@@ -206,11 +181,30 @@ def found(plan: Schedule, readings: Readings, freedom: float = math.inf) -> Chan
 
 
 def _at_stage(plan: Schedule, readings: Readings, error: float, freedom: float) -> Change:
-    shapes = _shapes(plan, readings)
-    along = shapes.unit @ readings.whitened  # (shapes, 3)
+    place, row, vectors, covariances = readings
+    count = len(place)
+    root = np.linalg.cholesky(covariances.mean(axis=0))
+    inverse = np.linalg.inv(root)
+    # A reading's covariance is at most the mean one over its weight: less weight than due at most.
+    weight = 1.0 / np.linalg.eigvalsh(inverse @ covariances @ inverse.T)[:, -1]
+    belongs = (row[:, None] == np.unique(row)).astype(float)
+
+    def centred(values: np.ndarray) -> np.ndarray:
+        """Values (.., n) without the weighted mean of their pose."""
+        means = (values * weight) @ belongs / (weight @ belongs)
+        return values - means @ belongs.T
+
+    gaps = np.arange(plan.poses, count - plan.poses + 1)
+    shapes = np.vstack([place / plan.measurements, np.arange(count) >= gaps[:, None]])
+    shapes = centred(shapes)
+    length = np.sqrt(np.sum(shapes**2 * weight, axis=1))
+    told = length > 1e-9
+    gaps, shapes, length = np.append(0, gaps)[told], shapes[told], length[told]
+    whitened = inverse @ vectors.T  # (3, n)
+    along = (shapes * weight / length[:, None]) @ whitened.T  # (shapes, 3)
     square = np.sum(along**2, axis=1)
-    within = float(np.sum(shapes.within(readings.whitened.T) ** 2))
-    own = 3.0 * (len(readings.place) - plan.poses)
+    within = float(np.sum(centred(whitened) ** 2 * weight))
+    own = 3.0 * (count - plan.poses)
     factor, stands_out = 1.0, True
     if math.isfinite(freedom):
         within, freedom = within + freedom, own + freedom
@@ -218,27 +212,48 @@ def _at_stage(plan: Schedule, readings: Readings, error: float, freedom: float) 
     elif own > _LEAST_FREEDOM:
         # Noise larger than stated, or one reading that went wrong, is no change: that has to stand
         # out from the scatter of the readings as well.
-        against = shapes.thresholds(_BESIDE * error, own)
-        stands_out = bool(np.any(square / within > against))
-    least = shapes.thresholds(error, freedom)
-    best = likelier(square, freedom)
-    scale = 1.0 / shapes.length[best]
-    widest = math.sqrt(float(np.linalg.eigvalsh(readings.root_mm @ readings.root_mm.T)[-1]))
-    change = readings.root_mm @ along[best] * scale
+        stands_out = bool(np.any(square / within > _thresholds(len(gaps), _BESIDE * error, own)))
+    least = _thresholds(len(gaps), error, freedom)
+    best = _likelier(square, freedom)
+    widest = factor * math.sqrt(float(np.linalg.eigvalsh(root @ root.T)[-1]))
+    x, y, z = (root @ along[best] / length[best]).tolist()
+    before = int(gaps[best])
     return Change(
-        between=None if best == 0 else _about(readings.place, shapes.gap[best]),
-        change_mm=(float(change[0]), float(change[1]), float(change[2])),
-        deviation_mm=float(factor * widest * scale),
+        between=(int(place[before - 1]) + 1, int(place[before]) + 1) if best else None,
+        change_mm=(x, y, z),
+        deviation_mm=float(widest / length[best]),
         is_found=stands_out and bool(np.any(square > least)),
-        unseen_mm=float(factor * widest / shapes.length[0] * half_found(float(least[0]), freedom)),
+        unseen_mm=float(widest / length[0] * _half_found(float(least[0]), freedom)),
     )
 
 
-def _shapes(plan: Schedule, readings: Readings) -> Shapes:
-    time, row = plan.time(readings.place), readings.row
-    return shapes_of(tuple(time), tuple(row), tuple(readings.weight))
+def _thresholds(shapes: int, error: float, freedom: float) -> np.ndarray:
+    """Squares (shapes,) of which one is exceeded with probability ``error`` at most, no change."""
+    shares = np.full(shapes, error * (1.0 - _OF_DRIFT) / max(shapes - 1, 1))
+    shares[0] = error * (_OF_DRIFT if shapes > 1 else 1.0)
+    if math.isinf(freedom):
+        return scipy.special.chdtri(3.0, shares)
+    return 1.0 - scipy.special.betaincinv(0.5 * (freedom - 3.0), 1.5, shares)
 
 
-def _about(place: np.ndarray, gap: int) -> tuple[int, int]:
-    """Numbers (from 1) of the reference readings on both sides of a gap."""
-    return int(place[gap - 1]) + 1, int(place[gap]) + 1
+def _likelier(square: np.ndarray, freedom: float) -> int:
+    """The shape to name: the drift, or the step that fits best where steps are likelier on average.
+
+    So a step, which has many places to fit by chance, is not preferred for their number.
+    """
+    likely = 0.5 * square if math.isinf(freedom) else -0.5 * freedom * np.log1p(-square)
+    steps = likely[1:]
+    if not steps.size or likely[0] >= np.logaddexp.reduce(steps) - math.log(steps.size):
+        return 0
+    return 1 + int(np.argmax(steps))
+
+
+def _half_found(least: float, freedom: float) -> float:
+    """Length of a mean (3,), in standard deviations, whose square exceeds ``least`` half the time.
+
+    Of the linear drift alone: steps only add to what is found.
+    """
+    if math.isinf(freedom):
+        return math.sqrt(float(scipy.special.chndtrinc(least, 3.0, 0.5)))
+    ratio = least / (1.0 - least) * (freedom - 3.0) / 3.0
+    return math.sqrt(float(scipy.special.ncfdtrinc(3.0, freedom - 3.0, 0.5, ratio)))

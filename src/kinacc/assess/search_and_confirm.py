@@ -11,17 +11,17 @@ import numpy as np
 from kinacc.assess.adaptive import FIRST_SHARE, AdaptiveAssessor, Candidates, check_budget
 from kinacc.assess.confirming import ConfirmingCampaign
 from kinacc.assess.counts import excepted, hardly_missed
-from kinacc.assess.noise_taken import (
+from kinacc.assess.noise import (
     ESTIMATED,
     KNOWN,
     CampaignNoise,
+    factor_limit,
     noise_faults,
     noise_plan,
 )
 from kinacc.assess.population import LargestSize, largest_size
 from kinacc.assess.reference_poses import (
     Change,
-    alarms,
     found,
     planned_readings,
     schedule_faults,
@@ -36,6 +36,7 @@ from kinacc.assess.statement import (
     Statement,
     Suspicious,
 )
+from kinacc.assess.suspicious_readings import suspicious_readings
 from kinacc.errors import Problem, refuse
 
 VISITED = 0.9  # of the budget, where it is smaller than the number of candidates
@@ -69,8 +70,8 @@ class SearchAndConfirm(AdaptiveAssessor):
     known, it is taken ``noise_margin`` times as large, and always at least as large as readings of
     the same block show it. ``noise: estimated`` takes it as stated up to one factor: estimated from
     readings of the same block, or from a test before with ``noise_freedom`` degrees of freedom
-    (:mod:`kinacc.assess.noise_factor`). Where readings contradict what is stated, bounds are
-    withheld (:mod:`kinacc.assess.noise_alarms`). ``error_of: visit`` bounds what 95 % of future
+    (:mod:`kinacc.assess.noise`). Where readings contradict what is stated, bounds are
+    withheld. ``error_of: visit`` bounds what 95 % of future
     visits to the worst pose keep; ``arm_mm`` is the arm's own standard deviation per axis, all of
     the noise where it is null. ``references`` readings return to reference poses by plan; where
     these show a drift or step, bounds are withheld (:mod:`kinacc.assess.reference_poses`).
@@ -219,13 +220,13 @@ class SearchAndConfirmCampaign(ConfirmingCampaign):
 
     def _limits_mm(self, error: float) -> np.ndarray:
         """Upper limits (m,) of single points for an allowed error."""
-        plan, own = self.noise_plan, self.noise.taken(error).factor.own
+        plan, own = self.noise_plan, self.noise.taken(error).own
         return self.looks.limits_mm(self.boundary_of(plan.mean_share * error, plan.freedom), own)
 
     def _single_factor(self) -> np.ndarray:
         """Factors (m,) on the noise that lower limits of single points rest on."""
-        factor = self.noise.taken(1.0 - self.settings.confidence).factor
-        return factor.own * (factor.at_most(0.5 * self.single_error) / factor.value)
+        noise = self.noise.taken(1.0 - self.settings.confidence)
+        return noise.own * factor_limit(noise.freedom, 1.0 - 0.5 * self.single_error)
 
     def alarms(self) -> tuple[Reason, ...]:
         """What the readings say against what the bounds rest on."""
@@ -239,23 +240,23 @@ class SearchAndConfirmCampaign(ConfirmingCampaign):
             first = {"readings": len(suspicious), "number": suspicious[0].number}
             found = (Reason("wrong_readings", first),)
         # A few wrong readings look like too much scatter: what tells more comes first.
-        drift = alarms(self.change())
+        change = self.change()
+        drift = (change.reason,) if change is not None and change.is_found else ()
         return (*found, *drift, *self.noise.alarms())
 
     def suspicious(self) -> tuple[Suspicious, ...]:
         """Readings that stand apart from others of their point."""
-        from kinacc.assess.suspicious_readings import Noise, readings_by_row, suspicious_readings
-
         if self.noise.missing():
             return ()
-        factor = self.noise.taken(1.0 - self.settings.confidence).factor.value
         # Where all readings scatter more than stated, none is wrong for doing so too.
-        factor = max(factor, self.noise.usual_scatter())
+        taken = self.noise.taken(1.0 - self.settings.confidence).value
         return suspicious_readings(
-            readings_by_row(self.ledger, self.blocks, self.counts),
+            self.ledger,
+            self.blocks,
+            self.counts,
             self.extra + self.settings.references,
-            self.ledger.candidates.points,
-            Noise(factor, self.noise_plan.freedom),
+            max(taken, self.noise.usual_scatter()),
+            self.noise_plan.freedom,
         )
 
     def _withheld(self) -> Reason | None:
@@ -272,7 +273,7 @@ class SearchAndConfirmCampaign(ConfirmingCampaign):
 
     def _lower_mm(self) -> float:
         if self.average.has_spoken:
-            own = self.noise.taken(1.0 - self.settings.confidence).factor.own
+            own = self.noise.taken(1.0 - self.settings.confidence).own
             found = self.average.bound_mm(own)
         else:
             found = self.looks.largest_lower_mm(self._single_factor())

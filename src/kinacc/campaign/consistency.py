@@ -8,9 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinacc.assess.adaptive import Ledger
-from kinacc.assess.noise_alarms import scatter_alarm
-from kinacc.assess.noise_factor import Contrasts, contrasts
-from kinacc.assess.noise_taken import ESTIMATED, KNOWN, false_scatter, without_wrong_blocks
+from kinacc.assess.noise import ESTIMATED, KNOWN, Contrasts, contrasts, false_scatter, scatter_alarm
 from kinacc.campaign.reading import covariance_mm2, unplanned_mm2
 from kinacc.campaign.state import State
 
@@ -77,7 +75,7 @@ def _within_blocks(state: State) -> Contrasts:
     every = [*blocks, *(beyond + row_of[each.reading.point] for each in in_hand)]
     found = contrasts(ledger, every)
     guarded = getattr(state.plan.assessor, "wrong_rate", 0.0) > 0.0
-    return without_wrong_blocks(found, every) if guarded else found
+    return found.without_wrong_blocks(every) if guarded else found
 
 
 def nearness(state: State) -> Scatter | None:

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from kinacc.assess.adaptive import covariance_faults
-from kinacc.assess.noise_factor import ENOUGH, FEWEST
+from kinacc.assess.noise import ENOUGH, FEWEST
 from kinacc.config import json_files
 from kinacc.errors import InputError, Problem, refuse
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from kinacc.assess.limits import VISITS as FUTURE
-from kinacc.assess.noise_taken import KNOWN, noise_plan
+from kinacc.assess.noise import KNOWN, noise_plan
 from kinacc.assess.registry import RECOMMENDED
 from kinacc.assess.statement import CANDIDATES, MEAN, MEASURED, REGION, Reason, Statement
 from kinacc.campaign import consistency, instrument

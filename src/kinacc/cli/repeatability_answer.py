@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinacc.assess.noise_factor import ENOUGH, FEWEST
+from kinacc.assess.noise import ENOUGH, FEWEST
 from kinacc.calibration.noise import per_axis_mm
 from kinacc.campaign.known_noise import FORMAT
 from kinacc.checks import repeatability as checks

@@ -1,0 +1,403 @@
+"""How large the bounds of a campaign take the noise, and what its readings say against that.
+
+A block is what one decision reads at one point. How its readings differ tells of the noise alone,
+whatever the errors are, and nothing of the block's mean. So a factor on the covariances stated
+that is estimated from a number of differences fixed beforehand is independent of all means, and of
+every decision that was taken on means.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from kinacc.assess.adaptive import Candidates, Ledger
+from kinacc.assess.statement import VISIT, Reason
+from kinacc.errors import Problem
+
+if TYPE_CHECKING:
+    from kinacc.assess.search_and_confirm import SearchAndConfirm
+
+KNOWN, ESTIMATED = "known", "estimated"
+ENOUGH = 60  # degrees of freedom that are asked for: 20 triples
+FEWEST = 30  # degrees of freedom below which no factor is estimated
+MOST = 120  # degrees of freedom beyond which a factor is as good as known, or checked
+_SINGLES = 9  # blocks of a single reading: about the three stages of the lower bound, and its end
+_NOISE_PART = 0.2  # of an allowed error, where the noise itself has to be bounded
+_MEDIAN = 2.366  # of a chi-square with three degrees of freedom
+_CLEARLY = 1.7  # three standard deviations of the root of the median of one, over that median's
+_FAR = 16.27  # squared contrast that one in a thousand exceeds: no scatter where some are wrong
+SCATTER = 4e-3  # probability that noise as stated is ever called larger in a campaign
+BESIDE_REFERENCES = 1e-3  # the same where alarms of reference poses have their part of 1 % in all
+_LARGER = 1.2  # times the noise stated: what readings are held against
+_LARGER_THAN_TESTED = 1.5  # the same where a test says the noise: no test tells it to 20 %
+_TAILS = 5.5  # logarithm of the ratio of likelihoods that tells heavy tails; false in 0.2 %
+_HEAVY = 8.0  # degrees of freedom of the heavy-tailed readings that normal ones are held against
+_STEP = 0.7  # of the standard deviation of a logarithm of scale: nodes of the integral over it
+
+
+class Contrasts(NamedTuple):
+    """Differences within blocks, in the order taken: standard normal where the noise is as stated.
+
+    rows: (n,) candidate of each; places: (n,) of its reading in the ledger, from 0; values: (n, 3),
+    each the difference of a reading from the mean of those before it in its block, in units of its
+    own standard deviations.
+    """
+
+    rows: np.ndarray
+    places: np.ndarray
+    values: np.ndarray
+
+    @property
+    def freedom(self) -> int:
+        """Degrees of freedom: three for each difference."""
+        return 3 * len(self.rows)
+
+    @property
+    def squares(self) -> np.ndarray:
+        """Squared lengths (n,)."""
+        return np.sum(self.values**2, axis=1)
+
+    def without_wrong_blocks(self, blocks: Sequence[int]) -> Contrasts:
+        """Differences of blocks without a reading far off, ``blocks`` being those of all readings.
+
+        Readings that go wrong and are guarded against tell nothing of the noise of others; one is
+        in many differences of its block.
+        """
+        own = np.asarray(blocks)[self.places]
+        near = ~np.isin(own, own[self.squares > _FAR])
+        return Contrasts(*(column[near] for column in self))
+
+
+def contrasts(ledger: Ledger, blocks: Sequence[int]) -> Contrasts:
+    """Differences within blocks of all readings of a ledger, in the order taken.
+
+    blocks: of each reading the number of its block; readings of a block are of one point.
+    """
+    under_way: dict[int, tuple[np.ndarray, np.ndarray]] = {}  # mean, and inverse of its covariance
+    rows, places, values = [], [], []
+    for place, (block, (row, reading, covariance)) in enumerate(
+        zip(blocks, ledger.readings, strict=True)
+    ):
+        own = ledger.candidates.covariance_mm2[row] if covariance is None else covariance
+        if block not in under_way:
+            under_way[block] = np.array(reading), np.linalg.inv(own)
+            continue
+        mean, weight = under_way[block]
+        apart, added = np.array(reading) - mean, np.linalg.inv(own)
+        rows.append(row)
+        places.append(place)
+        values.append(np.linalg.solve(np.linalg.cholesky(own + np.linalg.inv(weight)), apart))
+        weight = weight + added
+        under_way[block] = mean + np.linalg.solve(weight, added @ apart), weight
+    found = np.array(values).reshape(-1, 3)
+    return Contrasts(np.array(rows, dtype=np.int64), np.array(places, dtype=np.int64), found)
+
+
+def planned_freedom(spare: int) -> int:
+    """Degrees of freedom that ``spare`` readings beyond the visit bring, whatever is decided.
+
+    A block has two readings or more, but for a few; so half of all others tell of the noise.
+    """
+    return 3 * max((spare - _SINGLES + 1) // 2, 0)
+
+
+def largest_factor(
+    candidates: Candidates, rows: np.ndarray, readings_mm: np.ndarray, error: float
+) -> float:
+    """Factor that the true one exceeds with probability at most ``error``, whatever the errors are.
+
+    From one reading (n, 3) each of different candidates (n,). Errors take readings farther away
+    than noise alone, never nearer: the median of their squared sizes, in the units of the noise, is
+    at least that of as many central chi-squares with three degrees of freedom, times the factor
+    squared. The median says more than the sum where a few errors are large.
+    """
+    from scipy.special import betaincinv, chdtri
+
+    square = np.einsum("ni,nij,nj->n", readings_mm, candidates.inverses[rows], readings_mm)
+    rank = (len(square) + 1) // 2
+    # The share of a chi-square below its order statistic is a beta variable.
+    below = float(betaincinv(rank, len(square) - rank + 1, error))
+    return math.sqrt(float(np.sort(square)[rank - 1]) / float(chdtri(3, 1.0 - below)))
+
+
+@dataclass(frozen=True)
+class NoisePlan:
+    """What is known of the noise before anything is read.
+
+    ``margin``: times the noise stated that bounds allow for. ``freedom``: degrees of freedom that
+    limits on means are calibrated with, infinite where the factor is no estimate; ``estimating``:
+    of the campaign's own, 0 where a test brings them. ``is_bounded``: nothing but the size of
+    readings says how large the noise may be. ``mean_share``: part of an allowed error that limits
+    on means may spend; the rest is for limits of the noise. ``limited``: degrees of freedom of the
+    test whose upper limit is taken for the noise, where readings may be wrong; else 0.
+    """
+
+    margin: float = 1.0
+    freedom: float = math.inf
+    estimating: int = 0
+    is_bounded: bool = False
+    mean_share: float = 1.0
+    limited: int = 0
+
+
+def noise_plan(settings: SearchAndConfirm, first: int) -> NoisePlan:
+    """Of a campaign that visits ``first`` points."""
+    within = planned_freedom(max(settings.measurements - first - settings.references, 0))
+    tested = settings.noise_freedom
+    if settings.noise == KNOWN:
+        return NoisePlan(margin=1.0 if within >= MOST else settings.noise_margin)
+    if settings.wrong_rate:
+        # The law of clipped scores is known for a stated noise alone, or one that is no larger.
+        return NoisePlan(mean_share=1.0 - _NOISE_PART, limited=tested)
+    # All that is sure to come, so that bounds are sure to come; no more than helps.
+    estimating = min(within, MOST) if within >= FEWEST and not tested else 0
+    if not tested and not estimating:
+        return NoisePlan(is_bounded=True, mean_share=1.0 - _NOISE_PART)
+    of_arm = settings.error_of == VISIT and settings.arm_mm is None
+    share = 1.0 - _NOISE_PART if of_arm else 1.0
+    return NoisePlan(freedom=tested or estimating, estimating=estimating, mean_share=share)
+
+
+def noise_faults(settings: SearchAndConfirm) -> list[Problem]:
+    """What of the settings of noise and of the arm's own share in it cannot be."""
+    problems, freedom, arm = [], settings.noise_freedom, settings.arm_mm
+    if freedom and settings.noise == KNOWN:
+        problems.append(Problem("noise_freedom", f"{freedom}", f"0 where noise is {KNOWN}"))
+    elif freedom != 0 and not freedom >= FEWEST:
+        allowed = f"0 without a test before, or at least {FEWEST}; {ENOUGH} are asked for"
+        problems.append(Problem("noise_freedom", f"{freedom}", allowed))
+    if arm is not None and settings.error_of != VISIT:
+        problems.append(Problem("arm_mm", f"{arm}", f"nothing where error_of is not {VISIT}"))
+    elif arm is not None and not 0.0 <= arm < math.inf:
+        problems.append(Problem("arm_mm", f"{arm}", "0 or above, in mm"))
+    return problems
+
+
+def factor_limit(freedom: float, above: float) -> float:
+    """Factor that the true one is below with probability ``above``, over one that was estimated."""
+    from scipy.special import chdtri
+
+    return 1.0 if math.isinf(freedom) else math.sqrt(freedom / float(chdtri(freedom, above)))
+
+
+@dataclass(frozen=True)
+class NoiseTaken:
+    """Factor on the standard deviations planned, for bounds.
+
+    ``value``, from ``freedom`` degrees, infinite where it is no estimate; ``own`` (m,): factors of
+    candidates that were read so often that they have one of their own, the larger of it and
+    ``value``; elsewhere ``value``. ``least`` and ``most``: what the noise itself is not below and
+    not above; ``said``: how all this was had, None where the noise is as stated.
+    """
+
+    value: float
+    freedom: float
+    own: np.ndarray
+    least: float
+    most: float
+    said: Reason | None
+
+
+class CampaignNoise:
+    """The noise of one campaign, by its settings and the readings of its ledger.
+
+    ``blocks``: of every reading of the ledger the number of its block.
+    """
+
+    def __init__(
+        self,
+        settings: SearchAndConfirm,
+        plan: NoisePlan,
+        ledger: Ledger,
+        blocks: Sequence[int],
+        first: int,
+    ) -> None:
+        self.settings, self.plan, self.ledger = settings, plan, ledger
+        self.first, self._blocks = first, blocks
+        self._known: tuple[int, Contrasts] = (-1, contrasts(ledger, []))
+
+    @property
+    def contrasts(self) -> Contrasts:
+        """Differences within the blocks of all readings so far."""
+        if self._known[0] != self.ledger.taken:
+            self._known = self.ledger.taken, contrasts(self.ledger, self._blocks)
+        return self._known[1]
+
+    @property
+    def telling(self) -> Contrasts:
+        """Those that tell of the noise: of blocks without a wrong reading, where some may be."""
+        found = self.contrasts
+        return found.without_wrong_blocks(self._blocks) if self.settings.wrong_rate else found
+
+    def missing(self) -> Reason | None:
+        """Why the noise is not known yet; None where it is."""
+        if self.plan.estimating and self.contrasts.freedom < self.plan.estimating:
+            found = {"freedom": self.contrasts.freedom, "needed": self.plan.estimating}
+            return Reason("noise_unknown", found)
+        if self.plan.is_bounded and len(self.ledger.visited) < self.first:
+            return Reason("first_visit", {"left": self.first - len(self.ledger.visited)})
+        return None
+
+    def taken(self, error: float) -> NoiseTaken:
+        """The noise for bounds that may err with this probability; not where it is ``missing``."""
+        plan, part, own = self.plan, _NOISE_PART * error, np.ones(self.ledger.candidates.points)
+        if self.settings.noise == KNOWN:
+            most, said = self._stated_or_shown()
+            return NoiseTaken(most, math.inf, most * own, 1.0, most, said)
+        if plan.is_bounded:
+            rows = np.array(self.ledger.visited[: self.first])
+            first = np.array([self.ledger.readings_of(row, 1)[0][0] for row in rows])
+            most = largest_factor(self.ledger.candidates, rows, first, part)
+            said = Reason("noise_bounded", {"factor": most})
+            return NoiseTaken(most, math.inf, most * own, 0.0, most, said)
+        freedom = plan.limited or plan.freedom
+        least, most = factor_limit(freedom, part), factor_limit(freedom, 1.0 - part)
+        if plan.limited:
+            said = Reason("noise_limited", {"factor": most, "freedom": plan.limited})
+            return NoiseTaken(most, math.inf, most * own, least, most, said)
+        value, own = estimated_factor(self.contrasts, plan.estimating, len(own))
+        code = "noise_estimated" if plan.estimating else "noise_tested"
+        said = Reason(code, {"factor": value, "freedom": freedom})
+        return NoiseTaken(value, freedom, own, value * least, value * most, said)
+
+    def alarms(self) -> tuple[Reason, ...]:
+        """What readings of the same block say against the noise stated, and against normal ones."""
+        scatter = tails = None
+        if not self.settings.wrong_rate:
+            tails = tails_alarm(self.contrasts)
+        if not self.plan.estimating and not self.plan.is_bounded:
+            scatter = scatter_alarm(
+                self.telling,
+                tested=self.settings.noise_freedom or math.inf,
+                margin=self.plan.margin,
+                false=false_scatter(self.settings.references),
+            )
+        return tuple(each for each in (scatter, tails) if each is not None)
+
+    def usual_scatter(self) -> float:
+        """Factor on the noise planned that most differences within blocks have; 0 where few are.
+
+        By their median, which a few wrong readings do not turn, and only where it is clearly above
+        what is planned: the chance of a false suspicion is never larger by it.
+        """
+        squares = self.contrasts.squares
+        if 3 * len(squares) < FEWEST:
+            return 0.0
+        usual = math.sqrt(float(np.median(squares)) / _MEDIAN)
+        return usual if usual > 1.0 + _CLEARLY / math.sqrt(len(squares)) else 0.0
+
+    def arms_mm(self, noise: NoiseTaken) -> tuple[float, float, float]:
+        """The arm's own standard deviation: at least, likely, at most."""
+        if self.settings.arm_mm is not None:
+            return (self.settings.arm_mm,) * 3
+        visited = self.ledger.visited
+        variances = np.linalg.eigvalsh(self.ledger.candidates.covariance_mm2[visited])
+        unknown = self.plan.is_bounded or self.settings.noise == KNOWN
+        likely = float(np.sqrt(variances.mean())) * (1.0 if unknown else noise.value)
+        least = noise.least * math.sqrt(float(variances.min()))
+        largest = float((noise.own[visited] * np.sqrt(variances[:, -1])).max())
+        return least, likely, noise.most * largest / noise.value
+
+    def _stated_or_shown(self) -> tuple[float, Reason | None]:
+        """Factor on a noise that is stated: what bounds allow for, or more where repeats show more.
+
+        Where the noise is as stated, bounds are never less sure for being wider.
+        """
+        found, margin = self.telling, self.plan.margin
+        shown = math.sqrt(float(found.squares.sum()) / max(found.freedom, 1))
+        if found.freedom >= FEWEST and shown > margin:
+            return shown, Reason("noise_shown", {"factor": shown, "freedom": found.freedom})
+        return margin, Reason("noise_margin", {"margin": margin}) if margin > 1.0 else None
+
+
+def estimated_factor(found: Contrasts, estimating: int, points: int) -> tuple[float, np.ndarray]:
+    """The factor that the first ``estimating`` numbers tell, or, with none, a test before: 1.
+
+    And of every point (m,): one with 30 degrees of freedom of its own keeps the larger of its own
+    factor and this one.
+    """
+    first = found.values.reshape(-1)[:estimating]
+    value = math.sqrt(float(np.mean(first**2))) if estimating else 1.0
+    count = 3 * np.bincount(found.rows, minlength=points)
+    own = np.sqrt(np.bincount(found.rows, found.squares, points) / np.maximum(count, 1))
+    return value, np.where(count >= FEWEST, np.maximum(own, value), value)
+
+
+def false_scatter(references: int) -> float:
+    """Probability that noise as stated is ever called larger, beside so many references."""
+    return BESIDE_REFERENCES if references else SCATTER
+
+
+def scatter_alarm(
+    found: Contrasts, *, tested: float = math.inf, margin: float = 1.0, false: float = SCATTER
+) -> Reason | None:
+    """That readings of the same block differ more than the noise stated allows.
+
+    ``tested``: degrees of freedom of the test that the noise stated comes from; ``margin``: how
+    many times that noise the bounds allow for; ``false``: the probability that noise as stated is
+    ever called larger. Ratio of two likelihoods: noise 1.2 times as large as allowed for (1.5 times
+    where it was tested) over noise as large. Where it is no larger the ratio's mean never exceeds
+    1, so it ever exceeds 1/p with a probability of p at most (Ville's inequality).
+    """
+    ratios = larger_over_stated(found.squares / margin**2, tested)
+    if ratios.max(initial=-math.inf) < -math.log(false):
+        return None
+    ratio = math.sqrt(float(np.mean(found.squares)) / 3.0)
+    return Reason("scatter", {"ratio": ratio, "freedom": found.freedom})
+
+
+def larger_over_stated(squares: np.ndarray, tested: float) -> np.ndarray:
+    """Logarithm of the ratio of :func:`scatter_alarm` after each of the squared contrasts (n,).
+
+    With a noise that was tested, both likelihoods are averaged over all sizes of it.
+    """
+    freedom, total = 3.0 * np.arange(1, len(squares) + 1), np.cumsum(squares)
+    if math.isinf(tested):
+        return 0.5 * total * (1.0 - 1.0 / _LARGER**2) - freedom * math.log(_LARGER)
+    nearer = np.log((tested + total) / (tested + total / _LARGER_THAN_TESTED**2))
+    return 0.5 * (tested + freedom) * nearer - freedom * math.log(_LARGER_THAN_TESTED)
+
+
+def tails_alarm(found: Contrasts) -> Reason | None:
+    """That some differences within blocks are too far out for normal readings of any noise.
+
+    Ratio of two likelihoods, each averaged over all sizes of noise: heavy-tailed readings (half of
+    the weight each: axes by themselves, and all three axes at once) over normal ones. Where
+    readings are normal its mean is 1 at all times, so it ever exceeds exp(5.5) with a probability
+    of 0.4 % at most (Ville's inequality); how far it jumps beyond makes that 0.2 %.
+    """
+    if found.freedom < FEWEST or heavy_over_normal(found.values) <= _TAILS:
+        return None
+    farthest = float(np.abs(found.values).max() / _scale(found.values))
+    return Reason("tails", {"farthest": farthest, "freedom": found.freedom})
+
+
+def heavy_over_normal(values: np.ndarray) -> float:
+    """Logarithm of the ratio of likelihoods of :func:`tails_alarm` for contrasts (n, 3)."""
+    from scipy.special import gammaln
+
+    half = values.size / 2.0
+    step = _STEP / math.sqrt(2.0 * values.size)
+    log_scale = math.log(_scale(values)) + np.arange(-0.8, 0.8 + step, step)
+
+    def log_t(square: np.ndarray, axes: int) -> np.ndarray:
+        """Log likelihood (scales,) of Student's t of so many axes and variance 1."""
+        power, spread = (_HEAVY + axes) / 2.0, _HEAVY - 2.0
+        peak = gammaln(power) - gammaln(_HEAVY / 2.0) - axes / 2.0 * math.log(math.pi * spread)
+        scaled = square.reshape(-1) * np.exp(-2.0 * log_scale)[:, None]
+        return np.sum(peak - power * np.log1p(scaled / spread), axis=1)
+
+    both = np.logaddexp(log_t(values**2, 1), log_t(np.sum(values**2, axis=1), 3)) - math.log(2.0)
+    heavy = np.logaddexp.reduce(both - values.size * log_scale) + math.log(step)
+    normal = gammaln(half) - math.log(2.0) - half * math.log(math.pi * float(np.sum(values**2)))
+    return float(heavy - normal)
+
+
+def _scale(values: np.ndarray) -> float:
+    """Standard deviation of normal contrasts, by their median: far ones do not move it."""
+    return float(np.median(np.abs(values))) / 0.6745

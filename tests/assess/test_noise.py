@@ -1,0 +1,486 @@
+"""The noise: estimated from readings that belong together, and contradicted where it is wrong."""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+
+import numpy as np
+import pytest
+from scipy.stats import binom, chi2, f, kstest, norm, t
+
+from kinacc.assess.adaptive import Candidates, Ledger
+from kinacc.assess.limits import visit_mm
+from kinacc.assess.noise import (
+    BESIDE_REFERENCES,
+    SCATTER,
+    Contrasts,
+    contrasts,
+    estimated_factor,
+    factor_limit,
+    heavy_over_normal,
+    larger_over_stated,
+    largest_factor,
+    planned_freedom,
+    scatter_alarm,
+    tails_alarm,
+)
+from kinacc.assess.search_and_confirm import SearchAndConfirm
+from kinacc.assess.simulate import carry_on, noisy
+from kinacc.assess.suspicious_readings import suspicious_readings
+from kinacc.errors import InputError
+
+POINTS, NOISE_MM = 40, 0.1
+
+
+def equal(points, sigma_mm=0.1):
+    return Candidates.with_equal_noise(np.full(points, sigma_mm))
+
+
+def of_normal(numbers, rng, factor=1.0):
+    return of_values(factor * rng.normal(size=(numbers // 3, 3)))
+
+
+def of_values(values, rows=None):
+    """Contrasts at one point, or at rows."""
+    places = np.arange(len(values))
+    return Contrasts(0 * places if rows is None else rows, places, values)
+
+
+def told(candidates, rows, readings, unplanned=()):
+    """A ledger with readings, of which those at places ``unplanned`` have another covariance."""
+    ledger = Ledger(candidates)
+    for at, (row, reading) in enumerate(zip(rows, readings, strict=True)):
+        ledger.record(row, reading, dict(unplanned).get(at))
+    return ledger
+
+
+def by_hand(ledger, blocks):
+    """Chi-square within every block about its weighted mean, and its degrees of freedom."""
+    members = {}
+    for block, (row, reading, own) in zip(blocks, ledger.readings, strict=True):
+        covariance = ledger.candidates.covariance_mm2[row] if own is None else own
+        members.setdefault(block, []).append((np.linalg.inv(covariance), np.array(reading)))
+    total, freedom = 0.0, 0
+    for of_block in members.values():
+        weight = sum(each for each, _ in of_block)
+        mean = np.linalg.solve(weight, sum(each @ x for each, x in of_block))
+        total += sum((x - mean) @ each @ (x - mean) for each, x in of_block)
+        freedom += 3 * (len(of_block) - 1)
+    return total, freedom
+
+
+@pytest.mark.parametrize("own", [(), (4, 7, 8, 30)])
+def test_readings_of_a_block_differ_by_what_a_fit_of_its_mean_leaves(own):
+    rng = np.random.default_rng(2)
+    roots = rng.normal(size=(5, 3, 3)) + 2.0 * np.eye(3)
+    candidates = Candidates(roots @ np.swapaxes(roots, 1, 2))
+    blocks = rng.permutation(np.repeat(np.arange(12), [1, 1, 1, 2, 2, 2, 3, 4, 4, 5, 7, 8]))
+    rows = blocks % 5
+    readings = rng.normal(size=(40, 3)) + 10.0 * rows[:, None]
+    unplanned = {at: np.diag(rng.uniform(0.5, 2.0, 3)) for at in own}
+    found = contrasts(ledger := told(candidates, rows, readings, unplanned), blocks)
+    total, freedom = by_hand(ledger, blocks)
+    assert found.freedom == freedom
+    assert np.sum(found.values**2) == pytest.approx(total, rel=1e-9)
+    # What was told first stays as it was, whatever is read later.
+    early = {at: each for at, each in unplanned.items() if at < 21}
+    before = contrasts(told(candidates, rows[:21], readings[:21], early), blocks[:21])
+    if not set(own) - set(early):
+        assert found.values[: len(before.values)] == pytest.approx(before.values, abs=1e-9)
+    assert contrasts(Ledger(candidates), []).freedom == 0
+
+
+def test_a_factor_is_student_distributed_with_means_that_decided_where_to_read():
+    """Blocks go to the larger of two block means: an allocation that runs after noise."""
+    rng = np.random.default_rng(3)
+    candidates, errors, last = equal(2), 0.2 * np.eye(2, 3), []
+    for _ in range(2000):
+        rows, readings, means = [0, 1], list(errors + 0.1 * rng.normal(size=(2, 3))), [[], []]
+        for row, first in enumerate(readings):
+            means[row].append(first)
+        for _ in range(3):
+            row = int(np.argmax([np.linalg.norm(np.mean(each, axis=0)) for each in means]))
+            block = errors[row] + 0.1 * rng.normal(size=(2, 3))
+            rows += [row, row]
+            readings += list(block)
+            means[row].append(block.mean(axis=0))
+        found = contrasts(told(candidates, rows, readings), [0, 1, 2, 2, 3, 3, 4, 4])
+        factor, _ = estimated_factor(found, 9, 2)
+        # The newest block was decided on all before it, its mean is free of its differences.
+        last.append((means[row][-1] - errors[row])[0] / (0.1 * factor / math.sqrt(2.0)))
+    assert kstest(last, t(9).cdf).pvalue > 0.01
+    far = int(np.sum(np.abs(last) > 3.0))
+    assert binom.sf(far, 2000, 2.0 * t(9).sf(3.0)) > 0.01
+    assert binom.sf(far - 1, 2000, 2.0 * norm.sf(3.0)) < 1e-4
+
+
+@pytest.mark.parametrize("spare", [0, 1, 9, 10, 11, 40, 41, 100, 101])
+def test_how_much_a_plan_is_sure_to_tell_of_the_noise(spare):
+    """Any campaign has as many contrasts, whatever its readings made it do."""
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        errors = rng.normal(size=(30, 3)) * rng.choice([0.0, 0.1, 1.0])
+        campaign = SearchAndConfirm(30 + spare).begin(equal(30))
+        carry_on(campaign, lambda row, _: errors[row] + 0.1 * rng.normal(size=3))  # noqa: B023
+        told_of = contrasts(campaign.ledger, campaign.blocks).freedom
+        assert planned_freedom(spare) <= told_of <= 3 * spare
+
+
+def test_one_reading_of_each_pose_bounds_the_noise_whatever_the_errors_are():
+    rng = np.random.default_rng(6)
+    below = []
+    for _ in range(4000):
+        factor = largest_factor(equal(21), np.arange(21), 0.13 * rng.normal(size=(21, 3)), 0.05)
+        below.append(factor < 1.3)
+    # Exact where there are no errors: the 11th of 21 chi-squares.
+    assert binom.cdf(sum(below), 4000, 0.05) > 0.005
+    assert binom.sf(sum(below), 4000, 0.05) > 0.005
+    one = np.array([[0.3, 0.0, 0.0]])
+    assert chi2.cdf((3.0 / largest_factor(equal(1), [0], one, 0.05)) ** 2, 3) == pytest.approx(0.05)
+    readings = 0.1 * rng.normal(size=(21, 3))
+    more = readings * rng.uniform(1.0, 9.0, 21)[:, None]
+    assert largest_factor(equal(21), np.arange(21), more, 0.05) >= largest_factor(
+        equal(21), np.arange(21), readings, 0.05
+    )
+
+
+def test_noise_20_percent_larger_than_stated_is_said_by_80_triples():
+    rng = np.random.default_rng(7)
+    said = [scatter_alarm(of_normal(480, rng, 1.2)) is not None for _ in range(1000)]
+    assert np.mean(said) >= 0.95
+    found = scatter_alarm(of_normal(480, rng, 1.3))
+    assert found.code == "scatter"
+    assert found.numbers["freedom"] == 480
+    assert found.numbers["ratio"] == pytest.approx(1.3, abs=0.15)
+    assert scatter_alarm(of_normal(0, rng)) is None
+
+
+def test_scatter_as_stated_is_hardly_ever_an_alarm_at_any_time():
+    rng = np.random.default_rng(8)
+    false = sum(scatter_alarm(of_normal(900, rng)) is not None for _ in range(8000))
+    assert binom.sf(false - 1, 8000, SCATTER) > 0.005
+    false = sum(
+        scatter_alarm(of_normal(900, rng, 1.2), margin=1.2) is not None for _ in range(4000)
+    )
+    assert binom.sf(false - 1, 4000, SCATTER) > 0.005
+    rare = sum(
+        scatter_alarm(of_normal(300, rng), false=BESIDE_REFERENCES) is not None for _ in range(8000)
+    )
+    assert binom.sf(rare - 1, 8000, BESIDE_REFERENCES) > 0.005
+
+
+def test_scatter_is_held_to_a_repeatability_test_with_its_own_uncertainty():
+    rng, false, said = np.random.default_rng(14), 0, 0
+    for _ in range(4000):
+        # What a test of 30 degrees of freedom says of the noise is off by 13 %.
+        test = math.sqrt(rng.chisquare(30) / 30.0)
+        false += scatter_alarm(of_normal(300, rng, 1.0 / test), tested=30) is not None
+        said += scatter_alarm(of_normal(300, rng, 1.0 / test)) is not None
+    assert binom.sf(false - 1, 4000, SCATTER) > 0.005
+    assert said > 100
+    assert scatter_alarm(of_normal(300, rng, 2.5), tested=30) is not None
+
+
+@pytest.mark.parametrize(("tested", "larger"), [(12.0, 1.5), (math.inf, 1.2)])
+def test_the_ratio_for_larger_noise_is_that_of_two_densities(tested, larger):
+    squares = np.random.default_rng(15).chisquare(3, 7)
+    if math.isinf(tested):
+        expected = np.sum(chi2(3, scale=larger**2).logpdf(squares) - chi2(3).logpdf(squares))
+    else:
+        mean = squares.mean() / 3.0
+        expected = f(21, 12, scale=larger**2).logpdf(mean) - f(21, 12).logpdf(mean)
+    assert larger_over_stated(squares, tested)[-1] == pytest.approx(expected)
+
+
+def student_triples(rng, campaigns, joint):
+    """Contrasts of 100 triples of Student's t with four degrees of freedom and variance 1."""
+    z = rng.normal(size=(campaigns, 100, 3, 3))
+    z /= np.sqrt(rng.chisquare(4, (*z.shape[:-1], 1 if joint else 3)) / 4.0) * math.sqrt(2.0)
+    pair = (z[:, :, 1] - z[:, :, 0]) / math.sqrt(2.0)
+    third = (z[:, :, 2] - z[:, :, :2].mean(axis=2)) * math.sqrt(2.0 / 3.0)
+    values = np.stack([pair, third], axis=2).reshape(campaigns, 200, 3)
+    return [of_values(each) for each in values]
+
+
+@pytest.mark.parametrize(("joint", "least"), [(False, 0.9), (True, 0.94)])
+def test_heavy_tails_are_said_by_100_triples(joint, least):
+    rng = np.random.default_rng(9)
+    found = [tails_alarm(each) for each in student_triples(rng, 200, joint)]
+    assert np.mean([each is not None for each in found]) >= least
+    assert all(each.numbers["farthest"] > 3.2 for each in found if each)
+
+
+def test_normal_readings_of_any_size_have_no_heavy_tails():
+    rng = np.random.default_rng(10)
+    assert not any(tails_alarm(of_normal(150, rng, 5.0)) for _ in range(1000))
+    values = of_normal(150, rng).values
+    assert heavy_over_normal(3.7 * values) == pytest.approx(heavy_over_normal(values), abs=1e-6)
+
+
+def false_tails(steps, campaigns, rng):
+    """Probability that normal readings ever have heavy tails by so many contrasts, by drawing the
+    heavy-tailed ones and weighing each by the ratio at which it is stopped."""
+    total = 0.0
+    for campaign in range(campaigns):
+        z = rng.normal(size=(steps, 3))
+        z /= np.sqrt(rng.chisquare(8, (steps, 1 if campaign % 2 else 3)) / 6.0)
+        for read in range(10, steps + 1, 4):
+            if (ratio := heavy_over_normal(z[:read])) > 5.5:
+                total += math.exp(-ratio)
+                break
+    return total / campaigns
+
+
+def test_heavy_tails_are_false_in_a_quarter_of_a_percent_at_most():
+    assert false_tails(240, 60, np.random.default_rng(12)) < 0.0025
+
+
+LONE = np.array([[1.0, 0.0, 0.0]] + [[0.1, 0.0, 0.0]] * (POINTS - 1))
+
+
+def carried_on(seed, measurements=70, times=1.0, stated_mm=NOISE_MM, limit=None, **settings):
+    """A campaign on candidates one of which is far off; noise ``times`` 0.1 mm."""
+    rng = np.random.default_rng(seed)
+    errors = rng.permutation(LONE)
+    candidates = Candidates.with_equal_noise(np.full(POINTS, stated_mm))
+    campaign = SearchAndConfirm(measurements, **settings).begin(candidates)
+    noise_mm = times * NOISE_MM
+    carry_on(campaign, lambda row, _: errors[row] + noise_mm * rng.normal(size=3), limit=limit)
+    return campaign
+
+
+def said(seed, measurements=70, **given):
+    """What such a campaign states on all candidates."""
+    return carried_on(seed, measurements, **given).statements()[1]
+
+
+def scatter_within_blocks(campaign):
+    """Root of the pooled variance of readings of the same block, over the noise stated."""
+    of_block = defaultdict(list)
+    for block, (_, reading, _) in zip(
+        campaign.reading_blocks(), campaign.ledger.readings, strict=True
+    ):
+        of_block[block].append(reading)
+    apart = sum(((np.array(each) - np.mean(each, axis=0)) ** 2).sum() for each in of_block.values())
+    return math.sqrt(apart / sum(3 * (len(each) - 1) for each in of_block.values())) / NOISE_MM
+
+
+def test_without_knowing_the_noise_bounds_follow_the_noise_there_is():
+    """What is stated is only planned with: ten times as much, or a tenth, changes little."""
+    width = {}
+    for stated_mm in (0.03, 0.4):
+        found = [said(seed, 90, stated_mm=stated_mm, noise="estimated") for seed in range(8)]
+        assert sum(each.upper_mm < 1.0 or each.lower_mm > 1.0 for each in found) <= 2
+        width[stated_mm] = np.mean([each.upper_mm - each.lower_mm for each in found])
+        factor = np.mean([each.noise.numbers["factor"] for each in found])
+        assert factor * stated_mm == pytest.approx(NOISE_MM, rel=0.1)
+    assert max(width.values()) < 1.6 * min(width.values())
+
+
+def test_nothing_is_bounded_before_the_noise_is_estimated():
+    early, late = (said(1, 90, limit=limit, noise="estimated") for limit in (45, None))
+    assert early.withheld.code == "noise_unknown"
+    assert early.withheld.numbers["freedom"] < early.withheld.numbers["needed"]
+    assert np.isnan([early.lower_mm, early.value_mm, early.upper_mm]).tolist() == [
+        True,
+        False,
+        True,
+    ]
+    assert late.noise.code == "noise_estimated"
+
+
+def test_a_repeatability_test_before_serves_at_once():
+    early = said(1, 90, limit=40, noise="estimated", noise_freedom=60)
+    assert early.withheld is None
+    assert early.noise.code == "noise_tested"
+    known = said(1, 90, limit=40, noise_margin=1.0)
+    assert known.upper_mm < early.upper_mm < 1.1 * known.upper_mm
+    assert 0.6 * known.lower_mm < early.lower_mm < known.lower_mm
+    wrong = said(1, 90, times=2.0, noise="estimated", noise_freedom=60).withheld
+    assert wrong.code in ("scatter", "wrong_readings")
+
+
+def test_one_reading_of_each_pose_bounds_noise_and_error_together():
+    found = [said(seed, POINTS, noise="estimated", stated_mm=0.01) for seed in range(40)]
+    assert all(each.noise.code == "noise_bounded" for each in found)
+    assert sum(each.upper_mm < 1.0 for each in found) <= 5
+    assert sum(each.lower_mm > 1.0 for each in found) <= 5
+
+
+def test_noise_far_above_the_one_stated_is_said_and_nothing_bounded():
+    found = [said(seed, 160, times=1.6) for seed in range(20)]
+    alarmed = [each for each in found if each.withheld]
+    assert len(alarmed) >= 18
+    assert {each.withheld.code for each in alarmed} <= {"scatter", "wrong_readings"}
+    assert all(math.isnan(each.upper_mm) and each.value_mm > 0.5 for each in alarmed)
+
+
+def test_noise_is_taken_as_stated_or_as_repeats_show_it_where_that_is_more():
+    more = 0
+    for campaign in (carried_on(seed, 200, times=1.04) for seed in range(12)):
+        shown, told, ones = (
+            scatter_within_blocks(campaign),
+            campaign.statements()[1],
+            np.ones(POINTS),
+        )
+        upper_mm = campaign.looks.limits_mm(campaign.looks.boundary, ones).max()
+        lower_mm = campaign.average.bound_mm(ones)
+        if shown <= 1.0:
+            assert (told.noise, told.upper_mm, told.lower_mm) == (None, upper_mm, lower_mm)
+            continue
+        more += 1
+        assert told.noise.code == "noise_shown"
+        assert told.noise.numbers["factor"] == pytest.approx(shown)
+        assert told.upper_mm > upper_mm
+        assert told.lower_mm < lower_mm
+    assert 0 < more < 12
+
+
+@pytest.mark.parametrize("noise", ["known", "estimated"])
+def test_a_bound_on_a_future_visit_is_that_on_the_mean_and_the_arms_own_scatter(noise):
+    of_mean = said(4, 90, noise=noise)
+    visit = said(4, 90, noise=noise, error_of="visit", arm_mm=0.05)
+    assert visit.error_of == "visit"
+    for name in ("lower_mm", "value_mm", "upper_mm"):
+        assert getattr(visit, name) == pytest.approx(visit_mm(getattr(of_mean, name), 0.05))
+    wide = said(4, 90, noise=noise, error_of="visit")
+    assert wide.upper_mm > visit.upper_mm
+    assert wide.upper_mm > visit_mm(of_mean.upper_mm, 0.9 * NOISE_MM)
+
+
+def test_the_worst_pose_of_a_noisy_arm_is_bounded_with_its_noise_estimated():
+    truth_mm = visit_mm(1.0, NOISE_MM)
+    found = [said(seed, 90, noise="estimated", error_of="visit") for seed in range(40)]
+    assert sum(each.upper_mm < truth_mm for each in found) <= 5
+    assert sum(each.lower_mm > truth_mm for each in found) <= 5
+
+
+def test_what_no_repeat_sees_widens_both_bounds():
+    without, within = said(5, 90), said(5, 90, allowance_mm=0.03)
+    assert within.upper_mm == pytest.approx(without.upper_mm + 0.03)
+    assert within.lower_mm == pytest.approx(without.lower_mm - 0.03)
+    assert within.value_mm == without.value_mm
+
+
+def test_settings_of_the_noise_that_cannot_be_are_all_told_at_once():
+    with pytest.raises(InputError) as told:
+        SearchAndConfirm(90, noise="estimated", noise_freedom=20, arm_mm=0.1)
+    for part in (
+        "noise_freedom",
+        "at least 30; 60 are asked for",
+        "arm_mm",
+        "error_of is not visit",
+    ):
+        assert part in str(told.value)
+    with pytest.raises(InputError, match="noise_freedom"):
+        SearchAndConfirm(90, noise_freedom=60)
+    with pytest.raises(InputError, match="arm_mm"):
+        SearchAndConfirm(90, error_of="visit", arm_mm=-0.1)
+
+
+def test_limits_of_a_factor_are_those_of_a_chi_square_and_a_noisy_pose_keeps_its_own():
+    assert chi2.cdf(60 / factor_limit(60, 0.98) ** 2, 60) == pytest.approx(0.02)
+    assert factor_limit(math.inf, 0.98) == 1.0
+    rng = np.random.default_rng(5)
+    rows = np.repeat([0, 1, 2], [20, 20, 4])
+    values = rng.normal(size=(44, 3)) * np.array([1.0, 2.0, 2.0])[rows, None]
+    value, own = estimated_factor(of_values(values, rows), 60, 4)
+    assert own[1] == pytest.approx(np.sqrt(np.mean(values[20:40] ** 2)))
+    assert own[[2, 3]].tolist() == [value] * 2
+    assert own[0] >= value
+
+
+@pytest.mark.parametrize("stretch", [np.eye(3), np.diag([4.0, 1.0, 0.25])])
+def test_noise_that_few_readings_cannot_check_is_taken_larger_in_both_bounds(stretch):
+    chance = np.random.default_rng(21)
+    readings = chance.normal(size=(POINTS, 3))
+    covariance = np.tile(0.01 * stretch, (POINTS, 1, 1))
+    found = []
+    for margin, stated in ((1.2, covariance), (1.0, 1.44 * covariance)):
+        campaign = SearchAndConfirm(POINTS, noise_margin=margin).begin(Candidates(stated))
+        carry_on(campaign, lambda row, _: readings[row])
+        found.append(campaign.statements()[0])
+    assert found[0].noise.numbers == {"margin": 1.2}
+    assert found[0].lower_mm == pytest.approx(found[1].lower_mm, rel=1e-9)
+    assert found[0].upper_mm == pytest.approx(found[1].upper_mm, rel=1e-9)
+
+
+@pytest.mark.parametrize("known", [True, False], ids=["each its own", "all the same"])
+def test_bounds_hold_where_the_instrument_sees_worst_if_it_is_told_so(known):
+    """Noise up to ten times as large across the beam as along it; the largest error across."""
+    points, budget, rng = 12, 20, np.random.default_rng(3)
+    beam = rng.normal(size=(points, 3))
+    beam /= np.linalg.norm(beam, axis=1)[:, None]
+    across, own = np.linspace(0.05, 0.3, points)[:, None, None], beam[:, :, None] * beam[:, None, :]
+    covariance = across**2 * (np.eye(3) - own) + 0.03**2 * own
+    errors = 0.02 * rng.normal(size=(points, 3))
+    side = np.cross(beam[-1], (1.0, 0.0, 0.0))
+    errors[-1] = 1.5 * side / np.linalg.norm(side)
+    same = np.tile(np.eye(3) * np.trace(covariance.mean(axis=0)) / 3.0, (points, 1, 1))
+    told, root, held = covariance if known else same, np.linalg.cholesky(covariance), np.zeros(2)
+    for number in range(40):
+        order = np.random.default_rng(number).permutation(points)
+        campaign = SearchAndConfirm(budget, noise_margin=1.0).begin(Candidates(told[order]))
+        carry_on(campaign, noisy(errors[order], root[order], budget, 8, number))
+        about = campaign.statements()[1]
+        held += about.upper_mm >= 1.5, about.lower_mm <= 1.5
+    assert held.min() >= 36 if known else held.min() < 32
+
+
+COUNTS = (1, 3, 5, 7, 9, 11, 14, 18, 22, 28, 35, 44, 55, 69, 86)
+BEYOND = 60
+
+
+def ledger_of(seed, factor=1.0, wrong=None):
+    """Visit 40 points, then read again whatever looks largest; ``wrong``: {number: shift}."""
+    rng = np.random.default_rng(seed)
+    error, root = rng.normal(size=(POINTS, 3)), np.diag([1.0, 0.5, 2.0])
+    ledger, blocks = Ledger(Candidates(np.tile(root @ root, (POINTS, 1, 1)))), []
+
+    def read(point, block):
+        blocks.append(block)
+        value = error[point] + factor * root @ rng.normal(size=3)
+        ledger.record(point, value + (wrong or {}).get(len(blocks), 0.0))
+
+    for point in range(POINTS):
+        read(point, -1 - point)
+    while True:
+        point = int(np.argmax(np.linalg.norm(ledger.mean_mm, axis=1)))
+        count = ledger.count.item(point)
+        more = COUNTS[COUNTS.index(count) + 1] - count
+        if len(blocks) + more > POINTS + BEYOND:
+            return ledger, blocks
+        for _ in range(more):
+            read(point, len(blocks))
+
+
+def named(seed, *noise, false_alarm=0.002, **course):
+    return suspicious_readings(
+        *ledger_of(seed, **course), COUNTS, BEYOND, *noise, false_alarm=false_alarm
+    )
+
+
+@pytest.mark.parametrize(("factor", "noise"), [(1.0, ()), (1.3, (1.3,)), (1.0, (1.0, 60.0))])
+def test_nothing_is_named_where_all_is_noise_although_points_were_chosen_for_being_large(
+    factor, noise
+):
+    alarms = sum(bool(named(s, *noise, false_alarm=0.2, factor=factor)) for s in range(50))
+    assert alarms <= 0.2 * 50 + 3.0 * math.sqrt(50 * 0.2 * 0.8)
+    # Shared among readings of which not all are taken, but no wider than that.
+    assert len(noise) > 1 or alarms >= 2
+
+
+@pytest.mark.parametrize("number", [13, 60, 75, 90])
+def test_a_reading_far_off_is_named_by_its_number_and_its_point(number):
+    """Number 13 is the first at its point, which later ones deny."""
+    ledger, blocks = ledger_of(7, wrong={number: (20.0, 0.0, 0.0)})
+    (found,) = suspicious_readings(ledger, blocks, COUNTS, BEYOND)
+    assert (found.number, found.row) == (number, ledger.readings[number - 1][0])
+    assert found.deviations > 5.0
+
+
+def test_noise_estimated_from_few_readings_makes_suspicion_harder():
+    wrong = {75: (7.0, 0.0, 0.0)}
+    assert named(7, wrong=wrong)
+    assert not named(7, 1.0, 8.0, wrong=wrong)
