@@ -31,7 +31,7 @@ def arm():
 def test_every_closed_form_solution_reaches_the_pose_and_one_is_the_start(arm, seed):
     q = np.random.default_rng(seed).uniform(LOW, HIGH)
     target = oracle.dh_forward(oracle.MH180, q)
-    solutions, reached = closed_form.solve(arm, as_pose(target))
+    solutions, reached = arm.solve(as_pose(target))
     for solution in solutions[0][reached[0]]:
         gap = brute.pose_error(target, oracle.dh_forward(oracle.MH180, solution))
         assert np.abs(gap[:3]).max() < 1e-6
@@ -45,7 +45,7 @@ def test_every_closed_form_solution_reaches_the_pose_and_one_is_the_start(arm, s
 def test_closed_form_finds_all_that_brute_force_finds(arm, seed):
     rng = np.random.default_rng(seed)
     target = oracle.dh_forward(oracle.MH180, rng.uniform(LOW, HIGH))
-    solutions, reached = closed_form.solve(arm, as_pose(target))
+    solutions, reached = arm.solve(as_pose(target))
     found = brute.all_solutions(
         lambda q: brute.dh_step(oracle.MH180, q), target, rng.uniform(-np.pi, np.pi, (90, 6))
     )

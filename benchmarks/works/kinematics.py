@@ -195,14 +195,13 @@ def _pinocchio_slopes(pin, q_rad: np.ndarray) -> Callable[[], object]:
 @functools.cache
 def goals(smoke: bool):
     """Rotations and positions to reach, and which branches (n, 8) the nominal arm has there."""
-    from kinacc.kinematics import dh, inverse, robot
+    from kinacc.kinematics import dh, robot
     from kinacc.kinematics.inverse import closed_form
 
     model, q_rad = problem(smoke)
     pose = dh.forward(model, q_rad[: 50 if smoke else GOALS])
     arm = robot.load("mh180")
-    form = inverse.closed_form_of(arm)
-    start, found = form.solve(form.arm, pose, inverse.branches_of(arm), closed_form.Start())
+    start, found = closed_form.recognise(arm.dh).solve(pose, closed_form.Start())
     slopes = dh.joint_jacobian(model, np.nan_to_num(start).reshape(-1, 6))
     slopes[:, 3:] *= 1000.0
     condition = np.linalg.cond(slopes).reshape(found.shape)

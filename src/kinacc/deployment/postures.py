@@ -15,8 +15,7 @@ from kinacc.geometry import IDENTITY, Pose, compose, log_so3
 from kinacc.kinematics import dh
 from kinacc.kinematics.inverse import few_axes, limits, newton
 from kinacc.kinematics.inverse import solve as all_branches
-from kinacc.kinematics.inverse.onto_model import Functions, functions_of
-from kinacc.kinematics.model import JointState
+from kinacc.kinematics.model import ErrorModel, JointState
 from kinacc.kinematics.region import points
 
 POSITION_TOLERANCE_MM = newton.POSITION_TOLERANCE_MM
@@ -167,7 +166,7 @@ class Goals:
         like = self.like.select(rows)
         kinds = [np.nan_to_num(each) for each in (like.s, like.payload) if each is not None]
         if not kinds or self.model.table is not None:
-            return self._onto(functions_of(self.model), start, rows)
+            return self._onto(self.model, start, rows, None)
         # Directions and payloads differ by row, and a refinement drops rows as they converge.
         found = np.empty_like(start)
         _, first, group = np.unique(
@@ -175,17 +174,18 @@ class Goals:
         )
         for number, one in enumerate(first):
             own = np.flatnonzero(group.ravel() == number)
-            functions = functions_of(self.model, like.select(slice(one, one + 1)))
-            found[own] = self._onto(functions, start[own], rows[own])
+            state = like.select(slice(one, one + 1))
+            found[own] = self._onto(self.model, start[own], rows[own], state)
         return found
 
-    def _onto(self, of: Functions, start: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    def _onto(
+        self, model: ErrorModel, start: np.ndarray, rows: np.ndarray, like: JointState | None
+    ) -> np.ndarray:
         """Joints (m, k) refined from ``start`` onto the goals ``rows`` (m,), reached or not."""
         wanted = Pose(self.wanted.rotation[rows], self.wanted.position_mm[rows])
         if self.has_few_axes:
-            slides = self.calibration.robot.dh.prismatic
-            return few_axes.refine(of.forward, of.jacobian, wanted, self.carried, start, slides)
-        return newton.refine(of.forward, of.jacobian, wanted, start).q_rad
+            return few_axes.refine(model, wanted, self.carried, start, like)
+        return newton.refine(model, wanted, start, like).q_rad
 
     def _left(self, q_dh: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """What is left, (m,) mm and (m,) rad, at DH joints (m, k) of goals ``rows``."""
@@ -210,9 +210,8 @@ class Goals:
         share = points("sobol", count, robot.dh.joints)
         starts = robot.dh_joints(low + share * (high - low))
         found = np.full((len(rows), count, robot.dh.joints), np.nan)
-        functions = functions_of(self.plain)
         for number, start in enumerate(starts):
-            q_dh = self._onto(functions, np.tile(start, (len(rows), 1)), rows)
+            q_dh = self._onto(self.plain, np.tile(start, (len(rows), 1)), rows, None)
             at = compose(dh.forward(self.plain, q_dh), self.carried)
             off = np.linalg.norm(at.position_mm - self.wanted.position_mm[rows], axis=1)
             reached = off <= _NEAR_START_MM

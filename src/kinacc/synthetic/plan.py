@@ -20,7 +20,7 @@ TURN_DEG = 50.0
 CORNER_SHARE = 0.5
 CORNER_DEG = (43.0, TURN_DEG)
 DOWN = Attitude(rotation_x(np.pi))
-BRANCHES = ("front-up-noflip", "front-up-flip")
+BRANCHES = 2  # the first: facing the space, elbow up, either wrist
 RUN_H = 6.0
 _PLAN_SEED = 180
 _BLOCK = 256
@@ -35,8 +35,8 @@ def configurations(robot: Robot, poses: int, attitude: Attitude = DOWN) -> np.nd
     form = closed_form.recognise(robot.dh)
     found = np.empty((0, 6))
     while len(found) < poses:
-        q_rad, reached = closed_form.solve(form, _poses(rng, attitude), BRANCHES)
-        rows, branch = np.arange(_BLOCK), rng.integers(0, len(BRANCHES), _BLOCK)
+        q_rad, reached = form.solve(_poses(rng, attitude))
+        rows, branch = np.arange(_BLOCK), rng.integers(0, BRANCHES, _BLOCK)
         chosen, good = q_rad[rows, branch], reached[rows, branch]
         good &= np.all((chosen >= robot.q_min_rad) & (chosen <= robot.q_max_rad), axis=1)
         found = np.vstack([found, chosen[good]])

@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from kinacc.geometry import Pose
-from kinacc.kinematics import dh, inverse
+from kinacc.kinematics import inverse
 from kinacc.kinematics.dh import DHModel
-from kinacc.kinematics.inverse import limits, newton, numeric
+from kinacc.kinematics.inverse import grid_of, limits, newton
+from kinacc.kinematics.model import ErrorModel, JointState
 from kinacc.kinematics.robot import Robot
 
 
@@ -114,7 +115,7 @@ def joints_within(arm: Robot, count: int, seed: int = 6) -> np.ndarray:
     high = np.where(arm.dh.prismatic, high, np.minimum(high, np.pi))
     q = rng.uniform(low, high, (count, arm.dh.joints))
     if arm.dh.joints == 7:
-        q[:, 0] = rng.choice(numeric.grid_of(arm), count)
+        q[:, 0] = rng.choice(grid_of(arm), count)
     return q
 
 
@@ -129,10 +130,10 @@ def pick(pose: Pose, rows) -> Pose:
     return Pose(pose.rotation[rows], pose.position_mm[rows])
 
 
-def assert_verified(model: DHModel, pose: Pose, solved: inverse.Solutions) -> None:
+def assert_verified(model: ErrorModel, pose: Pose, solved: inverse.Solutions) -> None:
     """Every joint given returns to its pose within 1e-6 mm and 1e-9 rad."""
     rows, columns = np.nonzero(np.isfinite(solved.q_rad[..., 0]))
-    error = newton.pose_error(pick(pose, rows), dh.forward(model, solved.q_rad[rows, columns]))
+    error = newton.pose_error(pick(pose, rows), model.pose(JointState(solved.q_rad[rows, columns])))
     assert len(rows)
     assert np.linalg.norm(error[:, :3], axis=1).max() < 1e-6
     assert np.linalg.norm(error[:, 3:], axis=1).max() < 1e-9

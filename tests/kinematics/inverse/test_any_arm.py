@@ -9,12 +9,20 @@ import numpy as np
 import pytest
 
 from kinacc.errors import InputError
-from kinacc.geometry import Pose
+from kinacc.geometry import Pose, exp_so3
 from kinacc.kinematics import dh, inverse, robot, vec
-from kinacc.kinematics.inverse import Status, kernels, limits, numeric, search
-from kinacc.kinematics.inverse.chain_rows import rows_of, targets_of
+from kinacc.kinematics.inverse import Status, closed_form, few_axes, limits, newton, postures
+from kinacc.kinematics.model import JointState
 
-UR10, IIWA = robot.load("ur10"), robot.load("iiwa14")
+MH180, UR10, IIWA = (robot.load(name) for name in ("mh180", "ur10", "iiwa14"))
+FANUC = robot.load("fanuc_r2000ic_165f").dh
+TABLE_II = dh.DHModel(  # of the paper, q5 offset read as -3.141
+    [0.001, -1.568, 0.001, -3.142, -3.141, 0.002],
+    [-1.157, -0.898, 0.066, -1226.154, -0.104, -224.698],
+    [323.453, 1151.356, 299.501, 0.029, 0.026, 0.028],
+    [-1.573, 3.140, -1.571, -1.571, -1.571, 3.142],
+    np.zeros(6),
+)
 SEARCHED = [
     arms.OFFSET_WRIST,
     arms.GENERAL,
@@ -26,36 +34,81 @@ SEARCHED = [
 ]
 
 
-def few(arm: robot.Robot) -> int:
-    return 12 if arm.dh.joints == 7 else 200
+def sideways(model: dh.DHModel) -> dh.DHModel:
+    """The arm with a shoulder offset and a tilted, shifted flange."""
+    return replace(
+        model,
+        d_mm=model.d_mm + np.array([0, 80, 25, 0, 0, 0]),
+        a_mm=model.a_mm + np.array([0, 0, 0, 0, 0, 40]),
+        beta_rad=np.array([0, 0, 0, 0, 0, 0.3]),
+    )
 
 
-@pytest.mark.parametrize("arm", [UR10, IIWA, *SEARCHED], ids=lambda arm: arm.name)
-def test_what_is_found_is_verified_and_the_start_is_among_it(arm):
-    q = arms.joints_within(arm, few(arm))
-    pose = dh.forward(arm.dh, q)
-    solved = inverse.solve(arm, arm.dh, pose)
+def wavy(arm: robot.Robot, q: np.ndarray) -> vec.VECModel:
+    """A VEC model of the calibrated arm, over the range of joints (n, k)."""
+    plain = vec.without_errors(arms.calibrated(arm), q.min(axis=0), q.max(axis=0), 3)
+    noise = np.random.default_rng(2).normal(size=plain.coefficients.shape)
+    return replace(plain, coefficients=noise * np.array([0.1] * 3 + [1e-4] * 3)[:, None])
+
+
+@pytest.mark.parametrize("model", [MH180.dh, FANUC, UR10.dh, *map(sideways, (MH180.dh, FANUC))])
+def test_closed_forms_return_to_the_pose_and_name_branches_by_posture(model):
+    q = np.random.default_rng(5).uniform(-np.pi, np.pi, (1000, 6))
+    pose = dh.forward(model, q)
+    found, reached = closed_form.recognise(model).solve(pose)
+    rows, columns = np.nonzero(reached)
+    back = dh.forward(model, found[rows, columns])
+    assert np.abs(back.position_mm - pose.position_mm[rows]).max() < 1e-8
+    assert np.abs(back.rotation - pose.rotation[rows]).max() < 1e-11
+    gap = found - q[:, None]
+    gap = np.abs(gap - 2 * np.pi * np.rint(gap / (2 * np.pi))).max(axis=2)
+    nearest = np.where(reached, gap, np.inf).min(axis=1)
+    assert np.quantile(nearest, 0.99) < 1e-9
+    assert nearest.max() < 1e-6  # beside a singular posture angles lose digits, the pose does not
+    if closed_form.recognise(model).parallel:  # whose elbow is bent towards axis 4
+        return
+    named = postures.classes_of(model, found[rows, columns])
+    assert (named == columns).mean() > 0.999
+
+
+def test_no_closed_form_is_taken_where_none_applies():
+    for arm in (arms.OFFSET_WRIST, arms.GENERAL, arms.STANFORD, arms.FIVE, IIWA):
+        assert closed_form.recognise(arm.dh) is None
+    assert closed_form.recognise(arms.calibrated(MH180)) is None
+    assert closed_form.recognise_seven(arms.OFFSET_ELBOW.dh) is None
+
+
+@pytest.mark.parametrize("kind", ["nominal", "calibrated", "vec"])
+@pytest.mark.parametrize("arm", [MH180, UR10, IIWA, *SEARCHED], ids=lambda arm: arm.name)
+def test_what_is_found_is_verified_and_own_postures_are_among_it(arm, kind):
+    count = (12 if arm.dh.joints == 7 else 200) // (2 if kind == "vec" else 1)
+    q = arms.joints_within(arm, count)
+    made = {"nominal": arm.dh, "calibrated": arms.calibrated(arm), "vec": wavy(arm, q)}
+    model = made[kind]
+    pose = model.pose(JointState(q))
+    solved = inverse.solve(arm, model, pose)
     assert solved.branches == inverse.branches_of(arm)
     assert len(set(solved.branches)) == len(solved.branches)
-    arms.assert_verified(arm.dh, pose, solved)
-    assert arms.share_missed(arm, q, solved) <= 0.01
+    arms.assert_verified(model, pose, solved)
+    assert arms.share_missed(arm, q, solved) <= 0.005
     inside = solved.status == Status.FOUND
     assert limits.within_limits(arm, solved.q_rad[inside]).all()
     outside = solved.status == Status.OUTSIDE_LIMITS
     assert not limits.within_limits(arm, solved.q_rad[outside]).any()
-    assert not (solved.status == Status.NOT_CONVERGED).any()
+    assert kind != "nominal" or not (solved.status == Status.NOT_CONVERGED).any()
 
 
-@pytest.mark.parametrize(
-    "arm", [UR10, IIWA, arms.OFFSET_WRIST, arms.STANFORD], ids=lambda arm: arm.name
-)
-def test_calibrated_arms_are_found_too(arm):
-    model = arms.calibrated(arm)
-    q = arms.joints_within(arm, few(arm))
+@pytest.mark.parametrize("where", ["wrist", "elbow"])
+def test_few_branches_are_dropped_near_singular_postures(where):
+    model = TABLE_II
+    q = np.random.default_rng(7).uniform(MH180.q_min_rad, MH180.q_max_rad, (2000, 6))
+    aside = np.random.default_rng(8).uniform(-0.02, 0.02, 2000)
+    q[:, 4 if where == "wrist" else 2] = aside + (0 if where == "wrist" else np.arctan2(1225, 300))
     pose = dh.forward(model, q)
-    solved = inverse.solve(arm, model, pose)
+    solved = inverse.solve(MH180, model, pose)
     arms.assert_verified(model, pose, solved)
-    assert arms.share_missed(arm, q, solved) <= 0.01
+    assert arms.share_missed(MH180, q, solved) < 0.01
+    assert np.mean(solved.status == Status.NOT_CONVERGED) < 0.02
 
 
 @pytest.mark.parametrize("arm", [UR10, arms.OFFSET_WRIST, arms.GENERAL], ids=lambda arm: arm.name)
@@ -63,34 +116,29 @@ def test_a_dense_multistart_finds_nothing_more(arm):
     q = arms.joints_within(arm, 6, seed=3)
     pose = dh.forward(arm.dh, q)
     solved = inverse.solve(arm, arm.dh, pose)
-    rows, targets = rows_of(arm.dh), targets_of(pose)
     for row in range(len(q)):
-        start = np.random.default_rng(row).uniform(-np.pi, np.pi, (2000, 6))
-        goal = np.repeat(targets[[row]], len(start), axis=0)
-        kernels.refine(rows, goal, start, 60, 1e-9)
-        there = dh.forward(arm.dh, start)
-        hit = np.abs(there.position_mm - pose.position_mm[row]).max(axis=1) < 1e-7
-        hit &= np.abs(there.rotation - pose.rotation[row]).max(axis=(1, 2)) < 1e-9
+        start = np.random.default_rng(row).uniform(-np.pi, np.pi, (1000, 6))
+        found = newton.refine(arm.dh, arms.pick(pose, np.full(1000, row)), start)
         listed = solved.q_rad[row][np.isfinite(solved.q_rad[row, :, 0])]
-        distance = arms.apart(arm, start[hit][:, None], listed[None])
-        assert hit.sum() > 50
+        distance = arms.apart(arm, found.q_rad[found.converged][:, None], listed[None])
+        assert found.converged.sum() > 50
         assert distance.min(axis=1).max() < 1e-4
         assert np.unique(distance.argmin(axis=1)).size == len(listed)
 
 
 def test_the_search_agrees_with_the_closed_form_of_parallel_axes():
-    pose = dh.forward(UR10.dh, arms.joints_within(UR10, 300, seed=8))
-    closed = inverse.solve(UR10, UR10.dh, pose)
-    table = search.table_of(UR10.dh, *limits.dh_limits(UR10))
-    found = search.search(table, pose)
-    assert (found.error_mm[np.isfinite(found.error_mm)] < 1e-6).all()
-    for row in range(300):
-        listed = closed.q_rad[row][np.isfinite(closed.q_rad[row, :, 0])]
-        mine = found.q_rad[row][np.isfinite(found.error_mm[row])]
-        distance = arms.apart(UR10, listed[:, None], mine[None])
+    pose = dh.forward(UR10.dh, arms.joints_within(UR10, 200, seed=8))
+    closed = inverse.solve(UR10, UR10.dh, pose).q_rad
+    table = postures.table_of(UR10.dh, *limits.dh_limits(UR10))
+    rows, q_rad, error = postures.search(table, pose, 0.0)
+    assert (error < 1e-6).all()
+    lost = 0
+    for row in range(200):
+        listed = closed[row][np.isfinite(closed[row, :, 0])]
+        distance = arms.apart(UR10, listed[:, None], q_rad[rows == row][None])
         assert distance.min(axis=0).max() < 1e-4  # the search invents nothing
-        if len(mine) != len(listed):  # and misses only beside a singular wrist
-            assert np.abs(np.sin(listed[:, 4])).min() < 0.02
+        lost += np.sum(distance.min(axis=1) > 1e-4)
+    assert lost <= 0.002 * np.isfinite(closed[..., 0]).sum()
 
 
 @pytest.mark.parametrize("arm", [UR10, arms.OFFSET_WRIST, arms.STANFORD], ids=lambda a: a.name)
@@ -102,7 +150,7 @@ def test_branches_do_not_depend_on_the_batch_and_follow_a_path(arm):
     alone = inverse.solve(arm, arm.dh, arms.pick(pose, [7]))
     assert np.array_equal(alone.status[0], whole.status[7])
     found = np.isfinite(alone.q_rad[0])
-    assert np.abs(alone.q_rad[0] - whole.q_rad[7])[found].max() < 1e-9
+    assert np.abs(alone.q_rad[0] - whole.q_rad[7])[found].max() < 1e-7
     near = arms.apart(arm, whole.q_rad, q[:, None])
     column = np.nanargmin(np.where(np.isnan(near), np.inf, near), axis=1)
     assert (column == column[0]).all()
@@ -115,7 +163,7 @@ def test_some_branches_are_that_part_of_all():
     part = inverse.solve(UR10, UR10.dh, pose, chosen)
     columns = [everything.branches.index(name) for name in chosen]
     assert np.array_equal(part.q_rad, everything.q_rad[:, columns], equal_nan=True)
-    with pytest.raises(InputError, match="has no branch front"):
+    with pytest.raises(InputError):
         inverse.solve(UR10, UR10.dh, pose, ("front",))
 
 
@@ -124,99 +172,79 @@ def test_the_freedom_of_seven_axes_is_sampled_where_it_is_asked_for():
     q = arms.joints_within(IIWA, 5)
     q[:, 0] = grid[1]
     solved = inverse.solve(IIWA, IIWA.dh, dh.forward(IIWA.dh, q), grid_rad=grid)
-    assert solved.branches[0].startswith("q1=-20deg ")
     assert {name.split()[0] for name in solved.branches} == {"q1=-20deg", "q1=35deg"}
     for column, name in enumerate(solved.branches):
         first = solved.q_rad[:, column, 0]
         value = grid[0] if name.startswith("q1=-20") else grid[1]
         assert np.allclose(first[np.isfinite(first)], value, atol=0)
     assert arms.share_missed(IIWA, q, solved) == 0.0
-    assert np.rad2deg(numeric.grid_of(IIWA)) == pytest.approx(np.arange(-150, 151, 30))
+    assert np.rad2deg(inverse.grid_of(IIWA)) == pytest.approx(np.arange(-150, 151, 30))
 
 
 def test_coupled_joints_keep_the_limits_of_what_is_reported():
     coupling = np.eye(6)
-    coupling[2, 1] = 1.0
+    coupling[2, 1] = -1.0  # joint 3 is reported against the horizontal
     arm = replace(arms.OFFSET_WRIST, joint_map=coupling, q_min_rad=np.full(6, -1.0))
     solved = inverse.solve(arm, arm.dh, dh.forward(arm.dh, arms.joints_within(arm, 40)))
-    inside = solved.status == Status.FOUND
-    reported = limits.reported_joints(arm, solved.q_rad[inside])
+    reported = limits.reported_joints(arm, solved.q_rad[solved.status == Status.FOUND])
     assert limits.within(reported, arm.q_min_rad, arm.q_max_rad).all()
+    q = np.random.default_rng(1).uniform(-1.0, 1.0, (5, 6))
+    assert np.allclose(limits.reported_joints(arm, arm.dh_joints(q)), q)
+    assert limits.uncoupled(arm).tolist() == [True, False, False, True, True, True]
+    assert np.isinf(limits.dh_limits(arm)[0][1:3]).all()
 
 
-@pytest.mark.parametrize("arm", [UR10, arms.STANFORD], ids=lambda arm: arm.name)
-def test_a_vec_model_is_inverted_over_its_range(arm):
-    low, high = limits.dh_limits(arm)
-    low, high = np.maximum(low, np.where(arm.dh.prismatic, low, -3.0)), np.minimum(high, 2000.0)
-    high = np.where(arm.dh.prismatic, high, np.minimum(high, 3.0))
-    plain = vec.without_errors(arm.dh, low, high, 3)
-    noise = np.random.default_rng(2).normal(size=plain.coefficients.shape)
-    model = replace(plain, coefficients=noise * np.array([0.1] * 3 + [1e-4] * 3)[:, None])
-    q = np.random.default_rng(3).uniform(low, high, (60, 6))
+def test_solutions_outside_the_fitted_range_say_so():
+    q = arms.joints_within(MH180, 300)
+    model = wavy(MH180, q)
+    fitted = np.deg2rad([-60.0] * 3 + [-180.0] * 3), np.deg2rad([60.0] * 3 + [180.0] * 3)
     pose = vec.pose(model, q)
-    solved = inverse.solve(arm, model, pose, fitted_range_rad=(low, high))
-    rows, columns = np.nonzero(solved.status == Status.FOUND)
-    reached = vec.pose(model, solved.q_rad[rows, columns])
-    assert np.abs(reached.position_mm - pose.position_mm[rows]).max() < 1e-6
-    assert limits.within(solved.q_rad[rows, columns], low, high).all()
-    assert arms.share_missed(arm, q, solved) <= 0.02
+    solved = inverse.solve(MH180, model, pose, fitted_range_rad=fitted)
+    for status, inside in ((Status.FOUND, True), (Status.OUTSIDE_RANGE, False)):
+        joints = solved.q_rad[solved.status == status]
+        assert len(joints)
+        assert limits.within_limits(MH180, joints).all()
+        assert (limits.within(joints, *fitted) == inside).all()
 
 
 def test_out_of_reach_is_said():
     pose = Pose(np.eye(3)[None], np.array([[9000.0, 0.0, 0.0]]))
-    for arm in (UR10, IIWA, arms.OFFSET_WRIST, arms.STANFORD):
+    for arm in (MH180, UR10, IIWA, arms.OFFSET_WRIST, arms.STANFORD):
         solved = inverse.solve(arm, arm.dh, pose)
         assert (solved.status == Status.OUT_OF_REACH).all()
         assert np.isnan(solved.q_rad).all()
+    refined = newton.refine(MH180.dh, pose, np.zeros((1, 6)))
+    assert not refined.converged[0]
+    assert refined.position_error_mm[0] > 1000
+
+
+def test_a_few_axes_put_the_point_where_it_is_wanted():
+    carried = Pose(np.eye(3), np.array([10.0, -20.0, 120.0]))
+    for arm in (arms.SCARA, arms.FIVE):
+        q, model = arms.joints_within(arm, 20), arms.calibrated(arm)
+        pose = dh.forward(arm.dh, q)
+        wanted = Pose(
+            pose.rotation, pose.position_mm + (pose.rotation @ carried.position_mm[:, None])[..., 0]
+        )
+        found = dh.forward(model, few_axes.refine(model, wanted, carried, q))
+        point = found.position_mm + (found.rotation @ carried.position_mm[:, None])[..., 0]
+        near = np.linalg.norm(point - wanted.position_mm, axis=1) < 1e-6
+        assert near.mean() > 0.8  # others are out of reach
 
 
 def test_machining_branches_face_the_work_with_the_elbow_up():
-    assert inverse.machining_branches(UR10) == ("front-up-noflip", "front-up-flip")
-    assert inverse.machining_branches(arms.OFFSET_WRIST)[:2] == (
-        "front-up-noflip",
-        "front-up-flip",
-    )
+    up = ("front-up-noflip", "front-up-flip")
+    assert inverse.machining_branches(UR10) == up
+    assert inverse.machining_branches(arms.OFFSET_WRIST)[:2] == up
     assert inverse.machining_branches(IIWA) == inverse.branches_of(IIWA)
-
-
-def test_an_elbow_is_up_above_the_floor_even_where_axis_1_points_down():
     turned = Pose(np.diag([1.0, -1.0, -1.0]), np.zeros(3))
-    arm = replace(robot.load("mh180"), base=turned)
-    q = np.deg2rad([[10.0, 20.0, -35.0, 30.0, 60.0, 20.0], [10.0, 60.0, -120.0, 30.0, 60.0, 20.0]])
-    for joints in q:
-        frames = dh.chain(arm.dh, joints[None]).position_mm[0]
-        shoulder, elbow, wrist = (frames[row, [0, 2]] for row in (1, 2, 4))
-        reach = wrist - shoulder
-        aside = reach[0] * (elbow - shoulder)[1] - reach[1] * (elbow - shoulder)[0]
-        solved = inverse.solve(arm, arm.dh, dh.forward(arm.dh, joints[None]))
-        near = np.linalg.norm(np.nan_to_num(solved.q_rad[0], nan=9.0) - joints, axis=1).argmin()
-        worked_in = solved.branches[near] in inverse.machining_branches(arm)
-        assert worked_in == (aside < 0.0)  # above the line to the wrist once turned over
+    assert inverse.machining_branches(replace(MH180, base=turned))[0] == "front-down-noflip"
 
 
-# --- compiled and plain ---------------------------------------------------------------------------
-
-
-def test_compiled_steps_are_those_of_the_models():
-    for arm in (arms.GENERAL, arms.STANFORD):
-        q = arms.joints_within(arm, 5)
-        frames = dh.chain(arm.dh, q)
-        rows = rows_of(arm.dh)
-        axes, origins, end = np.empty((6, 3)), np.empty((6, 3)), np.empty((3, 4))
-        for row in range(5):
-            kernels.end_of(rows, q[row], axes, origins, end)
-            assert np.allclose(end[:, 3], frames.position_mm[row, -1], atol=1e-9)
-            assert np.allclose(end[:, :3], frames.rotation[row, -1], atol=1e-12)
-            assert np.allclose(axes, frames.rotation[row, :-1, :, 2], atol=1e-12)
-            assert np.allclose(origins, frames.position_mm[row, :-1], atol=1e-9)
-
-
-def test_compiled_refinement_is_the_plain_one():
-    arm = arms.STANFORD
-    q = arms.joints_within(arm, 3)
-    targets, rows = targets_of(dh.forward(arm.dh, q)), rows_of(arm.dh)
-    fast, plain = q + 0.05, q + 0.05
-    kernels.refine(rows, targets, fast, 40, 1e-9)
-    kernels.refine.py_func(rows, targets, plain, 40, 1e-9)
-    assert np.allclose(fast, plain, atol=1e-6)
-    assert arms.apart(arm, fast, q).max() < 1e-6
+def test_rotation_error_is_the_rotation_vector_even_half_a_turn_away():
+    rng = np.random.default_rng(0)
+    vector = rng.normal(size=(200, 3))
+    vector *= (np.linspace(0, 3.14, 200) / np.linalg.norm(vector, axis=1))[:, None]
+    start, zero = exp_so3(rng.normal(size=(200, 3))), np.zeros((200, 3))
+    error = newton.pose_error(Pose(exp_so3(vector) @ start, zero), Pose(start, zero))
+    assert np.abs(error[:, 3:] - vector).max() < 1e-9

@@ -1,26 +1,18 @@
-"""Joint angles of wanted flange poses: closed forms, search, any model, limits and turns."""
+"""Joint angles of wanted flange poses: closed forms, a table of postures, any model, limits."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
 from enum import IntEnum
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
 from kinacc.errors import InputError, Problem
-from kinacc.geometry import Pose
-from kinacc.kinematics.inverse import (
-    closed_form,
-    limits,
-    numeric,
-    onto_model,
-    parallel_axes,
-    rescue,
-)
+from kinacc.geometry import Pose, compose, invert
+from kinacc.kinematics import dh as _dh
+from kinacc.kinematics.dh import PARAMETERS, DHModel
+from kinacc.kinematics.inverse import closed_form, limits, newton, postures
 from kinacc.kinematics.inverse.closed_form import BRANCHES
-from kinacc.kinematics.inverse.onto_model import Functions
 from kinacc.kinematics.model import ErrorModel, JointState
 from kinacc.kinematics.robot import Robot
 
@@ -29,12 +21,21 @@ __all__ = [
     "Solutions",
     "Status",
     "branches_of",
-    "closed_form_of",
+    "grid_of",
     "machining_branches",
     "solve",
 ]
 
-_NEAR_RAD = 0.2  # a refinement moves joints less than this, but for joints 4 and 6 when aligned
+# An arm a little different from the nominal one may have postures the nominal one just misses.
+_NEAR_MISS_MM = 30.0
+_BENDS_RAD = (0.02, 0.1)
+_GRID_RAD = np.deg2rad(30.0)
+_GRID_POINTS = 9  # of a first joint that slides
+_AT_LIMIT_RAD = 1e-9
+_SAME_RAD = 1e-6
+_WEAK_MM, _ASIDE_RAD = 60.0, (-0.25, -0.08, 0.08, 0.25)  # beside nearly singular postures
+# Postures of one name: of sixteen in all five were the most seen; two with spherical joints.
+_PER_NAME, _PER_NAME_SPHERICAL = 8, 2
 
 
 class Status(IntEnum):
@@ -65,23 +66,16 @@ class Solutions(NamedTuple):
     branches: tuple[str, ...]
 
 
-class ClosedForm(NamedTuple):
-    """A nominal arm with a closed form: its constants, all branches, and second starts."""
+def grid_of(robot: Robot) -> np.ndarray:
+    """Values of DH joint 1 at which the freedom of a seven-axis arm is sampled.
 
-    arm: closed_form.SphericalWristArm | parallel_axes.ParallelAxesArm
-    solve: Callable[..., tuple[np.ndarray, np.ndarray]]
-    starts: Callable[..., Iterator[tuple[np.ndarray, np.ndarray]]]
-
-
-def closed_form_of(robot: Robot) -> ClosedForm | None:
-    """Closed form of the nominal arm, or None where it has none here."""
-    wrist = closed_form.recognise(robot.dh)
-    if wrist is not None:
-        return ClosedForm(wrist, closed_form.solve, rescue.starts)
-    parallel = parallel_axes.recognise(robot.dh)
-    if parallel is not None:
-        return ClosedForm(parallel, parallel_axes.solve, parallel_axes.starts)
-    return None
+    Every 30 degrees within the limits and one turn; nine places for a joint that slides.
+    """
+    low, high = (limit[0] for limit in limits.dh_limits(robot))
+    if robot.dh.prismatic[0]:
+        return np.linspace(low, high, _GRID_POINTS)
+    steps = np.arange(-5, 7) * _GRID_RAD
+    return steps[(steps >= low - _AT_LIMIT_RAD) & (steps <= high + _AT_LIMIT_RAD)]
 
 
 def branches_of(robot: Robot, grid_rad: np.ndarray | None = None) -> tuple[str, ...]:
@@ -89,9 +83,19 @@ def branches_of(robot: Robot, grid_rad: np.ndarray | None = None) -> tuple[str, 
 
     ``grid_rad``: values of joint 1 at which the freedom of a seven-axis arm is sampled.
     """
-    if closed_form_of(robot) is not None:
+    if closed_form.recognise(robot.dh) is not None:
         return BRANCHES
-    return numeric.names_of(robot, numeric.grid_of(robot) if grid_rad is None else grid_rad)
+    numbered = tuple(
+        name if number == 1 else f"{name} ({number})"
+        for number in range(1, _per_name(robot.dh) + 1)
+        for name in postures.names_of(robot.dh)
+    )
+    if robot.dh.joints < 7:
+        return numbered
+    grid = grid_of(robot) if grid_rad is None else grid_rad
+    slides = robot.dh.prismatic[0]
+    heads = [f"{value:.6g}mm" if slides else f"{np.rad2deg(value):.6g}deg" for value in grid]
+    return tuple(f"q1={head} {name}" for head in heads for name in numbered)
 
 
 def machining_branches(robot: Robot) -> tuple[str, ...]:
@@ -124,12 +128,12 @@ def solve(
     OUTSIDE_LIMITS, those within them but outside ``fitted_range_rad`` (k,), (k,) OUTSIDE_RANGE.
     ``branches`` are some of ``branches_of``, others raise InputError; None for all. ``grid_rad``
     are the values of DH joint 1 at which the freedom of a seven-axis arm is sampled
-    (``numeric.grid_of`` when not given).
+    (``grid_of`` when not given).
 
     With a closed form, a branch that converged to the joints of an earlier one is a DUPLICATE and
     branches keep the name they started from; on a calibrated arm one may be missed within 5 mm of
-    axis 1 and where two singularities meet (9 of 20,000 random postures). The search looks for
-    postures within the limits and slightly beyond, and names what it finds by ``posture``.
+    axis 1 and where two singularities meet. The search looks for postures within the limits and
+    slightly beyond, and names what it finds by ``postures.classes_of``.
     """
     known = branches_of(robot, grid_rad)
     names = known if branches is None else tuple(branches)
@@ -137,21 +141,22 @@ def solve(
     if unknown:
         problem = Problem(f"robot {robot.name}", f"has no branch {unknown[0]}", ", ".join(known))
         raise InputError(problem)
+    columns = [known.index(name) for name in names]
     like = None if travel is None else JointState(np.zeros((1, model.joints)), travel[None])
-    functions = onto_model.functions_of(model, like)
-    form = closed_form_of(robot)
+    onto = _Onto(robot, model, like, fitted_range_rad)
+    form = closed_form.recognise(robot.dh)
     if form is not None:
-        q_rad, status = _by_closed_form(robot, form, functions, pose, names, fitted_range_rad)
+        q_rad, status = _by_closed_form(onto, form, pose, columns)
     else:
-        grid = numeric.grid_of(robot) if grid_rad is None else grid_rad
-        columns = [known.index(name) for name in names]
-        q_rad, found, expected = (
-            part[:, columns]
-            for part in numeric.solve(robot, functions, pose, grid, fitted_range_rad)
-        )
-        status = np.full(found.shape, Status.OUT_OF_REACH, dtype=np.int8)
-        status[expected] = Status.NOT_CONVERGED
-        status[found] = Status.FOUND
+        if robot.dh.joints < 7:
+            q_rad, expected = _searched(onto, pose, None)
+        else:
+            grid = grid_of(robot) if grid_rad is None else grid_rad
+            parts = [_searched(onto, pose, value) for value in grid]
+            q_rad, expected = (np.concatenate(each, axis=1) for each in zip(*parts, strict=True))
+        q_rad, expected = q_rad[:, columns], expected[:, columns]
+        status = np.where(expected, Status.NOT_CONVERGED, Status.OUT_OF_REACH).astype(np.int8)
+        status[np.isfinite(q_rad[..., 0])] = Status.FOUND
     good = status == Status.FOUND
     if fitted_range_rad is not None:
         status[good & ~limits.within(q_rad, *fitted_range_rad)] = Status.OUTSIDE_RANGE
@@ -159,59 +164,160 @@ def solve(
     return Solutions(q_rad, status, names)
 
 
+class _Onto(NamedTuple):
+    """How starts are brought onto a model."""
+
+    robot: Robot
+    model: ErrorModel
+    like: JointState | None
+    preferred_rad: tuple[np.ndarray, np.ndarray] | None
+
+    def turns(self, q_rad: np.ndarray) -> np.ndarray:
+        """Joints (..., k) on the turns ``limits.take_turns`` prefers."""
+        box, slides = limits.dh_limits(self.robot), self.robot.dh.prismatic
+        return limits.take_turns(q_rad, box, self.preferred_rad, slides)
+
+    def converge(self, goal: Pose, start: np.ndarray, first: int) -> tuple[np.ndarray, np.ndarray]:
+        """Joints (m, k) on their final turns and convergence (m,), from starts (m, k).
+
+        Turns are taken before the refinement, as a model need not repeat after one, and once more
+        after it, as a step may cross one. Joints before ``first`` stay.
+        """
+        found = newton.refine(self.model, goal, self.turns(start), self.like, first)
+        q_rad, converged = found.q_rad, found.converged
+        turned = self.turns(q_rad)
+        changed = np.flatnonzero(converged & (np.abs(turned - q_rad) > 1.0).any(axis=1))
+        if len(changed):
+            part = Pose(goal.rotation[changed], goal.position_mm[changed])
+            again = newton.refine(self.model, part, turned[changed], self.like, first)
+            q_rad[changed], converged[changed] = again.q_rad, again.converged
+        return q_rad, converged
+
+
 def _by_closed_form(
-    robot: Robot,
-    form: ClosedForm,
-    functions: Functions,
-    pose: Pose,
-    names: tuple[str, ...],
-    preferred_rad: tuple[np.ndarray, np.ndarray] | None,
+    onto: _Onto, form: closed_form.SixAxes, pose: Pose, columns: list[int]
 ) -> tuple[np.ndarray, np.ndarray]:
-    starts, reached = form.solve(form.arm, pose, names, closed_form.Start())
-    rows, columns = np.nonzero(reached)
-    box = limits.dh_limits(robot)
-    goal = Pose(pose.rotation[rows], pose.position_mm[rows])
-    turns = partial(limits.take_turns, limits_rad=box, preferred_rad=preferred_rad)
-    found, converged = onto_model.converge(functions, goal, starts[rows, columns], turns)
+    """Joints (n, b, 6) and status (n, b): from bent starts and, where these missed, exact ones."""
+    starts, reached = (part[:, columns] for part in form.solve(pose, closed_form.Start()))
     q_rad = np.full(starts.shape, np.nan)
-    q_rad[rows[converged], columns[converged]] = found[converged]
     status = np.full(reached.shape, Status.OUT_OF_REACH, dtype=np.int8)
-    status[rows[converged], columns[converged]] = Status.FOUND
-    repeated = onto_model.mark_duplicates(q_rad, status == Status.FOUND)
-    status[repeated], q_rad[repeated] = Status.DUPLICATE, np.nan
+    rows, places = np.nonzero(reached)
+    _add(onto, pose, starts, rows, places, q_rad, status)
     missed = np.flatnonzero((reached & (status != Status.FOUND)).any(axis=1))
-    if len(missed):
-        part = Pose(pose.rotation[missed], pose.position_mm[missed])
-        again = q_rad[missed], status[missed]
-        _rescue(form, functions, part, names, turns, box, *again)
-        q_rad[missed], status[missed] = again
+    part = Pose(pose.rotation[missed], pose.position_mm[missed])
+    starts[missed], reached[missed] = (each[:, columns] for each in form.solve(part))
+    rows, places = np.nonzero(reached[missed] & (status[missed] != Status.FOUND))
+    rows = missed[rows]
+    unreached = status[rows, places] == Status.OUT_OF_REACH
+    status[rows[unreached], places[unreached]] = Status.NOT_CONVERGED
+    _add(onto, pose, starts, rows, places, q_rad, status)
     return q_rad, status
 
 
-def _rescue(
-    form: ClosedForm,
-    functions: Functions,
+def _add(
+    onto: _Onto,
     pose: Pose,
-    names: tuple[str, ...],
-    turns: Callable[[np.ndarray], np.ndarray],
-    box: tuple[np.ndarray, np.ndarray],
+    starts: np.ndarray,
+    rows: np.ndarray,
+    places: np.ndarray,
     q_rad: np.ndarray,
     status: np.ndarray,
 ) -> None:
-    """Fill the branches still missing at poses (m, ...) from second starts, in place."""
-    lower, upper = box
-    for number, (start, tried) in enumerate(form.starts(form.arm, pose, names)):
-        if number == 0:
-            status[tried & (status == Status.OUT_OF_REACH)] = Status.NOT_CONVERGED
-        # Second starts are worth it only for joints somebody could use.
-        usable = limits.within(turns(start), lower - _NEAR_RAD, upper + _NEAR_RAD)
-        rows, columns = np.nonzero(tried & usable & (status != Status.FOUND))
-        if len(rows) == 0:
-            continue
-        goal = Pose(pose.rotation[rows], pose.position_mm[rows])
-        found, converged = onto_model.converge(functions, goal, start[rows, columns], turns)
-        for row, column, joints in zip(
-            rows[converged], columns[converged], found[converged], strict=True
-        ):
-            if not onto_model.same_posture(q_rad[row], joints).any():
-                q_rad[row, column], status[row, column] = joints, Status.FOUND
+    """Fill ``q_rad`` and ``status`` at rows and places (m,) with what is found there and new."""
+    goal = Pose(pose.rotation[rows], pose.position_mm[rows])
+    found, converged = onto.converge(goal, starts[rows, places], 0)
+    known = (_apart(found[:, None], q_rad[rows]) < _SAME_RAD).any(axis=1)
+    for good, code in ((converged & known, Status.DUPLICATE), (converged & ~known, Status.FOUND)):
+        status[rows[good], places[good]] = code
+    good = converged & ~known
+    rows, places = rows[good], places[good]
+    q_rad[rows, places] = found[good]
+    again = postures.repeats(rows, found[good], onto.robot.dh.prismatic, _SAME_RAD)
+    status[rows[again], places[again]], q_rad[rows[again], places[again]] = Status.DUPLICATE, np.nan
+
+
+def _apart(q_rad: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Largest difference (...) of joints (..., k) but for whole turns; infinite for NaN."""
+    gap = q_rad - other
+    gap = np.abs(gap - 2.0 * np.pi * np.rint(gap / (2.0 * np.pi))).max(axis=-1, initial=0.0)
+    return np.where(np.isnan(gap), np.inf, gap)
+
+
+def _searched(onto: _Onto, pose: Pose, first: float | None) -> tuple[np.ndarray, np.ndarray]:
+    """Joints (n, b, k) in their branches, NaN where empty, and whether the nominal arm has one.
+
+    Joint 1 stands at ``first`` where that is given.
+    """
+    dh, count = onto.robot.dh, len(pose.position_mm)
+    low, high = limits.dh_limits(onto.robot)  # coupled joints, without limits, make a turn
+    low, high = np.where(np.isfinite(low), low, -np.pi), np.where(np.isfinite(high), high, np.pi)
+    seven = closed_form.recognise_seven(dh)
+    if first is None:
+        rows, start, error = postures.search(postures.table_of(dh, low, high), pose, _NEAR_MISS_MM)
+    elif seven is None:
+        columns = (getattr(dh, name) for name in (*PARAMETERS, "prismatic"))
+        head, tail = zip(*((column[:1], column[1:]) for column in columns), strict=True)
+        before = _dh.forward(DHModel(*head), np.array([[first]]))
+        table = postures.table_of(DHModel(*tail), low[1:], high[1:])
+        rows, start, error = postures.search(table, compose(invert(before), pose), _NEAR_MISS_MM)
+    else:
+        q_rad, missed_mm = seven.solve(pose, first)
+        for bend in _BENDS_RAD:
+            bent, short_mm = seven.solve(pose, first, _NEAR_MISS_MM, bend)
+            short_mm[_apart(bent, q_rad[:, :8]) < _SAME_RAD] = np.inf
+            q_rad = np.concatenate([q_rad, bent], axis=1)
+            missed_mm = np.concatenate([missed_mm, np.maximum(short_mm, 1.0)], axis=1)
+        rows, slots = np.nonzero(np.isfinite(missed_mm))
+        start, error = q_rad[rows, slots], missed_mm[rows, slots]
+    if first is not None:
+        start = np.insert(start, 0, first, axis=1)
+    goal = Pose(pose.rotation[rows], pose.position_mm[rows])
+    fixed = 0 if first is None else 1
+    q_rad, converged = onto.converge(goal, start, fixed)
+    exact = error < 1e-6
+    expected = np.isfinite(_placed(dh, count, rows[exact], start[exact])[..., 0])
+    rows, q_rad = rows[converged], q_rad[converged]
+    of, start = _siblings(dh, q_rad, fixed)
+    goal = Pose(pose.rotation[rows[of]], pose.position_mm[rows[of]])
+    again, converged = onto.converge(goal, start, fixed)
+    rows = np.concatenate([rows, rows[of[converged]]])
+    order = np.argsort(rows, kind="stable")
+    rows, q_rad = rows[order], np.concatenate([q_rad, again[converged]])[order]
+    new = ~postures.repeats(rows, q_rad, dh.prismatic, _SAME_RAD)
+    return _placed(dh, count, rows[new], q_rad[new]), expected
+
+
+def _siblings(dh: DHModel, q_rad: np.ndarray, first: int) -> tuple[np.ndarray, np.ndarray]:
+    """Which joints (m, k) are nearly singular, and starts beside them: a second posture is close.
+
+    The nominal arm may have one posture, or none, where the model has two. Starts lie along the
+    direction of joints, from ``first`` on, that moves the flange least.
+    """
+    unit = np.where(dh.prismatic, 1e3, 1.0)
+    slopes = _dh.joint_jacobian(dh, q_rad) * np.repeat([1.0, 1e3], 3)[:, None] * unit
+    _, sizes, directions = np.linalg.svd(slopes[..., first:], full_matrices=False)
+    weak = np.flatnonzero(sizes[:, -1] < _WEAK_MM)
+    step = np.zeros((len(weak), q_rad.shape[1]))
+    step[:, first:] = directions[weak, -1]
+    starts = [q_rad[weak] + size * unit * step for size in _ASIDE_RAD]
+    return np.tile(weak, len(_ASIDE_RAD)), np.concatenate(starts)
+
+
+def _placed(dh: DHModel, count: int, rows: np.ndarray, q_rad: np.ndarray) -> np.ndarray:
+    """Joints (m, k) of poses ``rows`` (m,) put into their branches: (count, b, k), NaN if empty."""
+    names, most = len(postures.names_of(dh)), _per_name(dh)
+    placed = np.full((count, most * names, dh.joints), np.nan)
+    if len(rows) == 0:
+        return placed
+    classes = postures.classes_of(dh, q_rad)
+    order = np.lexsort([*q_rad.T[::-1], q_rad[:, 2], classes, rows])
+    rows, classes, q_rad = rows[order], classes[order], q_rad[order]
+    group = rows * names + classes
+    number = np.arange(len(group)) - np.searchsorted(group, group, side="left")
+    fits = number < most
+    placed[rows[fits], number[fits] * names + classes[fits]] = q_rad[fits]
+    return placed
+
+
+def _per_name(dh: DHModel) -> int:
+    return _PER_NAME if closed_form.recognise_seven(dh) is None else _PER_NAME_SPHERICAL

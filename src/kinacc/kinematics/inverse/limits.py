@@ -9,6 +9,7 @@ from kinacc.kinematics.robot import Robot
 _TWO_PI = 2.0 * np.pi
 _ROUND_OFF_RAD = 1e-12
 _TIE_RAD = 1e-9
+_OUTSIDE = 100.0  # more than any angle in rad that is compared
 
 
 def reported_joints(robot: Robot, q_rad: np.ndarray) -> np.ndarray:
@@ -79,42 +80,20 @@ def take_turns(
     taken; where none lies within both, the one within the limits nearest to zero; where none does,
     the one in (-pi, pi]. Joints that slide (``prismatic`` (k,)) are left alone.
     """
-    boxes = [limits_rad] if preferred_rad is None else [limits_rad, preferred_rad]
-    rows = q_rad.reshape(-1, q_rad.shape[-1])
-    best = np.empty(rows.shape)
-    for begin in range(0, len(rows), _BLOCK):
-        block = slice(begin, begin + _BLOCK)
-        best[block] = _turned(rows[block], boxes)
-    best = best.reshape(q_rad.shape)
-    return best if prismatic is None else np.where(prismatic, q_rad, best)
-
-
-def _turned(q_rad: np.ndarray, boxes: list[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
-    base = q_rad - _TWO_PI * np.rint(q_rad / _TWO_PI)
     # Half a turn is a tie that round-off must not decide: it counts as +pi.
+    base = q_rad - _TWO_PI * np.rint(q_rad / _TWO_PI)
     base = np.where(base < -np.pi + _TIE_RAD, base + _TWO_PI, base)
-    best, cost = base.ravel(), _cost(base, boxes).ravel()
-    left = np.flatnonzero(~(cost < _OUTSIDE))  # what another turn may serve better
-    joint = left % q_rad.shape[1]
-    near = [(lower[joint], upper[joint]) for lower, upper in boxes]
-    angle, lowest = best[left], cost[left]
-    # Two turns either way reach every turn a +-720 degree joint has.
-    for turns in (-1, 1, -2, 2) if len(left) else ():
-        turned = angle + turns * _TWO_PI
-        cost = _cost(turned, near)
+    best, lowest = base, np.full(base.shape, np.inf)
+    for turns in (0, -1, 1, -2, 2):  # these reach every turn a +-720 degree joint has
+        angle = base + turns * _TWO_PI
+        cost = np.abs(angle)
+        for weight, box in ((2.0 * _OUTSIDE, limits_rad), (_OUTSIDE, preferred_rad)):
+            if box is not None:
+                lower, upper = box
+                outside = (angle < lower - _ROUND_OFF_RAD) | (angle > upper + _ROUND_OFF_RAD)
+                cost += weight * outside
         better = cost < lowest
-        best[left[better]], lowest = turned[better], np.where(better, cost, lowest)
-    return best.reshape(q_rad.shape)
-
-
-def _cost(angle: np.ndarray, boxes: list[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
-    """How far angles are from zero; outside the boxes, the first before the second, more."""
-    cost = np.abs(angle)
-    for weight, (lower, upper) in zip((2.0 * _OUTSIDE, _OUTSIDE), boxes, strict=False):
-        outside = (angle < lower - _ROUND_OFF_RAD) | (angle > upper + _ROUND_OFF_RAD)
-        cost += weight * outside
-    return cost
-
-
-_BLOCK = 1024  # rows of one block stay in the cache
-_OUTSIDE = 100.0  # more than any angle in rad that is compared
+        best, lowest = np.where(better, angle, best), np.where(better, cost, lowest)
+        if (lowest < _OUTSIDE).all():
+            break
+    return best if prismatic is None else np.where(prismatic, q_rad, best)
