@@ -1,9 +1,9 @@
 """Write the page that shows what the results of a data set are worth."""
 
-from kinacc.report import results_page
+from kinacc.report import dataset
 from kinacc.report.page import html
 from kinacc.workflow.script import stage
 
 with stage(snakemake) as job:
-    page = results_page.run(job.inputs, {"dataset": job.dataset, "folder": str(job.folder)})
+    page = dataset.run(job.inputs, {"dataset": job.dataset, "folder": str(job.folder)})
     job.write_files({"html": html(page, job.marks()).encode()})

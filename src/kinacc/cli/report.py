@@ -47,7 +47,7 @@ def written(folder: str, out: str | None = None, without: Collection[str] = ()) 
     """
     from kinacc import __version__
     from kinacc.campaign.journal import of_results
-    from kinacc.report import results_page
+    from kinacc.report import dataset
     from kinacc.report.page import html
     from kinacc.report.summary import ON_PAGE, PAGE_TABLES, read_tables
     from kinacc.tables import sums
@@ -67,6 +67,6 @@ def written(folder: str, out: str | None = None, without: Collection[str] = ()) 
         "reason": reason,
     }
     path = Path(out or place / _PAGE)
-    page = results_page.run({**shown, **campaigns}, settings)
+    page = dataset.run({**shown, **campaigns}, settings)
     write_whole(path, html(page, {"kinacc_version": __version__}).encode())
     return path

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import cycle
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -14,6 +16,7 @@ _TARGETS = {
     "candidates": ("all candidates", style.PURPLE, (0, (4, 1.5))),
     "region": ("share of the region", style.GREEN, (0, (1, 1))),
 }
+_INSTRUMENTS = ((style.BLUE, "o"), (style.ORANGE, "^"), (style.GREEN, "s"), (style.PURPLE, "D"))
 
 
 def draw(
@@ -35,6 +38,29 @@ def draw(
             style.outside_label(right, _place(right, tolerance_mm), "tolerance", style.VERMILION)
         left.set_ylim(bottom=0.0)
         style.name_dataset(figure, name)
+    return figure
+
+
+def readings(table: Columns, tolerance_mm: float | None = None) -> Figure:
+    """Draw ``campaign_readings`` in the order taken, by instrument."""
+    names = np.asarray(table["instrument"]).astype(str)
+    struck = np.array([bool(each) for each in table["struck"]])
+    with style.house():
+        figure = style.new_figure(style.DOUBLE_COLUMN_IN, 2.2)
+        ax = figure.subplots()
+        for name, (colour, marker) in zip(dict.fromkeys(names), cycle(_INSTRUMENTS), strict=False):
+            mine = (names == name) & ~struck
+            size = np.asarray(table["error_mm"])[mine]
+            number = np.asarray(table["reading"])[mine]
+            ax.plot(number, size, marker, ms=2.5, color=colour, label=style.literal(name))
+        if struck.any():
+            at, size = (np.asarray(table[each])[struck] for each in ("reading", "error_mm"))
+            ax.plot(at, size, "x", color=style.VERMILION, label="struck")
+        if tolerance_mm is not None:
+            ax.axhline(tolerance_mm, color=style.VERMILION, lw=1.0, ls=(0, (6, 2)))
+        ax.set(xlabel="Reading, in the order taken", ylabel="Distance from the model, mm")
+        ax.set_ylim(bottom=0.0)
+        _legend_above(ax)
     return figure
 
 

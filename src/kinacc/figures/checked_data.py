@@ -39,6 +39,14 @@ def draw(
     return figure
 
 
+def coverage(joints: Sequence[Mapping]) -> Figure:
+    """Measured range of every joint within its limits; see ``draw``."""
+    with style.house():
+        figure = Figure(figsize=(style.DOUBLE_COLUMN_IN, 1.6), layout="constrained")
+        _joints(figure.subplots(), joints)
+    return figure
+
+
 def _joints(axes, coverage: Sequence[Mapping]) -> None:
     for row in coverage:
         joint, span = row["joint"], row["most"] - row["least"]

@@ -2,57 +2,97 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 
-from kinacc.kinematics.robot import Robot
-from kinacc.report import (
-    accuracy_map,
-    data_check,
-    histories,
-    identifiability,
-    paper,
-    parameters,
-    residuals,
-    robot_history,
-    selection,
-    study,
-    terminal,
-)
-from kinacc.report.page import FirstScreen, Page, Part, Section
-from kinacc.report.summary import CalibrationSummary
-from kinacc.tables.columns import Columns
+from kinacc.calibration.summary import LARGE_SHARE
+from kinacc.campaign import folder as campaigns
+from kinacc.campaign import of_calibration, report
+from kinacc.kinematics import robot
+from kinacc.report import campaign, fit_sections, study_sections, terminal
+from kinacc.report.page import FirstScreen, Page, Table
+from kinacc.report.summary import CalibrationSummary, summarise
 
-# In the order of the page: what a section reads, and how it is made.
-_OF_THE_FIT: tuple[tuple[str, Callable[..., Part]], ...] = (
-    ("history", robot_history.section),
-    ("pose_errors", residuals.section),
-    ("accuracy_map", accuracy_map.section),
-    ("measurements", data_check.section),
-    ("dh_covariance", identifiability.section),
-    ("dh_model", parameters.section),
+# In the order of the page: the table that a section needs, and how it is made.
+_OF_THE_FIT = (
+    ("history", study_sections.history),
+    ("pose_errors", fit_sections.residuals),
+    ("accuracy_map", study_sections.accuracy_map),
+    ("measurements", fit_sections.data),
+    ("dh_covariance", fit_sections.identifiability),
+    ("dh_model", fit_sections.parameters),
 )
-_OF_THE_STUDY: tuple[tuple[str, Callable[..., Part]], ...] = (
-    ("study_summary", study.section),
-    ("histories", histories.section),
-    ("claims", paper.tables_section),
-    ("claims", paper.claims_section),
+_OF_THE_STUDY = (
+    ("study_summary", study_sections.study),
+    ("histories", study_sections.histories),
+    ("claims", study_sections.paper_tables),
+    ("claims", study_sections.claims),
 )
 
 
-def page(
-    first: FirstScreen,
-    tables: Mapping[str, Columns],
-    robot: Robot,
-    summary: CalibrationSummary,
-    campaign: Section | None,
-) -> Page:
-    """The page on the tables of a data set; each section where there is what it reads."""
-    return Page(
-        first,
-        (
-            *(make(tables, robot) for needed, make in _OF_THE_FIT if needed in tables),
-            selection.section(tables, terminal.selection(summary)),
-            *([campaign] if campaign else []),
-            *(make(tables, robot) for needed, make in _OF_THE_STUDY if needed in tables),
-        ),
+def run(inputs: Mapping, settings: Mapping) -> Page:
+    """The page on the tables that are there, and on the campaign of their calibration.
+
+    ``settings``: ``dataset``; ``folder`` where the results are not in their usual place,
+    ``outdated`` tables that are left out, and ``reason``, why all results are outdated.
+    """
+    name = settings["dataset"]
+    files = {role: each for role, each in inputs.items() if isinstance(each, Path)}
+    tables = {role: each for role, each in inputs.items() if role not in files}
+    places = [each.parent for role, each in files.items() if role.startswith("campaign_")]
+    place = Path(settings.get("folder", f"results/{name}"))
+    summary = summarise(place, tables, places, settings.get("reason", ""))
+    arm = robot.of_text(str(tables["robot"]["description"][0]), "robot.parquet")
+    sections = [make(tables, arm) for needed, make in _OF_THE_FIT if needed in tables]
+    sections.append(fit_sections.selection(tables, terminal.selection(summary)))
+    assessed = of_calibration.sought(name, tables, places).assessed
+    if assessed is not None:
+        opened = campaigns.open_(assessed.place)
+        sections.append(campaign.section(opened, *report.tables(opened)))
+    sections += [make(tables, arm) for needed, make in _OF_THE_STUDY if needed in tables]
+    return Page(first_screen(summary, settings.get("outdated", ())), sections)
+
+
+def first_screen(summary: CalibrationSummary, left_out: Sequence[str] = ()) -> FirstScreen:
+    """The answer, the errors before and after, and what is open.
+
+    ``left_out``: tables made from others than those now there.
+    """
+    turned = summary.orientation_errors()
+    columns = [["model", "model"]]
+    for unit in ("mm", "mrad") if turned else ("mm",):
+        for name, key in (("mean", "mean"), (f"{LARGE_SHARE:.0%}", "quantile_99"),
+                          ("largest", "largest")):  # fmt: skip
+            columns.append([f"{name}, {unit}", f"{key}_{unit}", ""])
+    rows = []
+    for model, errors in summary.position_errors().items():
+        row = {"model": summary.label(model)}
+        for part in filter(None, (errors, turned.get(model))):
+            for key in ("mean", "quantile_99", "largest"):
+                row[f"{key}_{part.unit}"] = terminal.size(getattr(part, key))
+        rows.append(row | ({"remark": "selected"} if model == summary.selected else {}))
+    where = "held-out" if summary.is_held_out else "fitted"
+    count = terminal.counted(summary.best.n, "reading")
+    steps = [text for step in summary.next_steps for text in (f"{step.purpose}:", step.command)]
+    notes = {"Next": steps, **terminal.notes(summary, None)}
+    if left_out:
+        made = f"{', '.join(left_out)}: made from other tables than those here, so not shown"
+        notes["Left out"] = [made, "kinacc check-results"]
+    return FirstScreen(
+        summary.name,
+        terminal.about(summary),
+        _badge(summary),
+        terminal.headline(summary),
+        [Table(f"Errors at the same {count} ({where}) for every model", rows, columns)],
+        notes,
     )
+
+
+def _badge(summary: CalibrationSummary) -> tuple[str, bool]:
+    """The result of the data check in two or three words, and whether it is a warning."""
+    if summary.synthetic:
+        return "SYNTHETIC ARM", False
+    if not summary.checked:
+        return "DATA: not checked", True
+    count = sum(each.is_open for each in summary.findings)
+    return (f"DATA: {terminal.counted(count, 'problem')}", True) if count else ("DATA: OK", False)
