@@ -14,9 +14,6 @@ import pytest
 ABSENT = "Chromium absent: "
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 PHONE, DESK = (390, 844), (1100, 900)
-_READY = (
-    "const done = arguments[0]; kinacc.everything().then(() => done(null), (e) => done(`${e}`))"
-)
 
 
 class Chromium:
@@ -36,14 +33,13 @@ class Chromium:
         self.driver.set_script_timeout(60)
 
     @contextmanager
-    def opened(self, path: Path, size=DESK, dark=False, drawn=True) -> Iterator[Chromium]:
+    def opened(self, path: Path, size=DESK, dark=False) -> Iterator[Chromium]:
         """A page just opened; fails at the end where it complained or asked for another file."""
         self.show(size, dark)
         for kind in ("browser", "performance"):
             self.driver.get_log(kind)
         self.driver.get(path.as_uri())
-        if drawn:
-            self.draw()
+        self.run("await new Promise((go) => setTimeout(go, 500))")
         yield self
         worse = [each for each in self.driver.get_log("browser") if each["level"] != "INFO"]
         assert worse == [], worse
@@ -57,10 +53,6 @@ class Chromium:
         self.command("Emulation.setDeviceMetricsOverride", **told)
         scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
         self.command("Emulation.setEmulatedMedia", media=media, features=[scheme])
-
-    def draw(self) -> None:
-        """Wait until every picture is drawn."""
-        assert self.driver.execute_async_script(_READY) is None
 
     def run(self, script: str, *values: object):
         """What a script returns; a promise is waited for."""

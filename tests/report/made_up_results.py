@@ -7,7 +7,6 @@ from parsed import read
 
 from kinacc.kinematics.dh import PARAMETERS, DHModel
 from kinacc.kinematics.robot import Robot
-from kinacc.report.page import Picture
 from kinacc.tables.allowed import ERRORS
 
 TRAVEL_RAD = np.pi / 2  # either way; of the sliding joint 100 mm
@@ -59,7 +58,7 @@ def identified(**told: tuple) -> dict:
     Names are written with two underscores for the point: j1__d_mm.
     """
     rows = []
-    for name in robot().dh.parameter_names:
+    for name in robot().dh.names:
         plain = ("fixed", np.nan, "not fitted") if "beta" in name else ("identified", 0.1, None)
         rows.append((name, *told.pop(name.replace(".", "__"), plain)))
     rows += [(name.replace("__", "."), *each) for name, each in told.items()]
@@ -176,40 +175,6 @@ def table(section, caption: str):
     return found
 
 
-def picture(section, key: str):
-    """The picture of a section by its key."""
-    (found,) = (each for each in pictures_of(section) if each.key == key)
-    return found
-
-
-def pictures_of(section) -> list:
-    """The pictures of a section."""
-    blocks = getattr(section, "pictures", None) or getattr(section, "blocks", ())
-    return [each for each in blocks if isinstance(each, Picture)]
-
-
 def words(section) -> str:
     """All paragraphs of a section."""
     return "\n".join(read(section).paragraphs)
-
-
-def data(found) -> dict:
-    """The data of a picture."""
-    renderers = found.plot.renderers
-    return next(each.data_source.data for each in renderers if each.data_source.name)
-
-
-def set_nothing_that_is_not_there(found) -> bool:
-    """Whether all that the controls of a picture set is there, and a column where one is named."""
-    named = {each.name: each for each in found.plot.references() if each.name}
-    columns = data(found)
-    return all(
-        name in named
-        and prop in named[name].properties()
-        and (
-            not isinstance(value, dict) or (value.keys() == {"field"} and value["field"] in columns)
-        )
-        for control in found.controls
-        for option in control.options
-        for name, prop, value in option.sets
-    )

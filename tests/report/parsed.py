@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass, field
 
 import lxml.html
@@ -12,21 +11,18 @@ from kinacc.report.page import FirstScreen, Page, html
 
 @dataclass(frozen=True)
 class Shown:
-    """A table of a page: cells as text, ``marked`` remarks, ``picks`` and ``choices`` by row."""
+    """A table of a page: cells as text, ``marked`` remarks by row."""
 
     caption: str
     heads: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
     marked: dict[int, str] = field(default_factory=dict)
     folded: bool = False
-    picked_in: str = ""
-    picks: tuple[int, ...] = ()
-    choices: tuple = ()
 
 
 @dataclass(frozen=True)
 class Read:
-    """Words by their place, tables and paragraphs of a section."""
+    """Words by their place, tables, paragraphs and captions of pictures of a section."""
 
     title: str
     population: str
@@ -35,13 +31,12 @@ class Read:
     to_do: str
     tables: tuple[Shown, ...]
     paragraphs: tuple[str, ...]
-    described: dict[str, str]
-    captions: dict[str, str]
+    captions: tuple[str, ...]
 
 
 def as_page(*sections) -> str:
     """Sections as a page whose first screen is empty."""
-    return html(Page(FirstScreen("made up", "", ("", False), (), (), ()), sections))
+    return html(Page(FirstScreen("made up", "", ("", False)), sections))
 
 
 def read(section) -> Read:
@@ -49,48 +44,28 @@ def read(section) -> Read:
     tree = lxml.html.document_fromstring(as_page(section).encode())
     (own,) = tree.xpath(f'//section[@id="{section.key}"]')
     words = [each.text_content() for each in own.xpath('./dl[@class="reading"]/dd')]
-    plots = {
-        each.get("id").removeprefix("plot-"): each for each in own.xpath('.//div[@class="plot"]')
-    }
     return Read(
         own.xpath("./h2")[0].text_content(),
         "".join(own.xpath('./p[@class="population"]/text()')),
         *words,
         tuple(map(_table, own.xpath(".//table"))),
         tuple(each.text_content() for each in own.xpath("./p[not(@class)]")),
-        {key: plot.get("aria-label") for key, plot in plots.items()},
-        {key: "".join(plot.xpath("../figcaption/text()")) for key, plot in plots.items()},
+        tuple(each.text_content() for each in own.xpath(".//figcaption")),
     )
 
 
 def _table(table) -> Shown:
-    rows, marked, picks, choices = [], {}, [], []
+    rows, marked = [], {}
     for number, row in enumerate(table.xpath("./tbody/tr")):
-        rows.append(
-            tuple(
-                each.text_content()
-                for each in row.xpath(
-                    "./*[not(contains(@class, 'screen') or contains(@class, 'remark'))]"
-                )
-            )
-        )
-        remark = "".join(
-            each.text_content() for each in row.xpath("./td[contains(@class, 'remark')]")
-        )
+        cells = row.xpath("./*[not(contains(@class, 'remark'))]")
+        rows.append(tuple(each.text_content() for each in cells))
+        remark = "".join(each.text_content() for each in row.xpath("./td[@class='remark']"))
         if remark:
             marked[number] = remark
-        for button in row.xpath(".//button"):
-            picks.append(int(button.get("data-pick")))
-            if button.get("data-choices"):
-                choices.append(tuple(map(tuple, json.loads(button.get("data-choices")))))
-    heads = table.xpath("./thead/tr/th[not(contains(@class, 'screen')) and not(span)]")
     return Shown(
         table.xpath("./caption")[0].text_content(),
-        tuple(each.text_content() for each in heads),
+        tuple(each.text_content() for each in table.xpath("./thead/tr/th[not(span)]")),
         tuple(rows),
         marked,
         table.getparent().getparent().tag == "details",
-        next(iter(table.xpath(".//button/@data-picture")), ""),
-        tuple(picks),
-        tuple(choices),
     )

@@ -22,7 +22,6 @@ from kinacc.figures.campaign import draw
 from kinacc.kinematics import robot as robots
 from kinacc.report import page
 from kinacc.report.campaign import campaign_page, section
-from kinacc.report.page import Picture, Table
 
 TRUE_MM = 0.2
 
@@ -68,7 +67,7 @@ def first_of(campaign):
 
 
 def note(first, name):
-    return " ".join(text.words for each, texts in first.notes if each == name for text in texts)
+    return " ".join(first.notes.get(name, ()))
 
 
 def test_the_first_sentence_is_a_promise_with_its_odds_its_poses_and_its_conditions(whole):
@@ -113,7 +112,7 @@ def test_readings_that_scatter_more_than_stated_take_the_promise_back():
     assert "times as much as the noise stated" in first.answers[0]
     assert "So no bound is stated." in first.answers
     assert not any("By a procedure" in each for each in first.answers)
-    assert {row[4] for row in first.tables[0].rows} == {"-"}
+    assert {row["right"] for row in first.tables[0].rows} == {None}
     assert "new campaign" in note(first, "NEXT")
 
 
@@ -136,19 +135,15 @@ def test_a_reading_that_went_wrong_is_named_on_the_first_screen():
 def test_a_bound_on_all_but_some_says_so_in_promise_and_table():
     first = first_of(measured(points=60, budget=40, tolerance_mm=2.0))
     assert "no more than 3 of these 60 candidates are off" in first.answers[0]
-    assert [row[0] for row in first.tables[0].rows][-1] == "all but 3 candidates"
+    assert [row["of"] for row in first.tables[0].rows][-1] == "all but 3 candidates"
     assert first.badge == ("UNDECIDED", True)
 
 
-def test_course_picture_and_conformity_say_how_many_a_bound_leaves_out():
+def test_picture_and_conformity_say_how_many_a_bound_leaves_out():
     found = measured(points=60, budget=40, tolerance_mm=2.0)
     about = found.tables["campaign_bounds"]
     left = np.asarray(about["excepted"])
     assert (left > 0).any()
-    every = blocks([section(found.state, found.tables, "here")], Table)
-    (table,) = [each for each in every if "course" in each.caption]
-    stated = [row for row in table.rows if row[2] != "measured points" and row[3] != "-"]
-    assert {row[2] for row in stated} == {"all but 3 candidates"}
     drawn = draw(found.tables["campaign_points"], about, len(found.state.plan.route))
     labels = [each.get_text() for each in drawn.findobj(matplotlib.text.Text)]
     assert "bounds, all but 3 candidates" in labels
@@ -173,40 +168,25 @@ def test_a_bound_as_small_as_the_noise_is_not_promised_for_less_noise():
     assert "the noise is exactly 0.5 mm per axis" in first.answers[0]
 
 
-def blocks(parts, kind):
-    return [block for part in parts for block in part.blocks if isinstance(block, kind)]
+def section_of(campaign):
+    return section(campaign.opened, campaign.state, campaign.tables)
 
 
-def named(picture):
-    """What a picture shares with its tables: the data whose rows can be selected."""
-    sources = [each.data_source for each in picture.plot.renderers]
-    return next(each.data for each in sources if each.name)
+def test_every_point_with_its_limits_is_in_a_table(whole):
+    found = section_of(whole).values
+    assert sorted(row["point"] for row in found["every"]) == sorted(f"p{i}" for i in range(12))
+    largest = found["largest"][0]["error_mm"]
+    assert largest == np.nanmax(whole.tables["campaign_points"]["error_mm"])
+    assert found["whom"] == "these 12 candidates (drawn)"
 
 
-def test_every_point_with_its_limits_is_in_picture_and_table(whole):
-    parts = campaign_page(whole.opened, whole.state, whole.tables).sections
-    drawn = {each.key: each for each in blocks(parts, Picture)}
-    data = named(drawn["points-sizes"])
-    assert sorted(data["called"]) == sorted(f"p{i}" for i in range(12))
-    assert sorted(data["place"]) == [*range(1, 13)]
-    largest = next(each for each in blocks(parts, Table) if "largest errors" in each.caption)
-    for row, pick in zip(largest.rows, largest.picks, strict=True):
-        assert data["called"][pick] == row[0]
-        assert f"{data['error_mm'][pick]:.3f}" == row[2]
-    assert float(largest.rows[0][2]) == pytest.approx(
-        np.nanmax(whole.tables["campaign_points"]["error_mm"]), abs=5e-4
-    )
-
-
-def test_what_was_struck_stands_there_with_its_reason_as_text_and_bytes_repeat():
+def test_what_was_struck_stands_there_with_its_reason_as_text():
     reason = '<script>alert("x")</script>'
     entries = (folder.strike_entry(2, reason),)
     campaign = measured(readings=6, extra=entries, names=[f'<b>"{i}' for i in range(12)])
-    built = campaign_page(campaign.opened, campaign.state, campaign.tables)
-    struck = next(each for each in blocks(built.sections, Table) if "void" in each.caption)
-    assert [(row[0], row[3]) for row in struck.rows] == [("2", reason)]
-    text = page.html(built)
-    assert text == page.html(campaign_page(campaign.opened, campaign.state, campaign.tables))
+    (row,) = section_of(campaign).values["struck"]
+    assert (row["reading"], row["struck"]) == (2, reason)
+    text = page.html(campaign_page(campaign.opened, campaign.state, campaign.tables))
     assert "<script>alert" not in text
     assert "&lt;script&gt;alert" in text
     assert '<b>"' not in text
@@ -215,39 +195,22 @@ def test_what_was_struck_stands_there_with_its_reason_as_text_and_bytes_repeat()
 def test_a_point_left_out_is_told_with_its_reason_and_no_candidate_any_more():
     unread = measured(readings=6).state.rows[-1]
     campaign = measured(readings=6, extra=(folder.leave_out_entry(int(unread), "behind a <b>"),))
-    built = campaign_page(campaign.opened, campaign.state, campaign.tables)
-    left = next(each for each in blocks(built.sections, Table) if "left out" in each.caption)
-    assert left.rows == ((campaign.state.plan.points.label[unread], "behind a <b>"),)
-    assert "these 11 candidates" in note(built.first, "VALID")
-    assert "was left out: behind a <b>" in note(built.first, "OPEN")
-
-
-def test_the_course_says_nothing_where_nothing_could_be_said(whole):
-    parts = campaign_page(whole.opened, whole.state, whole.tables).sections
-    course = next(each for each in blocks(parts, Table) if "course" in each.caption)
-    early = [row for row in course.rows if int(row[0]) < 5 and row[2] == "all candidates"]
-    assert {row[3] for row in early} == {"-"}
-    assert all(row[6].startswith("no upper bound: ") for row in early)
-    assert course.rows[-1][3] == f"{whole.state.statements()[-1].upper_mm:.3f}"
+    (row,) = section_of(campaign).values["left_out"]
+    label = campaign.state.plan.points.label[unread]
+    assert (row["point"], row["left_out"]) == (label, "behind a <b>")
+    first = first_of(campaign)
+    assert "these 11 candidates" in note(first, "VALID")
+    assert "was left out: behind a <b>" in note(first, "OPEN")
 
 
 def test_noise_as_stated_is_seen_as_one_and_fourfold_noise_as_four():
     def rms(noise_mm):
         campaign = measured(points=4, budget=120, noise_mm=noise_mm)
-        parts = campaign_page(campaign.opened, campaign.state, campaign.tables).sections
-        drawn = {each.key: each for each in blocks(parts, Picture)}
-        apart = named(drawn["noise-repeats"])["apart"]
-        return float(np.sqrt(np.mean(np.square(apart))))
+        (row,) = section_of(campaign).values["instruments"]
+        return row["scatter"]
 
     assert rms(0.05) == pytest.approx(1.0, abs=0.15)
     assert rms(0.2) == pytest.approx(4.0, abs=0.6)
-
-
-def test_as_a_section_it_is_kept_apart_from_held_out_errors(whole):
-    part = section(whole.state, whole.tables, "campaign-1")
-    assert "12 candidates" in part.population
-    assert "none of the held-out rows" in part.population
-    assert all(each.key.startswith("campaign-1-") for each in blocks((part,), Picture))
 
 
 def test_an_estimate_for_candidates_that_are_not_all_measured_is_said_to_be_low(whole):

@@ -1,14 +1,11 @@
 """The section on the data says what was measured, what is wrong with it and what to do."""
 
 import numpy as np
-import pytest
 from made_up_results import (
     TRAVEL_RAD,
     check,
-    data,
     everything,
     measurements,
-    picture,
     pose_errors,
     robot,
     selection,
@@ -17,11 +14,11 @@ from made_up_results import (
 )
 from parsed import read
 
-from kinacc.report import data_check
+from kinacc.report import fit_sections
 
 
 def section(slides=False, **tables):
-    return data_check.section(everything() | tables, robot(slides))
+    return fit_sections.data(everything() | tables, robot(slides))
 
 
 def measured(found) -> dict[str, str]:
@@ -36,7 +33,7 @@ def test_a_synthetic_arm_has_no_file_to_check():
     tables = everything()
     del tables["data_check"]
     tables["measurements"]["row"][:] = np.nan
-    found = data_check.section(tables, robot())
+    found = fit_sections.data(tables, robot())
     assert "no measured file to check" in words(found)
     assert "of a synthetic arm" in read(found).population
 
@@ -133,26 +130,9 @@ def test_the_ranges_of_joints_stand_beside_their_limits_deg_and_mm():
     joints = np.array([[-0.5 * TRAVEL_RAD, 0, 0, -20.0], [0.5 * TRAVEL_RAD, 0, 0, 30.0]])
     found = section(slides=True, measurements=measurements(joints))
     rows = table(found, "Range of every joint").rows
-    assert rows[0] == ("J1, deg", "-45.0 to 45.0", "-90.0 to 90.0", "50%")
-    assert rows[1][3] == "0%"
-    assert rows[3] == ("J4, mm", "-20.0 to 30.0", "-100.0 to 100.0", "25%")
-
-
-def test_a_gap_in_the_travel_of_a_joint_is_left_empty_and_its_ends_are_filled():
-    q1 = TRAVEL_RAD * np.array([-1.0, -0.999, 1.0])
-    joints = np.stack([q1, *np.zeros((3, 3))], axis=1)
-    cells = data(picture(section(measurements=measurements(joints)), "coverage"))
-    mine = [i for i, joint in enumerate(cells["joint"]) if joint == "J1, deg"]
-    assert [int(cells["poses"][i]) for i in mine] == [2, 1]
-    assert [cells["where"][i] for i in mine] == ["-90 to -87", "87 to 90"]
-    assert float(cells["left"][mine[0]]) == 0.0
-    assert float(cells["right"][mine[1]]) == pytest.approx(100.0)
-
-
-def test_a_joint_beyond_its_limits_is_drawn_beyond_its_frame():
-    joints = np.array([[1.1 * TRAVEL_RAD, 0, 0, 0], [0, 0, 0, 0]])
-    cells = data(picture(section(measurements=measurements(joints)), "coverage"))
-    assert max(cells["right"]) > 100.0
+    assert rows[0] == ("1", "deg", "-45.0 to 45.0", "-90.0 to 90.0", "50%")
+    assert rows[1][4] == "0%"
+    assert rows[3] == ("4", "mm", "-20.0 to 30.0", "-100.0 to 100.0", "25%")
 
 
 def test_one_row_is_enough_for_a_section():

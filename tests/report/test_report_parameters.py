@@ -4,17 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from bokeh.models import VArea
 from made_up_results import (
     TRAVEL_RAD,
     covariance,
-    data,
     dh_model,
     everything,
     identified,
-    picture,
     robot,
-    set_nothing_that_is_not_there,
     table,
     vec_model,
 )
@@ -23,41 +19,27 @@ from parsed import read
 from kinacc.kinematics import vec
 from kinacc.kinematics.dh import PARAMETERS, DHModel, forward
 from kinacc.kinematics.vec import ERRORS
-from kinacc.report import parameters
+from kinacc.report import fit_sections
 
 NAMES = [f"j{joint}.{error}.{n}" for joint in range(1, 5) for error in ERRORS for n in range(3)]
 
 
 def section(slides=False, **tables):
-    return parameters.section(everything() | tables, robot(slides))
+    return fit_sections.parameters(everything() | tables, robot(slides))
 
 
-def test_differences_have_their_unit_and_bars_of_two_standard_deviations():
+def test_differences_have_their_unit_and_standard_deviation():
     change = {"d_mm": [0, 0, 0, 1.5], "alpha_rad": [0, -0.0004, 0, 0]}
     model = dh_model(change) | {"std_alpha_rad": np.full(4, 0.0001)}
-    found = section(dh_model=model)
-    lengths, angles = (data(picture(found, f"differences-{of}")) for of in ("lengths", "angles"))
-    d4, alpha2 = lengths["short"].index("j4 d"), angles["short"].index("j2 alpha")
-    assert [lengths[each][d4] for each in ("low", "difference", "high")] == pytest.approx(
-        [1.3, 1.5, 1.7]
-    )
-    assert [angles[each][alpha2] for each in ("low", "difference", "high")] == pytest.approx(
-        [-0.6, -0.4, -0.2]
-    )
-    rows = {row[0]: row[1:] for row in table(found, "DH parameters").rows}
+    rows = {row[0]: row[1:] for row in table(section(dh_model=model), "DH parameters").rows}
     assert rows["d of joint 4"][:4] == ("100.0000 mm", "101.5000 mm", "+1.5000 mm", "0.1000 mm")
     assert rows["alpha of joint 2"][2:] == ("-0.4000 mrad", "0.1000 mrad", "identified")
 
 
-def test_an_undetermined_parameter_has_no_bar_and_a_marker_of_its_own():
+def test_an_undetermined_parameter_has_no_standard_deviation():
     told = identified(j1__d_mm=("undetermined", np.nan, "a sentence"))
     model = dh_model() | {"std_d_mm": np.array([np.nan, 0.1, 0.1, 0.1])}
     found = section(dh_model=model, dh_identified=told)
-    shown = data(picture(found, "differences-lengths"))
-    at = shown["short"].index("j1 d")
-    assert np.isnan(shown["low"][at])
-    assert shown["size_undetermined"][at] > 0.0
-    assert shown["size_identified"][at] == 0.0
     rows = {row[0]: row[1:] for row in table(found, "DH parameters").rows}
     assert rows["d of joint 1"][3:] == ("–", "undetermined")
 
@@ -71,29 +53,32 @@ def test_an_angle_beta_that_no_joint_has_is_not_listed_and_a_fixed_length_is():
     assert {each for each in named if each.startswith("beta")} == {"beta of joint 3"}
 
 
-def curve(found, name: str, kind: str = "eps") -> np.ndarray:
-    return np.asarray(data(picture(found, f"curves-{kind}"))[name], dtype=float)
+def errors(slides=False, **tables):
+    """Errors and standard deviations of joints by name, j1.eps_z, over the joint's range."""
+    found, arm = everything() | tables, robot(slides)
+    model = vec.VECModel.from_columns(found["vec_model"], arm.dh.prismatic)
+    _, values, std = fit_sections.vec_errors(found, model, arm)
+    names = [f"j{joint}.{error}" for joint in range(1, 5) for error in ERRORS]
+    flat = [each.reshape(len(names), -1) for each in (values, std)]
+    return [dict(zip(names, each, strict=True)) for each in flat]
 
 
 def test_what_a_dh_table_can_say_is_left_out_of_the_errors_of_joints():
     at = np.linspace(-1.0, 1.0, 200)
     wave = np.polynomial.chebyshev.chebfit(at, np.cos(TRAVEL_RAD * at + 0.3), 10)
     same = {f"j2__{each}__{n}": c for each in ("eps_x", "eps_z") for n, c in enumerate(wave)}
-    found = section(vec_model=vec_model(10, j1__delta_z__0=3.0, **same))
-    assert curve(found, "j1_delta_z", "delta") == pytest.approx(0.0, abs=1e-5)
-    assert curve(found, "j2_eps_x") == pytest.approx(0.0, abs=1e-4)  # the neighbour's frame
-    assert np.ptp(curve(found, "j2_eps_z")) > 500.0  # about its own axis: an eccentric encoder
+    found, _ = errors(vec_model=vec_model(10, j1__delta_z__0=3.0, **same))
+    assert found["j1.delta_z"] == pytest.approx(0.0, abs=1e-5)
+    assert found["j2.eps_x"] == pytest.approx(0.0, abs=1e-4)  # the neighbour's frame
+    assert np.ptp(found["j2.eps_z"]) > 500.0  # about its own axis: an eccentric encoder
 
 
 def test_the_linear_part_of_a_sliding_joint_is_its_neighbours_turn():
     lines = {f"j4__{each}__1": 0.2 for each in ("delta_x", "delta_z", "eps_x")}
-    found = section(slides=True, vec_model=vec_model(**lines))
-    assert curve(found, "j4_delta_x", "delta") == pytest.approx(0.0, abs=1e-6)
-    assert np.ptp(curve(found, "j4_delta_z", "delta")) == pytest.approx(0.4)
-    assert np.ptp(curve(found, "j4_eps_x")) == pytest.approx(400.0)
-    options = picture(found, "curves-eps").controls[0].options
-    labels = [value for each in options for name, _, value in each.sets if name == "eps-axis"]
-    assert [each[-3:] for each in labels] == ["deg", "deg", "deg", " mm"]
+    found, _ = errors(slides=True, vec_model=vec_model(**lines))
+    assert found["j4.delta_x"] == pytest.approx(0.0, abs=1e-6)
+    assert np.ptp(found["j4.delta_z"]) == pytest.approx(0.4)
+    assert np.ptp(found["j4.eps_x"]) == pytest.approx(400.0)
 
 
 def between(slides: bool, joint: int, twist: np.ndarray) -> dict[str, float]:
@@ -126,44 +111,28 @@ def test_what_is_left_out_changes_no_pose_where_the_neighbour_takes_it_over(slid
         q = arm.q_max_rad * np.random.default_rng(1).uniform(-1, 1, (20, 4))
         same = vec.forward(vec.VECModel.from_columns(model, arm.dh.prismatic), q)
         assert same.position_mm == pytest.approx(forward(arm.dh, q).position_mm, abs=1e-4)
-    found = section(slides=slides, vec_model=model)
-    for kind in ("delta", "eps"):
-        for axis in "xyz":
-            assert curve(found, f"j{joint + 1}_{kind}_{axis}", kind) == pytest.approx(0, abs=1e-5)
+    found, _ = errors(slides=slides, vec_model=model)
+    for error in ERRORS:
+        assert found[f"j{joint + 1}.{error}"] == pytest.approx(0, abs=1e-5)
 
 
-def test_the_band_is_of_what_is_shown():
+def test_the_standard_deviation_is_of_what_is_shown():
     variance = np.zeros(len(NAMES))
     variance[NAMES.index("j1.eps_z.0")] = 1.0  # a constant: no pose tells whose it is
     variance[NAMES.index("j1.eps_z.2")] = 1e-6
     known = covariance(NAMES, np.diag(variance))
     model = vec_model(j1__eps_z__2=0.002)
-    found = section(vec_model=model, vec_covariance=known)
-    value, high = curve(found, "j1_eps_z"), curve(found, "j1_eps_z_high")
+    found, std = errors(vec_model=model, vec_covariance=known)
+    value, spread = found["j1.eps_z"], std["j1.eps_z"]
     # A standard deviation of half the coefficient: two of them are the curve's own height.
-    assert high - value == pytest.approx(np.abs(value), abs=1e-5)
+    assert 2.0 * spread == pytest.approx(np.abs(value), abs=1e-5)
     assert value.mean() == pytest.approx(0.0, abs=1e-6)
     assert np.ptp(value) == pytest.approx(4.0)
-    at_an_end = table(found, "The largest of every error").rows[0][-1]
+    shown = section(vec_model=model, vec_covariance=known)
+    at_an_end = table(shown, "The largest of every error").rows[0][-1]
     assert [float(each) for each in at_an_end.split(" ± ")] == pytest.approx(
-        [value[0], 0.5 * (high[0] - value[0])], abs=1e-3
+        [value[0], spread[0]], abs=1e-3
     )
-
-
-def test_results_without_a_covariance_show_curves_without_bands():
-    found = section()
-    assert "not known" in read(found).captions["curves-eps"]
-    assert not picture(found, "curves-eps").plot.select({"type": VArea})
-
-
-def test_the_control_of_joints_sets_what_is_there():
-    bare = section()
-    banded = section(vec_covariance=covariance(NAMES, np.eye(len(NAMES))))
-    for found in (bare, banded):
-        for kind in ("delta", "eps"):
-            shown = picture(found, f"curves-{kind}")
-            assert [each.label for each in shown.controls[0].options] == ["1", "2", "3", "4"]
-            assert set_nothing_that_is_not_there(shown)
 
 
 def test_backlash_and_bending_stand_in_tables_where_they_were_fitted():

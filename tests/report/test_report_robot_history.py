@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import numpy as np
 from made_up_history import history
-from parsed import as_page, read
+from parsed import read
 
 from kinacc.deployment.history_words import first_words
 from kinacc.kinematics import robot
-from kinacc.report import robot_history
+from kinacc.report import study_sections
 
 ARM = robot.load("mh180")
 
 
 def section_of(table):
-    return robot_history.section({"history": table}, ARM)
+    return study_sections.history({"history": table}, ARM)
 
 
 def test_every_line_has_a_row_with_its_verdict_first():
@@ -28,21 +27,8 @@ def test_every_line_has_a_row_with_its_verdict_first():
     assert table.marked == {4: "too few poses"}
 
 
-def test_pictures_show_each_line_and_say_what_it_means():
-    found = section_of(history(6, changed=3))
-    errors, moved = found.pictures
-    assert errors.plot.x_range is moved.plot.x_range
-    (data,) = {each.data_source for each in moved.plot.renderers if each.data_source.name}
-    np.testing.assert_allclose(data.data["moved_mm"][3], 0.45, rtol=1e-6)
-    assert data.data["joint_said"][3] == "joint 4"
-    page = as_page(found)
-    assert "Recalibrate: 0.30 mm beyond chance, joint 4" not in page  # the last line still holds
-    assert "The last calibration still holds, that of 2026-04-15" in page
-
-
 def test_a_first_line_has_nothing_to_be_held_to():
     found = section_of(history(1))
-    assert len(found.pictures) == 1
     (words,) = read(found).paragraphs
     assert words.startswith("The first line of its series")
 

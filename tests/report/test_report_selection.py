@@ -2,19 +2,16 @@
 
 import numpy as np
 from made_up_results import (
-    data,
     everything,
     orders,
-    picture,
     pose_errors,
     selection,
-    set_nothing_that_is_not_there,
     table,
     words,
 )
 from parsed import read
 
-from kinacc.report import selection as page_section
+from kinacc.report import fit_sections
 
 TRIED = (
     (np.nan, 0, 0.50, 0.16, 0.02, 0),
@@ -30,7 +27,7 @@ def section(**tables):
 
 
 def of(found):
-    return page_section.section(found, "VEC selected.")
+    return fit_sections.selection(found, "VEC selected.")
 
 
 def test_the_selected_model_is_marked_and_its_gain_stands_in_standard_errors():
@@ -57,20 +54,13 @@ def test_nothing_held_out_says_that_there_is_nothing_to_judge_by():
     assert table(found, "Models at held-out poses").rows[1][2:] == ("–",) * 5
 
 
-def test_a_stated_order_is_said_to_be_stated_and_has_no_picture():
+def test_a_stated_order_is_said_to_be_stated():
     found = section()
     assert "2, is stated and no other was tried" in words(found)
-    assert not found.pictures
 
 
 def test_orders_that_were_tried_show_the_chosen_one_and_what_it_was_chosen_by():
     found = section(vec_orders=orders(*TRIED))
-    shown = picture(found, "orders")
-    columns = data(shown)
-    assert list(columns["order"]) == [0, 2, 4]  # of the choice that has seen all rows
-    assert [each > 0 for each in columns["chosen"]] == [False, True, False]
-    assert "Lowest at order 4, chosen: 2" in read(found).described["orders"]
-    assert set_nothing_that_is_not_there(shown)
     tried = table(found, "Orders tried")
     assert tried.rows[1] == ("2", "0.3", "0.4", "0.7", "0.3100", "0.00600", "0.00700")
     assert tried.rows[2][-1] == "–"
@@ -81,7 +71,6 @@ def test_orders_that_were_tried_show_the_chosen_one_and_what_it_was_chosen_by():
 
 def test_choices_for_folds_alone_stand_in_the_table():
     found = section(vec_orders=orders(*TRIED[3:]))
-    assert not found.pictures
     assert table(found, "Orders chosen").rows[0][0] == "without fold 0"
 
 

@@ -43,7 +43,7 @@ def section(opened: Opened, state: State, tables: Mapping[str, Columns]) -> Part
         figures["readings"] = drawing.readings(tables["campaign_readings"], limits.tolerance_mm)
     struck = readings["struck"].notna()
     values = {
-        "population": _population(state),
+        "whom": _population(state),
         "point": state.plan.about["point"],
         "pledges": [words.pledge(each, state) for each in words.distinct(state)],
         "near": [line for head, told in nearness.told(state) for line in (f"{head}:", *told)],
