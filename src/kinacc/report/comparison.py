@@ -99,7 +99,9 @@ def _table(found: Difference) -> Table:
     heads = ("rms mm", "by chance mm", "largest mm", "rms mrad", "by chance mrad")
     columns = [["", "how"]]
     columns += [[head, key, ".3f"] for head, key in zip(heads, list(rows[0])[1:], strict=True)]
-    return Table("Distance of the poses of {1} from those of {0}".format(*found.names), rows, columns)
+    return Table(
+        "Distance of the poses of {1} from those of {0}".format(*found.names), rows, columns
+    )
 
 
 def _sentence(line: str) -> str:
