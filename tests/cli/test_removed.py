@@ -34,7 +34,7 @@ def test_an_option(command, option):
 
 @pytest.mark.parametrize("key", removed.KEYS)
 def test_a_key(key):
-    _, problems = check_section(Settings, {key: {}}, (), ".".join)
+    _, problems = check_section(Settings, {key: {}}, ".".join)
     assert [each.fix for each in problems] == [removed.KEYS[key]]
 
 

@@ -230,7 +230,7 @@ BAD = {
     ),
     "parameters no joint has": (
         "calibration: {dh: {parameters: {joint 7 d: fixed, joint 2 e: free}}}",
-        ("parameters.joint 2 e", "no parameter of joints"),
+        ("calibration.dh.parameters", "joint 2 e", "no parameter of joints"),
     ),
     "components of frames nobody estimates": (
         "calibration: {frames: {base z: fixed}}",

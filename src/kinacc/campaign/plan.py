@@ -150,7 +150,7 @@ def assessor_of(name: str, settings: Mapping[str, object]) -> AdaptiveAssessor:
     own = {*known} - {"measurements"}
     shared = own & {*Study.model_fields}
     asked = {each: value for each, value in settings.items() if each in shared}
-    problems = check_section(Study, asked, (), lambda path: f"setting {path[0]} of {name}")[1]
+    problems = check_section(Study, asked, lambda path: f"setting {path[0]} of {name}")[1]
     for each, value in settings.items():
         where = f"setting {each} of {name}"
         if each not in known:

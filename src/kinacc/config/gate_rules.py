@@ -18,6 +18,7 @@ from pydantic import (
 
 from kinacc.config.fields import Distinct, Section, Text, refused, setting
 from kinacc.config.names import not_in_a_line
+from kinacc.config.reading import Place
 from kinacc.config.values import nearest, shown
 from kinacc.errors import Problem, first_few
 
@@ -273,7 +274,7 @@ Gates = Annotated[
 
 
 def wrong_datasets(
-    gates: Sequence[Limits], datasets: Collection[str] | None, place: Callable[..., str]
+    gates: Sequence[Limits], datasets: Collection[str] | None, place: Place
 ) -> Iterator[Problem]:
     """Gates that name data sets that are not there.
 
@@ -281,7 +282,7 @@ def wrong_datasets(
     section of a data set.
     """
     for number, gate in enumerate(gates):
-        named, where = gate.get("datasets"), place("gates", number, "datasets")
+        named, where = gate.get("datasets"), place(("gates", number, "datasets"))
         if named and datasets is None:
             what = "is given inside of a data set, which it is about alone"
             yield Problem(where, what, fix="leave it out, or put the gate at the top level")

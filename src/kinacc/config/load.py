@@ -13,7 +13,13 @@ from kinacc.config import gate_rules, series
 from kinacc.config.reading import Document, KeyPath, dotted, read
 from kinacc.config.schema import plain
 from kinacc.config.settings import Configuration, DataSet, Settings
-from kinacc.config.validate import ROBOTS, check_dataset_name, check_robot, check_section
+from kinacc.config.validate import (
+    ROBOTS,
+    Place,
+    check_dataset_name,
+    check_robot,
+    check_section,
+)
 from kinacc.config.values import shown
 from kinacc.errors import InputError, Problem
 
@@ -147,9 +153,9 @@ def _resolve(
                     return document.place(path)
         return f"default, {dotted(path)}" if path else documents[-1].name
 
-    top = {name: value for name, value in merged.items() if name != "datasets"}
-    shared, problems = check_section(Configuration, top, (), place)
-    datasets = merged.get("datasets")
+    shared, datasets = dict(merged), merged.get("datasets")
+    shared.pop("datasets", None)
+    shared, problems = check_section(Configuration, shared, place)
     if not isinstance(datasets, Mapping) or not datasets:
         what = "no data set is given" if not datasets else f"{shown(datasets)} is not a section"
         where = place(("datasets",)) if "datasets" in merged else documents[0].place(())
@@ -160,16 +166,13 @@ def _resolve(
         what = f"{len(datasets)} data sets are given"
         allowed = f"at most {_MOST_DATASETS} in one run"
         return {}, [*problems, Problem(place(("datasets",)), what, allowed)]
-    problems += gate_rules.wrong_datasets(
-        shared.get("gates") or (), [*datasets], lambda *at: place(at)
-    )
+    problems += gate_rules.wrong_datasets(shared.get("gates") or (), [*datasets], place)
     resolved: dict[str, dict[str, Any]] = {}
     for name, content in datasets.items():
         if len(problems) > _MOST_PROBLEMS:
             what = "this data set and those after it were not looked at"
             problems.append(Problem(place(("datasets", name)), what, fix="mend the others first"))
             break
-        problems += check_dataset_name(name, place)
         found, wrong = _dataset(name, content, shared, place, folder, contradictions)
         problems += [*wrong, *series.taken(name, found, datasets, place)]
         resolved |= found
@@ -180,24 +183,29 @@ def _dataset(
     name: str,
     content: Any,
     shared: Mapping[str, Any],
-    place: Callable[[KeyPath], str],
+    place: Place,
     folder: Path,
     contradictions: Contradictions,
 ) -> tuple[dict[str, dict[str, Any]], list[Problem]]:
     """Full settings of a data set, and of those its series stands for, by name."""
     path: KeyPath = ("datasets", name)
-    own, problems = check_section(DataSet, content, path, place)
-    robot, has_series = own.pop("robot", None), "series" in own
-    lines = series.by_date(own.pop("series", None) or ())
-    problems += series.of_each_other(lines, (*path, "series"), place)
+
+    def below(keys: KeyPath) -> str:
+        return place((*path, *keys))
+
+    problems = check_dataset_name(name, below(()))
+    own, wrong = check_section(DataSet, content, below)
+    problems += wrong
+    robot, lines = own.pop("robot", None), series.by_date(own.pop("series", None) or ())
+    problems += series.of_each_other(lines, below)
     known_robot = None
     if robot is not None:
-        unknown = check_robot(robot, place((*path, "robot")), folder)
+        unknown = check_robot(robot, below(("robot",)), folder)
         known_robot = None if unknown else robot
         problems += unknown
-    elif content is None or (isinstance(content, Mapping) and "robot" not in content):
+    elif not isinstance(content, Mapping) or "robot" not in content:
         allowed = "robot: a shipped robot's name or the path of a robot file"
-        problems.append(Problem(place(path), "names no robot", allowed))
+        problems.append(Problem(below(()), "names no robot", allowed))
     settings = Settings.model_validate(overlay(shared, own, _MAPPINGS))
     full = {"robot": robot, **settings.model_dump(by_alias=True)}
 
@@ -207,25 +215,22 @@ def _dataset(
             if isinstance(given, list):
                 break  # a list is given whole
             given = given.get(key, {}) if isinstance(given, Mapping) else {}
-        return place((*path, *keys)) if given != {} else f"{place(keys)} (data set {name})"
+        return below(keys) if given != {} else f"{place(keys)} (data set {name})"
 
     problems += series.contradicted(full, origin) if lines else ()
-    problems += gate_rules.wrong_datasets(own.get("gates") or (), None, origin)
+    problems += gate_rules.wrong_datasets(own.get("gates") or (), None, below)
     problems += gate_rules.without_limit(full["gates"], name, full["tolerance"], origin)
     full["gates"] = gate_rules.about(full["gates"], name)
-    if not lines:
-        has_series = has_series or any("series" in each.where for each in problems)
-        given = () if has_series else contradictions(name, known_robot, full, origin, folder)
-        return {name: full}, [*problems, *given]
     resolved = series.expanded(name, full, [line for _, line in lines])
-    for number, line in lines:
+    is_series = bool(lines) or (isinstance(content, Mapping) and "series" in content)
+    for number, line in lines if is_series else [(None, None)]:
 
-        def of_file(*keys: str, number: int = number) -> str:
-            is_path = keys == ("measurements", "file", "path")
-            return place((*path, "series", number, "path")) if is_path else origin(*keys)
+        def of_file(*keys: str | int, number: int | None = number) -> str:
+            is_line = number is not None and keys == _IDENTITY[1]
+            return below(("series", number, "path")) if is_line else origin(*keys)
 
-        settings_of_line = resolved[f"{name}-{line.date}"]
-        problems += contradictions(name, known_robot, settings_of_line, of_file, folder)
+        one = resolved[f"{name}-{line.date}" if line else name]
+        problems += contradictions(name, known_robot, one, of_file, folder)
     return resolved, problems
 
 

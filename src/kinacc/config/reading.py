@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shlex
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from datetime import date
 from pathlib import Path
@@ -14,6 +15,7 @@ import yaml
 from kinacc.errors import Problem
 
 KeyPath = tuple[Any, ...]
+Place = Callable[[KeyPath], str]
 
 # Thousands of data sets in one file stay below these, a second of work and 100 MB; what does not
 # would take minutes or all memory.

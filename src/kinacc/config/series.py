@@ -14,7 +14,7 @@ from pydantic import BeforeValidator, Field
 
 from kinacc.config.fields import Section, Text, refused, setting
 from kinacc.config.names import LONGEST
-from kinacc.config.reading import KeyPath
+from kinacc.config.reading import Place
 from kinacc.config.values import shown
 from kinacc.errors import Problem, first_few
 
@@ -24,7 +24,6 @@ FLAGS = {
     "tool": "the tool or targets sit on the flange",
 }
 _DAY = "a day as 2026-03-01"
-Place = Callable[[KeyPath], str]
 
 
 def day_of(value: Any) -> str | None:
@@ -63,23 +62,23 @@ def by_date(given: Sequence[Mapping[str, Any]]) -> list[tuple[int, Line]]:
     return sorted(numbered, key=lambda each: each[1].date)
 
 
-def of_each_other(
-    found: Sequence[tuple[int, Line]], path: KeyPath, place: Place
-) -> Iterator[Problem]:
+def of_each_other(found: Sequence[tuple[int, Line]], place: Place) -> Iterator[Problem]:
     """What is wrong with lines, ordered by date, beside one another."""
     for (_, before), (number, line) in pairwise(found):
         if line.date == before.date:
             what = f"{line.date} is the date of two lines"
-            yield Problem(place((*path, number, "date")), what, "a day of its own for each")
+            yield Problem(place(("series", number, "date")), what, "a day of its own for each")
         for name, how in FLAGS.items():
             if getattr(line, name) is None:
                 what = f"does not say whether {how} as on {before.date}"
-                yield Problem(place((*path, number)), what, f"{name}: {SAME}, or {name}: {MOVED}")
+                yield Problem(
+                    place(("series", number)), what, f"{name}: {SAME}, or {name}: {MOVED}"
+                )
     paths = [line.path for _, line in found]
     for order, (number, line) in enumerate(found):
         if line.path in paths[:order]:
             what = f"{line.path} stands in two lines"
-            yield Problem(place((*path, number, "path")), what, "every file once")
+            yield Problem(place(("series", number, "path")), what, "every file once")
 
 
 def contradicted(full: Mapping[str, Any], place: Callable[..., str]) -> Iterator[Problem]:
@@ -124,6 +123,8 @@ def expanded(
         file = {**full["measurements"]["file"], "path": line.path}
         return {**full, "measurements": {**full["measurements"], "file": file}}
 
+    if not found:
+        return {name: dict(full)}
     lines = {f"{name}-{line.date}": line for line in found}
     first = dict.fromkeys(FLAGS)
     series = [

@@ -9,15 +9,30 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import AfterValidator, Field
 
-from kinacc.config.fields import AUTO, Distinct, Or, Pair, Section, Text, setting
+from kinacc.config import parameter_rules
+from kinacc.config.fields import AUTO, Distinct, Or, Pair, Section, Text, refused, setting
 from kinacc.config.gate_rules import Gates
 from kinacc.config.measured import Measurements
 from kinacc.config.series import Series
 
 JointNumbers = Annotated[list[Annotated[int, Field(ge=1, le=7)]], Field(max_length=7), Distinct]
 JointPairs = Annotated[list[Pair], Field(min_length=4, max_length=7)]
+
+
+def _known(about: str) -> AfterValidator:
+    def check(rules: dict[str, Any]) -> dict[str, Any]:
+        problems = parameter_rules.rules(rules, about)[1]
+        if problems:
+            raise refused(
+                "; ".join(f"{each.where}: {each.what}" for each in problems), problems[0].fix
+            )
+        return rules
+
+    return AfterValidator(check)
+
+
 _THREE = Field(min_length=3, max_length=3)
 Vector = Annotated[list[Annotated[float, Field(ge=-10000, le=10000)]], _THREE]
 Angles = Annotated[list[Annotated[float, Field(ge=-360, le=360)]], _THREE]
@@ -123,7 +138,7 @@ class DhFit(Section):
         "joints with a Hayati twist beta beside d, or auto: beta in place of d where the next "
         "axis is nearly parallel",
     )
-    parameters: dict[Text, Any] = setting(
+    parameters: Annotated[dict[Text, Any], _known(parameter_rules.JOINTS)] = setting(
         {},
         "parameters that are free, fixed or known beforehand; the others are free, beta where "
         "hayati_joints says so",
@@ -182,7 +197,7 @@ class Calibration(Section):
         "fixed",
         "base and tool frames: the robot file's own, or estimated with the model",
     )
-    frames: dict[Text, Any] = setting(
+    frames: Annotated[dict[Text, Any], _known(parameter_rules.FRAMES)] = setting(
         {},
         "components of base and tool that are fixed or known beforehand, where the others are "
         "estimated",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -11,16 +11,13 @@ from pydantic import BaseModel, ValidationError
 
 from kinacc import removed
 from kinacc.config.names import LONGEST
-from kinacc.config.parameter_rules import FRAMES, JOINTS, rules
-from kinacc.config.reading import KeyPath
+from kinacc.config.reading import Place
 from kinacc.config.schema import DATASET_NAME, allowed, json_schema, node_at
 from kinacc.config.values import nearest, number_in_text, other_unit, shown, stem
 from kinacc.errors import Problem
 
 ROBOTS = Path(__file__).parents[1] / "kinematics" / "robots"
-Place = Callable[[KeyPath], str]
 _MOST_PROBLEMS = 100  # in one section: nobody has more, and each is held against all names
-_RULES = ((JOINTS, ("calibration", "dh", "parameters")), (FRAMES, ("calibration", "frames")))
 # What is wrong, by what pydantic calls it.
 _WHAT = {
     "int_type": "is not a number",
@@ -40,35 +37,21 @@ _WHAT = {
 
 
 def check_section(
-    model: type[BaseModel], content: Any, path: KeyPath, place: Place
+    model: type[BaseModel], content: Any, place: Place
 ) -> tuple[dict[str, Any], list[Problem]]:
     """A section as given without what cannot be used, and everything wrong with it."""
-    content = {} if content is None else content
     problems: list[Problem] = []
     try:
         model.model_validate(content)
     except ValidationError as error:
         found = error.errors(include_url=False)
-        for each in found[:_MOST_PROBLEMS]:
-            steps = _steps(each["loc"])
-            problems.append(_problem(model, each, steps, lambda p: place((*path, *p))))
+        problems = [_problem(model, each, place) for each in found[:_MOST_PROBLEMS]]
         if len(found) > _MOST_PROBLEMS:
             what = f"and {len(found) - _MOST_PROBLEMS} more"
-            problems.append(Problem(place(path), what, fix="mend the others first"))
+            problems.append(Problem(place(()), what, fix="mend the others first"))
         for each in found:
             content = _without(content, _steps(each["loc"]))
-    for about, keys in _RULES:
-        value: Any = content
-        for key in keys:
-            value = (value.get(key) or {}) if isinstance(value, Mapping) else {}
-        wrong = rules(value, about, _places_below((*path, *keys), place))[1]
-        content = _without(content, [*keys]) if wrong else content
-        problems += wrong
-    return dict(content), problems
-
-
-def _places_below(path: KeyPath, place: Place) -> Callable[[str], str]:
-    return lambda name: place((*path, name))
+    return dict(content or {}), problems
 
 
 def _steps(loc: tuple[Any, ...]) -> list[Any]:
@@ -89,9 +72,10 @@ def _without(content: Any, steps: list[Any]) -> Any:
     return {**content, first: _without(content[first], rest)}
 
 
-def _problem(model: type[BaseModel], error: Any, steps: list[Any], place: Place) -> Problem:
+def _problem(model: type[BaseModel], error: Any, place: Place) -> Problem:
     kind, value, known = error["type"], error["input"], error.get("ctx", {})
-    loc, where = error["loc"], place(tuple(steps))
+    loc, steps = error["loc"], _steps(error["loc"])
+    where = place(tuple(steps))
     if loc[-1:] == ("[key]",):
         node = node_at(loc[:-2], model)
         node = {"allowed": node["allowed"]} if "allowed" in node else node["propertyNames"]
@@ -161,10 +145,9 @@ def _places(schema: dict[str, Any], name: Any) -> Iterator[tuple[str, ...]]:
     return below(schema, ())
 
 
-def check_dataset_name(name: Any, place: Place) -> list[Problem]:
+def check_dataset_name(name: Any, where: str) -> list[Problem]:
     """A name becomes a folder below results/, so it may not lead anywhere else."""
     words = f"at most {LONGEST} letters, digits, _ and -, the first not -"
-    where = place(("datasets", name))
     if not isinstance(name, str):
         what = f"the data set's name {shown(name)} is not text"
         return [Problem(where, what, words, "put the name in quotes")]

@@ -152,7 +152,8 @@ def _of_errors(name: str, tables: RunTables, gate: Mapping[str, Any], unit: str)
     about = {"model": model, "statistic": words, "at": gate["at"], "rows": len(sizes)}
     size, why = of(sizes), ""
     if statistic == "p99" and len(sizes) < FEWEST_OF_QUANTILE:
-        why = f"{len(sizes)} rows are fewer than {FEWEST_OF_QUANTILE}"
+        others = "a limit on mean, rms, largest or p99_gamma needs fewer"
+        why = f"{len(sizes)} rows are too few, {FEWEST_OF_QUANTILE} would do; {others}"
     if np.isnan(size):
         why = "an error is exactly zero: no gamma distribution fits"
     return Figure(size, unit, called, about, why)
