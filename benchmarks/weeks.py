@@ -18,7 +18,7 @@ from kinacc.calibration import dh_fit
 from kinacc.calibration.constraints import frame_terms, free_parameters, parallel_joints
 from kinacc.calibration.frames import known
 from kinacc.calibration.observations import Observations, full_poses
-from kinacc.deployment import drift
+from kinacc.deployment.history import SAME, Session, history
 from kinacc.deployment.record import Calibration
 from kinacc.gate import accepted, chance
 from kinacc.geometry import Pose, compose, exp_so3, invert
@@ -52,7 +52,7 @@ def measured(seed: int, week: int, q_rad: np.ndarray, offset_rad: np.ndarray) ->
     return replace(seen, fold=assign(seen.pose, FOLDS, 0))
 
 
-def session(seen: Observations, name: str) -> drift.Session:
+def session(seen: Observations, name: str) -> Session:
     """The DH calibration of a week and its held-out errors."""
     free = free_parameters(ARM.dh.joints, parallel_joints(ARM.dh))
 
@@ -70,7 +70,7 @@ def session(seen: Observations, name: str) -> drift.Session:
         held_out_mm[out] = np.linalg.norm(seen.position_mm - at.position_mm, axis=1)[out]
     whole = fit(seen)
     own = Calibration(name, ARM, "dh", whole.model, whole.frames.base, {"tool": whole.frames.tool})
-    return drift.Session(name, name, "", drift.SAME if name == "1" else "moved", drift.SAME, own,
+    return Session(name, name, "", SAME if name == "1" else "moved", SAME, own,
                          seen, held_out_mm, *[np.nan] * 3)  # fmt: skip
 
 
@@ -86,7 +86,7 @@ def verdict(seed: int, changed: bool, poses: int) -> str:
     worse = chance.change("mean", *samples, False, accepted.CONFIDENCE)
     if not worse.open and worse.least > 0.0:
         return "worse: held-out errors"
-    row = drift.history([weeks, later], WEIGHT, seed=16)
+    row = history([weeks, later], WEIGHT, seed=16)
     return {"holds": "same", "recalibrate": "worse: arm"}.get(row["verdict"][1], "undecided")
 
 

@@ -66,7 +66,7 @@ SLOW = (
     "deployment/test_compare.py",
     "deployment/test_verify.py",
     "deployment/test_compensate.py",
-    "deployment/test_drift.py",
+    "deployment/test_history.py",
     "deployment/test_poses_unlike_the_measured.py",
     "deployment/test_predict.py",
     "figures/test_figure_files.py",

@@ -33,9 +33,9 @@ import numpy as np
 
 from kinacc.calibration.frames import known
 from kinacc.calibration.observations import Observations, full_poses
-from kinacc.deployment import drift_chance, drift_pairs
-from kinacc.deployment.drift import LEVEL, factor
-from kinacc.deployment.drift_pairs import Pair, Setup
+from kinacc.deployment import history_model
+from kinacc.deployment.history import LEVEL
+from kinacc.deployment.history_model import Pair, Setup
 from kinacc.kinematics import robot as robots
 from kinacc.synthetic import plan, tracker
 from kinacc.synthetic.accepted import accepted_draw, rows
@@ -88,17 +88,17 @@ class Arm:
 
     def pair(self, first: Observations, second: Observations) -> Pair:
         """Both, about the arm's geometry."""
-        both = drift_pairs.joined(first, second, SETUP)
+        both = history_model.joined(first, second, SETUP)
         frames = known(sessions=len(both.session_names))
-        return drift_pairs.about(self.true.dh, frames, both, len(first), WEIGHT_MM_PER_RAD)
+        return history_model.about(self.true.dh, frames, both, len(first), WEIGHT_MM_PER_RAD)
 
     def understated(self, series: Observations) -> float:
         """What halves of a series say of the misfit; nothing where all poses are shared."""
         if self.plans == SAME:
             return 1.0
-        alone = drift_pairs.about(self.true.dh, known(), series, len(series), WEIGHT_MM_PER_RAD)
-        cuts = drift_pairs.halves(alone, np.repeat(series.q_rad, 6, axis=0), SETUP)
-        return drift_chance.understated([*cuts], self.rng)
+        alone = history_model.about(self.true.dh, known(), series, len(series), WEIGHT_MM_PER_RAD)
+        cuts = history_model.halves(alone, np.repeat(series.q_rad, 6, axis=0), SETUP)
+        return history_model.understated([*cuts], self.rng)
 
 
 # Names of DH parameters by the error they are: (of this joint or the next, place among ERRORS).
@@ -117,13 +117,15 @@ def year(arm: Arm) -> tuple[list[dict], np.ndarray, np.ndarray]:
     for month in range(1, MONTHS):
         series = arm.series()
         own = arm.understated(series)
-        found = drift_chance.moved(arm.pair(force, series), factor(wide, own), arm.rng)
+        found = history_model.moved(
+            arm.pair(force, series), history_model.misfit_factor(wide, own), arm.rng
+        )
         chance_mm = found.chance_mm(LEVEL)
         alarm = found.moved_mm > chance_mm
         decisions.append({
             "plans": arm.plans, "month": month + 1, "moved_mm": found.moved_mm,
             "chance_mm": chance_mm, "probability": found.probability,
-            "factor": factor(wide, own), "alarm": int(alarm),
+            "factor": history_model.misfit_factor(wide, own), "alarm": int(alarm),
         })  # fmt: skip
         hits, sizes = _seen(found, chance_mm)
         seen += hits
@@ -133,12 +135,12 @@ def year(arm: Arm) -> tuple[list[dict], np.ndarray, np.ndarray]:
     return decisions, seen, np.mean(size, axis=0)
 
 
-def _seen(found: drift_chance.Moved, chance_mm: float) -> tuple[np.ndarray, np.ndarray]:
+def _seen(found: history_model.Moved, chance_mm: float) -> tuple[np.ndarray, np.ndarray]:
     units = np.zeros((36, len(CHANGES)))
     for number, (joint, name) in enumerate(CHANGES):
         after, error = PARAMETERS[name]
         if joint + after < JOINTS:
-            units[6 * (joint + after) + error, number] = drift_chance.UNITS[error]
+            units[6 * (joint + after) + error, number] = history_model.UNITS[error]
     along = found.along(units)
     size = np.linalg.norm(along, axis=0)
     unit = along / np.where(size > UNSEEN_MM, size, np.inf)

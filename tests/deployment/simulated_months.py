@@ -14,7 +14,7 @@ from kinacc.calibration import dh_fit
 from kinacc.calibration.constraints import frame_terms, free_parameters, parallel_joints
 from kinacc.calibration.frames import known
 from kinacc.calibration.observations import Observations, full_poses
-from kinacc.deployment import drift
+from kinacc.deployment.history import Session, history
 from kinacc.deployment.record import Calibration
 from kinacc.geometry import Pose, compose
 from kinacc.kinematics import robot as robots
@@ -63,7 +63,7 @@ def month(
     return full_poses(q_rad, Pose(seen[:, :3, :3], seen[:, :3, 3]))
 
 
-def session(seen: Observations, number: int, moved: bool) -> drift.Session:
+def session(seen: Observations, number: int, moved: bool) -> Session:
     """A line of the series with a DH calibration of its own."""
     arm = robots.load("ur10")
     seen = full_poses(seen.q_rad, Pose(seen.rotation, seen.position_mm))
@@ -82,9 +82,7 @@ def session(seen: Observations, number: int, moved: bool) -> drift.Session:
     nothing = (np.nan, np.nan, np.nan)
     base = MOVED if moved else SAME
     date = f"2026-{number:02}-01"
-    return drift.Session(
-        f"ur-{date}", date, "", base, drift.SAME, calibration, seen, sizes, *nothing
-    )
+    return Session(f"ur-{date}", date, "", base, SAME, calibration, seen, sizes, *nothing)
 
 
 def year_of(
@@ -99,4 +97,4 @@ def year_of(
     for number in range(1, months + 1):
         knocked = np.broadcast_to(knock_rad if number == months else 0.0, 6)
         lines.append(session(month(year, number, other_poses, moved, knocked), number, moved))
-    return drift.history(lines, WEIGHT_MM_PER_RAD, seed=year)
+    return history(lines, WEIGHT_MM_PER_RAD, seed=year)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from made_up_history import history
 from parsed import read
 
-from kinacc.deployment.history_words import first_words
 from kinacc.kinematics import robot
 from kinacc.report import study_sections
+from kinacc.report.history_lines import sentence
 
 ARM = robot.load("mh180")
 
@@ -34,8 +34,7 @@ def test_a_first_line_has_nothing_to_be_held_to():
 
 
 def test_the_first_screen_says_what_the_last_line_says():
-    assert first_words(history(4, changed=3)) == (
-        "History, 4 lines: recalibrate: 0.30 mm beyond chance, joint 4, since the calibration of "
-        "2026-01-15."
+    assert sentence(history(4, changed=3)) == (
+        "recalibrate: 0.30 mm beyond chance, joint 4, since the calibration of 2026-01-15"
     )
-    assert first_words(history(3)).startswith("History, 3 lines: the last calibration still holds")
+    assert sentence(history(3)).startswith("the last calibration still holds")

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from kinacc.campaign import of_calibration
-from kinacc.deployment import drift
+from kinacc.deployment.history import Session, history, session_of
 from kinacc.tables import store
 from kinacc.tables.columns import Columns
 
@@ -17,10 +17,10 @@ from kinacc.tables.columns import Columns
 def run(inputs: Mapping, settings: Mapping) -> dict[str, Columns]:
     """``history``: a row for each line, by ``<line>/<table>`` of its calibration, by date."""
     weight = settings["calibration"]["rotation_weight_mm_per_rad"]
-    return {"history": drift.history([*_sessions(inputs, settings)], weight, settings["seed"])}
+    return {"history": history([*_sessions(inputs, settings)], weight, settings["seed"])}
 
 
-def _sessions(inputs: Mapping, settings: Mapping) -> Iterator[drift.Session]:
+def _sessions(inputs: Mapping, settings: Mapping) -> Iterator[Session]:
     tolerance_mm = settings.get("tolerance", {}).get("mm", np.nan)  # left out where none is set
     campaigns = [each.parent for role, each in sorted(inputs.items()) if "/campaign_" in role]
     for line in settings["series"]:
@@ -29,7 +29,7 @@ def _sessions(inputs: Mapping, settings: Mapping) -> Iterator[drift.Session]:
             for role, each in inputs.items()
             if role.startswith(f"{line['name']}/") and not isinstance(each, Path)
         }
-        found = drift.session_of(tables, line["name"], line["date"], line["base"], line["tool"])
+        found = session_of(tables, line["name"], line["date"], line["base"], line["tool"])
         yield replace(
             found,
             digest=store.digest_of("measurements", tables["measurements"]),

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from kinacc import __version__
-from kinacc.deployment import drift, folder
+from kinacc.deployment import folder, history
 from kinacc.errors import FitError, InputError, Problem, first_few, refuse
 from kinacc.gate import chance
 from kinacc.gate.outcome import FAILED, PASSED, UNDECIDED, WARNED, Outcome
@@ -142,17 +142,17 @@ def _errors(now: Path, before: Path, _: float) -> tuple[str, str, dict[str, Any]
 def _arm(
     now: Path, before: Path, rotation_weight_mm_per_rad: float
 ) -> tuple[str, str, dict[str, Any]]:
-    """Whether the accepted calibration still holds, by :mod:`kinacc.deployment.drift`.
+    """Whether the accepted calibration still holds, by :mod:`kinacc.deployment.history`.
 
     A new fit absorbs a knocked joint, so that held-out errors do not show it. The instrument
     counts as set up anew, the tool as the same.
     """
     names = ("robot", "measurements", "pose_errors")
     sessions = [
-        drift.session_of(folder.read_tables(each, *names), name, name, MOVED, SAME)
+        history.session_of(folder.read_tables(each, *names), name, name, MOVED, SAME)
         for name, each in (("1 accepted", before), ("2 now", now))
     ]
-    rows = drift.history(sessions, rotation_weight_mm_per_rad, _SEED)
+    rows = history.history(sessions, rotation_weight_mm_per_rad, _SEED)
     row = {name: values[1] for name, values in rows.items()}
     figures: dict[str, Any] = {name: float(row[name]) for name in ("moved_mm", "chance_mm")}
     says = f"moved by {figures['moved_mm']:.3f} mm, by chance up to {figures['chance_mm']:.3f} mm"

@@ -11,11 +11,11 @@ import numpy as np
 from kinacc.assess.conformity import ACCEPT, REJECT
 from kinacc.config.gate_rules import LIMITS, limit_key, limited
 from kinacc.config.values import nearest
-from kinacc.deployment.history_words import sentence
 from kinacc.errors import InputError, first_few
 from kinacc.gate import chance
 from kinacc.gate.outcome import FAILED, PASSED, UNDECIDED, WARNED, Outcome
 from kinacc.gate.values import RunTables, figure, sample
+from kinacc.report.history_lines import sentence
 from kinacc.tables import sums
 from kinacc.tables.allowed import FINDING_LEVELS, FIRST, HOLDS, LEFT_OUT, RECALIBRATE
 

@@ -9,11 +9,11 @@ import numpy as np
 import pandas as pd
 
 from kinacc.config.error_models import model_name
-from kinacc.deployment.history_words import sentence
 from kinacc.figures import fig4, history_over_time, iterations
 from kinacc.figures.truth import FOOTNOTE, OF_MODELS
 from kinacc.kinematics.robot import Robot
 from kinacc.report import charts
+from kinacc.report.history_lines import sentence
 from kinacc.report.page import Part, records
 from kinacc.tables.allowed import VERDICTS
 from kinacc.tables.columns import Columns

@@ -21,7 +21,6 @@ from kinacc.campaign.of_calibration import Sought
 from kinacc.config.error_models import ERROR_MODELS, MEASURED, NOMINAL, PLAINEST, model_name
 from kinacc.deployment import applicability
 from kinacc.deployment import folder as results
-from kinacc.deployment.history_words import sentence
 from kinacc.deployment.record import Calibration
 from kinacc.errors import InputError, Problem, refuse
 from kinacc.geometry import quaternion_from_rotation
@@ -29,6 +28,7 @@ from kinacc.kinematics import robot
 from kinacc.kinematics.model import JointState
 from kinacc.kinematics.robot import Robot
 from kinacc.measurements.row_names import RowNames
+from kinacc.report.history_lines import sentence
 from kinacc.tables import store, sums
 from kinacc.tables.allowed import FINDING_LEVELS, LEFT_OUT, SUBSETS, VERDICTS
 from kinacc.tables.columns import Columns

@@ -13,8 +13,9 @@ from kinacc.calibration import dh_fit
 from kinacc.calibration.constraints import frame_terms, free_parameters, parallel_joints
 from kinacc.calibration.frames import known
 from kinacc.calibration.observations import Observations, full_poses
-from kinacc.deployment import drift
-from kinacc.deployment.drift import Session
+from kinacc.deployment import history as histories
+from kinacc.deployment.history import LEVEL, Session
+from kinacc.deployment.history_model import Setup
 from kinacc.deployment.record import Calibration
 from kinacc.geometry import Pose, compose, exp_so3, invert
 from kinacc.kinematics import robot as robots
@@ -84,7 +85,7 @@ def session(seen: Observations, date: str, base: str = SAME, name: str = "mh180"
 
 
 def history(*sessions: Session) -> Columns:
-    return drift.history(sessions, WEIGHT, seed=0)
+    return histories.history(sessions, WEIGHT, seed=0)
 
 
 def test_an_arm_that_nothing_happened_to_keeps_its_calibration():
@@ -115,7 +116,7 @@ def test_a_knocked_joint_is_named_and_the_new_calibration_is_in_force_from_then_
     assert found["in_force"][2] == "arm-2026-02-01"
     assert found["joint"][1] == 3
     assert found["beyond_mm"][1] > 0.1
-    assert found["probability"][1] < drift.LEVEL
+    assert found["probability"][1] < LEVEL
 
 
 def test_another_place_of_the_tracker_and_other_poses_are_no_change_of_the_arm():
@@ -163,6 +164,19 @@ def test_too_few_poses_are_said_to_tell_nothing():
 
     assert found["verdict"][1] == "cannot be told"
     assert "fewer than 20 configurations in arm-2026-02-01" in found["reason"][1]
+
+
+def test_readings_of_the_line_in_force_are_not_compared_with_themselves():
+    old, new = measured(1), measured(2, [0.0, 0.0, 0.7, 0.0, 0.0, 0.0])
+    both = histories.joined(new, old, Setup(True, True))
+    first = session(old, "2026-01-01")
+    alone, grown = (
+        history(first, replace(session(new, "2026-02-01"), observations=each))
+        for each in (new, both)
+    )
+    assert grown["verdict"][1] == "recalibrate"
+    for name in ("moved_mm", "chance_mm", "in_force_mean_mm"):
+        assert grown[name][1] == pytest.approx(alone[name][1], rel=1e-3)
 
 
 def ur10_series(name: str, date: str) -> Session:

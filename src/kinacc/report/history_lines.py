@@ -28,13 +28,6 @@ def sentence(history: Mapping, row: int = -1) -> str:
     return f"whether the calibration of {day} still holds cannot be told{reason}"
 
 
-def first_words(history: Mapping) -> str:
-    """The same as a sentence for the first screen of a page."""
-    count = len(history["verdict"])
-    lines = f"{count} line{'s' * (count != 1)}"
-    return f"History, {lines}: {sentence(history)}."
-
-
 def _day(history: Mapping, series: object) -> str:
     """The date of a line by the name of its data set."""
     found = np.flatnonzero(np.asarray(history["series"]) == series)

@@ -1,0 +1,274 @@
+"""A robot's history: whether the arm changed since the calibration in force was made.
+
+The last calibration holds unless the arm moved, over the poses of a later series, by more than an
+arm shows that did not change: see ``history_model`` for what that is taken to be. The level is that
+of a year of monthly calibrations. Where most of the later series lies outside the joint ranges of
+the one in force, that is no test of the arm but of the model, and nothing can be told.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from kinacc.calibration import dh_fit
+from kinacc.calibration.constraints import frame_terms
+from kinacc.calibration.frames import Frames, known, stacked
+from kinacc.calibration.models import Fit
+from kinacc.calibration.observations import Observations, from_columns
+from kinacc.calibration.one_thread import one_thread
+from kinacc.calibration.residuals import errors
+from kinacc.calibration.summary import LARGE_SHARE
+from kinacc.config.error_models import MEASURED, Comparison
+from kinacc.deployment import folder, history_model
+from kinacc.deployment.history_model import Setup, joined
+from kinacc.deployment.record import Calibration
+from kinacc.deployment.shared_readings import known_readings
+from kinacc.deployment.verify import LEAST_HELD_OUT, frames_under, held_out_vectors, says_there
+from kinacc.errors import FitError, InputError
+from kinacc.kinematics import robot as robots
+from kinacc.kinematics.robot import carried
+from kinacc.measurements.folds import SAME_CONFIGURATION_RAD, configurations
+from kinacc.tables.allowed import FIRST, HOLDS, OPEN, RECALIBRATE, SAME
+from kinacc.tables.columns import Columns
+from kinacc.tables.contract import ARTEFACTS, columns_of
+
+LEVEL = 0.05 / 12  # of a decision: monthly calibrations raise a false alarm in 1 year of 20
+ENOUGH = 0.5  # of the readings, in the joint ranges of the series in force
+MOST = 1500  # configurations of a series: what more would add is small beside the misfit
+
+
+@dataclass(frozen=True)
+class Session:
+    """One line of a series: what was measured, and the calibration it gave.
+
+    ``calibration``: the selected model of this line's data set. ``observations``: all its rows in
+    the order they were measured. ``held_out_mm`` (m,): position errors of that model at held-out
+    rows, empty without folds. ``base``, ``tool``: SAME or MOVED since the line before (of the
+    first: whatever is written there). ``temperature_c``, ``bound_mm``, ``tolerance_mm``: NaN where
+    not known.
+    """
+
+    name: str
+    date: str
+    digest: str
+    base: str
+    tool: str
+    calibration: Calibration
+    observations: Observations
+    held_out_mm: np.ndarray
+    temperature_c: float = np.nan
+    bound_mm: float = np.nan
+    tolerance_mm: float = np.nan
+
+
+def session_of(
+    tables: Mapping[str, Columns], name: str, date: str, base: str, tool: str
+) -> Session:
+    """A line of a series from the tables of its results."""
+    arm = robots.of_text(str(tables["robot"]["description"][0]), "robot.parquet")
+    calibration, measured = folder.calibration(tables, arm, name=name), tables["measurements"]
+    seen = from_columns(measured, arm)
+    held_out = held_out_vectors(tables["pose_errors"], calibration.choice, len(seen))
+    held_out_mm = np.linalg.norm(held_out[np.isfinite(held_out).all(axis=1)], axis=1)
+    temperature_c = float(pd.Series(measured.get("temperature_c", []), dtype=float).mean())
+    return Session(name, date, "", base, tool, calibration, seen, held_out_mm, temperature_c)
+
+
+def history(sessions: Sequence[Session], rotation_weight_mm_per_rad: float, seed: int) -> Columns:
+    """The table ``history``: one row a session, in the order of their dates.
+
+    The same whatever order they are given in, and a row the same whatever comes after it: all
+    chance follows from ``seed`` and the names of the two series compared.
+    """
+    comparison = _Comparison(rotation_weight_mm_per_rad, seed, {})
+    rows: list[dict[str, Any]] = []
+    force, setup = None, Setup(True, True)
+    for session in sorted(sessions, key=lambda each: each.date):
+        setup = Setup(
+            setup.same_base & (session.base == SAME), setup.same_tool & (session.tool == SAME)
+        )
+        row = {name: getattr(session, name) for name in ("date", "digest", "base", "tool")} | {
+            "series": session.name,
+            "rows": len(session.observations),
+            "configurations": _count(session.observations),
+            "model": session.calibration.choice,
+            "temperature_c": session.temperature_c,
+            "bound_mm": session.bound_mm,
+            "tolerance_mm": session.tolerance_mm,
+            "verdict": FIRST,
+            **_sizes("held_out", session.held_out_mm),
+        }
+        if force is not None:
+            row |= {"in_force": force.name} | comparison.row(force, session, setup)
+        rows.append(row)
+        if row["verdict"] in (FIRST, RECALIBRATE):
+            force, setup = session, Setup(True, True)
+    names = [each.name for each in ARTEFACTS["history"].columns]
+    return columns_of("history", [[row.get(name) for name in names] for row in rows])
+
+
+@dataclass(frozen=True)
+class _Comparison:
+    """How sessions are compared; ``known``: what halves of a series showed, by name and setup."""
+
+    rotation_weight_mm_per_rad: float
+    seed: int
+    known: dict[tuple[str, Setup], float]
+
+    def row(self, force: Session, session: Session, setup: Setup) -> dict[str, Any]:
+        """What a row says of ``session`` while the calibration of ``force`` was in force.
+
+        Readings that the session in force holds as well are left out.
+        """
+        series = (session.observations, force.observations)
+        shared = known_readings(*([each.q_rad, each.position_mm] for each in series))
+        session = replace(session, observations=session.observations.select(~shared))
+        row: dict[str, Any] = {}
+        try:
+            row |= _sizes("in_force", self.errors_mm(force, session, setup))
+            few = [each for each in (force, session) if _count(each.observations) < LEAST_HELD_OUT]
+            if few:
+                what = f"fewer than {LEAST_HELD_OUT} configurations in {few[0].name}"
+                return row | {"verdict": OPEN, "reason": what}
+            return row | self.moved(force, session, setup)
+        except (FitError, InputError) as problem:
+            return row | {"verdict": OPEN, "reason": str(problem)}
+
+    @one_thread
+    def moved(self, force: Session, session: Session, setup: Setup) -> dict[str, Any]:
+        """What moved, what chance shows, and the verdict. Raises FitError."""
+        prismatic = session.calibration.robot.dh.prismatic
+        first, second = _thinned(force.observations), _thinned(session.observations)
+        both = joined(first, second, setup)
+        pair = self._about(force, both, len(first))
+        misfit = 1.0
+        if pair.has_other_poses:
+            shown = [self.understated(each, setup) for each in (force, session)]
+            misfit = history_model.misfit_factor(*shown)
+        found = history_model.moved(pair, misfit, self._rng(force.name, session.name))
+        moved_mm, chance_mm = found.moved_mm, found.chance_mm(LEVEL)
+        row = {
+            "moved_mm": moved_mm,
+            "chance_mm": chance_mm,
+            "beyond_mm": max(0.0, moved_mm - chance_mm),
+            "probability": found.probability,
+            "verdict": HOLDS,
+        }
+        there = _share_inside(session.observations.q_rad, force.observations.q_rad, prismatic)
+        if there < ENOUGH:
+            what = (
+                f"only {there:.0%} of the readings lie in the joint ranges of {force.name}: errors "
+                "of a calibration where nothing was measured are no change"
+            )
+            return row | {"verdict": OPEN, "reason": what}
+        if moved_mm > chance_mm:
+            joint = history_model.joint_of(found, prismatic)
+            return row | {"verdict": RECALIBRATE, "joint": joint}
+        held_out_mm = float(np.mean(force.held_out_mm)) if len(force.held_out_mm) else np.inf
+        if chance_mm > held_out_mm:
+            what = (
+                f"chance alone shows up to {chance_mm:.2f} mm, more than the held-out error of the "
+                f"calibration in force ({held_out_mm:.2f} mm on average)"
+            )
+            return row | {"verdict": OPEN, "reason": what}
+        return row
+
+    @one_thread
+    def understated(self, session: Session, setup: Setup) -> float:
+        """What halves of a series say of the misfit (``history_model.understated``)."""
+        key = session.name, setup
+        if key not in self.known:
+            series = _thinned(session.observations)
+            alone = self._about(session, series, len(series))
+            q_rad = np.repeat(series.q_rad, 3 + 3 * series.has_rotation, axis=0)
+            cuts = [*history_model.halves(alone, q_rad, setup)]
+            self.known[key] = history_model.understated(cuts, self._rng(session.name))
+        return self.known[key]
+
+    def _about(self, session: Session, series: Observations, first: int) -> history_model.Pair:
+        """The pair about the DH model of a session's calibration, with its own base and targets."""
+        robot, model = session.calibration.robot, session.calibration.plainest.model.dh
+        counts = len(series.session_names), len(series.target_names)
+        weight = self.rotation_weight_mm_per_rad
+        terms = frame_terms(series, known(robot.base, carried(robot), *counts))
+        fit = dh_fit.fit_frames(series, model, rotation_weight_mm_per_rad=weight, frame_terms=terms)
+        return history_model.about(model, fit.frames, series, first, weight)
+
+    def errors_mm(self, force: Session, session: Session, setup: Setup) -> np.ndarray:
+        """Position errors (n,) of the calibration in force where its model says something.
+
+        Base and tool that were moved are fitted to the rows outside each fold, to all without.
+        """
+        model, seen = force.calibration.model, session.observations
+        seen = seen.select(says_there(model, seen.q_rad).all(axis=1))
+        found = [np.zeros(0)]
+        for fold in np.unique(seen.fold):
+            tried = seen.fold == fold
+            train = seen.select(~tried if fold >= 0 else tried)
+            if len(train):
+                kind, frames = (
+                    force.calibration.choice,
+                    self._frames(force.calibration, train, setup),
+                )
+                off = errors({kind: Fit(model, frames)}, seen.select(tried))[
+                    Comparison(MEASURED, kind).name
+                ]
+                found.append(np.linalg.norm(off.position_mm, axis=1))
+        return np.concatenate(found)
+
+    def _frames(self, calibration: Calibration, seen: Observations, setup: Setup) -> Frames:
+        """Base and targets by the calibration, what was moved as ``seen`` shows it."""
+        targets, tool = calibration.targets, carried(calibration.robot)
+        stated = Frames(
+            stacked([calibration.base] * len(seen.session_names)),
+            stacked([targets.get(name, tool) for name in seen.target_names]),
+        )
+        terms = frame_terms(seen, stated)
+        kept = {name for name in seen.target_names if setup.same_tool and name in targets}
+        kept |= {"base"} if setup.same_base and len(seen.session_names) == 1 else set()
+        free = np.array([name.rpartition(".")[0] not in kept for name in terms.names])
+        if not free.any():
+            return stated
+        weight = self.rotation_weight_mm_per_rad
+        return frames_under(calibration.model, seen, replace(terms, free=free), weight)
+
+    def _rng(self, *names: str) -> np.random.Generator:
+        words = hashlib.sha256("\n".join(names).encode()).digest()
+        return np.random.default_rng([self.seed, *words])
+
+
+def _thinned(observations: Observations) -> Observations:
+    """At most ``MOST`` configurations, evenly over the order they were measured in."""
+    configuration = configurations(observations.pose, observations.q_rad)
+    count = configuration.max() + 1
+    kept = np.linspace(0, count - 1, min(MOST, count)).round().astype(int)
+    return observations.select(np.isin(configuration, kept))
+
+
+def _share_inside(q_rad: np.ndarray, ranged_rad: np.ndarray, prismatic: np.ndarray) -> float:
+    """Share of joints (n, k) that lie in the ranges of others (m, k), but for full turns."""
+    low = ranged_rad.min(axis=0) - SAME_CONFIGURATION_RAD
+    above = np.where(prismatic, q_rad - low, np.mod(q_rad - low, 2.0 * np.pi))
+    wide = ranged_rad.max(axis=0) + SAME_CONFIGURATION_RAD - low
+    return float(np.mean(np.all((above >= 0.0) & (above <= wide), axis=1)))
+
+
+def _sizes(kind: str, errors_mm: np.ndarray) -> dict[str, float]:
+    """Mean, 99 % and largest of errors (n,), NaN of none."""
+    if not len(errors_mm):
+        errors_mm = np.array([np.nan])
+    return {
+        f"{kind}_mean_mm": float(np.mean(errors_mm)),
+        f"{kind}_quantile_99_mm": float(np.quantile(errors_mm, LARGE_SHARE)),
+        f"{kind}_largest_mm": float(np.max(errors_mm)),
+    }
+
+
+def _count(observations: Observations) -> int:
+    return len(np.unique(configurations(observations.pose, observations.q_rad)))
