@@ -10,22 +10,20 @@ import numpy as np
 
 from kinacc.calibration.noise import of_measurements
 from kinacc.checks import (
-    cells,
-    commanded,
     coverage,
-    doubles,
-    fitting,
+    digits,
     meanings,
-    noise,
+    moved,
     orientations,
+    readings,
+    robust_fit,
     rows,
     tails,
-    targets,
 )
-from kinacc.checks.cells import Cells
 from kinacc.checks.findings import Finding, finding
-from kinacc.checks.fitting import Fitted
+from kinacc.checks.readings import Readings
 from kinacc.checks.report import Report
+from kinacc.checks.robust_fit import Fitted
 from kinacc.checks.rows import Raw
 from kinacc.errors import InputError, Problem
 from kinacc.kinematics import robot as robots
@@ -100,46 +98,40 @@ def check(
     reading: MeasuredFile, layout: Layout, robot: Robot, dataset: str, path: str, progress: Progress
 ) -> Report:
     """Report on what was read from ``path``. Raises InputError for too few poses."""
-    every = cells.of_columns(reading.columns, robot.dh.joints, reading.row_names)
+    every = readings.of_file(reading, robot)
     if (count := len(np.unique(every.pose))) < _FEWEST_POSES:
         raise InputError(Problem(path, f"{count} poses", f"at least {_FEWEST_POSES}"))
-    one, cell = cells.merged(every)
+    one, cell = readings.merged(every)
     first = np.unique(cell, return_index=True)[1]
-    repeats, distances = noise.repeats(every, cell), noise.distances(every)
+    distances = readings.distances(every)
     scatter = of_measurements(reading.columns, robot)
-    equal = doubles.earlier(every)
-    moved, numbers = targets.found(every, distances)
+    by_distances, renamed = moved.by_distances(every, distances)
     fitted, raw, found = _meant(one, reading, layout, robot, first, progress)
     kinds = {each.kind for each in found}
-    found += [*doubles.found(every, scatter.per_axis_mm), *moved]
+    found += by_distances
     if not any(kind.startswith("joint_") for kind in kinds):
         found += _outside(every, robot)
+    gross = []
     if "does_not_fit" in kinds:
         fitted = None
     else:
-        seen = replace(fitted.seen, target=numbers[first])
-        fitted = fitting.with_jumps(seen, robot.dh, progress)
-        raw = replace(raw, earlier=equal[first])
-        if fitted.jumps and _turned_well(fitted):
+        seen = replace(fitted.seen, target=renamed.target[first], target_names=renamed.target_names)
+        fitted, jumps = moved.with_jumps(seen, robot.dh, progress)
+        raw = replace(raw, earlier=digits.unread(every)[first])
+        if jumps and _turned_well(fitted):
             found = [each for each in found if each.kind != "orientations"]
-        found += fitting.moved_frames(fitted)
-        if reading.commanded is None:
-            found += commanded.coarse(fitted, raw.q, robot.dh.prismatic)
-        else:
-            found += commanded.compared(fitted, raw.q, raw.commanded, raw.meaning)
+        found += moved.findings(fitted, jumps)
+        found += digits.commanded(fitted, raw.q, raw.commanded, raw.meaning)
         found += [*rows.found(fitted, raw), *_largest(fitted)]
-    found += [*_scattered(every, repeats), *doubles.stale(every, equal, scatter.per_axis_mm)]
-    gross = []
-    if fitted is not None:
-        off = np.flatnonzero(fitted.left_mm > _GROSS * fitted.trial.sigma_mm)
-        gross = fitted.seen.cells.lines(off)
+        gross = fitted.seen.lines(fitted.left_mm > _GROSS * fitted.trial.sigma_mm)
+    found += [*_scattered(every, cell), *digits.copies(every, scatter.per_axis_mm)]
     facts = coverage.facts_of(every, robot, scatter, distances, fitted)
     unread = dict.fromkeys((*reading.notes, *reading.left_out()))
     return Report(
         dataset,
         path,
         facts,
-        coverage.remarks_of(every, repeats, scatter, distances),
+        coverage.remarks_of(every, readings.correlation(every, cell), scatter, distances),
         tuple(
             replace(each.held_to(gross), row_names=reading.row_names)
             for each in _once(found, np.unique(every.line).size)
@@ -148,17 +140,17 @@ def check(
             *(finding(LEFT_OUT, words=words) for words in unread),
             *coverage.thin(facts["joint_coverage"]),
         ),
-        *(() if fitted is None else (fitted.seen.cells.line, fitted.left_mm)),
+        *(() if fitted is None else (fitted.seen.line, fitted.left_mm)),
     )
 
 
 def _meant(
-    one: Cells, reading: MeasuredFile, layout: Layout, robot: Robot, first, progress: Progress
+    one: Readings, reading: MeasuredFile, layout: Layout, robot: Robot, first, progress: Progress
 ) -> tuple[Fitted, Raw, list[Finding]]:
     """The fit of the file as it is meant, what it was read from, and findings of all rows."""
-    here = fitting.fit(meanings.as_written(robot.joint_map).seen(one), robot.dh)
+    here = robust_fit.fit(meanings.as_written(robot.joint_map).seen(one), robot.dh)
     meaning, changes = meanings.find(one, robot, here.trial, progress)
-    fitted = fitting.fit(meaning.seen(one), robot.dh) if changes else here
+    fitted = robust_fit.fit(meaning.seen(one), robot.dh) if changes else here
     stated = None if reading.commanded is None else reading.commanded[first]
     none = np.zeros(len(one), dtype=np.int64)
     raw = Raw(one.q, reading.turns[first], layout, meaning, stated, none)
@@ -166,7 +158,7 @@ def _meant(
     if fitted.trial.sigma_mm > meanings.FAR * spread_mm:
         return fitted, raw, [*changes, _no_fit(one, fitted, robot, spread_mm)]
     found = [*changes, *_of_other_lengths(one, fitted, robot)]
-    seen, there = fitted.seen, fitted.seen.cells.turned
+    seen, there = fitted.seen, fitted.seen.has_rotation
     if not there.any():
         return fitted, raw, found
     way, least, before = orientations.find(
@@ -175,14 +167,13 @@ def _meant(
     bad = before > meanings.BAD_RAD
     if bad and (by_turns := meanings.find_by_turns(one, robot, meaning, least)) is not None:
         meaning, told = by_turns
-        fitted = fitting.fit(meaning.seen(one), robot.dh)
+        fitted = robust_fit.fit(meaning.seen(one), robot.dh)
         return fitted, replace(raw, meaning=meaning), [*found, told]
     if way.change is not None:
         found.append(orientations.told(way.change, one, there, before, least))
-        rotation = seen.cells.rotation.copy()
+        rotation = seen.rotation.copy()
         rotation[there] = meaning.rotations(way.read(raw.turns[there]))
-        seen = replace(seen, cells=replace(seen.cells, rotation=rotation))
-        fitted = fitting.fit(seen, robot.dh)
+        fitted = robust_fit.fit(replace(seen, rotation=rotation), robot.dh)
     elif bad:
         degrees = float(np.rad2deg(before))
         found.append(finding("orientations", one.lines(there), as_written_deg=degrees))
@@ -191,14 +182,14 @@ def _meant(
 
 def _turned_well(fitted: Fitted) -> bool:
     """Whether the orientations go with the joints, now that every jump has frames of its own."""
-    there = fitted.seen.cells.turned
+    there = fitted.seen.has_rotation
     if not there.any():
         return False
-    flange, rotation = fitted.left.flange[there], fitted.seen.cells.rotation[there]
+    flange, rotation = fitted.left.flange[there], fitted.seen.rotation[there]
     return orientations.scatter(flange, rotation, fitted.seen.target[there]) < meanings.BAD_RAD
 
 
-def _no_fit(one: Cells, fitted: Fitted, robot: Robot, spread_mm: float) -> Finding:
+def _no_fit(one: Readings, fitted: Fitted, robot: Robot, spread_mm: float) -> Finding:
     whole_mm = float(np.sum(np.abs(robot.dh.a_mm)) + np.sum(np.abs(robot.dh.d_mm)))
     unit = (
         f". The points spread over {spread_mm:.3g} mm, links and offsets of {robot.name} add up "
@@ -213,7 +204,7 @@ def _no_fit(one: Cells, fitted: Fitted, robot: Robot, spread_mm: float) -> Findi
     )
 
 
-def _of_other_lengths(one: Cells, fitted: Fitted, robot: Robot) -> Iterator[Finding]:
+def _of_other_lengths(one: Readings, fitted: Fitted, robot: Robot) -> Iterator[Finding]:
     """An arm that fits with other lengths alone is another one of the same build."""
     new, old = (np.stack([arm.a_mm, arm.d_mm]) for arm in (fitted.trial.arm.model, robot.dh))
     apart = np.abs(new - old)
@@ -235,21 +226,21 @@ def _of_other_lengths(one: Cells, fitted: Fitted, robot: Robot) -> Iterator[Find
 def _largest(fitted: Fitted) -> Iterator[Finding]:
     """Readings that are no outliers, and stand apart from the others all the same."""
     good = np.flatnonzero(~fitted.bad)
-    poses, number = np.unique(fitted.seen.cells.pose[good], return_inverse=True)
+    poses, number = np.unique(fitted.seen.pose[good], return_inverse=True)
     worst = np.zeros(len(poses))
     np.maximum.at(worst, number, fitted.left_mm[good])
     if count := tails.detached(worst):
         ordered = np.sort(worst)[::-1]
         yield finding(
             "largest_rows",
-            fitted.seen.cells.lines(good[worst[number] >= ordered[count - 1]]),
+            fitted.seen.lines(good[worst[number] >= ordered[count - 1]]),
             count=count,
             errors=", ".join(f"{value:.3g}" for value in ordered[:count]),
             next=f"{ordered[count]:.3g}",
         )
 
 
-def _outside(every: Cells, robot: Robot) -> Iterator[Finding]:
+def _outside(every: Readings, robot: Robot) -> Iterator[Finding]:
     """Rows in which a joint is beyond its limits."""
     for each in outside_limits(robot, every.q, LIMIT_SLACK):
         yield finding(
@@ -262,9 +253,9 @@ def _outside(every: Cells, robot: Robot) -> Iterator[Finding]:
         )
 
 
-def _scattered(every: Cells, repeats: noise.Repeats) -> Iterator[Finding]:
-    """Readings far from the others taken at the same configuration."""
-    length = np.linalg.norm(repeats.deviation_mm, axis=1)
+def _scattered(every: Readings, cell: np.ndarray) -> Iterator[Finding]:
+    """Readings far from the others of their cell (n,), taken at the same configuration."""
+    length = np.linalg.norm(readings.deviations_mm(every, cell), axis=1)
     off = np.flatnonzero(length > tails.limit(length, 3))
     if off.size:
         largest_mm = float(length[off].max())

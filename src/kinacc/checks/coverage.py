@@ -9,10 +9,9 @@ import numpy as np
 from kinacc.calibration.noise import Noise
 from kinacc.calibration.observations import from_columns
 from kinacc.calibration.vec_estimator import VECEstimator
-from kinacc.checks.cells import Cells
 from kinacc.checks.findings import Finding, finding
-from kinacc.checks.fitting import Fitted
-from kinacc.checks.noise import Distance, Repeats
+from kinacc.checks.readings import Distance, Readings
+from kinacc.checks.robust_fit import Fitted
 from kinacc.kinematics.robot import Robot
 from kinacc.measurements import folds
 from kinacc.tables.columns import Columns
@@ -22,7 +21,7 @@ _PER_POSE = 6  # independent numbers of a rigid body, however many targets it ca
 
 
 def facts_of(
-    every: Cells, robot: Robot, noise: Noise, distances: list[Distance], fitted: Fitted | None
+    every: Readings, robot: Robot, noise: Noise, distances: list[Distance], fitted: Fitted | None
 ) -> dict[str, object]:
     """What is there, by name; units stand in the names."""
     facts: dict[str, object] = {
@@ -30,7 +29,7 @@ def facts_of(
         "rows": int(np.unique(every.line).size),
         "poses": int(np.unique(every.pose).size),
         "readings": len(every),
-        "orientations": int(every.turned.sum()),
+        "orientations": int(every.has_rotation.sum()),
         "targets": _counts(every.target_names, every.target),
     }
     if len(every.session_names) > 1:
@@ -82,17 +81,17 @@ def _covered(q: np.ndarray, robot: Robot, joint: int) -> dict[str, object]:
 
 
 def remarks_of(
-    every: Cells, repeats: Repeats, noise: Noise, distances: list[Distance]
+    every: Readings, correlation: float, noise: Noise, distances: list[Distance]
 ) -> tuple[str, ...]:
     """What else to know about the file, in words."""
     remarks = []
     if len(every.target_names) > 1:
-        how = f" (their repeats correlate by {repeats.common:.2f})"
+        how = f" (their repeats correlate by {correlation:.2f})"
         remarks.append(
             "targets of one pose share the arm's error and are no independent samples"
-            f"{how if np.isfinite(repeats.common) else ''}"
+            f"{how if np.isfinite(correlation) else ''}"
         )
-    if repeats.groups and distances:
+    if noise.freedom and distances:
         between = float(np.median([each.std_mm for each in distances])) / np.sqrt(2.0)
         if between < 0.5 * noise.per_axis_mm:
             remarks.append(

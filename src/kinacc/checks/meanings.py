@@ -13,10 +13,10 @@ from itertools import combinations, permutations
 
 import numpy as np
 
-from kinacc.checks import hand_eye, orientations, robust_fit
-from kinacc.checks.cells import Cells
+from kinacc.checks import orientations, robust_fit
 from kinacc.checks.findings import Finding, finding
-from kinacc.checks.robust_fit import Seen, Trial
+from kinacc.checks.readings import Readings, thinned
+from kinacc.checks.robust_fit import Trial
 from kinacc.kinematics import dh
 from kinacc.kinematics.robot import Robot
 
@@ -69,11 +69,14 @@ class Meaning:
         """Orientations (n, 3, 3) in right-handed coordinates."""
         return rotation * np.outer(MIRROR, MIRROR) if self.mirrored else rotation
 
-    def seen(self, cells: Cells) -> Seen:
-        """The cells as this meaning has them."""
-        position_mm = cells.position_mm * self.scale * (MIRROR if self.mirrored else 1.0)
-        known = replace(cells, position_mm=position_mm, rotation=self.rotations(cells.rotation))
-        return Seen(known, self.joints(cells.q), cells.session, cells.target)
+    def seen(self, read: Readings) -> Readings:
+        """The readings as this meaning has them."""
+        return replace(
+            read,
+            q_rad=self.joints(read.q),
+            position_mm=read.position_mm * self.scale * (MIRROR if self.mirrored else 1.0),
+            rotation=self.rotations(read.rotation),
+        )
 
     def changed(self, change: Finding, **values) -> Meaning:
         """This meaning with one more change."""
@@ -169,46 +172,46 @@ def single(meaning: Meaning, slides: np.ndarray) -> Iterator[Meaning]:
 class Misfit:
     """Misfit of base and target alone, as a share of the points' spread."""
 
-    cells: Cells
+    read: Readings
     robot: Robot
 
     def __call__(self, meaning: Meaning) -> float:
         left = np.linalg.norm(self._left(meaning).position_mm, axis=1)
-        points = meaning.seen(self.cells).cells.position_mm
+        points = meaning.seen(self.read).position_mm
         return float(np.quantile(left, _MAJORITY)) / max(spread_mm(points), 1e-12)
 
     def turns(self, meaning: Meaning) -> float:
         """Scatter of the orientations seen from the flange, placed by the positions alone, rad."""
-        rotation = meaning.seen(self.cells).cells.rotation
-        return orientations.scatter(self._left(meaning).flange, rotation, self.cells.target)
+        rotation = meaning.seen(self.read).rotation
+        return orientations.scatter(self._left(meaning).flange, rotation, self.read.target)
 
     def ratio(self, meaning: Meaning) -> float:
         """Spread of the measured points over that of the flange."""
-        seen = meaning.seen(self.cells)
-        flange = dh.forward(self.robot.dh, seen.q).position_mm
-        return spread_mm(seen.cells.position_mm) / max(spread_mm(flange), 1e-12)
+        seen = meaning.seen(self.read)
+        flange = dh.forward(self.robot.dh, seen.q_rad).position_mm
+        return spread_mm(seen.position_mm) / max(spread_mm(flange), 1e-12)
 
     def _left(self, meaning: Meaning) -> robust_fit.Residuals:
-        seen = meaning.seen(self.cells)
-        points = replace(seen.cells, rotation=np.full_like(seen.cells.rotation, np.nan))
-        one = Seen(points, seen.q, np.zeros_like(seen.base), seen.target)
-        return robust_fit.residuals(hand_eye.found(one, self.robot.dh, draws=0, stretches=()), one)
+        seen = meaning.seen(self.read)
+        seen = replace(seen, rotation=np.full_like(seen.rotation, np.nan))
+        begin = robust_fit.start(seen, self.robot.dh, draws=0, stretches=())
+        return robust_fit.residuals(begin, seen)
 
 
 def find(
-    cells: Cells, robot: Robot, written: Trial, progress: Progress
+    read: Readings, robot: Robot, written: Trial, progress: Progress
 ) -> tuple[Meaning, tuple[Finding, ...]]:
-    """The meaning of merged ``cells``, and its changes as findings of all lines.
+    """The meaning of merged ``read``, and its changes as findings of all lines.
 
-    ``written`` is the fit of the cells as they stand.
+    ``written`` is the fit of the readings as they stand.
     """
-    spread = spread_mm(cells.position_mm)
+    spread = spread_mm(read.position_mm)
     here = as_written(robot.joint_map)
-    if len(np.unique(cells.pose)) < _FEWEST or spread == 0.0:
+    if len(np.unique(read.pose)) < _FEWEST or spread == 0.0:
         return here, ()
     # One session: each has its own base, and a meaning holds for all of them.
-    part = cells.select(np.flatnonzero(cells.session == np.argmax(np.bincount(cells.session))))
-    misfit = Misfit(part.select(hand_eye.thinned(np.arange(len(part)), _TRIED_ROWS)), robot)
+    part = _largest_session(read, np.arange(len(read)))
+    misfit = Misfit(part.select(thinned(np.arange(len(part)), _TRIED_ROWS)), robot)
     least, tried = misfit(here), {}
     for value, each in _searched(misfit, here, written.sigma_mm < _GOOD * spread, progress):
         # A meaning that is found again is kept with the fewest changes.
@@ -221,7 +224,7 @@ def find(
     close = [pair for pair in better if pair[0] < _AS_GOOD * best]
     # Of meanings that do equally well, the one that changes least comes first.
     close.sort(key=lambda pair: (*_simplicity(pair[1]), pair[0]))
-    many = part.select(hand_eye.thinned(np.arange(len(part)), _FITTED_ROWS))
+    many = part.select(thinned(np.arange(len(part)), _FITTED_ROWS))
     fitted = [
         (_left_mm(many, robot, each), each)
         for _, each in progress(close[:_FITTED], "likely ways to read the columns fitted")
@@ -240,7 +243,7 @@ def find(
     more = {"joint_map": found.matrix.tolist()} if alone else {}
     findings = [
         change.at(
-            cells.lines(),
+            read.lines(),
             detail,
             as_written_mm=written.sigma_mm,
             found_mm=left * found.scale,
@@ -253,16 +256,15 @@ def find(
 
 
 def find_by_turns(
-    cells: Cells, robot: Robot, here: Meaning, least_rad: float
+    read: Readings, robot: Robot, here: Meaning, least_rad: float
 ) -> tuple[Meaning, Finding] | None:
     """One change of the joints that brings the orientations together; None where none does.
 
     A joint near the target turns it without moving it much. ``least_rad`` is what other readings
     of the orientations leave: a change of the joints is preferred where it does about as well.
     """
-    largest = np.argmax(np.bincount(cells.session[cells.turned]))
-    rows = np.flatnonzero(cells.turned & (cells.session == largest))
-    misfit = Misfit(cells.select(hand_eye.thinned(rows, _TURNED_ROWS)), robot)
+    part = _largest_session(read, np.flatnonzero(read.has_rotation))
+    misfit = Misfit(part.select(thinned(np.arange(len(part)), _TURNED_ROWS)), robot)
     limit = _AS_GOOD * max(misfit(here), _SHOWN)
     rivals = [each for each in single(here, robot.dh.prismatic) if misfit(each) < limit]
     tried = [(misfit.turns(each), each) for each in rivals]
@@ -271,8 +273,17 @@ def find_by_turns(
         return None
     # The common changes come first: of those that do about as well, the first.
     value, found = next(pair for pair in tried if pair[0] < _AS_GOOD * least)
-    told = orientations.told(found.changes[-1], cells, cells.turned, misfit.turns(here), value)
+    told = orientations.told(found.changes[-1], read, read.has_rotation, misfit.turns(here), value)
     return found, told
+
+
+def _largest_session(read: Readings, rows: np.ndarray) -> Readings:
+    """The readings ``rows`` of the session with most of them."""
+    part = read.select(rows)
+    largest = np.argmax(np.bincount(part.session))
+    part = part.select(part.session == largest)
+    names = (read.session_names[largest],)
+    return replace(part, session=np.zeros_like(part.session), session_names=names)
 
 
 def _simplicity(meaning: Meaning) -> tuple[int, int]:
@@ -302,7 +313,7 @@ def _rounds(misfit: Misfit, here: Meaning, tried: list) -> Iterator[Iterable[Mea
     slides = misfit.robot.dh.prismatic
     units = [
         scaled
-        for each in of_units(here, misfit.cells.q, slides)
+        for each in of_units(here, misfit.read.q, slides)
         for scaled in of_scale(each, misfit.ratio(each))
     ]
     left = finding("left_handed")
@@ -322,11 +333,10 @@ def _rounds(misfit: Misfit, here: Meaning, tried: list) -> Iterator[Iterable[Mea
         yield [each for _, root in front for each in single(root, slides)]
 
 
-def _left_mm(cells: Cells, robot: Robot, meaning: Meaning) -> float:
+def _left_mm(read: Readings, robot: Robot, meaning: Meaning) -> float:
     """Standard deviation per axis left by the corrected arm, in the file's own lengths."""
-    seen = meaning.seen(cells)
-    seen = Seen(seen.cells, seen.q, np.zeros_like(seen.base), seen.target)
-    return robust_fit.best(seen, hand_eye.found(seen, robot.dh)).sigma_mm / meaning.scale
+    seen = meaning.seen(read)
+    return robust_fit.best(seen, robust_fit.start(seen, robot.dh)).sigma_mm / meaning.scale
 
 
 def spread_mm(points: np.ndarray) -> float:

@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kinacc.checks.cells import Cells, nearest_rotation
 from kinacc.checks.findings import Finding, finding
+from kinacc.checks.readings import Readings, nearest_rotation
 from kinacc.measurements.layout import ANGLES, Layout, in_order_of
 from kinacc.measurements.orientation import rotations
 
@@ -67,12 +67,14 @@ def find(
     return written, here, here
 
 
-def told(change: Finding, cells: Cells, there: np.ndarray, before: float, least: float) -> Finding:
+def told(
+    change: Finding, read: Readings, there: np.ndarray, before: float, least: float
+) -> Finding:
     """The finding of a change that brings orientations (mask ``there``) together; scatters, rad."""
     detail = " (seen from the flange they scatter by {as_written_deg:.3g} deg as written, by "
     detail += "{found_deg:.3g} deg so)"
     degrees = {"as_written_deg": float(np.rad2deg(before)), "found_deg": float(np.rad2deg(least))}
-    return change.at(cells.lines(there), detail, **degrees)
+    return change.at(read.lines(there), detail, **degrees)
 
 
 def simple(layout: Layout, raw: np.ndarray) -> Iterator[Turn]:

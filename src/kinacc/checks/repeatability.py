@@ -12,6 +12,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+import pandas as pd
+from scipy.special import chdtrc, gammaincinv
 
 from kinacc.calibration.noise import means, scatter
 
@@ -34,21 +36,6 @@ class Repeated:
     pose: np.ndarray
     side: np.ndarray
     visit: np.ndarray
-
-
-@dataclass(frozen=True)
-class Scatter:
-    """Mean square (3, 3), mm^2, of deviations from means, of ``freedom`` degrees for each axis.
-
-    Zero where there is none. ``std_mm``: per axis.
-    """
-
-    mean_square_mm2: np.ndarray
-    freedom: int
-
-    @property
-    def std_mm(self) -> np.ndarray:
-        return np.sqrt(np.diag(self.mean_square_mm2))
 
 
 @dataclass(frozen=True)
@@ -104,50 +91,34 @@ class Group:
     rp_mm: float
 
 
-def visits_of(read: Repeated) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Mean (v, 3) of every visit, its number of readings (v,) and its side (v,)."""
-    mean, count = means(read.position_mm, read.visit)
-    return mean, count, _of_group(read.visit, read.side)
-
-
 def parts(read: Repeated) -> Parts:
     """Variances of instrument, visits and sides, and that of a reading from any side."""
-    within = _within(read.position_mm, read.visit)
-    visit_mm, readings, side_of = visits_of(read)
-    between = _within(visit_mm, side_of)
+    visit_mm, readings, side_of = _visits(read)
     side_mm, visits = means(visit_mm, side_of)
-    pose_of = _of_group(read.side, read.pose)
-    across = _within(side_mm, pose_of)
+    pose_of = _larger(read.side, read.pose)
+    (within, seen), (between, returned), (across, sides) = levels = [
+        scatter(read.position_mm, read.visit),
+        scatter(visit_mm, side_of),
+        scatter(side_mm, pose_of),
+    ]
     # What part of the variance of a level below is in the mean square of each level.
-    per_visit = 1.0 / readings
-    of_visit = _average(per_visit, side_of, between.freedom)
-    of_side = _average(1.0 / visits, pose_of, across.freedom)
-    deeper = means(per_visit[:, None], side_of)[0][:, 0] / visits
-    of_side_below = _average(deeper, pose_of, across.freedom)
+    of_visit = _share(1.0 / readings, side_of, returned)
+    of_side = _share(1.0 / visits, pose_of, sides)
+    deeper = means(1.0 / readings[:, None], side_of)[0][:, 0] / visits
+    of_side_below = _share(deeper, pose_of, sides)
     unknown = np.full((3, 3), np.nan)
-    seen, returned = within.freedom > 0, between.freedom > 0
-    instrument = within.mean_square_mm2
-    arm = _no_less_than_zero(between.mean_square_mm2 - of_visit * instrument)
-    sides = _no_less_than_zero(
-        across.mean_square_mm2 - of_side * arm - of_side_below * instrument
-    ) * (across.freedom > 0)
+    instrument = within if seen else unknown
     if not returned:
-        return Parts(instrument if seen else unknown, unknown, unknown, unknown, 0.0)
-    shares = (
-        (1.0 - of_visit + of_side * of_visit - of_side_below, within),
-        (1.0 - of_side, between),
-        (1.0, across),
-    )
-    terms = [(c * np.trace(x.mean_square_mm2), x.freedom) for c, x in shares if x.freedom]
-    spread = sum(term**2 / freedom for term, freedom in terms)
-    freedom = sum(term for term, _ in terms) ** 2 / spread if spread > 0.0 else between.freedom
-    return Parts(
-        instrument if seen else unknown,
-        arm,
-        sides if across.freedom else unknown,
-        (instrument if seen else 0.0) + arm + (sides if across.freedom else 0.0),
-        float(freedom),
-    )
+        return Parts(instrument, unknown, unknown, unknown, 0.0)
+    arm = _no_less_than_zero(between - of_visit * within)
+    side = _no_less_than_zero(across - of_side * arm - of_side_below * within)
+    shares = (1.0 - of_visit + of_side * of_visit - of_side_below, 1.0 - of_side, 1.0)
+    terms = np.array([c * np.trace(square) for c, (square, _) in zip(shares, levels, strict=True)])
+    own = np.array([freedom for _, freedom in levels])
+    spread = np.sum(terms[own > 0] ** 2 / own[own > 0])
+    freedom = terms[own > 0].sum() ** 2 / spread if spread > 0.0 else returned
+    whole = within * bool(seen) + arm + side * bool(sides)
+    return Parts(instrument, arm, side if sides else unknown, whole, float(freedom))
 
 
 def noise_of(found: Parts, resolution_mm: np.ndarray) -> Noise | None:
@@ -173,8 +144,6 @@ def differ_by_axis(covariance_mm2: np.ndarray, freedom: float) -> float:
 
     NaN for fewer than five degrees of freedom, or a covariance of less than three directions.
     """
-    from scipy.special import chdtrc
-
     sizes = np.linalg.eigvalsh(covariance_mm2)
     if freedom < _FEWEST or sizes[0] <= 1e-12 * sizes[-1]:
         return math.nan
@@ -189,17 +158,15 @@ def differ_by_pose(read: Repeated, resolution_mm: np.ndarray) -> tuple[float, np
     nothing. Where there is none, of the readings of one visit. Less than the rounding of
     ``resolution_mm`` (3,) counts as that.
     """
-    from scipy.special import chdtrc
-
-    values, _, group = visits_of(read)
-    pose_of = _of_group(read.side, read.pose)
-    if not _within(values, group).freedom:
-        values, group, pose_of = read.position_mm, read.visit, _of_group(read.visit, read.pose)
-    pooled = _within(values, group)
-    if not pooled.freedom:
+    values, _, group = _visits(read)
+    pose_of = _larger(read.side, read.pose)
+    if not scatter(values, group)[1]:
+        values, group, pose_of = read.position_mm, read.visit, _larger(read.visit, read.pose)
+    square_mm2, pooled = scatter(values, group)
+    if not pooled:
         return math.nan, np.full(read.pose.max() + 1, np.nan)
     floor = np.diag(resolution_mm**2 / 12.0) + 1e-24 * np.eye(3)
-    root = np.linalg.cholesky(pooled.mean_square_mm2 + floor)
+    root = np.linalg.cholesky(square_mm2 + floor)
     mean, count = means(values, group)
     white = np.linalg.solve(root, (values - mean[group]).T).T
     square = np.bincount(pose_of[group], np.sum(white**2, axis=1))
@@ -220,19 +187,18 @@ def differ_by_pose(read: Repeated, resolution_mm: np.ndarray) -> tuple[float, np
 
 def groups(read: Repeated) -> list[Group]:
     """Every pose from every side, with ISO 9283's repeatability of its visits."""
-    visit_mm, readings, side_of = visits_of(read)
+    visit_mm, readings, side_of = _visits(read)
     found = []
-    for side, pose in enumerate(_of_group(read.side, read.pose)):
-        own = visit_mm[side_of == side]
-        count = len(own)
-        centred = own - own.mean(axis=0)
-        length = np.linalg.norm(centred, axis=1)
-        many = count > 1
-        std = np.sqrt(np.sum(centred**2, axis=0) / (count - 1)) if many else np.full(3, np.nan)
-        middle = float(length.mean()) if many else math.nan
-        spread = float(np.std(length, ddof=1)) if count >= _FEWEST_VISITS else math.nan
+    for side, pose in enumerate(_larger(read.side, read.pose)):
+        own, std = visit_mm[side_of == side], np.full(3, np.nan)
+        middle = spread = math.nan
+        length = np.linalg.norm(own - own.mean(axis=0), axis=1)
+        if len(own) > 1:
+            std, middle = np.std(own, axis=0, ddof=1), float(length.mean())
+        if len(own) >= _FEWEST_VISITS:
+            spread = float(np.std(length, ddof=1))
         seen = int(readings[side_of == side].sum())
-        found.append(Group(int(pose), side, count, seen, std, middle, middle + 3.0 * spread))
+        found.append(Group(int(pose), side, len(own), seen, std, middle, middle + 3.0 * spread))
     return found
 
 
@@ -241,27 +207,23 @@ def pooled_rp(read: Repeated) -> tuple[float, float]:
 
     The standard deviation is pooled. NaN without a pose that was visited thrice from one side.
     """
-    visit_mm, _, side_of = visits_of(read)
+    visit_mm, _, side_of = _visits(read)
     mean, count = means(visit_mm, side_of)
     many = count[side_of] >= _FEWEST_VISITS
-    length, own = np.linalg.norm(visit_mm - mean[side_of], axis=1)[many], side_of[many]
-    if not len(own):
+    if not many.any():
         return math.nan, math.nan
-    own = np.unique(own, return_inverse=True)[1].ravel()
-    spread = _within(length[:, None], own)
-    return float(length.mean()), float(length.mean() + 3.0 * spread.std_mm[0])
+    length = np.linalg.norm(visit_mm - mean[side_of], axis=1)[many]
+    own = np.unique(side_of[many], return_inverse=True)[1]
+    square = scatter(length[:, None], own)[0].item()
+    return float(length.mean()), float(length.mean() + 3.0 * math.sqrt(square))
 
 
 def between_sides_mm(read: Repeated) -> float:
     """ISO 9283's vAP: largest distance of a pose's middle from one side to that from another."""
-    visit_mm, _, side_of = visits_of(read)
-    side_mm, pose_of = means(visit_mm, side_of)[0], _of_group(read.side, read.pose)
-    apart = [
-        np.linalg.norm(side_mm[one] - side_mm[other])
-        for one in range(len(side_mm))
-        for other in range(one)
-        if pose_of[one] == pose_of[other]
-    ]
+    visit_mm, _, side_of = _visits(read)
+    side_mm, pose_of = means(visit_mm, side_of)[0], _larger(read.side, read.pose)
+    pairs = [side_mm[pose_of == pose] for pose in np.unique(pose_of)]
+    apart = [np.linalg.norm(own[:, None] - own, axis=2).max() for own in pairs if len(own) > 1]
     return float(max(apart, default=math.nan))
 
 
@@ -270,41 +232,34 @@ def far_off(read: Repeated) -> np.ndarray:
 
     More than six times the median distance from the median position of the pose from that side.
     """
-    length = np.full(len(read.side), np.nan)
-    for side in range(read.side.max() + 1):
-        own = np.flatnonzero(read.side == side)
-        if len(own) > 2:
-            middle = np.median(read.position_mm[own], axis=0)
-            length[own] = np.linalg.norm(read.position_mm[own] - middle, axis=1)
-    if np.isnan(length).all():
+    by_side = pd.DataFrame(read.position_mm).groupby(read.side)
+    length = np.linalg.norm(read.position_mm - by_side.transform("median"), axis=1)
+    several = np.bincount(read.side)[read.side] > 2
+    if not several.any():
         return np.zeros(0, dtype=int)
-    return np.flatnonzero(length > _FAR * max(float(np.nanmedian(length)), 1e-12))
+    limit = _FAR * max(float(np.median(length[several])), 1e-12)
+    return np.flatnonzero(several & (length > limit))
 
 
 def limits(std_mm: np.ndarray, freedom: float) -> tuple[np.ndarray, np.ndarray]:
     """95 % limits of standard deviations of ``freedom`` degrees each."""
-    from scipy.special import gammaincinv
-
     low, high = (np.sqrt(freedom / (2.0 * gammaincinv(freedom / 2.0, p))) for p in (0.975, 0.025))
     return std_mm * low, std_mm * high
 
 
-def _of_group(group: np.ndarray, larger: np.ndarray) -> np.ndarray:
+def _visits(read: Repeated) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Mean (v, 3) of every visit, its number of readings (v,) and its side (v,)."""
+    return *means(read.position_mm, read.visit), _larger(read.visit, read.side)
+
+
+def _larger(group: np.ndarray, larger: np.ndarray) -> np.ndarray:
     """The pose or side (g,), of ``larger`` (n,), that every group (n,) of readings is of."""
-    found = np.zeros(group.max() + 1, dtype=int)
-    found[group] = larger
-    return found
+    return larger[np.unique(group, return_index=True)[1]]
 
 
-def _within(values: np.ndarray, group: np.ndarray) -> Scatter:
-    """Scatter of values (n, k) about the means of their groups."""
-    return Scatter(*scatter(values, group))
-
-
-def _average(part: np.ndarray, group: np.ndarray, freedom: int) -> float:
-    """Mean of what each member (n,) of a group brings to the mean square of ``_within``."""
-    _, count = means(part[:, None], group)
-    return float(np.sum(part * (1.0 - 1.0 / count[group])) / max(freedom, 1))
+def _share(part: np.ndarray, group: np.ndarray, freedom: int) -> float:
+    """Mean of what each member (n,) of a group brings to the mean square of its level."""
+    return float(np.sum(part * (1.0 - 1.0 / np.bincount(group)[group])) / max(freedom, 1))
 
 
 def _no_less_than_zero(covariance: np.ndarray) -> np.ndarray:

@@ -3,17 +3,22 @@
 Base frames, targets and small corrections of every DH parameter are fitted together by iteratively
 reweighted least squares with Tukey's biweight, so that a third of the readings may be wrong. The
 corrections lean on nominal with a strength that leaving configurations out decides, so that a file
-of few poses is not explained away. Kept apart from the calibration, whose fits trust their data.
+of few poses is not explained away. It starts from the best of many closed forms, and judges every
+reading with its configuration left out; the fits of the calibration do neither.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kinacc.checks.cells import Cells
-from kinacc.geometry import Pose, exp_so3, log_so3, skew
+from kinacc.calibration.frames import Frames
+from kinacc.calibration.hand_eye import closed_form_start
+from kinacc.checks import tails
+from kinacc.checks.readings import Readings, nearest_rotation, thinned
+from kinacc.geometry import Pose, compose, exp_so3, log_so3, skew
 from kinacc.kinematics import dh
 from kinacc.kinematics.dh import DHModel
 
@@ -31,32 +36,25 @@ _OFF_ZERO = 1e-3
 _FAR_RAD, _FAR_MM = 0.25, 150.0
 _CAP = 10.0  # sigma: what is left of a configuration counts no more than this
 _READ_PER_PARAMETER = 2.0  # with fewer numbers than this the redescending loss is not used
+_FITTED_ROWS = 900
+_IS_ANGLE = np.array([True, False, False, True, True])  # of dh.PARAMETERS
 
-
-@dataclass(frozen=True)
-class Seen:
-    """What is fitted: cells, their DH joint values (n, k), and the frames they are seen through.
-
-    ``base`` and ``target`` (n,): indices of the base frame and of the target point.
-    """
-
-    cells: Cells
-    q: np.ndarray
-    base: np.ndarray
-    target: np.ndarray
-
-    def select(self, rows: np.ndarray) -> Seen:
-        """The same of ``rows``."""
-        return Seen(self.cells.select(rows), self.q[rows], self.base[rows], self.target[rows])
+_DRAWS = 24  # with a third of the readings wrong, 8 of 24 draws of two are free of them, or more
+_DRAWN = 12  # configurations per draw
+_STRETCHES = (2, 3, 5)
+_KEPT = 0.5  # share of the readings a refinement of the start trusts
+_JUDGED = 0.4  # share of the readings that must fit: the rest may be of another base
+_REFINEMENTS = 4
+_ASTRAY = 5.0  # times what the others leave: a target whose place was not found
+_START_ROWS = 600
 
 
 @dataclass(frozen=True)
 class Arm:
-    """Model, ``base`` (B) in the instrument's frame and ``targets`` (T) in the flange frame."""
+    """A DH model with its bases in the instrument's frame and targets in the flange frame."""
 
     model: DHModel
-    base: Pose
-    targets: Pose
+    frames: Frames
 
 
 @dataclass(frozen=True)
@@ -80,7 +78,7 @@ class Trial:
 
     ``left_out`` (n, 6), mm and rad: residuals of the fitted readings when their configuration is
     left out, to first order; ``judged``: the same over what the fit without it leaves open there.
-    ``nominal`` is the model the corrections lean on.
+    ``nominal`` is the model the corrections lean on, by ``strength``.
     """
 
     arm: Arm
@@ -92,6 +90,62 @@ class Trial:
     judged: np.ndarray
 
 
+@dataclass(frozen=True)
+class Fitted:
+    """The fit of all readings ``seen``, ``chosen`` (m,) of them, and what it leaves.
+
+    ``left_mm`` and ``left_rad`` (n,): lengths of the residuals, configurations left out where they
+    were fitted, -1 without orientation; ``limit_mm`` and ``limit_rad`` what they may be.
+    """
+
+    seen: Readings
+    chosen: np.ndarray
+    trial: Trial
+    left: Residuals
+    left_mm: np.ndarray
+    left_rad: np.ndarray
+    limit_mm: float
+    limit_rad: float
+
+    @property
+    def bad(self) -> np.ndarray:
+        """True (n,) where a reading is further out than it may be."""
+        return (self.left_mm > self.limit_mm) | (self.left_rad > self.limit_rad)
+
+
+def fit(seen: Readings, model: DHModel) -> Fitted:
+    """The robust fit of at most ``_FITTED_ROWS`` readings, and what it leaves of all."""
+    chosen = thinned(np.arange(len(seen)), _FITTED_ROWS)
+    few = seen.select(chosen)
+    found = best(few, start(few, model))
+    left = residuals(found.arm, seen)
+    lengths = []
+    for part, residual in ((slice(0, 3), left.position_mm), (slice(3, 6), left.turn_rad)):
+        length = np.linalg.norm(residual, axis=1)
+        without, over = (
+            np.linalg.norm(each[:, part], axis=1) for each in (found.left_out, found.judged)
+        )
+        # A reading that alone determines something lies anywhere without it, however sound it is:
+        # it is far only where it is so too over what the fit without it leaves open.
+        unknown = (without > tails.limit(without, 3)) & (over <= tails.limit(over, 3))
+        length[chosen] = np.where(unknown, over, without)
+        lengths.append(length)
+    limits = [tails.limit(length, 3) for length in lengths]
+    left_rad = np.where(np.isfinite(lengths[1]), lengths[1], -1.0)
+    return Fitted(seen, chosen, found, left, lengths[0], left_rad, *limits)
+
+
+def residuals(arm: Arm, seen: Readings, flange: Pose | None = None) -> Residuals:
+    """What ``arm`` leaves of the readings; ``flange`` (n) where the model's poses are known."""
+    flange = flange or dh.forward(arm.model, seen.q_rad)
+    base = Pose(*(each[seen.session] for each in arm.frames.bases))
+    flange = compose(base, flange)
+    predicted = compose(flange, Pose(*(each[seen.target] for each in arm.frames.targets)))
+    turn, there = np.full((len(seen), 3), np.nan), seen.has_rotation
+    turn[there] = log_so3(predicted.rotation[there] @ np.swapaxes(seen.rotation[there], 1, 2))
+    return Residuals(predicted.position_mm - seen.position_mm, turn, predicted, flange.rotation)
+
+
 def sigma_of(vectors: np.ndarray) -> float:
     """Standard deviation per axis of vectors (n, 3), from the shorter ones."""
     length = np.linalg.norm(vectors[np.isfinite(vectors[:, 0])], axis=1)
@@ -100,63 +154,44 @@ def sigma_of(vectors: np.ndarray) -> float:
     return max(float(np.quantile(length, _QUANTILE)) / _QUANTILE_3D, _LEAST_SIGMA)
 
 
-def residuals(arm: Arm, seen: Seen, flange: Pose | None = None) -> Residuals:
-    """What ``arm`` leaves of the readings; ``flange`` (n) where the model's poses are known."""
-    flange = dh.forward(arm.model, seen.q) if flange is None else flange
-    base = Pose(arm.base.rotation[seen.base], arm.base.position_mm[seen.base])
-    rotation = base.rotation @ flange.rotation
-    point = flange.position_mm + _turned(flange.rotation, arm.targets.position_mm[seen.target])
-    position = _turned(base.rotation, point) + base.position_mm
-    turned = rotation @ arm.targets.rotation[seen.target]
-    turn = np.full(position.shape, np.nan)
-    there = seen.cells.turned
-    if there.any():
-        measured = seen.cells.rotation[there]
-        turn[there] = log_so3(turned[there] @ np.swapaxes(measured, 1, 2))
-    return Residuals(position - seen.cells.position_mm, turn, Pose(turned, position), rotation)
-
-
-def best(seen: Seen, start: Arm, strengths: tuple[float, ...] = STRENGTHS) -> Trial:
+def best(seen: Readings, begin: Arm, strengths: tuple[float, ...] = STRENGTHS) -> Trial:
     """The fit whose strength predicts configurations left out best."""
-    chosen, least, cap = None, np.inf, None
-    arm = start
+    chosen, least, cap, arm = None, np.inf, None, begin
+    number = np.unique(seen.pose, return_inverse=True)[1]
     for strength in strengths:
-        trial = fit(seen, arm, start.model, strength, huber=True)
-        if chosen is not None and _far(trial.arm.model, start.model):
+        trial = reweighted(seen, arm, begin.model, strength, huber=True)
+        if chosen is not None and _far(trial.arm.model, begin.model):
             continue
-        arm = trial.arm
-        cap = cap or _CAP * trial.sigma_mm
-        score = _left_out_score(trial, seen, cap)
+        arm, cap = trial.arm, cap or _CAP * trial.sigma_mm
+        length = np.minimum(np.linalg.norm(trial.left_out[:, :3], axis=1), cap)
+        score = np.mean(np.bincount(number, length) / np.bincount(number))
         # Stronger corrections must pay: noise alone moves the score by a per mille or so.
         if score < 0.99 * least:
             chosen, least = trial, score
         elif score > 1.5 * least:
             break
-    if _few(seen, chosen):
+    corrections = 5 * begin.model.joints if chosen.strength > 0.0 else 0
+    frames = 6 * len(seen.session_names) + 3 * len(seen.target_names)
+    if 3 * len(seen) < _READ_PER_PARAMETER * (frames + corrections):
         return chosen
-    final = fit(seen, chosen.arm, start.model, chosen.strength)
-    return chosen if _far(final.arm.model, start.model) else final
+    final = reweighted(seen, chosen.arm, begin.model, chosen.strength)
+    return chosen if _far(final.arm.model, begin.model) else final
 
 
-def _few(seen: Seen, trial: Trial) -> bool:
-    """Whether so little was read that a loss without a say for gross errors could fit any of it."""
-    corrections = 5 * trial.nominal.joints if trial.strength > 0.0 else 0
-    frames = 6 * int(seen.base.max() + 1) + 3 * int(seen.target.max() + 1)
-    return 3 * len(seen.q) < _READ_PER_PARAMETER * (frames + corrections)
-
-
-def fit(seen: Seen, start: Arm, nominal: DHModel, strength: float, huber: bool = False) -> Trial:
-    """Robust fit from ``start`` with corrections of about ``strength`` (mm, mrad) to nominal.
+def reweighted(
+    seen: Readings, begin: Arm, nominal: DHModel, strength: float, huber: bool = False
+) -> Trial:
+    """Robust fit from ``begin`` with corrections of about ``strength`` (mm, mrad) to nominal.
 
     Tukey's biweight, which gives gross errors no say, or Huber's loss, which needs no good start.
     """
-    arm = start
+    arm = begin
     for _ in range(_ITERATIONS):
-        step = _Step.at(seen, arm, nominal, strength, huber)
+        step = Linear.at(seen, arm, nominal, strength, huber)
         arm, moved = step.taken(arm)
         if moved < _SETTLED * min(step.sigma_mm, 1.0):
             break
-    step = _Step.at(seen, arm, nominal, strength, huber)
+    step = Linear.at(seen, arm, nominal, strength, huber)
     plain, judged = step.left_out(seen)
     return Trial(arm, nominal, step.sigma_mm, step.sigma_rad, strength, plain, judged)
 
@@ -166,19 +201,8 @@ def _far(model: DHModel, nominal: DHModel) -> bool:
     return bool(moved[:, _IS_ANGLE].max() > _FAR_RAD or moved[:, ~_IS_ANGLE].max() > _FAR_MM)
 
 
-def _left_out_score(trial: Trial, seen: Seen, cap: float) -> float:
-    """Mean length of what configurations leave when left out."""
-    length = np.minimum(np.linalg.norm(trial.left_out[:, :3], axis=1), cap)
-    number = np.unique(seen.cells.pose, return_inverse=True)[1]
-    return float(np.mean(np.bincount(number, length) / np.bincount(number)))
-
-
-def _turned(rotation: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-    return np.einsum("nij,nj->ni", rotation, vectors)
-
-
 @dataclass(frozen=True)
-class _Step:
+class Linear:
     """One linearisation: weighted design of all readings and the solution of its normal equations.
 
     Columns: per base 3 mm and 3 rad about its readings' centroid, per target 3 mm and 3 rad, then
@@ -193,65 +217,70 @@ class _Step:
     centroids: np.ndarray
     sigma_mm: float
     sigma_rad: float
-    units: np.ndarray
 
     @classmethod
-    def at(cls, seen: Seen, arm: Arm, nominal: DHModel, strength: float, huber: bool) -> _Step:
-        left = residuals(arm, seen)
-        sigma_mm, sigma_rad = sigma_of(left.position_mm), sigma_of(left.turn_rad)
-        centroids = _centroids(left.predicted.position_mm, seen.base, len(arm.base.rotation))
-        design = _design(seen, arm, left, centroids, strength > 0.0)
-        units = np.tile(np.where(_IS_ANGLE, 1e-3, 1.0), arm.model.joints)
-        frames = design.shape[2] - (units.size if strength > 0.0 else 0)
-        design[:, :, frames:] *= units if strength > 0.0 else 1.0
+    def at(cls, seen: Readings, arm: Arm, nominal: DHModel, strength: float, huber: bool) -> Linear:
+        """The linearisation of an arm that leans on ``nominal``."""
+        left, count = residuals(arm, seen), len(seen)
+        session = np.eye(len(arm.frames.bases.rotation))[seen.session]
+        target = np.eye(len(arm.frames.targets.rotation))[seen.target]
+        points = left.predicted.position_mm
+        centroids = session.T @ points / np.maximum(session.sum(axis=0), 1.0)[:, None]
+        one, zero = np.tile(np.eye(3), (count, 1, 1)), np.zeros((count, 3, 3))
+        of_base = np.block([[one, -skew(points - centroids[seen.session])], [zero, one]])
+        of_target = np.block([[left.flange, zero], [zero, left.flange]])
+        columns = [
+            np.einsum("nij,nb->nibj", block, there).reshape(count, 6, -1)
+            for block, there in ((of_base, session), (of_target, target))
+        ]
+        frames = columns[0].shape[2] + columns[1].shape[2]
+        lean, moved = np.zeros(frames), np.zeros(frames)
+        if strength > 0.0:
+            units, base = _units(nominal), arm.frames.bases.rotation[seen.session]
+            inner = dh.parameter_jacobian(arm.model, seen.q_rad).reshape(count, 6, -1)
+            turns = base @ inner[:, 3:]
+            swing = left.flange @ arm.frames.targets.position_mm[seen.target][..., None]
+            shifts = base @ inner[:, :3] - skew(swing[..., 0]) @ turns
+            columns.append(np.concatenate([shifts, turns], axis=1) * units)
+            lean = np.append(lean, np.full(units.size, strength**-2.0))
+            moved = np.append(moved, (dh.to_vector(arm.model) - dh.to_vector(nominal)) / units)
+        design = np.concatenate(columns, axis=2)
         residual = np.concatenate([left.position_mm, np.nan_to_num(left.turn_rad)], axis=1)
-        weights = np.empty(residual.shape)
+        sigma_mm, sigma_rad = sigma_of(left.position_mm), sigma_of(left.turn_rad)
+        weights = np.zeros((count, 6))
         weights[:, :3] = _weight(left.position_mm, sigma_mm, huber) / sigma_mm**2
-        weights[:, 3:] = 0.0
         if np.isfinite(sigma_rad):
             weights[:, 3:] = _weight(left.turn_rad, sigma_rad, huber) / sigma_rad**2
         flat = design.reshape(-1, design.shape[2])
         weighted = flat * weights.reshape(-1, 1)
-        gram = weighted.T @ flat
-        rhs = weighted.T @ residual.ravel()
-        if strength > 0.0:
-            moved = (dh.to_vector(arm.model) - dh.to_vector(nominal)) / units
-            gram[range(frames, len(gram)), range(frames, len(gram))] += strength**-2.0
-            rhs[frames:] += moved / strength**2
+        gram = weighted.T @ flat + np.diag(lean)
         # What no reading shows (a target's turn, a base nobody sees) stays where it is.
         diagonal = np.diag(gram)
-        scale = np.where(
-            diagonal > 0.0, 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0)), 0.0
-        )
-        inverse = np.linalg.pinv(gram * np.outer(scale, scale), rcond=1e-12, hermitian=True)
-        inverse *= np.outer(scale, scale)
-        step = -inverse @ rhs
-        return cls(design, residual, weights, inverse, step, centroids, sigma_mm, sigma_rad, units)
+        scale = np.where(diagonal > 0.0, np.where(diagonal > 0.0, diagonal, 1.0) ** -0.5, 0.0)
+        both = np.outer(scale, scale)
+        inverse = np.linalg.pinv(gram * both, rcond=1e-12, hermitian=True) * both
+        step = -inverse @ (weighted.T @ residual.ravel() + lean * moved)
+        return cls(design, residual, weights, inverse, step, centroids, sigma_mm, sigma_rad)
 
     def taken(self, arm: Arm) -> tuple[Arm, float]:
         """The arm after the step, and how far it moves: mm of lengths, mm at one metre of turns."""
-        bases, targets = len(arm.base.rotation), len(arm.targets.rotation)
-        base = self.step[: 6 * bases].reshape(bases, 6)
-        target = self.step[6 * bases : 6 * (bases + targets)].reshape(targets, 6)
-        turn = exp_so3(base[:, 3:])
-        offset = arm.base.position_mm - self.centroids
-        moved = Arm(
-            arm.model,
-            Pose(turn @ arm.base.rotation, self.centroids + base[:, :3] + _turned(turn, offset)),
-            Pose(
-                exp_so3(target[:, 3:]) @ arm.targets.rotation,
-                arm.targets.position_mm + target[:, :3],
-            ),
+        bases, targets = arm.frames.bases, arm.frames.targets
+        count = len(bases.rotation) + len(targets.rotation)
+        frames = self.step[: 6 * count].reshape(count, 6)
+        base, target = np.split(frames, [len(bases.rotation)])
+        turn, offset = exp_so3(base[:, 3:]), bases.position_mm - self.centroids
+        place = self.centroids + base[:, :3] + (turn @ offset[..., None])[..., 0]
+        moved = Frames(
+            Pose(turn @ bases.rotation, place),
+            Pose(exp_so3(target[:, 3:]) @ targets.rotation, targets.position_mm + target[:, :3]),
         )
-        rest = self.step[6 * (bases + targets) :]
+        model, rest = arm.model, self.step[6 * count :]
         if rest.size:
-            vector = dh.to_vector(arm.model) + rest * self.units
-            moved = replace(moved, model=dh.with_vector(arm.model, vector))
-        lengths = np.abs(np.concatenate([base[:, :3].ravel(), target[:, :3].ravel(), rest]))
-        angles = np.abs(np.concatenate([base[:, 3:].ravel(), target[:, 3:].ravel()]))
-        return moved, float(max(lengths.max(), 1e3 * angles.max()))
+            model = dh.with_vector(model, dh.to_vector(model) + rest * _units(model))
+        lengths = np.abs(np.append(frames[:, :3], rest)).max()
+        return Arm(model, moved), float(max(lengths, 1e3 * np.abs(frames[:, 3:]).max()))
 
-    def left_out(self, seen: Seen) -> tuple[np.ndarray, np.ndarray]:
+    def left_out(self, seen: Readings) -> tuple[np.ndarray, np.ndarray]:
         """Residuals (n, 6), mm and rad, of every reading with its configuration left out.
 
         Then the same over what the fit without it leaves open there: as wide as ``sigma`` for a
@@ -260,12 +289,14 @@ class _Step:
         plain, judged = self.residual.copy(), self.residual.copy()
         unit = np.repeat([self.sigma_mm, self.sigma_rad], 3)
         unit = np.where(np.isfinite(unit), unit, 1.0)
-        seen_there = np.repeat([np.ones(len(seen.q), bool), seen.cells.turned], 3, axis=0).T
-        scaled = self.design / unit[:, None] * seen_there[:, :, None]
+        there = np.repeat([np.ones(len(seen), bool), seen.has_rotation], 3, axis=0).T
+        scaled = self.design / unit[:, None] * there[:, :, None]
         share = self.weights * unit**2
-        order = np.argsort(seen.cells.pose, kind="stable")
-        sizes = np.unique(seen.cells.pose, return_counts=True)[1]
-        begins = np.concatenate([[0], np.cumsum(sizes)[:-1]])
+        sizes, order = (
+            np.unique(seen.pose, return_counts=True)[1],
+            np.argsort(seen.pose, kind="stable"),
+        )
+        begins = np.cumsum(sizes) - sizes
         for size in np.unique(sizes):
             rows = order[begins[sizes == size][:, None] + np.arange(size)]
             block = scaled[rows].reshape(len(rows), 6 * size, -1)
@@ -275,52 +306,18 @@ class _Step:
             whole = (1.0 + _OFF_ZERO) * np.eye(6 * size)
             rest = np.linalg.pinv(whole - open_there * weight, rcond=1e-12)
             left = rest @ (self.residual[rows] / unit).reshape(len(rows), -1, 1)
-            value, axes = np.linalg.eigh(_symmetric(rest @ open_there))
-            spread = np.sqrt(1.0 + np.maximum(value, 0.0))[:, :, None]
-            found = axes @ ((np.swapaxes(axes, 1, 2) @ left) / spread)
+            spread = rest @ open_there
+            value, axes = np.linalg.eigh(0.5 * (spread + np.swapaxes(spread, 1, 2)))
+            over = np.sqrt(1.0 + np.maximum(value, 0.0))[:, :, None]
+            found = axes @ ((np.swapaxes(axes, 1, 2) @ left) / over)
             plain[rows.ravel()] = left.reshape(-1, 6) * unit
             judged[rows.ravel()] = found.reshape(-1, 6) * unit
-        return np.where(seen_there, plain, np.nan), np.where(seen_there, judged, np.nan)
+        return np.where(there, plain, np.nan), np.where(there, judged, np.nan)
 
 
-def _symmetric(matrices: np.ndarray) -> np.ndarray:
-    return 0.5 * (matrices + np.swapaxes(matrices, 1, 2))
-
-
-_IS_ANGLE = np.array([True, False, False, True, True])  # of dh.PARAMETERS
-
-
-def _design(seen: Seen, arm: Arm, left: Residuals, centroids, corrected: bool) -> np.ndarray:
-    """Derivatives (n, 6, P) of the residuals."""
-    count, bases, targets = len(seen.q), len(arm.base.rotation), len(arm.targets.rotation)
-    joints = arm.model.joints
-    frames = 6 * (bases + targets)
-    design = np.zeros((count, 6, frames + (5 * joints if corrected else 0)))
-    rows = np.arange(count)[:, None]
-    spoke = left.predicted.position_mm - centroids[seen.base]
-    column = 6 * seen.base[:, None] + np.arange(3)
-    design[rows, np.arange(3), column] = 1.0
-    design[rows, 3 + np.arange(3), column + 3] = 1.0
-    design[rows[:, :, None], np.arange(3)[:, None], (column + 3)[:, None, :]] = -skew(spoke)
-    column = 6 * bases + 6 * seen.target[:, None] + np.arange(3)
-    place = (rows[:, :, None], np.arange(3)[:, None], column[:, None, :])
-    design[place] = left.flange
-    design[rows[:, :, None], 3 + np.arange(3)[:, None], (column + 3)[:, None, :]] = left.flange
-    if corrected:
-        base = arm.base.rotation[seen.base]
-        inner = dh.parameter_jacobian(arm.model, seen.q).reshape(count, 6, -1)
-        turns = base @ inner[:, 3:]
-        swing = _turned(left.flange, arm.targets.position_mm[seen.target])
-        design[:, :3, frames:] = base @ inner[:, :3] - skew(swing) @ turns
-        design[:, 3:, frames:] = turns
-    return design
-
-
-def _centroids(points: np.ndarray, base: np.ndarray, bases: int) -> np.ndarray:
-    count = np.maximum(np.bincount(base, minlength=bases), 1)[:, None]
-    sums = np.zeros((bases, 3))
-    np.add.at(sums, base, points)
-    return sums / count
+def _units(model: DHModel) -> np.ndarray:
+    """One mm or mrad (5k,) of every DH parameter."""
+    return np.tile(np.where(_IS_ANGLE, 1e-3, 1.0), model.joints)
 
 
 def _weight(vectors: np.ndarray, sigma: float, huber: bool) -> np.ndarray:
@@ -333,3 +330,80 @@ def _weight(vectors: np.ndarray, sigma: float, huber: bool) -> np.ndarray:
         return np.where(length < max(_GROSS * sigma, 3.0 * usual), weight, 0.0)[:, None]
     share = np.minimum(length / (BIWEIGHT * sigma), 1.0)
     return ((1.0 - share**2) ** 2)[:, None]
+
+
+def start(
+    seen: Readings, model: DHModel, draws: int = _DRAWS, stretches: tuple[int, ...] = _STRETCHES
+) -> Arm:
+    """Bases and targets to start from, though part of the readings may be wrong.
+
+    Of closed forms on all readings of the largest session, on stretches of it and on random draws,
+    the one that fits the better two fifths best.
+    """
+    largest = np.argmax(np.bincount(seen.session))
+    part = seen.select(thinned(np.flatnonzero(seen.session == largest), _START_ROWS))
+    flange = dh.forward(model, part.q_rad)
+    found, least = None, np.inf
+    for rows in _draws(part, draws, stretches):
+        for _ in range(_REFINEMENTS):
+            at = Pose(*(each[rows] for each in flange))
+            arm = Arm(model, closed_form_start(part.select(rows), at))
+            misfit = np.linalg.norm(residuals(arm, part, flange).position_mm, axis=1)
+            middle = float(np.quantile(misfit, _JUDGED))
+            if middle >= least:
+                break
+            found, least = arm, middle
+            rows = np.argsort(misfit)[: max(int(_KEPT * len(misfit)), _DRAWN)]
+    frames = _placed(found, part, flange, least) if len(seen.target_names) > 1 else found.frames
+    for other in np.unique(seen.session[seen.session != largest]):
+        own = seen.select(seen.session == other)
+        base = _rigid(own, Arm(model, frames), largest)
+        frames.bases.rotation[other], frames.bases.position_mm[other] = base
+    return Arm(model, frames)
+
+
+def _draws(part: Readings, draws: int, stretches: tuple[int, ...]) -> Iterator[np.ndarray]:
+    """All readings, stretches of the file, and random configurations."""
+    every, poses = np.arange(len(part)), np.unique(part.pose)
+    yield every
+    for parts in stretches:
+        for piece in np.array_split(every, parts):
+            if len(np.unique(part.pose[piece])) >= _DRAWN:
+                yield piece
+    rng = np.random.default_rng(0)
+    for _ in range(draws if len(poses) > _DRAWN else 0):
+        yield np.flatnonzero(np.isin(part.pose, rng.choice(poses, _DRAWN, replace=False)))
+
+
+def _placed(arm: Arm, part: Readings, flange: Pose, usual_mm: float) -> Frames:
+    """Frames with targets that were in none of the readings chosen put where theirs have them."""
+    misfit = np.linalg.norm(residuals(arm, part, flange).position_mm, axis=1)
+    base = Pose(*(each[part.session[0]] for each in arm.frames.bases))
+    there = (part.position_mm - base.position_mm) @ base.rotation - flange.position_mm
+    there = (np.swapaxes(flange.rotation, 1, 2) @ there[..., None])[..., 0]
+    targets = Pose(*(each.copy() for each in arm.frames.targets))
+    for each in np.unique(part.target):
+        of = part.target == each
+        if np.median(misfit[of]) > _ASTRAY * usual_mm:
+            targets.position_mm[each] = np.median(there[of], axis=0)
+            of &= part.has_rotation
+            if of.any():
+                turned = np.swapaxes(base.rotation @ flange.rotation[of], 1, 2)
+                turned = np.median(turned @ part.rotation[of], axis=0)
+                targets.rotation[each] = nearest_rotation(turned)
+    return Frames(arm.frames.bases, targets)
+
+
+def _rigid(own: Readings, arm: Arm, base: int) -> Pose:
+    """Base of readings whose arm is known: rigid motion of its points onto the measured ones."""
+    rows = np.arange(len(own))
+    known = residuals(arm, replace(own, session=np.full_like(own.session, base)))
+    points = known.predicted.position_mm
+    for _ in range(_REFINEMENTS):
+        centre, onto = points[rows].mean(axis=0), own.position_mm[rows].mean(axis=0)
+        turn = nearest_rotation((own.position_mm[rows] - onto).T @ (points[rows] - centre))
+        moved = (points - centre) @ turn.T + onto
+        misfit = np.linalg.norm(moved - own.position_mm, axis=1)
+        rows = np.argsort(misfit)[: max(int(_KEPT * len(misfit)), min(len(misfit), 4))]
+    motion = Pose(turn, onto - turn @ centre)
+    return compose(motion, Pose(*(each[base] for each in arm.frames.bases)))

@@ -9,9 +9,9 @@ import numpy as np
 
 from kinacc.checks import meanings, orientations, robust_fit
 from kinacc.checks.findings import Finding, finding
-from kinacc.checks.fitting import Fitted
 from kinacc.checks.meanings import Meaning
-from kinacc.checks.robust_fit import Seen
+from kinacc.checks.readings import Readings
+from kinacc.checks.robust_fit import Fitted
 from kinacc.kinematics import dh
 from kinacc.measurements.layout import Layout
 
@@ -39,7 +39,7 @@ def found(fitted: Fitted, raw: Raw) -> list[Finding]:
     bad = np.flatnonzero(fitted.bad)
     if not bad.size:
         return []
-    open_rows, findings, cells = bad, [], fitted.seen.cells
+    open_rows, findings, lines = bad, [], fitted.seen.lines
     for change, seen in _explanations(fitted, raw, bad):
         left = robust_fit.residuals(fitted.trial.arm, seen)
         near = np.linalg.norm(left.position_mm, axis=1) <= fitted.limit_mm
@@ -48,27 +48,25 @@ def found(fitted: Fitted, raw: Raw) -> list[Finding]:
         if rows.size:
             change = replace(change, fix="correct these rows, or exclude them", values={})
             largest_mm = float(fitted.left_mm[rows].max())
-            findings.append(
-                change.at(cells.lines(rows), " in these rows", largest_error_mm=largest_mm)
-            )
+            findings.append(change.at(lines(rows), " in these rows", largest_error_mm=largest_mm))
             open_rows = np.setdiff1d(open_rows, rows)
     stale = open_rows[raw.earlier[open_rows] > 0]
     if stale.size:
-        findings.append(finding("repeated_reading/off", cells.lines(stale), count=stale.size))
+        findings.append(finding("repeated_reading/off", lines(stale), count=stale.size))
         open_rows = np.setdiff1d(open_rows, stale)
     return [*findings, *_outliers(fitted, open_rows)]
 
 
-def _explanations(fitted: Fitted, raw: Raw, rows: np.ndarray) -> Iterator[tuple[Finding, Seen]]:
+def _explanations(fitted: Fitted, raw: Raw, rows: np.ndarray) -> Iterator[tuple[Finding, Readings]]:
     """Every known fault undone in the readings ``rows``."""
     seen, q, meaning = fitted.seen.select(rows), raw.q[rows], raw.meaning
     joints, turning = q.shape[1], meaning.unit == 1.0
 
-    def other(q: np.ndarray) -> Seen:
-        return replace(seen, q=meaning.joints(q))
+    def other(q: np.ndarray) -> Readings:
+        return replace(seen, q_rad=meaning.joints(q))
 
-    def moved(position_mm: np.ndarray, rotation: np.ndarray = seen.cells.rotation) -> Seen:
-        return replace(seen, cells=replace(seen.cells, position_mm=position_mm, rotation=rotation))
+    def moved(position_mm: np.ndarray, rotation: np.ndarray = seen.rotation) -> Readings:
+        return replace(seen, position_mm=position_mm, rotation=rotation)
 
     for factor, unit, stated in (
         (180.0 / np.pi, "radians", "degrees"),
@@ -77,30 +75,30 @@ def _explanations(fitted: Fitted, raw: Raw, rows: np.ndarray) -> Iterator[tuple[
         change = finding("joint_units", unit=unit, stated=stated, short="")
         yield change, other(q * np.where(turning, factor, 1.0))
     for factor, unit in ((1e3, "metres"), (1e-3, ""), (25.4, "inches")):
-        yield meanings.of_length(unit), moved(factor * seen.cells.position_mm)
+        yield meanings.of_length(unit), moved(factor * seen.position_mm)
     if raw.commanded is not None:
         yield finding("commanded_joints/better"), other(raw.commanded[rows])
-    there = seen.cells.turned
+    there = seen.has_rotation
     if there.any():
         numbers = raw.turns[rows][there]
         for way in orientations.simple(raw.layout, numbers):
-            rotation = seen.cells.rotation.copy()
+            rotation = seen.rotation.copy()
             rotation[there] = way.read(numbers)
-            yield way.change, moved(seen.cells.position_mm, rotation)
+            yield way.change, moved(seen.position_mm, rotation)
     for axis, name in enumerate("xyz"):
         mirror = np.where(np.arange(3) == axis, -1.0, 1.0)
         position_mm, change = (
-            seen.cells.position_mm * mirror,
+            seen.position_mm * mirror,
             finding("left_handed/axis", axis=name),
         )
         yield change, moved(position_mm)
-        yield change, moved(position_mm, seen.cells.rotation * np.outer(mirror, mirror))
+        yield change, moved(position_mm, seen.rotation * np.outer(mirror, mirror))
     for one in np.unique(fitted.seen.target):
-        number = fitted.seen.cells.target[fitted.seen.target == one][0]
+        number = fitted.seen.target[fitted.seen.target == one][0]
         # Readings of the target itself are made to fit nothing.
-        others = (seen.cells.target != number)[:, None]
-        swapped = moved(np.where(others, seen.cells.position_mm, np.inf))
-        change = finding("target_swapped", target=seen.cells.target_names[number])
+        others = (seen.target != number)[:, None]
+        swapped = moved(np.where(others, seen.position_mm, np.inf))
+        change = finding("target_swapped", target=seen.target_names[number])
         yield change, replace(swapped, target=np.full_like(seen.target, one))
     for joint in range(joints):
         signs = np.where(np.arange(joints) == joint, -1.0, 1.0)
@@ -109,15 +107,15 @@ def _explanations(fitted: Fitted, raw: Raw, rows: np.ndarray) -> Iterator[tuple[
         for beside in {joint - 1, 1} - {joint}:
             for sign in (1.0, -1.0):
                 coupled = meanings.coupled(meaning, joint, beside, sign)
-                yield coupled.changes[-1], replace(seen, q=coupled.joints(q))
+                yield coupled.changes[-1], replace(seen, q_rad=coupled.joints(q))
 
 
 def _outliers(fitted: Fitted, rows: np.ndarray) -> Iterator[Finding]:
     """What no fault explains; told apart where one joint standing elsewhere explains it."""
     joint, off = _one_joint(fitted, rows)
-    cells = fitted.seen.cells
+    seen = fitted.seen
     for each in np.unique(joint[joint >= 0]):
-        lines = cells.lines(rows[joint == each])
+        lines = seen.lines(rows[joint == each])
         yield finding(
             "commanded_joints/one",
             lines,
@@ -130,10 +128,10 @@ def _outliers(fitted: Fitted, rows: np.ndarray) -> Iterator[Finding]:
         worst, angle = rest[np.argmax(fitted.left_mm[rest])], fitted.left_rad[rest].max()
         yield finding(
             "outliers",
-            cells.lines(rest),
+            seen.lines(rest),
             count=rest.size,
             turned=f" and {1e3 * angle:.3g} mrad" if angle > fitted.limit_rad else "",
-            row=cells.row_names.one(cells.line[worst]),
+            row=seen.row_names.one(seen.line[worst]),
             largest_mm=float(fitted.left_mm[worst]),
             limit_mm=fitted.limit_mm,
         )
@@ -143,27 +141,24 @@ def _one_joint(fitted: Fitted, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray
     """Joint (m,) whose displacement alone explains a reading, -1 where none, and by how much."""
     seen, arm = fitted.seen.select(rows), fitted.trial.arm
     left = robust_fit.residuals(arm, seen)
-    jacobian = dh.joint_jacobian(arm.model, seen.q)
-    base = arm.base.rotation[seen.base]
-    swing = np.einsum("nij,nj->ni", left.flange, arm.targets.position_mm[seen.target])
+    jacobian = dh.joint_jacobian(arm.model, seen.q_rad)
+    base = arm.frames.bases.rotation[seen.session]
+    swing = left.flange @ arm.frames.targets.position_mm[seen.target][..., None]
     axes = base @ jacobian[:, 3:]
-    moves = base @ jacobian[:, :3] + np.cross(axes, swing[:, :, None], axis=1)
-    scale = fitted.limit_rad if np.isfinite(fitted.limit_rad) else np.inf
-    best, size, least = np.full(len(rows), -1), np.zeros(len(rows)), np.full(len(rows), np.inf)
-    turned = seen.cells.turned
-    for joint in range(jacobian.shape[2]):
-        direction = np.concatenate(
-            [moves[:, :, joint] / fitted.limit_mm, axes[:, :, joint] / scale * turned[:, None]], 1
-        )
-        error = np.concatenate(
-            [left.position_mm / fitted.limit_mm, np.nan_to_num(left.turn_rad) / scale], axis=1
-        )
-        weight = np.maximum(np.sum(direction**2, axis=1), 1e-12)
-        by = -np.sum(direction * error, axis=1) / weight
-        rest = np.linalg.norm(error + by[:, None] * direction, axis=1)
-        # A line is hit by chance with the share of directions that pass so near it.
-        free = np.where(turned, 5, 2)
-        chance = jacobian.shape[2] * (1.0 / np.maximum(np.linalg.norm(error, axis=1), 1.0)) ** free
-        good = (rest < 1.0) & (rest < least) & (chance < _CHANCE)
-        best[good], size[good], least[good] = joint, by[good], rest[good]
-    return best, size
+    moves = base @ jacobian[:, :3] + np.cross(axes, swing, axis=1)
+    turned = seen.has_rotation
+    # Positions and orientations in units of what they may be off.
+    share = np.where(turned, 1.0 / fitted.limit_rad, 0.0)[:, None, None]
+    directions = np.concatenate([moves / fitted.limit_mm, axes * share], axis=1)
+    turn = np.nan_to_num(left.turn_rad) * share[..., 0]
+    error = np.concatenate([left.position_mm / fitted.limit_mm, turn], axis=1)
+    weight = np.maximum(np.sum(directions**2, axis=1), 1e-12)
+    by = -np.einsum("nij,ni->nj", directions, error) / weight
+    rest = np.linalg.norm(error[..., None] + by[:, None] * directions, axis=1)
+    # A line is hit by chance with the share of directions that pass so near it.
+    size = np.maximum(np.linalg.norm(error, axis=1), 1.0)
+    chance = jacobian.shape[2] * size ** -np.where(turned, 5.0, 2.0)
+    best = np.argmin(rest, axis=1)
+    place = np.arange(len(rows)), best
+    good = (rest[place] < 1.0) & (chance < _CHANCE)
+    return np.where(good, best, -1), by[place]

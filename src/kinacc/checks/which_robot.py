@@ -41,12 +41,11 @@ def _left(reading: MeasuredFile, arm) -> float:
 
     The arm is taken as described: corrected, an arm of similar build would fit as well.
     """
-    from kinacc.checks import cells, hand_eye, meanings, robust_fit
+    from kinacc.checks import readings, robust_fit
 
-    every = cells.merged(cells.of_columns(reading.columns, arm.dh.joints, reading.row_names))[0]
-    few = every.select(hand_eye.thinned(np.arange(len(every)), _ROWS))
+    every = readings.merged(readings.of_file(reading, arm))[0]
+    few = every.select(readings.thinned(np.arange(len(every)), _ROWS))
     point = few.position_mm - np.median(few.position_mm, axis=0)
     spread = float(np.median(np.linalg.norm(point, axis=1)))
-    seen = meanings.as_written(arm.joint_map).seen(few)
-    fitted = robust_fit.best(seen, hand_eye.found(seen, arm.dh), strengths=(0.0,))
+    fitted = robust_fit.best(few, robust_fit.start(few, arm.dh), strengths=(0.0,))
     return fitted.sigma_mm / max(spread, 1e-9)

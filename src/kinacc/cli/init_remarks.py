@@ -18,7 +18,7 @@ _ROUNDED_MM = 0.02  # rms; less is nothing beside what instruments measure with
 
 def remarks_on(guess: Guess, report: Report | None) -> list[str]:
     """What has to be said of the points though nothing contradicts them."""
-    from kinacc.checks.rounding import smallest_step
+    from kinacc.checks.digits import smallest_step
 
     fit = report.facts.get("quick_fit") if report else None
     left = fit["left_per_axis_mm"] if isinstance(fit, Mapping) else None
@@ -39,17 +39,17 @@ def rounded(guess: Guess, reading: MeasuredFile, arm: Robot) -> list[str]:
     """What rounding the joints costs, in words, where it costs anything that matters."""
     import numpy as np
 
-    from kinacc.checks import rounding
+    from kinacc.checks import digits
 
     if guess.section.get("pulses_per_deg") or arm.dh.prismatic.any():
         return []
     unit = 1.0 if guess.section["joint_unit"] == "deg" else 180.0 / np.pi
     cells = [guess.table.columns[name.column] for name in guess.found.joints]
-    step = rounding.smallest_step(cells, unit, guess.table.decimal)
+    step = digits.smallest_step(cells, unit, guess.table.decimal)
     if step <= 0.0:
         return []
     q = np.stack([reading.columns[f"q{i + 1}"] for i in range(guess.joints)], axis=1)
-    cost = rounding.cost(arm.dh, q @ np.asarray(arm.joint_map).T, step)
+    cost = digits.cost(arm.dh, q @ np.asarray(arm.joint_map).T, step)
     if cost.rms_mm < _ROUNDED_MM:
         return []
     return [

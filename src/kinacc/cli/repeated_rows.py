@@ -8,8 +8,8 @@ from datetime import datetime, time, timedelta
 
 import numpy as np
 
+from kinacc.checks.digits import smallest_step, step_between
 from kinacc.checks.repeatability import Repeated
-from kinacc.checks.rounding import smallest_step, step_between
 from kinacc.cli.rows import LENGTH, Quantities, open_table
 from kinacc.errors import Problem, first_few, refuse
 from kinacc.measurements.layout import columns_of_quantity, listed

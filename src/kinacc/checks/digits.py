@@ -1,0 +1,232 @@
+"""What digits tell: readings not taken anew, joints on round numbers, cost of rounding."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from decimal import Decimal, InvalidOperation
+
+import numpy as np
+import scipy
+
+from kinacc.checks import robust_fit, tails
+from kinacc.checks.findings import Finding, finding
+from kinacc.checks.meanings import Meaning
+from kinacc.checks.readings import Readings, grouped
+from kinacc.checks.robust_fit import Fitted
+from kinacc.errors import first_few
+from kinacc.kinematics import dh
+from kinacc.kinematics.dh import DHModel
+
+_CHANCE = 0.01  # expected number of coincidences above which equal readings tell nothing
+_GRIDS_DEG = (1.0, 0.5, 0.1, 0.05, 0.01)
+_FINER = 10.0  # a read-back value has digits well below the grid of a commanded one
+_FEWEST = 3
+_WORSE = 1.5  # times the median error of the other rows
+_RANKED = 1e-3  # significance of that
+_EXACT = 1e-6  # of the grid
+_FITTED_AWAY = 0.3  # of the errors that rounding makes: what a fit of few poses leaves of them
+_MOST_POSES = 200
+_MOST_DIGITS = 30  # before or behind the mark: beyond all that is measured
+_STEP = 1e-4  # of a difference quotient, rad
+
+
+def copies(every: Readings, noise_mm: float) -> Iterator[Finding]:
+    """Rows equal to an earlier one in every joint and reading, or in every reading alone.
+
+    Readings have a limited number of digits: where repeats scatter by ``noise_mm`` per axis (NaN
+    if unknown) so little that equal digits are no surprise, there is no finding.
+    """
+    if not _unlikely(every, noise_mm):
+        return
+    line, reading, q = _by_line(every)
+    names = every.row_names
+    twice = _earlier_equal(np.column_stack([q, reading]))
+    again = np.flatnonzero(twice >= 0)
+    if again.size:
+        first = int(line[twice[again[0]]])
+        row = names.one(first)
+        yield finding(
+            "duplicate_rows", line[again], count=again.size, row=row, first_copied_line=first
+        )
+    earlier = unread(every)
+    again, at = np.unique(every.line[earlier > 0], return_index=True)
+    if again.size:
+        first = earlier[earlier > 0][at]
+        pairs = zip(again.tolist(), first.tolist(), strict=True)
+        told = [f"{names.one(line)} repeats {names.number(of)}" for line, of in pairs]
+        yield finding("repeated_reading", again, pairs=first_few(told, 4))
+
+
+def unread(every: Readings) -> np.ndarray:
+    """Line (n,) of an earlier row of other joints whose readings are equal in every digit, or 0."""
+    line, reading, q = _by_line(every)
+    same = _earlier_equal(reading)
+    moved = (np.abs(q - q[same]) > 1e-6).any(axis=1)
+    earlier = np.where((same >= 0) & moved, line[same], 0)
+    return earlier[np.searchsorted(line, every.line)]
+
+
+def _by_line(every: Readings) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Lines (m,) of the file, readings of each side by side, and joints (m, k)."""
+    line, first, inverse = np.unique(every.line, return_index=True, return_inverse=True)
+    reading = np.full((len(line), len(every.target_names), 12), np.inf)
+    reading[inverse, every.target, :3] = every.position_mm
+    reading[inverse, every.target, 3:] = np.nan_to_num(every.rotation.reshape(-1, 9), nan=np.inf)
+    return line, reading.reshape(len(line), -1), every.q[first]
+
+
+def _earlier_equal(values: np.ndarray) -> np.ndarray:
+    """Index (n,) of the first equal row before each, -1 where there is none."""
+    number = grouped(values)
+    first = np.unique(number, return_index=True)[1][number]
+    return np.where(first < np.arange(len(values)), first, -1)
+
+
+def _unlikely(every: Readings, noise_mm: float) -> bool:
+    """Whether equal digits by chance are to be expected less than ``_CHANCE`` times."""
+    if not noise_mm > 0.0:
+        return True
+    steps = np.diff(np.unique(every.position_mm))
+    steps = steps[steps > 1e-12 * np.abs(every.position_mm).max(initial=1.0)]
+    digit = steps.min(initial=np.inf) if steps.size else 0.0
+    per_axis = min(digit / (2.0 * np.sqrt(np.pi) * noise_mm), 1.0)
+    numbers = 3 * len(every.target_names) + 3 * bool(every.has_rotation.any())
+    counts = np.unique(every.pose, return_counts=True)[1]
+    pairs = float(np.sum(counts * (counts - 1) / 2)) / max(len(every.target_names), 1) ** 2
+    return max(pairs, 1.0) * per_axis**numbers < _CHANCE
+
+
+def commanded(
+    fitted: Fitted, q: np.ndarray, stated: np.ndarray | None, meaning: Meaning
+) -> Iterator[Finding]:
+    """Joints (n, k) as commanded where those read back are wanted.
+
+    By the ``stated`` commanded joints, where the file has them, else by round numbers.
+    """
+    if stated is None:
+        yield from _round(fitted, np.rad2deg(q[:, ~fitted.trial.nominal.prismatic]))
+        return
+    both = np.isfinite(stated).all(axis=1)
+    if not both.any():
+        return
+    seen, arm = fitted.seen, fitted.trial.arm
+    read, sent = (
+        robust_fit.residuals(arm, replace(seen, q_rad=meaning.joints(joints))).position_mm
+        for joints in (q, np.where(both[:, None], stated, q))
+    )
+    apart = np.linalg.norm(sent - read, axis=1)
+    # What is apart everywhere (a following error of a few um) is how the arm is.
+    usual = tails.limit(apart[both], 3) if apart[both].any() else 0.0
+    limit_mm = max(np.nan_to_num(usual, posinf=0.0), fitted.limit_mm)
+    rows = np.flatnonzero(both & (apart > limit_mm))
+    if rows.size:
+        lines = seen.lines(rows)
+        nearer = np.mean(np.linalg.norm(sent[rows], axis=1) < fitted.left_mm[rows]) > 0.5
+        yield finding(
+            "commanded_joints/apart",
+            lines,
+            count=len(lines),
+            better="the commanded" if nearer else "those read back",
+            largest_mm=float(apart[rows].max()),
+        )
+    sigma = robust_fit.sigma_of(sent[both])
+    if sigma < 0.7 * robust_fit.sigma_of(read[both]):
+        yield finding("commanded_joints/exchanged", seen.lines(both), sigma=f"{sigma:.3g}")
+
+
+def _round(fitted: Fitted, q_deg: np.ndarray) -> Iterator[Finding]:
+    """Rows on round numbers where the others are not, which fit worse; or all on a coarse grid."""
+    q_deg, left, seen = q_deg[:, np.ptp(q_deg, axis=0) > 0.0], fitted.left_mm, fitted.seen
+    if q_deg.shape[1] < 2:
+        return
+    for grid in _GRIDS_DEG:
+        on, fine = _on(q_deg, grid), ~_on(q_deg, grid / _FINER)
+        if len(np.unique(q_deg[on], axis=0)) < _FEWEST or fine.sum() < len(on) / 2:
+            continue
+        worse = float(np.median(left[on]) / np.median(left[fine]))
+        ranked = scipy.stats.mannwhitneyu(left[on], left[fine], alternative="greater").pvalue
+        if worse > _WORSE and ranked < _RANKED:
+            lines = seen.lines(on)
+            times = f"{worse:.2g}"
+            yield finding("commanded_joints", lines, grid_deg=grid, count=len(lines), times=times)
+            return
+    grid = next((grid for grid in _GRIDS_DEG[:4] if _on(q_deg, grid).all()), None)
+    if grid is not None:
+        arm, slides = fitted.trial.arm, fitted.trial.nominal.prismatic
+        off = np.random.default_rng(0).uniform(-0.5, 0.5, seen.q_rad.shape) * np.deg2rad(grid)
+        there = robust_fit.residuals(arm, replace(seen, q_rad=seen.q_rad + off * ~slides))
+        apart = there.predicted.position_mm - fitted.left.predicted.position_mm
+        rounding = float(np.median(np.linalg.norm(apart, axis=1)))
+        error = float(np.sqrt(np.median(left**2)))
+        if _FITTED_AWAY < error / rounding < 1.5:
+            words = {"error": f"{error:.3g}", "rounding": f"{rounding:.3g}"}
+            yield finding("commanded_joints/all", seen.lines(), grid_deg=grid, **words)
+
+
+def _on(q_deg: np.ndarray, grid: float) -> np.ndarray:
+    """True (n,) where all joints are whole multiples of ``grid``."""
+    steps = q_deg / grid
+    return (np.abs(steps - np.round(steps)) < _EXACT * np.maximum(np.abs(steps), 1.0)).all(axis=1)
+
+
+@dataclass(frozen=True)
+class Rounding:
+    """Joints written in steps of ``step_deg``.
+
+    ``reach_mm`` is the largest distance of the flange from a joint's axis, ``step_mm`` what one
+    step moves it there, ``rms_mm`` and ``most_mm`` what rounding all joints adds to its position.
+    """
+
+    step_deg: float
+    reach_mm: float
+    step_mm: float
+    rms_mm: float
+    most_mm: float
+
+
+def smallest_step(cells: Sequence[Sequence[object]], unit: float, decimal: str) -> float:
+    """The step of numbers as written: the most digits that any cell has behind its mark.
+
+    ``unit`` is that of the file in the unit wanted. Zero where the file holds no texts, whose
+    numbers are not rounded.
+    """
+    texts = [cell for column in cells for cell in column]
+    if not all(isinstance(cell, str) and "e" not in cell.lower() for cell in texts):
+        return 0.0
+    digits = (len(cell.strip().partition(decimal)[2]) for cell in texts)
+    return unit * 10.0 ** -max(digits, default=0)
+
+
+def step_between(cells: Sequence[object], unit: float, decimal: str) -> float:
+    """The largest step of which all numbers of a column are whole multiples away from each other.
+
+    ``unit`` is that of the file in the unit wanted. Zero where all are equal, or a cell is no
+    number.
+    """
+    values = []
+    for cell in cells:
+        try:
+            value = Decimal(str(cell).strip().replace("\u2212", "-").replace(decimal, "."))
+        except InvalidOperation:
+            return 0.0
+        if not value.is_finite() or abs(value.adjusted()) > _MOST_DIGITS:
+            return 0.0
+        values.append(value)
+    digits = max((-int(each.as_tuple().exponent) for each in values), default=0)
+    whole = [int(each.scaleb(digits)) for each in values]
+    return unit * math.gcd(*(each - whole[0] for each in whole)) * 10.0**-digits
+
+
+def cost(model: DHModel, q: np.ndarray, step: float) -> Rounding:
+    """What steps of ``step`` deg cost at joints (n, k): a rounded number is off by half at most."""
+    q = q[:: max(len(q) // _MOST_POSES, 1)]
+    half = 0.5 * np.deg2rad(step)
+    moves = dh.joint_jacobian(model, q)[:, :3, ~model.prismatic]
+    arm = np.linalg.norm(moves, axis=1)  # (n, joints) distances of the flange from every axis
+    reach = float(arm.max())
+    # Rounding is uniform over a step: its standard deviation is half of one over the root of 3.
+    rms = half / np.sqrt(3.0) * np.sqrt(np.mean(np.sum(arm**2, axis=1)))
+    most = half * arm.sum(axis=1).max()
+    return Rounding(step, reach, float(2.0 * half * reach), float(rms), float(most))

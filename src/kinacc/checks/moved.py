@@ -1,0 +1,307 @@
+"""Instruments and targets that moved: jumps in the order of the file, and slow drifts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy
+
+from kinacc.checks import robust_fit, tails
+from kinacc.checks.findings import Finding, finding
+from kinacc.checks.readings import Distance, Readings
+from kinacc.checks.robust_fit import Fitted, Linear, fit
+from kinacc.geometry import Pose, compose, invert, log_so3
+from kinacc.kinematics.dh import DHModel
+
+_MOST_SPLITS = 8
+_TRIED = 3  # places tried for one split
+_FEWEST = 5  # poses on either side of a split
+_FEW = 30  # poses: with fewer, two more frames explain noise
+_CAP = 10.0  # sigma
+_NEAR = 150  # readings after a split
+_BETTER = 0.85  # of what is left overall: a split of a good file leaves all but a few per cent
+_BETTER_THERE = 0.55  # of what is left of the readings after the split
+_PLAIN = 0.5  # share at which no other place need be tried
+_EXCESS = 2.0  # times what chance, or a step along a joint, explains
+
+Progress = Callable[[Iterable, str], Iterable]
+
+
+@dataclass(frozen=True)
+class Jump:
+    """Base (``target`` None) or target that is elsewhere in the readings ``rows`` on."""
+
+    target: int | None
+    rows: np.ndarray
+
+
+def with_jumps(
+    seen: Readings, model: DHModel, progress: Progress
+) -> tuple[Fitted, tuple[Jump, ...]]:
+    """The fit with every jump of base or target taken out, one after the other, and the jumps."""
+    fitted, jumps = fit(seen, model), []
+    for _ in progress(range(_MOST_SPLITS), "searches for a moved instrument or target"):
+        # Poses of equal joints are one: read often, they make no jump any surer.
+        few = len(np.unique(np.round(fitted.seen.q_rad, 6), axis=0)) < _FEW
+        best, least = None, _PLAIN if few else 1.0
+        for row, kind in _places(fitted):
+            others = np.unique(fitted.seen.target[fitted.seen.session == fitted.seen.session[row]])
+            for target in dict.fromkeys((kind, None, *others.tolist())):
+                split = _parted(fitted, row, target, model)
+                share = _share_left(fitted, *split) if split else np.inf
+                if share < least:
+                    best, least = split, share
+            if least < _PLAIN:
+                break
+        if best is None:
+            break
+        fitted = best[0]
+        jumps.append(best[1])
+    return fitted, tuple(jumps)
+
+
+def _places(fitted: Fitted) -> list[tuple[int, int | None]]:
+    """Readings before which base (None) or a target may have moved, likely places first.
+
+    A step is judged by how much of the residuals it explains (score test of further frames, under
+    Huber's loss, with the parameters of the fit free). Residuals of real arms vary smoothly with
+    the joints, and files run through these in order: a step must explain more than chance, and
+    more than steps along any joint or coordinate explain of the rest, which are no jumps.
+    """
+    trial, few = fitted.trial, fitted.seen.select(fitted.chosen)
+    if trial.sigma_mm < tails.ROUNDING:
+        return []
+    linear = Linear.at(few, trial.arm, trial.nominal, trial.strength, huber=True)
+    root = np.sqrt(linear.weights)
+    design = linear.design * root[..., None]
+    residual = linear.residual * root + design @ linear.step
+    bases, targets = len(few.session_names), len(few.target_names)
+    kinds = [(None, few.session == base, 6 * base, 6) for base in range(bases)]
+    kinds += [(each, few.target == each, 6 * (bases + each), 3) for each in range(targets)]
+    found = []
+    for target, there, begin, width in kinds:
+        rows = np.flatnonzero(there)
+        if len(rows) < 4 * _FEWEST:
+            continue
+        columns = design[rows, :, begin : begin + width]
+        gains, solved, inner = _gains(columns, residual[rows], design[rows], linear.inverse)
+        place = int(np.argmax(gains))
+        after = np.where(np.arange(len(rows)) >= place, 1.0, 0.0)[:, None]
+        step = columns @ solved[place] * after - design[rows] @ (linear.inverse @ inner[place])
+        rest = residual[rows] - step
+        reference = scipy.special.chdtri(width, tails.FAMILY_WISE / (len(rows) * len(kinds)))
+        for along in (*few.q_rad[rows].T, *few.position_mm[rows].T):
+            order = np.argsort(along, kind="stable")
+            own = _gains(columns[order], rest[order], design[rows[order]], linear.inverse)[0]
+            reference = max(reference, own.max())
+        if gains[place] > _EXCESS * reference:
+            found.append((gains[place] / reference, int(fitted.chosen[rows[place]]), target))
+    return [(row, target) for _, row, target in sorted(found, key=lambda e: -e[0])[:_TRIED]]
+
+
+def _gains(
+    columns: np.ndarray, residual: np.ndarray, design: np.ndarray, inverse: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Part (n,) of the squared residuals (n, 6) that a step before each row explains.
+
+    ``columns`` (n, 6, f) of a frame, all ``design`` (n, 6, P) with the ``inverse`` (P, P) of its
+    normal equations. Also the step (n, f), and J'Z of it (n, P). 0 too near either end.
+    """
+
+    def after(products: np.ndarray) -> np.ndarray:
+        return np.cumsum(products[::-1], axis=0)[::-1]
+
+    transposed = np.swapaxes(columns, 1, 2)
+    score = after(transposed @ residual[..., None])[..., 0]
+    shared = after(transposed @ design)
+    gram = after(transposed @ columns)
+    ridge = 1e-6 * np.trace(gram[0]) / gram.shape[1] * np.eye(gram.shape[1])
+    open_ = gram - shared @ inverse @ np.swapaxes(shared, 1, 2) + ridge
+    solved = np.linalg.solve(open_, score[..., None])
+    gains = np.sum(solved[..., 0] * score, axis=1)
+    gains[:_FEWEST] = gains[len(gains) - _FEWEST + 1 :] = 0.0
+    return gains, solved[..., 0], (np.swapaxes(shared, 1, 2) @ solved)[..., 0]
+
+
+def _parted(
+    fitted: Fitted, row: int, target: int | None, model: DHModel
+) -> tuple[Fitted, Jump] | None:
+    """The fit without a jump of base or target near a reading, and the jump; None if there is none.
+
+    The reading is the one that parts the two frames best.
+    """
+    seen, rows = _split(fitted.seen, row, target)
+    again = fit(seen, model)
+    kind, labels = ("session", seen.session) if target is None else ("target", seen.target)
+    before, after = getattr(fitted.seen, kind)[row], labels[row]
+    both = np.flatnonzero((labels == before) | (labels == after))
+    costs = []
+    for index in (before, after):
+        part = replace(seen.select(both), **{kind: np.full(len(both), index)})
+        left = np.linalg.norm(robust_fit.residuals(again.trial.arm, part).position_mm, axis=1)
+        costs.append(np.minimum(left, _CAP * again.trial.sigma_mm))
+    cost = np.append(0.0, np.cumsum(costs[0])) + np.append(0.0, np.cumsum(costs[1][::-1]))[::-1]
+    place = int(np.argmin(cost))
+    if min(len(np.unique(seen.pose[side])) for side in np.split(both, [place])) < _FEWEST:
+        return None
+    if both[place] != row:
+        seen, rows = _split(fitted.seen, both[place], target)
+        again = fit(seen, model)
+    return again, Jump(target, rows)
+
+
+def _split(seen: Readings, row: int, target: int | None) -> tuple[Readings, np.ndarray]:
+    """Frames split before reading ``row``: a new base for the rest of its session, or target."""
+    kind = "session" if target is None else "target"
+    label, names = getattr(seen, kind), getattr(seen, f"{kind}_names")
+    own = label[row] if target is None else target
+    rows = (np.arange(len(seen)) >= row) & (label == own)
+    split = {kind: np.where(rows, len(names), label), f"{kind}_names": (*names, names[own])}
+    return replace(seen, **split), np.flatnonzero(rows)
+
+
+def _share_left(before: Fitted, after: Fitted, jump: Jump) -> float:
+    """What a split leaves, over what it may leave at most to be believed: overall, or where it is.
+
+    The fits' own lengths are compared, each cut at ten sigma so that gross errors do not decide.
+    """
+    cap = _CAP * before.trial.sigma_mm
+    one, other = np.minimum(before.left_mm, cap), np.minimum(after.left_mm, cap)
+    near = jump.rows[:_NEAR]
+    everywhere = float(np.mean(other) / np.mean(one))
+    there = float(np.mean(other[near]) / np.mean(one[near]))
+    return min(everywhere / _BETTER, max(there / _BETTER_THERE, everywhere))
+
+
+def findings(fitted: Fitted, jumps: Iterable[Jump]) -> Iterator[Finding]:
+    """Jumps of base and targets; a drift in place of the jumps of a base that drifts."""
+    seen, arm = fitted.seen, fitted.trial.arm
+    drifts = {name: _drift_mm(fitted, name) for name in dict.fromkeys(seen.session_names)}
+    for name, drift in drifts.items():
+        if drift is not None:
+            own = [seen.session_names[each] == name for each in seen.session]
+            yield finding("drift", seen.line[own], by=_signed(drift), drift_mm=drift.tolist())
+    for jump in jumps:
+        first, last = jump.rows[[0, -1]]
+        kind = "session" if jump.target is None else "target"
+        label, names = getattr(seen, kind), getattr(seen, f"{kind}_names")
+        name = names[label[first]]
+        if jump.target is None and drifts[name] is not None:
+            continue
+        same = [row for row in range(first) if names[label[row]] == name]
+        poses = arm.frames.bases if jump.target is None else arm.frames.targets
+        # How far points in the middle of the readings went.
+        old, new = (Pose(*(e[n] for e in poses)) for n in (label[same[-1]], label[last]))
+        shift, turn = new.position_mm - old.position_mm, 0.0
+        if jump.target is None:
+            middle = fitted.left.predicted.position_mm[jump.rows].mean(axis=0)
+            motion = compose(new, invert(old))
+            here = motion.rotation.T @ (middle - motion.position_mm)
+            shift, turn = middle - here, float(np.linalg.norm(log_so3(motion.rotation)))
+        yield finding(
+            "base_jump" if jump.target is None else "target_moved",
+            seen.lines(jump.rows),
+            row=seen.row_names.one(int(seen.line[first])),
+            target=name or "",
+            by=_signed(shift),
+            first_line=int(seen.line[first]),
+            shift_mm=shift.tolist(),
+            turn_mrad=1e3 * turn,
+        )
+
+
+def _signed(vector: np.ndarray) -> str:
+    return ", ".join(f"{value:+.3g}" for value in vector)
+
+
+def _drift_mm(fitted: Fitted, session: str | None) -> np.ndarray | None:
+    """How far the base of a session drifted (3,), mm; None where it jumped or stayed.
+
+    A jump leaves no trend on either side of it. A steady drift that is split leaves one in every
+    part: together as far as the frame drifted, which is more than the parts are apart.
+    """
+    seen, bases = fitted.seen, fitted.trial.arm.frames.bases
+    parts = [n for n, name in enumerate(seen.session_names) if name == session]
+    if len(parts) < 2:
+        return None
+    rows = np.isin(seen.session, parts)
+    parts = list(dict.fromkeys(seen.session[rows].tolist()))
+    within = np.zeros(3)
+    for part in parts:
+        own = np.flatnonzero((seen.session == part) & ~fitted.bad)
+        if len(own) >= _FEWEST:
+            time = np.linspace(-0.5, 0.5, len(own))
+            within -= time @ fitted.left.position_mm[own] / np.sum(time**2)
+    middle = fitted.left.predicted.position_mm[rows].mean(axis=0)
+    first, last = (Pose(*(each[part] for each in bases)) for part in (parts[0], parts[-1]))
+    apart = compose(compose(last, invert(first)), Pose(np.eye(3), middle)).position_mm - middle
+    return within if within @ apart > 0.5 * (apart @ apart) else None
+
+
+_FEWEST_ROWS = 4  # on either side of a change of a distance
+
+
+def by_distances(every: Readings, distances: list[Distance]) -> tuple[list[Finding], Readings]:
+    """Targets that moved against the others or were exchanged in single rows.
+
+    Findings, and the readings in which a target that moved counts as another from there on.
+    """
+    moved, line = every, every.line
+    moves = [(distance, *_move(distance.length_mm)) for distance in distances]
+    steps, found = [move for move in moves if move[1]], []
+    while steps:
+        # The target that most of the changed distances have in common.
+        counts = np.zeros(len(every.target_names))
+        for distance, _, size in steps:
+            counts[[distance.one, distance.other]] += 1.0 + 1e-3 * min(abs(size), 100.0)
+        target = int(np.argmax(counts))
+        mine = [step for step in steps if target in (step[0].one, step[0].other)]
+        steps = [step for step in steps if step not in mine]
+        first = int(line[mine[0][0].rows[mine[0][1]][0]])
+        rows = (every.target == target) & (line >= first)
+        names = (*moved.target_names, every.target_names[target])
+        numbers = np.where(rows, len(names) - 1, moved.target)
+        moved = replace(moved, target=numbers, target_names=names)
+        others = [every.target_names[d.other if d.one == target else d.one] for d, _, _ in mine]
+        sizes = zip(mine, others, strict=True)
+        found.append(
+            finding(
+                "target_moved/distances",
+                line[rows],
+                target=every.target_names[target],
+                sure="" if len(every.target_names) > 2 else " (or the other of the two)",
+                row=every.row_names.one(first),
+                by=", ".join(f"{size:+.3g} mm to {name}" for (_, _, size), name in sizes),
+                first_line=first,
+                largest_change_mm=max(abs(size) for _, _, size in mine),
+            )
+        )
+    off, largest = [], 0.0
+    for distance, place, size in moves:
+        length = distance.length_mm - size * (np.arange(len(distance.rows)) >= (place or np.inf))
+        away = np.abs(length - np.median(length))
+        far = away > tails.limit(away, 1, len(away) * len(moves))
+        off += line[distance.rows[far, 0]].tolist()
+        largest = max(largest, float(away[far].max(initial=0.0)))
+    if off:
+        found.append(finding("outliers/distances", off, count=len(set(off)), largest_mm=largest))
+    return found, moved
+
+
+def _move(length: np.ndarray) -> tuple[int | None, float]:
+    """Row at which a distance (n,) changes for good, and by how much; None where it does not."""
+    count, place = len(length), np.arange(_FEWEST_ROWS, len(length) - _FEWEST_ROWS + 1)
+    if count < 2 * _FEWEST_ROWS + 2:
+        return None, 0.0
+    clipped = np.clip(length, *np.quantile(length, [0.02, 0.98]))
+    before = np.cumsum(clipped)[place - 1]
+    step = (clipped.sum() - before) / (count - place) - before / place
+    row = int(place[np.argmax(step**2 * place * (count - place))])
+    sides = np.split(length, [row])
+    middles = [float(np.median(side)) for side in sides]
+    size = middles[1] - middles[0]
+    # A distance that only drifts is no move: it must leave what both sides scatter by far.
+    rest = np.abs(np.concatenate([side - mid for side, mid in zip(sides, middles, strict=True)]))
+    return (row, size) if abs(size) > tails.limit(rest, 1) else (None, 0.0)
