@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
+from typing import Self
 
 import numpy as np
 
@@ -80,7 +81,7 @@ class Observations:
         """Measured frames (n,); rotations are NaN where none was measured."""
         return Pose(self.rotation, self.position_mm)
 
-    def select(self, rows: np.ndarray | slice) -> Observations:
+    def select(self, rows: np.ndarray | slice) -> Self:
         """The observations of ``rows`` (mask, indices or slice)."""
         columns = {
             field.name: getattr(self, field.name)[rows]

@@ -54,7 +54,7 @@ def copies(every: Readings, noise_mm: float) -> Iterator[Finding]:
     again, at = np.unique(every.line[earlier > 0], return_index=True)
     if again.size:
         first = earlier[earlier > 0][at]
-        pairs = zip(again.tolist(), first.tolist(), strict=True)
+        pairs = zip(again, first, strict=True)
         told = [f"{names.one(line)} repeats {names.number(of)}" for line, of in pairs]
         yield finding("repeated_reading", again, pairs=first_few(told, 4))
 
@@ -195,7 +195,7 @@ def smallest_step(cells: Sequence[Sequence[object]], unit: float, decimal: str) 
     texts = [cell for column in cells for cell in column]
     if not all(isinstance(cell, str) and "e" not in cell.lower() for cell in texts):
         return 0.0
-    digits = (len(cell.strip().partition(decimal)[2]) for cell in texts)
+    digits = (len(str(cell).strip().partition(decimal)[2]) for cell in texts)
     return unit * 10.0 ** -max(digits, default=0)
 
 
