@@ -9,13 +9,14 @@ import numpy as np
 import pytest
 import shared_data
 from command_line import call
+from measured_worlds import measured_world
 from stages_by_hand import run_stage
 
 from kinacc.assess.random_numbers import key_of
 from kinacc.assess.search_and_confirm import SearchAndConfirm
 from kinacc.assess.simulate import conduct
 from kinacc.assess.single_shot import SingleShot
-from kinacc.assess.world import drawn_world, measured_world
+from kinacc.assess.world import drawn_world
 from kinacc.campaign import folder as campaigns
 from kinacc.campaign.reading import Reading
 from kinacc.cli.campaign_plans import field_of

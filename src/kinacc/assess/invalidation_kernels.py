@@ -1,20 +1,17 @@
-"""Compiled model invalidation (eqs. 15-24): one run at one bound, and exact scans over bounds.
+"""Compiled model invalidation (eqs. 15-24): exact scans over bounds, and the readings they take.
 
 All compiled code is in this one file: numba's cache is aware of changes in the file of the function
 called, not in files that function's helpers come from. The first part draws the readings, on which
-see :mod:`kinacc.assess.random_numbers`.
+see :mod:`kinacc.assess.random_numbers`. The plain twin of a run at one bound is
+:func:`kinacc.assess.model_invalidation.Invalidation.history`.
 
-The plain twin of :func:`run` is :func:`kinacc.assess.model_invalidation.history`. Bounds on the
-grid are integers k with eta = k / 1000 mm. ``power`` is the exponent of the number of readings in a
-point's weight, readings**power / sigma: 1/2 for Sigma / r, 1/4 for Sigma / sqrt(r).
-
-How a scan is exact without visiting every bound. For a fixed history the rejection probability
-falls as eta grows, and the point to measure again is the largest of functions that are linear in
-eta. So if both decisions agree at the two ends of an interval of bounds, every bound inside takes
-the same path. Where they do not, the interval is cut at the last grid bound that agrees with the
+How a scan is exact without a run at every bound. For a fixed history the rejection probability
+falls as the bound grows, and the point to measure again is the largest of functions linear in
+the bound. So if both decisions agree at the two ends of an interval of bounds, every bound inside
+takes the same path. Where they do not, the interval is cut at the last bound that agrees with the
 end looked at first; the other piece waits and later resumes from the history it shares. Decisions
 closer than rounding and the table of :func:`_about` could turn (``guard``, ``margin``) are left to
-single bounds, which are decided exactly as a run decides them.
+single bounds, which are decided without the table.
 """
 
 from __future__ import annotations
@@ -25,7 +22,6 @@ import numpy as np
 
 from kinacc.compiled import compiled
 
-GRID_PER_MM = 1000.0
 # Columns of the state (m, 3) of a run: how many readings there are of a point, the magnitude of
 # their mean (mm), and the weight of the point (1/mm).
 READS, SIZE, WEIGHT = 0, 1, 2
@@ -137,34 +133,8 @@ def chi2_3(x):
 
 
 @compiled
-def _miss(size, weight, eta, squared):
-    """1 - p-hat of one point: probability that a measurement comes out larger than this one."""
-    excess = size - eta
-    if excess <= 0.0:
-        return 1.0
-    distance = excess * weight
-    return 1.0 - chi2_3(distance * distance if squared else distance)
-
-
-@compiled
-def _roots(power, budget):
-    """Weight of a point with noise 1 after each number of readings."""
-    roots = np.sqrt(np.arange(budget + 1.0))
-    return roots if power == 0.5 else np.sqrt(roots)
-
-
-@compiled
-def _add(sizes, sigma, roots, state, i):
-    """Take the next reading of row i, which is known."""
-    v = int(state[i, READS])
-    state[i, READS] = v + 1.0
-    state[i, SIZE] = sizes[i, v]
-    state[i, WEIGHT] = roots[v + 1] / sigma[i]
-
-
-@compiled
 def _about(size, weight, eta, squared):
-    """As :func:`_miss`, from a table of cubics and several times as fast."""
+    """1 - p-hat of one point, from a table of cubics: a measurement comes out larger so often."""
     excess = size - eta
     if excess <= 0.0:
         return 1.0
@@ -196,7 +166,8 @@ def _exact_survival(eta, state, active, squared):
     """Product of 1 - p-hat at a bound over the active rows, in the order of their visits."""
     survival = 1.0
     for i in active:
-        survival *= _miss(state[i, SIZE], state[i, WEIGHT], eta, squared)
+        distance = max(state[i, SIZE] - eta, 0.0) * state[i, WEIGHT]
+        survival *= 1.0 - chi2_3(distance * distance if squared else distance)
     return survival
 
 
@@ -207,17 +178,6 @@ def _side(survival, alpha, guard):
     if probability > alpha + guard:
         return 1
     return -1 if probability < alpha - guard else 0
-
-
-@compiled
-def _side_at(eta, state, active, squared, alpha, guard):
-    """The side at a bound, from as many rows as it takes."""
-    survival = 1.0
-    for i in active:
-        survival *= _about(state[i, SIZE], state[i, WEIGHT], eta, squared)
-        if 1.0 - survival > alpha + guard:
-            return 1
-    return _side(survival, alpha, guard)
 
 
 @compiled
@@ -234,12 +194,23 @@ def _winner(eta, state, active):
 
 
 @compiled
-def _last_on_side(side, near, far, state, active, squared, alpha, guard):
-    """The grid bound farthest from ``near``, towards ``far``, that is on the same side."""
-    inside, outside = near, far
-    while abs(outside - inside) > 1:
+def _last_alike(row, side, bounds, near, far, state, active, setting, guards):
+    """The bound farthest from ``near``, towards ``far``, with the same decision.
+
+    The same ``side`` of the threshold, or, with a ``row``, the same point that surely wins.
+    """
+    alpha, squared = setting
+    guard, margin = guards
+    inside, outside, miss = near, far, np.empty(state.shape[0])
+    while outside - inside > 1:
         middle = (inside + outside) // 2
-        if _side_at(middle / GRID_PER_MM, state, active, squared, alpha, guard) == side:
+        if row < 0:
+            survival = _survival(bounds[middle], state, active, squared, miss)
+            alike = _side(survival, alpha, guard) == side
+        else:
+            other, best, rival = _winner(bounds[middle], state, active)
+            alike = other == row and best - rival > margin
+        if alike:
             inside = middle
         else:
             outside = middle
@@ -247,25 +218,11 @@ def _last_on_side(side, near, far, state, active, squared, alpha, guard):
 
 
 @compiled
-def _last_with_winner(row, near, far, state, active, margin):
-    """The grid bound farthest from ``near``, towards ``far``, at which ``row`` surely wins."""
-    inside, outside = near, far
-    while abs(outside - inside) > 1:
-        middle = (inside + outside) // 2
-        other, best, rival = _winner(middle / GRID_PER_MM, state, active)
-        if other == row and best - rival > margin:
-            inside = middle
-        else:
-            outside = middle
-    return inside
-
-
-@compiled
-def _resume(sizes, sigma, roots, state, path, low, rows):
+def _resume(sizes, sigma, roots, state, path, lowest, rows):
     """Rebuild the state after the steps of a path; returns (points visited, active rows).
 
-    A row is active if it can still exceed a bound of the interval that starts at ``low``: one whose
-    mean lies within the lowest bound has p-hat 0 throughout and is never measured again.
+    A row is active if it can still exceed a bound of the interval that begins at ``lowest``: one
+    whose mean lies within has p-hat 0 throughout and is never measured again.
     """
     state[:, READS] = 0.0
     visited = 0
@@ -276,7 +233,7 @@ def _resume(sizes, sigma, roots, state, path, low, rows):
     for i in range(visited):
         v = int(state[i, READS])
         state[i, SIZE], state[i, WEIGHT] = sizes[i, v - 1], roots[v] / sigma[i]
-        if state[i, SIZE] > low / GRID_PER_MM:
+        if state[i, SIZE] > lowest:
             rows[count] = i
             count += 1
     return visited, count
@@ -333,160 +290,90 @@ def _insist(
 
 
 @compiled
-def _guards(largest_mm, points, sigma, power, budget):
-    """How near a probability is to the threshold, and scores are to each other, to be in doubt."""
-    margin = 1e-12 * largest_mm / sigma.min() * float(budget) ** power
-    return 1e-9 + points * _ABOUT + margin, margin
+def scan(world, bounds, wanted, alpha, squared, roots):
+    """Decide the bounds (n,), mm, ascending or descending, in order until one is as ``wanted``.
 
-
-@compiled
-def run(world, eta, alpha, squared, power, budget):
-    """One sequential run: (rejected, measurements, points visited, rejection probability)."""
-    sigma, sizes = world[2], world[7]
-    points, roots = sigma.size, _roots(power, budget)
-    guard, margin = _guards(sizes[:, 0].max(), points, sigma, power, budget)
-    state, miss = np.zeros((points, 3)), np.ones(points)
-    rows, path = np.empty(points, np.int64), np.empty(budget, np.int64)
-    visited, count, steps, survival = 0, 0, 0, 1.0
-    while True:
-        active = rows[:count]
-        side = _side(survival, alpha, guard)
-        if side == 0:
-            survival = _exact_survival(eta, state, active, squared)
-        rejected = 1.0 - survival > alpha
-        if steps == budget or (not rejected and visited == points):
-            break
-        if rejected:
-            i, _, rival = _winner(eta, state, active)
-            steps, survival, _ = _insist(
-                i,
-                (eta, eta),
-                (rival, rival),
-                world,
-                roots,
-                state,
-                miss,
-                miss,
-                active,
-                path,
-                steps,
-                (alpha, squared),
-                (guard, margin),
-            )
-        else:
-            i = visited
-            visited += 1
-            _add(sizes, sigma, roots, state, i)
-            steps += 1
-            if state[i, SIZE] > eta:
-                rows[count] = i
-                count += 1
-                miss[i] = _about(state[i, SIZE], state[i, WEIGHT], eta, squared)
-                survival *= miss[i]
-    return rejected, steps, visited, 1.0 - _exact_survival(eta, state, rows[:count], squared)
-
-
-@compiled
-def bisect(world, top, tolerance, alpha, squared, power, budget):
-    """Halve [0, top] mm until at most ``tolerance`` wide; returns the end that was not rejected."""
-    low, high = 0.0, top
-    while high - low > tolerance:
-        middle = 0.5 * (low + high)
-        if run(world, middle, alpha, squared, power, budget)[0]:
-            low = middle
-        else:
-            high = middle
-    return high
-
-
-@compiled
-def scan(world, bottom, top, upward, alpha, squared, power, budget):
-    """Decide the bounds k = bottom .. top exactly, in one direction, until the answer is known.
-
-    upward: the lowest k not rejected (top + 1 if all are); otherwise the highest k rejected
-    (bottom - 1 if none is). Returns (k, number of pieces whose path was followed to its end).
+    wanted: whether it is to be rejected. roots: weight of a point with noise 1 after 0, 1, .. up to
+    all readings. Returns the place of that bound (n where none is), and of the last run followed
+    whether it rejected, its measurements, points visited and rejection probability; and how many
+    runs were followed to their end.
     """
     sigma, sizes = world[2], world[7]
-    points, roots = sigma.size, _roots(power, budget)
-    state = np.zeros((points, 3))
+    points, budget = sigma.size, roots.size - 1
+    state, rows, path = (
+        np.zeros((points, 3)),
+        np.empty(points, np.int64),
+        np.empty(budget, np.int64),
+    )
     at_near, at_far = np.ones(points), np.ones(points)
-    rows = np.empty(points, np.int64)
-    path = np.empty(budget, np.int64)
-    waiting = np.empty((top - bottom + 2, 3), np.int64)  # near end, far end, steps shared
-    waiting[0, 0], waiting[0, 1], waiting[0, 2] = (bottom, top, 0) if upward else (top, bottom, 0)
-    depth, pieces = 1, 0
-    onward = 1 if upward else -1
-    guard, margin = _guards(top / GRID_PER_MM, points, sigma, power, budget)
+    waiting = np.empty((bounds.size + 1, 3), np.int64)  # near end, far end, steps shared
+    waiting[0, 0], waiting[0, 1], waiting[0, 2] = 0, bounds.size - 1, 0
+    depth, runs = 1, 0
+    margin = 1e-12 * max(bounds.max(), sizes[:, 0].max()) / sigma.min() * roots[budget]
+    guards = 1e-9 + points * _ABOUT + margin, margin
+    setting = alpha, squared
     while depth > 0:
         depth -= 1
         near, far, steps = waiting[depth, 0], waiting[depth, 1], waiting[depth, 2]
-        visited, count = _resume(sizes, sigma, roots, state, path[:steps], min(near, far), rows)
-        near_survival = _survival(near / GRID_PER_MM, state, rows[:count], squared, at_near)
-        far_survival = _survival(far / GRID_PER_MM, state, rows[:count], squared, at_far)
+        lowest = min(bounds[near], bounds[far])
+        visited, count = _resume(sizes, sigma, roots, state, path[:steps], lowest, rows)
+        near_survival = _survival(bounds[near], state, rows[:count], squared, at_near)
+        far_survival = _survival(bounds[far], state, rows[:count], squared, at_far)
         while True:
             active = rows[:count]
-            side = _side(near_survival, alpha, guard)
-            if near != far and (side == 0 or _side(far_survival, alpha, guard) != side):
+            side = _side(near_survival, alpha, guards[0])
+            if near != far and (side == 0 or _side(far_survival, alpha, guards[0]) != side):
                 last = near
                 if side != 0:
-                    last = _last_on_side(side, near, far, state, active, squared, alpha, guard)
-                waiting[depth, 0], waiting[depth, 1], waiting[depth, 2] = last + onward, far, steps
-                depth += 1
-                far = last
-                far_survival = _survival(far / GRID_PER_MM, state, active, squared, at_far)
+                    last = _last_alike(-1, side, bounds, near, far, state, active, setting, guards)
+                waiting[depth, 0], waiting[depth, 1], waiting[depth, 2] = last + 1, far, steps
+                depth, far = depth + 1, last
+                far_survival = _survival(bounds[far], state, active, squared, at_far)
             if side == 0:
-                near_survival = _exact_survival(near / GRID_PER_MM, state, active, squared)
+                near_survival = _exact_survival(bounds[near], state, active, squared)
             rejected = 1.0 - near_survival > alpha
             if steps == budget or (not rejected and visited == points):
                 break
             if not rejected:
-                i = visited
-                visited += 1
-                _add(sizes, sigma, roots, state, i)
-                path[steps] = i
-                steps += 1
-                size, weight = state[i, SIZE], state[i, WEIGHT]
-                if size > min(near, far) / GRID_PER_MM:
-                    rows[count] = i
-                    count += 1
-                    at_near[i] = _about(size, weight, near / GRID_PER_MM, squared)
-                    at_far[i] = _about(size, weight, far / GRID_PER_MM, squared)
+                i, visited = visited, visited + 1
+                size, weight = sizes[i, 0], roots[1] / sigma[i]
+                state[i, READS], state[i, SIZE], state[i, WEIGHT] = 1.0, size, weight
+                path[steps], steps = i, steps + 1
+                if size > min(bounds[near], bounds[far]):
+                    rows[count], count = i, count + 1
+                    at_near[i] = _about(size, weight, bounds[near], squared)
+                    at_far[i] = _about(size, weight, bounds[far], squared)
                     near_survival *= at_near[i]
                     far_survival *= at_far[i]
-            else:
-                i, best, rival = _winner(near / GRID_PER_MM, state, active)
-                far_rival = rival
-                if near != far:
-                    other, far_best, far_rival = _winner(far / GRID_PER_MM, state, active)
-                    sure = best - rival > margin
-                    if not sure or other != i or far_best - far_rival <= margin:
-                        last = near
-                        if sure:
-                            last = _last_with_winner(i, near, far, state, active, margin)
-                        waiting[depth, 0], waiting[depth, 1] = last + onward, far
-                        waiting[depth, 2] = steps
-                        depth += 1
-                        far = last
-                        _survival(far / GRID_PER_MM, state, active, squared, at_far)
-                        far_rival = _winner(far / GRID_PER_MM, state, active)[2]
-                steps, near_survival, far_survival = _insist(
-                    i,
-                    (near / GRID_PER_MM, far / GRID_PER_MM),
-                    (rival, far_rival),
-                    world,
-                    roots,
-                    state,
-                    at_near,
-                    at_far,
-                    active,
-                    path,
-                    steps,
-                    (alpha, squared),
-                    (guard, margin),
-                )
-        pieces += 1
-        if upward and not rejected:
-            return min(near, far), pieces
-        if not upward and rejected:
-            return max(near, far), pieces
-    return (top + 1 if upward else bottom - 1), pieces
+                continue
+            i, best, rival = _winner(bounds[near], state, active)
+            other, far_best, far_rival = _winner(bounds[far], state, active)
+            sure = best - rival > margin
+            if near != far and not (sure and other == i and far_best - far_rival > margin):
+                last = near
+                if sure:
+                    last = _last_alike(i, 0, bounds, near, far, state, active, setting, guards)
+                waiting[depth, 0], waiting[depth, 1], waiting[depth, 2] = last + 1, far, steps
+                depth, far = depth + 1, last
+                _survival(bounds[far], state, active, squared, at_far)
+                far_rival = _winner(bounds[far], state, active)[2]
+            steps, near_survival, far_survival = _insist(
+                i,
+                (bounds[near], bounds[far]),
+                (rival, far_rival),
+                world,
+                roots,
+                state,
+                at_near,
+                at_far,
+                active,
+                path,
+                steps,
+                setting,
+                guards,
+            )
+        runs += 1
+        probability = 1.0 - _exact_survival(bounds[near], state, active, squared)
+        if rejected == wanted:
+            return near, rejected, steps, visited, probability, runs
+    return bounds.size, rejected, steps, visited, probability, runs

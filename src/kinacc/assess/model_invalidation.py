@@ -57,10 +57,7 @@ class Invalidation:
 
     def run(self, world: World, eta_mm: float) -> Run:
         """One sequential run at the bound eta."""
-        from kinacc.assess import invalidation_kernels as kernels
-
-        self._check_visits(world)
-        return Run(*kernels.run(world.arrays, float(eta_mm), *self._arguments))
+        return Run(*self._scan(world, np.array([float(eta_mm)]), True)[1:5])
 
     def history(self, world: World, eta_mm: float) -> list[Step]:
         """Every measurement of one run at the bound eta, in order (Figs. 5 and 6).
@@ -96,10 +93,14 @@ class Invalidation:
             steps.append(Step(row, counts[row], _magnitude(reading), average_mm, rejection))
         return steps
 
-    @property
-    def _arguments(self) -> tuple[float, bool, float, int]:
+    def _scan(self, world: World, bounds_mm: np.ndarray, wanted: bool) -> tuple:
+        """The scan of :func:`kinacc.assess.invalidation_kernels.scan` with these settings."""
+        from kinacc.assess.invalidation_kernels import scan
+
+        self._check_visits(world)
+        roots = np.arange(self.measurements + 1.0) ** _POWERS[self.covariance]
         squared = self.distance == "squared"
-        return (float(self.alpha), squared, _POWERS[self.covariance], int(self.measurements))
+        return scan(world.arrays, bounds_mm, wanted, float(self.alpha), squared, roots)
 
     def _check_visits(self, world: World) -> None:
         if world.visits < self.measurements:
@@ -141,15 +142,16 @@ class ModelInvalidation(Invalidation, Assessor):
 
     def assessed_mm(self, world: World) -> float:
         """The bound the search arrives at, mm."""
-        from kinacc.assess import invalidation_kernels as kernels
-
-        self._check_visits(world)
-        largest = float(world.magnitudes_mm(self.measurements).max())
         if self.search == "bisection":
-            return kernels.bisect(world.arrays, largest, 1.0 / GRID_PER_MM, *self._arguments)
-        upward = self.search == "from_below"
-        k, _ = kernels.scan(world.arrays, 0, self.top(world), upward, *self._arguments)
-        return (k if upward else k + 1) / GRID_PER_MM
+            low, high = 0.0, float(world.magnitudes_mm(self.measurements).max())
+            while high - low > 1.0 / GRID_PER_MM:
+                middle = 0.5 * (low + high)
+                low, high = (middle, high) if self.run(world, middle).rejected else (low, middle)
+            return high
+        bounds = np.arange(self.top(world) + 1) / GRID_PER_MM
+        if self.search == "from_below":
+            return self._scan(world, bounds, False)[0] / GRID_PER_MM
+        return (bounds.size - self._scan(world, bounds[::-1].copy(), True)[0]) / GRID_PER_MM
 
     def top(self, world: World) -> int:
         """Grid bound at or above every first reading: no run at it can reject."""

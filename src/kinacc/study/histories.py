@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kinacc.assess.model_invalidation import Invalidation, Step
-from kinacc.assess.world import World
+from kinacc.assess.world import World, checked_errors
 from kinacc.config.records import of_section
-from kinacc.study.monte_carlo import Visits, checked_errors, world_of
+from kinacc.study.monte_carlo import Visits, world_of
 from kinacc.tables.columns import Columns
 from kinacc.tables.contract import columns_of
 

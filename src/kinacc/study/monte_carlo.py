@@ -20,7 +20,7 @@ from kinacc.assess.assessor import Assessor, every_reading
 from kinacc.assess.maximum import Maximum
 from kinacc.assess.model_invalidation import ModelInvalidation
 from kinacc.assess.outlier_rejection import OutlierRejection
-from kinacc.assess.world import World, draw
+from kinacc.assess.world import World, checked_errors, draw
 from kinacc.config.records import of_section
 from kinacc.errors import InputError, Problem
 from kinacc.tables.columns import Columns
@@ -162,21 +162,6 @@ def true_accuracy_mm(true_error_mm: ArrayLike) -> float:
             Problem("true_error_mm", "no values, or values that are not finite", "numbers in mm")
         )
     return float(values.max())
-
-
-def checked_errors(error_mm: ArrayLike) -> np.ndarray:
-    """True errors as (m, 3) float64; InputError where they cannot be used."""
-    errors = np.ascontiguousarray(error_mm, dtype=np.float64)
-    if errors.ndim != 2 or errors.shape[1] != 3 or errors.shape[0] == 0:
-        raise InputError(
-            Problem("true errors", f"shape {errors.shape}", "(m, 3) with m at least 1, in mm")
-        )
-    bad = np.flatnonzero(~np.isfinite(errors).all(axis=1))
-    if bad.size:
-        raise InputError(
-            Problem("true errors", f"points {bad[:5].tolist()} are not finite", "numbers in mm")
-        )
-    return errors
 
 
 def _nanometres(noise_mm: float) -> int:
