@@ -21,7 +21,7 @@ sys.path[:0] = [str(TESTS), *(str(TESTS / name) for name in ("checks", "cli", "c
 import plants  # noqa: E402
 import yaml  # noqa: E402
 from good_files import File, simulated  # noqa: E402
-from measurements.files_as_they_come import FILES  # noqa: E402
+from measurements.scoring import measured  # noqa: E402
 
 from kinacc.calibration import (  # noqa: E402
     error_model,
@@ -160,34 +160,11 @@ def _is_number(value: object) -> bool:
     return bool(values) and all(isinstance(each, float) for each in values)
 
 
-FOREIGN = (
-    "german_decimal_commas", "german_latin1", "thousands_swiss", "inches", "units_row", "french",
-    "japanese", "yaskawa_axes", "one_row_per_reflector", "no_readings_as_written",
-    "aligned_with_blanks", "kuka_log_abc", "fanuc_log_wpr", "abb_log_rax",
-    "rtde_recording_and_tracker",
-)  # fmt: skip
-
-
-def write_foreign_files() -> None:
-    """Foreign files as their makers write them, and the robot of each."""
-    robots = {}
-    for name in FOREIGN:
-        folder = GOLDEN / "foreign" / name
-        folder.mkdir(parents=True, exist_ok=True)
-        measured = FILES[name](folder)
-        robot = Path(measured.robot).name  # a shipped robot's name, or a file beside the readings
-        robots[name] = [robot, *(path.name for path in measured.files)]
-    (GOLDEN / "foreign" / "files.json").write_text(json.dumps(robots, indent=1) + "\n")
-
-
 def understanding(name: str, folder: Path) -> dict:
     """What ``init`` makes of a foreign file: the data set it describes, or why it does not."""
-    robot, *files = json.loads((GOLDEN / "foreign" / "files.json").read_text())[name]
-    for file in files:
-        shutil.copyfile(GOLDEN / "foreign" / name / file, folder / file)
-    beside = GOLDEN / "foreign" / name / robot
-    robot = beside if beside.is_file() else robot
-    words = ["init", *(folder / file for file in files), "--robot", robot, "--yes", "--json"]
+    measured_ = measured(name)
+    files = [Path(shutil.copy(path, folder)) for path in measured_.files]
+    words = ["init", *files, "--robot", measured_.robot, "--yes", "--json"]
     done = call(*words, "--out", folder, "--name", "n")
     if done.exit_code:
         return {"exit_code": done.exit_code}

@@ -93,7 +93,7 @@ def test_every_planted_fault_but_none_has_a_finding():
     assert [name for name, found in FINDINGS.items() if not found] == ["none"]
 
 
-UNDERSTOOD = json.loads((cases.GOLDEN / "foreign" / "understanding.json").read_text())
+UNDERSTOOD = json.loads((cases.GOLDEN / "understanding.json").read_text())
 
 
 @pytest.mark.filterwarnings("ignore::UserWarning")

@@ -8,6 +8,7 @@ and something is left out, or a suspicion is named and the arm left as it was.
 
 from __future__ import annotations
 
+import json
 import re
 from dataclasses import dataclass
 from functools import cache
@@ -17,8 +18,6 @@ import numpy as np
 import pandas as pd
 import yaml
 from command_line import call
-from measurements.measured_file import Measured
-from measurements.simulated_arms import flange
 from scipy.spatial.transform import Rotation
 from stages_by_hand import run_stage
 
@@ -47,6 +46,52 @@ WORDS = {
     "sigma": r"sigma|standard deviation|\bk ?= ?[12]|coverage",
 }
 GIVEN = {"--robot", "--yes", "--json", "--out", "--name", "--help", "--force"}
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A measured file, or two, of ``foreign/``, and what a reader has to find: a row per reading.
+
+    `joints_rad` (n, k) as the robot reports them; `points_mm` per target (n, 3), nan without a
+    reading; `rotations` (n, 3, 3) of the first target or None; `std_mm` per target (n, 3) where
+    stated. `questions`: what the file leaves open. `must_ask`: the same, where neither the file
+    nor the numbers can answer. `any_frame`: the reader chooses the axes (angles and distance).
+    `says`: what the answer has to mention, as a regular expression. Where `readable` is False the
+    file may be refused: it lacks something, or nobody would blame a reader for saying no.
+    """
+
+    files: tuple[Path, ...]
+    robot: str
+    joints_rad: np.ndarray
+    points_mm: dict[str, np.ndarray]
+    rotations: np.ndarray | None = None
+    std_mm: dict[str, np.ndarray] | None = None
+    questions: frozenset[str] = frozenset()
+    must_ask: frozenset[str] = frozenset()
+    any_frame: bool = False
+    readable: bool = True
+    says: str = ""
+
+
+FOREIGN = Path(__file__).parent / "foreign"
+FILES = sorted(path.name for path in FOREIGN.iterdir())
+
+
+def measured(name: str) -> Measured:
+    """A file as a maker of instruments, robots or tables writes it, and its truth."""
+    folder = FOREIGN / name
+    told = json.loads((folder / "truth.json").read_text(encoding="utf-8"))
+    for key in ("joints_rad", "rotations"):
+        told |= {key: np.array(told[key], dtype=float)} if key in told else {}
+    for key in ("points_mm", "std_mm"):
+        if key in told:
+            told[key] = {target: np.array(each, dtype=float) for target, each in told[key].items()}
+    for key in ("questions", "must_ask"):
+        told[key] = frozenset(told.get(key, ()))
+    told["files"] = tuple(folder / each for each in told["files"])
+    if (folder / told["robot"]).is_file():
+        told["robot"] = str(folder / told["robot"])
+    return Measured(**told)
 
 
 @dataclass(frozen=True)
@@ -218,6 +263,19 @@ def _robot_wrong(found: pd.DataFrame, joints: list[str], results: Path) -> str:
     turned, moved = flange(rows, first[joints].to_numpy(float) @ mapped.T)
     off = reach_mm(turned, moved, first[["x_mm", "y_mm", "z_mm"]].to_numpy(float))
     return "" if off < REACHED_MM else f"{ROBOT} misses the points by {off:.0f} mm"
+
+
+def flange(rows: np.ndarray, joints: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Rotation (n, 3, 3) and position (n, 3) of the flange for DH joints (n, k)."""
+    turned = np.tile(np.eye(3), (len(joints), 1, 1))
+    moved = np.zeros((len(joints), 3))
+    for row, angle in zip(np.asarray(rows, dtype=float), joints.T, strict=True):
+        theta, d, a, alpha = angle + row[0], row[1], row[2], row[3]
+        about_z = Rotation.from_rotvec(theta[:, None] * [0, 0, 1]).as_matrix()
+        link = about_z @ np.array([a, 0.0, 0.0]) + np.array([0.0, 0.0, d])
+        moved = moved + np.einsum("nij,nj->ni", turned, link)
+        turned = turned @ about_z @ Rotation.from_euler("x", alpha).as_matrix()
+    return turned, moved
 
 
 def _number(row: dict[str, float], key: str) -> float:

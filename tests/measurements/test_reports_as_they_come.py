@@ -132,16 +132,6 @@ def test_remarks_of_a_list_of_points_may_begin_with_a_semicolon(tmp_path):
     assert len(found.table) == 3
 
 
-def test_points_in_the_order_of_letters_come_in_their_own(tmp_path):
-    order = sorted(range(ROWS), key=lambda n: f"P{n}")
-    path = file(tmp_path, HEAD + lines(points(order), None, ","))
-    found = text.look(path)
-    names = [cell.strip() for cell in found.table.columns["Point"]]
-    assert names == [f"P{n}" for n in range(ROWS)]
-    assert found.table.line[2] != 6  # each keeps the line it stands on
-    assert "order" in " ".join(found.table.notes)
-
-
 UNCERTAIN = [*(f"q{i}_deg" for i in range(1, 7)), *"XYZ", "Ux", "Uy", "Uz"]
 
 

@@ -59,8 +59,6 @@ def load(path: str | Path, layout: Layout | None = None, source: str | None = No
             told += "measurements.file.encoding, such as latin-1 or cp932"
             table = replace(table, notes=(*table.notes, told))
     table = robot_programs.expanded(table)
-    if layout.names is not None and {*layout.names[:-3]} <= {*GROUPS, POINT}:
-        table = in_natural_order(table)
     if layout.layout == FEATURES:
         from kinacc.measurements.features import by_feature
 
@@ -70,26 +68,6 @@ def load(path: str | Path, layout: Layout | None = None, source: str | None = No
 
         return cartesian(table, layout.directions)
     return table
-
-
-def in_natural_order(table: RawTable) -> RawTable:
-    """A list of points with P2 before P10, within groups as they come; each keeps its line."""
-    if POINT not in table.columns:
-        return table
-    names = table.texts(POINT)
-    groups = [(), *(table.texts(name) for name in GROUPS if name in table.columns)]
-    keys = list(zip(*groups[1:], strict=True)) or [()] * len(table)
-    place = {key: number for number, key in enumerate(dict.fromkeys(keys))}
-
-    def natural(row: int):
-        parts = re.findall(r"\d{1,18}|\D+|\d", names[row])
-        return place[keys[row]], [(0, int(p)) if p.isdecimal() else (1, p) for p in parts]
-
-    order = sorted(range(len(table)), key=natural)
-    if order == list(range(len(table))):
-        return table
-    told = f"points in their natural order, {names[order[0]]} first, and not in that of the file"
-    return replace(table.select(np.array(order)), notes=(*table.notes, told))
 
 
 def quotes_numbers(path: Path, layout: Layout) -> bool:

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 
 import numpy as np
@@ -253,10 +253,13 @@ class _Finder:
 
     def any(self, name: str) -> Place | None:
         """The column of ``name``, if there is one; in two units it has to say the same twice."""
-        units, mapped_unit = _kind(name, self.layout, self.prismatic)[:2]
-        if name in self.layout.columns:
-            foreign = self.layout.columns[name]
-            return Place(foreign, units[mapped_unit]) if foreign in self.table.columns else None
+        units, unit, key = _kind(name, self.layout, self.prismatic)
+        foreign = self.layout.columns.get(name)
+        if foreign is not None:
+            if foreign not in self.table.columns:
+                return None
+            self._refuse_unit(foreign, _stated_unit(self.table, foreign), unit, key)
+            return Place(foreign, units[unit])
         present = columns_of_quantity(self.table, name, units)
         if len(present) > 1:
             first, *others = (self.table.values(p.column) * p.factor for p in present)
@@ -264,7 +267,20 @@ class _Finder:
             if not all(np.allclose(first, each, 0.0, off, equal_nan=True) for each in others):
                 names = " or ".join(each.column for each in present)
                 self.problem(names, "is given in two units that do not say the same")
+        # A key that is the default may not be meant, and one may be about a mapped column.
+        about = unit == _DEFAULT.get(key, unit) or any(
+            _kind(each, self.layout, self.prismatic)[2] == key for each in self.layout.columns
+        )
+        for place in () if about else present[:1]:
+            self._refuse_unit(place.column, place.column.rpartition("_")[2], unit, key)
         return present[0] if present else None
+
+    def _refuse_unit(self, column: str, stated: str | None, unit: str, key: str) -> None:
+        """Note a column that states another unit than the key that is about it."""
+        what = f"says {stated}, but measurements.file.{key} says {unit}"
+        problem = Problem(f"{self.table.path}: column {column}", what, "the same in both places")
+        if key and stated not in (None, unit) and problem not in self.problems:
+            self.problems.append(problem)
 
     def group(self, names: Sequence[str], required: bool = False) -> tuple[Place, ...]:
         """Columns of quantities that come together, or none of them where not ``required``."""
@@ -306,8 +322,7 @@ class _Finder:
         own = {c: split(name)[0] or TOOL for c, (name, _, unit) in own.items()
                if unit in LENGTH and split(name)[1] == "x"}  # fmt: skip
         says = {name: column_names.role(name_of(f"{name} x").words) for name in own.values()}
-        letters = [n for n in says if len(n) == 1 and says[n] == column_names.PLAIN]
-        read = [n for n in says if says[n] in _READ or n in named or (letters and len(n) == 1)]
+        read = [n for n in says if says[n] in _READ or n in named]
         frames = [n for n in says if n not in read and column_names.is_frame(name_of(n).words)]
         if not read and not named and len(frames) == 1:
             read = frames  # the tool centre point, under its usual name
@@ -371,33 +386,6 @@ def _kind(quantity: str, layout: Layout, prismatic: Sequence) -> tuple[dict, str
     if part in COVARIANCE:
         return AREA, f"{layout.length_unit}2", ""
     return _SINGLE.get(quantity, (PURE, "", ""))
-
-
-def unit_problems(table: RawTable, layout: Layout, prismatic: np.ndarray) -> Iterator[Problem]:
-    """Keys that state another unit than the columns they are about.
-
-    A key that is the default may not be meant: of our names (q1_rad) the name is believed then.
-    ``prismatic`` (k,) marks joints whose position is a length.
-    """
-    said: dict[str, dict[str, str | None]] = {}
-    for quantity, column in layout.columns.items():
-        _, unit, key = _kind(quantity, layout, prismatic)
-        if key and column in table.columns:
-            said.setdefault(key, {})[column] = _stated_unit(table, column)
-    for column in map(str, table.columns):
-        ours, _, own = column.rpartition("_")
-        units, unit, key = _kind(ours, layout, prismatic)
-        # Where a mapped column states no unit, the key is about that one.
-        meant = key and unit != _DEFAULT[key] and None not in said.get(key, {}).values()
-        if meant and own in units and ours not in layout.columns:
-            said.setdefault(key, {})[column] = own
-    for key, stated in said.items():
-        unit = layout.angle_unit if key == "orientation.unit" else getattr(layout, key)
-        for other in {*stated.values()} - {None, unit}:
-            columns = ", ".join(column for column, each in stated.items() if each == other)
-            what = f"says {other}, but measurements.file.{key} says {unit}"
-            fix = "correct the key, or the name where it is the one that is wrong"
-            yield Problem(f"{table.path}: column {columns}", what, "the same in both places", fix)
 
 
 def _stated_unit(table: RawTable, column: str) -> str | None:

@@ -24,7 +24,6 @@ from kinacc.measurements.layout import (
     Place,
     Target,
     find,
-    unit_problems,
 )
 from kinacc.measurements.orientation import quaternions, rotation_std
 from kinacc.measurements.row_names import RowNames
@@ -126,7 +125,6 @@ def convert(table: RawTable, layout: Layout, robot: Robot, strict: bool = True) 
     problems: list[Problem] = []
     title = f"{table.path} cannot be used"
     found = find(table, layout, robot.dh.prismatic, problems)
-    problems += unit_problems(table, layout, robot.dh.prismatic)
     refuse(problems, title)
     if not found.targets:
         problems.append(Problem(table.path, "no target is asked for", "measurements.file.targets"))

@@ -45,7 +45,7 @@ def test_semicolons_decimal_commas_and_lines_around_the_names(file):
 def test_every_mark_between_columns(file, mark):
     rows = [["q1", "q2", "q3", "q4", "x", "y", "z"], *([["1.5"] * 7] * 3)]
     path = file("\n".join(mark.join(row) for row in rows))
-    assert text.look(path).written.delimiter == mark
+    assert text.look(path).written.delimiter == ("blanks" if mark == " " else mark)
     assert text.look(path).written.decimal == "."
 
 

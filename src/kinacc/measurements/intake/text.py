@@ -128,10 +128,6 @@ def _text(path: Path, answers: Mapping[str, str]) -> tuple[Layout, Head, list[Ro
     if head is None or head.width < 2:
         what = "no line of column names above rows of numbers was found"
         raise InputError(Problem(str(path), what, "columns parted by ; , tab or blanks"))
-    if best == BLANKS and head.line:
-        used = [lines[line - 1].rstrip("\r\n") for line, _ in rows if line >= head.line]
-        if all(line.split(" ") == line.split() for line in used):  # single ones, in the names too
-            best, rows = " ", list(rows_of_lines(lines, " ", str(path)))
     told = [f"read as {encoding}"] if encoding != "utf-8" else []
     return Layout(best, encoding=encoding), head, rows, told
 
