@@ -21,7 +21,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "calibration"))
 
 from simulated import POINT, POSE, THREE, disturbed, far_off, joints, measure
 
-from kinacc.calibration import constraints, dh_fit
+from kinacc.calibration import constraints, fitting
 from kinacc.errors import FitError
 from kinacc.kinematics import robot
 
@@ -40,7 +40,7 @@ def costs(name: str, kind: str, starts: int) -> np.ndarray:
     for number in range(starts):
         start = far_off(arm.dh, np.random.default_rng(1000 + number))
         try:
-            fit = dh_fit.fit(
+            fit = fitting.fit(
                 data,
                 start,
                 free=free,

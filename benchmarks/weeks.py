@@ -14,9 +14,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from kinacc.calibration import dh_fit
-from kinacc.calibration.constraints import frame_terms, free_parameters, parallel_joints
-from kinacc.calibration.frames import known
+from kinacc.calibration import fitting
+from kinacc.calibration.constraints import free_parameters, parallel_joints
+from kinacc.calibration.frames import frame_terms, known
 from kinacc.calibration.observations import Observations, full_poses
 from kinacc.deployment.history import SAME, Session, history
 from kinacc.deployment.record import Calibration
@@ -59,7 +59,7 @@ def session(seen: Observations, name: str) -> Session:
     def fit(part: Observations):
         terms = frame_terms(part, known(ARM.base, robots.carried(ARM)))
         terms = replace(terms, free=np.array(["base" in each for each in terms.names]))
-        return dh_fit.fit(part, ARM.dh, free=free, rotation_weight_mm_per_rad=WEIGHT,
+        return fitting.fit(part, ARM.dh, free=free, rotation_weight_mm_per_rad=WEIGHT,
                           threshold=1e-4, frame_terms=terms)  # fmt: skip
 
     held_out_mm = np.zeros(len(seen))

@@ -15,7 +15,8 @@ from dataclasses import replace
 import numpy as np
 
 from kinacc import synthetic
-from kinacc.calibration import dh_fit
+from kinacc.calibration import fitting
+from kinacc.calibration.constraints import free_parameters
 from kinacc.calibration.models import Fit
 from kinacc.calibration.observations import Observations, from_columns
 from kinacc.calibration.residuals import Errors, cross_validated, errors
@@ -44,10 +45,10 @@ def everything(arm: robot.Robot) -> Observations:
 
 def fitted(seen: Observations, arm: robot.Robot) -> tuple[Fit, Errors]:
     """A calibration, and its errors at poses held out."""
-    free = dh_fit.free_parameters(arm.dh.joints)
+    free = free_parameters(arm.dh.joints)
 
     def fit(part: Observations, _fold: int = 0) -> dict[str, Fit]:
-        found = dh_fit.fit(
+        found = fitting.fit(
             part, arm.dh, free=free, rotation_weight_mm_per_rad=WEIGHT, threshold=1e-3
         )
         return {"dh": Fit(found.model, found.frames)}

@@ -62,12 +62,12 @@ def works(smoke: bool) -> list[Work]:
 
 def dh_positions() -> Callable[[], float]:
     """A DH fit to positions: the rms of its residuals."""
-    from kinacc.calibration import dh_fit
+    from kinacc.calibration import fitting
 
     nominal, free, seen, frames = _positions()
 
     def run() -> float:
-        found = dh_fit.fit(
+        found = fitting.fit(
             seen, nominal, free=free, frames=frames, rotation_weight_mm_per_rad=WEIGHT,
             threshold=1e-5,
         )  # fmt: skip
@@ -78,10 +78,10 @@ def dh_positions() -> Callable[[], float]:
 
 def vec_with_rank(count: int, order: int) -> Callable[[], tuple[float, int]]:
     """A VEC fit with base and tool, and its rank report: cost and rank."""
-    from kinacc.calibration import dh_fit, vec_fit
+    from kinacc.calibration import fitting, vec_fit
 
     seen, empty = _wavy(count, order)
-    frames = dh_fit.fit_frames(seen, empty.dh, rotation_weight_mm_per_rad=WEIGHT).frames
+    frames = fitting.fit_frames(seen, empty.dh, rotation_weight_mm_per_rad=WEIGHT)
     prior = vec_fit.Prior(1.0, 1e-3, 1.0, 1e-3)
 
     def run() -> tuple[float, int]:
@@ -96,12 +96,12 @@ def vec_with_rank(count: int, order: int) -> Callable[[], tuple[float, int]]:
 
 
 def _dh(smoke: bool) -> Callable[[], tuple[float, int]]:
-    from kinacc.calibration import dh_fit
+    from kinacc.calibration import fitting
 
     nominal, free, seen, frames = _full_poses(60 if smoke else 500)
 
     def run() -> tuple[float, int]:
-        found = dh_fit.fit(
+        found = fitting.fit(
             seen, nominal, free=free, frames=frames, rotation_weight_mm_per_rad=WEIGHT,
             threshold=1e-2,
         )  # fmt: skip
@@ -113,13 +113,18 @@ def _dh(smoke: bool) -> Callable[[], tuple[float, int]]:
 def _scipy(smoke: bool, analytic: bool) -> Callable[[], tuple[float, None]]:
     from scipy.optimize import least_squares
 
-    from kinacc.calibration import dh_fit, held
+    from kinacc.calibration import fitting
+    from kinacc.calibration.frames import FrameParameters
+    from kinacc.calibration.system import PoseSystem
     from kinacc.kinematics import dh
 
     nominal, free, seen, frames = _full_poses(60 if smoke else 500)
-    coordinates = held.known_frames(seen, frames).coordinates
-    system = held.pose_system(seen, dh_fit.flange_model(nominal, free), coordinates, WEIGHT)
-    start, scale = dh.to_vector(nominal)[free.ravel()], dh_fit.scales(free)
+    flange = fitting.flange_model(nominal, free.ravel())
+    system = PoseSystem(seen, flange, FrameParameters.none(frames), WEIGHT)
+    start, scale = (
+        dh.to_vector(nominal)[free.ravel()],
+        np.tile([1e-3, 1.0, 1.0, 1e-3, 1e-3], len(free))[free.ravel()],
+    )
 
     def jacobian(z: np.ndarray) -> np.ndarray:
         return np.concatenate([each for _, each in system.blocks(start + scale * z)]) * scale

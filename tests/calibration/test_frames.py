@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinacc.calibration.frames import Frames, coordinates
 from kinacc.calibration.hand_eye import closed_form_start
 from kinacc.calibration.observations import Observations, full_poses
 from kinacc.geometry import Pose, compose, exp_so3, log_so3
@@ -90,25 +89,6 @@ def test_several_targets_of_a_pose_have_a_start_each():
     start = closed_form_start(observations, flange)
     np.testing.assert_allclose(start.targets.position_mm, points, atol=1e-6)
     assert turned_by(start.base.rotation, BASE.rotation) < 1e-9
-
-
-def test_coordinates_lead_back_to_frames():
-    q = some_joints(6, 5)
-    observations = full_poses(q, measured(q))
-    anchor = Frames(BASE, Pose(TOOL.rotation[None], TOOL.position_mm[None]))
-    coords = coordinates(observations, anchor, True, True)
-    assert coords.size == 12
-    same = coords.frames(np.zeros(12))
-    np.testing.assert_allclose(same.base.position_mm, BASE.position_mm, atol=1e-9)
-    np.testing.assert_allclose(same.base.rotation, BASE.rotation, atol=1e-12)
-    x = np.random.default_rng(6).normal(size=12) * np.where(coords.is_angle(), 0.1, 10.0)
-    moved = coords.frames(x)
-    # Points of the instrument land where the inverse base of these coordinates puts them.
-    point = np.array([100.0, 200.0, 300.0])
-    inverse = coords.inverse_base(x)
-    by_coordinates = inverse.rotation @ (point - coords.centroid_mm[0]) + inverse.position_mm
-    by_frames = moved.base.rotation.T @ (point - moved.base.position_mm)
-    np.testing.assert_allclose(by_coordinates, by_frames, atol=1e-9)
 
 
 def test_a_short_session_is_placed_by_the_long_one_whichever_comes_first():

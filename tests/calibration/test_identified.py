@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from simulated import POINT, POSE, THREE, disturbed, joints, measure
 
-from kinacc.calibration import blind_words, constraints, dh_fit, identified, tables, uncertainty
+from kinacc.calibration import blind_words, constraints, fitting, identified, tables, uncertainty
 from kinacc.calibration.frames import MOTIONS
 from kinacc.config import parameter_rules
 from kinacc.geometry import Pose, compose, exp_so3
@@ -34,7 +34,7 @@ def asked(name, kind=POSE, sessions=1, instead=False, rules=None, moving=None, p
     known = constraints.arm_terms(
         arm.dh, free, parameter_rules.rules(rules or {}, parameter_rules.JOINTS)[0]
     )
-    fit = dh_fit.fit(
+    fit = fitting.fit(
         data,
         known.nominal,
         free=known.free,
@@ -105,7 +105,7 @@ def test_a_wrist_that_always_points_one_way_leaves_base_and_tool_open():
     q[:, 5] = rng.uniform(-1.0, 1.0, 80)
     free = constraints.free_parameters(6, (2, 3))
     data = measure(disturbed(arm.dh, free, rng), q, POSE, rng)
-    fit = dh_fit.fit(data, arm.dh, free=free, rotation_weight_mm_per_rad=500.0, threshold=1e-3)
+    fit = fitting.fit(data, arm.dh, free=free, rotation_weight_mm_per_rad=500.0, threshold=1e-3)
     told = uncertainty.of_fit(fit, data.target_names)
     left_open = identified.left_open(fit, told, data)
     said = blind_words.sentences(left_open)
@@ -156,7 +156,7 @@ def test_directions_in_words_move_no_pose_anywhere(kind):
     arm, rng = robot.load("ur10"), np.random.default_rng(3)
     free = constraints.free_parameters(6, (2, 3))
     data = measure(disturbed(arm.dh, free, rng), joints(arm, 80, rng), kind, rng)
-    fit = dh_fit.fit(data, arm.dh, free=free, rotation_weight_mm_per_rad=500.0, threshold=1e-3)
+    fit = fitting.fit(data, arm.dh, free=free, rotation_weight_mm_per_rad=500.0, threshold=1e-3)
     told = uncertainty.of_fit(fit, data.target_names)
     groups = identified.left_open(fit, told, data).groups
     directions = np.concatenate([each.directions for each in groups if each.structural])

@@ -10,7 +10,8 @@ import scipy.linalg  # noqa: F401 (its BLAS is one of those counted)
 import simulated
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from kinacc.calibration import dh_fit, vec_fit
+from kinacc.calibration import fitting, vec_fit
+from kinacc.calibration.constraints import free_parameters
 from kinacc.calibration.frames import known
 from kinacc.calibration.one_thread import one_thread
 from kinacc.calibration.system import PoseSystem
@@ -18,7 +19,7 @@ from kinacc.errors import InputError
 from kinacc.kinematics import robot, vec
 
 ARM = robot.load("mh180")
-FREE = dh_fit.free_parameters(6, (2, 3))
+FREE = free_parameters(6, (2, 3))
 
 
 def threads() -> set[int]:
@@ -35,12 +36,12 @@ def two_threads():
 def during(monkeypatch):
     """Numbers of threads seen whenever residuals were computed."""
     seen = []
-    for name in ("gram", "blocks", "cost"):
+    for name in ("normal", "blocks", "residual"):
         own = getattr(PoseSystem, name)
 
-        def watched(self, x, own=own):
+        def watched(self, *given, own=own, **more):
             seen.append(threads())
-            return own(self, x)
+            return own(self, *given, **more)
 
         monkeypatch.setattr(PoseSystem, name, watched)
     return seen
@@ -53,7 +54,7 @@ def observed(count=60):
 
 
 def fit_dh(seen):
-    return dh_fit.fit(seen, ARM.dh, free=FREE, rotation_weight_mm_per_rad=500.0, threshold=0.01)
+    return fitting.fit(seen, ARM.dh, free=FREE, rotation_weight_mm_per_rad=500.0, threshold=0.01)
 
 
 def fit_vec(seen):

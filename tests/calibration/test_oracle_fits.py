@@ -8,7 +8,8 @@ from oracles import fits
 from oracles import kinematics as oracle
 
 from kinacc import geometry
-from kinacc.calibration import dh_fit, frames, vec_fit
+from kinacc.calibration import fitting, frames, vec_fit
+from kinacc.calibration.constraints import free_parameters
 from kinacc.calibration.observations import full_poses
 from kinacc.kinematics import dh, vec
 
@@ -49,7 +50,7 @@ def test_dh_fit_is_the_smallest_displacement_that_minimises_the_residual(hayati,
     truth = nominal + np.random.default_rng(1).normal(size=(6, 5)) * [1e-3, 0.8, 0.8, 1e-3, 0]
     q = joints(22, 2)
     measured = noisy_poses(truth, q, 3)
-    free = dh_fit.free_parameters(6, hayati)
+    free = free_parameters(6, hayati)
     assert free[:, :4].all()
     assert [i + 1 for i in range(6) if free[i, 4]] == list(hayati)
     mask = free.ravel()
@@ -61,7 +62,7 @@ def test_dh_fit_is_the_smallest_displacement_that_minimises_the_residual(hayati,
         return fits.residual(lambda i: oracle.dh_forward(table, q[i]), measured, WEIGHT)
 
     expected = fits.truncated_fit(function, nominal.ravel()[mask], DH_UNIT[mask], threshold)
-    fit = dh_fit.fit(
+    fit = fitting.fit(
         full_poses(q, stack(measured)),
         dh.DHModel(*nominal.T),
         free=free,

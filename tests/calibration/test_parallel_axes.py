@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinacc.calibration import dh_fit
+from kinacc.calibration import fitting
+from kinacc.calibration.constraints import free_parameters
 from kinacc.calibration.observations import full_poses
 from kinacc.geometry import Pose, compose, exp_so3
 from kinacc.kinematics import dh
@@ -39,23 +40,23 @@ def fitted(whole, tool_z_mm=0.0):
     if not whole:
         nothing = np.full_like(turned, np.nan)
         observations = replace(observations, rotation=nothing)
-    fit = dh_fit.fit(
+    fit = fitting.fit(
         observations,
         SCARA,
-        free=dh_fit.free_parameters(4, (1, 2, 3)),
+        free=free_parameters(4, (1, 2, 3)),
         rotation_weight_mm_per_rad=500.0,
         threshold=1e-2,
     )
-    nominal = dh_fit.fit_frames(observations, SCARA, rotation_weight_mm_per_rad=500.0)
+    nominal = fitting.fit_frames(observations, SCARA, rotation_weight_mm_per_rad=500.0)
     return fit, nominal
 
 
 @pytest.mark.parametrize("whole", [False, True], ids=["positions", "poses"])
 def test_base_and_tool_stay_along_the_axes_all_joints_share(whole):
     fit, nominal = fitted(whole)
-    assert abs(nominal.frames.tool.position_mm[2]) < 1e-6
+    assert abs(nominal.tool.position_mm[2]) < 1e-6
     assert abs(fit.frames.tool.position_mm[2]) < 2.0
-    moved = fit.frames.base.position_mm - nominal.frames.base.position_mm
+    moved = fit.frames.base.position_mm - nominal.base.position_mm
     assert np.linalg.norm(moved) < 2.0
     assert not np.isfinite(fit.solution.std[2])  # which is not to say that it is known
 

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinacc.calibration import dh_fit
+from kinacc.calibration import fitting
+from kinacc.calibration.constraints import free_parameters
 from kinacc.calibration.observations import full_poses
 from kinacc.geometry import Pose, compose, exp_so3
 from kinacc.kinematics import dh, robot
@@ -56,10 +57,10 @@ def read(seed, targets, turned):
 
 
 def fitted(observations, loss="squares"):
-    return dh_fit.fit(
+    return fitting.fit(
         observations,
         ARM.dh,
-        free=dh_fit.free_parameters(6),
+        free=free_parameters(6),
         rotation_weight_mm_per_rad=500.0,
         threshold=1e-3,
         loss=loss,

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 from simulated import POINT, POSE, THREE, disturbed, joints, measure
 
-from kinacc.calibration import constraints, dh_fit, frames, robust, uncertainty
-from kinacc.calibration.constrained import ConstrainedFrames
+from kinacc.calibration import constraints, fitting, frames, robust, uncertainty
+from kinacc.calibration.constraints import free_parameters
 from kinacc.config import parameter_rules
 from kinacc.errors import InputError
 from kinacc.geometry import compose, log_so3
 from kinacc.kinematics import dh, robot
 
 ARM = robot.load("mh180")
-FREE = dh_fit.free_parameters(6)
+FREE = free_parameters(6)
 WEIGHT = 500.0
 
 
@@ -36,10 +36,10 @@ def fitted(observations, arm_rules=None, frame_rules=None, **given):
         sessions=len(observations.session_names),
         targets=len(observations.target_names),
     )
-    of_frames = constraints.frame_terms(
+    of_frames = frames.frame_terms(
         observations, stated, parameter_rules.rules(frame_rules or {}, parameter_rules.FRAMES)[0]
     )
-    return dh_fit.fit(
+    return fitting.fit(
         observations,
         arm.nominal,
         free=arm.free,
@@ -53,7 +53,7 @@ def fitted(observations, arm_rules=None, frame_rules=None, **given):
 
 def test_no_rule_is_the_plain_fit_to_the_bit():
     _, data = seen()
-    plain = dh_fit.fit(data, ARM.dh, free=FREE, rotation_weight_mm_per_rad=WEIGHT, threshold=1e-3)
+    plain = fitting.fit(data, ARM.dh, free=FREE, rotation_weight_mm_per_rad=WEIGHT, threshold=1e-3)
     np.testing.assert_array_equal(dh.to_vector(fitted(data).model), dh.to_vector(plain.model))
 
 
@@ -100,21 +100,6 @@ def test_one_angle_of_a_tool_can_be_fixed():
     known = uncertainty.of_fit(found, data.target_names)
     at = known.names.index("t0.rz_rad")
     assert known.covariance[at, at] == pytest.approx(0.0, abs=1e-5)
-
-
-def test_the_derivative_of_constrained_frames_is_that_of_finite_differences():
-    _, data = seen(THREE, sessions=2)
-    found = fitted(data, frame_rules={"base2 x": "fixed", "t1 y": {"prior_std_mm": 1.0}})
-    coords = found.coordinates
-    assert isinstance(coords, ConstrainedFrames)
-    y = found.solution.x[: coords.size] + 1e-3
-    change, step = coords.change(y), 1e-5
-    for column in range(coords.size):
-        moved = step * np.eye(coords.size)[column]
-        ahead, behind = coords.inner_coordinates(y + moved), coords.inner_coordinates(y - moved)
-        np.testing.assert_allclose(
-            change[:, column], (ahead - behind) / (2 * step), rtol=1e-6, atol=1e-5
-        )
 
 
 def test_a_prior_weighs_as_its_standard_deviation_says():

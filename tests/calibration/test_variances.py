@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinacc.calibration import dh_fit, uncertainty, variances
+from kinacc.calibration import fitting, uncertainty, variances
+from kinacc.calibration.constraints import free_parameters
 from kinacc.calibration.observations import full_poses
 from kinacc.deployment.predict import predict
 from kinacc.deployment.record import Calibration
@@ -32,10 +33,10 @@ def measured(arm, q_rad, std_rad, seed):
 
 
 def fitted(arm, observations):
-    return dh_fit.fit(
+    return fitting.fit(
         observations,
         arm.dh,
-        free=dh_fit.free_parameters(6),
+        free=free_parameters(6),
         rotation_weight_mm_per_rad=WEIGHT,
         threshold=1e-3,
     )

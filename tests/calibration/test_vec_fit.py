@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import simulated
 
-from kinacc.calibration import constraints, dh_fit, frames, vec_fit
+from kinacc.calibration import constraints, fitting, frames, vec_fit
 from kinacc.calibration.observations import full_poses
 from kinacc.calibration.vec_fit import Prior
 from kinacc.geometry import Pose, compose, exp_so3
@@ -175,7 +175,7 @@ def test_one_point_without_orientation_is_enough_to_converge(seed):
     true = simulated.disturbed(arm.dh, constraints.free_parameters(arm.dh.joints), rng)
     seen = simulated.measure(true, q, simulated.POINT, rng)
     train, test = seen.select(slice(0, 80)), seen.select(slice(80, None))
-    begin = dh_fit.fit_frames(train, arm.dh, rotation_weight_mm_per_rad=WEIGHT).frames
+    begin = fitting.fit_frames(train, arm.dh, rotation_weight_mm_per_rad=WEIGHT)
     found = vec_fit.fit(
         train,
         vec.without_errors(arm.dh, q.min(axis=0), q.max(axis=0), 1),

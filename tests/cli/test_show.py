@@ -60,7 +60,7 @@ def measurements(folder, poses=60, target="tool"):
 
 
 def vec_orders(folder, orders=range(1, 8)):
-    rows = [(None, order, 1.0, 1.0, 0.7, 1 / order + 0.05 * order, 0.0, 0.0, int(order == 4))
+    rows = [(None, order, 1.0, 1.0, 0.7, -1 / order - 0.05 * order, 0.0, int(order == 4))
             for order in orders]  # fmt: skip
     return write(folder, "vec_orders", rows)
 
@@ -188,8 +188,8 @@ def test_numbers_are_aligned_and_rounding_is_not_shown_as_a_number(tmp_path):
 
 def test_a_table_of_one_row_stands_upright(tmp_path):
     said = show(vec_orders(tmp_path, [5])).output
-    assert "order                 5\n" in said
-    assert "fold                  -\n" in said
+    assert "order              5\n" in said
+    assert "fold               -\n" in said
 
 
 def test_columns_are_described_with_unit_and_what_they_hold(tmp_path):

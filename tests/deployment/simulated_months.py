@@ -10,9 +10,9 @@ from __future__ import annotations
 import numpy as np
 from oracles.kinematics import UR10, dh_link, rot_x, rot_y, rot_z, trans
 
-from kinacc.calibration import dh_fit
-from kinacc.calibration.constraints import frame_terms, free_parameters, parallel_joints
-from kinacc.calibration.frames import known
+from kinacc.calibration import fitting
+from kinacc.calibration.constraints import free_parameters, parallel_joints
+from kinacc.calibration.frames import frame_terms, known
 from kinacc.calibration.observations import Observations, full_poses
 from kinacc.deployment.history import Session, history
 from kinacc.deployment.record import Calibration
@@ -67,7 +67,7 @@ def session(seen: Observations, number: int, moved: bool) -> Session:
     """A line of the series with a DH calibration of its own."""
     arm = robots.load("ur10")
     seen = full_poses(seen.q_rad, Pose(seen.rotation, seen.position_mm))
-    fit = dh_fit.fit(
+    fit = fitting.fit(
         seen,
         arm.dh,
         free=free_parameters(arm.dh.joints, parallel_joints(arm.dh)),

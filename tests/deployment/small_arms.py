@@ -6,7 +6,8 @@ from functools import cache
 
 import numpy as np
 
-from kinacc.calibration import dh_fit, frames, tables, uncertainty, vec_fit
+from kinacc.calibration import fitting, frames, tables, uncertainty, vec_fit
+from kinacc.calibration.constraints import free_parameters
 from kinacc.calibration.frames import Frames
 from kinacc.calibration.observations import Observations, full_poses
 from kinacc.calibration.vec_fit import Prior
@@ -61,11 +62,11 @@ def results(name: str, count: int = 80, seed: int = 3) -> dict:
 def results_of(name: str, seen: Observations) -> dict:
     """The tables of what was seen of an arm."""
     arm = robot.load(name)
-    nominal = dh_fit.fit_frames(seen, arm.dh, rotation_weight_mm_per_rad=WEIGHT)
-    dh_found = dh_fit.fit(
+    nominal = fitting.fit_frames(seen, arm.dh, rotation_weight_mm_per_rad=WEIGHT)
+    dh_found = fitting.fit(
         seen,
         arm.dh,
-        free=dh_fit.free_parameters(arm.dh.joints, HAYATI.get(name, ())),
+        free=free_parameters(arm.dh.joints, HAYATI.get(name, ())),
         rotation_weight_mm_per_rad=WEIGHT,
         threshold=1e-3,
     )
@@ -75,10 +76,10 @@ def results_of(name: str, seen: Observations) -> dict:
         vec.without_errors(arm.dh, low, high, 2),
         prior=Prior(1.0, 1e-3, 0.7, 1e-3),
         rotation_weight_mm_per_rad=WEIGHT,
-        frames=nominal.frames,
+        frames=nominal,
         frames_free=True,
     )
-    of = {"vec": vec_found.frames, "dh": dh_found.frames, "nominal": nominal.frames}
+    of = {"vec": vec_found.frames, "dh": dh_found.frames, "nominal": nominal}
     known = uncertainty.of_fit(dh_found, ("tool",))
     return {
         "vec_model": vec_found.model.to_columns(vec_found.std),

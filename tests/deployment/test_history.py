@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 import shared_data
 
-from kinacc.calibration import dh_fit
-from kinacc.calibration.constraints import frame_terms, free_parameters, parallel_joints
-from kinacc.calibration.frames import known
+from kinacc.calibration import fitting
+from kinacc.calibration.constraints import free_parameters, parallel_joints
+from kinacc.calibration.frames import frame_terms, known
 from kinacc.calibration.observations import Observations, full_poses
 from kinacc.deployment import history as histories
 from kinacc.deployment.history import LEVEL, Session
@@ -67,7 +67,7 @@ def session(seen: Observations, date: str, base: str = SAME, name: str = "mh180"
     seen = replace(seen, fold=assign(seen.pose, 5, 0))
     free = free_parameters(arm.dh.joints, parallel_joints(arm.dh))
     terms = frame_terms(seen, known(arm.base, robots.carried(arm)))
-    fit = dh_fit.fit(
+    fit = fitting.fit(
         seen,
         arm.dh,
         free=free,

@@ -8,8 +8,9 @@ import numpy as np
 import paper_settings as paper
 import pytest
 
-from kinacc.calibration import dh_fit
+from kinacc.calibration import fitting
 from kinacc.calibration.blind_words import sentences
+from kinacc.calibration.constraints import free_parameters
 from kinacc.calibration.observations import full_poses
 from kinacc.deployment.planning import (
     choose,
@@ -33,10 +34,10 @@ def test_the_rank_is_that_of_a_fit_to_the_same_poses(name, hayati):
     joints = spread(arm, 120)
     shown = information(arm, joints, paper.experiment(TOOL, hayati_joints=hayati))
     q_dh = joints @ arm.joint_map.T
-    fit = dh_fit.fit(
+    fit = fitting.fit(
         full_poses(q_dh, compose(dh.forward(arm.dh, q_dh), TOOL)),
         arm.dh,
-        free=dh_fit.free_parameters(6, hayati),
+        free=free_parameters(6, hayati),
         rotation_weight_mm_per_rad=500.0,
         threshold=1e-3,
     )

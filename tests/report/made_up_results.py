@@ -110,17 +110,16 @@ def vec_model(order: int = 2, **coefficients: float) -> dict:
 
 
 def orders(*rows: tuple) -> dict:
-    """``vec_orders`` of fold, order, rms, excess, its standard error and whether chosen."""
-    fold, order, rms, excess, error, chosen = (np.array(each) for each in zip(*rows, strict=True))
+    """``vec_orders`` of fold, order, log evidence, that less the best, and whether chosen."""
+    fold, order, evidence, less, chosen = (np.array(each) for each in zip(*rows, strict=True))
     return {
         "fold": fold.astype(float),
         "order": order,
         "prior_std_mm": np.full(len(rows), 0.3),
         "prior_std_mrad": np.full(len(rows), 0.4),
         "prior_decay": np.full(len(rows), 0.7),
-        "held_out_rms_mm": rms.astype(float),
-        "excess_mm2": excess.astype(float),
-        "excess_std_error_mm2": error.astype(float),
+        "log_evidence": evidence.astype(float),
+        "log_evidence_less": less.astype(float),
         "chosen": chosen,
     }
 
@@ -163,7 +162,7 @@ def everything() -> dict:
         "dh_covariance": covariance(["j1.a_mm", "j2.a_mm"], [[1.0, 0.5], [0.5, 1.0]]),
         "dh_model": dh_model(),
         "vec_model": vec_model(),
-        "vec_orders": orders((np.nan, 2, np.nan, np.nan, np.nan, 1)),
+        "vec_orders": orders((np.nan, 2, np.nan, np.nan, 1)),
         "model_selection": selection(),
         "pose_errors": pose_errors(),
     }

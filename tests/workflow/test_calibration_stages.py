@@ -348,15 +348,6 @@ def test_a_target_seen_in_one_configuration_always_trains(plan):
     assert np.isnan(split["fold"]).sum() == 3
 
 
-def test_order_and_prior_cannot_be_chosen_without_folds_that_hold_rows(plan):
-    one = {name: values[:30] for name, values in columns().items()}
-    one["pose"] = np.zeros(30, dtype=int)  # one configuration, in one fold
-    split = source.split(one, plan.settings["mh180"])
-    given = settings_of(plan, "vec", calibration__vec__order="auto")
-    with pytest.raises(InputError, match="no order or prior can be tried"):
-        RUNS["vec"]({"measurements": split}, given)
-
-
 def test_too_few_poses_for_the_order_is_bad_input(plan):
     few = {name: values[:20] for name, values in columns().items()}
     split = source.split(few, plan.settings["mh180"])

@@ -8,42 +8,18 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from kinacc.calibration import dh_fit, tables
-from kinacc.calibration.constrained import ConstrainedFrames
+from kinacc.calibration import fitting, tables
 from kinacc.calibration.dh_estimator import DHEstimator
-from kinacc.calibration.dh_fit import Unknowns
-from kinacc.calibration.frames import ANGLE_UNIT_RAD, FrameCoordinates, Frames
+from kinacc.calibration.fitting import MORE_POSES, ModelFit
+from kinacc.calibration.frames import ANGLE_UNIT_RAD
 from kinacc.calibration.models import Common, Estimator, Fit
 from kinacc.calibration.observations import Observations
-from kinacc.calibration.robust import Weights
-from kinacc.calibration.solve import Solution
-from kinacc.calibration.system import FlangeModel
 from kinacc.calibration.uncertainty import Uncertainty, scale_of
-from kinacc.geometry import Pose
-from kinacc.kinematics import compliance
 from kinacc.kinematics.compliance import ComplianceModel
-from kinacc.kinematics.model import JointState
 from kinacc.kinematics.robot import Robot
 from kinacc.tables.columns import Columns
 
 _NO_MOMENT = 1e-6  # N m, or mm of lever: far above rounding, far below what bends a joint
-
-
-@dataclass(frozen=True)
-class ComplianceFit:
-    """Fitted ``model`` and ``frames``; ``std`` (P,) as its parameters, NaN undetermined.
-
-    ``free`` (P,) marks those that took part; ``solution`` has the figures of the fit, frame
-    coordinates (``coordinates``) first. ``weights`` of the rows, where the loss had some.
-    """
-
-    model: ComplianceModel
-    frames: Frames
-    std: np.ndarray
-    free: np.ndarray
-    solution: Solution
-    coordinates: FrameCoordinates | ConstrainedFrames
-    weights: Weights | None = None
 
 
 @dataclass(frozen=True)
@@ -58,7 +34,7 @@ class ComplianceEstimator(Estimator):
 
     kind: ClassVar[str] = "compliance"
     name: ClassVar[str] = "compliance fit"
-    fix: ClassVar[str] = dh_fit.DH_FIX
+    fix: ClassVar[str] = MORE_POSES
 
     @classmethod
     def of(cls, calibration: Mapping, arm: Robot, every: Observations) -> Self:
@@ -113,61 +89,28 @@ class ComplianceEstimator(Estimator):
 
     def fit(
         self, observations: Observations, others: Mapping[str, Fit], near: Fit | None = None
-    ) -> ComplianceFit:
+    ) -> ModelFit:
         """The bent arm closest to the measurements, whatever the DH model follows."""
         arm = self.dh.arm
         nominal = replace(self.stiff, dh=arm.nominal)
-        held, names = compliance.to_vector(nominal), nominal.parameter_names
-        free = np.concatenate([arm.free.ravel(), np.ones(len(names) - arm.free.size, bool)])
-
-        def model(x: np.ndarray) -> ComplianceModel:
-            vector = held.copy()
-            vector[free] = x
-            return compliance.with_vector(nominal, vector)
-
-        def linearised(x: np.ndarray, at: JointState) -> tuple[Pose, np.ndarray]:
-            bent = model(x)
-            return bent.pose(at), bent.parameter_jacobian(at).transpose(2, 1, 0)[free]
-
-        flange = FlangeModel(
-            int(free.sum()),
-            lambda x, at: model(x).pose(at),
-            linearised,
-        )
-        more = len(names) - arm.free.size
-        unknowns = Unknowns(
-            self.name,
-            flange,
-            start=held[free],
-            nominal=held[free],
-            prior_std=np.concatenate([arm.std[arm.free], np.full(more, np.inf)]),
-            scale=np.concatenate([dh_fit.scales(arm.free), _scales(nominal, observations)]),
-        )
+        more = len(nominal.names) - arm.free.size
         frames, terms = self.common.frames(observations)
-        coords, solution, weights = dh_fit.solved(
+        return fitting.fit(
             observations,
-            unknowns,
-            arm.nominal,
+            nominal,
+            free=np.concatenate([arm.free.ravel(), np.ones(more, dtype=bool)]),
+            std=np.concatenate([arm.std.ravel(), np.full(more, np.inf)]),
+            scale=_scales(nominal, observations),
             rotation_weight_mm_per_rad=self.common.rotation_weight_mm_per_rad,
             threshold=self.dh.threshold,
             frames=frames,
             frame_terms=terms,
             loss=self.dh.loss,
-        )
-        std = np.full(held.size, np.nan)
-        std[free] = solution.std[coords.size :]
-        return ComplianceFit(
-            model(solution.x[coords.size :]),
-            coords.frames(solution.x[: coords.size]),
-            std,
-            free,
-            solution,
-            coords,
-            weights,
+            name=self.name,
         )
 
     def tables(
-        self, fitted: ComplianceFit, known: Uncertainty, observations: Observations
+        self, fitted: ModelFit, known: Uncertainty, observations: Observations
     ) -> dict[str, Columns]:
         """How the fit went."""
         return {"compliance_fit": tables.fit_columns("compliance_fit", fitted, known)}
@@ -186,10 +129,10 @@ def _load_changes(every: Observations, payload: np.ndarray) -> bool:
 
 
 def _scales(nominal: ComplianceModel, observations: Observations) -> np.ndarray:
-    """By each coefficient what turns its joint by one mrad, rms over the observations."""
+    """By each parameter what moves a pose as one mm; coefficients turn a joint by one mrad, rms."""
     moments = nominal.moments(observations.at)
-    rms = np.sqrt(np.mean(moments**2, axis=0))
-    names = nominal.parameter_names[len(nominal.dh.parameter_names) :]
-    plain = np.array([scale_of(name) for name in names])
-    own = rms[np.isfinite(nominal.coefficients)]
-    return np.divide(ANGLE_UNIT_RAD, own, out=plain, where=own > _NO_MOMENT)
+    rms = np.sqrt(np.mean(moments**2, axis=0))[np.isfinite(nominal.coefficients)]
+    plain = np.array([scale_of(name) for name in nominal.names])
+    own = plain[-len(rms) :] if len(rms) else plain[:0]
+    np.divide(ANGLE_UNIT_RAD, rms, out=own, where=rms > _NO_MOMENT)
+    return plain

@@ -1,4 +1,4 @@
-"""What a fit takes for granted: parameters of the arm and of its frames, from rules."""
+"""Which parameters of an arm a fit estimates, and what is known of them, from rules."""
 
 from __future__ import annotations
 
@@ -7,13 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinacc.calibration.constrained import FrameTerms
-from kinacc.calibration.frames import Frames, coordinates, known
-from kinacc.calibration.observations import Observations
 from kinacc.config import parameter_rules
 from kinacc.config.parameter_rules import Rule
-from kinacc.errors import Problem, refuse
-from kinacc.kinematics import dh
 from kinacc.kinematics.dh import PARAMETERS, DHModel
 from kinacc.kinematics.robot.axes import NEARLY_PARALLEL
 
@@ -66,7 +61,7 @@ def arm_terms(nominal: DHModel, free: np.ndarray, rules: Sequence[Rule] = ()) ->
 
     A rule for a whole joint speaks of the parameters that are free by default.
     """
-    values = dh.to_vector(nominal).reshape(free.shape).copy()
+    values = nominal.start.reshape(free.shape).copy()
     chosen, std = free.copy(), np.full(free.shape, np.inf)
     for joint, column in np.ndindex(free.shape):
         name = PARAMETERS[column]
@@ -76,46 +71,4 @@ def arm_terms(nominal: DHModel, free: np.ndarray, rules: Sequence[Rule] = ()) ->
         chosen[joint, column] = rule.free
         values[joint, column] = rule.value.get(parameter_rules.unit(name), values[joint, column])
         std[joint, column] = rule.std.get(parameter_rules.unit(name), np.inf)
-    return ArmTerms(dh.with_vector(nominal, values.ravel()), chosen, std)
-
-
-def frame_terms(
-    observations: Observations, stated: Frames, rules: Sequence[Rule] = ()
-) -> FrameTerms:
-    """Terms of base and targets, all free but for ``rules``; ``stated``: where a fixed one is."""
-    require_known(rules, observations)
-    coords = coordinates(observations, stated, base_free=True, targets_free=True)
-    names = tuple(coords.motion_names(observations.target_names))
-    at = [*stated.bases.position_mm, *stated.targets.position_mm]
-    frames = list(dict.fromkeys(name.rpartition(".")[0] for name in names))
-    free, value = np.ones(len(names), dtype=bool), np.zeros(len(names))
-    std = np.full(len(names), np.inf)
-    for number, name in enumerate(names):
-        frame, _, component = name.rpartition(".")
-        if component[1:] == "_mm":
-            value[number] = at[frames.index(frame)]["xyz".index(component[0])]
-        rule = parameter_rules.rule_for(rules, component, frame=frame)
-        if rule is None:
-            continue
-        free[number] = rule.free
-        value[number] = rule.value.get(parameter_rules.unit(component), value[number])
-        std[number] = rule.std.get(parameter_rules.unit(component), np.inf)
-    return FrameTerms(names, free, value, std, stated)
-
-
-def require_known(rules: Sequence[Rule], observations: Observations) -> None:
-    """Raise InputError naming every rule about a frame ``observations`` do not let estimate."""
-    if not rules:
-        return
-    sessions, targets = len(observations.session_names), len(observations.target_names)
-    start = known(sessions=sessions, targets=targets)
-    coords = coordinates(observations, start, base_free=True, targets_free=True)
-    frames: dict[str, list[str]] = {}
-    for name in coords.motion_names(observations.target_names):
-        frame, _, component = name.rpartition(".")
-        frames.setdefault(frame, []).append(component)
-    problems = [
-        Problem(f"{parameter_rules.KEYS[parameter_rules.FRAMES]}, {rule.name!r}", what, allowed)
-        for rule, what, allowed in parameter_rules.strangers(rules, observations.joints, frames)
-    ]
-    refuse(problems)
+    return ArmTerms(nominal.with_parameters(values.ravel()), chosen, std)

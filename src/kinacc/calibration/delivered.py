@@ -6,7 +6,6 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from kinacc.calibration.constraints import require_known
 from kinacc.calibration.models import Fit, estimators
 from kinacc.calibration.observations import Observations, from_columns
 from kinacc.calibration.system import require_enough
@@ -49,6 +48,5 @@ def require_enough_rows(inputs: Mapping, robot: Robot, calibration: Mapping) -> 
     for estimator in estimators(calibration, robot, every).values():
         frames, common = 0, estimator.common
         if common.frames_estimated and len(seen):
-            require_known(common.frame_rules, seen)
             frames = int(common.terms(seen).free.sum())
         require_enough(seen, estimator.size + frames, estimator.name, estimator.fix)

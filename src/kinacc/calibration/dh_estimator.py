@@ -8,9 +8,9 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from kinacc.calibration import dh_fit, identified, tables
+from kinacc.calibration import fitting, identified, tables
 from kinacc.calibration.constraints import ArmTerms, arm_terms, free_parameters, parallel_joints
-from kinacc.calibration.dh_fit import DHFit
+from kinacc.calibration.fitting import MORE_POSES, ModelFit
 from kinacc.calibration.frames import Frames
 from kinacc.calibration.models import Common, Estimator, Fit
 from kinacc.calibration.observations import Observations, full_poses
@@ -42,7 +42,7 @@ class DHEstimator(Estimator):
 
     kind: ClassVar[str] = "dh"
     name: ClassVar[str] = "DH fit"
-    fix: ClassVar[str] = dh_fit.DH_FIX
+    fix: ClassVar[str] = MORE_POSES
 
     @classmethod
     def of(cls, calibration: Mapping, arm: Robot, every: Observations) -> Self:
@@ -72,7 +72,7 @@ class DHEstimator(Estimator):
 
     def fit(
         self, observations: Observations, others: Mapping[str, Fit], near: Fit | None = None
-    ) -> DHFit:
+    ) -> ModelFit:
         """The DH model; base and targets are those of the VEC model where it follows that."""
         frames, terms = self.common.frames(observations)
         followed = others["vec"] if self.follows_vec else None
@@ -85,7 +85,7 @@ class DHEstimator(Estimator):
             observations = poses.with_targets_of(observations)
             frames, terms = Frames(IDENTITY, followed.frames.targets), None
         arm = self.arm
-        fitted = dh_fit.fit(
+        fitted = fitting.fit(
             observations,
             arm.nominal,
             free=arm.free,
@@ -99,7 +99,7 @@ class DHEstimator(Estimator):
         return fitted.with_frames(followed.frames) if followed else fitted
 
     def tables(
-        self, fitted: DHFit, known: Uncertainty, observations: Observations
+        self, fitted: ModelFit, known: Uncertainty, observations: Observations
     ) -> dict[str, Columns]:
         """How the fit went, and which parameters the observations determine."""
         told = identified.parameters(fitted, known)

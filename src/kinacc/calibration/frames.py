@@ -1,19 +1,23 @@
-"""Robot base and targets as parameters: coordinates, closed-form start, conversions.
+"""Robot base and targets: frames, what is known of them beforehand, and their parameters.
 
-A target's frame seen from the robot base is ``flange . target`` by the model and
-``invert(base) . measured`` by the instrument. The fits work on the inverse of the base: residuals
-then live in the robot base and the flange Jacobians need no further rotation.
+A target is measured at ``base . flange . target``. Components are named ``base.x_mm`` ..
+``base.rz_rad`` (``base2`` and so on for further sessions) and ``<target>.x_mm`` ..
+``<target>.rz_rad``. A position is the frame's own; a rotation vector w turns a reference
+orientation R to exp(w) R.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from kinacc.calibration.observations import Observations
-from kinacc.geometry import IDENTITY, Pose, exp_so3, invert, skew
+from kinacc.config import parameter_rules
+from kinacc.config.parameter_rules import Rule
+from kinacc.errors import Problem, refuse
+from kinacc.geometry import IDENTITY, Pose, exp_so3, log_so3, skew
 
 MOTIONS = ("x_mm", "y_mm", "z_mm", "rx_rad", "ry_rad", "rz_rad")
 BASE = "base"
@@ -64,115 +68,6 @@ def known(
     return Frames(stacked([base] * sessions), stacked([tool] * targets))
 
 
-@dataclass(frozen=True)
-class FrameCoordinates:
-    """Vector coordinates of the estimated part of ``Frames`` around ``anchor``.
-
-    Order: per session the inverse base (3 mm, 3 rad) about its ``centroid_mm`` (S, 3) of the
-    measurements if ``base_free``; then, if ``targets_free``, per target 3 mm and, where ``turns``
-    (T,) is true, 3 rad. A rotation vector w stands for ``exp(w)`` before the anchor's rotation.
-    """
-
-    anchor: Frames
-    base_free: bool
-    targets_free: bool
-    turns: np.ndarray
-    centroid_mm: np.ndarray
-
-    @property
-    def size(self) -> int:
-        """Number of coordinates."""
-        targets = int(3 * self.turns.size + 3 * self.turns.sum()) if self.targets_free else 0
-        return self._bases + targets
-
-    @property
-    def _bases(self) -> int:
-        return 6 * self.anchor.sessions if self.base_free else 0
-
-    def base_columns(self, session: int) -> slice:
-        """Columns of one session's inverse base."""
-        return slice(6 * session, 6 * session + 6)
-
-    def target_columns(self, target: int) -> slice:
-        """Columns of one target: 3, or 6 with its rotation."""
-        begin = self._bases + int(3 * target + 3 * self.turns[:target].sum())
-        return slice(begin, begin + 3 + 3 * int(self.turns[target]))
-
-    def is_angle(self) -> np.ndarray:
-        """True (size,) where a coordinate is an angle in rad."""
-        kinds = ([False] * 3 + [True] * 3) * (self._bases // 6)
-        if self.targets_free:
-            for turn in self.turns:
-                kinds += [False] * 3 + [True] * 3 * int(turn)
-        return np.array(kinds, dtype=bool)
-
-    def inverse_base(self, x: np.ndarray, session: int = 0) -> Pose:
-        """Inverse base at coordinates ``x``, applied to points minus the session's centroid."""
-        bases, centre = self.anchor.bases, self.centroid_mm[session]
-        inverse = invert(Pose(bases.rotation[session], bases.position_mm[session]))
-        at_centroid = inverse.rotation @ centre + inverse.position_mm
-        if not self.base_free:
-            return Pose(inverse.rotation, at_centroid)
-        part = x[self.base_columns(session)]
-        return Pose(exp_so3(part[3:]) @ inverse.rotation, at_centroid + part[:3])
-
-    def targets(self, x: np.ndarray) -> Pose:
-        """Target frames (T, ...) in the flange at coordinates ``x``."""
-        if not self.targets_free:
-            return self.anchor.targets
-        rotation = self.anchor.targets.rotation.copy()
-        position = self.anchor.targets.position_mm.copy()
-        for target in range(self.turns.size):
-            part = x[self.target_columns(target)]
-            position[target] += part[:3]
-            if self.turns[target]:
-                rotation[target] = exp_so3(part[3:]) @ rotation[target]
-        return Pose(rotation, position)
-
-    def frames(self, x: np.ndarray) -> Frames:
-        """``Frames`` at coordinates ``x``."""
-        bases = []
-        for session, centre in enumerate(self.centroid_mm):
-            inverse = self.inverse_base(x, session)
-            offset = inverse.position_mm - inverse.rotation @ centre
-            bases.append(invert(Pose(inverse.rotation, offset)))
-        return Frames(stacked(bases), self.targets(x))
-
-    def motion_names(self, target_names: tuple[str, ...]) -> list[str]:
-        """Names of the parameters, in the order of the rows of ``motions``."""
-        names = []
-        for session in range(self.anchor.sessions if self.base_free else 0):
-            base = BASE if session == 0 else f"{BASE}{session + 1}"
-            names += [f"{base}.{motion}" for motion in MOTIONS]
-        if self.targets_free:
-            for name, turns in zip(target_names, self.turns, strict=True):
-                names += [f"{name}.{motion}" for motion in (MOTIONS if turns else MOTIONS[:3])]
-        return names
-
-    def motions(self, x: np.ndarray) -> np.ndarray:
-        """Derivative (F, F) of the named motions of base and targets in the coordinates at x."""
-        motions = np.zeros((self.size, self.size))
-        for session in range(self.anchor.sessions if self.base_free else 0):
-            inverse = self.inverse_base(x, session)
-            place = self.base_columns(session)
-            shift, turned = slice(place.start, place.start + 3), slice(place.start + 3, place.stop)
-            base = inverse.rotation.T
-            turn = base @ left_jacobian(x[turned])
-            # m = c - R'p, R' turning by exp(-R'J dw): see inverse_base.
-            motions[shift, shift] = -base
-            motions[shift, turned] = -skew(base @ inverse.position_mm) @ turn
-            motions[turned, turned] = -turn
-        if self.targets_free:
-            for target, turns in enumerate(self.turns):
-                columns = self.target_columns(target)
-                begin = columns.start
-                motions[begin : begin + 3, begin : begin + 3] = np.eye(3)
-                if turns:
-                    turned = left_jacobian(x[begin + 3 : begin + 6])
-                    motions[begin + 3 : begin + 6, begin + 3 : begin + 6] = turned
-        return motions
-
-
 def stacked(poses: Sequence[Pose]) -> Pose:
     """Single poses as one with a leading axis."""
     return Pose(
@@ -180,18 +75,66 @@ def stacked(poses: Sequence[Pose]) -> Pose:
     )
 
 
-def coordinates(
-    observations: Observations, anchor: Frames, base_free: bool, targets_free: bool
-) -> FrameCoordinates:
-    """Coordinates around ``anchor``; a target turns where any of its orientations was measured.
+@dataclass(frozen=True)
+class FrameTerms:
+    """What is known of the F components ``names`` of base and targets before a fit.
 
-    A session that nothing was measured in keeps its base, a target never seen its place.
+    ``free`` (F,): estimated. ``value`` (F,) in mm and rad: where the others stay and what a prior
+    of standard deviation ``std`` (F,) expects; std inf where there is none. ``stated``: the frames
+    whose orientations the rotation vectors start from.
     """
-    turns = orientations_measured(observations)
-    centroid = np.zeros((anchor.sessions, 3))
-    for session in np.unique(observations.session):
-        centroid[session] = observations.position_mm[observations.session == session].mean(axis=0)
-    return FrameCoordinates(anchor, base_free, targets_free, turns, centroid)
+
+    names: tuple[str, ...]
+    free: np.ndarray
+    value: np.ndarray
+    std: np.ndarray
+    stated: Frames
+
+
+def frame_terms(
+    observations: Observations, stated: Frames, rules: Sequence[Rule] = ()
+) -> FrameTerms:
+    """Terms of base and targets, all free but for ``rules``; ``stated``: where a fixed one is.
+
+    Raises InputError naming every rule about a frame that ``observations`` do not let estimate.
+    """
+    names = component_names(observations)
+    frames: dict[str, list[str]] = {}
+    for name in names:
+        frame, _, component = name.rpartition(".")
+        frames.setdefault(frame, []).append(component)
+    refuse(
+        [
+            Problem(f"{parameter_rules.KEYS[parameter_rules.FRAMES]}, {rule.name!r}", what, allowed)
+            for rule, what, allowed in parameter_rules.strangers(rules, observations.joints, frames)
+        ]
+    )
+    at_mm = [*stated.bases.position_mm, *stated.targets.position_mm]
+    place_mm = dict(zip(frames, at_mm, strict=True))
+    free, value = np.ones(len(names), dtype=bool), np.zeros(len(names))
+    std = np.full(len(names), np.inf)
+    for number, name in enumerate(names):
+        frame, _, component = name.rpartition(".")
+        if component.endswith("_mm"):
+            value[number] = place_mm[frame]["xyz".index(component[0])]
+        rule = parameter_rules.rule_for(rules, component, frame=frame)
+        if rule is not None:
+            unit = parameter_rules.unit(component)
+            free[number] = rule.free
+            value[number] = rule.value.get(unit, value[number])
+            std[number] = rule.std.get(unit, np.inf)
+    return FrameTerms(names, free, value, std, stated)
+
+
+def component_names(observations: Observations) -> tuple[str, ...]:
+    """Names of what can be estimated: a target turns where an orientation of it was measured."""
+    sessions = range(1, len(observations.session_names) + 1)
+    names = [f"{BASE}{i if i > 1 else ''}.{motion}" for i in sessions for motion in MOTIONS]
+    for target, turns in zip(
+        observations.target_names, orientations_measured(observations), strict=True
+    ):
+        names += [f"{target}.{motion}" for motion in (MOTIONS if turns else MOTIONS[:3])]
+    return tuple(names)
 
 
 def orientations_measured(observations: Observations) -> np.ndarray:
@@ -201,11 +144,118 @@ def orientations_measured(observations: Observations) -> np.ndarray:
     return found
 
 
-def with_stated_orientations(frames: Frames, stated: Frames, observations: Observations) -> Frames:
-    """``frames`` whose targets have the ``stated`` orientation where none was measured."""
-    measured = orientations_measured(observations)[:, None, None]
-    rotation = np.where(measured, frames.targets.rotation, stated.targets.rotation)
-    return Frames(frames.bases, Pose(rotation, frames.targets.position_mm))
+@dataclass(frozen=True)
+class FrameParameters:
+    """F components of base and targets as parameters of a fit.
+
+    ``begin`` (F,): where they start, about the orientations of ``reference``. ``free`` (F,): those
+    that are estimated. Priors expect ``mean`` (F,) within ``std`` (F,), inf for none. ``hidden``
+    (m, F): motions of unit length (mm and mrad) that the poses do not show and that are held.
+    No components (F = 0): base and targets are known, at ``reference``.
+    """
+
+    names: tuple[str, ...]
+    reference: Frames
+    begin: np.ndarray
+    free: np.ndarray
+    mean: np.ndarray
+    std: np.ndarray
+    hidden: np.ndarray
+    angle: np.ndarray = field(init=False)
+
+    def __post_init__(self) -> None:
+        angle = np.array([name.endswith("_rad") for name in self.names], dtype=bool)
+        object.__setattr__(self, "angle", angle)
+
+    @classmethod
+    def none(cls, frames: Frames) -> FrameParameters:
+        """No parameters: base and targets are ``frames``."""
+        blank = np.zeros(0)
+        return cls((), frames, blank, blank.astype(bool), blank, blank, np.zeros((0, 0)))
+
+    @classmethod
+    def of(
+        cls, observations: Observations, start: Frames, terms: FrameTerms | None
+    ) -> FrameParameters:
+        """Parameters that begin at ``start``, or where ``terms`` fix them.
+
+        Rotation vectors turn the stated orientation where one of their components is fixed or has a
+        prior, or where no orientation was measured; else that of ``start``.
+        """
+        names = component_names(observations)
+        size = len(names)
+        terms = terms or FrameTerms(
+            names, np.ones(size, bool), np.zeros(size), np.full(size, np.inf), start
+        )
+        order = [terms.names.index(name) for name in names]
+        free, value, std = terms.free[order], terms.value[order], terms.std[order]
+        bound = ~free | np.isfinite(std)
+        begin, reference = np.zeros(size), start
+        for kind, number, columns in _slots(names, start.sessions):
+            here, stated = getattr(start, kind), getattr(terms.stated, kind)
+            begin[columns[:3]] = here.position_mm[number]
+            turned = columns[3:]
+            if not len(turned) or bound[turned].any():
+                rotation = getattr(reference, kind).rotation.copy()
+                rotation[number] = stated.rotation[number]
+                if len(turned):
+                    apart = here.rotation[number] @ rotation[number].T
+                    begin[turned] = log_so3(apart[None])[0]
+                moved = Pose(rotation, here.position_mm)
+                reference = replace(reference, **{kind: moved})
+        begin[~free] = value[~free]
+        mean = np.where(np.isfinite(std), value, begin)
+        return cls(names, reference, begin, free, mean, std, np.zeros((0, size)))
+
+    @property
+    def size(self) -> int:
+        """Number of components F."""
+        return len(self.names)
+
+    @property
+    def scale(self) -> np.ndarray:
+        """Displacements (F,) that count as one mm."""
+        return np.where(self.angle, ANGLE_UNIT_RAD, 1.0)
+
+    @property
+    def slots(self) -> list[tuple[str, int, np.ndarray]]:
+        """``bases`` or ``targets``, the number of the frame and the indices of its components."""
+        return _slots(self.names, self.reference.sessions)
+
+    def frames(self, c: np.ndarray) -> Frames:
+        """``Frames`` at components ``c`` (F,)."""
+        found = {
+            kind: Pose(at.rotation.copy(), at.position_mm.copy())
+            for kind in ("bases", "targets")
+            for at in (getattr(self.reference, kind),)
+        }
+        for kind, number, columns in self.slots:
+            found[kind].position_mm[number] = c[columns[:3]]
+            if len(columns) == 6:
+                turned = exp_so3(c[columns[3:]]) @ found[kind].rotation[number]
+                found[kind].rotation[number] = turned
+        return Frames(**found)
+
+    def motions(self, c: np.ndarray) -> np.ndarray:
+        """Derivative (F, F) of shifts and turns of the frames in their components at ``c``."""
+        found = np.eye(self.size)
+        for _, _, columns in self.slots:
+            if len(columns) == 6:
+                found[np.ix_(columns[3:], columns[3:])] = left_jacobian(c[columns[3:]])
+        return found
+
+
+def _slots(names: Sequence[str], sessions: int) -> list[tuple[str, int, np.ndarray]]:
+    labels = [name.rpartition(".")[0] for name in names]
+    frames = list(dict.fromkeys(labels))
+    return [
+        (
+            "bases" if number < sessions else "targets",
+            number if number < sessions else number - sessions,
+            np.flatnonzero([label == frame for label in labels]),
+        )
+        for number, frame in enumerate(frames)
+    ]
 
 
 def left_jacobian(w_rad: np.ndarray) -> np.ndarray:
@@ -216,3 +266,13 @@ def left_jacobian(w_rad: np.ndarray) -> np.ndarray:
         return np.eye(3) + 0.5 * cross + cross @ cross / 6.0
     versine, excess = (1 - np.cos(angle)) / angle**2, (angle - np.sin(angle)) / angle**3
     return np.eye(3) + versine * cross + excess * (cross @ cross)
+
+
+def inverse_left_jacobians(w_rad: np.ndarray) -> np.ndarray:
+    """Inverses (n, 3, 3) of ``left_jacobian`` for rotation vectors (n, 3)."""
+    angle = np.linalg.norm(w_rad, axis=1)
+    half = 0.5 * np.maximum(angle, _SMALL_ANGLE_RAD)
+    series = 1 / 12 + angle**2 / 720
+    factor = np.where(angle < _SMALL_ANGLE_RAD, series, (1 - half / np.tan(half)) / (4 * half**2))
+    cross = skew(w_rad)
+    return np.eye(3) - 0.5 * cross + factor[:, None, None] * (cross @ cross)

@@ -4,16 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, NamedTuple, Protocol, Self
+from typing import Any, ClassVar, NamedTuple, Self
 
-import numpy as np
-
-from kinacc.calibration import dh_fit
-from kinacc.calibration.constrained import ConstrainedFrames, FrameTerms
-from kinacc.calibration.constraints import frame_terms
-from kinacc.calibration.frames import FrameCoordinates, Frames, known
+from kinacc.calibration.fitting import ModelFit, fit_frames
+from kinacc.calibration.frames import Frames, FrameTerms, frame_terms, known
 from kinacc.calibration.observations import Observations
-from kinacc.calibration.solve import Solution
 from kinacc.calibration.uncertainty import Uncertainty
 from kinacc.config import error_models, parameter_rules
 from kinacc.config.error_models import NOMINAL
@@ -80,34 +75,6 @@ class Common:
         return self.stated(observations), None
 
 
-class Fitted(Protocol):
-    """What a fit leaves: model, frames and how sure it is of them."""
-
-    @property
-    def model(self) -> ErrorModel:
-        """The model fitted."""
-
-    @property
-    def frames(self) -> Frames:
-        """Base and targets it was fitted with."""
-
-    @property
-    def std(self) -> np.ndarray:
-        """Standard deviations of the model's parameters, NaN where undetermined."""
-
-    @property
-    def free(self) -> np.ndarray:
-        """True for parameters that took part, of the shape of ``std``."""
-
-    @property
-    def coordinates(self) -> FrameCoordinates | ConstrainedFrames:
-        """What the first entries of ``solution`` stand for; the free parameters follow."""
-
-    @property
-    def solution(self) -> Solution:
-        """Figures of the fit."""
-
-
 @dataclass(frozen=True)
 class Estimator:
     """How models of one kind are fitted: what all fits share, and settings of its own."""
@@ -145,7 +112,7 @@ class Estimator:
 
     def fit(
         self, observations: Observations, others: Mapping[str, Fit], near: Fit | None = None
-    ) -> Fitted:
+    ) -> ModelFit:
         """The model of ``observations``; ``others`` are fitted already. Raises FitError.
 
         ``near``: a fit like this one to nearly the same observations, which may save steps.
@@ -185,12 +152,9 @@ def fit_all(
 def nominal_frames(observations: Observations, common: Common) -> Frames:
     """Base and targets of the nominal arm; nothing to fit where they are known. Raises FitError."""
     frames, terms = common.frames(observations)
-    return (
-        frames
-        or dh_fit.fit_frames(
-            observations,
-            common.nominal,
-            rotation_weight_mm_per_rad=common.rotation_weight_mm_per_rad,
-            frame_terms=terms,
-        ).frames
+    return frames or fit_frames(
+        observations,
+        common.nominal,
+        rotation_weight_mm_per_rad=common.rotation_weight_mm_per_rad,
+        frame_terms=terms,
     )

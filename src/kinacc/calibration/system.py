@@ -1,30 +1,25 @@
-"""Whitened residuals of a flange model seen through base and targets, with their Jacobian.
+"""Whitened residuals of a flange model seen through base and targets, and their normal equations.
 
-Numbers first, observations last: one operation for a whole block of them, and products of Jacobians
-without a copy.
+A parameter of a model may move the arm as a few motions do, times a function of the pose: a VEC
+coefficient is a joint's error times a Chebyshev polynomial. Normal equations follow from motions
+and functions without the Jacobian of the parameters ever being formed.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
-from kinacc.calibration.basis_expansion import Group, gram, spread_rows, summed
-from kinacc.calibration.frames import FrameCoordinates, left_jacobian
+from kinacc.calibration.frames import FrameParameters, inverse_left_jacobians, left_jacobian
 from kinacc.calibration.observations import Observations
 from kinacc.errors import InputError, Problem
-from kinacc.geometry import Pose, log_so3
-from kinacc.kinematics.chain import cross
+from kinacc.geometry import Pose, log_so3, skew
 from kinacc.kinematics.model import JointState
 
 BLOCK_ROWS = 1024
-WRITTEN_OUT = 350  # parameters up to which the written-out Jacobian is the shorter way to J'J
-_KEPT = 32  # blocks up to which functions of their poses are kept
-_NEAR = 0.5  # cosine of the angle below which a rotation vector follows from the skew part alone
-_SMALL_ANGLE_RAD = 1e-3
 
 
 def require_enough(observations: Observations, parameters: int, name: str, fix: str) -> None:
@@ -38,89 +33,35 @@ def require_enough(observations: Observations, parameters: int, name: str, fix: 
         raise InputError(Problem("measurements", what, allowed, fix))
 
 
-Pull = Callable[[np.ndarray, np.ndarray], np.ndarray]
+@dataclass(frozen=True)
+class Group:
+    """Motions ``columns``, each spread over the T functions ``basis`` (n, T); None: as they are.
+
+    Parameters follow motion by motion, function by function.
+    """
+
+    columns: slice
+    basis: np.ndarray | None = None
+
+    @property
+    def motions(self) -> int:
+        """Number of motions."""
+        return self.columns.stop - self.columns.start
 
 
 @dataclass(frozen=True)
 class FlangeModel:
-    """A kinematic model with P parameters, as functions of the vector and of the observations.
+    """A kinematic model with P parameters, as functions of their vector and of joint states.
 
-    ``pose(x, at)``: flange poses (n, ...). ``linearised(x, at)``: these and motions (E, 6, n),
-    rows 0-2 mm per parameter, rows 3-5 the rotation vector w of ``exp(w) R``, robot base. Motions
-    are those of the parameters, E = P, or ``expansion(at)`` spreads them over these. None: P = 0.
-    ``pulled(x, at)``: poses and, of forces and moments (3, n) on the flange, their product (E, n)
-    with the motions, where that takes less than these.
+    ``pose(x, at)``: flange poses (n, ...). ``linearised(x, at)``: these and motions (n, 6, E), rows
+    0-2 mm per parameter, rows 3-5 the rotation vector w of ``exp(w) R``, robot base. Motions are
+    those of the parameters, E = P, or ``expansion(at)`` spreads them over these. None: P = 0.
     """
 
     size: int
     pose: Callable[[np.ndarray, JointState], Pose]
     linearised: Callable[[np.ndarray, JointState], tuple[Pose, np.ndarray]] | None = None
     expansion: Callable[[JointState], list[Group]] | None = None
-    pulled: Callable[[np.ndarray, JointState], tuple[Pose, Pull]] | None = None
-
-    def with_motions(self, x: np.ndarray, at: JointState) -> tuple[Pose, np.ndarray]:
-        """Flange poses (n, ...) and motions (E, 6, n)."""
-        if self.linearised is None:
-            return self.pose(x, at), np.zeros((0, 6, len(at)))
-        return self.linearised(x, at)
-
-
-@dataclass(frozen=True)
-class _Part:
-    """A block of n observations as residuals need it, which no parameter changes.
-
-    ``components`` 3, or 6 where an orientation was measured; ``turned`` (n,) says where.
-    ``centred`` (3, n): positions about their session's centroid; ``rotation`` (3, 3, n): measured,
-    the identity where not. ``sessions``, ``targets``: which there are, and their rows.
-    ``root`` (n,): factors of the residuals, None for ones.
-    """
-
-    at: JointState
-    target: np.ndarray
-    turned: np.ndarray
-    centred: np.ndarray
-    rotation: np.ndarray
-    sessions: tuple[tuple[int, np.ndarray | slice], ...]
-    targets: tuple[tuple[int, np.ndarray | slice], ...]
-    root: np.ndarray | None
-
-    @classmethod
-    def of(
-        cls, seen: Observations, coordinates: FrameCoordinates, root: np.ndarray | None
-    ) -> _Part:
-        """``seen`` under what ``coordinates`` know of it."""
-        turned = seen.has_rotation
-        rotation = np.where(turned[:, None, None], seen.rotation, np.eye(3))
-        return cls(
-            seen.at,
-            seen.target,
-            turned,
-            np.ascontiguousarray((seen.position_mm - coordinates.centroid_mm[seen.session]).T),
-            np.ascontiguousarray(rotation.transpose(1, 2, 0)),
-            _rows(seen.session),
-            _rows(seen.target),
-            root,
-        )
-
-    @property
-    def components(self) -> int:
-        return 6 if self.turned.any() else 3
-
-    @cached_property
-    def factor(self) -> np.ndarray | None:
-        """Factors (c, n) of the residuals, 0 where nothing was measured; None for ones."""
-        if self.root is None and (self.components == 3 or self.turned.all()):
-            return None
-        factor = np.ones((self.components, len(self.turned)))
-        factor[3:] = self.turned
-        return factor if self.root is None else factor * self.root
-
-    @property
-    def kept(self) -> np.ndarray:
-        """True (n, c) where a component was measured."""
-        kept = np.ones((len(self.turned), self.components), dtype=bool)
-        kept[:, 3:] = self.turned[:, None]
-        return kept
 
 
 @dataclass(frozen=True)
@@ -129,307 +70,182 @@ class PoseSystem:
 
     Per observation three position residuals and, where an orientation was measured, three of the
     rotation vector log(R_model R_measured'), times ``rotation_weight_mm_per_rad``. Parameters: the
-    frame coordinates first, then the model's. ``root`` (n,): factors of the residuals of every
-    observation, None for ones.
+    components of ``frames`` first, then the model's. ``root`` (n,): factors of the residuals of
+    every observation, None for ones.
     """
 
     observations: Observations
     model: FlangeModel
-    coordinates: FrameCoordinates
+    frames: FrameParameters
     rotation_weight_mm_per_rad: float
     root: np.ndarray | None = None
 
     @property
     def size(self) -> int:
         """Number of parameters."""
-        return self.coordinates.size + self.model.size
+        return self.frames.size + self.model.size
 
     @property
-    def count(self) -> int:
-        """Number of residuals."""
-        return self.observations.components
+    def counts(self) -> np.ndarray:
+        """Numbers (2,) of residuals of positions and of rotations."""
+        seen = self.observations
+        return 3 * np.array([len(seen), int(seen.has_rotation.sum())])
 
     def weighted(self, root: np.ndarray) -> PoseSystem:
         """The same residuals times ``root`` (n,) by observation."""
         return replace(self, root=root)
 
-    def cost(self, x: np.ndarray) -> float:
-        """Sum of squared whitened residuals."""
-        return sum(float(np.vdot(each, each)) for each in self._residuals(x))
-
     def residual(self, x: np.ndarray) -> np.ndarray:
         """All residuals (m,), observation by observation."""
-        found = zip(self._residuals(x), self._parts, strict=True)
-        return np.concatenate([residual.T[part.kept] for residual, part in found])
+        found = []
+        for part, factor, _ in self._parts:
+            pose = self.model.pose(x[self.frames.size :], part.at)
+            residual = _Seen(self, x, part, pose).residual
+            found.append((residual * factor)[factor > 0.0])
+        return np.concatenate(found)
 
     def blocks(self, x: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Residual (m,) and Jacobian (m, P) per block of observations, ordered as ``residual``."""
-        for part in self._parts:
-            rows = spread_rows(self._columns(x, part), self._groups(part))
-            rows = rows.transpose(2, 1, 0)[part.kept]
+        for part, factor, groups in self._parts:
+            rows = spread(self._columns(x, part, factor), groups)[factor > 0.0]
             yield rows[:, -1], rows[:, :-1]
 
-    def stacked(self, x: np.ndarray) -> Iterator[tuple[int, np.ndarray]]:
-        """Rows of ``[J | r]`` (m, P+1) in any order: 0 and those of positions, 1 and of rotations.
+    def normal(self, x: np.ndarray, by_kind: bool = False) -> np.ndarray:
+        """Gram matrices (K, P+1, P+1) of ``[J | r]``: normal equations and, last, the cost.
 
-        Rows that were not measured are zero.
+        K = 1 for all residuals, or 2 ``by_kind``: of positions and of rotations.
         """
-        for part in self._parts:
-            columns, groups = self._columns(x, part), self._groups(part)
-            for begin in range(0, part.components, 3):
-                rows = spread_rows(columns[:, begin : begin + 3], groups)
-                yield begin // 3, rows.reshape(len(rows), -1).T
-
-    def gram(self, x: np.ndarray) -> np.ndarray:
-        """Gram matrix (P+1, P+1) of ``[J | r]``: normal equations and, last, the cost."""
-        total = np.zeros((self.size + 1, self.size + 1))
-        for part in self._parts:
-            columns, groups = self._columns(x, part), self._groups(part)
-            if self.size > WRITTEN_OUT:
-                total += gram(np.ascontiguousarray(columns.transpose(2, 1, 0)), groups)
-            else:
-                rows = spread_rows(columns, groups).reshape(len(total), -1)
-                total += rows @ rows.T
+        kinds = (slice(0, 3), slice(3, 6)) if by_kind else (slice(None),)
+        total = np.zeros((len(kinds), self.size + 1, self.size + 1))
+        for part, factor, groups in self._parts:
+            columns = self._columns(x, part, factor)
+            for number, kind in enumerate(kinds):
+                total[number] += gram(columns[:, kind], groups)
         return total
 
-    def gradient(self, x: np.ndarray) -> np.ndarray:
-        """The last row (P+1,) of ``gram`` alone."""
-        total = np.zeros(self.size + 1)
-        for part in self._parts:
-            if self.model.pulled is None:
-                columns = self._columns(x, part)
-                seen = np.einsum("ecn,cn->en", columns, columns[-1])
-            else:
-                seen = self._pulled(x, part)
-            total += summed(seen, self._groups(part))
-        return total
-
-    def gram_blocks(self, x: np.ndarray) -> Iterator[tuple[np.ndarray, list[Group]]]:
-        """Per block the columns (n, c, E+1) of motions and, last, residuals, and their groups.
-
-        c is 3, or 6 where an orientation was measured. Rows that were not measured are zero.
-        """
-        for part in self._parts:
-            columns = self._columns(x, part).transpose(2, 1, 0)
-            yield np.ascontiguousarray(columns), self._groups(part)
-
     @cached_property
-    def _parts(self) -> list[_Part]:
-        seen, root = self.observations, self.root
-        blocks = [slice(at, at + BLOCK_ROWS) for at in range(0, len(seen), BLOCK_ROWS)]
-        return [
-            _Part.of(seen.select(rows), self.coordinates, None if root is None else root[rows])
-            for rows in blocks
-        ]
-
-    @cached_property
-    def _kept_groups(self) -> dict[int, list[Group]]:
-        return {}
-
-    def _groups(self, part: _Part) -> list[Group]:
-        if len(self._parts) > _KEPT:
-            return self._expanded(part)
-        found = self._kept_groups.get(id(part))
-        if found is None:
-            found = self._kept_groups[id(part)] = self._expanded(part)
+    def _parts(self) -> list[tuple[Observations, np.ndarray, list[Group]]]:
+        """Blocks of observations, factors (n, 3 or 6) of residuals, 0 if not measured, groups."""
+        found = []
+        for begin in range(0, len(self.observations), BLOCK_ROWS):
+            rows = slice(begin, begin + BLOCK_ROWS)
+            part = self.observations.select(rows)
+            turned = part.has_rotation
+            factor = np.ones((len(part), 6 if turned.any() else 3))
+            factor[:, 3:] = turned[:, None]
+            if self.root is not None:
+                # An observation of no weight stays a row.
+                factor *= np.maximum(self.root[rows], np.finfo(float).tiny)[:, None]
+            found.append((part, factor, self._groups(part.at)))
         return found
 
-    def _expanded(self, part: _Part) -> list[Group]:
-        frames = self.coordinates.size
+    def _groups(self, at: JointState) -> list[Group]:
         if self.model.expansion is None:
-            return [Group(slice(0, self.size + 1), None)]
-        groups, end = [Group(slice(0, frames), None)], frames
-        for group in self.model.expansion(part.at):
-            end = group.columns.stop + frames
-            groups.append(Group(slice(group.columns.start + frames, end), group.basis))
-        return [*groups, Group(slice(end, end + 1), None)]
+            return [Group(slice(0, self.size + 1))]
+        groups, end = [Group(slice(0, self.frames.size))], self.frames.size
+        for each in self.model.expansion(at):
+            groups.append(Group(slice(end, end + each.motions), each.basis))
+            end += each.motions
+        return [*groups, Group(slice(end, end + 1))]
 
-    def _residuals(self, x: np.ndarray) -> Iterator[np.ndarray]:
-        for part in self._parts:
-            flange = self.model.pose(x[self.coordinates.size :], part.at)
-            residual = self._seen(x, part, flange).residual
-            yield residual if part.factor is None else residual * part.factor
-
-    def _columns(self, x: np.ndarray, part: _Part) -> np.ndarray:
-        """Motions and, last, residuals of a block (E+1, c, n)."""
-        frames = self.coordinates.size
-        flange, motions = self.model.with_motions(x[frames:], part.at)
-        seen = self._seen(x, part, flange)
-        columns = np.zeros((frames + len(motions) + 1, part.components, len(part.turned)))
-        columns[-1] = seen.residual
-        own = columns[frames:-1]
-        own[:, :3] = motions[:, :3]
-        turns = motions[:, 3:]
-        if self._arms_matter():
-            # A turn of the flange swings the target's arm: w x arm.
-            for axis in range(3):
-                u, v = (axis + 1) % 3, (axis + 2) % 3
-                own[:, axis] += turns[:, u] * seen.arm[v]
-                own[:, axis] -= turns[:, v] * seen.arm[u]
-        turning = None
-        if part.components == 6:
-            turning = self.rotation_weight_mm_per_rad * _inverse_left_jacobian(seen.angles)
-            for axis in range(3):
-                np.multiply(turns[:, 0], turning[axis, 0], out=own[:, 3 + axis])
-                own[:, 3 + axis] += turns[:, 1] * turning[axis, 1]
-                own[:, 3 + axis] += turns[:, 2] * turning[axis, 2]
-        if frames:
-            self._fill_frames(columns, x[:frames], part, seen, turning)
-        if part.factor is not None:
-            columns *= part.factor
-        return columns
-
-    def _pulled(self, x: np.ndarray, part: _Part) -> np.ndarray:
-        """``_columns`` (E+1, c, n) times residuals, summed over c, without the motions."""
-        coordinates, frames = self.coordinates, self.coordinates.size
-        flange, pull = self.model.pulled(x[frames:], part.at)
-        seen = self._seen(x, part, flange)
-        residual = seen.residual
-        squared = residual * residual
-        if part.factor is not None:
-            residual, squared = residual * part.factor**2, squared * part.factor**2
-        force, moment = residual[:3], np.zeros_like(residual[:3])
-        turning = None
-        if part.components == 6:
-            turning = self.rotation_weight_mm_per_rad * _inverse_left_jacobian(seen.angles)
-            moment = np.einsum("ijn,in->jn", turning, residual[3:])
-        own = pull(force, moment + cross(seen.arm, force))
-        found = np.zeros((frames + len(own) + 1, len(part.turned)))
-        found[frames:-1], found[-1] = own, squared.sum(axis=0)
-        for session, rows in part.sessions if coordinates.base_free else ():
-            begin = coordinates.base_columns(session).start
-            about = cross(force[:, rows], seen.turned[:, rows])
-            if turning is not None:
-                about -= np.einsum("ijn,jn->in", turning[..., rows], residual[3:, rows])
-            found[begin : begin + 3, rows] = -force[:, rows]
-            found[begin + 3 : begin + 6, rows] = left_jacobian(x[begin + 3 : begin + 6]).T @ about
-        for target, rows in part.targets if coordinates.targets_free else ():
-            begin, rotation = coordinates.target_columns(target).start, seen.rotation[..., rows]
-            found[begin : begin + 3, rows] = np.einsum("ijn,in->jn", rotation, force[:, rows])
-            if turning is not None and coordinates.turns[target]:
-                about = np.einsum("ijn,in->jn", rotation, moment[:, rows])
-                turn = left_jacobian(x[begin + 3 : begin + 6])
-                found[begin + 3 : begin + 6, rows] = turn.T @ about
-        return found
-
-    def _seen(self, x: np.ndarray, part: _Part, flange: Pose) -> _Seen:
-        frame_x = x[: self.coordinates.size]
-        targets = self.coordinates.targets(frame_x)
-        rotation = np.ascontiguousarray(flange.rotation.transpose(1, 2, 0))
-        place = targets.position_mm[part.target].T
-        arm = rotation[:, 0] * place[0] + rotation[:, 1] * place[1] + rotation[:, 2] * place[2]
-        full = part.components == 6
-        measured = np.empty_like(part.rotation) if full else None
-        turned, shift = np.empty_like(part.centred), np.empty_like(part.centred)
-        for session, rows in part.sessions:
-            inverse = self.coordinates.inverse_base(frame_x, session)
-            turned[:, rows] = inverse.rotation @ part.centred[:, rows]
-            shift[:, rows] = inverse.position_mm[:, None]
-            if full:
-                measured[..., rows] = np.tensordot(inverse.rotation, part.rotation[..., rows], 1)
-        residual = np.empty((part.components, len(part.turned)))
-        residual[:3] = flange.position_mm.T + arm - turned - shift
-        angles = None
-        if full:
-            held = np.empty_like(rotation)
-            for target, rows in part.targets:
-                own = targets.rotation[target]
-                held[..., rows] = np.einsum("ikn,kj->ijn", rotation[..., rows], own)
-            apart = sum(held[:, None, k] * measured[None, :, k] for k in range(3))
-            angles = _rotation_vector(apart)
-            if not part.turned.all():
-                angles[:, ~part.turned] = 0.0
-            residual[3:] = self.rotation_weight_mm_per_rad * angles
-        return _Seen(residual, rotation, arm, turned, angles)
-
-    def _arms_matter(self) -> bool:
-        free = self.coordinates.targets_free
-        return free or bool(np.any(self.coordinates.anchor.targets.position_mm))
-
-    def _fill_frames(self, columns, frame_x, part, seen, turning):
-        coordinates = self.coordinates
-        for session, rows in part.sessions if coordinates.base_free else ():
-            begin = coordinates.base_columns(session).start
-            turn = left_jacobian(frame_x[begin + 3 : begin + 6])
-            for axis in range(3):
-                columns[begin + axis, axis, rows] = -1.0
-                about = turn[:, axis, None]
-                columns[begin + 3 + axis][:3, rows] = cross(seen.turned[:, rows], about)
-                if turning is not None:
-                    # The measured side stands behind exp(r): L^-1 exp(r) is the transposed L^-1.
-                    moved = np.einsum("jin,j->in", turning[..., rows], -turn[:, axis])
-                    columns[begin + 3 + axis][3:, rows] = moved
-        for target, rows in part.targets if coordinates.targets_free else ():
-            begin, rotation = coordinates.target_columns(target).start, seen.rotation[..., rows]
-            columns[begin : begin + 3, :3, rows] = rotation.transpose(1, 0, 2)
-            if turning is None or not coordinates.turns[target]:
-                continue
-            turn = left_jacobian(frame_x[begin + 3 : begin + 6])
-            for axis in range(3):
-                about = np.einsum("ijn,j->in", rotation, turn[:, axis])
-                moved = np.einsum("ijn,jn->in", turning[..., rows], about)
-                columns[begin + 3 + axis][3:, rows] = moved
+    def _columns(self, x: np.ndarray, part: Observations, factor: np.ndarray) -> np.ndarray:
+        """Motions and, last, residuals of a block (n, 3 or 6, E+1), times ``factor``."""
+        frames = self.frames.size
+        if self.model.linearised is None:
+            pose, motions = self.model.pose(x, part.at), np.zeros((len(part), 6, 0))
+        else:
+            pose, motions = self.model.linearised(x[frames:], part.at)
+        seen = _Seen(self, x, part, pose)
+        count = factor.shape[1]
+        columns = np.zeros((len(part), count, frames + motions.shape[2] + 1))
+        # A turn w of the flange swings the target's arm: w x arm.
+        columns[:, :3, frames:-1] = motions[:, :3] - skew(seen.arm) @ motions[:, 3:]
+        if count == 6:
+            columns[:, 3:, frames:-1] = seen.turning @ motions[:, 3:]
+        for kind, number, own in self.frames.slots:
+            rows = part.session == number if kind == "bases" else part.target == number
+            if rows.any():
+                turn = left_jacobian(x[own[3:]]) if len(own) == 6 else None
+                columns[rows, :, own[0] : own[-1] + 1] = seen.of_frame(kind, rows, turn, count)
+        columns[:, :, -1] = seen.residual
+        return columns * factor[:, :, None]
 
 
-@dataclass(frozen=True)
 class _Seen:
-    """Residuals (c, n) of a block, and what they are made of.
+    """Residuals (n, 3 or 6) of a block at flange poses, and what their derivatives are made of.
 
-    ``rotation`` (3, 3, n) of the flange, ``arm`` (3, n) from there to the target, ``turned`` (3, n)
-    measured points in the robot base about their centroid, ``angles`` (3, n) of rotation residuals.
+    ``arm`` (n, 3): from the flange to the target, robot base; ``turning`` (n, 3, 3): derivative of
+    rotation residuals by turns of the model in the robot base.
     """
 
-    residual: np.ndarray
-    rotation: np.ndarray
-    arm: np.ndarray
-    turned: np.ndarray
-    angles: np.ndarray | None
+    def __init__(self, system: PoseSystem, x: np.ndarray, part: Observations, flange: Pose) -> None:
+        frames = system.frames.frames(x[: system.frames.size])
+        self.flange = flange.rotation
+        self.back = np.swapaxes(frames.bases.rotation, 1, 2)[part.session]
+        self.reach = part.position_mm - frames.bases.position_mm[part.session]
+        place = frames.targets.position_mm[part.target]
+        self.arm = (flange.rotation @ place[:, :, None])[..., 0]
+        local = (self.back @ self.reach[:, :, None])[..., 0]
+        self.residual = flange.position_mm + self.arm - local
+        turned = part.has_rotation
+        self.turning = None
+        if turned.any():
+            weight = system.rotation_weight_mm_per_rad
+            model = flange.rotation @ frames.targets.rotation[part.target]
+            seen = self.back @ np.where(turned[:, None, None], part.rotation, np.eye(3))
+            angles = log_so3(model @ np.swapaxes(seen, 1, 2)) * turned[:, None]
+            self.residual = np.concatenate([self.residual, weight * angles], axis=1)
+            self.turning = weight * inverse_left_jacobians(angles)
+
+    def of_frame(
+        self, kind: str, rows: np.ndarray, turn: np.ndarray | None, count: int
+    ) -> np.ndarray:
+        """Derivative (r, 3 or 6, 3 or 6) of residuals by the components of one base or target."""
+        ahead = self.back[rows] if kind == "bases" else self.flange[rows]
+        found = np.zeros((len(ahead), count, 3 if turn is None else 6))
+        found[:, :3, :3] = ahead
+        if turn is None:
+            return found
+        about = ahead @ turn
+        if kind == "bases":
+            found[:, :3, 3:] = -ahead @ skew(self.reach[rows]) @ turn
+        if count == 6:
+            # The measured side stands behind exp(r): L^-1 exp(r) is the transposed L^-1.
+            turning = self.turning[rows]
+            turning = np.swapaxes(turning, 1, 2) if kind == "bases" else turning
+            found[:, 3:, 3:] = turning @ about
+        return found
 
 
-def _rows(label: np.ndarray) -> tuple[tuple[int, np.ndarray | slice], ...]:
-    """Every label (n,) with its rows."""
-    found = np.unique(label)
-    if found.size == 1:
-        return ((int(found[0]), slice(None)),)
-    return tuple((int(each), np.flatnonzero(label == each)) for each in found)
+def spread(columns: np.ndarray, groups: Sequence[Group]) -> np.ndarray:
+    """Jacobian (n, m, P) in the parameters, from the motions ``columns`` (n, m, E)."""
+    parts = []
+    for group in groups:
+        own = columns[:, :, group.columns]
+        if group.basis is not None:
+            own = (own[..., None] * group.basis[:, None, None, :]).reshape(*own.shape[:2], -1)
+        parts.append(own)
+    return np.concatenate(parts, axis=2)
 
 
-def _rotation_vector(rotation: np.ndarray) -> np.ndarray:
-    """Rotation vectors (3, n) of rotations (3, 3, n)."""
-    cosine = 0.5 * (rotation[0, 0] + rotation[1, 1] + rotation[2, 2] - 1.0)
-    if not np.all(cosine > _NEAR):
-        return np.ascontiguousarray(log_so3(rotation.transpose(2, 0, 1)).T)
-    skewed = 0.5 * np.stack(
-        [
-            rotation[2, 1] - rotation[1, 2],
-            rotation[0, 2] - rotation[2, 0],
-            rotation[1, 0] - rotation[0, 1],
-        ]
-    )
-    square = skewed[0] ** 2 + skewed[1] ** 2 + skewed[2] ** 2
-    sine = np.sqrt(square)
-    small = sine < _SMALL_ANGLE_RAD
-    factor = 1.0 + square / 6.0 + 0.075 * square**2
-    if not small.all():
-        safe = np.where(small, 1.0, sine)
-        factor = np.where(small, factor, np.arctan2(safe, cosine) / safe)
-    return factor * skewed
-
-
-def _inverse_left_jacobian(angles: np.ndarray) -> np.ndarray:
-    """Inverse left Jacobians (3, 3, n) of rotation vectors (3, n), as ``frames`` has them."""
-    square = angles[0] ** 2 + angles[1] ** 2 + angles[2] ** 2
-    angle = np.sqrt(square)
-    factor = 1 / 12 + square / 720
-    small = angle < _SMALL_ANGLE_RAD
-    if not small.all():
-        half = 0.5 * np.where(small, 1.0, angle)
-        factor = np.where(small, factor, (1 - half / np.tan(half)) / (4 * half**2))
-    found = factor * angles[:, None] * angles[None]
-    found += np.eye(3)[..., None] * (1.0 - factor * square)
-    half = 0.5 * angles
-    for axis in range(3):
-        u, v = (axis + 1) % 3, (axis + 2) % 3
-        found[u, v] += half[axis]
-        found[v, u] -= half[axis]
-    return found
+def gram(columns: np.ndarray, groups: Sequence[Group]) -> np.ndarray:
+    """Gram matrix (P, P) of the spread Jacobian of ``columns`` (n, m, E), summed over n and m."""
+    if all(group.basis is None for group in groups):
+        rows = columns.reshape(-1, columns.shape[2])
+        return rows.T @ rows
+    products = np.swapaxes(columns, 1, 2) @ columns  # (n, E, E)
+    ones = np.ones((len(columns), 1))
+    bases = [ones if group.basis is None else group.basis for group in groups]
+    ends = np.cumsum([0, *(g.motions * b.shape[1] for g, b in zip(groups, bases, strict=True))])
+    result = np.empty((ends[-1], ends[-1]))
+    for i, (first, basis) in enumerate(zip(groups, bases, strict=True)):
+        for j, (second, other) in enumerate(zip(groups[: i + 1], bases, strict=False)):
+            # A GEMM over the poses: every pair of motions against every pair of functions.
+            own = products[:, first.columns, second.columns].reshape(len(columns), -1)
+            both = (basis[:, :, None] * other[:, None, :]).reshape(len(columns), -1)
+            shape = first.motions, second.motions, basis.shape[1], other.shape[1]
+            block = (own.T @ both).reshape(shape).transpose(0, 2, 1, 3)
+            block = block.reshape(shape[0] * shape[2], shape[1] * shape[3])
+            result[ends[i] : ends[i + 1], ends[j] : ends[j + 1]] = block
+            result[ends[j] : ends[j + 1], ends[i] : ends[i + 1]] = block.T
+    return result

@@ -8,13 +8,13 @@ import numpy as np
 
 from kinacc.calibration.blind_groups import LeftOpen
 from kinacc.calibration.blind_words import reasons
-from kinacc.calibration.dh_fit import DHFit
+from kinacc.calibration.evidence import Choice
+from kinacc.calibration.fitting import ModelFit
 from kinacc.calibration.frames import Frames, stacked
 from kinacc.calibration.identified import IDENTIFIED, PRIOR, Parameter
-from kinacc.calibration.selection import Choice
 from kinacc.calibration.solve import Solution, Spectrum
 from kinacc.calibration.uncertainty import Uncertainty, scaled_unit, unit_of
-from kinacc.calibration.vec_fit import Prior, VECFit
+from kinacc.calibration.vec_fit import Prior
 from kinacc.geometry import quaternion_from_rotation
 from kinacc.kinematics.tables import frame
 from kinacc.tables.columns import Columns
@@ -52,13 +52,13 @@ def frames_of(
     return Frames(stacked(bases), stacked(targets))
 
 
-def vec_fit_columns(fit: VECFit, gauge: Spectrum, uncertainty: Uncertainty) -> Columns:
+def vec_fit_columns(fit: ModelFit, gauge: Spectrum, uncertainty: Uncertainty) -> Columns:
     """``vec_fit``: figures of the fit, the prior of every coefficient, singular values.
 
     And the directions of base and targets that the data do not determine.
     """
     rows = [*_solution_rows(fit.solution), *_spectrum_rows(gauge)]
-    names = fit.model.parameter_names
+    names = fit.model.names
     units = ["mm" if "delta" in name else "rad" for name in names]
     rows += [
         ("prior_std", number, name, value, unit)
@@ -74,15 +74,20 @@ def vec_orders_columns(choices: Sequence[Choice], stated: tuple[int, Prior]) -> 
 
     Without ``choices`` the ``stated`` order and prior are the one row there is.
     """
-    rows = []
+    rows = [(None, stated[0], *_stated(stated[1]), None, None, True)] if not choices else []
     for choice in choices:
-        for held_out in choice.held_out or (None,):
-            for trial in choice.trials:
-                figures = trial.rms_mm, *trial.excess_mm2(choice.best)
-                tried = trial.order, *_stated(trial.prior)
-                rows.append((held_out, *tried, *figures, trial is choice.chosen))
-    if not rows:
-        rows = [(None, stated[0], *_stated(stated[1]), None, None, None, True)]
+        best = max(trial.log_evidence for trial in choice.trials)
+        rows += [
+            (
+                choice.held_out,
+                trial.order,
+                *_stated(trial.prior),
+                trial.log_evidence,
+                trial.log_evidence - best,
+                trial is choice.chosen,
+            )
+            for trial in choice.trials
+        ]
     return columns_of("vec_orders", rows)
 
 
@@ -100,7 +105,7 @@ def chosen_order(columns: Mapping, fold: int | None) -> tuple[int, float, float]
     )
 
 
-def fit_columns(name: str, fit: DHFit, uncertainty: Uncertainty) -> Columns:
+def fit_columns(name: str, fit: ModelFit, uncertainty: Uncertainty) -> Columns:
     """``dh_fit`` or its like: figures, singular values, directions the data do not determine."""
     rows = [*_solution_rows(fit.solution), *_spectrum_rows(fit.solution.spectrum)]
     if fit.weights is not None:

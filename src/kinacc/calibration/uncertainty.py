@@ -18,7 +18,7 @@ import numpy as np
 from kinacc.calibration.frames import ANGLE_UNIT_RAD
 
 if TYPE_CHECKING:
-    from kinacc.calibration.models import Fitted
+    from kinacc.calibration.fitting import ModelFit
 
 
 @dataclass(frozen=True)
@@ -37,17 +37,15 @@ class Uncertainty:
     @property
     def determined(self) -> np.ndarray:
         """True (P,) where no undetermined direction reaches a parameter."""
-        from kinacc.calibration.truncated_svd import TOUCH_SQUARED
+        from kinacc.calibration.solve import TOUCH_SQUARED
 
         return np.sum(self.undetermined**2, axis=0) <= TOUCH_SQUARED
 
 
-def of_fit(fit: Fitted, target_names: tuple[str, ...]) -> Uncertainty:
+def of_fit(fit: ModelFit, target_names: tuple[str, ...]) -> Uncertainty:
     """Uncertainty of base and targets if estimated, then of the parameters that took part."""
     names, change = _named(fit, target_names)
-    undetermined = np.zeros((0, len(names)))
-    if fit.solution.undetermined is not None:
-        undetermined = _directions(fit, fit.solution.undetermined, names, change)
+    undetermined = _directions(fit, fit.solution.undetermined, names, change)
     return Uncertainty(names, change @ fit.solution.covariance @ change.T, undetermined)
 
 
@@ -87,25 +85,23 @@ def _unit(name: str) -> tuple[str, float]:
 
 
 def named_directions(
-    fit: Fitted, target_names: tuple[str, ...], directions: np.ndarray
+    fit: ModelFit, target_names: tuple[str, ...], directions: np.ndarray
 ) -> np.ndarray:
     """Directions (m, P) of a fit's own coordinates, in units of its scale, as of its names."""
     return _directions(fit, directions, *_named(fit, target_names))
 
 
-def _named(fit: Fitted, target_names: tuple[str, ...]) -> tuple[tuple[str, ...], np.ndarray]:
+def _named(fit: ModelFit, target_names: tuple[str, ...]) -> tuple[tuple[str, ...], np.ndarray]:
     """Names of motions and parameters, and their derivative in the fit's own coordinates."""
-    free = list(compress(fit.model.parameter_names, fit.free.ravel()))
-    frames, moving = fit.coordinates.size, fit.coordinates.motion_names(target_names)
-    names = (*moving, *free)
-    change = np.zeros((len(names), len(fit.solution.x)))
-    change[: len(moving), :frames] = fit.coordinates.motions(fit.solution.x[:frames])
-    change[len(moving) :, frames:] = np.eye(len(free))
-    return names, change
+    free = list(compress(fit.model.names, fit.free.ravel()))
+    frames = fit.parameters.size
+    change = np.eye(len(fit.solution.x))
+    change[:frames, :frames] = fit.parameters.motions(fit.solution.x[:frames])
+    return (*fit.parameters.names, *free), change
 
 
 def _directions(
-    fit: Fitted, directions: np.ndarray, names: tuple[str, ...], change: np.ndarray
+    fit: ModelFit, directions: np.ndarray, names: tuple[str, ...], change: np.ndarray
 ) -> np.ndarray:
     return (directions * fit.solution.scale) @ change.T / _units(names)
 

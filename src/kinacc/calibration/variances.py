@@ -2,40 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from itertools import combinations_with_replacement
+from typing import TYPE_CHECKING
 
 import numpy as np
+import scipy
 
 from kinacc.calibration.observations import Observations
-from kinacc.calibration.solve import System
 from kinacc.measurements.folds import configurations
+
+if TYPE_CHECKING:
+    from kinacc.calibration.system import PoseSystem
 
 WORST_CONDITION = 1e6  # of the equations for variances: beyond it they cannot be told apart
 LEAST_FREEDOM = 1e-12  # in residuals
-
-
-def along_root(
-    costs: np.ndarray,
-    counts: np.ndarray,
-    fitted: Sequence[np.ndarray],
-    told: Sequence[np.ndarray],
-    pooled: float,
-) -> np.ndarray:
-    """Covariance (r, r) of coordinates along a root: root C root' is that of the parameters.
-
-    The sandwich of a least-squares estimator between residuals of two variances; were they equal
-    it would be ``pooled`` times the identity. A root (P, r) times its transpose inverts J'J and the
-    prior's rows. ``fitted``: the Jacobian of positions and that of rotations along the root of the
-    fit, or their triangular factors (m, r), which have the same products; ``told`` along that of
-    the directions spoken of. ``costs`` and ``counts`` (2,) of residuals; ``pooled`` is the variance
-    of the prior's rows too.
-    """
-    parts = np.stack([each.T @ each for each in fitted])
-    apart = of_kinds(costs, counts, parts, pooled)
-    parts = np.stack([each.T @ each for each in told])
-    own = np.einsum("i,iab->ab", apart - pooled, parts)
-    return pooled * np.eye(parts.shape[1]) + own
 
 
 def of_kinds(costs: np.ndarray, counts: np.ndarray, parts: np.ndarray, pooled: float) -> np.ndarray:
@@ -84,19 +64,21 @@ def shared_errors(observations: Observations) -> tuple[np.ndarray, ...]:
     return tuple(np.where(kind, 6 * each[row] + axis, -1) for each in levels for kind in kinds)
 
 
-def along_root_shared(
-    system: System,
+def along_root(
+    system: PoseSystem,
     x: np.ndarray,
     errors: tuple[np.ndarray, ...],
     fitted: np.ndarray,
     told: np.ndarray,
     pooled: float,
 ) -> np.ndarray:
-    """As ``along_root``, for residuals that are sums of ``errors`` (see ``shared_errors``).
+    """Covariance (r, r) of coordinates along ``told`` (P, r): told C told' is the parameters'.
 
-    The variance of each kind of error follows from the sums of squares of residuals added up by
-    label, whose expectations are linear in all variances; none is negative. A kind that the
-    residuals cannot tell from those before it is left out, the last ones first.
+    The sandwich of a least-squares estimator whose residuals are sums of ``errors`` (see
+    ``shared_errors``). The variance of each kind of error follows from the sums of squares of
+    residuals added up by label, whose expectations are linear in all variances; none is negative. A
+    kind that the residuals cannot tell from those before it is left out, the last ones first.
+    ``fitted`` (P, q): the root of the fit; ``pooled`` is the variance of a prior's rows.
     """
     if not pooled > 0.0:
         return pooled * np.eye(told.shape[1])
@@ -134,9 +116,7 @@ def _of_shared(
     count = len(errors)
     while count > 1 and np.linalg.cond(scaled[:count, :count]) > WORST_CONDITION:
         count -= 1
-    from scipy.optimize import nnls  # 0.2 s of every start; few fits come here
-
-    return pooled * nnls(scaled[:count, :count], wanted[:count])[0] / unit[:count]
+    return pooled * scipy.optimize.nnls(scaled[:count, :count], wanted[:count])[0] / unit[:count]
 
 
 def _added(values: np.ndarray, label: np.ndarray) -> np.ndarray:

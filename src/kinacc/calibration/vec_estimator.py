@@ -8,14 +8,14 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from kinacc.calibration import selection, tables, vec_fit
-from kinacc.calibration.constrained import FrameTerms
-from kinacc.calibration.frames import Frames
+from kinacc.calibration import evidence, tables, vec_fit
+from kinacc.calibration.evidence import Choice
+from kinacc.calibration.fitting import ModelFit, placed
+from kinacc.calibration.frames import FrameParameters, Frames, FrameTerms
 from kinacc.calibration.models import Common, Estimator, Fit, nominal_frames
 from kinacc.calibration.observations import Observations
-from kinacc.calibration.selection import Choice, Grid
 from kinacc.calibration.uncertainty import Uncertainty
-from kinacc.calibration.vec_fit import Prior, VECFit
+from kinacc.calibration.vec_fit import Prior
 from kinacc.config.error_models import NOMINAL
 from kinacc.kinematics import vec
 from kinacc.kinematics.robot import Robot
@@ -29,14 +29,15 @@ _AUTO = "auto"
 class VECEstimator(Estimator):
     """Settings of ``calibration.vec``.
 
-    ``joint_range_rad`` (k,), (k,) of the DH joints. ``grid``: orders and priors to choose from;
-    None where ``order`` and ``prior`` are stated.
+    ``joint_range_rad`` (k,), (k,) of the DH joints. ``orders`` to choose from; ``order`` is that of
+    a fit. ``prior_stated``: only the order is chosen.
     """
 
     joint_range_rad: tuple[np.ndarray, np.ndarray]
     order: int
     prior: Prior
-    grid: Grid | None
+    orders: tuple[int, ...]
+    prior_stated: bool
     travel_direction: bool
 
     kind: ClassVar[str] = "vec"
@@ -51,12 +52,14 @@ class VECEstimator(Estimator):
         stated = Prior(
             float(section["prior_std_mm"]), angle_rad, float(section["prior_decay"]), angle_rad
         )
+        orders = [each for each in evidence.ORDERS if each <= int(section["order_highest"])]
         return cls(
             Common.of(calibration, arm),
             _joint_range_rad(section, arm, every.q_rad),
             1 if section["order"] == _AUTO else int(section["order"]),
             stated,
-            _grid(section, stated),
+            tuple(orders) if section["order"] == _AUTO else (int(section["order"]),),
+            section["prior"] != "chosen",
             bool(section["travel_direction"]),
         )
 
@@ -65,29 +68,36 @@ class VECEstimator(Estimator):
         """Number of coefficients."""
         return 6 * self.common.nominal.joints * (self.order + 1)
 
+    @property
+    def open(self) -> bool:
+        """Whether order or prior are left to the evidence."""
+        return len(self.orders) > 1 or not self.prior_stated
+
     def choices(self, every: Observations, progress: Callable | None = None) -> dict[str, Columns]:
-        """``vec_orders``: the order and prior of every fold, or those stated."""
-        tried = [] if self.grid is None else self._tried(every, progress)
-        return {"vec_orders": tables.vec_orders_columns(tried, (self.order, self.prior))}
+        """``vec_orders``: the order and prior with each fold unseen and with all seen."""
+        found: list[Choice] = []
+        folds = [None, *(int(fold) for fold in np.unique(every.fold) if fold >= 0)]
+        if self.open:
+            for fold in progress(folds, "shares of the poses held out") if progress else folds:
+                seen = every if fold is None else every.select(every.fold != fold)
+                found.append(self._choice(seen, fold, found[0] if found else None))
+        return {"vec_orders": tables.vec_orders_columns(found, (self.order, self.prior))}
 
     def chosen(self, tables_of: Mapping[str, Columns], fold: int | None) -> Self:
         """The estimator with the order and prior that ``vec_orders`` states for one fold."""
-        if self.grid is None:
+        if not self.open:
             return self
         order, std_mm, decay = tables.chosen_order(tables_of["vec_orders"], fold)
-        for prior in self.grid.priors:
-            if prior.delta_mm == std_mm and prior.decay == decay:
-                return replace(self, order=order, prior=prior)
-        raise ValueError(f"vec_orders states a prior of {std_mm} mm, decay {decay}: not in grid")
+        prior = self.prior
+        if not self.prior_stated:
+            prior = evidence.prior_of(std_mm, decay, self.prior.offset_rad)
+        return replace(self, order=order, prior=prior)
 
     def fit(
         self, observations: Observations, others: Mapping[str, Fit], near: Fit | None = None
-    ) -> VECFit:
+    ) -> ModelFit:
         """The VEC model on the nominal arm, base and targets starting where that has them."""
         frames, terms = self._begin(observations, others)
-        start: VECModel | None = near.model if near else None
-        # High orders are worth it; the end is the same to a few nm, which the paper's tables keep.
-        worth = self.grid is not None and start is not None and start.order == self.order
         return vec_fit.fit(
             self._wanted(observations),
             self._empty(self.order),
@@ -96,11 +106,10 @@ class VECEstimator(Estimator):
             frames=frames,
             frames_free=terms is not None,
             frame_terms=terms,
-            start=start if worth else None,
         )
 
     def tables(
-        self, fitted: VECFit, known: Uncertainty, observations: Observations
+        self, fitted: ModelFit, known: Uncertainty, observations: Observations
     ) -> dict[str, Columns]:
         """How the fit went, and what the poses tell of the coefficients without a prior."""
         gauge = vec_fit.gauge(
@@ -111,23 +120,19 @@ class VECEstimator(Estimator):
         )
         return {"vec_fit": tables.vec_fit_columns(fitted, gauge, known)}
 
-    def _tried(self, every: Observations, progress: Callable | None) -> list[Choice]:
-        frames, terms = self._begin(every, {})
-        weight = self.common.rotation_weight_mm_per_rad
-        at = vec_fit.frames_of(every, self._empty(1), frames, terms is not None, terms, weight)
-        size = at.coordinates.size
-        # That a trial trains on three blocks of five is no limit: the prior holds what these do
-        # not show. What is chosen is fitted without a fold, too.
-        count = selection.carried(every.select(every.fold >= 0))
-        grid = self.grid.within(count, self.common.nominal.joints, size)
-        return selection.choices(
-            self._wanted(every),
-            self._empty(max(grid.orders)),
-            at,
-            weight,
-            grid,
-            progress,
-        )
+    def _choice(self, seen: Observations, fold: int | None, near: Choice | None) -> Choice:
+        frames, terms = self._begin(seen, {})
+        weight, arm = self.common.rotation_weight_mm_per_rad, self.common.nominal
+        parameters = FrameParameters.none(frames)
+        if terms is not None:
+            parameters = placed(seen, arm, terms, weight, start=frames)
+        most = evidence.highest_order(seen, arm.joints, parameters.size)
+        orders = [each for each in self.orders if each <= most] or [self.orders[0]]
+        stated = self.prior if self.prior_stated else None
+        return evidence.choose(
+            self._wanted(seen), self._empty(1), parameters, weight, orders,
+            self.prior.offset_rad, stated, fold, near,
+        )  # fmt: skip
 
     def _begin(
         self, observations: Observations, others: Mapping[str, Fit]
@@ -143,19 +148,6 @@ class VECEstimator(Estimator):
 
     def _wanted(self, observations: Observations) -> Observations:
         return observations if self.travel_direction else observations.without_directions()
-
-
-def _grid(section: Mapping, stated: Prior) -> Grid | None:
-    """The orders and priors to choose from; None where both are stated."""
-    by_order, by_prior = section["order"] == _AUTO, section["prior"] == "chosen"
-    if not by_order and not by_prior:
-        return None
-    orders = (
-        tuple(order for order in selection.ORDERS if order <= int(section["order_highest"]))
-        if by_order
-        else (int(section["order"]),)
-    )
-    return Grid(orders, selection.chosen_priors(stated.offset_rad) if by_prior else (stated,))
 
 
 def _joint_range_rad(

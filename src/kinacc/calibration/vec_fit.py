@@ -1,4 +1,4 @@
-"""VEC coefficients, base and targets fitted to poses under a stated Gaussian prior."""
+"""VEC coefficients, base and targets fitted to poses under a Gaussian prior."""
 
 from __future__ import annotations
 
@@ -6,28 +6,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kinacc.calibration.basis_expansion import Group
-from kinacc.calibration.constrained import ConstrainedFrames, FrameTerms
-from kinacc.calibration.frames import ANGLE_UNIT_RAD, FrameCoordinates, Frames, coordinates
-from kinacc.calibration.held import (
-    Kept,
-    Placed,
-    known_frames,
-    placed,
-    pose_system,
-)
-from kinacc.calibration.map_estimate import minimise_with_prior
+from kinacc.calibration.fitting import ModelFit, Unknowns, placed, solved
+from kinacc.calibration.frames import ANGLE_UNIT_RAD, FrameParameters, Frames, FrameTerms
 from kinacc.calibration.observations import Observations
 from kinacc.calibration.one_thread import one_thread
-from kinacc.calibration.solve import Solution, Spectrum, spectrum
-from kinacc.calibration.system import FlangeModel, PoseSystem, Pull, require_enough
+from kinacc.calibration.solve import Solution, Spectrum, singular_values
+from kinacc.calibration.system import FlangeModel, Group, PoseSystem
 from kinacc.geometry import Pose
 from kinacc.kinematics import vec
 from kinacc.kinematics.model import JointState
 from kinacc.kinematics.vec import ERRORS, VECModel
 
 VEC_FIX = "measure more poses, or lower calibration.vec.order"
-FRAME_PRIOR_UNITS = 10.0  # mm and mrad about the starting frames; holds what no pose shows
 RANK_THRESHOLD = 1e-10  # far below every weak direction, far above rounding: exact gauges only
 
 
@@ -49,7 +39,7 @@ class Prior:
     constant_rad: float | None = None
 
     def std(self, model: VECModel) -> np.ndarray:
-        """Standard deviations (P,) ordered as ``vec.to_vector``."""
+        """Standard deviations (P,) ordered as the parameters of a VEC model."""
         falling = self.decay ** np.maximum(np.arange(model.order + 1) - 1, 0)
         per_error = np.where(np.arange(len(ERRORS)) < 3, self.delta_mm, self.eps_rad)
         one = np.outer(per_error, falling)
@@ -59,23 +49,6 @@ class Prior:
             one[3:, 0] = self.constant_rad
         offsets = np.full(model.direction_offsets_rad.size, self.offset_rad)
         return np.concatenate([np.tile(one.ravel(), model.joints), offsets])
-
-
-@dataclass(frozen=True)
-class VECFit:
-    """Fitted ``model`` and ``frames``; ``std`` (P,) as ``vec.to_vector``; ``prior_std`` (P,).
-
-    ``solution`` has the figures of the fit over the frame coordinates (``coordinates``) and the
-    ``free`` (P,) coefficients.
-    """
-
-    model: VECModel
-    frames: Frames
-    std: np.ndarray
-    prior_std: np.ndarray
-    free: np.ndarray
-    solution: Solution
-    coordinates: FrameCoordinates | ConstrainedFrames
 
 
 @one_thread
@@ -88,70 +61,32 @@ def fit(
     frames: Frames,
     frames_free: bool,
     frame_terms: FrameTerms | None = None,
-    start: VECModel | None = None,
-) -> VECFit:
+) -> ModelFit:
     """Coefficients of ``empty`` (its DH arm, joint range and order) from ``observations``.
 
-    Base and targets are ``frames``, or start there if ``frames_free``, under ``frame_terms``;
-    coefficients start at those of ``start``, a model like ``empty``, or at zero. Direction offsets
-    that no observation shows are left at zero, std NaN; the two of a joint that always travelled
-    sum to zero, so that the model at an unknown direction is the mean of both.
+    Base and targets are ``frames``, or start there if ``frames_free``, under ``frame_terms``.
+    Direction offsets that no observation shows are left at zero, std NaN; the two of a joint that
+    always travelled sum to zero, so that the model at an unknown direction is the mean of both.
     Raises FitError, and InputError where there are fewer residuals than parameters.
     """
+    weight = rotation_weight_mm_per_rad
     free, flange = flange_model(observations, empty)
-    require_enough(observations, flange.size, "VEC fit", VEC_FIX)
-    at = frames_of(
-        observations, empty, frames, frames_free, frame_terms, rotation_weight_mm_per_rad
+    prior_std, nothing = prior.std(empty), np.zeros(flange.size)
+    unknowns = Unknowns(
+        "VEC fit", flange, nothing, nothing, prior_std[free], scales(empty)[free], True, VEC_FIX
     )
-    coords = at.coordinates
-    require_enough(observations, coords.size + flange.size, "VEC fit", VEC_FIX)
-    system = pose_system(observations, flange, coords, rotation_weight_mm_per_rad)
-    prior_std = prior.std(empty)
-    expected, stated_std = at.known
-    frame_std = np.where(np.isfinite(stated_std), stated_std, FRAME_PRIOR_UNITS * at.scale)
-    begin = np.zeros(system.size)
-    if start is not None:
-        begin[coords.size :] = vec.to_vector(start)[free]
-    scale = np.concatenate([at.scale, _units(_is_angle(empty)[free])])
-    keep = np.append(~at.held, np.ones(flange.size, dtype=bool))
-    kept = Kept(system, keep, begin)
-    solution = minimise_with_prior(
-        kept if at.held.any() else system,
-        start=begin[keep],
-        prior_mean=np.concatenate([expected, np.zeros(flange.size)])[keep],
-        prior_std=np.concatenate([frame_std, prior_std[free]])[keep],
-        scale=scale[keep],
-        name="VEC fit",
+    parameters = FrameParameters.none(frames)
+    if frames_free:
+        parameters = placed(observations, empty.dh, frame_terms, weight, start=frames)
+    found, solution, _ = solved(
+        observations, unknowns, parameters, rotation_weight_mm_per_rad=weight
     )
-    if at.held.any():
-        solution = kept.solution(solution, at.open, scale)
-    solution = _with_centred_offsets(solution, observations, empty, free, coords.size)
+    solution = _with_centred_offsets(solution, observations, empty, free, parameters.size)
     vector, std = np.zeros(free.size), np.full(free.size, np.nan)
-    vector[free] = solution.x[coords.size :]
-    std[free] = solution.std[coords.size :]
-    return VECFit(
-        model=vec.with_vector(empty, vector),
-        frames=coords.frames(solution.x[: coords.size]),
-        std=std,
-        prior_std=prior_std,
-        free=free,
-        solution=solution,
-        coordinates=coords,
-    )
-
-
-def frames_of(
-    observations: Observations,
-    empty: VECModel,
-    frames: Frames,
-    frames_free: bool,
-    terms: FrameTerms | None,
-    rotation_weight_mm_per_rad: float,
-) -> Placed:
-    """Coordinates of base and targets of a fit, none where these are known."""
-    if not frames_free:
-        return known_frames(observations, frames)
-    return placed(observations, empty.dh.pose, frames, terms, rotation_weight_mm_per_rad)
+    vector[free] = solution.x[parameters.size :]
+    std[free] = solution.std[parameters.size :]
+    model = empty.with_parameters(vector)
+    return ModelFit(model, found, std, free, prior_std, solution, parameters)
 
 
 @one_thread
@@ -163,25 +98,43 @@ def gauge(
     Base and targets count as known. Directions beyond the rank change no pose to first order:
     constant frame changes between neighbouring joints.
     """
-    coords = coordinates(observations, frames, base_free=False, targets_free=False)
     free, flange = flange_model(observations, empty)
-    system = PoseSystem(observations, flange, coords, rotation_weight_mm_per_rad)
-    return spectrum(
-        system, np.zeros(system.size), _units(_is_angle(empty)[free]), 0, RANK_THRESHOLD
-    )
+    known = FrameParameters.none(frames)
+    system = PoseSystem(observations, flange, known, rotation_weight_mm_per_rad)
+    values = singular_values(system, np.zeros(system.size), scales(empty)[free])
+    return Spectrum.of(values, RANK_THRESHOLD)
 
 
 def flange_model(observations: Observations, empty: VECModel) -> tuple[np.ndarray, FlangeModel]:
-    """Mask (P,) of the coefficients that ``observations`` speak of, and the arm they move."""
-    free = _informed(observations, empty)
-    return free, _flange_model(empty, free)
+    """Mask (P,) of the coefficients that ``observations`` speak of, and the arm they move.
 
+    These are all but the offsets of directions that do not occur in the data.
+    """
+    errors, joints = len(ERRORS), empty.joints
+    seen = (observations.s[:, :, None] == np.array([-1, 1])).any(axis=0)
+    free = np.concatenate([np.ones(empty.coefficients.size, dtype=bool), seen.ravel()])
+    directed = np.flatnonzero(seen.any(axis=1))
+    about_z = np.concatenate([np.arange(errors * joints), errors * directed + errors - 1])
 
-def _informed(observations: Observations, empty: VECModel) -> np.ndarray:
-    """Mask (P,): every coefficient, and the offsets of directions that occur in the data."""
-    directions = np.array([-1, 1])
-    seen = (observations.s[:, :, None] == directions).any(axis=0)
-    return np.concatenate([np.ones(empty.coefficients.size, dtype=bool), seen.ravel()])
+    def model(x: np.ndarray) -> VECModel:
+        vector = np.zeros(free.size)
+        vector[free] = x
+        return empty.with_parameters(vector)
+
+    def linearised(x: np.ndarray, at: JointState) -> tuple[Pose, np.ndarray]:
+        moved = vec.motions(model(x), at.q_rad, at.s)
+        return moved.pose, moved.jacobian()[about_z].transpose(2, 1, 0)
+
+    def expansion(at: JointState) -> list[Group]:
+        basis, travelled = vec.chebyshev_basis(empty, at.q_rad), vec.direction_basis(at.s)
+        groups = [Group(slice(errors * i, errors * (i + 1)), basis[:, i]) for i in range(joints)]
+        for number, joint in enumerate(directed, errors * joints):
+            groups.append(Group(slice(number, number + 1), travelled[:, joint, seen[joint]]))
+        return groups
+
+    return free, FlangeModel(
+        int(free.sum()), lambda x, at: model(x).pose(at), linearised, expansion
+    )
 
 
 def _with_centred_offsets(
@@ -218,47 +171,9 @@ def _with_centred_offsets(
     )
 
 
-def _flange_model(empty: VECModel, free: np.ndarray) -> FlangeModel:
-    seen = free[empty.coefficients.size :].reshape(empty.joints, 2)
-    directed = np.flatnonzero(seen.any(axis=1))
-    errors = len(ERRORS)
-
-    def model(x: np.ndarray) -> VECModel:
-        vector = np.zeros(free.size)
-        vector[free] = x
-        return vec.with_vector(empty, vector)
-
-    about_z = np.concatenate([np.arange(errors * empty.joints), errors * directed + errors - 1])
-
-    def linearised(x: np.ndarray, at: JointState) -> tuple[Pose, np.ndarray]:
-        moved = vec.motions(model(x), at.q_rad, at.s)
-        jacobian = moved.jacobian()
-        return moved.pose, jacobian[about_z] if directed.size else jacobian
-
-    def pulled(x: np.ndarray, at: JointState) -> tuple[Pose, Pull]:
-        moved = vec.motions(model(x), at.q_rad, at.s)
-        return moved.pose, lambda *wrench: moved.pulled(*wrench)[about_z]
-
-    def expansion(at: JointState) -> list[Group]:
-        basis, travelled = vec.chebyshev_basis(empty, at.q_rad), vec.direction_basis(at.s)
-        groups = [
-            Group(slice(errors * joint, errors * (joint + 1)), basis[:, joint])
-            for joint in range(empty.joints)
-        ]
-        for number, joint in enumerate(directed, errors * empty.joints):
-            groups.append(Group(slice(number, number + 1), travelled[:, joint, seen[joint]]))
-        return groups
-
-    return FlangeModel(
-        int(free.sum()), lambda x, at: model(x).pose(at), linearised, expansion, pulled
-    )
-
-
-def _is_angle(model: VECModel) -> np.ndarray:
+def scales(model: VECModel) -> np.ndarray:
+    """Displacements (P,) of the coefficients that count as one mm."""
     one = np.repeat(np.arange(len(ERRORS)) >= 3, model.order + 1)
     offsets = np.ones(model.direction_offsets_rad.size, dtype=bool)
-    return np.concatenate([np.tile(one.ravel(), model.joints), offsets])
-
-
-def _units(is_angle: np.ndarray) -> np.ndarray:
+    is_angle = np.concatenate([np.tile(one, model.joints), offsets])
     return np.where(is_angle, ANGLE_UNIT_RAD, 1.0)

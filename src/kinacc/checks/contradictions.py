@@ -24,7 +24,6 @@ _SYNTHESISED = "mh180"
 # A few gigabytes, or a day of work, each.
 _MOST_CELLS, _MOST_TERMS = 2_000_000, 1_000_000
 _MOST_SIMULATIONS, _MOST_READINGS, _MOST_HELD = 200_000, 10**9, 10**8
-_FOLDS_TO_CHOOSE = 3  # one held out of the choice, one to try candidates on, one to fit them to
 
 
 def load(
@@ -48,7 +47,6 @@ def contradictions(
     """
     measurements = full["measurements"]
     yield from _folds(measurements, place)
-    yield from _choice(full, place)
     yield from _frames(full["calibration"], place)
     if measurements["source"] == "file":
         yield from _file(name, measurements["file"], place, folder)
@@ -217,17 +215,6 @@ def _frames(calibration: Mapping[str, Any], place) -> Iterator[Problem]:
             f"{', '.join(calibration['frames'])}, but base and tool are not estimated",
             "{} where calibration.base_and_tool is fixed",
         )
-
-
-def _choice(full: Mapping[str, Any], place) -> Iterator[Problem]:
-    folds, volumetric = full["measurements"]["folds"], full["calibration"]["vec"]
-    for key, wanted in (("order", "auto"), ("prior", "chosen")):
-        if volumetric[key] == wanted and (folds is None or folds < _FOLDS_TO_CHOOSE):
-            yield Problem(
-                place("calibration", "vec", key),
-                f"{wanted}, but measurements.folds is {shown(folds)}",
-                f"at least {_FOLDS_TO_CHOOSE} folds to choose by, or a stated {key}",
-            )
 
 
 def _joints(name: str, joints: Mapping[str, Any], place, folder: Path) -> Iterator[Problem]:

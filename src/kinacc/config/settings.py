@@ -84,12 +84,12 @@ class VecFit(Section):
 
     order: Annotated[int, Field(ge=0, le=40), AUTO] = setting(
         5,
-        "order of the Chebyshev polynomials, or auto: chosen by held-out errors",
+        "order of the Chebyshev polynomials, or auto: chosen by evidence",
     )
     order_highest: int = setting(40, "highest order tried where order is auto", ge=1, le=40)
     prior: Literal["stated", "chosen"] = setting(
         "stated",
-        "the prior stated below, or one chosen by held-out errors, with the order",
+        "the prior stated below, or one chosen by evidence, with the order",
     )
     joint_range: Annotated[JointPairs, Or(("data", "limits"))] = setting(
         "data",

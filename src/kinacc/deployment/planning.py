@@ -14,8 +14,7 @@ import numpy as np
 
 from kinacc.calibration import frames
 from kinacc.calibration.blind_groups import LeftOpen, groups, of_arm
-from kinacc.calibration.dh_fit import joints_anywhere
-from kinacc.calibration.identified import STRUCTURAL
+from kinacc.calibration.identified import STRUCTURAL, joints_anywhere
 from kinacc.calibration.uncertainty import Uncertainty
 from kinacc.deployment.predict import BLOCK, sensitivity
 from kinacc.deployment.record import TOOL, Calibration, nominal

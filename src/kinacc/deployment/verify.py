@@ -15,15 +15,19 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from kinacc.calibration import dh_fit, robust
-from kinacc.calibration.constrained import FrameTerms
-from kinacc.calibration.constraints import frame_terms
-from kinacc.calibration.frames import ANGLE_UNIT_RAD, MOTIONS, Frames, known, stacked
+from kinacc.calibration.fitting import fit_frames
+from kinacc.calibration.frames import (
+    ANGLE_UNIT_RAD,
+    MOTIONS,
+    Frames,
+    frame_terms,
+    known,
+    stacked,
+)
 from kinacc.calibration.models import Fit
 from kinacc.calibration.observations import Observations, from_columns
 from kinacc.calibration.residuals import errors
 from kinacc.calibration.summary import LARGE_SHARE
-from kinacc.calibration.system import FlangeModel
 from kinacc.calibration.tables import frames_of
 from kinacc.config.error_models import ERROR_MODELS, MEASURED, NOMINAL, Comparison
 from kinacc.deployment import folder
@@ -305,26 +309,12 @@ def frames_at(
     terms = frame_terms(seen, stated)
     of_base = np.arange(len(terms.names)) < len(MOTIONS) * len(sessions)  # these stand first
     terms = replace(terms, free=np.where(of_base, BASE in moved, TOOL in moved))
-    return frames_under(model, seen, terms, rotation_weight_mm_per_rad)
-
-
-def frames_under(
-    model: ErrorModel, seen: Observations, terms: FrameTerms, rotation_weight_mm_per_rad: float
-) -> Frames:
-    """Base and targets of ``seen`` under ``terms``, the arm held at ``model``, of whatever kind."""
-    nothing, held = np.zeros(0), FlangeModel(0, lambda x, at: model.pose(at))
-    unknowns = dh_fit.Unknowns("fit of base and tool", held, nothing, nothing, nothing, nothing)
-    coordinates, solution, _ = dh_fit.solved(
+    return fit_frames(
         seen,
-        unknowns,
-        model.dh,
+        model,
         rotation_weight_mm_per_rad=rotation_weight_mm_per_rad,
-        threshold=0.0,
-        frames=None,
         frame_terms=terms,
-        loss=robust.SQUARES,
     )
-    return coordinates.frames(solution.x)
 
 
 def says_there(model: ErrorModel, q_rad: np.ndarray) -> np.ndarray:

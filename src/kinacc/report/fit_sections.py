@@ -315,7 +315,7 @@ def selection(tables: Tables, why: str) -> Part:
     chosen, tried = orders, orders
     if len(orders):
         chosen = orders[orders["chosen"] == 1]
-        tried = orders[orders["fold"].isna() & orders["held_out_rms_mm"].notna()]
+        tried = orders[orders["fold"].isna() & orders["log_evidence"].notna()]
         tried = tried.sort_values("order", kind="stable")
     models = []
     for each in records(choice):
@@ -337,7 +337,7 @@ def selection(tables: Tables, why: str) -> Part:
         "standard_errors": STANDARD_ERRORS,
         "plainest": model_name(PLAINEST),
         "models": models,
-        "stated": not len(orders) or not chosen["held_out_rms_mm"].notna().any(),
+        "stated": not len(orders) or not chosen["log_evidence"].notna().any(),
         "tried": [
             each | ({"remark": "← chosen"} if each["chosen"] else {})
             for each in tried.to_dict("records")
