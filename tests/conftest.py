@@ -43,7 +43,6 @@ SLOW = (
     "calibration/test_oracle_fits.py",
     "calibration/test_reach.py",
     "calibration/test_repeated_configurations.py",
-    "calibration/test_selection.py",
     "calibration/test_vec_fit.py",
     "campaign/test_campaign_commands.py",
     "campaign/test_forecast.py",

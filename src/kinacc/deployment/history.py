@@ -16,9 +16,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from kinacc.calibration import dh_fit
-from kinacc.calibration.constraints import frame_terms
-from kinacc.calibration.frames import Frames, known, stacked
+from kinacc.calibration.fitting import fit_frames
+from kinacc.calibration.frames import Frames, frame_terms, known, stacked
 from kinacc.calibration.models import Fit
 from kinacc.calibration.observations import Observations, from_columns
 from kinacc.calibration.one_thread import one_thread
@@ -29,7 +28,7 @@ from kinacc.deployment import folder, history_model
 from kinacc.deployment.history_model import Setup, joined
 from kinacc.deployment.record import Calibration
 from kinacc.deployment.shared_readings import known_readings
-from kinacc.deployment.verify import LEAST_HELD_OUT, frames_under, held_out_vectors, says_there
+from kinacc.deployment.verify import LEAST_HELD_OUT, held_out_vectors, says_there
 from kinacc.errors import FitError, InputError
 from kinacc.kinematics import robot as robots
 from kinacc.kinematics.robot import carried
@@ -197,8 +196,8 @@ class _Comparison:
         counts = len(series.session_names), len(series.target_names)
         weight = self.rotation_weight_mm_per_rad
         terms = frame_terms(series, known(robot.base, carried(robot), *counts))
-        fit = dh_fit.fit_frames(series, model, rotation_weight_mm_per_rad=weight, frame_terms=terms)
-        return history_model.about(model, fit.frames, series, first, weight)
+        frames = fit_frames(series, model, rotation_weight_mm_per_rad=weight, frame_terms=terms)
+        return history_model.about(model, frames, series, first, weight)
 
     def errors_mm(self, force: Session, session: Session, setup: Setup) -> np.ndarray:
         """Position errors (n,) of the calibration in force where its model says something.
@@ -236,7 +235,10 @@ class _Comparison:
         if not free.any():
             return stated
         weight = self.rotation_weight_mm_per_rad
-        return frames_under(calibration.model, seen, replace(terms, free=free), weight)
+        terms = replace(terms, free=free)
+        return fit_frames(
+            seen, calibration.model, rotation_weight_mm_per_rad=weight, frame_terms=terms
+        )
 
     def _rng(self, *names: str) -> np.random.Generator:
         words = hashlib.sha256("\n".join(names).encode()).digest()

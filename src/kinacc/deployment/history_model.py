@@ -32,7 +32,7 @@ import numpy as np
 import scipy
 
 from kinacc.calibration import vec_fit
-from kinacc.calibration.frames import Frames, coordinates
+from kinacc.calibration.frames import FrameParameters, Frames
 from kinacc.calibration.observations import Observations
 from kinacc.calibration.system import PoseSystem
 from kinacc.kinematics import vec
@@ -109,11 +109,10 @@ def about(
     both = replace(both, q_rad=q_rad)
     low, high = q_rad.min(axis=0) - _NARROW_RAD, q_rad.max(axis=0) + _NARROW_RAD
     _, flange = vec_fit.flange_model(both, vec.without_errors(model, low, high, ORDER))
-    coords = coordinates(both, frames, base_free=True, targets_free=True)
+    coords = FrameParameters.of(both, frames, None)
+    at = np.append(coords.begin, np.zeros(flange.size))
     system = PoseSystem(both, flange, coords, rotation_weight_mm_per_rad)
-    residual, jacobian = (
-        np.concatenate(parts) for parts in zip(*system.blocks(np.zeros(system.size)), strict=True)
-    )
+    residual, jacobian = (np.concatenate(parts) for parts in zip(*system.blocks(at), strict=True))
     row = np.repeat(np.arange(len(both)), 3 + 3 * both.has_rotation)
     of_frames, errors = np.split(jacobian, [coords.size], axis=1)
     count = len(ERRORS) * model.joints * (ORDER + 1)
@@ -127,7 +126,7 @@ def about(
     late = np.concatenate([_late(first), _late(len(both) - first)])
     return Pair(
         frames=of_frames,
-        is_base=np.arange(coords.size) < 6 * coords.anchor.sessions,
+        is_base=np.arange(coords.size) < 6 * frames.sessions,
         own=~np.any(of_frames[row < first] != 0.0, axis=0),
         constant=errors[:, ~grows],
         longer=1e-3 * longer.ravel(),
