@@ -212,7 +212,7 @@ def test_a_yaml_chooses_the_chain_and_adds_what_a_urdf_lacks(tmp_path):
     path.write_text("urdf: arm.urdf\ntip_lnk: l6\ndh: []\n")
     said = refusal(robot.load, path)
     assert "did you mean tip_link?" in said
-    assert "given beside urdf" in said
+    assert "dh: unknown key" in said
     path.write_text("urdf: other.urdf\n")
     assert "there is no such file" in refusal(robot.load, path)
 
@@ -224,17 +224,17 @@ def test_a_yaml_chooses_the_chain_and_adds_what_a_urdf_lacks(tmp_path):
     ("old", "new", "words"),
     [
         ('name="j1" type="revolute"', 'name="j1" type="revolut"', "its type is 'revolut'"),
-        ('name="j1" type="revolute"', 'name="j1" type="floating"', "is floating"),
+        ('name="j1" type="revolute"', 'name="j1" type="floating"', "its type is 'floating'"),
         ('xyz="0 0 0.1273"', 'xyz="0 0 127,3"', "origin xyz='0 0 127,3'; allowed: 3 finite"),
         ('xyz="0 0 0.1273"', 'xyz="0 0.1273"', "origin xyz='0 0.1273'"),
         ('<axis xyz="0 0 1"/>', '<axis xyz="0 0 0"/>', "axis has no direction"),
         ('upper="2.0"', 'upper="nan"', "limit upper='nan'"),
         ('lower="-2.5"', 'lower="3.0"', "limits 3 to 2"),
-        ('<limit lower="-2.5" upper="2.0" effort="1" velocity="1"/>', "", "has no limits"),
+        ('<limit lower="-2.5" upper="2.0" effort="1" velocity="1"/>', "", "limits 0 to 0"),
         ('name="j2"', 'name="j1"', "joint j1 is given more than once"),
         ('<child link="l3"/>', '<child link="l2"/>', "child link l2 is given more than once"),
         ("</robot>", "", "is not XML"),
-        ('<robot name="arm">', "<robot>", "'name' is missing"),
+        ('<robot name="arm">', "<robot>", "is no <robot"),
         ('<parent link="l3"/>', '<parent link="x3"/>', "'x3'"),
         (
             '<robot name="arm">',

@@ -3,9 +3,8 @@
 A robot is one of the shipped ones, a YAML file or a URDF file (docs/robots.md).
 """
 
-from kinacc.kinematics.robot.description import files, load, of_text, shipped
+from kinacc.kinematics.robot.description import as_yaml, files, load, of_text, shipped
 from kinacc.kinematics.robot.record import Robot, carried, forward, in_own_units, outside_limits
-from kinacc.kinematics.robot.written import as_yaml
 
 __all__ = [
     "Robot",

@@ -1,15 +1,27 @@
-"""Robots by name or file: YAML with every fault listed, or URDF."""
+"""Robots by name or file: a table of DH rows in YAML, or URDF. Robot files written."""
 
 from __future__ import annotations
 
+import difflib
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from datetime import date
+from math import pi
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
+import yaml
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    ValidationError,
+    field_validator,
+    model_validator,
+)
+from scipy.spatial.transform import Rotation
 
 from kinacc.config.names import not_in_a_line
 from kinacc.config.reading import Document, parsed, read
@@ -18,48 +30,264 @@ from kinacc.geometry import (
     IDENTITY,
     Pose,
     compose,
-    exp_so3,
-    rotation_from_quaternion,
+    quaternion_from_rotation,
     rotation_x,
     rotation_y,
-    rotation_z,
 )
-from kinacc.kinematics.dh import DHModel
-from kinacc.kinematics.robot.forms import from_modified
-from kinacc.kinematics.robot.reader import ANGLE, LENGTH, Reader
+from kinacc.kinematics.dh import PARAMETERS, DHModel
+from kinacc.kinematics.robot import urdf as _urdf
 from kinacc.kinematics.robot.record import FEWEST_JOINTS, MOST_JOINTS, Robot
 
 _SHIPPED = Path(__file__).parents[1] / "robots"
-_ANGLES, _LENGTHS = ("theta_offset", "alpha", "beta"), ("d", "a")
-_LIMITS = ("limits_deg", "limits_rad", "limits_mm", "limits_m")
-_ROW_KEYS = (
-    "joint",
-    "name",
-    "theta_offset_deg",
-    "theta_offset_rad",
-    "d_mm",
-    "d_m",
-    "a_mm",
-    "a_m",
-    "alpha_deg",
-    "alpha_rad",
-    "beta_deg",
-    "beta_rad",
-    "sign",
-    *_LIMITS,
-)
-_ABOUT_KEYS = ("name", "source", "date")
-_DH_KEYS = (*_ABOUT_KEYS, "convention", "dh", *_LIMITS[:2], "joint_map", "base", "flange", "tool")
-_URDF_KEYS = (*_ABOUT_KEYS, "urdf", "base_link", "tip_link", "joint_map", "tool")
-_FRAME_KEYS = (
-    "position_mm",
-    "position_m",
-    "quaternion_wxyz",
-    "rotation_vector_deg",
-    "rotation_vector_rad",
-    "rpy_deg",
-    "rpy_rad",
-)
+_LARGEST = 1e9  # of any number: beyond, nothing about an arm is meant, and products overflow
+_LONGEST_M = 20.0  # no arm has a link this long, so it was meant in mm
+_SHORTEST_MM = 20.0  # of all lengths together
+_MOST_TURNS_RAD = 4.0 * pi
+_SUGGESTIONS = 20
+_UNITS = {"deg": pi / 180.0, "rad": 1.0, "mm": 1.0, "m": 1e3}
+
+Number = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-_LARGEST, le=_LARGEST)]
+Limits = tuple[Number, Number]
+Vector = tuple[Number, Number, Number]
+Text = Annotated[str, BeforeValidator(lambda value: "" if value is None else str(value))]
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+
+    def given(self, stem: str) -> tuple[str, Any] | None:
+        """Unit and value of a quantity whose key names its unit; ValueError where two are given."""
+        keys = [f"{stem}_{unit}" for unit in _UNITS]
+        found = [key for key in keys if getattr(self, key, None) is not None]
+        if len(found) > 1:
+            raise ValueError(f"{stem} is given twice: {' and '.join(found)}")
+        return (found[0].rpartition("_")[2], getattr(self, found[0])) if found else None
+
+    def quantity(self, stem: str, default: Any = None) -> Any:
+        """A length in mm or an angle in rad; ValueError where it is missing."""
+        found = self.given(stem) or (None if default is None else ("rad", default))
+        if found is None:
+            units = [unit for unit in _UNITS if f"{stem}_{unit}" in type(self).model_fields]
+            raise ValueError(
+                f"{stem} is missing: {' or '.join(f'{stem}_{unit}' for unit in units)}"
+            )
+        return np.multiply(found[1], _UNITS[found[0]])
+
+
+class Frame(_Strict):
+    """A frame by a position and one form of orientation."""
+
+    position_mm: Vector | None = None
+    position_m: Vector | None = None
+    quaternion_wxyz: tuple[Number, Number, Number, Number] | None = None
+    rotation_vector_deg: Vector | None = None
+    rotation_vector_rad: Vector | None = None
+    rpy_deg: Vector | None = None
+    rpy_rad: Vector | None = None
+
+    @model_validator(mode="after")
+    def _one_orientation(self) -> Self:
+        self.pose()
+        return self
+
+    def pose(self) -> Pose:
+        """The frame; identity where nothing is given."""
+        turns = [stem for stem in ("rotation_vector", "rpy") if self.given(stem)]
+        if len(turns) + (self.quaternion_wxyz is not None) > 1:
+            raise ValueError("a second orientation: give one")
+        rotation = np.eye(3)
+        if self.quaternion_wxyz is not None:
+            if abs(np.linalg.norm(self.quaternion_wxyz) - 1.0) > 1e-3:
+                raise ValueError("quaternion_wxyz is no unit quaternion w, x, y, z")
+            rotation = Rotation.from_quat(self.quaternion_wxyz, scalar_first=True).as_matrix()
+        elif turns == ["rpy"]:  # as in URDF: about fixed x, then y, then z
+            rotation = Rotation.from_euler("xyz", self.quantity("rpy")).as_matrix()
+        elif turns:
+            rotation = Rotation.from_rotvec(self.quantity("rotation_vector")).as_matrix()
+        return Pose(rotation, np.array(self.quantity("position", (0.0, 0.0, 0.0)), dtype=float))
+
+
+class Row(_Strict):
+    """A row of a DH table and what belongs to its joint."""
+
+    joint: Literal["revolute", "prismatic"] = "revolute"
+    name: Text = ""
+    theta_offset_deg: Number | None = None
+    theta_offset_rad: Number | None = None
+    d_mm: Number | None = None
+    d_m: Number | None = None
+    a_mm: Number | None = None
+    a_m: Number | None = None
+    alpha_deg: Number | None = None
+    alpha_rad: Number | None = None
+    beta_deg: Number | None = None
+    beta_rad: Number | None = None
+    sign: Literal[1, -1] = 1
+    limits_deg: Limits | None = None
+    limits_rad: Limits | None = None
+    limits_mm: Limits | None = None
+    limits_m: Limits | None = None
+
+    @field_validator("theta_offset_deg", "alpha_deg", "beta_deg")
+    @classmethod
+    def _not_in_rad(cls, value: float | None) -> float | None:
+        quarters = round((value or 0.0) / (pi / 2.0))
+        if value and 0 < abs(quarters) <= 4 and abs(value - quarters * pi / 2.0) < 2e-3:
+            raise ValueError(f"{quarters} quarter turns in rad: write {90 * quarters}, or _rad")
+        return value
+
+    @field_validator("theta_offset_rad", "alpha_rad", "beta_rad")
+    @classmethod
+    def _not_in_deg(cls, value: float | None) -> float | None:
+        if value and abs(value) > 2.0 * pi + 1e-3:
+            raise ValueError("more than a turn: write _deg")
+        return value
+
+    @field_validator("d_m", "a_m")
+    @classmethod
+    def _not_in_mm(cls, value: float | None) -> float | None:
+        if value and abs(value) > _LONGEST_M:
+            raise ValueError("longer than any arm: write _mm")
+        return value
+
+    @model_validator(mode="after")
+    def _whole(self) -> Self:
+        self.parameters()
+        found, units = self.given("limits"), ("mm", "m") if self.slides else ("deg", "rad")
+        if found and found[0] not in units:
+            kind = "slides" if self.slides else "turns"
+            raise ValueError(f"the joint {kind}: give its limits in {' or '.join(units)}")
+        if found:
+            in_own_units(*found)
+        return self
+
+    @property
+    def slides(self) -> bool:
+        """Whether the joint is prismatic."""
+        return self.joint == "prismatic"
+
+    def parameters(self) -> tuple[float, ...]:
+        """theta, d, a, alpha, beta in rad and mm."""
+        needed = [float(self.quantity(stem)) for stem in ("theta_offset", "d", "a", "alpha")]
+        return (*needed, float(self.quantity("beta", 0.0)))
+
+
+def in_own_units(unit: str, limits: Limits) -> np.ndarray:
+    """Limits (2,) in rad or mm; ValueError where they are reversed or look like degrees."""
+    if limits[0] >= limits[1]:
+        raise ValueError(f"limits {list(limits)} are reversed or empty")
+    if unit == "rad" and max(map(abs, limits)) > _MOST_TURNS_RAD:
+        raise ValueError(f"limits {list(limits)} look like degrees: write limits_deg")
+    return np.multiply(limits, _UNITS[unit])
+
+
+class _About(_Strict):
+    name: Text = ""
+    source: Text = ""
+    date: Text = ""
+    joint_map: list[list[Number]] | None = None
+    tool: Frame = Frame()
+
+    @field_validator("name")
+    @classmethod
+    def _in_a_line(cls, value: str) -> str:
+        for fault in not_in_a_line("name", value) if value else ():
+            raise ValueError(fault.what)
+        return value
+
+    def matrix(self, count: int) -> np.ndarray:
+        """Matrix (k, k) from reported to DH joints; ValueError where it is none."""
+        rows = self.joint_map or []
+        if len(rows) != count or any(len(row) != count for row in rows):
+            raise ValueError(f"joint_map is no {count} x {count} matrix")
+        if abs(np.linalg.det(rows)) < 1e-9:
+            raise ValueError("joint_map is singular")
+        return np.array(rows)
+
+
+class Table(_About):
+    """A robot file with a table of DH rows."""
+
+    convention: Literal["standard", "modified"] = "standard"
+    dh: list[Row]
+    limits_deg: list[Limits] | None = None
+    limits_rad: list[Limits] | None = None
+    base: Frame = Frame()
+    flange: Frame = Frame()
+
+    @field_validator("dh", mode="before")
+    @classmethod
+    def _as_many_joints(cls, rows: Any) -> Any:
+        if isinstance(rows, list) and not FEWEST_JOINTS <= len(rows) <= MOST_JOINTS:
+            raise ValueError(f"has {len(rows)} joints, not {FEWEST_JOINTS} to {MOST_JOINTS}")
+        return rows
+
+    @model_validator(mode="after")
+    def _whole(self) -> Self:
+        self.robot()
+        return self
+
+    def robot(self) -> Robot:
+        """The arm; ValueError where parts of the file contradict each other."""
+        columns = np.array([row.parameters() for row in self.dh]).T
+        total = np.abs(columns[1:3]).sum()
+        if 0.0 < total < _SHORTEST_MM:
+            raise ValueError(f"all lengths together are {total:g} mm: write d_m and a_m")
+        slides = np.array([row.slides for row in self.dh])
+        table, base = DHModel(*columns, slides), self.base.pose()
+        if self.convention == "modified":
+            table, before = from_modified(table)
+            base = compose(base, before)
+        signs = [row.sign for row in self.dh]
+        joint_map = np.diag(np.array(signs, dtype=float))
+        if self.joint_map is not None:
+            if any("sign" in row.model_fields_set for row in self.dh):
+                raise ValueError("joint_map is given beside a joint's sign")
+            joint_map = self.matrix(len(self.dh))
+        limits = self._limits()
+        return Robot(
+            name=self.name or "robot",
+            source=self.source,
+            date=self.date,
+            dh=table,
+            q_min_rad=limits[:, 0],
+            q_max_rad=limits[:, 1],
+            joint_map=joint_map,
+            base=base,
+            flange=self.flange.pose(),
+            tool=self.tool.pose(),
+            joint_names=tuple(row.name or f"joint {i}" for i, row in enumerate(self.dh, 1)),
+        )
+
+    def _limits(self) -> np.ndarray:
+        """Limits (k, 2) of the reported joints, from the rows or from one list for all."""
+        shared = self.given("limits")
+        if shared and len(shared[1]) != len(self.dh):
+            raise ValueError(f"limits_{shared[0]} has {len(shared[1])} pairs, not {len(self.dh)}")
+        limits, in_degrees = [], []
+        for number, row in enumerate(self.dh):
+            found = row.given("limits")
+            if shared and not row.slides:
+                if found:
+                    raise ValueError(f"joint {number + 1}: its limits are given twice")
+                found = shared[0], shared[1][number]
+            if found is None:
+                units = ("mm", "m") if row.slides else ("deg", "rad")
+                names = " or ".join(f"limits_{unit}" for unit in units)
+                raise ValueError(f"joint {number + 1}: its limits are missing: {names}")
+            limits.append(in_own_units(*found))
+            in_degrees += found[1] if found[0] == "deg" else ()
+        if in_degrees and max(map(abs, in_degrees)) < 6.3:
+            raise ValueError("no joint turns more than 6.3 deg: write limits_rad")
+        return np.array(limits)
+
+
+class ByUrdf(_About):
+    """A robot file that names a URDF file, the links its chain runs between, and what it lacks."""
+
+    urdf: str = Field(min_length=1)
+    base_link: str | None = None
+    tip_link: str | None = None
 
 
 def shipped() -> list[str]:
@@ -70,13 +298,11 @@ def shipped() -> list[str]:
 def load(name_or_path: str | Path) -> Robot:
     """Robot of a shipped name, of a YAML file or of a URDF file.
 
-    Raises InputError listing everything that is wrong with the description.
+    Raises InputError listing what is wrong with the description.
     """
     path = _path(name_or_path)
     if path.suffix.lower() in (".urdf", ".xacro", ".xml"):
-        from kinacc.kinematics.robot import urdf
-
-        return urdf.load(path)
+        return _urdf.load(path)
     document, problems = read(path)
     if path.parent == _SHIPPED:
         document = replace(document, name=path.name)
@@ -89,16 +315,6 @@ def of_text(text: str, name: str) -> Robot:
     Raises InputError as ``load`` does.
     """
     return _described(*parsed(text, name), Path(name))
-
-
-def _described(document: Document, problems: list[Problem], path: Path) -> Robot:
-    title = f"The robot description {document.name} cannot be used"
-    refuse(problems, title)
-    reader = Reader(document)
-    robot = _from_urdf(reader, path) if "urdf" in document.data else _from_table(reader)
-    if reader.problems or robot is None:
-        raise InputError(reader.in_order(), title)
-    return robot
 
 
 def files(name_or_path: str | Path) -> list[Path]:
@@ -124,216 +340,124 @@ def _path(name_or_path: str | Path) -> Path:
     return path
 
 
-# --- a table of DH rows ---------------------------------------------------------------------------
+def _described(document: Document, problems: list[Problem], path: Path) -> Robot:
+    title = f"The robot description {document.name} cannot be used"
+    refuse(problems, title)
+    kind: type[_About] = ByUrdf if "urdf" in document.data else Table
+    try:
+        described = kind.model_validate(document.data)
+        if isinstance(described, Table):
+            return described.robot()
+        return _by_urdf(described, document, path)
+    except ValidationError as error:
+        raise InputError(_problems(error, document, kind), title) from None
+    except ValueError as error:
+        raise InputError(Problem(document.name, str(error)), title) from None
 
 
-def _from_table(reader: Reader) -> Robot | None:
-    content = reader.document.data
-    reader.known_keys(content, _DH_KEYS)
-    rows = content.get("dh")
-    if not isinstance(rows, list) or not rows:
-        reader.fault(("dh",), "missing", "a list with one row per joint, or urdf with a file")
-        return None
-    if not FEWEST_JOINTS <= len(rows) <= MOST_JOINTS:
-        reader.fault(("dh",), f"has {len(rows)} joints", f"{FEWEST_JOINTS} to {MOST_JOINTS}")
-        if len(rows) > MOST_JOINTS:
-            return None
-    table = _rows(reader, rows)
-    limits = _limits(reader, content, rows, table.prismatic)
-    joint_map = _joint_map(reader, content, rows)
-    convention = content.get("convention", "standard")
-    if convention not in ("standard", "modified"):
-        reader.fault(("convention",), "unknown", "standard, modified (Craig)", value=convention)
-    base, flange, tool = (_frame(reader, content, key) for key in ("base", "flange", "tool"))
-    if reader.problems:
-        return None
-    if convention == "modified":
-        table, before = from_modified(table)
-        base = compose(base, before)
-    return Robot(
-        **_about(reader, "robot"),
-        dh=table,
-        q_min_rad=limits[:, 0],
-        q_max_rad=limits[:, 1],
-        joint_map=joint_map,
-        base=base,
-        flange=flange,
-        tool=tool,
-        joint_names=tuple(str(row.get("name", f"joint {i}")) for i, row in enumerate(rows, 1)),
-    )
-
-
-def _rows(reader: Reader, rows: list) -> DHModel:
-    """The table as it is given; NaN where something is missing, with a problem for each."""
-    columns: dict[str, list[float]] = {name: [] for name in (*_ANGLES, *_LENGTHS)}
-    prismatic = []
-    for number, row in enumerate(rows):
-        path = ("dh", number)
-        if not isinstance(row, Mapping):
-            reader.fault(path, "is not a row of DH values", ", ".join(_ROW_KEYS), value=row)
-            row = dict.fromkeys(("theta_offset_rad", "d_mm", "a_mm", "alpha_rad"), 0.0)
-        reader.known_keys(row, _ROW_KEYS, path)
-        for name in _ANGLES:
-            default = 0.0 if name == "beta" else None
-            columns[name].append(reader.quantity(row, name, ANGLE, path, default))
-        for name in _LENGTHS:
-            columns[name].append(reader.quantity(row, name, LENGTH, path))
-        kind = row.get("joint", "revolute")
-        if kind not in ("revolute", "prismatic"):
-            reader.fault((*path, "joint"), "unknown", "revolute, prismatic", value=kind)
-        if row.get("sign", 1) not in (1, -1) or isinstance(row.get("sign"), bool):
-            reader.fault((*path, "sign"), "is no sign", "1, -1", value=row["sign"])
-        prismatic.append(kind == "prismatic")
-    total = np.nansum(np.abs(columns["d"])) + np.nansum(np.abs(columns["a"]))
-    if 0.0 < total < 20.0:
-        fix = "if they were meant in metres, write d_m and a_m"
-        reader.fault(("dh",), f"all lengths together are {total:g} mm", "an arm's lengths", fix)
-    return DHModel(
-        columns["theta_offset"],
-        columns["d"],
-        columns["a"],
-        columns["alpha"],
-        columns["beta"],
-        prismatic,
-    )
-
-
-def _limits(reader: Reader, content: Mapping, rows: list, prismatic: np.ndarray) -> np.ndarray:
-    """Limits (k, 2) of the reported joints, from the rows or from one list for all."""
-    shared = reader.unit_key(content, "limits", ANGLE, ())
-    listed = content.get(shared) if shared else None
-    if shared and (not isinstance(listed, list) or len(listed) != len(rows)):
-        reader.fault((shared,), "wrong length", f"{len(rows)} pairs, one per joint")
-        return np.full((len(rows), 2), np.nan)
-    limits = np.full((len(rows), 2), np.nan)
-    in_degrees = []
-    for number, row in enumerate(rows):
-        row = row if isinstance(row, Mapping) else {}
-        units = LENGTH if prismatic[number] else ANGLE
-        given = [key for key in _LIMITS if key in row]
-        path, value = ("dh", number, *given[:1]), row.get(given[0]) if given else None
-        if listed is not None and not prismatic[number]:
-            if given:
-                reader.fault(path, f"given twice, also in {shared}", "in one of the two places")
-            path, value, given = (shared, number), listed[number], [shared]
-        unit = given[0].rpartition("_")[2] if given else ""
-        if not given:
-            names = " or ".join(f"limits_{unit}" for unit in units)
-            reader.fault(path, "its limits are missing", f"[lower, upper] as {names}")
-        elif unit not in units:
-            kind = "slides" if prismatic[number] else "turns"
-            fix = " or ".join(f"limits_{unit}" for unit in units)
-            reader.fault(path, f"the joint {kind}", f"limits in {' or '.join(units)}", fix)
-        elif len(given) > 1:
-            reader.fault(path, "given twice", f"one of {', '.join(given)}")
-        else:
-            limits[number] = reader.pair(value, unit, path, units[unit])
-            if unit == "deg":
-                in_degrees += list(np.rad2deg(limits[number]))
-    if in_degrees and np.nanmax(np.abs(in_degrees)) < 6.3:
-        fix = "if they were meant in rad, write limits_rad"
-        reader.fault((shared or "dh",), "no joint turns more than 6.3 deg", "degrees", fix)
-    return limits
-
-
-def _joint_map(reader: Reader, content: Mapping, rows: list) -> np.ndarray:
-    """Matrix (k, k) from reported to DH joints: the rows' signs, or given as a whole."""
-    signs = [row.get("sign", 1) if isinstance(row, Mapping) else 1 for row in rows]
-    if "joint_map" not in content:
-        return np.diag([float(sign) if sign in (1, -1) else 1.0 for sign in signs])
-    if any(isinstance(row, Mapping) and "sign" in row for row in rows):
-        allowed = "signs in the rows, or joint_map with the signs in it"
-        reader.fault(("joint_map",), "given beside a joint's sign", allowed)
-    return _square(reader, content["joint_map"], len(rows))
-
-
-def _square(reader: Reader, matrix: object, count: int) -> np.ndarray:
-    allowed = f"an invertible {count} x {count} matrix: DH joints = joint_map times reported joints"
-    square = isinstance(matrix, list) and len(matrix) == count
-    if not square or any(not isinstance(row, list) or len(row) != count for row in matrix):
-        reader.fault(("joint_map",), "has the wrong shape", allowed)
-        return np.eye(count)
-    before = len(reader.problems)
-    values = np.array(
-        [[reader.number(each, ("joint_map", i)) for each in row] for i, row in enumerate(matrix)]
-    )
-    if len(reader.problems) == before and abs(np.linalg.det(values)) < 1e-9:
-        reader.fault(("joint_map",), "is singular", allowed)
-    return values
-
-
-# --- frames, text and URDF ------------------------------------------------------------------------
-
-
-def _frame(reader: Reader, content: Mapping, name: str) -> Pose:
-    """A frame given by a position and one form of orientation; identity where it is not given."""
-    frame = content.get(name)
-    if frame is None:
-        return IDENTITY
-    if not isinstance(frame, Mapping):
-        reader.fault((name,), "is not a frame", ", ".join(_FRAME_KEYS), value=frame)
-        return IDENTITY
-    reader.known_keys(frame, _FRAME_KEYS, (name,))
-    position = np.zeros(3)
-    key = reader.unit_key(frame, "position", LENGTH, (name,))
-    if key:
-        position = np.array(reader.numbers(frame[key], 3, (name, key)))
-        position *= LENGTH[key.rpartition("_")[2]]
-    turns = [key for key in _FRAME_KEYS[2:] if key in frame]
-    if len(turns) > 1:
-        reader.fault((name, turns[1]), "a second orientation", f"one of {', '.join(turns)}")
-    return Pose(_rotation(reader, frame, name, turns[0]) if turns else np.eye(3), position)
-
-
-def _rotation(reader: Reader, frame: Mapping, name: str, key: str) -> np.ndarray:
-    path = (name, key)
-    if key == "quaternion_wxyz":
-        values = np.array(reader.numbers(frame[key], 4, path))
-        length = np.linalg.norm(values)
-        if abs(length - 1.0) > 1e-3:
-            reader.fault(path, f"has length {length:.6g}", "a unit quaternion w, x, y, z")
-        return rotation_from_quaternion(values / length)
-    values = np.array(reader.numbers(frame[key], 3, path)) * ANGLE[key.rpartition("_")[2]]
-    if key.startswith("rpy"):  # as in URDF: about fixed x, then y, then z
-        return rotation_z(values[2]) @ rotation_y(values[1]) @ rotation_x(values[0])
-    return exp_so3(values)
-
-
-def _about(reader: Reader, name: str) -> dict[str, str]:
-    content: dict[str, Any] = {key: reader.document.data.get(key) for key in _ABOUT_KEYS}
-    if isinstance(content["date"], date):
-        content["date"] = content["date"].isoformat()
-    content["name"] = content["name"] or name
-    for fault in not_in_a_line("name", str(content["name"])):
-        reader.fault(("name",), fault.what, fault.allowed)
-    return {key: "" if value is None else str(value) for key, value in content.items()}
-
-
-def _from_urdf(reader: Reader, path: Path) -> Robot | None:
-    """A YAML that names a URDF file, the links its chain runs between, and what a URDF lacks."""
-    from kinacc.kinematics.robot import urdf
-
-    content = reader.document.data
-    reader.known_keys(content, _URDF_KEYS)
-    if "dh" in content:
-        reader.fault(("dh",), "given beside urdf", "one description of the joints")
-    texts = {key: content.get(key) for key in ("urdf", "base_link", "tip_link")}
-    for key, value in texts.items():
-        may_be_absent = key != "urdf" and value is None
-        if not may_be_absent and (not isinstance(value, str) or not value):
-            reader.fault((key,), "is not text", "a name", value=value)
-    tool = _frame(reader, content, "tool")
-    if reader.problems:
-        return None
-    file = path.parent / texts["urdf"]
+def _by_urdf(described: ByUrdf, document: Document, path: Path) -> Robot:
+    file = path.parent / described.urdf
     if not os.path.isfile(file):
-        reader.fault(("urdf",), "there is no such file", "a path from this file", value=str(file))
-        return None
-    robot = urdf.load(file, texts["base_link"], texts["tip_link"])
-    about = _about(reader, robot.name)
-    if not about["source"]:
-        about["source"] = robot.source
-    joint_map = robot.joint_map
-    if "joint_map" in content:
-        joint_map = _square(reader, content["joint_map"], len(robot.joint_map))
-    return replace(robot, **about, joint_map=joint_map, tool=tool)
+        raise InputError(Problem(document.place(("urdf",)), f"{file}: there is no such file"))
+    robot = _urdf.load(file, described.base_link, described.tip_link)
+    matrix = robot.joint_map
+    if described.joint_map is not None:
+        matrix = described.matrix(len(matrix))
+    return replace(
+        robot,
+        name=described.name or robot.name,
+        source=described.source or robot.source,
+        date=described.date,
+        joint_map=matrix,
+        tool=described.tool.pose(),
+    )
+
+
+def _problems(error: ValidationError, document: Document, kind: type) -> list[Problem]:
+    """What pydantic found, as it stands in the file."""
+    found = []
+    for number, each in enumerate(error.errors(include_url=False)):
+        place, value = each["loc"], each["input"]
+        while place and not document.gives(place):
+            place = place[:-1]
+        what = each["msg"].removeprefix("Value error, ")
+        if each["type"] == "extra_forbidden":
+            what = "unknown key"
+            if number < _SUGGESTIONS:
+                what += _nearest(str(place[-1]), _keys(kind, place))
+        elif not isinstance(value, Mapping | list):
+            what = f"{str(value)[:60]}: {what}"
+        if len(each["loc"]) > len(place) and each["type"] == "missing":
+            what = f"{each['loc'][-1]} is missing"
+        found.append((document.lines.get(place, 0), Problem(document.place(place), what)))
+    return [problem for _, problem in sorted(found, key=lambda pair: pair[0])]
+
+
+def _keys(kind: type, place: tuple) -> list[str]:
+    inner = {"dh": Row, "base": Frame, "flange": Frame, "tool": Frame}
+    return list(inner.get(place[0] if len(place) > 1 else "", kind).model_fields)
+
+
+def _nearest(name: str, known: list[str]) -> str:
+    """What to write instead of an unknown key; empty where nothing is like it."""
+    stem = name.rpartition("_")[0] if name.rpartition("_")[2] in _UNITS else name
+    same = [f"{stem}_{unit}" for unit in _UNITS if f"{stem}_{unit}" in known]
+    close = same or difflib.get_close_matches(name[:100].lower(), known, n=1, cutoff=0.55)
+    return f"; did you mean {' or '.join(close)}?" if close else ""
+
+
+def from_modified(table: DHModel) -> tuple[DHModel, Pose]:
+    """Standard chain and base of a modified (Craig) table, exactly.
+
+    Row i of ``table`` reads ``Tx(a) Rx(alpha) Ry(beta) Rz(q + theta) Tz(d)``: a, alpha and beta lie
+    before the joint. Regrouping the same product hands them to the row above; those of the first
+    row become the base (first DH frame in the arm's base frame), those of the last row vanish.
+    """
+    handed_up = {name: np.append(getattr(table, name)[1:], 0.0) for name in PARAMETERS[2:]}
+    first = rotation_x(table.alpha_rad[0]) @ rotation_y(table.beta_rad[0])
+    return replace(table, **handed_up), Pose(first, np.array([table.a_mm[0], 0.0, 0.0]))
+
+
+def as_yaml(robot: Robot, heading: Iterable[str] = ()) -> str:
+    """Robot file of ``robot`` in standard DH, lengths in mm and angles in rad.
+
+    ``heading`` are lines of comment at the top. ``of_text`` reads joints and limits back bit by
+    bit, and turns of the frames to rounding.
+    """
+    about = {"name": robot.name, "source": robot.source, "date": robot.date}
+    lines = [
+        *(f"# {line}" for line in heading),
+        *(_entry(*each) for each in about.items() if each[1]),
+    ]
+    signs = np.diag(robot.joint_map)
+    simple = np.array_equal(robot.joint_map, np.diag(signs)) and (np.abs(signs) == 1.0).all()
+    lines.append("dh:")
+    for joint, slides in enumerate(robot.dh.prismatic):
+        row: dict[str, Any] = {name: float(getattr(robot.dh, name)[joint]) for name in PARAMETERS}
+        if robot.joint_names and robot.joint_names[joint] != f"joint {joint + 1}":
+            row["name"] = robot.joint_names[joint]
+        if slides:
+            row["joint"] = "prismatic"
+        if simple and signs[joint] < 0.0:
+            row["sign"] = -1
+        ends = float(robot.q_min_rad[joint]), float(robot.q_max_rad[joint])
+        row["limits_mm" if slides else "limits_rad"] = list(ends)
+        lines.append(f"  - {_flow(row)}")
+    if not simple:
+        lines.append(_entry("joint_map", robot.joint_map.tolist()))
+    for name in ("base", "flange", "tool"):
+        pose = getattr(robot, name)
+        if not all(np.array_equal(own, none) for own, none in zip(pose, IDENTITY, strict=True)):
+            turn = quaternion_from_rotation(pose.rotation).tolist()
+            frame = {"position_mm": pose.position_mm.tolist(), "quaternion_wxyz": turn}
+            lines.append(_entry(name, frame))
+    return "\n".join(lines) + "\n"
+
+
+def _entry(key: str, value: Any) -> str:
+    return _flow({key: value})[1:-1]
+
+
+def _flow(value: Any) -> str:
+    options: dict[str, Any] = {"width": float("inf"), "allow_unicode": True, "sort_keys": False}
+    return yaml.safe_dump(value, default_flow_style=True, **options).rstrip("\n")

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from lxml import etree
+from scipy.spatial.transform import Rotation
 
 from kinacc.errors import InputError, Problem, refuse
-from kinacc.geometry import Pose, compose
+from kinacc.geometry import IDENTITY, Pose, compose
 from kinacc.kinematics.robot.axes import Axes, chain_of
 from kinacc.kinematics.robot.record import FEWEST_JOINTS, MOST_JOINTS, Robot
 
@@ -48,23 +49,31 @@ def load(path: str | Path, base_link: str | None = None, tip_link: str | None = 
     the file leaves a choice. Limits come from the file; a continuous joint gets a turn either way.
     """
     path = Path(path)
-    chain, name, (base_link, tip_link) = _between_links(path, base_link, tip_link)
-    place = str(path)
+    joints, links, name = _parse(path)
+    base, tip = _ends(joints, links, base_link, tip_link, str(path))
+    chain = _between(joints, base, tip)
     moving = [joint for joint in chain if joint.kind in MOVING]
-    problems = list(_faults(moving, base_link, tip_link, place))
-    refuse(problems, f"{place} cannot be used as a robot")
-    axes, flange = _axes(chain)
+    refuse(list(_faults(moving, base, tip, str(path))), f"{path} cannot be used as a robot")
+    here, points, directions, limits = IDENTITY, [], [], []
+    for joint in chain:
+        here = compose(here, joint.origin)
+        if joint.kind in MOVING:
+            points.append(here.position_mm)
+            directions.append(here.rotation @ (joint.axis / np.linalg.norm(joint.axis)))
+            scale = _MM_PER_M if joint.kind == "prismatic" else 1.0
+            endless = joint.kind == "continuous"
+            limits.append((-_TURN_RAD, _TURN_RAD) if endless else np.multiply(joint.limits, scale))
     prismatic = np.array([joint.kind == "prismatic" for joint in moving])
-    base, dh, rest = chain_of(axes, flange, prismatic)
-    limits = np.array([_limits(joint) for joint in moving])
+    first, dh, rest = chain_of(Axes(np.array(points), np.array(directions)), here, prismatic)
+    low, high = np.array(limits, dtype=float).T
     return Robot(
         name=name,
         dh=dh,
-        q_min_rad=limits[:, 0],
-        q_max_rad=limits[:, 1],
+        q_min_rad=low,
+        q_max_rad=high,
         joint_map=np.eye(len(moving)),
-        source=f"URDF file {path.name}, from link {base_link} to link {tip_link}",
-        base=base,
+        source=f"URDF file {path.name}, from link {base} to link {tip}",
+        base=first,
         flange=rest,
         joint_names=tuple(joint.name for joint in moving),
     )
@@ -74,113 +83,57 @@ def joints_between(
     path: str | Path, base_link: str | None = None, tip_link: str | None = None
 ) -> list[Joint]:
     """Joints of the chain ``load`` takes, from base to tip, fixed ones included."""
-    return _between_links(Path(path), base_link, tip_link)[0]
-
-
-def _between_links(
-    path: Path, base_link: str | None, tip_link: str | None
-) -> tuple[list[Joint], str, tuple[str, str]]:
-    """The chain, the name of the robot and the links the chain runs between."""
-    joints, links, name = _parse(path)
-    ends = _ends(joints, links, base_link, tip_link, str(path))
-    return _chain(joints, *ends, str(path)), name, ends
-
-
-def _axes(chain: list[Joint]) -> tuple[Axes, Pose]:
-    """Axes of the moving joints and the tip, all at zero joints in the base link's frame."""
-    here = Pose(np.eye(3), np.zeros(3))
-    points, directions = [], []
-    for joint in chain:
-        here = compose(here, joint.origin)
-        if joint.kind in MOVING:
-            points.append(here.position_mm)
-            directions.append(here.rotation @ (joint.axis / np.linalg.norm(joint.axis)))
-    return Axes(np.array(points), np.array(directions)), here
-
-
-def _limits(joint: Joint) -> tuple[float, float]:
-    if joint.kind == "continuous":
-        return -_TURN_RAD, _TURN_RAD
-    low, high = joint.limits
-    scale = _MM_PER_M if joint.kind == "prismatic" else 1.0
-    return low * scale, high * scale
-
-
-# --- which chain ----------------------------------------------------------------------------------
+    joints, links, _ = _parse(Path(path))
+    return _between(joints, *_ends(joints, links, base_link, tip_link, str(path)))
 
 
 def _ends(
     joints: list[Joint], links: list[str], base: str | None, tip: str | None, place: str
 ) -> tuple[str, str]:
-    children = {joint.child for joint in joints}
+    """The links the chain runs between, stated or the only ones there can be."""
     problems = [
         Problem(f"{place}, {key}", f"there is no link {link!r}", ", ".join(links))
         for key, link in (("base_link", base), ("tip_link", tip))
         if link is not None and link not in links
     ]
+    children = {joint.child for joint in joints}
     roots = [link for link in links if link not in children]
     if base is None and len(roots) != 1:
-        what = f"has {len(roots)} links without a parent" if roots else "has no root link"
+        what = f"has {len(roots)} links without a parent"
         problems.append(Problem(place, what, "one root, or base_link", ", ".join(roots or links)))
-    refuse(problems, f"{place} cannot be used as a robot")
+    title = f"{place} cannot be used as a robot"
+    refuse(problems, title)
     base = base or roots[0]
     if tip is not None:
+        if tip == base or not _between(joints, base, tip):
+            what = f"link {tip} does not hang on {base}"
+            raise InputError(Problem(f"{place}, tip_link", what, "a link below base_link"), title)
         return base, tip
     parents = {joint.parent for joint in joints}
-    tips = [link for link in links if link not in parents and _reaches(joints, base, link)]
-    counts = {link: _moving_between(joints, base, link) for link in tips}
-    usable = [link for link in tips if FEWEST_JOINTS <= counts[link] <= MOST_JOINTS]
-    if len(usable) == 1:
-        return base, usable[0]
-    found = "; ".join(f"{link} ({counts[link]} moving joints)" for link in tips)
-    problem = Problem(
-        place,
-        f"the chain from {base} can end at {len(tips)} links: {found}",
-        f"the link the flange is, with {FEWEST_JOINTS} to {MOST_JOINTS} moving joints before it",
-        f"write a robot YAML with urdf: {Path(place).name}, base_link and tip_link; "
-        f"all links: {', '.join(links)}",
-    )
-    raise InputError(problem, f"{place} leaves open where the arm ends")
-
-
-def _up(joints: list[Joint], link: str) -> Iterator[Joint]:
-    """Joints from a link towards the root."""
-    by_child = {joint.child: joint for joint in joints}
-    seen = set()
-    while link in by_child and link not in seen:
-        seen.add(link)
-        yield by_child[link]
-        link = by_child[link].parent
-
-
-def _reaches(joints: list[Joint], base: str, link: str) -> bool:
-    return link == base or any(joint.parent == base for joint in _up(joints, link))
+    chains = {link: _between(joints, base, link) for link in links if link not in parents}
+    counts = {
+        link: sum(joint.kind in MOVING for joint in chain)
+        for link, chain in chains.items()
+        if chain
+    }
+    usable = [link for link, count in counts.items() if FEWEST_JOINTS <= count <= MOST_JOINTS]
+    if len(usable) != 1:
+        found = "; ".join(f"{link} ({count} moving joints)" for link, count in counts.items())
+        what = f"the chain from {base} can end at {len(counts)} links: {found}"
+        allowed = f"one with {FEWEST_JOINTS} to {MOST_JOINTS} moving joints before it"
+        fix = f"write a robot YAML with urdf: {Path(place).name}, base_link and tip_link"
+        raise InputError(Problem(place, what, allowed, fix), title)
+    return base, usable[0]
 
 
 def _between(joints: list[Joint], base: str, link: str) -> list[Joint]:
-    found = []
-    for joint in _up(joints, link):
-        found.append(joint)
-        if joint.parent == base:
-            break
-    return found[::-1]
-
-
-def _moving_between(joints: list[Joint], base: str, link: str) -> int:
-    if link == base:
-        return 0
-    return sum(joint.kind in MOVING for joint in _between(joints, base, link))
-
-
-def _chain(joints: list[Joint], base: str, tip: str, place: str) -> list[Joint]:
-    if base == tip or not _reaches(joints, base, tip):
-        names = [tip, *(joint.parent for joint in _up(joints, tip))]
-        problem = Problem(
-            f"{place}, tip_link", f"link {tip} does not hang on {base}", "a link below base_link"
-        )
-        fix = f"links above {tip}: {', '.join(names[1:]) or 'none'}"
-        raise InputError(Problem(problem.where, problem.what, problem.allowed, fix))
-    return _between(joints, base, tip)
+    """Joints from a link above to a link; none where the one does not hang on the other."""
+    above = {joint.child: joint for joint in joints}
+    chain: list[Joint] = []
+    while link != base and link in above and len(chain) < len(joints):
+        chain.append(above[link])
+        link = above[link].parent
+    return chain[::-1] if link == base else []
 
 
 def _faults(moving: list[Joint], base: str, tip: str, place: str) -> Iterator[Problem]:
@@ -191,62 +144,39 @@ def _faults(moving: list[Joint], base: str, tip: str, place: str) -> Iterator[Pr
         where = f"{place}:{joint.line}, joint {joint.name}"
         if joint.mimics:
             what = f"follows joint {joint.mimics} (mimic)"
-            allowed = "independent joints: the chain of a linkage is not a serial arm"
-            yield Problem(where, what, allowed, "choose a tip_link before it")
+            yield Problem(where, what, "independent joints", "choose a tip_link before it")
         if np.linalg.norm(joint.axis) < 1e-9:
             yield Problem(where, "its axis has no direction", 'e.g. <axis xyz="0 0 1"/>')
         low, high = joint.limits
-        if joint.kind != "continuous" and not (math.isfinite(low) and math.isfinite(high)):
-            yield Problem(where, "has no limits", '<limit lower=".." upper=".."/>')
-        elif joint.kind != "continuous" and not low < high:
-            yield Problem(where, f"limits {low:g} to {high:g}", "lower below upper")
-
-
-# --- the file -------------------------------------------------------------------------------------
+        if joint.kind != "continuous" and not low < high:
+            yield Problem(where, f"limits {low:g} to {high:g}", '<limit lower=".." upper=".."/>')
 
 
 def _parse(path: Path) -> tuple[list[Joint], list[str], str]:
     """Joints, link names and the name of the robot."""
-    from lxml import etree
-    from pytransform3d import urdf as library
-
     place, title = str(path), f"{path} cannot be used as a robot"
     root = _root(path, title)
-    problems = list(_faults_of_text(root, place))
+    if root.tag != "robot" or not root.get("name"):
+        raise InputError(Problem(place, "is no <robot name=..>", "a URDF file"), title)
+    if any("xacro" in str(element.tag) for element in root.iter("{*}*")):
+        what = "holds xacro macros"
+        raise InputError(Problem(place, what, "plain URDF", "expand it with xacro first"), title)
+    elements, links = root.findall("joint"), [each.get("name", "") for each in root.findall("link")]
+    if len(elements) > _MOST_JOINTS:
+        what = f"has {len(elements)} joints"
+        raise InputError(Problem(place, what, f"at most {_MOST_JOINTS}, fixed included"), title)
+    problems: list[Problem] = []
+    joints = [_joint(element, place, links, problems) for element in elements]
+    for what, given in (("joint", "name"), ("child link", "child")):
+        counts = Counter(getattr(joint, given) for joint in joints)
+        for name in (name for name, count in counts.items() if count > 1):
+            problems.append(Problem(place, f"{what} {name} is given more than once"))
     refuse(problems, title)
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # on meshes it cannot find, which we do not need
-            text = etree.tostring(_joints_alone(root), encoding="unicode")
-            name, links, joints = library.parse_urdf(text)
-    except (library.UrdfException, ValueError) as error:
-        raise InputError(Problem(place, str(error).rstrip(".")), title) from None
-    elements = {element.get("name"): element for element in root.findall("joint")}
-    records = []
-    for joint in joints:
-        element = elements[joint.joint_name]
-        follows = element.find("mimic")
-        frame = np.asarray(joint.child2parent)
-        records.append(
-            Joint(
-                joint.joint_name,
-                joint.joint_type,
-                joint.parent,
-                joint.child,
-                Pose(frame[:3, :3], frame[:3, 3] * _MM_PER_M),
-                np.asarray(joint.joint_axis, dtype=float),
-                joint.limits,
-                "" if follows is None else follows.get("joint", "?"),
-                element.sourceline or 0,
-            )
-        )
-    return records, [link.name for link in links], name
+    return joints, links, root.get("name")
 
 
 def _root(path: Path, title: str):
     """The root of an XML file that is no larger than robots are and defines no entities."""
-    from lxml import etree
-
     place = str(path)
     try:
         with open(path, "rb") as stream:
@@ -266,70 +196,41 @@ def _root(path: Path, title: str):
         raise InputError(Problem(f"{place}:{line}", f"is not XML: {error.msg}"), title) from None
     definitions = root.getroottree().docinfo.internalDTD
     if definitions is not None and any(True for _ in definitions.iterentities()):
-        what = "defines entities, which can stand for anything"
-        raise InputError(Problem(place, what, "plain URDF", "write out what they stand for"), title)
+        raise InputError(Problem(place, "defines entities", "plain URDF"), title)
     return root
 
 
-def _joints_alone(root):
-    """The robot without what a chain does not need: shapes, masses, materials, plugins."""
-    from lxml import etree
+def _joint(element, place: str, links: list[str], problems: list[Problem]) -> Joint:
+    """A joint of the file; what is wrong with it goes to ``problems``."""
+    name, kind = str(element.get("name")), element.get("type")
+    where = f"{place}:{element.sourceline}, joint {name}"
+    if kind not in (*MOVING, "fixed"):
+        problems.append(Problem(where, f"its type is {kind!r}", ", ".join((*MOVING, "fixed"))))
 
-    alone = etree.Element("robot", dict(root.attrib))
-    for link in root.findall("link"):
-        etree.SubElement(alone, "link", dict(link.attrib))
-    for joint in root.findall("joint"):
-        kept = etree.SubElement(alone, "joint", dict(joint.attrib))
-        for tag in ("origin", "parent", "child", "axis", "limit"):
-            if (child := joint.find(tag)) is not None:
-                etree.SubElement(kept, tag, dict(child.attrib))
-    return alone
+    def value(tag: str, key: str) -> str | None:
+        child = element.find(tag)
+        return None if child is None else child.get(key)
 
+    def numbers(tag: str, key: str, default: str, most: float = _FARTHEST) -> list[float]:
+        text, count = value(tag, key) or default, len(default.split())
+        try:
+            found = [float(word) for word in text.split()]
+        except ValueError:
+            found = []
+        odd = not text.isascii() or "_" in text  # Python takes more for a number than others do
+        if len(found) != count or odd or not all(abs(each) <= most for each in found):
+            allowed = f"{count} finite number{'s' if count > 1 else ''} of at most {most:g}"
+            problems.append(Problem(where, f"{tag} {key}={text[:60]!r}", allowed))
+            return [0.0] * count
+        return found
 
-def _faults_of_text(root, place: str) -> Iterator[Problem]:
-    """What a lenient parser would read as something else: macros, wrong numbers, double names."""
-    if root.tag != "robot":
-        yield Problem(f"{place}:{root.sourceline}", f"begins with <{root.tag}>", "<robot>")
-    macros = [element for element in root.iter("{*}*") if "xacro" in str(element.tag)]
-    if macros:
-        where = f"{place}:{macros[0].sourceline}"
-        yield Problem(where, "holds xacro macros", "plain URDF", "expand it with xacro first")
-        return
-    names = [element.get("name") for element in root.findall("joint")]
-    if len(names) > _MOST_JOINTS:
-        yield Problem(place, f"has {len(names)} joints", f"at most {_MOST_JOINTS}, fixed included")
-        return
-    children = [each.get("link") for each in root.findall("joint/child")]
-    for what, given in (("joint", names), ("child link", children)):
-        for name in sorted(str(name) for name, count in Counter(given).items() if count > 1):
-            yield Problem(place, f"{what} {name} is given more than once", "every name once")
-    for element in root.findall("joint"):
-        where = f"{place}:{element.sourceline}, joint {element.get('name')}"
-        if element.get("type") not in (*MOVING, "fixed", "planar", "floating"):
-            kinds = ", ".join((*MOVING, "fixed"))
-            yield Problem(where, f"its type is {element.get('type')!r}", kinds)
-        if element.get("type") in ("planar", "floating"):
-            yield Problem(where, f"is {element.get('type')}", ", ".join((*MOVING, "fixed")))
-        for tag, key, count, most in (
-            ("origin", "xyz", 3, _FARTHEST),
-            ("origin", "rpy", 3, _FARTHEST),
-            ("axis", "xyz", 3, _FARTHEST),
-            ("limit", "lower", 1, _NO_LIMIT),
-            ("limit", "upper", 1, _NO_LIMIT),
-        ):
-            child = element.find(tag)
-            value = None if child is None else child.get(key)
-            if value is not None and not _are_numbers(value, count, most):
-                allowed = f"{count} finite number{'s' if count > 1 else ''} of at most {most:g}"
-                said = repr(value if len(value) <= 60 else f"{value[:57]}...")
-                yield Problem(where, f"{tag} {key}={said}", allowed)
-
-
-def _are_numbers(text: str, count: int, most: float) -> bool:
-    if not text.isascii() or "_" in text:  # Python takes more for a number than others do
-        return False
-    try:
-        values = [float(word) for word in text.split()]
-    except ValueError:
-        return False
-    return len(values) == count and all(abs(value) <= most for value in values)
+    parent, child = str(value("parent", "link")), str(value("child", "link"))
+    for link in (parent, child):
+        if link not in links:
+            problems.append(Problem(where, f"there is no link {link!r}"))
+    turn = Rotation.from_euler("xyz", numbers("origin", "rpy", "0 0 0")).as_matrix()
+    origin = Pose(turn, _MM_PER_M * np.array(numbers("origin", "xyz", "0 0 0")))
+    axis = np.array(numbers("axis", "xyz", "1 0 0"))
+    ends = (numbers("limit", key, "0", _NO_LIMIT)[0] for key in ("lower", "upper"))
+    follows = "" if element.find("mimic") is None else element.find("mimic").get("joint", "?")
+    return Joint(name, kind, parent, child, origin, axis, tuple(ends), follows, element.sourceline)
