@@ -45,11 +45,7 @@ def test_the_paper_s_study_is_the_default():
     assert list(loaded) == ["mh180"]
     paper = loaded["mh180"]
     assert paper == {"robot": "mh180", **defaults()}
-    assert paper["study"]["noise_mm"] == [0.05, 0.1, 0.15, 0.2, 0.25, 0.3]
-    assert (paper["study"]["repetitions"], paper["study"]["measurements"]) == (100, 200)
     assert (paper["study"]["alpha"], paper["evaluation"]["points"]) == (0.6, 200)
-    assert paper["map"] == {"slices_deg": [0.0, 15.0, 30.0, 45.0, 60.0], "grid_mm": 25.0}
-    assert paper["evaluation"]["cylinder"]["radial_span_mm"] == 900.0
     histories = paper["histories"]
     for name, eta_mm in (("rejected", 0.834), ("larger", 0.844), ("kept", 1.023)):
         assert histories[f"eta_ratio_{name}"] * 0.906 == pytest.approx(eta_mm, abs=1e-6)
@@ -68,16 +64,6 @@ def test_the_ur10_example_adds_its_data_sets():
         assert own["study"] == loaded["mh180"]["study"]
         assert own["evaluation"]["space"] == "measured"
     assert loaded["mh180"] == load([PAPER])["mh180"]
-
-
-def test_absent_data_says_where_it_comes_from(tmp_path):
-    alone = tmp_path / "ur10.yaml"
-    alone.write_text(UR10.read_text())
-    found = complaints(PAPER, alone)
-    text = the_one(found, "ur10.yaml", "datasets.ur10_b.measurements.file.path")
-    assert "does not exist" in text
-    assert "series_B.csv" in text
-    assert "github.com/christianlandgraf/ipa-robot-accuracy" in text
 
 
 def test_paths_are_seen_from_the_file_they_stand_in(tmp_path, monkeypatch):
@@ -119,20 +105,6 @@ def test_a_value_of_the_command_line_is_no_second_file():
         load([PAPER], {"datasets": {"mh180": {"measurements": {"source": "File"}}}})
     (problem,) = caught.value.problems
     assert problem.where == "command line, datasets.mh180.measurements.source"
-
-
-def test_values_of_the_command_line_come_last():
-    loaded = load([PAPER], overrides={"study": {"repetitions": 2}})
-    assert loaded["mh180"]["study"]["repetitions"] == 2
-    found = complaints(PAPER, overrides={"study": {"repetition": 2}})
-    assert "did you mean repetitions?" in the_one(found, "command line", "study.repetition")
-
-
-def test_whole_numbers_given_for_real_ones_are_the_same_setting(config):
-    own = config("map: {grid_mm: 30}\ncalibration: {dh: {truncation: 1e-6}}\n")
-    loaded = load([PAPER, own])["mh180"]
-    assert isinstance(loaded["map"]["grid_mm"], float)
-    assert loaded["calibration"]["dh"]["truncation"] == 1e-6
 
 
 def test_column_names_of_two_data_sets_do_not_mix(config, tmp_path):
@@ -314,12 +286,6 @@ def test_what_is_no_configuration_at_all(tmp_path, content, words):
     path.write_bytes(content)
     found = complaints(PAPER, path)
     assert any(words in text and "own.yaml" in text for text in found), found
-
-
-def test_absent_files_and_folders_are_named(tmp_path):
-    found = complaints(PAPER, tmp_path / "absent.yaml", tmp_path)
-    the_one(found, "absent.yaml", "no such file")
-    the_one(found, "is a folder")
 
 
 def test_no_data_set_is_a_problem(config):

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
-import yaml
 
 from kinacc.calibration.constraints import arm_terms, free_parameters, parallel_joints
 from kinacc.config import parameter_rules
@@ -115,12 +112,3 @@ def test_beta_takes_the_place_of_d_where_asked():
     assert beside.sum() == 26
     assert instead.sum() == 24
     assert not instead[[1, 2], 1].any()
-
-
-def test_the_mask_on_the_page_about_fitting_is_one():
-    page = (Path(__file__).parents[2] / "docs" / "fitting.md").read_text(encoding="utf-8")
-    shown = yaml.safe_load(page.split("```yaml")[1].split("```")[0])["calibration"]
-    for about, content in ((FRAMES, shown["frames"]), (JOINTS, shown["dh"]["parameters"])):
-        found, problems = parameter_rules.rules(content, about)
-        assert not problems
-        assert len(found) == len(content)

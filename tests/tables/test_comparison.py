@@ -12,46 +12,23 @@ MARKS = {"kinacc_version": "0", "config_hash": "c", "seed": 1}
 ROWS = 12
 
 
-def measurements():
+def points():
     draw = np.random.default_rng(3)
+    names = [f"q{joint}" for joint in range(1, 7)] + ["ex_mm", "ey_mm", "ez_mm", "true_error_mm"]
+    directions = {f"s{joint}": np.zeros(ROWS, int) for joint in range(1, 7)}
     return {
-        "pose": np.arange(ROWS),
-        **{f"q{joint}": draw.uniform(-1.0, 1.0, ROWS) for joint in range(1, 7)},
-        **{f"s{joint}": np.zeros(ROWS, int) for joint in range(1, 7)},
-        "target": ["tool"] * ROWS,
-        **{f"{axis}_mm": draw.normal(size=ROWS) for axis in "xyz"},
-        "qw": np.ones(ROWS),
-        **{f"q{axis}": np.zeros(ROWS) for axis in "xyz"},
-        "repeat": np.zeros(ROWS, int),
-        "subset": ["train"] * ROWS,
-        "fold": [0.0, 1.0] * (ROWS // 2),
-    }
-
-
-def claims():
-    return {
-        "claim": ["first", "second"],
-        "statement": ["a sentence", "another"],
-        "statistic": ["mean", "mean"],
-        "evidence": ["tables", "tables"],
-        "paper": [1.0, 2.0],
-        "reproduced": [1.1, 2.1],
-        "tolerance": [0.2, 0.2],
-        "verdict": ["agrees", "agrees"],
-        "share": [np.nan, np.nan],
-        "used_to_choose": [False, True],
-    }
+        "point": np.arange(ROWS),
+        **{name: draw.uniform(size=ROWS) for name in names},
+    } | directions
 
 
 def written(folder, artefact, columns):
-    folder.mkdir(exist_ok=True)
-    path = folder / f"{artefact}.parquet"
-    path.write_bytes(store.content_of(store.to_table(artefact, columns, MARKS)))
-    return path
+    store.write_table(folder / f"{artefact}.parquet", artefact, columns, MARKS)
+    return folder / f"{artefact}.parquet"
 
 
-def differences(tmp_path, artefact, before, now, tolerances=None):
-    paths = [written(tmp_path / name, artefact, columns)
+def differences(tmp_path, before, now, tolerances=None):
+    paths = [written(tmp_path / name, "assessment_points", columns)
              for name, columns in (("before", before), ("now", now))]  # fmt: skip
     return list(compare_tables(*paths, tolerances))
 
@@ -62,78 +39,53 @@ def changed(table, column, row, value):
     return {**table, column: values}
 
 
-def test_the_same_tables_do_not_differ(tmp_path):
-    assert differences(tmp_path, "measurements", measurements(), measurements()) == []
-    assert differences(tmp_path, "claims", claims(), claims()) == []
-
-
 @pytest.mark.parametrize(("by_mm", "found"), [(1e-5, 1), (-1e-5, 1), (1e-8, 0)])
 def test_a_length_may_differ_by_rounding_and_by_no_more(tmp_path, by_mm, found):
-    table = measurements()
-    now = changed(table, "y_mm", 7, table["y_mm"][7] + by_mm)
-    told = differences(tmp_path, "measurements", table, now)
-    assert [each.column for each in told] == ["y_mm"] * found
-    for each in told:
-        assert (each.rows, each.unit) == (1, "mm")
-        assert each.largest == pytest.approx(1e-5, rel=1e-3)
-        assert "pose=7" in each.row
+    table = points()
+    now = changed(table, "ey_mm", 7, table["ey_mm"][7] + by_mm)
+    told = differences(tmp_path, table, now)
+    assert [(each.column, each.rows, each.unit, each.row) for each in told] == [
+        ("ey_mm", 1, "mm", "point=7")
+    ] * found
+    assert all(each.largest == pytest.approx(1e-5, rel=1e-3) for each in told)
+    (told,) = differences(tmp_path, table, changed(table, "s3", 1, 1))
+    assert (told.table, told.column, told.rows) == ("assessment_points", "s3", 1)
+    other = changed(changed(table, "ex_mm", 0, 0.01), "ey_mm", 0, 9.0)
+    told = differences(tmp_path, table, other, {"assessment_points.ex_mm": 2.0})
+    assert [each.column for each in told] == ["ey_mm"]
 
 
-@pytest.mark.parametrize(
-    ("artefact", "table", "column", "value"),
-    [
-        ("measurements", measurements(), "subset", "validation"),
-        ("measurements", measurements(), "s3", 1),
-        ("measurements", measurements(), "fold", np.nan),
-        ("claims", claims(), "verdict", "differs"),
-    ],
-)
-def test_a_count_a_word_and_a_null_are_equal_or_differ(tmp_path, artefact, table, column, value):
-    now = changed(table, column, 1, value)
-    (told,) = differences(tmp_path, artefact, table, now)
-    assert (told.table, told.column, told.rows) == (artefact, column, 1)
-
-
-def test_a_missing_row_and_a_new_one_are_counted(tmp_path):
-    table = measurements()
-    fewer = {name: list(values)[:-2] for name, values in table.items()}
-    (told,) = differences(tmp_path, "measurements", table, fewer)
+def test_rows_belong_together_by_their_key_and_are_missing_or_new(tmp_path):
+    order = np.random.default_rng(5).permutation(ROWS)
+    table = points()
+    assert differences(tmp_path, table, {k: v[order] for k, v in table.items()}) == []
+    fewer = {name: values[:-2] for name, values in table.items()}
+    (told,) = differences(tmp_path, table, fewer)
     assert (told.column, told.what.split(",")[0]) == ("", "2 rows missing")
-    (told,) = differences(tmp_path, "measurements", fewer, table)
+    (told,) = differences(tmp_path, fewer, table)
     assert told.what.startswith("2 rows new")
 
 
-def test_a_missing_column_is_named(tmp_path):
-    whole = written(tmp_path / "whole", "measurements", measurements())
-    (tmp_path / "part").mkdir()
-    part = tmp_path / "part" / "measurements.parquet"
-    pq.write_table(pq.read_table(whole).drop_columns(["fold"]), part)
-    (told,) = compare_tables(whole, part)
-    assert (told.column, told.what) == ("fold", "missing")
-    (told,) = compare_tables(part, whole)
-    assert (told.column, told.what) == ("fold", "new")
-
-
-def test_rows_in_another_order_are_the_same(tmp_path):
-    order = np.random.default_rng(5).permutation(ROWS)
-    now = {name: [list(values)[i] for i in order] for name, values in measurements().items()}
-    assert differences(tmp_path, "measurements", measurements(), now) == []
-
-
-def test_a_tolerance_of_ones_own_counts_for_its_column_alone(tmp_path):
-    table = measurements()
-    now = changed(changed(table, "x_mm", 0, table["x_mm"][0] + 0.01), "y_mm", 0, 9.0)
-    told = differences(tmp_path, "measurements", table, now, {"measurements.x_mm": 0.1})
-    assert [each.column for each in told] == ["y_mm"]
-
-
-def test_folders_are_compared_table_by_table(tmp_path):
-    for name in ("before", "now"):
-        written(tmp_path / name, "measurements", measurements())
-        written(tmp_path / name, "claims", claims())
-    assert list(compare_folders(tmp_path / "before", tmp_path / "now")) == []
-    (tmp_path / "now" / "claims.parquet").unlink()
-    (told,) = compare_folders(tmp_path / "before", tmp_path / "now")
-    assert (told.table, told.what) == ("claims.parquet", "missing")
+def test_files_and_columns_that_are_missing_are_named(tmp_path):
+    before, now = (written(tmp_path / name, "assessment_points", points()) for name in "ab")
+    assert list(compare_folders(before.parent, now.parent)) == []
+    pq.write_table(pq.read_table(now).drop_columns(["ex_mm"]), now)
+    (told,) = compare_tables(before, now)
+    assert (told.column, told.what) == ("ex_mm", "missing")
+    now.unlink()
+    (told,) = compare_folders(before.parent, now.parent)
+    assert (told.table, told.what) == (before.name, "missing")
     with pytest.raises(InputError, match="holds no table"):
-        list(compare_folders(tmp_path / "nothing", tmp_path / "now"))
+        list(compare_folders(now.parent, before.parent))
+
+
+@pytest.mark.parametrize(("row", "value"), [("text", "other"), ("number", None), ("number", 2.0)])
+def test_words_and_nulls_are_equal_or_differ(tmp_path, row, value):
+    table = {"quantity": ["text", "number"], "number": [1, 2], "parameter": ["one", "one"]}
+    table |= {"value": [1.0, 1.0], "unit": ["mm", "mm"]}
+    column, place = ("parameter", 0) if row == "text" else ("value", 1)
+    now = changed(table, column, place, value)
+    paths = [written(tmp_path / name, "vec_fit", each) for name, each in (("a", table), ("b", now))]
+    assert [each.table for each in compare_tables(*paths)] == ["vec_fit"] * (
+        2 if row == "text" else 1
+    )

@@ -21,7 +21,6 @@ from kinacc.tables.columns import (
     BY_STD,
     SAME_AMONG,
     SAME_WITHIN,
-    Artefact,
     Column,
     joint_count,
 )
@@ -89,51 +88,51 @@ def compare_tables(
     """
     name = before.stem if before.stem in ARTEFACTS else before.parent.name
     artefact = ARTEFACTS.get(name)
-    tables = [store.columns_in(store.read_arrow(path, any_type=True)) for path in (before, now)]
-    old, new = (pd.DataFrame(table) for table in tables)
-    for column in [*old.columns.difference(new.columns), *new.columns.difference(old.columns)]:
-        which = "missing" if column in old else "new"
-        yield Difference(name, str(column), which)
+    old, new = map(store.read_table, (before, now))
+    for column in old.columns.symmetric_difference(new.columns):
+        yield Difference(name, str(column), "missing" if column in old else "new")
     joints = joint_count(artefact, old.columns) if artefact else 0
     known = {each.name: each for each in artefact.for_joints(joints)} if artefact else {}
     key = [each for each in (artefact.key if artefact else ()) if each in old and each in new]
-    old, new = (_keyed(table, key, artefact) for table in (old, new))
+    old, new = _keyed(old, key, name), _keyed(new, key, name)
     for which, one, other in (("missing", old, new), ("new", new, old)):
         only = one.index.difference(other.index)
         if len(only):
             yield Difference(name, "", f"{len(only)} rows {which}, first {_row(key, only[0])}")
     common = old.index.intersection(new.index)
     old, new = old.loc[common], new.loc[common]
-    for column in old.columns.intersection(new.columns):
-        if column in key:
-            continue
-        allowed = _tolerance(name, str(column), known.get(column), old, tolerances or {})
-        found = _column(name, str(column), old[column], new[column], allowed, key)
-        if found is not None:
-            unit = known[column].unit if column in known else ""
-            yield found if found.largest is None else _with_unit(found, unit)
+    own = tolerances or {}
+    for column in old.columns.intersection(new.columns).difference(key, sort=False):
+        contract = known.get(column)
+        allowed = own.get(f"{name}.{column}", own.get(name, _tolerance(contract, old, column)))
+        one, other = old[column], new[column]
+        differs = (one.isna() != other.isna()).to_numpy()
+        both = (one.notna() & other.notna()).to_numpy()
+        largest = None
+        if one.dtype.kind in "fiu" and other.dtype.kind in "fiu":
+            apart = np.abs(other.to_numpy(float) - one.to_numpy(float))
+            beyond = both & ~(apart <= allowed)
+            largest = float(np.max(apart[beyond], initial=0.0))
+        else:
+            beyond = both & (one.to_numpy(object) != other.to_numpy(object))
+        differs = differs | beyond
+        if differs.any():
+            first = int(np.argmax(differs))
+            unit = contract.unit if contract and contract.unit != "1" else ""
+            values = (int(differs.sum()), _row(key, old.index[first]), one.iloc[first])
+            yield Difference(name, str(column), "", *values, other.iloc[first], largest, unit)
 
 
-def _with_unit(found: Difference, unit: str) -> Difference:
-    return Difference(**{**found.__dict__, "unit": "" if unit == "1" else unit})
-
-
-def _keyed(table: pd.DataFrame, key: list[str], artefact: Artefact | None) -> pd.DataFrame:
+def _keyed(table: pd.DataFrame, key: list[str], name: str) -> pd.DataFrame:
     """Rows by their key and, where several share one, a running number."""
-    if "quantity" in table and artefact is not None and artefact.name.endswith("_fit"):
+    if name.endswith("_fit"):
         table = table[~table["quantity"].isin(_ROUNDING)]
-    columns = [
-        table[name].round(_KEY_DIGITS) if table[name].dtype.kind == "f" else table[name]
-        for name in key
-    ]
-    if not columns:
+    if not key:
         return table.reset_index(drop=True)
-    keys = pd.DataFrame(dict(zip(key, columns, strict=True)))
-    running = keys.astype(object).where(keys.notna(), "").groupby(key, dropna=False).cumcount()
-    index = pd.MultiIndex.from_frame(
-        keys.astype(object).where(keys.notna(), "").assign(running=running)
-    )
-    return table.set_index(index)
+    keys = table[key].round(_KEY_DIGITS).astype(object)
+    keys = keys.where(keys.notna(), "")
+    keys["running"] = keys.groupby(key).cumcount()
+    return table.set_index(pd.MultiIndex.from_frame(keys))
 
 
 def _row(key: list[str], values: object) -> str:
@@ -142,12 +141,8 @@ def _row(key: list[str], values: object) -> str:
     return ", ".join(told) or str(values[0])
 
 
-def _tolerance(
-    table: str, name: str, column: Column | None, rows: pd.DataFrame, own: Mapping[str, float]
-) -> np.ndarray | float:
-    for place in (f"{table}.{name}", table):
-        if place in own:
-            return own[place]
+def _tolerance(column: Column | None, rows: pd.DataFrame, name: str) -> np.ndarray | float:
+    """What numbers of a column may differ by: one for all, or one for each row."""
     if column is None or column.kind == "text":
         return 0.0
     within = column.same_within
@@ -157,33 +152,8 @@ def _tolerance(
         return _RELATIVE * float(np.nanmax(np.abs(rows[name].to_numpy(float)), initial=0.0))
     if within in (BY_ROW, BY_POSES) and column.unit not in SAME_WITHIN:
         if "error" in rows:
-            lengths = rows["error"].astype(str).str.startswith("delta")
+            lengths = rows["error"].str.startswith("delta").to_numpy(bool)
             return np.where(lengths, SAME_WITHIN["mm"], SAME_WITHIN["rad"])
         units = rows["unit"] if "unit" in rows else pd.Series("", index=rows.index)
-        return units.map(lambda unit: SAME_AMONG.get(str(unit), _RELATIVE)).to_numpy(float)
+        return units.map(SAME_AMONG).fillna(_RELATIVE).to_numpy(float)
     return SAME_WITHIN.get(column.unit, _RELATIVE)
-
-
-def _column(
-    table: str,
-    name: str,
-    old: pd.Series,
-    new: pd.Series,
-    allowed: np.ndarray | float,
-    key: list[str],
-) -> Difference | None:
-    null = old.isna().to_numpy() != new.isna().to_numpy()
-    both = old.notna().to_numpy() & new.notna().to_numpy()
-    if old.dtype.kind in "fiu" and new.dtype.kind in "fiu":
-        apart = np.abs(new.to_numpy(float) - old.to_numpy(float))
-        differs = null | (both & ~(apart <= allowed))
-        largest = float(np.max(apart[differs & both], initial=0.0))
-    else:
-        differs = null | (both & (old.to_numpy() != new.to_numpy()))
-        largest = None
-    if not differs.any():
-        return None
-    first = int(np.argmax(differs))
-    row = _row(key, old.index[first])
-    count = int(differs.sum())
-    return Difference(table, name, "", count, row, old.iloc[first], new.iloc[first], largest)
