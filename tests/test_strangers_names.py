@@ -8,6 +8,7 @@ import html
 import io
 import shlex
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,8 +19,6 @@ import pytest
 from command_line import call
 
 import kinacc
-from kinacc.calibration.misfit import Misfit
-from kinacc.calibration.noise import UNKNOWN
 from kinacc.cli.sheet import Field, Sheet
 from kinacc.errors import InputError, Problem
 from kinacc.figures import campaign_plan
@@ -48,17 +47,17 @@ def test_no_cell_of_a_workbook_is_a_formula(tmp_path):
     assert [row[0].value for row in rows[:3]] == ["'=name", "'@unit", "'=1+1"]
 
 
-def test_a_table_of_a_calibrated_arm_holds_no_formula(monkeypatch):
-    from kinacc.deployment.export import description
+def test_a_table_of_a_calibrated_arm_holds_no_formula():
+    from kinacc.deployment.export.formats import csv as format_csv
+    from kinacc.deployment.export.source import Source
+    from kinacc.deployment.record import nominal
     from kinacc.kinematics import robot
 
-    arm = robot.load("mh180")
-    given = type("Calibrated", (), {"robot": arm, "left_open": ("=HYPERLINK(1)",), "targets": {}})
-    given.model = type("Model", (), {"table": arm.dh})
-    text = description.robot_csv(given, np.full((6, 5), np.nan), arm.dh, Misfit("dh", 0.1, UNKNOWN))
-    assert [row["undetermined"] for row in csv.DictReader(io.StringIO(text))][
-        -1
-    ] == "'=HYPERLINK(1)"
+    arm = replace(nominal(robot.load("mh180")), choice="dh", left_open=("=HYPERLINK(1)",))
+    text = format_csv.text(Source(arm, {}, Path()))
+    assert [row["undetermined"] for row in csv.DictReader(io.StringIO(text))][-1].startswith(
+        "'=HYPERLINK(1)"
+    )
 
 
 @pytest.mark.parametrize("name", ["$\\frac$", "$x$", "_left out", "a--><script>1</script>"])

@@ -67,10 +67,11 @@ ASSUMED = {
         kinacc export results/ur10_b --format yaml --out first
         kinacc export results/ur10_d --format yaml --out second
         python -c "
-        from kinacc.deployment.export.urdf import generated
+        from kinacc.deployment.export.formats import urdf
+        from kinacc.deployment.export.source import Source
         from kinacc.deployment.record import nominal
         from kinacc.kinematics import robot
-        print(generated(nominal(robot.load('ur10'))))" > my_ur10.urdf
+        print(urdf.text(Source(nominal(robot.load('ur10')), {}, '.')))" > my_ur10.urdf
         mv first/ur10_b.yaml before.yaml
         mv second/ur10_d.yaml after.yaml
     """,

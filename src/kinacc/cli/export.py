@@ -8,8 +8,7 @@ from kinacc.cli import choice
 from kinacc.cli.choice import option
 from kinacc.cli.output import answers
 from kinacc.config.error_models import ERROR_MODELS, PLAINEST
-
-FORMATS = ("yaml", "json", "csv", "urdf", "markdown", "latex")
+from kinacc.deployment.export.files import FORMATS
 
 
 @click.command("export")
@@ -50,10 +49,10 @@ def export(
       kinacc export results/mh180 --out exported
       kinacc export results/ur10_b --format urdf --urdf my_ur10.urdf --out exported
     """
-    from kinacc.deployment.export.files import CARRY_ALL, contents, note, warning, write
+    from kinacc.deployment.export.files import contents, formats_of, note, warning, write
     from kinacc.errors import Problem, refuse
 
-    wanted = formats or (FORMATS if model == PLAINEST else CARRY_ALL)
+    wanted = formats or formats_of(model)
     about_urdf = {"--base-link": base_link, "--tip-link": tip_link}
     problems = [
         Problem(option, "is given without a file of yours", fix="give --urdf as well")

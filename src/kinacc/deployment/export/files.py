@@ -2,33 +2,33 @@
 
 from __future__ import annotations
 
+import pkgutil
 from collections.abc import Mapping, Sequence
+from importlib import import_module
 from pathlib import Path
-
-import numpy as np
+from types import ModuleType
 
 from kinacc.calibration import blind_words
-from kinacc.calibration.identified import FIXED
-from kinacc.calibration.misfit import misfit
 from kinacc.config import names
 from kinacc.config.error_models import PLAINEST, model_name
 from kinacc.deployment import folder as results
-from kinacc.deployment.export import description, tables, urdf
-from kinacc.errors import InputError, Problem, refuse
-from kinacc.kinematics.dh import PARAMETERS
+from kinacc.deployment.export import formats as _formats
+from kinacc.deployment.export.source import Source
+from kinacc.errors import Problem, refuse
 from kinacc.kinematics.robot import Robot
-from kinacc.tables import store
 from kinacc.tables.atomic import replacing
 
-CARRY_ALL = ("json",)  # formats for models that are no table of DH parameters
-_ENDINGS = {
-    "yaml": ".yaml",
-    "json": ".json",
-    "csv": ".csv",
-    "urdf": ".urdf",
-    "markdown": "_tables.md",
-    "latex": "_tables.tex",
-}
+FORMATS = tuple(each.name for each in pkgutil.iter_modules(_formats.__path__))
+
+
+def format_named(name: str) -> ModuleType:
+    """The module of a format."""
+    return import_module(f"{_formats.__name__}.{name}")
+
+
+def formats_of(model: str) -> tuple[str, ...]:
+    """Formats that carry a model."""
+    return tuple(each for each in FORMATS if model == PLAINEST or format_named(each).ANY_MODEL)
 
 
 def contents(
@@ -51,39 +51,21 @@ def contents(
     else:
         problems = names.not_of_a_file("--name", name)
     refuse(problems, "Nothing was written")
-    found = results.read_tables(folder)
-    arm = results.calibration(found, robot, model, dataset)
+    tables = results.read_tables(folder)
+    arm = results.calibration(tables, robot, model, dataset)
     if arm.model.table is None:
-        what, fix = f"cannot carry a {model} model", f"or give --model {PLAINEST}"
-        problems = [
-            Problem(f"--format {each}", what, ", ".join(CARRY_ALL), fix)
-            for each in dict.fromkeys(formats)
-            if each not in CARRY_ALL
-        ]
-        refuse(problems, "Nothing was written")
-    fits = misfit(found, robot, model)
-    std = _deviations(found[f"{model}_model"], arm.model.joints)
-    made = {}
-    for each in dict.fromkeys(formats):
-        if each == "yaml":
-            text = description.robot_yaml(arm)
-        elif each == "json":
-            known = store.read_metadata(Path(folder) / f"{model}_model.parquet")
-            marks = {key: known[key] for key in store.PROVENANCE_KEYS if key in known}
-            own = None if arm.model.table is not None else found[f"{model}_model"]
-            text = description.robot_json(arm, std, robot.dh, marks, fits, own)
-        elif each == "csv":
-            text = description.robot_csv(arm, std, robot.dh, fits)
-        elif each == "urdf" and urdf_file is not None:
-            text = urdf.corrected(arm, urdf_file, *links)
-        elif each == "urdf":
-            text = urdf.generated(arm, dh_joints)
-        else:
-            text = _tables(found, robot, dataset, arm.left_open or (), each)
-        # A name of its own, so that the DH files may stand beside it.
-        own_name = dataset if model == PLAINEST else f"{dataset}_{model}"
-        made[f"{own_name if name is None else name}{_ENDINGS[each]}"] = text
-    return made
+        able, fix = formats_of(model), f"or give --model {PLAINEST}"
+        what = f"cannot carry a {model} model"
+        wrong = [each for each in dict.fromkeys(formats) if each not in able]
+        refuse(
+            [Problem(f"--format {each}", what, ", ".join(able), fix) for each in wrong],
+            "Nothing was written",
+        )
+    source = Source(arm, tables, Path(folder), urdf_file, links, dh_joints)
+    # A name of its own, so that the DH files may stand beside it.
+    stem = name or (dataset if model == PLAINEST else f"{dataset}_{model}")
+    modules = [format_named(each) for each in dict.fromkeys(formats)]
+    return {f"{stem}{each.ENDING}": each.text(source) for each in modules}
 
 
 def warning(folder: Path | str) -> str:
@@ -109,11 +91,11 @@ def note(folder: Path | str, model: str = PLAINEST) -> str:
         return ""
     rms = {each: f"{known.position_mm:.3f} mm" for each, known in left.items()}
     option = "without --model" if other == PLAINEST else f"--model {other}"
-    formats = "" if other == PLAINEST else f", as {' and '.join(CARRY_ALL).upper()}"
+    carried = "" if other == PLAINEST else f", as {' and '.join(formats_of(other)).upper()}"
     kind = "plainest" if other == PLAINEST != selected else "selected"
     return (
         f"note: this is the {model_name(model)} model, {rms[model]} rms of {left[model].poses}; "
-        f"{option} writes the {kind} one{formats}: {model_name(other)}, {rms[other]}"
+        f"{option} writes the {kind} one{carried}: {model_name(other)}, {rms[other]}"
     )
 
 
@@ -130,35 +112,3 @@ def write(made: Mapping[str, str], target: Path | str, force: bool = False) -> l
         for part, text in zip(temporary, made.values(), strict=True):
             part.write_text(text, encoding="utf-8")
     return [str(path) for path in paths]
-
-
-def _tables(found: Mapping, robot: Robot, dataset: str, unseen: Sequence[str], form: str) -> str:
-    if "residuals" not in found:
-        raise InputError(Problem(f"{dataset}: residuals.parquet", "no such file", "a finished run"))
-    nominal = {"joint": np.arange(1, robot.dh.joints + 1)}
-    nominal |= {name: getattr(robot.dh, name) for name in PARAMETERS}
-    told = found.get(f"{PLAINEST}_identified", {"parameter": [], "status": []})
-    pairs = zip(told["parameter"], told["status"], strict=True)
-    fixed = {str(parameter) for parameter, status in pairs if status == FIXED}
-    selected = results.recorded_model(found)
-    made = tables.paper_tables(
-        found["residuals"],
-        found["dh_model"],
-        nominal,
-        dataset,
-        unseen,
-        fixed,
-        selected,
-        misfit(found, robot, PLAINEST),
-    )
-    return (tables.markdown if form == "markdown" else tables.latex)(made)
-
-
-def _deviations(columns: Mapping[str, np.ndarray], joints: int) -> np.ndarray:
-    """Standard deviations (k, 5), by joint, as ``dh.PARAMETERS``; NaN where it has none of them."""
-    if f"std_{PARAMETERS[0]}" not in columns:
-        return np.full((joints, len(PARAMETERS)), np.nan)
-    order = np.argsort(columns["joint"], kind="stable")
-    return np.stack(
-        [np.asarray(columns[f"std_{name}"], dtype=float)[order] for name in PARAMETERS], axis=1
-    )

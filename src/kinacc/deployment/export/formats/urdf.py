@@ -12,11 +12,7 @@ import numpy as np
 
 from kinacc.calibration.hand_eye import closed_form_start
 from kinacc.calibration.observations import full_poses
-from kinacc.deployment.export.description import (
-    left_open_lines,
-    orientation_lines,
-    robot_name,
-)
+from kinacc.deployment.export.source import Source
 from kinacc.deployment.record import TOOL, Calibration
 from kinacc.errors import InputError, Problem
 from kinacc.geometry import (
@@ -39,7 +35,17 @@ _SAME_ARM_MM = 1e-3  # how far a file's nominal arm may be from the robot's
 _PROBES = 24
 
 
-def generated(calibration: Calibration, dh_joints: bool = False) -> str:
+ENDING, ANY_MODEL = ".urdf", False
+
+
+def text(source: Source) -> str:
+    """A URDF of the calibrated DH chain, or the file of one's own, corrected."""
+    if source.urdf_file is not None:
+        return corrected(source, source.urdf_file, *source.links)
+    return generated(source, source.dh_joints)
+
+
+def generated(source: Source, dh_joints: bool = False) -> str:
     """A URDF of the calibrated DH chain: base_link, link_1 .. link_k, flange and tool.
 
     Joints are those the controller reports, or with ``dh_joints`` those of the DH table. Raises
@@ -47,16 +53,16 @@ def generated(calibration: Calibration, dh_joints: bool = False) -> str:
     """
     from lxml import etree
 
+    calibration = source.calibration
     robot, dh = calibration.robot, calibration.model
     names = robot.joint_names or tuple(f"joint_{i}" for i in range(1, dh.joints + 1))
     senses = np.ones(dh.joints) if dh_joints else _signs(robot)
     frames, end = _origins(dh)
     frames[0] = compose(robot.base, frames[0])
-    root = etree.Element("robot", name=_name(robot_name(calibration)))
-    about = f"calibrated from {robot.name} with data set {calibration.name}"
-    about = re.sub("-(?=-)", "- ", about)  # XML ends a comment at two of them
+    root = etree.Element("robot", name=_name(source.name))
+    about = re.sub("-(?=-)", "- ", source.about)  # XML ends a comment at two of them
     root.append(etree.Comment(f" {about}; effort and velocity are placeholders "))
-    for line in [*orientation_lines(calibration), *left_open_lines(calibration)]:
+    for line in [*source.orientation_lines, *source.left_open_lines]:
         root.append(etree.Comment(f" {line} "))
     etree.SubElement(root, "link", name="base_link")
     low, high = robot.q_min_rad, robot.q_max_rad
@@ -89,7 +95,7 @@ def generated(calibration: Calibration, dh_joints: bool = False) -> str:
 
 
 def corrected(
-    calibration: Calibration,
+    source: Source,
     path: str | Path,
     base_link: str | None = None,
     tip_link: str | None = None,
@@ -103,7 +109,7 @@ def corrected(
     """
     from lxml import etree
 
-    path = Path(path)
+    path, calibration = Path(path), source.calibration
     chain = joints_between(path, base_link, tip_link)
     moving = [joint for joint in chain if joint.kind in MOVING]
     base, tip = _ends_in_file(calibration, chain, path)
@@ -131,7 +137,7 @@ def corrected(
         _set_origin(elements[tail[0].name], compose(last, invert(rest)))
     else:
         _add_tip(tree.getroot(), moving[-1].child, last)
-    for place, line in enumerate(left_open_lines(calibration)):
+    for place, line in enumerate(source.left_open_lines):
         tree.getroot().insert(place, etree.Comment(f" {line} "))
     return etree.tostring(tree, encoding="unicode") + "\n"
 

@@ -1,0 +1,109 @@
+"""Tables I to III as a paper prints them, which Markdown and LaTeX share."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from kinacc.calibration.identified import FIXED
+from kinacc.calibration.misfit import in_words, misfit
+from kinacc.config.error_models import ERROR_MODELS, MEASURED, PLAINEST, Comparison, model_name
+from kinacc.deployment.export.source import Source
+from kinacc.deployment.record import POSES
+from kinacc.errors import InputError, Problem
+from kinacc.kinematics.dh import PARAMETERS
+
+_STATISTICS = {"mean": "mean", "max": "max", "rms": "rms", "gamma99": "99 % gamma"}
+_HEADS = dict(zip(PARAMETERS, ("theta - q [rad]", "d [mm]", "a [mm]", "alpha [rad]", "beta [rad]"),
+                  strict=True))  # fmt: skip
+_MOST_DECIMALS = 6
+
+
+@dataclass(frozen=True)
+class PaperTable:
+    """Cells as text, and what stands above and under them."""
+
+    name: str
+    caption: str
+    cells: pd.DataFrame
+    notes: list[str]
+
+
+def paper_tables(source: Source) -> list[PaperTable]:
+    """Residuals of the models and DH parameters; the selected model comes first."""
+    if "residuals" not in source.tables:
+        place = f"{source.calibration.name}: residuals.parquet"
+        raise InputError(Problem(place, "no such file", "a finished run"))
+    name, selected = source.calibration.name, source.selected
+    measured = {
+        model: _residuals(
+            source,
+            Comparison(MEASURED, model).name,
+            model,
+            f"{model_name(model)} model{' (selected)' * (model == selected)} against "
+            f"measurements, {name}",
+        )
+        for model in dict.fromkeys(("vec", "dh", *({selected} & set(ERROR_MODELS))))
+    }
+    between = _residuals(source, "dh_vs_vec", "dh_vec", f"DH model against VEC model, {name}")
+    made = [measured.pop("vec"), _parameters(source), between, *measured.values()]
+    return sorted(made, key=lambda table: table.name != selected)
+
+
+def with_deviation(value: float, std: float) -> str:
+    """``value ± std`` with two digits of the deviation; the value alone where there is none."""
+    if not np.isfinite(std):
+        return f"{round(value, 4) + 0.0:.4f}†"
+    if std <= 0.0:
+        return f"{value:g}"
+    decimals = min(max(1 - int(np.floor(np.log10(std))), 0), _MOST_DECIMALS)
+    return f"{value:.{decimals}f} ± {std:.{decimals}f}"
+
+
+def _residuals(source: Source, comparison: str, name: str, caption: str) -> PaperTable:
+    table = pd.DataFrame(
+        {key: np.asarray(each) for key, each in source.tables["residuals"].items()}
+    )
+    table = table[table["fold"].astype(float).isna() & (table["comparison"] == comparison)]
+    table = table.sort_values("subset", key=lambda each: each.map([*POSES].index), kind="stable")
+    cells = pd.DataFrame({
+        "": table["quantity"] + " [" + table["unit"] + "], " + table["subset"].map(POSES),
+        "points": table["n"].astype(int).astype(str),
+    })  # fmt: skip
+    for key, head in _STATISTICS.items():
+        cells[head] = [f"{each:.3f}" if np.isfinite(each) else "-" for each in table[key]]
+    note = "99 % gamma: quantile of a gamma distribution fitted to the magnitudes."
+    return PaperTable(name, caption, cells, [note])
+
+
+def _parameters(source: Source) -> PaperTable:
+    fitted = pd.DataFrame(dict(source.tables["dh_model"])).sort_values("joint", kind="stable")
+    told = source.tables.get(f"{PLAINEST}_identified", {"parameter": [], "status": []})
+    pairs = zip(told["parameter"], told["status"], strict=True)
+    fixed = {str(parameter) for parameter, status in pairs if status == FIXED}
+    shown = [each for each in PARAMETERS if each != "beta_rad" or (fitted[each] != 0.0).any()]
+
+    def cell(joint: int, parameter: str, value: float, std: float) -> str:
+        nominal = float(getattr(source.calibration.robot.dh, parameter)[joint - 1])
+        if parameter == "beta_rad" and not np.isfinite(std) and value == nominal:
+            return "-"
+        is_fixed = f"j{joint}.{parameter}" in fixed
+        return f"{value:g} (fixed)" if is_fixed else with_deviation(value, std)
+
+    cells = pd.DataFrame({"joint": fitted["joint"].astype(int).astype(str)})
+    for each in shown:
+        columns = zip(fitted["joint"], fitted[each], fitted[f"std_{each}"], strict=True)
+        cells[_HEADS[each]] = [cell(int(joint), each, x, std) for joint, x, std in columns]
+    worth = misfit(source.tables, source.calibration.robot, PLAINEST)
+    notes = [f"One standard deviation behind ±, {in_words([worth])}."]
+    marks = "".join(cells.to_numpy().ravel())
+    if "†" in marks:
+        notes.append("† only determined together with others: one of many values that fit as well.")
+    if "(fixed)" in marks:
+        notes.append("Fixed: not fitted, the value is nominal.")
+    if source.calibration.left_open:
+        notes.append(f"Left open by the poses: {'; '.join(source.calibration.left_open)}.")
+    caption = f"DH parameters, {source.calibration.name}"
+    return PaperTable("dh_parameters", caption, cells, notes)
