@@ -27,7 +27,11 @@ OPTIONS = {
         "--metric": "travel is that of the joint that moves most",
     },
     "plan-campaign": _CAMPAIGN,
-    "campaign": _CAMPAIGN | {"--head": "now --sha256 with --readings, as a report gives them"},
+    "campaign": _CAMPAIGN
+    | {
+        "--simulations": "kinacc plan-campaign simulates budgets before a campaign begins",
+        "--head": "now --sha256 with --readings, as a report gives them",
+    },
 }
 # Options that are taken under their former names too.
 RENAMED = {

@@ -38,7 +38,7 @@ class Arm:
 
 def standing(folder):
     """What status says, without a forecast."""
-    return json.loads(call("campaign", "status", folder, "--json", "--simulations", 0).stdout)
+    return json.loads(call("campaign", "status", folder, "--json").stdout)
 
 
 def files_of(folder):

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from scipy.stats import kstest
 
-from kinacc.campaign import consistency, folder, of_calibration, words
+from kinacc.campaign import consistency, folder, words
 from kinacc.campaign.consistency import in_words, scatter
 from kinacc.campaign.instrument import instruments
 from kinacc.campaign.reading import Reading
@@ -109,7 +107,6 @@ def test_noise_stated_far_above_noise_and_errors_is_told_for_bounds_may_fall_sho
     assert "cannot be relied on" in told
     assert told in words.standing(state)
     assert "too small" not in " ".join(words.statements(state))
-    assert told in of_calibration.Assessed(Path("check"), state, state.statements()[0]).in_words()
 
 
 def test_readings_of_a_perfect_arm_with_the_noise_stated_are_not_called_too_near(make_plan):

@@ -19,7 +19,7 @@ def begun(tmp_path, make_plan):
 
 
 def refusal(path) -> str:
-    done = call("campaign", "status", path, "--simulations", 0)
+    done = call("campaign", "status", path)
     assert done.exit_code == 2, done.output
     assert isinstance(done.exception, SystemExit), done.exception
     return done.output

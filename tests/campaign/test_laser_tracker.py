@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-
 import numpy as np
 import pytest
 from campaign_on_disk import Arm
@@ -84,14 +82,6 @@ def test_readings_of_a_laser_tracker_count_by_where_they_were_taken(begun, tmp_p
     rms = np.sqrt(np.trace(opened.plan.covariance_mm2, axis1=1, axis2=2) / 3.0)
     wanted = [rms[opened.plan.points.number(row["point"])] for row in cells]
     np.testing.assert_allclose([float(row["noise_mm"]) for row in cells], wanted, rtol=1e-9)
-
-
-def test_a_forecast_of_a_campaign_simulates_each_reading_with_the_noise_there(begun, tmp_path):
-    folder = begun("--instrument", f"tracker={LASER}", budget=30)
-    read_in_its_frame(folder, 12, tmp_path / "readings.csv")
-    done = call("campaign", "status", folder, "--width-mm", 3, "--json", "--simulations", 2)
-    assert done.exit_code == 0, done.output
-    assert json.loads(done.stdout)["forecast"]["simulations"] == 2
 
 
 def test_a_plan_with_a_laser_tracker_is_read_as_it_was_written(begun):

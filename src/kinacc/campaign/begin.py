@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from kinacc.assess.adaptive import AdaptiveAssessor, Candidates
-from kinacc.campaign.instrument import INSTRUMENT, Instrument
+from kinacc.campaign.instrument import Instrument
 from kinacc.campaign.plan import Limits, Plan, Points
 from kinacc.config.names import not_in_a_line
 from kinacc.deployment.planning import distances, shortest_path
@@ -100,11 +100,6 @@ def plausible_mm(arm: Calibration, instruments: Sequence[Instrument]) -> float:
     left = arm.residual.position_mm if arm.residual else np.nan
     usual = 50.0 if not np.isfinite(left) else max(5.0, 20.0 * left)
     return float(f"{usual + 10.0 * noise:.3g}")
-
-
-def needs_instrument_frame(instruments: Sequence[Instrument]) -> bool:
-    """Whether any reading comes in the instrument's frame."""
-    return any(each.frame == INSTRUMENT for each in instruments)
 
 
 def _to_base(arm: Calibration) -> Pose:

@@ -88,9 +88,18 @@ def open_(folder: Path | str) -> Opened:
 @contextmanager
 def writing(folder: Path | str) -> Iterator[Opened]:
     """The campaign, held for this writer alone."""
-    open_(folder)  # no lock file where there is no campaign
+    require_method(open_(folder))  # no lock file where there is no campaign
     with journal.writing(Path(folder)):
         yield open_(folder)
+
+
+def require_method(opened: Opened) -> None:
+    """Raise InputError where this version computes bounds otherwise than the campaign's."""
+    if opened.plan.method != plan.METHOD:
+        begun = opened.plan.about.get("kinacc_version", "an earlier version")
+        what = f"uses bounds of method {opened.plan.method}; kinacc {__version__} has {plan.METHOD}"
+        fix = f"continue it with kinacc {begun}, or begin a new campaign"
+        raise InputError(Problem(str(opened.folder), what, fix=fix))
 
 
 def marks_of(opened: Opened) -> dict[str, object]:
@@ -133,20 +142,14 @@ def readings_entry(
     readings: Sequence[Reading],
     file: str | None = None,
     path: str | None = None,
-    grown: bool = False,
-    was: Sequence[int] = (),
 ) -> dict:
     """The entry of readings that are taken together.
 
-    ``file`` is the digest of their file, ``path`` where it lies from the campaign's folder,
-    ``grown`` says that it held rows that were taken of it before; rows of it ``was`` readings, by
-    number, that were taken otherwise.
+    ``file`` is the digest of their file, ``path`` where it lies from the campaign's folder.
     """
     entry: dict = {"kind": READINGS, "readings": [each.as_entry() for each in readings]}
     entry |= {"file": file} if file is not None else {}
-    entry |= {"path": path} if path is not None else {}
-    entry |= {"grown": True} if grown else {}
-    return {**entry, "was": list(was)} if was else entry
+    return entry | ({"path": path} if path is not None else {})
 
 
 def strike_entry(number: int, reason: str) -> dict:

@@ -23,6 +23,7 @@ from kinacc.errors import InputError, Problem, refuse
 from kinacc.geometry import Pose
 
 FORMAT = 1
+METHOD = 2  # of the bounds: raised where the same readings give other bounds
 _ABOUT = ("robot", "calibration", "model", "point")
 
 
@@ -79,7 +80,7 @@ class Plan:
     ``order`` (m,) is the random order of the candidates; ``route`` the points of the first visit
     in the order they are driven to. ``to_base`` takes the instrument's frame to the robot's base.
     ``slides`` (k,): which joints slide. ``about`` names robot, calibration, model and point.
-    ``overruled``: what spoke against beginning it so, a sentence each.
+    ``overruled``: what spoke against beginning it so, a sentence each. ``method``: of the bounds.
     """
 
     points: Points
@@ -93,6 +94,7 @@ class Plan:
     seed: int
     about: Mapping[str, str]
     overruled: tuple[str, ...] = ()
+    method: int = METHOD
 
     @cached_property
     def covariance_mm2(self) -> np.ndarray:
@@ -198,6 +200,7 @@ def to_json(plan: Plan) -> bytes:
     ]
     content = {
         "format": FORMAT,
+        "method": plan.method,
         "about": dict(plan.about),
         "assessor": {"name": plan.assessor.name, "settings": asdict(plan.assessor)},
         "instruments": [
@@ -267,6 +270,7 @@ def _plan(content: Mapping) -> Plan:
         content["seed"],
         content["about"],
         tuple(map(str, content.get("overruled", ()))),
+        content.get("method", 1),
     )
 
 
@@ -315,6 +319,7 @@ def _checked(plan: Plan) -> Plan:
         "about": isinstance(plan.about, Mapping)
         and all(isinstance(plan.about.get(each), str) for each in _ABOUT),
     }
+    fits["method"] = isinstance(plan.method, int)
     fits["seed"] = isinstance(plan.seed, int) and plan.seed >= 0
     aims = [each for each in (plan.limits.tolerance_mm, plan.limits.width_mm) if each is not None]
     fits["limits"] = plan.limits.target in TARGETS and all(

@@ -45,8 +45,6 @@ REASONS = {
     # of budgets that are small
     "excepted_ahead": "the bound will be on all candidates but {excepted:.0f}; with {enough:.0f} "
     "readings it would be on all of them",
-    # of forecasts that are not made
-    "few_read": "{read} points were read, {needed} are needed",
     # of decisions on a tolerance
     "between": "the tolerance lies between lower and upper bound: measure more",
     "contradict": "the bounds contradict each other or the value: is the noise stated too small?",

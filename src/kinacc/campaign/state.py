@@ -40,12 +40,10 @@ class Import:
     """Readings that were taken of a file, and others that rows of it were, by their ``numbers``.
 
     ``path`` leads from the campaign's folder to the file; None in campaigns of earlier versions.
-    ``grown``: the file held rows that were taken of it before.
     """
 
     path: str | None
     numbers: frozenset[int]
-    grown: bool
 
 
 @dataclass
@@ -129,7 +127,7 @@ def restore(
             readings += [Reading.of_entry(each) for each in entry["readings"]]
             if entry.get("file"):
                 numbers = frozenset([*range(before + 1, len(readings) + 1), *entry.get("was", ())])
-                imports.append(Import(entry.get("path"), numbers, bool(entry.get("grown"))))
+                imports.append(Import(entry.get("path"), numbers))
         elif entry["kind"] == LEAVE_OUT:
             left_out[int(entry["point"])] = str(entry["reason"])
         elif entry["kind"] == STRIKE:

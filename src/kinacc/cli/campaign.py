@@ -194,27 +194,19 @@ def strike(folder, number, reason, out) -> None:
 
 @campaign.command("status")
 @click.argument("folder", type=click.Path())
-@option("--width-mm", type=float, help="Wanted distance of upper from lower bound. [as begun]")
 @option("--tolerance-mm", type=float, help="Largest error allowed. [as begun]")
-@option("--target", type=click.Choice(["candidates", "measured"]),
-        help="Which largest error the forecast is about. [as begun]")  # fmt: skip
-@option("--simulations", default=20, type=click.IntRange(0, 10_000),
-        help="Simulated ends for the forecast; 0 for none.")  # fmt: skip
 @answers()
-def status(out, **given) -> None:
-    """Say what the readings so far allow to say, and what is still needed.
-
-    How many more readings the wanted width should take, or what the tolerance is likely to be
-    decided to, is simulated from what was read so far: a forecast, no bound rests on it.
+def status(folder, tolerance_mm, out) -> None:
+    """Show the current bounds and the readings still needed.
 
     \b
     Example:
       kinacc campaign status check
-      kinacc campaign status check --width-mm 0.15 --json
+      kinacc campaign status check --tolerance-mm 0.5 --json
     """
     from kinacc.cli import campaigns
 
-    campaigns.status(out=out, **given)
+    campaigns.status(folder, tolerance_mm, out)
 
 
 @campaign.command("report")

@@ -84,9 +84,7 @@ def start(given: Mapping, out: Output) -> None:
         calibration, points, assessor, instruments, limits, given["seed"], joints_now, about,
         by_travel=given["visit"] == "travel",
     )  # fmt: skip
-    unsure = prediction_check.unsure(
-        calibration, points, instruments, given["point"], limits.implausible_mm
-    )
+    unsure = prediction_check.unsure(calibration, points, given["point"])
     left_mm = calibration.residual.position_mm if calibration.residual else math.nan
     problems = slips.of_noise(instruments, left_mm)
     problems += [*slips.of_distance(begun), *known_noise.doubts(tested)]
@@ -95,8 +93,10 @@ def start(given: Mapping, out: Output) -> None:
     if not given["sure"]:
         refuse(problems, "The campaign was not begun")
     begun = replace(begun, overruled=tuple(f"{each.where}: {each.what}" for each in problems))
-    for line in [*whose, *([] if unsure is None else unsure.in_words())]:
+    for line in whose:
         click.echo(line, err=True)
+    if unsure and unsure.not_measured:
+        click.echo(f"warning: {unsure.in_words()}", err=True)
     folders.start(given["folder"], begun)
     out.say(
         answers.begun_facts(given["folder"], begun, unsure),
@@ -123,6 +123,7 @@ def _tolerance_mm(given: float | None, results: Path) -> tuple[float | None, lis
 def next_(path: str, every: bool, out: Output) -> None:
     """Name the next point, or all that are certain."""
     opened = open_(path)
+    folders.require_method(opened)
     found = opened.state()
     say_doubts(opened)
     if found.asked is None:
@@ -138,36 +139,18 @@ def next_(path: str, every: bool, out: Output) -> None:
     out.deliver(answers.visit_sheet(opened.plan, wanted), ordered)
 
 
-def status(
-    folder: str,
-    width_mm: float | None,
-    tolerance_mm: float | None,
-    target: str | None,
-    simulations: int,
-    out: Output,
-) -> None:
-    """Say where the campaign stands, and what it is likely to need."""
-    from kinacc.campaign import forecast, nearness
+def status(folder: str, tolerance_mm: float | None, out: Output) -> None:
+    """Show the bounds so far and the readings still needed."""
+    from kinacc.campaign import nearness
     from kinacc.cli.campaign_options import not_positive
-    from kinacc.progress import reporting
 
-    refuse(not_positive(width_mm=width_mm, tolerance_mm=tolerance_mm))
+    refuse(not_positive(tolerance_mm=tolerance_mm))
     opened = open_(folder)
     found = opened.state()
-    aims = opened.plan.limits
-    wanted = width_mm or aims.width_mm
-    tolerance = tolerance_mm or aims.tolerance_mm
-    target = target or aims.target
-    ahead, why_none = None, None
-    if simulations and found.asked is not None:
-        why_none = words.reason(forecast.why_none(found))
-        with reporting("forecast", bar=True) as progress:
-            ahead = forecast.forecast(found, simulations, wanted, tolerance, target, progress)
+    tolerance = tolerance_mm or opened.plan.limits.tolerance_mm
     if not out.as_json:
         say_doubts(opened)
-    lines = words.standing(found)
-    lines += words.statements(found)
-    lines += nearness.in_words(found)
+    lines = [*words.standing(found), *words.statements(found), *nearness.in_words(found)]
     lines += words.begun_against(opened.plan)
     if tolerance is not None:
         for said in found.statements():
@@ -176,14 +159,8 @@ def status(
                 f"tolerance {tolerance:g} mm, {words.target(said)}: {verdict.verdict}, "
                 f"{words.reason(verdict.reason)}"
             )
-    if ahead is not None:
-        lines += forecast.in_words(ahead)
-    elif why_none and (wanted or tolerance):
-        lines.append(f"no forecast: {why_none}")
     facts = answers.as_facts(found, tolerance)
-    facts["limits"] = nearness.as_facts(found)
-    facts |= {"forecast": answers.forecast_facts(ahead), "no_forecast": why_none or None}
-    out.say(facts, "\n".join(lines))
+    out.say(facts | {"limits": nearness.as_facts(found)}, "\n".join(lines))
 
 
 def write_report(path: str, to: str | None, formats: Sequence[str], out: Output) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import shlex
 from collections.abc import Sequence
+from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,7 +22,6 @@ from kinacc.tables.columns import Columns, joint_count
 from kinacc.tables.contract import ARTEFACTS
 
 if TYPE_CHECKING:
-    from kinacc.campaign.forecast import Forecast
     from kinacc.campaign.prediction_check import Unsure
 
 
@@ -36,7 +36,7 @@ def begun_facts(folder: str, begun: Plan, unsure: Unsure | None) -> dict[str, ob
         "budget": begun.assessor.measurements,
         "implausible_mm": begun.limits.implausible_mm,
         "joint_tolerance_deg": math.degrees(begun.limits.joint_rad),
-        "prediction": None if unsure is None else unsure.as_facts(),
+        "prediction": None if unsure is None else asdict(unsure),
         "begun_against": list(begun.overruled),
     }
 
@@ -212,23 +212,4 @@ def _decision_facts(said: Statement, tolerance: float) -> dict[str, object]:
         "guard_band_mm": found.guard_band_mm,
         "acceptance_limit_mm": found.acceptance_limit_mm,
         "risk": found.risk,
-    }
-
-
-def forecast_facts(ahead: Forecast | None) -> dict[str, object] | None:
-    """A forecast for a machine."""
-    if ahead is None:
-        return None
-    return {
-        "by": "simulation from the readings so far",
-        "simulations": ahead.simulations,
-        "readings_left": ahead.left,
-        "final_width_mm": dict(zip(("q05", "median", "q95"), ahead.width_mm, strict=True)),
-        "target": ahead.target,
-        "wanted_width_mm": ahead.wanted_mm,
-        "reached_within_budget": ahead.reached,
-        "readings_needed": ahead.more,
-        "budget_of_a_new_campaign": ahead.budget,
-        "largest_budget_tried": ahead.tried,
-        "decisions": ahead.decisions,
     }

@@ -20,7 +20,7 @@ from kinacc.cli.campaigns import say_doubts
 from kinacc.cli.campaigns_answers import as_facts
 from kinacc.cli.output import Output
 from kinacc.cli.rows import ANGLE, LENGTH, Quantities, open_table
-from kinacc.errors import InputError, Problem, first_few, refuse
+from kinacc.errors import InputError, Problem, refuse
 from kinacc.measurements.table import RawTable, numbers_of
 
 _COMPUTED = {"predict": "unexplained_mm", "compensate": "solver_residual_mm"}  # columns of theirs
@@ -62,16 +62,14 @@ def record(given: Asked, out: Output) -> None:
 
 @dataclass(frozen=True)
 class _Made:
-    """Readings that are taken, and what is wrong with rows that are not.
+    """Readings that are taken, problems of rows that are not, numbers of readings known before.
 
-    Numbers of readings whose rows are ``known``, and of those ``gone`` from the file. ``source`` is
-    what the journal keeps of the file.
+    ``source``: digest and path of the file.
     """
 
     taken: list[Reading]
     skipped: Sequence[Problem] = ()
     known: tuple[int, ...] = ()
-    gone: tuple[int, ...] = ()
     source: tuple = ()
 
 
@@ -193,93 +191,39 @@ def _of_file(given: Asked, before: State) -> _Made:
     rows, problems = _rows(table, given.instrument, before)
     read = {number: row for number, row in enumerate(rows) if isinstance(row, Reading)}
     compared = imports.compare(read, before, place, given.again)
-    readings = _numbered(before)
     left_out = frozenset(before.left_out)
-    earlier = _recorded(before)
     unusual_mm = _unusual_mm(before, read.values())
-    good = []
+    good, earlier = [], {}
     for number, row in enumerate(rows):
         called = table.row_names.one(table.line[number])
         where = f"{table.path}, {called}"
         if isinstance(row, Problem):
-            wrong = [row]
-        elif number in compared.known:
-            one = compared.known[number]
-            wrong = _altered(row, where, one, readings[one], before)
-        elif number in compared.changed:
-            wrong = []  # told for all such rows together
-        else:
+            problems.append(row)
+        elif number not in compared.known:
             wrong = reading.problems_of(
                 before.plan, row, where, left_out, given.accept_implausible, unusual_mm
             )
             if not given.again:
                 wrong += _repeated(row, where, earlier)
             good += [] if wrong else [row]
+            problems += wrong
         if isinstance(row, Reading):
             earlier.setdefault(imports.digits(row), called)
-        problems += wrong
-    changed = {int(table.line[row]): one for row, one in sorted(compared.changed.items())}
-    if changed:
-        place_of = f"{table.path}, {table.row_names.spans(changed)}"
-        problems.append(_in_place(place_of, [*changed.values()], readings, given.folder, before))
+    if compared.missing:
+        what = f"does not hold {_listed(compared.missing)} any more, which was recorded from it"
+        strike = shlex.join(["kinacc", "campaign", "strike", given.folder, "NUMBER"])
+        fix = (
+            f"bring the rows back; or strike wrong readings ({strike} --reason ..) and record the "
+            "file again; --again where all its rows are new readings"
+        )
+        problems.append(Problem(table.path, what, fix=fix))
     if not good and not problems:
         what = f"was recorded before: {_listed(compared.known.values())}, no row is new"
         fix = "a reading that is equal to another to the last digit is a further row of the file"
         raise InputError(Problem(path, what, fix=fix), "Nothing was recorded")
     if problems and not given.skip_bad:
         raise InputError(problems, "Nothing was recorded")
-    known = tuple(sorted(compared.known.values()))
-    source = mark, place, compared.grown, compared.adopted
-    return _Made(good, problems, known, compared.gone, source)
-
-
-def _numbered(before: State) -> dict[int, Reading]:
-    struck = (each for each, _ in before.struck)
-    return {each.number: each.reading for each in (*before.told, *before.in_hand, *struck)}
-
-
-def _altered(row: Reading, where: str, number: int, known: Reading, before: State) -> list[Problem]:
-    """The problem with a row that is a reading by its position, and says else of it."""
-    differs = imports.unlike(row, known, before.plan.slides)
-    if not differs:
-        return []
-    what = f"is reading {number} by its position, and was recorded with another {differs}"
-    fix = f"bring the row back, or strike reading {number} and record the file again"
-    return [Problem(where, what, fix=fix)]
-
-
-def _in_place(
-    where: str, numbers: Sequence[int], readings: Mapping[int, Reading], path: str, before: State
-) -> Problem:
-    """The problem with rows that stand where others were when the file was recorded."""
-    labels = [before.plan.points.label[readings[each].point] for each in numbers]
-    strike = ["kinacc", "campaign", "strike", path]
-    if len(numbers) == 1:
-        (number,) = numbers
-        seen = ", ".join(f"{each:g}" for each in readings[number].position_mm)
-        what = (
-            f"stands where reading {number} was, which the file does not hold any more: point "
-            f"{labels[0]}, ({seen}) mm"
-        )
-        fix = (
-            "bring the row back if it was changed by mistake; if it was wrong before, run "
-            f"`{shlex.join([*strike, str(number), '--reason', '..'])}` and record the file again; "
-            "give --again if this is a reading of its own"
-        )
-        return Problem(where, what, fix=fix)
-    points = first_few([*dict.fromkeys(labels)])
-    what = (
-        f"stand where {_listed(numbers)} were, which the file does not hold any more "
-        f"(point{'s' if len({*labels}) > 1 else ''} {points})"
-    )
-    ways = [
-        "one of these:",
-        "      all are new readings, in a file written over: record it again with --again",
-        "      rows were changed by mistake: bring them back, and record the file again",
-        "      rows were wrong before: strike their readings, and record the file again:",
-        f"        {shlex.join(strike)} NUMBER --reason ..",
-    ]
-    return Problem(where, what, fix="\n".join(ways))
+    return _Made(good, problems, tuple(sorted(compared.known.values())), (mark, place))
 
 
 def _listed(numbers: Iterable[int]) -> str:
@@ -372,7 +316,6 @@ def _say_taken(given: Asked, made: _Made, before: State, after: State, out: Outp
         "taken": len(made.taken),
         "skipped": [str(each) for each in made.skipped],
         "known": list(made.known),
-        "gone": list(made.gone),
         "next": None if after.asked is None else label[after.asked],
         "readings": after.taken,
         "last_reading": after.numbered,
@@ -381,9 +324,6 @@ def _say_taken(given: Asked, made: _Made, before: State, after: State, out: Outp
     if not out.as_json:
         for each in made.skipped:
             click.echo(f"not taken: {each}", err=True)
-        if made.gone:
-            said = f"not in the file any more, and still in the campaign: {_listed(made.gone)}"
-            click.echo(f"{said}; strike what is void", err=True)
     if given.file is None:
         found = made.taken[0]
         size = float(np.linalg.norm(reading.error_mm(after.plan, found)))

@@ -332,10 +332,6 @@ def read_tables(
 ) -> dict[str, Columns]:
     """The tables of a results folder. Raises InputError naming every ``needed`` one missing."""
     folder = Path(folder)
-    if (folder / journal.PLAN).is_file():
-        status = shlex.join(["kinacc", "campaign", "status", str(folder)])
-        fix = f"run {status}, or name its results folder"
-        raise InputError(Problem(str(folder), "is a campaign, not a results folder", fix=fix))
     if not any((folder / f"{name}.parquet").is_file() for name in needed):
         fix = "kinacc calibrate FILE.yaml makes one"
         what = "holds no calibration" if folder.is_dir() else "no such folder"
@@ -436,6 +432,11 @@ def data_set_folders(folders: Iterable[Path]) -> list[Path]:
             what = "is not a folder" if folder.exists() else "no such folder"
             fix = "name the folder of all results, or of one data set"
             problems.append(Problem(str(folder), what, fix=fix))
+            continue
+        if (folder / journal.PLAN).is_file():
+            status = shlex.join(["kinacc", "campaign", "status", str(folder)])
+            fix = f"run {status}, or name its results folder"
+            problems.append(Problem(str(folder), "is a campaign, not a results folder", fix=fix))
             continue
         inside = [folder] if any(folder.glob("*.parquet")) else sorted(folder.iterdir())
         own = [
