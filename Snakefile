@@ -17,7 +17,6 @@ import sys
 from pathlib import Path
 
 from snakemake.exceptions import WorkflowError
-from snakemake.logging import logger
 
 from kinacc.campaign.journal import of_results as campaigns_of
 from kinacc.errors import InputError
@@ -27,19 +26,18 @@ from kinacc.workflow.data_sets import RESULTS, campaign_files, digests, read_dat
 from kinacc.workflow.outdated import CALIBRATION
 from kinacc.workflow.start import job_environment
 
-os.environ.update(job_environment(str(workflow.current_basedir)))
+HERE = str(workflow.current_basedir)
+if {*"{}"} & {*HERE}:
+    raise WorkflowError("the workflow's folder has braces in its name: rename the folder")
+os.environ.update(job_environment(HERE))
 if os.path.isfile(sys.executable):  # not quoted yet: Snakemake does not, in the commands of jobs
     sys.executable = shlex.quote(sys.executable)
-
-if {*"{}"} & {*str(workflow.current_basedir)}:
-    raise WorkflowError("the workflow's folder has braces in its name: rename the folder")
 
 try:
     if workflow.modifier.namespace:  # a module of another workflow, which hands over `config`
         data = read_data_sets([], config, absolute=True)
     else:
-        own = os.path.join(str(workflow.current_basedir), "config.yaml")
-        default = "config.yaml" if os.path.isfile("config.yaml") else own
+        default = "config.yaml" if os.path.isfile("config.yaml") else os.path.join(HERE, "config.yaml")
         data = read_data_sets(workflow.configfiles or [default], workflow.config_settings.config)
 except InputError as error:
     raise WorkflowError(str(error)) from None
@@ -60,26 +58,21 @@ rule all:
     """every table, picture and page of every data set"""
     default_target: True
     input:
-        [calibration_of(dataset) + study_of(dataset) for dataset in data.settings],
-    message:
-        "every table and figure is up to date"
+        [calibration_of(dataset) for dataset in data.settings],
+        [[*study_of(dataset), f"{RESULTS}/{dataset}/SHA256SUMS"] for dataset in data.told],
 
 
 rule calibration:
     """the models of every data set and what is left of the errors"""
     input:
         [calibration_of(dataset) for dataset in data.settings],
-    message:
-        "every model is up to date"
 
 
 rule robustness:
     """everything, and the claims on further synthetic arms, whose shares go into claims.parquet"""
     input:
         rules.all.input,
-        [table(dataset, "robustness") for dataset in data.told if not data.is_measured(dataset)],
-    message:
-        "every table and figure is up to date, with the claims on further synthetic arms"
+        [[*tables(dataset, "robustness").values()] for dataset in data.told if not data.is_measured(dataset)],
 
 
 include: "workflow/rules/calibration.smk"

@@ -1,8 +1,12 @@
 """Set-up on machines that are not as they should be."""
 
+import re
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
+
+import yaml
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -36,3 +40,16 @@ def test_lock_files_hold_names_versions_and_hashes_only():
         assert "--hash=sha256:" in text
         for foreign in ("://", "--index", "--find-links", "--extra", "file:", "/home", " @ "):
             assert foreign not in text, f"{name}: {foreign}"
+
+
+def test_the_conda_environment_has_every_dependency_in_the_version_of_the_lock():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    wanted = {re.match(r"[\w-]+", each)[0] for each in project["dependencies"]} - {"snakemake"}
+    locked = (ROOT / "requirements" / "run.txt").read_text()
+    locked = dict(re.findall(r"^([a-z0-9_.-]+)==([^ ;]+)", locked, re.M))
+    environment = yaml.safe_load((ROOT / "workflow" / "envs" / "kinacc.yaml").read_text())
+    python, *pinned = environment["dependencies"]
+    assert python == f"python {project['requires-python']}"
+    found = dict(each.replace("matplotlib-base", "matplotlib").split(" =") for each in pinned)
+    assert wanted <= set(found)
+    assert found == {name: locked[name] for name in found}

@@ -4,32 +4,20 @@
 rule accuracy_map:
     """the largest error over the slices of the evaluation space (Fig. 3)"""
     input:
-        unpack(lambda w: from_outside(w.dataset) | models(w.dataset)),
+        unpack(lambda w: robot(w.dataset) | models(w.dataset)),
     output:
         accuracy_map="results/{dataset}/accuracy_map.parquet",
         sums="results/{dataset}/sums/accuracy_map.sha256",
     log:
         "results/{dataset}/logs/accuracy_map.log",
-    group:
-        "data_set"
     conda:
         "../envs/kinacc.yaml"
     params:
-        settings=values(
-            "robot",
-            "evaluation.cylinder",
-            "evaluation.reference_orientation_deg",
-            "evaluation.reference_frame",
-            "evaluation.rotation_deg",
-            "evaluation.rotations",
-            "evaluation.tool_mm",
-            "evaluation.invert_with",
-            "evaluation.travel_direction",
-            "map",
+        **job(
+            "accuracy_map.py",
+            "robot map",
+            evaluation="cylinder reference_orientation_deg reference_frame rotation_deg rotations tool_mm invert_with travel_direction",
         ),
-        files=content(),
-        seed=seed,
-        code=code("accuracy_map.py"),
     message:
         "{wildcards.dataset}: mapping the largest error (Fig. 3)"
     script:
@@ -39,7 +27,7 @@ rule accuracy_map:
 rule operating_points:
     """the operating points of the study and their true errors"""
     input:
-        unpack(lambda w: from_outside(w.dataset) | models(w.dataset)),
+        unpack(lambda w: robot(w.dataset) | models(w.dataset)),
         measurements="results/{dataset}/measurements.parquet",
         pose_errors="results/{dataset}/pose_errors.parquet",
     output:
@@ -47,15 +35,10 @@ rule operating_points:
         sums="results/{dataset}/sums/operating_points.sha256",
     log:
         "results/{dataset}/logs/operating_points.log",
-    group:
-        "data_set"
     conda:
         "../envs/kinacc.yaml"
     params:
-        settings=values("robot", "evaluation"),
-        files=content(),
-        seed=seed,
-        code=code("operating_points.py"),
+        **job("operating_points.py", "robot evaluation"),
     message:
         "{wildcards.dataset}: choosing the operating points of the study"
     script:
@@ -71,21 +54,10 @@ rule study_part:
         sums="results/{dataset}/sums/study_part.{scatteritem}.sha256",
     log:
         "results/{dataset}/logs/study_part.{scatteritem}.log",
-    group:
-        "data_set"
     conda:
         "../envs/kinacc.yaml"
     params:
-        settings=values(
-            "seed",
-            "study.noise_mm",
-            "study.repetitions",
-            "study.measurements",
-            "study.alpha",
-            "study.visiting_order",
-        ),
-        seed=seed,
-        code=code("study_part.py"),
+        **job("study_part.py", "seed", study="noise_mm repetitions measurements alpha visiting_order"),
     message:
         "{wildcards.dataset}: simulating the assessors under noise, part {wildcards.scatteritem}"
     script:
@@ -104,16 +76,10 @@ rule study:
         sums="results/{dataset}/sums/study.sha256",
     log:
         "results/{dataset}/logs/study.log",
-    group:
-        "data_set"
     conda:
         "../envs/kinacc.yaml"
     params:
-        settings=values(
-            "seed", "study.outlier_rule", "study.distance", "study.covariance", "study.search"
-        ),
-        seed=seed,
-        code=code("study.py"),
+        **job("study.py", "seed", study="outlier_rule distance covariance search"),
     message:
         "{wildcards.dataset}: summing up the study (Fig. 4)"
     script:
@@ -129,22 +95,10 @@ rule histories:
         sums="results/{dataset}/sums/histories.sha256",
     log:
         "results/{dataset}/logs/histories.log",
-    group:
-        "data_set"
     conda:
         "../envs/kinacc.yaml"
     params:
-        settings=values(
-            "seed",
-            "study.measurements",
-            "study.alpha",
-            "study.distance",
-            "study.covariance",
-            "study.visiting_order",
-            "histories",
-        ),
-        seed=seed,
-        code=code("histories.py"),
+        **job("histories.py", "seed histories", study="measurements alpha distance covariance visiting_order"),
     message:
         "{wildcards.dataset}: following single model invalidations (Figs. 5 and 6)"
     script:
@@ -167,14 +121,10 @@ rule claims:
         sums="results/{dataset}/sums/claims.sha256",
     log:
         "results/{dataset}/logs/claims.log",
-    group:
-        "data_set"
     conda:
         "../envs/kinacc.yaml"
     params:
-        settings=values("robot"),
-        seed=seed,
-        code=code("claims.py"),
+        **job("claims.py", "robot"),
     message:
         "{wildcards.dataset}: holding the paper's claims to the results"
     script:
@@ -184,7 +134,7 @@ rule claims:
 rule robustness_part:
     """fits, study and claims with further draws of the synthetic arm, a part of them; on request"""
     input:
-        unpack(lambda w: from_outside(w.dataset)),
+        unpack(lambda w: robot(w.dataset)),
     output:
         robustness_chunk="results/{dataset}/robustness_chunk/{scatteritem}.parquet",
         sums="results/{dataset}/sums/robustness_part.{scatteritem}.sha256",
@@ -195,20 +145,7 @@ rule robustness_part:
     resources:
         runtime=lambda w, attempt: 60 * attempt,
     params:
-        settings=values(
-            "seed",
-            "robot",
-            "measurements",
-            "calibration",
-            "evaluation",
-            "map",
-            "study",
-            "histories",
-            "robustness",
-        ),
-        files=content(),
-        seed=seed,
-        code=code("robustness_part.py"),
+        **job("robustness_part.py", "seed robot measurements calibration evaluation map study histories robustness"),
     message:
         "{wildcards.dataset}: the study on further synthetic arms, part {wildcards.scatteritem}"
     script:
@@ -227,9 +164,7 @@ rule robustness_table:
     conda:
         "../envs/kinacc.yaml"
     params:
-        settings=values(),
-        seed=seed,
-        code=code("robustness_table.py"),
+        **job("robustness_table.py"),
     message:
         "{wildcards.dataset}: gathering the claims on further synthetic arms"
     script:

@@ -4,28 +4,22 @@
 rule measurements:
     """measured poses, read from a file or simulated with the paper's synthetic arm"""
     input:
-        unpack(lambda w: from_outside(w.dataset, "measured")),
+        unpack(lambda w: robot(w.dataset, measured=True)),
     output:
         measurements="results/{dataset}/measurements.parquet",
         robot="results/{dataset}/robot.parquet",
         sums="results/{dataset}/sums/measurements.sha256",
     log:
         "results/{dataset}/logs/measurements.log",
-    group:
-        "data_set"
     conda:
         "../envs/kinacc.yaml"
     params:
-        settings=values(
-            "seed",
-            "robot",
-            "measurements",
-            "evaluation.reference_orientation_deg",
-            "evaluation.reference_frame",
+        **job(
+            "measurements.py",
+            "seed robot measurements",
+            measured=True,
+            evaluation="reference_orientation_deg reference_frame",
         ),
-        files=content("measured"),
-        seed=seed,
-        code=code("measurements.py"),
     message:
         "{wildcards.dataset}: reading or simulating the measured poses"
     script:
@@ -35,21 +29,16 @@ rule measurements:
 rule data_check:
     """what is wrong with a measured file; findings that spoil a fit end the run here"""
     input:
-        unpack(lambda w: from_outside(w.dataset, "measured")),
+        unpack(lambda w: robot(w.dataset, measured=True)),
     output:
         data_check="results/{dataset}/data_check.parquet",
         sums="results/{dataset}/sums/data_check.sha256",
     log:
         "results/{dataset}/logs/data_check.log",
-    group:
-        "data_set"
     conda:
         "../envs/kinacc.yaml"
     params:
-        settings=values("robot", "measurements", "calibration", "data_check"),
-        files=content("measured"),
-        seed=seed,
-        code=code("data_check.py"),
+        **job("data_check.py", "robot measurements calibration data_check", measured=True),
     message:
         "{wildcards.dataset}: checking the measured file"
     script:
@@ -59,7 +48,7 @@ rule data_check:
 rule fit_vec:
     """the volumetric error compensation model, eqs. 5 and 6 (Table I)"""
     input:
-        unpack(lambda w: from_outside(w.dataset) | checked(w.dataset)),
+        unpack(lambda w: robot(w.dataset) | checked(w.dataset)),
         measurements="results/{dataset}/measurements.parquet",
     output:
         vec_model="results/{dataset}/vec_model.parquet",
@@ -70,21 +59,10 @@ rule fit_vec:
         sums="results/{dataset}/sums/fit_vec.sha256",
     log:
         "results/{dataset}/logs/fit_vec.log",
-    group:
-        "data_set"
     conda:
         "../envs/kinacc.yaml"
     params:
-        settings=values(
-            "robot",
-            "calibration.rotation_weight_mm_per_rad",
-            "calibration.base_and_tool",
-            "calibration.frames",
-            "calibration.vec",
-        ),
-        files=content(),
-        seed=seed,
-        code=code("fit_vec.py"),
+        **job("fit_vec.py", "robot", calibration="rotation_weight_mm_per_rad base_and_tool frames vec"),
     message:
         "{wildcards.dataset}: fitting the VEC model to the training poses"
     script:
@@ -94,7 +72,7 @@ rule fit_vec:
 rule fit_compliance:
     """the DH model with joints that bend under gravity, where calibration.compliance asks for it"""
     input:
-        unpack(lambda w: from_outside(w.dataset) | checked(w.dataset)),
+        unpack(lambda w: robot(w.dataset) | checked(w.dataset)),
         measurements="results/{dataset}/measurements.parquet",
     output:
         compliance_model="results/{dataset}/compliance_model.parquet",
@@ -104,22 +82,10 @@ rule fit_compliance:
         sums="results/{dataset}/sums/fit_compliance.sha256",
     log:
         "results/{dataset}/logs/fit_compliance.log",
-    group:
-        "data_set"
     conda:
         "../envs/kinacc.yaml"
     params:
-        settings=values(
-            "robot",
-            "calibration.rotation_weight_mm_per_rad",
-            "calibration.base_and_tool",
-            "calibration.frames",
-            "calibration.dh",
-            "calibration.compliance",
-        ),
-        files=content(),
-        seed=seed,
-        code=code("fit_compliance.py"),
+        **job("fit_compliance.py", "robot", calibration="rotation_weight_mm_per_rad base_and_tool frames dh compliance"),
     message:
         "{wildcards.dataset}: fitting the DH model with joints that bend"
     script:
@@ -129,7 +95,7 @@ rule fit_compliance:
 rule fit_dh:
     """the DH model, to the VEC model at the measured configurations or to the poses (Table II)"""
     input:
-        unpack(lambda w: from_outside(w.dataset) | further_frames(w.dataset)),
+        unpack(lambda w: robot(w.dataset) | further_frames(w.dataset)),
         measurements="results/{dataset}/measurements.parquet",
         vec_model="results/{dataset}/vec_model.parquet",
         vec_frames="results/{dataset}/vec_frames.parquet",
@@ -142,21 +108,10 @@ rule fit_dh:
         sums="results/{dataset}/sums/fit_dh.sha256",
     log:
         "results/{dataset}/logs/fit_dh.log",
-    group:
-        "data_set"
     conda:
         "../envs/kinacc.yaml"
     params:
-        settings=values(
-            "robot",
-            "calibration.rotation_weight_mm_per_rad",
-            "calibration.base_and_tool",
-            "calibration.frames",
-            "calibration.dh",
-        ),
-        files=content(),
-        seed=seed,
-        code=code("fit_dh.py"),
+        **job("fit_dh.py", "robot", calibration="rotation_weight_mm_per_rad base_and_tool frames dh"),
     message:
         "{wildcards.dataset}: fitting the DH model"
     script:
@@ -166,7 +121,7 @@ rule fit_dh:
 rule residuals:
     """what is left of the errors, at training and at held-out poses (Tables I and III)"""
     input:
-        unpack(lambda w: from_outside(w.dataset) | models(w.dataset)),
+        unpack(lambda w: robot(w.dataset) | models(w.dataset)),
         measurements="results/{dataset}/measurements.parquet",
         vec_orders="results/{dataset}/vec_orders.parquet",
     output:
@@ -178,15 +133,10 @@ rule residuals:
         sums="results/{dataset}/sums/residuals.sha256",
     log:
         "results/{dataset}/logs/residuals.log",
-    group:
-        "data_set"
     conda:
         "../envs/kinacc.yaml"
     params:
-        settings=values("robot", "calibration"),
-        files=content(),
-        seed=seed,
-        code=code("residuals.py"),
+        **job("residuals.py", "robot calibration"),
     message:
         "{wildcards.dataset}: comparing models and measurements, at held-out poses too"
     script:
@@ -196,22 +146,17 @@ rule residuals:
 rule excluded_rows:
     """errors of the rows that the configuration excludes, which no fit has seen"""
     input:
-        unpack(lambda w: from_outside(w.dataset, "measured") | models(w.dataset)),
+        unpack(lambda w: robot(w.dataset, measured=True) | models(w.dataset)),
         measurements="results/{dataset}/measurements.parquet",
     output:
         excluded_rows="results/{dataset}/excluded_rows.parquet",
         sums="results/{dataset}/sums/excluded_rows.sha256",
     log:
         "results/{dataset}/logs/excluded_rows.log",
-    group:
-        "data_set"
     conda:
         "../envs/kinacc.yaml"
     params:
-        settings=values("robot", "measurements"),
-        files=content("measured"),
-        seed=seed,
-        code=code("excluded_rows.py"),
+        **job("excluded_rows.py", "robot measurements", measured=True),
     message:
         "{wildcards.dataset}: errors of the excluded rows"
     script:
@@ -221,31 +166,16 @@ rule excluded_rows:
 rule summary:
     """what the calibration is worth, one figure a row"""
     input:
-        unpack(
-            lambda w: from_outside(w.dataset)
-            | models(w.dataset)
-            | fit_tables(w.dataset)
-            | checked(w.dataset)
-            | excluded(w.dataset)
-        ),
-        measurements="results/{dataset}/measurements.parquet",
-        robot="results/{dataset}/robot.parquet",
-        pose_errors="results/{dataset}/pose_errors.parquet",
-        model_selection="results/{dataset}/model_selection.parquet",
+        unpack(lambda w: robot(w.dataset) | calibrated(w.dataset)),
     output:
         summary="results/{dataset}/summary.parquet",
         sums="results/{dataset}/sums/summary.sha256",
     log:
         "results/{dataset}/logs/summary.log",
-    group:
-        "data_set"
     conda:
         "../envs/kinacc.yaml"
     params:
-        settings=values(*CALIBRATION),
-        files=content(),
-        seed=seed,
-        code=code("summary.py"),
+        **job("summary.py", " ".join(CALIBRATION)),
     message:
         "{wildcards.dataset}: summing up what the calibration is worth"
     script:
@@ -255,12 +185,9 @@ rule summary:
 rule history:
     """the calibrations of a series held to one another, and their picture"""
     input:
-        unpack(lambda w: lines_of(w.dataset)),
+        unpack(lambda w: lines(w.dataset)),
     output:
-        **{
-            f"history_over_time_{kind}": f"results/{{dataset}}/figures/history_over_time.{kind}"
-            for kind in data.formats
-        },
+        **pictures("{dataset}", "history_over_time"),
         history="results/{dataset}/history.parquet",
         sums="results/{dataset}/sums/history.sha256",
     log:
@@ -268,9 +195,7 @@ rule history:
     conda:
         "../envs/kinacc.yaml"
     params:
-        settings=values("seed", "series", "calibration", "tolerance.mm"),
-        seed=seed,
-        code=code("history.py"),
+        **job("history.py", "seed series calibration", tolerance="mm"),
     message:
         "{wildcards.dataset}: holding the calibrations of the series to one another"
     script:

@@ -4,37 +4,21 @@
 rule figures:
     """Figs. 1, 2, 4, 5 and 6"""
     input:
-        unpack(lambda w: from_outside(w.dataset)),
+        unpack(lambda w: robot(w.dataset)),
         dh_model="results/{dataset}/dh_model.parquet",
         frames="results/{dataset}/frames.parquet",
         assessment_points="results/{dataset}/assessment_points.parquet",
         study_summary="results/{dataset}/study_summary.parquet",
         histories="results/{dataset}/histories.parquet",
     output:
-        **{
-            f"fig{n}_{kind}": f"results/{{dataset}}/figures/fig{n}.{kind}"
-            for n in (1, 2, 4, 5, 6)
-            for kind in data.formats
-        },
+        **pictures("{dataset}", "fig1", "fig2", "fig4", "fig5", "fig6"),
         sums="results/{dataset}/sums/figures.sha256",
     log:
         "results/{dataset}/logs/figures.log",
-    group:
-        "data_set"
     conda:
         "../envs/kinacc.yaml"
     params:
-        settings=values(
-            "seed",
-            "robot",
-            "evaluation.space",
-            "evaluation.cylinder",
-            "evaluation.tool_mm",
-            "measurements.source",
-        ),
-        files=content(),
-        seed=seed,
-        code=code("figures.py", shown=True),
+        **job("figures.py", "seed robot", shown=True, evaluation="space cylinder tool_mm", measurements="source"),
     message:
         "{wildcards.dataset}: drawing Figs. 1, 2, 4, 5 and 6"
     script:
@@ -46,18 +30,14 @@ rule map_figure:
     input:
         accuracy_map="results/{dataset}/accuracy_map.parquet",
     output:
-        **{f"fig3_{kind}": f"results/{{dataset}}/figures/fig3.{kind}" for kind in data.formats},
+        **pictures("{dataset}", "fig3"),
         sums="results/{dataset}/sums/map_figure.sha256",
     log:
         "results/{dataset}/logs/map_figure.log",
-    group:
-        "data_set"
     conda:
         "../envs/kinacc.yaml"
     params:
-        settings=values(),
-        seed=seed,
-        code=code("map_figure.py", shown=True),
+        **job("map_figure.py", shown=True),
     message:
         "{wildcards.dataset}: drawing Fig. 3"
     script:
@@ -67,22 +47,16 @@ rule map_figure:
 rule report:
     """one page that shows what the results are worth"""
     input:
-        unpack(lambda w: page_inputs(w.dataset)),
+        unpack(lambda w: calibrated(w.dataset) | summed_up(w.dataset) | studied(w.dataset) | campaigns(w.dataset)),
     output:
-        html=report(
-            "results/{dataset}/report.html", category="{dataset}", labels={"file": "report.html"}
-        ),
+        html=report("results/{dataset}/report.html", category="{dataset}", labels={"file": "report.html"}),
         sums="results/{dataset}/sums/report.sha256",
     log:
         "results/{dataset}/logs/report.log",
-    group:
-        "data_set"
     conda:
         "../envs/kinacc.yaml"
     params:
-        settings=values(),
-        seed=seed,
-        code=code("report.py", shown=True),
+        **job("report.py", shown=True),
     message:
         "{wildcards.dataset}: writing the page"
     script:
@@ -92,7 +66,7 @@ rule report:
 rule digests:
     """digests of all files of a data set, as their stages left them"""
     input:
-        lambda w: sums_of(w.dataset),
+        lambda w: calibration_of(w.dataset) + study_of(w.dataset),
     output:
         "results/{dataset}/SHA256SUMS",
     log:
@@ -100,7 +74,5 @@ rule digests:
     localrule: True
     conda:
         "../envs/kinacc.yaml"
-    message:
-        "{wildcards.dataset}: gathering digests"
     shell:
-        "cat {input:q} > {output:q} 2> {log:q}"
+        'cat "$(dirname {output:q})"/sums/*.sha256 > {output:q} 2> {log:q}'
