@@ -1,9 +1,10 @@
 """A robot's history: whether the arm changed since the calibration in force was made.
 
 The last calibration holds unless the arm moved, over the poses of a later series, by more than an
-arm shows that did not change: see ``history_model`` for what that is taken to be. The level is that
-of a year of monthly calibrations. Where most of the later series lies outside the joint ranges of
-the one in force, that is no test of the arm but of the model, and nothing can be told.
+arm shows that did not change: see ``history_model`` for what that is taken to be. Two tests share
+the level of a year of monthly calibrations: the rms movement, and the offset of the joint that
+stands out most. Where most of the later series lies outside the joint ranges of the one in force,
+that is no test of the arm but of the model, and nothing can be told.
 """
 
 from __future__ import annotations
@@ -151,12 +152,13 @@ class _Comparison:
             shown = [self.understated(each, setup) for each in (force, session)]
             misfit = history_model.misfit_factor(*shown)
         found = history_model.moved(pair, misfit, self._rng(force.name, session.name))
-        moved_mm, chance_mm = found.moved_mm, found.chance_mm(LEVEL)
+        moved_mm, chance_mm = found.moved_mm, found.chance_mm(LEVEL / 2.0)
+        by_offset = history_model.offset_probability(found, prismatic)
         row = {
             "moved_mm": moved_mm,
             "chance_mm": chance_mm,
             "beyond_mm": max(0.0, moved_mm - chance_mm),
-            "probability": found.probability,
+            "probability": min(1.0, 2.0 * min(found.probability, by_offset)),
             "verdict": HOLDS,
         }
         there = _share_inside(session.observations.q_rad, force.observations.q_rad, prismatic)
@@ -166,7 +168,7 @@ class _Comparison:
                 "of a calibration where nothing was measured are no change"
             )
             return row | {"verdict": OPEN, "reason": what}
-        if moved_mm > chance_mm:
+        if moved_mm > chance_mm or by_offset <= LEVEL / 2.0:
             joint = history_model.joint_of(found, prismatic)
             return row | {"verdict": RECALIBRATE, "joint": joint}
         held_out_mm = float(np.mean(force.held_out_mm)) if len(force.held_out_mm) else np.inf

@@ -19,7 +19,8 @@ def sentence(history: Mapping, row: int = -1) -> str:
         joint = float(history["joint"][row])
         most = "" if np.isnan(joint) else f", joint {joint:.0f}"
         beyond = float(history["beyond_mm"][row])
-        return f"recalibrate: {beyond:.2f} mm beyond chance{most}, since the calibration of {day}"
+        what = f"{beyond:.2f} mm beyond chance" if beyond else "the offset of a joint changed"
+        return f"recalibrate: {what}{most}, since the calibration of {day}"
     if verdict == HOLDS:
         moved, chance = (float(history[name][row]) for name in ("moved_mm", "chance_mm"))
         seen = f": {moved:.2f} mm moved, where chance shows up to {chance:.2f} mm"
