@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
-
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -91,26 +89,10 @@ def test_quaternions_of_either_sign(tmp_path, good, truth):
     assert (reading.columns["qw"] >= 0).all()
 
 
-def test_semicolons_decimal_commas_and_foreign_names(tmp_path, good, truth):
-    names = {"q1": "shoulder", "x": "measurement_x", "rx": "measurement_rx"}
-    foreign = {"q1_deg": "shoulder", "x_mm": "measurement_x", "rx_deg": "measurement_rx"}
-    columns = {foreign.get(name, name): values for name, values in good.items()}
-    path = written(tmp_path, columns, ";", ",")
-    section = SECTION | {"path": path, "delimiter": ";", "decimal": ",", "columns": names}
-    assert_is_truth(read(section, ARM).columns, truth)
-
-
 def test_parquet(tmp_path, good, truth):
     path = tmp_path / "poses.parquet"
     pq.write_table(pa.table(good), path)
     assert_is_truth(read(SECTION | {"path": str(path)}, ARM).columns, truth)
-
-
-def test_position_only_has_no_quaternion(tmp_path, good):
-    turn = SECTION["orientation"] | {"kind": "none"}
-    reading = read(SECTION | {"path": written(tmp_path, good), "orientation": turn}, ARM)
-    assert np.isnan(reading.columns["qw"]).all()
-    assert "rx_deg" in reading.unused
 
 
 def test_rows_of_one_pose_are_counted_as_repeats(tmp_path, good):
@@ -232,22 +214,6 @@ def test_a_seventh_joint_the_robot_has_not(tmp_path, good):
     assert "q7 is there, the robot has 6 joints" in text
 
 
-def test_coupled_joints_reach_the_same_points(tmp_path, good, truth):
-    q_rad, pose = truth
-    matrix = np.eye(6)
-    matrix[2, 1] = 1.0
-    coupled = dataclasses.replace(ARM, joint_map=matrix)
-    reported = np.linalg.solve(matrix, q_rad.T).T
-    inside = (np.abs(reported) < np.deg2rad(359)).all(axis=1)
-    columns = {name: values[inside] for name, values in good.items()}
-    columns |= {f"q{i + 1}_deg": np.rad2deg(reported[inside, i]) for i in range(6)}
-    reading = read(SECTION | {"path": written(tmp_path, columns)}, coupled)
-    found = np.stack([reading.columns[f"q{i}"] for i in range(1, 7)], axis=1)
-    np.testing.assert_allclose(
-        dh.forward(ARM.dh, found @ matrix.T).position_mm, pose.position_mm[inside], atol=1e-9
-    )
-
-
 def test_a_column_mapped_to_two_quantities_is_refused(tmp_path, good):
     text = problems_of(tmp_path, good, columns={"q1": "q2_deg"})
     assert "column q2_deg: is taken for 2 quantities, q1 among them" in text
@@ -261,20 +227,6 @@ def test_a_file_without_orientations_is_told_from_a_missing_column(tmp_path, goo
     assert "orientation.kind" in text
     assert "rz_deg or rz_rad" in problems_of(tmp_path, {**bare, "rx_deg": good["rx_deg"],
                                                         "ry_deg": good["ry_deg"]})  # fmt: skip
-
-
-@pytest.mark.parametrize("nothing", ["NaN", "nan", "NA", "#N/A", "null"])
-def test_what_programs_write_for_nothing_is_an_empty_cell(tmp_path, good, nothing):
-    columns = {name: [f"{value!r}" for value in column.tolist()] for name, column in good.items()}
-    for name in ("x_mm", "y_mm", "z_mm", "rx_deg", "ry_deg", "rz_deg"):
-        columns[name][3] = nothing
-    reading = read(SECTION | {"path": written(tmp_path, columns)}, ARM)
-    assert len(reading.columns["pose"]) == 11
-    assert "1 row holds no reading: line 5" in " ".join(reading.left_out())
-    columns["q2_deg"][4] = nothing
-    reading = read(SECTION | {"path": written(tmp_path, columns)}, ARM)
-    assert len(reading.columns["pose"]) == 10
-    assert "1 row holds not all joints: line 6" in reading.left_out()
 
 
 def test_a_list_of_no_targets_asks_for_a_name(tmp_path, good):

@@ -96,3 +96,12 @@ def test_what_is_open_is_asked_about(tmp_path):
         rows.read(two, ARM)
     found = rows.read(two, ARM, answers={"take": ["right_j1_deg"]}).joints
     np.testing.assert_allclose(np.rad2deg(found), Q_DEG + 1.0, atol=1e-6)
+
+
+def test_units_that_contradict_each_other_are_refused(tmp_path):
+    names = [*(f"J{n} [deg]" for n in range(1, 6)), "J6 [rad]"]
+    with pytest.raises(InputError, match="one unit for all"):
+        rows.read(table(tmp_path, names, Q_DEG), ARM)
+    degrees = table(tmp_path, [f"J{n} [deg]" for n in range(1, 7)], Q_DEG)
+    with pytest.raises(InputError, match="one unit for all"):
+        rows.read(degrees, ARM, answers={"joint_unit": "rad"})

@@ -5,14 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from command_line import call
-from stages_by_hand import run_stage
 
 from kinacc.checks.contradictions import load
 from kinacc.config.schema import defaults
 from kinacc.errors import InputError
 from kinacc.kinematics import robot
 from kinacc.measurements.reader import read
-from kinacc.tables import store
 
 ARM = robot.load("ur10")
 COUNT = 40
@@ -91,18 +89,3 @@ def test_a_charge_without_a_unit_is_left_to_the_user(tmp_path):
     section, output = described(path)
     assert "payload" not in section["columns"]
     assert "charge" in output
-
-
-@pytest.mark.parametrize("names", [[], ["payload_kg"]])
-def test_the_table_has_the_columns_where_the_file_has_them(tmp_path, names):
-    path = written(tmp_path, names, [(7,) * len(names)] * COUNT)
-    (tmp_path / "set.yaml").write_text(
-        f"datasets: {{own: {{robot: ur10, measurements: {{source: file, file: "
-        f'{{path: "{path}", orientation: {{kind: none}}}}}}}}}}\n'
-    )
-    out = tmp_path / "results"
-    done = run_stage("measurements", "--config", tmp_path / "set.yaml", "--results", out)
-    assert done.exit_code == 0, done.output
-    table = store.read(out / "own" / "measurements.parquet")
-    assert ("payload_kg" in table) == bool(names)
-    assert call("check-results", out / "own").output.count("measurements.parquet") == 0

@@ -6,9 +6,7 @@ import datetime
 
 import numpy as np
 import pytest
-from command_line import call
 from written_tables import (
-    ARM,
     JOINTS,
     POINT_MM,
     Q_DEG,
@@ -47,25 +45,6 @@ def test_a_workbook_with_a_title_is_read_from_the_sheet_that_holds_a_table(tmp_p
     assert reading(tmp_path / "readings.xlsx").columns["row"][0] == 4
 
 
-def test_a_workbook_with_units_under_the_names_and_a_blank_first_column(tmp_path):
-    names = [None, *(f"J{i}" for i in range(1, 7)), *"XYZ", "Remark"]
-    units = [None, *["deg"] * 6, *["mm"] * 3]
-    rows = [[None, *row] for row in TABLE[1:]]
-    rows[3].append("tracker moved?")
-    path = workbook(tmp_path, {"Sheet1": [names, units, *rows, [None, "Mean", *[1.0] * 8]]})
-    assert_is_truth(reading(path), atol=1e-9)
-    assert "row 17: statistics" in " ".join(looked(path).told)
-
-
-def test_a_workbook_with_names_of_groups_over_the_names(tmp_path):
-    over = ["Robot", *[None] * 5, "Nominal", None, None, "Measured", None, None]
-    names = [*(f"J{i}" for i in range(1, 7)), *"XYZ", *"XYZ"]
-    rows = [[*row[:6], 1.0, 2.0, 3.0, *row[6:]] for row in TABLE[1:]]
-    path = workbook(tmp_path, {"Sheet1": [over, names, ["deg"] * 6 + ["mm"] * 6, *rows]})
-    assert looked(path).section["columns"]["x"] == "Measured X"
-    assert_is_truth(reading(path), atol=1e-9)
-
-
 def test_a_workbook_with_text_in_place_of_numbers(tmp_path):
     rows = [[f"{value:.3f}".replace(".", ",") for value in row] for row in TABLE[1:]]
     assert_is_truth(reading(workbook(tmp_path, {"Tabelle1": [TABLE[0], *rows]})))
@@ -78,15 +57,6 @@ def test_two_sheets_with_tables_are_asked_about(tmp_path):
     assert_is_truth(reading(path, sheet="before"), atol=1e-9)
     with pytest.raises(InputError, match="before, after"):
         looked(path, sheet="between")
-
-
-def test_blank_cells_of_a_workbook_are_no_readings_by_row(tmp_path):
-    rows = [list(row) for row in TABLE]
-    rows[3][6:] = [None] * 3
-    rows[9][6:] = ["---"] * 3
-    found = reading(workbook(tmp_path, {"Sheet1": rows}))
-    assert_is_truth(found, ~np.isin(np.arange(ROWS), (2, 8)), atol=1e-9)
-    assert "2 rows hold no reading: rows 4, 10" in found.left_out()
 
 
 def test_a_date_in_a_workbook_is_named_with_sheet_row_and_column(tmp_path):
@@ -161,15 +131,6 @@ def test_how_many_sigma_is_asked_where_someone_is_there(tmp_path):
     assert section["sigma"] == 2
 
 
-def test_how_many_sigma_stops_where_nobody_is_there(tmp_path):
-    rows = [[*row, "0.02", "0.04", "0.06"] for row in cells()]
-    words = ["--robot", "ur10", "--out", tmp_path, "--name", "cell", "--yes"]
-    done = call("init", file(tmp_path, lines(rows, UNCERTAIN)), *words)
-    assert done.exit_code == 2
-    assert "Ux, Uy, Uz do not tell how many standard deviations" in done.output
-    assert not (tmp_path / "cell.yaml").exists()
-
-
 @pytest.mark.parametrize("name", ["U{} (k=2) [mm]", "Unc. {} [mm] (k = 2)"])
 def test_uncertainties_whose_names_say_k_are_so_many_standard_deviations(name, tmp_path):
     names = [*JOINTS, *XYZ, *(name.format(axis) for axis in "xyz")]
@@ -180,16 +141,6 @@ def test_uncertainties_whose_names_say_k_are_so_many_standard_deviations(name, t
     assert np.isnan(reading(path, sigma="none").columns["std_y_mm"]).all()
     with pytest.raises(InputError, match=r"--sigma 1: not all of"):
         looked(path, sigma="1")
-
-
-def test_uncertainties_of_the_points_of_two_files_are_read_as_answered(tmp_path):
-    names = [f"P{row}" for row in range(len(cells()))]
-    rows = [[name, *row] for name, row in zip(names, cells(), strict=True)]
-    joints = file(tmp_path, lines([row[:7] for row in rows], ["Name", *JOINTS]), "joints.csv")
-    spread = [[row[0], *row[7:], "0.02", "0.04", "0.06"] for row in rows]
-    points = file(tmp_path, lines(spread, ["Name", *"XYZ", "Ux", "Uy", "Uz"]), "points.csv")
-    found = reading([joints, points], sigma="2")
-    np.testing.assert_allclose(found.columns["std_z_mm"], 0.03)
 
 
 def report(names, more=(), axes=("X", "Y", "Z"), once=False):
@@ -353,33 +304,3 @@ def test_the_way_horizontal_angles_count_is_found_by_trying(tmp_path):
     assert told["file"]["directions"]["horizontal"] == "counterclockwise"
     assert told["suspicions"] == []
     assert any("found by trying" in words for words in told["told"])
-
-
-def test_what_is_as_usual_leaves_the_settings_of_a_run_as_they_were(tmp_path):
-    from kinacc.workflow.data_sets import read_data_sets
-
-    path = file(tmp_path, lines(cells()))
-    head = "datasets: {cell: {robot: ur10, calibration: {base_and_tool: estimated}, evaluation: "
-    head += "{space: measured}, measurements: {source: file, file: "
-    for more, there in (("", False), (", sigma: 2, encoding: cp932", True)):
-        config = tmp_path / "cell.yaml"
-        config.write_text(f"{head}{{path: {path}, orientation: {{kind: none}}{more}}}}}}}}}\n")
-        settings = read_data_sets([str(config)]).settings["cell"]["measurements"]["file"]
-        for key in ("sigma", "encoding"):
-            assert (key in settings) == there
-        assert "layout" not in settings
-
-
-def test_a_workbook_goes_from_init_to_the_check(tmp_path):
-    from click.testing import CliRunner
-
-    from kinacc.cli.group import main
-
-    path = workbook(tmp_path, {"notes": [["warm"]], "Data": [["Cell 3"], [], *TABLE]})
-    words = ["init", str(path), "--robot", "ur10", "--out", str(tmp_path), "--yes"]
-    done = CliRunner().invoke(main, words)
-    assert done.exit_code == 0, done.output
-    assert "file: sheet 'Data'" in done.output
-    checked = CliRunner().invoke(main, ["check-data", str(tmp_path / "readings.yaml")])
-    assert checked.exit_code in (0, 1), checked.output
-    assert ARM.name in checked.output or "ur10" in checked.output

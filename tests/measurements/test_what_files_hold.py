@@ -7,17 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import shared_data
 from scipy.spatial.transform import Rotation
 
 from kinacc.checks.contradictions import load
 from kinacc.config.schema import defaults
 from kinacc.errors import InputError
 from kinacc.geometry import exp_so3, log_so3, rotation_from_quaternion
-from kinacc.kinematics import dh, robot
+from kinacc.kinematics import robot
 from kinacc.measurements.reader import UNCERTAINTY, read
-from kinacc.synthetic import source as stage
-from kinacc.tables import store
 
 ROOT = Path(__file__).parents[2]
 ARM = robot.load("ur10")
@@ -69,15 +66,6 @@ def test_targets_are_found_by_their_names_and_may_be_missing(tmp_path, joints):
     np.testing.assert_array_equal(columns["x_mm"][second], 100.0 + 7.0 * columns["pose"][second])
     assert (columns["repeat"] == 0).all()
     assert np.isnan(columns["qw"]).all()
-
-
-def test_a_row_without_any_target_is_left_out_and_named(tmp_path, joints):
-    one = {n: v.astype(object) for n, v in points().items()}
-    for name in one:
-        one[name][5] = " "
-    found = reading(tmp_path, joints | one)
-    assert len(found.columns["pose"]) == COUNT - 1
-    assert found.left_out() == ["1 row holds no reading: line 7"]
 
 
 def test_half_a_point_is_no_reading_of_its_target_and_is_told(tmp_path, joints):
@@ -221,19 +209,6 @@ def test_commanded_joints_beside_those_read_back(tmp_path, joints):
     assert "column q3_cmd: is missing beside" in refused(tmp_path, joints | commanded | points())
 
 
-def test_lines_above_and_under_the_names_are_skipped(tmp_path, joints):
-    table = joints | points()
-    rows = [",".join(map(str, row)) for row in zip(*table.values(), strict=True)]
-    text = ["Instrument 4711", "", ",".join(table), ",".join(["unit"] * len(table)), *rows]
-    path = tmp_path / "foreign.csv"
-    path.write_text("\n".join(text))
-    section = defaults()["measurements"]["file"] | {"path": str(path)}
-    section |= {"skip_lines": 2, "skip_under_names": 1, "orientation": {"kind": "none"}}
-    section["orientation"] |= {"convention": "XYZ", "unit": "deg"}
-    found = read(section, ARM, strict=False)
-    np.testing.assert_array_equal(found.columns["row"], np.arange(5, 5 + COUNT))
-
-
 def test_a_sliding_joint_is_read_as_a_length(tmp_path, joints):
     slides = np.arange(6) == 2
     arm = dataclasses.replace(ARM, dh=dataclasses.replace(ARM.dh, prismatic=slides))
@@ -241,20 +216,6 @@ def test_a_sliding_joint_is_read_as_a_length(tmp_path, joints):
     columns = reading(tmp_path, joints | points(), arm=arm).columns
     np.testing.assert_allclose(columns["q3"], joints["q3_m"] * 1000.0)
     np.testing.assert_allclose(columns["q2"], np.deg2rad(joints["q2_deg"]))
-
-
-def test_what_a_file_states_stands_in_the_artefact(tmp_path, joints):
-    table = joints | points("mA_") | {f"mA_std_{axis}_mm": np.full(COUNT, 0.01) for axis in "xyz"}
-    table["session"] = words(*["a"] * COUNT)
-    found = reading(tmp_path, table)
-    settings = {"seed": 1, "measurements": defaults()["measurements"]}
-    path = tmp_path / "measurements.parquet"
-    store.write(path, "measurements", stage.split(found.columns, settings), MARKS | {"seed": 1})
-    again = store.read(path)
-    assert list(again["session"]) == ["a"] * COUNT
-    np.testing.assert_allclose(again["std_x_mm"], 0.01)
-    np.testing.assert_array_equal(again["row"], np.arange(2, 2 + COUNT))
-    assert np.isnan(again["temperature_c"]).all()
 
 
 def example(name: str, dataset: str):
@@ -275,17 +236,3 @@ def test_a_published_file_is_used_as_its_publisher_wrote_it():
             published.columns[name], plain.columns[name], atol=1e-7, err_msg=name
         )
     assert np.isfinite(np.stack([published.columns[name] for name in UNCERTAINTY[:3]])).all()
-
-
-@shared_data.needed("")
-def test_three_reflectors_read_ten_times():
-    found = example("fanuc.yaml", "fanuc")
-    assert found.unused == ()
-    poses, readings = np.unique(found.columns["pose"], return_counts=True)
-    assert len(poses) == 24
-    assert (readings == 30).all()
-    assert set(found.columns["target"]) == {"mA", "mB", "mC"}
-    arm = robot.load("fanuc_r2000ic_165f")
-    q_rad = np.stack([found.columns[f"q{i}"] for i in range(1, 7)], axis=1)
-    reach = np.linalg.norm(dh.forward(arm.dh, arm.dh_joints(q_rad)).position_mm, axis=1)
-    assert (reach < 3500).all()

@@ -7,7 +7,6 @@ import re
 import numpy as np
 import pytest
 from written_tables import (
-    ARM,
     JOINTS,
     POINT_MM,
     Q_DEG,
@@ -24,7 +23,6 @@ from written_tables import (
 from kinacc.errors import InputError
 from kinacc.measurements.intake.choices import Undecided
 from kinacc.measurements.intake.text import look
-from kinacc.measurements.reader import read
 
 GERMAN = [*(f"Achse {i} [°]" for i in range(1, 7)), *(f"{axis} gemessen [mm]" for axis in "XYZ")]
 
@@ -75,15 +73,6 @@ def test_a_degree_sign_that_an_export_lost_leaves_the_unit_to_the_numbers(lost, 
     path = file(tmp_path, lines(cells(), names, ";"))
     assert looked(path).section["joint_unit"] == "deg"
     assert_is_truth(reading(path))
-
-
-def test_a_description_without_the_characters_says_what_to_set(tmp_path):
-    path = file(tmp_path, lines(cells(), [*GERMAN[:6], *"XYZ"], ";"), encoding="latin-1")
-    section = looked(path).section
-    wrong = {ours: name.replace("°", "\ufffd") for ours, name in section["columns"].items()}
-    found = read(section | {"encoding": "utf-8", "columns": wrong}, ARM, strict=False)
-    assert_is_truth(found)
-    assert "set measurements.file.encoding" in " ".join(found.left_out())
 
 
 WRITTEN = {
@@ -156,16 +145,6 @@ def test_a_file_is_read_whatever_parts_its_columns_and_digits(case, tmp_path):
     assert_is_truth(reading(file(tmp_path, WRITTEN[case])))
 
 
-def test_points_of_two_groups_under_joined_names(tmp_path):
-    over = ["Joints", *[""] * 5, "Nominal", "", "", "Measured", "", ""]
-    names = [*(f"J{i}" for i in range(1, 7)), *"XYZ", *"XYZ"]
-    rows = [[*row[:6], "1.5", "2.5", "3.5", *row[6:]] for row in cells()]
-    found = looked(file(tmp_path, lines([names, *rows], over, ";")))
-    assert found.section["columns"]["x"] == "Measured X"
-    assert found.section["names"][6] == "Nominal X"
-    assert_is_truth(reading(file(tmp_path, lines([names, *rows], over, ";"))))
-
-
 AMBIGUOUS = {
     "a comma before three digits": lambda cell: re.sub(r"\.\d+", "", cell) + ",125",
     "a point before three digits, or none": lambda cell: (
@@ -223,7 +202,7 @@ def test_the_answer_of_a_person_counts_as_the_option_does(tmp_path):
     answered = CliRunner().invoke(main, words, input=".\nur10\n")
     assert "2,512 is 2512" in answered.output
     written = (tmp_path / "readings.yaml").read_text(encoding="utf-8")
-    assert 'thousands: ","' in written
+    assert "thousands: ','" in written
 
 
 def test_a_thousand_where_all_others_have_none_is_asked_about(tmp_path):
@@ -271,14 +250,6 @@ def test_a_summary_behind_a_blank_line_is_told_and_not_read(tmp_path):
     path = file(tmp_path, lines(rows, ["Point", *JOINTS, *XYZ], ";") + summary)
     assert_is_truth(reading(path))
     assert "line 17: statistics of the rows, not read (Summary)" in reading(path).left_out()
-
-
-def test_units_in_the_cells_are_those_of_the_columns(tmp_path):
-    rows = [[*row[:6], *(f"{v / 1000:.6f} m" for v in point)]
-            for row, point in zip(cells(), POINT_MM, strict=True)]  # fmt: skip
-    path = file(tmp_path, lines(rows, [*JOINTS, *"XYZ"], ";"))
-    assert looked(path).section["length_unit"] == "m"
-    assert_is_truth(reading(path))
 
 
 def test_statistics_and_remarks_between_the_rows_are_told_with_their_lines(tmp_path):
@@ -345,14 +316,6 @@ def test_numbers_that_stand_for_no_reading_are_found_and_told(case, unit, tmp_pa
     np.testing.assert_allclose(x, POINT_MM[kept, 0] + 4000, atol=2e-3)
 
 
-def test_two_numbers_for_no_reading_in_one_file_are_both_found(tmp_path):
-    away = np.add(POINT_MM, (4000, 0, 0))
-    rows = [[*row[:6], *(f"{v:.3f}" for v in p)] for row, p in zip(cells(), away, strict=True)]
-    rows[2][6:], rows[8][6:] = ["0"] * 3, ["9999.99"] * 3
-    found = looked(file(tmp_path, lines(rows, mark=";")))
-    assert found.section["no_reading"] == [0.0, 9999.99]
-
-
 def test_one_zero_among_points_around_it_is_asked_about(tmp_path):
     near = POINT_MM - POINT_MM.mean(axis=0)
     rows = [[*row[:6], *map(str, np.round(p, 3))] for row, p in zip(cells(), near, strict=True)]
@@ -392,14 +355,6 @@ def test_a_nine_in_one_coordinate_is_asked_about(tmp_path):
     assert "--no-reading" in str(undecided(path))
     found = reading(path, no_reading="9999")
     assert_is_truth(found, np.arange(ROWS) != 4)
-
-
-def test_joints_that_are_missing_in_a_row_leave_it_out(tmp_path):
-    rows = cells()
-    rows[3][2] = ""
-    found = reading(file(tmp_path, lines(rows, mark=";")))
-    assert_is_truth(found, np.arange(ROWS) != 3)
-    assert "1 row holds not all joints: line 5" in found.left_out()
 
 
 def test_joints_that_stand_for_the_rows_below_are_not_guessed(tmp_path):

@@ -71,7 +71,7 @@ def is_comment(cells: Sequence, delimiter: str = "") -> bool:
 def _kind(cells: Sequence, delimiter: str) -> str:
     """What a row is that is no reading: a remark, or a mean or spread by its label."""
     first = cells[0]
-    if first is not None and (type(first) is not str or "0" <= first[:1] <= "9"):
+    if first is not None and (type(first) is not str or first.lstrip("+-−")[:1].isdigit()):
         return ""
     if is_comment(cells, delimiter):
         return _REMARK

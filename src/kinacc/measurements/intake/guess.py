@@ -114,7 +114,7 @@ def look(
         return np.where(np.isin(every, void), np.nan, every)
 
     problems: list[Problem] = []
-    units = _Units(table.path, values, problems, dict(looked.assumed), above=looked.stated)
+    units = Units(table.path, values, problems, dict(looked.assumed), above=looked.stated)
     turning = [name for name in found.joints if name.unit not in LENGTH and not per_deg]
     first = next(iter(found.targets.values()))
     joint_unit = units.of(turning, "joint_unit")
@@ -258,7 +258,7 @@ def _refuse(path: str, table: RawTable, found: NamedColumns, take: Sequence[str]
 
 
 @dataclass
-class _Units:
+class Units:
     """Units of columns: those they state, or those the size of their numbers speaks for."""
 
     path: str
@@ -267,6 +267,7 @@ class _Units:
     assumed: dict[str, str] = field(default_factory=dict)
     stated: dict[str, tuple[str, str]] = field(default_factory=dict)
     above: Mapping[str, str] = field(default_factory=dict)
+    given: Mapping[str, str] = field(default_factory=dict)  # asks for one unit for all
 
     def of(self, names: Sequence[Name], setting: str) -> str:
         """The unit of columns; what is wrong with it is a problem."""
@@ -277,7 +278,11 @@ class _Units:
         words = listed([name.column for name in names])
         most = max(np.nanmax(np.abs(self.values(name)), initial=0.0) for name in names)
         above = self.above.get(setting.removesuffix("_unit"), "")  # in a line around the rows
-        unit = next((each.unit for each in names if each.unit), above)
+        given = self.given.get(setting)
+        unit = given or next((n.unit for n in names if n.unit), above)
+        if self.given and (odd := {n.unit for n in names} - {"", unit}):
+            what = f"are in {' and '.join(sorted({*odd, unit}))}"
+            self.problems.append(Problem(f"{self.path}: columns {words}", what, "one unit for all"))
         if not unit:
             unit = small if most <= largest else usual
             self.assumed[setting] = f"{words} are in {unit}: the largest number is {most:.4g}"
