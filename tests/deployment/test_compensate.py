@@ -6,8 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from small_arms import calibrated, joints
 
-from kinacc.deployment.compensate import compensate, programmed
-from kinacc.deployment.postures import PoseStatus
+from kinacc.deployment.compensate import PoseStatus, compensate, programmed
 from kinacc.deployment.predict import predict
 from kinacc.deployment.record import nominal
 from kinacc.geometry import Pose, compose, invert, log_so3

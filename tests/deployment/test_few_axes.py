@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinacc.deployment.compensate import compensate, programmed
-from kinacc.deployment.postures import FEW_AXES_TURN_RAD, PoseStatus
+from kinacc.deployment.compensate import FEW_AXES_TURN_RAD, PoseStatus, compensate, programmed
 from kinacc.deployment.record import nominal
 from kinacc.geometry import Pose, log_so3, rotation_x, skew
 from kinacc.kinematics import dh, robot

@@ -18,8 +18,13 @@ from kinacc.cli.tables import (
     pose_fields,
 )
 from kinacc.deployment.applicability import is_measured_there
-from kinacc.deployment.compensate import Compensation, programmed
-from kinacc.deployment.postures import FEW_AXES_TURN_RAD, ROTATION_TOLERANCE_RAD, PoseStatus
+from kinacc.deployment.compensate import (
+    FEW_AXES_TURN_RAD,
+    ROTATION_TOLERANCE_RAD,
+    Compensation,
+    PoseStatus,
+    programmed,
+)
 from kinacc.deployment.record import Calibration
 from kinacc.errors import InputError, Problem, refuse
 from kinacc.geometry import Pose, rotation_from_quaternion

@@ -1,38 +1,57 @@
-"""Joint values at which a calibrated arm puts its tool where it is wanted, verified one by one."""
+"""Joint values at which a calibrated arm puts its tool where it is wanted, verified one by one.
+
+Every posture of the plain arm is refined onto the wanted pose on the calibrated model; of those
+that the model returns to the pose within tolerance the nearest to the given joints is taken.
+"""
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
+from enum import IntEnum
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
-from kinacc.deployment.postures import (
-    SAME_POSTURE_RAD,
-    SAME_RAD,
-    Goals,
-    Judged,
-    PoseStatus,
-    within_each,
-)
 from kinacc.deployment.record import Calibration
 from kinacc.errors import InputError, Problem
-from kinacc.geometry import Pose, compose, invert
+from kinacc.geometry import IDENTITY, Pose, compose, invert, log_so3
 from kinacc.kinematics import dh
-from kinacc.kinematics.inverse import limits
-from kinacc.kinematics.model import JointState
+from kinacc.kinematics.inverse import few_axes, limits, newton, solve
+from kinacc.kinematics.model import ErrorModel, JointState
+from kinacc.kinematics.region import points
+
+POSITION_TOLERANCE_MM = newton.POSITION_TOLERANCE_MM
+ROTATION_TOLERANCE_RAD = newton.ROTATION_TOLERANCE_RAD
+FEW_AXES_TURN_RAD = 0.05  # of an arm of four or five axes; more is another orientation
+SAME_POSTURE_RAD = 0.35  # a calibration moves joints by less, another posture by more
+SAME_RAD = 1e-5
+_NEAR_START_MM = 1.0  # a posture of the plain arm, as a start on the calibrated one
+_STARTS, _FEW_STARTS = 48, 16  # of the search where an arm has no list of branches
+
+
+class PoseStatus(IntEnum):
+    """What became of a wanted pose; joints are given for the first three."""
+
+    CONVERGED = 0
+    EXTRAPOLATED = 1
+    OTHER_POSTURE = 2
+    OUTSIDE_LIMITS = 3
+    OUTSIDE_RANGE = 4
+    NOT_REACHED = 5
 
 
 class Compensation(NamedTuple):
     """Joints that reach n wanted poses.
 
     ``q_rad`` (n, k): reported joints (mm where a joint slides), NaN unless the forward model was
-    seen to return to the pose within the tolerances of ``postures``. An arm of four or five axes
-    has the position alone within tolerance, and the nearest orientation it can take there, at most
-    ``postures.FEW_AXES_TURN_RAD`` away.
-    ``status`` (n,): a ``Status``. ``position_error_mm`` and ``rotation_error_rad`` (n,): what is
-    left at the best joints found. ``offending`` (n, k): joints outside limits or covered range.
-    ``change`` (n, k): joints less those given as near, NaN without those.
+    seen to return to the pose within POSITION_TOLERANCE_MM and ROTATION_TOLERANCE_RAD. An arm of
+    four or five axes has the position alone within tolerance, and the nearest orientation it can
+    take there, at most FEW_AXES_TURN_RAD away. ``status`` (n,): a ``PoseStatus``.
+    ``position_error_mm`` and ``rotation_error_rad`` (n,): what is left at the best joints found.
+    ``offending`` (n, k): joints outside limits or covered range. ``change`` (n, k): joints less
+    those given as near, NaN without those.
     """
 
     q_rad: np.ndarray
@@ -60,7 +79,11 @@ def compensate(
     in, for a VEC model that knows them; ``payload`` (n, 4) as in a ``JointState``.
     Raises InputError for an unknown frame or point, and for poses that are no numbers.
     """
-    _require_numbers(wanted)
+    known = np.isfinite(wanted.position_mm).all(axis=1)
+    known &= np.isfinite(wanted.rotation).all(axis=(1, 2))
+    if not known.all():
+        shown = ", ".join(str(row) for row in np.flatnonzero(~known)[:5])
+        raise InputError(Problem("wanted poses", f"no number in row {shown}", "finite poses"))
     robot, count = calibration.robot, len(wanted.position_mm)
     carried, origin = calibration.point(point), calibration.origin(frame)
     goal = compose(invert(origin), compose(wanted, invert(carried)))
@@ -68,25 +91,34 @@ def compensate(
     near = np.zeros(robot.dh.joints) if near_rad is None else np.atleast_2d(near_rad)
     near = np.broadcast_to(near, (count, robot.dh.joints))
     like = JointState(robot.dh_joints(near), None if s is None else np.asarray(s), payload)
-    arm = Goals(calibration, goal, near, like, carried)
-    best = _Best.none(count, robot.dh.joints, given)
-    if given:
-        every = np.arange(count)
-        best.offer(arm.judged(robot.dh_joints(near), every), every)
-    rows = np.flatnonzero(~best.settled())
-    for start, own in arm.postures(rows) if len(rows) else ():
-        wanting = ~best.settled()[own]
-        if wanting.any():
-            best.offer(arm.judged(start[wanting], own[wanting]), own[wanting])
-    return _outcome(calibration, best, near, given)
-
-
-def _require_numbers(wanted: Pose) -> None:
-    known = np.isfinite(wanted.position_mm).all(axis=1)
-    known &= np.isfinite(wanted.rotation).all(axis=(1, 2))
-    if not known.all():
-        shown = ", ".join(str(row) for row in np.flatnonzero(~known)[:5])
-        raise InputError(Problem("wanted poses", f"no number in row {shown}", "finite poses"))
+    arm = _Goals(calibration, goal, near, like, carried)
+    every = np.arange(count)
+    found = arm.judged(robot.dh_joints(near), every)
+    left = ~((found.status <= PoseStatus.EXTRAPOLATED) & (found.movement <= SAME_POSTURE_RAD))
+    more = arm.judged(*arm.postures(every[left] if given else every))
+    found = _Judged(*map(np.concatenate, zip(found, more, strict=True))) if given else more
+    best = found.best(count, given)
+    hit = found.status != PoseStatus.NOT_REACHED
+    nearest = np.full(count, np.inf)
+    np.minimum.at(nearest, found.row[hit], found.movement[hit])
+    status = best.status.copy()
+    usable = status <= PoseStatus.EXTRAPOLATED
+    status[usable & given & (best.movement > nearest + SAME_RAD)] = PoseStatus.OTHER_POSTURE
+    reported = limits.reported_joints(robot, best.q_dh)
+    outside = np.where(
+        (status == PoseStatus.OUTSIDE_LIMITS)[:, None],
+        ~_within_each(calibration, reported),
+        calibration.outside_range(best.q_dh),
+    )
+    q_rad = np.where((status <= PoseStatus.OTHER_POSTURE)[:, None], reported, np.nan)
+    return Compensation(
+        q_rad,
+        status,
+        best.off_mm,
+        best.angle_rad,
+        outside & (status != PoseStatus.NOT_REACHED)[:, None],
+        q_rad - near if given else np.full(q_rad.shape, np.nan),
+    )
 
 
 def programmed(calibration: Calibration, q_rad: np.ndarray, point: str | None = None) -> Pose:
@@ -96,74 +128,175 @@ def programmed(calibration: Calibration, q_rad: np.ndarray, point: str | None = 
     return compose(robot.base, compose(end, calibration.programmed_point(point)))
 
 
-@dataclass
-class _Best:
-    """The best posture so far of every wanted pose."""
+class _Judged(NamedTuple):
+    """Refined DH joints (m, k) for goals ``row`` (m,), status, what is left, largest movement."""
 
+    row: np.ndarray
     q_dh: np.ndarray
     status: np.ndarray
     off_mm: np.ndarray
     angle_rad: np.ndarray
     movement: np.ndarray
-    nearest: np.ndarray  # movement to the nearest posture, usable or not
-    given: bool  # whether joints were given that the posture should be near to
 
-    @classmethod
-    def none(cls, count: int, joints: int, given: bool) -> _Best:
-        far = np.full(count, np.inf)
-        status = np.full(count, PoseStatus.NOT_REACHED)
-        blank = np.full((count, joints), np.nan)
-        return cls(blank, status, far.copy(), far.copy(), far.copy(), far.copy(), given)
+    def best(self, count: int, given: bool) -> _Judged:
+        """Of ``count`` goals the best each: usable before not, then near before far."""
+        missed = self.status == PoseStatus.NOT_REACHED
+        cost = np.minimum(self.movement, 99.0) + 1e3 * (self.status > PoseStatus.EXTRAPOLATED)
+        cost += 200.0 * ((self.status == PoseStatus.EXTRAPOLATED) & (not given))
+        cost = np.where(missed, 1e6 + np.minimum(self.off_mm, 1e8), cost)
+        order = np.lexsort([cost, self.row])
+        rows, first = np.unique(self.row[order], return_index=True)
+        chosen = order[first]
+        full = [np.full((count, *each.shape[1:]), np.inf) for each in self]
+        for column, values in zip(full, self, strict=True):
+            column[rows] = values[chosen]
+        status = np.full(count, int(PoseStatus.NOT_REACHED))
+        status[rows] = self.status[chosen]
+        full[1][~np.isin(np.arange(count), rows)] = np.nan
+        return _Judged(*full)._replace(status=status)
 
-    def settled(self) -> np.ndarray:
-        """True (n,) where no other posture can be better, as they are offered nearest first."""
-        if not self.given:
-            return self.status == PoseStatus.CONVERGED
-        return (self.status <= PoseStatus.EXTRAPOLATED) & (self.movement <= SAME_POSTURE_RAD)
 
-    def offer(self, found: Judged, rows: np.ndarray) -> None:
-        """Keep what is better: usable before not, then near before far, then what is left."""
-        hit = found.status != PoseStatus.NOT_REACHED
-        self.nearest[rows] = np.where(
-            hit, np.minimum(self.nearest[rows], found.movement), self.nearest[rows]
+@dataclass(frozen=True)
+class _Goals:
+    """Wanted poses ``goal`` (n, ...) of the last DH frame, and what becomes of starts for them.
+
+    ``near`` (n, k): reported joints; ``like``: how the arm travels there and what it carries.
+    """
+
+    calibration: Calibration
+    goal: Pose
+    near: np.ndarray
+    like: JointState
+    point: Pose
+
+    @property
+    def has_few_axes(self) -> bool:
+        return self.calibration.robot.dh.joints < few_axes.SIX
+
+    @property
+    def carried(self) -> Pose:
+        """What is brought to the goal; an arm of few axes turns about its point."""
+        return self.point if self.has_few_axes else IDENTITY
+
+    @cached_property
+    def wanted(self) -> Pose:
+        return compose(self.goal, self.carried)
+
+    def judged(self, start: np.ndarray, rows: np.ndarray) -> _Judged:
+        """Joints refined from ``start`` (m, k) onto the goals ``rows`` (m,), verified forward.
+
+        A start so far from limits or covered range that no refinement brings it back is judged as
+        it stands.
+        """
+        calibration, robot, model = self.calibration, self.calibration.robot, self.calibration.model
+        is_bounded = model.domain is not None
+        reach = limits.travel_unit(robot) * SAME_POSTURE_RAD
+        reported = limits.reported_joints(robot, start)
+        beyond_limits = ~_within_each(calibration, reported, reach).all(axis=1)
+        hopeless = beyond_limits | (
+            calibration.outside_range(start, reach).any(axis=1) & is_bounded
         )
-        old = self._cost(self.status[rows], self.movement[rows], self.off_mm[rows])
-        new = self._cost(found.status, found.movement, found.off_mm)
-        better = new < old - 1e-9
-        chosen = rows[better]
-        self.q_dh[chosen] = found.q_dh[better]
-        self.status[chosen] = found.status[better]
-        self.off_mm[chosen] = found.off_mm[better]
-        self.angle_rad[chosen] = found.angle_rad[better]
-        self.movement[chosen] = found.movement[better]
+        status = np.where(beyond_limits, PoseStatus.OUTSIDE_LIMITS, PoseStatus.OUTSIDE_RANGE)
+        q_dh, worth = start.copy(), np.flatnonzero(~hopeless)
+        off, angle = np.full((2, len(start)), np.nan)
+        own = rows[worth]
+        with np.errstate(all="ignore"):  # far outside its range a model may be no number
+            q_dh[worth] = self._refined(start[worth], own)
+            turned = self._turned(q_dh[worth], own)
+            again = np.flatnonzero((np.abs(turned - q_dh[worth]) > 1.0).any(axis=1))
+            q_dh[worth[again]] = turned[again]
+            if len(again) and is_bounded:  # errors need not repeat after a turn
+                q_dh[worth[again]] = self._refined(turned[again], own[again])
+            off[worth], angle[worth] = self._left(model, q_dh[worth], own)
+        turn_rad = FEW_AXES_TURN_RAD if self.has_few_axes else ROTATION_TOLERANCE_RAD
+        hit = (off <= POSITION_TOLERANCE_MM) & (angle <= turn_rad)
+        reported = limits.reported_joints(robot, q_dh)
+        beyond = PoseStatus.OUTSIDE_RANGE if is_bounded else PoseStatus.EXTRAPOLATED
+        covered = ~calibration.outside_range(q_dh).any(axis=1)
+        refined = np.where(covered, PoseStatus.CONVERGED, beyond)
+        inside = _within_each(calibration, reported).all(axis=1)
+        refined = np.where(inside, refined, PoseStatus.OUTSIDE_LIMITS)
+        refined = np.where(hit, refined, PoseStatus.NOT_REACHED)
+        apart = np.abs(reported - self.near[rows]) / limits.travel_unit(robot)
+        status = np.where(hopeless, status, refined)
+        return _Judged(rows, q_dh, status, off, angle, np.max(apart, axis=1))
 
-    def _cost(self, status: np.ndarray, movement: np.ndarray, off_mm: np.ndarray) -> np.ndarray:
-        missed = status == PoseStatus.NOT_REACHED
-        within = np.where(missed, np.minimum(off_mm, 1e8), np.minimum(movement, 99.0))
-        usable = status <= PoseStatus.EXTRAPOLATED
-        within = within + np.where(
-            (status == PoseStatus.EXTRAPOLATED) & (not self.given), 200.0, 0.0
+    def postures(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Starts (m, k) in every posture of the plain arm at goals ``rows``, and their goals."""
+        calibration, robot = self.calibration, self.calibration.robot
+        plain, count = calibration.model.dh, _FEW_STARTS if self.has_few_axes else _STARTS
+        if not self.has_few_axes:
+            with suppress(InputError):
+                part = Pose(self.goal.rotation[rows], self.goal.position_mm[rows])
+                found = solve(robot, plain, part).q_rad
+                there = np.isfinite(found).all(axis=2)
+                own = np.broadcast_to(rows[:, None], there.shape)[there]
+                return self._turned(found[there], own), own
+        share = points("sobol", count, robot.dh.joints)
+        starts = robot.dh_joints(robot.q_min_rad + share * (robot.q_max_rad - robot.q_min_rad))
+        own = np.repeat(rows, count)
+        q_dh = self._onto(plain, np.tile(starts, (len(rows), 1)), own, None)
+        near = self._left(plain, q_dh, own)[0] <= _NEAR_START_MM
+        return self._turned(q_dh[near], own[near]), own[near]
+
+    def _turned(self, q_dh: np.ndarray, rows: np.ndarray) -> np.ndarray:
+        """Revolute joints on the turn nearest to the given joints that lies within the limits.
+
+        Of several turns one that a bounded model covers.
+        """
+        robot = self.calibration.robot
+        lower, upper = limits.dh_limits(robot)
+        if self.calibration.model.domain is not None:
+            low, high = self.calibration.fitted_range_rad
+            cut = np.maximum(lower, low), np.minimum(upper, high)
+            lower, upper = np.where(cut[0] < cut[1], cut, (lower, upper))
+        near = robot.dh_joints(self.near[rows])
+        turn = 2.0 * np.pi * ~robot.dh.prismatic
+        base = q_dh + turn * np.rint((near - q_dh) / (2.0 * np.pi))
+        angles = base + np.array([0, -1, 1, -2, 2])[:, None, None] * turn
+        outside = (angles < lower - 1e-9) | (angles > upper + 1e-9)
+        cost = (np.abs(angles - near) + 100.0 * outside).round(9)
+        return np.take_along_axis(angles, np.argmin(cost, axis=0)[None], axis=0)[0]
+
+    def _refined(self, start: np.ndarray, rows: np.ndarray) -> np.ndarray:
+        model, like = self.calibration.model, self.like.select(rows)
+        kinds = [np.nan_to_num(each) for each in (like.s, like.payload) if each is not None]
+        if not kinds or model.table is not None:
+            return self._onto(model, start, rows, None)
+        # Directions and payloads differ by row, and a refinement takes one state.
+        found = np.empty_like(start)
+        _, first, group = np.unique(
+            np.hstack(kinds), axis=0, return_index=True, return_inverse=True
         )
-        return np.where(missed, 1e6, np.where(usable, 0.0, 1e3)) + within
+        for number, one in enumerate(first):
+            own = np.flatnonzero(group.ravel() == number)
+            state = like.select(slice(one, one + 1))
+            found[own] = self._onto(model, start[own], rows[own], state)
+        return found
+
+    def _onto(
+        self, model: ErrorModel, start: np.ndarray, rows: np.ndarray, like: JointState | None
+    ) -> np.ndarray:
+        """Joints (m, k) refined from ``start`` onto the goals ``rows`` (m,), reached or not."""
+        wanted = Pose(self.wanted.rotation[rows], self.wanted.position_mm[rows])
+        if self.has_few_axes:
+            return few_axes.refine(model, wanted, self.carried, start, like)
+        return newton.refine(model, wanted, start, like).q_rad
+
+    def _left(
+        self, model: ErrorModel, q_dh: np.ndarray, rows: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """What is left, (m,) mm and (m,) rad, at DH joints (m, k) of goals ``rows``."""
+        at = compose(model.pose(self.like.select(rows).moved(q_dh)), self.carried)
+        off = np.linalg.norm(at.position_mm - self.wanted.position_mm[rows], axis=1)
+        turned = at.rotation @ np.swapaxes(self.wanted.rotation[rows], 1, 2)
+        angle = np.linalg.norm(log_so3(turned), axis=1)
+        return np.nan_to_num(off, nan=np.inf), np.nan_to_num(angle, nan=np.inf)
 
 
-def _outcome(calibration: Calibration, best: _Best, near: np.ndarray, given: bool) -> Compensation:
-    status = best.status.copy()
-    other = (status <= PoseStatus.EXTRAPOLATED) & (best.movement > best.nearest + SAME_RAD) & given
-    status[other] = PoseStatus.OTHER_POSTURE
-    reported = limits.reported_joints(calibration.robot, best.q_dh)
-    said = status <= PoseStatus.OTHER_POSTURE
-    outside = np.where(
-        (status == PoseStatus.OUTSIDE_LIMITS)[:, None],
-        ~within_each(calibration, reported),
-        calibration.outside_range(best.q_dh),
-    )
-    q_rad = np.where(said[:, None], reported, np.nan)
-    return Compensation(
-        q_rad,
-        status,
-        best.off_mm,
-        best.angle_rad,
-        outside & (status != PoseStatus.NOT_REACHED)[:, None],
-        q_rad - near if given else np.full(q_rad.shape, np.nan),
-    )
+def _within_each(
+    calibration: Calibration, reported: np.ndarray, slack: np.ndarray | float = 1e-9
+) -> np.ndarray:
+    """Whether reported joints (n, k) are within the limits, joint by joint."""
+    robot = calibration.robot
+    return (reported >= robot.q_min_rad - slack) & (reported <= robot.q_max_rad + slack)
