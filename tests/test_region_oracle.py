@@ -8,22 +8,10 @@ import math
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from scipy.stats import qmc
 
 from kinacc.kinematics import region
 
 CYLINDER = region.Cylinder(1200.0, 900.0, 0.0, 500.0, 0.0, math.radians(60))
-
-
-@pytest.mark.parametrize("dimensions", [1, 3, 6, 8])
-def test_sequences_are_those_of_scipy(dimensions):
-    sobol = qmc.Sobol(dimensions, scramble=False, bits=30).random(256)
-    np.testing.assert_allclose(region.points("sobol", 255, dimensions), sobol[1:], atol=1e-12)
-    halton = qmc.Halton(dimensions, scramble=False).random(300)
-    np.testing.assert_allclose(region.points("halton", 299, dimensions), halton[1:], atol=1e-12)
-    np.testing.assert_allclose(
-        region.points("halton", 20, dimensions, first=7), halton[7:27], atol=1e-12
-    )
 
 
 def test_orientations_are_flange_rotations_about_x_then_y_then_z():
@@ -95,3 +83,25 @@ def test_tool_poses_turn_with_the_slice():
     np.testing.assert_allclose(
         region.reference_rotation(np.radians([180, 20, 5])), reference.as_matrix(), atol=1e-14
     )
+
+
+def test_sequences_start_at_one_and_can_be_taken_in_pieces():
+    for sequence in region.SEQUENCES:
+        whole = region.points(sequence, 40, 5)
+        np.testing.assert_array_equal(whole[7:], region.points(sequence, 33, 5, first=8))
+        np.testing.assert_array_equal(region.points(sequence, 41, 5, first=0)[1:], whole)
+        assert whole.min() > 0.0
+
+
+def test_a_space_has_its_faces_and_may_cross_half_a_turn():
+    def at(radius, angle_deg, height):
+        angle = math.radians(angle_deg)
+        return np.array([radius * math.cos(angle), radius * math.sin(angle), height])
+
+    for good in [(1200, 0, 0), (2100, 60, 500), (1500, 30, 100)]:
+        assert region.contains(CYLINDER, at(*good))
+    for bad in [(1199, 30, 0), (2101, 30, 0), (1500, -1, 0), (1500, 61, 0), (1500, 9, 501)]:
+        assert not region.contains(CYLINDER, at(*bad))
+    across = region.Cylinder(100.0, 100.0, 0.0, 10.0, math.radians(170), math.radians(190))
+    assert region.contains(across, at(150, -175, 5))
+    assert not region.contains(across, at(150, 0, 5))

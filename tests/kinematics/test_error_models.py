@@ -15,19 +15,25 @@ from kinacc.kinematics.model import ErrorModel, JointState
 from kinacc.kinematics.tables import of_kind
 
 ARM = robot.load("mh180")
-SPAN = np.full(6, 2.0)
+STANFORD = dh.DHModel(
+    np.zeros(6),
+    [412.0, 154.0, 0.0, 0.0, 0.0, 263.0],
+    np.zeros(6),
+    np.deg2rad([-90, 90, 0, -90, 90, 0]),
+    np.zeros(6),
+    [False, False, True, False, False, False],
+)
 COUNT = 8
 
 
-def dh_example():
+def dh_example(arm=ARM.dh):
     rng = np.random.default_rng(0)
-    return replace(
-        ARM.dh, d_mm=ARM.dh.d_mm + rng.normal(size=6), beta_rad=1e-3 * rng.normal(size=6)
-    )
+    return replace(arm, d_mm=arm.d_mm + rng.normal(size=6), beta_rad=1e-3 * rng.normal(size=6))
 
 
-def vec_example():
-    empty = vec.without_errors(ARM.dh, -SPAN, SPAN, 3)
+def vec_example(arm=ARM.dh):
+    span = np.where(arm.prismatic, 600.0, 2.0)
+    empty = vec.without_errors(arm, -span, span, 3)
     size = np.array([0.1] * 3 + [1e-4] * 3)[:, None]
     rng = np.random.default_rng(1)
     return replace(
@@ -37,12 +43,12 @@ def vec_example():
     )
 
 
-def compliance_example():
+def compliance_example(arm=ARM.dh):
     """Joints of both kinds, of none and of one, below known links and a payload, on a slope."""
     rng, nothing = np.random.default_rng(4), np.nan
     links = np.hstack([rng.uniform(5.0, 300.0, (6, 1)), rng.uniform(-300.0, 300.0, (6, 3))])
     return compliance.ComplianceModel(
-        dh_example(),
+        dh_example(arm),
         np.array([1e-6, 2e-6, 3e-6, nothing, nothing, 2e-5]),
         np.array([nothing, 1e-6, nothing, 2e-6, nothing, nothing]),
         np.array([0.6, 0.0, -0.8]),
@@ -54,18 +60,20 @@ def compliance_example():
 EXAMPLES = {"dh": dh_example, "vec": vec_example, "compliance": compliance_example}
 
 
-@pytest.fixture(params=ERROR_MODELS)
+@pytest.fixture(params=[(kind, arm) for kind in ERROR_MODELS for arm in (ARM.dh, STANFORD)])
 def model(request):
-    return EXAMPLES[request.param]()
+    kind, arm = request.param
+    return EXAMPLES[kind](arm)
 
 
 @pytest.fixture
-def at():
+def at(model):
     """Postures that travel in all directions and carry different loads, or what is stated."""
     rng = np.random.default_rng(2)
     payload = np.array([20.0, 100.0, 100.0, 100.0]) * rng.uniform(0.0, 1.0, (COUNT, 4))
     payload[0] = np.nan
-    return JointState(rng.uniform(-1.0, 1.0, (COUNT, 6)), rng.integers(-1, 2, (COUNT, 6)), payload)
+    q = rng.uniform(-1.0, 1.0, (COUNT, 6)) * np.where(model.dh.prismatic, 500.0, 1.0)
+    return JointState(q, rng.integers(-1, 2, (COUNT, 6)), payload)
 
 
 def movement(before, after):
@@ -74,8 +82,8 @@ def movement(before, after):
 
 
 def test_slopes_in_the_joints_are_those_of_the_pose(model, at):
-    slopes, step = model.joint_jacobian(at), 1e-6
-    for joint in range(6):
+    slopes = model.joint_jacobian(at)
+    for joint, step in enumerate(np.where(model.dh.prismatic, 1e-3, 1e-6)):
         shift = step * np.eye(6)[joint]
         ends = (model.pose(at.moved(at.q_rad + way * shift)) for way in (-1, 1))
         np.testing.assert_allclose(
@@ -108,7 +116,7 @@ def test_slopes_by_differences_serve_a_model_that_has_no_others(model, at):
 
 def test_a_model_comes_back_from_its_table_bit_by_bit(model, at):
     columns = model.to_columns(np.ones(len(model.names)))
-    again = of_kind(model.kind).from_columns(columns, ARM.dh.prismatic)
+    again = of_kind(model.kind).from_columns(columns, model.dh.prismatic)
     for one, other in zip(model.pose(at), again.pose(at), strict=True):
         np.testing.assert_array_equal(one, other)
     np.testing.assert_array_equal(model.domain, again.domain)

@@ -27,7 +27,6 @@ COEFFICIENTS = (COMPLIANCE, LEVER)
 _NM_PER_KG_MM = STANDARD_GRAVITY * 1e-3
 _LINK = ("link_mass_kg", "link_x_mm", "link_y_mm", "link_z_mm")
 _GRAVITY = ("gravity_x", "gravity_y", "gravity_z")
-_TURNS = np.array([True, False, False, True, True])  # of dh.PARAMETERS: others shift
 
 
 @dataclass(frozen=True)
@@ -101,26 +100,41 @@ class ComplianceModel(ErrorModel):
 
     def pose(self, at: JointState) -> Pose:
         """Poses (n, ...) of the bent arm."""
-        return _dh.forward(self.dh, self._bent(at, self.moments(at)))
+        return _dh.forward(self.dh, at.q_rad + self._give(self.moments(at)))
 
     def moments(self, at: JointState) -> np.ndarray:
         """What bends the joints (n, k, 2): moments of known masses, N m, and levers, mm."""
-        return np.stack([part[-1] @ self.gravity for part in self._parts(at)[1]], axis=2)
+        walk = _chain.Walk(self.dh, at.q_rad)
+        own = np.broadcast_to(self.payload, (len(at), 4))
+        payload = own if at.payload is None else np.where(np.isnan(at.payload), own, at.payload)
+        links = np.nan_to_num(self.links)
+        # Weights and their first moments (3, n) beyond a joint, from the last joint on.
+        weight, first = payload[:, 0], payload[:, 0] * _place(walk.end, payload[:, 1:].T)
+        moments = np.empty((len(at), self.joints, 2))
+        ends = [*walk.before[1:], walk.end]
+        for joint in range(self.joints - 1, -1, -1):
+            weight = weight + links[joint, 0]
+            first = first + links[joint, 0] * _place(ends[joint], links[joint, 1:])
+            axis, origin = walk.before[joint].z, walk.before[joint].p_mm
+            known = _chain.cross(axis, first - weight * origin)
+            moments[:, joint, 0] = _NM_PER_KG_MM * (self.gravity @ known)
+            moments[:, joint, 1] = self.gravity @ _chain.cross(axis, walk.end.p_mm - origin)
+        return moments
 
     def joint_jacobian(self, at: JointState) -> np.ndarray:
         """Jacobian (n, 6, k) of ``pose`` in the joints."""
-        slopes = self._turn_slopes(at)
-        by_joint = slopes[:, :, np.arange(self.joints), np.where(self.dh.prismatic, 1, 0)]
-        bent = _dh.joint_jacobian(self.dh, self._bent(at, self.moments(at)))
+        moving = np.arange(self.joints), np.where(self.dh.prismatic, 1, 0)  # theta, or d
+        by_joint = self._give_slopes(at)[:, :, *moving]
+        bent = _dh.joint_jacobian(self.dh, at.q_rad + self._give(self.moments(at)))
         return bent + bent @ by_joint
 
     def linearised(self, at: JointState) -> tuple[Pose, np.ndarray]:
         """Poses (n, ...) and their Jacobian (n, 6, P) in the parameters."""
         moments = self.moments(at)
-        q_rad = self._bent(at, moments)
+        q_rad = at.q_rad + self._give(moments)
         bent = _dh.joint_jacobian(self.dh, q_rad)
         pose, of_dh = self.dh.linearised(JointState(q_rad))
-        of_dh = of_dh + bent @ self._turn_slopes(at).reshape(len(at), self.joints, -1)
+        of_dh = of_dh + bent @ self._give_slopes(at).reshape(len(at), self.joints, -1)
         joint, kind = np.nonzero(np.isfinite(self.coefficients))
         own = bent[:, :, joint] * moments[:, None, joint, kind]
         return pose, np.concatenate([of_dh, own], axis=2)
@@ -157,59 +171,24 @@ class ComplianceModel(ErrorModel):
             of(PAYLOAD_COLUMNS)[0],
         )
 
-    def _bent(self, at: JointState, moments: np.ndarray) -> np.ndarray:
-        """Joints (n, k) with the angles by which they give way."""
-        return at.q_rad + np.sum(moments * np.nan_to_num(self.coefficients), axis=2)
+    def _give(self, moments: np.ndarray) -> np.ndarray:
+        """Angles (n, k) by which joints give way under moments (n, k, 2)."""
+        return np.sum(moments * np.nan_to_num(self.coefficients), axis=2)
 
-    def _parts(self, at: JointState) -> tuple[_chain.Walk, list[tuple[np.ndarray, ...]]]:
-        """The arm as commanded, and what moments of known masses and of a unit weight consist of.
+    def _give_slopes(self, at: JointState) -> np.ndarray:
+        """Derivatives (n, k, k, 5) of the angles by which joints give way, in the DH parameters.
 
-        Of each kind: weight beyond each joint (n, k, 1) and its first moment (n, k, 3), N and N m
-        or 1 and mm; axis x lever x weight (n, k, 3), which along gravity is the moment.
+        By central differences: a milliradian of give makes what these lose smaller than rounding.
         """
-        walk = _chain.Walk(self.dh, at.q_rad)
-        ends = [*walk.before[1:], walk.end]
-        own = np.broadcast_to(self.payload, (len(at), 4))
-        payload = own if at.payload is None else np.where(np.isnan(at.payload), own, at.payload)
-        mass, centre = np.nan_to_num(self.links[:, 0]), np.nan_to_num(self.links[:, 1:])
-        mass = np.array(np.broadcast_to(mass, (len(at), self.joints)))
-        weighted = np.stack(
-            [mass[:, j, None] * _place(end, centre[j]) for j, end in enumerate(ends)], axis=1
-        )
-        weighted[:, -1] += payload[:, :1] * _place(walk.end, payload[:, 1:].T)
-        mass[:, -1] += payload[:, 0]
-        unit, at_end = np.zeros_like(mass), np.zeros_like(weighted)
-        unit[:, -1], at_end[:, -1] = 1.0, walk.end.p_mm.T
-        axis = np.stack([frames.z.T for frames in walk.before], axis=1)
-        origin = np.stack([frames.p_mm.T for frames in walk.before], axis=1)
-        parts = []
-        for weight, first in ((_NM_PER_KG_MM * mass, _NM_PER_KG_MM * weighted), (unit, at_end)):
-            beyond = np.cumsum(weight[:, ::-1], axis=1)[:, ::-1, None]
-            first = np.cumsum(first[:, ::-1], axis=1)[:, ::-1]
-            parts.append((beyond, first, np.cross(axis, first - beyond * origin)))
-        return walk, parts
-
-    def _turn_slopes(self, at: JointState) -> np.ndarray:
-        """Derivatives (n, k, k, 5) of the angles of each joint in the DH parameters of each."""
-        walk, parts = self._parts(at)
-        moves = [
-            [(a.z, a.p_mm), (a.z, a.p_mm), (b.x, b.p_mm), (b.x, b.p_mm), (c.y, c.p_mm)]
-            for a, b, c in walk.frames
-        ]
-        axes, origins = np.array(moves).transpose(2, 4, 0, 1, 3)  # (n, k, 5, 3)
-        axis, joint = axes[:, :, 0], np.arange(self.joints)
-        known, total = np.nan_to_num(self.coefficients), np.zeros(1)
-        for kind, (weight, first, arm) in enumerate(parts):
-            # A motion before the joint's axis turns axis and weights alike: a x (z x r) . g.
-            whole = np.einsum("nji,nlpi->njlp", np.cross(arm, self.gravity), axes) * _TURNS
-            # One behind it moves the weights it carries: z x (a x (p - o)) . g, or z x a . g.
-            weight = weight[:, :, None]
-            reach = np.cross(axes, first[:, :, None] - weight * origins)
-            moved = np.where(_TURNS[:, None], reach, weight * axes)
-            behind = np.einsum("nji,nlpi->njlp", np.cross(self.gravity, axis), moved)
-            slope = np.where((joint >= joint[:, None])[..., None], behind, whole)
-            total = total + slope * known[:, kind, None, None]
-        return total
+        start, slopes = self.dh.start, []
+        for shift in np.diag(np.where(np.array(self.dh.units) == "rad", 1e-5, 1e-2)):
+            ends = [
+                replace(self, dh=self.dh.with_parameters(start + way * shift))
+                for way in (1.0, -1.0)
+            ]
+            ahead, behind = (model._give(model.moments(at)) for model in ends)
+            slopes.append((ahead - behind) / (2.0 * shift.max()))
+        return np.stack(slopes, axis=2).reshape(len(at), self.joints, self.joints, -1)
 
 
 def to_vector(model: ComplianceModel) -> np.ndarray:
@@ -223,5 +202,5 @@ def with_vector(model: ComplianceModel, vector: np.ndarray) -> ComplianceModel:
 
 
 def _place(frames: _chain.Columns, centre: np.ndarray) -> np.ndarray:
-    """Points (n, 3) in the robot base, given in the frames as (3,) or (3, n)."""
-    return (centre[0] * frames.x + centre[1] * frames.y + centre[2] * frames.z + frames.p_mm).T
+    """Points (3, n) in the robot base, given in the frames as (3,) or (3, n)."""
+    return centre[0] * frames.x + centre[1] * frames.y + centre[2] * frames.z + frames.p_mm

@@ -13,6 +13,7 @@ from kinacc.geometry import Pose, log_so3
 if TYPE_CHECKING:
     from kinacc.kinematics.dh import DHModel
 
+_STEPS, _COEFFICIENT_STEP = {"rad": 1e-6, "mm": 1e-4}, 1e-9  # of central differences
 # A state's payload, as tables name it.
 PAYLOAD_COLUMNS = ("payload_kg", "payload_x_mm", "payload_y_mm", "payload_z_mm")
 
@@ -94,7 +95,7 @@ class ErrorModel:
     def linearised(self, at: JointState) -> tuple[Pose, np.ndarray]:
         """Poses (n, ...) and their Jacobian (n, 6, P) in the parameters."""
         poses = self.pose(at)
-        step = np.array([1e-6 if unit == "rad" else 1e-4 for unit in self.units])
+        step = np.array([_STEPS.get(unit, _COEFFICIENT_STEP) for unit in self.units])
         return poses, _differences(lambda x: self.with_parameters(x).pose(at), self.start, step)
 
     def joint_jacobian(self, at: JointState) -> np.ndarray:

@@ -5,11 +5,13 @@ Everything is in the robot base frame; the cylinder stands about its z axis.
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from itertools import product
 from typing import NamedTuple
 
 import numpy as np
+from scipy.stats import qmc
 
 from kinacc.geometry import Pose, rotation_x, rotation_y, rotation_z
 
@@ -147,57 +149,14 @@ def tool_poses(
 def points(sequence: str, count: int, dimensions: int, first: int = 1) -> np.ndarray:
     """Points ``first`` to ``first + count - 1`` of an unscrambled sequence, (count, dimensions).
 
-    ``sobol`` (Joe and Kuo's direction numbers, up to 8 dimensions) or ``halton`` (first primes).
-    Point 0 is the origin, a corner of every space, so sequences start at 1 by default.
-    Unscrambled and unshifted: no seed enters.
+    ``sobol`` (Joe and Kuo's direction numbers) or ``halton`` (first primes). Point 0 is the origin,
+    a corner of every space, so sequences start at 1 by default. Unscrambled and unshifted: no seed
+    enters.
     """
-    index = np.arange(first, first + count, dtype=np.int64)
-    return (_sobol if sequence == "sobol" else _halton)(index, dimensions)
-
-
-_PRIMES = (2, 3, 5, 7, 11, 13, 17, 19)
-# Joe and Kuo 2008, new-joe-kuo-6: degree, polynomial, first direction numbers, from dimension 2 on.
-_SOBOL = (
-    (1, 0, (1,)),
-    (2, 1, (1, 3)),
-    (3, 1, (1, 3, 1)),
-    (3, 2, (1, 1, 1)),
-    (4, 1, (1, 1, 3, 3)),
-    (4, 4, (1, 3, 5, 13)),
-    (5, 2, (1, 1, 5, 5, 17)),
-)
-_SOBOL_BITS = 30
-
-
-def _halton(index: np.ndarray, dimensions: int) -> np.ndarray:
-    result = np.zeros((len(index), dimensions))
-    for column, base in enumerate(_PRIMES[:dimensions]):
-        rest, scale = index.copy(), 1.0 / base
-        while rest.any():
-            result[:, column] += scale * (rest % base)
-            rest //= base
-            scale /= base
-    return result
-
-
-def _sobol(index: np.ndarray, dimensions: int) -> np.ndarray:
-    gray = index ^ (index >> 1)
-    result = np.zeros((len(index), dimensions), dtype=np.int64)
-    for column in range(dimensions):
-        for bit, direction in enumerate(_directions(column)):
-            result[:, column] ^= np.where((gray >> bit) & 1, direction, 0)
-    return result / float(1 << _SOBOL_BITS)
-
-
-def _directions(column: int) -> list[int]:
-    if column == 0:
-        return [1 << (_SOBOL_BITS - 1 - bit) for bit in range(_SOBOL_BITS)]
-    degree, polynomial, first = _SOBOL[column - 1]
-    numbers = [value << (_SOBOL_BITS - 1 - bit) for bit, value in enumerate(first)]
-    for bit in range(degree, _SOBOL_BITS):
-        number = numbers[bit - degree] ^ (numbers[bit - degree] >> degree)
-        for step in range(1, degree):
-            if (polynomial >> (degree - 1 - step)) & 1:
-                number ^= numbers[bit - step]
-        numbers.append(number)
-    return numbers
+    if sequence == "halton":
+        engine = qmc.Halton(dimensions, scramble=False)
+    else:
+        engine = qmc.Sobol(dimensions, scramble=False, bits=30)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # a number of points that is no power of two is meant
+        return engine.fast_forward(first).random(count) if first else engine.random(count)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from kinacc.kinematics.inverse.limits import take_turns, within
+from kinacc.kinematics.inverse.limits import take_turns
 
 TURN = 2.0 * np.pi
 
@@ -55,21 +55,3 @@ def test_half_a_turn_is_half_a_turn_forwards_and_a_slide_stays_where_it_is():
     taken = take_turns(q, limits, prismatic=np.array([False, True]))
     np.testing.assert_allclose(taken[:, 0], np.pi)
     np.testing.assert_array_equal(taken[:, 1], q[:, 1])
-
-
-def test_many_rows_take_the_turns_each_would_take_alone():
-    rng = np.random.default_rng(4)
-    q = rng.uniform(-3.0 * TURN, 3.0 * TURN, (2500, 3))
-    limits = (np.array([-4.0, -7.0, 1.0]), np.array([4.0, 7.0, 13.0]))
-    together = take_turns(q, limits)
-    alone = np.concatenate([take_turns(row[None], limits) for row in q[::97]])
-    np.testing.assert_array_equal(together[::97], alone)
-    assert take_turns(q.reshape(50, 50, 3), limits).shape == (50, 50, 3)
-
-
-def test_the_faces_of_a_box_belong_to_it():
-    box = (np.array([-1.0, 2.0]), np.array([1.0, 3.0]))
-    inside = np.array([[-1.0, 2.0], [1.0, 3.0], [0.0, 2.5]])
-    outside = np.array([[-1.001, 2.5], [1.001, 2.5], [0.0, 1.999], [0.0, 3.001]])
-    assert within(inside, *box).all()
-    assert not within(outside, *box).any()

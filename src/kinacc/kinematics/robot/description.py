@@ -99,7 +99,7 @@ class Frame(_Strict):
         if self.quaternion_wxyz is not None:
             if abs(np.linalg.norm(self.quaternion_wxyz) - 1.0) > 1e-3:
                 raise ValueError("quaternion_wxyz is no unit quaternion w, x, y, z")
-            rotation = Rotation.from_quat(self.quaternion_wxyz, scalar_first=True).as_matrix()
+            rotation = Rotation.from_quat(np.roll(self.quaternion_wxyz, -1)).as_matrix()
         elif turns == ["rpy"]:  # as in URDF: about fixed x, then y, then z
             rotation = Rotation.from_euler("xyz", self.quantity("rpy")).as_matrix()
         elif turns:
