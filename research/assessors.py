@@ -1,12 +1,11 @@
 """All assessors by name: those of kinacc, and those that were no better and stand here."""
 
-from kinacc.assess.registry import CHOOSING, PLACES, Registry
+from kinacc.assess import registry
+from research.kinematic import Kinematic
+from research.sequential import Sequential
+from research.two_stage import TwoStage
 
-HERE = {
-    "two_stage": "research.two_stage:TwoStage",
-    "sequential": "research.sequential:Sequential",
-    "kinematic": "research.kinematic:Kinematic",
-}
-ASSESSORS = Registry(PLACES | HERE)
-ADAPTIVE = Registry(CHOOSING | HERE)
+HERE: dict[str, type] = {each.name: each for each in (TwoStage, Sequential, Kinematic)}
+ASSESSORS = registry.ASSESSORS | HERE
+ADAPTIVE = registry.ADAPTIVE | HERE
 SLOW = {"kinematic"}  # half a second a campaign of 200 readings: simulated less often

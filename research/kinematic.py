@@ -11,8 +11,8 @@ import numpy as np
 from kinacc.assess.adaptive import (
     FIRST_SHARE,
     AdaptiveAssessor,
+    Campaign,
     Candidates,
-    LedgerCampaign,
     check_budget,
     first_points,
 )
@@ -83,7 +83,7 @@ class Kinematic(AdaptiveAssessor):
         return KinematicCampaign(self, candidates)
 
 
-class KinematicCampaign(LedgerCampaign):
+class KinematicCampaign(Campaign):
     """See :class:`Kinematic`."""
 
     def __init__(self, settings: Kinematic, candidates: Candidates) -> None:

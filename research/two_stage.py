@@ -11,8 +11,8 @@ import numpy as np
 
 from kinacc.assess.adaptive import (
     AdaptiveAssessor,
+    Campaign,
     Candidates,
-    LedgerCampaign,
     about_all_if_all_measured,
     check_budget,
 )
@@ -56,7 +56,7 @@ class TwoStage(AdaptiveAssessor):
         return TwoStageCampaign(self, candidates)
 
 
-class TwoStageCampaign(LedgerCampaign):
+class TwoStageCampaign(Campaign):
     """See :class:`TwoStage`. ``again``: the suspects that have new readings."""
 
     settings: TwoStage

@@ -10,7 +10,7 @@ import pytest
 from campaign_on_disk import SIGMA_MM, Arm, files_of, recorded, refused, standing
 from command_line import call
 
-from kinacc.assess.registry import CHOOSING
+from kinacc.assess.registry import ADAPTIVE
 from kinacc.assess.simulate import conduct
 from kinacc.campaign import folder as campaigns
 from kinacc.campaign.words import reason
@@ -447,7 +447,7 @@ def test_candidates_drawn_for_a_vec_model_are_ones_it_speaks_of(calibration, tmp
     assert "says nothing beyond" in done.output
 
 
-@pytest.mark.parametrize("assessor", CHOOSING)
+@pytest.mark.parametrize("assessor", ADAPTIVE)
 def test_a_campaign_of_any_assessor_begins_as_it_is_offered_and_takes_a_reading(begun, assessor):
     folder = begun("--noise-mm", SIGMA_MM, "--assessor", assessor, "--sure")
     asked = standing(folder)["next"]

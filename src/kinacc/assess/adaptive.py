@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from kinacc.assess.reference_poses import Change
 
 _SYMMETRY = 1e-9  # largest asymmetry of a covariance, and spread that counts as equal noise
+_COVARIANCE = "symmetric, positive definite, in mm^2"
 
 
 @dataclass(frozen=True)
@@ -47,7 +48,7 @@ class Candidates:
             found = f"shape {covariance.shape}"
             raise InputError(Problem("covariance", found, "(m, 3, 3) with m at least 1, in mm^2"))
         problems = [
-            Problem(f"covariance of point {row}", said, "symmetric, positive definite, in mm^2")
+            Problem(f"covariance of point {row}", said, _COVARIANCE)
             for row, said in covariance_faults(covariance)
         ]
         for name in ("q_rad", "effects"):
@@ -78,82 +79,9 @@ class Candidates:
         return np.sqrt(np.trace(self.covariance_mm2, axis1=1, axis2=2) / 3.0)
 
     @cached_property
-    def is_equal_noise(self) -> np.ndarray:
-        """Whether the noise of a point is equal in all directions (m,)."""
-        even = self.sigma_mm[:, None, None] ** 2 * np.eye(3)
-        spread = np.abs(self.covariance_mm2 - even).max(axis=(1, 2))
-        return spread <= _SYMMETRY * self.sigma_mm**2
-
-    @cached_property
     def inverses(self) -> np.ndarray:
         """Inverses (m, 3, 3) of the covariances."""
         return np.linalg.inv(self.covariance_mm2)
-
-    @cached_property
-    def weights(self) -> list[float]:
-        """Of a reading of each point 1 / variance per axis; 0 where that is not equal in all."""
-        variances = np.where(self.is_equal_noise, self.covariance_mm2[:, 0, 0], math.inf)
-        return (1.0 / variances).tolist()
-
-
-class Campaign(Protocol):
-    """One assessment under way.
-
-    ``first``: rows 0 to ``first`` - 1 are visited whatever is read, each before any other point.
-    ``reference_poses``: of these, rows 0 to ``reference_poses`` - 1 come first of all, and are read
-    again by plan. ``factor``: times the noise stated that bounds allow for. ``ledger``: the
-    readings that count, for others to look at and not to change.
-    """
-
-    first: int
-    reference_poses: int
-    factor: float
-    ledger: Ledger
-
-    def visit(self) -> tuple[int, ...]:
-        """Rows in the order in which they are read whatever is read, until readings decide."""
-        ...
-
-    def next(self) -> int | None:
-        """The row to measure next; None if no further measurement is wanted."""
-        ...
-
-    def record(
-        self, point: int, reading_mm: np.ndarray, covariance_mm2: np.ndarray | None = None
-    ) -> None:
-        """Take a reading (3,) at a row: measured minus modelled position, robot base frame.
-
-        covariance_mm2: (3, 3) of this reading where it is not the planned one. InputError, and
-        nothing taken, where the reading cannot be used.
-        """
-        ...
-
-    def statements(self) -> tuple[Statement, ...]:
-        """What the readings so far allow to say, the main statement first."""
-        ...
-
-    def alarms(self) -> tuple[Reason, ...]:
-        """What the readings say against what the statements rest on: codes with their numbers."""
-        ...
-
-    def suspicious(self) -> tuple[Suspicious, ...]:
-        """Readings that the noise as stated does not explain, by number."""
-        ...
-
-    def change(self) -> Change | None:
-        """What reference poses show of a drift or step of the frame; None where there are none."""
-        ...
-
-    def reading_blocks(self) -> list[int]:
-        """Of every reading in order the number of its block: what one decision reads at a point."""
-        ...
-
-    def point_limits(self) -> dict[int, tuple[float, float]]:
-        """Lower and upper limit (mm) on the size of every measured row, as the assessor has them.
-
-        With its confidence each upper limit holds by itself, and all lower limits together.
-        """
-        ...
 
 
 class AdaptiveAssessor(Protocol):
@@ -186,60 +114,47 @@ class Ledger:
         self.candidates = candidates
         self.count = np.zeros(points, dtype=np.int64)
         self.visited: list[int] = []  # in the order of their first readings
-        self.taken = 0
         # Every reading in order: its row, its numbers, its covariance where not the planned one.
         self.readings: list[tuple[int, list[float], np.ndarray | None]] = []
         self._unplanned: set[int] = set()  # rows with readings of other covariance
         self.mean_mm = np.zeros((points, 3))
         self.noise_mm = np.full(points, math.inf)  # of the mean, per axis, root mean square
-        self._weight = np.zeros(points)  # sum of 1 / variance where all noise was equal
-        # Where noise is not equal: sum of inverse covariances, that times readings, its inverse.
-        self._information: dict[int, tuple[np.ndarray, np.ndarray, np.ndarray]] = {}
+        self._weight = np.zeros((points, 3, 3))  # sum of inverse covariances
+        self._weighted = np.zeros((points, 3))  # sum of these times readings
+        self._spread = np.zeros((points, 3, 3))  # covariance of the mean
+
+    @property
+    def taken(self) -> int:
+        """Number of readings."""
+        return len(self.readings)
 
     def record(self, point: int, reading_mm, covariance_mm2=None, afresh: bool = False) -> None:
         """Take one reading, or raise InputError and take nothing.
 
         ``afresh`` forgets what was read at the point before; it counts as taken all the same.
         """
-        reading, weight = self._checked(point, reading_mm, covariance_mm2)
+        reading = self._checked(point, reading_mm, covariance_mm2)
         if not self.count[point]:
             self.visited.append(point)
         if afresh:
-            self.count[point], self._weight[point], self.mean_mm[point] = 0, 0.0, 0.0
-            self._information.pop(point, None)
-        self.count[point] += 1
-        self.taken += 1
-        self.readings.append((point, reading, covariance_mm2))
+            self.count[point], self._weight[point], self._weighted[point] = 0, 0.0, 0.0
+        inverse = self.candidates.inverses[point]
         if covariance_mm2 is not None:
             self._unplanned.add(point)
-        if weight and point not in self._information:
-            # Plain numbers: three components are too few for array operations to pay.
-            total = self._weight.item(point) + weight
-            part, mean = weight / total, self.mean_mm[point]
-            (a, b, c), (x, y, z) = mean.tolist(), reading
-            mean[0], mean[1], mean[2] = a + (x - a) * part, b + (y - b) * part, c + (z - c) * part
-            self._weight[point] = total
-            self.noise_mm[point] = math.sqrt(1.0 / total)
-            return
-        known = self._weight[point]
-        before = (known * np.eye(3), known * self.mean_mm[point])
-        matrix, vector = self._information.get(point, before)[:2]
-        if covariance_mm2 is None:
-            inverse = self.candidates.inverses[point]
-        else:
             inverse = np.linalg.inv(np.asarray(covariance_mm2, dtype=float))
-        matrix, vector = matrix + inverse, vector + inverse @ np.array(reading)
-        spread = np.linalg.inv(matrix)
-        self._information[point] = (matrix, vector, spread)
-        self.mean_mm[point] = spread @ vector
-        self.noise_mm[point] = math.sqrt(np.trace(spread) / 3.0)
+        self.count[point] += 1
+        self.readings.append((point, reading.tolist(), covariance_mm2))
+        self._weight[point] += inverse
+        self._weighted[point] += inverse @ reading
+        spread = np.linalg.inv(self._weight[point])
+        self._spread[point] = 0.5 * (spread + spread.T)
+        self.mean_mm[point] = spread @ self._weighted[point]
+        self.noise_mm[point] = math.sqrt(spread.trace() / 3.0)
 
     def noise(self, point: int) -> float | np.ndarray:
         """Noise of a point's mean: standard deviation per axis (mm), or covariance (3, 3)."""
-        if point in self._information:
-            spread = self._information[point][2]
-            return 0.5 * (spread + spread.T)
-        return float(self.noise_mm[point])
+        spread, noise = self._spread[point], self.noise_mm.item(point)
+        return noise if _is_even(spread, noise**2) else spread
 
     def as_planned(self, point: int) -> bool:
         """Whether all readings of a point came with the covariance planned for it."""
@@ -256,34 +171,34 @@ class Ledger:
         """Sizes of the mean readings of the visited points, in visiting order."""
         return np.sqrt(np.sum(self.mean_mm[self.visited] ** 2, axis=1))
 
-    def _checked(self, point, reading_mm, covariance_mm2) -> tuple[list[float], float]:
-        """The reading as numbers, and its weight as in :attr:`Candidates.weights`."""
+    def _checked(self, point, reading_mm, covariance_mm2) -> np.ndarray:
+        """The reading as numbers (3,)."""
         problems = []
         points = self.candidates.points
         if not 0 <= point < points:
             problems.append(Problem("point", f"{point}", f"0 to {points - 1}"))
-        given = np.asarray(reading_mm, dtype=float)
-        reading = given.tolist()
-        if given.shape != (3,) or not all(map(math.isfinite, reading)):
-            problems.append(Problem("reading", f"{reading}", "three numbers, in mm"))
-        if covariance_mm2 is None:
-            refuse(problems, "this reading cannot be recorded")
-            return reading, self.candidates.weights[point]
-        covariance = np.asarray(covariance_mm2, dtype=float)
-        if covariance.shape != (3, 3):
-            problems.append(Problem("covariance", f"shape {covariance.shape}", "(3, 3), in mm^2"))
-        else:
-            allowed = "symmetric, positive definite, in mm^2"
-            faults = covariance_faults(covariance[None])
-            problems += [Problem("covariance", said, allowed) for _, said in faults]
+        reading = np.asarray(reading_mm, dtype=float)
+        if reading.shape != (3,) or not np.all(np.isfinite(reading)):
+            problems.append(Problem("reading", f"{reading.tolist()}", "three numbers, in mm"))
+        if covariance_mm2 is not None:
+            covariance = np.asarray(covariance_mm2, dtype=float)
+            faults = [(0, f"shape {covariance.shape}, not (3, 3)")]
+            if covariance.shape == (3, 3):
+                faults = covariance_faults(covariance[None])
+            problems += [Problem("covariance", said, _COVARIANCE) for _, said in faults]
         refuse(problems, "this reading cannot be recorded")
-        even = np.trace(covariance) / 3.0
-        spread = np.abs(covariance - even * np.eye(3)).max()
-        return reading, 1.0 / covariance.item(0, 0) if spread <= _SYMMETRY * even else 0.0
+        return reading
 
 
-class LedgerCampaign:
-    """What campaigns have in common: readings in a ledger, limits from the means."""
+class Campaign:
+    """One assessment under way: readings in a ledger, limits from the means.
+
+    ``first``: rows 0 to ``first`` - 1 are visited whatever is read, each before any other point.
+    ``reference_poses``: of these, rows 0 to ``reference_poses`` - 1 come first of all, and are read
+    again by plan. ``factor``: times the noise stated that bounds allow for. ``ledger``: the
+    readings that count, for others to look at and not to change. A campaign of one's own has
+    ``next`` and ``statements``; the rest is here.
+    """
 
     first = 0
     reference_poses = 0
@@ -292,19 +207,31 @@ class LedgerCampaign:
     def __init__(self, settings: AdaptiveAssessor, candidates: Candidates) -> None:
         lacking = [
             Problem(f"candidates, {name}", "not given", "joints and what their errors do at them")
-            for name in settings.needs
+            for name in getattr(settings, "needs", ())
             if getattr(candidates, name) is None
         ]
         refuse(lacking, f"{settings.name} needs to know the arm")
         self.settings = settings
         self.ledger = Ledger(candidates)
 
+    def next(self) -> int | None:
+        """The row to measure next; None if no further measurement is wanted."""
+        raise NotImplementedError
+
+    def statements(self) -> tuple[Statement, ...]:
+        """What the readings so far allow to say, the main statement first."""
+        raise NotImplementedError
+
     def visit(self) -> tuple[int, ...]:
-        """The first rows, one after the other."""
+        """Rows in the order in which they are read whatever is read, until readings decide."""
         return tuple(range(self.first))
 
     def record(self, point: int, reading_mm, covariance_mm2=None) -> None:
-        """Take a reading."""
+        """Take a reading (3,) at a row: measured minus modelled position, robot base frame.
+
+        covariance_mm2: (3, 3) of this reading where it is not the planned one. InputError, and
+        nothing taken, where the reading cannot be used.
+        """
         self.ledger.record(point, reading_mm, covariance_mm2)
 
     def reading_blocks(self) -> list[int]:
@@ -320,21 +247,25 @@ class LedgerCampaign:
         return found
 
     def alarms(self) -> tuple[Reason, ...]:
-        """None: this assessor takes what it is told of the noise."""
+        """What the readings say against what the statements rest on: codes with their numbers."""
         return ()
 
     def change(self) -> Change | None:
-        """None: this assessor reads no reference poses again."""
+        """What reference poses show of a drift or step of the frame; None where there are none."""
         return None
 
     def suspicious(self) -> tuple[Suspicious, ...]:
-        """None: this assessor looks for none."""
+        """Readings that the noise as stated does not explain, by number."""
         return ()
 
     def point_limits(self) -> dict[int, tuple[float, float]]:
-        """Those of the mean readings alone, the lower one corrected for the number of points."""
-        allowed = 1.0 - self.settings.confidence
-        return self._mean_limits(self.ledger.visited, allowed / max(len(self.ledger.visited), 1))
+        """Lower and upper limit (mm) on the size of every measured row, as the assessor has them.
+
+        With its confidence each upper limit holds by itself, and all lower limits together. Here
+        those of the mean readings alone.
+        """
+        visited = self.ledger.visited
+        return self._mean_limits(visited, (1.0 - self.settings.confidence) / max(len(visited), 1))
 
     def _mean_limits(self, rows: Iterable[int], lower: float) -> dict[int, tuple[float, float]]:
         """Limits of mean readings; ``lower`` is the error allowed to a lower limit."""
@@ -356,7 +287,7 @@ def first_points(measurements: int, points: int, share: float) -> int:
     return max(math.ceil(share * min(measurements, points)), 1)
 
 
-class OnceCampaign(LedgerCampaign):
+class OnceCampaign(Campaign):
     """One reading each of the first points; what is stated is left to the assessor."""
 
     def __init__(self, settings, candidates: Candidates) -> None:
@@ -375,6 +306,11 @@ def about_all_if_all_measured(said: Statement, ledger: Ledger) -> tuple[Statemen
         return said, replace(said, target=CANDIDATES)
     withheld = Reason("unmeasured", {"left": points - seen, "points": points})
     return said, Statement(CANDIDATES, value_mm=said.value_mm, withheld=withheld)
+
+
+def _is_even(covariance_mm2: np.ndarray, variance: float) -> bool:
+    """Whether a covariance (3, 3) is equal in all directions."""
+    return bool(np.abs(covariance_mm2 - variance * np.eye(3)).max() <= _SYMMETRY * variance)
 
 
 def covariance_faults(covariance_mm2: np.ndarray) -> list[tuple[int, str]]:

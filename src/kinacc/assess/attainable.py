@@ -17,14 +17,12 @@ import numpy as np
 
 from kinacc.assess.statement import MEAN, MEASURED, REGION, Statement
 
-_NODES = 8  # of a panel; each panel of a quadrature is twice as wide as the one before
+_NODES = 96  # of a quadrature, densest at its beginning
 _BEYOND = 6.0  # standard deviations behind which nothing is left of an integrand
 _TABLE_TO = 30.0  # standard deviations of size up to which quantiles of lengths are tabulated
-_POWER = (
-    1.5  # of noise over distance from a level; 2 evens quantiles out, 2/3 ties of unequal noise
-)
-_LEVELS = 7  # levels tried first when the best counts are sought
-_HALVINGS = 4  # of the distance at which neighbours of the best level are tried next
+# Of noise over distance from a level: 2 evens quantiles out, 2/3 ties of unequal noise.
+_POWER = 1.5
+_LEVELS, _ROUNDS = 7, 3  # levels tried when the best counts are sought, ever closer to the best
 
 
 class WidthLimits(NamedTuple):
@@ -46,8 +44,7 @@ def points_bounded(said: Statement, visited: Sequence[int], candidates: int) -> 
     other = said.target == REGION or said.excepted > 0 or said.error_of != MEAN
     if math.isnan(said.upper_mm) or other:
         return np.empty(0, dtype=int)
-    every = np.arange(candidates)
-    return np.sort(np.asarray(visited, int)) if said.target == MEASURED else every
+    return np.sort(np.asarray(visited, int)) if said.target == MEASURED else np.arange(candidates)
 
 
 def limits_of(
@@ -65,44 +62,60 @@ def limits_of(
 def width_limits(
     sizes_mm: np.ndarray, noise_mm: np.ndarray | float, readings: int, error: float
 ) -> WidthLimits:
-    """All three limits for a number of readings and the error allowed to each side."""
+    """All three limits for a number of readings and the error allowed to each side.
+
+    The lower one where all points but the largest are read once. Infinite with fewer readings than
+    points.
+    """
     if len(sizes_mm) == 0:
         return NONE
-    return WidthLimits(
-        attainable_excess_mm(sizes_mm, noise_mm, readings, error),
-        proven_excess_mm(sizes_mm, noise_mm, readings, error),
-        lower_distance_mm(sizes_mm, noise_mm, readings, error),
-    )
-
-
-def attainable_excess_mm(
-    sizes_mm: np.ndarray, noise_mm: np.ndarray | float, readings: int, error: float
-) -> float:
-    """Mean excess of the largest upper limit, each point read as often as :func:`best_counts` says.
-
-    A point's limit is that of :func:`kinacc.assess.limits.upper_limit_mm`: it misses the size of
-    its point with probability ``error`` exactly. Infinite with fewer readings than points.
-    """
-    sizes, noise = _descending(sizes_mm, noise_mm)
-    if readings < len(sizes):
-        return math.inf
-    return _mean_excess_mm(sizes, noise, _best_counts(sizes, noise, readings, error), error)
+    attainable = lower = math.inf
+    if readings >= len(sizes_mm):
+        counts = best_counts(sizes_mm, noise_mm, readings, error)
+        attainable = mean_excess_mm(sizes_mm, noise_mm, counts, error)
+        largest = np.broadcast_to(noise_mm, len(sizes_mm)).item(int(np.argmax(sizes_mm)))
+        lower = _deviate(error) * largest / math.sqrt(readings - len(sizes_mm) + 1)
+    proven = proven_excess_mm(sizes_mm, noise_mm, readings, error)
+    return WidthLimits(attainable, proven, lower)
 
 
 def best_counts(
     sizes_mm: np.ndarray, noise_mm: np.ndarray | float, readings: int, error: float
 ) -> np.ndarray:
-    """Readings of each point, at least one, that make the mean excess least: (m,), in their order.
+    """Readings (m,) of each point, at least one, that make the mean excess least.
 
     The best of those counts that are in proportion to a power of noise over distance from a common
     level; what single readings moved by trial still gain is 2 %. ValueError: fewer than points.
     """
     if readings < len(sizes_mm):
         raise ValueError("every point is read at least once")
-    order = np.argsort(-np.asarray(sizes_mm), kind="stable")
-    counts = np.empty(len(order), dtype=np.int64)
-    counts[order] = _best_counts(*_descending(sizes_mm, noise_mm), readings, error)
-    return counts
+    noise = np.broadcast_to(np.asarray(noise_mm, dtype=float), len(sizes_mm))
+    below = float(np.max(sizes_mm)) - sizes_mm
+    # A level hardly above the largest size gives it all; one far above all shares equally.
+    first, last = 0.1 * noise.min() / math.sqrt(readings), noise.max() * 10.0 + below.max()
+    for _ in range(_ROUNDS):
+        levels = np.geomspace(first, last, _LEVELS)
+        tried = [_filled((noise / (level + below)) ** _POWER, readings) for level in levels]
+        excess = [mean_excess_mm(sizes_mm, noise_mm, counts, error) for counts in tried]
+        best = int(np.argmin(excess))
+        first, last = levels[max(best - 1, 0)], levels[min(best + 1, _LEVELS - 1)]
+    return tried[best]
+
+
+def mean_excess_mm(
+    sizes_mm: np.ndarray, noise_mm: np.ndarray | float, counts: np.ndarray, error: float
+) -> float:
+    """Mean of what the largest upper limit is above the largest size, by readings (m,) of a point.
+
+    A point's limit is that of :func:`kinacc.assess.limits.upper_limit_mm`: it misses the size of
+    its point with probability ``error`` exactly.
+    """
+    top, spread = float(np.max(sizes_mm)), noise_mm / np.sqrt(counts)
+    reaches = sizes_mm - top + (_deviate(error) + _BEYOND) * spread
+    sizes, spread = sizes_mm[reaches > 0.0], spread[reaches > 0.0]  # others are never the largest
+    gaps, weights = _quadrature(float(reaches.max()))
+    shortest = _short_length((top + gaps)[:, None] / spread, error)
+    return float(weights @ (1.0 - _length_below(shortest, sizes / spread).prod(axis=1)))
 
 
 def proven_excess_mm(
@@ -116,94 +129,57 @@ def proven_excess_mm(
     that of the best test with all readings on one point: the largest p that all this leaves,
     integrated over u. Infinite where readings are less than 1 - error of the points.
     """
-    sizes, noise = _descending(sizes_mm, noise_mm)
-    if readings <= (1.0 - error) * len(sizes):
+    from scipy.special import ndtr, xlogy
+
+    points = len(sizes_mm)
+    if readings <= (1.0 - error) * points:
         return math.inf
-    z = _deviate(error)
-    narrowest = float(np.max(noise)) / math.sqrt(readings)
-    far = _enough_mm(sizes, noise, readings, error)
-    gaps, weights = _panels(narrowest, max(far, (z + _BEYOND) * narrowest))
-    distances = gaps[:, None] + (sizes[0] - sizes)
-    from scipy.special import ndtr
+    noise = np.broadcast_to(np.asarray(noise_mm, dtype=float), points)
+    z, widest = _deviate(error), float(noise.max())
+    # From here on the readings pay for certainty, or the best test is certain.
+    certain = math.sqrt(-2.0 * math.log(error) * points / (readings - (1.0 - error) * points))
+    gaps, weights = _quadrature(widest * max(certain, (z + _BEYOND) / math.sqrt(readings)))
+    deviations = (gaps[:, None] + (np.max(sizes_mm) - sizes_mm)) / noise
 
-    best_test = ndtr((distances / noise).min(axis=1) * math.sqrt(readings) - z)
-    probability = np.minimum(best_test, _affordable(distances / noise, readings, error))
-    return float(weights @ (1.0 - probability))
+    def needed(probability: np.ndarray) -> np.ndarray:
+        """Mean readings it takes that P(bound < level) is so large, by level."""
+        rest = 1.0 - probability
+        divergence = xlogy(probability, probability / error) + xlogy(rest, rest / (1.0 - error))
+        return np.maximum(2.0 * divergence[:, None] / deviations**2, 1.0 - error).sum(axis=1)
 
-
-def lower_distance_mm(
-    sizes_mm: np.ndarray, noise_mm: np.ndarray | float, readings: int, error: float
-) -> float:
-    """Mean distance of the lower bound from the largest size, all others read once: z s/sqrt(k)."""
-    sizes, noise = _descending(sizes_mm, noise_mm)
-    if readings < len(sizes):
-        return math.inf
-    return _deviate(error) * float(noise[0]) / math.sqrt(readings - len(sizes) + 1)
-
-
-def _descending(
-    sizes_mm: np.ndarray, noise_mm: np.ndarray | float
-) -> tuple[np.ndarray, np.ndarray]:
-    sizes = np.asarray(sizes_mm, dtype=float)
-    order = np.argsort(-sizes, kind="stable")
-    return sizes[order], np.broadcast_to(np.asarray(noise_mm, dtype=float), sizes.shape)[order]
-
-
-def _best_counts(sizes: np.ndarray, noise: np.ndarray, readings: int, error: float) -> np.ndarray:
-    if readings == len(sizes):
-        return np.ones(len(sizes), dtype=np.int64)
-    # A level hardly above the largest size gives it all; one far above all shares equally.
-    low = math.log(0.1 * float(noise.min()) / math.sqrt(readings))
-    high = math.log(float(noise.max()) * 10.0 + float(sizes[0] - sizes[-1]))
-    step = (high - low) / (_LEVELS - 1)
-    tried: dict[float, tuple[float, np.ndarray]] = {}
-    asked = [low + number * step for number in range(_LEVELS)]
-    for _ in range(_HALVINGS + 1):
-        for level in asked:
-            distances = math.exp(level) + (sizes[0] - sizes)
-            counts = _filled((noise / distances) ** _POWER, readings)
-            tried[level] = _mean_excess_mm(sizes, noise, counts, error), counts
-        best = min(tried, key=lambda level: tried[level][0])
-        step *= 0.5
-        asked = [best - step, best + step]
-    return tried[best][1]
+    low, high = np.full(len(gaps), error), np.ones(len(gaps))
+    paid = needed(high) <= readings
+    for _ in range(40):
+        middle = 0.5 * (low + high)
+        enough = needed(middle) <= readings
+        low, high = np.where(enough, middle, low), np.where(enough, high, middle)
+    best_test = ndtr(deviations.min(axis=1) * math.sqrt(readings) - z)
+    return float(weights @ (1.0 - np.minimum(best_test, np.where(paid, 1.0, low))))
 
 
 def _filled(wanted: np.ndarray, readings: int) -> np.ndarray:
     """Whole counts in proportion to those wanted (m,), at least 1, ``readings`` together."""
-    order = np.argsort(-wanted, kind="stable")
-    total = np.cumsum(wanted[order])
+    ordered = np.sort(wanted)[::-1]
     filled = np.arange(1, len(wanted) + 1)
-    factors = (readings - len(wanted) + filled) / total  # if so many points are above 1
-    holds = np.flatnonzero(factors * wanted[order] > 1.0)
-    exact = np.maximum(factors[holds[-1]] * wanted, 1.0)
+    factors = (readings - len(wanted) + filled) / np.cumsum(ordered)  # if so many are above 1
+    holds = np.flatnonzero(factors * ordered > 1.0)
+    exact = np.maximum((factors[holds[-1]] if holds.size else 0.0) * wanted, 1.0)
     counts = np.floor(exact).astype(np.int64)
     left = readings - int(counts.sum())
     counts[np.argsort(counts - exact, kind="stable")[:left]] += 1
     return counts
 
 
-def _mean_excess_mm(
-    sizes: np.ndarray, noise: np.ndarray, counts: np.ndarray, error: float
-) -> float:
-    """Mean of what the largest upper limit is above the largest size, sizes descending."""
-    spread = noise / np.sqrt(counts)
-    reaches = sizes - sizes[0] + (_deviate(error) + _BEYOND) * spread
-    sizes, spread = sizes[reaches > 0.0], spread[reaches > 0.0]  # others are never the largest
-    reach = float(reaches.max())
-    gaps, weights = _panels(float(spread[0]), reach)
-    levels = (sizes[0] + gaps)[:, None] / spread
-    below = _length_below(_short_length(levels, error), sizes / spread)
-    return float(weights @ (1.0 - below.prod(axis=1)))
+@lru_cache(maxsize=1)
+def _legendre() -> tuple[np.ndarray, np.ndarray]:
+    return np.polynomial.legendre.leggauss(_NODES)
 
 
-def _panels(first: float, end: float) -> tuple[np.ndarray, np.ndarray]:
-    """Nodes and weights of a quadrature from 0 to ``end``, fine as ``first`` at the beginning."""
-    nodes, weights = np.polynomial.legendre.leggauss(_NODES)
-    panels = max(math.ceil(math.log2(max(end / first, 1.0) + 1.0)), 1)
-    edges = end * (2.0 ** np.arange(panels + 1) - 1.0) / (2.0**panels - 1.0)
-    half = 0.5 * np.diff(edges)[:, None]
-    return (edges[:-1, None] + half * (nodes + 1.0)).ravel(), (half * weights).ravel()
+def _quadrature(end: float) -> tuple[np.ndarray, np.ndarray]:
+    """Nodes and weights from 0 to ``end``, by the cube of a Gauss-Legendre variable."""
+    nodes, weights = _legendre()
+    share = 0.5 * (nodes + 1.0)
+    return end * share**3, end * 1.5 * share**2 * weights
 
 
 def _length_below(lengths: np.ndarray, sizes: np.ndarray) -> np.ndarray:
@@ -221,71 +197,20 @@ def _length_below(lengths: np.ndarray, sizes: np.ndarray) -> np.ndarray:
 
 def _short_length(sizes: np.ndarray, error: float) -> np.ndarray:
     """Length that a reading of noise 1 stays below with probability ``error``, by true size."""
-    z = _deviate(error)
-    known, lengths = _short_lengths(error)
-    far = np.maximum(sizes, _TABLE_TO)
-    return np.where(
-        sizes < _TABLE_TO,
-        np.interp(sizes, known, lengths),
-        far - z + 1.0 / far + 0.5 * z / (far * far),
-    )
+    z, far = _deviate(error), np.maximum(sizes, _TABLE_TO)
+    beyond = far - z + 1.0 / far + 0.5 * z / (far * far)
+    return np.where(sizes < _TABLE_TO, np.interp(sizes, *_short_lengths(error)), beyond)
 
 
 @lru_cache(maxsize=16)
 def _short_lengths(error: float) -> tuple[np.ndarray, np.ndarray]:
-    sizes = np.linspace(0.0, _TABLE_TO, 6001)
-    low, high = np.zeros_like(sizes), sizes + 4.0
-    for _ in range(48):
-        middle = 0.5 * (low + high)
-        short = _length_below(middle, sizes) < error
-        low, high = np.where(short, middle, low), np.where(short, high, middle)
-    return sizes, 0.5 * (low + high)
+    from scipy.special import chndtrix
+
+    sizes = np.linspace(0.0, _TABLE_TO, 3001)
+    return sizes, np.sqrt(chndtrix(error, 3.0, sizes**2))
 
 
 def _deviate(error: float) -> float:
     from scipy.special import ndtri
 
     return -float(ndtri(error))
-
-
-def _divergence(probability: np.ndarray, error: float) -> np.ndarray:
-    """Kullback-Leibler divergence of a probability of at least ``error`` from ``error``."""
-    from scipy.special import xlogy
-
-    rest = 1.0 - probability
-    return xlogy(probability, probability / error) + xlogy(rest, rest / (1.0 - error))
-
-
-def _readings_needed(deviations: np.ndarray, probability: np.ndarray, error: float) -> np.ndarray:
-    """Mean readings it takes that P(bound < level) = ``probability``; deviations: (levels, m)."""
-    by_divergence = 2.0 * _divergence(probability, error)[:, None] / (deviations * deviations)
-    return np.maximum(by_divergence, 1.0 - error).sum(axis=1)
-
-
-def _affordable(deviations: np.ndarray, readings: int, error: float) -> np.ndarray:
-    """Largest probability that the readings can pay for, by level: (levels,)."""
-    low = np.full(len(deviations), error)
-    high = np.ones(len(deviations))
-    paid = _readings_needed(deviations, high, error) <= readings
-    for _ in range(40):
-        middle = 0.5 * (low + high)
-        enough = _readings_needed(deviations, middle, error) <= readings
-        low, high = np.where(enough, middle, low), np.where(enough, high, middle)
-    return np.where(paid, 1.0, low)
-
-
-def _enough_mm(sizes: np.ndarray, noise: np.ndarray, readings: int, error: float) -> float:
-    """Distance above the largest size from which on the readings pay for certainty."""
-    one = np.ones(1)
-
-    def enough(gap: float) -> bool:
-        deviations = (gap + sizes[0] - sizes)[None, :] / noise
-        return bool(_readings_needed(deviations, one, error)[0] <= readings)
-
-    low, high = 0.0, float(noise.max())
-    while not enough(high):
-        high *= 2.0
-    for _ in range(30):
-        middle = 0.5 * (low + high)
-        low, high = (low, middle) if enough(middle) else (middle, high)
-    return high

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from kinacc.assess.adaptive import Candidates, LedgerCampaign
+from kinacc.assess.adaptive import Campaign, Candidates
 from kinacc.assess.looks import EARLY, Looks, boundary, look_counts
 from kinacc.assess.lower_average import SHARE, LowerAverage, direction_of
 from kinacc.assess.noise import NoisePlan
@@ -18,7 +18,7 @@ _ONCE = 0.6  # of the upper bound's error for the visit, where hardly any readin
 _FEW = 0.25  # of the visit: with fewer readings after it, the visit has more of the error
 
 
-class ConfirmingCampaign(LedgerCampaign):
+class ConfirmingCampaign(Campaign):
     """A visit of ``first`` points, then blocks of readings up to a point's next look.
 
     After every block the point with the largest upper limit is read, among those whose next look
@@ -148,10 +148,8 @@ class ConfirmingCampaign(LedgerCampaign):
 
     def _noise_along(self, point: int, covariance_mm2) -> float:
         """Standard deviation of a reading along the direction of its block."""
-        candidates = self.ledger.candidates
-        if covariance_mm2 is None and candidates.is_equal_noise.item(point):
-            return candidates.sigma_mm.item(point)
-        own = candidates.covariance_mm2[point] if covariance_mm2 is None else covariance_mm2
+        planned = self.ledger.candidates.covariance_mm2[point]
+        own = planned if covariance_mm2 is None else covariance_mm2
         along = np.array(self._direction)
         return math.sqrt(float(along @ np.asarray(own) @ along))
 

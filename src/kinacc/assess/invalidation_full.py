@@ -10,8 +10,8 @@ import numpy as np
 from kinacc.assess.adaptive import (
     FIRST_SHARE,
     AdaptiveAssessor,
+    Campaign,
     Candidates,
-    LedgerCampaign,
     check_budget,
     first_points,
 )
@@ -62,7 +62,7 @@ class ModelInvalidationFull(AdaptiveAssessor):
         return ChallengeCampaign(self, candidates, self.bound_mm)
 
 
-class ChallengeCampaign(LedgerCampaign):
+class ChallengeCampaign(Campaign):
     """New points first, then the worst point at the bound under test."""
 
     settings: Any

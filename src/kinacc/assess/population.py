@@ -16,6 +16,7 @@ _FREEDOM = 10  # a bump is a chi density with so many degrees: 23 % standard dev
 _STEP = 0.2  # distance of bumps in the logarithm of their scale
 _SMALLEST, _LARGEST = 0.03, 0.8  # scales of the first and last bump over the largest reading
 _ROUNDS = 50  # EM steps; many more would follow the noise of the readings
+_NO_SIZE = 1e-12  # of the noise: what readings below it count as
 _PSEUDO = 0.2  # points' worth of mass spread over the bumps before any reading
 
 
@@ -39,17 +40,17 @@ def largest_size(sizes_mm: np.ndarray, noise_mm: np.ndarray, unmeasured: int) ->
     unmeasured: number of points without a reading, taken as drawn from the same population.
     Sizes go with the largest reading: where every reading is 0, so is every size.
     """
-    # Compiled code, which only statements need: a reading is recorded without.
-    from kinacc.assess.size_kernels import reading_densities
-
     top = float(sizes_mm.max())
     if top == 0.0:
         return LargestSize(np.zeros(1), np.ones(1), np.ones(1))
     scale = top * np.exp(np.arange(np.log(_SMALLEST), np.log(_LARGEST), _STEP))
-    size, width = _grid(top)
+    # Sizes, fine up to a little above the largest reading and wider beyond.
+    wide = np.geomspace(1.2 * top, 4.0 * top, 61)[1:]
+    edges = np.concatenate([np.linspace(0.0, 1.2 * top, 361), wide])
+    size, width = 0.5 * (edges[1:] + edges[:-1]), np.diff(edges)
     bumps = _chi_density(size, scale / np.sqrt(_FREEDOM)) * width
     bumps /= bumps.sum(axis=1, keepdims=True)
-    likelihood = reading_densities(sizes_mm, noise_mm, size)
+    likelihood = reading_densities(sizes_mm[:, None], noise_mm[:, None], size)
     by_bump = likelihood @ bumps.T
     pseudo = _PSEUDO / scale.size
     weight = np.full(scale.size, 1.0 / scale.size)
@@ -58,29 +59,25 @@ def largest_size(sizes_mm: np.ndarray, noise_mm: np.ndarray, unmeasured: int) ->
         weight = weight * ((1.0 / (by_bump @ weight)) @ by_bump) + pseudo
         weight /= weight.sum()
     prior = weight @ bumps
-    # In the memory of the likelihood: arrays so large are slow to get from the system.
-    posterior = np.multiply(likelihood, prior, out=likelihood)
-    np.cumsum(posterior, axis=1, out=posterior)
-    posterior /= posterior[:, -1:].copy()
-    np.log(np.maximum(posterior, 1e-300, out=posterior), out=posterior)
-    measured = np.exp(posterior.sum(axis=0))
-    everywhere = measured * np.cumsum(prior) ** unmeasured
-    return LargestSize(size, _rising(measured), _rising(everywhere))
+    posterior = np.cumsum(likelihood * prior, axis=1)
+    measured = np.exp(np.log(np.maximum(posterior / posterior[:, -1:], 1e-300)).sum(axis=0))
+    both = np.array([measured, measured * np.cumsum(prior) ** unmeasured])
+    # Strictly increasing to 1, for interpolation.
+    both = np.maximum.accumulate(both / both[:, -1:], axis=1) + 1e-15 * np.arange(size.size)
+    return LargestSize(size, *both)
 
 
-def _rising(distribution: np.ndarray) -> np.ndarray:
-    """Strictly increasing to 1, for interpolation."""
-    return np.maximum.accumulate(distribution / distribution[-1]) + 1e-15 * np.arange(
-        distribution.size
-    )
+def reading_densities(x: np.ndarray, noise: np.ndarray, true: np.ndarray) -> np.ndarray:
+    """Density (n, g) of readings of sizes x (n, 1) at true sizes (g,), up to a factor per reading.
 
-
-def _grid(top_mm: float) -> tuple[np.ndarray, np.ndarray]:
-    """Sizes, fine up to a little above the largest reading and wider beyond, and their widths."""
-    fine = np.linspace(0.0, 1.2 * top_mm, 361)
-    wide = np.geomspace(1.2 * top_mm, 4.0 * top_mm, 61)[1:]
-    edges = np.concatenate([fine, wide])
-    return 0.5 * (edges[1:] + edges[:-1]), np.diff(edges)
+    noise: (n, 1) standard deviations per axis; the largest value of every row is 1. Noncentral chi
+    with three degrees of freedom: exp(-(x - a)^2 / 2) (1 - exp(-2 x a)) / a; of a reading of 0,
+    what is left of the factor is in proportion to a.
+    """
+    gap = ((x - true) / noise) ** 2
+    away = -np.expm1(-2.0 * np.maximum(x / noise, _NO_SIZE) * true / noise)
+    found = np.exp(0.5 * (gap.min(axis=1, keepdims=True) - gap)) * away / true
+    return found / found.max(axis=1, keepdims=True)
 
 
 def _chi_density(size_mm: np.ndarray, unit_mm: np.ndarray) -> np.ndarray:

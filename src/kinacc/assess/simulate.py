@@ -8,9 +8,10 @@ from collections.abc import Callable
 import numpy as np
 
 from kinacc.assess.adaptive import AdaptiveAssessor, Campaign, Candidates
+from kinacc.assess.assessor import Assessment
 from kinacc.assess.limits import visit_mm
 from kinacc.assess.random_numbers import key_of
-from kinacc.assess.statement import CANDIDATES, MEASURED, VISIT, Statement
+from kinacc.assess.statement import CANDIDATES, MEASURED, REGION, VISIT, Statement
 from kinacc.assess.world import World, drawn_world
 
 Reading = Callable[[int, int], np.ndarray]  # (row, how often it was read before): (3,), mm
@@ -43,6 +44,31 @@ def conduct(assessor: AdaptiveAssessor, world: World, **known: np.ndarray) -> Ca
     campaign = assessor.begin(Candidates.with_equal_noise(world.sigma_mm, **known))
     carry_on(campaign, world.reading_mm)
     return campaign
+
+
+def assess_world(assessor, world: World, budget: int) -> tuple[Assessment, float]:
+    """One assessment of a world, whichever the interface, and what its upper bound is held to, mm.
+
+    An assessor that looks back has ``assess``; one that chooses as it goes has ``begin`` and is
+    stopped after ``budget`` readings. Its statement on all candidates counts, else its first.
+    """
+    size = np.sqrt(np.sum(world.error_mm**2, axis=1))
+    if hasattr(assessor, "assess"):
+        return assessor.assess(world), float(size.max())
+    rows: list[int] = []
+
+    def reading_mm(row: int, visit: int) -> np.ndarray:
+        rows.append(row)
+        return world.reading_mm(row, visit)
+
+    campaign = assessor.begin(Candidates.with_equal_noise(world.sigma_mm))
+    carry_on(campaign, reading_mm, limit=budget)
+    stated = campaign.statements()
+    said = next((each for each in stated if each.target == CANDIDATES), stated[0])
+    found = Assessment(said.value_mm, len(rows), len(set(rows)), said.lower_mm, said.upper_mm)
+    if said.target == REGION:
+        return found, float(np.quantile(size, said.share, method="inverted_cdf"))
+    return found, truth_mm(said, size, rows)
 
 
 def noisy(errors_mm: np.ndarray, noise_root: np.ndarray, visits: int, *entropy: int) -> Reading:

@@ -17,19 +17,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kinacc.assess.assessor import Assessor, every_reading
-from kinacc.assess.maximum import Maximum
-from kinacc.assess.model_invalidation import ModelInvalidation
-from kinacc.assess.outlier_rejection import OutlierRejection
+from kinacc.assess.registry import PAPER as ASSESSORS
+from kinacc.assess.simulate import assess_world
 from kinacc.assess.world import World, checked_errors, draw
 from kinacc.config.records import of_section
 from kinacc.errors import InputError, Problem
 from kinacc.tables.columns import Columns
 from kinacc.tables.contract import columns_of
 
-# The paper's three by class: a registry would make the study depend on whatever joins it.
-ASSESSORS: dict[str, type[Assessor]] = {
-    each.name: each for each in (Maximum, OutlierRejection, ModelInvalidation)
-}
 NM_PER_MM = 1_000_000
 SWITCHES = tuple(switch for cls in ASSESSORS.values() for switch in cls.switches)
 _SHUFFLE = 1  # keeps the key of the order apart from the key of the readings
@@ -117,8 +112,20 @@ def simulate(
     rows, world = [], None
     for noise, repetition in progress(jobs, "simulations", len(jobs)) if progress else jobs:
         world = world_of(errors, noise, repetition, visits, seed, world)
-        rows += [_row(noise, repetition, each, world) for each in assessors]
+        for each in assessors:
+            switches = {switch: getattr(each, switch, None) for switch in SWITCHES}
+            row = assessed_row(noise, repetition, each, world)
+            row.pop("bounded_mm")
+            rows.append({**row, **switches})
     return ordered(columns_of("study_chunk", rows))
+
+
+def assessed_row(noise_mm: float, repetition: int, assessor, world: World) -> dict:
+    """One assessment, with the size that its upper bound is held to (``bounded_mm``)."""
+    found, bounded_mm = assess_world(assessor, world, world.visits)
+    name = getattr(assessor, "name", type(assessor).__name__)
+    place = {"noise_mm": noise_mm, "repetition": repetition, "assessor": name}
+    return {**place, **found._asdict(), "bounded_mm": bounded_mm}
 
 
 def ordered(rows: Columns) -> Columns:
@@ -166,22 +173,6 @@ def true_accuracy_mm(true_error_mm: ArrayLike) -> float:
 
 def _nanometres(noise_mm: float) -> int:
     return round(float(noise_mm) * NM_PER_MM)
-
-
-def _row(noise_mm: float, repetition: int, assessor: Assessor, world: World) -> dict:
-    """One assessment as a row of ``study_chunk``."""
-    found = assessor.assess(world)
-    return {
-        "noise_mm": noise_mm,
-        "repetition": repetition,
-        "assessor": assessor.name,
-        **{switch: getattr(assessor, switch, None) for switch in SWITCHES},
-        "assessed_mm": found.assessed_mm,
-        "measurements": found.measurements,
-        "points_visited": found.points_visited,
-        "lower_mm": found.lower_mm,
-        "upper_mm": found.upper_mm,
-    }
 
 
 def _std_error(sample: np.ndarray) -> float:

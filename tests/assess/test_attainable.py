@@ -1,5 +1,7 @@
 """The limits shown beside a bound: held to slow sums, all designs and simulated campaigns."""
 
+from __future__ import annotations
+
 import itertools
 import math
 
@@ -7,19 +9,14 @@ import numpy as np
 import pytest
 from scipy import integrate, optimize, special
 
-from kinacc.assess.attainable import (
-    attainable_excess_mm,
-    best_counts,
-    limits_of,
-    lower_distance_mm,
-    proven_excess_mm,
-    width_limits,
-)
-from kinacc.assess.limits import upper_limit_mm
+from kinacc.assess.adaptive import Candidates
+from kinacc.assess.attainable import best_counts, limits_of, proven_excess_mm, width_limits
+from kinacc.assess.search_and_confirm import SearchAndConfirm
 from kinacc.assess.statement import CANDIDATES, MEASURED, REGION, Statement
 
 ERROR = 0.05
 Z = 1.6448536269514722
+SIGMA_MM, POINTS = 0.1, 40
 
 FIELDS = {
     "lone": np.r_[0.2 * np.ones(5), 1.0, 0.2 * np.ones(4)],
@@ -57,17 +54,8 @@ def test_the_attainable_excess_is_what_campaigns_of_its_design_have(field):
         assert counts.sum() == readings
         excess = np.maximum(simulated(sizes, noise, counts) - sizes.max(), 0.0)
         near = 4.0 * excess.std() / math.sqrt(len(excess))
-        said = attainable_excess_mm(sizes, noise, readings, ERROR)
+        said = width_limits(sizes, noise, readings, ERROR).attainable_mm
         assert said == pytest.approx(excess.mean(), abs=near)
-
-
-def test_its_bound_misses_a_lone_point_as_often_as_is_allowed():
-    sizes, noise = np.array([1.0, 0.0]), np.full(2, 0.1)
-    largest = simulated(sizes, noise, best_counts(sizes, noise, 6, ERROR))
-    assert np.mean(largest < 1.0) == pytest.approx(ERROR, abs=4 * math.sqrt(0.0475 / 20_000))
-    assert upper_limits(np.array([0.7]), 0.1)[0] == pytest.approx(
-        upper_limit_mm(np.array([0.7, 0.0, 0.0]), 0.1, ERROR), abs=1e-5
-    )
 
 
 def excess_by_quad(sizes: np.ndarray, noise: np.ndarray, counts: tuple[int, ...]) -> float:
@@ -90,7 +78,7 @@ def test_no_other_counts_do_much_better_than_the_best_counts(sizes):
     noise, readings = np.array([0.2, 0.1, 0.3]), 9
     every = (c for c in itertools.product(range(1, 8), repeat=3) if sum(c) == readings)
     best_mm = min(excess_by_quad(sizes, noise, counts) for counts in every)
-    said = attainable_excess_mm(sizes, noise, readings, ERROR)
+    said = width_limits(sizes, noise, readings, ERROR).attainable_mm
     assert best_mm - 1e-4 <= said <= 1.02 * best_mm
 
 
@@ -171,20 +159,32 @@ def test_limits_are_told_of_statements_on_the_mean_error_of_all_their_points_alo
         assert all(math.isnan(limit) for limit in other)
 
 
-def test_the_order_of_points_does_not_matter():
-    sizes, noise = np.linspace(0.1, 1.0, 12), np.linspace(0.3, 0.05, 12)
-    order = np.random.default_rng(1).permutation(12)
-    counts = best_counts(sizes, noise, 40, ERROR)
-    assert np.array_equal(best_counts(sizes[order], noise[order], 40, ERROR), counts[order])
-    mixed = width_limits(sizes[order], noise[order], 40, ERROR)
-    assert np.allclose(mixed, width_limits(sizes, noise, 40, ERROR), rtol=1e-12)
-    assert lower_distance_mm(sizes, noise, 40, ERROR) == pytest.approx(Z * 0.05 / math.sqrt(29))
+def directed(sizes_mm, seed: int = 3) -> np.ndarray:
+    """Errors of these sizes in directions of their own."""
+    vectors = np.random.default_rng(seed).normal(size=(len(sizes_mm), 3))
+    return vectors / np.linalg.norm(vectors, axis=1)[:, None] * np.asarray(sizes_mm)[:, None]
 
 
-def test_more_readings_or_less_noise_leave_less():
-    sizes = FIELDS["spread"]
-    by_readings = np.array([width_limits(sizes, 0.1, n, ERROR) for n in (10, 15, 20, 40, 80)])
-    assert np.all(np.diff(by_readings, axis=0) < 0.0)
-    # A limit scales with noise and sizes together.
-    once, tenfold = (width_limits(k * sizes, k * 0.1, 25, ERROR) for k in (1.0, 10.0))
-    assert np.allclose(np.array(tenfold), 10.0 * np.array(once), rtol=2e-3)
+def ended(settings: SearchAndConfirm, errors_mm: np.ndarray, chance: np.random.Generator):
+    """What is said on all candidates at the end of a campaign with normal readings."""
+    campaign = settings.begin(Candidates.with_equal_noise(np.full(len(errors_mm), SIGMA_MM)))
+    while (row := campaign.next()) is not None:
+        campaign.record(row, errors_mm[row] + SIGMA_MM * chance.normal(size=3))
+    return next(each for each in campaign.statements() if each.target == CANDIDATES)
+
+
+@pytest.mark.parametrize(
+    ("large", "upper", "lower"), [(1, 1.25, 1.6), (2, 1.6, 2.7), (8, 2.2, 2.7)]
+)
+def test_readings_after_the_visit_are_spent_nearly_as_well_as_with_the_sizes_known(
+    large, upper, lower
+):
+    sizes = np.random.default_rng(4).uniform(0.1, 0.5, POINTS)
+    sizes[:large] = 1.2
+    chance, budget = np.random.default_rng(5), 2 * POINTS
+    settings = SearchAndConfirm(budget, noise_margin=1.0)
+    said = [ended(settings, directed(sizes), chance) for _ in range(100)]
+    excess = np.mean([max(each.upper_mm - 1.2, 0.0) for each in said])
+    assert excess <= upper * width_limits(sizes, SIGMA_MM, budget, 0.05).attainable_mm
+    least = Z * SIGMA_MM / math.sqrt(budget - POINTS + 1)
+    assert np.mean([1.2 - each.lower_mm for each in said]) <= lower * least

@@ -1,0 +1,394 @@
+"""Every assessor that chooses as it goes: one interface, honest bounds, an independent answer."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import paper_settings as paper
+import pytest
+from scipy.stats import binom, gamma
+
+from kinacc.assess.adaptive import Candidates, Ledger, first_points
+from kinacc.assess.conformity import ACCEPT, REJECT, UNDECIDED, decide
+from kinacc.assess.gamma_quantile import GammaQuantile
+from kinacc.assess.invalidation_calibrated import InvalidationCalibrated
+from kinacc.assess.invalidation_full import ModelInvalidationFull
+from kinacc.assess.limits import BallDistances
+from kinacc.assess.model_invalidation import mahalanobis_excess, point_probability
+from kinacc.assess.random_numbers import key_of
+from kinacc.assess.region_share import RegionShare, largest_rank, smallest_rank
+from kinacc.assess.registry import ADAPTIVE
+from kinacc.assess.search_and_confirm import SearchAndConfirm
+from kinacc.assess.simulate import conduct, noisy
+from kinacc.assess.single_shot import SingleShot
+from kinacc.assess.statement import CANDIDATES, MEASURED, REGION, TARGETS, Reason, Statement
+from kinacc.assess.world import drawn_world
+from kinacc.errors import InputError
+
+BOUNDING = [SingleShot, InvalidationCalibrated, SearchAndConfirm]
+LIVE = [paper.assessor(name, measurements=40) for name in ADAPTIVE]
+TAKEN, REFUSED = "taken", "refused"
+WITH_CONFIDENCE = ("region_share", "single_shot", "invalidation_calibrated", "search_and_confirm")
+WITH_VISITED = ("model_invalidation_full", "invalidation_calibrated")
+
+
+def directions(points: int, seed: int = 5) -> np.ndarray:
+    """Unit vectors."""
+    vectors = np.random.default_rng(seed).normal(size=(points, 3))
+    return vectors / np.linalg.norm(vectors, axis=1)[:, None]
+
+
+def field(points: int, seed: int = 5) -> np.ndarray:
+    """Errors of 0.2 to 1 mm, larger ones rarer."""
+    size = 1.0 - 0.8 * np.random.default_rng(seed).uniform(size=points) ** 0.5
+    return directions(points, seed) * size[:, None]
+
+
+def world(points: int = 30, sigma: float = 0.1, seed: int = 1, visits: int = 200):
+    return drawn_world(field(points), sigma, key_of(seed), visits)
+
+
+def some_candidates(points: int = 30) -> Candidates:
+    return Candidates.with_equal_noise(np.full(points, 0.1))
+
+
+@pytest.mark.parametrize("assessor", LIVE, ids=lambda each: each.name)
+@pytest.mark.parametrize("points", [1, 2, 15, 60])
+def test_every_assessor_keeps_its_budget_and_says_something_at_the_end(assessor, points):
+    campaign = conduct(assessor, world(points))
+    said = campaign.statements()
+    assert {each.target for each in said} <= set(TARGETS)
+    assert said[0].value_mm > 0.0 or said[0].withheld
+    assert not said[0].withheld or type(assessor) not in BOUNDING
+    assert campaign.ledger.taken <= assessor.measurements
+    for each in said:
+        if not each.withheld and not math.isnan(each.upper_mm):
+            assert each.lower_mm <= each.upper_mm
+            assert each.confidence == 0.95
+    assert campaign.next() is None
+
+
+@pytest.mark.parametrize("assessor", LIVE, ids=lambda each: each.name)
+def test_a_campaign_told_its_readings_again_goes_on_as_before(assessor):
+    readings, candidates = world(), some_candidates()
+    first, reads, told = assessor.begin(candidates), np.zeros(30, int), []
+    while (point := first.next()) is not None:
+        if len(told) % 9 == 0:
+            again = assessor.begin(candidates)
+            for each in told:
+                assert again.next() == each[0]
+                again.record(*each)
+            assert again.next() == point
+        told.append((point, readings.reading_mm(point, int(reads[point])).copy()))
+        first.record(*told[-1])
+        reads[point] += 1
+    assert 1 <= len(told) <= 40
+
+
+@pytest.mark.parametrize("assessor", LIVE, ids=lambda each: each.name)
+def test_a_reading_that_cannot_be_used_changes_nothing(assessor):
+    readings, candidates = world(), some_candidates()
+    one, other = assessor.begin(candidates), assessor.begin(candidates)
+    bad = [
+        (0, [math.nan, 0.0, 0.0], None),
+        (0, [0.0, 0.0], None),
+        (30, [0.0, 0.0, 0.0], None),
+        (-1, [0.0, 0.0, 0.0], None),
+        (0, [0.1, 0.0, 0.0], np.zeros((3, 3))),
+        (0, [0.1, 0.0, 0.0], np.diag([1.0, 1.0, -1.0])),
+        (0, [0.1, 0.0, 0.0], [[1.0, 0.5, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]),
+        (0, [0.1, 0.0, 0.0], np.eye(2)),
+    ]
+    reads = np.zeros(30, int)
+    while (point := one.next()) is not None:
+        for wrong in bad:
+            with pytest.raises(InputError):
+                other.record(*wrong)
+        for campaign in (one, other):
+            campaign.record(point, readings.reading_mm(point, int(reads[point])))
+        reads[point] += 1
+        assert other.next() == one.next()
+    assert repr(other.statements()) == repr(one.statements())
+
+
+@pytest.mark.parametrize(
+    ("covariance", "said"),
+    [
+        (np.zeros((2, 3, 3)), "not positive definite"),
+        (np.stack([np.eye(3), np.diag([1.0, 1.0, -1e-3])]), "point 1: not positive definite"),
+        (np.array([[[1.0, 0.9, 0], [0, 1, 0], [0, 0, 1]]]), "not symmetric"),
+        (np.full((1, 3, 3), np.nan), "not finite"),
+        (np.eye(3), "shape"),
+        (np.ones((3, 3, 3)), "not positive definite"),
+    ],
+)
+def test_covariances_that_are_none_are_refused_with_their_point(covariance, said):
+    with pytest.raises(InputError, match=said):
+        Candidates(covariance)
+
+
+def test_unequal_noise_is_weighted_as_least_squares_would():
+    ledger = Ledger(Candidates.with_equal_noise(np.full(2, 0.1)))
+    rng = np.random.default_rng(6)
+    readings = rng.normal(size=(5, 3))
+    spreads = [np.diag(rng.uniform(0.5, 2.0, 3)) + 0.2 for _ in readings]
+    spreads[0] = 0.01 * np.eye(3)
+    for reading, spread in zip(readings, spreads, strict=True):
+        ledger.record(1, reading, spread)
+    inverses = [np.linalg.inv(each) for each in spreads]
+    total = np.linalg.inv(sum(inverses))
+    weighted = sum(each @ reading for each, reading in zip(inverses, readings, strict=True))
+    assert ledger.mean_mm[1] == pytest.approx(total @ weighted)
+    assert ledger.noise(1) == pytest.approx(total)
+
+
+def coverage(assessor, errors, sigma, draws, target=MEASURED):
+    """Share of campaigns whose upper bound, and lower bound, hold."""
+    size = np.linalg.norm(errors, axis=1)
+    upper = lower = said_any = 0
+    for draw in range(draws):
+        order = np.random.default_rng([draw, 3]).permutation(len(errors))
+        readings = drawn_world(errors[order], sigma, key_of(4, draw), assessor.measurements)
+        campaign = conduct(assessor, readings)
+        said = next(each for each in campaign.statements() if each.target == target)
+        truth = size[order][campaign.ledger.visited].max() if target == MEASURED else size.max()
+        if not said.withheld:
+            said_any += 1
+            upper += said.upper_mm >= truth
+            lower += said.lower_mm <= truth
+    return upper / said_any, lower / said_any
+
+
+def least(draws: int) -> float:
+    """Share of bounds that 95 % confidence may fall to by chance in a test of many."""
+    return 0.95 - 3.5 * math.sqrt(0.05 * 0.95 / draws)
+
+
+@pytest.mark.parametrize("cls", BOUNDING)
+@pytest.mark.parametrize("shape", ["one", "equal", "spread"])
+def test_the_bound_on_the_measured_points_holds(cls, shape):
+    # One large error is the hardest for the upper limit: no other point's noise comes to its aid.
+    errors = {
+        "one": np.vstack([[[1.0, 0.0, 0.0]], 1e-3 * directions(24)]),
+        "equal": directions(25),
+        "spread": field(25),
+    }[shape]
+    draws = 400
+    upper, lower = coverage(paper.assessor(cls, measurements=40), errors, 0.2, draws)
+    assert upper >= least(draws)
+    assert lower >= least(draws)
+
+
+def test_the_single_shot_bound_is_exact_where_one_point_decides():
+    errors = np.vstack([[[1.0, 0.0, 0.0]], 1e-3 * directions(24)])
+    upper, _ = coverage(ADAPTIVE["single_shot"](measurements=25), errors, 0.1, 1500)
+    assert upper == pytest.approx(0.95, abs=0.02)
+
+
+@pytest.mark.parametrize("assessor", LIVE, ids=lambda each: each.name)
+def test_every_measured_point_has_limits_and_no_other(assessor):
+    campaign = assessor.begin(some_candidates())
+    assert campaign.point_limits() == {}
+    readings, reads = world(seed=3), np.zeros(30, int)
+    while (point := campaign.next()) is not None:
+        campaign.record(point, readings.reading_mm(point, int(reads[point])))
+        reads[point] += 1
+        if campaign.ledger.taken % 9 == 0:
+            assert set(campaign.point_limits()) == set(campaign.ledger.visited)
+    limits = campaign.point_limits()
+    size = np.linalg.norm(field(30), axis=1)
+    assert all(0.0 <= lower < upper for lower, upper in limits.values())
+    assert all(lower <= size[row] for row, (lower, _) in limits.items())
+    assert np.mean([size[row] <= upper for row, (_, upper) in limits.items()]) > 0.8
+
+
+def test_gamma_quantile_is_that_of_the_best_fit():
+    sizes = gamma.rvs(5.0, scale=0.1, size=150, random_state=1)
+    errors = sizes[:, None] * np.array([0.0, 0.6, 0.8])
+    (said,) = conduct(GammaQuantile(150), drawn_world(errors, 1e-6, key_of(1), 1)).statements()
+    shape, _, scale = gamma.fit(sizes, floc=0)
+    assert said.target == REGION
+    assert said.value_mm == pytest.approx(gamma.ppf(0.99, shape, scale=scale), rel=1e-3)
+    assert not said.withheld
+
+
+def test_gamma_quantile_says_when_noise_or_a_lone_error_spoil_it():
+    sizes = gamma.rvs(5.0, scale=0.1, size=100, random_state=2)
+    errors = sizes[:, None] * np.array([1.0, 0.0, 0.0])
+    (noisy,) = conduct(GammaQuantile(100), drawn_world(errors, 0.5, key_of(1), 1)).statements()
+    assert noisy.withheld.code == "much_noise"
+    errors[7] *= 20.0
+    (lone,) = conduct(GammaQuantile(100), drawn_world(errors, 0.01, key_of(1), 1)).statements()
+    assert lone.withheld.code == "not_gamma"
+
+
+@pytest.mark.parametrize(("count", "probability"), [(50, 0.084), (200, 0.05), (20, 0.1)])
+def test_ranks_are_the_last_that_the_binomial_allows(count, probability):
+    rank = largest_rank(count, probability, 0.05)
+    assert binom.cdf(rank - 1, count, probability) <= 0.05 or rank == 0
+    assert binom.cdf(rank, count, probability) > 0.05
+    rank = smallest_rank(count, probability, 0.05)
+    assert binom.sf(rank - 1, count, probability) <= 0.05
+    assert binom.sf(rank - 2, count, probability) > 0.05
+
+
+@pytest.mark.parametrize("sigma", [0.001, 0.1, 0.5])
+def test_the_share_of_the_region_keeps_its_confidence(sigma):
+    rng = np.random.default_rng(4)
+    pool = rng.normal(size=(4000, 3)) * rng.uniform(0.1, 0.5, (4000, 1))
+    truth = np.quantile(np.linalg.norm(pool, axis=1), 0.9)
+    held = np.zeros(2)
+    for draw in range(400):
+        errors = pool[rng.integers(0, 4000, 80)]
+        (said,) = conduct(RegionShare(80), drawn_world(errors, sigma, key_of(draw), 1)).statements()
+        held += said.upper_mm >= truth, said.lower_mm <= truth
+    assert held.min() >= 400 * (0.95 - 3.5 * math.sqrt(0.05 * 0.95 / 400))
+
+
+def test_too_few_points_for_a_share_are_told_how_many_it_takes():
+    (said,) = conduct(RegionShare(20), drawn_world(np.eye(3), 0.1, key_of(1), 1)).statements()
+    assert said.withheld == Reason("few_points", {"read": 3, "share": 0.9, "needed": 35})
+
+
+def test_full_invalidation_states_what_the_papers_states_where_noise_is_equal():
+    readings = drawn_world(field(20), 0.1, key_of(6), 40)
+    full = conduct(ModelInvalidationFull(40, alpha=0.6), readings)
+    reads = {row: int(full.ledger.count[row]) for row in full.ledger.visited}
+    size_mm = {
+        row: np.linalg.norm(np.mean([readings.reading_mm(row, i) for i in range(count)], axis=0))
+        for row, count in reads.items()
+    }
+
+    def rejection(bound_mm: float) -> float:
+        """Eqs. 18 to 20 of the paper, as its own algorithm has them."""
+        excess = [mahalanobis_excess(size_mm[row], bound_mm, 0.1, reads[row], "r") for row in reads]
+        return 1.0 - math.prod(1.0 - point_probability(each, "squared") for each in excess)
+
+    said_mm = full.statements()[0].value_mm
+    assert max(reads.values()) > 1
+    assert rejection((1.0 - 1e-5) * said_mm) > 0.6 >= rejection((1.0 + 1e-5) * said_mm)
+
+
+def rejected_at_the_truth(eq21: bool) -> float:
+    """Share of readings of an error on the bound that a 5 % test of the bound rejects."""
+    rng = np.random.default_rng(7)
+    spread = np.diag([0.2, 0.05, 0.05]) ** 2
+    error = np.array([1.0, 1.0, 0.0]) / math.sqrt(2.0)
+    readings = error + rng.multivariate_normal(np.zeros(3), spread, 4000)
+    if eq21:
+        gap = readings - readings / np.maximum(np.linalg.norm(readings, axis=1), 1.0)[:, None]
+        square = np.einsum("ni,ij,nj->n", gap, np.linalg.inv(spread), gap)
+    else:
+        many = np.broadcast_to(spread, (4000, 3, 3))
+        square = BallDistances(readings, many).beyond(1.0) ** 2
+    return float(np.mean(square > 2.705543))  # one-sided 5 % along one direction
+
+
+def test_the_nearest_point_keeps_the_error_rate_that_eq_21_breaks():
+    assert rejected_at_the_truth(eq21=False) <= 0.06
+    assert rejected_at_the_truth(eq21=True) > 0.15
+
+
+def test_a_reading_with_a_covariance_of_its_own_widens_the_calibrated_bound():
+    candidates = Candidates.with_equal_noise(np.full(5, 0.1))
+    bounds = []
+    for given in (None, 0.01 * np.eye(3)):
+        campaign = InvalidationCalibrated(40, alpha=0.6).begin(candidates)
+        while (point := campaign.next()) is not None:
+            campaign.record(point, np.array([0.5, 0.0, 0.0]), given)
+        bounds.append(campaign.statements()[0].upper_mm)
+    assert bounds[0] < bounds[1]
+
+
+@pytest.mark.parametrize(
+    ("tolerance", "verdict"), [(1.2, ACCEPT), (1.3, ACCEPT), (1.0, UNDECIDED), (0.7, REJECT)]
+)
+def test_a_tolerance_is_held_to_both_bounds(tolerance, verdict):
+    found = decide(Statement(MEASURED, 0.9, 0.8, 1.2, 0.95), tolerance)
+    assert found.verdict == verdict
+    assert found.guard_band_mm == pytest.approx(0.3)
+    assert found.acceptance_limit_mm == pytest.approx(tolerance - 0.3)
+    assert found.risk == pytest.approx(0.05)
+
+
+@pytest.mark.parametrize(("value", "lower", "upper"), [(1.1, 0.9, 1.0), (0.9, 1.2, 1.0)])
+def test_bounds_that_contradict_each_other_or_the_value_decide_nothing(value, lower, upper):
+    for tolerance in (0.8, 1.05, 1.3):
+        found = decide(Statement(MEASURED, value, lower, upper, 0.95), tolerance)
+        assert found.verdict == UNDECIDED
+        assert found.reason.code == "contradict"
+
+
+def test_a_bound_that_leaves_candidates_out_accepts_nothing_and_may_reject():
+    said = Statement(CANDIDATES, 0.9, 0.8, 1.0, 0.95, excepted=3)
+    assert decide(said, 1.2).verdict == UNDECIDED
+    assert decide(said, 1.2).reason.numbers == {"excepted": 3}
+    assert decide(said, 0.7).verdict == REJECT
+
+
+def test_no_bound_is_no_decision_and_no_tolerance_an_error():
+    found = decide(Statement(CANDIDATES, 0.9, withheld=Reason("suspects")), 1.0)
+    assert (found.verdict, found.reason) == (UNDECIDED, Reason("suspects"))
+    for wrong in (0.0, -1.0, math.nan, math.inf):
+        with pytest.raises(InputError, match="tolerance"):
+            decide(Statement(MEASURED, 0.9, 0.8, 1.2, 0.95), wrong)
+
+
+LIMITS = [
+    *((name, "measurements", 0, REFUSED) for name in ADAPTIVE),
+    *((name, "measurements", 1, TAKEN) for name in ADAPTIVE),
+    *((name, "measurements", 2.5, REFUSED) for name in ADAPTIVE),
+    *((name, "confidence", 0.5, TAKEN) for name in WITH_CONFIDENCE),
+    *((name, "confidence", 0.49, REFUSED) for name in WITH_CONFIDENCE),
+    *((name, "confidence", 1.0, REFUSED) for name in WITH_CONFIDENCE),
+    *((name, "visited", 0.0, REFUSED) for name in WITH_VISITED),
+    *((name, "visited", 1.0, TAKEN) for name in WITH_VISITED),
+    *((name, "visited", 1.1, REFUSED) for name in WITH_VISITED),
+    *((name, "share", 0.0, REFUSED) for name in ("gamma_quantile", "region_share")),
+    *((name, "share", 1.0, REFUSED) for name in ("gamma_quantile", "region_share")),
+    *((name, "share", 0.999, TAKEN) for name in ("gamma_quantile", "region_share")),
+    ("region_share", "deviations", 0.0, TAKEN),
+    ("region_share", "deviations", -0.1, REFUSED),
+    ("model_invalidation_full", "bound_mm", 0.0, REFUSED),
+    ("model_invalidation_full", "bound_mm", 0.001, TAKEN),
+]
+
+
+@pytest.mark.parametrize(("name", "key", "value", "verdict"), LIMITS)
+def test_the_limits_of_a_setting(name, key, value, verdict):
+    settings = {"measurements": 40} | {key: value}
+    if verdict == TAKEN:
+        assert getattr(paper.assessor(name, **settings), key) == value
+        return
+    with pytest.raises(InputError) as caught:
+        paper.assessor(name, **settings)
+    (problem,) = caught.value.problems
+    assert problem.where == key
+    assert str(value) in problem.what
+    assert problem.allowed
+    assert name in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("measurements", "points", "share", "first"),
+    [(150, 100, 0.6, 100), (149, 100, 0.6, 60), (40, 100, 0.6, 24), (41, 100, 0.6, 25),
+     (1, 100, 0.6, 1), (1, 1, 0.6, 1), (50, 40, 0.5, 20), (60, 40, 0.5, 40)],
+)  # fmt: skip
+def test_the_first_visit_is_a_share_or_everything_where_the_budget_is_half_as_large_again(
+    measurements, points, share, first
+):
+    assert first_points(measurements, points, share) == first
+
+
+def test_noisy_readings_are_the_errors_and_noise_of_the_covariance_asked_for():
+    errors = np.array([[1.0, 2.0, 3.0], [0.0, 0.0, 0.0]])
+    root = np.array([[0.3, 0.0, 0.0], [0.1, 0.2, 0.0], [0.0, 0.05, 0.1]])
+    read = noisy(errors, root, 4000, 3, 1)
+    readings = np.array([read(0, visit) for visit in range(4000)])
+    np.testing.assert_allclose(readings.mean(axis=0), errors[0], atol=0.02)
+    np.testing.assert_allclose(np.cov(readings.T), root @ root.T, atol=0.006)
+    again = noisy(errors, root, 4000, 3, 1)
+    np.testing.assert_array_equal(again(1, 7), read(1, 7))
+    assert not np.array_equal(read(1, 7), read(1, 8))
+    assert not np.array_equal(noisy(errors, root, 4000, 3, 2)(1, 7), read(1, 7))

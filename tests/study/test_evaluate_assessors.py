@@ -1,0 +1,103 @@
+"""Assessors beside each other: the study's own rows, honest bounds, and bounds that are too low."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import paper_settings as paper
+import pytest
+
+from kinacc.assess.adaptive import Campaign
+from kinacc.assess.maximum import Maximum
+from kinacc.assess.single_shot import SingleShot
+from kinacc.assess.statement import Statement
+from kinacc.errors import InputError
+from kinacc.figures import fig4
+from kinacc.study import monte_carlo
+from kinacc.study.evaluate_assessors import assess_worlds, evaluate_assessors
+
+ERRORS = np.random.default_rng(11).normal(size=(40, 3)) * 0.3
+TRUE = float(np.linalg.norm(ERRORS, axis=1).max())
+
+
+class LargestReading:
+    """The paper's maximum as one would write it in a notebook."""
+
+    name = "largest_reading"
+
+    def begin(self, candidates):
+        return LargestCampaign(self, candidates)
+
+
+class LargestCampaign(Campaign):
+    def next(self):
+        taken = self.ledger.taken
+        return taken if taken < self.ledger.candidates.points else None
+
+    def statements(self):
+        return (Statement("measured", value_mm=float(self.ledger.sizes_mm().max())),)
+
+
+@dataclass(frozen=True)
+class Shrunk:
+    """Bounds of another assessor less a fifth."""
+
+    measurements: int
+    name: str = "shrunk"
+
+    def begin(self, candidates):
+        campaign = SingleShot(self.measurements).begin(candidates)
+        stated = campaign.statements
+        campaign.statements = lambda: [
+            replace(each, upper_mm=0.8 * each.upper_mm) for each in stated()
+        ]
+        return campaign
+
+
+def test_a_maximum_of_ones_own_gives_the_rows_of_the_study():
+    section = paper.study(measurements=40)
+    visits = monte_carlo.Visits(40, section["visiting_order"])
+    study = monte_carlo.simulate(ERRORS, [0.1, 0.3], range(5), visits, 3, [Maximum(40)])
+    own = assess_worlds(ERRORS, [LargestReading()], [0.1, 0.3], 40, 5, 3)
+    for name in ("noise_mm", "repetition", "measurements", "points_visited"):
+        assert own[name].tolist() == study[name].tolist()
+    assert own["assessed_mm"].to_numpy() == pytest.approx(study["assessed_mm"], rel=1e-12)
+    table = evaluate_assessors(ERRORS, [LargestReading()], [0.1, 0.3], 40, 5, 3)
+    summary = monte_carlo.summary(study, TRUE)
+    for name in ("mean_mm", "min_mm", "max_mm", "bias_mm", "rmse_mm", "repetitions"):
+        assert table[name].to_numpy() == pytest.approx(summary[name], rel=1e-9)
+    assert table["stated"].tolist() == [0.0, 0.0]
+    assert table["coverage"].isna().all()
+
+
+def test_honest_bounds_cover_and_bounds_shrunk_by_a_fifth_are_shown_to_fail():
+    table = evaluate_assessors(ERRORS, [SingleShot(1), Shrunk(1), Maximum(1)], 0.1, 40, 300, 1)
+    honest, shrunk, maximum = table.to_dict("records")
+    assert honest["coverage"] >= 0.91
+    assert honest["lower_coverage"] >= 0.91
+    assert shrunk["coverage"] < 0.8
+    assert (honest["stated"], maximum["stated"]) == (1.0, 0.0)
+    # One world for all: the same readings have the same largest.
+    assert honest["mean_mm"] == pytest.approx(maximum["mean_mm"], rel=1e-9)
+    assert honest["width_mm"] > shrunk["width_mm"] > 0.0
+
+
+def test_the_table_is_what_fig_4_draws():
+    paper_three = monte_carlo.assessors(paper.study(), all_readings=False)
+    table = evaluate_assessors(ERRORS, [*paper_three, LargestReading()], [0.1, 0.2], 40, 3, 1)
+    figure = fig4.draw({name: table[name].to_numpy() for name in table}, true_accuracy_mm=TRUE)
+    drawn = [text.get_text() for text in figure.axes[0].texts]
+    assert any("Largest" in each for each in drawn)
+    assert len(figure.axes[0].containers) == 4
+
+
+@pytest.mark.parametrize(
+    ("noise", "budget", "repetitions", "where"),
+    [(0.0, 40, 3, "noise_mm"), (0.1, 0, 3, "budget"), (0.1, 40, 0, "repetitions")],
+)
+def test_what_cannot_be_simulated_is_refused(noise, budget, repetitions, where):
+    with pytest.raises(InputError, match=where):
+        evaluate_assessors(ERRORS, [Maximum(1)], noise, budget, repetitions, 1)
+    with pytest.raises(InputError, match="twice"):
+        evaluate_assessors(ERRORS, [Maximum(1), Maximum(2)], 0.1, 40, 3, 1)
