@@ -36,7 +36,7 @@ def evaluate_assessors(
     assessors : sequence
         Of the paper (:data:`kinacc.assess.registry.PAPER`), of those that choose as they go
         (:data:`kinacc.assess.registry.ADAPTIVE`), or of one's own: an object whose
-        ``begin(candidates)`` returns a campaign with ``next``, ``record`` and ``statements`` as :class:`kinacc.assess.adaptive.Campaign`.
+        ``begin(candidates)`` returns a campaign (:class:`kinacc.assess.adaptive.Campaign`).
         ``name`` is its name in the table; its field ``measurements`` is set to the budget.
     noise_mm : float or sequence of floats
         Standard deviations of a reading per axis, mm.
