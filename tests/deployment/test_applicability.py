@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shared_data
-from command_line import call
 from small_arms import calibrated, joints, measured, measured_at, results_of
 from stages_by_hand import run_stage
 
@@ -16,7 +15,6 @@ from kinacc.deployment.applicability import is_measured_there, share_of_box
 from kinacc.deployment.folder import calibration
 from kinacc.kinematics import robot
 from kinacc.kinematics.model import JointState
-from kinacc.tables import store
 
 SERIES = "ur10_tmac/series_D.csv"
 
@@ -58,18 +56,6 @@ def test_errors_are_the_usual_ones_where_it_was_measured_and_larger_elsewhere(pa
     usual, there, elsewhere = found.residual.position_mm, off_mm[inside], off_mm[~inside]
     assert np.sqrt(np.mean(there**2)) < 1.3 * usual
     assert np.sqrt(np.mean(elsewhere**2)) > 2.0 * usual
-
-
-@shared_data.needed(SERIES)
-def test_the_half_page_says_how_little_of_the_box_of_joints_was_measured(part_of_the_series):
-    results = part_of_the_series[0]
-    told = call("fitted", results).output
-    said = "of poses in these ranges (share of travel), under 1 % are like those measured:"
-    assert said in told
-    known = store.read(results / "summary.parquet")
-    share = np.asarray(known["value"])[np.asarray(known["topic"]) == "like_measured"]
-    assert len(share) == 1
-    assert 0.0 <= share[0] < 0.01
 
 
 @pytest.mark.parametrize("model", ["dh", "vec"])

@@ -2,8 +2,6 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from small_arms import calibrated, joints
 
 from kinacc.deployment.compensate import PoseStatus, compensate, programmed
@@ -35,21 +33,6 @@ def test_joints_come_back_from_their_own_poses(name, model):
     moved = np.abs(found.q_rad - q_rad).max(axis=1)
     assert np.median(moved) < 1e-8
     assert moved.max() < 1e-4  # the wrist of a nearly singular posture is known less well
-
-
-@settings(max_examples=20, deadline=None)
-@given(st.integers(0, 10_000), st.sampled_from(["dh", "vec"]))
-def test_a_nominal_program_is_corrected_by_little(seed, model):
-    arm, q_rad = calibrated("mh180", model), joints("mh180", 5, seed)
-    wanted = programmed(arm, q_rad)
-    found = compensate(arm, wanted, q_rad)
-    good = found.status <= PoseStatus.OTHER_POSTURE
-    assert good.mean() >= 0.8  # a wrist near alignment may need a turn the range does not have
-    off, _ = left(arm, found.q_rad[good], Pose(*(part[good] for part in wanted)))
-    assert off < 1e-6
-    assert (found.change[good] == found.q_rad[good] - q_rad[good]).all()
-    nominal_off = np.linalg.norm(predict(arm, q_rad).pose.position_mm - wanted.position_mm, axis=1)
-    assert nominal_off.max() > 1e-3  # there was something to correct
 
 
 def test_without_joints_to_be_near_any_posture_the_data_cover_is_good():

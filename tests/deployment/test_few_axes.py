@@ -75,15 +75,6 @@ def test_the_point_is_exact_and_no_joint_turns_it_nearer(name):
             assert np.linalg.norm(left) > turn[row] - 1e-7
 
 
-def test_without_joints_to_be_near_a_posture_is_found():
-    plain, arm = real_arm("scara")
-    wanted = programmed(plain, program("scara", 3))
-    found = compensate(arm, wanted)
-    assert (found.status == PoseStatus.CONVERGED).all()
-    there = arm.pose(JointState(found.q_rad))
-    assert np.linalg.norm(there.position_mm - wanted.position_mm, axis=1).max() < 1e-6
-
-
 def test_another_orientation_than_the_arm_takes_is_not_reached():
     plain, arm = real_arm("scara")
     q = program("scara", 2)

@@ -88,19 +88,6 @@ def history(*sessions: Session) -> Columns:
     return histories.history(sessions, WEIGHT, seed=0)
 
 
-def test_an_arm_that_nothing_happened_to_keeps_its_calibration():
-    months = [session(measured(month), f"2026-0{month}-01") for month in (1, 2, 3)]
-
-    found = history(*months)
-
-    assert list(found["verdict"]) == ["first", "holds", "holds"]
-    assert list(found["in_force"]) == [None, "arm-2026-01-01", "arm-2026-01-01"]
-    assert (found["moved_mm"][1:] < found["chance_mm"][1:]).all()
-    assert (found["beyond_mm"][1:] == 0.0).all()
-    assert np.isnan(found["joint"]).all()
-    assert np.isfinite(found["in_force_mean_mm"][1:]).all()
-
-
 def test_a_knocked_joint_is_named_and_the_new_calibration_is_in_force_from_then_on():
     # 0.7 mrad is named on each of the first 12 accepted arms, 0.5 mrad on 9 of them.
     knocked = [0.0, 0.0, 0.7, 0.0, 0.0, 0.0]
@@ -223,15 +210,3 @@ def test_series_measured_in_different_parts_of_the_joints_are_said_to_tell_nothi
 
     assert found["verdict"][1] == "cannot be told"
     assert "joint ranges of arm-2026-01-01" in found["reason"][1]
-
-
-def test_simulated_years_can_be_run_from_their_tool(tmp_path, monkeypatch):
-    import history_years
-
-    monkeypatch.setattr(history_years, "POOL", 2000)
-    history_years.run(same=1, other=1, out=tmp_path)
-
-    years = np.genfromtxt(tmp_path / "years.csv", delimiter=",", names=True, dtype=None)
-    assert list(years["decisions"]) == [11, 11]
-    assert years["false_alarms"].sum() <= 2
-    assert (tmp_path / "power.csv").is_file()

@@ -121,17 +121,6 @@ def test_a_generated_file_moves_as_the_calibrated_arm(name):
         assert_same(arm.pose(JointState(q_rad @ arm.robot.joint_map.T), "base", point), theirs)
 
 
-def test_a_generated_file_is_read_back_as_the_same_arm(tmp_path):
-    arm = bent(robot.load("ur10"))
-    path = tmp_path / "own.urdf"
-    path.write_text(urdf.generated(of(arm)))
-    back = robot.load(path)
-    q_rad = some_joints(arm.robot)
-    wanted = arm.pose(JointState(q_rad))
-    assert np.abs(robot.forward(back, q_rad).position_mm - wanted.position_mm).max() < CLOSE_MM
-    np.testing.assert_allclose(back.q_max_rad, arm.robot.q_max_rad)
-
-
 @pytest.mark.parametrize("robot_from", ["file", "shipped"])
 @pytest.mark.parametrize("tail", [TAIL, ""])
 def test_a_file_of_ones_own_is_corrected_in_place(tmp_path, robot_from, tail):

@@ -52,29 +52,6 @@ def test_a_robot_file_is_read_back_bit_by_bit(name, tmp_path):
     np.testing.assert_allclose(carried.rotation, arm.targets[TOOL].rotation, atol=1e-14)
 
 
-def test_a_coupled_sliding_arm_with_a_base_is_read_back(tmp_path):
-    arm, coupled = bent("mh180"), np.eye(6)
-    coupled[2, 1] = -1.0
-    slides = np.array([True, *[False] * 5])
-    base = Pose(exp_so3(np.array([0.0, 0.1, 0.0])), np.array([0.0, 0.0, 500.0]))
-    own = replace(
-        arm.robot,
-        joint_map=coupled,
-        base=base,
-        flange=base,
-        dh=replace(arm.robot.dh, prismatic=slides),
-        q_min_rad=np.array([-500.0, *arm.robot.q_min_rad[1:]]),
-        q_max_rad=np.array([500.0, *arm.robot.q_max_rad[1:]]),
-    )
-    arm = replace(arm, robot=own, model=replace(arm.model, prismatic=slides))
-    back = read_back(arm, tmp_path)
-    np.testing.assert_array_equal(back.joint_map, coupled)
-    np.testing.assert_array_equal(back.q_min_rad, own.q_min_rad)
-    q = np.random.default_rng(1).uniform(-0.5, 0.5, (5, 6))
-    wanted = arm.pose(JointState(q @ coupled.T), "base", "flange").position_mm
-    np.testing.assert_allclose(robot.forward(back, q).position_mm, wanted, atol=1e-9)
-
-
 def model_table(arm):
     """``dh_model`` of an arm, with standard deviations."""
     table = {"joint": np.arange(1, arm.model.joints + 1)}
