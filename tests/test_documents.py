@@ -86,7 +86,7 @@ def shown_commands(page: Path) -> list[list[str]]:
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_commands_are_there_and_take_what_is_shown(page):
     for words in shown_commands(page):
-        command, above = main, click.Context(main)
+        command, above = main, click.Context(main, **main.context_settings)
         while isinstance(command, click.Group):
             command = command.get_command(above, words[0])
             assert command is not None, words

@@ -145,7 +145,6 @@ def test_standard_deviations_of_an_arm_with_eccentric_gears_are_marked(eccentric
     printed("report", results, "--out", page)
     marked = [
         printed("summary", results),
-        *(printed("show", results, table) for table in ("dh_model", "dh_identified")),
         *(next(tmp_path.glob(each)).read_text("utf-8") for each in ("*.csv", "*.md", "*.tex")),
         page.read_text("utf-8"),
         printed("compare", results, results, "--page", compared),
@@ -156,7 +155,6 @@ def test_standard_deviations_of_an_arm_with_eccentric_gears_are_marked(eccentric
         assert "valid given the model" in text
         assert re.search(rf"\(\S+ mm\): DH {re.escape(f'{ratio:.3g}')}\b", text)
     for each in (
-        told("show", results, "dh_model")["standard_deviations"],
         json.loads(next(tmp_path.glob("*.json")).read_text())["standard_deviations"],
         *told("compare", results, results)["standard_deviations"],
     ):

@@ -1,159 +1,254 @@
-"""``kinacc show``: a table in the terminal, a picture of it, or the same for a spreadsheet."""
+"""``kinacc show``: the tables of a folder, and one table in the terminal or in a file."""
 
 from __future__ import annotations
 
+import json
 import shlex
 import sys
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
+import pandas as pd
+from rich.console import Console
+from rich.table import Table
 
-from kinacc.cli.output import Output, answers
-from kinacc.errors import Problem, refuse
+from kinacc.campaign.journal import PLAN
+from kinacc.cli.output import plain, require_writable
+from kinacc.cli.summary import write
+from kinacc.config.values import nearest
+from kinacc.errors import InputError, Problem, as_seen, first_few, refuse
+from kinacc.tables import store
+from kinacc.tables.contract import ARTEFACTS
 
-if TYPE_CHECKING:
-    from kinacc.cli.screen import Screen
-    from kinacc.cli.sheet import Sheet
-
-_ALL = "all"
 _ROWS = 20
-
-
-class _Rows(click.ParamType):
-    name = "rows"
-
-    def convert(self, value, param, ctx) -> int:
-        """A number of rows; more than any table has for all of them."""
-        if isinstance(value, int) or value == _ALL:
-            return sys.maxsize if value == _ALL else value
-        if not value.isdecimal() or int(value) < 1:
-            self.fail(f"{value!r} is neither a number of rows nor {_ALL}", param, ctx)
-        return int(value)
+_NONE = "-"
+_SENTENCE = 40  # characters: longer texts are wrapped
 
 
 @click.command("show")
-@click.argument("path", type=click.Path(), default="results")
+@click.argument("path", type=click.Path(path_type=Path), default=Path("results"))
 @click.argument("name", metavar="[TABLE]", required=False)
-@click.option("--columns", metavar="A,B,..", help="Show these columns, in this order; q* for q1 ..")
+@click.option("--columns", metavar="A,B,..", help="Columns, in this order; q* for q1 ..")
 @click.option(
     "--where",
     "conditions",
     multiple=True,
     metavar="COLUMN=VALUE",
-    help="Take only rows that say so, - where there is no value; may be repeated.",
+    help="Rows with this value, - for none; may be repeated.",
 )
-@click.option(
-    "--rows",
-    type=_Rows(),
-    metavar="N|all",
-    help=f"Rows: of both ends on the screen [{_ROWS}], the first in CSV, JSON and --out [all].",
-)
-@click.option("--describe", is_flag=True, help="Say what the columns mean, and what they hold.")
-@click.option("--csv", "as_csv", is_flag=True, help="Print rows with all digits as CSV.")
-@answers("Print rows as JSON.", table=True)
-def show(
-    path: str,
-    name: str | None,
-    columns: str | None,
-    conditions: tuple[str, ...],
-    rows: int | None,
-    describe: bool,
-    as_csv: bool,
-    out: Output,
-) -> None:
-    """Show a TABLE of results, or what is in the folder PATH, of results or of a campaign.
-
-    A table is a Parquet file, named with or without its ending, alone or after its folder. What is
-    the same in every row stands above the table; what does not fit the screen is named.
+@click.option("--rows", type=click.IntRange(1), help=f"Number of rows.  [{_ROWS} on the screen]")
+@click.option("--describe", is_flag=True, help="Unit, meaning and contents of the columns.")
+@click.option("--csv", "as_csv", is_flag=True, help="Rows with all digits as CSV.")
+@click.option("--json", "as_json", is_flag=True, help="Rows as JSON.")
+@click.option("--out", "-o", type=click.Path(), help="Table as .csv, .xlsx or .parquet.")
+@click.option("--force", is_flag=True, help="Replacement of an existing file.")
+def show(path, name, columns, conditions, rows, describe, as_csv, as_json, out, force) -> None:
+    """Show a TABLE of results, or list the tables of the folder PATH.
 
     \b
     Example:
-      kinacc show
       kinacc show results/ur10_b
       kinacc show results/ur10_b residuals --where fold=-
       kinacc show results/ur10_b/measurements --columns "pose,q*" --csv > joints.csv
     """
-    from kinacc.cli import show_files, show_table
-
-    refuse(at_odds({"--csv": as_csv, "--json": out.as_json}))
-    refuse(at_odds({"--describe": describe, "--out": out.table is not None}))
-    answer = Answer(out, as_csv)
-    place = show_files.found(path, name)
+    require_writable([out], force, (".csv", ".xlsx", ".parquet"))
+    place = find(path, name)
+    units: Mapping[str, str] = {}
     if place.is_dir():
-        given = {"--columns": columns, "--where": conditions, "--describe": describe}
-        refuse(_of_tables(place, given))
-        listed = show_files.listing(place)
-        answer.give(listed.sheet, rows, below=listed.below)
-        return
-    kept = show_table.where(show_table.read(place), conditions)
-    chosen = show_table.choose(kept, columns)
-    above, below = show_table.words(chosen, describe)
-    if describe:
-        answer.give(show_table.described(chosen), rows, above, below)
+        of_table = {"--columns": columns, "--where": conditions, "--describe": describe}
+        named = [option for option, value in of_table.items() if value]
+        if named:
+            what = f"is a folder, and {', '.join(named)} is about one table"
+            raise InputError(Problem(str(place), what, fix=f"{_typed(place)} lists its tables"))
+        frame = listing(place)
     else:
-        answer.give(chosen.sheet, rows, above, below, columns is None, is_table=True)
+        frame, units = read(place)
+        frame = choose(frame, columns, conditions)
+        if describe:
+            frame, units = described(frame, units, place.stem), {}
+    cut = frame if rows is None else frame[:rows]
+    if out is not None:
+        write(cut, Path(out))
+        click.echo(f"{out}: {len(cut)} rows")
+    elif as_json:
+        found = [plain(each) for each in cut.to_dict("records")]
+        click.echo(json.dumps({"units": dict(units), "rows": found}, indent=1))
+    elif as_csv:
+        click.echo(cut.to_csv(index=False, float_format="%.12g"), nl=False)
+    else:
+        most = len(frame) if place.is_dir() or describe else rows or _ROWS
+        print_table(frame, units, most, f"{place}: {len(frame)} rows" if place.is_file() else "")
+        if place.is_dir():
+            click.echo(_next(place, frame))
+        elif (known := ARTEFACTS.get(place.stem)) is not None:
+            click.echo(known.meaning)
 
 
-@dataclass(frozen=True)
-class Answer:
-    """Where a sheet goes: to the screen, or to a machine."""
+def find(path: Path, name: str | None) -> Path:
+    """The file or folder meant. Raises InputError with what is there instead."""
+    asked = path if name is None else path / name
+    for each in (asked, asked.with_name(f"{asked.name}.parquet") if asked.name else asked):
+        if each.is_file():
+            return each
+    if asked.is_dir():
+        return asked
+    above = next(each for each in asked.parents if each.exists())
+    if above.is_file():
+        raise InputError(Problem(str(above), f"is a file, and holds no {asked.name}", "a folder"))
+    there = sorted(each.stem for each in above.glob("*.parquet"))
+    there += sorted(each.name for each in above.iterdir() if each.is_dir() and each.name[0] != ".")
+    elsewhere = sorted(Path().glob(f"results/*/{asked.stem}.parquet"))
+    fix = f"there is {elsewhere[0]}" if elsewhere else ""
+    if close := nearest(asked.stem, tuple(there)):
+        fix = f"did you mean {above / close}?"
+    raise InputError(Problem(str(asked), "no such table or folder", first_few(there, 30), fix))
 
-    out: Output
-    as_csv: bool = False
 
-    def give(
-        self,
-        sheet: Sheet,
-        rows: int | None,
-        above: Iterable[str] = (),
-        below: Iterable[str] = (),
-        hoist: bool = False,
-        is_table: bool = False,
-    ) -> None:
-        """Hand out a sheet, ``rows`` of it at most where that is said.
+def listing(folder: Path) -> pd.DataFrame:
+    """Tables of a folder with rows and meaning, or its folders with tables. InputError if none."""
+    paths = {each.stem: each for each in folder.glob("*.parquet") if each.name[0] != "."}
+    names = [name for name in ARTEFACTS if name in paths]
+    names += sorted(paths.keys() - names)
+    rows: list[tuple] = []
+    for name in names:
+        meaning = ARTEFACTS[name].meaning.partition(". ")[0] if name in ARTEFACTS else ""
+        try:
+            rows.append((name, str(store.row_count(paths[name])), meaning))
+        except InputError as error:
+            rows.append((name, "", error.problems[0].what))
+    if rows:
+        return pd.DataFrame(rows, columns=["table", "rows", "meaning"])
+    within = [each for each in sorted(folder.iterdir()) if each.is_dir()]
+    rows = [(each.name, len(list(each.glob("*.parquet")))) for each in within]
+    rows = [row for row in rows if row[1]]
+    if rows:
+        return pd.DataFrame(rows, columns=["folder", "tables"])
+    if (folder / PLAN).is_file():
+        fix = f"kinacc campaign report {shlex.quote(str(folder))} writes them"
+        raise InputError(Problem(str(folder), "is a campaign without tables so far", fix=fix))
+    allowed = "the folder of a data set, or of all results"
+    raise InputError(Problem(str(folder), "holds no table", allowed))
 
-        What stands ``above`` and ``below`` is for the screen, and so is leaving out rows of a table
-        unasked.
-        """
-        from kinacc.cli.screen import Screen
 
-        if self.out.as_json or self.out.table is not None:
-            self.out.deliver(sheet.first(rows))
-            return
-        if self.as_csv:
-            click.echo(sheet.first(rows).as_csv(), nl=False)
-            return
-        screen = Screen.here()
-        screen.words(sheet.title, "bold")
-        for line in above:
-            screen.words(line)
-        if is_table and len(sheet) == 1:
-            screen.record(sheet)
+def read(path: Path) -> tuple[pd.DataFrame, dict[str, str]]:
+    """A Parquet file and the units of its columns. InputError where it is none, or damaged."""
+    table = store.read_arrow(path, any_type=True)
+    units = {each.name: (each.metadata or {}).get(b"unit", b"").decode() for each in table.schema}
+    return table.to_pandas(), units
+
+
+def choose(
+    frame: pd.DataFrame, columns: str | None, conditions: Sequence[str] = ()
+) -> pd.DataFrame:
+    """Rows that meet the conditions, and the columns named. InputError for unknown columns."""
+    problems = []
+    for condition in conditions:
+        name, mark, value = condition.partition("=")
+        if not mark or name not in frame:
+            problems.append(_unknown("--where", name, frame))
+            continue
+        values = frame[name]
+        if value in ("", _NONE):
+            frame = frame[values.isna()]
+        elif pd.api.types.is_numeric_dtype(values):
+            wanted = pd.to_numeric(pd.Series([value]), errors="coerce")[0]
+            frame = frame[(values - wanted).abs() <= 1e-9 * abs(wanted)]
         else:
-            more = ["--columns {0},.. shows them"] if is_table else []
-            screen.table(sheet, rows or (_ROWS if is_table else None), hoist, *more)
-        for line in below:
-            screen.words(line, "dim")
-        self.show(screen)
-
-    def show(self, screen: Screen) -> None:
-        """Print what was composed; what is coloured was decided by the terminal and NO_COLOR."""
-        click.echo(screen.text(), nl=False, color=True)
-
-
-def at_odds(given: dict[str, bool]) -> list[Problem]:
-    """The problem with options of which only one can be had."""
-    both = [name for name, is_given in given.items() if is_given]
-    return [Problem(" and ".join(both), "cannot be had together", "one")] if both[1:] else []
+            frame = frame[values.astype(str) == value]
+    wanted_names: list[str] = []
+    for pattern in columns.split(",") if columns else frame.columns:
+        own = [each for each in frame.columns if fnmatchcase(each, pattern.strip())]
+        if not own:
+            problems.append(_unknown("--columns", pattern.strip(), frame))
+        wanted_names += own
+    refuse(problems)
+    if not len(frame):
+        raise InputError(Problem("--where", "no row meets " + " and ".join(conditions)))
+    return frame[list(dict.fromkeys(wanted_names))]
 
 
-def _of_tables(folder: Path, given: dict[str, object]) -> list[Problem]:
-    """The problem with options that are about a table, where a folder was given."""
-    names = [name for name, value in given.items() if value]
-    if not names:
-        return []
-    fix = f"name one as well; `{shlex.join(['kinacc', 'show', str(folder)])}` lists them"
-    return [Problem(str(folder), f"is a folder, {', '.join(names)} is about one table", "", fix)]
+def described(frame: pd.DataFrame, units: Mapping[str, str], artefact: str) -> pd.DataFrame:
+    """Unit, meaning and contents of every column."""
+    known = {}
+    if artefact in ARTEFACTS:
+        contract = ARTEFACTS[artefact]
+        known = {each.name: each.meaning for each in contract.columns}
+    rows = []
+    for name, values in frame.items():
+        stem = str(name).rstrip("0123456789") + "*"
+        there = values.dropna()
+        if pd.api.types.is_numeric_dtype(values) and len(there):
+            holds = f"{there.min():.6g} to {there.max():.6g}"
+        else:
+            kinds = list(dict.fromkeys(map(str, there)))
+            holds = first_few(kinds, 4) if len(kinds) <= 4 else f"{len(kinds)} different texts"
+        absent = f", {len(values) - len(there)} without" if len(there) < len(values) else ""
+        meaning = known.get(str(name), known.get(stem, ""))
+        rows.append((name, units.get(str(name), ""), meaning, holds + absent))
+    return pd.DataFrame(rows, columns=["column", "unit", "meaning", "holds"])
+
+
+def print_table(frame: pd.DataFrame, units: Mapping[str, str], most: int, title: str = "") -> None:
+    """Print at most so many rows, both ends; constant columns once, above the table."""
+    console = Console(file=sys.stdout, highlight=False, markup=False, emoji=False)
+    if title:
+        console.print(as_seen(title), soft_wrap=True)
+    heads = {name: _heading(str(name), units.get(str(name), "")) for name in frame}
+    cells = {name: _cells(values) for name, values in frame.items()}
+    alike = [name for name in cells if len(frame) > 1 and len(set(cells[name])) == 1]
+    if alike and len(alike) < len(cells):
+        constant = ", ".join(f"{heads[name]} {cells[name][0]}" for name in alike)
+        console.print(as_seen(f"in every row: {constant}"))
+        cells = {name: each for name, each in cells.items() if name not in alike}
+    head = len(frame) if len(frame) <= most else most - most // 3
+    tail = len(frame) if head == len(frame) else len(frame) - most // 3
+    rows = [*range(head), *range(tail, len(frame))]
+    table = Table(box=None, pad_edge=False)
+    left, hidden = console.width, []
+    for name, texts in cells.items():
+        width = max(len(heads[name]), *(len(texts[row]) for row in rows))
+        wraps = width > _SENTENCE  # sentences take the room that is left
+        left -= (_SENTENCE if wraps else width) + 2
+        if left < 0 and table.columns:
+            hidden.append(str(name))
+            continue
+        numeric = pd.api.types.is_numeric_dtype(frame[name])
+        table.add_column(heads[name], justify="right" if numeric else "left", no_wrap=not wraps)
+    kept = [each for name, each in cells.items() if str(name) not in hidden]
+    for row in rows:
+        if row == tail:
+            table.add_row(f".. {tail - head} more")
+        table.add_row(*(each[row] for each in kept))
+    console.print(table)
+    if hidden:
+        console.print(as_seen(f"not shown: {', '.join(hidden)} (--columns {hidden[0]},..)"))
+
+
+def _heading(name: str, unit: str) -> str:
+    told = unit in ("", "1") or unit.startswith("see ") or name.endswith(f"_{unit}")
+    return as_seen(name if told else f"{name} [{unit}]")
+
+
+def _cells(values: pd.Series) -> list[str]:
+    """Values as text: numbers with six significant digits, - for none."""
+    if pd.api.types.is_float_dtype(values):
+        return [_NONE if each != each else f"{each:.6g}" for each in values]
+    return [_NONE if each is None or each != each else as_seen(str(each)) for each in values]
+
+
+def _unknown(place: str, name: str, frame: pd.DataFrame) -> Problem:
+    names = tuple(map(str, frame.columns))
+    close = nearest(name, names)
+    fix = f"did you mean {close}?" if close else ""
+    return Problem(place, f"there is no column {name!r}", ", ".join(names), fix)
+
+
+def _next(folder: Path, frame: pd.DataFrame) -> str:
+    first = folder / str(frame.iloc[0, 0])
+    return f"{_typed(first)} shows one; --describe explains its columns"
+
+
+def _typed(place: Path) -> str:
+    return shlex.join(["kinacc", "show", str(place)])

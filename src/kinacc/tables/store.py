@@ -248,6 +248,11 @@ def read_schema(path: Path | str) -> pa.Schema:
     return _open(path, lambda file: file.schema_arrow)
 
 
+def row_count(path: Path | str) -> int:
+    """Number of rows of a table's file; InputError if absent or not Parquet."""
+    return _open(path, lambda file: file.metadata.num_rows)
+
+
 def read_metadata(path: Path | str) -> dict[str, str]:
     """Provenance of a table's file as text, the same for all tables of a stage.
 
