@@ -14,7 +14,6 @@ from kinacc.measurements.table import RawTable
 BEYOND = 1e8  # no unit makes a length of this
 LIMIT_SLACK = 1e-6  # a joint may be beyond its limits by the last written digit
 _UNIT_QUATERNION = 1e-3  # how far from 1 a measured quaternion's length may be
-_CORRELATION = 1.0 + 1e-6  # a correlation may exceed 1 by rounding only
 
 
 def none_read(points: np.ndarray, number: float) -> np.ndarray:
@@ -54,16 +53,14 @@ def quaternion_problems(
 
 
 def covariance_problems(
-    table: RawTable, elements: Sequence[np.ndarray], places: Sequence[Place]
+    table: RawTable, covariance: np.ndarray, places: Sequence[Place]
 ) -> Iterator[Problem]:
-    """Covariances (xx, xy, xz, yy, yz, zz, each (n,)) that are none."""
-    xx, xy, xz, yy, yz, zz = elements
-    with np.errstate(invalid="ignore", divide="ignore"):
-        correlations = np.abs([xy / np.sqrt(xx * yy), xz / np.sqrt(xx * zz), yz / np.sqrt(yy * zz)])
-        determinant = xx * (yy * zz - yz**2) - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz)
-        wrong = (np.min([xx, yy, zz], axis=0) <= 0.0) | (correlations.max(axis=0) > _CORRELATION)
-        wrong |= determinant < -1e-9 * xx * yy * zz
-    if wrong.any():
+    """Matrices (n, 3, 3) that are no covariances."""
+    there = np.isfinite(covariance).all(axis=(1, 2))
+    eigenvalues = np.linalg.eigvalsh(covariance[there])
+    wrong = np.flatnonzero(there)[eigenvalues[:, 0] < -1e-9 * np.abs(eigenvalues[:, 2])]
+    wrong = np.union1d(wrong, np.flatnonzero((np.einsum("nii->ni", covariance) <= 0.0).any(axis=1)))
+    if wrong.size:
         allowed = "a matrix without negative variances"
         yield at(table, places, wrong, "is no covariance", allowed)
 

@@ -97,20 +97,16 @@ def by_feature(table: RawTable) -> RawTable:
         for axis in AXES:
             columns[f"{value} {axis}"] = [cells.get(each.get(axis, -1)) for each in rows]
             units[f"{value} {axis}"] = units.get(value, "")
-    notes, differ = list(table.notes), []
     for name in table.columns:
         if name not in (found.feature, found.axis, *found.values):
             cells, gaps = table.columns[name], table.gaps(name)
-            own = [[cells[r] for r in each.values() if not gaps[r]] for each in rows]
-            if any(len({*each}) > 1 for each in own):
-                differ.append(name)
-            else:
+            own = [dict.fromkeys(cells[r] for r in each.values() if not gaps[r]) for each in rows]
+            if all(len(each) < 2 for each in own):  # of the feature, and not of an axis
                 columns[name] = [next(iter(each), None) for each in own]
+    notes = list(table.notes)
     if other := [str(table.columns[found.axis][n]) for n, axis in enumerate(axes) if not axis]:
         told = ", ".join([*dict.fromkeys(other)][:5])
         notes.append(f"{len(other)} rows of other quantities than X, Y, Z, not read ({told})")
-    if differ:
-        notes.append(f"columns that differ between the axes, not read: {', '.join(differ)}")
     letters = table.letters and dict.fromkeys(columns, "") | dict(table.letters)
     made = replace(table, columns=frame(columns), line=table.line[first], units=units)
     return replace(made, notes=tuple(notes), letters=letters)

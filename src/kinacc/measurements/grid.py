@@ -238,17 +238,15 @@ def _problems(
         problems.append(Problem(path, "no rows under the column names", "at least one row"))
     where = f"{path}: {word} {line or 1}"
     if len(names) == 1:
-        others = [mark for mark in (",", ";", "\t") if mark != delimiter and mark in names[0]]
-        hint = f"set measurements.file.delimiter to {others[0]!r}" if others else ""
-        problems.append(Problem(where, f"only one column, {names[0][:60]!r}", "several", hint))
+        fix = "set measurements.file.delimiter to ';', ',' or a tab"
+        problems.append(Problem(where, f"only one column, {names[0][:60]!r}", "several", fix))
     if doubled := sorted(name for name, count in Counter(names).items() if count > 1):
         problems.append(Problem(where, f"column names given twice: {', '.join(doubled)}"))
     ragged = [(number, len(cells)) for number, cells in rows if len(cells) != len(names)]
     if ragged and not problems:
         number, width = ragged[0]
-        fix = "check the delimiter and the decimal mark"
-        if delimiter == "," and len(ragged) == len(rows) and width > len(names):
-            fix += ": decimal commas between commas cannot be told apart, export with another one"
+        fix = "check the delimiter and the decimal mark: decimal commas between commas cannot be "
+        fix += "told apart"
         what = f"{width} cells under {len(names)} column names"
         more = f" and {len(ragged) - 1} more" if len(ragged) > 1 else ""
         allowed = f"{len(names)} cells in every row"

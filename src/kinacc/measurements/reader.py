@@ -254,11 +254,12 @@ def _uncertainty(table, target: Target, turn: np.ndarray, layout: Layout, proble
     if target.std:
         values[:3] = spread(target.std).T
     if target.covariance:
-        xx, xy, xz, yy, yz, zz = elements = _stacked(table, target.covariance, problems).T
-        problems += faults.covariance_problems(table, elements, target.covariance)
-        with np.errstate(invalid="ignore", divide="ignore"):
-            values[:3] = np.sqrt([xx, yy, zz])
-            values[3:6] = xy / np.sqrt(xx * yy), xz / np.sqrt(xx * zz), yz / np.sqrt(yy * zz)
+        elements = _stacked(table, target.covariance, problems)
+        matrix = elements[:, [0, 1, 2, 1, 3, 4, 2, 4, 5]].reshape(-1, 3, 3)
+        problems += faults.covariance_problems(table, matrix, target.covariance)
+        with np.errstate(invalid="ignore"):
+            values[:3] = np.sqrt(elements[:, [0, 3, 5]]).T
+            values[3:6] = elements[:, [1, 2, 4]].T / values[[0, 0, 1]] / values[[1, 2, 2]]
     if target.std_turn and target.turn and layout.orientation != "quaternion":
         std = spread(target.std_turn)
         axes = layout.convention.lower()

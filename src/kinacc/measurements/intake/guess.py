@@ -240,20 +240,15 @@ def _refuse(path: str, table: RawTable, found: NamedColumns, take: Sequence[str]
             why = next((f": {why}" for group, why in found.aside if column in group.names), "")
             allowed = "one column of joints, of a point or of an orientation"
             problems.append(Problem(f"--take {column}", f"cannot be read{why}", allowed))
-    kinds = ((found.joints, ("joints",), "no columns of 4 to 7 joints", "q1_deg, q2_deg .."),
-             (found.targets, ("point", "pose"), "no columns of a measured point",
-              "x_mm, y_mm, z_mm"))  # fmt: skip
-    for _, kind, what, names in (each for each in kinds if not each[0]):
-        left = [(group, why) for group, why in found.aside if group.kind in kind]
+    joints = (found.joints, "no columns of 4 to 7 joints", ("joints",), "q1_deg ..")
+    points = (found.targets, "no columns of a measured point", ("point", "pose"), "x_mm ..")
+    for _, what, kinds, names in (each for each in (joints, points) if not each[0]):
+        left = [(group, why) for group, why in found.aside if group.kind in kinds]
         told = "; ".join(f"{group.in_words()}: {why}" for group, why in left)
-        fix = f"name them {names}"
-        if bool(found.joints) != bool(found.targets):
-            fix += "; where they stand in a file of their own, give both: kinacc init JOINTS POINTS"
-        nominal = [g.names[0] for g, _ in left if g.kind == "point" and g.role == NOMINAL]
-        if nominal:
-            fix += f"; --take {shlex.quote(nominal[0])} reads them all the same"
-        what = f"{what} were found" + (f" ({told})" if told else "")
-        problems.append(Problem(path, what, fix=fix))
+        takes = [g.names[0] for g, _ in left if g.kind == "point" and g.role == NOMINAL][:1]
+        fix = f"name them {names}, or give joints and points as two files: init JOINTS POINTS"
+        fix += "".join(f"; --take {shlex.quote(name)} reads them all the same" for name in takes)
+        problems.append(Problem(path, f"{what} were found ({told})", fix=fix))
     refuse(problems, f"{path} cannot be described")
 
 

@@ -176,13 +176,8 @@ def encoding_of(path: Path) -> str:
         if error.start < len(sample) - 2:
             return "latin-1"
     # Japanese where the bytes are pairs that begin as its usual characters do, else Western.
-    usual = pairs = place = 0
-    while place < len(sample):
-        single = sample[place] < 0x80 or 0xA0 <= sample[place] <= 0xDF
-        pairs += not single
-        usual += not single and sample[place] < 0xA0
-        place += 1 if single else 2
-    return "cp932" if pairs and 2 * usual >= pairs else "latin-1"
+    leads = [pair[0] for pair in re.findall(rb"[\x81-\x9f\xe0-\xfc].", sample)]
+    return "cp932" if leads and 2 * sum(lead < 0xA0 for lead in leads) >= len(leads) else "latin-1"
 
 
 def _workbook(path: Path, answers: Mapping[str, str]) -> tuple[Layout, Head, list[Row], list[str]]:
@@ -264,9 +259,7 @@ def _named(
     for line, cells in rows[: head.first]:
         if len(cells) > 3 and len(filled(cells)) == len(cells) and not heads.numbers_in(cells):
             what = f"{len(cells)} names above rows of {head.width} cells"
-            fix = "export it with ; or tab between the columns"
-            if written.delimiter == "," and head.width > len(cells):
-                fix = f"decimal commas between commas cannot be told apart: {fix}"
+            fix = "decimal commas between commas cannot be told apart: export it with ; or tab "
             raise InputError(Problem(f"{path}: line {line}", what, "a name for every cell", fix))
     fix = "write a line of names above the numbers, such as q1_deg,..,x_mm,y_mm,z_mm, or give "
     fix += f"--names with {head.width} names parted by commas"
