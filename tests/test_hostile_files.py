@@ -64,6 +64,7 @@ YAML = {
     "long digits under a tag": (f'seed: !!int "{"1:" * 4000}1"', "a number of 8001 characters"),
     "a long text": (f"seed: {'x' * 50_000}", "text of 50000 characters"),
     "a large file": ("# nothing\n" * 500_000, "at most 4000 kB"),
+    "many unknown keys": ("".join(f"key_{i}: 0\n" for i in range(90_000)), "more"),
     "many values": ("seed: [" + "1," * 300_000 + "1]", "too many values"),
     "tags that do not fit": ("seed: !!timestamp x\n!!set y: !!bool z\n? !!int ''\n: 1\n", "seed"),
 }

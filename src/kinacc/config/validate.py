@@ -49,6 +49,7 @@ def check_section(
         if len(found) > _MOST_PROBLEMS:
             what = f"and {len(found) - _MOST_PROBLEMS} more"
             problems.append(Problem(place(()), what, fix="mend the others first"))
+            return {}, problems
         for each in found:
             content = _without(content, _steps(each["loc"]))
     return dict(content or {}), problems
