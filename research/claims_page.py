@@ -7,12 +7,12 @@ from collections.abc import Iterable
 import numpy as np
 import pandas as pd
 
-from kinacc.config.records import value_at
 from kinacc.config.schema import defaults
 from kinacc.study.claims.evaluate import all_claims
 from kinacc.study.claims.numbers import TRUE_ACCURACY_MM
 from kinacc.study.claims.study_sentences import study_claims
 from research import reasons
+from research.dotted import value_at
 from research.judged_runs import ABOUT
 from research.open_choices import (
     ALL,

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from kinacc.config.records import with_values
 from kinacc.synthetic.accepted import further_draws
+from research.dotted import with_values
 from research.open_choices import (
     ALL,
     ALL_AND_ARM,

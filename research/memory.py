@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from kinacc.config.records import value_at
 from kinacc.study.in_memory import lean
 from kinacc.workflow.code import config_hash
+from research.dotted import value_at
 
 _EVALUATION = tuple(
     f"evaluation.{key}"

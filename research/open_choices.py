@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from kinacc.config.records import value_at
+from research.dotted import value_at
 
 # What runs vary beside single choices: nothing, the arm, or several at once.
 DEFAULT, ARM = "default", "arm"

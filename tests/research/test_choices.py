@@ -8,11 +8,11 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from kinacc.config.records import value_at
 from kinacc.config.schema import defaults
 from kinacc.study import in_memory, robustness
 from kinacc.study.claims.evaluate import all_claims, evaluate
 from research import design
+from research.dotted import value_at
 from research.judged_runs import alike, judged
 from research.open_choices import ALL, FIG_5, OPEN, STATED
 

@@ -85,14 +85,11 @@ def _joined(text: str, data: Any, path: Path, value: Any) -> str:
         own.update(value)
     else:
         own.extend(value)
-    present = {key.value: each for key, each in node.value} if rest else {}
     whole, _, _ = _deepest(text, data, path[:depth])
     if node.flow_style or not node.value:
         return text[: node.start_mark.index] + flow(whole) + text[node.end_mark.index :]
-    if rest and rest[0] in present:  # null: its place takes the value
-        each = present[rest[0]]
-        end = text[each.end_mark.index :]
-        return f"{text[: each.start_mark.index]} {flow(whole[rest[0]])}{end}"
+    if rest and rest[0] in {key.value for key, _ in node.value}:
+        raise KeyError(rest[0])  # null, or a value of another kind
     newline = "\r\n" if "\r\n" in text else "\n"
     indent, lines = " " * node.start_mark.column, []
     for key in rest:

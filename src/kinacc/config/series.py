@@ -16,7 +16,7 @@ from kinacc.config.fields import Section, Text, refused, setting
 from kinacc.config.names import LONGEST
 from kinacc.config.reading import Place
 from kinacc.config.values import shown
-from kinacc.errors import Problem, first_few
+from kinacc.errors import Problem
 
 SAME, MOVED = "same", "moved"
 FLAGS = {
@@ -104,10 +104,9 @@ def taken(
         if each in datasets:
             what = f"has the name of a line of the series of {name}"
             yield Problem(place(("datasets", each)), what, "another name")
-    if long := [each for each in names if len(each) > LONGEST]:
-        what = f"{first_few(long, 1)} cannot be the name of a data set"
+    if any(len(each) > LONGEST for each in names):
         allowed = f"at most {LONGEST - len('-2026-03-01')} characters where there is a series"
-        yield Problem(place(("datasets", name)), what, allowed)
+        yield Problem(place(("datasets", name)), "has too long a name", allowed)
 
 
 def expanded(
