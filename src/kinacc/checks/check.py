@@ -21,10 +21,10 @@ from kinacc.checks import (
     tails,
 )
 from kinacc.checks.findings import Finding, finding
+from kinacc.checks.meanings import Meaning
 from kinacc.checks.readings import Readings
 from kinacc.checks.report import Report
 from kinacc.checks.robust_fit import Fitted
-from kinacc.checks.rows import Raw
 from kinacc.errors import InputError, Problem
 from kinacc.kinematics import robot as robots
 from kinacc.kinematics.robot import Robot, outside_limits
@@ -101,12 +101,12 @@ def check(
     every = readings.of_file(reading, robot)
     if (count := len(np.unique(every.pose))) < _FEWEST_POSES:
         raise InputError(Problem(path, f"{count} poses", f"at least {_FEWEST_POSES}"))
-    one, cell = readings.merged(every)
-    first = np.unique(cell, return_index=True)[1]
+    every = replace(every, earlier=digits.unread(every))
     distances = readings.distances(every)
-    scatter = of_measurements(reading.columns, robot)
     by_distances, renamed = moved.by_distances(every, distances)
-    fitted, raw, found = _meant(one, reading, layout, robot, first, progress)
+    one, cell, away_mm = readings.merged(every)
+    scatter = of_measurements(reading.columns, robot)
+    fitted, meaning, found = _meant(one, layout, robot, progress)
     kinds = {each.kind for each in found}
     found += by_distances
     if not any(kind.startswith("joint_") for kind in kinds):
@@ -115,23 +115,29 @@ def check(
     if "does_not_fit" in kinds:
         fitted = None
     else:
-        seen = replace(fitted.seen, target=renamed.target[first], target_names=renamed.target_names)
-        fitted, jumps = moved.with_jumps(seen, robot.dh, progress)
-        raw = replace(raw, earlier=digits.unread(every)[first])
+        target = renamed.target[np.unique(cell, return_index=True)[1]]
+        seen = replace(fitted.seen, target=target, target_names=renamed.target_names)
+        fitted, jumps = moved.without_jumps(seen, robot.dh, progress)
         if jumps and _turned_well(fitted):
             found = [each for each in found if each.kind != "orientations"]
-        found += moved.findings(fitted, jumps)
-        found += digits.commanded(fitted, raw.q, raw.commanded, raw.meaning)
-        found += [*rows.found(fitted, raw), *_largest(fitted)]
+        found += jumps
+        found += digits.commanded(fitted, meaning)
+        found += [*rows.found(fitted, meaning, layout), *_largest(fitted)]
         gross = fitted.seen.lines(fitted.left_mm > _GROSS * fitted.trial.sigma_mm)
-    found += [*_scattered(every, cell), *digits.copies(every, scatter.per_axis_mm)]
+    off = np.flatnonzero(away_mm > tails.limit(away_mm, 3))
+    if off.size:
+        most_mm = float(away_mm[off].max())
+        found.append(
+            finding("outliers/repeats", every.line[off], count=off.size, largest_mm=most_mm)
+        )
+    found += digits.copies(every, scatter.per_axis_mm)
     facts = coverage.facts_of(every, robot, scatter, distances, fitted)
     unread = dict.fromkeys((*reading.notes, *reading.left_out()))
     return Report(
         dataset,
         path,
         facts,
-        coverage.remarks_of(every, readings.correlation(every, cell), scatter, distances),
+        coverage.remarks_of(every, scatter, distances),
         tuple(
             replace(each.held_to(gross), row_names=reading.row_names)
             for each in _once(found, np.unique(every.line).size)
@@ -145,39 +151,36 @@ def check(
 
 
 def _meant(
-    one: Readings, reading: MeasuredFile, layout: Layout, robot: Robot, first, progress: Progress
-) -> tuple[Fitted, Raw, list[Finding]]:
-    """The fit of the file as it is meant, what it was read from, and findings of all rows."""
+    one: Readings, layout: Layout, robot: Robot, progress: Progress
+) -> tuple[Fitted, Meaning, list[Finding]]:
+    """The fit of the file as it is meant, its meaning, and findings of all rows."""
     here = robust_fit.fit(meanings.as_written(robot.joint_map).seen(one), robot.dh)
     meaning, changes = meanings.find(one, robot, here.trial, progress)
     fitted = robust_fit.fit(meaning.seen(one), robot.dh) if changes else here
-    stated = None if reading.commanded is None else reading.commanded[first]
-    none = np.zeros(len(one), dtype=np.int64)
-    raw = Raw(one.q, reading.turns[first], layout, meaning, stated, none)
     spread_mm = meanings.spread_mm(one.position_mm) * meaning.scale
     if fitted.trial.sigma_mm > meanings.FAR * spread_mm:
-        return fitted, raw, [*changes, _no_fit(one, fitted, robot, spread_mm)]
+        return fitted, meaning, [*changes, _no_fit(one, fitted, robot, spread_mm)]
     found = [*changes, *_of_other_lengths(one, fitted, robot)]
     seen, there = fitted.seen, fitted.seen.has_rotation
     if not there.any():
-        return fitted, raw, found
+        return fitted, meaning, found
     way, least, before = orientations.find(
-        raw.turns[there], layout, fitted.left.flange[there], seen.target[there]
+        one.turns[there], layout, fitted.left.flange[there], seen.target[there]
     )
     bad = before > meanings.BAD_RAD
     if bad and (by_turns := meanings.find_by_turns(one, robot, meaning, least)) is not None:
         meaning, told = by_turns
         fitted = robust_fit.fit(meaning.seen(one), robot.dh)
-        return fitted, replace(raw, meaning=meaning), [*found, told]
+        return fitted, meaning, [*found, told]
     if way.change is not None:
         found.append(orientations.told(way.change, one, there, before, least))
         rotation = seen.rotation.copy()
-        rotation[there] = meaning.rotations(way.read(raw.turns[there]))
+        rotation[there] = meaning.rotations(way.read(one.turns[there]))
         fitted = robust_fit.fit(replace(seen, rotation=rotation), robot.dh)
     elif bad:
         degrees = float(np.rad2deg(before))
         found.append(finding("orientations", one.lines(there), as_written_deg=degrees))
-    return fitted, raw, found
+    return fitted, meaning, found
 
 
 def _turned_well(fitted: Fitted) -> bool:
@@ -251,15 +254,6 @@ def _outside(every: Readings, robot: Robot) -> Iterator[Finding]:
             unit=each.unit,
             allowed=each.allowed,
         )
-
-
-def _scattered(every: Readings, cell: np.ndarray) -> Iterator[Finding]:
-    """Readings far from the others of their cell (n,), taken at the same configuration."""
-    length = np.linalg.norm(readings.deviations_mm(every, cell), axis=1)
-    off = np.flatnonzero(length > tails.limit(length, 3))
-    if off.size:
-        largest_mm = float(length[off].max())
-        yield finding("outliers/repeats", every.line[off], count=off.size, largest_mm=largest_mm)
 
 
 def _once(known: list[Finding], lines: int) -> list[Finding]:

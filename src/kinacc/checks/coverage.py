@@ -80,17 +80,11 @@ def _covered(q: np.ndarray, robot: Robot, joint: int) -> dict[str, object]:
     return {"joint": joint + 1, **ends, "unit": unit, "share": share}
 
 
-def remarks_of(
-    every: Readings, correlation: float, noise: Noise, distances: list[Distance]
-) -> tuple[str, ...]:
+def remarks_of(every: Readings, noise: Noise, distances: list[Distance]) -> tuple[str, ...]:
     """What else to know about the file, in words."""
     remarks = []
     if len(every.target_names) > 1:
-        how = f" (their repeats correlate by {correlation:.2f})"
-        remarks.append(
-            "targets of one pose share the arm's error and are no independent samples"
-            f"{how if np.isfinite(correlation) else ''}"
-        )
+        remarks.append("targets of one pose share the arm's error and are no independent samples")
     if noise.freedom and distances:
         between = float(np.median([each.std_mm for each in distances])) / np.sqrt(2.0)
         if between < 0.5 * noise.per_axis_mm:

@@ -9,6 +9,7 @@ from decimal import Decimal, InvalidOperation
 
 import numpy as np
 import scipy
+from numpy import ndarray
 
 from kinacc.checks import robust_fit, tails
 from kinacc.checks.findings import Finding, finding
@@ -50,16 +51,16 @@ def copies(every: Readings, noise_mm: float) -> Iterator[Finding]:
         yield finding(
             "duplicate_rows", line[again], count=again.size, row=row, first_copied_line=first
         )
-    earlier = unread(every)
-    again, at = np.unique(every.line[earlier > 0], return_index=True)
+    there = every.earlier > 0
+    again, at = np.unique(every.line[there], return_index=True)
     if again.size:
-        first = earlier[earlier > 0][at]
+        first = every.earlier[there][at]
         pairs = zip(again, first, strict=True)
         told = [f"{names.one(line)} repeats {names.number(of)}" for line, of in pairs]
         yield finding("repeated_reading", again, pairs=first_few(told, 4))
 
 
-def unread(every: Readings) -> np.ndarray:
+def unread(every: Readings) -> ndarray:
     """Line (n,) of an earlier row of other joints whose readings are equal in every digit, or 0."""
     line, reading, q = _by_line(every)
     same = _earlier_equal(reading)
@@ -68,7 +69,7 @@ def unread(every: Readings) -> np.ndarray:
     return earlier[np.searchsorted(line, every.line)]
 
 
-def _by_line(every: Readings) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _by_line(every: Readings) -> tuple[ndarray, ndarray, ndarray]:
     """Lines (m,) of the file, readings of each side by side, and joints (m, k)."""
     line, first, inverse = np.unique(every.line, return_index=True, return_inverse=True)
     reading = np.full((len(line), len(every.target_names), 12), np.inf)
@@ -77,7 +78,7 @@ def _by_line(every: Readings) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return line, reading.reshape(len(line), -1), every.q[first]
 
 
-def _earlier_equal(values: np.ndarray) -> np.ndarray:
+def _earlier_equal(values: ndarray) -> ndarray:
     """Index (n,) of the first equal row before each, -1 where there is none."""
     number = grouped(values)
     first = np.unique(number, return_index=True)[1][number]
@@ -98,23 +99,19 @@ def _unlikely(every: Readings, noise_mm: float) -> bool:
     return max(pairs, 1.0) * per_axis**numbers < _CHANCE
 
 
-def commanded(
-    fitted: Fitted, q: np.ndarray, stated: np.ndarray | None, meaning: Meaning
-) -> Iterator[Finding]:
-    """Joints (n, k) as commanded where those read back are wanted.
+def commanded(fitted: Fitted, meaning: Meaning) -> Iterator[Finding]:
+    """Joints as commanded where those read back are wanted.
 
-    By the ``stated`` commanded joints, where the file has them, else by round numbers.
+    By the commanded joints, where the file has them too, else by round numbers.
     """
-    if stated is None:
-        yield from _round(fitted, np.rad2deg(q[:, ~fitted.trial.nominal.prismatic]))
-        return
-    both = np.isfinite(stated).all(axis=1)
-    if not both.any():
-        return
     seen, arm = fitted.seen, fitted.trial.arm
+    both = np.isfinite(seen.commanded).all(axis=1)
+    if not both.any():
+        yield from _round(fitted, np.rad2deg(seen.q[:, ~fitted.trial.nominal.prismatic]))
+        return
     read, sent = (
         robust_fit.residuals(arm, replace(seen, q_rad=meaning.joints(joints))).position_mm
-        for joints in (q, np.where(both[:, None], stated, q))
+        for joints in (seen.q, np.where(both[:, None], seen.commanded, seen.q))
     )
     apart = np.linalg.norm(sent - read, axis=1)
     # What is apart everywhere (a following error of a few um) is how the arm is.
@@ -136,7 +133,7 @@ def commanded(
         yield finding("commanded_joints/exchanged", seen.lines(both), sigma=f"{sigma:.3g}")
 
 
-def _round(fitted: Fitted, q_deg: np.ndarray) -> Iterator[Finding]:
+def _round(fitted: Fitted, q_deg: ndarray) -> Iterator[Finding]:
     """Rows on round numbers where the others are not, which fit worse; or all on a coarse grid."""
     q_deg, left, seen = q_deg[:, np.ptp(q_deg, axis=0) > 0.0], fitted.left_mm, fitted.seen
     if q_deg.shape[1] < 2:
@@ -165,7 +162,7 @@ def _round(fitted: Fitted, q_deg: np.ndarray) -> Iterator[Finding]:
             yield finding("commanded_joints/all", seen.lines(), grid_deg=grid, **words)
 
 
-def _on(q_deg: np.ndarray, grid: float) -> np.ndarray:
+def _on(q_deg: ndarray, grid: float) -> ndarray:
     """True (n,) where all joints are whole multiples of ``grid``."""
     steps = q_deg / grid
     return (np.abs(steps - np.round(steps)) < _EXACT * np.maximum(np.abs(steps), 1.0)).all(axis=1)
@@ -219,7 +216,7 @@ def step_between(cells: Sequence[object], unit: float, decimal: str) -> float:
     return unit * math.gcd(*(each - whole[0] for each in whole)) * 10.0**-digits
 
 
-def cost(model: DHModel, q: np.ndarray, step: float) -> Rounding:
+def cost(model: DHModel, q: ndarray, step: float) -> Rounding:
     """What steps of ``step`` deg cost at joints (n, k): a rounded number is off by half at most."""
     q = q[:: max(len(q) // _MOST_POSES, 1)]
     half = 0.5 * np.deg2rad(step)

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from itertools import combinations, permutations
 
 import numpy as np
+from numpy import ndarray
 
 from kinacc.checks import orientations, robust_fit
 from kinacc.checks.findings import Finding, finding
@@ -54,18 +55,18 @@ class Meaning:
     ``scale`` and, where ``mirrored``, by ``MIRROR``. ``changes`` are its findings.
     """
 
-    matrix: np.ndarray
-    unit: np.ndarray
-    zero: np.ndarray
+    matrix: ndarray
+    unit: ndarray
+    zero: ndarray
     scale: float = 1.0
     mirrored: bool = False
     changes: tuple[Finding, ...] = ()
 
-    def joints(self, q: np.ndarray) -> np.ndarray:
+    def joints(self, q: ndarray) -> ndarray:
         """DH joint values (n, k) of joints as read (n, k)."""
         return (q * self.unit) @ self.matrix.T + self.zero
 
-    def rotations(self, rotation: np.ndarray) -> np.ndarray:
+    def rotations(self, rotation: ndarray) -> ndarray:
         """Orientations (n, 3, 3) in right-handed coordinates."""
         return rotation * np.outer(MIRROR, MIRROR) if self.mirrored else rotation
 
@@ -83,13 +84,13 @@ class Meaning:
         return replace(self, changes=(*self.changes, change), **values)
 
 
-def as_written(joint_map: np.ndarray) -> Meaning:
+def as_written(joint_map: ndarray) -> Meaning:
     """The file means what it says."""
     joints = len(joint_map)
     return Meaning(np.array(joint_map, dtype=float), np.ones(joints), np.zeros(joints))
 
 
-def of_units(meaning: Meaning, q: np.ndarray, slides: np.ndarray) -> Iterator[Meaning]:
+def of_units(meaning: Meaning, q: ndarray, slides: ndarray) -> Iterator[Meaning]:
     """The meaning, and those with joints (n, k) in another unit that stays within two turns."""
     yield meaning
     largest = float(np.abs(q[:, ~slides]).max(initial=0.0))
@@ -147,7 +148,7 @@ def coupled(meaning: Meaning, joint: int, other: int, sign: float) -> Meaning:
     return meaning.changed(change, matrix=matrix)
 
 
-def single(meaning: Meaning, slides: np.ndarray) -> Iterator[Meaning]:
+def single(meaning: Meaning, slides: ndarray) -> Iterator[Meaning]:
     """Every meaning one change of the joints away: signs, couplings, zeros, order."""
     joints = range(len(slides))
     signed = {each.values["joint"] for each in meaning.changes if each.kind == "joint_sign"}
@@ -277,7 +278,7 @@ def find_by_turns(
     return found, told
 
 
-def _largest_session(read: Readings, rows: np.ndarray) -> Readings:
+def _largest_session(read: Readings, rows: ndarray) -> Readings:
     """The readings ``rows`` of the session with most of them."""
     part = read.select(rows)
     largest = np.argmax(np.bincount(part.session))
@@ -339,7 +340,7 @@ def _left_mm(read: Readings, robot: Robot, meaning: Meaning) -> float:
     return robust_fit.best(seen, robust_fit.start(seen, robot.dh)).sigma_mm / meaning.scale
 
 
-def spread_mm(points: np.ndarray) -> float:
+def spread_mm(points: ndarray) -> float:
     """Root of the median squared distance of points (n, 3) from their middle."""
     centred = points - np.median(points, axis=0)
     return float(np.sqrt(np.median(np.sum(centred**2, axis=1))))

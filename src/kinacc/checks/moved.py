@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
+from numpy import ndarray
 
 from kinacc.checks import robust_fit, tails
 from kinacc.checks.findings import Finding, finding
@@ -24,6 +25,7 @@ _NEAR = 150  # readings after a split
 _BETTER = 0.85  # of what is left overall: a split of a good file leaves all but a few per cent
 _BETTER_THERE = 0.55  # of what is left of the readings after the split
 _PLAIN = 0.5  # share at which no other place need be tried
+_STEADY = 0.9  # of what jumps explain; of one jump, a steady motion explains 0.75 at most
 _EXCESS = 2.0  # times what chance, or a step along a joint, explains
 
 Progress = Callable[[Iterable, str], Iterable]
@@ -34,14 +36,15 @@ class Jump:
     """Base (``target`` None) or target that is elsewhere in the readings ``rows`` on."""
 
     target: int | None
-    rows: np.ndarray
+    rows: ndarray
 
 
-def with_jumps(
+def without_jumps(
     seen: Readings, model: DHModel, progress: Progress
-) -> tuple[Fitted, tuple[Jump, ...]]:
-    """The fit with every jump of base or target taken out, one after the other, and the jumps."""
-    fitted, jumps = fit(seen, model), []
+) -> tuple[Fitted, list[Finding]]:
+    """The fit with every jump of base or target taken out, one after the other, and these."""
+    whole = fitted = fit(seen, model)
+    jumps: list[Jump] = []
     for _ in progress(range(_MOST_SPLITS), "searches for a moved instrument or target"):
         # Poses of equal joints are one: read often, they make no jump any surer.
         few = len(np.unique(np.round(fitted.seen.q_rad, 6), axis=0)) < _FEW
@@ -59,7 +62,19 @@ def with_jumps(
             break
         fitted = best[0]
         jumps.append(best[1])
-    return fitted, tuple(jumps)
+    return fitted, list(_findings(whole, fitted, jumps)) if jumps else []
+
+
+def _linearised(fitted: Fitted) -> tuple[Readings, ndarray, ndarray, ndarray]:
+    """The readings that were fitted, under Huber's loss, with what is free of the fit taken out.
+
+    Weighted design (m, 6, P), residuals (m, 6), and the inverse (P, P) of the normal equations.
+    """
+    trial, few = fitted.trial, fitted.seen.select(fitted.chosen)
+    linear = Linear.at(few, trial.arm, trial.nominal, trial.strength, huber=True)
+    root = np.sqrt(linear.weights)
+    design = linear.design * root[..., None]
+    return few, design, linear.residual * root + design @ linear.step, linear.inverse
 
 
 def _places(fitted: Fitted) -> list[tuple[int, int | None]]:
@@ -70,13 +85,9 @@ def _places(fitted: Fitted) -> list[tuple[int, int | None]]:
     the joints, and files run through these in order: a step must explain more than chance, and
     more than steps along any joint or coordinate explain of the rest, which are no jumps.
     """
-    trial, few = fitted.trial, fitted.seen.select(fitted.chosen)
-    if trial.sigma_mm < tails.ROUNDING:
+    if fitted.trial.sigma_mm < tails.ROUNDING:
         return []
-    linear = Linear.at(few, trial.arm, trial.nominal, trial.strength, huber=True)
-    root = np.sqrt(linear.weights)
-    design = linear.design * root[..., None]
-    residual = linear.residual * root + design @ linear.step
+    few, design, residual, inverse = _linearised(fitted)
     bases, targets = len(few.session_names), len(few.target_names)
     kinds = [(None, few.session == base, 6 * base, 6) for base in range(bases)]
     kinds += [(each, few.target == each, 6 * (bases + each), 3) for each in range(targets)]
@@ -86,42 +97,42 @@ def _places(fitted: Fitted) -> list[tuple[int, int | None]]:
         if len(rows) < 4 * _FEWEST:
             continue
         columns = design[rows, :, begin : begin + width]
-        gains, solved, inner = _gains(columns, residual[rows], design[rows], linear.inverse)
+        gains, solved, inner = _gains(columns, residual[rows], design[rows], inverse)
+        gains[:_FEWEST] = gains[len(gains) - _FEWEST + 1 :] = 0.0
         place = int(np.argmax(gains))
         after = np.where(np.arange(len(rows)) >= place, 1.0, 0.0)[:, None]
-        step = columns @ solved[place] * after - design[rows] @ (linear.inverse @ inner[place])
+        step = columns @ solved[place] * after - design[rows] @ (inverse @ inner[place])
         rest = residual[rows] - step
         reference = scipy.special.chdtri(width, tails.FAMILY_WISE / (len(rows) * len(kinds)))
         for along in (*few.q_rad[rows].T, *few.position_mm[rows].T):
             order = np.argsort(along, kind="stable")
-            own = _gains(columns[order], rest[order], design[rows[order]], linear.inverse)[0]
-            reference = max(reference, own.max())
+            own = _gains(columns[order], rest[order], design[rows[order]], inverse)[0]
+            reference = max(reference, own[_FEWEST : len(own) - _FEWEST + 1].max())
         if gains[place] > _EXCESS * reference:
             found.append((gains[place] / reference, int(fitted.chosen[rows[place]]), target))
     return [(row, target) for _, row, target in sorted(found, key=lambda e: -e[0])[:_TRIED]]
 
 
 def _gains(
-    columns: np.ndarray, residual: np.ndarray, design: np.ndarray, inverse: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    columns: ndarray, residual: ndarray, design: ndarray, inverse: ndarray
+) -> tuple[ndarray, ndarray, ndarray]:
     """Part (n,) of the squared residuals (n, 6) that a step before each row explains.
 
     ``columns`` (n, 6, f) of a frame, all ``design`` (n, 6, P) with the ``inverse`` (P, P) of its
-    normal equations. Also the step (n, f), and J'Z of it (n, P). 0 too near either end.
+    normal equations. Also the step (n, f), and J'Z of it (n, P).
     """
 
-    def after(products: np.ndarray) -> np.ndarray:
+    def after(products: ndarray) -> ndarray:
         return np.cumsum(products[::-1], axis=0)[::-1]
 
     transposed = np.swapaxes(columns, 1, 2)
     score = after(transposed @ residual[..., None])[..., 0]
     shared = after(transposed @ design)
     gram = after(transposed @ columns)
-    ridge = 1e-6 * np.trace(gram[0]) / gram.shape[1] * np.eye(gram.shape[1])
+    ridge = 1e-6 * np.diag(np.diag(gram[0]))
     open_ = gram - shared @ inverse @ np.swapaxes(shared, 1, 2) + ridge
     solved = np.linalg.solve(open_, score[..., None])
     gains = np.sum(solved[..., 0] * score, axis=1)
-    gains[:_FEWEST] = gains[len(gains) - _FEWEST + 1 :] = 0.0
     return gains, solved[..., 0], (np.swapaxes(shared, 1, 2) @ solved)[..., 0]
 
 
@@ -152,7 +163,7 @@ def _parted(
     return again, Jump(target, rows)
 
 
-def _split(seen: Readings, row: int, target: int | None) -> tuple[Readings, np.ndarray]:
+def _split(seen: Readings, row: int, target: int | None) -> tuple[Readings, ndarray]:
     """Frames split before reading ``row``: a new base for the rest of its session, or target."""
     kind = "session" if target is None else "target"
     label, names = getattr(seen, kind), getattr(seen, f"{kind}_names")
@@ -175,16 +186,16 @@ def _share_left(before: Fitted, after: Fitted, jump: Jump) -> float:
     return min(everywhere / _BETTER, max(there / _BETTER_THERE, everywhere))
 
 
-def findings(fitted: Fitted, jumps: Iterable[Jump]) -> Iterator[Finding]:
+def _findings(whole: Fitted, fitted: Fitted, jumps: list[Jump]) -> Iterator[Finding]:
     """Jumps of base and targets; a drift in place of the jumps of a base that drifts."""
     seen, arm = fitted.seen, fitted.trial.arm
-    drifts = {name: _drift_mm(fitted, name) for name in dict.fromkeys(seen.session_names)}
+    drifts = _drifts_mm(whole, fitted)
     for name, drift in drifts.items():
         if drift is not None:
             own = [seen.session_names[each] == name for each in seen.session]
             yield finding("drift", seen.line[own], by=_signed(drift), drift_mm=drift.tolist())
     for jump in jumps:
-        first, last = jump.rows[[0, -1]]
+        first = jump.rows[0]
         kind = "session" if jump.target is None else "target"
         label, names = getattr(seen, kind), getattr(seen, f"{kind}_names")
         name = names[label[first]]
@@ -193,7 +204,7 @@ def findings(fitted: Fitted, jumps: Iterable[Jump]) -> Iterator[Finding]:
         same = [row for row in range(first) if names[label[row]] == name]
         poses = arm.frames.bases if jump.target is None else arm.frames.targets
         # How far points in the middle of the readings went.
-        old, new = (Pose(*(e[n] for e in poses)) for n in (label[same[-1]], label[last]))
+        old, new = (Pose(*(e[n] for e in poses)) for n in label[[same[-1], first]])
         shift, turn = new.position_mm - old.position_mm, 0.0
         if jump.target is None:
             middle = fitted.left.predicted.position_mm[jump.rows].mean(axis=0)
@@ -212,32 +223,31 @@ def findings(fitted: Fitted, jumps: Iterable[Jump]) -> Iterator[Finding]:
         )
 
 
-def _signed(vector: np.ndarray) -> str:
+def _signed(vector: ndarray) -> str:
     return ", ".join(f"{value:+.3g}" for value in vector)
 
 
-def _drift_mm(fitted: Fitted, session: str | None) -> np.ndarray | None:
-    """How far the base of a session drifted (3,), mm; None where it jumped or stayed.
+def _drifts_mm(whole: Fitted, split: Fitted) -> dict[str | None, ndarray | None]:
+    """How far the base of each session drifted (3,), mm; None where it jumped or stayed.
 
-    A jump leaves no trend on either side of it. A steady drift that is split leaves one in every
-    part: together as far as the frame drifted, which is more than the parts are apart.
+    It drifts where a steady motion explains as much of what the fit without jumps leaves as the
+    jumps that were found, whose places are chosen.
     """
-    seen, bases = fitted.seen, fitted.trial.arm.frames.bases
-    parts = [n for n, name in enumerate(seen.session_names) if name == session]
-    if len(parts) < 2:
-        return None
-    rows = np.isin(seen.session, parts)
-    parts = list(dict.fromkeys(seen.session[rows].tolist()))
-    within = np.zeros(3)
-    for part in parts:
-        own = np.flatnonzero((seen.session == part) & ~fitted.bad)
-        if len(own) >= _FEWEST:
-            time = np.linspace(-0.5, 0.5, len(own))
-            within -= time @ fitted.left.position_mm[own] / np.sum(time**2)
-    middle = fitted.left.predicted.position_mm[rows].mean(axis=0)
-    first, last = (Pose(*(each[part] for each in bases)) for part in (parts[0], parts[-1]))
-    apart = compose(compose(last, invert(first)), Pose(np.eye(3), middle)).position_mm - middle
-    return within if within @ apart > 0.5 * (apart @ apart) else None
+    few, design, residual, inverse = _linearised(whole)
+    found: dict[str | None, ndarray | None] = {}
+    for base, name in enumerate(few.session_names):
+        rows = np.flatnonzero(few.session == base)
+        columns, own = design[rows, :, 6 * base : 6 * base + 6], (residual[rows], design[rows])
+        part = split.seen.session[whole.chosen[rows]]
+        jumps = [columns * (part == each)[:, None, None] for each in np.unique(part)[1:]]
+        found[name] = None
+        if jumps:
+            time = np.linspace(-0.5, 0.5, len(rows))[:, None, None]
+            gains, motion, _ = _gains(columns * time, *own, inverse)
+            by_jumps = _gains(np.concatenate(jumps, axis=2), *own, inverse)[0]
+            if gains[0] > _STEADY * by_jumps[0]:
+                found[name] = -motion[0, :3]
+    return found
 
 
 _FEWEST_ROWS = 4  # on either side of a change of a distance
@@ -290,7 +300,7 @@ def by_distances(every: Readings, distances: list[Distance]) -> tuple[list[Findi
     return found, moved
 
 
-def _move(length: np.ndarray) -> tuple[int | None, float]:
+def _move(length: ndarray) -> tuple[int | None, float]:
     """Row at which a distance (n,) changes for good, and by how much; None where it does not."""
     count, place = len(length), np.arange(_FEWEST_ROWS, len(length) - _FEWEST_ROWS + 1)
     if count < 2 * _FEWEST_ROWS + 2:

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy import ndarray
 
 from kinacc.checks.findings import Finding, finding
 from kinacc.checks.readings import Readings, nearest_rotation
@@ -35,10 +36,10 @@ class Turn:
     """A way to read orientations: ``read`` turns raw numbers (n, 3 or 4) into (n, 3, 3)."""
 
     change: Finding | None
-    read: Callable[[np.ndarray], np.ndarray]
+    read: Callable[[ndarray], ndarray]
 
 
-def scatter(flange: np.ndarray, rotation: np.ndarray, target: np.ndarray) -> float:
+def scatter(flange: ndarray, rotation: ndarray, target: ndarray) -> float:
     """Angle within which most orientations agree, seen from the flange, each target by itself.
 
     ``flange`` and ``rotation`` (n, 3, 3) in the instrument's frame, none of them missing.
@@ -49,7 +50,7 @@ def scatter(flange: np.ndarray, rotation: np.ndarray, target: np.ndarray) -> flo
 
 
 def find(
-    raw: np.ndarray, layout: Layout, flange: np.ndarray, target: np.ndarray
+    raw: ndarray, layout: Layout, flange: ndarray, target: ndarray
 ) -> tuple[Turn, float, float]:
     """The best way to read the raw orientations (n, 3 or 4), and its scatter and that as written.
 
@@ -67,9 +68,7 @@ def find(
     return written, here, here
 
 
-def told(
-    change: Finding, read: Readings, there: np.ndarray, before: float, least: float
-) -> Finding:
+def told(change: Finding, read: Readings, there: ndarray, before: float, least: float) -> Finding:
     """The finding of a change that brings orientations (mask ``there``) together; scatters, rad."""
     detail = " (seen from the flange they scatter by {as_written_deg:.3g} deg as written, by "
     detail += "{found_deg:.3g} deg so)"
@@ -77,7 +76,7 @@ def told(
     return change.at(read.lines(there), detail, **degrees)
 
 
-def simple(layout: Layout, raw: np.ndarray) -> Iterator[Turn]:
+def simple(layout: Layout, raw: ndarray) -> Iterator[Turn]:
     """Ways one change away from what is stated, likely ones first."""
     yield from _backwards(Turn(None, lambda raw: rotations(raw, layout)))
     largest = np.nanmax(np.abs(raw), initial=0.0)
@@ -156,7 +155,7 @@ def _euler(layout: Layout, convention: str, order: list[int], words: str) -> Tur
     return Turn(change, lambda raw: rotations(raw[:, order], other))
 
 
-def _angles(turns: np.ndarray) -> np.ndarray:
+def _angles(turns: ndarray) -> ndarray:
     """Angles (n,) of rotations (n, 3, 3) to their robust mean."""
     rows = np.arange(len(turns))
     for _ in range(5):

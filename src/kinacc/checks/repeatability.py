@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
+from numpy import ndarray
 from scipy.special import chdtrc, gammaincinv
 
 from kinacc.calibration.noise import means, scatter
@@ -32,10 +33,10 @@ class Repeated:
     A side is of one pose, and a visit is of one side: no number is that of two.
     """
 
-    position_mm: np.ndarray
-    pose: np.ndarray
-    side: np.ndarray
-    visit: np.ndarray
+    position_mm: ndarray
+    pose: ndarray
+    side: ndarray
+    visit: ndarray
 
 
 @dataclass(frozen=True)
@@ -46,10 +47,10 @@ class Parts:
     each axis (0: not told).
     """
 
-    instrument: np.ndarray
-    visits: np.ndarray
-    sides: np.ndarray
-    whole: np.ndarray
+    instrument: ndarray
+    visits: ndarray
+    sides: ndarray
+    whole: ndarray
     freedom: float
 
 
@@ -61,14 +62,14 @@ class Noise:
     are taken as equal where ``is_even``. ``rounded`` (3,): whether an axis is that of rounding.
     """
 
-    covariance_mm2: np.ndarray
+    covariance_mm2: ndarray
     freedom: float
     by_axis: float
     is_even: bool
-    rounded: np.ndarray
+    rounded: ndarray
 
     @property
-    def std_mm(self) -> np.ndarray:
+    def std_mm(self) -> ndarray:
         """Standard deviation per axis (3,)."""
         return np.sqrt(np.diag(self.covariance_mm2))
 
@@ -86,7 +87,7 @@ class Group:
     side: int
     visits: int
     readings: int
-    std_mm: np.ndarray
+    std_mm: ndarray
     mean_distance_mm: float
     rp_mm: float
 
@@ -121,7 +122,7 @@ def parts(read: Repeated) -> Parts:
     return Parts(instrument, arm, side if sides else unknown, whole, float(freedom))
 
 
-def noise_of(found: Parts, resolution_mm: np.ndarray) -> Noise | None:
+def noise_of(found: Parts, resolution_mm: ndarray) -> Noise | None:
     """The noise of a reading, no less than the rounding of ``resolution_mm`` (3,).
 
     None where it is not told. Equal along the axes, with three times their degrees of freedom,
@@ -139,7 +140,7 @@ def noise_of(found: Parts, resolution_mm: np.ndarray) -> Noise | None:
     return Noise(whole + np.diag(lacking), freedom, by_axis, is_even, lacking > 0.0)
 
 
-def differ_by_axis(covariance_mm2: np.ndarray, freedom: float) -> float:
+def differ_by_axis(covariance_mm2: ndarray, freedom: float) -> float:
     """Probability of a covariance (3, 3) so unlike an equal one, where it is equal (Mauchly).
 
     NaN for fewer than five degrees of freedom, or a covariance of less than three directions.
@@ -151,7 +152,7 @@ def differ_by_axis(covariance_mm2: np.ndarray, freedom: float) -> float:
     return float(chdtrc(5, -(freedom - 23.0 / 18.0) * shape))
 
 
-def differ_by_pose(read: Repeated, resolution_mm: np.ndarray) -> tuple[float, np.ndarray]:
+def differ_by_pose(read: Repeated, resolution_mm: ndarray) -> tuple[float, ndarray]:
     """Probability that poses scatter so differently by chance (Bartlett), and their scatter (p,).
 
     Of the visits of every pose from one side, over that of all poses; NaN where a pose tells
@@ -227,7 +228,7 @@ def between_sides_mm(read: Repeated) -> float:
     return float(max(apart, default=math.nan))
 
 
-def far_off(read: Repeated) -> np.ndarray:
+def far_off(read: Repeated) -> ndarray:
     """Readings, by index, that lie much farther from the others of their pose than most do.
 
     More than six times the median distance from the median position of the pose from that side.
@@ -241,28 +242,28 @@ def far_off(read: Repeated) -> np.ndarray:
     return np.flatnonzero(several & (length > limit))
 
 
-def limits(std_mm: np.ndarray, freedom: float) -> tuple[np.ndarray, np.ndarray]:
+def limits(std_mm: ndarray, freedom: float) -> tuple[ndarray, ndarray]:
     """95 % limits of standard deviations of ``freedom`` degrees each."""
     low, high = (np.sqrt(freedom / (2.0 * gammaincinv(freedom / 2.0, p))) for p in (0.975, 0.025))
     return std_mm * low, std_mm * high
 
 
-def _visits(read: Repeated) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _visits(read: Repeated) -> tuple[ndarray, ndarray, ndarray]:
     """Mean (v, 3) of every visit, its number of readings (v,) and its side (v,)."""
     return *means(read.position_mm, read.visit), _larger(read.visit, read.side)
 
 
-def _larger(group: np.ndarray, larger: np.ndarray) -> np.ndarray:
+def _larger(group: ndarray, larger: ndarray) -> ndarray:
     """The pose or side (g,), of ``larger`` (n,), that every group (n,) of readings is of."""
     return larger[np.unique(group, return_index=True)[1]]
 
 
-def _share(part: np.ndarray, group: np.ndarray, freedom: int) -> float:
+def _share(part: ndarray, group: ndarray, freedom: int) -> float:
     """Mean of what each member (n,) of a group brings to the mean square of its level."""
     return float(np.sum(part * (1.0 - 1.0 / np.bincount(group)[group])) / max(freedom, 1))
 
 
-def _no_less_than_zero(covariance: np.ndarray) -> np.ndarray:
+def _no_less_than_zero(covariance: ndarray) -> ndarray:
     """The nearest covariance (3, 3) of a difference of two, which need not be one."""
     size, axes = np.linalg.eigh(0.5 * (covariance + covariance.T))
     return (axes * np.maximum(size, 0.0)) @ axes.T

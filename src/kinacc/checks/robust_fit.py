@@ -13,6 +13,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy import ndarray
 
 from kinacc.calibration.frames import Frames
 from kinacc.calibration.hand_eye import closed_form_start
@@ -66,10 +67,10 @@ class Residuals:
     flange's rotation in the instrument's frame.
     """
 
-    position_mm: np.ndarray
-    turn_rad: np.ndarray
+    position_mm: ndarray
+    turn_rad: ndarray
     predicted: Pose
-    flange: np.ndarray
+    flange: ndarray
 
 
 @dataclass(frozen=True)
@@ -86,8 +87,8 @@ class Trial:
     sigma_mm: float
     sigma_rad: float
     strength: float
-    left_out: np.ndarray
-    judged: np.ndarray
+    left_out: ndarray
+    judged: ndarray
 
 
 @dataclass(frozen=True)
@@ -99,16 +100,16 @@ class Fitted:
     """
 
     seen: Readings
-    chosen: np.ndarray
+    chosen: ndarray
     trial: Trial
     left: Residuals
-    left_mm: np.ndarray
-    left_rad: np.ndarray
+    left_mm: ndarray
+    left_rad: ndarray
     limit_mm: float
     limit_rad: float
 
     @property
-    def bad(self) -> np.ndarray:
+    def bad(self) -> ndarray:
         """True (n,) where a reading is further out than it may be."""
         return (self.left_mm > self.limit_mm) | (self.left_rad > self.limit_rad)
 
@@ -146,7 +147,7 @@ def residuals(arm: Arm, seen: Readings, flange: Pose | None = None) -> Residuals
     return Residuals(predicted.position_mm - seen.position_mm, turn, predicted, flange.rotation)
 
 
-def sigma_of(vectors: np.ndarray) -> float:
+def sigma_of(vectors: ndarray) -> float:
     """Standard deviation per axis of vectors (n, 3), from the shorter ones."""
     length = np.linalg.norm(vectors[np.isfinite(vectors[:, 0])], axis=1)
     if not length.size:
@@ -209,12 +210,12 @@ class Linear:
     the 5 corrections per joint (mm, mrad) where the strength is above zero.
     """
 
-    design: np.ndarray
-    residual: np.ndarray
-    weights: np.ndarray
-    inverse: np.ndarray
-    step: np.ndarray
-    centroids: np.ndarray
+    design: ndarray
+    residual: ndarray
+    weights: ndarray
+    inverse: ndarray
+    step: ndarray
+    centroids: ndarray
     sigma_mm: float
     sigma_rad: float
 
@@ -280,7 +281,7 @@ class Linear:
         lengths = np.abs(np.append(frames[:, :3], rest)).max()
         return Arm(model, moved), float(max(lengths, 1e3 * np.abs(frames[:, 3:]).max()))
 
-    def left_out(self, seen: Readings) -> tuple[np.ndarray, np.ndarray]:
+    def left_out(self, seen: Readings) -> tuple[ndarray, ndarray]:
         """Residuals (n, 6), mm and rad, of every reading with its configuration left out.
 
         Then the same over what the fit without it leaves open there: as wide as ``sigma`` for a
@@ -315,12 +316,12 @@ class Linear:
         return np.where(there, plain, np.nan), np.where(there, judged, np.nan)
 
 
-def _units(model: DHModel) -> np.ndarray:
+def _units(model: DHModel) -> ndarray:
     """One mm or mrad (5k,) of every DH parameter."""
     return np.tile(np.where(_IS_ANGLE, 1e-3, 1.0), model.joints)
 
 
-def _weight(vectors: np.ndarray, sigma: float, huber: bool) -> np.ndarray:
+def _weight(vectors: ndarray, sigma: float, huber: bool) -> ndarray:
     """Weights (n, 1) of vectors (n, 3); 0 where not measured."""
     length = np.linalg.norm(np.nan_to_num(vectors, nan=np.inf), axis=1)
     if huber:
@@ -362,7 +363,7 @@ def start(
     return Arm(model, frames)
 
 
-def _draws(part: Readings, draws: int, stretches: tuple[int, ...]) -> Iterator[np.ndarray]:
+def _draws(part: Readings, draws: int, stretches: tuple[int, ...]) -> Iterator[ndarray]:
     """All readings, stretches of the file, and random configurations."""
     every, poses = np.arange(len(part)), np.unique(part.pose)
     yield every

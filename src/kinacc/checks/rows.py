@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
+from numpy import ndarray
 
 from kinacc.checks import meanings, orientations, robust_fit
 from kinacc.checks.findings import Finding, finding
@@ -18,29 +19,13 @@ from kinacc.measurements.layout import Layout
 _CHANCE = 0.01  # that a wrong explanation fits
 
 
-@dataclass(frozen=True)
-class Raw:
-    """What the cells were read from: joints ``q`` (n, k) and orientations ``turns`` as written.
-
-    ``commanded`` (n, k) joints, None where the file has none; ``earlier`` (n,) the line of an equal
-    earlier reading, 0 where there is none.
-    """
-
-    q: np.ndarray
-    turns: np.ndarray
-    layout: Layout
-    meaning: Meaning
-    commanded: np.ndarray | None
-    earlier: np.ndarray
-
-
-def found(fitted: Fitted, raw: Raw) -> list[Finding]:
+def found(fitted: Fitted, meaning: Meaning, layout: Layout) -> list[Finding]:
     """Findings of all bad readings, one per kind of explanation; the rest are outliers."""
     bad = np.flatnonzero(fitted.bad)
     if not bad.size:
         return []
     open_rows, findings, lines = bad, [], fitted.seen.lines
-    for change, seen in _explanations(fitted, raw, bad):
+    for change, seen in _explanations(fitted, meaning, layout, bad):
         left = robust_fit.residuals(fitted.trial.arm, seen)
         near = np.linalg.norm(left.position_mm, axis=1) <= fitted.limit_mm
         near &= ~(np.linalg.norm(left.turn_rad, axis=1) > fitted.limit_rad)
@@ -50,22 +35,25 @@ def found(fitted: Fitted, raw: Raw) -> list[Finding]:
             largest_mm = float(fitted.left_mm[rows].max())
             findings.append(change.at(lines(rows), " in these rows", largest_error_mm=largest_mm))
             open_rows = np.setdiff1d(open_rows, rows)
-    stale = open_rows[raw.earlier[open_rows] > 0]
+    stale = open_rows[fitted.seen.earlier[open_rows] > 0]
     if stale.size:
         findings.append(finding("repeated_reading/off", lines(stale), count=stale.size))
         open_rows = np.setdiff1d(open_rows, stale)
     return [*findings, *_outliers(fitted, open_rows)]
 
 
-def _explanations(fitted: Fitted, raw: Raw, rows: np.ndarray) -> Iterator[tuple[Finding, Readings]]:
+def _explanations(
+    fitted: Fitted, meaning: Meaning, layout: Layout, rows: ndarray
+) -> Iterator[tuple[Finding, Readings]]:
     """Every known fault undone in the readings ``rows``."""
-    seen, q, meaning = fitted.seen.select(rows), raw.q[rows], raw.meaning
+    seen = fitted.seen.select(rows)
+    q = seen.q
     joints, turning = q.shape[1], meaning.unit == 1.0
 
-    def other(q: np.ndarray) -> Readings:
+    def other(q: ndarray) -> Readings:
         return replace(seen, q_rad=meaning.joints(q))
 
-    def moved(position_mm: np.ndarray, rotation: np.ndarray = seen.rotation) -> Readings:
+    def moved(position_mm: ndarray, rotation: ndarray = seen.rotation) -> Readings:
         return replace(seen, position_mm=position_mm, rotation=rotation)
 
     for factor, unit, stated in (
@@ -76,12 +64,11 @@ def _explanations(fitted: Fitted, raw: Raw, rows: np.ndarray) -> Iterator[tuple[
         yield change, other(q * np.where(turning, factor, 1.0))
     for factor, unit in ((1e3, "metres"), (1e-3, ""), (25.4, "inches")):
         yield meanings.of_length(unit), moved(factor * seen.position_mm)
-    if raw.commanded is not None:
-        yield finding("commanded_joints/better"), other(raw.commanded[rows])
+    yield finding("commanded_joints/better"), other(seen.commanded)
     there = seen.has_rotation
     if there.any():
-        numbers = raw.turns[rows][there]
-        for way in orientations.simple(raw.layout, numbers):
+        numbers = seen.turns[there]
+        for way in orientations.simple(layout, numbers):
             rotation = seen.rotation.copy()
             rotation[there] = way.read(numbers)
             yield way.change, moved(seen.position_mm, rotation)
@@ -110,7 +97,7 @@ def _explanations(fitted: Fitted, raw: Raw, rows: np.ndarray) -> Iterator[tuple[
                 yield coupled.changes[-1], replace(seen, q_rad=coupled.joints(q))
 
 
-def _outliers(fitted: Fitted, rows: np.ndarray) -> Iterator[Finding]:
+def _outliers(fitted: Fitted, rows: ndarray) -> Iterator[Finding]:
     """What no fault explains; told apart where one joint standing elsewhere explains it."""
     joint, off = _one_joint(fitted, rows)
     seen = fitted.seen
@@ -137,7 +124,7 @@ def _outliers(fitted: Fitted, rows: np.ndarray) -> Iterator[Finding]:
         )
 
 
-def _one_joint(fitted: Fitted, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _one_joint(fitted: Fitted, rows: ndarray) -> tuple[ndarray, ndarray]:
     """Joint (m,) whose displacement alone explains a reading, -1 where none, and by how much."""
     seen, arm = fitted.seen.select(rows), fitted.trial.arm
     left = robust_fit.residuals(arm, seen)
