@@ -198,42 +198,22 @@ def _by_closed_form(
     onto: _Onto, form: closed_form.SixAxes, pose: Pose, columns: list[int]
 ) -> tuple[np.ndarray, np.ndarray]:
     """Joints (n, b, 6) and status (n, b): from bent starts and, where these missed, exact ones."""
-    starts, reached = (part[:, columns] for part in form.solve(pose, closed_form.Start()))
-    q_rad = np.full(starts.shape, np.nan)
-    status = np.full(reached.shape, Status.OUT_OF_REACH, dtype=np.int8)
-    rows, places = np.nonzero(reached)
-    _add(onto, pose, starts, rows, places, q_rad, status)
-    missed = np.flatnonzero((reached & (status != Status.FOUND)).any(axis=1))
-    part = Pose(pose.rotation[missed], pose.position_mm[missed])
-    starts[missed], reached[missed] = (each[:, columns] for each in form.solve(part))
-    rows, places = np.nonzero(reached[missed] & (status[missed] != Status.FOUND))
-    rows = missed[rows]
-    unreached = status[rows, places] == Status.OUT_OF_REACH
-    status[rows[unreached], places[unreached]] = Status.NOT_CONVERGED
-    _add(onto, pose, starts, rows, places, q_rad, status)
+    q_rad = np.full((len(pose.position_mm), len(columns), 6), np.nan)
+    status = np.full(q_rad.shape[:2], Status.OUT_OF_REACH, dtype=np.int8)
+    for start in (closed_form.Start(), closed_form.EXACT):
+        starts, reached = (part[:, columns] for part in form.solve(pose, start))
+        if start is closed_form.EXACT:
+            status[reached & (status == Status.OUT_OF_REACH)] = Status.NOT_CONVERGED
+        rows, places = np.nonzero(reached & (status != Status.FOUND))
+        goal = Pose(pose.rotation[rows], pose.position_mm[rows])
+        found, converged = onto.converge(goal, starts[rows, places], 0)
+        rows, places = rows[converged], places[converged]
+        q_rad[rows, places], status[rows, places] = found[converged], Status.FOUND
+        rows, places = np.nonzero(status == Status.FOUND)
+        again = postures.repeats(rows, q_rad[rows, places], onto.robot.dh.prismatic, _SAME_RAD)
+        q_rad[rows[again], places[again]] = np.nan
+        status[rows[again], places[again]] = Status.DUPLICATE
     return q_rad, status
-
-
-def _add(
-    onto: _Onto,
-    pose: Pose,
-    starts: np.ndarray,
-    rows: np.ndarray,
-    places: np.ndarray,
-    q_rad: np.ndarray,
-    status: np.ndarray,
-) -> None:
-    """Fill ``q_rad`` and ``status`` at rows and places (m,) with what is found there and new."""
-    goal = Pose(pose.rotation[rows], pose.position_mm[rows])
-    found, converged = onto.converge(goal, starts[rows, places], 0)
-    known = (_apart(found[:, None], q_rad[rows]) < _SAME_RAD).any(axis=1)
-    for good, code in ((converged & known, Status.DUPLICATE), (converged & ~known, Status.FOUND)):
-        status[rows[good], places[good]] = code
-    good = converged & ~known
-    rows, places = rows[good], places[good]
-    q_rad[rows, places] = found[good]
-    again = postures.repeats(rows, found[good], onto.robot.dh.prismatic, _SAME_RAD)
-    status[rows[again], places[again]], q_rad[rows[again], places[again]] = Status.DUPLICATE, np.nan
 
 
 def _apart(q_rad: np.ndarray, other: np.ndarray) -> np.ndarray:

@@ -53,26 +53,18 @@ class SixAxes:
     dh: DHModel
     parallel: bool
 
-    def solve(
-        self, pose: Pose, start: Start = EXACT, turn_6_rad: float = 0.0
-    ) -> tuple[np.ndarray, np.ndarray]:
+    def solve(self, pose: Pose, start: Start = EXACT) -> tuple[np.ndarray, np.ndarray]:
         """DH joint angles (n, 8, 6) in (-pi, pi] of flange poses (n, ...), and reached (n, 8).
 
         Columns as ``BRANCHES``; angles out of reach are those of the nearest posture. Aligned
         wrists have joint 4 (of parallel axes: joint 6) at zero, a wrist centre on axis 1 theta_1 at
-        zero. ``turn_6_rad`` turns joint 6 of parallel axes away from its solution, and joints 2 to
-        4 with it so that they hold the meeting point: for starts where the wrist is nearly aligned.
+        zero.
         """
-        dh, sine, cosine = (
-            self.dh,
-            np.sign(np.sin(self.dh.alpha_rad)),
-            np.sign(np.cos(self.dh.alpha_rad)),
-        )
+        dh = self.dh
+        sine, cosine = np.sign(np.sin(dh.alpha_rad)), np.sign(np.cos(dh.alpha_rad))
         s1, s2, s3, s4, s5 = sine[0], cosine[1], cosine[2], sine[3], sine[4]
         rotation, point = _wrist_centre(dh, pose)
-        sideways = dh.d_mm[1] + s2 * (dh.d_mm[2] + s3 * dh.d_mm[3])
-        if not self.parallel:
-            sideways = dh.d_mm[1] + s2 * (dh.d_mm[2] + np.cos(dh.alpha_rad[2]) * dh.d_mm[3])
+        sideways = dh.d_mm[1] + s2 * (dh.d_mm[2] + np.cos(dh.alpha_rad[2]) * dh.d_mm[3])
         side = -s1 * sideways if abs(sideways) > _TOLERANCE else 0.0
         x, y, z = point.T[..., None]
         square = x * x + y * y
@@ -94,7 +86,6 @@ class SixAxes:
                     (-s5, -np.sign(np.sin(alpha))),
                     -flips,
                     -dh.theta_offset_rad[5],
-                    -turn_6_rad,
                     np.sin(start.least_bend_rad),
                 )
             )
@@ -179,7 +170,7 @@ class SevenAxes:
             arm = arm @ _across(theta, alpha)
         left = np.swapaxes(arm, -1, -2) @ rotation[:, None, None]
         least = np.sin(least_bend_rad)
-        last = _wrist(left[:, :, :, None], s[4:6], _SIDES, dh.theta_offset_rad[4], 0.0, least)
+        last = _wrist(left[:, :, :, None], s[4:6], _SIDES, dh.theta_offset_rad[4], least)
         shape = len(w), 2, 2, 2
         theta = [part[..., None] for part in (theta_2, theta_3, theta_4)]
         theta = np.stack([np.broadcast_to(each, shape) for each in (*theta, *last)], axis=-1)
@@ -237,14 +228,12 @@ def _wrist(
     signs: tuple[float, float] | np.ndarray,
     side: np.ndarray,
     free_rad: float,
-    turn_rad: float = 0.0,
     least_sine: float = 0.0,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Angles (..., 2) with Rz(first) Rx(+-90) Rz(middle) Rx(+-90) Rz(last) = ``rotation``.
 
     ``rotation`` (..., 1, 3, 3); ``signs`` of the two twists; ``side`` (2,) the sign of the middle
-    angle. An aligned wrist has its first angle at ``free_rad``. The first is turned by ``turn_rad``
-    and the last makes up for it where the wrist is aligned.
+    angle. An aligned wrist has its first angle at ``free_rad``.
     """
     x, y = rotation[..., 0, 2], rotation[..., 1, 2]
     sine = np.hypot(x, y)
@@ -252,7 +241,7 @@ def _wrist(
         side * np.maximum(sine, least_sine), -signs[0] * signs[1] * rotation[..., 2, 2]
     )
     first = np.arctan2(signs[1] * side * y, signs[1] * side * x)
-    first = np.where(sine < _ALIGNED, free_rad, first) + turn_rad
+    first = np.where(sine < _ALIGNED, free_rad, first)
     # The last from the frame behind the first as it was found, so that close to alignment, where
     # the first is ill-determined, the two still make the wanted rotation together.
     c, s = np.cos(first), np.sin(first)

@@ -37,22 +37,8 @@ class Refined(NamedTuple):
 
 def pose_error(target: Pose, actual: Pose) -> np.ndarray:
     """Error (n, 6): position in mm and the rotation vector in rad that turns actual to target."""
-    error = np.empty((len(target.position_mm), 6))
-    error[:, :3] = target.position_mm - actual.position_mm
-    wanted, found = target.rotation, actual.rotation
-    # Half the sum of the cross products of the axes is the axis times the sine of the angle.
-    for i in range(3):
-        j, k = (i + 1) % 3, (i + 2) % 3
-        product = found[:, j, :] * wanted[:, k, :] - found[:, k, :] * wanted[:, j, :]
-        error[:, 3 + i] = 0.5 * (product[:, 0] + product[:, 1] + product[:, 2])
-    cosine = 0.5 * (np.einsum("nij,nij->n", wanted, found) - 1.0)
-    sine = np.linalg.norm(error[:, 3:], axis=1)
-    safe = np.where(sine < 1e-8, 1.0, sine)
-    error[:, 3:] *= np.where(sine < 1e-8, 1.0, np.arctan2(safe, cosine) / safe)[:, None]
-    far = np.flatnonzero(cosine < 0.0)
-    if len(far):
-        error[far, 3:] = log_so3(wanted[far] @ np.swapaxes(found[far], 1, 2))
-    return error
+    turn = log_so3(target.rotation @ np.swapaxes(actual.rotation, 1, 2))
+    return np.concatenate([target.position_mm - actual.position_mm, turn], axis=1)
 
 
 def refine(

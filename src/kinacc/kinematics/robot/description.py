@@ -40,7 +40,6 @@ from kinacc.kinematics.robot.record import FEWEST_JOINTS, MOST_JOINTS, Robot
 
 _SHIPPED = Path(__file__).parents[1] / "robots"
 _LARGEST = 1e9  # of any number: beyond, nothing about an arm is meant, and products overflow
-_LONGEST_M = 20.0  # no arm has a link this long, so it was meant in mm
 _SHORTEST_MM = 20.0  # of all lengths together
 _MOST_TURNS_RAD = 4.0 * pi
 _SUGGESTIONS = 20
@@ -128,26 +127,11 @@ class Row(_Strict):
     limits_mm: Limits | None = None
     limits_m: Limits | None = None
 
-    @field_validator("theta_offset_deg", "alpha_deg", "beta_deg")
-    @classmethod
-    def _not_in_rad(cls, value: float | None) -> float | None:
-        quarters = round((value or 0.0) / (pi / 2.0))
-        if value and 0 < abs(quarters) <= 4 and abs(value - quarters * pi / 2.0) < 2e-3:
-            raise ValueError(f"{quarters} quarter turns in rad: write {90 * quarters}, or _rad")
-        return value
-
     @field_validator("theta_offset_rad", "alpha_rad", "beta_rad")
     @classmethod
     def _not_in_deg(cls, value: float | None) -> float | None:
         if value and abs(value) > 2.0 * pi + 1e-3:
             raise ValueError("more than a turn: write _deg")
-        return value
-
-    @field_validator("d_m", "a_m")
-    @classmethod
-    def _not_in_mm(cls, value: float | None) -> float | None:
-        if value and abs(value) > _LONGEST_M:
-            raise ValueError("longer than any arm: write _mm")
         return value
 
     @model_validator(mode="after")
@@ -158,7 +142,7 @@ class Row(_Strict):
             kind = "slides" if self.slides else "turns"
             raise ValueError(f"the joint {kind}: give its limits in {' or '.join(units)}")
         if found:
-            in_own_units(*found)
+            _limits_of(*found)
         return self
 
     @property
@@ -172,7 +156,7 @@ class Row(_Strict):
         return (*needed, float(self.quantity("beta", 0.0)))
 
 
-def in_own_units(unit: str, limits: Limits) -> np.ndarray:
+def _limits_of(unit: str, limits: Limits) -> np.ndarray:
     """Limits (2,) in rad or mm; ValueError where they are reversed or look like degrees."""
     if limits[0] >= limits[1]:
         raise ValueError(f"limits {list(limits)} are reversed or empty")
@@ -275,7 +259,7 @@ class Table(_About):
                 units = ("mm", "m") if row.slides else ("deg", "rad")
                 names = " or ".join(f"limits_{unit}" for unit in units)
                 raise ValueError(f"joint {number + 1}: its limits are missing: {names}")
-            limits.append(in_own_units(*found))
+            limits.append(_limits_of(*found))
             in_degrees += found[1] if found[0] == "deg" else ()
         if in_degrees and max(map(abs, in_degrees)) < 6.3:
             raise ValueError("no joint turns more than 6.3 deg: write limits_rad")
