@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
+from kinacc.calibration.fitting import once
 from kinacc.calibration.frames import FrameParameters
 from kinacc.calibration.observations import Observations
 from kinacc.calibration.one_thread import one_thread
@@ -127,7 +128,7 @@ class _Linear:
         self.observations, self.empty = observations, empty
         self.parameters, self.weight = parameters, weight
         self.motions = 6 * empty.joints
-        self.root = None
+        self.root = once(observations)
         self.built, self.gram = -1, np.zeros((0, 0))
         # A reading that no arm with constant errors comes near bends high orders most.
         for _ in range(_SCREENINGS):
@@ -138,7 +139,7 @@ class _Linear:
             step = -np.linalg.solve(own + np.diag(ridge), normal[:flat, -1])
             squared = self._misfit(system, scale[:-1] * step)
             far = max(FAR**2 * float(np.median(squared)), np.finfo(float).tiny)
-            self.root = np.sqrt(far / np.maximum(squared, far))
+            self.root = once(observations) * np.sqrt(far / np.maximum(squared, far))
 
     def _system(self, order: int) -> tuple[PoseSystem, np.ndarray, int]:
         empty = vec.without_errors(self.empty.dh, self.empty.q_min_rad, self.empty.q_max_rad, order)
@@ -186,8 +187,7 @@ class _Linear:
             self.gram = normal[flat:, flat:] - sides.T @ sides
             self.flat = flat
         size = 1 + self.motions * order
-        shown = float(np.sum(self.root**2 * (3 + 3 * self.observations.has_rotation)))
-        return self.gram[:size, :size], shown - self.flat
+        return self.gram[:size, :size], self._system(0)[0].weight - self.flat
 
 
 def _best(

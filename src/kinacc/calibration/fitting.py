@@ -23,6 +23,7 @@ from kinacc.calibration.system import FlangeModel, PoseSystem, require_enough
 from kinacc.calibration.uncertainty import scale_of
 from kinacc.geometry import Pose
 from kinacc.kinematics.model import ErrorModel, JointState
+from kinacc.measurements.folds import configurations
 
 # Of the best-seen motion of base and targets. Axes tilted by a mrad, as those of every arm are,
 # show as much of a motion that the described arm does not: each model would follow it another way.
@@ -92,11 +93,13 @@ def solved(
     flange, frames = unknowns.flange, parameters
     require_enough(observations, frames.size + flange.size, unknowns.name, unknowns.fix)
     frame_std = frames.std
+    system = PoseSystem(observations, flange, frames, rotation_weight_mm_per_rad)
     if unknowns.held:
+        system = system.weighted(once(observations))
         frame_std = np.where(np.isfinite(frame_std), frame_std, FRAME_PRIOR_UNITS * frames.scale)
     task = Task(
         unknowns.name,
-        PoseSystem(observations, flange, frames, rotation_weight_mm_per_rad),
+        system,
         np.concatenate([frames.begin, unknowns.start]),
         np.concatenate([frames.mean, unknowns.nominal]),
         np.concatenate([frame_std, unknowns.prior_std]),
@@ -105,6 +108,18 @@ def solved(
     )
     solution, weights = minimise_robust(task, loss)
     return frames.frames(solution.x[: frames.size]), solution, weights
+
+
+def once(observations: Observations) -> np.ndarray:
+    """Factors (n,) of residuals by which a configuration counts once, however often it was read.
+
+    What a model cannot explain is common to all readings of a configuration and target: beside a
+    prior they are one.
+    """
+    same = configurations(observations.pose, observations.q_rad)
+    both = np.stack([same, observations.target])
+    _, group, count = np.unique(both, axis=1, return_inverse=True, return_counts=True)
+    return 1.0 / np.sqrt(count[group.ravel()])
 
 
 @one_thread
@@ -204,9 +219,11 @@ def flange_model(nominal: ErrorModel, free: np.ndarray) -> FlangeModel:
         vector[free] = x
         return nominal.with_parameters(vector)
 
+    chosen = np.flatnonzero(free)
+
     def linearised(x: np.ndarray, at: JointState) -> tuple[Pose, np.ndarray]:
         pose, jacobian = model(x).linearised(at)
-        return pose, jacobian[:, :, free]
+        return pose, jacobian.transpose(2, 1, 0)[chosen]
 
     return FlangeModel(int(free.sum()), lambda x, at: model(x).pose(at), linearised)
 

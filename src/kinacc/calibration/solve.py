@@ -23,7 +23,7 @@ STEP_TOLERANCE = 1e-6  # mm and mrad
 PRIOR_TOLERANCE = 1e-4  # the same where priors hold weak directions: poses move by nm
 MAX_ITERATIONS = 60
 PATIENCE, HELD_PATIENCE = 12, 3  # steps after which standing still counts as arrived
-STANDSTILL, NO_CHANGE = 1e-9, 1e-6  # share of the objective; of the variance
+STANDSTILL, NO_CHANGE = 1e-9, 1e-5  # share of the objective; of the variance
 MAX_HALVINGS = 12
 MEMORY = 6  # steps that suggest the next one
 # Going back to nominal where the data is (nearly) blind costs a little: the optimum of a truncated
@@ -38,6 +38,7 @@ TOUCH_SQUARED = 1e-4  # a parameter is undetermined if a truncated direction hol
 MOVES_SQUARED = 0.25  # what moves a known frame by half as much as itself is known too
 MAX_PASSES = 100
 SETTLED = 1e-4  # mm and mrad by which a pass of a robust loss may still move a parameter
+_PANEL, _ROWS = 16, 384  # columns and rows reduced at once
 SCALE_PASSES = 20  # after these the scale of a loss is held, so that no cycle can form
 
 
@@ -165,7 +166,9 @@ class _Descent:
         with np.errstate(divide="ignore"):
             self.weight = self.scale / task.prior_std[self.active]  # for unit variance
         self.frames = int(self.active[: task.system.frames.size].sum())
-        self.count = int(task.system.counts.sum())
+        self.count = float(task.system.counts.sum())
+        if task.threshold is None:
+            self.count = task.system.weight
         self.variance = 0.0
         self.ranks: tuple[int, int] | None = None
         self.past: list[tuple[np.ndarray, np.ndarray]] = []
@@ -447,12 +450,17 @@ def singular_values(
     digits below 1e-7 of the largest, unlike through the normal equations.
     """
     active = np.ones(system.size, dtype=bool) if active is None else active
-    factor = np.zeros((0, int(active.sum())))
+    size = int(active.sum())
+    factor = np.zeros((size, size), order="F")
     for _, jacobian in system.blocks(x):
         rows = (jacobian * scale)[:, active]
-        factor = np.linalg.qr(np.concatenate([factor, rows]), mode="r")
+        for begin in range(0, len(rows), _ROWS):  # few at a time stay in the cache
+            some = np.array(rows[begin : begin + _ROWS], order="F")
+            factor = scipy.linalg.lapack.dtpqrt(
+                0, min(_PANEL, size), factor, some, overwrite_a=1, overwrite_b=1
+            )[0]
     frames = int(active[: system.frames.size].sum())
-    return np.linalg.svd(factor[frames:, frames:], compute_uv=False)
+    return np.linalg.svd(np.triu(factor)[frames:, frames:], compute_uv=False)
 
 
 def undetermined(

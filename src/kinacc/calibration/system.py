@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+import scipy
 
 from kinacc.calibration.frames import FrameParameters, inverse_left_jacobians, left_jacobian
 from kinacc.calibration.observations import Observations
@@ -20,6 +21,7 @@ from kinacc.geometry import Pose, log_so3, skew
 from kinacc.kinematics.model import JointState
 
 BLOCK_ROWS = 1024
+WRITTEN_OUT = 350  # parameters up to which the written-out Jacobian is the shorter way to J'J
 
 
 def require_enough(observations: Observations, parameters: int, name: str, fix: str) -> None:
@@ -48,12 +50,17 @@ class Group:
         """Number of motions."""
         return self.columns.stop - self.columns.start
 
+    @property
+    def size(self) -> int:
+        """Number of parameters."""
+        return self.motions * (1 if self.basis is None else self.basis.shape[1])
+
 
 @dataclass(frozen=True)
 class FlangeModel:
     """A kinematic model with P parameters, as functions of their vector and of joint states.
 
-    ``pose(x, at)``: flange poses (n, ...). ``linearised(x, at)``: these and motions (n, 6, E), rows
+    ``pose(x, at)``: flange poses (n, ...). ``linearised(x, at)``: these and motions (E, 6, n), rows
     0-2 mm per parameter, rows 3-5 the rotation vector w of ``exp(w) R``, robot base. Motions are
     those of the parameters, E = P, or ``expansion(at)`` spreads them over these. None: P = 0.
     """
@@ -91,6 +98,12 @@ class PoseSystem:
         seen = self.observations
         return 3 * np.array([len(seen), int(seen.has_rotation.sum())])
 
+    @property
+    def weight(self) -> float:
+        """Number of residuals, each times its squared factor."""
+        squared = 1.0 if self.root is None else self.root**2
+        return float(np.sum(squared * (3 + 3 * self.observations.has_rotation)))
+
     def weighted(self, root: np.ndarray) -> PoseSystem:
         """The same residuals times ``root`` (n,) by observation."""
         return replace(self, root=root)
@@ -101,13 +114,13 @@ class PoseSystem:
         for part, factor, _ in self._parts:
             pose = self.model.pose(x[self.frames.size :], part.at)
             residual = _Seen(self, x, part, pose).residual
-            found.append((residual * factor)[factor > 0.0])
+            found.append((residual * factor).T[factor.T > 0.0])
         return np.concatenate(found)
 
     def blocks(self, x: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Residual (m,) and Jacobian (m, P) per block of observations, ordered as ``residual``."""
         for part, factor, groups in self._parts:
-            rows = spread(self._columns(x, part, factor), groups)[factor > 0.0]
+            rows = spread(self._columns(x, part, factor), groups).transpose(2, 1, 0)[factor.T > 0.0]
             yield rows[:, -1], rows[:, :-1]
 
     def normal(self, x: np.ndarray, by_kind: bool = False) -> np.ndarray:
@@ -119,23 +132,23 @@ class PoseSystem:
         total = np.zeros((len(kinds), self.size + 1, self.size + 1))
         for part, factor, groups in self._parts:
             columns = self._columns(x, part, factor)
-            for number, kind in enumerate(kinds):
+            for number, kind in enumerate(kinds[: len(factor) // 3]):
                 total[number] += gram(columns[:, kind], groups)
         return total
 
     @cached_property
     def _parts(self) -> list[tuple[Observations, np.ndarray, list[Group]]]:
-        """Blocks of observations, factors (n, 3 or 6) of residuals, 0 if not measured, groups."""
+        """Blocks of observations, factors (3 or 6, n) of residuals, 0 if not measured, groups."""
         found = []
         for begin in range(0, len(self.observations), BLOCK_ROWS):
             rows = slice(begin, begin + BLOCK_ROWS)
             part = self.observations.select(rows)
             turned = part.has_rotation
-            factor = np.ones((len(part), 6 if turned.any() else 3))
-            factor[:, 3:] = turned[:, None]
+            factor = np.ones((6 if turned.any() else 3, len(part)))
+            factor[3:] = turned
             if self.root is not None:
                 # An observation of no weight stays a row.
-                factor *= np.maximum(self.root[rows], np.finfo(float).tiny)[:, None]
+                factor *= np.maximum(self.root[rows], np.finfo(float).tiny)
             found.append((part, factor, self._groups(part.at)))
         return found
 
@@ -149,32 +162,39 @@ class PoseSystem:
         return [*groups, Group(slice(end, end + 1))]
 
     def _columns(self, x: np.ndarray, part: Observations, factor: np.ndarray) -> np.ndarray:
-        """Motions and, last, residuals of a block (n, 3 or 6, E+1), times ``factor``."""
+        """Motions and, last, residuals of a block (E+1, 3 or 6, n), times ``factor``."""
         frames = self.frames.size
         if self.model.linearised is None:
-            pose, motions = self.model.pose(x, part.at), np.zeros((len(part), 6, 0))
+            pose, motions = self.model.pose(x, part.at), np.zeros((0, 6, len(part)))
         else:
             pose, motions = self.model.linearised(x[frames:], part.at)
         seen = _Seen(self, x, part, pose)
-        count = factor.shape[1]
-        columns = np.zeros((len(part), count, frames + motions.shape[2] + 1))
-        # A turn w of the flange swings the target's arm: w x arm.
-        columns[:, :3, frames:-1] = motions[:, :3] - skew(seen.arm) @ motions[:, 3:]
-        if count == 6:
-            columns[:, 3:, frames:-1] = seen.turning @ motions[:, 3:]
-        for kind, number, own in self.frames.slots:
+        columns = np.zeros((frames + len(motions) + 1, *factor.shape))
+        own, turns = columns[frames:-1], motions[:, 3:]
+        for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+            # A turn w of the flange swings the target's arm: w x arm.
+            own[:, i] = motions[:, i] + turns[:, j] * seen.arm[k] - turns[:, k] * seen.arm[j]
+            if seen.turning is not None:
+                own[:, 3 + i] = np.einsum("jn,ejn->en", seen.turning[:, i].T, turns)
+        for kind, number, at in self.frames.slots:
             rows = part.session == number if kind == "bases" else part.target == number
             if rows.any():
-                turn = left_jacobian(x[own[3:]]) if len(own) == 6 else None
-                columns[rows, :, own[0] : own[-1] + 1] = seen.of_frame(kind, rows, turn, count)
-        columns[:, :, -1] = seen.residual
-        return columns * factor[:, :, None]
+                turn = left_jacobian(x[at[3:]]) if len(at) == 6 else None
+                columns[at[0] : at[-1] + 1, :, rows] = seen.of_frame(kind, rows, turn, len(factor))
+        columns[-1] = seen.residual
+        return columns if self._plain else columns * factor
+
+    @cached_property
+    def _plain(self) -> bool:
+        """Whether every residual counts once."""
+        turned = self.observations.has_rotation
+        return self.root is None and bool(turned.all() or not turned.any())
 
 
 class _Seen:
-    """Residuals (n, 3 or 6) of a block at flange poses, and what their derivatives are made of.
+    """Residuals (3 or 6, n) of a block at flange poses, and what their derivatives are made of.
 
-    ``arm`` (n, 3): from the flange to the target, robot base; ``turning`` (n, 3, 3): derivative of
+    ``arm`` (3, n): from the flange to the target, robot base; ``turning`` (n, 3, 3): derivative of
     rotation residuals by turns of the model in the robot base.
     """
 
@@ -184,9 +204,9 @@ class _Seen:
         self.back = np.swapaxes(frames.bases.rotation, 1, 2)[part.session]
         self.reach = part.position_mm - frames.bases.position_mm[part.session]
         place = frames.targets.position_mm[part.target]
-        self.arm = (flange.rotation @ place[:, :, None])[..., 0]
-        local = (self.back @ self.reach[:, :, None])[..., 0]
-        self.residual = flange.position_mm + self.arm - local
+        self.arm = np.einsum("nij,nj->in", flange.rotation, place)
+        local = np.einsum("nij,nj->in", self.back, self.reach)
+        self.residual = flange.position_mm.T + self.arm - local
         turned = part.has_rotation
         self.turning = None
         if turned.any():
@@ -194,55 +214,62 @@ class _Seen:
             model = flange.rotation @ frames.targets.rotation[part.target]
             seen = self.back @ np.where(turned[:, None, None], part.rotation, np.eye(3))
             angles = log_so3(model @ np.swapaxes(seen, 1, 2)) * turned[:, None]
-            self.residual = np.concatenate([self.residual, weight * angles], axis=1)
+            self.residual = np.concatenate([self.residual, weight * angles.T])
             self.turning = weight * inverse_left_jacobians(angles)
 
     def of_frame(
         self, kind: str, rows: np.ndarray, turn: np.ndarray | None, count: int
     ) -> np.ndarray:
-        """Derivative (r, 3 or 6, 3 or 6) of residuals by the components of one base or target."""
+        """Derivative (3 or 6, 3 or 6, r) of residuals by the components of one base or target."""
         ahead = self.back[rows] if kind == "bases" else self.flange[rows]
         found = np.zeros((len(ahead), count, 3 if turn is None else 6))
         found[:, :3, :3] = ahead
-        if turn is None:
-            return found
-        about = ahead @ turn
-        if kind == "bases":
-            found[:, :3, 3:] = -ahead @ skew(self.reach[rows]) @ turn
-        if count == 6:
-            # The measured side stands behind exp(r): L^-1 exp(r) is the transposed L^-1.
-            turning = self.turning[rows]
-            turning = np.swapaxes(turning, 1, 2) if kind == "bases" else turning
-            found[:, 3:, 3:] = turning @ about
-        return found
+        if turn is not None:
+            if kind == "bases":
+                found[:, :3, 3:] = -ahead @ skew(self.reach[rows]) @ turn
+            if self.turning is not None:
+                # The measured side stands behind exp(r): L^-1 exp(r) is the transposed L^-1.
+                turning = self.turning[rows]
+                turning = np.swapaxes(turning, 1, 2) if kind == "bases" else turning
+                found[:, 3:, 3:] = turning @ (ahead @ turn)
+        return found.transpose(2, 1, 0)
 
 
 def spread(columns: np.ndarray, groups: Sequence[Group]) -> np.ndarray:
-    """Jacobian (n, m, P) in the parameters, from the motions ``columns`` (n, m, E)."""
-    parts = []
+    """Rows (P, m, n) of the parameters, from those of the motions ``columns`` (E, m, n)."""
+    if all(group.basis is None for group in groups):
+        return columns
+    full = np.empty((sum(group.size for group in groups), *columns.shape[1:]))
+    begin = 0
     for group in groups:
-        own = columns[:, :, group.columns]
-        if group.basis is not None:
-            own = (own[..., None] * group.basis[:, None, None, :]).reshape(*own.shape[:2], -1)
-        parts.append(own)
-    return np.concatenate(parts, axis=2)
+        own, into = columns[group.columns], full[begin : begin + group.size]
+        begin += group.size
+        if group.basis is None:
+            into[:] = own
+        else:
+            basis = np.ascontiguousarray(group.basis.T)[:, None]
+            np.multiply(own[:, None], basis, out=into.reshape(group.motions, -1, *own.shape[1:]))
+    return full
 
 
 def gram(columns: np.ndarray, groups: Sequence[Group]) -> np.ndarray:
-    """Gram matrix (P, P) of the spread Jacobian of ``columns`` (n, m, E), summed over n and m."""
-    if all(group.basis is None for group in groups):
-        rows = columns.reshape(-1, columns.shape[2])
-        return rows.T @ rows
-    products = np.swapaxes(columns, 1, 2) @ columns  # (n, E, E)
-    ones = np.ones((len(columns), 1))
-    bases = [ones if group.basis is None else group.basis for group in groups]
-    ends = np.cumsum([0, *(g.motions * b.shape[1] for g, b in zip(groups, bases, strict=True))])
+    """Gram matrix (P, P) of the spread rows of ``columns`` (E, m, n), summed over m and n."""
+    count = columns.shape[2]
+    sizes = [group.size for group in groups]
+    if sum(sizes) <= WRITTEN_OUT:
+        rows = spread(columns, groups).reshape(sum(sizes), -1)
+        half = scipy.linalg.blas.dsyrk(1.0, rows.T, trans=1, lower=1)
+        return half + np.tril(half, -1).T
+    by_pose = np.ascontiguousarray(columns.transpose(2, 1, 0))
+    products = np.swapaxes(by_pose, 1, 2) @ by_pose  # (n, E, E)
+    bases = [np.ones((count, 1)) if group.basis is None else group.basis for group in groups]
+    ends = np.cumsum([0, *sizes])
     result = np.empty((ends[-1], ends[-1]))
     for i, (first, basis) in enumerate(zip(groups, bases, strict=True)):
         for j, (second, other) in enumerate(zip(groups[: i + 1], bases, strict=False)):
             # A GEMM over the poses: every pair of motions against every pair of functions.
-            own = products[:, first.columns, second.columns].reshape(len(columns), -1)
-            both = (basis[:, :, None] * other[:, None, :]).reshape(len(columns), -1)
+            own = products[:, first.columns, second.columns].reshape(count, -1)
+            both = (basis[:, :, None] * other[:, None, :]).reshape(count, -1)
             shape = first.motions, second.motions, basis.shape[1], other.shape[1]
             block = (own.T @ both).reshape(shape).transpose(0, 2, 1, 3)
             block = block.reshape(shape[0] * shape[2], shape[1] * shape[3])

@@ -123,7 +123,7 @@ def flange_model(observations: Observations, empty: VECModel) -> tuple[np.ndarra
 
     def linearised(x: np.ndarray, at: JointState) -> tuple[Pose, np.ndarray]:
         moved = vec.motions(model(x), at.q_rad, at.s)
-        return moved.pose, moved.jacobian()[about_z].transpose(2, 1, 0)
+        return moved.pose, moved.jacobian()[about_z]
 
     def expansion(at: JointState) -> list[Group]:
         basis, travelled = vec.chebyshev_basis(empty, at.q_rad), vec.direction_basis(at.s)
