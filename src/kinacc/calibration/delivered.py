@@ -49,4 +49,4 @@ def require_enough_rows(inputs: Mapping, robot: Robot, calibration: Mapping) -> 
         frames, common = 0, estimator.common
         if common.frames_estimated and len(seen):
             frames = int(common.terms(seen).free.sum())
-        require_enough(seen, estimator.size + frames, estimator.name, estimator.fix)
+        require_enough(seen, estimator.required + frames, estimator.name, estimator.fix)

@@ -10,8 +10,8 @@ import numpy as np
 
 from kinacc.calibration import fitting, identified, tables
 from kinacc.calibration.constraints import ArmTerms, arm_terms, free_parameters, parallel_joints
-from kinacc.calibration.fitting import MORE_POSES, ModelFit
-from kinacc.calibration.frames import Frames
+from kinacc.calibration.fitting import MORE_POSES, ModelFit, distinct
+from kinacc.calibration.frames import Frames, component_names
 from kinacc.calibration.models import Common, Estimator, Fit
 from kinacc.calibration.observations import Observations, full_poses
 from kinacc.calibration.uncertainty import Uncertainty
@@ -22,6 +22,8 @@ from kinacc.kinematics.robot import Robot
 from kinacc.tables.columns import Columns
 
 _AUTO = "auto"
+FEW = 3  # numbers a parameter; with fewer, priors of usual size hold what these do not show
+LEAST = 9  # numbers beside base and tool below which the nominal arm predicts better
 
 
 @dataclass(frozen=True)
@@ -70,6 +72,11 @@ class DHEstimator(Estimator):
         """Number of free parameters."""
         return int(self.arm.free.sum())
 
+    @property
+    def required(self) -> int:
+        """Numbers that a fit needs beside those for base and targets: of few, priors make up."""
+        return self.size if self.follows_vec else 0
+
     def fit(
         self, observations: Observations, others: Mapping[str, Fit], near: Fit | None = None
     ) -> ModelFit:
@@ -85,11 +92,20 @@ class DHEstimator(Estimator):
             observations = poses.with_targets_of(observations)
             frames, terms = Frames(IDENTITY, followed.frames.targets), None
         arm = self.arm
+        free, std, held = arm.free, arm.std, False
+        if not followed:
+            count = distinct(observations).components
+            estimated = len(component_names(observations)) if terms else 0
+            held = count < FEW * (estimated + self.size)
+            usual = arm.nominal.prior_std.reshape(free.shape)
+            std = np.minimum(std, usual) if held else std
+            free = free & (count >= estimated + LEAST)
         fitted = fitting.fit(
             observations,
             arm.nominal,
-            free=arm.free,
-            std=arm.std,
+            free=free,
+            std=std,
+            held=held and bool(free.any()),
             rotation_weight_mm_per_rad=self.common.rotation_weight_mm_per_rad,
             threshold=self.threshold,
             frames=frames,

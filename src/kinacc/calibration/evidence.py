@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from kinacc.calibration.fitting import once
+from kinacc.calibration.fitting import distinct, once
 from kinacc.calibration.frames import FrameParameters
 from kinacc.calibration.observations import Observations
 from kinacc.calibration.one_thread import one_thread
@@ -23,9 +23,9 @@ from kinacc.calibration.system import PoseSystem
 from kinacc.calibration.vec_fit import Prior, flange_model, scales
 from kinacc.kinematics import vec
 from kinacc.kinematics.vec import VECModel
-from kinacc.measurements.folds import configurations
 
 ORDERS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 28, 40)
+USUAL_STD = 0.1  # mm and mrad
 CONSTANT_STD = 3.0  # mm and mrad, of order 0 beside a chosen prior: all but free
 ENOUGH = 2.0  # log evidence below the best that a lower order may have
 PATIENCE = 2  # orders without a gain after which no higher one is tried
@@ -61,19 +61,20 @@ class Choice:
 
 
 def highest_order(observations: Observations, joints: int, frames: int) -> int:
-    """The highest order with no more parameters than residuals, below 0 where there is none.
-
-    One reading of every configuration and target counts: another of the same tells nothing new.
-    """
-    same = configurations(observations.pose, observations.q_rad)
-    first = np.unique(np.stack([same, observations.target]), axis=1, return_index=True)[1]
-    return (observations.select(first).components - frames) // (6 * joints) - 1
+    """The highest order with no more parameters than residuals, below 0 where there is none."""
+    return (distinct(observations).components - frames) // (6 * joints) - 1
 
 
 def prior_of(std_mm: float, decay: float, offset_rad: float) -> Prior:
     """The prior of a chosen width and fall."""
     constant = CONSTANT_STD, 1e-3 * CONSTANT_STD
     return Prior(std_mm, 1e-3 * std_mm, decay, offset_rad, *constant)
+
+
+def without_evidence(order: int, offset_rad: float, held_out: int | None) -> Choice:
+    """The choice of too few residuals to judge by: a prior of usual width."""
+    only = Trial(order, prior_of(USUAL_STD, 1.0, offset_rad), np.nan, 0.0)
+    return Choice(held_out, (only,), only)
 
 
 @one_thread

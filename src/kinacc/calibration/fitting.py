@@ -32,6 +32,10 @@ FRAME_PRIOR_UNITS = 10.0  # mm and mrad about the starting frames, where priors 
 _PART = 0.1  # of a unit motion that a target must have to be what is held
 _SAME = 6  # digits to which parts are equal
 MORE_POSES = "measure more poses"
+SURPLUS, LEAST_NOISE_MM = (
+    2,
+    0.03,
+)  # with fewer residuals a parameter, noise is taken as this at least
 
 
 @dataclass(frozen=True)
@@ -63,7 +67,8 @@ class Unknowns:
 
     ``nominal``: where they stay without data and what priors expect; ``prior_std``: inf for none;
     ``scale``: displacements that count as much as one mm. ``name`` is that of the fit.
-    ``held``: priors hold every parameter, no direction is truncated.
+    ``held``: priors hold every parameter, no direction is truncated; ``few``: of fewer residuals
+    than parameters, too.
     """
 
     name: str
@@ -73,6 +78,7 @@ class Unknowns:
     prior_std: np.ndarray
     scale: np.ndarray
     held: bool = False
+    few: bool = False
     fix: str = MORE_POSES
 
 
@@ -91,7 +97,9 @@ def solved(
     Raises FitError, and InputError where there are fewer residuals than parameters.
     """
     flange, frames = unknowns.flange, parameters
-    require_enough(observations, frames.size + flange.size, unknowns.name, unknowns.fix)
+    own = 0 if unknowns.few else flange.size
+    few = unknowns.few and observations.components < SURPLUS * (frames.size + flange.size)
+    require_enough(observations, frames.size + own, unknowns.name, unknowns.fix)
     frame_std = frames.std
     system = PoseSystem(observations, flange, frames, rotation_weight_mm_per_rad)
     if unknowns.held:
@@ -105,6 +113,7 @@ def solved(
         np.concatenate([frame_std, unknowns.prior_std]),
         np.concatenate([frames.scale, unknowns.scale]),
         None if unknowns.held else threshold,
+        LEAST_NOISE_MM**2 if few else 1e-8,
     )
     solution, weights = minimise_robust(task, loss)
     return frames.frames(solution.x[: frames.size]), solution, weights
@@ -116,10 +125,20 @@ def once(observations: Observations) -> np.ndarray:
     What a model cannot explain is common to all readings of a configuration and target: beside a
     prior they are one.
     """
+    _, group, count = _groups(observations)
+    return 1.0 / np.sqrt(count[group.ravel()])
+
+
+def distinct(observations: Observations) -> Observations:
+    """One reading of every configuration and target: another of the same tells nothing new."""
+    return observations.select(_groups(observations)[0])
+
+
+def _groups(observations: Observations) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """First rows (g,) of configurations and targets, the group (n,) of rows, and sizes (g,)."""
     same = configurations(observations.pose, observations.q_rad)
     both = np.stack([same, observations.target])
-    _, group, count = np.unique(both, axis=1, return_inverse=True, return_counts=True)
-    return 1.0 / np.sqrt(count[group.ravel()])
+    return np.unique(both, axis=1, return_index=True, return_inverse=True, return_counts=True)[1:]
 
 
 @one_thread
@@ -187,8 +206,9 @@ def fit(
         std.ravel()[mask],
         scale[mask],
         held,
+        held,
     )
-    require_enough(observations, unknowns.flange.size, name, MORE_POSES)
+    require_enough(observations, 0 if held else unknowns.flange.size, name, MORE_POSES)
     if frames is None:
         parameters = placed(observations, begin, frame_terms, rotation_weight_mm_per_rad, nominal)
     else:

@@ -19,6 +19,7 @@ from kinacc.kinematics.dh import DHModel
 from kinacc.kinematics.model import JointState
 
 IDENTIFIED, PRIOR, UNDETERMINED, FIXED = "identified", "prior", "undetermined", "fixed"
+LEANS = 0.5  # share of its prior above which a standard deviation is that of the prior
 STRUCTURAL = 1e-5  # share of the largest singular value over poses all over the joints
 UNSEEN_POSES = 60
 UNSEEN_WEIGHT = 500.0  # mm per rad; what is null is so by any weight
@@ -47,12 +48,13 @@ def parameters(fit: ModelFit, known: Uncertainty) -> list[Parameter]:
     of them where it has a prior (``truncated.MOVES_SQUARED``).
     """
     priors, fixed = _priors(fit), _fixed(fit)
+    std = dict(zip(known.names, np.sqrt(np.maximum(np.diag(known.covariance), 0.0)), strict=True))
     found = []
     for name, share in zip(
         known.names, np.sqrt(np.sum(known.undetermined**2, axis=0)), strict=True
     ):
         status = FIXED if name in fixed else IDENTIFIED
-        status = PRIOR if name in priors else status
+        status = PRIOR if name in priors and std[name] > LEANS * priors[name] else status
         most = MOVES_SQUARED if status == PRIOR else TOUCH_SQUARED
         status = UNDETERMINED if share**2 > most else status
         prior = priors[name] if status == PRIOR else None

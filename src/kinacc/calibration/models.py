@@ -102,6 +102,11 @@ class Estimator:
         """Number of free parameters of a model."""
         raise NotImplementedError
 
+    @property
+    def required(self) -> int:
+        """Numbers that a fit needs beside those for base and targets."""
+        return self.size
+
     def choices(self, every: Observations, progress: Callable | None = None) -> dict[str, Columns]:
         """Tables that say how settings left open were chosen. Raises FitError."""
         return {}

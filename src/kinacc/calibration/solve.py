@@ -30,7 +30,6 @@ MEMORY = 6  # steps that suggest the next one
 # fit is not quite the least cost.
 TRUNCATED_GROWTH, COST_RESOLUTION = 1e-3, 1e-9
 LEAST_COST = 1e-10  # mm^2: of noise-free data
-LEAST_VARIANCE = 1e-8  # mm^2: a prior must stay above rounding where data are free of noise
 FIRST_VARIANCE = 1e-6  # share of the mean squared misfit at the start
 VARIANCE_STEPS, FIRST_TOLERANCE = 20, 1e-2  # of the first step, which leads elsewhere
 FRAME_THRESHOLD = 1e-5  # frames have no nominal value to keep: only exact ambiguities are cut
@@ -101,6 +100,7 @@ class Task:
     Priors of standard deviation ``prior_std`` (P,), inf for none, expect ``nominal`` (P,), where
     directions that are left out stay. ``scale`` (P,): displacements that count as one mm. Singular
     values below ``threshold`` of the largest are left out; None: priors hold everything.
+    ``least_variance`` of residuals beside priors: at least above rounding.
     """
 
     name: str
@@ -110,6 +110,7 @@ class Task:
     prior_std: np.ndarray
     scale: np.ndarray
     threshold: float | None
+    least_variance: float = 1e-8
 
     @property
     def active(self) -> np.ndarray:
@@ -212,14 +213,14 @@ class _Descent:
             split = self.split()
             return split, split.step(self.gram[:-1, -1], self.displacement, 0.0 * self.weight)
         if first:
-            self.variance = max(FIRST_VARIANCE * self.cost / self.count, LEAST_VARIANCE)
+            self.variance = max(FIRST_VARIANCE * self.cost / self.count, self.task.least_variance)
         for _ in range(VARIANCE_STEPS if first else 1):
             split = self.split()
             squared = self.variance * self.weight**2
             step = split.step(self.gram[:-1, -1], self.displacement, squared)
             to = np.append(step, 1.0)
             left = float(to @ self.gram @ to) / max(self.count - split.effective, 1.0)
-            before, self.variance = self.variance, max(left, LEAST_VARIANCE)
+            before, self.variance = self.variance, max(left, self.task.least_variance)
             if abs(self.variance - before) <= FIRST_TOLERANCE * before:
                 break
         return split, step
@@ -283,6 +284,8 @@ class _Descent:
         told = self.split(telling=True)
         freedom = self.count - fitted.effective
         variance = self.cost / freedom if freedom > 0 else np.nan
+        if self.task.threshold is None:
+            variance = self.variance
         along = variance * np.eye(told.root.shape[1])
         spectrum = fitted.spectrum
         if len(self.grams) == 2:  # of truncated fits

@@ -164,7 +164,9 @@ def _undetermined_rows(uncertainty: Uncertainty) -> Iterable[tuple]:
             yield ("undetermined_direction", number, name, value, scaled_unit(name))
 
 
-def _spectrum_rows(spectrum: Spectrum) -> Iterable[tuple]:
+def _spectrum_rows(spectrum: Spectrum | None) -> Iterable[tuple]:
+    if spectrum is None:
+        return
     yield ("rank", None, None, spectrum.rank, "1")
     yield ("rank_threshold", None, None, spectrum.threshold, "1")
     yield ("gap", None, None, spectrum.gap if np.isfinite(spectrum.gap) else np.nan, "1")

@@ -69,6 +69,11 @@ class VECEstimator(Estimator):
         return 6 * self.common.nominal.joints * (self.order + 1)
 
     @property
+    def required(self) -> int:
+        """Numbers that a fit needs beside those for base and targets."""
+        return 0 if self.open else self.size
+
+    @property
     def open(self) -> bool:
         """Whether order or prior are left to the evidence."""
         return len(self.orders) > 1 or not self.prior_stated
@@ -106,6 +111,7 @@ class VECEstimator(Estimator):
             frames=frames,
             frames_free=terms is not None,
             frame_terms=terms,
+            few=self.open,
         )
 
     def tables(
@@ -127,7 +133,9 @@ class VECEstimator(Estimator):
         if terms is not None:
             parameters = placed(seen, arm, terms, weight, start=frames)
         most = evidence.highest_order(seen, arm.joints, parameters.size)
-        orders = [each for each in self.orders if each <= most] or [self.orders[0]]
+        orders = [each for each in self.orders if each <= most]
+        if not orders:
+            return evidence.without_evidence(self.orders[0], self.prior.offset_rad, fold)
         stated = self.prior if self.prior_stated else None
         return evidence.choose(
             self._wanted(seen), self._empty(1), parameters, weight, orders,

@@ -61,19 +61,29 @@ def fit(
     frames: Frames,
     frames_free: bool,
     frame_terms: FrameTerms | None = None,
+    few: bool = False,
 ) -> ModelFit:
     """Coefficients of ``empty`` (its DH arm, joint range and order) from ``observations``.
 
     Base and targets are ``frames``, or start there if ``frames_free``, under ``frame_terms``.
     Direction offsets that no observation shows are left at zero, std NaN; the two of a joint that
     always travelled sum to zero, so that the model at an unknown direction is the mean of both.
-    Raises FitError, and InputError where there are fewer residuals than parameters.
+    Raises FitError and, unless ``few`` residuals are enough, InputError where there are fewer than
+    parameters.
     """
     weight = rotation_weight_mm_per_rad
     free, flange = flange_model(observations, empty)
     prior_std, nothing = prior.std(empty), np.zeros(flange.size)
     unknowns = Unknowns(
-        "VEC fit", flange, nothing, nothing, prior_std[free], scales(empty)[free], True, VEC_FIX
+        "VEC fit",
+        flange,
+        nothing,
+        nothing,
+        prior_std[free],
+        scales(empty)[free],
+        True,
+        few,
+        VEC_FIX,
     )
     parameters = FrameParameters.none(frames)
     if frames_free:

@@ -121,7 +121,7 @@ def few_poses(columns: Columns, robot: Robot, calibration: Mapping) -> list[Find
     np.maximum.at(turned, pairs[0], 3.0 * seen.has_rotation[first])
     components = np.minimum(3.0 * np.bincount(pairs[0]) + turned, _PER_POSE)
     frames = int(fit.common.terms(seen).free.sum()) if fit.common.frames_estimated else 0
-    if components.sum() >= fit.size + frames:
+    if components.sum() >= fit.required + frames:
         return []
     few = finding(
         "few_poses",

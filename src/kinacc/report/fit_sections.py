@@ -194,9 +194,11 @@ def _rank(fit: Columns | None) -> dict | None:
     if fit is None:
         return None
     quantity, value = np.asarray(fit["quantity"]), np.asarray(fit["value"], dtype=float)
-    rank, threshold = (value[quantity == name][0] for name in ("rank", "rank_threshold"))
     share = value[quantity == "singular_value"]
-    if not rank or not len(share):
+    if not len(share):
+        return None
+    rank, threshold = (value[quantity == name][0] for name in ("rank", "rank_threshold"))
+    if not rank:
         return None
     return {"rank": int(rank), "threshold": threshold, "share": share / share[0]}
 

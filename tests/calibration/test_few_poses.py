@@ -1,0 +1,89 @@
+"""Few positions: an automatic calibration ends, and predicts no worse than the nominal arm."""
+
+from __future__ import annotations
+
+import copy
+
+import numpy as np
+import pytest
+import simulated
+
+from kinacc.calibration import models
+from kinacc.calibration.constraints import free_parameters, parallel_joints
+from kinacc.calibration.residuals import errors
+from kinacc.config.schema import defaults
+from kinacc.kinematics import dh, robot
+
+SIZES, SUBSETS = (6, 8, 12, 16, 20, 30), 20
+
+
+def settings():
+    made = copy.deepcopy(defaults()["calibration"])
+    made["base_and_tool"] = "estimated"
+    made["dh"] |= {"fit_to": "measurements", "hayati_joints": "auto"}
+    made["vec"] |= {"order": "auto", "prior": "chosen"}
+    return made
+
+
+def positions(name, offset_deg=(0.2, 0.45), count=300, seed=1):
+    """Positions of an arm whose joints are off by ``offset_deg`` either way."""
+    arm, rng = robot.load(name), np.random.default_rng(seed)
+    free = free_parameters(arm.dh.joints, parallel_joints(arm.dh), True)
+    true = simulated.disturbed(arm.dh, free, rng, 0.5e-3, 0.3)
+    turned = true.start.reshape(free.shape).copy()
+    size = np.deg2rad(rng.uniform(*offset_deg, len(free)))
+    turned[:, 0] += size * rng.choice([-1.0, 1.0], len(free))
+    true = dh.with_vector(true, turned.ravel())
+    return arm, simulated.measure(true, simulated.joints(arm, count, rng), simulated.POINT, rng)
+
+
+def mean_errors(arm, train, test, *kinds):
+    every = models.estimators(settings(), arm, train)
+    fits = models.fit_all(train, [every[kind] for kind in kinds])
+    found = errors(fits, test)
+    return [
+        np.linalg.norm(found[f"{kind}_vs_measured"].position_mm, axis=1).mean()
+        for kind in (*kinds, "nominal")
+    ]
+
+
+@pytest.mark.parametrize("name", ["mh180", "ur10", "irb120"])
+@pytest.mark.parametrize("offset_deg", [(0.2, 0.45), (0.0, 0.05)], ids=["turned", "small"])
+def test_dh_from_few_positions_beats_the_nominal_arm(name, offset_deg):
+    arm, seen = positions(name, offset_deg)
+    test = seen.select(slice(100, None))
+    for size in SIZES:
+        found = []
+        for subset in range(SUBSETS):
+            rows = np.random.default_rng(100 * size + subset).permutation(100)[:size]
+            found.append(mean_errors(arm, seen.select(rows), test, "dh"))
+        by_dh, nominal = np.mean(found, axis=0)
+        assert by_dh < nominal, (size, by_dh, nominal)
+        if size >= 20:
+            assert by_dh < 0.12
+            assert by_dh < 0.3 * nominal
+
+
+def test_very_few_positions_leave_the_arm_nominal():
+    arm, seen = positions("ur10")
+    by_dh, nominal = mean_errors(arm, seen.select(slice(5)), seen.select(slice(100, None)), "dh")
+    assert by_dh == pytest.approx(nominal, rel=1e-9)
+
+
+@pytest.mark.parametrize("size", [5, 8, 20])
+def test_every_model_of_an_automatic_calibration_ends(size):
+    arm, seen = positions("mh180", (0.0, 0.05))
+    test = seen.select(slice(100, None))
+    found = mean_errors(arm, seen.select(slice(size)), test, "vec", "dh")
+    assert np.isfinite(found).all()
+    assert found[1] <= found[2] * (1.0 + 1e-9)
+
+
+def test_few_parameters_of_many_are_said_to_rest_on_their_prior():
+    arm, seen = positions("mh180")
+    train = seen.select(slice(8))
+    estimator = models.estimators(settings(), arm, train)["dh"]
+    fitted = estimator.fit(train, {})
+    assert np.isfinite(fitted.prior_std[fitted.free]).all()
+    assert np.isfinite(fitted.std[fitted.free]).all()
+    assert (fitted.std <= fitted.prior_std * (1.0 + 1e-9))[fitted.free].all()
