@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
 from kinacc.calibration import blind_words
 from kinacc.calibration.misfit import Misfit, misfit
@@ -15,11 +16,11 @@ from kinacc.calibration.uncertainty import Uncertainty
 from kinacc.config.error_models import ALWAYS, ERROR_MODELS, PLAINEST
 from kinacc.deployment.record import MODELS, Calibration, Residual
 from kinacc.errors import InputError, Problem, first_few, gathered, refuse
-from kinacc.geometry import Pose
+from kinacc.kinematics import robot as robots
 from kinacc.kinematics import tables as model_tables
 from kinacc.kinematics.dh import PARAMETERS
-from kinacc.kinematics.model import JointState
 from kinacc.kinematics.robot import Robot
+from kinacc.tables import store
 from kinacc.tables.allowed import SUBSETS
 from kinacc.tables.columns import joint_count
 
@@ -53,7 +54,7 @@ def read_tables(folder: Path | str, *more: str) -> dict[str, dict[str, np.ndarra
     tables = {}
     for name in present:
         with gathered(problems):
-            tables[name] = _Table.of(name, folder / f"{name}.parquet")
+            tables[name] = _Table(name, folder / f"{name}.parquet")
     refuse(problems, f"{folder} cannot be used")
     return tables
 
@@ -61,35 +62,21 @@ def read_tables(folder: Path | str, *more: str) -> dict[str, dict[str, np.ndarra
 class _Table(dict[str, np.ndarray]):
     """Columns of a table of results; one that is asked for and is not there is a problem."""
 
-    path: Path
-
-    @classmethod
-    def of(cls, name: str, path: Path) -> _Table:
-        """The table of a file. InputError where it has no rows, or words in place of numbers."""
-        from kinacc.tables import store
-
-        table = cls(store.read(path))
-        table.path = path
-        contract = store.artefact_named(name)
-        rows = len(next(iter(table.values()), ()))
-        problems = [Problem(str(path), "has no rows", fix=store.remake(path))]
-        problems = problems if not rows and not contract.may_be_empty else []
-        for column in contract.for_joints(joint_count(contract, table)):
-            values = table.get(column.name)
-            if values is None or (column.kind == "text") == (values.dtype == object):
-                continue
-            kind, other = ("text", "numbers") if column.kind == "text" else ("numbers", "text")
-            where = f"{path}, column {column.name}"
-            problems.append(Problem(where, f"holds {other}", kind, store.remake(path)))
-        refuse(problems)
-        return table
+    def __init__(self, name: str, path: Path) -> None:
+        super().__init__(store.read(path))
+        self.path, contract = path, store.artefact_named(name)
+        wrong = (
+            [] if contract.may_be_empty or len(next(iter(self.values()), ())) else ["has no rows"]
+        )
+        for column in contract.for_joints(joint_count(contract, self)):
+            is_text = self.get(column.name, np.zeros(0)).dtype == object
+            if column.name in self and is_text != (column.kind == "text"):
+                wrong.append(f"column {column.name} holds {'text' if is_text else 'numbers'}")
+        refuse([Problem(str(path), what, fix=store.remake(path)) for what in wrong])
 
     def __missing__(self, name: str) -> np.ndarray:
-        from kinacc.tables import store
-
-        raise InputError(
-            Problem(str(self.path), f"has no column {name}", fix=store.remake(self.path))
-        )
+        what = f"has no column {name}"
+        raise InputError(Problem(str(self.path), what, fix=store.remake(self.path)))
 
 
 def recorded_robot(folder: Path | str) -> Robot | None:
@@ -97,25 +84,20 @@ def recorded_robot(folder: Path | str) -> Robot | None:
 
     Raises InputError where what it says cannot be read.
     """
-    from kinacc.kinematics import robot
-
     path = Path(folder) / "robot.parquet"
     if not path.is_file():
         return None
-    return robot.of_text(str(_Table.of("robot", path)["description"][0]), str(path))
+    return robots.of_text(str(_Table("robot", path)["description"][0]), str(path))
 
 
 def misfit_of(folder: Path | str, model: str) -> Misfit:
     """What the standard deviations of a model in a results folder are worth."""
-    from kinacc.tables import store
-
     robot = recorded_robot(folder)
     if robot is None:
         return Misfit(model, np.nan, UNKNOWN)
     paths = {name: Path(folder) / f"{name}.parquet" for name in ("measurements", "model_selection")}
-    return misfit(
-        {name: store.read(at) for name, at in paths.items() if at.is_file()}, robot, model
-    )
+    tables = {name: store.read(path) for name, path in paths.items() if path.is_file()}
+    return misfit(tables, robot, model)
 
 
 def calibration(
@@ -137,17 +119,24 @@ def calibration(
         raise InputError(Problem("model", what, ", ".join(made)))
     bounded = next(each for each in made.values() if each.domain is not None)
     _require_same_arm(bounded.dh, robot, name)
-    frames = tables["frames"]
-    of_model = np.asarray(frames["model"]) == choice
-    number = _session_number(frames, of_model, session)
-    anchored = made[choice].table is None and not _same_base(frames, choice, session)
-    told = tables.get(f"{PLAINEST}_identified")
+    frames, told = tables["frames"], tables.get(f"{PLAINEST}_identified")
+    number = _session_number(frames, choice, session)
+    bases = [model_tables.frame(frames, each, "base", session) for each in (PLAINEST, choice)]
+    # A model of the very base of the DH model: neither was fitted with it.
+    same_base = all(np.array_equal(one, other) for one, other in zip(*bases, strict=True))
+    anchored = made[choice].table is None and not same_base
+    measured, fitted, turned = tables.get("measurements"), None, frozenset()
+    if measured is not None:
+        is_fitted = np.asarray(measured["subset"]) == SUBSETS[0]
+        fitted = from_columns(measured, robot).at.select(is_fitted)
+        known = np.isfinite(np.asarray(measured["qw"], dtype=float))
+        turned = frozenset(map(str, np.asarray(measured["target"])[known]))
     return Calibration(
         name=name,
         robot=robot,
         choice=choice,
         model=made[choice],
-        base=model_tables.frame(frames, choice, "base", session),
+        base=bases[1],
         base_name="base" if number == 0 else f"base{number + 1}",
         anchor=calibration(tables, robot, PLAINEST, name, session) if anchored else None,
         left_open=None if told is None else tuple(blind_words.listed(told)),
@@ -157,8 +146,8 @@ def calibration(
         known=uncertainty(tables, choice),
         residual=residual(tables, choice),
         fitted_range_rad=bounded.domain,
-        fitted=_fitted(tables, robot),
-        orientation_measured=_with_orientation(tables),
+        fitted=fitted,
+        orientation_measured=turned,
     )
 
 
@@ -168,33 +157,11 @@ def targets_of(frames: Mapping, model: str) -> list[str]:
     return [str(each) for each in np.asarray(frames["frame"])[of_model] if each != "base"]
 
 
-def _with_orientation(tables: Tables) -> frozenset[str]:
-    """Targets of which any orientation was measured."""
-    if "measurements" not in tables:
-        return frozenset()
-    turned = np.isfinite(np.asarray(tables["measurements"]["qw"], dtype=float))
-    return frozenset(map(str, np.asarray(tables["measurements"]["target"])[turned]))
-
-
-def _fitted(tables: Tables, robot: Robot) -> JointState | None:
-    """How the arm stood at the readings that were fitted."""
-    if "measurements" not in tables:
-        return None
-    fitted = np.asarray(tables["measurements"]["subset"]) == SUBSETS[0]
-    return from_columns(tables["measurements"], robot).at.select(fitted)
-
-
-def _same_base(frames: Mapping, choice: str, session: str | None) -> bool:
-    """Whether a model has the very base of the DH model, so that neither was fitted with it."""
-    bases = [model_tables.frame(frames, each, "base", session) for each in (PLAINEST, choice)]
-    return all(np.array_equal(one, other) for one, other in zip(*bases, strict=True))
-
-
-def _session_number(frames: Mapping, of_model: np.ndarray, session: str | None) -> int:
+def _session_number(frames: Mapping, model: str, session: str | None) -> int:
     """Place of a session among the bases of a model; InputError for one that is not there."""
     if session is None or "session" not in frames:
         return 0
-    bases = of_model & (np.asarray(frames["frame"]) == "base")
+    bases = (np.asarray(frames["model"]) == model) & (np.asarray(frames["frame"]) == "base")
     known = [str(each) for each in np.asarray(frames["session"])[bases] if each is not None]
     if session not in known:
         allowed = ", ".join(known) or "none: the data name no sessions"
@@ -229,53 +196,41 @@ def residual(tables: Tables, choice: str, subset: str | None = None) -> Residual
 
     None where the table does not say.
     """
-    columns = tables.get("residuals")
-    if columns is None:
-        return None
-    ours = np.asarray(columns["comparison"]) == f"{choice}_vs_measured"
-    ours &= np.isnan(np.asarray(columns["fold"], dtype=float))
+    names = ("comparison", "subset", "quantity", "fold", "rms")
+    table = pd.DataFrame({name: tables.get("residuals", {}).get(name, []) for name in names})
+    pooled = table[(table["comparison"] == f"{choice}_vs_measured") & table["fold"].isna()]
     for each in ("validation", "train") if subset is None else (subset,):
-        rows = ours & (np.asarray(columns["subset"]) == each)
-        of = {str(columns["quantity"][i]): float(columns["rms"][i]) for i in np.flatnonzero(rows)}
-        if "position" in of:
-            return Residual(of["position"], 1e-3 * of.get("orientation", np.nan), each)
+        rms = pooled[pooled["subset"] == each].set_index("quantity")["rms"]
+        if "position" in rms:
+            turn = float(rms.get("orientation", np.nan))
+            return Residual(float(rms["position"]), 1e-3 * turn, each)
     return None
 
 
 def uncertainty(tables: Tables, choice: str) -> Uncertainty | None:
     """Covariance and undetermined directions of a fit; None where the tables lack them."""
-    columns = tables.get(f"{choice}_covariance")
+    columns, fit = tables.get(f"{choice}_covariance"), tables.get(f"{choice}_fit")
     if columns is None:
         return None
-    names = list(dict.fromkeys(str(each) for each in columns["parameter"]))
-    place = {name: number for number, name in enumerate(names)}
-    row, column = (
-        _places(columns[each], place, f"table {choice}_covariance")
-        for each in ("parameter", "other")
-    )
+    names = pd.Index(columns["parameter"]).unique()
+
+    def places(parameters: np.ndarray, table: str) -> np.ndarray:
+        found = names.get_indexer(parameters)
+        unknown = sorted({str(each) for each in parameters[found < 0]})
+        what = f"has parameters without a variance: {first_few(unknown)}"
+        refuse([Problem(f"table {choice}_{table}", what)] if unknown else [])
+        return found
+
+    row, column = (places(columns[each], "covariance") for each in ("parameter", "other"))
     covariance = np.zeros((len(names), len(names)))
     covariance[row, column] = covariance[column, row] = columns["covariance"]
-    return Uncertainty(tuple(names), covariance, _undetermined(tables, choice, place))
-
-
-def _undetermined(tables: Tables, choice: str, place: Mapping[str, int]) -> np.ndarray:
-    fit = tables.get(f"{choice}_fit")
-    if fit is None:
-        return np.zeros((0, len(place)))
-    rows = np.asarray(fit["quantity"]) == "undetermined_direction"
-    numbers, direction = np.unique(fit["number"][rows], return_inverse=True)
-    directions = np.zeros((len(numbers), len(place)))
-    column = _places(fit["parameter"][rows], place, f"table {choice}_fit")
-    directions[direction, column] = fit["value"][rows]
-    return directions
-
-
-def _places(names: np.ndarray, place: Mapping[str, int], table: str) -> np.ndarray:
-    """Places (n,) of parameters; InputError where the covariance has none of a name."""
-    unknown = sorted({str(each) for each in names if each not in place})
-    what = f"has parameters without a variance: {first_few(unknown)}"
-    refuse([Problem(table, what)] if unknown else [])
-    return np.array([place[each] for each in names], dtype=int)
+    directions = np.zeros((0, len(names)))
+    if fit is not None:
+        rows = np.asarray(fit["quantity"]) == "undetermined_direction"
+        numbers, direction = np.unique(fit["number"][rows], return_inverse=True)
+        directions = np.zeros((len(numbers), len(names)))
+        directions[direction, places(fit["parameter"][rows], "fit")] = fit["value"][rows]
+    return Uncertainty(tuple(map(str, names)), covariance, directions)
 
 
 def require_same_robot(recorded: Robot, given: Robot, place: str) -> None:
@@ -284,23 +239,18 @@ def require_same_robot(recorded: Robot, given: Robot, place: str) -> None:
     Limits and tool may differ: they are no part of what was fitted.
     """
     _require_same_arm(recorded.dh, given, place)
-    differs = {
-        "which joints slide": recorded.dh.prismatic != given.dh.prismatic,
-        "joint_map or signs": np.abs(recorded.joint_map - given.joint_map) > _SAME,
-        "base": ~_close(recorded.base, given.base),
-        "flange": ~_close(recorded.flange, given.flange),
+    pairs = {
+        "which joints slide": (recorded.dh.prismatic, given.dh.prismatic),
+        "joint_map or signs": (recorded.joint_map, given.joint_map),
+        "base": (np.column_stack(recorded.base), np.column_stack(given.base)),
+        "flange": (np.column_stack(recorded.flange), np.column_stack(given.flange)),
     }
     problems = [
         Problem(place, f"{given.name} differs from the recorded {recorded.name} in {what}")
-        for what, there in differs.items()
-        if np.any(there)
+        for what, (one, other) in pairs.items()
+        if not np.allclose(one, other, rtol=_SAME, atol=_SAME)
     ]
     refuse(problems, f"The results were made with another robot than {given.name}")
-
-
-def _close(one: Pose, other: Pose) -> np.ndarray:
-    pairs = zip(one, other, strict=True)
-    return np.array([np.allclose(a, b, rtol=_SAME, atol=_SAME) for a, b in pairs])
 
 
 def _require_same_arm(nominal, robot: Robot, name: str) -> None:
