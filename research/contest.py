@@ -22,16 +22,18 @@ from kinacc.assess.adaptive import Campaign, Candidates
 from kinacc.assess.attainable import NONE, WidthLimits, limits_of, points_bounded
 from kinacc.assess.random_numbers import key_of
 from kinacc.assess.registry import RECOMMENDED
-from kinacc.assess.simulate import carry_on, truth_mm
+from kinacc.assess.simulate import assess_world, carry_on, truth_mm
 from kinacc.assess.statement import CANDIDATES, REGION, Reason, Statement
 from kinacc.assess.world import World, drawn_world
 from kinacc.config.records import of_section
 from kinacc.deployment.folder import recorded_robot
+from kinacc.kinematics.robot import Robot, load
 from kinacc.study.fields import FAMILIES, ErrorField, of_measurements, of_points, synthetic
 from kinacc.tables import store
 from research import verdicts
 from research.assessors import ADAPTIVE, ASSESSORS, SLOW
 from research.conditions import CONDITIONS, STATED, Course
+from research.error_effects import joint_errors
 from research.made_up_fields import MADE_UP, made_up
 
 NM_PER_MM = 1_000_000
@@ -138,8 +140,9 @@ class Contest:
 
 def contested(folders: Sequence[str | Path], size: Size) -> list[ErrorField]:
     """Every field: of results folders of kinacc, of synthetic families, and those made up."""
-    found = [field_of(Path(each)) for each in folders]
-    found += [synthetic(family, draw) for family in FAMILIES for draw in size.draws]
+    found: list[ErrorField] = [field_of(Path(each)) for each in folders]
+    arm = load("mh180")
+    found += [of_arm(synthetic(each, draw), arm) for each in FAMILIES for draw in size.draws]
     return found + [made_up(name) for name in size.made_up]
 
 
@@ -151,8 +154,30 @@ def field_of(folder: Path) -> ErrorField:
 
     robot = recorded_robot(folder)
     if (folder / "data_check.parquet").is_file():  # of measured files alone
-        return of_measurements(folder.name, robot, table("pose_errors"), table("measurements"))
-    return of_points(folder.name, robot, table("assessment_points"))
+        field = of_measurements(folder.name, table("pose_errors"), table("measurements"))
+    else:
+        field = of_points(folder.name, table("assessment_points"))
+    return field if robot is None else of_arm(field, robot)
+
+
+@dataclass(frozen=True)
+class ArmField(ErrorField):
+    """Errors of an arm that is known: ``effects`` (n, 3, 6 k) of errors of its joints."""
+
+    effects: np.ndarray | None = None
+
+
+def of_arm(field: ErrorField, robot: Robot) -> ArmField:
+    """The field with what errors of single joints do at its configurations."""
+    effects = joint_errors(robot, field.q_rad)
+    own = {each.name: getattr(field, each.name) for each in dataclasses.fields(field)}
+    return ArmField(**own, effects=effects)
+
+
+def known(field: ErrorField, rows: np.ndarray) -> dict[str, np.ndarray]:
+    """What an assessor may know of candidates beside the noise: joints and effects."""
+    given = {"q_rad": field.q_rad, "effects": getattr(field, "effects", None)}
+    return {name: values[rows] for name, values in given.items() if values is not None}
 
 
 @dataclass(frozen=True)
@@ -227,13 +252,13 @@ class Assessed(NamedTuple):
     alarms: tuple[Reason, ...] = ()
 
 
-def conduct(assessor, world: World, condition: str = STATED, **known: np.ndarray) -> Campaign:
-    """Run a campaign to its end on the readings of a world; ``known`` as in :class:`Candidates`.
+def conduct(assessor, world: World, condition: str = STATED) -> Campaign:
+    """Run a campaign to its end on the readings of a world.
 
     ``condition``: how readings come about, a name of :data:`research.conditions.CONDITIONS`.
     """
     course = Course(CONDITIONS[condition], world, assessor.measurements)
-    campaign = assessor.begin(Candidates.with_equal_noise(course.stated_mm(), **known))
+    campaign = assessor.begin(Candidates.with_equal_noise(course.stated_mm()))
     carry_on(campaign, world.reading_mm if condition == STATED else course.reading_mm)
     return campaign
 
@@ -243,7 +268,6 @@ def assessed(
     settings: Mapping[str, object],
     world: World,
     condition: str = STATED,
-    **known: np.ndarray,
 ) -> Assessed:
     """What an assessor says of a world, whichever its interface.
 
@@ -252,10 +276,10 @@ def assessed(
     """
     assessor = of_section(ASSESSORS[name], settings)
     if name in ADAPTIVE:
-        campaign = conduct(assessor, world, condition, **known)
+        campaign = conduct(assessor, world, condition)
         taken, rows = campaign.ledger.taken, campaign.ledger.visited
         return Assessed(campaign.statements(), taken, len(rows), rows, campaign.alarms())
-    found = assessor.assess(world)
+    found, _ = assess_world(assessor, world, assessor.measurements)
     said = Statement(CANDIDATES, found.assessed_mm)
     return Assessed((said,), found.measurements, found.points_visited, None)
 
@@ -279,7 +303,8 @@ def campaigns(job: Job, repetitions: Iterable[int], contest: Contest) -> pd.Data
         near = _limits_in(world, job.budget)
         for name in contest.assessors:
             own = {**place, "assessor": name}
-            found = assessed(name, settings, world, job.world, **cell.field.known(chosen))
+            own_arm = {**settings, **known(cell.field, chosen)}
+            found = assessed(name, own_arm, world, job.world)
             graded = _graded(found, world, cell.field, job)
             if repetition < LIMITED:
                 limits = [near(each, found.visited) for each in found.statements]

@@ -62,8 +62,9 @@ class Kinematic(AdaptiveAssessor):
     measurements: int
     visited: float = FIRST_SHARE
     confidence: float = CONFIDENCE
+    q_rad: np.ndarray | None = None
+    effects: np.ndarray | None = None
     name: ClassVar[str] = "kinematic"
-    needs: ClassVar[tuple[str, ...]] = ("q_rad", "effects")
 
     def __post_init__(self) -> None:
         problems = check_budget(self.measurements, self.confidence)
@@ -80,11 +81,19 @@ class Kinematic(AdaptiveAssessor):
 
     def begin(self, candidates: Candidates) -> KinematicCampaign:
         """A new campaign. InputError without joints and effects of the candidates."""
+        lacking = [
+            Problem(name, "not given", "joints of the candidates, and what their errors do at them")
+            for name in ("q_rad", "effects")
+            if getattr(self, name) is None
+        ]
+        refuse(lacking, f"{self.name} needs to know the arm")
         return KinematicCampaign(self, candidates)
 
 
 class KinematicCampaign(Campaign):
     """See :class:`Kinematic`."""
+
+    settings: Kinematic
 
     def __init__(self, settings: Kinematic, candidates: Candidates) -> None:
         super().__init__(settings, candidates)
@@ -149,7 +158,7 @@ class KinematicCampaign(Campaign):
         """Why the model is not believed; None if it is."""
         from scipy.special import chdtrc
 
-        if self.first < (needed := points_needed(self.ledger.candidates.q_rad.shape[1])):
+        if self.first < (needed := points_needed(self.settings.q_rad.shape[1])):
             return Reason("few_for_model", {"first": self.first, "needed": needed})
         worst = float(known.odd.max())
         chance = -math.expm1(known.odd.size * math.log1p(-float(chdtrc(3, worst))))
@@ -178,9 +187,9 @@ class KinematicCampaign(Campaign):
         return plan
 
     def _posterior(self) -> Posterior:
-        candidates, visited = self.ledger.candidates, self.ledger.visited
+        settings, visited = self.settings, self.ledger.visited
         if self._basis is None:
-            self._basis = Basis.of(candidates.q_rad, candidates.effects)
+            self._basis = Basis.of(settings.q_rad, settings.effects)
             rows = visited[: self.first]
             means, noise = self.ledger.mean_mm[rows], self.ledger.noise_mm[rows]
             self._scales = fitted_scales(self._basis, rows, means, noise)

@@ -1,7 +1,7 @@
 """Errors of poses as what smooth errors of single joints do at the tool, plus what is local.
 
 e(q) = sum over joints and causes of J_c(q) f_c(q_j) + d(q). J_c is what one unit of cause c does at
-the tool (:mod:`kinacc.assess.error_effects`), f_c a smooth function of the joint's own angle: a
+the tool (:mod:`research.error_effects`), f_c a smooth function of the joint's own angle: a
 Gaussian process in Chebyshev polynomials, variance a_g^2 b_o^2 of the coefficient of order o, g the
 joint and the kind of cause. d is local to the pose: each component normal with a standard deviation
 drawn from a mixture of scales, so that most poses may be smooth and few far off. All scales are
@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinacc.assess.error_effects import CAUSES_PER_JOINT
+from research.error_effects import CAUSES_PER_JOINT
 
 ORDER = 6
 _ROUNDS = 40

@@ -27,37 +27,6 @@ FIELDS = {
 }
 
 
-def upper_limits(lengths: np.ndarray, spread: float) -> np.ndarray:
-    """Upper limits of lengths (k,) by the noncentral chi-squared of scipy, by interpolation."""
-    sizes = np.linspace(0.0, lengths.max() + 3.0 * spread, 1500)
-    shortest = spread * np.sqrt(special.chndtrix(ERROR, 3, (sizes / spread) ** 2))
-    return np.interp(lengths, shortest, sizes)
-
-
-def simulated(sizes: np.ndarray, noise: np.ndarray, counts: np.ndarray) -> np.ndarray:
-    """Largest upper limits (20000,) of campaigns that read a fixed number of times."""
-    rng = np.random.default_rng(17)
-    largest = np.zeros(20_000)
-    for size, spread in zip(sizes, noise / np.sqrt(counts), strict=True):
-        means = spread * rng.standard_normal((len(largest), 3)) + [size, 0.0, 0.0]
-        limits = upper_limits(np.linalg.norm(means, axis=1), spread)
-        largest = np.maximum(largest, limits)
-    return largest
-
-
-@pytest.mark.parametrize("field", FIELDS)
-def test_the_attainable_excess_is_what_campaigns_of_its_design_have(field):
-    sizes, noise = FIELDS[field], np.linspace(0.08, 0.2, 10)
-    for readings in (10, 25):
-        counts = best_counts(sizes, noise, readings, ERROR)
-        assert counts.min() >= 1
-        assert counts.sum() == readings
-        excess = np.maximum(simulated(sizes, noise, counts) - sizes.max(), 0.0)
-        near = 4.0 * excess.std() / math.sqrt(len(excess))
-        said = width_limits(sizes, noise, readings, ERROR).attainable_mm
-        assert said == pytest.approx(excess.mean(), abs=near)
-
-
 def excess_by_quad(sizes: np.ndarray, noise: np.ndarray, counts: tuple[int, ...]) -> float:
     spread = noise / np.sqrt(counts)
 

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import paper_settings as paper
 import pytest
-from scipy.stats import binom, gamma
+from scipy.stats import gamma
 
-from kinacc.assess.adaptive import Candidates, Ledger, first_points
+from kinacc.assess.adaptive import Candidates, Ledger
 from kinacc.assess.conformity import ACCEPT, REJECT, UNDECIDED, decide
 from kinacc.assess.gamma_quantile import GammaQuantile
 from kinacc.assess.invalidation_calibrated import InvalidationCalibrated
@@ -17,10 +17,10 @@ from kinacc.assess.invalidation_full import ModelInvalidationFull
 from kinacc.assess.limits import BallDistances
 from kinacc.assess.model_invalidation import mahalanobis_excess, point_probability
 from kinacc.assess.random_numbers import key_of
-from kinacc.assess.region_share import RegionShare, largest_rank, smallest_rank
+from kinacc.assess.region_share import RegionShare
 from kinacc.assess.registry import ADAPTIVE
 from kinacc.assess.search_and_confirm import SearchAndConfirm
-from kinacc.assess.simulate import conduct, noisy
+from kinacc.assess.simulate import conduct
 from kinacc.assess.single_shot import SingleShot
 from kinacc.assess.statement import CANDIDATES, MEASURED, REGION, TARGETS, Reason, Statement
 from kinacc.assess.world import drawn_world
@@ -186,23 +186,6 @@ def test_the_single_shot_bound_is_exact_where_one_point_decides():
     assert upper == pytest.approx(0.95, abs=0.02)
 
 
-@pytest.mark.parametrize("assessor", LIVE, ids=lambda each: each.name)
-def test_every_measured_point_has_limits_and_no_other(assessor):
-    campaign = assessor.begin(some_candidates())
-    assert campaign.point_limits() == {}
-    readings, reads = world(seed=3), np.zeros(30, int)
-    while (point := campaign.next()) is not None:
-        campaign.record(point, readings.reading_mm(point, int(reads[point])))
-        reads[point] += 1
-        if campaign.ledger.taken % 9 == 0:
-            assert set(campaign.point_limits()) == set(campaign.ledger.visited)
-    limits = campaign.point_limits()
-    size = np.linalg.norm(field(30), axis=1)
-    assert all(0.0 <= lower < upper for lower, upper in limits.values())
-    assert all(lower <= size[row] for row, (lower, _) in limits.items())
-    assert np.mean([size[row] <= upper for row, (_, upper) in limits.items()]) > 0.8
-
-
 def test_gamma_quantile_is_that_of_the_best_fit():
     sizes = gamma.rvs(5.0, scale=0.1, size=150, random_state=1)
     errors = sizes[:, None] * np.array([0.0, 0.6, 0.8])
@@ -221,16 +204,6 @@ def test_gamma_quantile_says_when_noise_or_a_lone_error_spoil_it():
     errors[7] *= 20.0
     (lone,) = conduct(GammaQuantile(100), drawn_world(errors, 0.01, key_of(1), 1)).statements()
     assert lone.withheld.code == "not_gamma"
-
-
-@pytest.mark.parametrize(("count", "probability"), [(50, 0.084), (200, 0.05), (20, 0.1)])
-def test_ranks_are_the_last_that_the_binomial_allows(count, probability):
-    rank = largest_rank(count, probability, 0.05)
-    assert binom.cdf(rank - 1, count, probability) <= 0.05 or rank == 0
-    assert binom.cdf(rank, count, probability) > 0.05
-    rank = smallest_rank(count, probability, 0.05)
-    assert binom.sf(rank - 1, count, probability) <= 0.05
-    assert binom.sf(rank - 2, count, probability) > 0.05
 
 
 @pytest.mark.parametrize("sigma", [0.001, 0.1, 0.5])
@@ -288,17 +261,6 @@ def rejected_at_the_truth(eq21: bool) -> float:
 def test_the_nearest_point_keeps_the_error_rate_that_eq_21_breaks():
     assert rejected_at_the_truth(eq21=False) <= 0.06
     assert rejected_at_the_truth(eq21=True) > 0.15
-
-
-def test_a_reading_with_a_covariance_of_its_own_widens_the_calibrated_bound():
-    candidates = Candidates.with_equal_noise(np.full(5, 0.1))
-    bounds = []
-    for given in (None, 0.01 * np.eye(3)):
-        campaign = InvalidationCalibrated(40, alpha=0.6).begin(candidates)
-        while (point := campaign.next()) is not None:
-            campaign.record(point, np.array([0.5, 0.0, 0.0]), given)
-        bounds.append(campaign.statements()[0].upper_mm)
-    assert bounds[0] < bounds[1]
 
 
 @pytest.mark.parametrize(
@@ -368,27 +330,3 @@ def test_the_limits_of_a_setting(name, key, value, verdict):
     assert str(value) in problem.what
     assert problem.allowed
     assert name in str(caught.value)
-
-
-@pytest.mark.parametrize(
-    ("measurements", "points", "share", "first"),
-    [(150, 100, 0.6, 100), (149, 100, 0.6, 60), (40, 100, 0.6, 24), (41, 100, 0.6, 25),
-     (1, 100, 0.6, 1), (1, 1, 0.6, 1), (50, 40, 0.5, 20), (60, 40, 0.5, 40)],
-)  # fmt: skip
-def test_the_first_visit_is_a_share_or_everything_where_the_budget_is_half_as_large_again(
-    measurements, points, share, first
-):
-    assert first_points(measurements, points, share) == first
-
-
-def test_noisy_readings_are_the_errors_and_noise_of_the_covariance_asked_for():
-    errors = np.array([[1.0, 2.0, 3.0], [0.0, 0.0, 0.0]])
-    root = np.array([[0.3, 0.0, 0.0], [0.1, 0.2, 0.0], [0.0, 0.05, 0.1]])
-    read = noisy(errors, root, 4000, 3, 1)
-    readings = np.array([read(0, visit) for visit in range(4000)])
-    np.testing.assert_allclose(readings.mean(axis=0), errors[0], atol=0.02)
-    np.testing.assert_allclose(np.cov(readings.T), root @ root.T, atol=0.006)
-    again = noisy(errors, root, 4000, 3, 1)
-    np.testing.assert_array_equal(again(1, 7), read(1, 7))
-    assert not np.array_equal(read(1, 7), read(1, 8))
-    assert not np.array_equal(noisy(errors, root, 4000, 3, 2)(1, 7), read(1, 7))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -63,15 +62,6 @@ def test_the_boundary_of_two_looks_is_that_of_a_normal_pair(error):
     assert 0.9 * error < 2.0 * norm.sf(at) - both.cdf([-at, -at]) < error
     assert boundary((1,), error, late=None).z == pytest.approx(norm.isf(error), abs=0.02)
     assert boundary((1, 2), error, late=None).alone == pytest.approx(norm.isf(error / 2))
-
-
-def test_looks_stand_so_near_that_few_readings_are_ever_left_over():
-    for extra in range(8, 400):
-        counts = look_counts(extra)
-        assert counts[:2] == (1, 3)
-        assert counts[-1] == extra + 1
-        assert all(after - before >= 2 for before, after in pairwise(counts[:-1]))
-        assert all(after <= 1.7 * before for before, after in pairwise(counts[1:]))
 
 
 def share_false(size, z, counts, choose, campaigns, rng):

@@ -16,7 +16,6 @@ from scipy.stats import ncx2
 
 from kinacc.assess.adaptive import Candidates
 from kinacc.assess.counts import excepted
-from kinacc.assess.lower_average import LowerAverage
 from kinacc.assess.population import largest_size, reading_densities
 from kinacc.assess.random_numbers import key_of
 from kinacc.assess.search_and_confirm import SearchAndConfirm
@@ -107,39 +106,6 @@ def test_where_fewer_are_read_than_there_are_the_bound_is_of_all_but_the_fewest(
     looks = said.boundary_of(ERROR / 2)
     wanted = largest_limit(world.given, world.sigma_mm, looks.counts, looks.z)
     assert everywhere.upper_mm == pytest.approx(wanted, rel=1e-9)
-
-
-def test_the_lower_bound_is_the_average_of_readings_along_what_was_read_before(monkeypatch):
-    counted, record = [], LowerAverage.record
-
-    def noted(average, row, direction, *rest):
-        counted.append((len(campaigns[0].ledger.readings) - 1, row, np.array(direction)))
-        record(average, row, direction, *rest)
-
-    campaigns, begin = [], SearchAndConfirm.begin
-    monkeypatch.setattr(LowerAverage, "record", noted)
-    monkeypatch.setattr(
-        SearchAndConfirm, "begin", lambda *given: campaigns.append(begin(*given)) or campaigns[0]
-    )
-    said, world = campaign(40, 200, 0.02, noise_margin=1.0)
-    rows = np.array([row for row, _ in world.given])
-    readings = np.array([reading for _, reading in world.given])
-    total = weight = 0.0
-    stages, bounds = said.average._stages, [0.0]
-    for place, (at, row, direction) in enumerate(counted, start=1):
-        # The direction is that of a mean of readings of the point, all of them before this one.
-        own = np.flatnonzero(rows[:at] == row)
-        means = np.cumsum(readings[own], axis=0)
-        means /= np.linalg.norm(means, axis=1)[:, None]
-        assert np.abs(means - direction).max(axis=1).min() < 1e-9
-        assert rows[at] == row
-        total += direction @ readings[at] / world.sigma_mm[row]
-        weight += 1.0 / world.sigma_mm[row]
-        if place in stages:
-            bounds.append((total - stages[place] * np.sqrt(place)) / weight)
-    assert len(counted) == said.average.wanted > 40
-    assert said.average.bound_mm(np.ones(40)) == pytest.approx(max(bounds), rel=1e-9)
-    assert said.statements()[0].lower_mm >= max(bounds) - 1e-12
 
 
 def directions(points: int, seed: int = 5) -> np.ndarray:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 
 import numpy as np
@@ -62,19 +61,6 @@ def test_the_limit_is_the_largest_over_all_directions(count, even):
     found = guarded_upper_mm(readings, covariances, 2.6, 0.01)
     assert found == pytest.approx(-min(climbed), rel=1e-3)
     assert guarded_upper_mm(readings[:2], covariances[:2], 9.0, 0.01) == math.inf
-
-
-@pytest.mark.parametrize("wrong", [(), (0,), (3, 7)])
-def test_a_limit_hardly_follows_readings_that_are_far_off(wrong):
-    rng = np.random.default_rng(5)
-    readings = np.array([6.0, 0.0, 0.0]) + rng.normal(size=(30, 3))
-    even = np.repeat(np.eye(3)[None], 30, 0)
-    plain = guarded_upper_mm(readings, even, 2.5, 0.01)
-    for to in itertools.product((-1e3, 1e3), repeat=len(wrong)):
-        moved = readings.copy()
-        moved[list(wrong), 0] = to
-        # A mean would move by 33 mm for each, from a limit of about 6.5 mm.
-        assert abs(guarded_upper_mm(moved, even, 2.5, 0.01) - plain) < 0.25 * len(wrong) + 1e-9
 
 
 def test_the_lower_limit_holds_whatever_wrong_readings_say():
@@ -223,12 +209,3 @@ def test_a_reference_pose_read_wrong_once_is_no_moved_tripod_and_a_moved_tripod_
 def test_a_guard_that_cannot_be_kept_is_refused(settings):
     with pytest.raises(InputError, match="wrong_rate"):
         SearchAndConfirm(BUDGET, **settings)
-
-
-def test_noise_twice_as_large_as_stated_is_said_and_no_reading_is_blamed():
-    def twice(number, rng, error):
-        return math.sqrt(3.0) * rng.normal(size=3)  # with the noise stated, twice that
-
-    codes = [{each.code for each in run(seed, twice).alarms()} for seed in range(6)]
-    assert all("scatter" in each for each in codes)
-    assert sum("wrong_readings" in each for each in codes) == 0

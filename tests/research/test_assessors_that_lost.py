@@ -9,13 +9,13 @@ import paper_settings as paper
 import pytest
 
 from kinacc.assess.adaptive import Candidates
-from kinacc.assess.error_effects import joint_errors
 from kinacc.assess.random_numbers import key_of
 from kinacc.assess.simulate import carry_on, conduct
 from kinacc.assess.statement import CANDIDATES, MEASURED, Reason
 from kinacc.assess.world import drawn_world
 from kinacc.errors import InputError
 from kinacc.kinematics import robot
+from research.error_effects import joint_errors
 from research.kinematic import Kinematic
 from research.kinematic_model import Basis, fitted_scales
 from research.sequential import Sequential
@@ -151,7 +151,7 @@ def test_the_kinematic_process_finds_and_bounds_the_largest_of_smooth_errors():
     q_rad = joints(160)
     errors = smooth_errors(q_rad)
     readings = drawn_world(errors, 0.1, key_of(10), 150)
-    campaign = conduct(Kinematic(150), readings, **known(q_rad))
+    campaign = conduct(Kinematic(150, **known(q_rad)), readings)
     everywhere, measured = campaign.statements()
     truth = np.linalg.norm(errors, axis=1).max()
     assert (everywhere.target, measured.target) == (CANDIDATES, MEASURED)
@@ -166,12 +166,12 @@ def test_the_kinematic_process_withholds_what_joints_do_not_explain():
     q_rad = joints(150)
     defect = smooth_errors(q_rad)
     defect[:3] += [1.5, 0.0, 0.0]
-    said = conduct(Kinematic(150), drawn_world(defect, 0.05, key_of(11), 150), **known(q_rad))
+    said = conduct(Kinematic(150, **known(q_rad)), drawn_world(defect, 0.05, key_of(11), 150))
     assert said.statements()[0].withheld.code == "unexplained_reading"
     chance = 0.4 * np.random.default_rng(12).normal(size=(150, 3))
-    said = conduct(Kinematic(150), drawn_world(chance, 0.05, key_of(11), 150), **known(q_rad))
+    said = conduct(Kinematic(150, **known(q_rad)), drawn_world(chance, 0.05, key_of(11), 150))
     assert said.statements()[0].withheld
-    few = conduct(Kinematic(60), drawn_world(chance, 0.05, key_of(11), 60), **known(q_rad))
+    few = conduct(Kinematic(60, **known(q_rad)), drawn_world(chance, 0.05, key_of(11), 60))
     assert few.statements()[0].withheld == Reason("few_for_model", {"first": 36, "needed": 84})
 
 
@@ -179,8 +179,8 @@ def test_the_kinematic_process_asks_for_what_it_needs():
     with pytest.raises(InputError) as caught:
         Kinematic(20).begin(Candidates.with_equal_noise(np.full(5, 0.1)))
     assert [each.where for each in caught.value.problems] == [
-        "candidates, q_rad",
-        "candidates, effects",
+        "q_rad",
+        "effects",
     ]
 
 

@@ -11,7 +11,6 @@ import pytest
 from scipy.stats import binomtest
 
 from kinacc.assess.attainable import width_limits
-from kinacc.assess.error_effects import joint_errors
 from kinacc.assess.random_numbers import key_of
 from kinacc.assess.world import drawn_world
 from kinacc.kinematics import robot
@@ -28,8 +27,7 @@ def field() -> ErrorField:
     rng = np.random.default_rng(1)
     q_rad = rng.uniform(-0.5, 0.5, (30, 6))
     error_mm = 0.4 * rng.normal(size=(30, 3))
-    effects = joint_errors(robot.load("mh180"), q_rad)
-    return ErrorField("made_up", error_mm, q_rad, effects, "synthetic")
+    return contest.of_arm(ErrorField("made_up", error_mm, q_rad, "synthetic"), robot.load("mh180"))
 
 
 @pytest.fixture(scope="module")

@@ -25,14 +25,6 @@ def test_a_shipped_draw_and_twenty_further_in_seed_order():
     assert seeds() == sorted(set(seeds()))
 
 
-def test_the_count_of_seeds_tried_is_stated():
-    from importlib import resources
-
-    text = (resources.files("kinacc") / "synthetic" / accepted.FILE).read_text(encoding="utf-8")
-    assert f"{seeds()[-1] + 1} seeds were tried for {len(seeds())} draws" in text
-    assert f"{seeds()[0] + 1} for the first" in " ".join(text.replace("#", "").split())
-
-
 def test_an_unknown_draw_says_how_many_there_are():
     with pytest.raises(InputError, match=r"0 to \d+"):
         accepted.accepted_draw(10_000)

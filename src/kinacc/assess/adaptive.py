@@ -33,14 +33,10 @@ class Candidates:
     """The m points an assessor may measure, rows in random order.
 
     The order must have been drawn without regard to the errors: the first k rows then stand for
-    all. covariance_mm2: (m, 3, 3) of one reading at each point, robot base frame; q_rad: (m, k)
-    joints, and ``effects`` (m, 3, P) the motion of the tool per unit of P possible causes (mm),
-    for assessors that use them.
+    all. covariance_mm2: (m, 3, 3) of one reading at each point, robot base frame.
     """
 
     covariance_mm2: np.ndarray
-    q_rad: np.ndarray | None = None
-    effects: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         covariance = np.array(self.covariance_mm2, dtype=float)
@@ -51,22 +47,14 @@ class Candidates:
             Problem(f"covariance of point {row}", said, _COVARIANCE)
             for row, said in covariance_faults(covariance)
         ]
-        for name in ("q_rad", "effects"):
-            given = getattr(self, name)
-            if given is None:
-                continue
-            if len(given) != len(covariance):
-                problems.append(Problem(name, f"{len(given)} rows", f"{len(covariance)} rows"))
-            elif not np.all(np.isfinite(given)):
-                problems.append(Problem(name, "holds values that are not finite", "numbers"))
         refuse(problems, "these candidates cannot be assessed")
         object.__setattr__(self, "covariance_mm2", covariance)
 
     @classmethod
-    def with_equal_noise(cls, sigma_mm: np.ndarray, **more: np.ndarray) -> Candidates:
+    def with_equal_noise(cls, sigma_mm: np.ndarray) -> Candidates:
         """Candidates with standard deviations (m,), equal in the three axes."""
         sigma = np.asarray(sigma_mm, dtype=float)
-        return cls(sigma[:, None, None] ** 2 * np.eye(3), **more)
+        return cls(sigma[:, None, None] ** 2 * np.eye(3))
 
     @property
     def points(self) -> int:
@@ -88,17 +76,15 @@ class AdaptiveAssessor(Protocol):
     """A method of assessment that chooses as it goes.
 
     ``name`` in tables; ``measurements`` it may spend; ``confidence`` of its bounds and of the
-    limits on single points. ``needs``: what it has to know of the candidates beside their noise,
-    names of :class:`Candidates`.
+    limits on single points.
     """
 
     name: ClassVar[str]
-    needs: ClassVar[tuple[str, ...]] = ()
     measurements: int
     confidence: float
 
     def begin(self, candidates: Candidates) -> Campaign:
-        """A new campaign without readings. InputError without what the assessor ``needs``."""
+        """A new campaign without readings."""
         ...
 
     def shortfall(self, points: int, joints: int) -> Reason | None:
@@ -121,7 +107,7 @@ class Ledger:
         self.noise_mm = np.full(points, math.inf)  # of the mean, per axis, root mean square
         self._weight = np.zeros((points, 3, 3))  # sum of inverse covariances
         self._weighted = np.zeros((points, 3))  # sum of these times readings
-        self._spread = np.zeros((points, 3, 3))  # covariance of the mean
+        self.spread_mm2 = np.zeros((points, 3, 3))  # covariance of the mean
 
     @property
     def taken(self) -> int:
@@ -147,13 +133,13 @@ class Ledger:
         self._weight[point] += inverse
         self._weighted[point] += inverse @ reading
         spread = np.linalg.inv(self._weight[point])
-        self._spread[point] = 0.5 * (spread + spread.T)
+        self.spread_mm2[point] = 0.5 * (spread + spread.T)
         self.mean_mm[point] = spread @ self._weighted[point]
         self.noise_mm[point] = math.sqrt(spread.trace() / 3.0)
 
     def noise(self, point: int) -> float | np.ndarray:
         """Noise of a point's mean: standard deviation per axis (mm), or covariance (3, 3)."""
-        spread, noise = self._spread[point], self.noise_mm.item(point)
+        spread, noise = self.spread_mm2[point], self.noise_mm.item(point)
         return noise if _is_even(spread, noise**2) else spread
 
     def as_planned(self, point: int) -> bool:
@@ -205,12 +191,6 @@ class Campaign:
     factor = 1.0
 
     def __init__(self, settings: AdaptiveAssessor, candidates: Candidates) -> None:
-        lacking = [
-            Problem(f"candidates, {name}", "not given", "joints and what their errors do at them")
-            for name in getattr(settings, "needs", ())
-            if getattr(candidates, name) is None
-        ]
-        refuse(lacking, f"{settings.name} needs to know the arm")
         self.settings = settings
         self.ledger = Ledger(candidates)
 

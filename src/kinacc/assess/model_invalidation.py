@@ -174,19 +174,9 @@ def point_probability(distance_outside: float, distance: str) -> float:
     """p-hat of one point (eq. 18) from its Mahalanobis distance to the candidate error (1)."""
     if distance_outside <= 0.0:
         return 0.0
-    x = distance_outside**2 if distance == "squared" else distance_outside
-    return chi_square_3(x)
+    from scipy.special import chdtr
 
-
-def chi_square_3(x: float) -> float:
-    """Chi-square distribution function with three degrees of freedom, in closed form."""
-    if x < 0.02:
-        total = term = 1.0
-        for n in range(1, 7):
-            term *= x / (2 * n + 3)
-            total += term
-        return math.sqrt(2.0 / math.pi) * x**1.5 * math.exp(-x / 2.0) * total / 3.0
-    return math.erf(math.sqrt(x / 2.0)) - math.sqrt(2.0 * x / math.pi) * math.exp(-x / 2.0)
+    return float(chdtr(3.0, distance_outside**2 if distance == "squared" else distance_outside))
 
 
 def _magnitude(vector: np.ndarray) -> float:

@@ -58,59 +58,31 @@ class RegionShareCampaign(OnceCampaign):
 
     def statements(self) -> tuple[Statement, ...]:
         """The bounds, or how many points they need."""
-        from scipy.special import chdtri, ndtr
+        from scipy.special import bdtr, bdtrc, chdtri, ndtr
 
-        chosen = self.settings
-        error = 1.0 - chosen.confidence
-        count = len(self.ledger.visited)
-        met = (1.0 - chosen.share) * float(ndtr(chosen.deviations))
-        rank = largest_rank(count, met, error)
-        if rank == 0:
+        share, error = self.settings.share, 1.0 - self.settings.confidence
+        visited, sizes = self.ledger.visited, self.ledger.sizes_mm()
+        count = len(visited)
+        ranks = np.arange(1, count + 1)
+        met = (1.0 - share) * float(ndtr(self.settings.deviations))
+        # The last k such that fewer than k of so many points are met with the error allowed.
+        upper = int(np.sum(bdtr(ranks - 1, count, met) <= error))
+        if upper == 0:
             needed = math.ceil(math.log(error) / math.log1p(-met))
-            few = {"read": count, "share": chosen.share, "needed": needed}
-            withheld = Reason("few_points", few)
-            return (Statement(REGION, share=chosen.share, withheld=withheld),)
-        sizes, spread = self.ledger.sizes_mm(), self._spread()
-        raised = np.sort(sizes + chosen.deviations * spread)[::-1]
+            withheld = Reason("few_points", {"read": count, "share": share, "needed": needed})
+            return (Statement(REGION, share=share, withheld=withheld),)
+        passing = (1.0 - share) + share * _LOWER_SLIP
+        lower = int(np.sum(bdtrc(ranks - 1, count, passing) > error))  # before the first such k
+        spread = np.sqrt(np.linalg.eigvalsh(self.ledger.spread_mm2[visited])[:, -1])
+        raised = np.sort(sizes + self.settings.deviations * spread)[::-1]
         lowered = np.sort(sizes - math.sqrt(float(chdtri(3, _LOWER_SLIP))) * spread)[::-1]
-        passing = (1.0 - chosen.share) + chosen.share * _LOWER_SLIP
-        lower_rank = smallest_rank(count, passing, error)
-        lower = float(lowered[lower_rank - 1]) if lower_rank <= count else 0.0
         said = Statement(
             REGION,
-            value_mm=float(np.quantile(sizes, chosen.share)),
-            lower_mm=max(lower, 0.0),
-            upper_mm=float(raised[rank - 1]),
-            confidence=chosen.confidence,
-            share=chosen.share,
+            value_mm=float(np.quantile(sizes, share)),
+            lower_mm=max(float(lowered[lower]), 0.0) if lower < count else 0.0,
+            upper_mm=float(raised[upper - 1]),
+            confidence=self.settings.confidence,
+            share=share,
             assumption=Reason("drawn_at_random"),
         )
         return (said,)
-
-    def _spread(self) -> np.ndarray:
-        """Largest standard deviation of each mean reading over the directions, mm."""
-        noises = [self.ledger.noise(point) for point in self.ledger.visited]
-        return np.array(
-            [
-                each if isinstance(each, float) else math.sqrt(np.linalg.eigvalsh(each)[-1])
-                for each in noises
-            ]
-        )
-
-
-def largest_rank(count: int, probability: float, error: float) -> int:
-    """Largest k such that fewer than k of ``count`` happen with at most ``error``; 0 if none."""
-    from scipy.special import bdtr
-
-    ranks = np.arange(1, count + 1)
-    allowed = ranks[bdtr(ranks - 1, count, probability) <= error]
-    return int(allowed[-1]) if allowed.size else 0
-
-
-def smallest_rank(count: int, probability: float, error: float) -> int:
-    """Smallest k such that k or more of ``count`` happen with at most ``error``."""
-    from scipy.special import bdtrc
-
-    ranks = np.arange(1, count + 1)
-    allowed = ranks[bdtrc(ranks - 1, count, probability) <= error]
-    return int(allowed[0]) if allowed.size else count + 1

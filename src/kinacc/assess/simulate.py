@@ -39,9 +39,9 @@ def carry_on(
     return done
 
 
-def conduct(assessor: AdaptiveAssessor, world: World, **known: np.ndarray) -> Campaign:
-    """Run a campaign to its end on the readings of a world; ``known`` as in :class:`Candidates`."""
-    campaign = assessor.begin(Candidates.with_equal_noise(world.sigma_mm, **known))
+def conduct(assessor: AdaptiveAssessor, world: World) -> Campaign:
+    """Run a campaign to its end on the readings of a world."""
+    campaign = assessor.begin(Candidates.with_equal_noise(world.sigma_mm))
     carry_on(campaign, world.reading_mm)
     return campaign
 

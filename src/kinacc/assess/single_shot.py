@@ -5,17 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-import numpy as np
-
 from kinacc.assess.adaptive import (
     AdaptiveAssessor,
     Candidates,
-    Ledger,
     OnceCampaign,
     about_all_if_all_measured,
     check_budget,
 )
-from kinacc.assess.limits import lower_limit_mm, upper_limit_mm
 from kinacc.assess.statement import CONFIDENCE, MEASURED, Reason, Statement
 from kinacc.errors import refuse
 
@@ -54,30 +50,15 @@ class SingleShotCampaign(OnceCampaign):
 
     def statements(self) -> tuple[Statement, ...]:
         """The bound, with the largest reading as the value."""
-        ledger = self.ledger
-        if not ledger.visited:
+        visited, error = self.ledger.visited, 1.0 - self.settings.confidence
+        if not visited:
             return (Statement(MEASURED, withheld=Reason("nothing_measured")),)
-        error = 1.0 - self.settings.confidence
-        each = error / self.first
-        means = _outstanding(ledger)
+        limits = self._mean_limits(visited, error / self.first).values()
         said = Statement(
             MEASURED,
-            value_mm=float(ledger.sizes_mm().max()),
-            lower_mm=max(lower_limit_mm(mean, noise, each) for mean, noise in means),
-            upper_mm=max(upper_limit_mm(mean, noise, error) for mean, noise in means),
+            value_mm=float(self.ledger.sizes_mm().max()),
+            lower_mm=max(lower for lower, _ in limits),
+            upper_mm=max(upper for _, upper in limits),
             confidence=self.settings.confidence,
         )
-        return about_all_if_all_measured(said, ledger)
-
-
-def _outstanding(ledger: Ledger) -> list[tuple[np.ndarray, float | np.ndarray]]:
-    """Means with their noise, of points with equal noise only the largest: limits rise with it."""
-    largest: dict[float, tuple[float, int]] = {}
-    uneven = []
-    for point, size in zip(ledger.visited, ledger.sizes_mm(), strict=True):
-        noise = ledger.noise(point)
-        if not isinstance(noise, float):
-            uneven.append((ledger.mean_mm[point], noise))
-        elif noise not in largest or size > largest[noise][0]:
-            largest[noise] = (size, point)
-    return uneven + [(ledger.mean_mm[point], noise) for noise, (_, point) in largest.items()]
+        return about_all_if_all_measured(said, self.ledger)

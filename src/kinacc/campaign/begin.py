@@ -72,7 +72,7 @@ def plan_of(
     order = np.random.default_rng(seed).permutation(len(points))
     to_base = _to_base(arm)
     noise = instruments[0].in_base(to_base, points.modelled_mm)
-    begun = assessor.begin(Candidates(noise[order], q_rad=points.joints[order]))
+    begun = assessor.begin(Candidates(noise[order]))
     route = order[: begun.first]
     if by_travel:
         unit = travel_unit(arm.robot)

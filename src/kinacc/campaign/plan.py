@@ -131,7 +131,7 @@ class Plan:
 
     def candidates(self, rows: np.ndarray) -> Candidates:
         """The candidates in the order of ``rows``, with the noise of the first instrument."""
-        return Candidates(self.covariance_mm2[rows], q_rad=self.points.joints[rows])
+        return Candidates(self.covariance_mm2[rows])
 
 
 def fixed_visit(assessor: AdaptiveAssessor, candidates: Candidates) -> int:

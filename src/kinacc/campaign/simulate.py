@@ -76,7 +76,7 @@ def outcomes(
         rng = np.random.default_rng([seed, number, repetition])
         rows = rng.permutation(field.points)[:points]
         covariances = np.tile(covariance_mm2, (points, 1, 1))
-        candidates = Candidates(covariances, **field.known(rows))
+        candidates = Candidates(covariances)
         sizes = np.linalg.norm(field.error_mm[rows], axis=1)
         most = max(each.measurements for each in assessors)
         reading = noisy(field.error_mm[rows], root, most, seed, number, repetition)

@@ -160,10 +160,9 @@ def field_of(name: str, point: str | None = None) -> ErrorField:
 
 
 def _of_folder(path: Path, point: str | None) -> ErrorField:
-    from kinacc.deployment.folder import recorded_robot
     from kinacc.tables import store
 
-    name, robot = path.resolve().name, recorded_robot(path)
+    name = path.resolve().name
     if measured := _measured(path):
         errors, seen = measured["pose_errors"], measured["measurements"]
         model, targets = _model_and_targets(measured)
@@ -172,9 +171,9 @@ def _of_folder(path: Path, point: str | None) -> ErrorField:
             what = f"{target!r} is no target of {path}"
             raise InputError(Problem("--point", what, ", ".join(targets)))
         several = len(targets) > 1
-        return fields.of_measurements(name, robot, errors, seen, model, target if several else None)
+        return fields.of_measurements(name, errors, seen, model, target if several else None)
     if (path / "assessment_points.parquet").is_file():
-        return fields.of_points(name, robot, store.read(path / "assessment_points.parquet"))
+        return fields.of_points(name, store.read(path / "assessment_points.parquet"))
     what = "holds neither pose_errors with measurements nor assessment_points"
     raise InputError(Problem(str(path), what, "a results folder", "run the workflow first"))
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from kinacc.assess.world import checked_errors
 from kinacc.errors import InputError, Problem
-from kinacc.study.monte_carlo import Visits, assessed_row, world_of
+from kinacc.study.monte_carlo import Visits, assessed_row, statistics, world_of
 
 KEYS = ["assessor", "noise_mm"]
 
@@ -74,19 +74,12 @@ def evaluate_assessors(
     rows = assess_worlds(errors, assessors, noise_mm, budget, repetitions, seed)
     truth = float(np.linalg.norm(checked_errors(errors), axis=1).max())
     stated = rows["upper_mm"].notna()
-    rows["square"] = (rows["assessed_mm"] - truth) ** 2
     rows["coverage"] = (rows["upper_mm"] >= rows["bounded_mm"]).where(stated).astype(float)
     rows["lower_coverage"] = (rows["lower_mm"] <= truth).where(stated).astype(float)
     rows["width_mm"] = rows["upper_mm"] - rows["lower_mm"]
     rows["stated"] = stated.astype(float)
-    groups = rows.groupby(KEYS, sort=False)
-    table = groups["assessed_mm"].agg(
-        mean_mm="mean", min_mm="min", max_mm="max", repetitions="size"
-    )
-    table["bias_mm"] = table["mean_mm"] - truth
-    table["rmse_mm"] = np.sqrt(groups["square"].mean())
-    bounds = groups[["stated", "coverage", "lower_coverage", "width_mm"]].mean()
-    return table.join(bounds).reset_index()
+    bounds = rows.groupby(KEYS)[["stated", "coverage", "lower_coverage", "width_mm"]].mean()
+    return statistics(rows, KEYS, truth).join(bounds, on=KEYS)
 
 
 def assess_worlds(

@@ -12,12 +12,10 @@ from functools import cached_property
 
 import numpy as np
 
-from kinacc.assess.error_effects import joint_errors
 from kinacc.config.error_models import MEASURED, PLAINEST, Comparison, model_name
 from kinacc.errors import InputError, Problem
 from kinacc.kinematics import dh
 from kinacc.kinematics import robot as robots
-from kinacc.kinematics.robot import Robot
 from kinacc.study.operating_points import readings_of
 from kinacc.synthetic import plan
 from kinacc.synthetic.accepted import accepted_draw
@@ -36,8 +34,7 @@ _RARE_SHARE, _RARE_MM = 0.01, (1.2, 1.9)
 class ErrorField:
     """True errors ``error_mm`` (n, 3) of a model, robot base frame.
 
-    Where the joints are known: ``q_rad`` (n, k) as reported; where the robot is: ``effects``
-    (n, 3, 6 k) of errors of each joint at the tool, see :func:`joint_errors`. ``kind`` is
+    Where the joints are known: ``q_rad`` (n, k) as reported. ``kind`` is
     ``paper``, ``synthetic``, ``made_up`` or ``measured``, empty for errors of a file. The first
     ``kept`` configurations are among any candidates drawn.
     """
@@ -45,7 +42,6 @@ class ErrorField:
     name: str
     error_mm: np.ndarray
     q_rad: np.ndarray | None = None
-    effects: np.ndarray | None = None
     kind: str = ""
     meaning: str = ""
     kept: int = 0
@@ -72,11 +68,6 @@ class ErrorField:
         """Sizes of the errors (n,)."""
         return np.linalg.norm(self.error_mm, axis=1)
 
-    def known(self, rows: np.ndarray) -> dict[str, np.ndarray]:
-        """What an assessor may know of candidates beside the noise: joints and effects."""
-        known = {"q_rad": self.q_rad, "effects": self.effects}
-        return {name: values[rows] for name, values in known.items() if values is not None}
-
     def candidates(self, count: int, entropy: tuple[int, ...]) -> np.ndarray:
         """Rows of ``count`` configurations drawn without replacement, in random order."""
         rng = np.random.default_rng([*entropy, 0])
@@ -86,16 +77,14 @@ class ErrorField:
         return rng.permutation(np.append(np.arange(self.kept), others)[:count])
 
 
-def of_points(name: str, robot: Robot | None, points: Mapping) -> ErrorField:
+def of_points(name: str, points: Mapping) -> ErrorField:
     """The paper's field: ``assessment_points`` of a modelled space."""
     meaning = "errors of the DH model at the operating points of the study"
-    q_rad = _stacked(points, "q")
-    return ErrorField(name, _vectors(points), q_rad, _effects(robot, q_rad), "paper", meaning)
+    return ErrorField(name, _vectors(points), _stacked(points, "q"), "paper", meaning)
 
 
 def of_measurements(
     name: str,
-    robot: Robot | None,
     errors: Mapping,
     measurements: Mapping,
     model: str = PLAINEST,
@@ -123,8 +112,7 @@ def of_measurements(
     means = np.array([vectors[rows[group]].mean(axis=0) for group in groups])
     meaning = f"held-out errors of the {model_name(model)} model at measured configurations"
     meaning += f", target {target}" if target else ""
-    q_rad = q_rad[first]
-    return ErrorField(name, means, q_rad, _effects(robot, q_rad), "measured", meaning)
+    return ErrorField(name, means, q_rad[first], "measured", meaning)
 
 
 def synthetic(name: str, draw: int) -> ErrorField:
@@ -146,8 +134,7 @@ def synthetic(name: str, draw: int) -> ErrorField:
     fitted = slice(None, CALIBRATION_POSES)
     left_mm = _beyond_dh(arm, q_rad, error_mm, fitted)
     q_rad, left_mm = q_rad[CALIBRATION_POSES:], left_mm[CALIBRATION_POSES:]
-    effects = joint_errors(nominal, q_rad)
-    return ErrorField(f"{name}_{draw}", left_mm, q_rad, effects, "synthetic", change.meaning)
+    return ErrorField(f"{name}_{draw}", left_mm, q_rad, "synthetic", change.meaning)
 
 
 @dataclass(frozen=True)
@@ -228,10 +215,6 @@ def _beyond_dh(arm: PhysicalRobot, q_rad, error_mm, fitted: slice) -> np.ndarray
     known = matrix[fitted].reshape(-1, matrix.shape[2])
     solved, *_ = np.linalg.lstsq(known, error_mm[fitted].ravel(), rcond=_TRUNCATION)
     return error_mm - matrix @ solved
-
-
-def _effects(robot: Robot | None, q_rad: np.ndarray) -> np.ndarray | None:
-    return None if robot is None else joint_errors(robot, q_rad)
 
 
 def _stacked(columns: Mapping, letter: str) -> np.ndarray:

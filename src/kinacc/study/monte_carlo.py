@@ -14,6 +14,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import pandas as pd
 from numpy.typing import ArrayLike
 
 from kinacc.assess.assessor import Assessor, every_reading
@@ -23,7 +24,7 @@ from kinacc.assess.world import World, checked_errors, draw
 from kinacc.config.records import of_section
 from kinacc.errors import InputError, Problem
 from kinacc.tables.columns import Columns
-from kinacc.tables.contract import columns_of
+from kinacc.tables.contract import ARTEFACTS, columns_of
 
 NM_PER_MM = 1_000_000
 SWITCHES = tuple(switch for cls in ASSESSORS.values() for switch in cls.switches)
@@ -147,18 +148,42 @@ def default_reading(rows: Columns, section: Mapping[str, object]) -> Columns:
     return {name: column[keep] for name, column in rows.items() if name not in SWITCHES}
 
 
+def statistics(rows: Columns | pd.DataFrame, keys: Sequence[str], true_mm: float) -> pd.DataFrame:
+    """Statistics of ``assessed_mm`` over the rows that agree in the key columns, a row each.
+
+    Columns mean_mm, min_mm, max_mm, bias_mm and rmse_mm against the true accuracy, repetitions and
+    std_error_mm of the mean (NaN of one value).
+    """
+    frame = pd.DataFrame(dict(rows))
+    frame["square"] = (frame["assessed_mm"] - true_mm) ** 2
+    groups = frame.groupby(list(keys), sort=False, dropna=False)
+    chosen = {"mean_mm": "mean", "min_mm": "min", "max_mm": "max"}
+    table = groups["assessed_mm"].agg(**chosen, repetitions="size", std_error_mm="sem")
+    table["bias_mm"] = table["mean_mm"] - true_mm
+    table["rmse_mm"] = np.sqrt(groups["square"].mean())
+    return table.reset_index()
+
+
 def summary(study: Columns, true_mm: float) -> Columns:
     """Columns of ``study_summary``: each assessor and noise against the true accuracy (mm)."""
-    return columns_of("study_summary", _statistics(study, ("assessor", "noise_mm"), true_mm))
+    return _by_assessor("study_summary", study, ["assessor", "noise_mm"], true_mm)
 
 
 def readings(rows: Columns, true_mm: float) -> Columns:
     """Columns of ``readings``: every reading of the assessors that have more than one."""
     keep = np.array([bool(ASSESSORS[name].switches) for name in rows["assessor"]], bool)
     kept = {name: column[keep] for name, column in rows.items()}
-    found = _statistics(kept, ("assessor", *SWITCHES, "noise_mm"), true_mm)
-    not_told = ("rmse_mm", "repetitions", "std_error_mm")
-    return columns_of("readings", [{n: row[n] for n in row if n not in not_told} for row in found])
+    return _by_assessor("readings", kept, ["assessor", *SWITCHES, "noise_mm"], true_mm)
+
+
+def _by_assessor(artefact: str, rows: Columns, keys: list[str], true_mm: float) -> Columns:
+    """Columns of an artefact, by assessor as in the paper, then by the other keys."""
+    table = statistics(rows, keys, true_mm)
+    rank = table["assessor"].map(list(ASSESSORS).index)
+    table = table.assign(rank=rank).sort_values(["rank", *keys[1:]], kind="stable")
+    known = [each.name for each in ARTEFACTS[artefact].columns]
+    table = table[[name for name in known if name in table]].astype(object)
+    return columns_of(artefact, table.where(table.notna(), None).to_dict("records"))
 
 
 def true_accuracy_mm(true_error_mm: ArrayLike) -> float:
@@ -173,41 +198,6 @@ def true_accuracy_mm(true_error_mm: ArrayLike) -> float:
 
 def _nanometres(noise_mm: float) -> int:
     return round(float(noise_mm) * NM_PER_MM)
-
-
-def _std_error(sample: np.ndarray) -> float:
-    """Standard error of the mean of a sample; NaN of one value."""
-    return sample.std(ddof=1) / np.sqrt(sample.size) if sample.size > 1 else np.nan
-
-
-def _statistics(rows: Columns, keys: Sequence[str], true_mm: float) -> list[dict]:
-    """Statistics of ``assessed_mm`` over the rows that agree in the key columns.
-
-    Sorted by assessor as in the registry, then by the other keys.
-    """
-    groups: dict[tuple, list[int]] = {}
-    for place, key in enumerate(zip(*(rows[name] for name in keys), strict=True)):
-        groups.setdefault(key, []).append(place)
-    ranks, found = [*ASSESSORS], []
-
-    def order(key: tuple) -> list:
-        return [ranks.index(key[0]), *("" if part is None else part for part in key[1:])]
-
-    for key in sorted(groups, key=order):
-        sample = rows["assessed_mm"][groups[key]]
-        found.append(
-            {
-                **dict(zip(keys, key, strict=True)),
-                "mean_mm": sample.mean(),
-                "min_mm": sample.min(),
-                "max_mm": sample.max(),
-                "bias_mm": sample.mean() - true_mm,
-                "rmse_mm": np.sqrt(np.mean((sample - true_mm) ** 2)),
-                "repetitions": sample.size,
-                "std_error_mm": _std_error(sample),
-            }
-        )
-    return found
 
 
 def simulated(inputs: Mapping, settings: Mapping, progress=None) -> dict[str, dict]:

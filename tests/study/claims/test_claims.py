@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from kinacc.study.claims import all_claims, evaluate
-from kinacc.study.claims.evaluate import shares_of
 from kinacc.study.claims.history_sentences import KEPT, LARGER, REJECTED
 from kinacc.study.claims.numbers import TABLE_2
 
@@ -156,12 +155,6 @@ def test_antiparallel_lengths_are_judged_by_their_difference_alone():
     assert row({"dh_model": table}, "table2_d_2_minus_d_3")["verdict"] == "differs"
 
 
-def test_numbers_of_the_papers_arm_say_nothing_on_another():
-    columns = evaluate({"dh_model": dh_model()}, paper_arm=False)
-    assert set(columns["verdict"]) == {"not comparable"}
-    assert np.isnan(columns["reproduced"]).all()
-
-
 def history(example: str, true_mm, probability, eta_mm: float, repeat=None, point=None):
     count = len(true_mm)
     return {
@@ -303,28 +296,3 @@ def test_map_sentences_differ_on_maps_unlike_the_papers():
 
 def test_missing_evidence_is_not_comparable_and_never_a_crash():
     assert set(evaluate({}, paper_arm=True)["verdict"]) == {"not comparable"}
-
-
-def test_one_noise_level_leaves_trends_undecided():
-    one = {name: values[::6] for name, values in summary(**as_in_the_paper()).items()}
-    assert row({"study_summary": one}, "maximum_grows_with_noise")["verdict"] == "not comparable"
-    assert row({"study_summary": one}, "model_invalidation_less_sensitive")["verdict"] == (
-        "not comparable"
-    )
-
-
-def test_share_counts_draws_that_could_be_judged():
-    claim = "maximum_overestimates"
-    robustness = {
-        "claim": np.array([claim] * 4, dtype=object),
-        "verdict": np.array(["agrees", "differs", "agrees", "not comparable"], dtype=object),
-    }
-    shares = shares_of(robustness)
-    assert shares == {claim: pytest.approx(2 / 3)}
-    assert row({}, claim, shares=shares)["share"] == pytest.approx(2 / 3)
-
-
-def test_every_claim_has_an_id_a_statement_and_evidence():
-    claims = all_claims()
-    assert len({claim.id for claim in claims}) == len(claims)
-    assert all(claim.statement and claim.statistic and claim.evidence for claim in claims)
