@@ -17,7 +17,6 @@ import numpy as np
 
 from kinacc.assess.adaptive import Candidates, Ledger
 from kinacc.assess.statement import VISIT, Reason
-from kinacc.errors import Problem
 
 if TYPE_CHECKING:
     from kinacc.assess.search_and_confirm import SearchAndConfirm
@@ -161,21 +160,6 @@ def noise_plan(settings: SearchAndConfirm, first: int) -> NoisePlan:
     of_arm = settings.error_of == VISIT and settings.arm_mm is None
     share = 1.0 - _NOISE_PART if of_arm else 1.0
     return NoisePlan(freedom=tested or estimating, estimating=estimating, mean_share=share)
-
-
-def noise_faults(settings: SearchAndConfirm) -> list[Problem]:
-    """What of the settings of noise and of the arm's own share in it cannot be."""
-    problems, freedom, arm = [], settings.noise_freedom, settings.arm_mm
-    if freedom and settings.noise == KNOWN:
-        problems.append(Problem("noise_freedom", f"{freedom}", f"0 where noise is {KNOWN}"))
-    elif freedom != 0 and not freedom >= FEWEST:
-        allowed = f"0 without a test before, or at least {FEWEST}; {ENOUGH} are asked for"
-        problems.append(Problem("noise_freedom", f"{freedom}", allowed))
-    if arm is not None and settings.error_of != VISIT:
-        problems.append(Problem("arm_mm", f"{arm}", f"nothing where error_of is not {VISIT}"))
-    elif arm is not None and not 0.0 <= arm < math.inf:
-        problems.append(Problem("arm_mm", f"{arm}", "0 or above, in mm"))
-    return problems
 
 
 def factor_limit(freedom: float, above: float) -> float:

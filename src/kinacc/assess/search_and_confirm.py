@@ -12,11 +12,12 @@ from kinacc.assess.adaptive import FIRST_SHARE, AdaptiveAssessor, Candidates, ch
 from kinacc.assess.confirming import ConfirmingCampaign
 from kinacc.assess.counts import excepted, hardly_missed
 from kinacc.assess.noise import (
+    ENOUGH,
     ESTIMATED,
+    FEWEST,
     KNOWN,
     CampaignNoise,
     factor_limit,
-    noise_faults,
     noise_plan,
 )
 from kinacc.assess.population import LargestSize, largest_size
@@ -43,10 +44,6 @@ VISITED = 0.9  # of the budget, where it is smaller than the number of candidate
 MARGIN = 1.2  # how much larger than stated noise may be that nothing can check
 MOST_WRONG = 0.1  # of the readings: with more, clipped scores tell hardly anything
 _MISSED = 0.5  # of the allowed error, where candidates are left that may hold the largest
-_WORDS = {
-    "noise": (KNOWN, ESTIMATED),
-    "error_of": (MEAN, VISIT),
-}
 
 
 @dataclass(frozen=True)
@@ -95,28 +92,38 @@ class SearchAndConfirm(AdaptiveAssessor):
     name: ClassVar[str] = "search_and_confirm"
 
     def __post_init__(self) -> None:
+        known, arm, freedom = self.noise == KNOWN, self.arm_mm, self.noise_freedom
+        stated = (
+            ("noise", self.noise in (KNOWN, ESTIMATED), f"{KNOWN}, {ESTIMATED}"),
+            ("error_of", self.error_of in (MEAN, VISIT), f"{MEAN}, {VISIT}"),
+            ("noise_margin", 1.0 <= self.noise_margin <= 10.0, "from 1 to 10"),
+            ("allowance_mm", 0.0 <= self.allowance_mm < math.inf, "0 or above, in mm"),
+            ("noise_freedom", not (known and freedom), f"0 where noise is {KNOWN}"),
+            (
+                "noise_freedom",
+                known or freedom == 0 or freedom >= FEWEST,
+                f"0 without a test before, or at least {FEWEST}; {ENOUGH} are asked for",
+            ),
+            (
+                "arm_mm",
+                arm is None or self.error_of == VISIT,
+                f"null: error_of is not {VISIT}",
+            ),
+            ("arm_mm", arm is None or 0.0 <= arm < math.inf, "0 or above, in mm"),
+            ("wrong_rate", 0.0 <= self.wrong_rate <= MOST_WRONG, f"from 0 to {MOST_WRONG}"),
+            (
+                "wrong_rate",
+                known or freedom or not self.wrong_rate,
+                "0 where the campaign estimates the noise, by readings that may be wrong",
+            ),
+        )
         problems = check_budget(self.measurements, self.confidence)
-        for each, words in _WORDS.items():
-            if getattr(self, each) not in words:
-                problems.append(Problem(each, f"{getattr(self, each)!r}", ", ".join(words)))
-        if not 1.0 <= self.noise_margin <= 10.0:
-            problems.append(Problem("noise_margin", f"{self.noise_margin}", "from 1 to 10"))
-        if not 0.0 <= self.allowance_mm < math.inf:
-            problems.append(Problem("allowance_mm", f"{self.allowance_mm}", "0 or above, in mm"))
         problems += schedule_faults(self.measurements, self.references)
-        problems += noise_faults(self)
-        if not 0.0 <= self.wrong_rate <= MOST_WRONG:
-            problems.append(Problem("wrong_rate", f"{self.wrong_rate}", f"from 0 to {MOST_WRONG}"))
-        if self.wrong_rate and self.noise == ESTIMATED and not self.noise_freedom:
-            what = (
-                f"{self.wrong_rate:g}, and the noise is estimated from readings that may be wrong"
-            )
-            fix = (
-                "state the noise or test it before, or leave wrong_rate at 0: suspicious readings "
-                "are then named"
-            )
-            allowed = "0 where the campaign estimates the noise"
-            problems.append(Problem("wrong_rate", what, allowed, fix))
+        problems += [
+            Problem(name, f"{getattr(self, name)!r}", allowed)
+            for name, holds, allowed in stated
+            if not holds
+        ]
         refuse(problems, f"{self.name} cannot work with these settings")
 
     def enough_for_all(self, points: int) -> int:

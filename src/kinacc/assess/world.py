@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -127,3 +128,8 @@ def checked_errors(error_mm: ArrayLike) -> np.ndarray:
         what = f"points {bad[:5].tolist()} are not finite"
         raise InputError(Problem("true errors", what, "numbers in mm"))
     return errors
+
+
+def error_vectors(columns: Mapping) -> np.ndarray:
+    """Return the error vectors (n, 3) in the columns ex_mm, ey_mm and ez_mm of a table."""
+    return np.stack([np.asarray(columns[f"e{axis}_mm"], dtype=float) for axis in "xyz"], axis=1)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kinacc.assess.world import error_vectors
 from kinacc.config.error_models import PLAINEST
 from kinacc.config.records import of_section
 from kinacc.geometry import Pose, compose, invert
@@ -201,7 +202,7 @@ def _measured(inputs: Mapping, count: int) -> Columns:
         np.asarray(errors["pose"])[rows], np.asarray(errors["target"])[rows]
     )
     chosen = [rows[groups[i]] for i in operating_points.spread_rows(len(groups), count)]
-    vectors = np.stack([np.asarray(errors[f"e{axis}_mm"], dtype=float) for axis in "xyz"], axis=1)
+    vectors = error_vectors(errors)
     first = np.array([np.asarray(errors["row"])[group[0]] for group in chosen]).astype(int)
     names = [name for name in measurements if name[:1] in "qs" and name[1:].isdigit()]
     columns: Columns = {"point": np.arange(len(chosen))}

@@ -12,6 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
+from kinacc.assess.world import error_vectors
 from kinacc.config.error_models import MEASURED, PLAINEST, Comparison, model_name
 from kinacc.errors import InputError, Problem
 from kinacc.kinematics import dh
@@ -80,7 +81,7 @@ class ErrorField:
 def of_points(name: str, points: Mapping) -> ErrorField:
     """The paper's field: ``assessment_points`` of a modelled space."""
     meaning = "errors of the DH model at the operating points of the study"
-    return ErrorField(name, _vectors(points), _stacked(points, "q"), "paper", meaning)
+    return ErrorField(name, error_vectors(points), _stacked(points, "q"), "paper", meaning)
 
 
 def of_measurements(
@@ -106,7 +107,7 @@ def of_measurements(
         raise InputError(Problem(f"field {name}", what, fix="set measurements.folds"))
     rows = np.flatnonzero(wanted)
     groups = readings_of(np.asarray(errors["pose"])[rows], np.asarray(errors["target"])[rows])
-    vectors, q_rad = _vectors(errors), _stacked(measurements, "q")
+    vectors, q_rad = error_vectors(errors), _stacked(measurements, "q")
     pose_of = {int(each): row for row, each in reversed([*enumerate(measurements["pose"])])}
     first = [pose_of[int(np.asarray(errors["pose"])[rows[group[0]]])] for group in groups]
     means = np.array([vectors[rows[group]].mean(axis=0) for group in groups])
@@ -220,7 +221,3 @@ def _beyond_dh(arm: PhysicalRobot, q_rad, error_mm, fitted: slice) -> np.ndarray
 def _stacked(columns: Mapping, letter: str) -> np.ndarray:
     names = [name for name in columns if name[:1] == letter and name[1:].isdigit()]
     return np.stack([np.asarray(columns[name], dtype=float) for name in names], axis=1)
-
-
-def _vectors(columns: Mapping) -> np.ndarray:
-    return np.stack([np.asarray(columns[f"e{axis}_mm"], dtype=float) for axis in "xyz"], axis=1)

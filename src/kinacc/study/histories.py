@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kinacc.assess.model_invalidation import Invalidation, Step
-from kinacc.assess.world import World, checked_errors
+from kinacc.assess.world import World, checked_errors, error_vectors
 from kinacc.config.records import of_section
 from kinacc.study.monte_carlo import Visits, world_of
 from kinacc.tables.columns import Columns
@@ -190,7 +190,7 @@ def _rows(
 def run(inputs: Mapping, settings: Mapping, progress=None) -> dict[str, dict]:
     """Return ``histories``."""
     points = inputs["assessment_points"]
-    error_mm = np.stack([points["ex_mm"], points["ey_mm"], points["ez_mm"]], axis=1)
+    error_mm = error_vectors(points)
     rows = histories(
         error_mm,
         of_section(HistorySettings, settings["histories"]),

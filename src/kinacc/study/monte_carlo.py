@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 from kinacc.assess.assessor import Assessor, every_reading
 from kinacc.assess.registry import PAPER as ASSESSORS
 from kinacc.assess.simulate import assess_world
-from kinacc.assess.world import World, checked_errors, draw
+from kinacc.assess.world import World, checked_errors, draw, error_vectors
 from kinacc.config.records import of_section
 from kinacc.errors import InputError, Problem
 from kinacc.tables.columns import Columns
@@ -209,7 +209,7 @@ def simulated(inputs: Mapping, settings: Mapping, progress=None) -> dict[str, di
     points = inputs["assessment_points"]
     study = of_section(StudySettings, settings["study"])
     part = settings.get("part") or {"number": 1, "of": 1}
-    error_mm = np.stack([points["ex_mm"], points["ey_mm"], points["ez_mm"]], axis=1)
+    error_mm = error_vectors(points)
     repetitions = settings.get("only") or part_of(study.repetitions, part["number"], part["of"])
     rows = simulate(
         error_mm,

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from kinacc.study.claims.claim import Claim, Finding, Tables
+from kinacc.synthetic.draw import TABLE_II
 
 RELATIVE_TOLERANCE = 0.10  # Tables I and III and the true accuracy
 ANGLE_TOLERANCE_RAD = 0.003
@@ -26,10 +27,8 @@ _STATISTICS = (("mean", "mean"), ("max", "maximum"), ("gamma99", "99 % gamma qua
 
 # Table II; theta 5 read as q5 - 3.141 (printed 3.114 would turn the wrist by 1.6 degrees).
 TABLE_2 = {
-    "theta_offset_rad": (0.001, -1.568, 0.001, -3.142, -3.141, 0.002),
-    "d_mm": (-1.157, -0.898, 0.066, -1226.154, -0.104, -224.698),
-    "a_mm": (323.453, 1151.356, 299.501, 0.029, 0.026, 0.028),
-    "alpha_rad": (-1.573, 3.140, -1.571, -1.571, -1.571, 3.142),
+    column: tuple(getattr(TABLE_II, column).tolist())
+    for column in ("theta_offset_rad", "d_mm", "a_mm", "alpha_rad")
 }
 TRUE_ACCURACY_MM = 0.906
 
