@@ -201,9 +201,28 @@ class Directions(Section):
     )
 
 
-class JointsFile(Section):
+class Written(Section):
+    """How numbers and columns are written in a file."""
+
+    decimal: Literal[".", ","] = setting(".", "decimal mark")
+    skip_lines: int = setting(0, "lines left out above the line of column names", ge=0, le=10000)
+    skip_under_names: int = setting(0, "lines left out under the column names", ge=0, le=100)
+    thousands: Thousands | None = setting(
+        None,
+        "mark between thousands, in cells where it stands between groups of three digits",
+    )
+    encoding: Encoding = setting(
+        "utf-8",
+        "characters of a text file; latin-1 with the signs of Windows",
+    )
+    sheet: Text | None = setting(None, "sheet of an Excel workbook; null for the first")
+    names: Names | None = setting(None, "names of the columns of a file that has no line of names")
+
+
+class JointsFile(Written):
     """Joints that stand in a file of their own, beside the points of path."""
 
+    delimiter: Literal[",", ";", "\t", " "] = setting(",", "character between two columns")
     path: Text | None = setting(
         None,
         "file of the joints, relative to the folder of the file this stands in; null where path"
@@ -223,23 +242,9 @@ class JointsFile(Section):
         le=1e10,
     )
     within_s: float = setting(0.5, "how far joints may be from a point in time", "s", gt=0, lt=3600)
-    delimiter: Literal[",", ";", "\t", " "] = setting(",", "character between two columns")
-    decimal: Literal[".", ","] = setting(".", "decimal mark")
-    skip_lines: int = setting(0, "lines left out above the line of column names", ge=0, le=10000)
-    skip_under_names: int = setting(0, "lines left out under the column names", ge=0, le=100)
-    thousands: Thousands | None = setting(
-        None,
-        "mark between thousands, in cells where it stands between groups of three digits",
-    )
-    encoding: Encoding = setting(
-        "utf-8",
-        "characters of a text file; latin-1 with the signs of Windows",
-    )
-    sheet: Text | None = setting(None, "sheet of an Excel workbook; null for the first")
-    names: Names | None = setting(None, "names of the columns of a file that has no line of names")
 
 
-class MeasuredFile(Section):
+class MeasuredFile(Written):
     """The measured file (used where source is file)."""
 
     path: Text | None = setting(
@@ -276,16 +281,6 @@ class MeasuredFile(Section):
         ",",
         "character between two columns, or blanks for one or more of them",
     )
-    decimal: Literal[".", ","] = setting(".", "decimal mark")
-    thousands: Thousands | None = setting(
-        None,
-        "mark between thousands, in cells where it stands between groups of three digits",
-    )
-    encoding: Encoding = setting(
-        "utf-8",
-        "characters of a text file; latin-1 with the signs of Windows",
-    )
-    sheet: Text | None = setting(None, "sheet of an Excel workbook; null for the first")
     layout: Literal["table", "features", "spherical"] = setting(
         "table",
         "a row per reading, a row per feature and axis (X, Y, Z), or two angles and a distance "
@@ -299,19 +294,6 @@ class MeasuredFile(Section):
         max_length=20,
     )
     sigma: int = setting(1, "standard deviations that an uncertainty in the file is", ge=1, le=3)
-    names: Names | None = setting(None, "names of the columns of a file that has no line of names")
-    skip_lines: int = setting(
-        0,
-        "lines left out above the line of column names, or above the rows where names gives these",
-        ge=0,
-        le=10000,
-    )
-    skip_under_names: int = setting(
-        0,
-        "lines left out under the column names, such as a line of units",
-        ge=0,
-        le=100,
-    )
     pulses_per_deg: list[Annotated[float, Field(ge=-1e7, le=1e7)]] | None = setting(
         None,
         "pulses of each joint's motor in one degree, where the joints are given in pulses",
