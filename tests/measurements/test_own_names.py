@@ -94,6 +94,12 @@ def test_what_is_open_is_asked_about(tmp_path):
                 Q_DEG, Q_DEG + 1.0)  # fmt: skip
     with pytest.raises(InputError, match="--take left_j1_deg or --take right_j1_deg"):
         rows.read(two, ARM)
+    names = [f"{ball}_{a} [mm]" for ball in ("m1", "m2") for a in "XYZ"]
+    several = table(tmp_path, names, POSE.position_mm, POSE.position_mm + 5.0 * POSE.rotation[:, 0])
+    with pytest.raises(InputError, match="several points: m1, m2"):
+        rows.open_table(several)
+    two = table(tmp_path, [f"{side}_j{n}_deg" for side in ("left", "right") for n in range(1, 7)],
+                Q_DEG, Q_DEG + 1.0)  # fmt: skip
     found = rows.read(two, ARM, answers={"take": ["right_j1_deg"]}).joints
     np.testing.assert_allclose(np.rad2deg(found), Q_DEG + 1.0, atol=1e-6)
 

@@ -152,7 +152,7 @@ def joint_values(joints: RawTable) -> np.ndarray:
 
 def by_time(points: RawTable, joints: RawTable, how: Join) -> tuple[np.ndarray, np.ndarray]:
     """Row of the joints (n,) next in time to every point, -1 for none; and where the arm moved."""
-    problems: list[Problem] = []
+    problems = []
     here = seconds(points, how.key_of_points, problems) + how.clock_offset_s
     there = seconds(joints, how.key, problems)
     refuse(problems)

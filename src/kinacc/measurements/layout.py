@@ -318,21 +318,21 @@ class _Finder:
             return list(self.layout.targets)
         mapped = [split(name) for name in self.layout.columns]
         named = [target or TOOL for target, quantity in mapped if quantity == "x"]
-        own = {c: c.rpartition("_") for c in map(str, self.table.columns)}
-        own = {c: split(name)[0] or TOOL for c, (name, _, unit) in own.items()
-               if unit in LENGTH and split(name)[1] == "x"}  # fmt: skip
-        says = {name: column_names.role(name_of(f"{name} x").words) for name in own.values()}
-        read = [n for n in says if says[n] in _READ or n in named]
-        frames = [n for n in says if n not in read and column_names.is_frame(name_of(n).words)]
+        parts = {c: c.rpartition("_") for c in map(str, self.table.columns)}
+        own = {split(ours)[0] or TOOL: column for column, (ours, _, unit) in parts.items()
+               if unit in LENGTH and split(ours)[1] == "x"}  # fmt: skip
+        says = {name: column_names.role(name_of(f"{name} x").words) for name in own}
+        read = [n for n in own if says[n] in _READ or n in named]
+        frames = [n for n in own if n not in read and column_names.is_frame(name_of(n).words)]
         if not read and not named and len(frames) == 1:
             read = frames  # the tool centre point, under its usual name
-        unclear = [n for n in says if n not in read and says[n] == column_names.OPEN]
-        if unclear or (says and not read and not named):
-            columns = [column for column, name in own.items() if name in (unclear or says)]
-            every = ", ".join(dict.fromkeys([*read, *(unclear or says)]))
-            fix = f"name those that were measured in measurements.file.targets (of: {every})"
+        unclear = [n for n in own if n not in read and says[n] == column_names.OPEN]
+        unclear = unclear if read or named else unclear or [n for n in own if n not in read]
+        if unclear:
+            fix = "name those that were measured in measurements.file.targets (of: "
+            fix += f"{', '.join(own)})"
             what = "the name does not say that this was measured"
-            self.problem(", ".join(columns), what, "measured points", fix)
+            self.problem(", ".join(own[n] for n in unclear), what, "measured points", fix)
         return list(dict.fromkeys([*read, *named])) or [TOOL]
 
     def target(self, name: str, alone: bool) -> Target:

@@ -68,9 +68,9 @@ def read(path: Path) -> RawTable | None:
     lines = np.array([text.count("\n", 0, place) + 1 for _, place, _ in found])
     widths = [len(joints) for _, _, joints in found]
     if len({*widths}) > 1 or not 4 <= widths[0] <= 7:
-        odd = [line for line, width in zip(lines, widths, strict=True) if width != min(widths)]
-        where = f"{path}: lines {first_few(odd or list(lines))}"
-        raise InputError(Problem(where, "another number of joints than elsewhere", "4 to 7 joints"))
+        odd = lines[np.array(widths) != min(widths)] if len({*widths}) > 1 else lines
+        what = "another number of joints than elsewhere"
+        raise InputError(Problem(f"{path}: lines {first_few([*odd])}", what, "4 to 7 joints"))
     columns = {"name": [name for name, _, _ in found]}
     columns |= {names[n]: [repr(joints[n]) for _, _, joints in found] for n in range(widths[0])}
     return RawTable.of(str(path), columns, lines, notes=notes)

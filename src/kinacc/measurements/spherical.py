@@ -79,7 +79,7 @@ def cartesian(table: RawTable, directions: Directions) -> RawTable:
     Raises InputError where there are none, or a cell of them is no number.
     """
     found = readings_of([name_of(c, table.units.get(c, "")) for c in table.columns])
-    problems: list[Problem] = []
+    problems = []
     if not found:
         what = "has no columns of a horizontal angle, a vertical angle and a distance"
         problems.append(Problem(table.path, what, "such as Hz, V and D"))

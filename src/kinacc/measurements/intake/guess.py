@@ -66,7 +66,7 @@ class Guess:
 
         Raises InputError where the reader cannot follow the section.
         """
-        problems: list[Problem] = []
+        problems = []
         slides = np.array([name.unit in LENGTH for name in self.found.joints])
         read = find(self.table, Layout.of(self.section), slides, problems)
         refuse(problems, f"{self.table.path} cannot be described")
@@ -113,7 +113,7 @@ def look(
         every = table.values(name.column)
         return np.where(np.isin(every, void), np.nan, every)
 
-    problems: list[Problem] = []
+    problems = []
     units = Units(table.path, values, problems, dict(looked.assumed), above=looked.stated)
     turning = [name for name in found.joints if name.unit not in LENGTH and not per_deg]
     first = next(iter(found.targets.values()))

@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from kinacc.errors import Problem, refuse
 from kinacc.measurements.column_names import NOMINAL, OPEN
@@ -46,6 +47,10 @@ def read(path: str | Path, answers: Mapping, need: str) -> tuple[RawTable, tuple
             ways = " or ".join(f"--take {shlex.quote(g.names[0])}" for g in question.readings)
             what = f"the names do not tell {question.about}: {question.why}"
             problems.append(Problem(table.path, what, fix=f"give {ways}"))
+    if need != JOINTS and len(found.targets) > 1:
+        ways = " or ".join(f"--take {shlex.quote(t['x'].column)}" for t in found.targets.values())
+        what = f"several points: {', '.join(found.targets)}"
+        problems.append(Problem(table.path, what, "one point in a row", f"give {ways}"))
     target = {} if need == JOINTS or not found.targets else next(iter(found.targets.values()))
     joints = () if any(q.about == "the joints" for q in found.questions) else found.joints
     if not problems and not (joints if need == JOINTS else target):
@@ -83,7 +88,8 @@ def read(path: str | Path, answers: Mapping, need: str) -> tuple[RawTable, tuple
         values = np.stack([table.values(turn[q].column) for q in order], axis=1)
         values = values * ANGLE[units.of([*turn.values()], "angle_unit")]
         turned = rotations(values, Layout(orientation=kind, convention=convention))
-        named |= _rotation_vectors(turned)
+        vectors = Rotation.from_matrix(turned).as_rotvec()
+        named |= {f"rv{axis}_rad": each for axis, each in zip("xyz", vectors.T, strict=True)}
         told += (f"{listed([n.column for n in turn.values()])}: {kind} {convention}",)
     refuse(problems, f"{path} cannot be used")
     named |= {n: table.columns[each.column] for n, each in found.single.items()}
@@ -97,13 +103,6 @@ def read(path: str | Path, answers: Mapping, need: str) -> tuple[RawTable, tuple
     read_ = [f"read as joints or points: {'; '.join(read_)}"]
     told = (*looked.told, *table.notes, *told, *units.assumed.values(), *read_)
     return replace(table, columns=frame(named)), tuple(dict.fromkeys(told))
-
-
-def _rotation_vectors(turned: np.ndarray) -> dict[str, np.ndarray]:
-    from scipy.spatial.transform import Rotation
-
-    vectors = Rotation.from_matrix(turned).as_rotvec()
-    return {f"rv{axis}_rad": column for axis, column in zip("xyz", vectors.T, strict=True)}
 
 
 def _names_rows(table: RawTable, name: str) -> bool:

@@ -218,7 +218,7 @@ def _times(file: _File) -> str:
 def _by_clock(
     joints: _File, points: _File, key: str, other: str, answers: Mapping[str, str]
 ) -> tuple[Join, tuple[str, ...]]:
-    problems: list[Problem] = []
+    problems = []
     there, here = seconds(joints.table, key, problems), seconds(points.table, other, problems)
     refuse(problems, "the times are no key")
     good = np.isfinite(there)

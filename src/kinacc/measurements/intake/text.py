@@ -300,23 +300,17 @@ def _in_words(
     written: Layout, rows: Sequence[Row], head: Head, stated: Mapping[str, str]
 ) -> list[str]:
     """What was found of how the file is written, as far as it is not as usual."""
-    told = []
-    above = [
-        " ".join(map(str, filled(cells))) for line, cells in rows if line <= written.skip_lines
-    ]
+    above = [" ".join(map(str, filled(c))) for line, c in rows if line <= written.skip_lines]
     above = [text.strip() for text in above if text and not _SEP.fullmatch(text)]
-    if above and head.names is None:
-        text = above[0] if len(above[0]) <= 50 else f"{above[0][:47]}..."
-        told.append(f"{written.skip_lines} rows above the names, not read ({text})")
-    if written.names is not None:
-        told.append(f"columns are called {', '.join(written.names)}")
-    if written.decimal == ",":
-        told.append("decimal commas")
-    if written.thousands is not None:
-        told.append(f"{written.thousands!r} between thousands")
-    if "frame" in stated:
-        told.append(f"frame of the points: {stated['frame']}")
-    return told
+    words = {
+        f"{written.skip_lines} rows above the names, not read ({''.join(above[:1])[:50]})": above
+        and head.names is None,
+        f"columns are called {', '.join(written.names or ())}": written.names,
+        "decimal commas": written.decimal == ",",
+        f"{written.thousands!r} between thousands": written.thousands,
+        f"frame of the points: {stated.get('frame')}": "frame" in stated,
+    }
+    return [told for told, there in words.items() if there]
 
 
 def _directions(
@@ -331,40 +325,35 @@ def _directions(
             what = f"are in {' and '.join(sorted(wrong | {each.distance.unit}))}"
             where = f"{table.path}: columns {', '.join(each.names)}"
             raise InputError(Problem(where, what, ", ".join((*PER_UNIT, *LENGTH))))
-    one, values = readings[0], []
-    for part in ("horizontal", "vertical"):
-        own = np.concatenate([table.values(getattr(each, part).column) for each in readings])
-        values.append(own[np.isfinite(own)] if np.isfinite(own).any() else np.zeros(1))
-    (horizontal, vertical), choices = values, []
+    one = readings[0]
+    horizontal, vertical = (
+        np.concatenate([table.values(getattr(each, part).column) for each in readings])
+        for part in ("horizontal", "vertical")
+    )
+    size, gon = np.nanmax(np.abs(horizontal), initial=0.0), _TURN["gon"] * _SLACK
     units = {unit for each in readings for unit in each.angle_units}
-    if any(
-        re.search(r"\bgra(d|de|ds|des)\b", n, re.IGNORECASE)
-        for each in readings
-        for n in each.names
-    ):
+    if any(re.search(r"\bgra(d|de|ds|des)\b", n.lower()) for each in readings for n in each.names):
         units = set()  # grad is gon in one language and degrees in another
     unit = answers.get("direction_unit") or (units.pop() if len(units) == 1 else stated)
-    size = float(np.abs(values[0]).max())
-    if unit not in PER_UNIT and _TURN["deg"] * _SLACK < size <= _TURN["gon"] * _SLACK:
-        unit = "gon"
-        told.append(f"{one.horizontal.column} is in gon: it goes to {size:.4g}")
-    elif unit not in PER_UNIT:
-        size = max(size, float(np.abs(vertical).max()))
-        ways = ["deg", "gon"] if size > _TURN["rad"] * _SLACK else ["rad", "deg", "gon"]
-        meant = {u: f"{horizontal[0]:g} is {np.rad2deg(horizontal[0] * PER_UNIT[u]):.4g} degrees"
-                 for u in ways}  # fmt: skip
+    choices = []
+    if unit not in PER_UNIT:
+        unit = "gon" if _TURN["deg"] * _SLACK < size <= gon else ""
+    if not unit:
+        large = max(size, np.nanmax(np.abs(vertical), initial=0.0)) > _TURN["rad"] * _SLACK
+        first = horizontal[0]
+        meant = {u: f"{first:g} is {np.rad2deg(first * PER_UNIT[u]):.4g} degrees"
+                 for u in ("rad", "deg", "gon")[int(large) :]}  # fmt: skip
         about = f"{one.horizontal.column} and {one.vertical.column} state no unit of their angles"
         choices.append(Choice("--direction-unit", about, meant))
-        unit = ""
+    there = vertical[np.isfinite(vertical)]
     quarter = _TURN[unit or "deg"] / 4.0
     counted = answers.get("vertical") or one.vertical_from
-    if not counted and (vertical > quarter * _SLACK).any() and (vertical > 0.0).all():
+    if not counted and (there > quarter * _SLACK).any() and (there > 0.0).all():
         counted = "zenith"
-    elif not counted and (vertical < 0.0).any() and (np.abs(vertical) <= quarter).all():
+    elif not counted and (there < 0.0).any() and (np.abs(there) <= quarter).all():
         counted = "horizon"
     if not counted and unit:
-        meant = {"zenith": f"{vertical[0]:g} is counted from straight up",
-                 "horizon": f"{vertical[0]:g} is up from level"}  # fmt: skip
+        meant = {"zenith": "counted from straight up", "horizon": "up from level"}
         about = f"{one.vertical.column} does not tell what it is counted from"
         choices.append(Choice("--vertical", about, meant))
     if choices:
