@@ -6,7 +6,6 @@ The arms are bent here by plain products of matrices, which share nothing with t
 from __future__ import annotations
 
 import copy
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,8 +15,6 @@ from kinacc.calibration.compliance_fit import ComplianceEstimator
 from kinacc.calibration.observations import Observations
 from kinacc.config.schema import defaults
 from kinacc.kinematics import dh, robot
-from kinacc.kinematics.compliance import ComplianceModel
-from kinacc.kinematics.model import JointState
 
 ARM = robot.load("mh180")
 MASSES = np.array([200.0, 150.0, 120.0, 40.0, 20.0, 5.0])
@@ -123,12 +120,6 @@ def test_loads_that_change_separate_compliance_from_weight():
     assert np.all(apart < 4.0 * std + 0.05 * SOFT[1:3])
 
 
-def test_the_same_load_in_every_row_separates_nothing():
-    payload = np.tile([[150.0, 0.0, 0.0, 200.0]], (60, 1))
-    found = fitted(measured(SOFT, payload, 60), links=False)
-    assert np.isnan(found.model.compliance_rad_per_nm).all()
-
-
 def test_rows_that_state_no_load_carry_that_of_the_settings():
     payload = np.full((60, 4), np.nan)
     payload[:30] = [100.0, 0.0, 0.0, 100.0]
@@ -151,30 +142,6 @@ def test_a_joint_that_gravity_does_not_turn_is_undetermined_and_stays_stiff():
     assert np.isnan(found.model.to_columns(found.std)["std_compliance_rad_per_nm"][0])
     columns = tables.fit_columns("compliance_fit", found, known_of)
     assert "j1.compliance_rad_per_nm" in set(columns["parameter"])
-
-
-def test_a_weight_on_the_axis_of_its_joint_spoils_nothing():
-    """Its moment is rounding, which is no unit to measure its compliance by."""
-    found = fitted(measured(SOFT), joints=(2, 3, 6))  # the last link's centre is on axis 6
-    plain = fitted(measured(SOFT))
-    assert found.solution.spectrum.rank == plain.solution.spectrum.rank
-    assert np.isnan(found.std[-1])
-    np.testing.assert_allclose(
-        found.model.compliance_rad_per_nm[1:3], plain.model.compliance_rad_per_nm[1:3], rtol=1e-4
-    )
-
-
-def test_an_arm_on_a_wall_turns_about_its_first_axis():
-    model = ComplianceModel(
-        ARM.dh, np.array([1e-6, *[np.nan] * 5]), np.full(6, np.nan), np.array([0.0, -1.0, 0.0]),
-        np.column_stack([MASSES, CENTRES]), np.zeros(4),
-    )  # fmt: skip
-    q = np.random.default_rng(3).uniform(-1.0, 1.0, (5, 6))
-    alone, gravity = np.array([1e-6, 0, 0, 0, 0, 0]), (0.0, -1.0, 0.0)
-    wanted = np.array([bent(ARM.dh, each, alone, np.zeros(4), gravity) for each in q])
-    seen = model.pose(JointState(q))
-    np.testing.assert_allclose(seen.position_mm, wanted[:, :3, 3], atol=1e-9)
-    np.testing.assert_allclose(seen.rotation, wanted[:, :3, :3], atol=1e-12)
 
 
 @pytest.mark.parametrize(("compliance", "chosen"), [(SOFT, "compliance"), (STIFF, "dh")])
@@ -200,21 +167,6 @@ def problems_of(arm, **changes):
     calibration["compliance"] |= {"joints": [2], "gravity": [0.0, 0.0, -1.0]} | changes
     found = ComplianceEstimator.contradictions(calibration, arm)
     return {where[-1]: what for where, what, _ in found}
-
-
-def test_joints_that_cannot_bend_are_named_each_by_its_number():
-    sliding = np.array([False, True, False, False, True, False])
-    arm = replace(ARM, dh=replace(ARM.dh, prismatic=sliding))
-    for joint in range(1, 7):
-        found = problems_of(arm, joints=[joint])
-        assert bool(found) == sliding[joint - 1]
-        assert (
-            found.get("joints", f"joint {joint} of mh180 slides")
-            == f"joint {joint} of mh180 slides"
-        )
-    assert problems_of(arm, joints=[2, 3, 5])["joints"] == "joint 2, 5 of mh180 slides"
-    assert problems_of(ARM, joints=[1, 6]) == {}
-    assert problems_of(ARM, joints=[6, 7])["joints"] == "mh180 has no joint 7"
 
 
 def test_links_and_gravity_that_do_not_belong_to_the_arm_are_named():

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from kinacc.calibration.hand_eye import closed_form_start
-from kinacc.calibration.observations import Observations, full_poses
+from kinacc.calibration.observations import full_poses
 from kinacc.geometry import Pose, compose, exp_so3, log_so3
 from kinacc.kinematics import dh, robot
 
@@ -66,29 +66,6 @@ def test_start_survives_a_tool_that_turns_about_one_axis_only():
     assert max(turned_by(a, b) for a, b in zip(again.rotation, seen.rotation, strict=True)) < 1e-9
     # Along the axis of the turns the tool cannot be told from the base: it is left at zero.
     assert abs(start.tool.position_mm[2]) < 1e-6
-
-
-def test_several_targets_of_a_pose_have_a_start_each():
-    q = np.repeat(some_joints(15, 4), 3, axis=0)
-    target = np.tile([0, 1, 2], 15)
-    points = np.array([[10.0, 0, 90], [-60, 30, 95], [0, 80, 110]])
-    flange = dh.forward(ARM.dh, q)
-    seen = compose(BASE, compose(flange, Pose(np.eye(3), points[target])))
-    zeros = np.zeros(len(q), dtype=int)
-    observations = Observations(
-        q_rad=q,
-        s=np.zeros(q.shape, np.int8),
-        position_mm=seen.position_mm,
-        rotation=np.full((len(q), 3, 3), np.nan),
-        pose=np.repeat(np.arange(15), 3),
-        target=target,
-        repeat=zeros,
-        fold=zeros - 1,
-        target_names=("mA", "mB", "mC"),
-    )
-    start = closed_form_start(observations, flange)
-    np.testing.assert_allclose(start.targets.position_mm, points, atol=1e-6)
-    assert turned_by(start.base.rotation, BASE.rotation) < 1e-9
 
 
 def test_a_short_session_is_placed_by_the_long_one_whichever_comes_first():

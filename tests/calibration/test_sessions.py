@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import simulated
 
-from kinacc.calibration import fitting, models, residuals, tables, uncertainty
+from kinacc.calibration import fitting, models, residuals
 from kinacc.calibration.constraints import free_parameters
 from kinacc.calibration.dh_estimator import DHEstimator
 from kinacc.calibration.models import Common
@@ -50,22 +50,6 @@ def test_a_session_of_three_poses_is_placed():
     few = (seen.session == 0) | (np.cumsum(seen.session == 1) <= 3)
     found = fit(seen.select(few))
     assert np.sqrt(found.solution.variance) < 0.03
-
-
-def test_every_base_keeps_its_session_in_the_tables():
-    seen = observed(simulated.POSE, 3)
-    found = fit(seen)
-    columns = tables.frames_columns({"dh": found.frames}, seen.target_names, seen.session_names)
-    again = tables.frames_of(columns, "dh", seen.target_names, seen.session_names)
-    np.testing.assert_allclose(again.bases.rotation, found.frames.bases.rotation, atol=1e-12)
-    np.testing.assert_array_equal(again.bases.position_mm, found.frames.bases.position_mm)
-    names = uncertainty.of_fit(found, seen.target_names).names
-    assert [name for name in names if name.endswith(".rx_rad")] == [
-        "base.rx_rad",
-        "base2.rx_rad",
-        "base3.rx_rad",
-        "t0.rx_rad",
-    ]
 
 
 def test_errors_of_every_session_are_in_its_own_base():

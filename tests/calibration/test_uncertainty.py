@@ -3,13 +3,12 @@
 import numpy as np
 import pytest
 
-from kinacc.calibration import fitting, frames, tables, uncertainty, vec_fit
+from kinacc.calibration import fitting, frames, tables, uncertainty
 from kinacc.calibration.constraints import free_parameters
 from kinacc.calibration.frames import Frames
 from kinacc.calibration.observations import full_poses
-from kinacc.calibration.vec_fit import Prior
-from kinacc.geometry import Pose, compose, exp_so3, invert, log_so3
-from kinacc.kinematics import dh, robot, vec
+from kinacc.geometry import Pose, compose, exp_so3, log_so3
+from kinacc.kinematics import dh, robot
 
 BASE = Pose(exp_so3(np.array([0.3, -1.1, 2.0])), np.array([2500.0, -900.0, 400.0]))
 TOOL = Pose(exp_so3(np.array([-0.4, 0.2, 0.7])), np.array([30.0, -20.0, 150.0]))
@@ -98,29 +97,3 @@ def test_predicted_spread_is_that_of_repeated_fits():
     assert scatter.mean() / variance.mean() == pytest.approx(1.0, abs=0.3)
     assert (scatter / variance).max() < 2.0
     assert (scatter / variance).min() > 0.5
-
-
-def test_vec_parameters_are_named_frames_first():
-    arm = robot.load("mh180")
-    observations = measured(arm, poses=60)
-    empty = vec.without_errors(arm.dh, arm.q_min_rad, arm.q_max_rad, 1)
-    fit = vec_fit.fit(
-        observations,
-        empty,
-        prior=Prior(1.0, 1e-3, 1.0, 1e-3),
-        rotation_weight_mm_per_rad=500.0,
-        frames=frames.known(BASE, TOOL),
-        frames_free=True,
-    )
-    known = uncertainty.of_fit(fit, ("tool",))
-    assert known.names[0] == "base.x_mm"
-    assert known.names[12] == "j1.delta_x.0"
-    assert len(known.names) == len(known.covariance) == 12 + 6 * 6 * 2
-    assert len(known.undetermined) == 0
-    std = np.sqrt(np.diag(known.covariance))[12:]
-    np.testing.assert_allclose(std, fit.std[: std.size])
-    assert uncertainty.is_angle("j1.eps_x.0")
-    assert not uncertainty.is_angle("j1.delta_x.0")
-    # The base origin lies where the base is: turning about the centroid moves it.
-    assert std[0] > 0.0
-    assert invert(fit.frames.base).position_mm.shape == (3,)

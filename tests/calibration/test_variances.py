@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -90,12 +88,3 @@ def test_variances_are_unbiased_where_one_kind_of_error_is_far_larger():
         found.append(solved)
     mean, error = np.mean(found, axis=0), np.std(found, axis=0) / np.sqrt(400)
     assert np.all(np.abs(mean - [0.0025, 1.0]) < 4 * error)
-
-
-def test_residuals_of_orientations_are_told_row_by_row():
-    arm = robot.load("mh180")
-    whole = measured(arm, joints(arm, 3, 1), 1e-4, 0)
-    rotation = whole.rotation.copy()
-    rotation[1] = np.nan
-    kinds = replace(whole, rotation=rotation).is_rotation
-    assert kinds.tolist() == [False] * 3 + [True] * 3 + [False] * 6 + [True] * 3

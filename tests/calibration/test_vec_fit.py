@@ -72,23 +72,6 @@ def test_poses_between_the_measured_ones_are_predicted():
     assert np.nanmin(found.std / found.prior_std) < 0.1
 
 
-def test_travel_direction_is_found_where_it_is_known():
-    true = true_model()
-    q = joints(500, 5)
-    s = np.random.default_rng(6).choice([-1, 1], q.shape).astype(np.int8)
-    found = vec_fit.fit(
-        full_poses(q, vec.pose(true, q, s), s),
-        empty_model(),
-        prior=PRIOR,
-        rotation_weight_mm_per_rad=WEIGHT,
-        frames=frames.known(),
-        frames_free=False,
-    )
-    # A constant may sit in the offsets or in eps_z: the difference of directions is what shows.
-    got, wanted = (np.diff(m.direction_offsets_rad)[:, 0] for m in (found.model, true))
-    np.testing.assert_allclose(got, wanted, atol=2e-7)
-
-
 def test_an_unknown_direction_is_the_mean_of_both():
     """Constants of eps_z and of both offsets are one: none of it may be lost at s = 0."""
     true = replace(empty_model(1), direction_offsets_rad=np.full((6, 2), 4e-4))
@@ -119,21 +102,6 @@ def fitted_at(true, q):
     return vec.pose(true, q, np.ones_like(q, dtype=np.int8)).position_mm
 
 
-def test_unknown_directions_leave_offsets_zero_and_without_deviation():
-    q = joints(100, 7)
-    found = vec_fit.fit(
-        full_poses(q, vec.pose(true_model(2), q)),
-        empty_model(2),
-        prior=PRIOR,
-        rotation_weight_mm_per_rad=WEIGHT,
-        frames=frames.known(),
-        frames_free=False,
-    )
-    assert not found.model.direction_offsets_rad.any()
-    assert np.isnan(found.std[-12:]).all()
-    assert np.isfinite(found.std[:-12]).all()
-
-
 def test_base_and_tool_are_estimated_along():
     base = Pose(exp_so3(np.array([0.2, 1.0, -2.0])), np.array([1500.0, -700.0, 300.0]))
     tool = Pose(exp_so3(np.array([0.5, -0.3, 0.1])), np.array([20.0, 30.0, 150.0]))
@@ -157,14 +125,6 @@ def test_base_and_tool_are_estimated_along():
     flange = vec.pose(found.model, new)
     got = compose(found.frames.base, compose(flange, found.frames.tool)).position_mm
     assert np.linalg.norm(got - wanted, axis=1).max() < 1e-3
-
-
-def test_prior_falls_with_the_order_as_stated():
-    std = Prior(2.0, 3e-3, 0.5, 7e-4).std(empty_model(3))
-    table = std[: 36 * 4].reshape(6, 6, 4)
-    np.testing.assert_allclose(table[2, 0], [2.0, 2.0, 1.0, 0.5])
-    np.testing.assert_allclose(table[4, 5], [3e-3, 3e-3, 1.5e-3, 0.75e-3])
-    np.testing.assert_allclose(std[36 * 4 :], 7e-4)
 
 
 @pytest.mark.parametrize("seed", [3, 4, 5])

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from kinacc.calibration import delivered, models, tables, uncertainty
-from kinacc.config.error_models import FITTED, NOMINAL, PLAINEST
+from kinacc.config.error_models import ESTIMATORS, NOMINAL, PLAINEST
 from kinacc.kinematics import robot
 from kinacc.tables.columns import Columns
 
@@ -43,7 +43,8 @@ def run(inputs: Mapping, settings: Mapping, kind: str, progress=None) -> dict[st
 
 def _gathered(inputs: Mapping, own: Columns) -> Columns:
     """Frames of the models fitted before, then ``own``."""
-    others = [inputs[f"{kind}_frames"] for kind in FITTED if f"{kind}_frames" in inputs]
+    kinds = reversed(ESTIMATORS)
+    others = [inputs[f"{kind}_frames"] for kind in kinds if f"{kind}_frames" in inputs]
     return {
         name: np.concatenate([*(np.asarray(each[name]) for each in others), values])
         for name, values in own.items()

@@ -9,7 +9,7 @@ import numpy as np
 from kinacc.calibration import model_comparison
 from kinacc.calibration.observations import Observations
 from kinacc.calibration.residuals import Errors
-from kinacc.config.error_models import COMPARISONS, ERROR_MODELS, MEASURED, Comparison
+from kinacc.config.error_models import ERROR_MODELS, MEASURED, NOMINAL, Comparison, comparisons
 from kinacc.measurements import folds
 from kinacc.tables.columns import Columns
 from kinacc.tables.contract import columns_of
@@ -24,7 +24,9 @@ def columns(
 ) -> dict[str, Columns]:
     """The three tables from errors ``seen`` at the rows that ``train`` and ``held_out`` (n,)."""
     bias, worst = [], []
-    for reference, name in ((each.reference, each.name) for each in COMPARISONS):
+    for reference, name in (
+        (each.reference, each.name) for each in comparisons((*ERROR_MODELS, NOMINAL))
+    ):
         if name not in seen:
             continue
         for estimate, errors, rows in (

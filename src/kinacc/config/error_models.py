@@ -14,14 +14,14 @@ MEASURED, NOMINAL = "measured", "nominal"  # nominal: the maker's, which nothing
 
 
 class Kind(NamedTuple):
-    """``module:Class`` of the model and of its estimator, and the references of its errors.
+    """``module:Class`` of model and estimator, or these themselves; the references of its errors.
 
     ``asked_by`` is the key of ``calibration.<kind>`` that has to say something for a data set to
     have such a model; empty where every data set has one.
     """
 
-    model: str
-    estimator: str
+    model: Any
+    estimator: Any
     compared_with: tuple[str, ...] = (MEASURED,)
     asked_by: str = ""
 
@@ -67,12 +67,21 @@ COMPARISONS = (
     *(Comparison(of, kind) for kind in FITTED for of in ERROR_MODELS[kind].compared_with),
     Comparison(MEASURED, NOMINAL),
 )
+OWN: dict[str, type] = {}  # registered in this process, by kind
+
+
+def register(kind: str, model: type, estimator: type) -> None:
+    """Fit a ``model`` of one's own in this process as those of the list are."""
+    OWN[kind] = model
+    ERROR_MODELS[kind] = Kind(model, estimator)
+    MODELS[kind], ESTIMATORS[kind] = model, estimator
 
 
 def comparisons(models: Collection[str]) -> tuple[Comparison, ...]:
     """What is compared with what where there are these ``models``, in the order of the tables."""
     there = {*models, MEASURED}
-    return tuple(each for each in COMPARISONS if there >= set(each))
+    own = tuple(Comparison(MEASURED, kind) for kind in OWN)
+    return tuple(each for each in (*own, *COMPARISONS) if there >= set(each))
 
 
 def model_name(model: str) -> str:
@@ -80,15 +89,17 @@ def model_name(model: str) -> str:
     return model if len(model) > 3 else model.upper()
 
 
-def loaded(place: str) -> Any:
-    """The object at ``module:name``."""
+def loaded(place: Any) -> Any:
+    """The object at ``module:name``; what is no text is the object itself."""
+    if not isinstance(place, str):
+        return place
     module, _, name = place.partition(":")
     return getattr(import_module(module), name)
 
 
 def asked_for(calibration: Mapping[str, Any]) -> tuple[str, ...]:
     """Kinds of models that the ``calibration`` settings ask for, in the order they are fitted."""
-    return tuple(
+    return *OWN, *(
         kind
         for kind in FITTED
         if kind in calibration

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from kinacc.config.error_models import MODELS, NOMINAL, loaded
+from kinacc.config.error_models import MODELS, NOMINAL, OWN, loaded
 from kinacc.errors import InputError, Problem
 from kinacc.geometry import Pose, rotation_from_quaternion
 from kinacc.kinematics.dh import DHModel
@@ -24,6 +24,10 @@ def models(tables: Mapping[str, Columns], nominal: DHModel) -> dict[str, ErrorMo
     made: dict[str, ErrorModel] = {}
     for kind in MODELS:
         if f"{kind}_model" not in tables:
+            continue
+        if kind in OWN:
+            value = np.asarray(tables[f"{kind}_model"]["value"], dtype=float)
+            made[kind] = OWN[kind](nominal).with_parameters(value)
             continue
         try:
             made[kind] = of_kind(kind).from_columns(tables[f"{kind}_model"], nominal.prismatic)

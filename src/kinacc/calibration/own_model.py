@@ -1,0 +1,96 @@
+"""Error models of one's own, registered from a notebook: one class and one line."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from kinacc.calibration import fitting
+from kinacc.calibration.fitting import MORE_POSES, ModelFit
+from kinacc.calibration.models import Common, Estimator, Fit
+from kinacc.calibration.observations import Observations
+from kinacc.config import error_models
+from kinacc.kinematics.model import ErrorModel
+from kinacc.kinematics.robot import Robot
+
+
+def register_error_model(model: type[ErrorModel]) -> type[ErrorModel]:
+    """Fit models of a class of one's own beside DH and VEC, in this process.
+
+    Fits, folds, residuals and the selection of a model go by it from then on: table
+    ``<kind>_model`` (parameter, value, std, unit), ``<kind>_covariance``, comparison
+    ``<kind>_vs_measured``.
+
+    Parameters
+    ----------
+    model
+        A frozen dataclass that inherits :class:`kinacc.kinematics.model.ErrorModel`: ``model(dh)``
+        is the arm before a fit, at DH parameters ``dh``. Where all of ``prior_std`` are finite,
+        priors hold the fit; else directions that the data do not determine stay at ``start``.
+
+    Returns
+    -------
+    type
+        The class, so that this serves as a decorator.
+    """
+    own = type(f"{model.__name__}Estimator", (OwnEstimator,), {"kind": model.kind, "model": model})
+    error_models.register(model.kind, _with_table(model), own)
+    return model
+
+
+class OwnEstimator(Estimator):
+    """How models of a registered class are fitted: to the measurements."""
+
+    model: ClassVar[Any]
+    name: ClassVar[str] = "fit of an own model"
+    fix: ClassVar[str] = MORE_POSES
+
+    @classmethod
+    def of(cls, calibration: Mapping, arm: Robot, every: Observations) -> Self:
+        """By the ``calibration`` settings."""
+        return cls(Common.of(calibration, arm))
+
+    @property
+    def size(self) -> int:
+        """Number of free parameters."""
+        return len(self.model(self.common.nominal).start)
+
+    def fit(
+        self, observations: Observations, others: Mapping[str, Fit], near: Fit | None = None
+    ) -> ModelFit:
+        """The model closest to the measurements."""
+        nominal = self.model(self.common.nominal)
+        frames, terms = self.common.frames(observations)
+        return fitting.fit(
+            observations,
+            nominal,
+            free=np.ones(self.size, dtype=bool),
+            std=nominal.prior_std,
+            held=bool(np.isfinite(nominal.prior_std).all()),
+            rotation_weight_mm_per_rad=self.common.rotation_weight_mm_per_rad,
+            threshold=THRESHOLD,
+            frames=frames,
+            frame_terms=terms,
+            name=f"{self.kind} fit",
+        )
+
+
+THRESHOLD = 0.01
+
+
+def _with_table(model: type[ErrorModel]) -> type[ErrorModel]:
+    """The class with a table of its parameters, where it has none of its own."""
+    if model.to_columns is ErrorModel.to_columns:
+        model.to_columns = _columns
+    return model
+
+
+def _columns(self: ErrorModel, std: np.ndarray) -> dict[str, np.ndarray]:
+    return {
+        "parameter": np.array(self.names, dtype=object),
+        "value": self.start,
+        "std": std,
+        "unit": np.array(self.units, dtype=object),
+    }

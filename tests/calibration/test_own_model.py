@@ -1,0 +1,96 @@
+"""An error model of one's own: registered in a line, fitted, held out and selected as DH is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import pytest
+import simulated
+from test_few_poses import settings
+
+from kinacc.calibration import models
+from kinacc.calibration.model_comparison_columns import selection_columns
+from kinacc.calibration.own_model import register_error_model
+from kinacc.calibration.residuals import cross_validated
+from kinacc.config import error_models
+from kinacc.geometry import compose
+from kinacc.kinematics import robot
+from kinacc.kinematics.dh import DHModel
+from kinacc.kinematics.model import ErrorModel
+
+
+@dataclass(frozen=True)
+class Ripple(ErrorModel):
+    """DH parameters, and a sine and a cosine of every joint's angle added to it."""
+
+    dh: DHModel
+    waves: np.ndarray = field(default_factory=lambda: np.zeros((6, 2)))
+    kind = "ripple"
+
+    @property
+    def names(self):
+        waves = [f"j{i}.{name}_rad" for i in range(1, 7) for name in ("sine", "cosine")]
+        return (*self.dh.names, *waves)
+
+    @property
+    def units(self):
+        return (*self.dh.units, *["rad"] * 12)
+
+    @property
+    def start(self):
+        return np.concatenate([self.dh.start, self.waves.ravel()])
+
+    @property
+    def prior_std(self):
+        return np.concatenate([self.dh.prior_std, np.full(12, 1e-3)])
+
+    def with_parameters(self, x):
+        return Ripple(self.dh.with_parameters(x[:-12]), x[-12:].reshape(6, 2))
+
+    def pose(self, at):
+        q = at.q_rad
+        turned = self.waves[:, 0] * np.sin(q) + self.waves[:, 1] * np.cos(q)
+        return self.dh.pose(at.moved(q + turned))
+
+
+@pytest.fixture
+def registered():
+    before = [dict(each) for each in (error_models.ERROR_MODELS, error_models.MODELS)]
+    estimators = dict(error_models.ESTIMATORS)
+    register_error_model(Ripple)
+    yield
+    error_models.OWN.clear()
+    for now, then in zip(
+        (error_models.ERROR_MODELS, error_models.MODELS, error_models.ESTIMATORS),
+        (*before, estimators),
+        strict=True,
+    ):
+        now.clear()
+        now.update(then)
+
+
+def test_a_registered_model_is_fitted_held_out_and_selected(registered):
+    arm, rng = robot.load("mh180"), np.random.default_rng(0)
+    true = Ripple(arm.dh, 1e-3 * rng.normal(size=(6, 2)))
+    q = simulated.joints(arm, 120, rng)
+    seen = simulated.measure(arm.dh, q, simulated.POSE, rng)
+    at = true.pose(seen.at)
+    base, tool = simulated.anywhere(rng, 900.0), simulated.anywhere(rng, 90.0)
+    pose = compose(base, compose(at, tool))
+    noisy = pose.position_mm + 0.03 * rng.normal(size=(120, 3))
+    seen = replace(seen, position_mm=noisy, rotation=pose.rotation)
+    every = models.estimators(settings(), arm, seen)
+    assert next(iter(every)) == "ripple"
+    pair = [every["ripple"], every["dh"]]
+    found = pair[0].fit(seen, {})
+    for joint in range(1, 5):  # of the first and last joints some is base and tool
+        assert found.model.waves[joint] == pytest.approx(true.waves[joint], abs=1e-4)
+    assert set(found.model.to_columns(found.std)) == {"parameter", "value", "std", "unit"}
+    held_out, _ = cross_validated(
+        seen, lambda train, fold: models.fit_all(train, pair), range(5), ("ripple", "dh", "nominal")
+    )
+    table = selection_columns(seen, held_out)
+    assert table["model"][table["selected"] == 1].tolist() == ["ripple"]
+    rms = dict(zip(table["model"], table["held_out_rms_mm"], strict=True))
+    assert rms["ripple"] < 0.1 < rms["dh"]
