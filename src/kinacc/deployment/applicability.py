@@ -21,7 +21,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from kinacc.deployment.predict import BLOCK, along_open, sensitivity
+from kinacc.deployment.predict import BLOCK, deviations
 from kinacc.deployment.record import Calibration
 from kinacc.kinematics.model import JointState
 from kinacc.kinematics.region import points
@@ -38,15 +38,11 @@ def position_std_mm(
 
     Directions that the calibration could not see count with one unit each: 1 mm or 1 mrad.
     """
-    found, plainest = np.zeros(len(at)), calibration.plainest
+    found = np.zeros(len(at))
     for first in range(0, len(at), BLOCK):
-        part = at.select(slice(first, first + BLOCK))
-        slopes = sensitivity(calibration, part, "instrument", point)
-        fitted = np.sum((slopes[:, :3] @ calibration.root) ** 2, axis=(1, 2))
-        if plainest is not calibration:
-            slopes = sensitivity(plainest, part, "instrument", point)
-        moved_mm = along_open(plainest, slopes)[:, 0]
-        found[first : first + BLOCK] = np.sqrt(fitted + moved_mm**2)
+        block = slice(first, first + BLOCK)
+        std, blind = deviations(calibration, at.select(block), "instrument", point)
+        found[block] = np.sqrt(np.sum(std[:, :3] ** 2, axis=1) + blind[:, 0] ** 2)
     return found
 
 

@@ -66,16 +66,9 @@ def predict(
     for begin in progress(starts, f"blocks of {BLOCK} poses") if progress else starts:
         rows = said[begin : begin + BLOCK]
         part = at.select(rows)
-        found = calibration.pose(part, frame, point)
-        pose.rotation[rows], pose.position_mm[rows] = found
-        if calibration.known is None:
-            continue
-        slopes = sensitivity(calibration, part, frame, point)
-        std[rows] = np.sqrt(np.sum((slopes @ calibration.root) ** 2, axis=2))
-        if calibration.plainest is calibration:
-            blind[rows] = along_open(calibration, slopes)
-        else:
-            blind[rows] = open_movement(calibration, part, frame, point)
+        pose.rotation[rows], pose.position_mm[rows] = calibration.pose(part, frame, point)
+        if calibration.known is not None:
+            std[rows], blind[rows] = deviations(calibration, part, frame, point)
     left = calibration.residual
     return Prediction(
         pose,
@@ -95,13 +88,18 @@ def open_movement(
 ) -> np.ndarray:
     """Movement (n, 2), mm and rad, of poses along what the calibration could not see."""
     plainest = calibration.plainest
-    return along_open(plainest, sensitivity(plainest, at, frame, point))
-
-
-def along_open(calibration: Calibration, slopes: np.ndarray) -> np.ndarray:
-    """Movement (n, 2), mm and rad, of poses by ``slopes`` along what is undetermined."""
-    moved = (slopes @ (calibration.known.undetermined * calibration.units).T) ** 2
+    undetermined = (plainest.known.undetermined * plainest.units).T
+    moved = (sensitivity(plainest, at, frame, point) @ undetermined) ** 2
     return np.sqrt(np.stack([moved[:, :3].sum(axis=(1, 2)), moved[:, 3:].sum(axis=(1, 2))], 1))
+
+
+def deviations(
+    calibration: Calibration, at: JointState, frame: str = "base", point: str | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Standard deviations (n, 6) and movement along what is undetermined (n, 2), mm and rad."""
+    slopes = sensitivity(calibration, at, frame, point)
+    std = np.sqrt(np.sum((slopes @ calibration.root) ** 2, axis=2))
+    return std, open_movement(calibration, at, frame, point)
 
 
 def sensitivity(
