@@ -54,7 +54,7 @@ def run_stage(name: str, *words: object) -> SimpleNamespace:
 
 def perform(name: str, configs: list[str], results: Path, dataset: str | None = None) -> Path:
     """Run a stage and write its tables and their digests; the folder of the data set."""
-    data = read_data_sets(configs, results=str(results))
+    data = read_data_sets(configs)
     dataset = dataset or next(iter(data.settings))
     settings, folder = data.settings[dataset], results / dataset
     folder.mkdir(parents=True, exist_ok=True)

@@ -115,6 +115,33 @@ def test_few_rows_cannot_pass_a_percentile_and_settings_decide_what_follows(
 
 
 @pytest.mark.parametrize(
+    ("row", "limit", "verdict", "key"),
+    [
+        ("{subset: train, fold: null, quantity: position}", "at_most: 0.3", PASSED, "value_mm"),
+        ("{subset: train, fold: null, quantity: position}", "at_least: 0.3", FAILED, "value_mm"),
+        ("{subset: train, fold: 1}", "at_most: 3.1", FAILED, "value_mrad"),
+        ("{subset: train, fold: 0}", "at_most: 3, undecided: warn", WARNED, "value_mm"),
+        ("{subset: train}", "at_most: 0.3", FAILED, None),
+        ("{subset: test}", "at_most: 0.3", FAILED, None),
+        ("{fould: 1}", "at_most: 0.3", FAILED, None),
+    ],
+)
+def test_any_number_of_a_table_is_held_to_a_limit(tmp_path, row, limit, verdict, key):
+    residuals = {
+        "comparison": "dh_vs_measured",
+        "subset": ["train", "validation", "train", "train"],
+        "fold": [np.nan, np.nan, 1, 0],
+        "quantity": ["position", "position", "orientation", "position"],
+        "unit": ["mm", "mm", "mrad", "mm"],
+        "mean": [0.2, 0.4, 3.2, np.nan],
+    }
+    tables = tables_of(tmp_path, residuals=residuals)
+    found = judged(tmp_path, f"table: residuals, row: {row}, column: mean, {limit}", tables)
+    assert found.verdict == verdict
+    assert key is None or key in found.figures
+
+
+@pytest.mark.parametrize(
     ("text", "names"),
     [
         (f"{MEAN}, at_most_mm: 1", "kinacc calibrate FILE.yaml"),

@@ -72,7 +72,10 @@ def half_written(folder: Path) -> list[Path]:
 
 def test_a_run_killed_with_all_its_processes_is_continued_by_the_same_command(fresh):
     folder, wanted = fresh
-    for name in ("config.yaml", FIRST, "results/own/vec_fit.parquet"):
+    own = Path("results/own")
+    moments = ("config.yaml", ".snakemake", "results/.lock", FIRST, own / "logs/fit_vec.log",
+               own / "vec_fit.parquet")  # fmt: skip
+    for name in moments:
         run = started(folder, FIT)
         until((folder / name).exists, run)
         os.killpg(run.pid, signal.SIGKILL)

@@ -80,7 +80,7 @@ def run_stages(config: Path, dataset: str, results: Path, names: tuple[str, ...]
 
     from kinacc.workflow.data_sets import read_data_sets
 
-    data = read_data_sets([str(config)], results=str(results))
+    data = read_data_sets([str(config)])
     left_out = {"compliance", "excluded_rows"}
     left_out |= {"claims"} if data.is_measured(dataset) else {"data_check"}
     for stage in STAGES:

@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from kinacc.geometry import quaternion_from_rotation, rotation_z
+from kinacc.calibration.frames import Frames
+from kinacc.calibration.tables import frames_columns
+from kinacc.geometry import Pose
 from kinacc.kinematics import dh, robot, vec
 from kinacc.kinematics.inverse import limits
 from kinacc.kinematics.model import JointState
-from kinacc.kinematics.vec import ERRORS
 from kinacc.study import evaluation
 from kinacc.synthetic import source
 from kinacc.tables.store import to_table
@@ -59,54 +60,21 @@ def vec_of(travel: bool = False) -> vec.VECModel:
     return vec.VECModel(ARM.dh, lower, upper, rng.normal(size=(6, 6, 4)) * scale, offsets)
 
 
-def vec_columns(model: vec.VECModel, shuffled: bool = False) -> dict[str, np.ndarray]:
-    rows = [
-        (joint, error, 0, order, model.coefficients[joint, ERRORS.index(error), order])
-        for joint in range(6)
-        for error in ERRORS
-        for order in range(model.order + 1)
-    ]
-    rows += [
-        (joint, "eps_z", direction, 0, model.direction_offsets_rad[joint, column])
-        for joint in range(6)
-        for column, direction in enumerate((-1, 1))
-        if model.direction_offsets_rad.any()
-    ]
-    if shuffled:
-        rows = [rows[i] for i in np.random.default_rng(0).permutation(len(rows))]
-    joint, error, direction, order, value = (np.array(column) for column in zip(*rows, strict=True))
-    columns = {
-        "joint": joint + 1,
-        "error": error.astype(object),
-        "direction": direction,
-        "order": order,
-        "coefficient": value,
-        "std": np.full(len(rows), np.nan),
-        "q_min_rad": model.q_min_rad[joint],
-        "q_max_rad": model.q_max_rad[joint],
-    }
-    return columns | {name: getattr(model.dh, name)[joint] for name in dh.PARAMETERS}
-
-
-def dh_columns(model: dh.DHModel) -> dict[str, np.ndarray]:
-    columns = {"joint": np.arange(1, 7)}
-    return columns | {name: getattr(model, name) for name in dh.PARAMETERS}
-
-
 def frames(tool_mm: tuple[float, float, float]) -> dict[str, np.ndarray]:
-    names = [(model, frame) for model in ("vec", "dh") for frame in ("base", "tool")]
-    position = np.array([tool_mm if frame == "tool" else (0, 0, 0) for _, frame in names], float)
-    columns = {
-        "model": np.array([model for model, _ in names], dtype=object),
-        "frame": np.array([frame for _, frame in names], dtype=object),
-    }
-    columns |= {f"{axis}_mm": position[:, i] for i, axis in enumerate("xyz")}
-    turned = quaternion_from_rotation(rotation_z(np.full(len(names), 0.0)))
-    return columns | {name: turned[:, i] for i, name in enumerate(("qw", "qx", "qy", "qz"))}
+    tool = Pose(np.eye(3)[None], np.array([tool_mm]))
+    same = Frames(Pose(np.eye(3), np.zeros(3)), tool)
+    return frames_columns({"vec": same, "dh": same}, ("tool",))
 
 
 def inputs(travel: bool = False) -> dict[str, dict[str, np.ndarray]]:
-    return {"vec_model": vec_columns(vec_of(travel)), "dh_model": dh_columns(ARM.dh)}
+    model = vec_of(travel)
+    split = model.coefficients.size
+    std = np.full(split + 12, np.nan)
+    std[split:] = 0.0 if travel else np.nan  # without one, offsets are left out
+    return {
+        "vec_model": model.to_columns(std),
+        "dh_model": ARM.dh.to_columns(np.full(30, np.nan)),
+    }
 
 
 def settings(**changed) -> dict:
@@ -115,17 +83,6 @@ def settings(**changed) -> dict:
 
 def joints(columns: dict, letter: str = "q") -> np.ndarray:
     return np.stack([columns[f"{letter}{i}"] for i in range(1, 7)], axis=1)
-
-
-@pytest.mark.parametrize("travel", [False, True])
-def test_models_come_back_from_their_tables_in_any_row_order(travel):
-    model = vec_of(travel)
-    read = vec.VECModel.from_columns(vec_columns(model, shuffled=True))
-    for name in ("coefficients", "direction_offsets_rad", "q_min_rad", "q_max_rad"):
-        assert np.array_equal(getattr(read, name), getattr(model, name))
-    assert all(
-        np.array_equal(getattr(read.dh, name), getattr(model.dh, name)) for name in dh.PARAMETERS
-    )
 
 
 def test_the_map_fits_its_contract_and_keeps_the_slices_as_configured():

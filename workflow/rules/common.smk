@@ -60,7 +60,7 @@ def calibrated(dataset):
     found = tables(dataset, "measurements", "robot", "residuals", "pose_errors", "model_selection", "worst_rows")
     found |= models(dataset) | tables(dataset, "dh_identified", "vec_orders") | checked(dataset)
     found |= tables(dataset, *(f"{kind}_{of}" for kind in data.models(dataset) for of in ("fit", "covariance")))
-    has_excluded = "exclude" in data.settings[dataset]["measurements"].get("file", {})
+    has_excluded = data.settings[dataset]["measurements"].get("file", {}).get("exclude")
     return found | (tables(dataset, "excluded_rows") if has_excluded else {})
 
 

@@ -21,7 +21,8 @@ def run(inputs: Mapping, settings: Mapping) -> dict[str, Columns]:
 
 
 def _sessions(inputs: Mapping, settings: Mapping) -> Iterator[Session]:
-    tolerance_mm = settings.get("tolerance", {}).get("mm", np.nan)  # left out where none is set
+    tolerance_mm = settings["tolerance"]["mm"]
+    tolerance_mm = np.nan if tolerance_mm is None else tolerance_mm
     campaigns = [each.parent for role, each in sorted(inputs.items()) if "/campaign_" in role]
     for line in settings["series"]:
         tables = {

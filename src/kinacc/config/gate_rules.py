@@ -153,6 +153,24 @@ class Value(Gate):
         return self
 
 
+class Table(Gate):
+    """A number of any table of the results within a limit, in the unit of its column."""
+
+    table: Text = setting(..., "the table")
+    row: dict[str, str | int | float | None] = setting(
+        {}, "values of columns that one row alone has; null for no value", allowed="{column: value}"
+    )
+    column: Text = setting(..., "the column")
+    at_most: float | None = setting(None, _MOST)
+    at_least: float | None = setting(None, _LEAST)
+
+    @model_validator(mode="after")
+    def _one_limit(self) -> Table:
+        if (self.at_most is None) == (self.at_least is None):
+            raise refused("has no limit or two", "give at_most or at_least")
+        return self
+
+
 class Against(Gate):
     """A figure of the errors not worse than that of the accepted run, beyond chance."""
 
@@ -259,6 +277,7 @@ Gates = Annotated[
     list[
         Annotated[
             Annotated[Value, Tag("value")]
+            | Annotated[Table, Tag("table")]
             | Annotated[Against, Tag("against")]
             | Annotated[Campaign, Tag("campaign")]
             | Annotated[Claims, Tag("claims")]

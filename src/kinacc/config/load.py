@@ -123,7 +123,11 @@ def _holders_of_files(own: Any) -> Iterator[tuple[dict[str, Any], str]]:
             yield found, key
     for listed, key in _LISTED_FILES:
         items = own.get(listed) if isinstance(own, dict) else None
-        yield from ((item, key) for item in (items or ()) if isinstance(item, dict))
+        yield from (
+            (item, key)
+            for item in (items if isinstance(items, list) else ())
+            if isinstance(item, dict)
+        )
 
 
 def _reading_order(documents: Sequence[Document]) -> Callable[[Problem], tuple[int, int]]:

@@ -14,7 +14,7 @@ from kinacc.config.values import nearest
 from kinacc.errors import InputError, first_few
 from kinacc.gate import chance
 from kinacc.gate.outcome import FAILED, PASSED, UNDECIDED, WARNED, Outcome
-from kinacc.gate.values import RunTables, figure, sample
+from kinacc.gate.values import Figure, RunTables, cell, figure, sample
 from kinacc.report.history_lines import sentence
 from kinacc.tables import sums
 from kinacc.tables.allowed import FINDING_LEVELS, FIRST, HOLDS, LEFT_OUT, RECALIBRATE
@@ -68,7 +68,11 @@ def of_gate(
     """The outcome of one gate; a missing table is a failure."""
     try:
         if gate["kind"] == "value":
-            found = _value(gate, tables, tolerance)
+            word, limit, own = limited(gate, tolerance)
+            found = _value(figure(gate["value"], tables, gate), word, limit, own)
+        elif gate["kind"] == "table":
+            word = LIMITS[gate[LIMITS[0]] is None]
+            found = _value(cell(tables, gate), word, gate[word])
         elif gate["kind"] == "against":
             found = _change(gate, dataset, tables, accepted)
         elif gate["kind"] == "campaign":
@@ -93,9 +97,7 @@ def _outcome(gate: Gate, dataset: str, found: Found) -> Outcome:
     return Outcome(dataset, gate["name"], kind, found.verdict, found.says, fix, found.figures)
 
 
-def _value(gate: Gate, tables: RunTables, tolerance: Mapping[str, Any]) -> Found:
-    word, limit, own = limited(gate, tolerance)
-    found = figure(gate["value"], tables, gate)
+def _value(found: Figure, word: str, limit: float, own: bool = True) -> Found:
     whose = "" if own else " (the tolerance of the configuration)"
     asked = f"{word.replace('_', ' ')} {found.worded(limit)} allowed{whose}"
     figures = {f"value{found.key}": found.size, f"{word}{found.key}": limit, "of": found.called}

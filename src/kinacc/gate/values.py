@@ -16,10 +16,11 @@ import pandas as pd
 from kinacc.calibration.summary import selected
 from kinacc.config.error_models import MEASURED, Comparison, model_name
 from kinacc.config.gate_rules import COMPARED, units
-from kinacc.errors import InputError, Problem
+from kinacc.errors import InputError, Problem, first_few
 from kinacc.gate.chance import STATISTICS, Sample
 from kinacc.measurements.folds import configurations_of
 from kinacc.tables import store
+from kinacc.tables.columns import joint_count
 from kinacc.tables.contract import ARTEFACTS
 
 SELECTED = "selected"
@@ -142,6 +143,31 @@ def figure(name: str, tables: RunTables, gate: Mapping[str, Any]) -> Figure:
     pose = tables["measurements"]["pose"]
     return Figure(float(len(pose) if word == "readings" else pose.nunique()), unit,
                   f"number of {word}")  # fmt: skip
+
+
+def cell(tables: RunTables, gate: Mapping[str, Any]) -> Figure:
+    """The number in the one row and column of a table that a gate names.
+
+    Raises Absent where the table is missing, InputError for another number of rows.
+    """
+    artefact, column = gate["table"], gate["column"]
+    table, where = tables[artefact], f"{artefact}.parquet"
+    if unknown := [name for name in (*gate["row"], column) if name not in table]:
+        what = f"has no column {first_few(unknown)}"
+        raise InputError(Problem(where, what, first_few(list(table), 30)))
+    for name, value in gate["row"].items():
+        table = table[table[name].isna() if value is None else table[name] == value]
+    if len(table) != 1:
+        fix = "name more columns in row" if len(table) else "other values in row"
+        raise InputError(Problem(where, f"has {len(table)} such rows", "one row", fix))
+    row = table.iloc[0]
+    known = ARTEFACTS[artefact].for_joints(joint_count(ARTEFACTS[artefact], table.columns))
+    unit = next(each.unit for each in known if each.name == column)
+    unit = str(row["unit"]) if unit == "see unit" else unit
+    size = pd.to_numeric(row[column], errors="coerce")
+    where = ", ".join(f"{name} {value}" for name, value in gate["row"].items())
+    called = f"{column} of {artefact}" + (f" ({where})" if where else "")
+    return Figure(float(size), unit, called, open="no number" if np.isnan(size) else "")
 
 
 def _of_errors(name: str, tables: RunTables, gate: Mapping[str, Any], unit: str) -> Figure:

@@ -10,11 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from kinacc.campaign.journal import JOURNAL, PLAN
-from kinacc.config.error_models import asked_for
-from kinacc.errors import Problem, refuse
-from kinacc.workflow.boundary import leading_out
+from kinacc.config.error_models import ERROR_MODELS, asked_for
+from kinacc.errors import InputError, Problem, refuse
 from kinacc.workflow.code import file_digest
-from kinacc.workflow.configured import in_use, words_read
 
 RESULTS = "results"
 Settings = Mapping[str, Any]
@@ -83,7 +81,7 @@ class DataSets:
         if not self.is_measured(dataset):
             return {}
         file = self.settings[dataset]["measurements"]["file"]
-        found = {"points_file": file["path"], "joints_file": file.get("joints", {}).get("path")}
+        found = {"points_file": file["path"], "joints_file": file["joints"]["path"]}
         return self._located({role: path for role, path in found.items() if path})
 
     def _located(self, files: Mapping[str, object]) -> dict[str, str]:
@@ -94,7 +92,6 @@ class DataSets:
 def read_data_sets(
     paths: Sequence[str | os.PathLike[str]],
     overrides: Settings | None = None,
-    results: str = RESULTS,
     absolute: bool = False,
 ) -> DataSets:
     """The data sets of configuration files and of values given on the command line.
@@ -104,16 +101,16 @@ def read_data_sets(
     from kinacc.checks.contradictions import load
     from kinacc.config.schema import without_execution_keys
 
-    full = load([Path(path) for path in paths], words_read(overrides or {}))
+    full = load([Path(path) for path in paths], _values(overrides or {}))
     first = next(iter(full.values()))
     problems = [
         Problem(f"datasets.{name}.figures.formats", "differ from data set to data set", "one list")
         for name, config in full.items()
         if config["figures"]["formats"] != first["figures"]["formats"]
     ]
-    refuse([*problems, *leading_out(results, full)])
+    refuse(problems)
     found = DataSets(
-        {name: in_use(without_execution_keys(config)) for name, config in full.items()},
+        {name: _in_use(without_execution_keys(config)) for name, config in full.items()},
         min(first["study"]["chunks"], *(each["study"]["repetitions"] for each in full.values())),
         tuple(first["figures"]["formats"]),
         absolute,
@@ -125,6 +122,33 @@ def read_data_sets(
         if re.search(r"\{\s*\w.*\}", path)
     )
     return found
+
+
+def _values(given: object) -> object:
+    """Texts read as YAML: Snakemake hands numbers inside ``--config a='{b: 1}'`` over as text."""
+    import yaml
+
+    from kinacc.config.load import COMMAND_LINE
+    from kinacc.config.reading import unreadable
+
+    if isinstance(given, Mapping):
+        return {key: _values(value) for key, value in given.items()}
+    if isinstance(given, (list, tuple)):
+        return [_values(value) for value in given]
+    if isinstance(given, str) and (problem := unreadable(given, COMMAND_LINE)):
+        raise InputError(problem)
+    return yaml.safe_load(given) if isinstance(given, str) else given
+
+
+def _in_use(config: Mapping[str, Any]) -> dict[str, Any]:
+    """The settings without the other source of measurements and models that nobody asks for."""
+    unused = {"synthetic", "file"} - {config["measurements"]["source"]}
+    unused |= {*ERROR_MODELS} - {*asked_for(config["calibration"])}
+    sections = {
+        section: {key: value for key, value in config[section].items() if key not in unused}
+        for section in ("measurements", "calibration")
+    }
+    return {**config, **sections}
 
 
 def digests(files: Mapping[str, str]) -> dict[str, str]:
