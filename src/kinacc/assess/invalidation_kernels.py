@@ -8,8 +8,8 @@ see :mod:`kinacc.assess.random_numbers`. The plain twin of a run at one bound is
 How a scan is exact without a run at every bound. For a fixed history the rejection probability
 falls as the bound grows, and the point to measure again is the largest of functions linear in
 the bound. So if both decisions agree at the two ends of an interval of bounds, every bound inside
-takes the same path. Where they do not, the interval is cut at the last bound that agrees with the
-end looked at first; the other piece waits and later resumes from the history it shares. Decisions
+takes the same path. Where they do not, the interval is cut in half; the other piece waits and later
+resumes from the history it shares. Decisions
 closer than rounding and the table of :func:`_about` could turn (``guard``, ``margin``) are left to
 single bounds, which are decided without the table.
 """
@@ -194,30 +194,6 @@ def _winner(eta, state, active):
 
 
 @compiled
-def _last_alike(row, side, bounds, near, far, state, active, setting, guards):
-    """The bound farthest from ``near``, towards ``far``, with the same decision.
-
-    The same ``side`` of the threshold, or, with a ``row``, the same point that surely wins.
-    """
-    alpha, squared = setting
-    guard, margin = guards
-    inside, outside, miss = near, far, np.empty(state.shape[0])
-    while outside - inside > 1:
-        middle = (inside + outside) // 2
-        if row < 0:
-            survival = _survival(bounds[middle], state, active, squared, miss)
-            alike = _side(survival, alpha, guard) == side
-        else:
-            other, best, rival = _winner(bounds[middle], state, active)
-            alike = other == row and best - rival > margin
-        if alike:
-            inside = middle
-        else:
-            outside = middle
-    return inside
-
-
-@compiled
 def _resume(sizes, sigma, roots, state, path, lowest, rows):
     """Rebuild the state after the steps of a path; returns (points visited, active rows).
 
@@ -323,12 +299,11 @@ def scan(world, bounds, wanted, alpha, squared, roots):
             active = rows[:count]
             side = _side(near_survival, alpha, guards[0])
             if near != far and (side == 0 or _side(far_survival, alpha, guards[0]) != side):
-                last = near
-                if side != 0:
-                    last = _last_alike(-1, side, bounds, near, far, state, active, setting, guards)
+                last = near if side == 0 else (near + far) // 2
                 waiting[depth, 0], waiting[depth, 1], waiting[depth, 2] = last + 1, far, steps
                 depth, far = depth + 1, last
                 far_survival = _survival(bounds[far], state, active, squared, at_far)
+                continue
             if side == 0:
                 near_survival = _exact_survival(bounds[near], state, active, squared)
             rejected = 1.0 - near_survival > alpha
@@ -350,13 +325,11 @@ def scan(world, bounds, wanted, alpha, squared, roots):
             other, far_best, far_rival = _winner(bounds[far], state, active)
             sure = best - rival > margin
             if near != far and not (sure and other == i and far_best - far_rival > margin):
-                last = near
-                if sure:
-                    last = _last_alike(i, 0, bounds, near, far, state, active, setting, guards)
+                last = (near + far) // 2 if sure else near
                 waiting[depth, 0], waiting[depth, 1], waiting[depth, 2] = last + 1, far, steps
                 depth, far = depth + 1, last
-                _survival(bounds[far], state, active, squared, at_far)
-                far_rival = _winner(bounds[far], state, active)[2]
+                far_survival = _survival(bounds[far], state, active, squared, at_far)
+                continue
             steps, near_survival, far_survival = _insist(
                 i,
                 (bounds[near], bounds[far]),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -50,29 +51,42 @@ def in_space(
     such wrist.
     """
     branches = _branches(robot, wrist)
-    found, counts, first = [], np.zeros(len(Status), dtype=int), 1
-    while sum(map(len, found)) < count:
-        if first > _DRAWS_PER_POINT * count:
-            raise _too_few(sum(map(len, found)), count, counts)
-        unit = region.points(sequence, count, 5, first)
-        q_rad, status = _solve_draws(robot, models, wanted, unit, branches)
+
+    def solve(unit: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        cells = region.fill(wanted.cylinder, unit[:, :3])
+        turn = (unit[:, 3] * len(wanted.orientations.names)).astype(int)
+        branch = branches[(unit[:, 4] * len(branches)).astype(int)]
+        turned = wanted.orientations.rotation[turn]
+        tool = region.tool_poses(cells, wanted.reference, turned, wanted.frame)
+        solved = joints_of(robot, models, tool, wanted.invert_with)
+        rows = np.arange(len(unit))
+        return solved.q_rad[rows, branch], solved.status[rows, branch]
+
+    return _drawn(sequence, count, 5, solve)
+
+
+def _drawn(
+    sequence: str,
+    count: int,
+    dimensions: int,
+    solve: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]],
+) -> np.ndarray:
+    """The first ``count`` of the joints that ``solve`` finds, with their status, for draws."""
+    found, counts, block = [], np.zeros(len(Status), dtype=int), max(count, 256)
+    for first in range(1, _DRAWS_PER_POINT * block, block):
+        q_rad, status = solve(region.points(sequence, block, dimensions, first))
         counts += np.bincount(status, minlength=len(Status))
         found.append(q_rad[status == Status.FOUND])
-        first += count
-    return np.concatenate(found)[:count]
-
-
-def _solve_draws(
-    robot: Robot, models: Models, wanted: PosesWanted, unit: np.ndarray, branches: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    cells = region.fill(wanted.cylinder, unit[:, :3])
-    turn = (unit[:, 3] * len(wanted.orientations.names)).astype(int)
-    branch = branches[(unit[:, 4] * len(branches)).astype(int)]
-    turned = wanted.orientations.rotation[turn]
-    tool = region.tool_poses(cells, wanted.reference, turned, wanted.frame)
-    solved = joints_of(robot, models, tool, wanted.invert_with)
-    rows = np.arange(len(unit))
-    return solved.q_rad[rows, branch], solved.status[rows, branch]
+        if counts[Status.FOUND] >= count:
+            return np.concatenate(found)[:count]
+    reasons = ", ".join(
+        f"{number} {status.name.lower().replace('_', ' ')}"
+        for status, number in zip(Status, counts, strict=True)
+        if status != Status.FOUND and number
+    )
+    what = f"only {counts[Status.FOUND]} of {counts.sum()} draws can be assessed ({reasons})"
+    fix = "move or enlarge the evaluation space, or fit the VEC model over a wider joint range"
+    raise InputError(Problem("evaluation.cylinder", what, f"{count} points", fix))
 
 
 def _branches(robot: Robot, wrist: str | None) -> np.ndarray:
@@ -100,26 +114,16 @@ def in_joints(
     naming the joints of which nothing is left, or saying how few configurations qualify.
     """
     lower, upper = _assessable_box(robot, models, *box_rad)
-    found, first, block = [], 1, max(count, 1024)
-    while sum(map(len, found)) < count:
-        if first > _DRAWS_PER_POINT * block:
-            problem = Problem(
-                "evaluation space",
-                f"only {sum(map(len, found))} of {first - 1} joint configurations lie in it",
-                f"{count} points",
-                "enlarge the space, or draw with points_in: space",
-            )
-            raise InputError(problem)
-        unit = region.points(sequence, block, len(lower), first)
+
+    def solve(unit: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         q_rad = robot.dh_joints(lower + unit * (upper - lower))
         good = limits.within(q_rad, *models.range_rad)
         if cylinder is not None:
             tool = models.by_name[models.assessed].tool_poses(q_rad, models.travel)
-            tool = compose(robot.base, tool)
-            good &= region.contains(cylinder, tool.position_mm)
-        found.append(q_rad[good])
-        first += block
-    return np.concatenate(found)[:count]
+            good &= region.contains(cylinder, compose(robot.base, tool).position_mm)
+        return q_rad, np.where(good, Status.FOUND, Status.OUTSIDE_RANGE)
+
+    return _drawn(sequence, count, len(lower), solve)
 
 
 def _assessable_box(
@@ -150,22 +154,6 @@ def spread_rows(total: int, count: int) -> np.ndarray:
     draws = region.points("halton", 4 * max(total, 1), 1, 0)[:, 0]
     rows = list(dict.fromkeys((draws * total).astype(int).tolist()))
     return np.array(rows[:count], dtype=int)
-
-
-def _too_few(found: int, count: int, counts: np.ndarray) -> InputError:
-    reasons = ", ".join(
-        f"{counts[status]} {status.name.lower().replace('_', ' ')}"
-        for status in Status
-        if status != Status.FOUND and counts[status]
-    )
-    return InputError(
-        Problem(
-            "evaluation.cylinder",
-            f"only {found} of {counts.sum()} poses drawn can be assessed ({reasons})",
-            f"{count} points",
-            "move the cylinder closer to the arm, or fit the VEC model over a wider joint range",
-        )
-    )
 
 
 def readings_of(pose: np.ndarray, target: np.ndarray) -> list[np.ndarray]:
