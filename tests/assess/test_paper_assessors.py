@@ -17,7 +17,6 @@ from oracles.worlds import philox_words
 
 from kinacc.assess import invalidation_kernels as kernels
 from kinacc.assess import random_numbers
-from kinacc.assess.assessor import every_reading
 from kinacc.assess.invalidation_kernels import chi2_3
 from kinacc.assess.model_invalidation import ModelInvalidation, point_probability
 from kinacc.assess.outlier_rejection import LIMITS, OutlierRejection
@@ -217,19 +216,6 @@ def test_the_table_of_a_scan_is_as_near_as_its_guard_takes_it_to_be(squared):
     assert np.max(np.abs(np.subtract(about, exact))) < kernels._ABOUT / 2
 
 
-def test_run_on_a_world_small_enough_to_follow_by_hand():
-    # One axis matters; sigma 1. Bound 0: first reading 1.0 -> R = 1, P* = F(1) = 0.1987 <= 0.6;
-    # second point 3.0 -> F(9) = 0.9707, P* = 1 - 0.8013 * 0.0293 = 0.9765 > 0.6: the worst point
-    # is read again: -1.0 -> mean 1.0, r = 2, R = sqrt 2, F(2) = 0.4276, P* = 0.5414: new point.
-    values = {(0, 1): 1.0, (1, 1): 3.0, (1, 2): -1.0, (2, 1): 0.0}
-    run = oracle.invalidation_run(
-        lambda j, v: [values[j, v], 0.0, 0.0], [0, 1, 2], [1.0] * 3, 0.0, 10
-    )
-    assert [(s.point, s.repeat) for s in run.steps] == [(0, 1), (1, 1), (1, 2), (2, 1)]
-    assert [round(s.probability, 4) for s in run.steps] == [0.1987, 0.9765, 0.5414, 0.5414]
-    assert (run.rejected, run.measurements, run.points_visited) == (False, 4, 3)
-
-
 def alone(first):
     return measured_world(first, np.zeros((len(first), 0, 3)), 0.1)
 
@@ -274,17 +260,6 @@ def shell(points: int, size_mm: float = 1.0) -> np.ndarray:
     return size_mm * error / np.linalg.norm(error, axis=1)[:, None]
 
 
-@pytest.mark.parametrize("cls", PAPER.values())
-@pytest.mark.parametrize(("points", "budget"), [(1, 1), (1, 50), (6, 1), (6, 4), (6, 50)])
-def test_budget_and_points_of_any_size(cls, points, budget):
-    world = drawn_world(shell(points), 0.1, key_of(points), budget)
-    for assessor in every_reading(cls, paper.study(measurements=budget)):
-        found = assessor.assess(world)
-        assert 0 <= found.assessed_mm < 2
-        assert 1 <= found.points_visited <= min(points, budget)
-        assert found.points_visited <= found.measurements <= budget
-
-
 def test_rejection_at_one_point_and_one_measurement_has_the_rate_eq_22_gives():
     # At the true bound one measurement rejects when its excess beyond eta passes the alpha quantile
     # of chi(3). For sigma much smaller than eta the excess is one-dimensional normal.
@@ -302,30 +277,6 @@ def test_words_are_those_of_numpy_philox(key0, key1, visit, point):
         np.uint64(key0), np.uint64(key1), np.uint64(visit), np.uint64(point)
     )
     assert [int(x) for x in mine] == philox_words([key0, key1], visit, point)
-
-
-def test_a_reading_belongs_to_its_point_whatever_the_order_and_the_rest():
-    rng = np.random.default_rng(0)
-    error = rng.normal(size=(12, 3))
-    key = random_numbers.key_of(1, 2, 3)
-    plain = drawn_world(error, 0.2, key, 9)
-    order = rng.permutation(12)
-    shuffled = drawn_world(error, 0.2, key, 30, order)
-    few = drawn_world(error[:5], 0.2, key, 9)
-    for row, point in enumerate(order):
-        for visit in (8, 0, 3):
-            np.testing.assert_array_equal(
-                shuffled.reading_mm(row, visit), plain.reading_mm(point, visit)
-            )
-    for visit in (2, 7):
-        np.testing.assert_array_equal(few.reading_mm(4, visit), plain.reading_mm(4, visit))
-    doubled = drawn_world(error, 0.4, key, 9)
-    np.testing.assert_allclose(
-        doubled.reading_mm(6, 5) - error[6],
-        2 * (plain.reading_mm(6, 5) - error[6]),
-        rtol=0,
-        atol=1e-15,
-    )
 
 
 @pytest.mark.parametrize(
