@@ -40,7 +40,7 @@ def put(file, names, rows, values):
 
 def taken(file, names, rows):
     """Values (m, k) of rows of columns."""
-    return file.columns.loc[rows, names].to_numpy()
+    return file.columns.loc[rows, names].to_numpy(copy=True)
 
 
 def scaled(file, names, factor, rows):
