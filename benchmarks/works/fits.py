@@ -116,13 +116,12 @@ def _scipy(smoke: bool, analytic: bool) -> Callable[[], tuple[float, None]]:
     from kinacc.calibration import fitting
     from kinacc.calibration.frames import FrameParameters
     from kinacc.calibration.system import PoseSystem
-    from kinacc.kinematics import dh
 
     nominal, free, seen, frames = _full_poses(60 if smoke else 500)
     flange = fitting.flange_model(nominal, free.ravel())
     system = PoseSystem(seen, flange, FrameParameters.none(frames), WEIGHT)
     start, scale = (
-        dh.to_vector(nominal)[free.ravel()],
+        nominal.start[free.ravel()],
         np.tile([1e-3, 1.0, 1.0, 1e-3, 1e-3], len(free))[free.ravel()],
     )
 
@@ -226,11 +225,10 @@ def _joints(arm, count: int, rng: np.random.Generator) -> np.ndarray:
 
 def _off(nominal, free: np.ndarray, rng: np.random.Generator):
     """The arm with its ``free`` parameters off as a calibration finds them."""
-    from kinacc.kinematics import dh
 
     unit = np.array([1e-3, 0.5, 0.5, 1e-3, 1e-3])
     off = free * unit * rng.normal(size=free.shape)
-    return dh.with_vector(nominal, dh.to_vector(nominal) + off.ravel())
+    return nominal.with_parameters(nominal.start + off.ravel())
 
 
 def _noisy(poses, rng: np.random.Generator):

@@ -22,16 +22,16 @@ def joints(arm, count, rng):
 def disturbed(model, free, rng, angle_rad=1e-3, length_mm=0.5):
     """The model with its ``free`` (k, 5) parameters off as a calibration finds them."""
     size = np.array([angle_rad, length_mm, length_mm, angle_rad, angle_rad])
-    table = dh.to_vector(model).reshape(-1, 5)
-    return dh.with_vector(model, (table + free * size * rng.normal(size=table.shape)).ravel())
+    table = model.start.reshape(-1, 5)
+    return model.with_parameters((table + free * size * rng.normal(size=table.shape)).ravel())
 
 
 def far_off(model, rng, angle_deg=5.0, length_mm=20.0):
     """The model with joint offsets and lengths anywhere within these distances."""
-    table = dh.to_vector(model).reshape(-1, 5).copy()
+    table = model.start.reshape(-1, 5).copy()
     table[:, 0] += np.deg2rad(angle_deg) * rng.uniform(-1, 1, len(table))
     table[:, 1:3] += length_mm * rng.uniform(-1, 1, (len(table), 2))
-    return dh.with_vector(model, table.ravel())
+    return model.with_parameters(table.ravel())
 
 
 def anywhere(rng, distance_mm, count=None):

@@ -32,7 +32,7 @@ def observed(order, seed=0, prior=WAVY):
     rng = np.random.default_rng(seed)
     empty = vec.without_errors(ARM.dh, LOW, HIGH, order)
     spread = prior.std(empty)
-    true = vec.with_vector(empty, spread * rng.normal(size=spread.size))
+    true = empty.with_parameters(spread * rng.normal(size=spread.size))
     q = rng.uniform(LOW, HIGH, (POSES, 6))
     seen = vec.pose(true, q)
     turn = exp_so3(NOISE_MM / WEIGHT * rng.normal(size=(POSES, 3)))

@@ -115,7 +115,7 @@ def test_every_undetermined_parameter_has_a_statement_and_no_other(name):
     found, fit, _ = asked(name, THREE)
     for each in found.values():
         assert bool(each.statement) == (each.status != "identified"), each
-    names = fit.model.parameter_names
+    names = fit.model.names
     for place, parameter in enumerate(names):
         std = fit.std.ravel()[place]
         assert np.isnan(std) == (found[parameter].status in ("undetermined", "fixed"))
@@ -154,9 +154,9 @@ def test_directions_in_words_move_no_pose_anywhere(kind):
 
     before = compose(fit.frames.base, compose(dh.forward(fit.model, q), fit.frames.tool))
     for direction, own in zip(directions, arm_part, strict=True):
-        vector = dh.to_vector(fit.model)
+        vector = fit.model.start
         vector[free.ravel()] += step * own
-        model = dh.with_vector(fit.model, vector)
+        model = fit.model.with_parameters(vector)
         base = moved("base", fit.frames.base, direction)
         tool = moved("t0", fit.frames.tool, direction)
         after = compose(base, compose(dh.forward(model, q), tool))

@@ -72,7 +72,7 @@ def test_dh_fit_is_the_smallest_displacement_that_minimises_the_residual(hayati,
     )
     assert fit.solution.spectrum.rank == expected["rank"]
     assert fit.solution.cost == pytest.approx(expected["cost"], rel=1e-7)
-    found = dh.to_vector(fit.model)
+    found = fit.model.start
     np.testing.assert_allclose(found[~mask], nominal.ravel()[~mask], rtol=0, atol=0)
     off = (found[mask] - expected["x"]) / DH_UNIT[mask]
     assert np.abs(off).max() < 1e-5
@@ -117,7 +117,7 @@ def test_vec_fit_is_where_the_gradient_with_its_prior_vanishes():
         frames=frames.known(),
         frames_free=False,
     )
-    x = vec.to_vector(fit.model)
+    x = fit.model.start
     size = series.size
     sigma = np.sqrt(fit.solution.variance)
 

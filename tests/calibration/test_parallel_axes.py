@@ -30,7 +30,7 @@ def fitted(whole, tool_z_mm=0.0):
     errors = np.tile([1e-3, 0.3, 0.3, 1e-3, 1e-3], 4) * rng.normal(size=20)
     # Beta of the last joint is a turn of the tool.
     errors[-1] = 0.0
-    arm = dh.with_vector(SCARA, dh.to_vector(SCARA) + errors)
+    arm = SCARA.with_parameters(SCARA.start + errors)
     q_rad = LOW + rng.uniform(size=(300, 4)) * (HIGH - LOW)
     tool = Pose(np.eye(3), np.array([40.0, 30.0, tool_z_mm]))
     seen = compose(BASE, compose(dh.forward(arm, q_rad), tool))

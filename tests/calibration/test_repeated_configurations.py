@@ -72,10 +72,10 @@ def fitted(observations, loss="squares"):
 )
 def test_parameters_are_off_by_as_much_as_is_said_where_poses_are_read_ten_times(targets, turned):
     """Two standard deviations hold the true parameter in 95 of 100 draws, within 4."""
-    true, held = dh.to_vector(ARM.dh), []
+    true, held = ARM.dh.start, []
     for seed in range(DRAWS):
         fit = fitted(read(seed, targets, turned))
-        off, std = dh.to_vector(fit.model) - true, fit.std.ravel()
+        off, std = fit.model.start - true, fit.std.ravel()
         known = np.isfinite(std)
         held.append(np.abs(off[known]) <= 2.0 * std[known])
     assert np.mean(held) == pytest.approx(0.954, abs=0.04)

@@ -12,7 +12,7 @@ from kinacc.calibration import fitting, vec_fit
 from kinacc.calibration.frames import FrameParameters, Frames
 from kinacc.calibration.system import PoseSystem
 from kinacc.geometry import compose, invert, log_so3
-from kinacc.kinematics import dh, robot, vec
+from kinacc.kinematics import robot, vec
 
 ARM, WEIGHT = robot.load("mh180"), 350.0
 
@@ -33,7 +33,7 @@ def system_of(name, kind, sessions=2, estimated=True, count=12):
         parameters = FrameParameters.none(anchor)
     if name == "dh":
         model = fitting.flange_model(ARM.dh, np.ones(30, dtype=bool))
-        at, unit = dh.to_vector(ARM.dh), np.tile([1e-2, 1.0, 1.0, 1e-2, 1e-2], 6)
+        at, unit = ARM.dh.start, np.tile([1e-2, 1.0, 1.0, 1e-2, 1e-2], 6)
     else:
         empty = vec.without_errors(ARM.dh, ARM.q_min_rad, ARM.q_max_rad, 2)
         free, model = vec_fit.flange_model(seen, empty)

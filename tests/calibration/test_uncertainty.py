@@ -43,12 +43,12 @@ def moved_arm(fit, names, direction, size):
         motion = np.array([of[f"{name}.{m}"] for m in frames.MOTIONS])
         return Pose(exp_so3(motion[3:]) @ pose.rotation, pose.position_mm + motion[:3])
 
-    vector = dh.to_vector(fit.model).copy()
-    for index, name in enumerate(fit.model.parameter_names):
+    vector = fit.model.start.copy()
+    for index, name in enumerate(fit.model.names):
         vector[index] += of.get(name, 0.0)
     tool = frame(fit.frames.tool, "tool")
     base = frame(fit.frames.base, "base")
-    return dh.with_vector(fit.model, vector), Frames(base, frames.known(tool=tool).targets)
+    return fit.model.with_parameters(vector), Frames(base, frames.known(tool=tool).targets)
 
 
 def seen_by(model, frames_, q_rad):

@@ -27,7 +27,7 @@ def joints(count, seed=0):
 def true_model(order=5, seed=1):
     empty = vec.without_errors(ARM.dh, LOW, HIGH, order)
     spread = Prior(0.2, 0.3e-3, 0.7, 2e-4).std(empty)
-    return vec.with_vector(empty, spread * np.random.default_rng(seed).normal(size=spread.size))
+    return empty.with_parameters(spread * np.random.default_rng(seed).normal(size=spread.size))
 
 
 def empty_model(order=5):

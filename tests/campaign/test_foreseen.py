@@ -24,7 +24,7 @@ def points(arm):
 @pytest.fixture(scope="module")
 def calibrated(arm):
     """The nominal arm with a deviation of the first joint's zero, and directions nobody saw."""
-    names = arm.model.parameter_names
+    names = arm.model.names
 
     def make(std_rad, blind_per_unit=0.0):
         covariance = np.zeros((len(names), len(names)))

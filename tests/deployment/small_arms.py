@@ -24,9 +24,9 @@ HAYATI = {"ur10": (2, 3)}
 def truth(name: str, seed: int = 1) -> dh.DHModel:
     """A real arm: the nominal one with errors of a tenth of a millimetre and of a milliradian."""
     arm, rng = robot.load(name), np.random.default_rng(seed)
-    vector = dh.to_vector(arm.dh)
+    vector = arm.dh.start
     errors = rng.normal(0.0, 1.0, vector.size) * np.tile([1e-3, 0.3, 0.3, 1e-3, 0.0], arm.dh.joints)
-    return dh.with_vector(arm.dh, vector + errors)
+    return arm.dh.with_parameters(vector + errors)
 
 
 def joints(name: str, count: int, seed: int = 2, part: float = 0.36) -> np.ndarray:

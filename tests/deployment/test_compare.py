@@ -14,7 +14,7 @@ from kinacc.deployment.shared_readings import NONE_SHARED, SharedReadings, share
 from kinacc.errors import InputError
 from kinacc.figures.comparison import draw
 from kinacc.geometry import Pose, exp_so3
-from kinacc.kinematics import dh, robot
+from kinacc.kinematics import robot
 
 
 def compare(first, second, q_rad, shared=NONE_SHARED):
@@ -24,10 +24,10 @@ def compare(first, second, q_rad, shared=NONE_SHARED):
 
 def changed(arm, **by_name):
     """The calibration with DH parameters changed: ``j2_a_mm=0.5``."""
-    vector, names = dh.to_vector(arm.model).copy(), arm.model.parameter_names
+    vector, names = arm.model.start.copy(), arm.model.names
     for name, value in by_name.items():
         vector[names.index(name.replace("_", ".", 1))] += value
-    return replace(arm, model=dh.with_vector(arm.model, vector))
+    return replace(arm, model=arm.model.with_parameters(vector))
 
 
 @pytest.mark.parametrize("name", ["mh180", "ur10"])

@@ -35,9 +35,9 @@ def real_arm(name):
     """The arm as described, with axes askew by a milliradian and lengths off by tenths of a mm."""
     plain = nominal(robot.of_text({"scara": SCARA, "five": FIVE}[name], name))
     rng = np.random.default_rng(4)
-    vector = dh.to_vector(plain.robot.dh)
+    vector = plain.robot.dh.start
     errors = np.tile([1e-3, 0.3, 0.3, 1e-3, 1e-3], plain.robot.dh.joints)
-    moved = dh.with_vector(plain.robot.dh, vector + errors * rng.normal(0.0, 1.0, vector.size))
+    moved = plain.robot.dh.with_parameters(vector + errors * rng.normal(0.0, 1.0, vector.size))
     return plain, replace(plain, model=moved, choice="dh")
 
 

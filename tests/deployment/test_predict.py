@@ -9,7 +9,7 @@ from kinacc.calibration.uncertainty import is_angle
 from kinacc.deployment.predict import predict, sensitivity
 from kinacc.deployment.record import nominal
 from kinacc.geometry import Pose, compose, exp_so3, log_so3
-from kinacc.kinematics import dh, robot, vec
+from kinacc.kinematics import dh, robot
 from kinacc.kinematics.model import JointState
 
 
@@ -23,9 +23,8 @@ def moved(arm, names, step):
         motion = np.array([of.get(f"{name}.{each}", 0.0) for each in MOTIONS])
         return Pose(exp_so3(motion[3:]) @ pose.rotation, pose.position_mm + motion[:3])
 
-    kind = {"dh": dh, "vec": vec}[arm.model.kind]
-    vector = kind.to_vector(arm.model) + [of.get(name, 0.0) for name in arm.model.parameter_names]
-    model = kind.with_vector(arm.model, vector)
+    vector = arm.model.start + [of.get(name, 0.0) for name in arm.model.names]
+    model = arm.model.with_parameters(vector)
     targets = {name: frame(pose, name) for name, pose in arm.targets.items()}
     return replace(arm, model=model, base=frame(arm.base, "base"), targets=targets)
 

@@ -31,11 +31,11 @@ def written(folder, gears_rad):
     q = np.deg2rad(rng.uniform(-70, 70, (POSES, 6)))
     q = np.concatenate([q, *[q[:AGAIN]] * (TIMES - 1)])
     q = q + np.deg2rad(0.01) * rng.uniform(-0.5, 0.5, q.shape)
-    parameters = dh.to_vector(arm.dh).reshape(-1, 5) + rng.normal(size=(6, 5)) * [
+    parameters = arm.dh.start.reshape(-1, 5) + rng.normal(size=(6, 5)) * [
         5e-4, 0.3, 0.3, 5e-4, 0.0,
     ]  # fmt: skip
     turned = q + gears_rad * np.sin(q + rng.uniform(0, 6, 6))
-    flange = dh.forward(dh.with_vector(arm.dh, parameters.ravel()), turned)
+    flange = dh.forward(arm.dh.with_parameters(parameters.ravel()), turned)
     point = flange.position_mm + flange.rotation @ [30.0, -20.0, 60.0]
     point = point @ exp_so3(np.array([0.3, -0.2, 1.1])).T + [1500.0, 200.0, -400.0]
     point = point + rng.normal(size=point.shape) * NOISE_MM

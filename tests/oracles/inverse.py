@@ -30,17 +30,6 @@ def dh_step(table, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return frames[-1], geometric_jacobian(frames)
 
 
-def vec_step(table, series, low, high, offsets, s, q) -> tuple[np.ndarray, np.ndarray]:
-    """Projected pose; its slope by plain differences, enough for Newton to converge."""
-
-    def pose(x):
-        return kinematics.projected(kinematics.vec_forward(table, series, low, high, offsets, x, s))
-
-    here, step = pose(q), 1e-6
-    columns = [pose_error(pose(q + step * row), here) / step for row in np.eye(6)]
-    return here, np.array(columns).T
-
-
 def newton(
     step: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]],
     target: np.ndarray,

@@ -27,11 +27,11 @@ STD = 0.02  # mm and mrad
 def arm(name="March", fitted=True, robot="ur10", **changes):
     """A calibration of an arm whose DH parameters are known to ``STD``, with some changed."""
     made = nominal(robots.load(robot), name)
-    names = made.model.parameter_names
-    vector = dh.to_vector(made.model).copy()
+    names = made.model.names
+    vector = made.model.start.copy()
     for parameter, by in changes.items():
         vector[names.index(parameter.replace("_", ".", 1))] += by
-    made = replace(made, model=dh.with_vector(made.model, vector), choice="dh")
+    made = replace(made, model=made.model.with_parameters(vector), choice="dh")
     if not fitted:
         return made
     covariance = np.diag([(STD * scale_of(each)) ** 2 for each in names])

@@ -51,7 +51,7 @@ def columns(base=None, tool=None):
     true = vec_kinematics.without_errors(arm.dh, np.full(6, -0.6), np.full(6, 0.6), 2)
     unit = np.repeat([0.3, 0.3e-3], 9)
     x = np.concatenate([np.tile(unit, 6), np.zeros(12)]) * rng.normal(size=120)
-    seen = vec_kinematics.pose(vec_kinematics.with_vector(true, x), q)
+    seen = vec_kinematics.pose(true.with_parameters(x), q)
     if base is not None:
         seen = compose(base, compose(seen, tool))
     position = seen.position_mm + 0.05 * rng.normal(size=(POSES, 3))

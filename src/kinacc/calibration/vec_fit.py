@@ -132,8 +132,8 @@ def flange_model(observations: Observations, empty: VECModel) -> tuple[np.ndarra
         return empty.with_parameters(vector)
 
     def linearised(x: np.ndarray, at: JointState) -> tuple[Pose, np.ndarray]:
-        moved = vec.motions(model(x), at.q_rad, at.s)
-        return moved.pose, moved.jacobian()[about_z]
+        walk = vec.walk(model(x), at.q_rad, at.s)
+        return walk.pose, walk.by_errors().reshape(errors * joints, 6, -1)[about_z]
 
     def expansion(at: JointState) -> list[Group]:
         basis, travelled = vec.chebyshev_basis(empty, at.q_rad), vec.direction_basis(at.s)

@@ -198,7 +198,7 @@ def reweighted(
 
 
 def _far(model: DHModel, nominal: DHModel) -> bool:
-    moved = np.abs(dh.to_vector(model) - dh.to_vector(nominal)).reshape(-1, 5)
+    moved = np.abs(model.start - nominal.start).reshape(-1, 5)
     return bool(moved[:, _IS_ANGLE].max() > _FAR_RAD or moved[:, ~_IS_ANGLE].max() > _FAR_MM)
 
 
@@ -244,7 +244,7 @@ class Linear:
             shifts = base @ inner[:, :3] - skew(swing[..., 0]) @ turns
             columns.append(np.concatenate([shifts, turns], axis=1) * units)
             lean = np.append(lean, np.full(units.size, strength**-2.0))
-            moved = np.append(moved, (dh.to_vector(arm.model) - dh.to_vector(nominal)) / units)
+            moved = np.append(moved, (arm.model.start - nominal.start) / units)
         design = np.concatenate(columns, axis=2)
         residual = np.concatenate([left.position_mm, np.nan_to_num(left.turn_rad)], axis=1)
         sigma_mm, sigma_rad = sigma_of(left.position_mm), sigma_of(left.turn_rad)
@@ -277,7 +277,7 @@ class Linear:
         )
         model, rest = arm.model, self.step[6 * count :]
         if rest.size:
-            model = dh.with_vector(model, dh.to_vector(model) + rest * _units(model))
+            model = model.with_parameters(model.start + rest * _units(model))
         lengths = np.abs(np.append(frames[:, :3], rest)).max()
         return Arm(model, moved), float(max(lengths, 1e3 * np.abs(frames[:, 3:]).max()))
 

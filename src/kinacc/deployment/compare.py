@@ -185,7 +185,7 @@ def _covered(first: Calibration, second: Calibration, q_rad: np.ndarray) -> np.n
 
 
 def _parameters(first: Calibration, second: Calibration) -> pd.DataFrame:
-    names = np.array(first.model.parameter_names)
+    names = np.array(first.model.names)
     unit = np.array([scale_of(name) for name in names])
     values = [each.model.comparable / unit for each in (first, second)]
     fitted, variance, blind = [], [], []
@@ -224,7 +224,7 @@ def _test(first: Calibration, second: Calibration) -> tuple[float, int, float]:
     """Squared distance, number of directions and probability, over what both determine."""
     if first.known is None or second.known is None:
         return np.nan, 0, np.nan
-    names = first.model.parameter_names
+    names = first.model.names
     units = np.array([scale_of(name) for name in names])
     difference = (second.model.comparable - first.model.comparable) / units
     total, blind = np.zeros((len(names), len(names))), []

@@ -177,9 +177,7 @@ def tool_positions(robot: Robot, joints: np.ndarray, tool: Pose | None) -> np.nd
 def information(robot: Robot, q_rad: np.ndarray, experiment: Experiment) -> Information:
     """Information of poses at reported joints (n, k), rad and mm."""
     beta = {f"j{joint}.beta_rad" for joint in experiment.hayati_joints}
-    names = tuple(
-        each for each in robot.dh.parameter_names if not each.endswith("beta_rad") or each in beta
-    )
+    names = tuple(each for each in robot.dh.names if not each.endswith("beta_rad") or each in beta)
     if experiment.frames_estimated:
         motions = frames.MOTIONS if experiment.orientation else frames.MOTIONS[:3]
         base = [f"{frames.BASE}.{motion}" for motion in frames.MOTIONS]

@@ -114,10 +114,10 @@ def sensitivity(
     end = calibration.model.pose(at)
     slopes = np.zeros((len(at), 6, len(calibration.known.names)))
     place = {each: number for number, each in enumerate(calibration.known.names)}
-    names = enumerate(calibration.model.parameter_names)
+    names = enumerate(calibration.model.names)
     chosen = [(place[each], number) for number, each in names if each in place]
     columns, numbers = np.array(chosen, dtype=int).reshape(-1, 2).T
-    slopes[:, :, columns] = calibration.model.parameter_jacobian(at)[:, :, numbers]
+    slopes[:, :, columns] = calibration.model.linearised(at)[1][:, :, numbers]
     # A turn of the last frame swings the point: w x arm = -[arm] w.
     lever_mm = (end.rotation @ carried.position_mm[:, None])[..., 0]
     slopes[:, :3] -= skew(lever_mm) @ slopes[:, 3:]

@@ -191,16 +191,6 @@ class ComplianceModel(ErrorModel):
         return np.stack(slopes, axis=2).reshape(len(at), self.joints, self.joints, -1)
 
 
-def to_vector(model: ComplianceModel) -> np.ndarray:
-    """``model.start``."""
-    return model.start
-
-
-def with_vector(model: ComplianceModel, vector: np.ndarray) -> ComplianceModel:
-    """``model.with_parameters(vector)``."""
-    return model.with_parameters(vector)
-
-
 def _place(frames: _chain.Columns, centre: np.ndarray) -> np.ndarray:
     """Points (3, n) in the robot base, given in the frames as (3,) or (3, n)."""
     return centre[0] * frames.x + centre[1] * frames.y + centre[2] * frames.z + frames.p_mm

@@ -124,16 +124,6 @@ class DHModel(ErrorModel):
         return cls(*(np.asarray(columns[name], float)[order] for name in PARAMETERS), prismatic)
 
 
-def to_vector(model: DHModel) -> np.ndarray:
-    """``model.start``."""
-    return model.start
-
-
-def with_vector(model: DHModel, vector: np.ndarray) -> DHModel:
-    """``model.with_parameters(vector)``."""
-    return model.with_parameters(vector)
-
-
 def forward(model: DHModel, q_rad: np.ndarray) -> Pose:
     """Flange poses (n, ...) in the robot base at joints ``q_rad`` (n, k) (eqs. 3-4)."""
     q_rad = np.atleast_2d(np.asarray(q_rad, dtype=float))

@@ -103,15 +103,6 @@ class ErrorModel:
         step = np.where(self.dh.prismatic, 1e-3, 1e-6)
         return _differences(lambda x: self.pose(at.moved(at.q_rad + x)), np.zeros(step.size), step)
 
-    def parameter_jacobian(self, at: JointState) -> np.ndarray:
-        """The Jacobian of ``linearised``."""
-        return self.linearised(at)[1]
-
-    @property
-    def parameter_names(self) -> tuple[str, ...]:
-        """``names``."""
-        return self.names
-
     @property
     def joints(self) -> int:
         """Number of joints k."""

@@ -94,31 +94,31 @@ class VECModel(ErrorModel):
 
     def joint_jacobian(self, at: JointState) -> np.ndarray:
         """Jacobian (n, 6, k) of ``pose`` in the joints. Exact."""
-        walk = _walk(self, at.q_rad, at.s)
+        moving = walk(self, at.q_rad, at.s)
         slopes = _slopes(self, at.q_rad)
         moved = np.empty((self.joints, 6, len(at)))
-        for joint, (into, by_errors) in enumerate(zip(moved, walk.by_errors(), strict=True)):
-            walk.by_joint(joint, into)
+        for joint, (into, by_errors) in enumerate(zip(moved, moving.by_errors(), strict=True)):
+            moving.by_joint(joint, into)
             into += np.einsum("ern,ne->rn", by_errors, slopes[:, joint])
         return np.ascontiguousarray(moved.transpose(2, 1, 0))
 
     def linearised(self, at: JointState) -> tuple[Pose, np.ndarray]:
         """Poses (n, ...) and their Jacobian (n, 6, P) in the coefficients. Exact."""
-        walk, count, cut = _walk(self, at.q_rad, at.s), len(at), self.coefficients.size
+        moving, count, cut = walk(self, at.q_rad, at.s), len(at), self.coefficients.size
         jacobian = np.zeros((count, 6, cut + self.direction_offsets_rad.size))
         expanded = jacobian[:, :, :cut].reshape(count, 6, *self.coefficients.shape)
-        elementary = walk.by_errors().transpose(3, 2, 0, 1)
+        elementary = moving.by_errors().transpose(3, 2, 0, 1)
         basis = chebyshev_basis(self, at.q_rad)
         np.multiply(elementary[..., None], basis[:, None, :, None, :], out=expanded)
         if at.s is not None:
             offsets = jacobian[:, :, cut:].reshape(count, 6, self.joints, 2)
             np.multiply(elementary[..., 5, None], direction_basis(at.s)[:, None], out=offsets)
-        return walk.pose, jacobian
+        return moving.pose, jacobian
 
     def to_columns(self, std: np.ndarray) -> dict[str, np.ndarray]:
         """The table ``vec_model``: coefficients of both directions, then offsets that have a std.
 
-        ``std`` (P,) as ``to_vector``.
+        ``std`` (P,) as ``start``.
         """
         joints, errors, terms = self.coefficients.shape
         split = self.coefficients.size
@@ -175,16 +175,6 @@ def without_errors(
     return VECModel(dh, q_min_rad, q_max_rad, np.zeros(shape), np.zeros((dh.joints, 2)))
 
 
-def to_vector(model: VECModel) -> np.ndarray:
-    """``model.start``."""
-    return model.start
-
-
-def with_vector(model: VECModel, vector: np.ndarray) -> VECModel:
-    """``model.with_parameters(vector)``."""
-    return model.with_parameters(vector)
-
-
 def mapped_joints(model: VECModel, q_rad: np.ndarray) -> np.ndarray:
     """Joints (n, k) mapped from the fitted range to [-1, 1]; beyond it the model extrapolates."""
     span = model.q_max_rad - model.q_min_rad
@@ -212,31 +202,16 @@ def errors(model: VECModel, q_rad: np.ndarray, s: np.ndarray | None = None) -> n
 
 def forward(model: VECModel, q_rad: np.ndarray, s: np.ndarray | None = None) -> Pose:
     """Flange poses (n, ...) as eqs. 5-6 print them: the rotation is not quite orthonormal."""
-    return _chain.to_pose(_walk(model, q_rad, s).end)
+    return _chain.to_pose(walk(model, q_rad, s).end)
 
 
 def pose(model: VECModel, q_rad: np.ndarray, s: np.ndarray | None = None) -> Pose:
     """Flange poses (n, ...) with the rotation projected to SO(3)."""
-    return _walk(model, q_rad, s).pose
+    return walk(model, q_rad, s).pose
 
 
-class motions:
-    """Poses (n, ...) as ``pose``, and how the joints' errors move them."""
-
-    def __init__(self, model: VECModel, q_rad: np.ndarray, s: np.ndarray | None = None) -> None:
-        walk = _walk(model, q_rad, s)
-        self.pose, self.moved = walk.pose, walk.by_errors().reshape(6 * model.joints, 6, -1)
-
-    def jacobian(self) -> np.ndarray:
-        """Motions (6k, 6, n) by the errors, joint by joint: position and rotation vector."""
-        return self.moved
-
-    def pulled(self, force: np.ndarray, moment: np.ndarray) -> np.ndarray:
-        """``jacobian`` (6k, n) times a force and a moment (3, n) on every flange."""
-        return np.einsum("ern,rn->en", self.moved, np.concatenate([force, moment]))
-
-
-def _walk(model: VECModel, q_rad: np.ndarray, s: np.ndarray | None) -> _chain.Walk:
+def walk(model: VECModel, q_rad: np.ndarray, s: np.ndarray | None = None) -> _chain.Walk:
+    """The walk along the arm: poses, and how the joints' errors move them (``by_errors``)."""
     q_rad = np.atleast_2d(np.asarray(q_rad, dtype=float))
     made = errors(model, q_rad, s).transpose(1, 2, 0)
     return _chain.Walk(model.dh, q_rad, np.ascontiguousarray(made))

@@ -71,12 +71,12 @@ def of(arm):
 def bent(arm, seed=0, size=1.0):
     """The arm with every DH parameter off, Hayati angles too, and a tool."""
     rng = np.random.default_rng(seed)
-    vector = dh.to_vector(arm.dh)
+    vector = arm.dh.start
     off = rng.normal(0.0, size, vector.size) * np.tile([2e-3, 0.5, 0.5, 2e-3, 1e-3], arm.dh.joints)
     return replace(
         nominal(arm, "test"),
         choice="dh",
-        model=dh.with_vector(arm.dh, vector + off),
+        model=arm.dh.with_parameters(vector + off),
         targets={TOOL: compose(arm.flange, TOOL_POSE)},
     )
 

@@ -13,7 +13,6 @@ from kinacc.geometry import Pose, compose, exp_so3, invert
 from kinacc.kinematics import dh, region, robot, vec
 from kinacc.kinematics.model import JointState
 from kinacc.kinematics.region import Cylinder
-from kinacc.study import operating_points
 from kinacc.study.accuracy_map import Models, PosesWanted, accuracy_map, errors_at
 
 UR10, IIWA = robot.load("ur10"), robot.load("iiwa14")
@@ -46,12 +45,6 @@ def test_a_map_is_made_with_the_branches_of_the_arm(arm):
     assert (result.position_max_mm[reached] < 5).all()
     expected = "front-up" if arm is UR10 else "q1="
     assert all(expected in name for name in result.worst_branch[reached])
-
-
-def test_points_are_drawn_in_the_space_of_an_arm_without_spherical_wrist():
-    models = models_of(UR10)
-    q = operating_points.in_space(UR10, models, wanted("ur10"), "sobol", 40)
-    assert region.contains(SPACES["ur10"], dh.forward(UR10.dh, q).position_mm).all()
 
 
 def test_a_base_of_its_own_moves_the_space_with_the_arm():

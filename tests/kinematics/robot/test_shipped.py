@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-import shared_data
 from scipy.optimize import minimize
 
 from kinacc.geometry import exp_so3, rotation_y
@@ -90,46 +89,3 @@ def farthest(name: str, frame: int, about: int) -> float:
 def test_reach_is_the_makers(name):
     reach, frame, about, within = REACH[name]
     assert farthest(name, frame, about) == pytest.approx(reach, abs=within)
-
-
-# --- measured FANUC -------------------------------------------------------------------------------
-
-POSES = "fanuc_r2000ic/poses.csv"
-
-
-def unmodelled_rms_mm(signs) -> float:
-    """Rms of the three targets when only base and targets are fitted to the readings' means."""
-    rows = np.genfromtxt(shared_data.path_of(POSES), delimiter=",", names=True)
-    chosen = [rows[rows["config"] == number] for number in np.unique(rows["config"])]
-    q = np.deg2rad(
-        [[part[f"q{i}_deg"].mean() for i in range(1, 7)] for part in chosen] * np.array(signs)
-    )
-    measured = np.array(
-        [[[part[f"m{t}_{a}_mm"].mean() for a in "xyz"] for t in "ABC"] for part in chosen]
-    )
-    flange = dh.forward(robot.load("fanuc_r2000ic_165f").dh, q)
-    targets, base_rotation, base = np.zeros((3, 3)), np.eye(3), np.zeros(3)
-    for _ in range(300):
-        seen = np.einsum("nij,tj->nti", flange.rotation, targets) + flange.position_mm[:, None]
-        a, b = seen.reshape(-1, 3), measured.reshape(-1, 3)
-        u, _, v = np.linalg.svd((a - a.mean(0)).T @ (b - b.mean(0)))
-        flip = np.diag([1, 1, np.sign(np.linalg.det(v.T @ u.T))])
-        base_rotation = v.T @ flip @ u.T
-        base = b.mean(0) - base_rotation @ a.mean(0)
-        in_base = np.einsum("ji,ntj->nti", base_rotation, measured - base)
-        local = np.einsum("nji,ntj->nti", flange.rotation, in_base - flange.position_mm[:, None])
-        targets = local.mean(0)
-    seen = np.einsum("nij,tj->nti", flange.rotation, targets) + flange.position_mm[:, None]
-    left = measured - (np.einsum("ij,ntj->nti", base_rotation, seen) + base)
-    return float(np.sqrt(np.mean(np.sum(left**2, axis=-1))))
-
-
-@shared_data.needed(POSES)
-def test_fanuc_signs_are_those_of_the_measured_arm():
-    signs = np.diag(robot.load("fanuc_r2000ic_165f").joint_map)
-    right = unmodelled_rms_mm(signs)
-    assert right == pytest.approx(0.7, abs=0.1)  # 0.717 leaving one configuration out
-    for joint in range(1, 6):
-        wrong = signs.copy()
-        wrong[joint] *= -1
-        assert unmodelled_rms_mm(wrong) > 20 * right

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from kinacc.errors import InputError
-from kinacc.kinematics import dh, robot
+from kinacc.kinematics import robot
 from kinacc.kinematics.robot import urdf
 
 UR10 = [
@@ -85,20 +85,6 @@ def test_known_arms_agree_with_pinocchio(joints, tmp_path):
     assert turned < 1e-12
     assert np.abs(arm.dh.d_mm).max() < 2000
     assert robot.files(path) == [path]
-
-
-def test_a_ur10_has_the_table_people_know(tmp_path):
-    path = tmp_path / "arm.urdf"
-    path.write_text(
-        text_of(
-            [(*row[:2], row[2].replace("1.570796325", repr(np.pi / 2)), row[3]) for row in UR10]
-        )
-    )
-    table, shipped = robot.load(path).dh, robot.load("ur10").dh
-    assert np.allclose(np.abs(table.a_mm), np.abs(shipped.a_mm))
-    assert np.allclose(np.abs(table.d_mm), np.abs(shipped.d_mm))
-    assert np.allclose(np.abs(np.sin(table.alpha_rad[:5])), np.abs(np.sin(shipped.alpha_rad[:5])))
-    assert np.array_equal(table.beta_rad, np.zeros(6))
 
 
 EXACT = ["0", "1.5707963267948966", "-1.5707963267948966", "3.141592653589793"]
@@ -190,7 +176,7 @@ def test_an_open_end_is_asked_for_with_the_links_there_are(tmp_path):
 
 def test_a_joint_that_follows_another_is_refused_in_the_chain_only(tmp_path):
     path = tmp_path / "arm.urdf"
-    path.write_text(text_of(UR10, FINGERS))
+    path.write_text(text_of(UR10, "<?xml-stylesheet href='x'?>" + FINGERS))
     said = refusal(urdf.load, path, None, "f1")
     assert "joint finger1: follows joint finger0 (mimic)" in said
 
@@ -251,46 +237,15 @@ def test_each_fault_is_named(old, new, words, tmp_path):
     assert words in refusal(robot.load, path)
 
 
-def test_nearly_parallel_axes_keep_parameters_of_the_arms_size(tmp_path):
-    joints = list(UR10)
-    joints[2] = ("revolute", "0 -0.1719 0.612", "0.00001 0 0.00002", "0 1 0")
-    path = tmp_path / "arm.urdf"
-    path.write_text(text_of(joints))
-    arm = robot.load(path)
-    assert np.abs(arm.dh.d_mm).max() < 300
-    assert np.abs(arm.dh.beta_rad).max() > 1e-6
-    assert compare(path, arm, "l7", 3)[0] < 1e-9
-    assert isinstance(arm.dh, dh.DHModel)
-
-
-@pytest.mark.parametrize(
-    "extra",
-    [
-        "<?xml-stylesheet href='x'?>",
-        '<link name="other"><visual><geometry><sphere/></geometry></visual></link>'
-        '<joint name="side" type="fixed"><parent link="l0"/><child link="other"/></joint>',
-        '<link name="other"><inertial><mass value="heavy"/></inertial></link>'
-        '<joint name="side" type="fixed"><parent link="l0"/><child link="other"/></joint>',
-    ],
-    ids=["a processing instruction", "a sphere without radius", "a mass in words"],
-)
-def test_what_a_chain_does_not_need_is_no_reason_to_refuse_a_file(tmp_path, extra):
-    path = tmp_path / "arm.urdf"
-    path.write_text(text_of(UR10, extra))
-    assert robot.load(path).dh.joints == 6
-
-
 @pytest.mark.parametrize(
     ("change", "words"),
     [
         (("?>\n", '?><!DOCTYPE r [<!ENTITY x SYSTEM "file:///etc/passwd">]>\n'), "entities"),
         (("0 0 0.1273", "0 0 1e308"), "origin xyz='0 0 1e308'; allowed: 3 finite numbers"),
-        (("0 0 0.1273", f"0 0 {'9' * 500_000}"), "origin xyz='0 0 999"),
         (("0 0 0.1273", "0 0 0_1"), "origin xyz='0 0 0_1'"),
-        (('lower="-2.5"', 'lower="-1e308"'), "limit lower='-1e308'"),
         (('<link name="l1"/>', '<link name="l1"/>' + "<link>" * 1000), "depth"),
     ],
-    ids=["entities", "far away", "long digits", "underscores", "limits", "nesting"],
+    ids=["entities", "far away", "underscores", "nesting"],
 )
 def test_a_urdf_file_made_to_do_harm_is_refused_in_a_line(tmp_path, change, words):
     path = tmp_path / "arm.urdf"
