@@ -152,6 +152,8 @@ def joint_jacobian(model: DHModel, q_rad: np.ndarray) -> np.ndarray:
     Columns of prismatic joints are per mm.
     """
     q_rad = np.atleast_2d(np.asarray(q_rad, dtype=float))
+    if len(q_rad) > _BLOCK:
+        return np.concatenate([joint_jacobian(model, part) for part in _blocks(q_rad)])
     walk = _chain.Walk(model, q_rad)
     moved = np.empty((model.joints, 6, len(q_rad)))
     for joint, into in enumerate(moved):
@@ -169,5 +171,15 @@ def parameter_jacobian(model: DHModel, q_rad: np.ndarray) -> np.ndarray:
 
 def pose_and_parameter_jacobian(model: DHModel, q_rad: np.ndarray) -> tuple[Pose, np.ndarray]:
     """``forward`` and ``parameter_jacobian`` in one pass."""
-    walk = _chain.Walk(model, np.atleast_2d(np.asarray(q_rad, dtype=float)))
+    q_rad = np.atleast_2d(np.asarray(q_rad, dtype=float))
+    if len(q_rad) > _BLOCK:
+        parts = [pose_and_parameter_jacobian(model, part) for part in _blocks(q_rad)]
+        poses, jacobians = zip(*parts, strict=True)
+        pose = Pose(*(np.concatenate(each) for each in zip(*poses, strict=True)))
+        return pose, np.concatenate(jacobians)
+    walk = _chain.Walk(model, q_rad)
     return walk.pose, np.ascontiguousarray(walk.by_parameters().transpose(3, 2, 0, 1))
+
+
+def _blocks(q_rad: np.ndarray) -> list[np.ndarray]:
+    return [q_rad[begin : begin + _BLOCK] for begin in range(0, len(q_rad), _BLOCK)]
