@@ -14,7 +14,7 @@ from kinacc.calibration import models, tables, uncertainty
 from kinacc.calibration.compliance_fit import ComplianceEstimator
 from kinacc.calibration.observations import Observations
 from kinacc.config.schema import defaults
-from kinacc.kinematics import dh, robot
+from kinacc.kinematics import robot
 
 ARM = robot.load("mh180")
 MASSES = np.array([200.0, 150.0, 120.0, 40.0, 20.0, 5.0])
@@ -65,7 +65,7 @@ def measured(compliance, payload=None, count=150, seed=0):
     rng = np.random.default_rng(seed)
     q = rng.uniform(-1.2, 1.2, (count, 6))
     off = np.array([1e-3, 0.4, 0.4, 1e-3, 0.0]) * rng.normal(size=(6, 5))
-    true = dh.with_vector(ARM.dh, dh.to_vector(ARM.dh) + off.ravel())
+    true = ARM.dh.with_parameters(ARM.dh.start + off.ravel())
     carried = np.zeros((count, 4)) if payload is None else payload
     seen = np.array([bent(true, q[i], compliance, carried[i]) for i in range(count)])
     zeros = np.zeros(count, dtype=int)

@@ -20,7 +20,7 @@ def disturbed(arm, free, rng):
     """Up to 5 degrees and 20 mm off; axes meant to be parallel (Hayati) within a degree."""
     shift = rng.uniform(-1, 1, (6, 5)) * [FIVE_DEG, 20.0, 20.0, FIVE_DEG, FIVE_DEG] * free
     shift[free[:, 4], 3:] *= 0.2
-    return dh.with_vector(arm.dh, dh.to_vector(arm.dh) + shift.ravel())
+    return arm.dh.with_parameters(arm.dh.start + shift.ravel())
 
 
 def measured(true, base, tool, rng, count=90):
@@ -94,9 +94,9 @@ def test_a_hundred_starts_reach_one_optimum():
 def test_antiparallel_lengths_move_as_little_as_their_difference_asks():
     arm = robot.load("mh180")
     rng = np.random.default_rng(3)
-    vector = dh.to_vector(arm.dh).reshape(6, 5).copy()
+    vector = arm.dh.start.reshape(6, 5).copy()
     vector[1, 1], vector[2, 1] = 300.0, 301.0  # d2, d3: only d2 - d3 = -1 shows
-    q, seen = measured(dh.with_vector(arm.dh, vector.ravel()), IDENTITY, IDENTITY, rng)
+    q, seen = measured(arm.dh.with_parameters(vector.ravel()), IDENTITY, IDENTITY, rng)
     found = fitting.fit(
         full_poses(q, seen),
         arm.dh,

@@ -12,7 +12,7 @@ from kinacc.calibration import models
 from kinacc.calibration.constraints import free_parameters, parallel_joints
 from kinacc.calibration.residuals import errors
 from kinacc.config.schema import defaults
-from kinacc.kinematics import dh, robot
+from kinacc.kinematics import robot
 
 SIZES, SUBSETS = (6, 8, 12, 16, 20, 30), 20
 
@@ -33,7 +33,7 @@ def positions(name, offset_deg=(0.2, 0.45), count=300, seed=1):
     turned = true.start.reshape(free.shape).copy()
     size = np.deg2rad(rng.uniform(*offset_deg, len(free)))
     turned[:, 0] += size * rng.choice([-1.0, 1.0], len(free))
-    true = dh.with_vector(true, turned.ravel())
+    true = true.with_parameters(turned.ravel())
     return arm, simulated.measure(true, simulated.joints(arm, count, rng), simulated.POINT, rng)
 
 

@@ -54,7 +54,7 @@ def fitted(observations, arm_rules=None, frame_rules=None, **given):
 def test_no_rule_is_the_plain_fit_to_the_bit():
     _, data = seen()
     plain = fitting.fit(data, ARM.dh, free=FREE, rotation_weight_mm_per_rad=WEIGHT, threshold=1e-3)
-    np.testing.assert_array_equal(dh.to_vector(fitted(data).model), dh.to_vector(plain.model))
+    np.testing.assert_array_equal(fitted(data).model.start, plain.model.start)
 
 
 @pytest.mark.parametrize("kind", [POINT, THREE, POSE])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import json
 import os
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
@@ -11,7 +12,6 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-import yaml
 from pydantic import (
     BaseModel,
     BeforeValidator,
@@ -409,39 +409,29 @@ def as_yaml(robot: Robot, heading: Iterable[str] = ()) -> str:
     bit, and turns of the frames to rounding.
     """
     about = {"name": robot.name, "source": robot.source, "date": robot.date}
-    lines = [
-        *(f"# {line}" for line in heading),
-        *(_entry(*each) for each in about.items() if each[1]),
-    ]
+    lines = [f"# {line}" for line in heading]
+    lines += [f"{key}: {json.dumps(value)}" for key, value in about.items() if value]
     signs = np.diag(robot.joint_map)
     simple = np.array_equal(robot.joint_map, np.diag(signs)) and (np.abs(signs) == 1.0).all()
     lines.append("dh:")
     for joint, slides in enumerate(robot.dh.prismatic):
-        row: dict[str, Any] = {name: float(getattr(robot.dh, name)[joint]) for name in PARAMETERS}
+        row = [f"{name}: {float(getattr(robot.dh, name)[joint])!r}" for name in PARAMETERS]
         if robot.joint_names and robot.joint_names[joint] != f"joint {joint + 1}":
-            row["name"] = robot.joint_names[joint]
+            row.insert(0, f"name: {json.dumps(robot.joint_names[joint])}")
         if slides:
-            row["joint"] = "prismatic"
+            row.append("joint: prismatic")
+        ends = [float(robot.q_min_rad[joint]), float(robot.q_max_rad[joint])]
+        row.append(f"limits_{'mm' if slides else 'rad'}: {ends}")
         if simple and signs[joint] < 0.0:
-            row["sign"] = -1
-        ends = float(robot.q_min_rad[joint]), float(robot.q_max_rad[joint])
-        row["limits_mm" if slides else "limits_rad"] = list(ends)
-        lines.append(f"  - {_flow(row)}")
+            row.append("sign: -1")
+        lines.append(f"  - {{{', '.join(row)}}}")
     if not simple:
-        lines.append(_entry("joint_map", robot.joint_map.tolist()))
+        lines.append("joint_map: # DH joints = joint_map times reported joints")
+        lines += [f"  - {row}" for row in robot.joint_map.tolist()]
     for name in ("base", "flange", "tool"):
         pose = getattr(robot, name)
         if not all(np.array_equal(own, none) for own, none in zip(pose, IDENTITY, strict=True)):
             turn = quaternion_from_rotation(pose.rotation).tolist()
-            frame = {"position_mm": pose.position_mm.tolist(), "quaternion_wxyz": turn}
-            lines.append(_entry(name, frame))
+            position = f"  position_mm: {pose.position_mm.tolist()}"
+            lines += [f"{name}:", position, f"  quaternion_wxyz: {turn}"]
     return "\n".join(lines) + "\n"
-
-
-def _entry(key: str, value: Any) -> str:
-    return _flow({key: value})[1:-1]
-
-
-def _flow(value: Any) -> str:
-    options: dict[str, Any] = {"width": float("inf"), "allow_unicode": True, "sort_keys": False}
-    return yaml.safe_dump(value, default_flow_style=True, **options).rstrip("\n")
