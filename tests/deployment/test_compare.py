@@ -65,7 +65,9 @@ def test_readings_in_both_calibrations_are_counted_once(first, second, common):
     assert ratio == pytest.approx(1.0, abs=0.25)
     assert np.mean([each.statistic / each.directions for each in apart]) < 0.7
     shifts = [each.apart_from_frames for each in found]
-    seen, expected = (np.mean([s[i] ** 2 for s in shifts]) for i in (2, 4))
+    seen, expected = (
+        np.mean([getattr(s, f"{n}_mm") ** 2 for s in shifts]) for n in ("rms", "chance")
+    )
     assert seen / expected == pytest.approx(1.0, abs=0.6)
 
 
