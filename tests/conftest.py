@@ -50,7 +50,6 @@ SLOW = (
     "campaign/test_lost_readings.py",
     "campaign/test_on_a_real_arm.py",
     "campaign/test_planning.py",
-    "campaign/test_report_above_its_bounds.py",
     "campaign/test_state.py",
     "checks/test_advice_on_misread_files.py",
     "cli/test_check_data.py",

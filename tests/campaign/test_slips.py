@@ -250,7 +250,7 @@ def test_what_a_campaign_was_begun_against_stands_beside_every_bound(start, tmp_
         assert set(said) <= set(done.stdout.splitlines()), done.output
     report = (folder / "report" / "report.md").read_text()
     assert report.count("begun against") == 1
-    assert report.index("begun against") < report.index("## What was measured")
+    assert report.index("begun against") < report.index("## Measurements")
     told = json.loads(call("campaign", "status", folder, "--json").stdout)["begun_against"]
     assert [f"begun against: {each}" for each in told] == said
 

@@ -21,7 +21,7 @@ from kinacc.deployment.record import nominal
 from kinacc.figures.campaign import draw
 from kinacc.kinematics import robot as robots
 from kinacc.report import page
-from kinacc.report.campaign import campaign_page, section
+from kinacc.report.campaign import campaign_page, markdown, section
 
 TRUE_MM = 0.2
 
@@ -147,7 +147,7 @@ def test_picture_and_conformity_say_how_many_a_bound_leaves_out():
     drawn = draw(found.tables["campaign_points"], about, len(found.state.plan.route))
     labels = [each.get_text() for each in drawn.findobj(matplotlib.text.Text)]
     assert "bounds, all but 3 candidates" in labels
-    text = report.markdown(found.opened, found.state, found.tables, "picture")
+    text = markdown(found.opened, found.state, found.tables, "picture")
     assert "- all but 3 candidates: **undecided**" in text
     assert "all candidates" not in text.split("## Conformity")[1].split("##")[0]
 
@@ -222,6 +222,6 @@ def test_an_estimate_for_candidates_that_are_not_all_measured_is_said_to_be_low(
         assert words.statement(said, part.state).endswith(low) == (said.target == CANDIDATES)
     first = first_of(part)
     assert sum(text.count(low) for text in first.answers) == 1
-    assert report.markdown(part.opened, part.state, part.tables, "picture").count(low) == 1
-    every = report.markdown(whole.opened, whole.state, whole.tables, "picture")
+    assert markdown(part.opened, part.state, part.tables, "picture").count(low) == 1
+    every = markdown(whole.opened, whole.state, whole.tables, "picture")
     assert "tends to be too low" not in every

@@ -1,4 +1,4 @@
-"""Tables and text of a campaign's report."""
+"""Tables of a campaign's report, and the facts it states."""
 
 from __future__ import annotations
 
@@ -9,24 +9,18 @@ import numpy as np
 
 from kinacc import __version__
 from kinacc.assess.adaptive import Campaign
-from kinacc.assess.conformity import decide
 from kinacc.assess.limits import VISITS as FUTURE
-from kinacc.assess.statement import MEAN, REGION
-from kinacc.campaign import consistency, nearness, words
+from kinacc.assess.statement import MEAN
+from kinacc.campaign import consistency, words
 from kinacc.campaign.folder import Opened
 from kinacc.campaign.instrument import noise
 from kinacc.campaign.journal import JOURNAL
 from kinacc.campaign.reading import covariance_mm2
 from kinacc.campaign.state import State, sayable
-from kinacc.config.names import in_markdown
 from kinacc.tables.columns import Columns
 from kinacc.tables.contract import columns_of
 
 _STATEMENTS = 150  # stated at so many moments of a campaign, at most
-_LARGEST = 10
-_SIZES = ("error", "lower", "upper")
-_DECIMALS = 3  # of mm, as shown
-_UNLIKELY = 3.0  # standard deviations of a mean reading
 
 
 def tables(opened: Opened, progress: Callable | None = None) -> tuple[State, dict[str, Columns]]:
@@ -143,66 +137,6 @@ def limits_of(state: State) -> dict[int, tuple[float, float]]:
     return {int(state.rows[row]): each for row, each in limits.items()}
 
 
-def markdown(opened: Opened, state: State, found: dict[str, Columns], picture: str) -> str:
-    """The report as text."""
-    plan = state.plan
-    about = {key: in_markdown(value) for key, value in plan.about.items()}
-    lines = [
-        f"# Largest error of {about['robot']}, {about['model']} model of {about['calibration']}",
-        "",
-        *(f"- {each}" for each in words.statements(state)),
-        *_nearness(state),
-        *(f"- {in_markdown(each)}" for each in words.begun_against(plan)),
-        *(f"- {in_markdown(each)}" for each in read_above(state, found["campaign_points"])),
-        "",
-    ]
-    if plan.limits.tolerance_mm is not None:
-        lines += ["## Conformity", "", *_conformity(state), ""]
-    lines += [f"![sizes of the errors, and the bounds as they grew]({picture})", ""]
-    lines += ["## What was measured", "", *(f"- {each}" for each in facts(opened, state)), ""]
-    points = found["campaign_points"]
-    shown = largest_read(points)
-    lines += ["## Largest errors", "", *_largest(points, shown), ""]
-    lines += beyond_limits(points, shown)
-    lines += ["## What the bounds rest on", "", *(f"- {each}" for each in grounds(state)), ""]
-    lines += [
-        "## What this report was made of",
-        "",
-        *(f"- {each}" for each in made_of(opened, state)),
-    ]
-    return "\n".join(lines) + "\n"
-
-
-def _nearness(state: State) -> list[str]:
-    """How near the bounds are, as a list within the list."""
-    lines = []
-    for head, told in nearness.told(state):
-        lines += [f"- {head}:", *(f"  - {each}" for each in told)]
-    return lines
-
-
-def _conformity(state: State) -> list[str]:
-    tolerance = state.plan.limits.tolerance_mm
-    lines = [f"Largest error allowed: {tolerance:g} mm.", ""]
-    for said in state.statements():
-        found = decide(said, tolerance)
-        line = f"- {words.target(said)}: **{found.verdict}**; {words.reason(found.reason)}"
-        if math.isfinite(found.guard_band_mm):
-            line += (
-                f" (guard band {found.guard_band_mm:.3f} mm, acceptance limit "
-                f"{found.acceptance_limit_mm:.3f} mm, risk at most {found.risk:.1%})"
-            )
-        lines.append(line)
-    lines += [
-        "",
-        "Accepted where the upper bound is within the tolerance, rejected where the lower bound is "
-        "beyond it: guarded acceptance and rejection of JCGM 106:2012, the rule of ISO 14253-1. "
-        "Between them nothing is decided. The guard band is how far "
-        "the estimate has to stay below the tolerance; the risk is that of either being wrong.",
-    ]
-    return lines
-
-
 def made_of(opened: Opened, state: State) -> list[str]:
     """Digests, number of readings, version and settings: ``kinacc campaign verify`` takes them."""
     told = {key: value for key, value in vars(state.plan.assessor).items() if value is not None}
@@ -218,18 +152,17 @@ def made_of(opened: Opened, state: State) -> list[str]:
     ]
 
 
-def facts(opened: Opened, state: State, written: Callable[[str], str] = in_markdown) -> list[str]:
-    """What was measured, with what and when, a line each; ``written``: as names are shown."""
+def facts(opened: Opened, state: State) -> list[str]:
+    """What was measured, with what and when, a line each."""
     plan = state.plan
     visited = len({each.reading.point for each in state.told})
-    source = written(plan.about["candidates"])
-    joints = f"{len(plan.points) - len(state.left_out)} candidates ({source})"
+    joints = f"{len(plan.points) - len(state.left_out)} candidates ({plan.about['candidates']})"
     lines = [
         f"{len(state.told)} readings of {plan.assessor.measurements} at {visited} of {joints}, "
         f"order drawn with seed {plan.seed}",
-        f"point measured: {written(plan.about['point'])}",
+        f"point measured: {plan.about['point']}",
         *(
-            f"instrument {written(each.name)}: {noise(each)}, {each.frame} frame"
+            f"instrument {each.name}: {noise(each)}, {each.frame} frame"
             for each in plan.instruments
         ),
         f"assessor {plan.assessor.name}: {(type(plan.assessor).__doc__ or '').splitlines()[0]}",
@@ -245,97 +178,9 @@ def facts(opened: Opened, state: State, written: Callable[[str], str] = in_markd
         lines.append(
             f"{large} readings beyond {plan.limits.implausible_mm:g} mm were taken on request"
         )
-    lines += map(written, words.not_counted(state))
+    lines += words.not_counted(state)
     lines += [*consistency.remarks(state), *words.of_frame(state), *words.of_the_noise(state)]
-    return [*lines, *map(written, words.suspicious(state))]
-
-
-def read_above(state: State, points: Columns) -> list[str]:
-    """What is to be said where points read more than an upper bound that is stated."""
-    size = _as_shown(points["error_mm"])
-    measured = int(np.sum(~np.isnan(size)))
-    lines = []
-    for said in words.distinct(state):
-        upper_mm = round(said.upper_mm, _DECIMALS)
-        above = np.flatnonzero(size > upper_mm)
-        if not above.size:
-            continue
-        top = above[np.argmax(size[above])]
-        noise_mm, count = float(points["noise_mm"][top]), int(points["readings"][top])
-        if said.target == REGION:
-            why = f"the bound leaves out {1.0 - said.share:.1%} of the region"
-        elif size[top] - said.upper_mm > _UNLIKELY * noise_mm:
-            why = (
-                f"its noise, {noise_mm:.3f} mm per axis, does not explain that: the noise "
-                "is stated too small, or this is one of the few campaigns the confidence allows to "
-                "be wrong"
-            )
-        else:
-            readings = "1 reading" if count == 1 else f"{count} readings"
-            why = (
-                "the bound is on the error that stays when a pose is measured again, and this is "
-                f"the mean of {readings} with noise of {noise_mm:.3f} mm per axis"
-            )
-        lines.append(
-            f"At most {said.upper_mm:.3f} mm for {words.target(said)}: {above.size} of the "
-            f"{measured} measured points read more than that, point {points['point'][top]} the "
-            f"most, {size[top]:.3f} mm; {why}."
-        )
-    return lines
-
-
-def _as_shown(values: np.ndarray) -> np.ndarray:
-    return np.round(np.asarray(values, dtype=float), _DECIMALS)
-
-
-def largest_read(points: Columns) -> np.ndarray:
-    """Rows of the largest errors read, largest first."""
-    size = np.asarray(points["error_mm"], dtype=float)
-    order = np.argsort(-np.where(np.isnan(size), -1.0, size), kind="stable")[:_LARGEST]
-    return order[~np.isnan(size[order])]
-
-
-def _largest(points: Columns, shown: np.ndarray) -> list[str]:
-    lines = ["| point | readings | error mm | at least mm | at most mm |", "|---|---|---|---|---|"]
-    for row in shown:
-        size, lower, upper = (float(points[f"{name}_mm"][row]) for name in _SIZES)
-        label, readings = in_markdown(points["point"][row]), int(points["readings"][row])
-        lines.append(f"| {label} | {readings} | {size:.3f} | {lower:.3f} | {upper:.3f} |")
-    return lines
-
-
-def beyond_limits(
-    points: Columns,
-    shown: np.ndarray,
-    written: Callable[[str], str] = in_markdown,
-) -> list[str]:
-    """What is to be said where rows that are shown read more than their limit, or limits cross."""
-    size, lower, upper = (_as_shown(points[f"{name}_mm"])[shown] for name in _SIZES)
-    once = np.asarray(points["readings"], dtype=float)[shown] == 1.0
-
-    def named(rows: np.ndarray) -> str:
-        return ", ".join(written(points["point"][row]) for row in shown[rows])
-
-    lines = []
-    if (above := size > upper).any():
-        text = (
-            f"Read above their own limit: {named(above)}. A limit is on the error that stays when "
-            "a pose is measured again, and the narrowest of those at several looks; the "
-            "error shown is the mean of what was read, with its noise."
-        )
-        if (quiet := above & once).any():
-            text += (
-                f" Read once, and less than the noise stated nearly always brings: {named(quiet)}; "
-                "the noise may be stated too large."
-            )
-        lines += [text, ""]
-    if (crossed := lower > upper).any():
-        lines += [
-            f"Limits that contradict each other: {named(crossed)}. Either the noise is stated too "
-            "small, or something moved between the readings.",
-            "",
-        ]
-    return lines
+    return [*lines, *words.suspicious(state)]
 
 
 def grounds(state: State) -> list[str]:

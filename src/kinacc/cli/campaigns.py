@@ -170,6 +170,7 @@ def write_report(path: str, to: str | None, formats: Sequence[str], out: Output)
     from kinacc.figures import campaign as drawing
     from kinacc.figures.save import render
     from kinacc.progress import reporting
+    from kinacc.report.campaign import markdown
     from kinacc.tables.atomic import write_together
     from kinacc.tables.store import content_of, to_table
 
@@ -203,7 +204,7 @@ def write_report(path: str, to: str | None, formats: Sequence[str], out: Output)
     )  # fmt: skip
     drawn = render(figure, pictures)
     contents |= {pictures[kind]: content for kind, content in drawn.items()}
-    contents[text] = report.markdown(opened, state, tables, "campaign.svg").encode()
+    contents[text] = markdown(opened, state, tables, "campaign.svg").encode()
     write_together(contents)
     written = [each.name for each in made_here]
     if out.page is not None:
@@ -213,7 +214,6 @@ def write_report(path: str, to: str | None, formats: Sequence[str], out: Output)
     facts = answers.as_facts(state, state.plan.limits.tolerance_mm)
     facts["limits"] = nearness.as_facts(state)
     lines = [*words.statements(state), *words.begun_against(state.plan)]
-    lines += report.read_above(state, tables["campaign_points"])
     lines.append(f"{into}: {', '.join(written)}")
     lines += [out.page] if out.page is not None else []
     out.say({**facts, "folder": str(into), "files": written, "page": out.page}, "\n".join(lines))

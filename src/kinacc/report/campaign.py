@@ -13,12 +13,12 @@ from kinacc.assess.statement import Statement
 from kinacc.campaign import consistency, folder, instrument, nearness, words
 from kinacc.campaign.folder import Opened
 from kinacc.campaign.reasons import ADVICE
-from kinacc.campaign.report import beyond_limits, facts, grounds, made_of, read_above
+from kinacc.campaign.report import facts, grounds, made_of
 from kinacc.campaign.state import State
 from kinacc.config.error_models import model_name
 from kinacc.figures import campaign as drawing
 from kinacc.report.campaign_answers import against, answers, leading, sentence
-from kinacc.report.page import FirstScreen, Page, Part, Table
+from kinacc.report.page import FirstScreen, Page, Part, Table, environment
 from kinacc.tables.columns import Columns
 
 _MODEL_ERROR = "This is the error of the model at these poses; the robot itself is not changed."
@@ -50,19 +50,36 @@ def section(opened: Opened, state: State, tables: Mapping[str, Columns]) -> Part
         "largest": measured[:_LARGEST].to_dict("records"),
         "every": measured[:_MOST_ROWS].to_dict("records"),
         "measured": len(measured),
-        "beyond": [
-            text for text in beyond_limits(
-                tables["campaign_points"], measured.index[:_LARGEST].to_numpy(), str) if text
-        ],
         "left_out": points[points["left_out"].notna()].to_dict("records"),
         "struck": readings[struck].to_dict("records"),
         "instruments": _instruments(state, readings, struck),
         "scatter": consistency.remarks(state),
         "grounds": list(map(sentence, grounds(state))),
-        "facts": [{"fact": sentence(each)} for each in facts(opened, state, str)],
+        "facts": [{"fact": sentence(each)} for each in facts(opened, state)],
         "made_of": made_of(opened, state)[:2],
     }  # fmt: skip
     return Part("campaign", values, figures=figures)
+
+
+def markdown(opened: Opened, state: State, tables: Mapping[str, Columns], picture: str) -> str:
+    """The report as text, by the same values as the page."""
+    tolerance = state.plan.limits.tolerance_mm
+    verdicts = (
+        []
+        if tolerance is None
+        else [(words.target(each), decide(each, tolerance)) for each in state.statements()]
+    )
+    more = {
+        "about": state.plan.about,
+        "statements": words.statements(state),
+        "begun_against": words.begun_against(state.plan),
+        "tolerance_mm": tolerance,
+        "verdicts": [(target, each, words.reason(each.reason)) for target, each in verdicts],
+        "picture": picture,
+        "made_of_all": made_of(opened, state),
+    }
+    values = section(opened, state, tables).values | more
+    return environment().get_template("campaign.md").render(values)
 
 
 def _instruments(state: State, readings: pd.DataFrame, struck: pd.Series) -> list[dict]:
@@ -165,7 +182,6 @@ def _notes(
     check = [
         *folder.doubts(opened),
         *words.begun_against(plan),
-        *read_above(state, tables["campaign_points"]),
     ]
     if state.in_hand:
         check.append(f"{len(state.in_hand)} readings were not asked for yet and are not used")

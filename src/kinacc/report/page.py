@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kinacc import __version__
+from kinacc.config.names import in_markdown
 from kinacc.tables.columns import Columns
 
 if TYPE_CHECKING:
@@ -87,15 +88,15 @@ def html(
         for part in page.sections
         for name, chart in part.charts.items()
     }
-    environment = _environment()
+    templates = environment()
     sections = []
     for part in page.sections:
         drawn = {name: _image(figure) for name, figure in part.figures.items()}
         drawn |= {name: f"chart-{part.key}-{name}" for name in part.charts}
-        template = environment.get_template(f"{part.key}.html")
+        template = templates.get_template(f"{part.key}.html")
         body = template.make_module({**part.values, "pictures": drawn})
         sections.append({"key": part.key, "body": body})
-    return environment.get_template("page.html").render(
+    return templates.get_template("page.html").render(
         page=page,
         sections=sections,
         marks={"kinacc_version": __version__, **page.marks, **(marks or {})},
@@ -150,17 +151,18 @@ def _text(name: str) -> str:
 
 
 @cache
-def _environment():
+def environment():
+    """Templates of pages and texts; those of pages escape what they show."""
     from jinja2 import Environment, FunctionLoader, StrictUndefined
 
     from kinacc.report.terminal import counted
 
-    environment = Environment(
+    made = Environment(
         loader=FunctionLoader(_text),
-        autoescape=True,
+        autoescape=lambda name: not str(name).endswith(".md"),
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters |= {"cell": cell, "counted": counted}
-    return environment
+    made.filters |= {"cell": cell, "counted": counted, "md": in_markdown}
+    return made
