@@ -19,6 +19,7 @@ ROTATION_TOLERANCE_RAD = 1e-9  # 1e-6 mm at a lever of one metre
 
 _LEVER_MM = 1000.0  # a radian counts as this, and so does a turn as travel of a joint that slides
 _LONGEST_TURN_RAD = 0.5
+_TIGHT_MM = 1e-9  # a radian counts as a metre
 _BLOCK = 8192
 _ROUND_OFF = 1e-15  # smallest damping, relative to the trace of J'J: keeps the solve regular
 _FIRST_DAMPING, _SMALLEST_DAMPING, _LARGEST_DAMPING = 1e-5, 1e-9, 1e3
@@ -98,14 +99,15 @@ def _refine_block(
         met = (position < POSITION_TOLERANCE_MM) & (rotation < ROTATION_TOLERANCE_RAD)
         cost = position**2 + (_LEVER_MM * rotation) ** 2
         better = cost < lowest
-        rows = active[better]
+        rows, already = active[better], result.converged[active]
         result.q_rad[rows], result.converged[rows] = trial[better], met[better]
         result.position_error_mm[rows] = position[better]
         result.rotation_error_rad[rows] = rotation[better]
         nearest[better], lowest[better] = error[better], cost[better]
         relaxed = np.where(damping > _SMALLEST_DAMPING, 0.1 * damping, 0.0)
         damping = np.where(better, relaxed, np.maximum(8.0 * damping, _FIRST_DAMPING))
-        going = ~result.converged[active]
+        # One step more than the tolerance asks for: it costs little and gains what it has gained.
+        going = ~(result.converged[active] & (already | (lowest < _TIGHT_MM**2)))
         if step >= cheap_until:
             going &= damping <= _LARGEST_DAMPING
         if step == _STEPS:
