@@ -1,8 +1,6 @@
 """The command line as a person uses it: help, one stage by hand, mistakes."""
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -48,17 +46,6 @@ def test_every_command_is_listed_once_with_all_its_words():
     for name in main.commands:
         (line,) = (line for line in shown.splitlines() if line.startswith(f"  {name} "))
         assert not line.endswith("...")
-
-
-def test_help_loads_no_numerical_library():
-    code = (
-        "import sys; from kinacc.cli.group import main\n"
-        "try: main(['calibrate', '--help'])\n"
-        "except SystemExit: pass\n"
-        "print(sorted({'numpy', 'scipy', 'pyarrow', 'numba', 'matplotlib'} & set(sys.modules)))"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.splitlines()[-1] == "[]"
 
 
 def test_checking_a_folder_that_is_not_there_fails(tmp_path):

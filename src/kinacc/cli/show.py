@@ -11,6 +11,7 @@ from pathlib import Path
 
 import click
 import pandas as pd
+import pyarrow as pa
 from rich.console import Console
 from rich.table import Table
 
@@ -136,7 +137,12 @@ def read(path: Path) -> tuple[pd.DataFrame, dict[str, str]]:
     """A Parquet file and the units of its columns. InputError where it is none, or damaged."""
     table = store.read_arrow(path, any_type=True)
     units = {each.name: (each.metadata or {}).get(b"unit", b"").decode() for each in table.schema}
-    return table.to_pandas(), units
+    try:
+        table.validate(full=True)
+        return table.to_pandas(), units
+    except (ValueError, pa.ArrowException) as error:
+        what = f"cannot be shown: {error}"
+        raise InputError(Problem(str(path), what, fix=store.remake(path))) from None
 
 
 def choose(

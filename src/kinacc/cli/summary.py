@@ -68,7 +68,10 @@ def summary(
     places = summaries.data_set_folders(folders or (Path(RESULTS),))
     found: list[CalibrationSummary | Problem]
     if len(places) == 1:
-        found = [summaries.summarise(places[0], outdated=choice.say_outdated(places[0]))]
+        try:
+            found = [summaries.summarise(places[0], outdated=choice.say_outdated(places[0]))]
+        except InputError as error:
+            found = [error.problems[0]]
     else:
         found = summaries.summarise_all(places)
     known = [each for each in found if not isinstance(each, Problem)]

@@ -258,7 +258,8 @@ def print_fleet(table: pd.DataFrame, by: str) -> None:
     console.print(grid)
     console.print("Position errors of the selected model at held-out poses.")
     for column in ("reason", "remarks"):
-        for text, group in table[table[column].fillna("") != ""].groupby(column, sort=False):
+        told = table[column].notna() & (table[column].astype(str) != "")
+        for text, group in table[told].groupby(column, sort=False):
             names = ", ".join(group["data_set"][:_MOST])
             more = f" and {len(group) - _MOST} more" if len(group) > _MOST else ""
             console.print(as_seen(f"{names}{more}: {text}"), soft_wrap=True)
