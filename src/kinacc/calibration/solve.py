@@ -20,9 +20,9 @@ from kinacc.calibration.system import PoseSystem
 from kinacc.errors import FitError
 
 STEP_TOLERANCE = 1e-6  # mm and mrad
-PRIOR_TOLERANCE = 1e-4  # the same where priors hold weak directions: poses move by nm
+PRIOR_TOLERANCE = 1e-6  # the same where priors hold weak directions, unless the objective stands still
 MAX_ITERATIONS = 60
-PATIENCE, HELD_PATIENCE = 12, 3  # steps after which standing still counts as arrived
+PATIENCE, HELD_PATIENCE = 12, 8  # steps after which standing still counts as arrived
 STANDSTILL, NO_CHANGE = 1e-9, 1e-5  # share of the objective; of the variance
 MAX_HALVINGS = 12
 MEMORY = 6  # steps that suggest the next one
@@ -237,7 +237,7 @@ class _Descent:
                 raise FitError(f"{self.task.name}: a step is not finite at cost {self.cost:.6g}")
             if iteration > 2:
                 self.ranks = split.ranks  # a rank that has been lost is not taken back
-            if size <= tolerance and abs(self.variance - settled) <= 1e-4 * settled:
+            if size <= tolerance and abs(self.variance - settled) <= 1e-9 * settled:
                 self.x[self.active] += self.scale * step
                 to = np.append(step, 1.0)
                 self.costs = to @ self.grams @ to
