@@ -131,7 +131,7 @@ mirror image, with errors of the same size.
 
 - Two arms of one maker, one of each type. The UR5 moved in 7 to 21 % of its joints' ranges.
 - From one series of the UR10 to the other the arm itself may have changed.
-- Nothing of orientations: the UR5's were not measured; `kinacc fitted` and `kinacc verify` give
+- Nothing of orientations: the UR5's were not measured; `kinacc summary` and `kinacc verify` give
   those of the UR10.
 - Not here: series A and C of the UR10, which are large, and a FANUC R-2000iC, whose data state no
   licence; [benchmarks](../benchmarks/README.md) have both. Series D is read as its authors

@@ -277,7 +277,7 @@ def test_the_direction_a_pose_was_approached_from_is_kept(tmp_path):
 
 def test_points_alone_are_told_to_bring_their_joints(tmp_path):
     files = written(tmp_path, m_csv=table(["Point", *XYZ], named_rows(), IT.point))
-    assert "kinacc init JOINTS POINTS" in refused(files)
+    assert "or give joints and points" in refused(files)
 
 
 def named_rows():

@@ -20,7 +20,7 @@ from kinacc.calibration.system import PoseSystem
 from kinacc.errors import FitError
 
 STEP_TOLERANCE = 1e-6  # mm and mrad
-PRIOR_TOLERANCE = 1e-6  # the same where priors hold weak directions, unless the objective stands still
+PRIOR_TOLERANCE = 1e-6  # the same beside priors, unless the objective stands still
 MAX_ITERATIONS = 60
 PATIENCE, HELD_PATIENCE = 12, 8  # steps after which standing still counts as arrived
 STANDSTILL, NO_CHANGE = 1e-9, 1e-5  # share of the objective; of the variance

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import shlex
-import sys
 from collections.abc import Mapping, Sequence
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -12,7 +11,6 @@ from pathlib import Path
 import click
 import pandas as pd
 import pyarrow as pa
-from rich.console import Console
 from rich.table import Table
 
 from kinacc.campaign.journal import PLAN
@@ -20,6 +18,7 @@ from kinacc.cli.output import plain, require_writable
 from kinacc.cli.summary import write
 from kinacc.config.values import nearest
 from kinacc.errors import InputError, Problem, as_seen, first_few, refuse
+from kinacc.report.terminal import screen
 from kinacc.tables import store
 from kinacc.tables.contract import ARTEFACTS
 
@@ -198,7 +197,7 @@ def described(frame: pd.DataFrame, units: Mapping[str, str], artefact: str) -> p
 
 def print_table(frame: pd.DataFrame, units: Mapping[str, str], most: int, title: str = "") -> None:
     """Print at most so many rows, both ends; constant columns once, above the table."""
-    console = Console(file=sys.stdout, highlight=False, markup=False, emoji=False)
+    console = screen()
     if title:
         console.print(as_seen(title), soft_wrap=True)
     heads = {name: _heading(str(name), units.get(str(name), "")) for name in frame}

@@ -31,6 +31,19 @@ _FEW_SHARE = 0.01
 _STATISTICS = ("mean", "quantile_99", "largest")
 
 
+class _Console(Console):
+    """A console whose reader may have gone: the command ends as others do then."""
+
+    def on_broken_pipe(self) -> None:
+        """Leave the error to the command."""
+        raise BrokenPipeError
+
+
+def screen(width: int | None = None) -> Console:
+    """The standard output, as wide as the terminal by default."""
+    return _Console(file=sys.stdout, width=width, highlight=False, markup=False, emoji=False)
+
+
 def print_summary(
     summary: CalibrationSummary,
     verbose: bool = False,
@@ -41,7 +54,7 @@ def print_summary(
 
     ``verbose``: every finding, parameter and population of errors.
     """
-    console = Console(file=sys.stdout, width=WIDTH, highlight=False, markup=False, emoji=False)
+    console = screen(WIDTH)
     console.print(as_seen(about(summary)), soft_wrap=True)
     for text in headline(summary, by, tolerance_mm):
         console.print(as_seen(text))
@@ -225,7 +238,7 @@ def fleet_table(
 
 def print_fleet(table: pd.DataFrame, by: str) -> None:
     """Print the table of many calibrations, then reasons and remarks of each."""
-    console = Console(file=sys.stdout, width=WIDTH, highlight=False, markup=False, emoji=False)
+    console = screen(WIDTH)
     shown = {
         "data_set": "data set",
         "verdict": "verdict",
