@@ -91,5 +91,6 @@ def test_eight_poses_read_thirty_times_for_216_coefficients(project):
     project.configure("calibration: {vec: {order: 5}}")
     text = project.snakemake(MODEL, ok=False)
     assert "few_poses" in text, text
-    assert "8 different poses give 48 independent numbers for the 216 coefficients" in text
+    assert "8 different poses" in text
+    assert "216 coefficients" in text
     assert "calibration.vec.order" in text

@@ -134,7 +134,8 @@ class _Comparison:
             row |= _sizes("in_force", self.errors_mm(force, session, setup))
             few = [each for each in (force, session) if _count(each.observations) < LEAST_HELD_OUT]
             if few:
-                what = f"fewer than {LEAST_HELD_OUT} configurations in {few[0].name}"
+                known = f", {shared.sum()} readings known before left out" if shared.any() else ""
+                what = f"fewer than {LEAST_HELD_OUT} configurations in {few[0].name}{known}"
                 return row | {"verdict": OPEN, "reason": what}
             return row | self.moved(force, session, setup)
         except (FitError, InputError) as problem:
