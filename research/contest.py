@@ -21,19 +21,15 @@ import pandas as pd
 from kinacc.assess.adaptive import Campaign, Candidates
 from kinacc.assess.attainable import NONE, WidthLimits, limits_of, points_bounded
 from kinacc.assess.random_numbers import key_of
-from kinacc.assess.registry import RECOMMENDED
+from kinacc.assess.registry import ADAPTIVE, ASSESSORS, RECOMMENDED
 from kinacc.assess.simulate import assess_world, carry_on, truth_mm
 from kinacc.assess.statement import CANDIDATES, REGION, Reason, Statement
 from kinacc.assess.world import World, drawn_world
 from kinacc.config.records import of_section
-from kinacc.deployment.folder import recorded_robot
-from kinacc.kinematics.robot import Robot, load
 from kinacc.study.fields import FAMILIES, ErrorField, of_measurements, of_points, synthetic
 from kinacc.tables import store
 from research import verdicts
-from research.assessors import ADAPTIVE, ASSESSORS, SLOW
 from research.conditions import CONDITIONS, STATED, Course
-from research.error_effects import joint_errors
 from research.made_up_fields import MADE_UP, made_up
 
 NM_PER_MM = 1_000_000
@@ -65,16 +61,15 @@ class Setup:
 class Size:
     """How large a tournament is.
 
-    ``budgets`` by number of candidates; ``repetitions`` of every cell, and ``repetitions_slow`` for
-    assessors that take more than 50 ms; ``draws``: accepted draws of which every synthetic family
-    is made; ``made_up``: names of fields that are made up; ``setups``: settings, and worlds in
-    which they are tried; ``assessors``: who takes part where nobody is named.
+    ``budgets`` by number of candidates; ``repetitions`` of every cell; ``draws``: accepted draws of
+    which every synthetic family is made; ``made_up``: names of fields that are made up; ``setups``:
+    settings, and worlds in which they are tried; ``assessors``: who takes part where nobody is
+    named.
     """
 
     noise_mm: tuple[float, ...]
     budgets: dict[int, tuple[int, ...]]
     repetitions: int
-    repetitions_slow: int
     draws: tuple[int, ...]
     made_up: tuple[str, ...] = ()
     setups: tuple[Setup, ...] = (Setup(),)
@@ -99,25 +94,23 @@ SETUPS = (
 )  # fmt: skip
 
 SIZES = {
-    "smoke": Size((0.1, 0.2), {50: (200,)}, 20, 5, (), ("even",)),
-    "default": Size((0.05, 0.1, 0.2, 0.3), {200: (50, 200), 1000: (200,)}, 20, 6, (0,)),
-    "coverage": Size((0.05, 0.1, 0.2, 0.3), {200: (200,)}, 1000, 200, (0,)),
-    "budgets": Size((0.1,), {200: (50, 100, 500), 1000: (200,)}, 200, 200, (0,)),
+    "smoke": Size((0.1, 0.2), {50: (200,)}, 20, (), ("even",)),
+    "default": Size((0.05, 0.1, 0.2, 0.3), {200: (50, 200), 1000: (200,)}, 20, (0,)),
+    "coverage": Size((0.05, 0.1, 0.2, 0.3), {200: (200,)}, 1000, (0,)),
+    "budgets": Size((0.1,), {200: (50, 100, 500), 1000: (200,)}, 200, (0,)),
     "workshop": Size(
         (0.1,),
         {200: (200, 300, 400)},
         2000,
-        200,
         (),
         tuple(MADE_UP),
         SETUPS,
-        (RECOMMENDED, "sequential"),
+        (RECOMMENDED,),
     ),
     "full": Size(
         (0.05, 0.1, 0.15, 0.2, 0.25, 0.3),
         {200: (50, 100, 150, 200, 300, 400, 500, 1000), 1000: (50, 200, 500, 1000, 1500)},
         2000,
-        200,
         (0, 1),
         tuple(MADE_UP),
         SETUPS,
@@ -141,8 +134,7 @@ class Contest:
 def contested(folders: Sequence[str | Path], size: Size) -> list[ErrorField]:
     """Every field: of results folders of kinacc, of synthetic families, and those made up."""
     found: list[ErrorField] = [field_of(Path(each)) for each in folders]
-    arm = load("mh180")
-    found += [of_arm(synthetic(each, draw), arm) for each in FAMILIES for draw in size.draws]
+    found += [synthetic(each, draw) for each in FAMILIES for draw in size.draws]
     return found + [made_up(name) for name in size.made_up]
 
 
@@ -152,32 +144,9 @@ def field_of(folder: Path) -> ErrorField:
     def table(name: str) -> Mapping[str, np.ndarray]:
         return store.read(folder / f"{name}.parquet")
 
-    robot = recorded_robot(folder)
     if (folder / "data_check.parquet").is_file():  # of measured files alone
-        field = of_measurements(folder.name, table("pose_errors"), table("measurements"))
-    else:
-        field = of_points(folder.name, table("assessment_points"))
-    return field if robot is None else of_arm(field, robot)
-
-
-@dataclass(frozen=True)
-class ArmField(ErrorField):
-    """Errors of an arm that is known: ``effects`` (n, 3, 6 k) of errors of its joints."""
-
-    effects: np.ndarray | None = None
-
-
-def of_arm(field: ErrorField, robot: Robot) -> ArmField:
-    """The field with what errors of single joints do at its configurations."""
-    effects = joint_errors(robot, field.q_rad)
-    own = {each.name: getattr(field, each.name) for each in dataclasses.fields(field)}
-    return ArmField(**own, effects=effects)
-
-
-def known(field: ErrorField, rows: np.ndarray) -> dict[str, np.ndarray]:
-    """What an assessor may know of candidates beside the noise: joints and effects."""
-    given = {"q_rad": field.q_rad, "effects": getattr(field, "effects", None)}
-    return {name: values[rows] for name, values in given.items() if values is not None}
+        return of_measurements(folder.name, table("pose_errors"), table("measurements"))
+    return of_points(folder.name, table("assessment_points"))
 
 
 @dataclass(frozen=True)
@@ -233,12 +202,10 @@ def summed(work: Sequence[Job], contest: Contest) -> pd.DataFrame:
     The campaigns themselves are not kept.
     """
     found: list[pd.DataFrame] = []
-    size = contest.size
     for job in work:
         for name in (each for each in contest.assessors if job.setup.takes(each, job.world)):
-            count = size.repetitions_slow if name in SLOW else size.repetitions
             alone = replace(contest, assessors=(name,))
-            found.append(verdicts.cells(campaigns(job, range(count), alone)))
+            found.append(verdicts.cells(campaigns(job, range(contest.size.repetitions), alone)))
     return pd.concat(found, ignore_index=True) if found else pd.DataFrame()
 
 
@@ -299,12 +266,11 @@ def campaigns(job: Job, repetitions: Iterable[int], contest: Contest) -> pd.Data
             "world": job.world,
             "repetition": repetition,
         }
-        world, chosen = world_of(cell, repetition, job.budget, contest.seed)
+        world = world_of(cell, repetition, job.budget, contest.seed)
         near = _limits_in(world, job.budget)
         for name in contest.assessors:
             own = {**place, "assessor": name}
-            own_arm = {**settings, **known(cell.field, chosen)}
-            found = assessed(name, own_arm, world, job.world)
+            found = assessed(name, settings, world, job.world)
             graded = _graded(found, world, cell.field, job)
             if repetition < LIMITED:
                 limits = [near(each, found.visited) for each in found.statements]
@@ -316,8 +282,8 @@ def campaigns(job: Job, repetitions: Iterable[int], contest: Contest) -> pd.Data
     return pd.DataFrame(rows)
 
 
-def world_of(cell: Cell, repetition: int, visits: int, seed: int) -> tuple[World, np.ndarray]:
-    """The world of one repetition, ``visits`` readings of each point, and its rows of the field.
+def world_of(cell: Cell, repetition: int, visits: int, seed: int) -> World:
+    """The world of one repetition, ``visits`` readings of each point.
 
     A campaign may spend its whole budget on one point; so the budget is what ``visits`` should be.
     """
@@ -325,7 +291,7 @@ def world_of(cell: Cell, repetition: int, visits: int, seed: int) -> tuple[World
     entropy = (seed, zlib.crc32(cell.field.name.encode()), cell.candidates, noise_nm, repetition)
     chosen = cell.field.candidates(cell.candidates, entropy)
     error_mm = cell.field.error_mm[chosen]
-    return drawn_world(error_mm, cell.noise_mm, key_of(*entropy), visits), chosen
+    return drawn_world(error_mm, cell.noise_mm, key_of(*entropy), visits)
 
 
 def _graded(found: Assessed, world: World, field: ErrorField, job: Job) -> list[dict]:

@@ -7,8 +7,8 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from kinacc.assess.registry import ASSESSORS
 from kinacc.figures import style
-from research.assessors import ASSESSORS
 
 UM_PER_MM = 1000.0
 _MARKERS = "<>hp8d"

@@ -71,7 +71,7 @@ def test_too_few_poses_leave_it_undecided(statistic, count):
 
 
 def test_an_arm_that_is_worse_by_exactly_the_allowance_seldom_fails():
-    """A few of the runs of benchmarks/gate_chance.py: 1 of 100 is asked for."""
+    """At most 1 of 100 is asked for; benchmarks/README.md has more kinds of errors."""
     draw, failed = np.random.default_rng(7), 0
     allowed = 0.1 * np.sqrt(8.0 / np.pi)  # of the mean of a tenth more
     for _ in range(200):

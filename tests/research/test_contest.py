@@ -12,13 +12,12 @@ from scipy.stats import binomtest
 
 from kinacc.assess.attainable import width_limits
 from kinacc.assess.random_numbers import key_of
+from kinacc.assess.registry import ASSESSORS
 from kinacc.assess.world import drawn_world
-from kinacc.kinematics import robot
 from kinacc.study.fields import ErrorField
 from research import contest, verdicts
-from research.assessors import ASSESSORS
 
-SMALL = contest.Size((0.1, 0.3), {20: (10, 40)}, 3, 2, (0,))
+SMALL = contest.Size((0.1, 0.3), {20: (10, 40)}, 3, (0,))
 
 
 @pytest.fixture(scope="module")
@@ -26,8 +25,7 @@ def field() -> ErrorField:
     """Thirty errors in random directions."""
     rng = np.random.default_rng(1)
     q_rad = rng.uniform(-0.5, 0.5, (30, 6))
-    error_mm = 0.4 * rng.normal(size=(30, 3))
-    return contest.of_arm(ErrorField("made_up", error_mm, q_rad, "synthetic"), robot.load("mh180"))
+    return ErrorField("made_up", 0.4 * rng.normal(size=(30, 3)), q_rad, "synthetic")
 
 
 @pytest.fixture(scope="module")
@@ -50,7 +48,7 @@ def test_every_assessor_is_in_every_cell(rows):
 
 def test_larger_budgets_see_the_same_first_readings(field):
     cell = contest.Cell(field, 20, 0.1)
-    few, many = (contest.world_of(cell, 1, visits, 5)[0] for visits in (10, 40))
+    few, many = (contest.world_of(cell, 1, visits, 5) for visits in (10, 40))
     assert np.array_equal(few.error_mm, many.error_mm)
     assert np.array_equal(few.reading_mm(3, 9), many.reading_mm(3, 9))
 
@@ -80,7 +78,7 @@ def test_every_bound_on_enough_readings_is_told_how_near_it_could_be(rows, field
     enough &= np.isin(rows["target"], ("measured", "candidates"))
     assert enough.sum() > 5
     job = contest.Job(contest.Cell(field, 20, 0.1), 40)
-    world, _ = contest.world_of(job.cell, 1, 40, 5)
+    world = contest.world_of(job.cell, 1, 40, 5)
     size = np.linalg.norm(world.error_mm, axis=1)
     known = width_limits(size, 0.1, 40, 0.05)
     of_all = enough & (rows["noise_mm"] == 0.1) & (rows["points_visited"] == 20)
@@ -222,7 +220,7 @@ def test_every_world_with_every_setup_is_a_row_of_its_own(field):
         contest.Setup("estimated", {"noise": "estimated"}, ("noise_1.2",)),
     )
     size = replace(SMALL, noise_mm=(0.1,), budgets={20: (40,)}, setups=setups)
-    names = ("maximum", "search_and_confirm", "sequential")
+    names = ("maximum", "search_and_confirm", "single_shot")
     given = contest.Contest(size, 5, names, paper.study())
     found = contest.summed(contest.jobs([field], size), given)
     of_all = found["target"] == "candidates"
@@ -232,8 +230,8 @@ def test_every_world_with_every_setup_is_a_row_of_its_own(field):
         ("search_and_confirm", "estimated", "noise_1.2"),
         ("search_and_confirm", "plain", "noise_1.2"),
         ("search_and_confirm", "plain", "stated"),
-        ("sequential", "plain", "noise_1.2"),
-        ("sequential", "plain", "stated"),  # knows no setting `noise`
+        ("single_shot", "plain", "noise_1.2"),
+        ("single_shot", "plain", "stated"),  # knows no setting `noise`
     ]
 
 

@@ -31,4 +31,3 @@ ADAPTIVE: dict[str, type] = {
 }
 ASSESSORS: dict[str, type] = PAPER | ADAPTIVE
 RECOMMENDED = SearchAndConfirm.name
-IN_RESEARCH = ("two_stage", "sequential", "kinematic")  # no better anywhere, and not shipped

@@ -12,7 +12,7 @@ import numpy as np
 
 from kinacc import removed
 from kinacc.assess.adaptive import AdaptiveAssessor, Candidates
-from kinacc.assess.registry import ADAPTIVE, IN_RESEARCH, RECOMMENDED
+from kinacc.assess.registry import ADAPTIVE
 from kinacc.assess.statement import CANDIDATES, TARGETS
 from kinacc.campaign.instrument import BASE, INSTRUMENT, Instrument
 from kinacc.campaign.laser_tracker import LaserTracker
@@ -145,8 +145,7 @@ def assessor_of(name: str, settings: Mapping[str, object]) -> AdaptiveAssessor:
     What it shares with the configuration's ``study`` is held to the schema and defaults to it.
     """
     if name not in ADAPTIVE:
-        fix = f"{name} stands in research/; use {RECOMMENDED}" if name in IN_RESEARCH else ""
-        raise InputError(Problem("--assessor", f"{name!r} is not there", ", ".join(ADAPTIVE), fix))
+        raise InputError(Problem("--assessor", f"{name!r} is not there", ", ".join(ADAPTIVE)))
     known = {field.name: field for field in fields(ADAPTIVE[name])}
     # A campaign's budget is its own: it may be larger than that of a simulation.
     own = {*known} - {"measurements"}

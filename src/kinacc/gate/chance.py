@@ -5,7 +5,7 @@ beyond what is allowed: where the true difference is exactly what is allowed, it
 ``1 - confidence`` of the cases. Configurations are resampled, as readings of one err together;
 runs held out at the same measurements are resampled together, others each by itself. Of the
 percentile of resampled differences and Student's interval by their spread the lower end counts:
-each by itself fails too often where errors are few or skewed (``benchmarks/gate_chance.py``).
+each by itself fails too often where errors are few or skewed (``benchmarks/README.md``).
 """
 
 from __future__ import annotations
