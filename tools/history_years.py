@@ -104,7 +104,6 @@ class Arm:
 # Names of DH parameters by the error they are: (of this joint or the next, place among ERRORS).
 PARAMETERS = {"theta": (0, 5), "d": (0, 2), "a": (1, 0), "alpha": (1, 3)}
 JOINTS = 6
-PRISMATIC = np.zeros(JOINTS, dtype=bool)
 CHANGES = [(joint, name) for joint in range(JOINTS) for name in PARAMETERS]
 UNSEEN_MM = 1e-3  # what base and tool take up
 SIZES_MM = np.arange(0.0, 1.001, 0.02)
@@ -121,12 +120,11 @@ def year(arm: Arm) -> tuple[list[dict], np.ndarray, np.ndarray]:
         found = history_model.moved(
             arm.pair(force, series), history_model.misfit_factor(wide, own), arm.rng
         )
-        chance_mm = found.chance_mm(LEVEL / 2.0)
-        by_offset = history_model.offset_probability(found, PRISMATIC)
-        alarm = found.moved_mm > chance_mm or by_offset <= LEVEL / 2.0
+        chance_mm = found.chance_mm(LEVEL)
+        alarm = found.moved_mm > chance_mm
         decisions.append({
             "plans": arm.plans, "month": month + 1, "moved_mm": found.moved_mm,
-            "chance_mm": chance_mm, "probability": min(found.probability, by_offset),
+            "chance_mm": chance_mm, "probability": found.probability,
             "factor": history_model.misfit_factor(wide, own), "alarm": int(alarm),
         })  # fmt: skip
         hits, sizes = _seen(found, chance_mm)

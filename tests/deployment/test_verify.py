@@ -12,7 +12,7 @@ from small_arms import BASE, TOOL, WEIGHT, joints, results, truth
 
 from kinacc.calibration.observations import full_poses
 from kinacc.deployment.folder import calibration, read_tables, recorded_robot, selected_model
-from kinacc.deployment.permutation import Columns, held_to, smallest_changes
+from kinacc.deployment.permutation import Columns, compare, smallest_changes
 from kinacc.deployment.predict import predict
 from kinacc.deployment.verify import model_errors
 from kinacc.geometry import Pose, compose, exp_so3
@@ -66,12 +66,10 @@ def test_five_poses_place_the_one_that_moved_and_leave_the_other(base, tool, mov
     assert rms_mm(base, tool, (kept,), turned, count=5)["dh"] > 10.0
 
 
-def test_models_are_compared_where_each_says_something_and_the_others_at_all_readings_too():
+def test_models_are_compared_at_the_readings_that_all_cover():
     found = errors_at(BASE, TOOL, (), part=0.55)
-    common, everywhere = (found[found["at"] == at] for at in found["at"].unique())
-    assert [*common["model"]] == ["nominal", "dh", "vec"]
-    assert [*everywhere["model"]] == ["nominal", "dh"]
-    assert 0 < common["readings"].max() < everywhere["readings"].min() == 60
+    assert [*found["model"]] == ["nominal", "dh", "vec"]
+    assert set(found["readings"]) < set(range(1, 60))
 
 
 def heavy_tailed(rng, count, fitted=0):
@@ -86,7 +84,7 @@ def test_the_level_does_not_rest_on_how_errors_are_spread():
     for _ in range(200):
         every = heavy_tailed(rng, 46)
         parts = (every._replace(columns=every.columns[rows]) for rows in (slice(6, None), slice(6)))
-        chances.append(held_to(*parts).probability)
+        chances.append(compare(*parts).probability)
     for level in (0.1, 0.5):
         assert np.mean(np.array(chances) <= level) == pytest.approx(level, abs=0.09)
 
@@ -102,7 +100,7 @@ def test_changes_of_the_stated_sizes_are_found_in_four_of_five_cases():
             off = new.columns.copy()
             off[..., -1] += offsets[1] * off[..., 1]
             changed = (new.times(factor), Columns(off, 0))
-            row[:] = [held_to(held_out, each).probability <= 0.01 for each in changed]
+            row[:] = [compare(held_out, each).probability <= 0.01 for each in changed]
     assert (found.mean(axis=(0, 1)) > 0.75).all()
     assert factor < 2.5
 
@@ -137,19 +135,19 @@ def written(base, name, rows, more=(), kind="none", target=""):
 def answered(found, described, *more, code=None):
     done = call("verify", described, "--calibration", found, *(more or SAME), "--json")
     answer = json.loads(done.stdout)
-    assert done.exit_code == (0 if answer["verdict"] == "passes" else 1), done.output
+    assert done.exit_code == (0 if answer["verdict"] == "pass" else 1), done.output
     return answer
 
 
 def test_every_model_is_held_to_readings_of_another_set_up(folder):
     base, found = folder
     answer = answered(found, base / "moved.yaml", *MOVED)
-    rows = {row["model"]: row for row in answer["rows"]}
-    assert list(rows) == ["nominal", "DH", "VEC"]
-    assert rows["VEC"]["mean_mm"] < rows["DH"]["mean_mm"] < rows["nominal"]["mean_mm"] < 5.0
-    assert rows["DH"]["mean_mrad"] is None  # positions were read alone
-    assert answer["shared_readings"] == 0
-    assert answer["verdict"] == "passes"
+    rows = {row["model"]: row for row in answer["errors"]}
+    assert list(rows) == ["nominal", "dh", "vec"]
+    assert rows["vec"]["mean_mm"] < rows["dh"]["mean_mm"] < rows["nominal"]["mean_mm"] < 5.0
+    assert rows["dh"]["mean_mrad"] is None  # positions were read alone
+    assert answer["known"] == 0
+    assert answer["verdict"] == "pass"
     assert answer["smallest_offsets"][0] is None  # as the base turns
     anew = answered(found, base / "other_target.yaml", *MOVED)
     assert anew["test"] == answer["test"]
@@ -157,10 +155,9 @@ def test_every_model_is_held_to_readings_of_another_set_up(folder):
 
 def test_what_cannot_count_gives_no_verdict(folder):
     base, found = folder
-    for name, reason in (("moved", "stands elsewhere"), ("same", "was fitted to all")):
+    for name, known in (("moved", 0), ("same", 80)):
         answer = answered(found, base / f"{name}.yaml")
-        assert answer["verdict"] == "cannot be told"
-        assert reason in answer["verdict_reason"]
+        assert (answer["verdict"], answer["known"]) == ("undecided", known)
 
 
 @pytest.mark.parametrize(
@@ -168,7 +165,7 @@ def test_what_cannot_count_gives_no_verdict(folder):
     [
         (("same.yaml", "mh180", "irb120"), SAME, ["another robot than"]),
         (("other_target.yaml", "", ""), SAME, ["no frame 'ball'"]),
-        (("same.yaml", "", ""), (), ["--base (the ", "--tool (the ", "moved where it"]),
+        (("same.yaml", "", ""), (), ["--base"]),
     ],
 )
 def test_what_cannot_be_held_is_refused(folder, change, options, said):
@@ -212,31 +209,30 @@ def later(folder, tmp_path_factory):
 @pytest.mark.parametrize("count", [12, 100])
 def test_an_arm_that_did_not_change_passes(folder, later, count):
     answer = answered(folder[1], later(1.0, count))
-    assert answer["verdict"] == "passes"
+    assert answer["verdict"] == "pass"
     assert answer["held_out"]["readings"] == 80
-    assert answer["here"]["readings"] <= answer["like_measured"]
+    assert answer["here"]["readings"] <= answer["near"]
     assert answer["test"]["rms_mm"] < answer["test"]["limit_mm"]
     assert answer["test"]["probability"] > 0.01
 
 
 def test_readings_that_were_fitted_are_left_out_and_the_others_count(folder, later):
     alone, more = (answered(folder[1], later(1.0, 12, known=known)) for known in (0, 30))
-    assert (more["readings"], more["shared_readings"]) == (42, 30)
+    assert (more["readings"], more["known"]) == (42, 30)
     assert more["test"] == alone["test"]
 
 
 @pytest.mark.parametrize("count", [12, 100])
-def test_an_arm_that_changed_fails_and_the_next_command_tells_arm_from_set_up(folder, later, count):
+def test_an_arm_that_changed_fails(folder, later, count):
     answer = answered(folder[1], later(3.0, count))
-    assert answer["verdict"] == "fails"
+    assert answer["verdict"] == "fail"
     assert answer["test"]["rms_mm"] > answer["test"]["limit_mm"]
-    assert answer["next"].endswith("--base moved --tool moved")
 
 
 def test_a_joint_that_lost_its_zero_is_named(folder, later):
     """By less than would double the errors."""
     answer = answered(folder[1], later(1.0, 12, offset_rad=1.5e-3))
-    assert answer["verdict"] == "fails"
+    assert answer["verdict"] == "fail"
     assert answer["test"]["joint"] == 3
     assert abs(answer["test"]["offset"]) == pytest.approx(1.5, rel=0.4)
 
@@ -246,7 +242,7 @@ def test_too_few_configurations_that_are_no_worse_pass_nothing(folder, later, ti
     answer = answered(folder[1], later(1.0, 2, times=times))
     assert answer["readings"] == 2 * times
     assert answer["here"]["configurations"] <= 2
-    assert answer["verdict"] == "cannot be told"
+    assert answer["verdict"] == "undecided"
     assert answer["smallest_factor"] is None or answer["smallest_factor"] > 2.0
 
 
@@ -264,4 +260,4 @@ def test_a_file_of_readings_is_read_as_those_of_the_calibration_were(folder, lat
     own.unlink()
     described = answered(found, file.with_suffix(".yaml"))
     assert answer["test"] == described["test"]
-    assert answer["rows"] == described["rows"]
+    assert answer["errors"] == described["errors"]

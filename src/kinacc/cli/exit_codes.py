@@ -34,8 +34,8 @@ OF_COMMANDS: dict[str, tuple[str, str, str]] = {
         "a file or its description cannot be used",
     ),
     "verify": (
-        "the calibration passes",
-        "it fails, or it cannot be told",
+        "PASS",
+        "FAIL or UNDECIDED",
         "the readings, the folder or an option cannot be used",
     ),
     "summary": (

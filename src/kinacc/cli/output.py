@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import io
 import json
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, is_dataclass
 from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+import numpy as np
+import pandas as pd
 
-from kinacc.errors import InputError, Problem
+from kinacc.config.names import in_csv
+from kinacc.errors import InputError, Problem, as_seen
+from kinacc.tables.atomic import write_whole
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -23,6 +28,7 @@ if TYPE_CHECKING:
 TABLES = (".csv", ".json", ".parquet", ".xlsx")
 PICTURES = (".svg", ".png", ".pdf")
 PAGES = (".html",)
+_WIDE = 4000  # characters: a terminal wraps what is wider than it
 
 
 @dataclass(frozen=True)
@@ -34,6 +40,33 @@ class Output:
     picture: str | None = None
     page: str | None = None
     force: bool = False
+    verbose: bool = False
+
+    def show(
+        self,
+        answer: object,
+        table: pd.DataFrame,
+        lines: Iterable[str] = (),
+        shown: pd.DataFrame | None = None,
+    ) -> None:
+        """Write ``table``; print ``answer`` as JSON, or ``lines`` and the table.
+
+        ``answer`` is the result of the command, a dataclass or a mapping; ``shown`` are the rows
+        of the screen, where they are not those of ``table``.
+        """
+        if self.table is not None:
+            write_table(table, self.table, answer)
+        if self.as_json:
+            click.echo(json.dumps(plain(answer), indent=1))
+            return
+        for line in lines:
+            click.echo(as_seen(line))
+        if self.table is not None:
+            click.echo(f"{self.table}: {len(table)} rows")
+            return
+        table = table if shown is None else shown
+        if len(table):
+            print_table(table)
 
     def say(self, facts: object, words: str) -> None:
         """Print the answer for a machine or for a person."""
@@ -64,7 +97,6 @@ class Output:
     def write_page(self, page: Page) -> None:
         """Write the page a person reads in a browser."""
         from kinacc.report.page import html
-        from kinacc.tables.atomic import write_whole
 
         write_whole(Path(self.page or ""), html(page).encode())
 
@@ -75,6 +107,7 @@ def answers(
     picture: str = "",
     page: str = "",
     force: str = "",
+    verbose: bool = False,
 ) -> Callable[[Callable], Callable]:
     """Options of a command's answer, handed over as ``out``; its files can be written then.
 
@@ -84,6 +117,8 @@ def answers(
     if table:
         words = "Write to a .csv, .xlsx, .json or .parquet file."
         options.insert(0, click.option("--out", "-o", "table", type=click.Path(), help=words))
+    if verbose:
+        options.append(click.option("--verbose", is_flag=True, help="Every row and detail."))
     if page:
         options.insert(0, click.option("--page", type=click.Path(), help=page))
     if picture:
@@ -111,13 +146,64 @@ def answers(
 _NAMES = tuple(each.name for each in fields(Output))
 
 
+def write_table(table: pd.DataFrame, path: Path | str, answer: object = None) -> None:
+    """Write a table whole, by the ending: .csv, .xlsx, .parquet, or .json of the whole answer."""
+    suffix, content = Path(path).suffix, io.BytesIO()
+    if suffix == ".json":
+        answer = {"rows": table} if answer is None else answer
+        write_whole(path, (json.dumps(plain(answer), indent=1) + "\n").encode())
+        return
+    if suffix == ".parquet":
+        table.to_parquet(content, index=False)
+    else:
+        # No text is a formula, or steers a terminal.
+        safe = table.rename(columns=in_csv).map(
+            lambda value: in_csv(as_seen(value)) if isinstance(value, str) else value
+        )
+        if suffix == ".csv":
+            safe.to_csv(content, index=False, float_format="%.12g", lineterminator="\n")
+        else:
+            safe.to_excel(content, index=False, freeze_panes=(1, 0))
+    write_whole(path, content.getvalue())
+
+
+def print_table(table: pd.DataFrame, most: int = 24) -> None:
+    """Print the first rows of a table."""
+    from rich.table import Table
+
+    from kinacc.report.terminal import screen
+
+    grid = Table(box=None, pad_edge=False)
+    for name, values in table.items():
+        numeric = pd.api.types.is_numeric_dtype(values)
+        grid.add_column(as_seen(str(name)), justify="right" if numeric else "left", no_wrap=True)
+    for row in table.head(most).itertuples(index=False):
+        grid.add_row(*map(_shown, row))
+    screen(_WIDE).print(grid)
+    if len(table) > most:
+        click.echo(f".. {len(table) - most} more rows (--out)")
+
+
+def _shown(value: object) -> str:
+    if value is None or value != value:
+        return "-"
+    if not isinstance(value, float):
+        return as_seen(str(value))
+    return f"{value:.4f}" if abs(value) >= 0.01 or abs(value) < 5e-5 else f"{value:.3g}"
+
+
 def plain(value: Any) -> Any:
-    """What JSON and Arrow know, whatever it is nested in; None for a number that is not finite."""
+    """What JSON holds, of results however nested; None for a number that is not finite."""
+    if is_dataclass(value):
+        value = {each.name: getattr(value, each.name) for each in fields(value)}
+    elif isinstance(value, pd.DataFrame):
+        value = value.to_dict("records")
+    elif isinstance(value, (np.ndarray, np.generic)):
+        value = value.tolist()
     if isinstance(value, Mapping):
         return {key: plain(each) for key, each in value.items()}
     if isinstance(value, (list, tuple)):
         return [plain(each) for each in value]
-    value = value.item() if hasattr(value, "item") else value
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 

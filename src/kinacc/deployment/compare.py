@@ -21,7 +21,7 @@ from kinacc.deployment.applicability import measured_by_all
 from kinacc.deployment.predict import sensitivity
 from kinacc.deployment.record import FLANGE, Calibration
 from kinacc.deployment.shared_readings import NONE_SHARED, SharedReadings, counted_once
-from kinacc.deployment.verify import says_there
+from kinacc.deployment.verify import covers
 from kinacc.errors import InputError, Problem, refuse
 from kinacc.geometry import Pose, compose, exp_so3, log_so3, skew
 from kinacc.kinematics import robot as robots
@@ -167,7 +167,7 @@ def require_alike(first: Calibration, second: Calibration) -> None:
 def _covered(first: Calibration, second: Calibration, q_rad: np.ndarray) -> np.ndarray:
     """True (n,) where both models say something. InputError where they do at hardly any joints."""
     both = (first, second)
-    there = np.all([says_there(each.model, each.robot.dh_joints(q_rad)) for each in both], axis=0)
+    there = np.all([covers(each.model, each.robot.dh_joints(q_rad)) for each in both], axis=0)
     covered = there.all(axis=1)
     count, given = int(covered.sum()), len(covered)
     if count < min(_FEWEST, given):

@@ -1,9 +1,8 @@
 """A robot's history: whether the arm changed since the calibration in force was made.
 
 The last calibration holds unless the arm moved, over the poses of a later series, by more than an
-arm shows that did not change: see ``history_model`` for what that is taken to be. Two tests share
-the level of a year of monthly calibrations: the rms movement, and the offset of the joint that
-stands out most. Where most of the later series lies outside the joint ranges of the one in force,
+arm shows that did not change: see ``history_model`` for what that is taken to be. Where most of the
+later series lies outside the joint ranges of the one in force,
 that is no test of the arm but of the model, and nothing can be told.
 """
 
@@ -29,7 +28,7 @@ from kinacc.deployment import folder, history_model
 from kinacc.deployment.history_model import Setup, joined
 from kinacc.deployment.record import Calibration
 from kinacc.deployment.shared_readings import known_readings
-from kinacc.deployment.verify import LEAST_HELD_OUT, held_out_vectors, says_there
+from kinacc.deployment.verify import LEAST_HELD_OUT, covers, held_out_vectors
 from kinacc.errors import FitError, InputError
 from kinacc.kinematics import robot as robots
 from kinacc.kinematics.robot import carried
@@ -153,13 +152,12 @@ class _Comparison:
             shown = [self.understated(each, setup) for each in (force, session)]
             misfit = history_model.misfit_factor(*shown)
         found = history_model.moved(pair, misfit, self._rng(force.name, session.name))
-        moved_mm, chance_mm = found.moved_mm, found.chance_mm(LEVEL / 2.0)
-        by_offset = history_model.offset_probability(found, prismatic)
+        moved_mm, chance_mm = found.moved_mm, found.chance_mm(LEVEL)
         row = {
             "moved_mm": moved_mm,
             "chance_mm": chance_mm,
             "beyond_mm": max(0.0, moved_mm - chance_mm),
-            "probability": min(1.0, 2.0 * min(found.probability, by_offset)),
+            "probability": found.probability,
             "verdict": HOLDS,
         }
         there = _share_inside(session.observations.q_rad, force.observations.q_rad, prismatic)
@@ -169,7 +167,7 @@ class _Comparison:
                 "of a calibration where nothing was measured are no change"
             )
             return row | {"verdict": OPEN, "reason": what}
-        if moved_mm > chance_mm or by_offset <= LEVEL / 2.0:
+        if moved_mm > chance_mm:
             joint = history_model.joint_of(found, prismatic)
             return row | {"verdict": RECALIBRATE, "joint": joint}
         held_out_mm = float(np.mean(force.held_out_mm)) if len(force.held_out_mm) else np.inf
@@ -208,7 +206,7 @@ class _Comparison:
         Base and tool that were moved are fitted to the rows outside each fold, to all without.
         """
         model, seen = force.calibration.model, session.observations
-        seen = seen.select(says_there(model, seen.q_rad).all(axis=1))
+        seen = seen.select(covers(model, seen.q_rad).all(axis=1))
         found = [np.zeros(0)]
         for fold in np.unique(seen.fold):
             tried = seen.fold == fold

@@ -229,25 +229,6 @@ class Moved(NamedTuple):
         return scipy.linalg.cholesky(covariance, lower=True)
 
 
-def offset_probability(found: Moved, prismatic: np.ndarray) -> float:
-    """Of offsets of single joints that stand out by at least as much where nothing changed.
-
-    The offset of every joint by itself is estimated by generalised least squares under chance; the
-    largest ratio to its standard deviation is held to the largest of every draw. Movement by chance
-    in all directions hides a change of one joint from the rms; this test has few directions.
-    """
-    turn, slide = ERRORS.index("eps_z"), ERRORS.index("delta_z")
-    own = len(ERRORS) * np.arange(len(prismatic)) + np.where(prismatic, slide, turn)
-    white = found.white()
-    units = np.diag(np.tile(UNITS, len(prismatic)))[:, own]
-    ways = scipy.linalg.solve_triangular(white, found.along(units), lower=True)
-    size = np.linalg.norm(ways, axis=0)
-    both = np.column_stack([found.change, found.chance.T])
-    along = ways[:, size > 0.0].T @ scipy.linalg.solve_triangular(white, both, lower=True)
-    ratios = np.abs(along / size[size > 0.0, None]).max(axis=0)
-    return float((1 + np.sum(ratios[1:] >= ratios[0])) / len(ratios))
-
-
 def understated(cuts: Sequence[Pair], rng: np.random.Generator) -> float:
     """Mean square movement between halves of one series, over that by chance: 1 if that is right.
 

@@ -1,29 +1,20 @@
-"""A calibration held to readings that it was not fitted to: later ones, or of another set-up.
+"""Verification of a calibration at readings that it was not fitted to: later ones, or a new set-up.
 
-The arm is taken as it was fitted. Base and tool are kept where they did not move, and fitted anew
-where they did, for every model alike. Errors are compared among models, and those of the selected
-model with its held-out errors by a permutation test.
+The joint models stay as they were fitted. Base and tool stay too, or are fitted to the new
+readings where they were moved, for every model alike. A permutation test compares the position
+errors of the selected model with its held-out errors.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import reduce
-from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 
 from kinacc.calibration.fitting import fit_frames
-from kinacc.calibration.frames import (
-    ANGLE_UNIT_RAD,
-    MOTIONS,
-    Frames,
-    frame_terms,
-    known,
-    stacked,
-)
+from kinacc.calibration.frames import ANGLE_UNIT_RAD, MOTIONS, Frames, frame_terms, known, stacked
 from kinacc.calibration.models import Fit
 from kinacc.calibration.observations import Observations, from_columns
 from kinacc.calibration.residuals import errors
@@ -32,7 +23,7 @@ from kinacc.calibration.tables import frames_of
 from kinacc.config.error_models import ERROR_MODELS, MEASURED, NOMINAL, Comparison
 from kinacc.deployment import folder
 from kinacc.deployment.applicability import is_measured_there
-from kinacc.deployment.permutation import LEVEL, Columns, Held, held_to, smallest_changes
+from kinacc.deployment.permutation import LEVEL, Columns, PermutationTest, compare, smallest_changes
 from kinacc.deployment.shared_readings import known_rows
 from kinacc.errors import InputError, Problem
 from kinacc.geometry import Pose, skew
@@ -43,22 +34,18 @@ from kinacc.measurements.folds import configurations
 
 Tables = Mapping[str, Mapping[str, np.ndarray]]
 BASE, TOOL = "base", "tool"
-PASSES, FAILS, OPEN = "passes", "fails", "cannot be told"
-KNOWN = "the calibration was fitted to all of these readings"
-ELSEWHERE = "instrument or tool stands elsewhere"
+PASS, FAIL, UNDECIDED = "pass", "fail", "undecided"
+SET_UP_MOVED = "the instrument or the tool was moved"
 FEW_HELD_OUT = "too few held-out configurations"
-SEVERAL = "several sessions, each with a base of its own"
-NOWHERE = "no configuration where it was measured"
-TAKEN_UP = "base and tool take up all that these poses show"
-FEW = "too few configurations where it was measured"
-LEAST_HELD_OUT = 20  # configurations: fewer do not say how large errors are
-DOUBLED = 2.0  # poses that would not show errors this many times as large pass nothing
+LEAST_HELD_OUT = 20  # configurations: fewer do not tell the size of errors
+DOUBLED = 2.0  # readings that would not show errors this many times as large decide nothing
 _FAR_MM = 10.0
-_SLACK = 1e-9  # rad and mm beyond the fitted range that are rounding
+_SLACK = 1e-9  # rad and mm beyond the fitted range: rounding
 
 
-class Level(NamedTuple):
-    """Position errors of a model: how many readings, of how many configurations, how large."""
+@dataclass(frozen=True)
+class Level:
+    """Position errors of a model: number of readings and configurations, mean and 99 %."""
 
     readings: int
     configurations: int
@@ -68,14 +55,26 @@ class Level(NamedTuple):
 
 @dataclass(frozen=True)
 class Verification:
-    """Whether new readings pass ``model``: PASSES, FAILS or OPEN, and why it cannot be told.
+    """Result of a verification.
 
-    ``known`` of the ``readings`` are those that it was fitted to, and left out; ``near`` of the
-    others lie where it was measured, and count. ``errors``: a row for each model, at all readings
-    and, where these differ, at those that every model covers. ``here`` are the errors that count,
-    ``held_out`` those held out, ``held`` the test of both. ``smallest_factor`` on all errors and
-    ``smallest_offsets`` (k,) of single joints (mrad or mm) are found in four of five cases; inf
-    where none is, or base and tool take it up.
+    Attributes
+    ----------
+    verdict
+        PASS, FAIL or UNDECIDED; ``reason`` says why it is undecided.
+    model
+        The selected model.
+    readings, known, near
+        Number of readings; of those the calibration was fitted to, which are left out; of the
+        remaining ones near measured poses, which alone count.
+    errors
+        A row for each model at the readings that all models cover.
+    here, held_out
+        Position errors that count, and held-out ones.
+    test
+        The permutation test of both; None where it was not possible.
+    smallest_factor, smallest_offsets
+        Factor on all errors, and offsets (k,) of single joints (mrad; mm where a joint slides),
+        detected in 80 % of cases; inf where none is.
     """
 
     verdict: str
@@ -87,7 +86,7 @@ class Verification:
     errors: pd.DataFrame
     held_out: Level | None = None
     here: Level | None = None
-    held: Held | None = None
+    test: PermutationTest | None = None
     smallest_factor: float = np.inf
     smallest_offsets: np.ndarray | None = None
 
@@ -99,48 +98,62 @@ def verify(
     moved: Sequence[str],
     rotation_weight_mm_per_rad: float,
 ) -> Verification:
-    """Hold the selected model of a results folder to the table ``measurements`` of new readings.
+    """Verify the selected model of a results folder at new readings.
 
-    ``moved``: what of BASE and TOOL is fitted to these anew; what they do not show of it stays as
-    ``robot`` has it. The test goes by positions; of a configuration the first reading of every
-    target counts. Raises InputError where a frame that is kept is not there, and FitError.
+    Parameters
+    ----------
+    tables
+        Tables of the results folder (``folder.read_tables`` with ``pose_errors``).
+    columns
+        The table ``measurements`` of the new readings.
+    moved
+        Which of BASE and TOOL are fitted to the new readings. Where these do not determine a
+        frame, it stays as in ``robot``.
+
+    Raises
+    ------
+    InputError
+        Where a frame that did not move is not in the tables.
+    FitError
     """
     calibration = folder.calibration(tables, robot)
     kind, model = calibration.choice, calibration.model
     is_known = known_rows(columns, tables.get("measurements", {}))
     seen = from_columns(columns, robot).select(~is_known)
-    point = next((each for each in seen.target_names if each in calibration.targets), None)
+    point = next((name for name in seen.target_names if name in calibration.targets), None)
     near = is_measured_there(calibration, seen.at, point) if len(seen) else is_known[:0]
     table = model_errors(tables, robot, seen, moved, rotation_weight_mm_per_rad)
-    told = Verification(OPEN, "", kind, len(is_known), int(is_known.sum()), int(near.sum()), table)
     held_out = _held_out(tables, kind, model, robot, seen, moved) if len(seen) else None
-    told = replace(told, held_out=held_out and _level(held_out))
-    rows = _whole_configurations(seen, near & says_there(model, seen.q_rad).all(axis=1))
+    rows = _whole_configurations(seen, near & covers(model, seen.q_rad).all(axis=1))
+    result = Verification(
+        UNDECIDED, "", kind, len(is_known), int(is_known.sum()), int(near.sum()), table,
+        held_out and _level(held_out),
+    )  # fmt: skip
     obstacles = {
-        KNOWN: not len(seen),
-        ELSEWHERE: not moved and table["mean_mm"].min() > _FAR_MM,
+        "the calibration was fitted to all of these readings": not len(seen),
+        SET_UP_MOVED: not moved and table["mean_mm"].min() > _FAR_MM,
         FEW_HELD_OUT: held_out is None or len(held_out.columns) < LEAST_HELD_OUT,
-        SEVERAL: BASE in moved and len(seen.session_names) > 1,
-        NOWHERE: not len(rows),
+        "several sessions, each with its own base": BASE in moved and len(seen.session_names) > 1,
+        "no reading near a measured pose": not len(rows),
     }
     if any(obstacles.values()):
-        return replace(told, reason=next(each for each, there in obstacles.items() if there))
+        return replace(result, reason=next(text for text, holds in obstacles.items() if holds))
     new = seen.select(rows.ravel())
     new = replace(new, rotation=np.full_like(new.rotation, np.nan))
     frames = frames_at(tables, kind, model, new, robot, moved, rotation_weight_mm_per_rad)
-    off = errors({kind: Fit(model, frames)}, new)[Comparison(MEASURED, kind).name].position_mm
-    at = new.select(slice(None, None, rows.shape[1]))
-    fresh = _columns(model, at, frames.targets, moved, off.reshape(*rows.shape, 3))
-    told = replace(told, here=_level(fresh))
+    off_mm = errors({kind: Fit(model, frames)}, new)[Comparison(MEASURED, kind).name].position_mm
+    poses = new.select(slice(None, None, rows.shape[1]))
+    fresh = _columns(model, poses, frames.targets, moved, off_mm.reshape(*rows.shape, 3))
+    result = replace(result, here=_level(fresh))
     if fresh.columns[..., -1].size <= fresh.rank:
-        return replace(told, reason=TAKEN_UP)
-    found, (factor, offsets) = held_to(held_out, fresh), smallest_changes(held_out, len(rows))
-    verdict = FAILS if found.probability <= LEVEL else PASSES if factor <= DOUBLED else OPEN
+        return replace(result, reason="base and tool explain all that these poses show")
+    test, (factor, offsets) = compare(held_out, fresh), smallest_changes(held_out, len(rows))
+    verdict = FAIL if test.probability <= LEVEL else PASS if factor <= DOUBLED else UNDECIDED
     return replace(
-        told,
+        result,
         verdict=verdict,
-        reason=FEW if verdict == OPEN else "",
-        held=found,
+        reason="too few configurations near measured poses" if verdict == UNDECIDED else "",
+        test=test,
         smallest_factor=factor,
         smallest_offsets=offsets,
     )
@@ -153,56 +166,49 @@ def model_errors(
     moved: Sequence[str],
     rotation_weight_mm_per_rad: float,
 ) -> pd.DataFrame:
-    """Statistics of the errors of every model, ``moved`` frames fitted to ``observations`` anew.
+    """Errors of every model at the readings that all cover, ``moved`` frames fitted to these.
 
-    First at the readings that all models cover, then, where these are not all, at all readings
-    for the models that cover them. Raises InputError where a target or a session that is kept is
-    another, or there are too few readings, and FitError.
+    Columns: model, readings, and mean, 99 %, largest and rms in mm and mrad. Raises InputError
+    for a target or session without a frame, and FitError.
     """
     if BASE not in moved:
         _require_sessions(tables, observations.session_names)
-    made = models(tables, robot.dh)
-    covered = {
-        kind: says_there(each, observations.q_rad).all(axis=1) for kind, each in made.items()
+    fitted = models(tables, robot.dh)
+    inside = [covers(model, observations.q_rad).all(axis=1) for model in fitted.values()]
+    part = observations.select(np.all(inside, axis=0))
+    statistics = {
+        "mean": np.mean,
+        "quantile_99": lambda sizes: np.quantile(sizes, LARGE_SHARE),
+        "largest": np.max,
+        "rms": lambda sizes: np.sqrt(np.mean(sizes**2)),
     }
-    common, everywhere = np.all([*covered.values()], axis=0), np.ones(len(observations), bool)
-    parts = [("covered by all models", common)] * (not common.all()) + [
-        ("all readings", everywhere)
-    ]
-    order = (NOMINAL, *ERROR_MODELS)
     rows = []
-    for at, there in parts:
-        for kind in sorted(made, key=order.index) if there.any() else ():
-            if not covered[kind][there].all():
-                continue
-            part, own = observations.select(there), made[kind]
-            frames = frames_at(tables, kind, own, part, robot, moved, rotation_weight_mm_per_rad)
-            off = errors({kind: Fit(own, frames)}, part)[Comparison(MEASURED, kind).name]
-            row = {"model": kind, "at": at, "readings": len(part)}
-            for vectors, unit in ((off.position_mm, "mm"), (1e3 * off.rotation_rad, "mrad")):
-                sizes = np.linalg.norm(vectors[np.isfinite(vectors).all(axis=1)], axis=1)
-                sizes = sizes if len(sizes) else np.array([np.nan])
-                row |= {
-                    f"mean_{unit}": sizes.mean(),
-                    f"quantile_99_{unit}": np.quantile(sizes, LARGE_SHARE),
-                    f"largest_{unit}": sizes.max(),
-                    f"rms_{unit}": np.sqrt(np.mean(sizes**2)),
-                }
-            rows.append(row)
-    names = ("mean", "quantile_99", "largest", "rms")
-    columns = [f"{name}_{unit}" for unit in ("mm", "mrad") for name in names]
-    return pd.DataFrame(rows, columns=["model", "at", "readings", *columns])
+    for kind in sorted(fitted, key=(NOMINAL, *ERROR_MODELS).index) if len(part) else ():
+        model = fitted[kind]
+        frames = frames_at(tables, kind, model, part, robot, moved, rotation_weight_mm_per_rad)
+        off = errors({kind: Fit(model, frames)}, part)[Comparison(MEASURED, kind).name]
+        row: dict[str, object] = {"model": kind, "readings": len(part)}
+        for vectors, unit in ((off.position_mm, "mm"), (1e3 * off.rotation_rad, "mrad")):
+            sizes = np.linalg.norm(vectors[np.isfinite(vectors).all(axis=1)], axis=1)
+            row |= {
+                f"{name}_{unit}": statistic(sizes) if len(sizes) else np.nan
+                for name, statistic in statistics.items()
+            }
+        rows.append(row)
+    columns = [f"{name}_{unit}" for unit in ("mm", "mrad") for name in statistics]
+    return pd.DataFrame(rows, columns=["model", "readings", *columns])
 
 
 def _whole_configurations(seen: Observations, counted: np.ndarray) -> np.ndarray:
-    """Rows (m, K) of configurations with all K targets: the first of each where it is counted."""
-    own, kinds = np.flatnonzero(counted), len(seen.target_names)
-    part = seen.select(own)
-    of = configurations(part.pose, part.q_rad)
-    _, first = np.unique(of * kinds + part.target, return_index=True)
-    number, count = np.unique(of[first], return_counts=True)
-    whole = np.isin(of[first], number[count == kinds])
-    return own[first[whole]].reshape(-1, kinds)
+    """Rows (m, K) of configurations with all K targets: the first counted reading of each."""
+    rows, targets = np.flatnonzero(counted), range(len(seen.target_names))
+    part = seen.select(rows)
+    table = pd.DataFrame({
+        "configuration": configurations(part.pose, part.q_rad), "target": part.target, "row": rows,
+    })  # fmt: skip
+    first = table.drop_duplicates(["configuration", "target"])
+    first = first.pivot(index="configuration", columns="target", values="row")
+    return first.reindex(columns=targets).dropna().to_numpy(int)
 
 
 def _held_out(
@@ -213,21 +219,16 @@ def _held_out(
     seen: Observations,
     moved: Sequence[str],
 ) -> Columns | None:
-    """Held-out errors of configurations with as many targets as ``seen``; None where none are.
-
-    At poses where every model was held out, as ``kinacc summary`` states them.
-    """
+    """Held-out errors of configurations with as many targets as ``seen``; None where none are."""
     if not {"pose_errors", "measurements"} <= set(tables):
         return None
     measured, names = from_columns(tables["measurements"], robot), seen.target_names
     if TOOL in moved:
         names = measured.target_names[: len(names)]
-    place = {name: number for number, name in enumerate(names)}
-    target = np.array([place.get(each, -1) for each in measured.target_names])[measured.target]
+    target = pd.Index(names).get_indexer(list(measured.target_names))[measured.target]
     vectors = held_out_vectors(tables["pose_errors"], kind, len(measured))
     named = replace(measured, target=target, target_names=names)
-    counted = np.isfinite(vectors).all(axis=1) & (target >= 0)
-    rows = _whole_configurations(named, counted)
+    rows = _whole_configurations(named, np.isfinite(vectors).all(axis=1) & (target >= 0))
     if not len(rows):
         return None
     targets = frames_of(tables["frames"], kind, names, measured.session_names).targets
@@ -236,15 +237,15 @@ def _held_out(
 
 def held_out_vectors(pose_errors: Mapping[str, np.ndarray], kind: str, count: int) -> np.ndarray:
     """Held-out position errors (count, 3) of measured rows, mm; NaN where any model has none."""
-    held = np.asarray(pose_errors["estimate"]) == "cross_validated"
-    comparison, row = (np.asarray(pose_errors[each])[held] for each in ("comparison", "row"))
-    tried = [row[comparison == each] for each in dict.fromkeys(comparison)]
-    common = reduce(np.intersect1d, tried) if tried else row
-    ours = (comparison == Comparison(MEASURED, kind).name) & np.isin(row, common)
-    found = np.full((count, 3), np.nan)
-    vectors = np.stack([np.asarray(pose_errors[f"e{axis}_mm"])[held] for axis in "xyz"], axis=1)
-    found[row[ours]] = vectors[ours]
-    return found
+    names = ["estimate", "comparison", "row", "ex_mm", "ey_mm", "ez_mm"]
+    table = pd.DataFrame({name: pose_errors[name] for name in names})
+    table = table[table["estimate"] == "cross_validated"]
+    kinds = table["comparison"].nunique()
+    table = table[table.groupby("row")["comparison"].transform("nunique") == kinds]
+    table = table[table["comparison"] == Comparison(MEASURED, kind).name]
+    vectors = np.full((count, 3), np.nan)
+    vectors[table["row"].to_numpy(int)] = table[names[3:]]
+    return vectors
 
 
 def _columns(
@@ -260,8 +261,8 @@ def _columns(
         place = np.repeat(flange.position_mm, kinds, axis=0) + arm
         parts += [np.broadcast_to(np.eye(3), turned.shape), -ANGLE_UNIT_RAD * skew(place)]
     if TOOL in moved:
-        own = np.tile(np.eye(kinds), (count, 1))
-        parts.append(np.einsum("nij,nk->nikj", turned, own).reshape(len(own), 3, -1))
+        shifts = np.einsum("nij,nk->nikj", turned, np.tile(np.eye(kinds), (count, 1)))
+        parts.append(shifts.reshape(len(shifts), 3, -1))
     fitted = sum(part.shape[2] for part in parts)
     slopes = np.repeat(slopes, kinds, axis=0)
     parts += [slopes[:, :3] - skew(arm) @ slopes[:, 3:], off_mm.reshape(-1, 3, 1)]
@@ -275,12 +276,13 @@ def _level(of: Columns) -> Level:
 
 
 def _require_sessions(tables: Tables, sessions: Sequence[str | None]) -> None:
-    bases = np.asarray(tables["frames"]["frame"]) == BASE
-    named = np.asarray(tables["frames"].get("session", np.full(len(bases), None)))
-    measured = {str(each) for each in named[bases]}
-    if tuple(sessions) == (None,) and len(measured) > 1:
-        what = "do not say in which session they were read, and each has a base of its own"
-        raise InputError(Problem("the readings", what, f"one of {', '.join(sorted(measured))}"))
+    frames = pd.DataFrame(dict(tables["frames"]))
+    if "session" not in frames or tuple(sessions) != (None,):
+        return
+    measured = sorted(set(map(str, frames.loc[frames["frame"] == BASE, "session"])))
+    if len(measured) > 1:
+        what = "have no session, and each session has its own base"
+        raise InputError(Problem("the readings", what, f"one of {', '.join(measured)}"))
 
 
 def frames_at(
@@ -292,21 +294,22 @@ def frames_at(
     moved: Sequence[str],
     rotation_weight_mm_per_rad: float,
 ) -> Frames:
-    """Base and targets of ``seen``: as the table ``frames`` has them, fitted anew what ``moved``.
+    """Base and targets of ``seen``: those of the table ``frames``, or fitted where ``moved``.
 
-    The arm is held at ``model``, which the table calls ``kind``.
+    The joint model stays ``model``, which the table calls ``kind``.
     """
     sessions, targets = seen.session_names, seen.target_names
-    stated = known(robot.base, carried(robot), len(sessions), len(targets))
+    frames = known(robot.base, carried(robot), len(sessions), len(targets))
     if BASE not in moved:
-        kept = [frame(tables["frames"], kind, BASE, each) for each in sessions]
-        stated = replace(stated, bases=stacked(kept))
+        bases = [frame(tables["frames"], kind, BASE, name) for name in sessions]
+        frames = replace(frames, bases=stacked(bases))
     if TOOL not in moved:
-        kept = [frame(tables["frames"], kind, each) for each in targets]
-        stated = replace(stated, targets=stacked(kept))
+        frames = replace(
+            frames, targets=stacked([frame(tables["frames"], kind, name) for name in targets])
+        )
     if not moved:
-        return stated
-    terms = frame_terms(seen, stated)
+        return frames
+    terms = frame_terms(seen, frames)
     of_base = np.arange(len(terms.names)) < len(MOTIONS) * len(sessions)  # these stand first
     terms = replace(terms, free=np.where(of_base, BASE in moved, TOOL in moved))
     return fit_frames(
@@ -317,8 +320,8 @@ def frames_at(
     )
 
 
-def says_there(model: ErrorModel, q_rad: np.ndarray) -> np.ndarray:
-    """True (n, k) where DH joints lie in the range a model says something about."""
+def covers(model: ErrorModel, q_rad: np.ndarray) -> np.ndarray:
+    """True (n, k) where DH joints lie in the range of the model."""
     if model.domain is None:
         return np.ones(q_rad.shape, dtype=bool)
     low, high = model.domain

@@ -18,8 +18,7 @@ def sentence(history: Mapping, row: int = -1) -> str:
     if verdict == RECALIBRATE:
         joint = float(history["joint"][row])
         most = "" if np.isnan(joint) else f", joint {joint:.0f}"
-        beyond = float(history["beyond_mm"][row])
-        what = f"{beyond:.2f} mm beyond chance" if beyond else "the offset of a joint changed"
+        what = f"{float(history['beyond_mm'][row]):.2f} mm beyond chance"
         return f"recalibrate: {what}{most}, since the calibration of {day}"
     if verdict == HOLDS:
         moved, chance = (float(history[name][row]) for name in ("moved_mm", "chance_mm"))
