@@ -277,9 +277,12 @@ def test_a_parquet_file_with_a_column_twice_is_refused(tmp_path):
     [
         (("plan-poses", "ur10", "--drawn", 10**9), "--drawn"),
         (("plan-poses", "ur10", "--poses", 10**6, "--drawn", 10**5), "--poses"),
-        (("plan-campaign", "--noise-mm", "0.05", "--poses", 10**9), "--poses"),
-        (("plan-campaign", "--noise-mm", "0.05", "--poses", 50_000), "--poses, --budget"),
-        (("plan-campaign", "--noise-mm", "0.05", "--repetitions", 10**9), "--repetitions"),
+        (("campaign", "plan", "--noise-mm", "0.05", "--candidates", 10**9), "--candidates"),
+        (
+            ("campaign", "plan", "--noise-mm", "0.05", "--candidates", 50_000),
+            "--candidates, --budget",
+        ),
+        (("campaign", "plan", "--noise-mm", "0.05", "--repetitions", 10**9), "--repetitions"),
         (("campaign", "start", "x", "--drawn", 10**9), "--drawn"),
     ],
     ids=lambda given: " ".join(map(str, given)) if isinstance(given, tuple) else "",

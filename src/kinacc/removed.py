@@ -9,6 +9,7 @@ COMMANDS = {
     "run": "now Snakemake's own: snakemake -c1 --until fit_dh, or -R fit_dh for a stage anew",
     "fitted": "now kinacc summary RESULTS (--verbose in place of --all)",
     "gate": "now kinacc check-results RESULTS --config FILE --against FOLDER",
+    "plan-campaign": "now kinacc campaign plan (--candidates in place of --poses)",
     "accept": 'now kinacc check-results RESULTS --accept FOLDER --reason ".."',
 }
 _CAMPAIGN = {
@@ -26,10 +27,9 @@ OPTIONS = {
         "--index": "poses are D-optimal (O1)",
         "--metric": "travel is that of the joint that moves most",
     },
-    "plan-campaign": _CAMPAIGN,
     "campaign": _CAMPAIGN
     | {
-        "--simulations": "kinacc plan-campaign simulates budgets before a campaign begins",
+        "--simulations": "kinacc campaign plan simulates budgets before a campaign begins",
         "--head": "now --sha256 with --readings, as a report gives them",
     },
 }
@@ -42,7 +42,6 @@ RENAMED = {
     "compensate": {"--output": "--out"},
     "compare": {"--output": "--out"},
     "plan-poses": {"--output": "--out"},
-    "plan-campaign": {"--output": "--out"},
 }
 # Sections and keys of the configuration.
 KEYS = {

@@ -126,10 +126,10 @@ def test_an_entry_nested_deeply_is_a_message(begun):
 
 @pytest.mark.parametrize("digits", ["１.５", "1_0", "٣"])
 def test_digits_of_other_alphabets_are_no_numbers_of_options(digits):
-    done = call("plan-campaign", "--noise-mm", digits, "--poses", 20, "--budget", 20)
+    done = call("campaign", "plan", "--noise-mm", digits, "--candidates", 20, "--budget", 20)
     assert done.exit_code == 2, done.output
     assert f"noise of instrument: {digits!r}" in done.output
-    done = call("plan-campaign", "--noise-mm", "0.05", "--poses", 20, "--budget", digits)
+    done = call("campaign", "plan", "--noise-mm", "0.05", "--candidates", 20, "--budget", digits)
     assert done.exit_code == 2, done.output
     assert f"{digits!r} is not a valid number" in done.output
 
@@ -149,14 +149,14 @@ def test_digits_of_other_alphabets_are_no_numbers_of_options(digits):
     ids=lambda given: " ".join(given)[:30] if isinstance(given, tuple) else "",
 )
 def test_settings_that_are_no_numbers_of_an_arm_are_named(words, said):
-    done = call("plan-campaign", "--noise-mm", "0.05", "--poses", 20, "--budget", 20,
+    done = call("campaign", "plan", "--noise-mm", "0.05", "--candidates", 20, "--budget", 20,
                 "--errors", "smooth", *words)  # fmt: skip
     assert done.exit_code == 2, done.output
     assert said in done.output
 
 
 def test_a_tool_beyond_all_arms_is_no_number():
-    done = call("plan-poses", "ur10", "--drawn", 50, "--poses", 12, "--tool-mm", "1e308,0,0")
+    done = call("plan-poses", "ur10", "--drawn", 50, "--candidates", 12, "--tool-mm", "1e308,0,0")
     assert done.exit_code == 2, done.output
     assert "--tool-mm: '1e308,0,0'; allowed: 3 numbers" in done.output
 

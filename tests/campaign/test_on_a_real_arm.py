@@ -19,7 +19,7 @@ from kinacc.assess.single_shot import SingleShot
 from kinacc.assess.world import drawn_world
 from kinacc.campaign import folder as campaigns
 from kinacc.campaign.reading import Reading
-from kinacc.cli.campaign_plans import field_of
+from kinacc.cli.campaign_plan import errors_of
 from kinacc.geometry import invert
 from kinacc.tables import store
 
@@ -191,4 +191,4 @@ def test_a_plan_simulates_with_the_errors_of_the_model_a_campaign_would_be_about
         columns["selected"] = (columns["model"] == model).astype(int)
         store.write(path, "model_selection", columns, store.read_metadata(path))
         largest = sizes[held_out & (errors["comparison"] == f"{model}_vs_measured")].max()
-        assert field_of(str(folder)).size_mm.max() == pytest.approx(largest, rel=0.02)
+        assert errors_of(str(folder)).size_mm.max() == pytest.approx(largest, rel=0.02)

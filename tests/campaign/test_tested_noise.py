@@ -45,12 +45,12 @@ def test_a_noise_both_tested_and_stated_is_refused(tested, calibration, tmp_path
     given = ["--repeatability", file, "--noise-mm", 0.1]
     said = refused("campaign", "start", tmp_path / "check", "--calibration", calibration, *given)
     assert "--repeatability: is given beside instrument=0.1; allowed: one of them" in said
-    assert "is given beside" in refused("plan-campaign", *given)
+    assert "is given beside" in refused("campaign", "plan", *given)
     assert not (tmp_path / "check").exists()
 
 
 def test_an_assessor_that_takes_the_noise_as_known_is_not_handed_a_tested_one(tested):
-    said = refused("plan-campaign", "--repeatability", tested(), "--assessor", "single_shot")
+    said = refused("campaign", "plan", "--repeatability", tested(), "--assessor", "single_shot")
     assert "single_shot takes the noise as known, and a test knows it up to a factor only" in said
 
 
@@ -94,10 +94,20 @@ def test_a_noise_that_differs_by_axis_is_turned_with_the_frame_of_its_readings(t
 def test_a_plan_with_a_tested_noise_is_little_wider_than_with_the_same_noise_stated(tested):
     file = tested(std_mm=(0.05,) * 30, visits=4)
     std = json.loads(file.read_text())["noise"]["std_mm"][0]
-    words = ["--poses", 20, "--budget", 100, "--repetitions", 3, "--errors", "smooth", "--json"]
+    words = [
+        "--candidates",
+        20,
+        "--budget",
+        100,
+        "--repetitions",
+        3,
+        "--errors",
+        "smooth",
+        "--json",
+    ]
     found = []
     for noise in (["--repeatability", file], ["--noise-mm", std, "--set", "noise_margin=1"]):
-        done = call("plan-campaign", *noise, *words)
+        done = call("campaign", "plan", *noise, *words)
         assert done.exit_code == 0, done.output
         found.append(json.loads(done.stdout)["rows"][0]["width_median_mm"])
     assert found[1] < found[0] < 1.1 * found[1]
@@ -105,7 +115,7 @@ def test_a_plan_with_a_tested_noise_is_little_wider_than_with_the_same_noise_sta
 
 def test_poses_that_scatter_differently_are_asked_about_before_one_noise_is_taken(tested, begun):
     file = tested(std_mm=(0.02,) * 19 + (0.2,), visits=6)
-    said = refused("plan-campaign", "--repeatability", file)
+    said = refused("campaign", "plan", "--repeatability", file)
     assert "pose P19" in said
     assert "--sure takes that of all poses together" in said
     plan = campaigns.open_(begun("--repeatability", file, "--sure")).plan
@@ -136,13 +146,13 @@ def test_a_file_that_tells_no_noise_is_refused_with_how_to_make_one(tested, cont
     if isinstance(content, dict):
         content = json.dumps({**json.loads(file.read_text()), **content})
     file.write_text(content)
-    told = refused("plan-campaign", "--repeatability", file)
+    told = refused("campaign", "plan", "--repeatability", file)
     assert said in told
     assert "kinacc repeatability FILE -o noise.json" in told
 
 
 def test_a_file_of_a_test_that_is_not_there_is_said_with_other_problems(tmp_path):
-    told = refused("plan-campaign", "--repeatability", tmp_path / "none.json", "--width-mm", -1)
+    told = refused("campaign", "plan", "--repeatability", tmp_path / "none.json", "--width-mm", -1)
     assert "no such file" in told
     assert "--width-mm" in told
 

@@ -175,7 +175,7 @@ def test_measured_errors_of_a_campaign_plan_the_next_one(folder, tmp_path):
     assert np.isnan(store.read(points)["ex_mm"]).any()
     for name in ("campaign_points", "campaign_readings"):
         errors = campaign / "report" / f"{name}.parquet"
-        done = call("plan-campaign", "--noise-mm", 0.05, "--poses", 5, "--budget", 5,
+        done = call("campaign", "plan", "--noise-mm", 0.05, "--candidates", 5, "--budget", 5,
                     "--errors", errors, "--repetitions", 2, "--json")  # fmt: skip
         assert done.exit_code == 0, done.output
         (row,) = json.loads(done.stdout)["rows"]

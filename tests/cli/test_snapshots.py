@@ -43,7 +43,7 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "compare": ("compare", FIT, LATER),
     "repeatability": ("repeatability", "visits.csv", "--rows", "visits"),
     "plan-poses": ("plan-poses", "ur10", "--poses", "12", "--drawn", "40", "-o", "plan.csv"),
-    "plan-campaign": ("plan-campaign", *NOISE, "--poses", "20", "--budget", "10",
+    "campaign plan": ("campaign", "plan", *NOISE, "--candidates", "20", "--budget", "10",
                       "--repetitions", "2"),
     "a word that is no command": ("fit", "arm.yaml"),
     "a command that is gone": ("gate", "results"),

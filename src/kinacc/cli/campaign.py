@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from kinacc.cli import choice
+from kinacc.cli import campaign_plan, choice
 from kinacc.cli.choice import option
 from kinacc.cli.file_options import joint_file_options
 from kinacc.cli.group import InOrder
@@ -16,6 +16,7 @@ def campaign() -> None:
     """Bound the largest error of a calibrated arm, one measurement after another.
 
     \b
+    plan     the budget of readings for a wanted bound, by simulation
     start    fix points, instruments, assessor and budget
     next     which joints to measure now
     record   take a reading, or a file of readings
@@ -252,3 +253,6 @@ def verify(folder, sha256, readings, out) -> None:
     from kinacc.cli import campaigns
 
     campaigns.verify(folder, sha256, readings, out)
+
+
+campaign.add_command(campaign_plan.plan)

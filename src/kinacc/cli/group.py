@@ -251,8 +251,7 @@ SECTIONS = {
     },
     "Its largest error": {
         "repeatability": "poses read again and again: what noise a reading has",
-        "plan-campaign": "how many readings a wanted bound takes",
-        "campaign": "measure: what next, what was read, what may be said",
+        "campaign": "bounds on it: plan, start, next, record, status, report",
     },
 }
 

@@ -243,7 +243,7 @@ def _next(opened: Opened, state: State, said: Sequence[Statement], lead: Stateme
         return _lines([done[verdict]])
     more = (
         "no decision: a new campaign with a larger budget, on candidates drawn anew; how large, "
-        "kinacc plan-campaign says"
+        "kinacc campaign plan says"
     )
     return _lines([more])
 

@@ -1,0 +1,273 @@
+"""Simulated campaigns on known errors: the bounds that a budget of readings brings."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from kinacc.assess.adaptive import AdaptiveAssessor, Candidates
+from kinacc.assess.attainable import limits_of
+from kinacc.assess.conformity import UNDECIDED, decide
+from kinacc.assess.counts import binomial_interval
+from kinacc.assess.simulate import carry_on, noisy, truth_mm
+from kinacc.assess.statement import CANDIDATES
+from kinacc.errors import InputError, Problem, refuse
+from kinacc.study.fields import ErrorField
+
+
+@dataclass(frozen=True)
+class Aim:
+    """Aim of a campaign: bounds at most ``width_mm`` apart, or a decision on ``tolerance_mm``.
+
+    ``power``: share of campaigns that have to reach it. ``target`` of the bounds.
+    """
+
+    width_mm: float | None = None
+    tolerance_mm: float | None = None
+    power: float = 0.8
+    target: str = CANDIDATES
+
+    @property
+    def is_set(self) -> bool:
+        """Whether there is a width or a tolerance."""
+        return self.width_mm is not None or self.tolerance_mm is not None
+
+
+@dataclass(frozen=True)
+class BudgetRow:
+    """Simulated campaigns of one budget on one kind of errors.
+
+    ``true_mm``: mean largest error of the candidates that the bound is on (all but ``excepted``).
+    ``width_*_mm``: quantiles of upper minus lower bound; 0 where they contradict each other,
+    infinite without a bound on all. ``stated``: share with an upper bound. Of these upper bounds:
+    ``excess_mm``, mean of bound minus truth; ``attainable_mm``, the same of the best design that
+    knows all errors; ``proven_mm``, the excess below which no reliable bound stays (NaN: none);
+    ``holding`` of ``judged`` hold, with exact 95 % limits of the share. ``within``: share as narrow
+    as wanted. ``accept``, ``reject``, ``undecided``: shares decided so. ``reached``: campaigns that
+    reach the aim; ``reached_low``: the share that they show with 97.5 % confidence.
+    """
+
+    errors: str
+    budget: int
+    readings: float
+    true_mm: float
+    excepted: int
+    width_q05_mm: float
+    width_median_mm: float
+    width_q95_mm: float
+    excess_mm: float
+    attainable_mm: float
+    proven_mm: float
+    stated: float
+    holding: int
+    judged: int
+    holds_low: float
+    holds_high: float
+    within: float
+    accept: float
+    reject: float
+    undecided: float
+    reached: int
+    reached_low: float
+
+
+@dataclass(frozen=True)
+class BudgetPlan:
+    """Answer of ``kinacc campaign plan``: a row for each kind of errors and budget.
+
+    ``budget``: the smallest that reaches the aim in the share ``power`` of the simulated campaigns
+    on all errors, as every larger one does; ``budget_shown``: the smallest for which so many
+    simulations show it with 97.5 % confidence. None where there is none, or no aim.
+    """
+
+    assessor: str
+    candidates: int
+    noise_mm: tuple[float, ...]
+    target: str
+    width_mm: float | None
+    tolerance_mm: float | None
+    power: float
+    repetitions: int
+    seed: int
+    budget: int | None
+    budget_shown: int | None
+    rows: tuple[BudgetRow, ...]
+
+    @property
+    def table(self) -> pd.DataFrame:
+        """The rows as a table; an infinite width is NaN."""
+        return pd.DataFrame(self.rows).replace(math.inf, math.nan)
+
+
+def plan_budget(
+    fields: Sequence[ErrorField],
+    candidates: int,
+    covariance_mm2: np.ndarray,
+    assessors: Sequence[AdaptiveAssessor],
+    aim: Aim,
+    repetitions: int = 30,
+    seed: int = 0,
+    progress: Callable | None = None,
+) -> BudgetPlan:
+    """Simulate campaigns of assessors, one for each budget, on every kind of errors.
+
+    Parameters
+    ----------
+    fields : sequence of ErrorField
+        Errors in mm from which candidates are drawn.
+    candidates : int
+        Number of candidates of a campaign.
+    covariance_mm2 : (3, 3) array
+        Covariance of a reading, mm^2, robot base frame.
+    assessors : sequence
+        Adaptive assessors that differ in their budget ``measurements``.
+    aim : Aim
+        Width or decision that a campaign is for.
+    repetitions, seed : int
+        Campaigns simulated for each row; the same readings serve all budgets.
+    progress : callable, optional
+        Reports on an iterable.
+
+    Returns
+    -------
+    BudgetPlan
+
+    Raises
+    ------
+    InputError
+        Where a field has too few errors, or an assessor states no bound on the target.
+    """
+    runs = simulate(fields, candidates, covariance_mm2, assessors, repetitions, seed, aim, progress)
+    groups = runs.groupby(["errors", "budget"], sort=False)
+    rows = tuple(_row(str(key[0]), int(key[1]), group, aim) for key, group in groups)
+    aims = (aim.width_mm, aim.tolerance_mm, aim.power, repetitions, seed)
+    return BudgetPlan(
+        assessors[0].name,
+        candidates,
+        tuple(np.sqrt(np.diag(covariance_mm2)).tolist()),
+        aim.target,
+        *aims,
+        smallest_budget(rows, aim, [row.reached / repetitions for row in rows]),
+        smallest_budget(rows, aim, [row.reached_low for row in rows]),
+        rows,
+    )
+
+
+def simulate(
+    fields: Sequence[ErrorField],
+    points: int,
+    covariance_mm2: np.ndarray,
+    assessors: Sequence[AdaptiveAssessor],
+    repetitions: int,
+    seed: int,
+    aim: Aim,
+    progress: Callable | None = None,
+) -> pd.DataFrame:
+    """Return one row for each simulated campaign; see :func:`plan_budget`."""
+    refuse(
+        Problem(
+            f"errors {field.name}",
+            f"only {field.points}, fewer than {points} candidates",
+            fix=f"--candidates {field.points}, or --errors smooth "
+            f"--largest-mm {field.size_mm.max():.3g}",
+        )
+        for field in fields
+        if field.points < points
+    )
+    candidates = Candidates(np.tile(covariance_mm2, (points, 1, 1)))
+    root, sigma_mm = np.linalg.cholesky(covariance_mm2), candidates.sigma_mm
+    most = max(each.measurements for each in assessors)
+    work = [
+        (number, repetition) for number in range(len(fields)) for repetition in range(repetitions)
+    ]
+    runs = []
+    for number, repetition in progress(work, "simulated sets of readings") if progress else work:
+        field, entropy = fields[number], (seed, number, repetition)
+        drawn = np.random.default_rng(entropy).permutation(field.points)[:points]
+        size_mm = field.size_mm[drawn]
+        reading = noisy(field.error_mm[drawn], root, most, *entropy)
+        for assessor in assessors:
+            campaign = assessor.begin(candidates)
+            readings, visited = carry_on(campaign, reading), campaign.ledger.visited
+            stated = [each for each in campaign.statements() if each.target == aim.target]
+            if not stated:
+                what = f"{assessor.name} states nothing about {aim.target}"
+                raise InputError(Problem("--assessor", what, fix="choose another, or --target"))
+            said, arm_mm = stated[0], getattr(assessor, "arm_mm", None)
+            limits = limits_of(said, visited, size_mm, sigma_mm, assessor.measurements)
+            width_mm = math.nan if said.excepted else said.upper_mm - said.lower_mm
+            tolerance_mm = aim.tolerance_mm
+            runs.append(
+                {
+                    "errors": field.name,
+                    "budget": assessor.measurements,
+                    "repetition": repetition,
+                    "readings": readings,
+                    "true_mm": truth_mm(
+                        said, size_mm, visited, sigma_mm if arm_mm is None else arm_mm
+                    ),
+                    "excepted": said.excepted,
+                    "lower_mm": said.lower_mm,
+                    "upper_mm": said.upper_mm,
+                    "width_mm": math.inf if math.isnan(width_mm) else max(width_mm, 0.0),
+                    "verdict": decide(said, tolerance_mm).verdict if tolerance_mm else UNDECIDED,
+                    "attainable_mm": limits.attainable_mm,
+                    "proven_mm": limits.proven_mm,
+                }
+            )
+    return pd.DataFrame(runs)
+
+
+def smallest_budget(rows: Sequence[BudgetRow], aim: Aim, shares: Sequence[float]) -> int | None:
+    """Return the smallest budget from which on all errors have the wanted share; None if none.
+
+    ``shares``: of the campaigns of each row.
+    """
+    enough = None
+    for budget in sorted({row.budget for row in rows}, reverse=True) if aim.is_set else ():
+        of_budget = (s for row, s in zip(rows, shares, strict=True) if row.budget == budget)
+        if min(of_budget) < aim.power:
+            break
+        enough = budget
+    return enough
+
+
+def _row(errors: str, budget: int, runs: pd.DataFrame, aim: Aim) -> BudgetRow:
+    count, stated = len(runs), runs[runs["upper_mm"].notna()]
+    above_mm = stated["upper_mm"] - stated["true_mm"]
+    holding, judged = int((above_mm >= 0.0).sum()), len(stated)
+    within = int((stated["width_mm"] <= (aim.width_mm or math.inf)).sum())
+    decided = {each: float((runs["verdict"] == each).mean()) for each in ("accept", "reject")}
+    undecided = 1.0 - sum(decided.values())
+    reached = [within] if aim.width_mm is not None or aim.tolerance_mm is None else []
+    reached += [round(count * (1.0 - undecided))] if aim.tolerance_mm is not None else []
+    ordered = np.sort(runs["width_mm"])  # of order, without interpolation: some are infinite
+    widths = [float(ordered[math.ceil(share * count) - 1]) for share in (0.05, 0.5, 0.95)]
+    low, high = binomial_interval(holding, judged) if judged else (math.nan, math.nan)
+    return BudgetRow(
+        errors=errors,
+        budget=budget,
+        readings=float(runs["readings"].mean()),
+        true_mm=float(runs["true_mm"].mean()),
+        excepted=int(runs["excepted"].max()),
+        width_q05_mm=widths[0],
+        width_median_mm=widths[1],
+        width_q95_mm=widths[2],
+        excess_mm=float(above_mm.mean()),
+        attainable_mm=float(stated["attainable_mm"].mean()),
+        proven_mm=float(stated["proven_mm"].mean()),
+        stated=judged / count,
+        holding=holding,
+        judged=judged,
+        holds_low=low,
+        holds_high=high,
+        within=within / count,
+        undecided=undecided,
+        reached=min(reached),
+        reached_low=binomial_interval(min(reached), count)[0],
+        **decided,
+    )

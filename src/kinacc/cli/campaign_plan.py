@@ -1,0 +1,275 @@
+"""``kinacc campaign plan``: the bounds that a budget of readings brings, by simulation."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+import numpy as np
+import pandas as pd
+
+from kinacc.cli import choice
+from kinacc.cli.choice import option
+from kinacc.cli.output import Output, answers, plain
+
+if TYPE_CHECKING:
+    from kinacc.campaign.planning import Aim, BudgetPlan
+    from kinacc.study.fields import ErrorField
+
+DEFAULT_ERRORS = ("smooth", "workshop", "defect")
+SHARES = (0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0)  # of the candidates: budgets by default
+_MOST_READINGS = 50_000_000  # a gigabyte: any pose may be read again and again
+_SHOWN = {
+    "errors": "errors",
+    "budget": "budget",
+    "true_mm": "largest\nerror mm",
+    "excepted": "excepted",
+    "width_median_mm": "width mm\nmedian",
+    "width_q95_mm": "width mm\n95 %",
+    "holding": "bounds\nhold",
+}
+
+
+@click.command("plan")
+@option("--candidates", default=200, type=click.IntRange(2, 100_000),
+        help="Number of candidates of the campaign.")  # fmt: skip
+@choice.campaign_options
+@option("--budget", multiple=True, type=click.IntRange(1, 1_000_000),
+        help="Readings in all; repeatable. [1/4 to 3 times the candidates]")  # fmt: skip
+@option("--power", default=0.8, type=click.FloatRange(0.0, 1.0),
+        help="Share of campaigns that reach the aim.")  # fmt: skip
+@option("--errors", multiple=True,
+        help="Errors to simulate; repeatable. [smooth, workshop, defect]")  # fmt: skip
+@option("--point", help="Target of a results folder. [the tool, else the first]")
+@option("--largest-mm", type=float, help="Largest error to scale the errors to.")
+@option("--repetitions", default=30, type=click.IntRange(2, 100_000),
+        help="Simulated campaigns per budget.")  # fmt: skip
+@answers(table=True, picture="Picture of width against budget: .svg, .png, .pdf.")
+def plan(out, **given) -> None:
+    """Simulate campaigns: the width of the bounds by budget, and the budget for a wanted width.
+
+    --errors is a results folder (its held-out errors), a file with columns ex_mm, ey_mm, ez_mm, or
+    a family of synthetic arms: smooth, gravity, ripple, thermal, workshop, defect, rare.
+
+    \b
+    Example:
+      kinacc campaign plan --noise-mm 0.05 --candidates 200 --width-mm 0.3 --errors results/arm
+    """
+    from kinacc.campaign.planning import Aim, plan_budget
+    from kinacc.progress import reporting
+
+    aim = Aim(given["width_mm"], given["tolerance_mm"], given["power"], given["target"])
+    fields, points, covariance, assessors = _question(given)
+    with reporting("campaign plan", bar=True) as progress:
+        runs = (given["repetitions"], given["seed"], progress)
+        found = plan_budget(fields, points, covariance, assessors, aim, *runs)
+    if out.picture is not None:
+        _draw(found, aim, out)
+    if out.table is not None:
+        from kinacc.cli.summary import write
+
+        write(found.table, Path(out.table))
+    if out.as_json:
+        click.echo(json.dumps(plain(asdict(found)), indent=1))
+        return
+    _print(found, aim)
+
+
+def _question(given: Mapping) -> tuple:
+    """Fields, number of candidates, covariance and assessors of the options."""
+    from kinacc.campaign import known_noise, slips
+    from kinacc.cli import campaign_options
+    from kinacc.errors import Problem, gathered, refuse
+    from kinacc.study import fields
+
+    problems: list[Problem] = []
+    named, points = given["errors"] or DEFAULT_ERRORS, given["candidates"]
+    folders = [Path(each) for each in named if each not in fields.FAMILIES and Path(each).is_dir()]
+    if given["point"] is not None and not folders:
+        problems.append(Problem("--point", "needs a results folder", "--errors FOLDER"))
+    tested, instruments, chosen, assessors = None, (), [], []
+    with gathered(problems):
+        tested = campaign_options.tested_noise(given["repeatability"])
+    with gathered(problems):
+        instruments = campaign_options.instruments(
+            given["noise_mm"],
+            given["covariance_mm2"],
+            resolution_mm=given["resolution_mm"],
+            calibrations=folders,
+            tested=tested,
+        )
+        if not given["sure"]:
+            problems += [*slips.of_noise(instruments), *known_noise.doubts(tested)]
+            problems += [each for path in folders for each in slips.of_repeats(instruments, path)]
+    lengths = ("width_mm", "tolerance_mm", "largest_mm")
+    problems += campaign_options.not_positive(**{name: given[name] for name in lengths})
+    budgets = sorted({*(given["budget"] or [max(round(s * points), 2) for s in SHARES])})
+    if points * budgets[-1] > _MOST_READINGS:
+        what = f"{points} candidates with up to {budgets[-1]} readings each"
+        allowed = f"a product of at most {_MOST_READINGS:,}"
+        problems.append(Problem("--candidates, --budget", what, allowed))
+    name, *method = (given[each] for each in ("assessor", "confidence", "settings"))
+    for budget in budgets:
+        with gathered(problems):
+            asked = campaign_options.workshop(given)
+            made = campaign_options.assessor(name, budget, *method, asked=asked, tested=tested)
+            assessors.append(campaign_options.with_references(made, points, given["references"]))
+    for errors in named:
+        with gathered(problems):
+            chosen.append(errors_of(errors, given["point"]))
+    refuse(dict.fromkeys(problems), "Nothing was simulated")
+    if (largest_mm := given["largest_mm"]) is not None:
+        chosen = [
+            replace(each, error_mm=each.error_mm * (largest_mm / each.size_mm.max()))
+            for each in chosen
+        ]
+    return chosen, points, instruments[0].covariance_mm2, assessors
+
+
+def errors_of(name: str, point: str | None = None) -> ErrorField:
+    """Return the errors of a family, a results folder or a file.
+
+    ``point``: target of a results folder, by default the one that a campaign is about.
+    """
+    from kinacc.cli import rows
+    from kinacc.errors import InputError, Problem, refuse
+    from kinacc.measurements.table import numbers
+    from kinacc.study import fields
+
+    path, names = Path(name), ("ex_mm", "ey_mm", "ez_mm")
+    if name in fields.FAMILIES:
+        return replace(fields.synthetic(name, 0), name=name)
+    if path.is_dir():
+        return _errors_of_folder(path, point)
+    if not path.is_file():
+        allowed = f"a results folder, a file, {', '.join(fields.FAMILIES)}"
+        raise InputError(Problem("--errors", f"{name!r} does not exist", allowed))
+    table, problems = rows.open_table(path), []
+    missing = [each for each in names if each not in table.columns]
+    if missing:
+        raise InputError(Problem(name, f"has no column {', '.join(missing)}", ", ".join(names)))
+    measured = ~np.all([table.gaps(each) for each in names], axis=0)
+    errors = np.stack([numbers(table, each, problems, gaps=True) for each in names], axis=1)
+    if not measured.any() or (not problems and np.isnan(errors[measured]).any()):
+        problems.append(
+            Problem(name, "has no error, or one that is not complete", ", ".join(names))
+        )
+    refuse(problems)
+    return fields.ErrorField(path.stem, errors[measured])
+
+
+def _errors_of_folder(path: Path, point: str | None) -> ErrorField:
+    from kinacc.config.error_models import PLAINEST
+    from kinacc.deployment.folder import recorded_model, targets_of
+    from kinacc.deployment.record import default_point
+    from kinacc.errors import InputError, Problem
+    from kinacc.study import fields
+    from kinacc.tables import store
+
+    names = ("pose_errors", "measurements", "model_selection", "frames", "assessment_points")
+    tables = {
+        each: store.read(path / f"{each}.parquet")
+        for each in names
+        if (path / f"{each}.parquet").is_file()
+    }
+    name = path.resolve().name
+    if not {"pose_errors", "measurements"} <= {*tables}:
+        if "assessment_points" in tables:
+            return fields.of_points(name, tables["assessment_points"])
+        what = "holds neither pose_errors with measurements nor assessment_points"
+        raise InputError(Problem(str(path), what, "a results folder"))
+    model = recorded_model(tables) or PLAINEST
+    targets = list(dict.fromkeys(np.asarray(tables["measurements"]["target"]).astype(str)))
+    if "frames" in tables:
+        targets = [each for each in targets_of(tables["frames"], model) if each in targets]
+    target = point or default_point(targets)
+    if target not in targets:
+        raise InputError(Problem("--point", f"{target!r} is no target", ", ".join(targets)))
+    several = len(targets) > 1
+    if several:
+        known = ", ".join(targets)
+        click.echo(f"{path}: errors of {target} ({known}); --point names another", err=True)
+    return fields.of_measurements(
+        name, tables["pose_errors"], tables["measurements"], model, target if several else None
+    )
+
+
+def _print(found: BudgetPlan, aim: Aim) -> None:
+    """The budget, then a row for each kind of errors and budget."""
+    from kinacc.cli.frame import as_rich
+    from kinacc.report import terminal
+
+    console = terminal.screen(terminal.WIDTH)
+    console.print(_verdict(found, aim), soft_wrap=True)
+    console.print(
+        f"Simulated: {found.repetitions} campaigns a row with {found.assessor}, largest error of "
+        f"{found.target} among {found.candidates}, noise {terminal.size(max(found.noise_mm))} mm.",
+        soft_wrap=True,
+    )
+    shown = dict(_SHOWN)
+    if not any(row.excepted for row in found.rows):
+        del shown["excepted"]
+    table = found.table
+    table["holding"] = [f"{row.holding} of {row.judged}" for row in found.rows]
+    if aim.width_mm is not None:
+        shown["within"] = "within"
+    if aim.tolerance_mm is not None:
+        shown |= {each: each for each in ("accept", "reject", "undecided")}
+    console.print(as_rich(table, shown))
+    if "excepted" in shown:
+        console.print(
+            "excepted: candidates that the bound leaves out; the largest error is that of the rest."
+        )
+    if judged := [row for row in found.rows if np.isfinite(row.attainable_mm)]:
+        most = max(row.budget for row in judged)
+        worst = max((r for r in judged if r.budget == most), key=lambda row: row.excess_mm)
+        console.print(
+            f"Mean excess of the upper bound with {most} readings (errors: {worst.errors}): "
+            f"{terminal.size(worst.excess_mm)} mm. With all errors known beforehand: "
+            f"{terminal.size(worst.attainable_mm)} mm. Limit of any reliable bound: "
+            f"{terminal.size(worst.proven_mm)} mm."
+        )
+
+
+def _draw(found: BudgetPlan, aim: Aim, out: Output) -> None:
+    """Draw width and share of campaigns that reach the aim against the budget."""
+    from kinacc.figures import campaign_plan
+
+    table = pd.DataFrame(found.rows)
+    curves = [
+        campaign_plan.Curve(
+            str(name),
+            group["budget"].to_numpy(float),
+            group[["width_q05_mm", "width_median_mm", "width_q95_mm"]].to_numpy(),
+            group["reached"].to_numpy() / found.repetitions,
+        )
+        for name, group in table.groupby("errors", sort=False)
+    ]
+    power = aim.power if aim.is_set else None
+    out.draw(campaign_plan.draw(curves, aim.width_mm, power, found.budget_shown or found.budget))
+
+
+def _verdict(found: BudgetPlan, aim: Aim) -> str:
+    if not aim.is_set:
+        return "No budget named: give --width-mm or --tolerance-mm."
+    wanted = [f"bounds at most {aim.width_mm:g} mm apart"] if aim.width_mm is not None else []
+    wanted += [f"a decision on {aim.tolerance_mm:g} mm"] if aim.tolerance_mm is not None else []
+    goal = " and ".join(wanted)
+    budget = found.budget_shown or found.budget or max(row.budget for row in found.rows)
+    worst = min((r for r in found.rows if r.budget == budget), key=lambda row: row.reached)
+    count = (
+        f"{worst.reached} of {found.repetitions} simulated campaigns (errors: {worst.errors}; at "
+        f"least {worst.reached_low:.0%} with 97.5 % confidence)"
+    )
+    if found.budget is None:
+        return f"No budget up to {budget} gives {goal} in {aim.power:.0%} of campaigns: {count}."
+    if found.budget_shown is None:
+        return (
+            f"{budget} readings may suffice for {goal}: {count}. Show it with more --repetitions."
+        )
+    text = f"{budget} readings give {goal} in at least {aim.power:.0%} of campaigns: {count}."
+    return text if found.budget == budget else f"{text} {found.budget} may suffice."
