@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
+
 import click
 
 from kinacc.cli import choice
@@ -10,11 +12,14 @@ from kinacc.cli.output import answers
 from kinacc.config.error_models import ERROR_MODELS, PLAINEST
 from kinacc.deployment.export.files import FORMATS
 
+_MAKERS = ("kuka", "abb", "fanuc", "ur", "yaskawa", "staubli", "ros")
+
 
 @click.command("export")
 @click.argument("folder", type=click.Path())
 @option("--out", "target", type=click.Path(), default=".", help="Folder.")
 @option("--format", "formats", multiple=True, type=click.Choice(FORMATS), help="Formats. [all]")
+@option("--for", "maker", type=click.Choice(_MAKERS), help="Controller to enter values into.")
 @option(
     "--model",
     type=click.Choice(list(ERROR_MODELS)),
@@ -30,7 +35,19 @@ from kinacc.deployment.export.files import FORMATS
 @choice.NAMING
 @answers("List the files as JSON.", force="Replace files that are there.")
 def export(
-    folder, target, formats, model, name, urdf, base_link, tip_link, dh_joints, robot, config, out
+    folder,
+    target,
+    formats,
+    maker,
+    model,
+    name,
+    urdf,
+    base_link,
+    tip_link,
+    dh_joints,
+    robot,
+    config,
+    out,
 ) -> None:
     """Write a calibrated model of FOLDER, a results folder, for other programs.
 
@@ -42,12 +59,16 @@ def export(
     markdown  Tables I to III
     latex     the same for a paper (booktabs)
 
+    With --for, a page of values to enter into the robot's controller instead: joint zeros, or the
+    DH offsets of UR, Staubli and ROS, TOOL and BASE, from a fit with only these parameters.
+
     Either all files appear or none; files that are there are kept without --force.
 
     \b
     Example:
       kinacc export results/mh180 --out exported
       kinacc export results/ur10_b --format urdf --urdf my_ur10.urdf --out exported
+      kinacc export results/ur10_b --for ur --out exported
     """
     from kinacc.deployment.export.files import contents, formats_of, note, warning, write
     from kinacc.errors import Problem, refuse
@@ -62,6 +83,9 @@ def export(
     if urdf is not None and "urdf" not in wanted:
         problems.append(Problem("--urdf", f"{urdf} is not wanted", "with --format urdf"))
     refuse(problems, "Nothing was written")
+    if maker is not None:
+        _to_controller(folder, target, maker, name, robot, config, out)
+        return
     made = contents(
         folder,
         choice.robot_of(folder, robot, config),
@@ -79,3 +103,28 @@ def export(
     for said in (warning(folder), note(folder, model)):
         if said:
             click.echo(said, err=True)
+
+
+def _to_controller(folder, target, maker, name, robot, config, out) -> None:
+    """Write the page of values for a controller, and its file where it reads one."""
+    from pathlib import Path
+
+    from kinacc.deployment import folder as results
+    from kinacc.deployment.export.files import write
+    from kinacc.deployment.export.pendant import fit_pendant
+    from kinacc.report.pendant import pendant_page
+    from kinacc.workflow.described import calibration_settings
+
+    data_set = Path(folder).resolve().name
+    arm = choice.robot_of(folder, robot, config)
+    settings = calibration_settings(Path(folder), config)
+    found = fit_pendant(results.read_tables(folder), arm, settings, maker, data_set)
+    stem = f"{name or data_set}_{maker}"
+    files = {f"{stem}.html": pendant_page(found)}
+    if found.ending:
+        files[f"{stem}{found.ending}"] = found.text + "\n"
+    paths = write(files, target, out.force)
+    choice.say_outdated(folder)
+    lines = [f"Mean position error at {found.errors[0].points} {found.errors[0].poses}:"]
+    lines += [f"  {each.model}: {each.position_mm:.3f} mm" for each in found.errors]
+    out.say({**asdict(found), "files": paths}, "\n".join([*lines, *paths]))

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 from kinacc.checks.contradictions import load
+from kinacc.config.schema import defaults
 from kinacc.errors import InputError, Problem
 from kinacc.workflow.data_sets import DataSets, read_data_sets
 
@@ -28,6 +29,21 @@ def beside(results: Path, dataset: str) -> Iterator[tuple[Path, DataSets]]:
         with suppress(InputError, OSError):
             if path.name == CONFIG or series.encode() in path.read_bytes():
                 yield path, _planned(str(path), path.stat().st_mtime_ns)
+
+
+def calibration_settings(folder: Path, configs: Sequence[str] = ()) -> Mapping[str, Any]:
+    """The section ``calibration`` by which the results in a folder were made.
+
+    Of ``configs``, or of a configuration beside the results; the defaults where none names them.
+    """
+    folder = folder.resolve()
+    plans = (
+        [read_data_sets(configs)] if configs else dict(beside(folder.parent, folder.name)).values()
+    )
+    for plan in plans:
+        if folder.name in plan.settings:
+            return plan.settings[folder.name]["calibration"]
+    return defaults()["calibration"]
 
 
 @cache

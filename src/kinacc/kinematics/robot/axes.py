@@ -28,16 +28,20 @@ class Axes(NamedTuple):
     direction: np.ndarray
 
 
-def chain_of(axes: Axes, flange: Pose, prismatic: np.ndarray) -> tuple[Pose, DHModel, Pose]:
+def chain_of(
+    axes: Axes, flange: Pose, prismatic: np.ndarray, nearly_parallel: float = NEARLY_PARALLEL
+) -> tuple[Pose, DHModel, Pose]:
     """Base, DH chain and flange with ``base chain(q) flange`` the arm's forward kinematics.
 
     ``flange`` is the arm's flange at zero joints in the base frame. The base is the identity where
     axis 1 is the base z axis, the returned flange where the last row can reach it by itself.
+    Axes are joined by their common normal where the sine of their angle is ``nearly_parallel`` or
+    more.
     """
     frame = base = _first_frame(axes.point_mm[0], axes.direction[0])
     rows = []
     for joint in range(1, len(axes.direction)):
-        rows.append(_row(frame, axes.point_mm[joint], axes.direction[joint]))
+        rows.append(_row(frame, axes.point_mm[joint], axes.direction[joint], nearly_parallel))
         frame = compose(frame, _across(rows[-1]))
     rows.append(_last_row(frame, flange))
     frame = compose(frame, _across(rows[-1]))
@@ -58,12 +62,17 @@ def _first_frame(point: np.ndarray, direction: np.ndarray) -> Pose:
     return Pose(rotation, point - (point @ direction) * direction)
 
 
-def _row(frame: Pose, point: np.ndarray, direction: np.ndarray) -> tuple[float, ...]:
+def _row(
+    frame: Pose,
+    point: np.ndarray,
+    direction: np.ndarray,
+    nearly_parallel: float = NEARLY_PARALLEL,
+) -> tuple[float, ...]:
     """theta, d, a, alpha, beta from a frame on one axis to a frame on the next."""
     w = frame.rotation.T @ direction
     p = frame.rotation.T @ (point - frame.position_mm)
     sine = np.hypot(w[0], w[1])
-    if sine < NEARLY_PARALLEL:
+    if sine < nearly_parallel:
         at = p - p[2] / w[2] * w
         theta, a = _theta_and_length(at[0], at[1])
         return (theta, 0.0, a, *_tilt(theta, w))

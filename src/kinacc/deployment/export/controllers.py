@@ -1,0 +1,291 @@
+"""How each maker's controller takes joint zeros, arms and frames: names, units and conventions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from kinacc.deployment.export.formats.urdf import rpy
+from kinacc.errors import InputError, Problem
+from kinacc.geometry import Pose, compose, rotation_x, rotation_y, rotation_z
+from kinacc.kinematics import dh
+from kinacc.kinematics.dh import PARAMETERS, DHModel
+from kinacc.kinematics.inverse.limits import reported_joints
+from kinacc.kinematics.robot import Robot
+from kinacc.kinematics.robot.axes import Axes, chain_of
+
+Numbers = dict[str, tuple[float, str]]  # by name: value and unit
+
+ZEROS = PARAMETERS[:1]
+_PARALLEL = 1e-12  # sine of an angle between axes, below which a common normal has no direction
+_UR_LINKS = ("shoulder", "upper_arm", "forearm", "wrist_1", "wrist_2", "wrist_3")
+_UR_ALPHA = np.deg2rad([90.0, 0.0, 0.0, 90.0, -90.0, 0.0])
+
+
+@dataclass(frozen=True)
+class Controller:
+    """What a controller takes.
+
+    ``takes``: the DH parameters it can be given; ``arm``: their numbers for a fitted model of a
+    robot; ``group``: what these are called; ``frame``: the numbers of a frame. ``text``: lines to
+    paste, of all numbers by group, in a file of the name's ``ending`` where there is one. ``enter``
+    and ``remark``: where the numbers belong, and what cannot be written.
+    """
+
+    name: str
+    takes: Sequence[str]
+    group: str
+    arm: Callable[[Robot, DHModel], Numbers]
+    frame: Callable[[Pose], Numbers]
+    enter: str
+    remark: str = ""
+    text: Callable[[dict[str, Numbers]], str] = lambda numbers: ""
+    ending: str = ""
+
+
+def _zeros(names: Sequence[str]) -> Callable[[Robot, DHModel], Numbers]:
+    """Angles (deg) of reported joints at which the axes stand when the pendant shows 0."""
+
+    def numbers(robot: Robot, model: DHModel) -> Numbers:
+        shift = model.theta_offset_rad - robot.dh.theta_offset_rad
+        angles = np.rad2deg(reported_joints(robot, shift))
+        return {name: (float(x), "deg") for name, x in zip(names, angles, strict=False)}
+
+    return numbers
+
+
+def _frame(
+    names: str, turn: Callable[[np.ndarray], np.ndarray], unit: str, length: str = "mm"
+) -> Callable[[Pose], Numbers]:
+    def numbers(pose: Pose) -> Numbers:
+        position = pose.position_mm * (1e-3 if length == "m" else 1.0)
+        units = [length] * 3 + [unit] * 4
+        values = [*position, *turn(pose.rotation)]
+        return dict(zip(names.split(), zip(values, units, strict=False), strict=True))
+
+    return numbers
+
+
+def _zyx(rotation: np.ndarray) -> np.ndarray:
+    return np.rad2deg(rpy(rotation))[::-1]
+
+
+def _fixed_xyz(rotation: np.ndarray) -> np.ndarray:
+    return np.rad2deg(rpy(rotation))
+
+
+def _moving_xyz(rotation: np.ndarray) -> np.ndarray:
+    return -np.rad2deg(rpy(rotation.T))
+
+
+def _quaternion(rotation: np.ndarray) -> np.ndarray:
+    return Rotation.from_matrix(rotation).as_quat(canonical=True, scalar_first=True)
+
+
+def _rotation_vector(rotation: np.ndarray) -> np.ndarray:
+    return Rotation.from_matrix(rotation).as_rotvec()
+
+
+def require_plain_joints(robot: Robot, name: str) -> None:
+    """InputError where reported joints are not those of the DH table."""
+    if not np.array_equal(robot.joint_map, np.eye(robot.dh.joints)):
+        what = f"reports joints with signs or couplings; {name} counts joints as its DH table does"
+        raise InputError(Problem(f"robot {robot.name}", what, fix="use --format urdf"))
+
+
+def _staubli(robot: Robot, model: DHModel) -> Numbers:
+    """Offsets of theta, d, a, b, alpha, beta, joint by joint."""
+    require_plain_joints(robot, "Staubli")
+    numbers: Numbers = {}
+    for joint in range(model.joints):
+        for name in PARAMETERS:
+            shift = getattr(model, name)[joint] - getattr(robot.dh, name)[joint]
+            stem, unit = name.replace("_offset", "").split("_")
+            if stem == "alpha":
+                numbers[f"b[{joint + 1}]"] = (0.0, "mm")
+            value = np.rad2deg(shift) if unit == "rad" else shift
+            numbers[f"{stem}[{joint + 1}]"] = (float(value), "deg" if unit == "rad" else "mm")
+    return numbers
+
+
+def _ur(robot: Robot, model: DHModel) -> Numbers:
+    """Deltas of a, d, alpha and theta: common normals of the fitted axes, however far they lie."""
+    require_plain_joints(robot, "UR")
+    nominal = robot.dh
+    if model.joints != len(_UR_ALPHA) or np.abs(nominal.alpha_rad - _UR_ALPHA).max() > 1e-3:
+        what = "has no DH table of UR arms (alpha 90, 0, 0, 90, -90, 0 deg)"
+        raise InputError(
+            Problem(f"robot {robot.name}", what, fix="use the table that UR publishes")
+        )
+    frames = dh.chain(model, np.zeros((1, model.joints)))
+    axes = Axes(frames.position_mm[0, :-1], frames.rotation[0, :-1, :, 2])
+    end = Pose(frames.rotation[0, -1], frames.position_mm[0, -1])
+    _, standard, _ = chain_of(axes, end, nominal.prismatic, _PARALLEL)
+    turns = standard.theta_offset_rad - nominal.theta_offset_rad
+    columns = {
+        "delta_theta": ((turns + np.pi) % (2.0 * np.pi) - np.pi, "rad"),
+        "delta_a": (1e-3 * (standard.a_mm - nominal.a_mm), "m"),
+        "delta_d": (1e-3 * (standard.d_mm - nominal.d_mm), "m"),
+        "delta_alpha": (standard.alpha_rad - nominal.alpha_rad, "rad"),
+    }
+    return {
+        f"{name}[{joint + 1}]": (float(values[joint]), unit)
+        for name, (values, unit) in columns.items()
+        for joint in range(model.joints)
+    }
+
+
+def _ros(robot: Robot, model: DHModel) -> Numbers:
+    """Origins of the joints, each in the link before it, d in front of the joint as UR has it."""
+    require_plain_joints(robot, "ROS")
+    names = _UR_LINKS if model.joints == len(_UR_LINKS) else robot.joint_names
+    numbers, before = {}, Pose(np.eye(3), np.zeros(3))
+    for joint, name in enumerate(names):
+        along = np.array([0.0, 0.0, model.d_mm[joint]])
+        origin = compose(before, Pose(rotation_z(model.theta_offset_rad[joint]), along))
+        for key, value in _ros_frame(origin).items():
+            numbers[f"{name.replace(' ', '_')} {key}"] = value
+        tilt = rotation_x(model.alpha_rad[joint]) @ rotation_y(model.beta_rad[joint])
+        before = Pose(tilt, np.array([model.a_mm[joint], 0.0, 0.0]))
+    return numbers
+
+
+_ros_frame = _frame("x y z roll pitch yaw", rpy, "rad", "m")
+
+
+def _list(numbers: Numbers, digits: str = ".6f") -> str:
+    return ", ".join(f"{value:{digits}}" for value, _ in numbers.values())
+
+
+def _kuka_text(numbers: dict[str, Numbers]) -> str:
+    lines, counts = [], {"TOOL": 0, "BASE": 0}
+    for group, frame in numbers.items():
+        kind = group.split()[0]
+        if kind not in counts:
+            for number, (value, _) in enumerate(frame.values(), 1):
+                lines.append(f"; $MAMES[{number}]: present value {value:+.6f}")
+            continue
+        counts[kind] += 1
+        inside = ",".join(f"{name} {value:.6f}" for name, (value, _) in frame.items())
+        lines.append(f"{kind}_DATA[{counts[kind]}]={{{inside}}}")
+    return "\n".join(lines)
+
+
+def _abb_text(numbers: dict[str, Numbers]) -> str:
+    lines = []
+    for group, frame in numbers.items():
+        kind, _, name = group.partition(" ")
+        if kind in ("TOOL", "BASE"):
+            data = f"t_{name}.tframe" if kind == "TOOL" else f"w_{name or 'base'}.uframe"
+            values = _list(frame, ".9g").split(", ")
+            lines.append(f"{data} := [[{', '.join(values[:3])}], [{', '.join(values[3:])}]];")
+    return "\n".join(lines)
+
+
+def _ur_text(numbers: dict[str, Numbers]) -> str:
+    lines, deltas = ["[mounting]"], numbers["DH deltas"]
+    for name in ("delta_theta", "delta_a", "delta_d", "delta_alpha"):
+        of_name = {key: x for key, x in deltas.items() if key.startswith(f"{name}[")}
+        lines.append(f"{name} = [ {_list(of_name, '.17g')}]")
+    return "\n".join(lines)
+
+
+def _staubli_text(numbers: dict[str, Numbers]) -> str:
+    rows: dict[str, list[str]] = {}
+    for key, (value, _) in numbers["DH offsets"].items():
+        name, joint = key.rstrip("]").split("[")
+        rows.setdefault(joint, []).append(f'{name}="{value:.9f}"')
+    lines = [f'  <DH index="{int(i) - 1}" {" ".join(each)} />' for i, each in rows.items()]
+    return "\n".join(['<DhArray name="dhOffset">', *lines, "</DhArray>"])
+
+
+def _ros_text(numbers: dict[str, Numbers]) -> str:
+    lines, links = ["kinematics:"], dict[str, list[str]]()
+    for key, (value, _) in numbers["joint origins"].items():
+        link, name = key.split()
+        links.setdefault(link, []).append(f"    {name}: {value:.17g}")
+    for link, rows in links.items():
+        lines += [f"  {link}:", *rows]
+    return "\n".join([*lines, "  hash: calib_kinacc"])
+
+
+CONTROLLERS = {
+    "kuka": Controller(
+        "KUKA",
+        ZEROS,
+        "joint zeros",
+        _zeros([f"A{i}" for i in range(1, 8)]),
+        _frame("X Y Z A B C", _zyx, "deg"),
+        "Joint zeros: add to $MAMES of each axis in the machine data, or drive every axis to minus "
+        "the value and master it there as 0. TOOL and BASE: Start-up, Calibrate, Numeric input.",
+        text=_kuka_text,
+    ),
+    "abb": Controller(
+        "ABB",
+        ZEROS,
+        "joint zeros",
+        _zeros([f"axis {i}" for i in range(1, 8)]),
+        _frame("x y z q1 q2 q3 q4", _quaternion, ""),
+        "Joint zeros: jog every axis to minus the value, then Calibration, Fine calibration. "
+        "TOOL: tframe of the tooldata; BASE: uframe of the wobjdata (robhold FALSE).",
+        "Absolute Accuracy files (absacc, .cfg of CalibWare) cannot be written: their format is "
+        "ABB's own. Switch Absolute Accuracy off, or its errors are corrected twice.",
+        _abb_text,
+    ),
+    "fanuc": Controller(
+        "FANUC",
+        ZEROS,
+        "joint zeros",
+        _zeros([f"J{i}" for i in range(1, 8)]),
+        _frame("X Y Z W P R", _fixed_xyz, "deg"),
+        "Joint zeros: jog all joints to 0, then SINGLE AXIS MASTER with the value as MSTR POS. "
+        "TOOL: UTOOL, direct entry; BASE: UFRAME, direct entry.",
+    ),
+    "ur": Controller(
+        "Universal Robots",
+        PARAMETERS,
+        "DH deltas",
+        _ur,
+        _frame("x y z rx ry rz", _rotation_vector, "rad", "m"),
+        "DH deltas: section [mounting] of /root/.urcontrol/calibration.conf, its checksums kept; "
+        "present values are added to UR's nominal table. TOOL: set_tcp; BASE: a plane feature.",
+        "Large delta_d of joints 2 to 4 are usual: their axes are nearly parallel.",
+        _ur_text,
+        ".conf",
+    ),
+    "yaskawa": Controller(
+        "Yaskawa",
+        ZEROS,
+        "joint zeros",
+        _zeros("SLURBTE"),
+        _frame("X Y Z Rx Ry Rz", _fixed_xyz, "deg"),
+        "Joint zeros: jog every axis to minus the value, then ROBOT, HOME POSITION, register it. "
+        "TOOL: tool file; BASE: user frame, as coordinates in the robot frame.",
+    ),
+    "staubli": Controller(
+        "Staubli",
+        PARAMETERS,
+        "DH offsets",
+        _staubli,
+        _frame("x y z rx ry rz", _moving_xyz, "deg"),
+        "DH offsets: array dhOffset of /usr/configs/arm.cfx; they are added to the standard DH "
+        "table of the robot file. TOOL: trsf of the tool; BASE: trsf of the frame.",
+        text=_staubli_text,
+        ending=".cfx",
+    ),
+    "ros": Controller(
+        "ROS",
+        PARAMETERS,
+        "joint origins",
+        _ros,
+        _ros_frame,
+        "Joint origins: kinematics_params_file of ur_robot_driver or ur_description. TOOL: a fixed "
+        "joint from the last link; BASE: a fixed joint from the base.",
+        "Other arms: kinacc export --format urdf.",
+        _ros_text,
+        ".yaml",
+    ),
+}

@@ -1,0 +1,1 @@
+"""Simulated controllers, arms and programs of five makers; nothing here imports kinacc."""

@@ -1,0 +1,45 @@
+"""Simulated measurements of an arm: what a tracker writes, and where its tool truly is."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from oracles.controllers.arms import Arm, frame
+
+# The arm's base in the tracker's frame, and the measured target on the flange.
+BASE = frame(2600.0, -700.0, 350.0, Rotation.from_rotvec([0.2, -0.4, 1.9]))
+TOOL = frame(40.0, -25.0, 160.0, Rotation.from_rotvec([0.3, 0.2, -0.6]))
+NOISE_MM, NOISE_RAD = 0.03, 6e-5
+
+
+def seen(arm: Arm, shown: np.ndarray) -> np.ndarray:
+    """Where the target of the true arm is, in the tracker's frame, at joints shown (6,)."""
+    return BASE @ arm.pose(shown, true=True) @ TOOL
+
+
+def write(folder: Path, arm: Arm, name: str = "arm", poses: int = 90, folds: int = 5) -> Path:
+    """A robot file, a file of measured poses and a configuration; the configuration's path."""
+    rng = np.random.default_rng(11)
+    lines = [",".join([*(f"q{i}_deg" for i in range(1, 7)), "x_mm,y_mm,z_mm,qw,qx,qy,qz"])]
+    for shown in arm.draw(rng, poses):
+        there = seen(arm, shown)
+        turn = Rotation.from_rotvec(rng.normal(0.0, NOISE_RAD, 3))
+        turned = turn * Rotation.from_matrix(there[:3, :3])
+        place = there[:3, 3] + rng.normal(0.0, NOISE_MM, 3)
+        values = [*np.rad2deg(shown), *place, *turned.as_quat(scalar_first=True)]
+        lines.append(",".join(f"{value:.9f}" for value in values))
+    (folder / "robot.yaml").write_text(arm.description())
+    (folder / "poses.csv").write_text("\n".join(lines) + "\n")
+    config = folder / f"{name}.yaml"
+    config.write_text(
+        f"datasets: {{{name}: {{robot: '{folder / 'robot.yaml'}'}}}}\n"
+        f"measurements: {{source: file, folds: {folds}, file: {{path: '{folder / 'poses.csv'}',"
+        " orientation: {kind: quaternion}}}\n"
+        "calibration: {base_and_tool: estimated, vec: {order: 1},"
+        " dh: {fit_to: measurements, hayati_joints: auto}}\n"
+        "evaluation: {space: measured}\n"
+    )
+    return config
