@@ -2,23 +2,17 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
+import pandas as pd
 import pytest
 from simulated import POINT, POSE, THREE, disturbed, joints, measure
 
-from kinacc.calibration import blind_words, constraints, fitting, identified, tables, uncertainty
-from kinacc.calibration.frames import MOTIONS
+from kinacc.calibration import constraints, fitting, identifiability, identified, uncertainty
+from kinacc.calibration.frames import MOTIONS, known
+from kinacc.calibration.identifiability import LeftOpen
 from kinacc.config import parameter_rules
 from kinacc.geometry import Pose, compose, exp_so3
 from kinacc.kinematics import dh, robot
-
-
-class Said(NamedTuple):
-    name: str
-    status: str
-    statement: str
 
 
 def asked(name, kind=POSE, sessions=1, instead=False, rules=None, moving=None, poses=80):
@@ -31,57 +25,51 @@ def asked(name, kind=POSE, sessions=1, instead=False, rules=None, moving=None, p
         if joint + 1 not in moving:
             q[:, joint] = 0.3
     data = measure(disturbed(arm.dh, free, rng), q, kind, rng, sessions=sessions)
-    known = constraints.arm_terms(
+    terms = constraints.arm_terms(
         arm.dh, free, parameter_rules.rules(rules or {}, parameter_rules.JOINTS)[0]
     )
     fit = fitting.fit(
         data,
-        known.nominal,
-        free=known.free,
-        std=known.std,
+        terms.nominal,
+        free=terms.free,
+        std=terms.std,
         rotation_weight_mm_per_rad=500.0,
         threshold=1e-3,
     )
-    told = uncertainty.of_fit(fit, data.target_names)
-    return said_of(fit, told, data), fit, told
+    known = uncertainty.of_fit(fit, data.target_names)
+    return by_name(identified.table(fit, known, data)), fit
 
 
-def said_of(fit, told, data):
+def by_name(table):
     """Rows of ``dh_identified`` by parameter."""
-    left_open = identified.left_open(fit, told, data)
-    table = tables.identified_columns(identified.parameters(fit, told), left_open, told)
-    rows = zip(table["parameter"], table["status"], table["statement"], strict=True)
-    return {name: Said(name, status, statement or "") for name, status, statement in rows}
+    return pd.DataFrame(dict(table)).set_index("parameter")
 
 
-def test_what_every_serial_arm_hides_is_said_in_words():
-    found, _, _ = asked("mh180")
-    for name, words in {
-        "j1.theta_offset_rad": "theta of joint 1 cannot be told from a turn of the base about the "
-        "axis of joint 1",
-        "j1.d_mm": "d of joint 1 cannot be told from a shift of the base along the axis of joint 1",
-        "j6.a_mm": "a of joint 6 cannot be told from a shift of the tool along x of the last frame",
-        "j2.d_mm": "d of joint 2 and d of joint 3 appear only as their difference",
-        "j3.d_mm": "d of joint 2 and d of joint 3 appear only as their difference",
-    }.items():
-        assert (found[name].status, found[name].statement) == ("undetermined", words)
-    assert found["j4.d_mm"].status == "identified"
-    assert found["j4.d_mm"].statement == ""
-    assert "axis of joint 1" in found["base.z_mm"].statement
+def test_what_every_serial_arm_hides():
+    found, _ = asked("mh180")
+    expected = {
+        "j1.theta_offset_rad": "theta of joint 1 +1 mrad, base rz -1 mrad",
+        "j1.d_mm": "d of joint 1 +1 mm, base z -1 mm",
+        "j2.d_mm": "d of joint 2 +1 mm, d of joint 3 +1 mm",
+        "j3.d_mm": "d of joint 2 +1 mm, d of joint 3 +1 mm",
+    }
+    for name, parts in expected.items():
+        assert found.status[name] == "undetermined"
+        assert found.statement[name] == f"{parts}: no pose separates these"
+    assert found.status["j4.d_mm"] == "identified"
+    assert pd.isna(found.statement["j4.d_mm"])
 
 
 @pytest.mark.parametrize(("kind", "sessions"), [(POINT, 1), (THREE, 2), (POSE, 2)])
 def test_three_parallel_axes_show_one_sum(kind, sessions):
-    found, _, _ = asked("ur10", kind, sessions)
+    found, _ = asked("ur10", kind, sessions)
     for joint in (2, 3, 4):
-        words = "d of joint 2, d of joint 3 and d of joint 4 appear only as their sum"
-        assert found[f"j{joint}.d_mm"].statement == words
-    base = "every base" if sessions == 2 else "the base"
-    assert base in found["j1.d_mm"].statement
+        assert "d of joint" in found.statement[f"j{joint}.d_mm"]
+    assert ("base2 z" in found.statement["j1.d_mm"]) == (sessions == 2)
 
 
 def test_a_wrist_that_always_points_one_way_leaves_base_and_tool_open():
-    """Seen on a measured arm: the tool's length and the base's place go together."""
+    """Observed on a measured arm: the tool's length and the base's place go together."""
     arm, rng = robot.load("ur10"), np.random.default_rng(1)
     q = np.zeros((80, 6))
     q[:, 1:3] = rng.uniform([-1.5, 0.5], [-0.5, 1.5], (80, 2))
@@ -92,41 +80,30 @@ def test_a_wrist_that_always_points_one_way_leaves_base_and_tool_open():
     free = constraints.free_parameters(6, (2, 3))
     data = measure(disturbed(arm.dh, free, rng), q, POSE, rng)
     fit = fitting.fit(data, arm.dh, free=free, rotation_weight_mm_per_rad=500.0, threshold=1e-3)
-    told = uncertainty.of_fit(fit, data.target_names)
-    left_open = identified.left_open(fit, told, data)
-    said = blind_words.sentences(left_open)
-    weak = (
-        "a shift of the base along y of the robot's base cannot be told from a shift of the tool "
-        "along z of the last frame (these poses show it too little, others may)"
-    )
-    assert weak in said
-    parameters = identified.parameters(fit, told)
-    table = tables.identified_columns(parameters, left_open, told)
-    assert weak in blind_words.listed(table)
-    assert set(blind_words.listed(table)) <= set(said)
-    found = {each.name: each for each in parameters}
-    assert found["t0.z_mm"].status == "undetermined"
-    place = told.names.index("t0.z_mm")
-    assert {each.structural for each in left_open.groups if each.members[place]} == {True, False}
+    known = uncertainty.of_fit(fit, data.target_names)
+    table = identified.table(fit, known, data)
+    listed = identifiability.listed(table)
+    assert any(text.startswith("base y") for text in identifiability.weak(listed))
+    assert set(listed) <= set(identified.left_open(fit, known, data).sentences)
+    assert by_name(table).status["t0.z_mm"] == "undetermined"
+    place = known.names.index("t0.z_mm")
+    left_open = identified.left_open(fit, known, data)
+    assert set(left_open.structural[left_open.members[:, place]]) == {True, False}
 
 
 @pytest.mark.parametrize("name", ["mh180", "iiwa14", "meca500"])
 def test_every_undetermined_parameter_has_a_statement_and_no_other(name):
-    found, fit, _ = asked(name, THREE)
-    for each in found.values():
-        assert bool(each.statement) == (each.status != "identified"), each
-    names = fit.model.names
-    for place, parameter in enumerate(names):
-        std = fit.std.ravel()[place]
-        assert np.isnan(std) == (found[parameter].status in ("undetermined", "fixed"))
+    found, fit = asked(name, THREE)
+    assert (found.statement.notna() == (found.status != "identified")).all()
+    undetermined = found.status[list(fit.model.names)].isin(["undetermined", "fixed"])
+    np.testing.assert_array_equal(np.isnan(fit.std.ravel()), undetermined)
 
 
 def test_a_prior_is_named_and_settles_what_hung_on_it():
-    rules = {"joint 2 d": {"prior_std_mm": 0.5}}
-    found, _, _ = asked("mh180", rules=rules)
-    assert found["j2.d_mm"].statement == "known beforehand to 0.5 mm"
-    assert found["j2.d_mm"].status == "prior"
-    assert found["j3.d_mm"].status == "identified"
+    found, _ = asked("mh180", rules={"joint 2 d": {"prior_std_mm": 0.5}})
+    assert found.statement["j2.d_mm"] == "known beforehand to 0.5 mm"
+    assert found.status["j2.d_mm"] == "prior"
+    assert found.status["j3.d_mm"] == "identified"
 
 
 @pytest.mark.parametrize("kind", [POSE, POINT])
@@ -137,8 +114,8 @@ def test_directions_in_words_move_no_pose_anywhere(kind):
     data = measure(disturbed(arm.dh, free, rng), joints(arm, 80, rng), kind, rng)
     fit = fitting.fit(data, arm.dh, free=free, rotation_weight_mm_per_rad=500.0, threshold=1e-3)
     told = uncertainty.of_fit(fit, data.target_names)
-    groups = identified.left_open(fit, told, data).groups
-    directions = np.concatenate([each.directions for each in groups if each.structural])
+    left_open = identified.left_open(fit, told, data)
+    directions = left_open.directions[left_open.structural]
     assert len(directions) == 8
     arm_part = directions[:, len(told.names) - int(free.sum()) :]
     step = np.where(np.tile([1, 0, 0, 1, 1], 6)[free.ravel()], 1e-3, 1.0) * 1e-3
@@ -161,3 +138,26 @@ def test_directions_in_words_move_no_pose_anywhere(kind):
         tool = moved("t0", fit.frames.tool, direction)
         after = compose(base, compose(dh.forward(model, q), tool))
         assert np.abs(after.position_mm - before.position_mm).max() < 2e-6
+
+
+OF_ARM = ("base.z_mm", "base.rz_rad", "j1.d_mm", "j1.a_mm", "j2.d_mm", "j3.d_mm", "j3.a_mm")
+STRUCTURAL = np.array(
+    [[1, 0, -1, 0, 0, 0, 0], [0, 1, 0, -1, 0, 0, 0], [0, 0, 0, 0, 1, -1, 0]], dtype=float
+)
+WEAK = np.array([[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]])
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_directions_do_not_depend_on_the_basis_of_their_space(seed):
+    rng = np.random.default_rng(seed)
+
+    def rotated(rows):
+        return np.linalg.qr(rng.normal(size=(len(rows), len(rows))))[0] @ rows
+
+    lost = rotated(np.concatenate([STRUCTURAL, WEAK]) / np.sqrt(2.0))
+    found = LeftOpen.of(rotated(STRUCTURAL), lost, OF_ARM, known())
+    parts = {tuple(np.flatnonzero(np.abs(row) > 1e-9)) for row in found.directions}
+    assert parts == {(0, 2), (1, 3), (4, 5), (6,)}
+    assert found.structural.tolist() == [True, True, True, False]
+    np.testing.assert_allclose(np.abs(found.directions).max(axis=1), 1.0)
+    assert not len(LeftOpen.of(np.zeros((0, 7)), np.zeros((0, 7)), OF_ARM, known()).directions)

@@ -102,8 +102,9 @@ def test_a_stated_length_of_the_tool_holds_every_model(std_mm):
         known = uncertainty.of_fit(fit, ("t0",))
         left_open = known.undetermined[:, known.names.index("t0.z_mm")]
         assert np.abs(left_open).max(initial=0.0) < 0.1, kind
-    told = identified.parameters(found["dh"], uncertainty.of_fit(found["dh"], ("t0",)))
-    assert {each.name: each.status for each in told}["t0.z_mm"] == "prior"
+    known = uncertainty.of_fit(found["dh"], ("t0",))
+    table = identified.table(found["dh"], known, pointing_one_way())
+    assert dict(zip(table["parameter"], table["status"], strict=True))["t0.z_mm"] == "prior"
 
 
 def test_a_fixed_length_of_the_tool_holds_every_model():

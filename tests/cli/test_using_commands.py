@@ -182,7 +182,7 @@ def test_plan_poses_writes_joints_a_controller_can_read(tmp_path):
     done = call("plan-poses", "ur10", "--poses", "12", "--drawn", "120", "--hayati", "2,3",
                 "-o", out, "--picture", picture)  # fmt: skip
     assert done.exit_code == 0, done.output
-    assert "  - theta of joint 1 cannot be told from a turn of the base" in done.output
+    assert "  - theta of joint 1 +1 mrad, base rz -1 mrad" in done.output
     rows = list(csv.DictReader(out.open()))
     assert [row["order"] for row in rows] == [str(i) for i in range(1, 13)]
     assert len({row["candidate"] for row in rows}) == 12

@@ -4,11 +4,11 @@ import numpy as np
 from made_up_results import covariance, everything, identified, robot, table, words
 from parsed import read
 
-from kinacc.calibration.blind_words import WEAK
+from kinacc.calibration.identifiability import POORLY_DETERMINED as WEAK
 from kinacc.report import fit_sections
 
-ALWAYS = "theta of joint 1 cannot be told from a turn of the base about the axis of joint 1"
-SOMETIMES = f"tool z changes no measured pose {WEAK}"
+ALWAYS = "theta of joint 1 +1 mrad, base rz -1 mrad: no pose separates these"
+SOMETIMES = f"tool z +1 mm{WEAK}"
 FIT = {
     "quantity": np.array(["rank", "rank_threshold", *["singular_value"] * 3], dtype=object),
     "value": np.array([2.0, 0.01, 40.0, 10.0, 0.02]),
@@ -33,7 +33,7 @@ def test_what_other_poses_would_show_stands_first_with_what_settles_it():
     )
     found = section(dh_identified=told)
     first, second = table(found, "What cannot be told apart").rows
-    assert first[0] == "tool z changes no measured pose"
+    assert first[0] == "tool z +1 mm"
     assert "kinacc plan-poses" in first[1]
     assert second == (ALWAYS, "no pose of such an arm does: no fault")
     assert "3 undetermined" in read(found).population

@@ -118,11 +118,9 @@ class DHEstimator(Estimator):
         self, fitted: ModelFit, known: Uncertainty, observations: Observations
     ) -> dict[str, Columns]:
         """How the fit went, and which parameters the observations determine."""
-        told = identified.parameters(fitted, known)
-        left_open = identified.left_open(fitted, known, observations)
         return {
             "dh_fit": tables.fit_columns("dh_fit", fitted, known),
-            "dh_identified": tables.identified_columns(told, left_open, known),
+            "dh_identified": identified.table(fitted, known, observations),
         }
 
 

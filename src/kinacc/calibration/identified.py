@@ -2,72 +2,78 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import compress
 
 import numpy as np
 
-from kinacc.calibration.blind_groups import LeftOpen, groups, of_arm
 from kinacc.calibration.fitting import ModelFit, flange_model
+from kinacc.calibration.identifiability import (
+    FIXED,
+    IDENTIFIED,
+    PRIOR,
+    UNDETERMINED,
+    LeftOpen,
+    statements,
+)
 from kinacc.calibration.observations import Observations, full_poses
 from kinacc.calibration.one_thread import one_thread
 from kinacc.calibration.solve import MOVES_SQUARED, TOUCH_SQUARED, undetermined
 from kinacc.calibration.system import PoseSystem
-from kinacc.calibration.uncertainty import Uncertainty, named_directions
+from kinacc.calibration.uncertainty import Uncertainty, is_angle, named_directions, unit_of
 from kinacc.geometry import Pose, compose
 from kinacc.kinematics.dh import DHModel
 from kinacc.kinematics.model import JointState
+from kinacc.tables.columns import Columns
+from kinacc.tables.contract import columns_of
 
-IDENTIFIED, PRIOR, UNDETERMINED, FIXED = "identified", "prior", "undetermined", "fixed"
 LEANS = 0.5  # share of its prior above which a standard deviation is that of the prior
 STRUCTURAL = 1e-5  # share of the largest singular value over poses all over the joints
 UNSEEN_POSES = 60
 UNSEEN_WEIGHT = 500.0  # mm per rad; what is null is so by any weight
 
 
-@dataclass(frozen=True)
-class Parameter:
-    """What is known of one parameter.
-
-    ``share``: length of its part in the undetermined directions of unit length (mm and mrad), 0
-    where it takes part in none. ``prior_std``: to how much it was known beforehand, mm or rad,
-    where that is what determines it.
-    """
-
-    name: str
-    status: str
-    share: float = 0.0
-    prior_std: float | None = None
-
-
-def parameters(fit: ModelFit, known: Uncertainty) -> list[Parameter]:
-    """Every parameter of a DH fit, frames first.
+def table(fit: ModelFit, known: Uncertainty, observations: Observations) -> Columns:
+    """``dh_identified``: status of every parameter of a DH fit, frames first, and why.
 
     Undetermined are those of which directions below the truncation's share of the largest singular
-    value (base and targets projected out) hold more than 1 % (``truncated.TOUCH_SQUARED``), or half
-    of them where it has a prior (``truncated.MOVES_SQUARED``).
+    value (base and targets projected out) hold more than 1 % (``solve.TOUCH_SQUARED``), or a
+    quarter where a prior determines it (``solve.MOVES_SQUARED``).
+
+    Parameters
+    ----------
+    fit : ModelFit
+        A fit of a DH model.
+    known : Uncertainty
+        Its uncertainty.
+    observations : Observations
+        What was fitted.
     """
-    priors, fixed = _priors(fit), _fixed(fit)
-    std = dict(zip(known.names, np.sqrt(np.maximum(np.diag(known.covariance), 0.0)), strict=True))
-    found = []
-    for name, share in zip(
-        known.names, np.sqrt(np.sum(known.undetermined**2, axis=0)), strict=True
-    ):
-        status = FIXED if name in fixed else IDENTIFIED
-        status = PRIOR if name in priors and std[name] > LEANS * priors[name] else status
-        most = MOVES_SQUARED if status == PRIOR else TOUCH_SQUARED
-        status = UNDETERMINED if share**2 > most else status
-        prior = priors[name] if status == PRIOR else None
-        found.append(Parameter(name, status, float(share), prior))
-    free = zip(fit.model.names, fit.free.ravel(), strict=True)
-    return found + [Parameter(name, FIXED) for name, is_free in free if not is_free]
+    free = fit.free.ravel()
+    prior = np.concatenate([fit.parameters.std, fit.prior_std.ravel()[free]])
+    estimated = np.concatenate([fit.parameters.free, free[free]])
+    std = np.sqrt(np.maximum(np.diag(known.covariance), 0.0))
+    part = np.linalg.norm(known.undetermined, axis=0)
+    why, rows = statements(left_open(fit, known, observations)), []
+    for i, name in enumerate(known.names):
+        status = IDENTIFIED if estimated[i] else FIXED
+        statement = None if estimated[i] else "fixed by calibration.frames"
+        if np.isfinite(prior[i]) and std[i] > LEANS * prior[i]:
+            size, unit = (1e3, "mrad") if is_angle(name) else (1.0, "mm")
+            status, statement = PRIOR, f"known beforehand to {size * prior[i]:g} {unit}"
+        if part[i] ** 2 > (MOVES_SQUARED if status == PRIOR else TOUCH_SQUARED):
+            status, statement = UNDETERMINED, why.get(name)
+        deviation = std[i] if status in (IDENTIFIED, PRIOR) else None
+        rows.append((name, status, deviation, unit_of(name), float(part[i]), statement))
+    fixed = compress(fit.model.names, ~free)
+    rows += [(name, FIXED, None, unit_of(name), 0.0, "not fitted") for name in fixed]
+    return columns_of("dh_identified", rows)
 
 
 def left_open(fit: ModelFit, known: Uncertainty, seen: Observations) -> LeftOpen:
     """What the data cannot tell apart. ``seen``: what was fitted."""
     hidden = named_directions(fit, seen.target_names, unseen_anywhere(fit, seen, STRUCTURAL))
-    found = groups(hidden, known.undetermined, of_arm(known.names))
-    return LeftOpen(found, known.names, fit.frames)
+    return LeftOpen.of(hidden, known.undetermined, known.names, fit.frames)
 
 
 @one_thread
@@ -115,15 +121,3 @@ def joints_anywhere(model: DHModel) -> np.ndarray:
     """Joints (n, k) of all kinds, beyond any limits: a whole turn each, or a metre either way."""
     reach = np.where(model.prismatic, 1e3, np.pi)
     return np.random.default_rng(0).uniform(-reach, reach, (UNSEEN_POSES, model.joints))
-
-
-def _priors(fit: ModelFit) -> dict[str, float]:
-    """Standard deviations of the priors by parameter, mm and rad."""
-    names = (*fit.parameters.names, *fit.model.names)
-    std = np.concatenate([fit.parameters.std, fit.prior_std.ravel()])
-    return {name: float(each) for name, each in zip(names, std, strict=True) if np.isfinite(each)}
-
-
-def _fixed(fit: ModelFit) -> set[str]:
-    """Components of frames that were not estimated."""
-    return set(compress(fit.parameters.names, ~fit.parameters.free))

@@ -6,14 +6,11 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
-from kinacc.calibration.blind_groups import LeftOpen
-from kinacc.calibration.blind_words import reasons
 from kinacc.calibration.evidence import Choice
 from kinacc.calibration.fitting import ModelFit
 from kinacc.calibration.frames import Frames, stacked
-from kinacc.calibration.identified import IDENTIFIED, PRIOR, Parameter
 from kinacc.calibration.solve import Solution, Spectrum
-from kinacc.calibration.uncertainty import Uncertainty, scaled_unit, unit_of
+from kinacc.calibration.uncertainty import Uncertainty, scaled_unit
 from kinacc.calibration.vec_fit import Prior
 from kinacc.geometry import quaternion_from_rotation
 from kinacc.kinematics.tables import frame
@@ -115,19 +112,6 @@ def fit_columns(name: str, fit: ModelFit, uncertainty: Uncertainty) -> Columns:
             ("rows_without_weight", None, None, int(np.sum(fit.weights.row == 0.0)), "1"),
         ]
     return columns_of(name, [*rows, *_undetermined_rows(uncertainty)])
-
-
-def identified_columns(
-    found: Sequence[Parameter], open_: LeftOpen, uncertainty: Uncertainty
-) -> Columns:
-    """``dh_identified``: status of every parameter, and in words why it is not identified."""
-    variance = dict(zip(uncertainty.names, np.diag(uncertainty.covariance), strict=True))
-    known = {IDENTIFIED, PRIOR}
-    rows = []
-    for each, why in zip(found, reasons(found, open_), strict=True):
-        std = np.sqrt(max(variance[each.name], 0.0)) if each.status in known else None
-        rows.append((each.name, each.status, std, unit_of(each.name), each.share, why))
-    return columns_of("dh_identified", rows)
 
 
 def covariance_columns(uncertainty: Uncertainty) -> Columns:

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinacc.calibration.blind_words import sentences
 from kinacc.cli import rows
 from kinacc.cli.file_options import joint_answers
 from kinacc.cli.plan_poses import MOST_CANDIDATES
@@ -101,7 +100,7 @@ def as_sheet(asked: PoseTask, plan: PosePlan) -> Sheet:
         "candidates": len(asked.joints),
         "parameters": len(plan.information.names),
         "determined_directions": plan.information.rank,
-        "undetermined": list(sentences(plan.information.left_open)),
+        "undetermined": list(plan.information.left_open.sentences),
         "travel_metric": TRAVEL,
         "travel_deg": float(np.rad2deg(plan.moves_rad.sum())),
         "travel_unordered_deg": float(np.rad2deg(plan.candidate_travel_rad)),
@@ -126,11 +125,11 @@ def in_words(plan: PosePlan) -> str:
         f"O1 = {plan.index[-1]:.4g} after {plan.swaps} swaps ({INDEX})",
         f"{shown.rank} of {len(shown.names)} parameter directions are determined; the candidates "
         "leave open:",
-        *(f"  - {words}" for words in sentences(shown.left_open)),
+        *(f"  - {line}" for line in shown.left_open.sentences),
         f"travel {np.rad2deg(plan.moves_rad.sum()):.0f} deg, "
         f"{np.rad2deg(plan.candidate_travel_rad):.0f} deg in the candidates' order ({TRAVEL})",
     ]
-    if not shown.left_open.groups:
+    if not len(shown.left_open.directions):
         lines[1] = f"all {shown.rank} parameters are determined"
     return "\n".join(lines)
 

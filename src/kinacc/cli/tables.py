@@ -147,11 +147,11 @@ def say_unlike(unlike: np.ndarray, calibration: Calibration) -> None:
 
     What the measured poses left open is said with it: elsewhere it shows.
     """
-    from kinacc.calibration import blind_words
+    from kinacc.calibration import identifiability
 
     if not unlike.any():
         return
-    told = blind_words.weak(calibration.left_open or ())
+    told = identifiability.weak(calibration.left_open or ())
     click.echo(
         f"warning: {int(unlike.sum())} of {len(unlike)} poses lie where the calibration was not "
         "measured: status says why; errors there may be larger than those held out"

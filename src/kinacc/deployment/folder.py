@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from kinacc.calibration import blind_words
+from kinacc.calibration import identifiability
 from kinacc.calibration.misfit import Misfit, misfit
 from kinacc.calibration.noise import UNKNOWN
 from kinacc.calibration.observations import from_columns
@@ -139,7 +139,7 @@ def calibration(
         base=bases[1],
         base_name="base" if number == 0 else f"base{number + 1}",
         anchor=calibration(tables, robot, PLAINEST, name, session) if anchored else None,
-        left_open=None if told is None else tuple(blind_words.listed(told)),
+        left_open=None if told is None else tuple(identifiability.listed(told)),
         targets={
             each: model_tables.frame(frames, choice, each) for each in targets_of(frames, choice)
         },

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kinacc.calibration import frames
-from kinacc.calibration.blind_groups import LeftOpen, groups, of_arm
+from kinacc.calibration.identifiability import LeftOpen
 from kinacc.calibration.identified import STRUCTURAL, joints_anywhere
 from kinacc.calibration.uncertainty import Uncertainty
 from kinacc.deployment.predict import BLOCK, sensitivity
@@ -190,11 +190,13 @@ def information(robot: Robot, q_rad: np.ndarray, experiment: Experiment) -> Info
     rank = int(np.sum(values > experiment.threshold * values[0]))
     lost, known = right[rank:], frames.known(arm.base, experiment.tool)
     if not len(lost):
-        return Information(slopes @ right.T, names, values, rank, LeftOpen((), names, known))
+        return Information(
+            slopes @ right.T, names, values, rank, LeftOpen.of(lost, lost, names, known)
+        )
     anywhere = _slopes(arm, joints_anywhere(arm.robot.dh), experiment).reshape(-1, len(names))
     _, everywhere, axes = np.linalg.svd(anywhere)
     hidden = axes[int(np.sum(everywhere > STRUCTURAL * everywhere[0])) :]
-    left_open = LeftOpen(groups(hidden, lost, of_arm(names)), names, known)
+    left_open = LeftOpen.of(hidden, lost, names, known)
     return Information(slopes @ right[:rank].T, names, values, rank, left_open)
 
 

@@ -7,9 +7,17 @@ from collections.abc import Mapping
 import numpy as np
 import pandas as pd
 
-from kinacc.calibration import blind_words, noise, summary
-from kinacc.calibration.blind_words import parameter_name
-from kinacc.calibration.identified import FIXED, IDENTIFIED, PRIOR, UNDETERMINED
+from kinacc.calibration import noise, summary
+from kinacc.calibration.identifiability import (
+    FIXED,
+    IDENTIFIED,
+    POORLY_DETERMINED,
+    PRIOR,
+    UNDETERMINED,
+    listed,
+    parameter_name,
+    weak,
+)
 from kinacc.calibration.misfit import in_words, misfit, misfits
 from kinacc.calibration.model_comparison import STANDARD_ERRORS
 from kinacc.calibration.uncertainty import is_angle
@@ -155,8 +163,8 @@ def _excluded(tables: Tables) -> list[dict]:
 def identifiability(tables: Tables, robot: Robot) -> Part:
     """Parameters that the poses do not determine, and those known only together."""
     told = tables["dh_identified"]
-    listed = blind_words.listed(told)
-    weak = blind_words.weak(listed)
+    open_directions = listed(told)
+    weak_directions = weak(open_directions)
     status = list(told["status"])
     pairs = pd.DataFrame(dict(tables["dh_covariance"]))
     pairs = pairs[pairs["parameter"] != pairs["other"]].dropna(subset="correlation")
@@ -169,9 +177,11 @@ def identifiability(tables: Tables, robot: Robot) -> Part:
     values = {
         "parameters": len(status),
         "counts": {words: status.count(each) for each, words in _STATUSES.items()},
-        "weak": weak,
-        "always": [text for text in listed if not text.endswith(blind_words.WEAK)],
-        "spread_deg": summary.flange_spread_deg(tables["measurements"], robot) if weak else None,
+        "weak": weak_directions,
+        "always": [text for text in open_directions if not text.endswith(POORLY_DETERMINED)],
+        "spread_deg": summary.flange_spread_deg(tables["measurements"], robot)
+        if weak_directions
+        else None,
         "rank": _rank(tables.get("dh_fit")),
         "close": int((pairs["correlation"].abs() >= _CLOSE).sum()),
         "limit": _CLOSE,

@@ -13,7 +13,7 @@ import pandas as pd
 
 from kinacc.assess.conformity import UNDECIDED
 from kinacc.assess.statement import CANDIDATES, Statement
-from kinacc.calibration import blind_words, misfit
+from kinacc.calibration import identifiability, misfit
 from kinacc.calibration import summary as figures
 from kinacc.calibration.summary import Tolerance
 from kinacc.campaign import instrument, journal, of_calibration, tolerance, words
@@ -377,8 +377,8 @@ def summarise(
     sought = of_calibration.sought(name, tables, places)
     measurements, best = tables["measurements"], figures.selected(tables["model_selection"])
     fits = misfit.misfits(tables, arm)
-    listed = blind_words.listed(tables["dh_identified"])
-    weak = blind_words.weak(listed)
+    listed = identifiability.listed(tables["dh_identified"])
+    weak = identifiability.weak(listed)
     rows = np.asarray(measurements.get("row", [np.nan]), dtype=float)
     synthetic = not np.isfinite(rows).any()
     errors = tuple(_errors(tables["pose_errors"]))
@@ -400,7 +400,9 @@ def summarise(
         joint_ranges=tuple(_ranges(measurements, arm)),
         share_measured=_fact(tables, "like_measured"),
         flange_spread_deg=figures.flange_spread_deg(measurements, arm),
-        unidentifiable=tuple(each for each in listed if not each.endswith(blind_words.WEAK)),
+        unidentifiable=tuple(
+            text for text in listed if not text.endswith(identifiability.POORLY_DETERMINED)
+        ),
         poorly_determined=tuple(weak),
         checked="data_check" in tables,
         findings=tuple(_findings(tables.get("data_check"))),

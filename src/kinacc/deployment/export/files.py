@@ -8,7 +8,7 @@ from importlib import import_module
 from pathlib import Path
 from types import ModuleType
 
-from kinacc.calibration import blind_words
+from kinacc.calibration import identifiability
 from kinacc.config import names
 from kinacc.config.error_models import PLAINEST, model_name
 from kinacc.deployment import folder as results
@@ -71,7 +71,7 @@ def contents(
 def warning(folder: Path | str) -> str:
     """What the measured poses show too little of, in a line; empty where they show everything."""
     told = results.read_tables(folder).get(f"{PLAINEST}_identified")
-    weak = [] if told is None else blind_words.weak(blind_words.listed(told))
+    weak = [] if told is None else identifiability.weak(identifiability.listed(told))
     if not weak:
         return ""
     more = f" and {len(weak) - 1} more" if len(weak) > 1 else ""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from kinacc.calibration.identified import FIXED
+from kinacc.calibration.identifiability import FIXED
 from kinacc.calibration.misfit import in_words, misfit
 from kinacc.config.error_models import ERROR_MODELS, MEASURED, PLAINEST, Comparison, model_name
 from kinacc.deployment.export.source import Source

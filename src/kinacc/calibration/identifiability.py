@@ -1,0 +1,175 @@
+"""Directions of parameters that poses do not determine, each with few parameters, and in words."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy
+
+from kinacc.calibration.frames import BASE, MOTIONS, Frames
+from kinacc.calibration.uncertainty import is_angle
+from kinacc.kinematics.dh import PARAMETERS
+
+IDENTIFIED, PRIOR, UNDETERMINED, FIXED = "identified", "prior", "undetermined", "fixed"
+UNIDENTIFIABLE = ": no pose separates these"
+POORLY_DETERMINED = ": poorly determined by these poses"
+LEAST = 0.02  # of the largest part of a direction; smaller parts are not listed
+_RANK = 1e-6
+_SEPARATE = 0.5  # part of a unit direction beside the structural ones that is reported
+_MOST_NAMES, _MOST_SENTENCES = 6, 3
+_JOIN = "; "
+
+
+@dataclass(frozen=True)
+class LeftOpen:
+    """Directions (m, P) of the parameters ``names`` (P,) that poses do not determine.
+
+    Displacements in mm and mrad, the largest of each direction 1. ``structural`` (m,): no pose
+    separates these; the others are poorly determined by the measured poses alone. ``frames``: base
+    and targets.
+    """
+
+    directions: np.ndarray
+    structural: np.ndarray
+    names: tuple[str, ...]
+    frames: Frames
+
+    @classmethod
+    def of(
+        cls, hidden: np.ndarray, undetermined: np.ndarray, names: Sequence[str], frames: Frames
+    ) -> LeftOpen:
+        """Mix directions so that each has few parameters.
+
+        Parameters
+        ----------
+        hidden : numpy.ndarray
+            Directions that no pose shows, shape (h, P), in mm and mrad.
+        undetermined : numpy.ndarray
+            Directions that the measured poses do not determine, shape (u, P); ``hidden`` included.
+        names : sequence of str
+            Names of the P parameters.
+        frames : Frames
+            Base and targets of the fit.
+        """
+        arm = of_arm(names)
+        exact, shown = _apart(hidden, arm), _apart(undetermined, arm)
+        structural = [_sparse(rows, among) for rows, among in zip(exact, (~arm, arm), strict=True)]
+        weak = [
+            _sparse(_beside(rows, known, among), among)
+            for rows, known, among in zip(shown, exact, (~arm, arm), strict=True)
+        ]
+        directions = np.concatenate([*structural, *weak])
+        count = sum(map(len, structural))
+        return cls(directions, np.arange(len(directions)) < count, tuple(names), frames)
+
+    @property
+    def members(self) -> np.ndarray:
+        """True (m, P) for the parameters that take part in a direction."""
+        return np.abs(self.directions) >= LEAST
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """A line (m,) for each direction: base motions along the robot's own axes."""
+        lines, arm = [], of_arm(self.names)
+        for direction, structural in zip(self.directions, self.structural, strict=True):
+            turned = self._in_robot_axes(direction)
+            parts = sorted(np.flatnonzero(np.abs(turned) >= LEAST), key=lambda i: -abs(turned[i]))
+            first = sorted(parts[:_MOST_NAMES], key=lambda i: (not arm[i], i))
+            turned = turned * np.sign(turned[first[0]])
+            shown = [
+                f"{parameter_name(self.names[i])} {turned[i]:+.2g} "
+                f"{'mrad' if is_angle(self.names[i]) else 'mm'}"
+                for i in first
+            ]
+            more = [f"{len(parts) - _MOST_NAMES} more"] if len(parts) > _MOST_NAMES else []
+            ending = UNIDENTIFIABLE if structural else POORLY_DETERMINED
+            lines.append(", ".join(shown + more) + ending)
+        return tuple(lines)
+
+    def _in_robot_axes(self, direction: np.ndarray) -> np.ndarray:
+        turned = direction.copy()
+        for session, rotation in enumerate(self.frames.bases.rotation):
+            base = f"{BASE}{session + 1 if session else ''}"
+            for motions in (MOTIONS[:3], MOTIONS[3:]):
+                if (names := [f"{base}.{motion}" for motion in motions])[0] in self.names:
+                    place = [self.names.index(name) for name in names]
+                    turned[place] = rotation.T @ direction[place]
+        return turned
+
+
+def of_arm(names: Sequence[str]) -> np.ndarray:
+    """True (P,) for parameters of the arm; the others are motions of base and targets."""
+    return np.array([name.partition(".")[2] not in MOTIONS for name in names])
+
+
+def listed(table: Mapping[str, Sequence]) -> list[str]:
+    """Every sentence of a ``dh_identified`` table on undetermined directions, once."""
+    rows = zip(table["status"], table["statement"], strict=True)
+    cells = (str(cell) for status, cell in rows if status == UNDETERMINED and cell)
+    texts = dict.fromkeys(text for cell in cells for text in cell.split(_JOIN))
+    return [text for text in texts if not text.endswith(" more")]
+
+
+def weak(sentences: Iterable[str]) -> list[str]:
+    """Those of ``listed`` that other poses would determine, without saying so."""
+    return [
+        text.removesuffix(POORLY_DETERMINED)
+        for text in sentences
+        if text.endswith(POORLY_DETERMINED)
+    ]
+
+
+def statements(left_open: LeftOpen) -> dict[str, str]:
+    """What poses leave open of each parameter that takes part, for ``dh_identified``."""
+    lines, found = left_open.sentences, {}
+    for name, members in zip(left_open.names, left_open.members.T, strict=True):
+        texts = [lines[i] for i in np.flatnonzero(members)]
+        more = [f"{len(texts) - _MOST_SENTENCES} more"] if len(texts) > _MOST_SENTENCES else []
+        if texts:
+            found[name] = _JOIN.join(texts[:_MOST_SENTENCES] + more)
+    return found
+
+
+def parameter_name(name: str) -> str:
+    """A parameter in words, as ``calibration.frames`` names those of base and targets."""
+    where, _, parameter = name.rpartition(".")
+    short = parameter.partition("_")[0]
+    return f"{short} of joint {where[1:]}" if parameter in PARAMETERS else f"{where} {short}"
+
+
+def _apart(rows: np.ndarray, arm: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Directions of frames alone, and the others; together they span what ``rows`` span."""
+    moving = np.abs(rows[:, arm]).max(axis=1, initial=0.0) > 0.0
+    alone, others = rows[~moving], rows[moving]
+    if not len(others):
+        return alone, others
+    left, values, _ = np.linalg.svd(others[:, arm])
+    count = int(np.sum(values > _RANK * values[0]))
+    if count == len(others):
+        return alone, others
+    mixed = left.T @ others
+    return np.concatenate([alone, mixed[count:]]), mixed[:count]
+
+
+def _beside(rows: np.ndarray, exact: np.ndarray, among: np.ndarray) -> np.ndarray:
+    """Directions in the span of ``rows`` that ``exact`` do not explain, by parts ``among``."""
+    if not len(rows) or not len(exact):
+        return rows
+    _, values, right = np.linalg.svd(exact[:, among], full_matrices=False)
+    basis = right[values > _RANK * values[0]]
+    rows = rows / np.linalg.norm(rows[:, among], axis=1, keepdims=True)
+    part = rows[:, among]
+    left, values, _ = np.linalg.svd(part - part @ basis.T @ basis, full_matrices=False)
+    rest = left[:, values > _SEPARATE].T @ rows
+    return rest - rest[:, among] @ np.linalg.pinv(exact[:, among], rcond=_RANK) @ exact
+
+
+def _sparse(rows: np.ndarray, among: np.ndarray) -> np.ndarray:
+    """The same space by directions that share no pivot ``among`` (P,), to a largest part of 1."""
+    if not len(rows):
+        return rows
+    left, upper, _ = scipy.linalg.qr(rows[:, among], mode="economic", pivoting=True)
+    mixed = scipy.linalg.solve_triangular(upper[:, : len(rows)], left.T @ rows)
+    return mixed / np.abs(mixed).max(axis=1, keepdims=True)
