@@ -68,7 +68,6 @@ SLOW = (
     "deployment/test_poses_unlike_the_measured.py",
     "deployment/test_predict.py",
     "figures/test_figure_files.py",
-    "figures/test_figure_stages.py",
     "figures/test_figures.py",
     "kinematics/inverse/test_any_arm.py",
     "measurements/test_what_files_hold.py",

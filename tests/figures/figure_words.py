@@ -1,44 +1,44 @@
-"""The six figures drawn from plausible tables, and the words found in a figure."""
+"""The six figures drawn from the golden tables of the MH180, and the words found in a figure."""
 
 from __future__ import annotations
 
-import figure_tables as tables
+from importlib import import_module
+from pathlib import Path
+
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from kinacc.figures import fig1, fig2, fig3, fig4, iterations, save
-from kinacc.kinematics import robot
+from kinacc.config.schema import defaults
+from kinacc.figures import save
+from kinacc.tables import store
 
-CYLINDER = {
-    "inner_radius_mm": 1200.0,
-    "radial_span_mm": 900.0,
-    "bottom_mm": 0.0,
-    "height_mm": 500.0,
-    "angle_deg": [0.0, 60.0],
-}
+RESULTS = Path(__file__).parents[1] / "golden" / "results" / "mh180"
+NAMES = ("fig1", "fig2", "fig3", "fig4", "fig5", "fig6")
+ROLES = ("dh_model", "frames", "assessment_points", "study_summary", "histories", "accuracy_map")
 
 
-def figures(dataset: str | None = None) -> dict[str, Figure]:
-    """Draw each figure once."""
-    arm = robot.load("mh180").dh
+def golden() -> dict[str, dict]:
+    """The tables that figures are drawn of."""
+    return {name: store.read(RESULTS / f"{name}.parquet") for name in ROLES}
+
+
+def settings(dataset=None, source="synthetic", **evaluation) -> dict:
+    known = defaults()
     return {
-        "fig1": fig1.draw(dataset=dataset),
-        "fig2": fig2.draw(arm, tables.joint_angles(), cylinder=CYLINDER, dataset=dataset),
-        "fig3": fig3.draw(tables.accuracy_map(), dataset=dataset),
-        "fig4": fig4.draw(tables.study_summary(), dataset=dataset),
-        "fig5": iterations.draw(
-            tables.history(0.834, seed=0),
-            example="rejected",
-            true_accuracy_mm=tables.TRUE_MM,
-            dataset=dataset,
-        ),
-        "fig6": iterations.draw(
-            tables.history(1.023, seed=5, example="not_rejected"),
-            example="not_rejected",
-            true_accuracy_mm=tables.TRUE_MM,
-            dataset=dataset,
-        ),
+        "dataset": dataset,
+        "robot": "mh180",
+        "evaluation": known["evaluation"] | evaluation,
+        "measurements": known["measurements"] | {"source": source},
+    }
+
+
+def figures(dataset: str | None = None, **changed) -> dict[str, Figure]:
+    """Each figure as its stage draws it."""
+    tables = golden() | changed
+    return {
+        name: import_module(f"kinacc.figures.{name}").run(tables, settings(dataset))
+        for name in NAMES
     }
 
 
@@ -66,20 +66,16 @@ def said(figure: Figure) -> str:
     return "\n".join(text.get_text() for text in words(figure))
 
 
-def boxes(figure: Figure) -> list[tuple[str, np.ndarray]]:
-    """Return each text with its box (left, bottom, right, top) in points."""
-    scale = 72 / figure.dpi
-    return [(t.get_text(), t.get_window_extent().extents * scale) for t in words(figure)]
-
-
 def problems(figure: Figure, slack_pt: float = 1.0) -> list[str]:
     """Name the texts that leave the figure or run into one another."""
-    found, known = [], boxes(figure)
-    width, height = figure.get_size_inches() * 72
-    for index, (text, (x0, y0, x1, y1)) in enumerate(known):
-        if min(x0, y0) < -slack_pt or x1 > width + slack_pt or y1 > height + slack_pt:
+    scale, found = 72 / figure.dpi, []
+    known = [(t.get_text(), t.get_window_extent().extents * scale) for t in words(figure)]
+    inside = np.array([0.0, 0.0, *figure.get_size_inches() * 72])
+    for index, (text, box) in enumerate(known):
+        if np.any((box - inside) * [-1, -1, 1, 1] > slack_pt):
             found.append(f"{text!r} leaves the figure")
-        for other, (u0, v0, u1, v1) in known[index + 1 :]:
-            if min(x1, u1) - max(x0, u0) > slack_pt and min(y1, v1) - max(y0, v0) > slack_pt:
+        for other, beside in known[index + 1 :]:
+            low, high = np.maximum(box[:2], beside[:2]), np.minimum(box[2:], beside[2:])
+            if np.all(high - low > slack_pt):
                 found.append(f"{text!r} overlaps {other!r}")
     return found

@@ -39,7 +39,7 @@ def test_after_a_run_there_is_nothing_to_do_and_touching_files_changes_nothing(p
         ("src/kinacc/kinematics/dh.py", TABLES | SHOWN),
         ("src/kinacc/cli/group.py", set()),
         ("workflow/scripts/claims.py", {"claims", "report", "digests"}),
-        ("workflow/scripts/map_figure.py", {"map_figure", "digests"}),
+        ("workflow/scripts/figures.py", {"figures", "map_figure", "digests"}),
     ],
 )
 def test_an_edited_line_makes_anew_what_depends_on_it(project, file, made):

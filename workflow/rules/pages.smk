@@ -37,11 +37,11 @@ rule map_figure:
     conda:
         "../envs/kinacc.yaml"
     params:
-        **job("map_figure.py", shown=True),
+        **job("figures.py", shown=True),
     message:
         "{wildcards.dataset}: drawing Fig. 3"
     script:
-        "../scripts/map_figure.py"
+        "../scripts/figures.py"
 
 
 rule report:

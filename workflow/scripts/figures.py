@@ -1,14 +1,18 @@
-"""Draw Figs. 1, 2, 4, 5 and 6."""
+"""Draw the figures that the outputs of the rule name, each by the module of its name."""
 
-from kinacc.figures import fig1, fig2, fig4, fig5, fig6, save
+from importlib import import_module
+
+from kinacc.figures import save
 from kinacc.workflow.script import stage
 
 with stage(snakemake) as job:
     settings = {**job.settings, "dataset": job.dataset}
+    formats = {}
+    for name, kind in (each.split("_") for each in job.outputs if each.startswith("fig")):
+        formats.setdefault(name, []).append(kind)
     drawn = {}
-    for module in (fig1, fig2, fig4, fig5, fig6):
-        name = module.__name__.rpartition(".")[2]
-        formats = [each.partition("_")[2] for each in job.outputs if each.startswith(f"{name}_")]
-        pictures = save.render(module.run(job.inputs, settings), formats)
+    for name, kinds in formats.items():
+        figure = import_module(f"kinacc.figures.{name}").run(job.inputs, settings)
+        pictures = save.render(figure, kinds)
         drawn |= {f"{name}_{kind}": content for kind, content in pictures.items()}
     job.write_files(drawn)

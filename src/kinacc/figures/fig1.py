@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,27 +12,17 @@ from matplotlib.figure import Figure
 
 from kinacc.figures import style
 
-
-@dataclass(frozen=True)
-class Example:
-    """One operating point in one dimension, all in mm.
-
-    ``true_mm`` lies beyond the bound ``eta_mm``, so H0 does not hold; ``far_mm`` and ``near_mm``
-    are two measurements of it, far from and near to the true value.
-    """
-
-    eta_mm: float = 1.0
-    true_mm: float = 1.5
-    sigma_mm: float = 0.25
-    far_mm: float = 1.17
-    near_mm: float = 1.4
+# One operating point in mm: the true value lies beyond the bound eta, so H0 does not hold.
+ETA_MM, TRUE_MM, SIGMA_MM = 1.0, 1.5, 0.25
+MEASURED_MM = {
+    "Less likely: far from its true value": 1.17,
+    "More likely: near its true value": 1.4,
+}
 
 
-@dataclass(frozen=True)
-class Case:
+class Case(NamedTuple):
     """One measurement judged: candidate (eq. 21), distance (eq. 20), P_k (eqs. 17-18)."""
 
-    measured_mm: float
     candidate_mm: float
     distance: float
     probability: float
@@ -46,7 +36,7 @@ def judge(measured_mm: float, eta_mm: float, sigma_mm: float) -> Case:
     """
     candidate = float(np.clip(measured_mm, -eta_mm, eta_mm))
     distance = abs(measured_mm - candidate) / sigma_mm
-    return Case(measured_mm, candidate, distance, math.erfc(distance / math.sqrt(2)))
+    return Case(candidate, distance, math.erfc(distance / math.sqrt(2)))
 
 
 def run(inputs: Mapping, settings: Mapping) -> Figure:
@@ -54,23 +44,18 @@ def run(inputs: Mapping, settings: Mapping) -> Figure:
     return draw()
 
 
-def draw(example: Example | None = None, dataset: str | None = None) -> Figure:
+def draw(dataset: str | None = None) -> Figure:
     """Draw the less likely case above the more likely one.
 
     Shaded: the part of the candidate's distribution farther from it than the measurement, whose
     area is P_k.
     """
-    example = example or Example()
     with style.house():
         figure = style.new_figure(style.SINGLE_COLUMN_IN, 3.5)
         axes = figure.subplots(2, 1, sharex=True)
-        for ax, measured, words in zip(
-            axes,
-            (example.far_mm, example.near_mm),
-            ("Less likely: far from its true value", "More likely: near its true value"),
-            strict=True,
-        ):
-            _case(ax, example, judge(measured, example.eta_mm, example.sigma_mm), words)
+        for ax, (title, measured) in zip(axes, MEASURED_MM.items(), strict=True):
+            _case(ax, measured)
+            ax.set_title(title, loc="left")
         axes[1].set_xlabel("Error (mm)")
         handles = axes[0].get_legend_handles_labels()
         figure.legend(*handles, loc="outside lower center", ncols=1, alignment="left")
@@ -78,57 +63,48 @@ def draw(example: Example | None = None, dataset: str | None = None) -> Figure:
     return figure
 
 
-def _density(x: np.ndarray, mean: float, sigma: float) -> np.ndarray:
-    return np.exp(-0.5 * ((x - mean) / sigma) ** 2) / (sigma * np.sqrt(2 * np.pi))
+def _case(ax: Axes, measured_mm: float) -> None:
+    candidate, _, probability = judge(measured_mm, ETA_MM, SIGMA_MM)
+    peak = 1 / (SIGMA_MM * np.sqrt(2 * np.pi))
+    ends = min(candidate, TRUE_MM) - 3.3 * SIGMA_MM, max(candidate, TRUE_MM) + 3.3 * SIGMA_MM
+    x = np.linspace(*ends, 401)
 
+    def density(at, mean: float) -> np.ndarray:
+        return peak * np.exp(-0.5 * ((at - mean) / SIGMA_MM) ** 2)
 
-def _case(ax: Axes, example: Example, case: Case, words: str) -> None:
-    sigma, peak = example.sigma_mm, 1 / (example.sigma_mm * np.sqrt(2 * np.pi))
-    low = min(case.candidate_mm, example.true_mm) - 3.3 * sigma
-    high = max(case.candidate_mm, example.true_mm) + 3.3 * sigma
-    x = np.linspace(low, high, 401)
-    assumed = _density(x, case.candidate_mm, sigma)
     ax.plot(
-        x,
-        _density(x, example.true_mm, sigma),
-        color=style.BLUE,
-        ls=(0, (4, 2)),
+        x, density(x, TRUE_MM), color=style.BLUE, ls=(0, (4, 2)),
         label="distribution of ẽ about its true value e (H₀ does not hold)",
-    )
-    ax.plot(x, assumed, color=style.VERMILION, label="assumed under H₀, about the candidate ê")
-    reach = abs(case.measured_mm - case.candidate_mm)
-    for tail in (x[x <= case.candidate_mm - reach], x[x >= case.candidate_mm + reach]):
-        edge = case.candidate_mm + np.copysign(reach, tail.mean() - case.candidate_mm)
-        tail = np.sort(np.append(tail, edge))
-        shade = ax.fill_between(
-            tail, _density(tail, case.candidate_mm, sigma), color=style.ORANGE, alpha=0.55, lw=0
-        )
-    shade.set_label("Pₖ, the chance of a measurement farther from ê than ẽ")
-
-    ax.vlines(example.true_mm, 0, peak, color=style.BLUE, lw=0.8, ls=(0, (4, 2)))
-    ax.vlines(case.candidate_mm, 0, peak, color=style.VERMILION, lw=0.8)
+    )  # fmt: skip
     ax.plot(
-        [case.measured_mm] * 2, [0, peak], color=style.INK, lw=1, marker="o", ms=3.5,
+        x, density(x, candidate), color=style.VERMILION,
+        label="assumed under H₀, about the candidate ê",
+    )  # fmt: skip
+    reach = abs(measured_mm - candidate)
+    low, high = candidate - reach, candidate + reach
+    label = "Pₖ, the chance of a measurement farther from ê than ẽ"
+    for tail in (np.append(x[x <= low], low), np.append(high, x[x >= high])):
+        shade = density(tail, candidate)
+        ax.fill_between(tail, shade, color=style.ORANGE, alpha=0.55, lw=0, label=label)
+        label = ""
+    ax.vlines(TRUE_MM, 0, peak, color=style.BLUE, lw=0.8, ls=(0, (4, 2)))
+    ax.vlines(candidate, 0, peak, color=style.VERMILION, lw=0.8)
+    ax.plot(
+        [measured_mm] * 2, [0, peak], color=style.INK, lw=1, marker="o", ms=3.5,
         markevery=[0], clip_on=False, zorder=4,
     )  # fmt: skip
-    for place, height, mark, colour in (
-        (case.candidate_mm, 1.03, "ê = η", style.VERMILION),
-        (example.true_mm, 1.03, "e", style.BLUE),
-        (case.measured_mm, 1.03, "ẽ", style.INK),
+    for place, mark, colour in (
+        (candidate, "ê = η", style.VERMILION),
+        (TRUE_MM, "e", style.BLUE),
+        (measured_mm, "ẽ", style.INK),
     ):
         ax.text(
-            place, peak * height, mark, ha="center", va="bottom", color=style.darker(colour),
+            place, 1.03 * peak, mark, ha="center", va="bottom", color=style.darker(colour),
             bbox={"fc": "white", "ec": "none", "pad": 0.6}, zorder=5,
         )  # fmt: skip
     ax.text(
-        0.985,
-        0.93,
-        f"Pₖ = {case.probability:.2f}",
-        transform=ax.transAxes,
-        ha="right",
-        va="top",
+        0.985, 0.93, f"Pₖ = {probability:.2f}", transform=ax.transAxes, ha="right", va="top",
         fontsize=style.TEXT_PT + 1,
-    )
-    ax.set_title(words, loc="left")
-    ax.set(ylim=(0, peak * 1.28), xlim=(low, high), ylabel="Density (1/mm)")
+    )  # fmt: skip
+    ax.set(ylim=(0, peak * 1.28), xlim=ends, ylabel="Density (1/mm)")
     ax.grid(False)

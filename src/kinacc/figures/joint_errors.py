@@ -26,15 +26,14 @@ def draw(joints: np.ndarray, values: np.ndarray, std: np.ndarray, units: Sequenc
     with style.house():
         figure = style.new_figure(style.DOUBLE_COLUMN_IN, 1.15 * len(joints) + 0.5)
         panels = figure.subplots(len(joints), 2, sharey="col", squeeze=False)
-        for joint, pair in enumerate(panels):
-            for kind, (ax, name) in enumerate(zip(pair, ("shift, mm", "turn, mrad"), strict=True)):
-                for axis, (colour, dash) in enumerate(_LINES):
-                    value = values[joint, 3 * kind + axis]
-                    reach = _DEVIATIONS * std[joint, 3 * kind + axis]
-                    ax.fill_between(
-                        joints[joint], value - reach, value + reach, color=colour, alpha=0.15, lw=0
-                    )
-                    ax.plot(joints[joint], value, color=colour, ls=dash, label="xyz"[axis])
-                ax.set(xlabel=f"joint {joint + 1}, {units[joint]}", ylabel=name)
+        for (joint, kind), ax in np.ndenumerate(panels):
+            for axis, (colour, dash) in enumerate(_LINES):
+                value = values[joint, 3 * kind + axis]
+                reach = _DEVIATIONS * std[joint, 3 * kind + axis]
+                ends = value - reach, value + reach
+                ax.fill_between(joints[joint], *ends, color=colour, alpha=0.15, lw=0)
+                ax.plot(joints[joint], value, color=colour, ls=dash, label="xyz"[axis])
+            ylabel = ("shift, mm", "turn, mrad")[kind]
+            ax.set(xlabel=f"joint {joint + 1}, {units[joint]}", ylabel=ylabel)
         panels[0, 1].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3)
     return figure

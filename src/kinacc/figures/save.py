@@ -6,39 +6,38 @@ Dates, versions and random identifiers are left out, fonts are embedded (PDF) or
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager, nullcontext
+from collections.abc import Iterable, Mapping
 from io import BytesIO
 from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from kinacc.errors import InputError, Problem
+from kinacc.errors import Problem, refuse
 from kinacc.figures import style
 from kinacc.tables.atomic import write_together
 
-FORMATS = ("svg", "png", "pdf")
-PNG_DPI = 200
-RASTER_DPI = 300  # of the dense meshes inside the vector formats
-
-_METADATA = {
-    "svg": {"Date": None, "Creator": None},
-    "png": {"Software": None},
-    "pdf": {"CreationDate": None, "ModDate": None, "Creator": None, "Producer": None},
+# Dots per inch (of the dense meshes inside the vector formats), and marks that are left out.
+_SAVED = {
+    "svg": (300, ("Date", "Creator")),
+    "png": (200, ("Software",)),
+    "pdf": (300, ("CreationDate", "ModDate", "Creator", "Producer")),
 }
+FORMATS = tuple(_SAVED)
 
 
 def render(figure: Figure, formats: Iterable[str]) -> dict[str, bytes]:
     """Return the file content for each format; InputError for others than svg, png and pdf."""
     formats = tuple(formats)
     unknown = [name for name in formats if name not in FORMATS]
-    if unknown:
-        raise InputError(
-            [Problem("figures.formats", f"{name!r}", ", ".join(FORMATS)) for name in unknown]
-        )
+    refuse([Problem("figures.formats", f"{name!r}", ", ".join(FORMATS)) for name in unknown])
+    found = {}
     with style.house():
         settle(figure)
-        return {name: _bytes(figure, name) for name in formats}
+        for name in formats:
+            buffer, (dpi, marks) = BytesIO(), _SAVED[name]
+            figure.savefig(buffer, format=name, dpi=dpi, metadata=dict.fromkeys(marks))
+            found[name] = buffer.getvalue()
+    return found
 
 
 def settle(figure: Figure) -> None:
@@ -54,46 +53,3 @@ def write(figure: Figure, paths: Mapping[str, Path]) -> None:
     """Write one file per format; each appears whole, and none appears unless all rendered."""
     contents = render(figure, paths)
     write_together({path: contents[name] for name, path in paths.items()})
-
-
-def _bytes(figure: Figure, name: str) -> bytes:
-    buffer = BytesIO()
-    dpi = PNG_DPI if name == "png" else RASTER_DPI
-    with _lean_pdf() if name == "pdf" else nullcontext():
-        figure.savefig(buffer, format=name, dpi=dpi, metadata=_METADATA[name])
-    return buffer.getvalue()
-
-
-@contextmanager
-def _lean_pdf() -> Iterator[None]:
-    """Embed fonts without their rules for setting text, and keep of a mesh what is drawn.
-
-    Reading the rules is most of the time that a PDF takes, and matplotlib places every letter
-    itself. A mesh is cut out of a raster of the whole figure, which would be kept for each.
-    """
-    from fontTools import subset
-    from matplotlib.backends.backend_pdf import PdfFile
-
-    load, add = subset.load_font, PdfFile.imageObject
-
-    def load_font(*args, **options):
-        font = load(*args, **options)
-        for rules in {"GDEF", "GPOS", "GSUB", "kern"} & set(font.keys()):
-            del font[rules]
-        return font
-
-    with (
-        _replaced(subset, "load_font", load_font),
-        _replaced(PdfFile, "imageObject", lambda file, image: add(file, image.copy())),
-    ):
-        yield
-
-
-@contextmanager
-def _replaced(owner: object, name: str, value: object) -> Iterator[None]:
-    kept = getattr(owner, name)
-    setattr(owner, name, value)
-    try:
-        yield
-    finally:
-        setattr(owner, name, kept)
