@@ -480,7 +480,7 @@ def test_a_joint_that_has_become_softer_is_named_by_the_comparison(finished, tmp
     later = made("residuals", configured(tmp_path, cell.robot, settings, folds=3))
     done = call("compare", folder, later, "--model", "compliance", "--json")
     assert done.exit_code == 0, done.output
-    rows = {row["parameter"]: row for row in yaml.safe_load(done.stdout)["rows"]}
+    rows = {row["name"]: row for row in yaml.safe_load(done.stdout)["parameters"]}
     sigmas = {name: abs(row["sigmas"] or 0.0) for name, row in rows.items()}
     assert sigmas["j2.compliance_rad_per_nm"] > 10.0
     assert max(sigmas, key=sigmas.get) == "j2.compliance_rad_per_nm"

@@ -9,7 +9,6 @@ import pytest
 from parsed import read
 
 from kinacc.calibration.uncertainty import Uncertainty, scale_of
-from kinacc.cli import comparison_report
 from kinacc.config import schema
 from kinacc.deployment.compare import compare
 from kinacc.deployment.planning import spread
@@ -19,7 +18,6 @@ from kinacc.kinematics import dh
 from kinacc.kinematics import robot as robots
 from kinacc.report import page
 from kinacc.report.comparison import comparison_page
-from kinacc.report.comparison_lines import lines
 
 STD = 0.02  # mm and mrad
 
@@ -50,10 +48,6 @@ def paged(first, second, shared=NONE_SHARED, poses=40):
     return comparison_page(found, first, spread(first.robot, poses))
 
 
-def note(built, name):
-    return " ".join(built.first.notes.get(name, ()))
-
-
 @pytest.fixture(scope="module")
 def bent():
     return paged(arm(), arm("November", j3_alpha_rad=1e-3, j2_a_mm=0.1))
@@ -61,16 +55,13 @@ def bent():
 
 def test_an_arm_that_changed_is_said_to_against_chance(bent):
     assert bent.first.badge == ("CHANGED", True)
-    assert bent.first.answers[0].startswith("The arm has changed")
     plain, apart = bent.first.tables[0].rows
     assert plain["rms_mm"] > apart["rms_mm"] > 2 * apart["chance_mm"] > 0.0
-    assert "measure the poses of the first again" in note(bent, "NEXT").lower()
 
 
 def test_an_arm_that_did_not_change_needs_nothing():
     built = paged(arm(), arm("November", j2_a_mm=0.01))
     assert built.first.badge == ("NO CHANGE PROVEN", False)
-    assert note(built, "NEXT").startswith("Nothing")
 
 
 def test_a_base_that_moved_is_not_taken_for_the_arm():
@@ -80,24 +71,14 @@ def test_a_base_that_moved_is_not_taken_for_the_arm():
     assert stays["rms_mm"] < 1e-6
 
 
-def test_terminal_page_and_json_call_no_arm_changed_that_was_measured_elsewhere():
+@pytest.mark.parametrize(("row", "verdict"), [(0, "changed"), (22, "change in doubt")])
+def test_no_arm_is_called_changed_that_was_measured_elsewhere(row, verdict):
     first, near = arm(), arm("November", j3_alpha_rad=5e-4)
-    q_rad = spread(first.robot, 40)
-    middle = np.median(q_rad[:, 0])
-    few = (np.array([middle + 1e-6, *[-9.0] * 5]), np.full(6, 9.0))
-    low = np.sort(q_rad[:, 0])[22]
-    few[0][0] = low
-    for ranges, said in ((None, "changed"), (few, "change in doubt")):
-        second = replace(near, fitted_range_rad=ranges)
-        found, built = compared(first, second), paged(first, second)
-        facts = comparison_report.answer(found).facts
-        assert found.verdict == facts["verdict"] == said
-        assert built.first.badge == (said.upper(), True)
-        for text in ("\n".join(lines(found)), " ".join(built.first.answers).lower()):
-            assert ("the arm has changed" in text) == (said == "changed")
-            assert ("a change of the arm is in doubt" in text) == (said != "changed")
-    assert 10 < facts["poses_measured_by_both"] < 20
-    assert "before anything is changed at the robot" in note(built, "NEXT")
+    low = np.sort(spread(first.robot, 40)[:, 0])[row]
+    ranges = np.array([low, *[-9.0] * 5]), np.full(6, 9.0)
+    found = compared(first, replace(near, fitted_range_rad=ranges))
+    assert found.verdict == verdict
+    assert found.poses["measured_by_both"].sum() == 40 - row
 
 
 class Curves(dh.DHModel):
@@ -113,30 +94,25 @@ def test_models_without_parameters_are_not_compared_where_one_was_never_measured
     second = replace(first, name="November", fitted_range_rad=far)
     built = paged(first, second)
     assert built.first.badge == ("NOT COMPARABLE HERE", True)
-    assert "none of the 40 poses lie where both were measured" in built.first.answers[0]
     assert not built.first.tables
-    assert "cannot be compared" in lines(compared(first, second))[0]
 
 
 def test_a_robot_that_was_never_fitted_gives_distances_and_no_verdict():
     built = paged(arm(j2_a_mm=0.5), arm("ur10.yaml", fitted=False))
     assert built.first.badge == ("UNKNOWN", True)
-    assert "has to be known" in built.first.answers[0]
 
 
 def test_the_same_readings_and_other_robots_are_no_change():
     same = paged(arm(), arm("other settings", j2_a_mm=0.5), SharedReadings(80, 80, 80))
     assert same.first.badge == ("SAME READINGS", False)
-    assert "nothing can have moved" in same.first.answers[0]
     other = paged(arm(), arm("B", robot="mh180"))
     assert other.first.badge == ("DIFFERENT ROBOTS", True)
-    assert "no change of one arm" in other.first.answers[0]
 
 
 def test_what_the_poses_leave_open_is_not_counted(bent):
     table = read(bent.sections[-1]).tables[0]
     row = next(each for each in table.rows if each[0] == "j1.d")
-    assert row[6:] == ("–", "undetermined in both")
+    assert row[6:] == ("–", "both")
 
 
 def test_the_poses_that_moved_the_most_are_listed(bent):

@@ -1,93 +1,94 @@
-"""Two calibrations of one arm: what moved, by how many standard deviations, and what that moves.
+"""Comparison of two calibrations of one arm: what moved, beside what moves by chance.
 
-Parameters alone mislead: directions the poses do not determine differ without meaning, and base and
-tool take up what joints share with them. So poses are compared as well, as they stand and after the
-base and tool changes that bring them closest together.
+Parameters alone mislead: directions that the poses do not determine differ without meaning, and
+base and tool absorb a part of the joint parameters. So predicted poses are compared too, as fitted
+and after the base and tool changes that bring them closest.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 import scipy
 
-from kinacc.calibration.misfit import Misfit
 from kinacc.calibration.uncertainty import scale_of, scaled_unit, unit_of
-from kinacc.config.error_models import model_name
 from kinacc.deployment.applicability import measured_by_all
 from kinacc.deployment.predict import sensitivity
 from kinacc.deployment.record import FLANGE, Calibration
 from kinacc.deployment.shared_readings import NONE_SHARED, SharedReadings, counted_once
 from kinacc.deployment.verify import covers
-from kinacc.errors import InputError, Problem, refuse
+from kinacc.errors import InputError, Problem
 from kinacc.geometry import Pose, compose, exp_so3, log_so3, skew
 from kinacc.kinematics import robot as robots
 from kinacc.kinematics.model import JointState
 
-OTHER_ROBOT, SAME_READINGS, NOT_COMPARABLE = (
-    "different robots",
-    "same readings",
-    "not comparable here",
-)
-UNPROVEN, IN_DOUBT, CHANGED, UNKNOWN = "no change proven", "change in doubt", "changed", "unknown"
+OTHER_ROBOT, SAME_READINGS = "different robots", "same readings"
+NOT_COMPARABLE, UNKNOWN = "not comparable here", "unknown"
+UNPROVEN, IN_DOUBT, CHANGED = "no change proven", "change in doubt", "changed"
+ROUNDING = 1e-9  # mm and mrad
 _SPAN = 1e-3  # directions closer than this are one
-_TOUCHED = 1e-4  # as in the fits: 1 % of a parameter in a direction nobody sees
+_TOUCHED = 1e-4  # 1 % of a parameter in an undetermined direction
 _STEPS = 8
 _ANOTHER = 0.005  # of the length of an arm; a calibration changes far less
-ROUNDING = 1e-9  # mm and mrad
-_FEWEST = 5  # poses: three would let base and tool take up nearly all
+_FEWEST = 5  # poses: base and tool absorb nearly all of three
 _UNLIKELY = 0.001
-_ENOUGH = 0.5  # of the poses measured by both
-
-
-@dataclass(frozen=True)
-class Shift:
-    """How poses moved: position (n,) mm and orientation (n,) rad, root mean squares, and the rms
-    that is expected of two calibrations of an arm that did not change (NaN where unknown)."""
-
-    position_mm: np.ndarray
-    orientation_rad: np.ndarray
-    rms_mm: float
-    rms_rad: float
-    chance_mm: float
-    chance_rad: float
+_ENOUGH = 0.5  # of the poses near measured poses of both
 
 
 @dataclass(frozen=True)
 class Difference:
-    """Two calibrations side by side, of ``names`` and ``robots``, by their models ``model``.
+    """Result of a comparison of two calibrations.
 
-    ``verdict`` is one of the words above; UNKNOWN where chance is not known. ``covered`` (n,) are
-    the poses compared, of all given: a VEC model covers its own joint range alone. ``measured``:
-    those of them that lie where both were measured. ``parameters``: None unless both are DH tables,
-    else a row for each that was fitted or differs, in mm and mrad: name, unit, first, second,
-    difference, its std and sigmas (NaN where either calibration does not determine it: undetermined
-    is "", "first", "second" or "both"). ``statistic`` is the squared distance in the ``directions``
-    both determine, in units of their covariances, ``probability`` that of one at least as large
-    where nothing changed. Shifts are those of the flange in the base, ``apart_from_frames`` after
-    the best base and tool; ``robots_apart_mm`` is the rms by which the arms differ before any
-    calibration, after the best base and tool. ``shared`` readings are counted once.
+    Attributes
+    ----------
+    names, robots
+        Of the two calibrations.
+    model
+        The error model compared.
+    verdict
+        CHANGED; IN_DOUBT where most poses are not near measured poses of both; UNPROVEN; UNKNOWN
+        without covariances; NOT_COMPARABLE (a model without parameters, at such poses);
+        SAME_READINGS; OTHER_ROBOT.
+    statistic, directions, probability
+        Squared distance in the directions that both determine, in units of their covariances, and
+        the probability of at least this distance where nothing changed.
+    shifts
+        Rows "as fitted" and "best base and tool": rms and largest change of flange poses in the
+        base, and the rms by chance (NaN where unknown).
+    parameters
+        Rows of fitted or different DH parameters, mm and mrad; ``sigmas`` is NaN where a
+        calibration does not determine one (``undetermined``: first, second, both); or None.
+    poses
+        A row for each pose compared: its number, whether it is near measured poses of both, and
+        the change of the flange, as fitted and (``arm_``) after the best base and tool.
+    poses_given
+        Number of poses given; the others lie outside the range of a model.
+    robots_apart_mm
+        Rms difference of the nominal arms after the best base and tool.
+    shared
+        Readings that both were fitted to, counted once.
+    held_out_over_noise
+        Of both; NaN where the noise is unknown.
     """
 
     names: tuple[str, str]
     robots: tuple[str, str]
     model: str
     verdict: str
-    covered: np.ndarray
-    measured: np.ndarray
-    parameters: pd.DataFrame | None
     statistic: float
     directions: int
     probability: float
-    as_they_stand: Shift
-    apart_from_frames: Shift
+    shifts: pd.DataFrame
+    parameters: pd.DataFrame | None
+    poses: pd.DataFrame
+    poses_given: int
     robots_apart_mm: float
-    same_robot: bool
     shared: SharedReadings
-    misfits: tuple[Misfit | None, Misfit | None]
+    held_out_over_noise: tuple[float, float]
 
 
 def compare(
@@ -97,34 +98,44 @@ def compare(
     rotation_weight_mm_per_rad: float,
     shared: SharedReadings = NONE_SHARED,
 ) -> Difference:
-    """What moved from ``first`` to ``second``, over reported joints ``q_rad`` (n, k), rad and mm.
+    """Compare ``second`` with ``first`` at reported joints ``q_rad`` (n, k), rad and mm.
 
-    ``shared``: readings that both were fitted to; without it they count as apart.
-    Raises InputError where the two are of different kinds of arm, or both cover hardly any joints.
+    ``shared``: readings that both were fitted to. Raises InputError for different kinds of arm,
+    and where a model covers hardly any of the joints.
     """
     require_alike(first, second)
-    covered = _covered(first, second, q_rad)
+    both = (first, second)
+    inside = [covers(each.model, each.robot.dh_joints(q_rad)).all(axis=1) for each in both]
+    covered = np.all(inside, axis=0)
+    if covered.sum() < min(_FEWEST, len(q_rad)):
+        what = f"{covered.sum()} of {len(q_rad)} poses lie in the joint ranges of both models"
+        fix = "give poses measured by both (--joints FILE), or compare DH models (--model dh)"
+        raise InputError(Problem(f"{first.name}, {second.name}", what, f"{_FEWEST} or more", fix))
     q_rad = q_rad[covered]
-    measured = measured_by_all((first, second), q_rad)
     names = (Path(first.name).name, Path(second.name).name)
     names = names if names[0] != names[1] else (first.name, second.name)
+    measured = measured_by_all(both, q_rad)
     first, second = both = counted_once(first, second, shared)
     parametric = first.model.comparable is not None and second.model.comparable is not None
-    test = _test(first, second) if parametric else (np.nan, 0, np.nan)
+    test, parameters = (np.nan, 0, np.nan), None
+    if parametric:
+        scale = np.array([scale_of(name) for name in first.model.names])
+        values = [each.model.comparable / scale for each in both]
+        known = [_Knowledge.of(each, scale) for each in both]
+        test = _test(values[1] - values[0], known)
+        parameters = _parameters(first.model.names, *values, known)
     before, after = (
         each.pose(JointState(each.robot.dh_joints(q_rad)), "base", FLANGE) for each in both
     )
     weights = np.array([1.0, 1.0, 1.0, *[rotation_weight_mm_per_rad] * 3])
-    scatter = None
-    if first.known is not None and second.known is not None:
-        scatter = np.concatenate([_scatter(each, q_rad) for each in both], axis=2)
+    moved = [_difference(before, after), _aligned(before, after, weights)]
+    scatter = _scatter(both, q_rad, before, weights)
     nominal = (robots.forward(each.robot, q_rad) for each in both)
-    apart = np.linalg.norm(_aligned(*nominal, weights)[:, :3], axis=1)
-    apart_mm = float(np.sqrt(np.mean(apart**2)))
+    apart_mm = _rms(_aligned(*nominal, weights)[:, :3])
     length_mm = float(np.hypot(first.robot.dh.a_mm, first.robot.dh.d_mm).sum())
-    same_robot, enough = apart_mm <= _ANOTHER * length_mm, float(np.mean(measured)) >= _ENOUGH
+    enough = float(np.mean(measured)) >= _ENOUGH
     verdicts = {
-        OTHER_ROBOT: not same_robot,
+        OTHER_ROBOT: apart_mm > _ANOTHER * length_mm,
         SAME_READINGS: shared.all_of_both,
         NOT_COMPARABLE: not parametric and not enough,
         UNKNOWN: not np.isfinite(test[2]),
@@ -132,113 +143,100 @@ def compare(
         CHANGED: enough,
         IN_DOUBT: True,
     }
+    poses = {"pose": 1 + np.flatnonzero(covered), "measured_by_both": measured}
+    for prefix, change in zip(("", "arm_"), moved, strict=True):
+        poses[f"{prefix}moved_mm"] = np.linalg.norm(change[:, :3], axis=1)
+        poses[f"{prefix}turned_mrad"] = 1e3 * np.linalg.norm(change[:, 3:], axis=1)
+    frames = ("as fitted", "best base and tool")
     return Difference(
         names,
         (first.robot.name, second.robot.name),
         first.choice,
-        next(each for each, holds in verdicts.items() if holds),
-        covered,
-        measured,
-        _parameters(first, second) if parametric else None,
+        next(verdict for verdict, holds in verdicts.items() if holds),
         *test,
-        _shift(_difference(before, after), scatter),
-        _shift(_aligned(before, after, weights), _without_frames(scatter, before, weights)),
+        pd.DataFrame([_shift(*each) for each in zip(frames, moved, scatter, strict=True)]),
+        parameters,
+        pd.DataFrame(poses),
+        len(covered),
         apart_mm,
-        same_robot,
         shared,
-        (first.misfit, second.misfit),
+        tuple(each.misfit.ratio if each.misfit else np.nan for each in both),
     )
 
 
 def require_alike(first: Calibration, second: Calibration) -> None:
-    """InputError where the joints of two arms do not mean the same, so that nothing compares."""
-    one, two = first.robot.dh, second.robot.dh
-    problems = []
-    if one.joints != two.joints:
-        allowed = f"{one.joints}, as {first.name} has"
-        problems.append(Problem(second.name, f"has {two.joints} joints", allowed))
-    elif not np.array_equal(one.prismatic, two.prismatic):
-        problems.append(Problem(second.name, "other joints slide", "the same kind of arm"))
-    elif not np.array_equal(first.robot.joint_map, second.robot.joint_map):
-        problems.append(Problem(second.name, "another joint_map", "the same reported joints"))
-    refuse(problems, f"{first.name} and {second.name} are not the same kind of robot")
+    """InputError where the joints of two arms do not mean the same."""
+    one, two = first.robot, second.robot
+    what = ""
+    if one.dh.joints != two.dh.joints:
+        what = f"has {two.dh.joints} joints, {first.name} {one.dh.joints}"
+    elif not np.array_equal(one.dh.prismatic, two.dh.prismatic):
+        what = f"has other sliding joints than {first.name}"
+    elif not np.array_equal(one.joint_map, two.joint_map):
+        what = f"has another joint_map than {first.name}"
+    if what:
+        raise InputError(Problem(second.name, what, "the same kind of robot"))
 
 
-def _covered(first: Calibration, second: Calibration, q_rad: np.ndarray) -> np.ndarray:
-    """True (n,) where both models say something. InputError where they do at hardly any joints."""
-    both = (first, second)
-    there = np.all([covers(each.model, each.robot.dh_joints(q_rad)) for each in both], axis=0)
-    covered = there.all(axis=1)
-    count, given = int(covered.sum()), len(covered)
-    if count < min(_FEWEST, given):
-        outside = np.sum(~there, axis=0)
-        joint = int(np.argmax(outside))
-        model = model_name(next(each for each in both if each.model.domain is not None).choice)
-        what = (
-            f"{f'only {count}' if count else 'none'} of the {given} poses to compare lie in the "
-            f"joint range of the {model} models; joint {joint + 1} is outside in {outside[joint]}"
-        )
-        fix = "compare at poses measured by both (--joints FILE), or the DH models (--model dh)"
-        place = f"{first.name} and {second.name}"
-        raise InputError(Problem(place, what, f"{_FEWEST} or more", fix))
-    return covered
+class _Knowledge(NamedTuple):
+    """What a fit knows of the P parameters of a model, mm and mrad.
+
+    ``fitted`` (P,), ``covariance`` (P, P), undetermined unit directions (u, P).
+    """
+
+    fitted: np.ndarray
+    covariance: np.ndarray
+    undetermined: np.ndarray
+
+    @classmethod
+    def of(cls, calibration: Calibration, scale: np.ndarray) -> _Knowledge:
+        known, count = calibration.known, len(scale)
+        if known is None:
+            unknown = np.full((count, count), np.nan)
+            return cls(np.zeros(count, dtype=bool), unknown, np.zeros((0, count)))
+        names = np.array(calibration.model.names)
+        pick = (names[:, None] == np.array(known.names)).astype(float)
+        covariance = pick @ known.covariance @ pick.T / np.outer(scale, scale)
+        unit = known.undetermined / np.linalg.norm(known.undetermined, axis=1, keepdims=True)
+        return cls(pick.any(axis=1), covariance, unit @ pick.T)
 
 
-def _parameters(first: Calibration, second: Calibration) -> pd.DataFrame:
-    names = np.array(first.model.names)
-    unit = np.array([scale_of(name) for name in names])
-    values = [each.model.comparable / unit for each in (first, second)]
-    fitted, variance, blind = [], [], []
-    for known in (first.known, second.known):
-        own = [] if known is None else [*known.names]
-        place = pd.Index(own).get_indexer(names)
-        fitted.append(place >= 0)
-        missing = np.full(len(names), np.nan if known is None else 0.0)
-        diagonal = np.append(np.diag(known.covariance) if own else [], 0.0)
-        variance.append(np.where(place >= 0, diagonal[place] / unit**2, missing))
-        length = np.linalg.norm(known.undetermined, axis=1, keepdims=True) if own else 1.0
-        touched = np.append(np.sum((known.undetermined / length) ** 2, axis=0) if own else [], 0.0)
-        blind.append((place >= 0) & (touched[place] > _TOUCHED))
-    std = np.sqrt(np.sum(variance, axis=0))
-    std[np.any(blind, axis=0)] = np.nan
-    difference = values[1] - values[0]
-    words = np.array(["", "first", "second", "both"], dtype=object)
-    units = [unit_of(name) for name in names]
+def _parameters(
+    names: tuple[str, ...], one: np.ndarray, two: np.ndarray, known: list[_Knowledge]
+) -> pd.DataFrame:
+    """Parameters ``one`` and ``two`` (P,) in mm and mrad, and what is known of them."""
+    hidden = [np.sum(each.undetermined**2, axis=0) > _TOUCHED for each in known]
+    std = np.sqrt(sum(np.diag(each.covariance) for each in known))
+    std[np.any(hidden, axis=0)] = np.nan
     table = pd.DataFrame({
         "name": [
-            name.rpartition("_")[0] if of in ("rad", "mm") else name
-            for name, of in zip(names, units, strict=True)
+            name.rpartition("_")[0] if unit_of(name) in ("rad", "mm") else name for name in names
         ],
         "unit": [scaled_unit(name) for name in names],
-        "first": values[0],
-        "second": values[1],
-        "difference": difference,
+        "first": one,
+        "second": two,
+        "difference": two - one,
         "std": std,
-        "sigmas": np.divide(difference, std, out=np.full(len(names), np.nan), where=std > 0.0),
-        "undetermined": words[blind[0] + 2 * blind[1]],
+        "sigmas": np.divide(two - one, std, out=np.full(len(std), np.nan), where=std > 0.0),
+        "undetermined": np.array(["", "first", "second", "both"])[hidden[0] + 2 * hidden[1]],
     })  # fmt: skip
-    return table[np.any(fitted, axis=0) | (np.abs(difference) > ROUNDING)].reset_index(drop=True)
+    fitted = known[0].fitted | known[1].fitted
+    return table[fitted | (np.abs(two - one) > ROUNDING)].reset_index(drop=True)
 
 
-def _test(first: Calibration, second: Calibration) -> tuple[float, int, float]:
+def _test(difference: np.ndarray, known: list[_Knowledge]) -> tuple[float, int, float]:
     """Squared distance, number of directions and probability, over what both determine."""
-    if first.known is None or second.known is None:
+    total = known[0].covariance + known[1].covariance
+    if not np.isfinite(total).all():
         return np.nan, 0, np.nan
-    names = first.model.names
-    units = np.array([scale_of(name) for name in names])
-    difference = (second.model.comparable - first.model.comparable) / units
-    total, blind = np.zeros((len(names), len(names))), []
-    for known in (first.known, second.known):
-        pick = (np.array(names)[:, None] == np.array(known.names)).astype(float)
-        total += pick @ known.covariance @ pick.T / np.outer(units, units)
-        blind.append(known.undetermined @ pick.T)
-    held = np.eye(len(names))[np.diag(total) == 0.0]
-    _, values, right = np.linalg.svd(np.concatenate([*blind, held]))
-    kept = right[int(np.sum(values > _SPAN * max(1.0, values.max(initial=0.0)))) :]
-    seen, vectors = np.linalg.eigh(kept @ total @ kept.T)
-    good = seen > 1e-12 * seen.max(initial=0.0)
-    along = (kept @ difference) @ vectors[:, good]
-    statistic, directions = float(np.sum(along**2 / seen[good])), int(good.sum())
+    held = np.eye(len(difference))[np.diag(total) == 0.0]
+    hidden = np.concatenate([known[0].undetermined, known[1].undetermined, held])
+    _, values, right = np.linalg.svd(hidden)
+    determined = right[int(np.sum(values > _SPAN * max(1.0, values.max(initial=0.0)))) :]
+    variance, vectors = np.linalg.eigh(determined @ total @ determined.T)
+    good = variance > 1e-12 * variance.max(initial=0.0)
+    along = (determined @ difference) @ vectors[:, good]
+    statistic, directions = float(np.sum(along**2 / variance[good])), int(good.sum())
     probability = float(scipy.special.chdtrc(directions, statistic)) if directions else np.nan
     return statistic, directions, probability
 
@@ -261,40 +259,52 @@ def _frame_slopes(pose: Pose, weights: np.ndarray) -> np.ndarray:
 
 def _aligned(before: Pose, after: Pose, weights: np.ndarray) -> np.ndarray:
     """Movement (n, 6) that no change of base and end frame explains, least squares."""
-    moved = after
     for _ in range(_STEPS):
-        left = (_difference(before, moved) * weights).ravel()
-        step = np.linalg.lstsq(_frame_slopes(moved, weights), -left, rcond=1e-9)[0]
+        left = (_difference(before, after) * weights).ravel()
+        step = np.linalg.lstsq(_frame_slopes(after, weights), -left, rcond=1e-9)[0]
         base, end = Pose(exp_so3(step[3:6]), step[:3]), Pose(exp_so3(step[9:12]), step[6:9])
-        moved = compose(base, compose(moved, end))
+        after = compose(base, compose(after, end))
         if np.abs(step * np.tile([1.0, 1.0, 1.0, 1e3, 1e3, 1e3], 2)).max() < 1e-10:
             break
-    return _difference(before, moved)
+    return _difference(before, after)
 
 
-def _scatter(calibration: Calibration, q_rad: np.ndarray) -> np.ndarray:
-    """Movement (n, 6, r) of the flange by one standard deviation of each direction of the fit."""
-    at = JointState(calibration.robot.dh_joints(q_rad))
-    return sensitivity(calibration, at, "base", FLANGE) @ calibration.root
+def _scatter(both, q_rad: np.ndarray, pose: Pose, weights: np.ndarray) -> list[np.ndarray | None]:
+    """Movement (n, 6, r) of the flange by one standard deviation of each direction of the fits.
 
-
-def _without_frames(
-    scatter: np.ndarray | None, pose: Pose, weights: np.ndarray
-) -> np.ndarray | None:
-    """``scatter`` (n, 6, r) less what base and end frame would take up."""
-    if scatter is None:
-        return None
+    As fitted, and less what base and end frame absorb; None twice without covariances.
+    """
+    if any(each.known is None for each in both):
+        return [None, None]
+    states = [JointState(each.robot.dh_joints(q_rad)) for each in both]
+    moved = np.concatenate(
+        [
+            sensitivity(each, at, "base", FLANGE) @ each.root
+            for each, at in zip(both, states, strict=True)
+        ],
+        axis=2,
+    )
     left, values, _ = np.linalg.svd(_frame_slopes(pose, weights), full_matrices=False)
     left = left[:, values > 1e-9 * values[0]]
-    moved = (scatter * weights[:, None]).reshape(len(left), -1)
-    return (moved - left @ (left.T @ moved)).reshape(scatter.shape) / weights[:, None]
+    flat = (moved * weights[:, None]).reshape(len(left), -1)
+    apart = (flat - left @ (left.T @ flat)).reshape(moved.shape) / weights[:, None]
+    return [moved, apart]
 
 
-def _shift(moved: np.ndarray, scatter: np.ndarray | None) -> Shift:
-    sizes = [np.linalg.norm(part, axis=1) for part in (moved[:, :3], moved[:, 3:])]
-    rms = [float(np.sqrt(np.mean(size**2))) for size in sizes]
+def _shift(frames: str, moved: np.ndarray, scatter: np.ndarray | None) -> dict[str, object]:
     chance = [np.nan, np.nan]
     if scatter is not None:
-        parts = (scatter[:, :3], scatter[:, 3:])
-        chance = [float(np.sqrt(np.sum(part**2) / len(moved))) for part in parts]
-    return Shift(sizes[0], sizes[1], rms[0], rms[1], chance[0], chance[1])
+        halves = scatter[:, :3], scatter[:, 3:]
+        chance = [float(np.sqrt(np.sum(half**2) / len(moved))) for half in halves]
+    return {
+        "frames": frames,
+        "rms_mm": _rms(moved[:, :3]),
+        "chance_mm": chance[0],
+        "largest_mm": float(np.linalg.norm(moved[:, :3], axis=1).max()),
+        "rms_mrad": 1e3 * _rms(moved[:, 3:]),
+        "chance_mrad": 1e3 * chance[1],
+    }
+
+
+def _rms(vectors: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(np.sum(vectors**2, axis=1))))

@@ -1,10 +1,9 @@
-"""Readings that a table holds already: they show no change and are not compared with themselves."""
+"""Readings that two tables share: these show no change, and are not compared with themselves."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from typing import NamedTuple
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
@@ -12,12 +11,13 @@ import pandas as pd
 from kinacc.deployment.record import Calibration
 from kinacc.tables.allowed import SUBSETS
 
-_COINCIDENCE = 0.01  # of the smaller table: equal digits of so few readings may be chance
-_DIGITS = 6  # of mm; angles are held to as many and three more
+_COINCIDENCE = 0.01  # of the smaller table: fewer equal readings may be chance
+_DIGITS = 6  # of mm; angles have three more
 
 
-class SharedReadings(NamedTuple):
-    """How many readings the fits of two calibrations have in common, of those each is fitted to."""
+@dataclass(frozen=True)
+class SharedReadings:
+    """Number of readings that two fits share, and of those each is fitted to."""
 
     count: int
     first: int
@@ -25,7 +25,7 @@ class SharedReadings(NamedTuple):
 
     @property
     def all_of_both(self) -> bool:
-        """Whether both are fitted to the very same readings."""
+        """Whether both are fitted to the same readings."""
         return 0 < self.count == self.first == self.second
 
 
@@ -40,50 +40,45 @@ def known_rows(table: Mapping, earlier: Mapping) -> np.ndarray:
     if not len(earlier):
         return np.zeros(len(table["x_mm"]), dtype=bool)
     joints = [name for name in table if name[0] == "q" and name[1:].isdecimal()]
-    names = (joints, ["x_mm", "y_mm", "z_mm"])
-    own, other = (
-        [np.stack([np.asarray(each[name], dtype=float) for name in part], axis=1) for part in names]
+    parts = (joints, ["x_mm", "y_mm", "z_mm"])
+    both = [
+        [np.stack([np.asarray(each[name], dtype=float) for name in part], axis=1) for part in parts]
         for each in (table, earlier)
-    )
-    return known_readings(own, other)
+    ]
+    return known_readings(*both)
 
 
-def known_readings(own: Sequence[np.ndarray], earlier: Sequence[np.ndarray]) -> np.ndarray:
-    """The same (n,) of joints (n, k) and positions (n, 3) mm, and those of an earlier series."""
-    one, other = (
+def known_readings(readings: Sequence[np.ndarray], earlier: Sequence[np.ndarray]) -> np.ndarray:
+    """The same of joints (n, k) and positions (n, 3) mm, and those of an earlier series."""
+    one, two = (
         pd.MultiIndex.from_arrays(
             np.hstack([joints.round(_DIGITS + 3), position_mm.round(_DIGITS)]).T + 0.0
         )
-        for joints, position_mm in (own, earlier)
+        for joints, position_mm in (readings, earlier)
     )
-    found = one.isin(other)
-    return found & (found.sum() >= _COINCIDENCE * min(len(one), len(other)))
+    known = one.isin(two)
+    return known & (known.sum() >= _COINCIDENCE * min(len(one), len(two)))
 
 
-def shared(first: Mapping, second: Mapping, same_file: bool) -> SharedReadings:
-    """Readings in both of two ``measurements`` tables, as far as they are fitted to.
-
-    Readings are one where joints and position agree to the last digits, or where they stand on the
-    same line of ``same_file``, however that was read.
-    """
+def shared(first: Mapping | None, second: Mapping | None) -> SharedReadings:
+    """Readings in both of two tables ``measurements``, of those that are fitted to."""
+    if first is None or second is None:
+        return NONE_SHARED
     fitted = []
-    for each in (first, second):
-        rows = np.asarray(each["subset"]) == SUBSETS[0]
-        fitted.append({name: np.asarray(values)[rows] for name, values in each.items()})
+    for table in (first, second):
+        rows = np.asarray(table["subset"]) == SUBSETS[0]
+        fitted.append({name: np.asarray(values)[rows] for name, values in table.items()})
     count = int(known_rows(*fitted).sum())
-    if same_file and all("row" in each for each in fitted):
-        lines = [pd.DataFrame({name: each[name] for name in ("row", "target")}) for each in fitted]
-        count = max(count, len(lines[0].dropna().merge(lines[1].dropna())))
-    return SharedReadings(count, *(len(each["subset"]) for each in fitted))
+    return SharedReadings(count, *(len(table["subset"]) for table in fitted))
 
 
 def counted_once(
     first: Calibration, second: Calibration, readings: SharedReadings
 ) -> tuple[Calibration, Calibration]:
-    """The calibrations with covariances whose sum is that of their difference.
+    """The calibrations with covariances whose sum is the covariance of their difference.
 
-    Estimates from common readings err together. With s of n1 and n2 readings in both, of equal
-    information each, the difference has covariance (1 - s / n2) C1 + (1 - s / n1) C2.
+    With s of n1 and n2 readings in both, of equal information each, the difference has the
+    covariance (1 - s / n2) C1 + (1 - s / n1) C2.
     """
 
     def scaled(calibration: Calibration, fitted: int) -> Calibration:

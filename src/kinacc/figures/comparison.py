@@ -78,18 +78,19 @@ def _parameters(ax: Axes, parameters: pd.DataFrame) -> None:
 
 
 def _shifts(ax: Axes, found: Difference) -> None:
-    looks = (
-        (found.as_they_stand, "as they stand", style.ORANGE, "-"),
-        (found.apart_from_frames, "after best base and tool", style.GREEN, (0, (4, 1.5))),
-    )
-    title = None
-    for shift, name, colour, line in looks:
-        share = np.arange(1, len(shift.position_mm) + 1) / len(shift.position_mm)
-        label = f"{name}: rms {shift.rms_mm:.3g} mm"
-        ax.plot(np.sort(shift.position_mm), share, color=colour, ls=line, label=label)
-        if np.isfinite(shift.chance_mm):
-            ax.axvline(shift.chance_mm, color=colour, lw=0.9, ls=(0, (1, 1.5)))
-            title = "dotted: rms expected by chance"
+    looks = ("moved_mm", style.ORANGE, "-"), ("arm_moved_mm", style.GREEN, (0, (4, 1.5)))
+    for (name, colour, line), row in zip(looks, found.shifts.itertuples(), strict=True):
+        ordered = np.sort(found.poses[name])
+        share = np.arange(1, len(ordered) + 1) / len(ordered)
+        ax.plot(
+            ordered, share, color=colour, ls=line, label=f"{row.frames}: rms {row.rms_mm:.3g} mm"
+        )
+        ax.axvline(row.chance_mm, color=colour, lw=0.9, ls=(0, (1, 1.5)))
     ax.set(xlabel="Change of flange position (mm)", ylabel="Share of poses", ylim=(0.0, 1.02))
     ax.set_xlim(left=0.0)
-    ax.legend(loc="best", title=title, title_fontsize=style.SMALL_PT)
+    dotted = found.shifts["chance_mm"].notna().any()
+    ax.legend(
+        loc="best",
+        title="dotted: rms expected by chance" if dotted else None,
+        title_fontsize=style.SMALL_PT,
+    )
