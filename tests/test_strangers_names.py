@@ -54,7 +54,7 @@ def test_a_table_of_a_calibrated_arm_holds_no_formula():
     from kinacc.kinematics import robot
 
     arm = replace(nominal(robot.load("mh180")), choice="dh", left_open=("=HYPERLINK(1)",))
-    text = format_csv.text(Source(arm, {}, Path()))
+    text = format_csv.text(Source(arm, {}))
     assert [row["undetermined"] for row in csv.DictReader(io.StringIO(text))][-1].startswith(
         "'=HYPERLINK(1)"
     )

@@ -18,7 +18,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "golden"))
 
 import cases
 
-from kinacc.deployment.export.files import contents
+from kinacc.deployment.export.files import contents, read_source
 from kinacc.deployment.folder import recorded_robot
 from kinacc.tables.comparison import compare_folders
 
@@ -76,7 +76,7 @@ def renew_exports() -> None:
     folder.mkdir(exist_ok=True)
     robot = recorded_robot(cases.RESULTS / "ur10_d")
     for model, formats in (("dh", ("yaml", "json", "csv", "urdf")), ("vec", ("json",))):
-        made = contents(cases.RESULTS / "ur10_d", robot, formats, model=model)
+        made = contents(read_source(cases.RESULTS / "ur10_d", robot, model), formats)
         for name, text in made.items():
             (folder / name).write_text(text)
 

@@ -8,7 +8,7 @@ import pytest
 
 from kinacc.calibration import delivered
 from kinacc.calibration.residuals import errors
-from kinacc.deployment.export.files import contents
+from kinacc.deployment.export.files import contents, read_source
 from kinacc.deployment.folder import recorded_robot
 from kinacc.kinematics import robot
 from kinacc.tables import store
@@ -106,7 +106,7 @@ def test_a_foreign_file_is_understood_as_before(name, tmp_path):
                                                 ("vec", ("json",))])  # fmt: skip
 def test_exports_are_as_before(model, formats):
     folder = cases.RESULTS / "ur10_d"
-    made = contents(folder, recorded_robot(folder), formats, model=model)
+    made = contents(read_source(folder, recorded_robot(folder), model), formats)
     for name, text in made.items():
         golden = (cases.GOLDEN / "exports" / name).read_text()
         if name.endswith(".json"):

@@ -71,7 +71,7 @@ ASSUMED = {
         from kinacc.deployment.export.source import Source
         from kinacc.deployment.record import nominal
         from kinacc.kinematics import robot
-        print(urdf.text(Source(nominal(robot.load('ur10')), {}, '.')))" > my_ur10.urdf
+        print(urdf.text(Source(nominal(robot.load('ur10')), {})))" > my_ur10.urdf
         mv first/ur10_b.yaml before.yaml
         mv second/ur10_d.yaml after.yaml
     """,

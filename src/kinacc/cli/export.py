@@ -70,7 +70,7 @@ def export(
       kinacc export results/ur10_b --format urdf --urdf my_ur10.urdf --out exported
       kinacc export results/ur10_b --for ur --out exported
     """
-    from kinacc.deployment.export.files import contents, formats_of, note, warning, write
+    from kinacc.deployment.export.files import contents, formats_of, notes, read_source, write
     from kinacc.errors import Problem, refuse
 
     wanted = formats or formats_of(model)
@@ -86,23 +86,13 @@ def export(
     if maker is not None:
         _to_controller(folder, target, maker, name, robot, config, out)
         return
-    made = contents(
-        folder,
-        choice.robot_of(folder, robot, config),
-        wanted,
-        name,
-        urdf,
-        (base_link, tip_link),
-        dh_joints,
-        model,
-    )
-    paths = write(made, target, out.force)
+    arm = choice.robot_of(folder, robot, config)
+    source = read_source(folder, arm, model, urdf, (base_link, tip_link), dh_joints)
+    paths = write(contents(source, wanted, name), target, out.force)
     reason = choice.say_outdated(folder)
-    facts = {"files": paths, **({"outdated": reason} if reason else {})}
-    out.say(facts, "\n".join(paths))
-    for said in (warning(folder), note(folder, model)):
-        if said:
-            click.echo(said, err=True)
+    out.say({"files": paths, **({"outdated": reason} if reason else {})}, "\n".join(paths))
+    for each in notes(source):
+        click.echo(each, err=True)
 
 
 def _to_controller(folder, target, maker, name, robot, config, out) -> None:

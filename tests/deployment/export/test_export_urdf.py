@@ -1,7 +1,6 @@
 """URDF of a calibrated arm: forward kinematics against pinocchio reading the same file."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
@@ -65,7 +64,7 @@ TAIL = """<link name="ee"/><link name="probe"/>
 
 
 def of(arm):
-    return Source(arm, {}, Path())
+    return Source(arm, {})
 
 
 def bent(arm, seed=0, size=1.0):

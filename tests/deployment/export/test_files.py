@@ -4,7 +4,6 @@ import csv
 import io
 import json
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -30,7 +29,7 @@ def bent(name, seed=0):
 
 
 def written(form, arm, **tables):
-    return format_named(form).text(Source(arm, tables, Path()))
+    return format_named(form).text(Source(arm, tables))
 
 
 def read_back(arm, tmp_path):

@@ -16,6 +16,7 @@ from kinacc.deployment.export import formats as _formats
 from kinacc.deployment.export.source import Source
 from kinacc.errors import Problem, refuse
 from kinacc.kinematics.robot import Robot
+from kinacc.tables import store
 from kinacc.tables.atomic import replacing
 
 FORMATS = tuple(each.name for each in pkgutil.iter_modules(_formats.__path__))
@@ -32,71 +33,65 @@ def formats_of(model: str) -> tuple[str, ...]:
 
 
 def contents(
-    folder: Path | str,
-    robot: Robot,
-    formats: Sequence[str],
-    name: str | None = None,
-    urdf_file: Path | str | None = None,
-    links: tuple[str | None, str | None] = (None, None),
-    dh_joints: bool = False,
-    model: str = PLAINEST,
+    source: Source, formats: Sequence[str] = (), name: str | None = None
 ) -> dict[str, str]:
-    """File names and their text for a calibrated model of a results folder.
+    """File names and their text for a calibrated model; all formats that carry it by default.
 
     Raises InputError for what cannot be exported.
     """
-    dataset = Path(folder).resolve().name
+    arm = source.calibration
     if name is None:
-        problems = names.not_in_a_line("the results folder", dataset)
+        refuse(names.not_in_a_line("the results folder", arm.name), "Nothing was written")
     else:
-        problems = names.not_of_a_file("--name", name)
-    refuse(problems, "Nothing was written")
-    tables = results.read_tables(folder)
-    arm = results.calibration(tables, robot, model, dataset)
-    if arm.model.table is None:
-        able, fix = formats_of(model), f"or give --model {PLAINEST}"
-        what = f"cannot carry a {model} model"
-        wrong = [each for each in dict.fromkeys(formats) if each not in able]
-        refuse(
-            [Problem(f"--format {each}", what, ", ".join(able), fix) for each in wrong],
-            "Nothing was written",
-        )
-    source = Source(arm, tables, Path(folder), urdf_file, links, dh_joints)
+        refuse(names.not_of_a_file("--name", name), "Nothing was written")
+    able = formats_of(arm.choice)
+    wrong = [each for each in dict.fromkeys(formats) if each not in able]
+    what, fix = f"cannot carry a {arm.choice} model", f"or give --model {PLAINEST}"
+    refuse(
+        [Problem(f"--format {each}", what, ", ".join(able), fix) for each in wrong],
+        "Nothing was written",
+    )
     # A name of its own, so that the DH files may stand beside it.
-    stem = name or (dataset if model == PLAINEST else f"{dataset}_{model}")
-    modules = [format_named(each) for each in dict.fromkeys(formats)]
+    stem = name or (arm.name if arm.choice == PLAINEST else f"{arm.name}_{arm.choice}")
+    modules = [format_named(each) for each in dict.fromkeys(formats or able)]
     return {f"{stem}{each.ENDING}": each.text(source) for each in modules}
 
 
-def warning(folder: Path | str) -> str:
-    """What the measured poses show too little of, in a line; empty where they show everything."""
-    told = results.read_tables(folder).get(f"{PLAINEST}_identified")
+def read_source(
+    folder: Path | str,
+    robot: Robot,
+    model: str = PLAINEST,
+    urdf_file: Path | str | None = None,
+    links: tuple[str | None, str | None] = (None, None),
+    dh_joints: bool = False,
+) -> Source:
+    """What formats are made of, from a results folder; InputError where it cannot be used."""
+    tables = results.read_tables(folder)
+    arm = results.calibration(tables, robot, model, Path(folder).resolve().name)
+    path = Path(folder) / f"{model}_model.parquet"
+    known = store.read_metadata(path) if path.is_file() else {}
+    marks = {key: known[key] for key in store.PROVENANCE_KEYS if key in known}
+    return Source(arm, tables, marks, urdf_file, links, dh_joints)
+
+
+def notes(source: Source) -> list[str]:
+    """What the poses leave open, and the model that was selected instead of the one written."""
+    said, arm = [], source.calibration
+    told = source.tables.get(f"{PLAINEST}_identified")
     weak = [] if told is None else identifiability.weak(identifiability.listed(told))
-    if not weak:
-        return ""
-    more = f" and {len(weak) - 1} more" if len(weak) > 1 else ""
-    return (
-        f"warning: the arm is calibrated for poses like the measured ones only: {weak[0]}{more}; "
-        "the files say so"
-    )
-
-
-def note(folder: Path | str, model: str = PLAINEST) -> str:
-    """What the ``model`` written leaves beside the selected one, and how to get the other."""
-    found = results.read_tables(folder)
-    selected = results.selected_model(found)
-    other = PLAINEST if model == selected else selected
-    left = {each: results.residual(found, each) for each in (model, other)}
-    if model == other or None in left.values():
-        return ""
-    rms = {each: f"{known.position_mm:.3f} mm" for each, known in left.items()}
-    option = "without --model" if other == PLAINEST else f"--model {other}"
-    carried = "" if other == PLAINEST else f", as {' and '.join(formats_of(other)).upper()}"
-    kind = "plainest" if other == PLAINEST != selected else "selected"
-    return (
-        f"note: this is the {model_name(model)} model, {rms[model]} rms of {left[model].poses}; "
-        f"{option} writes the {kind} one{carried}: {model_name(other)}, {rms[other]}"
-    )
+    if weak:
+        more = f" (and {len(weak) - 1} more)" if len(weak) > 1 else ""
+        said.append(f"warning: valid for poses like the measured ones: {weak[0]}{more}")
+    selected = results.selected_model(source.tables)
+    if selected != arm.choice:
+        rms = {model: results.residual(source.tables, model) for model in (arm.choice, selected)}
+        errors = ", ".join(
+            f"{model_name(model)} {left.position_mm:.3f} mm rms"
+            for model, left in rms.items()
+            if left is not None
+        )
+        said.append(f"note: {model_name(selected)} was selected (--model {selected}): {errors}")
+    return said
 
 
 def write(made: Mapping[str, str], target: Path | str, force: bool = False) -> list[str]:

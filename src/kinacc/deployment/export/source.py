@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
@@ -13,22 +13,22 @@ from kinacc.calibration.misfit import Misfit, misfit
 from kinacc.deployment import folder as results
 from kinacc.deployment.record import STATED, Calibration
 from kinacc.kinematics.dh import PARAMETERS, DHModel
-from kinacc.tables import store
 
 CONVENTION = "T = Rz(q + theta_offset) Tz(d) Tx(a) Rx(alpha) Ry(beta) per joint"
 
 
 @dataclass(frozen=True)
 class Source:
-    """A calibrated model, the ``tables`` of its results ``folder`` and what was asked for.
+    """A calibrated model, the ``tables`` of its results and what was asked for.
 
+    ``provenance``: version, settings and seed that the model was made with.
     ``urdf_file``: a URDF whose origins are to be corrected, from link ``links[0]`` to ``links[1]``;
     ``dh_joints``: a URDF in the joints of the DH table.
     """
 
     calibration: Calibration
     tables: Mapping[str, Mapping[str, np.ndarray]]
-    folder: Path
+    provenance: Mapping[str, str] = field(default_factory=dict)
     urdf_file: Path | str | None = None
     links: tuple[str | None, str | None] = (None, None)
     dh_joints: bool = False
@@ -67,13 +67,6 @@ class Source:
     def misfit(self) -> Misfit:
         """What the standard deviations are worth."""
         return misfit(self.tables, self.calibration.robot, self.calibration.choice)
-
-    @property
-    def provenance(self) -> dict[str, str]:
-        """Version, settings and seed that the model was made with."""
-        path = self.folder / f"{self.calibration.choice}_model.parquet"
-        known = store.read_metadata(path) if path.is_file() else {}
-        return {key: known[key] for key in store.PROVENANCE_KEYS if key in known}
 
     @property
     def selected(self) -> str:
