@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -37,6 +38,26 @@ class Robot:
     flange: Pose = IDENTITY
     tool: Pose = IDENTITY
     joint_names: tuple[str, ...] = ()
+
+    @classmethod
+    def from_name(cls, name: str | Path) -> Robot:
+        """A shipped robot by its name, or the robot of a robot file. Raises InputError."""
+        from kinacc.kinematics.robot.description import load
+
+        return load(name)
+
+    @classmethod
+    def from_urdf(
+        cls, path: str | Path, base_link: str | None = None, tip_link: str | None = None
+    ) -> Robot:
+        """The arm of a URDF between two links, its root and end where not given. InputError."""
+        from kinacc.kinematics.robot import urdf
+
+        return urdf.load(path, base_link, tip_link)
+
+    def forward(self, q_rad: np.ndarray) -> Pose:
+        """Flange poses (n, ...), mm, in the base frame at reported joints (n, k), nominal."""
+        return forward(self, q_rad)
 
     def dh_joints(self, reported: np.ndarray) -> np.ndarray:
         """DH joints (..., k) of reported joints (..., k); ``limits.reported_joints`` goes back."""

@@ -1,0 +1,355 @@
+"""The public face: what a notebook imports as ``kinacc``, and what the commands call."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, Literal
+
+import numpy as np
+import pandas as pd
+
+from kinacc import __version__
+from kinacc.calibration import error_model, residual_tables
+from kinacc.calibration.misfit import misfit
+from kinacc.checks import check
+from kinacc.config import schema
+from kinacc.config.error_models import PLAINEST, asked_for
+from kinacc.deployment import compare as comparing
+from kinacc.deployment import compensate as compensating
+from kinacc.deployment import folder as results
+from kinacc.deployment import predict as predicting
+from kinacc.deployment import shared_readings
+from kinacc.deployment import verify as verifying
+from kinacc.deployment.export import files as exports
+from kinacc.deployment.record import Calibration as CalibratedModel
+from kinacc.errors import InputError, Problem
+from kinacc.geometry import Pose
+from kinacc.kinematics import robot as robots
+from kinacc.kinematics.robot import Robot
+from kinacc.report import summary
+from kinacc.synthetic import source
+from kinacc.tables import store, sums
+from kinacc.tables.atomic import write_together
+from kinacc.tables.columns import Columns
+from kinacc.workflow.code import config_hash
+from kinacc.workflow.data_sets import read_data_sets
+
+Setup = Literal["same", "moved"]
+_MARKS = {"kinacc_version": __version__, "config_hash": config_hash({}), "seed": "0"}
+
+
+@dataclass(frozen=True)
+class Measurements:
+    """Measured poses of one robot.
+
+    Attributes
+    ----------
+    name
+        Name of the data set.
+    robot
+        The nominal robot.
+    table
+        One row a reading: pose, joints q1.. (rad; mm where a joint slides), position (mm, frame of
+        the instrument), quaternion (scalar first, NaN for positions only), fold and subset.
+    settings
+        Settings of the data set, complete, as in the configuration file.
+    """
+
+    name: str
+    robot: Robot = field(repr=False)
+    table: pd.DataFrame = field(repr=False)
+    settings: Mapping[str, Any] = field(repr=False)
+
+    def __len__(self) -> int:
+        return len(self.table)
+
+    def check(self) -> pd.DataFrame:
+        """Findings of the data check, the table ``data_check``.
+
+        Raises
+        ------
+        InputError
+            Listing the findings that would spoil a fit.
+        """
+        return pd.DataFrame(check.run({}, self.settings)["data_check"])
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """A calibrated robot: its tables and the model selected from them.
+
+    Attributes
+    ----------
+    name
+        Name of the data set.
+    model
+        The selected model with its frames and covariance.
+    tables
+        The tables of its results by name, as columns.
+    """
+
+    name: str
+    model: CalibratedModel = field(repr=False)
+    tables: Mapping[str, Columns] = field(repr=False)
+
+    @property
+    def robot(self) -> Robot:
+        """The nominal robot."""
+        return self.model.robot
+
+    @cached_property
+    def summary(self) -> summary.CalibrationSummary:
+        """Held-out errors, selection, data check and what the poses leave open."""
+        return summary.summarise(self.name, self.tables, campaigns=())
+
+    @property
+    def selected(self) -> str:
+        """Kind of the selected model: dh, vec, compliance or a registered one."""
+        return self.model.choice
+
+    @property
+    def residuals(self) -> pd.DataFrame:
+        """The table ``residuals``: mean, max, rms and gamma99 by comparison and subset."""
+        return self.table("residuals")
+
+    @property
+    def parameters(self) -> pd.DataFrame:
+        """Parameters of the selected model with their standard deviations (mm, rad)."""
+        return self.table(f"{self.selected}_model")
+
+    @property
+    def unidentifiable(self) -> tuple[str, ...]:
+        """Parameters that no pose separates."""
+        return self.summary.unidentifiable
+
+    @property
+    def poorly_determined(self) -> tuple[str, ...]:
+        """Parameters that other poses would determine."""
+        return self.summary.poorly_determined
+
+    def table(self, name: str) -> pd.DataFrame:
+        """A table of the results by name."""
+        if name not in self.tables:
+            raise InputError(Problem(name, "no such table", ", ".join(self.tables)))
+        return pd.DataFrame(self.tables[name])
+
+    def predict(
+        self, q_rad: np.ndarray, s: np.ndarray | None = None, frame: str = "base",
+        point: str | None = None,
+    ) -> predicting.Prediction:  # fmt: skip
+        """Poses at reported joints, each with its standard deviation.
+
+        Parameters
+        ----------
+        q_rad
+            (n, k) joints as the controller reports them, rad (mm where a joint slides).
+        s
+            (n, k) directions of travel, -1, 0 (unknown) or 1.
+        frame
+            ``base`` (of the robot) or ``instrument``.
+        point
+            A target by name or ``flange``; the tool where not given.
+
+        Returns
+        -------
+        Prediction
+            Poses (n, ...) in mm, standard deviations, residuals, joints outside the fitted range.
+        """
+        return predicting.predict(self.model, q_rad, s, frame, point)
+
+    def compensate(
+        self, poses: Pose, near_rad: np.ndarray | None = None, s: np.ndarray | None = None,
+        frame: str = "base", point: str | None = None,
+    ) -> compensating.Compensation:  # fmt: skip
+        """Joints at which the calibrated robot reaches wanted poses.
+
+        Parameters
+        ----------
+        poses
+            (n, ...) wanted poses of ``point`` in ``frame``, positions in mm.
+        near_rad
+            (n, k) or (k,) reported joints; the posture nearest to them is taken.
+        s, frame, point
+            As in :meth:`predict`.
+
+        Returns
+        -------
+        Compensation
+            Joints (n, k) and a ``PoseStatus`` for each pose.
+        """
+        return compensating.compensate(self.model, poses, near_rad, s, frame, point)
+
+    def save(self, folder: str | Path) -> Path:
+        """Write all tables to a results folder that commands and :func:`load_calibration` read."""
+        folder = Path(folder)
+        (folder / sums.FOLDER).mkdir(parents=True, exist_ok=True)
+        contents = {
+            f"{name}.parquet": store.content_of(store.to_table(name, columns, _MARKS))
+            for name, columns in self.tables.items()
+        }
+        written: dict[str | Path, bytes] = {folder / name: each for name, each in contents.items()}
+        digests = folder / sums.FOLDER / "calibration.sha256"
+        write_together(written | {digests: sums.text_of(contents, {})})
+        return folder
+
+    def export(self, folder: str | Path, formats: Sequence[str] = ()) -> list[Path]:
+        """Write the selected model for other programs: yaml, json, csv, urdf, markdown, latex.
+
+        Returns
+        -------
+        list of Path
+            The files written to ``folder``; files of the same names are replaced.
+        """
+        chosen = formats or exports.formats_of(self.selected)
+        with TemporaryDirectory() as place:
+            saved = self.save(Path(place) / self.name)
+            made = exports.contents(saved, self.robot, chosen, self.name, model=self.selected)
+        return [Path(path) for path in exports.write(made, folder, force=True)]
+
+
+def read_measurements(path: str | Path, dataset: str | None = None) -> Measurements:
+    """Read the measurements that a data set describes.
+
+    Parameters
+    ----------
+    path
+        A configuration file, as ``kinacc init`` writes it beside a measured file.
+    dataset
+        Data set of the file; not needed where it describes one.
+
+    Raises
+    ------
+    InputError
+        Listing what is wrong with settings or measurements, with file, line and column.
+    """
+    described = read_data_sets([path]).settings
+    if dataset is None and len(described) > 1:
+        raise InputError(Problem(str(path), "describes several data sets", ", ".join(described)))
+    name = dataset or next(iter(described))
+    if name not in described:
+        raise InputError(Problem("dataset", f"no data set {name!r}", ", ".join(described)))
+    settings = described[name]
+    table = pd.DataFrame(_as_written(source.run({}, settings))["measurements"])
+    return Measurements(name, robots.load(settings["robot"]), table, settings)
+
+
+def calibrate(measurements: Measurements) -> Calibration:
+    """Fit and compare the models of a data set, as ``kinacc calibrate`` does.
+
+    Parameters
+    ----------
+    measurements
+        Measured poses; rows that were taken out of ``table`` are not fitted.
+
+    Returns
+    -------
+    Calibration
+        The selected model, and all tables of its results.
+
+    Raises
+    ------
+    InputError
+        Listing what the data check found that would spoil a fit.
+    FitError
+        Where the data do not determine a fit.
+    """
+    settings = measurements.settings
+    tables = _as_written(source.run({}, settings))
+    tables["measurements"] = {
+        name: measurements.table[name].to_numpy() for name in tables["measurements"]
+    }
+    if settings["measurements"]["source"] == "file":
+        tables |= _as_written(check.run({}, settings))
+    kinds = [kind for kind in asked_for(settings["calibration"]) if kind != PLAINEST]
+    for kind in (*kinds, PLAINEST):
+        tables |= _as_written(error_model.run(tables, settings, kind))
+    for stage in (residual_tables, summary):
+        tables |= _as_written(stage.run(tables, settings))
+    return _of_tables(measurements.name, tables, measurements.robot)
+
+
+def load_calibration(folder: str | Path, model: str | None = None) -> Calibration:
+    """Read the calibration in a results folder.
+
+    Parameters
+    ----------
+    folder
+        Results folder of a data set, such as ``results/tracker``.
+    model
+        Kind of the model; the selected one where not given.
+
+    Raises
+    ------
+    InputError
+        Naming the tables that are missing or damaged.
+    """
+    folder = Path(folder)
+    tables = results.read_tables(folder, *summary.PAGE_TABLES, *summary.ON_PAGE)
+    robot, name = results.recorded_robot(folder), folder.resolve().name
+    if robot is None:
+        raise InputError(Problem(str(folder / "robot.parquet"), "no such file"))
+    return _of_tables(name, tables, robot, model)
+
+
+def verify(
+    calibration: Calibration, readings: Measurements, base: Setup, tool: Setup
+) -> verifying.Verification:
+    """Test whether a calibration still holds at readings that it was not fitted to.
+
+    Parameters
+    ----------
+    calibration
+        The calibration.
+    readings
+        New readings, 5 to 15 configurations.
+    base, tool
+        Whether instrument and target stand as they did (``same``) or were set up anew
+        (``moved``): what moved is fitted to the readings.
+    """
+    given = {verifying.BASE: base, verifying.TOOL: tool}
+    moved = [name for name, setup in given.items() if setup == "moved"]
+    weight = float(readings.settings["calibration"]["rotation_weight_mm_per_rad"])
+    columns = {name: readings.table[name].to_numpy() for name in readings.table}
+    return verifying.verify(calibration.tables, calibration.robot, columns, moved, weight)
+
+
+def compare(
+    first: Calibration, second: Calibration, q_rad: np.ndarray | None = None
+) -> comparing.Difference:
+    """What moved from a calibration to another one of the same robot.
+
+    Parameters
+    ----------
+    first, second
+        Two calibrations.
+    q_rad
+        (n, k) reported joints at which poses are compared; all measured ones where not given.
+    """
+    if q_rad is None:
+        names = [f"q{joint + 1}" for joint in range(first.robot.dh.joints)]
+        q_rad = np.concatenate(
+            [each.table("measurements")[names].to_numpy(dtype=float) for each in (first, second)]
+        )
+    measured = first.tables["measurements"], second.tables["measurements"]
+    readings = shared_readings.shared(*measured, same_file=False)
+    weight = schema.key("calibration.rotation_weight_mm_per_rad")["default"]
+    return comparing.compare(first.model, second.model, q_rad, weight, readings)
+
+
+def _of_tables(
+    name: str, tables: dict[str, Columns], robot: Robot, kind: str | None = None
+) -> Calibration:
+    model = results.calibration(tables, robot, kind, name)
+    return Calibration(name, replace(model, misfit=misfit(tables, robot, model.choice)), tables)
+
+
+def _as_written(tables: Mapping[str, Columns]) -> dict[str, Columns]:
+    """Tables held to their schemas, with its columns in its order."""
+    return {
+        name: store.columns_in(store.to_table(name, columns, _MARKS))
+        for name, columns in tables.items()
+    }

@@ -1,0 +1,84 @@
+"""The public face on a small data set: the same tables and answers as the commands give."""
+
+import numpy as np
+import pytest
+from stages_by_hand import perform
+
+import kinacc
+
+CONFIG = """\
+datasets: {arm: {robot: mh180}}
+measurements: {folds: 3, synthetic: {poses: 60, tracker_noise_mm: 0.05}}
+calibration: {vec: {order: 1}}
+"""
+STAGES = ("measurements", "vec", "dh", "residuals", "summary")
+
+
+@pytest.fixture(scope="module")
+def config(tmp_path_factory):
+    path = tmp_path_factory.mktemp("api") / "arm.yaml"
+    path.write_text(CONFIG)
+    return path
+
+
+@pytest.fixture(scope="module")
+def calibration(config):
+    return kinacc.calibrate(kinacc.read_measurements(config))
+
+
+@pytest.mark.parametrize("name", kinacc.__all__)
+def test_every_public_name_is_there(name):
+    assert getattr(kinacc, name) is not None
+
+
+def test_tables_are_those_of_the_workflow(calibration, config, tmp_path):
+    for stage in STAGES:
+        folder = perform(stage, [str(config)], tmp_path / "results")
+    for path in folder.glob("*.parquet"):
+        workflow, own = kinacc.read_table(path), calibration.table(path.stem)
+        assert list(workflow) == list(own)
+        for name in workflow.select_dtypes("number"):
+            np.testing.assert_array_equal(workflow[name], own[name].astype(float), err_msg=name)
+
+
+def test_saved_results_are_read_again(calibration, tmp_path):
+    read = kinacc.load_calibration(calibration.save(tmp_path / "arm"))
+    q_rad = calibration.table("measurements")[[f"q{i}" for i in range(1, 7)]].to_numpy()[:5]
+    np.testing.assert_array_equal(
+        read.predict(q_rad).pose.position_mm, calibration.predict(q_rad).pose.position_mm
+    )
+    assert read.selected == calibration.selected
+    assert read.summary.best == calibration.summary.best
+    assert read.unidentifiable == calibration.unidentifiable
+
+
+def test_joints_of_a_predicted_pose_reach_it(calibration):
+    q_rad = calibration.table("measurements")[[f"q{i}" for i in range(1, 7)]].to_numpy()[:5]
+    wanted = calibration.predict(q_rad).pose
+    np.testing.assert_allclose(calibration.compensate(wanted, q_rad).q_rad, q_rad, atol=1e-8)
+
+
+def test_verify_and_compare_find_no_change_in_the_same_readings(calibration, config):
+    readings = kinacc.read_measurements(config)
+    verified = kinacc.verify(calibration, readings, base="same", tool="same")
+    assert (verified.known, verified.verdict) == (len(readings), "cannot be told")
+    assert kinacc.compare(calibration, calibration).shared.all_of_both
+
+
+def test_rows_taken_out_are_not_fitted(config):
+    measured = kinacc.read_measurements(config)
+    fewer = kinacc.Measurements(
+        measured.name, measured.robot, measured.table[measured.table["pose"] >= 5],
+        measured.settings,
+    )  # fmt: skip
+    assert kinacc.calibrate(fewer).summary.readings == len(measured) - 5
+
+
+def test_a_robot_by_name_gives_its_flange():
+    pose = kinacc.Robot.from_name("ur10").forward(np.zeros(6))
+    np.testing.assert_allclose(pose.position_mm, [[-1184.3, -256.141, 11.6]], atol=1e-9)
+
+
+def test_export_writes_files(calibration, tmp_path):
+    (path,) = calibration.export(tmp_path, ["json"])
+    assert path.is_file()
