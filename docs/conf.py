@@ -1,8 +1,8 @@
 """The site of the pages, as Sphinx builds it: ``make docs``, from the folder of the repository.
 
 The pages stay plain Markdown. What is known anyway is put in: the contents of the site from the
-lists of links in index.md, entries of the API from the names in api.md, keys of the configuration
-and columns of tables from their models and schemas (reference.py).
+lists of links in index.md, entries of the API from the names in api.md, help of commands, keys
+of the configuration and columns of tables from the code (reference.py).
 """
 
 import inspect
@@ -50,6 +50,8 @@ def _made_of_the_page(app: object, page: str, source: list[str]) -> None:
         source[0] = "".join(map(_with_contents, re.split(r"^(?=## )", source[0], flags=re.M)))
     if page == "docs/api":
         source[0] = _NAME.sub(_entry, source[0])
+    if page == "docs/commands":
+        source[0] += reference.commands()
     if page == "docs/configuration":
         source[0] += reference.settings()
     if page == "docs/artifacts":

@@ -1,8 +1,28 @@
-"""The parts of configuration.md and artifacts.md that the site makes of models and schemas."""
+"""What the site adds to commands.md, configuration.md and artifacts.md, from the code."""
 
+import click
+
+from kinacc.cli.group import main
 from kinacc.config.schema import allowed, json_schema
 from kinacc.config.settings import Configuration
 from kinacc.tables.contract import ARTEFACTS
+
+
+def commands():
+    """The help of each command, in the sections of ``kinacc --help``."""
+    parts = []
+
+    def entry(words, command):
+        context = click.Context(command, info_name=words, terminal_width=80, max_content_width=80)
+        parts.append(f"### {words}\n\n```text\n{command.get_help(context)}\n```\n")
+        for name, below in getattr(command, "commands", {}).items():
+            entry(f"{words} {name}", below)
+
+    for title, names in main.sections.items():
+        parts.append(f"\n## {title}\n")
+        for name in names:
+            entry(f"kinacc {name}", main.commands[name])
+    return "\n".join(parts)
 
 
 def settings():

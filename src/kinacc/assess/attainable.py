@@ -3,7 +3,7 @@
 An upper bound is measured by its mean excess: how far it is above the largest size on average,
 counted as nothing where it is below. All functions take the true sizes of the points that the bound
 is about, (m,), mm, and the standard deviation of a reading per axis, one for all or (m,), mm.
-docs/limits-of-bounds.md has the proofs.
+docs/bounds.md has the proofs.
 """
 
 from __future__ import annotations

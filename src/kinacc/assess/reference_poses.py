@@ -8,7 +8,7 @@ A change has one of a number of shapes over the readings: linear in time, or a s
 gaps between them. Each shape is centred pose by pose, so that the errors of the poses drop out.
 What a shape explains is a square of three standard normal components where nothing changed; where
 the noise is known up to a factor only, it is taken as a part of the square of all that is left of
-the readings. Proofs: docs/drift-and-steps.md.
+the readings. Proofs: docs/alarms.md.
 """
 
 from __future__ import annotations

@@ -73,7 +73,7 @@ def arrangements(plan: Plan) -> list[str]:
         )
         lines.append(
             "a drift of one standard deviation over the campaign is found in under 10 % of "
-            "campaigns, and bounds then hold less often (docs/drift-and-steps.md)"
+            "campaigns, and bounds then hold less often (docs/alarms.md)"
         )
     if of.error_of != MEAN:
         lines.append(f"the error meant is what {FUTURE:.0%} of visits to the worst pose keep")
