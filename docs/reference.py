@@ -3,7 +3,7 @@
 import click
 
 from kinacc.cli.group import main
-from kinacc.config.schema import allowed, json_schema
+from kinacc.config.schema import json_schema
 from kinacc.config.settings import Configuration
 from kinacc.tables.contract import ARTEFACTS
 
@@ -75,3 +75,38 @@ def _table(head, rows):
     lines = [head, ["---"] * len(head), *rows]
     cells = ([cell.replace("|", "\\|") for cell in row] for row in lines)
     return "".join(f"| {' | '.join(row)} |\n" for row in cells)
+
+
+def allowed(node, unit=""):
+    """What a key takes, in words."""
+    unit = node.get("unit", unit)
+    if "allowed" in node:
+        return str(node["allowed"])
+    if "anyOf" in node:
+        return " or ".join(allowed(each, unit) for each in node["anyOf"])
+    if words := node.get("enum", [node["const"]] if "const" in node else None):
+        return ", ".join(repr(each) if not str(each).strip() else str(each) for each in words)
+    if "properties" in node:
+        return ", ".join(node["properties"])
+    if "oneOf" in node:
+        return "mappings, each with the key of one kind"
+    kind = node.get("type", "")
+    if kind == "array":
+        if "pair" in node:
+            return f"two numbers [smaller, larger]{_limits(node['items'], unit)}"
+        fewest, most = node.get("minItems", 0), node.get("maxItems")
+        count = "" if most is None else f" ({fewest if fewest == most else f'{fewest} to {most}'})"
+        return f"a list{count} of: {allowed(node['items'], unit)}"
+    if kind == "object":
+        return f"a mapping of {allowed(node.get('propertyNames', {'type': 'string'}))} to text"
+    if kind in ("integer", "number"):
+        return f"a {'whole ' if kind == 'integer' else ''}number{_limits(node, unit)}"
+    return {"null": "null", "boolean": "true, false", "string": "text"}.get(kind, "")
+
+
+def _limits(node, unit):
+    low = node.get("minimum", node.get("exclusiveMinimum"))
+    high = node.get("maximum", node.get("exclusiveMaximum"))
+    ends = ", ends excluded" if "exclusiveMinimum" in node else ""
+    parts = [f" in {unit}" if unit else "", "" if low is None else f" from {low:g}"]
+    return "".join(parts) + ("" if high is None else f" to {high:g}") + ends

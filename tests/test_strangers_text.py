@@ -50,38 +50,27 @@ def test_two_aliases_of_themselves_are_one_problem(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("text", "words"),
+    "text",
     [
-        (
-            "datasets: {own: {robot: mh180}}\nstudy:\n"
-            + "".join(f"  key_{i}: 0\n" for i in range(9_000)),
-            "and 8900 more; mend the others first",
+        "datasets: {own: {robot: mh180}}\nstudy:\n"
+        + "".join(f"  key_{i}: 0\n" for i in range(9_000)),
+        "datasets:\n"
+        + "".join(
+            f"  a{i}: {{{', '.join(f'n{i}_{j}: 0' for j in range(90))}}}\n" for i in range(100)
         ),
-        (
-            "datasets:\n"
-            + "".join(
-                f"  a{i}: {{{', '.join(f'n{i}_{j}: 0' for j in range(90))}}}\n" for i in range(100)
-            ),
-            "this data set and those after it were not looked at",
-        ),
-        (
-            "datasets: {own: {robot: mh180, measurements: {source: file, file: {path: x.csv,"
-            " exclude: [" + "{lines: [7], reason: a}," * 2_000 + "]}}}}\n",
-            "names line 7 more than once",
-        ),
+        "datasets: {own: {robot: mh180, measurements: {source: file, file: {path: x.csv,"
+        " exclude: [" + "{lines: [7], reason: a}," * 2_000 + "]}}}}\n",
     ],
     ids=["one section", "every data set", "rows excluded"],
 )
-def test_thousands_of_faults_are_not_all_looked_into(tmp_path, text, words):
-    said = problems_of(tmp_path, text)
-    assert any(words in each for each in said)
-    assert len(said) < 2000
+def test_thousands_of_faults_are_not_all_looked_into(tmp_path, text):
+    assert len(problems_of(tmp_path, text)) <= 101
 
 
 @pytest.mark.parametrize("length", [101, 300])
 def test_a_data_set_of_a_long_name_is_refused_where_it_is_named(tmp_path, length):
     (said,) = problems_of(tmp_path, f"datasets: {{{'a' * length}: {{robot: mh180}}}}\n")
-    assert "cannot be the name of a data set; allowed: at most 100 letters" in said
+    assert "cannot be the name of a data set; give a text of at most 100 letters" in said
 
 
 def test_a_file_of_a_long_name_is_described_under_a_shorter_one():

@@ -25,9 +25,7 @@ def asked(name, kind=POSE, sessions=1, instead=False, rules=None, moving=None, p
         if joint + 1 not in moving:
             q[:, joint] = 0.3
     data = measure(disturbed(arm.dh, free, rng), q, kind, rng, sessions=sessions)
-    terms = constraints.arm_terms(
-        arm.dh, free, parameter_rules.rules(rules or {}, parameter_rules.JOINTS)[0]
-    )
+    terms = constraints.arm_terms(arm.dh, free, parameter_rules.rules(rules or {}))
     fit = fitting.fit(
         data,
         terms.nominal,

@@ -27,18 +27,14 @@ def seen(kind=POSE, count=60, seed=0, noise_mm=0.05, sessions=1):
 
 
 def fitted(observations, arm_rules=None, frame_rules=None, **given):
-    arm = constraints.arm_terms(
-        ARM.dh, FREE, parameter_rules.rules(arm_rules or {}, parameter_rules.JOINTS)[0]
-    )
+    arm = constraints.arm_terms(ARM.dh, FREE, parameter_rules.rules(arm_rules or {}))
     stated = frames.known(
         ARM.base,
         robot.carried(ARM),
         sessions=len(observations.session_names),
         targets=len(observations.target_names),
     )
-    of_frames = frames.frame_terms(
-        observations, stated, parameter_rules.rules(frame_rules or {}, parameter_rules.FRAMES)[0]
-    )
+    of_frames = frames.frame_terms(observations, stated, parameter_rules.rules(frame_rules or {}))
     return fitting.fit(
         observations,
         arm.nominal,

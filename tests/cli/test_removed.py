@@ -8,8 +8,7 @@ from click.testing import CliRunner
 from kinacc import removed
 from kinacc.campaign.plan import _kept_assessor
 from kinacc.cli.group import main
-from kinacc.config.settings import Settings
-from kinacc.config.validate import check_section
+from kinacc.config.load import load
 from kinacc.errors import InputError
 
 PLACES = {"campaign": ["campaign", "start", "check"]}
@@ -34,8 +33,9 @@ def test_an_option(command, option):
 
 @pytest.mark.parametrize("key", removed.KEYS)
 def test_a_key(key):
-    _, problems = check_section(Settings, {key: {}}, ".".join)
-    assert [each.fix for each in problems] == [removed.KEYS[key]]
+    with pytest.raises(InputError) as caught:
+        load([], {"datasets": {"mh180": {"robot": "mh180", key: {}}}})
+    assert [each.fix for each in caught.value.problems] == [removed.KEYS[key]]
 
 
 @pytest.mark.parametrize("setting", removed.SETTINGS)

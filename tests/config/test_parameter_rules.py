@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 
 from kinacc.calibration.constraints import arm_terms, free_parameters, parallel_joints
 from kinacc.config import parameter_rules
-from kinacc.config.parameter_rules import FRAMES, JOINTS
+from kinacc.config.settings import Calibration, DhFit
 from kinacc.kinematics.robot import load, shipped
 
 
 def joint_rules(content):
-    found, problems = parameter_rules.rules(content, JOINTS)
-    assert not problems
-    return found
+    return parameter_rules.rules(DhFit(parameters=content).model_dump()["parameters"])
 
 
 def test_the_rule_that_says_most_holds_in_any_order():
@@ -54,48 +53,38 @@ def test_values_are_in_the_units_they_say_and_fix_without_a_prior():
     assert terms.nominal.theta_offset_rad[0] == nominal.theta_offset_rad[0]
 
 
-def test_every_fault_is_named_at_once():
-    content = {
-        "joint 3 e": "free",
-        "base z": "fixed",
-        "d": "loose",
-        "a": {"prior_std_mrad": 1.0},
-        "alpha": {"prior_std_deg": -1.0, "prior_std_mrad": 1.0},
-        "joint 1": {"value_mm": 3.0},
-        "joint 2 d": {"prior_std_mm": True, "std_mm": 1.0},
-        "j2.d_mm": "free",
-    }
-    _, problems = parameter_rules.rules(content, JOINTS)
-    text = "\n".join(str(each) for each in problems)
-    for words in (
-        "joint 3 e: 'joint 3 e' is no parameter of joints",
-        "base z: 'base z' is no parameter of joints",
-        "it belongs in calibration.frames",
-        "'loose' is not understood",
-        "a_mm is in mm",
-        "-1.0 is not positive",
-        "stated in two units",
-        "a value needs the name of one parameter",
-        "True is not a number",
-        "unknown key 'std_mm'",
-        "is said again; first as 'joint 2 d'",
-    ):
-        assert words in text, words
-    assert len(problems) == 10
+@pytest.mark.parametrize(
+    ("name", "state", "words"),
+    [
+        ("joint 3 e", "free", "no parameter of joints"),
+        ("base z", "fixed", "no parameter of joints"),
+        ("d", "loose", "'free' or 'fixed'"),
+        ("a", {"prior_std_mrad": 1.0}, "a_mm is named"),
+        ("alpha", {"prior_std_deg": 1.0, "prior_std_mrad": 1.0}, "two units"),
+        ("alpha", {"prior_std_deg": -1.0}, "greater than 0"),
+        ("joint 1", {"value_mm": 3.0}, "no one parameter"),
+        ("joint 2 d", {"prior_std_mm": True}, "valid number"),
+        ("joint 2 d", {"std_mm": 1.0}, "Extra inputs"),
+        ("j2.d_mm", "free", "said twice"),
+    ],
+)
+def test_a_fault_of_a_rule_is_refused(name, state, words):
+    content = {"joint 2 d": "free", name: state} if name == "j2.d_mm" else {name: state}
+    with pytest.raises(ValidationError, match=words):
+        DhFit(parameters=content)
 
 
 def test_frames_are_named_as_in_the_tables():
     content = {"base": "fixed", "tool.rz_rad": {"prior_std_deg": 1.0}, "mA x": {"value_mm": 3}}
-    found, problems = parameter_rules.rules(content, FRAMES)
-    assert not problems
+    section = Calibration(frames=content, base_and_tool="estimated").model_dump()
+    found = parameter_rules.rules(section["frames"])
     assert [(rule.frame, rule.parameter) for rule in found] == [
         ("base", None),
         ("tool", "rz_rad"),
         ("mA", "x_mm"),
     ]
-    _, problems = parameter_rules.rules({"joint 3 d": "fixed", "base q": "fixed"}, FRAMES)
-    assert "it belongs in calibration.dh.parameters" in str(problems[0])
-    assert len(problems) == 2
+    with pytest.raises(ValidationError, match="no parameter of frames"):
+        Calibration(frames={"joint 3 d": "fixed"}, base_and_tool="estimated")
 
 
 def test_parallel_axes_of_every_shipped_arm():

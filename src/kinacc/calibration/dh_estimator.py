@@ -55,7 +55,7 @@ class DHEstimator(Estimator):
             section["fit_to"] == "vec",
             hayati_joints(section, arm),
             section["hayati_joints"] == _AUTO,
-            tuple(parameter_rules.rules(section["parameters"], parameter_rules.JOINTS)[0]),
+            tuple(parameter_rules.rules(section["parameters"])),
             section["loss"],
             float(section["truncation"]),
         )

@@ -50,7 +50,7 @@ class Common:
             arm.dh,
             float(calibration["rotation_weight_mm_per_rad"]),
             calibration["base_and_tool"] == "estimated",
-            tuple(parameter_rules.rules(calibration["frames"], parameter_rules.FRAMES)[0]),
+            tuple(parameter_rules.rules(calibration["frames"])),
             arm.base,
             carried(arm),
         )

@@ -9,6 +9,7 @@ from dataclasses import asdict, dataclass, fields
 from functools import cached_property
 
 import numpy as np
+from pydantic import ValidationError
 
 from kinacc import removed
 from kinacc.assess.adaptive import AdaptiveAssessor, Candidates
@@ -17,8 +18,8 @@ from kinacc.assess.statement import CANDIDATES, TARGETS
 from kinacc.campaign.instrument import BASE, INSTRUMENT, Instrument
 from kinacc.campaign.laser_tracker import LaserTracker
 from kinacc.config import json_files
+from kinacc.config.load import problems_of
 from kinacc.config.settings import Study
-from kinacc.config.validate import check_section
 from kinacc.errors import InputError, Problem, refuse
 from kinacc.geometry import Pose
 
@@ -151,7 +152,11 @@ def assessor_of(name: str, settings: Mapping[str, object]) -> AdaptiveAssessor:
     own = {*known} - {"measurements"}
     shared = own & {*Study.model_fields}
     asked = {each: value for each, value in settings.items() if each in shared}
-    problems = check_section(Study, asked, lambda path: f"setting {path[0]} of {name}")[1]
+    problems: list[Problem] = []
+    try:
+        Study.model_validate(asked)
+    except ValidationError as error:
+        problems += problems_of(error, lambda path: f"setting {path[0]} of {name}")
     for each, value in settings.items():
         where = f"setting {each} of {name}"
         if each not in known:

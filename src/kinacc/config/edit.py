@@ -7,7 +7,7 @@ from typing import Any
 
 import yaml
 
-from kinacc.config.schema import plain
+from kinacc.config.reading import value_of
 from kinacc.errors import InputError, Problem
 
 Path = Sequence[str]
@@ -35,11 +35,11 @@ def with_added(text: str, path: Path, value: Any, name: str, without: Path = ())
         Where the text cannot be changed without changing more than that.
     """
     try:
-        changed, wanted = text, plain(yaml.safe_load(text))
+        changed, wanted = text, value_of(text, name)
         if without:
             changed = _without(changed, wanted, without)
         changed = _joined(changed, wanted, path, value)
-        if plain(yaml.safe_load(changed)) == wanted:
+        if value_of(changed, name) == wanted:
             return changed
     except (yaml.YAMLError, TypeError, AttributeError, KeyError):
         pass

@@ -45,27 +45,27 @@ def setting(
     ``allowed`` says in words what is taken where its type does not; ``more`` is for
     ``pydantic.Field``: ``ge``, ``le``, ``gt``, ``lt``, ``min_length``, ``max_length``, ``alias``.
     """
-    told = {"unit": unit, "execution": execution, "allowed": allowed}
-    extra: dict[str, Any] = {name: value for name, value in told.items() if value}
+    extra: dict[str, Any] = {"unit": unit, "execution": execution, "allowed": allowed}
+    extra = {name: value for name, value in extra.items() if value}
     return Field(default, description=about, json_schema_extra=extra, **more)
 
 
-def refused(what: str, fix: str = "") -> PydanticCustomError:
-    """An error of a validator: what is wrong with the value, and what to do."""
-    return PydanticCustomError("refused", "{what}", {"what": what, "fix": fix})
+def refused(what: str, fix: str = "", *keys: str | int) -> PydanticCustomError:
+    """An error of a validator: what is wrong, what to do, and the keys below where it stands."""
+    return PydanticCustomError("refused", "{what}", {"what": what, "fix": fix, "keys": keys})
 
 
-def _distinct(items: list[Any]) -> list[Any]:
-    repeated = sorted(str(each) for each, count in Counter(items).items() if count > 1)
-    if repeated:
+def distinct(items: list[Any]) -> list[Any]:
+    """The items. Raises where one stands there more than once."""
+    if repeated := [each for each, count in Counter(items).items() if count > 1]:
         raise refused(f"names {first_few(repeated)} more than once")
     return items
 
 
-def _rising(pair: list[float]) -> list[float]:
-    if not pair[0] < pair[1]:
-        raise refused(f"{pair} is reversed or empty", "put the smaller number first")
-    return pair
+def _rising(values: list[float]) -> list[float]:
+    if values != sorted(set(values)):
+        raise refused(f"{values} is not rising", "put smaller numbers first, each once")
+    return values
 
 
 @dataclass(frozen=True)
@@ -77,23 +77,25 @@ class Or:
     def __get_pydantic_core_schema__(
         self, source: Any, handler: GetCoreSchemaHandler
     ) -> core_schema.CoreSchema:
-        return core_schema.no_info_wrap_validator_function(
-            lambda value, inner: value if value in self.words else inner(value),
-            handler(source),
-            serialization=core_schema.plain_serializer_function_ser_schema(lambda value: value),
+        words = core_schema.literal_schema([*self.words])
+        kind = handler(source)
+        return core_schema.tagged_union_schema(
+            {"[word]": words, "[value]": kind},
+            lambda value: "[word]" if isinstance(value, str) else "[value]",
         )
 
     def __get_pydantic_json_schema__(
         self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict[str, Any]:
-        return {"anyOf": [{"enum": [*self.words]}, handler(schema)]}
+        return {"anyOf": [handler(each) for each in schema["choices"].values()]}
 
 
 Text = Annotated[str, Field(min_length=1)]
-Distinct = AfterValidator(_distinct)
+Distinct = AfterValidator(distinct)
+Rising = AfterValidator(_rising)
 Pair = Annotated[
     list[Annotated[float, Field(ge=-720, le=720)]],
     Field(min_length=2, max_length=2, json_schema_extra={"pair": True}),
-    AfterValidator(_rising),
+    Rising,
 ]
 AUTO = Or(("auto",))

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from typing import Annotated, Any, Literal
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import (
     AfterValidator,
@@ -11,16 +11,16 @@ from pydantic import (
     Discriminator,
     Field,
     Tag,
+    ValidationInfo,
     WithJsonSchema,
     computed_field,
     model_validator,
 )
 
-from kinacc.config.fields import Distinct, Section, Text, refused, setting
+from kinacc.config.fields import Distinct, Section, Text, distinct, refused, setting
 from kinacc.config.names import not_in_a_line
-from kinacc.config.reading import Place
-from kinacc.config.values import nearest, shown
-from kinacc.errors import Problem, first_few
+from kinacc.config.values import did_you_mean, shown
+from kinacc.errors import first_few
 
 COMPARED = "residuals."  # figures of errors, pose by pose: chance can be told of these alone
 _STATISTICS = {
@@ -52,14 +52,10 @@ FIGURES = {
     ),
 }
 # The figure whose limit the section `tolerance` gives, by what its `of` says.
-BOUND = "bound"
 OF_TOLERANCE = {
     "mean": "residuals.position.mean",
-    "rms": "residuals.position.rms",
     "quantile_99": "residuals.position.p99",
-    "gamma_99": "residuals.position.p99_gamma",
-    "largest": "residuals.position.largest",
-    BOUND: "bound.upper",
+    "bound": "bound.upper",
 }
 _ENDINGS = {"mm": "_mm", "mrad": "_mrad", "1": ""}
 LIMITS = ("at_most", "at_least")
@@ -81,6 +77,13 @@ def limit_key(word: str, gate: Limits) -> str:
     return word + _ENDINGS[FIGURES[gate["value"]][0]]
 
 
+def limited(gate: Limits, tolerance_mm: float | None) -> tuple[str, float | None, bool]:
+    """The limit of a gate of kind ``value``: at_most or at_least, its size, whether its own."""
+    sizes = {word: gate[limit_key(word, gate)] for word in LIMITS}
+    own = next((word for word in LIMITS if sizes[word] is not None), None)
+    return (own, sizes[own], True) if own else (LIMITS[0], tolerance_mm, False)
+
+
 def _name(name: str) -> str:
     for problem in not_in_a_line("", name):
         raise refused(problem.what, problem.allowed)
@@ -89,9 +92,16 @@ def _name(name: str) -> str:
 
 def _known(figure: str) -> str:
     if figure not in FIGURES:
-        close = nearest(figure, tuple(FIGURES))
-        raise refused(f"{figure!r} is not known", f"did you mean {close}?" if close else "")
+        raise refused(f"{figure!r} is not known", did_you_mean(figure, FIGURES))
     return figure
+
+
+def _data_sets(names: list[str], info: ValidationInfo) -> list[str]:
+    known = (info.context or {}).get("datasets", names)
+    if unknown := [each for each in names if each not in known]:
+        there = first_few([*map(str, known)], 10)
+        raise refused(f"names {first_few(unknown)}, which no data set is called", f"known: {there}")
+    return names
 
 
 Figure = Annotated[str, AfterValidator(_known), WithJsonSchema({"enum": [*FIGURES]})]
@@ -108,9 +118,12 @@ class Gate(Section):
         "fail",
         "what it is where the data cannot tell: too few poses, or a tolerance between the bounds",
     )
-    datasets: Annotated[list[Text], Field(min_length=1, max_length=5000), Distinct] | None = (
-        setting(None, "data sets it is about, where it stands at the top level; null for all")
-    )
+    datasets: (
+        Annotated[
+            list[Text], Field(min_length=1, max_length=5000), Distinct, AfterValidator(_data_sets)
+        ]
+        | None
+    ) = setting(None, "data sets it is about, where it stands at the top level; null for all")
 
     @computed_field  # type: ignore[prop-decorator]
     @property
@@ -118,18 +131,15 @@ class Gate(Section):
         """Name of the kind: that of the key that tells it."""
         return type(self).__name__.lower()
 
-    def limits(self, *words: str) -> list[str]:
-        """Limits that are given. Raises where one is in another unit than the gate's figure."""
-        given = vars(self)
-        right = [limit_key(word, given) for word in words]
-        named = [word + ending for word in words for ending in _ENDINGS.values()]
-        named = [each for each in named if given.get(each) is not None]
-        for each in named:
-            if each not in right:
-                unit = FIGURES[given["value"]][0]
-                called = f"in {unit}" if unit != "1" else "counted"
-                raise refused(f"{each}, but {given['value']} is {called}", " or ".join(right))
-        return named
+    def one_limit(self, *words: str, needed: bool = False) -> None:
+        """Raise where there are two limits, or one in another unit than the gate's figure."""
+        right = [limit_key(word, vars(self)) for word in words]
+        named = [f"{word}{ending}" for word in words for ending in _ENDINGS.values()]
+        named = [each for each in named if vars(self).get(each) is not None]
+        if len(named) > 1 or not {*named} <= {*right} or len(named) < needed:
+            unit = FIGURES[vars(self)["value"]][0]
+            what = f"{' and '.join(named) or 'no limit'}, where the figure is in {unit}"
+            raise refused(what, f"give one of {' or '.join(right)}")
 
 
 class Value(Gate):
@@ -146,10 +156,8 @@ class Value(Gate):
     at_least: float | None = setting(None, f"{_LEAST}, of what is counted", ge=0, le=1e9)
 
     @model_validator(mode="after")
-    def _one_limit(self) -> Value:
-        given = self.limits(*LIMITS)
-        if len(given) > 1:
-            raise refused(f"gives {' and '.join(given)}", "write two gates, each with one limit")
+    def _limit(self) -> Self:
+        self.one_limit(*LIMITS)
         return self
 
 
@@ -165,7 +173,7 @@ class Table(Gate):
     at_least: float | None = setting(None, _LEAST)
 
     @model_validator(mode="after")
-    def _one_limit(self) -> Table:
+    def _limit(self) -> Self:
         if (self.at_most is None) == (self.at_least is None):
             raise refused("has no limit or two", "give at_most or at_least")
         return self
@@ -192,13 +200,11 @@ class Against(Gate):
     )
 
     @model_validator(mode="after")
-    def _allowance(self) -> Against:
+    def _allowance(self) -> Self:
         if not self.value.startswith(COMPARED):
-            allowed = ", ".join(each for each in FIGURES if each.startswith(COMPARED))
-            raise refused(f"chance cannot be told of {self.value}", f"give one of {allowed}")
-        if not self.limits("allow"):
-            right = limit_key("allow", vars(self))
-            raise refused(f"has no {right}", f"{right}: by how much it may be worse")
+            what = f"chance cannot be told of {self.value}"
+            raise refused(what, f"give a figure that begins with {COMPARED}")
+        self.one_limit("allow", needed=True)
         return self
 
 
@@ -242,48 +248,44 @@ class History(Gate):
     history: Literal["holds"] = setting(..., "what is asked of it")
 
 
-KINDS = {each.__name__.lower(): each for each in Gate.__subclasses__()}
-_ONE_OF = f"give one of {', '.join(KINDS)}"
+# A change has the key ``value`` as well: it comes first.
+KINDS = {
+    each.__name__.lower(): each
+    for each in (Against, Value, Table, Campaign, Claims, Suspicions, History)
+}
 
 
-def _kinds(gate: Any) -> list[str]:
-    """Kinds that the keys of a gate tell: a change has the key ``value`` as well."""
-    told = [each for each in KINDS if each in gate]
-    return ["against"] if set(told) == {"value", "against"} else told
+def _kind(gate: Any) -> str:
+    kinds = [each for each in KINDS if each in gate] if isinstance(gate, dict) else [gate.kind]
+    return f"[{kinds[0]}]"
 
 
 def _of_one_kind(gate: Any) -> Any:
-    if not isinstance(gate, dict):
-        raise refused(f"{shown(gate)} is not a mapping", _ONE_OF)
-    told = _kinds(gate)
-    if len(told) > 1:
-        raise refused(f"is of {len(told)} kinds", _ONE_OF)
-    if not told:
-        close = [near for each in gate if (near := nearest(each, tuple(KINDS)))]
-        fix = f"did you mean {close[0]}?" if close else _ONE_OF
-        raise refused("names nothing to hold results to", fix)
+    kinds = {each for each in KINDS if isinstance(gate, dict) and each in gate}
+    if len(kinds - ({"value"} if "against" in kinds else {*()})) != 1:
+        close = [did_you_mean(each, KINDS) for each in gate] if isinstance(gate, dict) else []
+        fix = f"give one of {', '.join(KINDS)}"
+        fix = next(filter(None, [] if kinds else close), fix)
+        raise refused(f"{shown(gate)} is not of one kind", fix)
     return gate
 
 
 def _names_once(gates: list[Gate]) -> list[Gate]:
-    names = [each.name for each in gates]
-    for name in names:
-        if names.count(name) > 1:
-            raise refused(f"{name!r} is the name of two gates", "give each a name of its own")
+    distinct([each.name for each in gates])
     return gates
 
 
 Gates = Annotated[
     list[
         Annotated[
-            Annotated[Value, Tag("value")]
-            | Annotated[Table, Tag("table")]
-            | Annotated[Against, Tag("against")]
-            | Annotated[Campaign, Tag("campaign")]
-            | Annotated[Claims, Tag("claims")]
-            | Annotated[Suspicions, Tag("suspicions")]
-            | Annotated[History, Tag("history")],
-            Discriminator(lambda gate: getattr(gate, "kind", None) or _kinds(gate)[0]),
+            Annotated[Against, Tag("[against]")]
+            | Annotated[Value, Tag("[value]")]
+            | Annotated[Table, Tag("[table]")]
+            | Annotated[Campaign, Tag("[campaign]")]
+            | Annotated[Claims, Tag("[claims]")]
+            | Annotated[Suspicions, Tag("[suspicions]")]
+            | Annotated[History, Tag("[history]")],
+            Discriminator(_kind),
             BeforeValidator(_of_one_kind),
         ]
     ],
@@ -292,54 +294,15 @@ Gates = Annotated[
 ]
 
 
-def wrong_datasets(
-    gates: Sequence[Limits], datasets: Collection[str] | None, place: Place
-) -> Iterator[Problem]:
-    """Gates that name data sets that are not there.
-
-    ``datasets``: names that a gate at the top level may give; None where the gates stand in the
-    section of a data set.
-    """
+def require_limits(gates: Sequence[Gate], tolerance_mm: float | None, of: str) -> None:
+    """Raise for a gate that leaves its limit to the tolerance, which has none for its figure."""
     for number, gate in enumerate(gates):
-        named, where = gate.get("datasets"), place(("gates", number, "datasets"))
-        if named and datasets is None:
-            what = "is given inside of a data set, which it is about alone"
-            yield Problem(where, what, fix="leave it out, or put the gate at the top level")
-        elif unknown := [each for each in named or () if each not in (datasets or ())]:
-            what = f"names {first_few(unknown)}, which no data set is called"
-            yield Problem(where, what, first_few(sorted(datasets or ()), 10))
-
-
-def without_limit(
-    gates: Sequence[Limits], dataset: str, tolerance: Limits, place: Callable[..., str]
-) -> Iterator[Problem]:
-    """Gates of a data set that leave their limit to ``tolerance``, which has none for them."""
-    for number, gate in enumerate(gates):
-        if gate not in about(gates, dataset) or gate["kind"] not in ("campaign", "value"):
-            continue
-        if gate["kind"] == "campaign":
-            limit, of, own = "tolerance_mm", BOUND, gate["tolerance_mm"]
+        if isinstance(gate, Value):
+            figure, open_ = gate.value, not limited(vars(gate), None)[2]
+        elif isinstance(gate, Campaign):
+            figure, open_ = OF_TOLERANCE["bound"], gate.tolerance_mm is None
         else:
-            limit, own = limit_key(LIMITS[0], gate), _own(gate)
-            of = next((o for o, name in OF_TOLERANCE.items() if name == gate["value"]), "")
-        if own is None and (tolerance["mm"] is None or tolerance["of"] != of):
-            known = f", and tolerance is of {tolerance['of']}" if tolerance["mm"] else ""
-            fix = f"; or tolerance: {{mm: .., of: {of}}}" if of else ""
-            where = place("gates", number)
-            yield Problem(where, f"has no {limit}{known}", f"{limit}: a number{fix}")
-
-
-def _own(gate: Limits) -> tuple[str, float] | None:
-    sizes = [(word, gate[limit_key(word, gate)]) for word in LIMITS]
-    return next(((word, size) for word, size in sizes if size is not None), None)
-
-
-def limited(gate: Limits, tolerance: Limits) -> tuple[str, float, bool]:
-    """The limit of a gate of kind ``value``: at_most or at_least, its size, whether its own."""
-    own = _own(gate)
-    return (*own, True) if own else (LIMITS[0], float(tolerance["mm"]), False)
-
-
-def about(gates: Sequence[Limits], dataset: str) -> list[Limits]:
-    """The gates that are about a data set."""
-    return [each for each in gates if each["datasets"] is None or dataset in each["datasets"]]
+            continue
+        if open_ and (tolerance_mm is None or OF_TOLERANCE[of] != figure):
+            what = f"has no limit, and tolerance has none for {figure}"
+            raise refused(what, "write one into the gate", "gates", number)

@@ -1,39 +1,36 @@
-"""Load configuration files: merge, check everything at once, complete every data set."""
+"""Load configuration files: merge, complete every data set, check everything at once."""
 
 from __future__ import annotations
 
 import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from copy import deepcopy
 from dataclasses import replace
+from functools import reduce
 from pathlib import Path
 from typing import Any
 
-from kinacc.config import gate_rules, series
-from kinacc.config.reading import Document, KeyPath, dotted, read
-from kinacc.config.schema import plain
-from kinacc.config.settings import Configuration, DataSet, Settings
-from kinacc.config.validate import (
-    ROBOTS,
-    Place,
-    check_dataset_name,
-    check_robot,
-    check_section,
-)
-from kinacc.config.values import shown
+from pydantic import ValidationError
+
+from kinacc import removed
+from kinacc.config import series
+from kinacc.config.reading import Document, KeyPath, Place, read
+from kinacc.config.schema import keys
+from kinacc.config.settings import ROBOTS, Configuration
+from kinacc.config.values import did_you_mean, shown
 from kinacc.errors import InputError, Problem
 
 Contradictions = Callable[..., Iterable[Problem]]
 COMMAND_LINE = "command line"
 _MOST_DATASETS = 5_000
-_MOST_PROBLEMS = 1_000  # more are not sought: each takes a search for what was meant
-# What makes a data set the one it is: given in two files, two different data sets share a name.
-_IDENTITY = (("measurements", "source"), ("measurements", "file", "path"), ("series",))
-# Values that name files: in every data set, and of the top level; and in lists of mappings.
-_FILES: tuple[KeyPath, ...] = (("robot",), _IDENTITY[1], ("measurements", "file", "joints", "path"))
-_LISTED_FILES = (("series", "path"), ("gates", "campaign"))
+_MOST_PROBLEMS = 100  # nobody reads more, and each is held against all names
+# Whose text names a file, wherever these keys stand.
+_FILES = ("robot", "path", "campaign")
 # One value each, not a section: a data set's own replaces that of the top level.
 _MAPPINGS = ("columns", "parameters", "frames", "accept")
+# Given in two files, two different data sets share a name.
+_IDENTITY = (("measurements", "source"), ("measurements", "file", "path"), ("series",))
 
 
 def load(
@@ -47,32 +44,48 @@ def load(
     ``paths`` are merged in order as Snakemake merges its ``--configfile``: sections key by key, all
     else replaced. ``overrides`` (nested, as from ``--config``) come last. Paths of data and robots
     are relative to the file they stand in, those of ``overrides`` to the current ``folder``, and so
-    are those returned. ``contradictions`` (name, robot, full settings, place, folder) yields what
-    is wrong with settings that are each fine. Every data set has ``robot``, ``seed`` and all
-    sections of :class:`Settings`, numbers in the units their names carry.
+    are those returned. ``contradictions`` (full settings, place, folder) yields what is wrong with
+    settings that are each fine. Every data set has ``robot``, ``seed`` and all sections of
+    :class:`Settings`, numbers in the units their names carry.
 
     Raises InputError listing every problem in all files.
     """
     documents: list[Document] = []
     problems: list[Problem] = []
     for path in paths:
-        document, found = read(path)
-        documents.append(_from_here(document, Path(folder)))
-        problems += found
+        document, wrong = read(path)
+        if os.path.realpath(Path(path).parent) != os.path.realpath(folder):
+            beside = os.path.relpath(Path(path).absolute().parent, folder)
+            document = replace(document, data=_relocated(document.data, beside, Path(folder)))
+        documents.append(document)
+        problems += wrong
     if overrides:
-        documents.append(Document(COMMAND_LINE, plain(overrides)))
+        documents.append(Document(COMMAND_LINE, deepcopy(dict(overrides))))
     if not documents:
         raise InputError(Problem("configuration", "no file given", fix="give config.yaml"))
-    problems += _defined_twice(documents)
-    merged: dict[str, Any] = {}
-    for document in documents:
-        merged = overlay(merged, document.data)
+    merged = reduce(overlay, (each.data for each in documents))
     resolved: dict[str, dict[str, Any]] = {}
     if merged or not problems:
-        resolved, found = _resolve(merged, documents, Path(folder), contradictions)
-        problems += found
+        problems += _given_twice(documents)
+        shared = {key: value for key, value in merged.items() if key != "datasets"}
+        datasets = merged.get("datasets")
+        if not isinstance(datasets, Mapping) or not 0 < len(datasets) <= _MOST_DATASETS:
+            what = "no data set is given" if not datasets else "is no mapping of data sets by name"
+            allowed = f"datasets: with a section for each of at most {_MOST_DATASETS}"
+            where = next((e.place(("datasets",)) for e in documents if "datasets" in e.data), None)
+            problems.append(Problem(where or documents[0].name, what, allowed))
+            datasets = {}
+        for name, own in datasets.items():
+            context = {"folder": Path(folder), "dataset": name, "datasets": datasets}
+            found, wrong = _data_set(own, shared, documents, context, contradictions)
+            resolved |= found
+            problems += wrong
+            if len(problems) > _MOST_PROBLEMS:
+                break
     if problems:
         problems = sorted(dict.fromkeys(problems), key=_reading_order(documents))
+        if len(problems) > _MOST_PROBLEMS:
+            problems[_MOST_PROBLEMS:] = [Problem(documents[0].name, "more", fix="mend these first")]
         count = len(problems)
         title = f"{count} problem{'s' if count > 1 else ''} in the configuration"
         raise InputError(problems, title)
@@ -94,151 +107,118 @@ def overlay(
     return merged
 
 
-def _from_here(document: Document, folder: Path) -> Document:
-    """The document with the paths in it, which start where it stands, as seen from ``folder``."""
-    beside = Path(document.name).absolute().parent
-    if os.path.realpath(beside) == os.path.realpath(folder):
-        return document
-    data = plain(document.data)
-    datasets = data.get("datasets")
-    for own in [data, *(datasets.values() if isinstance(datasets, dict) else ())]:
-        for holder, key in _holders_of_files(own):
-            value = holder.get(key)
-            if not isinstance(value, str) or not value:
-                continue
-            near = os.path.relpath(beside / value, folder).replace(os.sep, "/")
-            is_name = (ROBOTS / f"{value}.yaml").is_file() or not os.path.exists(folder / near)
-            if not os.path.isabs(value) and not (key == "robot" and is_name):
-                holder[key] = near
-    return replace(document, data=data)
-
-
-def _holders_of_files(own: Any) -> Iterator[tuple[dict[str, Any], str]]:
-    """Mappings, and the keys in them, whose values name files."""
-    for *sections, key in _FILES:
-        found = own
-        for section in sections:
-            found = found.get(section) if isinstance(found, dict) else None
-        if isinstance(found, dict):
-            yield found, key
-    for listed, key in _LISTED_FILES:
-        items = own.get(listed) if isinstance(own, dict) else None
-        yield from (
-            (item, key)
-            for item in (items if isinstance(items, list) else ())
-            if isinstance(item, dict)
-        )
+def _relocated(value: Any, beside: str, folder: Path, key: Any = None) -> Any:
+    """Values whose files, named from the folder ``beside``, are as seen from ``folder``."""
+    if isinstance(value, dict):
+        return {name: _relocated(each, beside, folder, name) for name, each in value.items()}
+    if isinstance(value, list):
+        return [_relocated(each, beside, folder) for each in value]
+    if key not in _FILES or not isinstance(value, str) or not value or os.path.isabs(value):
+        return value
+    near = os.path.normpath(f"{beside}/{value}").replace(os.sep, "/")
+    is_name = (ROBOTS / f"{value}.yaml").is_file() or not os.path.exists(folder / near)
+    return value if key == "robot" and is_name else near
 
 
 def _reading_order(documents: Sequence[Document]) -> Callable[[Problem], tuple[int, int]]:
     """Sort key of problems: file by file as given, then line by line."""
+    names = [re.escape(each.name) for each in documents]
 
-    def key(problem: Problem) -> tuple[int, int]:
-        for number, document in enumerate(documents):
-            found = re.match(re.escape(document.name) + r"(?::(\d+))?(?:, |$)", problem.where)
-            if found:
-                return number, int(found.group(1) or 0)
-        return len(documents), 0
+    def order(problem: Problem) -> tuple[int, int]:
+        for number, name in enumerate(names):
+            if match := re.match(rf"{name}(?::(\d+))?(?:, |$)", problem.where):
+                return number, int(match[1] or 0)
+        return len(names), 0
 
-    return key
-
-
-def _resolve(
-    merged: Mapping[str, Any],
-    documents: Sequence[Document],
-    folder: Path,
-    contradictions: Contradictions,
-) -> tuple[dict[str, dict[str, Any]], list[Problem]]:
-    def place(path: KeyPath) -> str:
-        """Where a key was given last, else the section it would stand in, else a default."""
-        for length in range(len(path), 0, -1):
-            for document in reversed(documents):
-                if document.gives(path[:length]):
-                    return document.place(path)
-        return f"default, {dotted(path)}" if path else documents[-1].name
-
-    shared, datasets = dict(merged), merged.get("datasets")
-    shared.pop("datasets", None)
-    shared, problems = check_section(Configuration, shared, place)
-    if not isinstance(datasets, Mapping) or not datasets:
-        what = "no data set is given" if not datasets else f"{shown(datasets)} is not a section"
-        where = place(("datasets",)) if "datasets" in merged else documents[0].place(())
-        fix = f"known at the top level: {', '.join(Configuration.model_fields)}"
-        problems.append(Problem(where, what, "datasets: with a section for each data set", fix))
-        return {}, problems
-    if len(datasets) > _MOST_DATASETS:
-        what = f"{len(datasets)} data sets are given"
-        allowed = f"at most {_MOST_DATASETS} in one run"
-        return {}, [*problems, Problem(place(("datasets",)), what, allowed)]
-    problems += gate_rules.wrong_datasets(shared.get("gates") or (), [*datasets], place)
-    resolved: dict[str, dict[str, Any]] = {}
-    for name, content in datasets.items():
-        if len(problems) > _MOST_PROBLEMS:
-            what = "this data set and those after it were not looked at"
-            problems.append(Problem(place(("datasets", name)), what, fix="mend the others first"))
-            break
-        found, wrong = _dataset(name, content, shared, place, folder, contradictions)
-        problems += [*wrong, *series.taken(name, found, datasets, place)]
-        resolved |= found
-    return resolved, problems
+    return order
 
 
-def _dataset(
-    name: str,
-    content: Any,
+def _data_set(
+    own: Any,
     shared: Mapping[str, Any],
-    place: Place,
-    folder: Path,
+    documents: Sequence[Document],
+    context: Mapping[str, Any],
     contradictions: Contradictions,
 ) -> tuple[dict[str, dict[str, Any]], list[Problem]]:
     """Full settings of a data set, and of those its series stands for, by name."""
-    path: KeyPath = ("datasets", name)
+    name = context["dataset"]
 
-    def below(keys: KeyPath) -> str:
-        return place((*path, *keys))
+    def place(path: KeyPath) -> str:
+        """Where a key was given last, else where the section was that it would stand in."""
+        for length in range(len(path), -1, -1):
+            for base in (("datasets", name), ()):
+                for document in reversed(documents):
+                    if base + path[:length] and document.gives(base + path[:length]):
+                        return document.place(base + path)
+        raise AssertionError(path)  # the data set itself is given
 
-    problems = check_dataset_name(name, below(()))
-    own, wrong = check_section(DataSet, content, below)
-    problems += wrong
-    robot, lines = own.pop("robot", None), series.by_date(own.pop("series", None) or ())
-    problems += series.of_each_other(lines, below)
-    known_robot = None
-    if robot is not None:
-        unknown = check_robot(robot, below(("robot",)), folder)
-        known_robot = None if unknown else robot
-        problems += unknown
-    elif not isinstance(content, Mapping) or "robot" not in content:
-        allowed = "robot: a shipped robot's name or the path of a robot file"
-        problems.append(Problem(below(()), "names no robot", allowed))
-    settings = Settings.model_validate(overlay(shared, own, _MAPPINGS))
-    full = {"robot": robot, **settings.model_dump(by_alias=True)}
+    content = overlay(shared, own, _MAPPINGS) if isinstance(own, Mapping) else own
+    try:
+        whole = Configuration.model_validate({"datasets": {name: content}}, context=context)
+    except ValidationError as error:
+        return {}, [*problems_of(error, lambda path: place(path[2:]))]
+    full, problems = whole.datasets[name].model_dump(by_alias=True), []
+    if own.get("gates") and any(each["datasets"] for each in full["gates"]):
+        what = "names data sets inside of a data set, which its gates are about alone"
+        problems.append(Problem(place(("gates",)), what, fix="leave datasets out of the gate"))
+    full["gates"] = [each for each in full["gates"] if name in (each["datasets"] or [name])]
+    resolved = series.expanded(name, full)
+    for each, settings in resolved.items():
+        if each != name and each in context["datasets"]:
+            what = f"its line {each} has the name of another data set"
+            problems.append(Problem(place(("series",)), what, "another name"))
+        path = settings["measurements"]["file"]["path"]
+        lines = [line.get("path") for line in own.get("series") or ()]
 
-    def origin(*keys: str | int) -> str:
-        given: Any = own
-        for key in keys:
-            if isinstance(given, list):
-                break  # a list is given whole
-            given = given.get(key, {}) if isinstance(given, Mapping) else {}
-        return below(keys) if given != {} else f"{place(keys)} (data set {name})"
+        def of_line(keys: KeyPath, path: str = path, lines: list[Any] = lines) -> str:
+            is_line = path in lines and keys == _IDENTITY[1]
+            return place(("series", lines.index(path), "path") if is_line else keys)
 
-    problems += series.contradicted(full, origin) if lines else ()
-    problems += gate_rules.wrong_datasets(own.get("gates") or (), None, below)
-    problems += gate_rules.without_limit(full["gates"], name, full["tolerance"], origin)
-    full["gates"] = gate_rules.about(full["gates"], name)
-    resolved = series.expanded(name, full, [line for _, line in lines])
-    is_series = bool(lines) or (isinstance(content, Mapping) and "series" in content)
-    for number, line in lines if is_series else [(None, None)]:
-
-        def of_file(*keys: str | int, number: int | None = number) -> str:
-            is_line = number is not None and keys == _IDENTITY[1]
-            return below(("series", number, "path")) if is_line else origin(*keys)
-
-        one = resolved[f"{name}-{line.date}" if line else name]
-        problems += contradictions(name, known_robot, one, of_file, folder)
+        problems += contradictions(settings, of_line, context["folder"])
     return resolved, problems
 
 
-def _defined_twice(documents: Sequence[Document]) -> Iterator[Problem]:
+def problems_of(error: ValidationError, place: Place) -> Iterator[Problem]:
+    """What pydantic has against settings, with the key that is nearest to an unknown one."""
+    for each in error.errors(include_url=False)[: _MOST_PROBLEMS + 1]:
+        more = each.get("ctx", {})
+        path = (*each["loc"], *more.get("keys", ()))
+        # Kinds of gates and of values, and keys that are values, are no steps of the file.
+        path = tuple(step for step in path if not (isinstance(step, str) and step[:1] == "["))
+        kind, value, message = each["type"], each["input"], each["msg"]
+        message = f"{shown(value)} {message.removeprefix('Input ')}".partition(" or instance of ")[
+            0
+        ]
+        if kind == "missing":
+            yield Problem(place(path[:-1]), f"has no {path[-1]}")
+        elif kind == "extra_forbidden":
+            yield Problem(place(path), f"unknown key {path[-1]!r}", fix=_meant(path))
+        elif kind == "refused":
+            yield Problem(place(path), more["what"], fix=more["fix"])
+        elif kind == "literal_error":
+            words = re.findall(r"'([^']*)'", more["expected"])
+            yield Problem(place(path), message, fix=did_you_mean(value, words))
+        else:
+            yield Problem(place(path), message)
+
+
+def _meant(path: KeyPath) -> str:
+    """What to write instead of an unknown key of the settings."""
+    if path[-1] in removed.KEYS:
+        return removed.KEYS[path[-1]]
+    path = path[2:] if path[0] == "datasets" else path
+    steps, known = [str(step) for step in path if not isinstance(step, int)], keys()
+    section = ".".join(steps[:-1])
+    there = [each.rpartition(".")[2] for each in known if each.rpartition(".")[0] == section]
+    homes = [each for each in known if each.rpartition(".")[2] == steps[-1]]
+    return (
+        did_you_mean(steps[-1], there)
+        or (homes and f"it belongs at {' or '.join(homes[:3])}")
+        or f"known: {', '.join(there)}"
+    )
+
+
+def _given_twice(documents: Sequence[Document]) -> Iterator[Problem]:
     first: dict[KeyPath, Document] = {}
     for document in documents:
         datasets = document.data.get("datasets")

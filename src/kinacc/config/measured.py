@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import AfterValidator, BeforeValidator, Field
+from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
-from kinacc.config.fields import Distinct, Section, Text, refused, setting
-from kinacc.config.values import nearest
-from kinacc.errors import first_few
+from kinacc.config.fields import Distinct, Section, Text, distinct, refused, setting
+from kinacc.config.values import did_you_mean, shown
 
 # Names that a column of a measured file has for kinacc; those of POINT may have a target in front.
 ROW = [
@@ -69,9 +67,7 @@ def _is_column(name: Any) -> bool:
 
 def _column(name: Any) -> Any:
     if not _is_column(name):
-        close = nearest(name, (*ROW, *POINT))
-        fix = f"did you mean {close}?" if close else ""
-        raise refused(f"unknown name {name!r}", fix)
+        raise refused(f"unknown name {name!r}", did_you_mean(name, (*ROW, *POINT)))
     return name
 
 
@@ -88,15 +84,19 @@ def _listed(lines: Any) -> Any:
 
 
 def _each_line_once(rows: list[Excluded]) -> list[Excluded]:
-    count = Counter(line for row in rows for line in row.lines)
-    repeated = sorted(line for line, times in count.items() if times > 1)
-    if repeated:
-        raise refused(f"names line {first_few(repeated)} more than once", "give it one reason")
+    distinct([line for row in rows for line in row.lines])
     return rows
 
 
+def _column_once(names: dict[str, str]) -> dict[str, str]:
+    distinct([*names.values()])
+    return names
+
+
 Columns = Annotated[
-    dict[Annotated[str, BeforeValidator(_column)], Text], BeforeValidator(_ours_first)
+    dict[Annotated[str, BeforeValidator(_column)], Text],
+    BeforeValidator(_ours_first),
+    AfterValidator(_column_once),
 ]
 Names = Annotated[list[Text], Field(min_length=1, max_length=10000), Distinct]
 Thousands = Literal[".", ",", " ", "'"]
@@ -243,6 +243,13 @@ class JointsFile(Written):
     )
     within_s: float = setting(0.5, "how far joints may be from a point in time", "s", gt=0, lt=3600)
 
+    @model_validator(mode="after")
+    def _keys_are_given(self) -> Self:
+        for key in ("key", "key_of_points"):
+            if self.path and self.by != "order" and getattr(self, key) is None:
+                raise refused(f"needs {key}, to join by {self.by}", "name the column", key)
+        return self
+
 
 class MeasuredFile(Written):
     """The measured file (used where source is file)."""
@@ -339,3 +346,10 @@ class Measurements(Section):
     )
     synthetic: Synthetic = Synthetic()
     file: MeasuredFile = MeasuredFile()
+
+    @model_validator(mode="after")
+    def _fold_is_there(self) -> Self:
+        if self.validation_fold is not None and self.validation_fold >= (self.folds or 0):
+            what = f"there is no fold {self.validation_fold}, with folds: {shown(self.folds)}"
+            raise refused(what, "folds count from 0; null for none", "validation_fold")
+        return self

@@ -11,30 +11,48 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Annotated, Any
 
-from kinacc.errors import Problem
+from pydantic import AfterValidator, Field, model_serializer
+
+from kinacc.config.fields import Or, Section, Text, refused
 
 FREE, FIXED = "free", "fixed"
+JOINTS, FRAMES = "joints", "frames"
+KEYS = {JOINTS: "calibration.dh.parameters", FRAMES: "calibration.frames"}
 _PARAMETERS = {name: f"{name}_rad" for name in ("theta_offset", "alpha", "beta")}
 _PARAMETERS |= {"theta": "theta_offset_rad", "d": "d_mm", "a": "a_mm"}
 _COMPONENTS = {name: f"{name}_mm" for name in "xyz"}
 _COMPONENTS |= {f"r{name}": f"r{name}_rad" for name in "xyz"}
 _UNITS = {"mm": ("mm", 1.0), "rad": ("rad", 1.0), "mrad": ("rad", 1e-3)}
 _UNITS["deg"] = ("rad", math.pi / 180.0)
-_LARGEST = 1e100  # beyond, squares overflow
 _JOINT = re.compile(r"(?:joint ?|j)(\d{1,9})(?:[ .](\w+?)(?:_mm|_rad)?)?")
 _FRAME = re.compile(r"([^ .]+)(?:[ .]+(r?[xyz])(?:_mm|_rad)?)?")
-_SAID = re.compile("(value|prior_std)_(mm|rad|mrad|deg)")
-JOINTS, FRAMES = "joints", "frames"
-KEYS = {JOINTS: "calibration.dh.parameters", FRAMES: "calibration.frames"}
 _NAMES = {
     JOINTS: "d, joint 3, joint 3 d and the like, with theta, d, a, alpha, beta",
     FRAMES: "base, base rz, tool x and the like, with x, y, z, rx, ry, rz",
 }
-_SAYS = "free, fixed, or a mapping of value_ and prior_std_ with mm, mrad, rad or deg"
+_Value = Annotated[float | None, Field(gt=-1e100, lt=1e100)]  # beyond, squares overflow
+_Std = Annotated[float | None, Field(gt=0, lt=1e100)]
+
+
+class Known(Section):
+    """A value, a standard deviation about it, or both; each in one unit."""
+
+    value_mm: _Value = None
+    value_rad: _Value = None
+    value_mrad: _Value = None
+    value_deg: _Value = None
+    prior_std_mm: _Std = None
+    prior_std_rad: _Std = None
+    prior_std_mrad: _Std = None
+    prior_std_deg: _Std = None
+
+    @model_serializer
+    def _stated(self) -> dict[str, float]:
+        return {key: value for key, value in vars(self).items() if value is not None}
 
 
 @dataclass(frozen=True)
@@ -53,37 +71,57 @@ class Rule:
     std: Mapping[str, float] = field(default_factory=dict)
 
     @property
-    def says(self) -> int:
+    def weight(self) -> int:
         """How much the rule says about a parameter."""
         return 2 * (self.joint is not None or self.frame is not None) + bool(self.parameter)
 
 
-def rules(
-    content: Mapping[str, Any], about: str, place: Callable[[str], str] = str
-) -> tuple[list[Rule], list[Problem]]:
-    """Rules of a mapping about JOINTS or FRAMES and every problem with it.
+def rules(content: Mapping[str, Any]) -> list[Rule]:
+    """Rules of a valid mapping of names to ``free``, ``fixed``, or values and priors by unit."""
+    found = []
+    for name, state in content.items():
+        known: dict[str, dict[str, float]] = {"value": {}, "prior_std": {}}
+        for key, number in state.items() if isinstance(state, Mapping) else ():
+            kind, _, short = key.rpartition("_")
+            unit_, factor = _UNITS[short]
+            known[kind][unit_] = factor * number
+        is_free = state == FREE or bool(known["prior_std"])
+        joint, frame, parameter = _subject(name) or (None, None, None)
+        value, std = known["value"], known["prior_std"]
+        found.append(Rule(name, joint, frame, parameter, is_free, value, std))
+    return found
 
-    ``place`` words where a name is. What an arm has is not asked here: see ``strangers``.
-    """
-    found: dict[tuple[Any, ...], Rule] = {}
-    problems: list[Problem] = []
-    for name, says in content.items():
-        subject = _subject(name)
-        if subject is None or (subject[1] is not None) != (about == FRAMES):
-            other = KEYS[JOINTS if about == FRAMES else FRAMES]
-            # Any word could be the name of a frame.
-            is_known = subject and (subject[1] in (None, "base", "tool") or subject[2])
-            fix = f"it belongs in {other}" if is_known else ""
-            what = f"{name!r} is no parameter of {about}"
-            problems.append(Problem(place(name), what, _NAMES[about], fix))
-            continue
-        free, value, std, faults = _said(says, subject[2])
-        problems += [Problem(place(name), what, _SAYS) for what in faults]
-        if subject in found:
-            what = f"is said again; first as {found[subject].name!r}"
-            problems.append(Problem(place(name), what))
-        found[subject] = Rule(str(name), *subject, free, value, std)
-    return [*found.values()], problems
+
+def _check(about: str) -> AfterValidator:
+    """Validator of the names of rules about JOINTS or FRAMES, and of units beside names."""
+
+    def check(content: dict[str, Any]) -> dict[str, Any]:
+        subjects: list[Any] = []
+        for name, state in content.items():
+            subject = _subject(name)
+            if subject is None or (subject[1] is not None) != (about == FRAMES):
+                other = KEYS[JOINTS if about == FRAMES else FRAMES]
+                fix = f"give {_NAMES[about]}; others belong in {other}"
+                raise refused(f"{name!r} is no parameter of {about}", fix, name)
+            if subject in subjects:
+                raise refused(f"{name!r} is said twice, in two spellings", "", name)
+            subjects.append(subject)
+            stated = [] if isinstance(state, str) else list(state.model_dump())
+            kinds = [(key.rpartition("_")[0], _UNITS[key.rpartition("_")[2]][0]) for key in stated]
+            if len({*kinds}) < len(kinds) or (not stated and not isinstance(state, str)):
+                raise refused("states nothing, or the same in two units", "", name)
+            for key, (kind, unit_) in zip(stated, kinds, strict=True):
+                if (subject[2] or kind == "value") and unit(subject[2] or "") != unit_:
+                    what = f"{key}, but {subject[2] or 'no one parameter'} is named"
+                    raise refused(what, "name one parameter, and its unit", name)
+        return content
+
+    return AfterValidator(check)
+
+
+_State = Annotated[Known, Or((FREE, FIXED))]
+JointRules = Annotated[dict[Text, _State], _check(JOINTS)]
+FrameRules = Annotated[dict[Text, _State], _check(FRAMES)]
 
 
 def strangers(
@@ -98,11 +136,9 @@ def strangers(
             yield rule, f"there is no joint {rule.joint}", f"joints 1 to {joints}"
         if rule.frame is None or frames is None:
             continue
-        if rule.frame not in frames:
-            yield rule, f"no frame {rule.frame} is estimated", ", ".join(frames)
-        elif rule.parameter and rule.parameter not in frames[rule.frame]:
-            what = f"{rule.parameter} of {rule.frame} is not estimated"
-            yield rule, what, ", ".join(frames[rule.frame])
+        if rule.frame not in frames or rule.parameter not in (None, *frames[rule.frame]):
+            there = ", ".join(frames.get(rule.frame, frames))
+            yield rule, f"{rule.parameter or rule.frame} is not estimated", there
 
 
 def rule_for(
@@ -110,11 +146,8 @@ def rule_for(
 ) -> Rule | None:
     """The rule that says most about ``parameter`` of a joint (1-based) or of a frame."""
     about = [rule for rule in found if rule.parameter in (None, parameter)]
-    if frame is None:
-        about = [rule for rule in about if rule.frame is None and rule.joint in (None, joint)]
-    else:
-        about = [rule for rule in about if rule.frame == frame]
-    return max(about, key=lambda rule: rule.says, default=None)
+    about = [rule for rule in about if rule.frame == frame and rule.joint in (None, joint)]
+    return max(about, key=lambda rule: rule.weight, default=None)
 
 
 def unit(parameter: str) -> str:
@@ -122,49 +155,14 @@ def unit(parameter: str) -> str:
     return parameter.rpartition("_")[2]
 
 
-def _subject(name: Any) -> tuple[int | None, str | None, str | None] | None:
+def _subject(name: str) -> tuple[int | None, str | None, str | None] | None:
     """Joint, frame and parameter a name stands for; None where it stands for none."""
-    words = " ".join(str(name).split())
+    words = " ".join(name.split())
     lower = words.lower().removesuffix("_mm").removesuffix("_rad")
     if lower in _PARAMETERS:
         return None, None, _PARAMETERS[lower]
     if match := _JOINT.fullmatch(words.lower()):
-        joint, parameter = int(match[1]), match[2]
-        known = parameter is None or parameter in _PARAMETERS
-        return (joint, None, _PARAMETERS.get(parameter)) if known else None
-    if match := _FRAME.fullmatch(words):
-        return None, match[1], _COMPONENTS.get(match[2])
-    return None
-
-
-def _said(
-    says: Any, parameter: str | None
-) -> tuple[bool, dict[str, Any], dict[str, Any], list[str]]:
-    """Whether free, value and standard deviation by unit, and every fault."""
-    if says in (FREE, FIXED):
-        return says == FREE, {}, {}, []
-    if not isinstance(says, Mapping) or not says:
-        return True, {}, {}, [f"{says!r} is not understood"]
-    found: dict[str, dict[str, float]] = {"value": {}, "prior_std": {}}
-    faults: list[str] = []
-    for key, number in says.items():
-        match = _SAID.fullmatch(str(key))
-        if match is None:
-            faults.append(f"unknown key {key!r}")
-            continue
-        kind, factor = _UNITS[match[2]]
-        into = found[match[1]]
-        if isinstance(number, bool) or not isinstance(number, (int, float)):
-            faults.append(f"{key}: {number!r} is not a number")
-            continue
-        if kind in into:
-            faults.append(f"{key} is stated in two units")
-        if not abs(number) < _LARGEST or (match[1] == "prior_std" and number <= 0.0):
-            needed = "finite" if match[1] == "value" else "positive"
-            faults.append(f"{key}: {number!r} is not {needed}")
-        if parameter and unit(parameter) != kind:
-            faults.append(f"{key}: {parameter} is in {unit(parameter)}")
-        if match[1] == "value" and parameter is None:
-            faults.append(f"{key}: a value needs the name of one parameter")
-        into[kind] = factor * number
-    return bool(found["prior_std"]), found["value"], found["prior_std"], faults
+        is_known = match[2] is None or match[2] in _PARAMETERS
+        return (int(match[1]), None, _PARAMETERS.get(match[2])) if is_known else None
+    match = _FRAME.fullmatch(words)
+    return (None, match[1], _COMPONENTS.get(match[2])) if match else None

@@ -7,30 +7,24 @@ are what is plausible in it, so that a value in another unit is caught. Defaults
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+import re
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, model_validator
 
-from kinacc.config import parameter_rules
-from kinacc.config.fields import AUTO, Distinct, Or, Pair, Section, Text, refused, setting
-from kinacc.config.gate_rules import Gates
+from kinacc.config.fields import AUTO, Distinct, Or, Pair, Rising, Section, Text, refused, setting
+from kinacc.config.gate_rules import Gates, require_limits
 from kinacc.config.measured import Measurements
+from kinacc.config.names import LONGEST
+from kinacc.config.parameter_rules import FrameRules, JointRules
 from kinacc.config.series import Series
+from kinacc.config.values import did_you_mean
+
+ROBOTS = Path(__file__).parents[1] / "kinematics" / "robots"
 
 JointNumbers = Annotated[list[Annotated[int, Field(ge=1, le=7)]], Field(max_length=7), Distinct]
 JointPairs = Annotated[list[Pair], Field(min_length=4, max_length=7)]
-
-
-def _known(about: str) -> AfterValidator:
-    def check(rules: dict[str, Any]) -> dict[str, Any]:
-        problems = parameter_rules.rules(rules, about)[1]
-        if problems:
-            raise refused(
-                "; ".join(f"{each.where}: {each.what}" for each in problems), problems[0].fix
-            )
-        return rules
-
-    return AfterValidator(check)
 
 
 _THREE = Field(min_length=3, max_length=3)
@@ -138,7 +132,7 @@ class DhFit(Section):
         "joints with a Hayati twist beta beside d, or auto: beta in place of d where the next "
         "axis is nearly parallel",
     )
-    parameters: Annotated[dict[Text, Any], _known(parameter_rules.JOINTS)] = setting(
+    parameters: JointRules = setting(
         {},
         "parameters that are free, fixed or known beforehand; the others are free, beta where "
         "hayati_joints says so",
@@ -197,7 +191,7 @@ class Calibration(Section):
         "fixed",
         "base and tool frames: the robot file's own, or estimated with the model",
     )
-    frames: Annotated[dict[Text, Any], _known(parameter_rules.FRAMES)] = setting(
+    frames: FrameRules = setting(
         {},
         "components of base and tool that are fixed or known beforehand, where the others are "
         "estimated",
@@ -206,6 +200,13 @@ class Calibration(Section):
     vec: VecFit = VecFit()
     dh: DhFit = DhFit()
     compliance: ComplianceFit = ComplianceFit()
+
+    @model_validator(mode="after")
+    def _frames_are_estimated(self) -> Self:
+        if self.frames and self.base_and_tool == "fixed":
+            what = f"{', '.join(self.frames)}, but base and tool are not estimated"
+            raise refused(what, "set calibration.base_and_tool: estimated", "frames")
+        return self
 
 
 class Cylinder(Section):
@@ -290,7 +291,7 @@ class Evaluation(Section):
 class AccuracyMap(Section):
     """Accuracy maps (Fig. 3)."""
 
-    slices_deg: list[Annotated[float, Field(ge=-360, le=360)]] = setting(
+    slices_deg: Annotated[list[Annotated[float, Field(ge=-360, le=360)]], Rising] = setting(
         [0.0, 15.0, 30.0, 45.0, 60.0],
         "angles of the radial slices",
         "deg",
@@ -303,7 +304,7 @@ class AccuracyMap(Section):
 class Study(Section):
     """Monte Carlo study of the assessors (Fig. 4)."""
 
-    noise_mm: list[Annotated[float, Field(ge=0.001, le=5)]] = setting(
+    noise_mm: Annotated[list[Annotated[float, Field(ge=0.001, le=5)]], Rising] = setting(
         [0.05, 0.1, 0.15, 0.2, 0.25, 0.3],
         "standard deviations of the noise per axis",
         "mm",
@@ -375,6 +376,13 @@ class Histories(Section):
         le=1000000,
     )
 
+    @model_validator(mode="after")
+    def _larger(self) -> Self:
+        if self.eta_ratio_larger <= self.eta_ratio_rejected:
+            what = f"{self.eta_ratio_larger:g} is not larger than eta_ratio_rejected"
+            raise refused(what, "", "eta_ratio_larger")
+        return self
+
 
 class Figures(Section):
     """Pictures."""
@@ -428,15 +436,63 @@ class Settings(Section):
         execution=True,
     )
 
+    @model_validator(mode="after")
+    def _together(self, info: ValidationInfo) -> Self:
+        """Settings of different sections that cannot be together."""
+        cylinder = self.evaluation.cylinder
+        low, high = cylinder.angle_deg
+        outside = [each for each in self.map.slices_deg if not low <= each <= high]
+        if self.evaluation.space == "cylinder" and outside:
+            what = f"slices at {outside} deg lie outside of {low:g} to {high:g} deg"
+            raise refused(what, "see evaluation.cylinder.angle_deg", "map", "slices_deg")
+        name = (info.context or {}).get("dataset")
+        about = [each for each in self.gates if name in (each.datasets or (name,))]
+        require_limits(about, self.tolerance.mm, self.tolerance.of)
+        return self
+
+
+def _robot(robot: str, info: ValidationInfo) -> str:
+    shipped = sorted(item.stem for item in ROBOTS.glob("*.yaml"))
+    if robot not in shipped and not ((info.context or {}).get("folder", Path()) / robot).is_file():
+        is_file = robot.endswith((".yaml", ".yml", ".urdf")) or "/" in robot
+        meant = "" if is_file else did_you_mean(robot, shipped)
+        fix = meant or f"give {', '.join(shipped)}, or the path of a robot file"
+        raise refused(f"there is no robot {'file ' * is_file}{robot!r}", fix)
+    return robot
+
+
+def _data_set_name(name: Any) -> Any:
+    """A name becomes a folder below results/, so that it may not lead anywhere else."""
+    text = name if isinstance(name, str) else ""
+    if not re.fullmatch("[A-Za-z0-9_][A-Za-z0-9_-]*", text) or len(text) > LONGEST:
+        allowed = f"give a text of at most {LONGEST} letters, digits, _ and -, the first not -"
+        raise refused(f"{name!r} cannot be the name of a data set", allowed)
+    return name
+
 
 class DataSet(Settings):
     """A data set: its robot, and any section anew."""
 
-    robot: Text | None = setting(None, "name of a shipped robot, or path of a robot file")
+    robot: Annotated[Text, AfterValidator(_robot)] = setting(
+        ..., "name of a shipped robot, or path of a robot file"
+    )
     series: Series = setting([], "measured files of one arm, a calibration each")
+
+    @model_validator(mode="after")
+    def _of_one_kind(self) -> Self:
+        source, file = self.measurements.source, self.measurements.file
+        if self.series and source == "synthetic":
+            what = "synthetic, but a series is of measured files"
+            raise refused(what, "write file", "measurements", "source")
+        if self.series and (file.path or file.exclude or file.joints.path):
+            what = "path, exclude or joints.path of one file, beside a series of files"
+            raise refused(what, "write the file as a line of the series", "measurements", "file")
+        return self
 
 
 class Configuration(Settings):
     """A whole configuration: data sets by name, and what holds for all of them."""
 
-    datasets: dict[str, DataSet] = setting({}, "data sets by name")
+    datasets: dict[Annotated[str, BeforeValidator(_data_set_name)], DataSet] = setting(
+        {}, "data sets by name"
+    )

@@ -68,7 +68,7 @@ def of_gate(
     """The outcome of one gate; a missing table is a failure."""
     try:
         if gate["kind"] == "value":
-            word, limit, own = limited(gate, tolerance)
+            word, limit, own = limited(gate, tolerance["mm"])
             found = _value(figure(gate["value"], tables, gate), word, limit, own)
         elif gate["kind"] == "table":
             word = LIMITS[gate[LIMITS[0]] is None]

@@ -11,7 +11,7 @@ from typing import Any
 
 from kinacc.campaign.journal import JOURNAL, PLAN
 from kinacc.config.error_models import ERROR_MODELS, asked_for
-from kinacc.errors import InputError, Problem, refuse
+from kinacc.errors import Problem, refuse
 from kinacc.workflow.code import file_digest
 
 RESULTS = "results"
@@ -126,18 +126,14 @@ def read_data_sets(
 
 def _values(given: object) -> object:
     """Texts read as YAML: Snakemake hands numbers inside ``--config a='{b: 1}'`` over as text."""
-    import yaml
-
     from kinacc.config.load import COMMAND_LINE
-    from kinacc.config.reading import unreadable
+    from kinacc.config.reading import value_of
 
     if isinstance(given, Mapping):
         return {key: _values(value) for key, value in given.items()}
     if isinstance(given, (list, tuple)):
         return [_values(value) for value in given]
-    if isinstance(given, str) and (problem := unreadable(given, COMMAND_LINE)):
-        raise InputError(problem)
-    return yaml.safe_load(given) if isinstance(given, str) else given
+    return value_of(given, COMMAND_LINE) if isinstance(given, str) else given
 
 
 def _in_use(config: Mapping[str, Any]) -> dict[str, Any]:
