@@ -45,7 +45,6 @@ robustness: $(KINACC)
 
 public-robots: $(KINACC)
 	@$(PY) tools/public_robots.py $(CORES)
-	@$(PY) tools/document_public_robots.py
 
 lint: $(KINACC) $(TOOLS)
 	$(PY) -m ruff check .

@@ -21,15 +21,15 @@ says as well which sizes of a change would have been seen in it.
 from __future__ import annotations
 
 import argparse
-import csv
-from collections import Counter
-from collections.abc import Iterator
+from collections import defaultdict
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
 
 from kinacc.calibration.frames import known
 from kinacc.calibration.observations import Observations, full_poses
@@ -148,23 +148,24 @@ def _seen(found: history_model.Moved, chance_mm: float) -> tuple[np.ndarray, np.
     return square > chance_mm**2, size
 
 
-def run(same: int, other: int, out: Path, cores: int = 1) -> None:
+def run(same: int, other: int, out: Path, cores: int) -> None:
     """Simulate years of each kind; tables are written now and again."""
     years = [(plans, n) for plans, count in ((SAME, same), (OTHER, other)) for n in range(count)]
     decisions: list[dict] = []
-    seen, size, count = {}, {}, Counter()
+    seen, per_unit = defaultdict(list), defaultdict(list)
+    out.mkdir(parents=True, exist_ok=True)
     with ProcessPoolExecutor(cores) as workers:
-        found_of = workers.map(_year_of, years) if cores > 1 else map(_year_of, years)
-        for (plans, number), (found, hits, per_unit) in zip(years, found_of, strict=True):
-            decisions += [{"year": number} | each for each in found]
-            seen[plans] = seen.get(plans, 0) + hits
-            size[plans] = size.get(plans, 0) + per_unit
-            count[plans] += 1
-            if count.total() % 20 == 0 or count.total() == len(years):
-                _write(out / "years.csv", [*_years(decisions)])
-                _write(out / "power.csv", [*_power(seen, size, count)])
-                alarms = {each: _with_alarm(decisions, each) for each in count}
-                print(f"years with a false alarm: {alarms} of {dict(count)}", flush=True)
+        for (plans, number), found in zip(years, workers.map(_year_of, years), strict=True):
+            decisions += [{"year": number} | each for each in found[0]]
+            seen[plans].append(found[1])
+            per_unit[plans].append(found[2])
+            done = sum(map(len, seen.values()))
+            if done % 20 == 0 or done == len(years):
+                table = _years(pd.DataFrame(decisions))
+                _write(table, out / "years.csv")
+                _write(_power(seen, per_unit), out / "power.csv")
+                alarms = (table["false_alarms"] > 0).groupby(table["plans"]).agg(["sum", "count"])
+                print(f"years with a false alarm, of years: {alarms.T.to_dict('list')}", flush=True)
 
 
 def _year_of(which: tuple[str, int]) -> tuple[list[dict], np.ndarray, np.ndarray]:
@@ -172,77 +173,51 @@ def _year_of(which: tuple[str, int]) -> tuple[list[dict], np.ndarray, np.ndarray
     return year(Arm(number, plans))
 
 
-def _with_alarm(decisions: list[dict], plans: str) -> int:
-    return len({each["year"] for each in decisions if each["alarm"] and each["plans"] == plans})
-
-
-def _years(decisions: list[dict]) -> Iterator[dict]:
+def _years(decisions: pd.DataFrame) -> pd.DataFrame:
     """A row a year: how many of its decisions were false alarms, and how near the others came."""
-    for plans, number in dict.fromkeys((each["plans"], each["year"]) for each in decisions):
-        ours = [each for each in decisions if (each["plans"], each["year"]) == (plans, number)]
-        yield {
-            "plans": plans,
-            "year": number,
-            "decisions": len(ours),
-            "false_alarms": sum(each["alarm"] for each in ours),
-            "least_probability": min(each["probability"] for each in ours),
-            "median_moved_mm": float(np.median([each["moved_mm"] for each in ours])),
-            "median_chance_mm": float(np.median([each["chance_mm"] for each in ours])),
-        }
+    years = decisions.groupby(["plans", "year"], sort=False)
+    return years.agg(
+        decisions=("alarm", "size"),
+        false_alarms=("alarm", "sum"),
+        least_probability=("probability", "min"),
+        median_moved_mm=("moved_mm", "median"),
+        median_chance_mm=("chance_mm", "median"),
+    ).reset_index()
 
 
-def _power(seen: dict, size: dict, count: Counter) -> Iterator[dict]:
+def _power(seen: dict, per_unit: dict) -> pd.DataFrame:
     """How often a change of each size was seen, of those the readings can show."""
+    rows = []
     for plans, hits in seen.items():
-        for number, (joint, name) in enumerate(CHANGES):
-            per_unit = size[plans][number] / count[plans]
-            if per_unit <= UNSEEN_MM:
-                continue
-            for at, size_mm in enumerate(SIZES_MM):
-                yield {
-                    "plans": plans,
-                    "joint": joint + 1,
-                    "parameter": name,
-                    "mm_per_unit": per_unit,
-                    "moved_mm": size_mm,
-                    "seen": hits[number, at] / (count[plans] * (MONTHS - 1)),
-                }
+        shares, units = np.mean(hits, axis=0) / (MONTHS - 1), np.mean(per_unit[plans], axis=0)
+        for (joint, name), share, unit in zip(CHANGES, shares, units, strict=True):
+            if unit > UNSEEN_MM:
+                rows += [
+                    (plans, joint + 1, name, unit, size, each)
+                    for size, each in zip(SIZES_MM, share, strict=True)
+                ]
+    names = ["plans", "joint", "parameter", "mm_per_unit", "moved_mm", "seen"]
+    return pd.DataFrame(rows, columns=names)
 
 
-def _write(path: Path, rows: list[dict]) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with path.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.DictWriter(file, rows[0], lineterminator="\n")
-        writer.writeheader()
-        for row in rows:
-            writer.writerow({
-                name: f"{value:.5g}" if isinstance(value, float) else value
-                for name, value in row.items()
-            })  # fmt: skip
+def _write(table: pd.DataFrame, path: Path) -> None:
+    table.to_csv(path, index=False, float_format="%.5g", lineterminator="\n")
 
 
 def draw(out: Path) -> None:
     """``power.png`` from ``power.csv``: offsets of joints, one panel for each kind of plan."""
-    from matplotlib.figure import Figure
-
-    with (out / "power.csv").open(encoding="utf-8", newline="") as file:
-        rows = [row for row in csv.DictReader(file) if row["parameter"] == "theta"]
+    rows = pd.read_csv(out / "power.csv").query("parameter == 'theta' and joint > 1")
     figure = Figure(figsize=(8.0, 3.9), layout="constrained")
     panels = figure.subplots(1, 2, sharey=True)
-    titles = {SAME: "the same poses every month", OTHER: "other poses every month"}
-    for panel, plans in zip(panels, titles, strict=True):
-        for joint in range(2, JOINTS + 1):
-            ours = [r for r in rows if r["plans"] == plans and int(r["joint"]) == joint]
-            if not ours:
-                continue
-            per_mrad = float(ours[0]["mm_per_unit"])
-            sizes = np.array([float(r["moved_mm"]) for r in ours]) / per_mrad
-            shown = 100.0 * np.array([float(r["seen"]) for r in ours])
-            label = f"joint {joint} ({per_mrad:.2f} mm per mrad)"
-            panel.plot(sizes, shown, label=label)
+    titles = {SAME: ("the same poses every month", 1.0), OTHER: ("other poses every month", 4.0)}
+    for panel, (plans, (title, most)) in zip(panels, titles.items(), strict=True):
+        for joint, own in rows[rows["plans"] == plans].groupby("joint"):
+            mrad = own["moved_mm"] / own["mm_per_unit"]
+            label = f"joint {joint} ({own['mm_per_unit'].iloc[0]:.2f} mm per mrad)"
+            panel.plot(mrad, 100.0 * own["seen"], label=label)
         panel.axhline(80.0, color="0.6", linewidth=0.8)
-        panel.set(title=titles[plans], xlabel="change of one joint's offset, mrad")
-        panel.set(xlim=(0.0, 1.0 if plans == SAME else 4.0), ylim=(0.0, 102.0))
+        panel.set(title=title, xlabel="change of one joint's offset, mrad")
+        panel.set(xlim=(0.0, most), ylim=(0.0, 102.0))
     panels[0].set_ylabel("months that say recalibrate, %")
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
     figure.savefig(out / "power.png", dpi=150)
