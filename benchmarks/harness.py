@@ -38,8 +38,7 @@ class Work:
     ``count`` is the number of ``unit`` (poses, fits) in one run. ``agree`` gets the outputs of
     all contenders in order and raises where they differ. ``wanted`` says by the name of a
     contender how many times faster than it kinacc has to be: 1/3 for at most three times its
-    time. A name without contender is a library that is not installed. ``limit_ns`` a unit is
-    what no program can go below, ``limit`` why.
+    time.
     """
 
     name: str
@@ -48,8 +47,6 @@ class Work:
     contenders: Sequence[Contender]
     agree: Callable[[Sequence], None]
     wanted: Mapping[str, float] = field(default_factory=dict)
-    limit_ns: float | None = None
-    limit: str = ""
     wall: bool = False  # wall-clock instead of CPU time
     seconds: float = 6.0  # rounds go on for about this long
 
@@ -88,15 +85,9 @@ def measure(work: Work, smoke: bool = False) -> list[dict]:
             "work": work.name, "unit": work.unit, "beside": contender.name,
             "version": contender.version, "ns": 1e9 * np.median(own) / work.count,
             "ratio": middle, "ratio_low": low, "ratio_high": high,
+            "wanted": work.wanted.get(contender.name),
         })  # fmt: skip
-    if work.limit_ns is not None:
-        ratio = work.limit_ns / rows[0]["ns"]
-        rows.append({"work": work.name, "unit": work.unit, "beside": "limit",
-                     "version": work.limit, "ns": work.limit_ns, "ratio": ratio})  # fmt: skip
-    for name in work.wanted.keys() - {row["beside"] for row in rows}:
-        rows.append({"work": work.name, "unit": work.unit, "beside": name,
-                     "version": "not installed"})  # fmt: skip
-    return [{**row, "wanted": work.wanted.get(row["beside"])} for row in rows]
+    return rows
 
 
 def _in_turns(work: Work, runs: Sequence[Callable[[], object]]) -> np.ndarray:

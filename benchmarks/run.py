@@ -10,6 +10,7 @@ from __future__ import annotations
 import ast
 import os
 import platform
+import re
 import subprocess
 import sys
 from datetime import date
@@ -46,28 +47,21 @@ def page(tables: dict[str, pd.DataFrame]) -> str:
         title, _, text = (told or "").replace("``", "`").partition("\n\n")
         own_ns = rows.groupby("work", sort=False)["ns"].first()
         others = rows[rows.groupby("work").cumcount() > 0]
-        lines = [
-            "| work | beside | its time | kinacc's | kinacc is | wanted |",
-            "|---|---|---|---|---|---|",
-        ]
+        lines = ["| work | beside | its time | kinacc's | kinacc is | wanted |", "|---" * 6 + "|"]
         lines += [_line(row, own_ns[row.work]) for row in others.itertuples()]
         sections.append("\n".join([f"## {title}", "", text, "", *lines, "", rows.attrs["on"], ""]))
     return PAGE.format(sections="\n".join(sections))
 
 
 def _line(row, own_ns: float) -> str:
-    who = f"{row.beside}: {row.version}" if row.beside == "limit" else f"{row.beside} {row.version}"
-    if pd.isna(row.ns):
-        return f"| {row.work} | {who} | | {duration(own_ns)} | | {_times(row.wanted)} |"
-    spread = ""
-    if row.beside != "limit":
-        low, high = sorted(map(_size, (row.ratio_low, row.ratio_high)))
-        spread = f" ({low:.3g} to {high:.3g})"
+    low, high = sorted(map(_size, (row.ratio_low, row.ratio_high)))
     wanted = _times(row.wanted)
     if wanted and row.ratio < row.wanted:
         wanted = f"**{wanted}: not met**"
-    times = f"{duration(row.ns)} a {row.unit} | {duration(own_ns)}"
-    return f"| {row.work} | {who} | {times} | {_times(row.ratio)}{spread} | {wanted} |"
+    return (
+        f"| {row.work} | {row.beside} {row.version} | {duration(row.ns)} a {row.unit} "
+        f"| {duration(own_ns)} | {_times(row.ratio)} ({low:.3g} to {high:.3g}) | {wanted} |"
+    )
 
 
 def _times(ratio: float) -> str:
@@ -80,22 +74,18 @@ def _size(ratio: float) -> float:
 
 def duration(ns: float) -> str:
     """A time with three digits, in the unit that reads best."""
-    size, unit = next(
-        (each for each in ((1e9, "s"), (1e6, "ms"), (1e3, "µs")) if ns >= each[0]), (1.0, "ns")
-    )
-    return f"{ns / size:.3g} {unit}"
+    sizes = ((1e9, "s"), (1e6, "ms"), (1e3, "µs"), (0.0, "ns"))
+    size, unit = next(each for each in sizes if ns >= each[0])
+    return f"{ns / (size or 1.0):.3g} {unit}"
 
 
 def _facts() -> str:
     """What the figures were measured on: one line."""
-    told = Path("/proc/cpuinfo")
-    names = told.read_text().splitlines() if told.exists() else []
-    cpu = next(
-        (line.partition(": ")[2] for line in names if "model name" in line), platform.machine()
-    )
-    commit = subprocess.run(
-        ["git", "rev-parse", "--short=7", "HEAD"], cwd=ROOT, capture_output=True, text=True
-    ).stdout.strip()
+    info = Path("/proc/cpuinfo")
+    found = re.search("model name.*: (.*)", info.read_text()) if info.exists() else None
+    cpu = found[1] if found else platform.machine()
+    command = ["git", "rev-parse", "--short=7", "HEAD"]
+    commit = subprocess.run(command, cwd=ROOT, capture_output=True, text=True).stdout.strip()
     return (
         f"Measured on {cpu}, {os.cpu_count()} cores, Python {platform.python_version()}; "
         f"kinacc at {commit or 'no commit'}, {date.today()}."

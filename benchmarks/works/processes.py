@@ -14,12 +14,16 @@ import os
 import subprocess
 import sys
 import tempfile
-from collections.abc import Sequence
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 from harness import ROOT, Contender, Work
+
+from kinacc.geometry import exp_so3, quaternion_from_rotation
+from kinacc.kinematics import robot
 
 CALIBRATED = """\
 measurements: {folds: 2}
@@ -30,48 +34,36 @@ datasets:
     measurements: {source: file, file: {path: poses.csv, orientation: {kind: quaternion}}}
     evaluation: {space: measured}
 """
-JOINTS_DEG = "10,-20,30,0,45,0"
+COMMANDS = {
+    "predict": "-m kinacc predict results/arm --model dh --json --joints-deg 10,-20,30,0,45,0",
+    "compare": "-m kinacc compare results/arm results/arm",
+    "check-data": "-m kinacc check-data arm.yaml",
+}
 KEPT: list[tempfile.TemporaryDirectory] = []  # folders that go when the process ends
 
 
 def works(smoke: bool) -> list[Work]:
     """Three commands, and the paper; in smoke size the first command alone."""
-    own, numpy = version("kinacc"), np.__version__
-    cwd = calibrated(40 if smoke else 120)
-    plain = Contender("import numpy", numpy, lambda: python("-c", "import numpy", cwd=cwd))
-    commands = {
-        "predict": (
-            "predict",
-            "results/arm",
-            "--model",
-            "dh",
-            "--json",
-            "--joints-deg",
-            JOINTS_DEG,
-        ),
-        "compare": ("compare", "results/arm", "results/arm"),
-        "check-data": ("check-data", "arm.yaml"),
-    }
+    own, cwd = version("kinacc"), calibrated(40 if smoke else 120)
+    plain = Contender("import numpy", np.__version__, lambda: python(["-c", "import numpy"], cwd))
     each = [
         Work(
             name, "start", 1,
-            (Contender("kinacc", own, lambda words=words: kinacc(*words, cwd=cwd)), plain),
+            (Contender("kinacc", own, partial(python, line.split(), cwd)), plain),
             _predicted if name == "predict" else lambda outputs: None,
             {plain.name: 1 / 3.5}, seconds=9.0,
         )
-        for name, words in commands.items()
+        for name, line in COMMANDS.items()
     ]  # fmt: skip
     if smoke:
         return each[:1]
     idle = folder()
     (idle / "Snakefile").write_text('rule all:\n    input: "there"\n')
     (idle / "there").touch()
-    snakemake = ("-m", "snakemake", "--cores", 2)
-    beside = Contender(
-        "plain Snakemake", version("snakemake"), lambda: python(*snakemake, cwd=idle)
-    )
-    where = ("--snakefile", ROOT / "Snakefile", "--workflow-profile", ROOT / "profiles" / "default")
-    paper = Contender("kinacc", own, lambda: python(*snakemake, *where, "--no-hooks", cwd=folder()))
+    start = ["-m", "snakemake", "--cores", "2"]
+    where = f"--snakefile {ROOT}/Snakefile --workflow-profile {ROOT}/profiles/default --no-hooks"
+    paper = Contender("kinacc", own, lambda: python(start + where.split(), folder()))
+    beside = Contender("plain Snakemake", version("snakemake"), lambda: python(start, idle))
     return [
         *each,
         Work("the paper, two cores", "run", 1, (paper, beside), lambda outputs: None,
@@ -85,51 +77,36 @@ def folder() -> Path:
     return Path(KEPT[-1].name)
 
 
-def python(*words: object, cwd: Path) -> str:
-    """What a Python command prints; raises with all it said if it fails."""
-    environment = {**os.environ, "PYTHONPATH": str(ROOT / "src")}
-    environment.pop("PYTHONDONTWRITEBYTECODE", None)
+def python(words: list[str], cwd: Path) -> str:
+    """What a Python command prints; raises with its output if it fails."""
+    environment = os.environ | {"PYTHONPATH": str(ROOT / "src"), "PYTHONDONTWRITEBYTECODE": ""}
     done = subprocess.run(
-        [sys.executable, *map(str, words)], cwd=cwd, env=environment, capture_output=True, text=True
+        [sys.executable, *words], cwd=cwd, env=environment, capture_output=True, text=True
     )
     if done.returncode:
-        raise RuntimeError(f"{' '.join(map(str, words))}: {done.stdout}{done.stderr}")
+        raise RuntimeError(f"{words}: {done.stdout}{done.stderr}")
     return done.stdout
-
-
-def kinacc(*words: object, cwd: Path) -> str:
-    """What a command of kinacc prints."""
-    return python("-m", "kinacc", *words, cwd=cwd)
 
 
 def calibrated(poses: int) -> Path:
     """A folder with arm.yaml and its calibration: errors that bend smoothly, noise of 0.05 mm."""
-    from kinacc import geometry
-    from kinacc.kinematics import dh, robot
-
     arm, random, made = robot.load("mh180"), np.random.default_rng(0), folder()
     share = random.uniform(0.2, 0.8, (poses, 6))
     q_rad = arm.q_min_rad + share * (arm.q_max_rad - arm.q_min_rad)
-    flange = dh.forward(arm.dh, arm.dh_joints(q_rad))
-    bend_mm = 0.4 * np.sin(q_rad[:, :3])
-    position_mm = flange.position_mm + bend_mm + random.normal(0.0, 0.05, (poses, 3))
-    turn = geometry.exp_so3(random.normal(0.0, 2e-4, (poses, 3)))
-    quaternion = geometry.quaternion_from_rotation(turn @ flange.rotation)
+    flange = robot.forward(arm, q_rad)
+    bent_mm = 0.4 * np.sin(q_rad[:, :3]) + random.normal(0.0, 0.05, (poses, 3))
+    turn = exp_so3(random.normal(0.0, 2e-4, (poses, 3))) @ flange.rotation
     names = [*(f"q{i}_deg" for i in range(1, 7)), "x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz"]
-    rows = np.hstack([np.rad2deg(q_rad), position_mm, quaternion])
-    np.savetxt(
-        made / "poses.csv", rows, fmt="%.9f", delimiter=",", header=",".join(names), comments=""
-    )
+    columns = np.rad2deg(q_rad), flange.position_mm + bent_mm, quaternion_from_rotation(turn)
+    pd.DataFrame(np.hstack(columns), columns=names).to_csv(made / "poses.csv", index=False)
     (made / "arm.yaml").write_text(CALIBRATED)
-    kinacc("calibrate", "arm.yaml", "--cores", 1, cwd=made)
+    python(["-m", "kinacc", "calibrate", "arm.yaml", "--cores", "1"], made)
     return made
 
 
-def _predicted(outputs: Sequence[str]) -> None:
+def _predicted(outputs) -> None:
     """The predicted position is within 5 mm of the nominal arm's."""
-    from kinacc.kinematics import robot
-
     row = json.loads(outputs[0])["rows"][0]
-    q_rad = np.deg2rad([float(each) for each in JOINTS_DEG.split(",")])
+    q_rad = np.deg2rad([10, -20, 30, 0, 45, 0])
     nominal_mm = robot.forward(robot.load("mh180"), q_rad[None]).position_mm[0]
     np.testing.assert_allclose([row[f"{axis}_mm"] for axis in "xyz"], nominal_mm, atol=5.0)

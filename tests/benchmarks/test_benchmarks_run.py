@@ -50,12 +50,6 @@ def test_nothing_is_timed_where_outputs_differ(monkeypatch):
         harness.measure(work(harness.Contender("other", "2", lambda: 2)))
 
 
-def test_a_library_that_is_not_installed_is_named():
-    table = pd.DataFrame(harness.measure(work(wanted={"other": 8.0}), smoke=True))
-    table.attrs["on"] = ""
-    assert "| one | other not installed |" in run.page({"fits": table})
-
-
 def test_a_wish_that_is_not_met_stands_out_on_the_page():
     other = harness.Contender("other", "3.1", lambda: 1)
     table = pd.DataFrame(harness.measure(work(other, wanted={"other": 1e9}), smoke=True))
