@@ -9,9 +9,9 @@ from oracles.controllers.arms import Arm
 from stages_by_hand import CALIBRATED, run_stage
 
 
-def calibrated(folder: Path, arm: Arm, poses: int = 90) -> Path:
+def calibrated(folder: Path, arm: Arm, poses: int = 90, order: int = 1) -> Path:
     """The results folder of an arm that was measured and calibrated; its files beside it."""
-    config = measured.write(folder, arm, poses=poses)
+    config = measured.write(folder, arm, poses=poses, order=order)
     for stage in CALIBRATED:
         done = run_stage(stage, "--config", config, "--results", folder / "results")
         assert done.exit_code == 0, done.output

@@ -28,7 +28,8 @@ class Arm:
     """``rows``: theta offset (deg), d, a, alpha (deg) by joint; DH joints are ``matrix @ shown``.
 
     ``flange``: x, y, z (mm) and a rotation vector (deg) behind the last row. ``errors`` (6, 5): in
-    theta, d, a, alpha and a turn about y, rad and mm. ``middle`` and ``half`` (6,): joints shown
+    theta, d, a, alpha and a turn about y, rad and mm; every axis runs ahead by ``wave sin(2 q)``
+    (rad). ``middle`` and ``half`` (6,): joints shown
     (deg) at which programs and measurements are.
     """
 
@@ -40,6 +41,7 @@ class Arm:
     half: tuple
     limits: tuple
     errors: np.ndarray
+    wave: float = 0.0
 
     def pose(self, shown: np.ndarray, true: bool = False) -> np.ndarray:
         """The flange in the base at joints shown on the pendant (6,)."""
@@ -47,6 +49,7 @@ class Arm:
         error = self.errors if true else np.zeros((6, 5))
         for row, more, q in zip(self.rows, error, self.matrix @ shown, strict=True):
             theta, alpha = np.deg2rad(row[0]), np.deg2rad(row[3])
+            q = q + true * self.wave * np.sin(2.0 * q)
             here = here @ about("z", q + theta + more[0])
             here = here @ frame(row[2] + more[2], 0.0, 0.0) @ frame(0.0, 0.0, row[1] + more[1])
             here = here @ about("x", alpha + more[3]) @ about("y", more[4])

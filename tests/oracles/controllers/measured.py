@@ -20,7 +20,7 @@ def seen(arm: Arm, shown: np.ndarray) -> np.ndarray:
     return BASE @ arm.pose(shown, true=True) @ TOOL
 
 
-def write(folder: Path, arm: Arm, name: str = "arm", poses: int = 90, folds: int = 5) -> Path:
+def write(folder: Path, arm: Arm, name: str = "arm", poses: int = 90, order: int = 1) -> Path:
     """A robot file, a file of measured poses and a configuration; the configuration's path."""
     rng = np.random.default_rng(11)
     lines = [",".join([*(f"q{i}_deg" for i in range(1, 7)), "x_mm,y_mm,z_mm,qw,qx,qy,qz"])]
@@ -36,9 +36,9 @@ def write(folder: Path, arm: Arm, name: str = "arm", poses: int = 90, folds: int
     config = folder / f"{name}.yaml"
     config.write_text(
         f"datasets: {{{name}: {{robot: '{folder / 'robot.yaml'}'}}}}\n"
-        f"measurements: {{source: file, folds: {folds}, file: {{path: '{folder / 'poses.csv'}',"
+        f"measurements: {{source: file, folds: 5, file: {{path: '{folder / 'poses.csv'}',"
         " orientation: {kind: quaternion}}}\n"
-        "calibration: {base_and_tool: estimated, vec: {order: 1},"
+        f"calibration: {{base_and_tool: estimated, vec: {{order: {order}}},"
         " dh: {fit_to: measurements, hayati_joints: auto}}\n"
         "evaluation: {space: measured}\n"
     )

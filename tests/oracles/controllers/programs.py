@@ -64,6 +64,11 @@ CONVENTIONS = {
         lambda v: Rotation.from_quat(v, scalar_first=True),
         (2, 7, 4),
     ),
+    "table": Convention(
+        lambda turn: turn.as_quat(canonical=True, scalar_first=True),
+        lambda v: Rotation.from_quat(v, scalar_first=True),
+        (4, 7, 5),
+    ),
     "ur": Convention(
         lambda turn: turn.as_rotvec(), Rotation.from_rotvec, (6, 6, 6), metre=1e-3, joint=1.0
     ),
@@ -332,4 +337,30 @@ def yaskawa(arm: Arm, points: np.ndarray, tool: np.ndarray, base: np.ndarray) ->
     return program
 
 
-WRITERS = {"kuka": kuka, "abb": abb, "fanuc": fanuc, "ur": ur, "yaskawa": yaskawa}
+def table(arm: Arm, points: np.ndarray, tool: np.ndarray, base: np.ndarray) -> Program:
+    """CSV: poses in the robot's base, in no stated posture."""
+    program = Program(arm, "table", tool, np.eye(4))
+    lines = ["pose;x_mm;y_mm;z_mm;qw;qx;qy;qz;speed"]
+    lines += [f"P{i};{';'.join(program.add(q))};{250 + i}" for i, q in enumerate(points)]
+    program.files = {".csv": "\r\n".join(lines) + "\r\n"}
+    return program
+
+
+def table_of_joints(arm: Arm, points: np.ndarray, tool: np.ndarray, base: np.ndarray) -> Program:
+    """CSV: joints."""
+    program = Program(arm, "table", tool, np.eye(4))
+    lines = ["speed," + ",".join(f"q{i}_deg" for i in range(1, 7))]
+    lines += [f"{250 + i},{','.join(program.add(q, True))}" for i, q in enumerate(points)]
+    program.files = {".csv": "\n".join(lines)}
+    return program
+
+
+WRITERS = {
+    "kuka": kuka,
+    "abb": abb,
+    "fanuc": fanuc,
+    "ur": ur,
+    "yaskawa": yaskawa,
+    "csv": table,
+    "csv of joints": table_of_joints,
+}
