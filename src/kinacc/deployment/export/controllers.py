@@ -250,8 +250,8 @@ CONTROLLERS = {
         "DH deltas",
         _ur,
         _frame("x y z rx ry rz", _rotation_vector, "rad", "m"),
-        "DH deltas: section [mounting] of /root/.urcontrol/calibration.conf, its checksums kept; "
-        "present values are added to UR's nominal table. TOOL: set_tcp; BASE: a plane feature.",
+        "DH deltas: they replace those in section [mounting] of /root/.urcontrol/calibration.conf; "
+        "keep its other lines. TOOL: set_tcp; BASE: a plane feature.",
         "Large delta_d of joints 2 to 4 are usual: their axes are nearly parallel.",
         _ur_text,
         ".conf",

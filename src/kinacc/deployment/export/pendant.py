@@ -140,7 +140,9 @@ def fit_pendant(
         robot.name,
         name,
         tuple(
-            Value(group, key, unit, float(old[group][key][0]), float(value))
+            Value(
+                group, key, unit, *(round(float(x), 12) + 0.0 for x in (old[group][key][0], value))
+            )
             for group, numbers in new.items()
             for key, (value, unit) in numbers.items()
         ),
