@@ -2,7 +2,7 @@
 
 import click
 
-from kinacc.cli.group import main
+from kinacc.cli.group import SECTIONS, main
 from kinacc.config.schema import json_schema
 from kinacc.config.settings import Configuration
 from kinacc.tables.contract import ARTEFACTS
@@ -18,10 +18,11 @@ def commands():
         for name, below in getattr(command, "commands", {}).items():
             entry(f"{words} {name}", below)
 
-    for title, names in main.sections.items():
+    root = click.Context(main, info_name="kinacc")
+    for title, names in SECTIONS.items():
         parts.append(f"\n## {title}\n")
         for name in names:
-            entry(f"kinacc {name}", main.commands[name])
+            entry(f"kinacc {name}", main.get_command(root, name))
     return "\n".join(parts)
 
 

@@ -11,7 +11,6 @@ from functools import cached_property
 import numpy as np
 from pydantic import ValidationError
 
-from kinacc import removed
 from kinacc.assess.adaptive import AdaptiveAssessor, Candidates
 from kinacc.assess.registry import ADAPTIVE
 from kinacc.assess.statement import CANDIDATES, TARGETS
@@ -278,13 +277,15 @@ def _plan(content: Mapping) -> Plan:
     )
 
 
+# Settings that earlier plans state, with the defaults they had.
+_FORMER = {"correct_drift": False, "assume": "nothing", "isolation": 1.25, "crowd": 0.05}
+
+
 def _kept_assessor(name: str, settings: Mapping[str, object]) -> AdaptiveAssessor:
-    used = [each for each, value in removed.SETTINGS.items() if settings.get(each, value) != value]
+    used = [each for each, value in _FORMER.items() if settings.get(each, value) != value]
     fix = "begin a new campaign; readings can be recorded in it again"
     refuse(Problem(f"setting {each}", "is gone from kinacc", fix=fix) for each in used)
-    return assessor_of(
-        name, {k: value for k, value in settings.items() if k not in removed.SETTINGS}
-    )
+    return assessor_of(name, {k: value for k, value in settings.items() if k not in _FORMER})
 
 
 def _instrument(entry: Mapping) -> Instrument:

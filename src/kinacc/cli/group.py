@@ -6,7 +6,7 @@ import json
 import os
 import signal
 import threading
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict
 from difflib import get_close_matches
@@ -15,180 +15,121 @@ from typing import NoReturn
 
 import click
 
-from kinacc import __version__, removed
+from kinacc import __version__
 from kinacc.cli.exit_codes import AGAINST, NOBODY_READS, STOPPED, TERMINATED, UNUSABLE
 from kinacc.errors import InputError, KinaccError, MachineError, Problem, refused
 from kinacc.workflow.start import ONE_THREAD
 
-_AS_JSON, _ASKS_HELP = f"{__name__}.as_json", f"{__name__}.asks_help"
+_AS_JSON = f"{__name__}.as_json"
 _HELP = ("-h", "--help")
-
-
-class Named(Mapping[str, click.Command]):
-    """Commands by name, made when they are asked for."""
-
-    def __init__(self, names: Mapping[str, object], make: Callable[[str], click.Command]) -> None:
-        self.names, self.make = names, make
-
-    def __getitem__(self, name: str) -> click.Command:
-        if name not in self.names:
-            raise KeyError(name)
-        return self.make(name)
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self.names)
-
-    def __len__(self) -> int:
-        return len(self.names)
-
-
-# Words that people try, and the command that does it.
-_MEANT = {
-    "check": "check-data",
-    "fit": "calibrate",
-    "forward": "predict",
-    "identify": "calibrate",
-    "ik": "compensate",
-    "import": "init",
-    "inverse": "compensate",
-    "measure": "campaign next",
-    "correct": "compensate",
-    "remove": "strike",
-    "noise": "repeatability",
-    "reproduce": "study",
-    "results": "summary",
-    "cat": "show",
-    "head": "show",
-    "list": "show",
-    "ls": "show",
-    "print": "show",
-    "table": "show",
-    "view": "show",
-    "fleet": "summary",
-    "overview": "summary",
-    "undo": "strike",
-    "validate": "check-data",
+SECTIONS = {
+    "Measured data": {
+        "init": "describe a file of measurements, and its robot",
+        "check-data": "look for mistakes before anything is fitted",
+        "exclude": "rows that no fit shall use",
+        "plan-poses": "choose poses for a calibration, in a short order",
+        "calibrate": "fit the models and show their held-out errors",
+        "add": "new readings of the same arm, to its series",
+    },
+    "The study": {
+        "study": "maps, assessors under noise, figures and claims",
+        "show": "any table of results in the terminal, or as CSV",
+        "check-results": "digests, thresholds and the accepted run",
+    },
+    "A calibrated arm": {
+        "summary": "errors of one calibration, or a table of many",
+        "report": "one page to read, mail and keep",
+        "predict": "joints to the pose of the tool, with uncertainty",
+        "compensate": "poses or a program to the joints that reach them",
+        "export": "the model for other programs and controllers",
+        "verify": "does the calibration still hold at new readings?",
+        "compare": "differences of two calibrations",
+    },
+    "Its largest error": {
+        "repeatability": "noise of a reading, from poses read again and again",
+        "campaign": "bounds: plan, start, next, record, status, report",
+    },
 }
 
 
 class InOrder(click.Group):
-    """A group whose commands are listed in the order in which they were added."""
+    """A group that lists its commands in the order of the work, and names the nearest one."""
 
     def list_commands(self, context: click.Context) -> list[str]:
-        """The commands in the order of the work."""
+        """Names in the order of the work."""
         return list(self.commands)
 
     def resolve_command(
         self, context: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        """The command of a word; for one that is none, what may be meant."""
-        word = args[0]
-        if word in self.commands or word.startswith("-"):
-            return super().resolve_command(context, args)
-        if word in removed.COMMANDS:
-            raise click.UsageError(f"{word} is gone: {removed.COMMANDS[word]}", context)
+        """The command of a word; for another word, the nearest one."""
         names = self.list_commands(context)
-        meant = _MEANT.get(word.lower(), "")
-        if meant.partition(" ")[0] not in names:
-            meant = next(iter(get_close_matches(word.lower(), names, 1)), "")
-        fix = f" Did you mean {meant}?" if meant else f" There are: {', '.join(names)}."
-        raise click.UsageError(f"{word!r} is no command.{fix}", context)
+        if args[0] in names or args[0].startswith("-"):
+            return super().resolve_command(context, args)
+        near = get_close_matches(args[0].lower(), names, 1)
+        fix = f"Did you mean {near[0]}?" if near else f"There are: {', '.join(names)}."
+        raise click.UsageError(f"{args[0]!r} is no command. {fix}", context)
 
 
-class Lazy(InOrder):
-    """A group that lists its commands without importing them.
+class Commands(InOrder):
+    """All commands, loaded when they are called; bad input ends in a list of problems."""
 
-    ``sections`` are titles with names of commands, each with what it does in few words; ``make``
-    gives the command of a name.
-    """
+    def list_commands(self, context: click.Context) -> list[str]:
+        """Names in the order of the work."""
+        return [name for names in SECTIONS.values() for name in names]
 
-    def __init__(
-        self,
-        *args: object,
-        sections: Mapping[str, Mapping[str, str]],
-        make: Callable[[str], click.Command],
-        **more: object,
-    ) -> None:
-        names = {name: words for each in sections.values() for name, words in each.items()}
-        super().__init__(*args, commands=Named(names, make), **more)
-        self.sections = sections
+    def get_command(self, context: click.Context, name: str) -> click.Command | None:
+        """The command ``a-name``: ``a_name`` of the module ``kinacc.cli.a_name``."""
+        if name not in self.list_commands(context):
+            return None
+        name = name.replace("-", "_")
+        return getattr(import_module(f"kinacc.cli.{name}"), name)
 
     def format_commands(self, context: click.Context, formatter: click.HelpFormatter) -> None:
-        """The commands by what they are for, in the order of the work."""
-        for title, names in self.sections.items():
+        """The commands by purpose."""
+        for title, names in SECTIONS.items():
             with formatter.section(title):
                 formatter.write_dl(list(names.items()))
 
-
-def imported(package: str) -> Callable[[str], click.Command]:
-    """How the command ``a-name`` is had: as ``a_name`` of the module ``a_name`` of a package."""
-
-    def command(name: str) -> click.Command:
-        name = name.replace("-", "_")
-        return getattr(import_module(f"{package}.{name}"), name)
-
-    return command
-
-
-class Terminated(KeyboardInterrupt):
-    """The system asked the command to end (SIGTERM)."""
-
-
-class Commands(Lazy):
-    """A group whose commands report bad input as a list of problems, without a traceback."""
-
     def parse_args(self, context: click.Context, args: list[str]) -> list[str]:
-        """Words of the command line, with options under the names they have now."""
+        """Note whether problems are asked for as JSON; more threads of BLAS are not."""
         own = args[: args.index("--")] if "--" in args else args
         context.meta[_AS_JSON] = "--json" in own
-        context.meta[_ASKS_HELP] = not {*own}.isdisjoint(_HELP)
-        for i, word in enumerate(own):
-            name, mark, value = word.partition("=")
-            if gone := removed.OPTIONS.get(own[0], {}).get(name):
-                raise click.UsageError(f"{name} is gone: {gone}", context)
-            if new := removed.RENAMED.get(own[0], {}).get(name):
-                args = [*args[:i], f"{new}{mark}{value}", *args[i + 1 :]]
-                click.echo(f"{name} is called {new} now, and goes with the next version", err=True)
+        if {*own}.isdisjoint(_HELP):
+            os.environ.update(ONE_THREAD)
         return super().parse_args(context, args)
 
     def invoke(self, context: click.Context) -> object:
-        """Run the command; exit code 2 on bad input, 130 and 143 where it was stopped.
-
-        What the machine refuses (memory, a disk that is full) is 1, in one sentence as well, and
-        141 where nobody reads the output any more, as of other tools. With --json problems are
-        printed as JSON.
-        """
+        """Run the command; docs/commands.md has the exit codes of errors and signals."""
         came: list[int] = []
         try:
             with _listening(came):
-                if not context.meta[_ASKS_HELP]:
-                    os.environ.update(ONE_THREAD)
                 return super().invoke(context)
         except (Exception, KeyboardInterrupt) as error:
             usage = isinstance(error, click.UsageError) and not context.meta[_AS_JSON]
             if usage or isinstance(error, (click.exceptions.Exit, click.Abort)):
                 raise
-            code, said, problems = _ending(error, came)
+            code, text, problems = _ending(error, came)
         if problems and context.meta[_AS_JSON]:
             click.echo(json.dumps({"problems": [asdict(each) for each in problems]}, indent=1))
-        if said:
-            click.echo(said, err=True)
+        if text:
+            click.echo(text, err=True)
         context.exit(code)
 
 
 def _ending(error: BaseException, came: Sequence[int]) -> tuple[int, str, Sequence[Problem]]:
-    """Exit code, words and problems of what ended a command; a fault of its own is raised again.
+    """Exit code, text and problems of an error; a fault of kinacc itself is raised again.
 
-    ``came``: signals to stop. A library that one finds at work may raise an error of its own.
+    ``came``: signals to stop. A library that a signal meets may raise an error of its own.
     """
     if signal.SIGTERM in came:
         return TERMINATED, "stopped by the system; what was finished is kept", ()
     if came or isinstance(error, KeyboardInterrupt):
         return STOPPED, "stopped", ()
     if isinstance(error, MemoryError):
-        return AGAINST, f"there is not enough memory for this: {error or 'ask for less'}", ()
+        return AGAINST, f"not enough memory: {error or 'ask for less'}", ()
     if isinstance(error, RecursionError):
-        return AGAINST, "something given to this command is nested too deeply to be read", ()
+        return AGAINST, "the input is nested too deeply to be read", ()
     if isinstance(error, BrokenPipeError):
         return NOBODY_READS, "", ()
     if isinstance(error, OSError):
@@ -206,68 +147,33 @@ def _ending(error: BaseException, came: Sequence[int]) -> tuple[int, str, Sequen
 
 @contextmanager
 def _listening(came: list[int]) -> Iterator[None]:
-    """Ctrl-C, and SIGTERM as it, end the block so that what it began is tidied up."""
+    """Ctrl-C and SIGTERM end the block as an exception, so that files in the making are removed."""
 
     def end(signum: int, _: object) -> NoReturn:
         came.append(signum)
-        raise Terminated if signum == signal.SIGTERM else KeyboardInterrupt
+        raise KeyboardInterrupt
 
     if threading.current_thread() is not threading.main_thread():
-        yield  # only the first thread of a program may say what signals do
+        yield  # Python sets handlers in the main thread only
         return
     before = {each: signal.getsignal(each) for each in (signal.SIGINT, signal.SIGTERM)}
     try:
-        for each, how in before.items():
-            if how != signal.SIG_IGN:  # as of SIGINT for a command in the background
+        for each, handler in before.items():
+            if handler != signal.SIG_IGN:  # as of SIGINT for a command in the background
                 signal.signal(each, end)
         yield
     finally:
-        for each, how in before.items():
-            signal.signal(each, how)
+        for each, handler in before.items():
+            signal.signal(each, handler)
 
 
-SECTIONS = {
-    "Measured data": {
-        "init": "describe a file of measurements, and its robot",
-        "check-data": "look for mistakes before anything is fitted",
-        "exclude": "rows that no fit shall use",
-        "plan-poses": "choose poses for a calibration, in a short order",
-        "calibrate": "fit the models, and say what they are worth",
-        "add": "new readings of the same arm, to its series",
-    },
-    "The study": {
-        "study": "everything beside: maps, the assessors under noise, claims",
-        "show": "any table of results in the terminal, or as CSV",
-        "check-results": "hold a results folder to its contract",
-    },
-    "A calibrated arm": {
-        "summary": "what a calibration is worth, or a table of many",
-        "report": "one page of it all, to read, mail and keep",
-        "predict": "joints to the pose of the tool, with uncertainty",
-        "compensate": "poses to the joints that put the tool there",
-        "export": "write the model for other programs",
-        "verify": "how far it is off at readings it was not fitted to",
-        "compare": "what differs between two calibrations",
-    },
-    "Its largest error": {
-        "repeatability": "poses read again and again: what noise a reading has",
-        "campaign": "bounds on it: plan, start, next, record, status, report",
-    },
-}
-
-
-@click.group(
-    cls=Commands,
-    sections=SECTIONS,
-    make=imported("kinacc.cli"),
-    context_settings={"help_option_names": list(_HELP)},
-)
+@click.group(cls=Commands, context_settings={"help_option_names": list(_HELP)})
 @click.version_option(__version__, prog_name="kinacc")
 def main() -> None:
-    """How accurate is a robot's kinematic model, and how large can its error be?
+    """Calibrate a robot's kinematic model, state its error, and bound the largest one.
 
-    Three commands lead from a file of measurements to an answer, in any folder. What they leave
-    serves the others. Every command has --help with an example.
+    Three commands lead from a file of measurements to an answer, in any folder. Every command has
+    --help with an example.
 
     \b
     Example:

@@ -13,7 +13,6 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from kinacc import removed
 from kinacc.config import series
 from kinacc.config.reading import Document, KeyPath, Place, read
 from kinacc.config.schema import keys
@@ -204,8 +203,6 @@ def problems_of(error: ValidationError, place: Place) -> Iterator[Problem]:
 
 def _meant(path: KeyPath) -> str:
     """What to write instead of an unknown key of the settings."""
-    if path[-1] in removed.KEYS:
-        return removed.KEYS[path[-1]]
     path = path[2:] if path[0] == "datasets" else path
     steps, known = [str(step) for step in path if not isinstance(step, int)], keys()
     section = ".".join(steps[:-1])
