@@ -156,7 +156,7 @@ def test_settings_that_are_no_numbers_of_an_arm_are_named(words, said):
 
 
 def test_a_tool_beyond_all_arms_is_no_number():
-    done = call("plan-poses", "ur10", "--drawn", 50, "--candidates", 12, "--tool-mm", "1e308,0,0")
+    done = call("plan-poses", "ur10", "--candidates", 50, "--tool-mm", "1e308,0,0")
     assert done.exit_code == 2, done.output
     assert "--tool-mm: '1e308,0,0'; allowed: 3 numbers" in done.output
 

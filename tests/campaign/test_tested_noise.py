@@ -93,7 +93,7 @@ def test_a_noise_that_differs_by_axis_is_turned_with_the_frame_of_its_readings(t
 
 def test_a_plan_with_a_tested_noise_is_little_wider_than_with_the_same_noise_stated(tested):
     file = tested(std_mm=(0.05,) * 30, visits=4)
-    std = json.loads(file.read_text())["noise"]["std_mm"][0]
+    std = json.loads(file.read_text())["std_mm"][0]
     words = [
         "--candidates",
         20,

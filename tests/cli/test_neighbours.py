@@ -33,7 +33,7 @@ def written(folder, tmp_path_factory):
     made = {}
     for kind in KINDS:
         commands = {
-            "plan-poses": ("plan-poses", "mh180", "--poses", 8, "--drawn", 60, "--joints-deg",
+            "plan-poses": ("plan-poses", "mh180", "--poses", 8, "--candidates", 60, "--joints-deg",
                            "-30:30,-20:20,-20:20,-30:30,40:70,-30:30", "--hayati", "2"),
             "campaign next": ("campaign", "next", again, "--all"),
             "predict": ("predict", folder, base / f"plan-poses.{kind}", "--model", "dh"),

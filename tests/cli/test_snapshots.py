@@ -42,7 +42,7 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "verify": ("verify", "new.yaml", "--calibration", FIT, "--base", "same", "--tool", "same"),
     "compare": ("compare", FIT, LATER),
     "repeatability": ("repeatability", "visits.csv", "--rows", "visits"),
-    "plan-poses": ("plan-poses", "ur10", "--poses", "12", "--drawn", "40", "-o", "plan.csv"),
+    "plan-poses": ("plan-poses", "ur10", "--poses", "12", "--candidates", "40", "-o", "plan.csv"),
     "campaign plan": ("campaign", "plan", *NOISE, "--candidates", "20", "--budget", "10",
                       "--repetitions", "2"),
     "a word that is no command": ("fit", "arm.yaml"),

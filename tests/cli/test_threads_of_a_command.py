@@ -9,7 +9,7 @@ import sys
 PROGRAM = """
 import sys
 from kinacc.cli import main
-sys.argv[1:] = ["plan-poses", "ur10", "--poses", "10", "--drawn", "20", "--json"]
+sys.argv[1:] = ["plan-poses", "ur10", "--poses", "10", "--candidates", "20", "--json"]
 try:
     main()
 finally:

@@ -114,7 +114,7 @@ def test_planned_poses_of_an_arm_beat_random_ones_and_are_driven_on_a_short_way(
     joints = spread(arm, 200)
     asked = paper.experiment(robot.carried(arm), hayati_joints=(2, 3))
     plan = plan_poses(arm, joints, asked, 15, np.zeros(6))
-    rows, rng = plan.information.rows, np.random.default_rng(0)
+    rows, rng = information(arm, joints, asked).rows, np.random.default_rng(0)
     random = [observability(rows[rng.permutation(200)[:15]]) for _ in range(100)]
     assert plan.index[-1] > max(random)
     assert (plan.index[:4] == 0.0).all()  # four full poses cannot tell thirty directions

@@ -6,8 +6,9 @@ from small_arms import BASE, TOOL, calibrated, joints, truth
 
 from kinacc.calibration.frames import MOTIONS
 from kinacc.calibration.uncertainty import is_angle
-from kinacc.deployment.predict import predict, sensitivity
+from kinacc.deployment.predict import predict
 from kinacc.deployment.record import nominal
+from kinacc.deployment.sensitivity import sensitivity
 from kinacc.geometry import Pose, compose, exp_so3, log_so3
 from kinacc.kinematics import dh, robot
 from kinacc.kinematics.model import JointState
@@ -79,11 +80,11 @@ def test_predictions_are_as_far_off_as_they_say():
     assert np.mean(np.square(scores)) == pytest.approx(1.0, abs=0.25)
 
 
-def test_blind_directions_show_where_the_frame_is_a_convention():
+def test_undetermined_directions_show_where_the_frame_is_a_convention():
     arm, q_rad = calibrated("mh180", "dh"), joints("mh180", 5)
     # From the instrument to the tool everything was measured; where the base stands was not.
-    assert predict(arm, q_rad, None, "instrument").blind_mm.max() < 0.02
-    assert predict(arm, q_rad, None, "base").blind_mm.min() > 0.5
+    assert predict(arm, q_rad, None, "instrument").undetermined[:, 0].max() < 0.02
+    assert predict(arm, q_rad, None, "base").undetermined[:, 0].min() > 0.5
 
 
 def test_a_vec_model_says_nothing_outside_its_range_and_dh_says_so():
@@ -92,7 +93,7 @@ def test_a_vec_model_says_nothing_outside_its_range_and_dh_says_so():
     found = predict(calibrated("mh180", "vec"), q_rad)
     assert found.outside.tolist() == [[False] * 6, [False, False, True, False, False, False],
                                       [False] * 6]  # fmt: skip
-    for values in (found.pose.position_mm, found.std, found.std_position_mm, found.residual_mm):
+    for values in (found.pose.position_mm, found.std, found.std_position_mm, found.undetermined):
         assert np.isnan(values[1]).all()
         assert np.isfinite(values[[0, 2]]).all()
     extrapolated = predict(calibrated("mh180", "dh"), q_rad)

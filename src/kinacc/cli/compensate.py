@@ -41,8 +41,9 @@ def compensate(
       kinacc compensate results/ur10_b target_poses.csv -o joints.csv
       kinacc compensate results/mh180 --program program.csv -o corrected.csv
     """
-    from kinacc.cli import rows, tables, target_poses
+    from kinacc.cli import rows, target_poses
     from kinacc.deployment.compensate import compensate as joints_for
+    from kinacc.deployment.sensitivity import deviations
     from kinacc.progress import reporting
 
     calibration = choice.calibration_of(folder, model, robot, config, session)
@@ -57,6 +58,7 @@ def compensate(
     )
     out.deliver(answer)
     rows.say_unused(given, calibration)
-    tables.say_unlike(unlike, calibration)
-    tables.say_convention(calibration, target_poses.reached(calibration, found), frame, point)
+    rows.warn_unlike(unlike)
+    at = target_poses.reached(calibration, found)
+    rows.warn_undetermined(deviations(calibration, at, frame, point)[1][:, 0], frame)
     rows.end_where_missing(found.q_rad, "joints")

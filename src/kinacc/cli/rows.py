@@ -45,6 +45,7 @@ _OWN_NAMES = {  # what a file under our names has where the need is for it
     "poses": re.compile(r"(?<![^\s,;\"'])(?:qw|rv?x_(?:deg|rad))(?![^\s,;\"'])"),
 }
 _HEAD = 1_000_000  # characters of a line looked at
+_MUCH_MOVED_MM = 0.1  # by a mm or mrad of what is undetermined
 
 
 @dataclass(frozen=True)
@@ -133,6 +134,33 @@ def of_arguments(texts: tuple[str, ...], unit: str, robot: Robot, option: str) -
         rows.append(row)
     refuse(problems)
     return np.array(rows) * np.where(slides, 1.0, ANGLE[unit])
+
+
+def given_joints(
+    robot: Robot, path: str | None, in_deg: tuple, in_rad: tuple, answers: Mapping
+) -> Rows:
+    """Joints of a file or of arguments. InputError without any, or outside the limits.
+
+    ``answers`` to what the file leaves open, by option.
+    """
+    if [path is not None, bool(in_deg), bool(in_rad)].count(True) != 1:
+        raise InputError(Problem("joints", "are needed once", "a file, --joints-deg, --joints-rad"))
+    if path is not None:
+        given = read(path, robot, answers=answers)
+    else:
+        unit = "deg" if in_deg else "rad"
+        joints = of_arguments(in_deg or in_rad, unit, robot, f"--joints-{unit}")
+        given = Rows(len(joints), np.arange(1, len(joints) + 1), joints, None, None, ())
+    require_within_limits(robot, given, path or "joints")
+    return given
+
+
+def joint_columns(prismatic: np.ndarray, joints: np.ndarray) -> dict[str, np.ndarray]:
+    """Columns of reported joints (n, k): q1_deg .., q1_mm where a joint slides (k,)."""
+    return {
+        f"q{joint + 1}_{'mm' if slides else 'deg'}": values if slides else np.rad2deg(values)
+        for joint, (slides, values) in enumerate(zip(prismatic, joints.T, strict=True))
+    }
 
 
 def candidates(path: str, robot: Robot, most: int, answers: Mapping | None = None) -> Rows:
@@ -343,6 +371,27 @@ def say_unused(given: Rows, calibration: Calibration) -> None:
     if given.payload is not None and not calibration.model.knows_loads:
         what = f"the {calibration.choice} model was fitted without loads that change"
         click.echo(f"not used: payload; {what}", err=True)
+
+
+def warn_unlike(unlike: np.ndarray) -> None:
+    """Count the rows (n,) unlike measured poses on the error stream."""
+    if np.any(unlike):
+        click.echo(
+            f"warning: {np.sum(unlike)} of {len(unlike)} poses are not near measured poses "
+            "(status); their errors may be larger",
+            err=True,
+        )
+
+
+def warn_undetermined(moved_mm: np.ndarray, frame: str) -> None:
+    """Warn where undetermined parameters move poses (n,) in the robot's base, mm per mm or mrad."""
+    largest = np.nan_to_num(moved_mm).max(initial=0.0)
+    if frame == "base" and largest > _MUCH_MOVED_MM:
+        click.echo(
+            f"warning: each mm or mrad of undetermined parameters moves poses by up to "
+            f"{largest:.2g} mm in the base frame; compare --frame instrument",
+            err=True,
+        )
 
 
 def end_where_missing(answers: np.ndarray, what: str) -> None:

@@ -21,8 +21,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from kinacc.deployment.predict import BLOCK, deviations
 from kinacc.deployment.record import Calibration
+from kinacc.deployment.sensitivity import deviations
 from kinacc.kinematics.model import JointState
 from kinacc.kinematics.region import points
 
@@ -36,14 +36,10 @@ def position_std_mm(
 ) -> np.ndarray:
     """Standard deviations (n,) of predicted positions in the instrument's frame, axes together.
 
-    Directions that the calibration could not see count with one unit each: 1 mm or 1 mrad.
+    Undetermined directions count with one unit each: 1 mm or 1 mrad.
     """
-    found = np.zeros(len(at))
-    for first in range(0, len(at), BLOCK):
-        block = slice(first, first + BLOCK)
-        std, blind = deviations(calibration, at.select(block), "instrument", point)
-        found[block] = np.sqrt(np.sum(std[:, :3] ** 2, axis=1) + blind[:, 0] ** 2)
-    return found
+    std, undetermined = deviations(calibration, at, "instrument", point)
+    return np.sqrt(np.sum(std[:, :3] ** 2, axis=1) + undetermined[:, 0] ** 2)
 
 
 def limit_mm(calibration: Calibration, point: str | None = None) -> float:

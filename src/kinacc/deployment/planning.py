@@ -1,5 +1,4 @@
-"""Which poses to measure: candidates, what each shows of the parameters, D-optimal exchange, order
-of travel.
+"""Planning of poses: candidates, their information, D-optimal exchange, and the order of travel.
 
 The arm is linearised at its nominal parameters. Displacements count in mm and mrad; a rotation of
 one radian weighs as much as ``rotation_weight_mm_per_rad`` in position.
@@ -7,7 +6,7 @@ one radian weighs as much as ``rotation_weight_mm_per_rad`` in position.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,8 +15,8 @@ from kinacc.calibration import frames
 from kinacc.calibration.identifiability import LeftOpen
 from kinacc.calibration.identified import STRUCTURAL, joints_anywhere
 from kinacc.calibration.uncertainty import Uncertainty
-from kinacc.deployment.predict import BLOCK, sensitivity
 from kinacc.deployment.record import TOOL, Calibration, nominal
+from kinacc.deployment.sensitivity import BLOCK, sensitivity
 from kinacc.errors import InputError, Problem, refuse
 from kinacc.geometry import Pose, compose
 from kinacc.kinematics import dh
@@ -28,22 +27,30 @@ from kinacc.kinematics.robot import Robot
 
 _MOST_DRAWS_PER_POSE = 400
 _NEIGHBOURS = 10  # of a measured pose, between which and the pose others are drawn
-_REGULAR = 1e-9  # of the mean eigenvalue: makes sets comparable that do not show every direction
+_REGULAR = 1e-9  # of the mean eigenvalue: makes sets without all directions comparable
 _TIE = 1e-6  # of the log determinant: less may be rounding
 _MOST_SWEEPS = 100
 _SHORTER_RAD = 1e-9
-
-Progress = Callable[[Iterable[int], str], Iterable[int]]
 
 
 @dataclass(frozen=True)
 class Experiment:
     """What is measured and fitted.
 
-    ``tool`` is the measured point or frame in the last DH frame; ``orientation``: a full pose is
-    measured, not a position alone; ``frames_estimated``: base and tool are fitted as well;
-    ``hayati_joints`` (1-based) have a beta. ``threshold``: a direction seen with less than this
-    share of the best-seen one counts as undetermined.
+    Attributes
+    ----------
+    tool
+        Measured point or frame in the last DH frame.
+    orientation
+        Whether orientations are measured beside positions.
+    frames_estimated
+        Whether base and tool are fitted as well.
+    hayati_joints
+        Joints (1-based) with a beta.
+    rotation_weight_mm_per_rad
+        Weight of an orientation.
+    threshold
+        Directions below this share of the largest singular value count as undetermined.
     """
 
     tool: Pose
@@ -58,27 +65,34 @@ class Experiment:
 class Information:
     """Rows (n, m, r) that n candidate poses add to the normal equations of r directions.
 
-    The r directions are those at least one candidate shows; the others are ``left_open``.
-    ``values`` (P,) are the singular values of all candidates together, falling, of the parameters
-    ``names`` (P,); ``rank`` of them count.
+    The r = ``rank`` directions are those that the candidates determine of the parameters ``names``
+    (P,); the others are ``left_open``.
     """
 
     rows: np.ndarray
     names: tuple[str, ...]
-    values: np.ndarray
     rank: int
     left_open: LeftOpen
 
 
 @dataclass(frozen=True)
 class PosePlan:
-    """Poses in driving order: rows ``chosen`` (N,) of the candidates, and ``moves_rad`` (N,) that
-    lead to each.
+    """Planned poses in driving order.
 
-    ``index`` (N,): observability index O1, the geometric mean of the singular values over the root
-    of the number of poses (Borm and Menq, Int. J. Robotics Research 10, 1991), after each addition,
-    the last one after ``swaps`` swaps. ``candidate_travel_rad``: travel in the order of the
-    candidates.
+    Attributes
+    ----------
+    chosen
+        (N,) rows of the candidates.
+    moves_rad
+        (N,) largest movement of a joint on the way to each pose.
+    index
+        (N,) observability index O1 after each added pose, the last one after all ``swaps``: the
+        geometric mean of the singular values over the root of the number of poses (Borm and Menq,
+        Int. J. Robotics Research 10, 1991).
+    candidate_travel_rad
+        Travel in the order of the candidates.
+    parameters, determined, undetermined
+        Number of parameters and of determined directions, and the undetermined ones as text.
     """
 
     chosen: np.ndarray
@@ -86,32 +100,34 @@ class PosePlan:
     index: np.ndarray
     swaps: int
     candidate_travel_rad: float
-    information: Information
+    parameters: int
+    determined: int
+    undetermined: tuple[str, ...]
 
 
 def plan_poses(
-    robot: Robot,
-    q_rad: np.ndarray,
-    experiment: Experiment,
-    count: int,
-    start_rad: np.ndarray,
-    progress: Progress | None = None,
+    robot: Robot, q_rad: np.ndarray, experiment: Experiment, count: int, start_rad: np.ndarray
 ) -> PosePlan:
-    """Choose ``count`` of the candidates ``q_rad`` (n, k), reported joints, and the order from
-    ``start_rad`` (k,).
+    """Choose ``count`` of the candidates ``q_rad`` (n, k), reported joints, from ``start_rad`` on.
 
     Raises InputError where so many poses cannot be chosen, or no candidate shows anything.
     """
     shown = information(robot, q_rad, experiment)
     if shown.rank == 0:
-        raise InputError(Problem("candidates", "show no direction at all"))
-    chosen, index, swaps = choose(shown.rows, count, progress)
+        raise InputError(Problem("candidates", "determine no parameter"))
+    chosen, index, swaps = choose(shown.rows, count)
     chosen = np.sort(chosen)
     distance = distances(np.concatenate([start_rad[None], q_rad[chosen]]) / travel_unit(robot))
     path = shortest_path(distance)
-    unordered = float(np.trace(distance, offset=1))
     return PosePlan(
-        chosen[path[1:] - 1], distance[path[:-1], path[1:]], index, swaps, unordered, shown
+        chosen[path[1:] - 1],
+        distance[path[:-1], path[1:]],
+        index,
+        swaps,
+        float(np.trace(distance, offset=1)),
+        len(shown.names),
+        shown.rank,
+        tuple(shown.left_open.sentences),
     )
 
 
@@ -129,23 +145,20 @@ def spread(
     """
     low, high = (robot.q_min_rad, robot.q_max_rad) if box_rad is None else box_rad
     low, high = np.maximum(low, robot.q_min_rad), np.minimum(high, robot.q_max_rad)
-    outside = [f"joint {joint + 1}" for joint in np.flatnonzero(low >= high)]
     refuse(
-        [Problem(joint, "its range lies outside the limits") for joint in outside],
-        "There are no poses to choose from",
+        Problem(f"joint {joint + 1}", "its range lies outside the limits")
+        for joint in np.flatnonzero(low >= high)
     )
-    found: list[np.ndarray] = []
-    first, block = 1, max(count, 1024)
-    while sum(map(len, found)) < count:
-        if first > _MOST_DRAWS_PER_POSE * block:
-            what = f"only {sum(map(len, found))} of {first - 1} joint values put the tool there"
-            raise InputError(Problem("region", what, f"{count} candidates", "enlarge the region"))
-        joints = low + points("sobol", block, len(low), first) * (high - low)
+    found, block = np.zeros((0, len(low))), max(count, 1024)
+    for draw in range(_MOST_DRAWS_PER_POSE):
+        joints = low + points("sobol", block, len(low), 1 + draw * block) * (high - low)
         if inside is not None:
             joints = joints[inside(tool_positions(robot, joints, tool))]
-        found.append(joints)
-        first += block
-    return np.concatenate(found)[:count]
+        found = np.concatenate([found, joints])
+        if len(found) >= count:
+            return found[:count]
+    what = f"only {len(found)} of {_MOST_DRAWS_PER_POSE * block} joint values put the tool there"
+    raise InputError(Problem("region", what, f"{count} candidates", "enlarge the region"))
 
 
 def between(measured: np.ndarray, unit: np.ndarray, count: int, seed: int) -> np.ndarray:
@@ -189,15 +202,11 @@ def information(robot: Robot, q_rad: np.ndarray, experiment: Experiment) -> Info
     _, values, right = np.linalg.svd(flat, full_matrices=len(flat) < len(names))
     rank = int(np.sum(values > experiment.threshold * values[0]))
     lost, known = right[rank:], frames.known(arm.base, experiment.tool)
-    if not len(lost):
-        return Information(
-            slopes @ right.T, names, values, rank, LeftOpen.of(lost, lost, names, known)
-        )
     anywhere = _slopes(arm, joints_anywhere(arm.robot.dh), experiment).reshape(-1, len(names))
     _, everywhere, axes = np.linalg.svd(anywhere)
     hidden = axes[int(np.sum(everywhere > STRUCTURAL * everywhere[0])) :]
-    left_open = LeftOpen.of(hidden, lost, names, known)
-    return Information(slopes @ right[:rank].T, names, values, rank, left_open)
+    left_open = LeftOpen.of(hidden if len(lost) else lost, lost, names, known)
+    return Information(slopes @ right[:rank].T, names, rank, left_open)
 
 
 def _slopes(arm: Calibration, q_dh: np.ndarray, experiment: Experiment) -> np.ndarray:
@@ -212,34 +221,28 @@ def _slopes(arm: Calibration, q_dh: np.ndarray, experiment: Experiment) -> np.nd
     return slopes
 
 
-def choose(
-    rows: np.ndarray, count: int, progress: Progress | None = None
-) -> tuple[np.ndarray, np.ndarray, int]:
-    """A D-optimal set by exchange (Fedorov 1972): candidates (count,), index O1 after each
-    (count,), swaps.
+def choose(rows: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray, int]:
+    """A D-optimal set by exchange (Fedorov 1972): candidates (count,), O1 (count,), swaps.
 
     Of candidates with ``rows`` (n, m, r) the best one is added until there are ``count``; then
-    every chosen one in turn is swapped for the best in its place, until a whole round finds nothing
-    better. Deterministic: of equals the first. Raises InputError for too few candidates, or poses
-    that cannot determine r directions.
+    each is swapped for the best in its place, until a round finds nothing better. Of equals the
+    first is taken. Raises InputError for too few candidates, or too few poses for r directions.
     """
     _, components, directions = rows.shape
-    least, problems = -(-directions // components), []
-    if count > len(rows):
-        what = f"{count} of {len(rows)} candidates are wanted"
-        problems.append(Problem("poses", what, "at most as many as there are candidates"))
-    if count < least:
-        what = f"{count} poses of {components} components cannot tell {directions} directions"
-        problems.append(Problem("poses", what, f"at least {least}"))
-    refuse(problems, "Poses cannot be chosen")
+    least = -(-directions // components)
+    if not least <= count <= len(rows):
+        allowed = f"at least {least}, at most {len(rows)} (candidates)"
+        raise InputError(
+            Problem("poses", f"{count}, to determine {directions} directions", allowed)
+        )
     floor = _REGULAR * float(np.sum(rows**2)) / (len(rows) * directions) * np.eye(directions)
     chosen: list[int] = []
     index = np.zeros(count)
-    for number in progress(range(count), "poses added") if progress else range(count):
+    for number in range(count):
         chosen.append(_best_addition(rows, chosen, floor))
         index[number] = observability(rows[chosen])
-    swaps, rounds = 0, range(_MOST_SWEEPS)
-    for _ in progress(rounds, "rounds of swaps at most") if progress else rounds:
+    swaps = 0
+    for _ in range(_MOST_SWEEPS):
         before = swaps
         for place in range(count):
             others = chosen[:place] + chosen[place + 1 :]

@@ -1,43 +1,85 @@
-"""Poses a calibrated arm is predicted to take, each with how sure that is."""
+"""Poses that a calibrated arm is predicted to take, with standard deviations."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
+import pandas as pd
 
-from kinacc.calibration.frames import MOTIONS
-from kinacc.deployment.record import FLANGE, Calibration
-from kinacc.geometry import Pose, compose, skew
+from kinacc.deployment.applicability import is_measured_there
+from kinacc.deployment.record import Calibration
+from kinacc.deployment.sensitivity import deviations
+from kinacc.geometry import Pose, quaternion_from_rotation
 from kinacc.kinematics.model import JointState
 
-BLOCK = 512  # poses per pass: bounds the memory of the sensitivities
 
+@dataclass(frozen=True)
+class Prediction:
+    """Predicted poses of n joint configurations; NaN where a model has no prediction.
 
-class Prediction(NamedTuple):
-    """Predicted poses (n, ...) and what is known of them.
-
-    ``std`` (n, 6): standard deviations by the parameter covariance of x, y, z (mm) and of small
-    turns about x, y, z (rad), in the frame of the pose; NaN where the model has no covariance.
-    ``std_position_mm`` and ``std_orientation_rad`` (n,): roots of the summed variances.
-    ``blind_mm`` and ``blind_rad`` (n,): how far the pose moves when the parameters move by one unit
-    (1 mm or 1 mrad) along the directions the calibration could not see, root of the summed squares;
-    by the DH model, which other models follow along these.
-    ``residual_mm`` and ``residual_rad`` (n,): rms of what the model left unexplained.
-    ``outside`` (n, k): joints outside the range the data cover; where the model
-    has a domain it says nothing there, and all else is NaN.
+    Attributes
+    ----------
+    pose
+        (n, ...) poses, mm, in the frame asked for.
+    std
+        (n, 6) standard deviations by the covariance of the parameters: x, y, z (mm) and small
+        turns about x, y, z (rad).
+    undetermined
+        (n, 2) movement (mm, rad) by one unit (1 mm or 1 mrad) of what the calibration did not
+        determine.
+    unexplained
+        (n, 2) rms position (mm) and orientation (rad) of what the model left of held-out poses.
+    outside
+        (n, k) whether a joint lies outside the measured range.
+    near
+        (n,) whether the configuration is near measured ones.
     """
 
     pose: Pose
     std: np.ndarray
-    std_position_mm: np.ndarray
-    std_orientation_rad: np.ndarray
-    blind_mm: np.ndarray
-    blind_rad: np.ndarray
-    residual_mm: np.ndarray
-    residual_rad: np.ndarray
+    undetermined: np.ndarray
+    unexplained: np.ndarray
     outside: np.ndarray
+    near: np.ndarray
+
+    @property
+    def std_position_mm(self) -> np.ndarray:
+        """Root (n,) of the summed variances of x, y and z."""
+        return np.linalg.norm(self.std[:, :3], axis=1)
+
+    @property
+    def status(self) -> list[str]:
+        """Whether each prediction is near measured poses, extrapolated, or absent."""
+        absent = np.isnan(self.pose.position_mm[:, 0])
+        texts = []
+        for missing, outside, near in zip(absent, self.outside, self.near, strict=True):
+            joints = ", ".join(map(str, np.flatnonzero(outside) + 1))
+            what = f"joint {joints} outside the measured range" if joints else ""
+            what = what or ("" if near else "joints unlike those measured")
+            texts.append(
+                f"{'no prediction' if missing else 'extrapolated'}: {what}" if what else "ok"
+            )
+        return texts
+
+    def table(self) -> pd.DataFrame:
+        """One row a pose: position, quaternion, standard deviations (mm, mrad), status."""
+        known = np.isfinite(self.pose.position_mm[:, 0])
+        quaternion = np.full((len(known), 4), np.nan)
+        quaternion[known] = quaternion_from_rotation(self.pose.rotation[known])
+        std = self.std * [1.0, 1.0, 1.0, 1e3, 1e3, 1e3]
+        columns = {
+            **dict(zip(("x_mm", "y_mm", "z_mm"), self.pose.position_mm.T, strict=True)),
+            **dict(zip(("qw", "qx", "qy", "qz"), quaternion.T, strict=True)),
+            **dict(zip(("std_x_mm", "std_y_mm", "std_z_mm"), std[:, :3].T, strict=True)),
+            **dict(zip(("std_rx_mrad", "std_ry_mrad", "std_rz_mrad"), std[:, 3:].T, strict=True)),
+            "std_position_mm": self.std_position_mm,
+            "std_orientation_mrad": np.linalg.norm(std[:, 3:], axis=1),
+        }
+        for name in ("unexplained", "undetermined"):
+            values = getattr(self, name)
+            columns |= {f"{name}_mm": values[:, 0], f"{name}_mrad": 1e3 * values[:, 1]}
+        return pd.DataFrame({**columns, "status": self.status})
 
 
 def predict(
@@ -46,108 +88,39 @@ def predict(
     s: np.ndarray | None = None,
     frame: str = "base",
     point: str | None = None,
-    progress: Callable[[Iterable[int], str], Iterable[int]] | None = None,
     payload: np.ndarray | None = None,
 ) -> Prediction:
-    """Poses of ``point`` in ``frame`` (base, instrument) at reported joints (n, k), rad and mm.
+    """Predict poses at reported joints.
 
-    ``s`` (n, k): travel directions, unknown where not given; ``payload`` (n, 4) as in a
-    ``JointState``. ``point``: a target by name or ``flange``; the tool where not given. Raises
-    InputError for an unknown frame or point.
+    Parameters
+    ----------
+    q_rad
+        (n, k) reported joints, rad (mm where a joint slides).
+    s
+        (n, k) directions of travel, -1, 0 (unknown) or 1.
+    frame
+        ``base`` of the robot, or ``instrument``.
+    point
+        A target by name or ``flange``; the tool where not given.
+    payload
+        (n, 4) as in ``JointState``.
+
+    Raises
+    ------
+    InputError
+        For an unknown frame or point.
     """
     q_rad = calibration.robot.dh_joints(np.atleast_2d(q_rad))
     at = JointState(q_rad, None if s is None else np.asarray(s), payload)
     count, outside = len(at), calibration.outside_range(at.q_rad)
-    silent = outside.any(axis=1) & (calibration.model.domain is not None)
-    said = np.flatnonzero(~silent)
+    rows = np.flatnonzero(~(outside.any(axis=1) & (calibration.model.domain is not None)))
+    part, near = at.select(rows), np.zeros(count, dtype=bool)
     pose = Pose(np.full((count, 3, 3), np.nan), np.full((count, 3), np.nan))
-    std, blind = np.full((count, 6), np.nan), np.full((count, 2), np.nan)
-    starts = range(0, len(said), BLOCK)
-    for begin in progress(starts, f"blocks of {BLOCK} poses") if progress else starts:
-        rows = said[begin : begin + BLOCK]
-        part = at.select(rows)
-        pose.rotation[rows], pose.position_mm[rows] = calibration.pose(part, frame, point)
-        if calibration.known is not None:
-            std[rows], blind[rows] = deviations(calibration, part, frame, point)
-    left = calibration.residual
-    return Prediction(
-        pose,
-        std,
-        np.sqrt(np.sum(std[:, :3] ** 2, axis=1)),
-        np.sqrt(np.sum(std[:, 3:] ** 2, axis=1)),
-        blind[:, 0],
-        blind[:, 1],
-        np.where(silent, np.nan, left.position_mm if left else np.nan),
-        np.where(silent, np.nan, left.orientation_rad if left else np.nan),
-        outside,
-    )
-
-
-def open_movement(
-    calibration: Calibration, at: JointState, frame: str = "base", point: str | None = None
-) -> np.ndarray:
-    """Movement (n, 2), mm and rad, of poses along what the calibration could not see."""
-    plainest = calibration.plainest
-    undetermined = (plainest.known.undetermined * plainest.units).T
-    moved = (sensitivity(plainest, at, frame, point) @ undetermined) ** 2
-    return np.sqrt(np.stack([moved[:, :3].sum(axis=(1, 2)), moved[:, 3:].sum(axis=(1, 2))], 1))
-
-
-def deviations(
-    calibration: Calibration, at: JointState, frame: str = "base", point: str | None = None
-) -> tuple[np.ndarray, np.ndarray]:
-    """Standard deviations (n, 6) and movement along what is undetermined (n, 2), mm and rad."""
-    slopes = sensitivity(calibration, at, frame, point)
-    std = np.sqrt(np.sum((slopes @ calibration.root) ** 2, axis=2))
-    return std, open_movement(calibration, at, frame, point)
-
-
-def sensitivity(
-    calibration: Calibration, at: JointState, frame: str = "base", point: str | None = None
-) -> np.ndarray:
-    """Jacobian (n, 6, P) of the pose in the parameters of ``calibration.known``.
-
-    Rows: position (mm) and small turn (rad) in ``frame``.
-    """
-    name = point or calibration.default_point
-    carried, origin = calibration.point(name), calibration.origin(frame)
-    end = calibration.model.pose(at)
-    slopes = np.zeros((len(at), 6, len(calibration.known.names)))
-    place = {each: number for number, each in enumerate(calibration.known.names)}
-    names = enumerate(calibration.model.names)
-    chosen = [(place[each], number) for number, each in names if each in place]
-    columns, numbers = np.array(chosen, dtype=int).reshape(-1, 2).T
-    slopes[:, :, columns] = calibration.model.linearised(at)[1][:, :, numbers]
-    # A turn of the last frame swings the point: w x arm = -[arm] w.
-    lever_mm = (end.rotation @ carried.position_mm[:, None])[..., 0]
-    slopes[:, :3] -= skew(lever_mm) @ slopes[:, 3:]
-    if name != FLANGE:
-        _fill(slopes, place, name, end.rotation, np.zeros_like(lever_mm))
-    slopes[:, :3] = origin.rotation @ slopes[:, :3]
-    slopes[:, 3:] = origin.rotation @ slopes[:, 3:]
-    if frame == "instrument" or calibration.anchor is not None:
-        # Motions of the base are about the instrument's axes, seen here in ``frame``.
-        turn = origin.rotation @ calibration.base.rotation.T
-        seen = compose(origin, compose(end, carried)).position_mm - origin.position_mm
-        _fill(slopes, place, calibration.base_name, np.broadcast_to(turn, end.rotation.shape), seen)
-    return slopes
-
-
-def _fill(
-    slopes: np.ndarray,
-    place: dict[str, int],
-    name: str,
-    turned: np.ndarray,
-    lever_mm: np.ndarray,
-) -> None:
-    """Columns of the motions of a frame: shifts (n, 3) ``turned``, turns swinging ``arm``."""
-    for axis, motion in enumerate(MOTIONS):
-        column = place.get(f"{name}.{motion}")
-        if column is None:
-            continue
-        along = turned[:, :, axis % 3]
-        if axis < 3:
-            slopes[:, :3, column] = along
-        else:
-            slopes[:, :3, column] = np.cross(along, lever_mm)
-            slopes[:, 3:, column] = along
+    pose.rotation[rows], pose.position_mm[rows] = calibration.pose(part, frame, point)
+    std, undetermined, unexplained = (np.full((count, size), np.nan) for size in (6, 2, 2))
+    std[rows], undetermined[rows] = deviations(calibration, part, frame, point)
+    if calibration.residual is not None:
+        residual = calibration.residual
+        unexplained[rows] = residual.position_mm, residual.orientation_rad
+    near[rows] = is_measured_there(calibration, part, point)
+    return Prediction(pose, std, undetermined, unexplained, outside, near)

@@ -89,6 +89,19 @@ class Calibration:
             return MEASURED if self.orientation_measured else STATED
         return MEASURED if name in self.orientation_measured else STATED
 
+    def facts(self, frame: str, point: str | None) -> dict[str, str]:
+        """Name, robot, model, frame and point of an answer, and why it is outdated if it is."""
+        point = point or self.default_point
+        return {
+            "calibration": self.name,
+            "robot": self.robot.name,
+            "model": self.choice,
+            "frame": frame,
+            "point": point,
+            "orientation": self.orientation_source(point),
+            **({"outdated": self.outdated} if self.outdated else {}),
+        }
+
     @property
     def default_point(self) -> str:
         """The tool where there is one, else the first target."""
