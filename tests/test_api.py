@@ -61,7 +61,7 @@ def test_joints_of_a_predicted_pose_reach_it(calibration):
 def test_verify_and_compare_find_no_change_in_the_same_readings(calibration, config):
     readings = kinacc.read_measurements(config)
     verified = kinacc.verify(calibration, readings, base="same", tool="same")
-    assert (verified.known, verified.verdict) == (len(readings), "cannot be told")
+    assert (verified.known, verified.verdict) == (len(readings), "undecided")
     assert kinacc.compare(calibration, calibration).shared.all_of_both
 
 

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any, Literal
 
 import numpy as np
@@ -25,6 +24,7 @@ from kinacc.deployment import predict as predicting
 from kinacc.deployment import shared_readings
 from kinacc.deployment import verify as verifying
 from kinacc.deployment.export import files as exports
+from kinacc.deployment.export.source import Source
 from kinacc.deployment.record import Calibration as CalibratedModel
 from kinacc.errors import InputError, Problem
 from kinacc.geometry import Pose
@@ -204,10 +204,7 @@ class Calibration:
         list of Path
             The files written to ``folder``; files of the same names are replaced.
         """
-        chosen = formats or exports.formats_of(self.selected)
-        with TemporaryDirectory() as place:
-            saved = self.save(Path(place) / self.name)
-            made = exports.contents(saved, self.robot, chosen, self.name, model=self.selected)
+        made = exports.contents(Source(self.model, self.tables), formats)
         return [Path(path) for path in exports.write(made, folder, force=True)]
 
 
@@ -335,7 +332,7 @@ def compare(
             [each.table("measurements")[names].to_numpy(dtype=float) for each in (first, second)]
         )
     measured = first.tables["measurements"], second.tables["measurements"]
-    readings = shared_readings.shared(*measured, same_file=False)
+    readings = shared_readings.shared(*measured)
     weight = schema.key("calibration.rotation_weight_mm_per_rad")["default"]
     return comparing.compare(first.model, second.model, q_rad, weight, readings)
 

@@ -77,11 +77,13 @@ def limit_key(word: str, gate: Limits) -> str:
     return word + _ENDINGS[FIGURES[gate["value"]][0]]
 
 
-def limited(gate: Limits, tolerance_mm: float | None) -> tuple[str, float | None, bool]:
+def limited(gate: Limits, tolerance_mm: float) -> tuple[str, float, bool]:
     """The limit of a gate of kind ``value``: at_most or at_least, its size, whether its own."""
-    sizes = {word: gate[limit_key(word, gate)] for word in LIMITS}
-    own = next((word for word in LIMITS if sizes[word] is not None), None)
-    return (own, sizes[own], True) if own else (LIMITS[0], tolerance_mm, False)
+    for word in LIMITS:
+        size = gate[limit_key(word, gate)]
+        if size is not None:
+            return word, size, True
+    return LIMITS[0], tolerance_mm, False
 
 
 def _name(name: str) -> str:
@@ -298,7 +300,7 @@ def require_limits(gates: Sequence[Gate], tolerance_mm: float | None, of: str) -
     """Raise for a gate that leaves its limit to the tolerance, which has none for its figure."""
     for number, gate in enumerate(gates):
         if isinstance(gate, Value):
-            figure, open_ = gate.value, not limited(vars(gate), None)[2]
+            figure, open_ = gate.value, not limited(vars(gate), 0.0)[2]
         elif isinstance(gate, Campaign):
             figure, open_ = OF_TOLERANCE["bound"], gate.tolerance_mm is None
         else:
