@@ -95,7 +95,7 @@ def test_ur_staubli_and_ros_describe_the_same_arm(ur):
     conf = dict(
         line.split(" = ") for line in (by_ur[2] / "arm_ur.conf").read_text().split("\n")[1:5]
     )
-    np.testing.assert_allclose(json.loads(conf["delta_d"]), d, rtol=1e-15)
+    np.testing.assert_allclose(json.loads(conf["delta_d"]), d, rtol=0, atol=1e-12)
     assert np.abs(d).max() > 1.0
     offsets = [
         dict(each.attrib) for each in etree.parse(by_staubli[2] / "arm_staubli.cfx").getroot()
