@@ -79,6 +79,13 @@ def test_a_robot_by_name_gives_its_flange():
     np.testing.assert_allclose(pose.position_mm, [[-1184.3, -256.141, 11.6]], atol=1e-9)
 
 
+def test_values_for_a_controller_state_the_error_of_what_it_takes(calibration):
+    found = calibration.values_for("staubli")
+    assert len(found.values) == 6 * 6 + 2 * 6
+    mine, _, nominal = found.errors
+    assert mine.position_mm < nominal.position_mm
+
+
 def test_export_writes_files(calibration, tmp_path):
     (path,) = calibration.export(tmp_path, ["json"])
     assert path.is_file()

@@ -17,6 +17,7 @@ from kinacc.calibration.misfit import misfit
 from kinacc.checks import check
 from kinacc.config import schema
 from kinacc.config.error_models import PLAINEST, asked_for
+from kinacc.config.schema import defaults
 from kinacc.deployment import compare as comparing
 from kinacc.deployment import compensate as compensating
 from kinacc.deployment import folder as results
@@ -24,6 +25,7 @@ from kinacc.deployment import predict as predicting
 from kinacc.deployment import shared_readings
 from kinacc.deployment import verify as verifying
 from kinacc.deployment.export import files as exports
+from kinacc.deployment.export import pendant as pendants
 from kinacc.deployment.export.source import Source
 from kinacc.deployment.record import Calibration as CalibratedModel
 from kinacc.errors import InputError, Problem
@@ -206,6 +208,24 @@ class Calibration:
         """
         made = exports.contents(Source(self.model, self.tables), formats)
         return [Path(path) for path in exports.write(made, folder, force=True)]
+
+    def values_for(self, controller: str, settings: Mapping | None = None) -> pendants.Pendant:
+        """Numbers to enter into a controller: kuka, abb, fanuc, ur, yaskawa, staubli, ros.
+
+        Parameters
+        ----------
+        controller
+            One of the names above.
+        settings
+            The section ``calibration`` of the data set; the defaults where not given.
+
+        Returns
+        -------
+        Pendant
+            Old and new values, and the mean errors at held-out poses.
+        """
+        settings = settings or defaults()["calibration"]
+        return pendants.fit_pendant(self.tables, self.robot, settings, controller, self.name)
 
 
 def read_measurements(path: str | Path, dataset: str | None = None) -> Measurements:
