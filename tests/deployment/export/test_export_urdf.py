@@ -63,8 +63,8 @@ TAIL = """<link name="ee"/><link name="probe"/>
     <parent link="ee"/><child link="probe"/></joint>"""
 
 
-def of(arm):
-    return Source(arm, {})
+def of(arm, path=None, tip=None, **more):
+    return Source(arm, {}, urdf_file=path, links=("world", tip), **more)
 
 
 def bent(arm, seed=0, size=1.0):
@@ -114,7 +114,7 @@ def test_a_generated_file_moves_as_the_calibrated_arm(name):
     q_rad = some_joints(arm.robot)
     names = [f"joint_{i}" for i in range(1, arm.robot.dh.joints + 1)]
     names = [each.replace(" ", "_") for each in arm.robot.joint_names] or names
-    text = urdf.generated(of(arm))
+    text = urdf.text(of(arm))
     for link, point in (("tool", "tool"), ("flange", "flange")):
         theirs = seen_by_pinocchio(text, link, q_rad, arm.robot.dh.prismatic, names)
         assert_same(arm.pose(JointState(q_rad @ arm.robot.joint_map.T), "base", point), theirs)
@@ -128,7 +128,7 @@ def test_a_file_of_ones_own_is_corrected_in_place(tmp_path, robot_from, tail):
     path.write_text(text)
     base_robot = robot.urdf.load(path, "world", tip) if robot_from == "file" else robot.load("ur10")
     arm = bent(base_robot)
-    done = urdf.corrected(of(arm), path, "world", tip)
+    done = urdf.text(of(arm, path, tip))
     joints = [joint.name for joint in robot.urdf.joints_between(path, "world", tip)]
     names = [name for name in joints if name not in ("stand", "mount", "hand", "stick")]
     q_rad = some_joints(base_robot)
@@ -164,7 +164,7 @@ def test_another_arm_is_refused_with_the_distance(tmp_path):
     text = UR10_FILE.replace("ELBOW", ELBOW).replace("TAIL", "")
     path.write_text(text.replace("0.5723", "0.5713"))
     with pytest.raises(InputError, match=r"differs from ur10 by up to .* mm"):
-        urdf.corrected(of(bent(robot.load("ur10"))), path, "world", "w3")
+        urdf.text(of(bent(robot.load("ur10")), path, "w3"))
 
 
 def test_coupled_joints_are_refused_and_dh_joints_offered():
@@ -173,10 +173,10 @@ def test_coupled_joints_are_refused_and_dh_joints_offered():
     coupled[2, 1] = 1.0
     arm = replace(arm, robot=replace(arm.robot, joint_map=coupled))
     with pytest.raises(InputError, match="--dh-joints"):
-        urdf.generated(of(arm))
+        urdf.text(of(arm))
     q_dh = np.random.default_rng(0).uniform(-1, 1, (5, 6))
     names = [each.replace(" ", "_") for each in arm.robot.joint_names]
-    text = urdf.generated(of(arm), dh_joints=True)
+    text = urdf.text(of(arm, dh_joints=True))
     theirs = seen_by_pinocchio(text, "flange", q_dh, arm.robot.dh.prismatic, names)
     assert_same(arm.pose(JointState(q_dh), "base", "flange"), theirs)
 

@@ -13,13 +13,12 @@ import numpy as np
 from kinacc.calibration.hand_eye import closed_form_start
 from kinacc.calibration.observations import full_poses
 from kinacc.deployment.export.source import Source
-from kinacc.deployment.record import TOOL, Calibration
+from kinacc.deployment.record import TOOL
 from kinacc.errors import InputError, Problem
 from kinacc.geometry import (
     IDENTITY,
     Pose,
     compose,
-    exp_so3,
     invert,
     rotation_x,
     rotation_y,
@@ -27,8 +26,8 @@ from kinacc.geometry import (
 )
 from kinacc.kinematics import dh as _dh
 from kinacc.kinematics.dh import DHModel
-from kinacc.kinematics.robot import Robot
-from kinacc.kinematics.robot.urdf import MOVING, Joint, joints_between
+from kinacc.kinematics.robot import Robot, forward
+from kinacc.kinematics.robot.urdf import MOVING, Joint, joints_between, load
 
 _M_PER_MM = 1e-3
 _SAME_ARM_MM = 1e-3  # how far a file's nominal arm may be from the robot's
@@ -40,12 +39,10 @@ ENDING, ANY_MODEL = ".urdf", False
 
 def text(source: Source) -> str:
     """A URDF of the calibrated DH chain, or the file of one's own, corrected."""
-    if source.urdf_file is not None:
-        return corrected(source, source.urdf_file, *source.links)
-    return generated(source, source.dh_joints)
+    return generated(source) if source.urdf_file is None else corrected(source)
 
 
-def generated(source: Source, dh_joints: bool = False) -> str:
+def generated(source: Source) -> str:
     """A URDF of the calibrated DH chain: base_link, link_1 .. link_k, flange and tool.
 
     Joints are those the controller reports, or with ``dh_joints`` those of the DH table. Raises
@@ -56,7 +53,7 @@ def generated(source: Source, dh_joints: bool = False) -> str:
     calibration = source.calibration
     robot, dh = calibration.robot, calibration.model
     names = robot.joint_names or tuple(f"joint_{i}" for i in range(1, dh.joints + 1))
-    senses = np.ones(dh.joints) if dh_joints else _signs(robot)
+    senses = np.ones(dh.joints) if source.dh_joints else _signs(robot)
     frames, end = _origins(dh)
     frames[0] = compose(robot.base, frames[0])
     root = etree.Element("robot", name=_name(source.name))
@@ -66,7 +63,7 @@ def generated(source: Source, dh_joints: bool = False) -> str:
         root.append(etree.Comment(f" {line} "))
     etree.SubElement(root, "link", name="base_link")
     low, high = robot.q_min_rad, robot.q_max_rad
-    if dh_joints:
+    if source.dh_joints:
         low, high = robot.dh_box(low, high)
     for i, origin in enumerate(frames):
         etree.SubElement(root, "link", name=f"link_{i + 1}")
@@ -91,16 +88,12 @@ def generated(source: Source, dh_joints: bool = False) -> str:
         etree.SubElement(root, "link", name="tool")
         tool = compose(invert(robot.flange), calibration.targets[TOOL])
         _joint(root, "tool_fixed", "fixed", "flange", "tool", tool)
-    return _written(root)
+    etree.indent(root)
+    return f'<?xml version="1.0"?>\n{etree.tostring(root, encoding="unicode")}\n'
 
 
-def corrected(
-    source: Source,
-    path: str | Path,
-    base_link: str | None = None,
-    tip_link: str | None = None,
-) -> str:
-    """The URDF at ``path`` with origins changed so that its tip goes where the calibration says.
+def corrected(source: Source) -> str:
+    """The file of one's own with origins changed so that its tip goes where the calibration says.
 
     Axes, meshes, limits, comments and everything that hangs on a link stay: origins of the moving
     joints change, and of the first fixed joint behind the last of them (one is added where there is
@@ -109,55 +102,58 @@ def corrected(
     """
     from lxml import etree
 
-    path, calibration = Path(path), source.calibration
-    chain = joints_between(path, base_link, tip_link)
-    moving = [joint for joint in chain if joint.kind in MOVING]
-    base, tip = _ends_in_file(calibration, chain, path)
-    fixed, tail = _fixed_parts(chain)
-    at_zero = _link_frames(chain)
+    calibration, path = source.calibration, Path(source.urdf_file or "")
+    base, tip = _ends_in_file(calibration.robot, path, source.links)
     plain, _ = _origins(calibration.robot.dh)
     better, end = _origins(calibration.model)
-    frame, anchors = base, []
-    for origin, there in zip(plain, at_zero, strict=True):
-        frame = compose(frame, origin)
-        # How the file's link sits on the axis; it sits there still after the correction.
-        anchors.append(compose(invert(frame), there))
     tree = etree.parse(str(path), etree.XMLParser(resolve_entities=False, no_network=True))
     elements = {each.get("name"): each for each in tree.getroot().findall("joint")}
-    before = invert(base)
-    for joint, gap, origin, anchor in zip(moving, fixed, better, anchors, strict=True):
-        new = compose(compose(invert(before), origin), anchor)
-        _set_origin(elements[joint.name], compose(invert(gap), new))
-        before = anchor
-    last = compose(compose(invert(before), end), tip)
+    frame, before, here, gap = base, invert(base), IDENTITY, IDENTITY
+    tail: list[Joint] = []
+    moved = iter(zip(plain, better, strict=True))
+    for joint in joints_between(path, *source.links):
+        here = compose(here, joint.origin)
+        if joint.kind not in MOVING:
+            gap = compose(gap, joint.origin)
+            tail.append(joint)
+            continue
+        old, new = next(moved)
+        frame = compose(frame, old)
+        # How the file's link sits on the axis; it sits there still after the correction.
+        anchor = compose(invert(frame), here)
+        origin = compose(compose(invert(before), new), anchor)
+        _set_origin(elements[joint.name], compose(invert(gap), origin))
+        before, gap, tail, last = anchor, IDENTITY, [], joint.child
+    rest = compose(compose(invert(before), end), tip)
     if tail:
-        rest = IDENTITY
-        for joint in tail[1:]:
-            rest = compose(rest, joint.origin)
-        _set_origin(elements[tail[0].name], compose(last, invert(rest)))
+        for joint in reversed(tail[1:]):
+            rest = compose(rest, invert(joint.origin))
+        _set_origin(elements[tail[0].name], rest)
     else:
-        _add_tip(tree.getroot(), moving[-1].child, last)
+        link = f"{last}_calibrated"
+        etree.SubElement(tree.getroot(), "link", name=link)
+        _joint(tree.getroot(), f"{link}_fixed", "fixed", last, link, rest)
     for place, line in enumerate(source.left_open_lines):
         tree.getroot().insert(place, etree.Comment(f" {line} "))
     return etree.tostring(tree, encoding="unicode") + "\n"
 
 
-def _ends_in_file(calibration: Calibration, chain: list[Joint], path: Path) -> tuple[Pose, Pose]:
+def _ends_in_file(
+    robot: Robot, path: Path, links: tuple[str | None, str | None]
+) -> tuple[Pose, Pose]:
     """First DH frame in the file's base link, and its tip link in the last DH frame."""
-    robot = calibration.robot
-    count = sum(joint.kind in MOVING for joint in chain)
-    if count != robot.dh.joints:
-        what = f"its chain has {count} moving joints, {robot.name} has {robot.dh.joints}"
-        raise InputError(Problem(str(path), what))
+    described = load(path, *links)
+    if described.dh.joints != robot.dh.joints:
+        what = f"its chain has {described.dh.joints} moving joints, {robot.name}"
+        raise InputError(Problem(str(path), f"{what} has {robot.dh.joints}"))
     _signs(robot)  # coupled joints have no URDF
-    rng = np.random.default_rng(0)
     low, high = np.maximum(robot.q_min_rad, -3.0e3), np.minimum(robot.q_max_rad, 3.0e3)
-    q_rad = low + rng.uniform(0.0, 1.0, (_PROBES, len(low))) * (high - low)
-    wanted = _forward(chain, q_rad)
+    share = np.random.default_rng(0).uniform(0.0, 1.0, (_PROBES, len(low)))
+    q_rad = low + share * (high - low)
+    wanted = forward(described, q_rad)
     ends = _dh.forward(robot.dh, robot.dh_joints(q_rad))
-    options = [(robot.base, robot.flange)]
     start = closed_form_start(full_poses(q_rad, wanted), ends)
-    options.append((start.base, start.tool))
+    options = (robot.base, robot.flange), (start.base, start.tool)
     misfits = []
     for base, tip in options:
         seen = compose(base, compose(ends, tip))
@@ -167,47 +163,6 @@ def _ends_in_file(calibration: Calibration, chain: list[Joint], path: Path) -> t
         allowed = f"the arm that was calibrated, within {_SAME_ARM_MM:g} mm, joints alike"
         raise InputError(Problem(str(path), what, allowed))
     return options[0] if misfits[0] <= 1e-8 else options[int(np.argmin(misfits))]
-
-
-def _forward(chain: list[Joint], q: np.ndarray) -> Pose:
-    """Tip frames (n, ...) of a file's chain at joints (n, k), rad and mm."""
-    count, number = len(q), 0
-    here = Pose(np.broadcast_to(np.eye(3), (count, 3, 3)), np.zeros((count, 3)))
-    for joint in chain:
-        here = compose(here, joint.origin)
-        if joint.kind not in MOVING:
-            continue
-        axis = joint.axis / np.linalg.norm(joint.axis)
-        step = q[:, number, None] * axis
-        number += 1
-        if joint.kind == "prismatic":
-            here = compose(here, Pose(np.broadcast_to(np.eye(3), (count, 3, 3)), step))
-        else:
-            here = compose(here, Pose(exp_so3(step), np.zeros((count, 3))))
-    return here
-
-
-def _fixed_parts(chain: list[Joint]) -> tuple[list[Pose], list[Joint]]:
-    """What fixed joints put in front of every moving joint, and the fixed joints after the last."""
-    gaps, gap, tail = [], IDENTITY, []
-    for joint in chain:
-        if joint.kind in MOVING:
-            gaps.append(gap)
-            gap, tail = IDENTITY, []
-        else:
-            gap = compose(gap, joint.origin)
-            tail.append(joint)
-    return gaps, tail
-
-
-def _link_frames(chain: list[Joint]) -> list[Pose]:
-    """Frames of the links behind the moving joints in the base link, at zero joints."""
-    here, found = IDENTITY, []
-    for joint in chain:
-        here = compose(here, joint.origin)
-        if joint.kind in MOVING:
-            found.append(here)
-    return found
 
 
 def _joint(root, name: str, kind: str, parent: str, child: str, origin: Pose):
@@ -231,14 +186,6 @@ def _set_origin(joint, origin: Pose) -> None:
     element.set("rpy", " ".join(_digits(value) for value in rpy(origin.rotation)))
 
 
-def _add_tip(root, parent: str, origin: Pose) -> None:
-    from lxml import etree
-
-    name = f"{parent}_calibrated"
-    etree.SubElement(root, "link", name=name)
-    _joint(root, f"{name}_fixed", "fixed", parent, name, origin)
-
-
 def rpy(rotation: np.ndarray) -> np.ndarray:
     """Roll, pitch, yaw (3,) of a rotation (3, 3): ``Rz(yaw) Ry(pitch) Rx(roll)``, also upright."""
     yaw = np.arctan2(rotation[1, 0], rotation[0, 0])
@@ -254,14 +201,6 @@ def _digits(value: float) -> str:
 
 def _name(text: str) -> str:
     return text.replace(" ", "_")
-
-
-def _written(root) -> str:
-    from lxml import etree
-
-    etree.indent(root)
-    head = '<?xml version="1.0"?>\n'
-    return head + etree.tostring(root, encoding="unicode") + "\n"
 
 
 def _origins(dh: DHModel) -> tuple[list[Pose], Pose]:
