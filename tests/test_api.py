@@ -5,6 +5,7 @@ import pytest
 from stages_by_hand import perform
 
 import kinacc
+from kinacc.workflow.outdated import outdated_reason
 
 CONFIG = """\
 datasets: {arm: {robot: mh180}}
@@ -50,6 +51,13 @@ def test_saved_results_are_read_again(calibration, tmp_path):
     assert read.selected == calibration.selected
     assert read.summary.best == calibration.summary.best
     assert read.unidentifiable == calibration.unidentifiable
+
+
+def test_saved_results_are_those_of_the_settings_beside_them(calibration, config):
+    folder = calibration.save(config.parent / "results" / "arm")
+    assert outdated_reason(folder) == ""
+    config.with_name("other.yaml").write_text(CONFIG.replace("order: 1", "order: 2"))
+    assert "other.yaml" in outdated_reason(folder)
 
 
 def test_joints_of_a_predicted_pose_reach_it(calibration):

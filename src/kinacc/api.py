@@ -38,7 +38,8 @@ from kinacc.tables import store, sums
 from kinacc.tables.atomic import write_together
 from kinacc.tables.columns import Columns
 from kinacc.workflow.code import config_hash
-from kinacc.workflow.data_sets import read_data_sets
+from kinacc.workflow.data_sets import DataSets, read_data_sets
+from kinacc.workflow.outdated import CALIBRATION
 
 Setup = Literal["same", "moved"]
 _MARKS = {"kinacc_version": __version__, "config_hash": config_hash({}), "seed": "0"}
@@ -92,11 +93,14 @@ class Calibration:
         The selected model with its frames and covariance.
     tables
         The tables of its results by name, as columns.
+    config_hash
+        Digest of the settings that the calibration was made with.
     """
 
     name: str
     model: CalibratedModel = field(repr=False)
     tables: Mapping[str, Columns] = field(repr=False)
+    config_hash: str = field(repr=False, default="")
 
     @property
     def robot(self) -> Robot:
@@ -189,8 +193,9 @@ class Calibration:
         """Write all tables to a results folder that commands and :func:`load_calibration` read."""
         folder = Path(folder)
         (folder / sums.FOLDER).mkdir(parents=True, exist_ok=True)
+        marks = {**_MARKS, "config_hash": self.config_hash}
         contents = {
-            f"{name}.parquet": store.content_of(store.to_table(name, columns, _MARKS))
+            f"{name}.parquet": store.content_of(store.to_table(name, columns, marks))
             for name, columns in self.tables.items()
         }
         written: dict[str | Path, bytes] = {folder / name: each for name, each in contents.items()}
@@ -286,7 +291,9 @@ def calibrate(measurements: Measurements) -> Calibration:
         tables |= _as_written(error_model.run(tables, settings, kind))
     for stage in (residual_tables, summary):
         tables |= _as_written(stage.run(tables, settings))
-    return _of_tables(measurements.name, tables, measurements.robot)
+    data = DataSets({measurements.name: settings}, 1, ())
+    made_by = config_hash(data.chosen(measurements.name, *CALIBRATION))
+    return _of_tables(measurements.name, tables, measurements.robot, None, made_by)
 
 
 def load_calibration(folder: str | Path, model: str | None = None) -> Calibration:
@@ -309,7 +316,8 @@ def load_calibration(folder: str | Path, model: str | None = None) -> Calibratio
     robot, name = results.recorded_robot(folder), folder.resolve().name
     if robot is None:
         raise InputError(Problem(str(folder / "robot.parquet"), "no such file"))
-    return _of_tables(name, tables, robot, model)
+    made_by = store.read_metadata(folder / "summary.parquet").get("config_hash", "")
+    return _of_tables(name, tables, robot, model, made_by)
 
 
 def verify(
@@ -358,10 +366,11 @@ def compare(
 
 
 def _of_tables(
-    name: str, tables: dict[str, Columns], robot: Robot, kind: str | None = None
+    name: str, tables: dict[str, Columns], robot: Robot, kind: str | None, made_by: str
 ) -> Calibration:
     model = results.calibration(tables, robot, kind, name)
-    return Calibration(name, replace(model, misfit=misfit(tables, robot, model.choice)), tables)
+    model = replace(model, misfit=misfit(tables, robot, model.choice))
+    return Calibration(name, model, tables, made_by)
 
 
 def _as_written(tables: Mapping[str, Columns]) -> dict[str, Columns]:

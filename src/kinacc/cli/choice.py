@@ -202,5 +202,5 @@ def say_outdated(folder: str | Path) -> str:
 
     reason = outdated_reason(folder)
     if reason:
-        click.echo(f"{folder} is {reason}; run kinacc calibrate again", err=True)
+        click.echo(f"{folder} is outdated: {reason}; run kinacc calibrate again", err=True)
     return reason

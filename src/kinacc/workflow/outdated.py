@@ -23,13 +23,13 @@ def outdated_reason(folder: Path | str) -> str:
     try:
         changed = sums.changed_since(folder)
         if changed:
-            return f"outdated: changed since the calibration: {first_few(changed, 3)}"
+            return f"changed since the calibration: {first_few(changed, 3)}"
         made_by = store.read_metadata(folder / "summary.parquet").get("config_hash")
         for path, data in beside(folder.parent, folder.name):
             if folder.name in data.settings:
                 now = config_hash(data.chosen(folder.name, *CALIBRATION))
                 if now != made_by:
-                    return f"outdated: settings in {path.name} changed since the calibration"
+                    return f"settings in {path.name} changed since the calibration"
     except (InputError, OSError):
         return ""  # whoever reads the results reports what is wrong with them
     return ""
