@@ -15,10 +15,10 @@ from kinacc.calibration.observations import from_columns
 from kinacc.calibration.uncertainty import Uncertainty
 from kinacc.config.error_models import ALWAYS, ERROR_MODELS, PLAINEST
 from kinacc.deployment.record import MODELS, Calibration, Residual
-from kinacc.errors import InputError, Problem, first_few, gathered, refuse
+from kinacc.errors import InputError, Problem, gathered, refuse
 from kinacc.kinematics import robot as robots
 from kinacc.kinematics import tables as model_tables
-from kinacc.kinematics.dh import PARAMETERS
+from kinacc.kinematics.dh import PARAMETERS, DHModel
 from kinacc.kinematics.robot import Robot
 from kinacc.tables import store
 from kinacc.tables.allowed import SUBSETS
@@ -39,39 +39,41 @@ def read_tables(folder: Path | str, *more: str) -> dict[str, dict[str, np.ndarra
     """The tables of a data set's results folder: columns (rows,) by table and name.
 
     ``more`` are read where they are there, beside those that every use needs. Units stand in the
-    names (_mm, _rad). Raises InputError naming all tables that are missing.
+    names (_mm, _rad). Raises InputError naming all tables that are missing or damaged.
     """
-    folder = Path(folder)
-    missing = [
-        Problem(str(folder / f"{name}.parquet"), "no such file", fix="run the workflow first")
-        for name in _NEEDED
-        if not (folder / f"{name}.parquet").is_file()
-    ]
-    refuse(missing, f"{folder} holds no calibration")
-    names = dict.fromkeys((*_NEEDED, *_WANTED, *more))
-    present = [name for name in names if (folder / f"{name}.parquet").is_file()]
+    paths = {name: Path(folder) / f"{name}.parquet" for name in (*_NEEDED, *_WANTED, *more)}
+    refuse(
+        [
+            Problem(str(paths[name]), "no such file", fix="run the workflow first")
+            for name in _NEEDED
+            if not paths[name].is_file()
+        ],
+        f"{folder} holds no calibration",
+    )
     problems: list[Problem] = []
     tables = {}
-    for name in present:
+    for name, path in paths.items():
         with gathered(problems):
-            tables[name] = _Table(name, folder / f"{name}.parquet")
+            if path.is_file():
+                tables[name] = _Table(name, path)
     refuse(problems, f"{folder} cannot be used")
     return tables
 
 
 class _Table(dict[str, np.ndarray]):
-    """Columns of a table of results; one that is asked for and is not there is a problem."""
+    """Columns of a table of results; a missing column is an InputError."""
 
     def __init__(self, name: str, path: Path) -> None:
         super().__init__(store.read(path))
         self.path, contract = path, store.artefact_named(name)
-        wrong = (
-            [] if contract.may_be_empty or len(next(iter(self.values()), ())) else ["has no rows"]
-        )
-        for column in contract.for_joints(joint_count(contract, self)):
-            is_text = self.get(column.name, np.zeros(0)).dtype == object
-            if column.name in self and is_text != (column.kind == "text"):
-                wrong.append(f"column {column.name} holds {'text' if is_text else 'numbers'}")
+        wrong = [
+            f"column {column.name} holds {'text' if column.kind != 'text' else 'numbers'}"
+            for column in contract.for_joints(joint_count(contract, self))
+            if column.name in self
+            and (self[column.name].dtype == object) != (column.kind == "text")
+        ]
+        if not contract.may_be_empty and not len(next(iter(self.values()), ())):
+            wrong.append("has no rows")
         refuse([Problem(str(path), what, fix=store.remake(path)) for what in wrong])
 
     def __missing__(self, name: str) -> np.ndarray:
@@ -91,7 +93,7 @@ def recorded_robot(folder: Path | str) -> Robot | None:
 
 
 def misfit_of(folder: Path | str, model: str) -> Misfit:
-    """What the standard deviations of a model in a results folder are worth."""
+    """Held-out error and noise of a model in a results folder."""
     robot = recorded_robot(folder)
     if robot is None:
         return Misfit(model, np.nan, UNKNOWN)
@@ -119,18 +121,18 @@ def calibration(
         raise InputError(Problem("model", what, ", ".join(made)))
     bounded = next(each for each in made.values() if each.domain is not None)
     _require_same_arm(bounded.dh, robot, name)
-    frames, told = tables["frames"], tables.get(f"{PLAINEST}_identified")
+    frames, identified = tables["frames"], tables.get(f"{PLAINEST}_identified")
     number = _session_number(frames, choice, session)
-    bases = [model_tables.frame(frames, each, "base", session) for each in (PLAINEST, choice)]
-    # A model of the very base of the DH model: neither was fitted with it.
-    same_base = all(np.array_equal(one, other) for one, other in zip(*bases, strict=True))
+    bases = [model_tables.frame(frames, kind, "base", session) for kind in (PLAINEST, choice)]
+    # A model with the base of the DH model: neither was fitted with it.
+    same_base = all(np.array_equal(one, two) for one, two in zip(*bases, strict=True))
     anchored = made[choice].table is None and not same_base
-    measured, fitted, turned = tables.get("measurements"), None, frozenset()
-    if measured is not None:
-        is_fitted = np.asarray(measured["subset"]) == SUBSETS[0]
-        fitted = from_columns(measured, robot).at.select(is_fitted)
-        known = np.isfinite(np.asarray(measured["qw"], dtype=float))
-        turned = frozenset(map(str, np.asarray(measured["target"])[known]))
+    fitted, turned = None, frozenset()
+    if "measurements" in tables:
+        measured = from_columns(tables["measurements"], robot)
+        fitted = measured.at.select(np.asarray(tables["measurements"]["subset"]) == SUBSETS[0])
+        known = np.unique(measured.target[measured.has_rotation])
+        turned = frozenset(measured.target_names[target] for target in known)
     return Calibration(
         name=name,
         robot=robot,
@@ -139,9 +141,10 @@ def calibration(
         base=bases[1],
         base_name="base" if number == 0 else f"base{number + 1}",
         anchor=calibration(tables, robot, PLAINEST, name, session) if anchored else None,
-        left_open=None if told is None else tuple(identifiability.listed(told)),
+        left_open=None if identified is None else tuple(identifiability.listed(identified)),
         targets={
-            each: model_tables.frame(frames, choice, each) for each in targets_of(frames, choice)
+            target: model_tables.frame(frames, choice, target)
+            for target in targets_of(frames, choice)
         },
         known=uncertainty(tables, choice),
         residual=residual(tables, choice),
@@ -170,25 +173,23 @@ def _session_number(frames: Mapping, model: str, session: str | None) -> int:
 
 
 def selected_model(tables: Tables) -> str:
-    """The model the fits selected; where none was recorded, the better one on held-out poses.
+    """The selected model; where none was recorded, the better one on held-out poses.
 
-    Raises InputError where the tables cannot tell.
+    Raises InputError where neither is known.
     """
-    recorded = recorded_model(tables)
-    if recorded:
+    if recorded := recorded_model(tables):
         return recorded
-    rms = {each: residual(tables, each, "validation") for each in ALWAYS}
+    rms = {kind: residual(tables, kind, "validation") for kind in ALWAYS}
     if any(each is None for each in rms.values()):
         what = "was not selected, and there are no held-out residuals to choose by"
         raise InputError(Problem("model", what, ", ".join(MODELS), "give --model"))
-    return min(rms, key=lambda each: rms[each].position_mm)
+    return min(rms, key=lambda kind: rms[kind].position_mm)
 
 
 def recorded_model(tables: Tables) -> str:
-    """The model that ``model_selection`` selected; empty where nothing says so."""
-    columns = tables.get("model_selection", {})
-    chosen = np.flatnonzero(np.asarray(columns.get("selected", [])) == 1)
-    return str(columns["model"][chosen[0]]) if len(chosen) else ""
+    """The model that ``model_selection`` selected; empty without that table."""
+    table = pd.DataFrame(dict(tables.get("model_selection", {"model": [], "selected": []})))
+    return str(next(iter(table.loc[table["selected"] == 1, "model"]), ""))
 
 
 def residual(tables: Tables, choice: str, subset: str | None = None) -> Residual | None:
@@ -209,28 +210,20 @@ def residual(tables: Tables, choice: str, subset: str | None = None) -> Residual
 
 def uncertainty(tables: Tables, choice: str) -> Uncertainty | None:
     """Covariance and undetermined directions of a fit; None where the tables lack them."""
-    columns, fit = tables.get(f"{choice}_covariance"), tables.get(f"{choice}_fit")
-    if columns is None:
+    if f"{choice}_covariance" not in tables:
         return None
-    names = pd.Index(columns["parameter"]).unique()
-
-    def places(parameters: np.ndarray, table: str) -> np.ndarray:
-        found = names.get_indexer(parameters)
-        unknown = sorted({str(each) for each in parameters[found < 0]})
-        what = f"has parameters without a variance: {first_few(unknown)}"
-        refuse([Problem(f"table {choice}_{table}", what)] if unknown else [])
-        return found
-
-    row, column = (places(columns[each], "covariance") for each in ("parameter", "other"))
-    covariance = np.zeros((len(names), len(names)))
-    covariance[row, column] = covariance[column, row] = columns["covariance"]
-    directions = np.zeros((0, len(names)))
-    if fit is not None:
-        rows = np.asarray(fit["quantity"]) == "undetermined_direction"
-        numbers, direction = np.unique(fit["number"][rows], return_inverse=True)
-        directions = np.zeros((len(numbers), len(names)))
-        directions[direction, places(fit["parameter"][rows], "fit")] = fit["value"][rows]
-    return Uncertainty(tuple(map(str, names)), covariance, directions)
+    names = ["parameter", "other", "covariance"]
+    table = pd.DataFrame({name: tables[f"{choice}_covariance"][name] for name in names})
+    parameters = list(dict.fromkeys(table["parameter"]))
+    half = table.pivot(index="parameter", columns="other", values="covariance")
+    half = half.reindex(index=parameters, columns=parameters)
+    covariance = half.fillna(half.T).fillna(0.0).to_numpy()
+    names = ["quantity", "number", "parameter", "value"]
+    fit = pd.DataFrame({name: tables.get(f"{choice}_fit", {}).get(name, []) for name in names})
+    fit = fit[fit["quantity"] == "undetermined_direction"]
+    directions = fit.pivot(index="number", columns="parameter", values="value")
+    directions = directions.reindex(columns=parameters).fillna(0.0).to_numpy(float)
+    return Uncertainty(tuple(map(str, parameters)), covariance, directions)
 
 
 def require_same_robot(recorded: Robot, given: Robot, place: str) -> None:
@@ -240,29 +233,29 @@ def require_same_robot(recorded: Robot, given: Robot, place: str) -> None:
     """
     _require_same_arm(recorded.dh, given, place)
     pairs = {
-        "which joints slide": (recorded.dh.prismatic, given.dh.prismatic),
+        "sliding joints": (recorded.dh.prismatic, given.dh.prismatic),
         "joint_map or signs": (recorded.joint_map, given.joint_map),
         "base": (np.column_stack(recorded.base), np.column_stack(given.base)),
         "flange": (np.column_stack(recorded.flange), np.column_stack(given.flange)),
     }
-    problems = [
-        Problem(place, f"{given.name} differs from the recorded {recorded.name} in {what}")
-        for what, (one, other) in pairs.items()
-        if not np.allclose(one, other, rtol=_SAME, atol=_SAME)
-    ]
-    refuse(problems, f"The results were made with another robot than {given.name}")
+    for what, (one, two) in pairs.items():
+        if not np.allclose(one, two, rtol=_SAME, atol=_SAME):
+            raise InputError(
+                Problem(place, f"was made with another robot than {given.name}: {what}")
+            )
 
 
-def _require_same_arm(nominal, robot: Robot, name: str) -> None:
+def _require_same_arm(nominal: DHModel, robot: Robot, name: str) -> None:
     place = f"results {name}".strip()
+    what, fix = f"was made with another robot than {robot.name}", "give its robot (--robot)"
     if nominal.joints != robot.dh.joints:
-        what = f"speak of {nominal.joints} joints, {robot.name} has {robot.dh.joints}"
-        raise InputError(Problem(place, what, fix="give the robot they were made with (--robot)"))
-    problems = []
-    for each in PARAMETERS:
-        made, given = getattr(nominal, each), getattr(robot.dh, each)
-        for joint in np.flatnonzero(np.abs(made - given) > _SAME * (1.0 + np.abs(given))):
-            what = f"joint {joint + 1} was fitted from {each} {made[joint]:.9g}"
-            allowed = f"{given[joint]:.9g}, as {robot.name} has it"
-            problems.append(Problem(place, what, allowed))
-    refuse(problems, f"The results were made with another robot than {robot.name}")
+        what = f"{what}: {nominal.joints} joints, not {robot.dh.joints}"
+        raise InputError(Problem(place, what, fix=fix))
+    for parameter in PARAMETERS:
+        one, two = getattr(nominal, parameter), getattr(robot.dh, parameter)
+        if (apart := np.flatnonzero(np.abs(one - two) > _SAME * (1.0 + np.abs(two)))).size:
+            joint = apart[0]
+            what = (
+                f"{what}: {parameter} of joint {joint + 1} {one[joint]:.9g}, not {two[joint]:.9g}"
+            )
+            raise InputError(Problem(place, what, fix=fix))

@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 
 from kinacc.calibration.fitting import fit_frames
-from kinacc.calibration.frames import ANGLE_UNIT_RAD, MOTIONS, Frames, frame_terms, known, stacked
+from kinacc.calibration.frames import ANGLE_UNIT_RAD, MOTIONS, Frames, frame_terms, stacked
 from kinacc.calibration.models import Fit
 from kinacc.calibration.observations import Observations, from_columns
 from kinacc.calibration.residuals import errors
@@ -24,12 +24,13 @@ from kinacc.config.error_models import ERROR_MODELS, MEASURED, NOMINAL, Comparis
 from kinacc.deployment import folder
 from kinacc.deployment.applicability import is_measured_there
 from kinacc.deployment.permutation import LEVEL, Columns, PermutationTest, compare, smallest_changes
+from kinacc.deployment.record import Calibration
 from kinacc.deployment.shared_readings import known_rows
 from kinacc.errors import InputError, Problem
 from kinacc.geometry import Pose, skew
 from kinacc.kinematics.model import ErrorModel
 from kinacc.kinematics.robot import Robot, carried
-from kinacc.kinematics.tables import frame, models
+from kinacc.kinematics.tables import models
 from kinacc.measurements.folds import configurations
 
 Tables = Mapping[str, Mapping[str, np.ndarray]]
@@ -140,7 +141,8 @@ def verify(
         return replace(result, reason=next(text for text, holds in obstacles.items() if holds))
     new = seen.select(rows.ravel())
     new = replace(new, rotation=np.full_like(new.rotation, np.nan))
-    frames = frames_at(tables, kind, model, new, robot, moved, rotation_weight_mm_per_rad)
+    of_sessions = _of_sessions(tables, robot, kind, new.session_names, moved)
+    frames = frames_at(of_sessions, new, moved, rotation_weight_mm_per_rad)
     off_mm = errors({kind: Fit(model, frames)}, new)[Comparison(MEASURED, kind).name].position_mm
     poses = new.select(slice(None, None, rows.shape[1]))
     fresh = _columns(model, poses, frames.targets, moved, off_mm.reshape(*rows.shape, 3))
@@ -171,8 +173,6 @@ def model_errors(
     Columns: model, readings, and mean, 99 %, largest and rms in mm and mrad. Raises InputError
     for a target or session without a frame, and FitError.
     """
-    if BASE not in moved:
-        _require_sessions(tables, observations.session_names)
     fitted = models(tables, robot.dh)
     inside = [covers(model, observations.q_rad).all(axis=1) for model in fitted.values()]
     part = observations.select(np.all(inside, axis=0))
@@ -185,7 +185,8 @@ def model_errors(
     rows = []
     for kind in sorted(fitted, key=(NOMINAL, *ERROR_MODELS).index) if len(part) else ():
         model = fitted[kind]
-        frames = frames_at(tables, kind, model, part, robot, moved, rotation_weight_mm_per_rad)
+        of_sessions = _of_sessions(tables, robot, kind, part.session_names, moved)
+        frames = frames_at(of_sessions, part, moved, rotation_weight_mm_per_rad)
         off = errors({kind: Fit(model, frames)}, part)[Comparison(MEASURED, kind).name]
         row: dict[str, object] = {"model": kind, "readings": len(part)}
         for vectors, unit in ((off.position_mm, "mm"), (1e3 * off.rotation_rad, "mrad")):
@@ -275,49 +276,44 @@ def _level(of: Columns) -> Level:
     return Level(len(sizes), len(of.columns), float(sizes.mean()), quantile)
 
 
-def _require_sessions(tables: Tables, sessions: Sequence[str | None]) -> None:
+def _of_sessions(
+    tables: Tables, robot: Robot, kind: str, sessions: Sequence[str | None], moved: Sequence[str]
+) -> list[Calibration]:
+    """The calibration with the base of each session. InputError where a session is not clear."""
+    if BASE in moved:
+        return [folder.calibration(tables, robot, kind)] * len(sessions)
     frames = pd.DataFrame(dict(tables["frames"]))
-    if "session" not in frames or tuple(sessions) != (None,):
-        return
-    measured = sorted(set(map(str, frames.loc[frames["frame"] == BASE, "session"])))
-    if len(measured) > 1:
-        what = "have no session, and each session has its own base"
-        raise InputError(Problem("the readings", what, f"one of {', '.join(measured)}"))
+    measured = frames.loc[frames["frame"] == BASE].get("session", pd.Series()).unique()
+    if tuple(sessions) == (None,) and len(measured) > 1:
+        what, allowed = "have no session, and each has its own base", ", ".join(map(str, measured))
+        raise InputError(Problem("the readings", what, f"one of {allowed}"))
+    return [folder.calibration(tables, robot, kind, session=session) for session in sessions]
 
 
 def frames_at(
-    tables: Tables,
-    kind: str,
-    model: ErrorModel,
+    calibrations: Sequence[Calibration],
     seen: Observations,
-    robot: Robot,
     moved: Sequence[str],
     rotation_weight_mm_per_rad: float,
 ) -> Frames:
-    """Base and targets of ``seen``: those of the table ``frames``, or fitted where ``moved``.
+    """Base and targets of ``seen``: those of the calibration, or fitted to it where ``moved``.
 
-    The joint model stays ``model``, which the table calls ``kind``.
+    ``calibrations``: one for each session, with its base; the joint model stays as fitted.
     """
-    sessions, targets = seen.session_names, seen.target_names
-    frames = known(robot.base, carried(robot), len(sessions), len(targets))
-    if BASE not in moved:
-        bases = [frame(tables["frames"], kind, BASE, name) for name in sessions]
-        frames = replace(frames, bases=stacked(bases))
-    if TOOL not in moved:
-        frames = replace(
-            frames, targets=stacked([frame(tables["frames"], kind, name) for name in targets])
-        )
+    calibration, names = calibrations[0], seen.target_names
+    tool = carried(calibration.robot)
+    targets = [
+        calibration.targets.get(name, tool) if TOOL in moved else calibration.point(name)
+        for name in names
+    ]
+    frames = Frames(stacked([each.base for each in calibrations]), stacked(targets))
     if not moved:
         return frames
     terms = frame_terms(seen, frames)
-    of_base = np.arange(len(terms.names)) < len(MOTIONS) * len(sessions)  # these stand first
+    of_base = np.arange(len(terms.names)) < len(MOTIONS) * len(calibrations)  # these stand first
     terms = replace(terms, free=np.where(of_base, BASE in moved, TOOL in moved))
-    return fit_frames(
-        seen,
-        model,
-        rotation_weight_mm_per_rad=rotation_weight_mm_per_rad,
-        frame_terms=terms,
-    )
+    weight = rotation_weight_mm_per_rad
+    return fit_frames(seen, calibration.model, rotation_weight_mm_per_rad=weight, frame_terms=terms)
 
 
 def covers(model: ErrorModel, q_rad: np.ndarray) -> np.ndarray:
