@@ -30,7 +30,7 @@ def closed_form_start(observations: Observations, flange: Pose) -> Frames:
             alone = _one_session(part, at)
             base, new = alone.base, alone.targets
         else:
-            base = _base_from_targets(part, at, found.targets, placed)
+            base = base_from_targets(part, at, found.targets, placed)
             new = _targets_from_base(part, at, base)
         found.bases.rotation[session], found.bases.position_mm[session] = base
         for target in seen[~placed[seen]]:
@@ -79,11 +79,11 @@ def _target_rotations(observations: Observations, flange: Pose, base: np.ndarray
     return rotations
 
 
-def _base_from_targets(
-    observations: Observations, flange: Pose, targets: Pose, placed: np.ndarray
+def base_from_targets(
+    observations: Observations, flange: Pose, targets: Pose, placed: np.ndarray | None = None
 ) -> Pose:
-    """Base that best carries the targets already ``placed`` (T,) onto their measured positions."""
-    rows = placed[observations.target]
+    """Base that best carries targets onto their measured positions; ``placed`` (T,): those known."""
+    rows = np.ones(len(observations), bool) if placed is None else placed[observations.target]
     at = targets.position_mm[observations.target[rows]]
     by_arm = flange.position_mm[rows] + (flange.rotation[rows] @ at[..., None])[..., 0]
     measured = observations.position_mm[rows]

@@ -65,16 +65,16 @@ def without_jumps(
     return fitted, list(_findings(whole, fitted, jumps)) if jumps else []
 
 
-def _linearised(fitted: Fitted) -> tuple[Readings, ndarray, ndarray, ndarray]:
+def _linearised(fitted: Fitted) -> tuple[Readings, ndarray, ndarray, Linear]:
     """The readings that were fitted, under Huber's loss, with what is free of the fit taken out.
 
-    Weighted design (m, 6, P), residuals (m, 6), and the inverse (P, P) of the normal equations.
+    Weighted design (m, 6, P), residuals (m, 6), and the linearisation itself.
     """
     trial, few = fitted.trial, fitted.seen.select(fitted.chosen)
     linear = Linear.at(few, trial.arm, trial.nominal, trial.strength, huber=True)
     root = np.sqrt(linear.weights)
     design = linear.design * root[..., None]
-    return few, design, linear.residual * root + design @ linear.step, linear.inverse
+    return few, design, linear.residual * root + design @ linear.step, linear
 
 
 def _places(fitted: Fitted) -> list[tuple[int, int | None]]:
@@ -87,23 +87,23 @@ def _places(fitted: Fitted) -> list[tuple[int, int | None]]:
     """
     if fitted.trial.sigma_mm < tails.ROUNDING:
         return []
-    few, design, residual, inverse = _linearised(fitted)
-    bases, targets = len(few.session_names), len(few.target_names)
-    kinds = [(None, few.session == base, 6 * base, 6) for base in range(bases)]
-    kinds += [(each, few.target == each, 6 * (bases + each), 3) for each in range(targets)]
+    few, design, residual, linear = _linearised(fitted)
+    inverse, slots = linear.inverse, linear.frames.slots
     found = []
-    for target, there, begin, width in kinds:
-        rows = np.flatnonzero(there)
+    for kind, number, at in slots:
+        target = None if kind == "bases" else number
+        rows = np.flatnonzero((few.session if target is None else few.target) == number)
         if len(rows) < 4 * _FEWEST:
             continue
-        columns = design[rows, :, begin : begin + width]
+        width = 6 if target is None else 3
+        columns = design[rows][:, :, at[:width]]
         gains, solved, inner = _gains(columns, residual[rows], design[rows], inverse)
         gains[:_FEWEST] = gains[len(gains) - _FEWEST + 1 :] = 0.0
         place = int(np.argmax(gains))
         after = np.where(np.arange(len(rows)) >= place, 1.0, 0.0)[:, None]
         step = columns @ solved[place] * after - design[rows] @ (inverse @ inner[place])
         rest = residual[rows] - step
-        reference = scipy.special.chdtri(width, tails.FAMILY_WISE / (len(rows) * len(kinds)))
+        reference = scipy.special.chdtri(width, tails.FAMILY_WISE / (len(rows) * len(slots)))
         for along in (*few.q_rad[rows].T, *few.position_mm[rows].T):
             order = np.argsort(along, kind="stable")
             own = _gains(columns[order], rest[order], design[rows[order]], inverse)[0]
@@ -233,20 +233,22 @@ def _drifts_mm(whole: Fitted, split: Fitted) -> dict[str | None, ndarray | None]
     It drifts where a steady motion explains as much of what the fit without jumps leaves as the
     jumps that were found, whose places are chosen.
     """
-    few, design, residual, inverse = _linearised(whole)
+    few, design, residual, linear = _linearised(whole)
     found: dict[str | None, ndarray | None] = {}
     for base, name in enumerate(few.session_names):
-        rows = np.flatnonzero(few.session == base)
-        columns, own = design[rows, :, 6 * base : 6 * base + 6], (residual[rows], design[rows])
+        rows, at = np.flatnonzero(few.session == base), linear.frames.slots[base][2]
+        columns, own = design[rows][:, :, at], (residual[rows], design[rows])
         part = split.seen.session[whole.chosen[rows]]
         jumps = [columns * (part == each)[:, None, None] for each in np.unique(part)[1:]]
         found[name] = None
         if jumps:
             time = np.linspace(-0.5, 0.5, len(rows))[:, None, None]
-            gains, motion, _ = _gains(columns * time, *own, inverse)
-            by_jumps = _gains(np.concatenate(jumps, axis=2), *own, inverse)[0]
+            gains, motion, _ = _gains(columns * time, *own, linear.inverse)
+            by_jumps = _gains(np.concatenate(jumps, axis=2), *own, linear.inverse)[0]
             if gains[0] > _STEADY * by_jumps[0]:
-                found[name] = -motion[0, :3]
+                arm = whole.trial.arm.frames.bases.position_mm[base]
+                middle = few.position_mm[rows].mean(axis=0) - arm
+                found[name] = -motion[0, :3] - np.cross(motion[0, 3:], middle)
     return found
 
 

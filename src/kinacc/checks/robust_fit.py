@@ -15,11 +15,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy import ndarray
 
-from kinacc.calibration.frames import Frames
-from kinacc.calibration.hand_eye import closed_form_start
+from kinacc.calibration.fitting import flange_model
+from kinacc.calibration.frames import FrameParameters, Frames
+from kinacc.calibration.hand_eye import base_from_targets, closed_form_start
+from kinacc.calibration.system import PoseSystem
 from kinacc.checks import tails
 from kinacc.checks.readings import Readings, nearest_rotation, thinned
-from kinacc.geometry import Pose, compose, exp_so3, log_so3, skew
+from kinacc.geometry import Pose, compose, log_so3
 from kinacc.kinematics import dh
 from kinacc.kinematics.dh import DHModel
 
@@ -39,6 +41,7 @@ _CAP = 10.0  # sigma: what is left of a configuration counts no more than this
 _READ_PER_PARAMETER = 2.0  # with fewer numbers than this the redescending loss is not used
 _FITTED_ROWS = 900
 _IS_ANGLE = np.array([True, False, False, True, True])  # of dh.PARAMETERS
+_PARTS = slice(0, 3), slice(3, 6)  # positions, turns
 
 _DRAWS = 24  # with a third of the readings wrong, 8 of 24 draws of two are free of them, or more
 _DRAWN = 12  # configurations per draw
@@ -204,10 +207,12 @@ def _far(model: DHModel, nominal: DHModel) -> bool:
 
 @dataclass(frozen=True)
 class Linear:
-    """One linearisation: weighted design of all readings and the solution of its normal equations.
+    """Weighted design of n readings at an arm, and the solution of its normal equations.
 
-    Columns: per base 3 mm and 3 rad about its readings' centroid, per target 3 mm and 3 rad, then
-    the 5 corrections per joint (mm, mrad) where the strength is above zero.
+    ``design`` (n, 6, P), ``residual`` (n, 6) in the robot's base, mm and rad, and ``weights``
+    (n, 6): zero where an orientation was not measured. Columns: components of ``frames``, then the
+    corrections of the DH parameters where the strength is above zero. ``inverse`` (P, P) of the
+    normal equations and their ``step`` (P,).
     """
 
     design: ndarray
@@ -215,71 +220,54 @@ class Linear:
     weights: ndarray
     inverse: ndarray
     step: ndarray
-    centroids: ndarray
+    frames: FrameParameters
     sigma_mm: float
     sigma_rad: float
 
     @classmethod
     def at(cls, seen: Readings, arm: Arm, nominal: DHModel, strength: float, huber: bool) -> Linear:
         """The linearisation of an arm that leans on ``nominal``."""
-        left, count = residuals(arm, seen), len(seen)
-        session = np.eye(len(arm.frames.bases.rotation))[seen.session]
-        target = np.eye(len(arm.frames.targets.rotation))[seen.target]
-        points = left.predicted.position_mm
-        centroids = session.T @ points / np.maximum(session.sum(axis=0), 1.0)[:, None]
-        one, zero = np.tile(np.eye(3), (count, 1, 1)), np.zeros((count, 3, 3))
-        of_base = np.block([[one, -skew(points - centroids[seen.session])], [zero, one]])
-        of_target = np.block([[left.flange, zero], [zero, left.flange]])
-        columns = [
-            np.einsum("nij,nb->nibj", block, there).reshape(count, 6, -1)
-            for block, there in ((of_base, session), (of_target, target))
-        ]
-        frames = columns[0].shape[2] + columns[1].shape[2]
-        lean, moved = np.zeros(frames), np.zeros(frames)
-        if strength > 0.0:
-            units, base = _units(nominal), arm.frames.bases.rotation[seen.session]
-            inner = dh.parameter_jacobian(arm.model, seen.q_rad).reshape(count, 6, -1)
-            turns = base @ inner[:, 3:]
-            swing = left.flange @ arm.frames.targets.position_mm[seen.target][..., None]
-            shifts = base @ inner[:, :3] - skew(swing[..., 0]) @ turns
-            columns.append(np.concatenate([shifts, turns], axis=1) * units)
-            lean = np.append(lean, np.full(units.size, strength**-2.0))
-            moved = np.append(moved, (arm.model.start - nominal.start) / units)
-        design = np.concatenate(columns, axis=2)
-        residual = np.concatenate([left.position_mm, np.nan_to_num(left.turn_rad)], axis=1)
-        sigma_mm, sigma_rad = sigma_of(left.position_mm), sigma_of(left.turn_rad)
-        weights = np.zeros((count, 6))
-        weights[:, :3] = _weight(left.position_mm, sigma_mm, huber) / sigma_mm**2
-        if np.isfinite(sigma_rad):
-            weights[:, 3:] = _weight(left.turn_rad, sigma_rad, huber) / sigma_rad**2
-        flat = design.reshape(-1, design.shape[2])
+        # A target that moved has two numbers and one name.
+        named = replace(seen, target_names=tuple(map(str, range(len(seen.target_names)))))
+        frames = FrameParameters.of(named, arm.frames, None)
+        free = np.full(nominal.start.size, strength > 0.0)
+        system = PoseSystem(named, flange_model(nominal, free), frames, 1.0)
+        there = np.repeat([np.ones(len(seen), bool), seen.has_rotation], 3, axis=0).T
+        design, residual = np.zeros((len(seen), 6, system.size)), np.zeros((len(seen), 6))
+        blocks = [*system.blocks(np.concatenate([frames.begin, arm.model.start[free]]))]
+        residual[there], design[there] = (
+            np.concatenate(part) for part in zip(*blocks, strict=True)
+        )
+        vectors = np.where(there, residual, np.nan)
+        sigma_mm, sigma_rad = (sigma_of(vectors[:, part]) for part in _PARTS)
+        weights = np.zeros((len(seen), 6))
+        for part, sigma in zip(_PARTS, (sigma_mm, sigma_rad), strict=True):
+            if np.isfinite(sigma):
+                weights[:, part] = _weight(vectors[:, part], sigma, huber) / sigma**2
+        lean = np.append(np.zeros(frames.size), (strength * _units(nominal))[free] ** -2.0)
+        moved = np.append(np.zeros(frames.size), (arm.model.start - nominal.start)[free])
+        flat = design.reshape(-1, system.size)
         weighted = flat * weights.reshape(-1, 1)
         gram = weighted.T @ flat + np.diag(lean)
-        # What no reading shows (a target's turn, a base nobody sees) stays where it is.
+        # What no reading shows (a base nobody sees) stays where it is.
         diagonal = np.diag(gram)
         scale = np.where(diagonal > 0.0, np.where(diagonal > 0.0, diagonal, 1.0) ** -0.5, 0.0)
         both = np.outer(scale, scale)
         inverse = np.linalg.pinv(gram * both, rcond=1e-12, hermitian=True) * both
         step = -inverse @ (weighted.T @ residual.ravel() + lean * moved)
-        return cls(design, residual, weights, inverse, step, centroids, sigma_mm, sigma_rad)
+        return cls(design, residual, weights, inverse, step, frames, sigma_mm, sigma_rad)
 
     def taken(self, arm: Arm) -> tuple[Arm, float]:
         """The arm after the step, and how far it moves: mm of lengths, mm at one metre of turns."""
-        bases, targets = arm.frames.bases, arm.frames.targets
-        count = len(bases.rotation) + len(targets.rotation)
-        frames = self.step[: 6 * count].reshape(count, 6)
-        base, target = np.split(frames, [len(bases.rotation)])
-        turn, offset = exp_so3(base[:, 3:]), bases.position_mm - self.centroids
-        place = self.centroids + base[:, :3] + (turn @ offset[..., None])[..., 0]
-        moved = Frames(
-            Pose(turn @ bases.rotation, place),
-            Pose(exp_so3(target[:, 3:]) @ targets.rotation, targets.position_mm + target[:, :3]),
-        )
-        model, rest = arm.model, self.step[6 * count :]
+        of_frames, rest = np.split(self.step, [self.frames.size])
+        model, scale = arm.model, self.frames.scale
         if rest.size:
-            model = model.with_parameters(model.start + rest * _units(model))
-        lengths = np.abs(np.append(frames[:, :3], rest)).max()
-        return Arm(model, moved), float(max(lengths, 1e3 * np.abs(frames[:, 3:]).max()))
+            model, scale = (
+                model.with_parameters(model.start + rest),
+                np.append(scale, _units(model)),
+            )
+        moved = float(np.abs(self.step / scale).max())
+        return Arm(model, self.frames.frames(self.frames.begin + of_frames)), moved
 
     def left_out(self, seen: Readings) -> tuple[ndarray, ndarray]:
         """Residuals (n, 6), mm and rad, of every reading with its configuration left out.
@@ -287,38 +275,33 @@ class Linear:
         Then the same over what the fit without it leaves open there: as wide as ``sigma`` for a
         sound reading, whether others determine it or it alone does. NaN where not measured.
         """
-        plain, judged = self.residual.copy(), self.residual.copy()
-        unit = np.repeat([self.sigma_mm, self.sigma_rad], 3)
-        unit = np.where(np.isfinite(unit), unit, 1.0)
-        there = np.repeat([np.ones(len(seen), bool), seen.has_rotation], 3, axis=0).T
-        scaled = self.design / unit[:, None] * there[:, :, None]
-        share = self.weights * unit**2
-        sizes, order = (
-            np.unique(seen.pose, return_counts=True)[1],
-            np.argsort(seen.pose, kind="stable"),
-        )
+        unit = np.nan_to_num(np.repeat([self.sigma_mm, self.sigma_rad], 3), nan=1.0)
+        plain, judged = self.residual / unit, self.residual / unit
+        scaled, share = self.design / unit[:, None], self.weights * unit**2
+        order = np.argsort(seen.pose, kind="stable")
+        sizes = np.unique(seen.pose, return_counts=True)[1]
         begins = np.cumsum(sizes) - sizes
         for size in np.unique(sizes):
             rows = order[begins[sizes == size][:, None] + np.arange(size)]
             block = scaled[rows].reshape(len(rows), 6 * size, -1)
-            weight = share[rows].reshape(len(rows), 1, -1)
             open_there = block @ self.inverse @ np.swapaxes(block, 1, 2)
             # What one configuration alone determines is unknown without it: far, not infinite.
             whole = (1.0 + _OFF_ZERO) * np.eye(6 * size)
-            rest = np.linalg.pinv(whole - open_there * weight, rcond=1e-12)
-            left = rest @ (self.residual[rows] / unit).reshape(len(rows), -1, 1)
+            rest = whole - open_there * share[rows].reshape(len(rows), 1, -1)
+            rest = np.linalg.pinv(rest, rcond=1e-12)
+            left = rest @ plain[rows].reshape(len(rows), -1, 1)
             spread = rest @ open_there
             value, axes = np.linalg.eigh(0.5 * (spread + np.swapaxes(spread, 1, 2)))
             over = np.sqrt(1.0 + np.maximum(value, 0.0))[:, :, None]
-            found = axes @ ((np.swapaxes(axes, 1, 2) @ left) / over)
-            plain[rows.ravel()] = left.reshape(-1, 6) * unit
-            judged[rows.ravel()] = found.reshape(-1, 6) * unit
-        return np.where(there, plain, np.nan), np.where(there, judged, np.nan)
+            plain[rows] = left.reshape(*rows.shape, 6)
+            judged[rows] = (axes @ (np.swapaxes(axes, 1, 2) @ left / over)).reshape(*rows.shape, 6)
+        unit = np.where(np.repeat([[True], [False]], 3) | seen.has_rotation[:, None], unit, np.nan)
+        return plain * unit, judged * unit
 
 
 def _units(model: DHModel) -> ndarray:
     """One mm or mrad (5k,) of every DH parameter."""
-    return np.tile(np.where(_IS_ANGLE, 1e-3, 1.0), model.joints)
+    return np.where(np.tile(_IS_ANGLE, model.joints), 1e-3, 1.0)
 
 
 def _weight(vectors: ndarray, sigma: float, huber: bool) -> ndarray:
@@ -356,10 +339,15 @@ def start(
             found, least = arm, middle
             rows = np.argsort(misfit)[: max(int(_KEPT * len(misfit)), _DRAWN)]
     frames = _placed(found, part, flange, least) if len(seen.target_names) > 1 else found.frames
+    targets = frames.targets
     for other in np.unique(seen.session[seen.session != largest]):
         own = seen.select(seen.session == other)
-        base = _rigid(own, Arm(model, frames), largest)
-        frames.bases.rotation[other], frames.bases.position_mm[other] = base
+        at, rows = dh.forward(model, own.q_rad), np.arange(len(own))
+        for _ in range(_REFINEMENTS):
+            base = base_from_targets(own.select(rows), Pose(*(e[rows] for e in at)), targets)
+            frames.bases.rotation[other], frames.bases.position_mm[other] = base
+            misfit = np.linalg.norm(residuals(Arm(model, frames), own, at).position_mm, axis=1)
+            rows = np.argsort(misfit)[: max(int(_KEPT * len(own)), min(len(own), 4))]
     return Arm(model, frames)
 
 
@@ -393,18 +381,3 @@ def _placed(arm: Arm, part: Readings, flange: Pose, usual_mm: float) -> Frames:
                 turned = np.median(turned @ part.rotation[of], axis=0)
                 targets.rotation[each] = nearest_rotation(turned)
     return Frames(arm.frames.bases, targets)
-
-
-def _rigid(own: Readings, arm: Arm, base: int) -> Pose:
-    """Base of readings whose arm is known: rigid motion of its points onto the measured ones."""
-    rows = np.arange(len(own))
-    known = residuals(arm, replace(own, session=np.full_like(own.session, base)))
-    points = known.predicted.position_mm
-    for _ in range(_REFINEMENTS):
-        centre, onto = points[rows].mean(axis=0), own.position_mm[rows].mean(axis=0)
-        turn = nearest_rotation((own.position_mm[rows] - onto).T @ (points[rows] - centre))
-        moved = (points - centre) @ turn.T + onto
-        misfit = np.linalg.norm(moved - own.position_mm, axis=1)
-        rows = np.argsort(misfit)[: max(int(_KEPT * len(misfit)), min(len(misfit), 4))]
-    motion = Pose(turn, onto - turn @ centre)
-    return compose(motion, Pose(*(each[base] for each in arm.frames.bases)))
