@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import scipy
@@ -27,16 +27,10 @@ _BETTER_THERE = 0.55  # of what is left of the readings after the split
 _PLAIN = 0.5  # share at which no other place need be tried
 _STEADY = 0.9  # of what jumps explain; of one jump, a steady motion explains 0.75 at most
 _EXCESS = 2.0  # times what chance, or a step along a joint, explains
+_FEWEST_ROWS = 4  # on either side of a change of a distance
 
 Progress = Callable[[Iterable, str], Iterable]
-
-
-@dataclass(frozen=True)
-class Jump:
-    """Base (``target`` None) or target that is elsewhere in the readings ``rows`` on."""
-
-    target: int | None
-    rows: ndarray
+Jump = tuple[int | None, ndarray]  # a target, None for the base, that is elsewhere in rows on
 
 
 def without_jumps(
@@ -45,15 +39,15 @@ def without_jumps(
     """The fit with every jump of base or target taken out, one after the other, and these."""
     whole = fitted = fit(seen, model)
     jumps: list[Jump] = []
+    # Poses of equal joints are one: read often, they make no jump any surer.
+    few = len(np.unique(np.round(seen.q_rad, 6), axis=0)) < _FEW
     for _ in progress(range(_MOST_SPLITS), "searches for a moved instrument or target"):
-        # Poses of equal joints are one: read often, they make no jump any surer.
-        few = len(np.unique(np.round(fitted.seen.q_rad, 6), axis=0)) < _FEW
         best, least = None, _PLAIN if few else 1.0
         for row, kind in _places(fitted):
             others = np.unique(fitted.seen.target[fitted.seen.session == fitted.seen.session[row]])
             for target in dict.fromkeys((kind, None, *others.tolist())):
                 split = _parted(fitted, row, target, model)
-                share = _share_left(fitted, *split) if split else np.inf
+                share = _share_left(fitted, split[0], split[1][1]) if split else np.inf
                 if share < least:
                     best, least = split, share
             if least < _PLAIN:
@@ -63,6 +57,12 @@ def without_jumps(
         fitted = best[0]
         jumps.append(best[1])
     return fitted, list(_findings(whole, fitted, jumps)) if jumps else []
+
+
+def _labels(seen: Readings, target: int | None) -> tuple[str, ndarray, tuple]:
+    """What the base (None) or a target is numbered by: its field, the numbers, their names."""
+    kind = "session" if target is None else "target"
+    return kind, getattr(seen, kind), getattr(seen, f"{kind}_names")
 
 
 def _linearised(fitted: Fitted) -> tuple[Readings, ndarray, ndarray, Linear]:
@@ -88,29 +88,28 @@ def _places(fitted: Fitted) -> list[tuple[int, int | None]]:
     if fitted.trial.sigma_mm < tails.ROUNDING:
         return []
     few, design, residual, linear = _linearised(fitted)
-    inverse, slots = linear.inverse, linear.frames.slots
-    found = []
+    slots, places = linear.frames.slots, []
     for kind, number, at in slots:
-        target = None if kind == "bases" else number
-        rows = np.flatnonzero((few.session if target is None else few.target) == number)
+        target, width = (None, 6) if kind == "bases" else (number, 3)
+        rows = np.flatnonzero(_labels(few, target)[1] == number)
         if len(rows) < 4 * _FEWEST:
             continue
-        width = 6 if target is None else 3
-        columns = design[rows][:, :, at[:width]]
-        gains, solved, inner = _gains(columns, residual[rows], design[rows], inverse)
-        gains[:_FEWEST] = gains[len(gains) - _FEWEST + 1 :] = 0.0
-        place = int(np.argmax(gains))
-        after = np.where(np.arange(len(rows)) >= place, 1.0, 0.0)[:, None]
-        step = columns @ solved[place] * after - design[rows] @ (inverse @ inner[place])
-        rest = residual[rows] - step
+        columns, own, inside = design[rows][:, :, at[:width]], design[rows], slice(
+            _FEWEST, len(rows) - _FEWEST + 1
+        )
+        gains, steps, inner = _gains(columns, residual[rows], own, linear.inverse)
+        place = _FEWEST + int(np.argmax(gains[inside]))
+        after = (np.arange(len(rows)) >= place)[:, None]
+        rest = residual[rows] - columns @ steps[place] * after
+        rest = rest + own @ (linear.inverse @ inner[place])
         reference = scipy.special.chdtri(width, tails.FAMILY_WISE / (len(rows) * len(slots)))
         for along in (*few.q_rad[rows].T, *few.position_mm[rows].T):
             order = np.argsort(along, kind="stable")
-            own = _gains(columns[order], rest[order], design[rows[order]], inverse)[0]
-            reference = max(reference, own[_FEWEST : len(own) - _FEWEST + 1].max())
+            steps_along = _gains(columns[order], rest[order], own[order], linear.inverse)[0]
+            reference = max(reference, steps_along[inside].max())
         if gains[place] > _EXCESS * reference:
-            found.append((gains[place] / reference, int(fitted.chosen[rows[place]]), target))
-    return [(row, target) for _, row, target in sorted(found, key=lambda e: -e[0])[:_TRIED]]
+            places.append((gains[place] / reference, int(fitted.chosen[rows[place]]), target))
+    return [place[1:] for place in sorted(places, key=lambda place: -place[0])[:_TRIED]]
 
 
 def _gains(
@@ -121,19 +120,15 @@ def _gains(
     ``columns`` (n, 6, f) of a frame, all ``design`` (n, 6, P) with the ``inverse`` (P, P) of its
     normal equations. Also the step (n, f), and J'Z of it (n, P).
     """
-
-    def after(products: ndarray) -> ndarray:
-        return np.cumsum(products[::-1], axis=0)[::-1]
-
     transposed = np.swapaxes(columns, 1, 2)
-    score = after(transposed @ residual[..., None])[..., 0]
-    shared = after(transposed @ design)
-    gram = after(transposed @ columns)
+    score, shared, gram = (
+        np.cumsum((transposed @ right)[::-1], axis=0)[::-1]
+        for right in (residual[..., None], design, columns)
+    )
+    across = np.swapaxes(shared, 1, 2)
     ridge = 1e-6 * np.diag(np.diag(gram[0]))
-    open_ = gram - shared @ inverse @ np.swapaxes(shared, 1, 2) + ridge
-    solved = np.linalg.solve(open_, score[..., None])
-    gains = np.sum(solved[..., 0] * score, axis=1)
-    return gains, solved[..., 0], (np.swapaxes(shared, 1, 2) @ solved)[..., 0]
+    step = np.linalg.solve(gram - shared @ inverse @ across + ridge, score)
+    return np.sum(step * score, axis=(1, 2)), step[..., 0], (across @ step)[..., 0]
 
 
 def _parted(
@@ -145,79 +140,75 @@ def _parted(
     """
     seen, rows = _split(fitted.seen, row, target)
     again = fit(seen, model)
-    kind, labels = ("session", seen.session) if target is None else ("target", seen.target)
-    before, after = getattr(fitted.seen, kind)[row], labels[row]
-    both = np.flatnonzero((labels == before) | (labels == after))
+    kind, labels, _ = _labels(seen, target)
+    frames = _labels(fitted.seen, target)[1][row], labels[row]
+    both = np.flatnonzero(np.isin(labels, frames))
     costs = []
-    for index in (before, after):
-        part = replace(seen.select(both), **{kind: np.full(len(both), index)})
+    for frame in frames:
+        part = replace(seen.select(both), **{kind: np.full(len(both), frame)})
         left = np.linalg.norm(robust_fit.residuals(again.trial.arm, part).position_mm, axis=1)
-        costs.append(np.minimum(left, _CAP * again.trial.sigma_mm))
-    cost = np.append(0.0, np.cumsum(costs[0])) + np.append(0.0, np.cumsum(costs[1][::-1]))[::-1]
-    place = int(np.argmin(cost))
+        costs.append(np.append(0.0, np.minimum(left, _CAP * again.trial.sigma_mm)))
+    place = int(np.argmin(np.cumsum(costs[0]) - np.cumsum(costs[1])))
     if min(len(np.unique(seen.pose[side])) for side in np.split(both, [place])) < _FEWEST:
         return None
     if both[place] != row:
         seen, rows = _split(fitted.seen, both[place], target)
         again = fit(seen, model)
-    return again, Jump(target, rows)
+    return again, (target, rows)
 
 
 def _split(seen: Readings, row: int, target: int | None) -> tuple[Readings, ndarray]:
     """Frames split before reading ``row``: a new base for the rest of its session, or target."""
-    kind = "session" if target is None else "target"
-    label, names = getattr(seen, kind), getattr(seen, f"{kind}_names")
+    kind, label, names = _labels(seen, target)
     own = label[row] if target is None else target
     rows = (np.arange(len(seen)) >= row) & (label == own)
     split = {kind: np.where(rows, len(names), label), f"{kind}_names": (*names, names[own])}
     return replace(seen, **split), np.flatnonzero(rows)
 
 
-def _share_left(before: Fitted, after: Fitted, jump: Jump) -> float:
+def _share_left(before: Fitted, after: Fitted, rows: ndarray) -> float:
     """What a split leaves, over what it may leave at most to be believed: overall, or where it is.
 
     The fits' own lengths are compared, each cut at ten sigma so that gross errors do not decide.
     """
-    cap = _CAP * before.trial.sigma_mm
-    one, other = np.minimum(before.left_mm, cap), np.minimum(after.left_mm, cap)
-    near = jump.rows[:_NEAR]
-    everywhere = float(np.mean(other) / np.mean(one))
-    there = float(np.mean(other[near]) / np.mean(one[near]))
+    lengths = [np.minimum(e.left_mm, _CAP * before.trial.sigma_mm) for e in (before, after)]
+    everywhere, there = (
+        float(np.mean(lengths[1][part]) / np.mean(lengths[0][part]))
+        for part in (slice(None), rows[:_NEAR])
+    )
     return min(everywhere / _BETTER, max(there / _BETTER_THERE, everywhere))
 
 
 def _findings(whole: Fitted, fitted: Fitted, jumps: list[Jump]) -> Iterator[Finding]:
     """Jumps of base and targets; a drift in place of the jumps of a base that drifts."""
-    seen, arm = fitted.seen, fitted.trial.arm
+    seen, frames = fitted.seen, fitted.trial.arm.frames
     drifts = _drifts_mm(whole, fitted)
     for name, drift in drifts.items():
-        if drift is not None:
-            own = [seen.session_names[each] == name for each in seen.session]
-            yield finding("drift", seen.line[own], by=_signed(drift), drift_mm=drift.tolist())
-    for jump in jumps:
-        first = jump.rows[0]
-        kind = "session" if jump.target is None else "target"
-        label, names = getattr(seen, kind), getattr(seen, f"{kind}_names")
-        name = names[label[first]]
-        if jump.target is None and drifts[name] is not None:
+        own = [seen.session_names[each] == name for each in seen.session]
+        yield finding("drift", seen.line[own], by=_signed(drift), drift_mm=drift.tolist())
+    for target, rows in jumps:
+        _, label, names = _labels(seen, target)
+        name = names[label[rows[0]]]
+        if target is None and name in drifts:
             continue
-        same = [row for row in range(first) if names[label[row]] == name]
-        poses = arm.frames.bases if jump.target is None else arm.frames.targets
-        # How far points in the middle of the readings went.
-        old, new = (Pose(*(e[n] for e in poses)) for n in label[[same[-1], first]])
+        before = [row for row in range(rows[0]) if names[label[row]] == name][-1]
+        poses = frames.bases if target is None else frames.targets
+        old, new = (Pose(*(e[n] for e in poses)) for n in label[[before, rows[0]]])
         shift, turn = new.position_mm - old.position_mm, 0.0
-        if jump.target is None:
-            middle = fitted.left.predicted.position_mm[jump.rows].mean(axis=0)
+        if target is None:
+            # How far points in the middle of the readings went.
+            middle = fitted.left.predicted.position_mm[rows].mean(axis=0)
             motion = compose(new, invert(old))
-            here = motion.rotation.T @ (middle - motion.position_mm)
-            shift, turn = middle - here, float(np.linalg.norm(log_so3(motion.rotation)))
+            shift = middle - motion.rotation.T @ (middle - motion.position_mm)
+            turn = float(np.linalg.norm(log_so3(motion.rotation)))
+        first = int(seen.line[rows[0]])
         yield finding(
-            "base_jump" if jump.target is None else "target_moved",
-            seen.lines(jump.rows),
-            row=seen.row_names.one(int(seen.line[first])),
+            "base_jump" if target is None else "target_moved",
+            seen.lines(rows),
+            row=seen.row_names.one(first),
             target=name or "",
             by=_signed(shift),
-            first_line=int(seen.line[first]),
+            first_line=first,
             shift_mm=shift.tolist(),
             turn_mrad=1e3 * turn,
         )
@@ -227,32 +218,27 @@ def _signed(vector: ndarray) -> str:
     return ", ".join(f"{value:+.3g}" for value in vector)
 
 
-def _drifts_mm(whole: Fitted, split: Fitted) -> dict[str | None, ndarray | None]:
-    """How far the base of each session drifted (3,), mm; None where it jumped or stayed.
+def _drifts_mm(whole: Fitted, split: Fitted) -> dict[str | None, ndarray]:
+    """How far the base of each session that drifted did so (3,), mm.
 
     It drifts where a steady motion explains as much of what the fit without jumps leaves as the
     jumps that were found, whose places are chosen.
     """
     few, design, residual, linear = _linearised(whole)
-    found: dict[str | None, ndarray | None] = {}
+    drifts: dict[str | None, ndarray] = {}
     for base, name in enumerate(few.session_names):
         rows, at = np.flatnonzero(few.session == base), linear.frames.slots[base][2]
-        columns, own = design[rows][:, :, at], (residual[rows], design[rows])
+        columns, rest = design[rows][:, :, at], (residual[rows], design[rows], linear.inverse)
         part = split.seen.session[whole.chosen[rows]]
         jumps = [columns * (part == each)[:, None, None] for each in np.unique(part)[1:]]
-        found[name] = None
         if jumps:
             time = np.linspace(-0.5, 0.5, len(rows))[:, None, None]
-            gains, motion, _ = _gains(columns * time, *own, linear.inverse)
-            by_jumps = _gains(np.concatenate(jumps, axis=2), *own, linear.inverse)[0]
-            if gains[0] > _STEADY * by_jumps[0]:
-                arm = whole.trial.arm.frames.bases.position_mm[base]
-                middle = few.position_mm[rows].mean(axis=0) - arm
-                found[name] = -motion[0, :3] - np.cross(motion[0, 3:], middle)
-    return found
-
-
-_FEWEST_ROWS = 4  # on either side of a change of a distance
+            gains, motion, _ = _gains(columns * time, *rest)
+            if gains[0] > _STEADY * _gains(np.concatenate(jumps, axis=2), *rest)[0][0]:
+                at_mm = whole.trial.arm.frames.bases.position_mm[base]
+                lever = few.position_mm[rows].mean(axis=0) - at_mm
+                drifts[name] = -motion[0, :3] - np.cross(motion[0, 3:], lever)
+    return drifts
 
 
 def by_distances(every: Readings, distances: list[Distance]) -> tuple[list[Finding], Readings]:
@@ -260,12 +246,12 @@ def by_distances(every: Readings, distances: list[Distance]) -> tuple[list[Findi
 
     Findings, and the readings in which a target that moved counts as another from there on.
     """
-    moved, line = every, every.line
+    moved, line, names = every, every.line, every.target_names
     moves = [(distance, *_move(distance.length_mm)) for distance in distances]
-    steps, found = [move for move in moves if move[1]], []
+    steps, findings = [move for move in moves if move[1]], []
     while steps:
         # The target that most of the changed distances have in common.
-        counts = np.zeros(len(every.target_names))
+        counts = np.zeros(len(names))
         for distance, _, size in steps:
             counts[[distance.one, distance.other]] += 1.0 + 1e-3 * min(abs(size), 100.0)
         target = int(np.argmax(counts))
@@ -273,19 +259,17 @@ def by_distances(every: Readings, distances: list[Distance]) -> tuple[list[Findi
         steps = [step for step in steps if step not in mine]
         first = int(line[mine[0][0].rows[mine[0][1]][0]])
         rows = (every.target == target) & (line >= first)
-        names = (*moved.target_names, every.target_names[target])
-        numbers = np.where(rows, len(names) - 1, moved.target)
-        moved = replace(moved, target=numbers, target_names=names)
-        others = [every.target_names[d.other if d.one == target else d.one] for d, _, _ in mine]
-        sizes = zip(mine, others, strict=True)
-        found.append(
+        numbers = np.where(rows, len(moved.target_names), moved.target)
+        moved = replace(moved, target=numbers, target_names=(*moved.target_names, names[target]))
+        changes = (f"{n:+.3g} mm to {names[d.one + d.other - target]}" for d, _, n in mine)
+        findings.append(
             finding(
                 "target_moved/distances",
                 line[rows],
-                target=every.target_names[target],
-                sure="" if len(every.target_names) > 2 else " (or the other of the two)",
+                target=names[target],
+                sure="" if len(names) > 2 else " (or the other of the two)",
                 row=every.row_names.one(first),
-                by=", ".join(f"{size:+.3g} mm to {name}" for (_, _, size), name in sizes),
+                by=", ".join(changes),
                 first_line=first,
                 largest_change_mm=max(abs(size) for _, _, size in mine),
             )
@@ -298,8 +282,9 @@ def by_distances(every: Readings, distances: list[Distance]) -> tuple[list[Findi
         off += line[distance.rows[far, 0]].tolist()
         largest = max(largest, float(away[far].max(initial=0.0)))
     if off:
-        found.append(finding("outliers/distances", off, count=len(set(off)), largest_mm=largest))
-    return found, moved
+        count = len(set(off))
+        findings.append(finding("outliers/distances", off, count=count, largest_mm=largest))
+    return findings, moved
 
 
 def _move(length: ndarray) -> tuple[int | None, float]:
@@ -311,9 +296,8 @@ def _move(length: ndarray) -> tuple[int | None, float]:
     before = np.cumsum(clipped)[place - 1]
     step = (clipped.sum() - before) / (count - place) - before / place
     row = int(place[np.argmax(step**2 * place * (count - place))])
-    sides = np.split(length, [row])
-    middles = [float(np.median(side)) for side in sides]
-    size = middles[1] - middles[0]
+    middles = [float(np.median(side)) for side in np.split(length, [row])]
     # A distance that only drifts is no move: it must leave what both sides scatter by far.
-    rest = np.abs(np.concatenate([side - mid for side, mid in zip(sides, middles, strict=True)]))
+    rest = np.abs(length - np.where(np.arange(count) < row, *middles))
+    size = middles[1] - middles[0]
     return (row, size) if abs(size) > tails.limit(rest, 1) else (None, 0.0)
