@@ -52,7 +52,7 @@ SLOW = (
     "campaign/test_planning.py",
     "campaign/test_state.py",
     "checks/test_advice_on_misread_files.py",
-    "cli/test_check_data.py",
+    "checks/test_check_data.py",
     "cli/test_init.py",
     "cli/test_init_readings.py",
     "cli/test_init_robots.py",

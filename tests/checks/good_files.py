@@ -78,15 +78,16 @@ def simulated(
     repeats=1,
     seed=0,
     share=0.6,
+    off=1.0,
 ) -> File:
-    """Readings of an arm that is off its description by half a millimetre and a milliradian.
+    """Readings of an arm that is ``off`` its description, by half a millimetre and a milliradian.
 
     ``share`` of the joints' ranges is used; ``turned`` adds rotation vectors.
     """
     rng, arm = np.random.default_rng(seed), robots.load(robot)
-    off = rng.normal(size=(4, arm.dh.joints)) * np.array([[1e-3], [0.5], [0.5], [1e-3]])
+    errors = off * rng.normal(size=(4, arm.dh.joints)) * [[1e-3], [0.5], [0.5], [1e-3]]
     names = ("theta_offset_rad", "d_mm", "a_mm", "alpha_rad")
-    there = {name: getattr(arm.dh, name) + by for name, by in zip(names, off, strict=True)}
+    there = {name: getattr(arm.dh, name) + by for name, by in zip(names, errors, strict=True)}
     arm = replace(arm, dh=replace(arm.dh, **there))
     low, high = np.maximum(arm.q_min_rad, -np.pi), np.minimum(arm.q_max_rad, np.pi)
     middle, half = (low + high) / 2, (high - low) / 2 * share

@@ -18,10 +18,9 @@ KeyPath = tuple[Any, ...]
 Place = Callable[[KeyPath], str]
 
 # Thousands of data sets in one file stay below these.
-_MOST_BYTES, _MOST_VALUES, _DEEPEST, _LONGEST_TEXT = 4_000_000, 200_000, 12, 10_000
+_MOST_BYTES, _MOST_VALUES, _DEEPEST = 4_000_000, 200_000, 12
 _TABLES = (".csv", ".tsv", ".xlsx", ".xls")
 _LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
-_SCALARS = (str, int, float, date, type(None))
 # YAML 1.1 reads 1e-6 (no point, no sign) as text; nobody who writes it means a text.
 _FLOAT = re.compile(r"[-+]?(\d+(\.\d*)?|\.\d+)[eE][-+]?\d+")
 
@@ -37,11 +36,11 @@ class Document:
     def gives(self, path: KeyPath) -> bool:
         """Whether the file has a value at a key path."""
         value: Any = self.data
-        for step in path:
-            is_key = isinstance(value, dict) and step in value
-            if not is_key and not (isinstance(value, list) and step in range(len(value))):
-                return False
-            value = value[step]
+        try:
+            for step in path:
+                value = value[step]
+        except (TypeError, LookupError):
+            return False
         return True
 
     def place(self, path: KeyPath) -> str:
@@ -49,7 +48,7 @@ class Document:
         known = path
         while known and known not in self.lines:
             known = known[:-1]
-        line = f":{self.lines[known]}" if known in self.lines else ""
+        line = f":{self.lines[known]}" if known else ""
         return f"{self.name}{line}, {dotted(path)}" if path else f"{self.name}{line}"
 
 
@@ -63,25 +62,24 @@ def read(path: Path | str) -> tuple[Document, list[Problem]]:
     """One YAML file; problems instead of exceptions for all that is wrong with it as YAML."""
     name = str(path)
     try:
-        # No more is read than is needed to see that it is too much: the file may be a device.
+        # No more is read than shows that it is too much: the file may be a device.
         with open(path, "rb") as stream:
             content = stream.read(_MOST_BYTES + 1)
-        if Path(path).suffix.lower() in _TABLES:
-            fix = f"{shlex.join(['kinacc', 'init', name])} writes a YAML file: give that"
-            raise InputError(Problem(name, "holds readings", "the .yaml file about them", fix))
-        if len(content) > _MOST_BYTES:
-            allowed = f"at most {_MOST_BYTES // 1000} kB"
-            raise InputError(Problem(name, "is too large for a description", allowed))
+    except OSError as error:
+        return Document(name, {}), [*refused(error, name).problems]
+    except ValueError as error:  # a name that no file can have
+        return Document(name, {}), [Problem(name, f"cannot be read: {error}", "a YAML file")]
+    if Path(path).suffix.lower() in _TABLES:
+        fix = f"{shlex.join(['kinacc', 'init', name])} writes a YAML file: give that"
+        return Document(name, {}), [Problem(name, "holds readings", "a .yaml file", fix)]
+    if len(content) > _MOST_BYTES:
+        allowed = f"at most {_MOST_BYTES // 1000} kB"
+        return Document(name, {}), [Problem(name, "is too large for a description", allowed)]
+    try:
         return parsed(content.decode("utf-8-sig"), name)
     except UnicodeDecodeError as error:
-        problems = [Problem(name, f"is not text in UTF-8 (byte {error.start})", "a YAML file")]
-    except OSError as error:
-        problems = [*refused(error, name).problems]
-    except ValueError as error:  # a name that no file can have
-        problems = [Problem(name, f"cannot be read: {error}", "a YAML file")]
-    except InputError as error:
-        problems = [*error.problems]
-    return Document(name, {}), problems
+        what = f"is not text in UTF-8 (byte {error.start})"
+        return Document(name, {}), [Problem(name, what, "a YAML file")]
 
 
 def parsed(text: str, name: str) -> tuple[Document, list[Problem]]:
@@ -106,23 +104,10 @@ def value_of(
 ) -> Any:
     """The value of a YAML text; ``lines`` and ``problems`` take lines of keys and keys given twice.
 
-    Raises InputError for what is no YAML, or too much to be read safely.
+    Raises InputError for text that is not YAML, or too much to be read safely.
     """
     lines, problems = {} if lines is None else lines, [] if problems is None else problems
-    construct = yaml.constructor.SafeConstructor().construct_object
     count = 0
-
-    def scalar(node: yaml.Node) -> Any:
-        if not isinstance(node, yaml.ScalarNode):
-            return "<values>"
-        if not node.style and _FLOAT.fullmatch(node.value):
-            return float(node.value)
-        try:
-            value = construct(node)
-        except (ArithmeticError, AttributeError, LookupError, ValueError, yaml.YAMLError):
-            return node.value
-        is_huge = isinstance(value, int) and abs(value) > 1e300  # what no float holds stays text
-        return node.value if is_huge or not isinstance(value, _SCALARS) else value
 
     def plain(node: yaml.Node, path: KeyPath) -> Any:
         nonlocal count
@@ -135,11 +120,12 @@ def value_of(
                 lines[(*path, number)] = item.start_mark.line + 1
             return [plain(item, (*path, number)) for number, item in enumerate(node.value)]
         if not isinstance(node, yaml.MappingNode):
-            return scalar(node)
+            return _scalar(node)
         mapping: dict[Any, Any] = {}
         for key_node, value_node in node.value:
-            key, line = scalar(key_node), key_node.start_mark.line + 1
-            here = (*path, key)
+            is_plain = isinstance(key_node, yaml.ScalarNode)
+            key = _scalar(key_node) if is_plain else "<values>"
+            here, line = (*path, key), key_node.start_mark.line + 1
             if key in mapping:
                 what = f"{key!r} is given twice, first in line {lines[here]}"
                 problems.append(Problem(f"{name}:{line}, {dotted(here)}", what, "once"))
@@ -149,30 +135,31 @@ def value_of(
         return mapping
 
     try:
-        _refuse_too_much(text, name)
+        depth = 0  # nodes within nodes take a step of the stack for each level
+        for number, event in enumerate(yaml.parse(text, Loader=_LOADER)):
+            depth += isinstance(event, yaml.CollectionStartEvent)
+            depth -= isinstance(event, yaml.CollectionEndEvent)
+            if depth > _DEEPEST or number > 2 * _MOST_VALUES:
+                where = f"{name}:{event.start_mark.line + 1}"
+                allowed = f"at most {_DEEPEST} levels and {_MOST_VALUES} values"
+                raise InputError(Problem(where, "holds too much", allowed))
         node = yaml.compose(text, Loader=_LOADER)
     except (yaml.YAMLError, ValueError) as error:
         mark = getattr(error, "problem_mark", None)
-        reasons = [getattr(error, key, None) for key in ("context", "problem")]
-        reason = ", ".join(filter(None, reasons)) or str(error).splitlines()[0]
+        reason = getattr(error, "problem", None) or str(error).splitlines()[0]
         where = name if mark is None else f"{name}:{mark.line + 1}"
         fix = "indent with blanks, not tabs" if "\\t" in reason else ""
         raise InputError(Problem(where, f"is not YAML: {reason}", fix=fix)) from None
     return None if node is None else plain(node, ())
 
 
-def _refuse_too_much(text: str, name: str) -> None:
-    """Raise InputError for a text that would take all memory, or all of the machine's stack.
-
-    Events come one after another; nodes within nodes take a step of the stack for each level.
-    """
-    depth = values = 0
-    for event in yaml.parse(text, Loader=_LOADER):
-        opens = isinstance(event, yaml.CollectionStartEvent)
-        depth += opens - isinstance(event, yaml.CollectionEndEvent)
-        values += opens or isinstance(event, yaml.ScalarEvent)
-        length = len(event.value) if isinstance(event, yaml.ScalarEvent) else 0
-        if depth > _DEEPEST or values > _MOST_VALUES or length > _LONGEST_TEXT:
-            line = event.start_mark.line + 1 if event.start_mark else 1
-            allowed = f"{_DEEPEST} levels, {_MOST_VALUES} values of {_LONGEST_TEXT} characters"
-            raise InputError(Problem(f"{name}:{line}", "holds too much", f"at most {allowed}"))
+def _scalar(node: yaml.ScalarNode) -> Any:
+    """The value of a node; text where YAML has no plain value for it, or no float holds it."""
+    if not node.style and _FLOAT.fullmatch(node.value):
+        return float(node.value)
+    try:
+        value = yaml.constructor.SafeConstructor().construct_object(node)
+        plain = isinstance(value, (str, int, float, date, type(None)))
+        return value if plain and not (isinstance(value, int) and abs(value) > 1e300) else node.value
+    except (ArithmeticError, AttributeError, LookupError, ValueError, yaml.YAMLError):
+        return node.value
