@@ -94,8 +94,10 @@ def _places(fitted: Fitted) -> list[tuple[int, int | None]]:
         rows = np.flatnonzero(_labels(few, target)[1] == number)
         if len(rows) < 4 * _FEWEST:
             continue
-        columns, own, inside = design[rows][:, :, at[:width]], design[rows], slice(
-            _FEWEST, len(rows) - _FEWEST + 1
+        columns, own, inside = (
+            design[rows][:, :, at[:width]],
+            design[rows],
+            slice(_FEWEST, len(rows) - _FEWEST + 1),
         )
         gains, steps, inner = _gains(columns, residual[rows], own, linear.inverse)
         place = _FEWEST + int(np.argmax(gains[inside]))

@@ -160,6 +160,8 @@ def _scalar(node: yaml.ScalarNode) -> Any:
     try:
         value = yaml.constructor.SafeConstructor().construct_object(node)
         plain = isinstance(value, (str, int, float, date, type(None)))
-        return value if plain and not (isinstance(value, int) and abs(value) > 1e300) else node.value
+        return (
+            value if plain and not (isinstance(value, int) and abs(value) > 1e300) else node.value
+        )
     except (ArithmeticError, AttributeError, LookupError, ValueError, yaml.YAMLError):
         return node.value
