@@ -82,7 +82,7 @@ def _target_rotations(observations: Observations, flange: Pose, base: np.ndarray
 def base_from_targets(
     observations: Observations, flange: Pose, targets: Pose, placed: np.ndarray | None = None
 ) -> Pose:
-    """Base that best carries targets onto their measured positions; ``placed`` (T,): those known."""
+    """Base that best carries targets onto their measured points; ``placed`` (T,): those known."""
     rows = np.ones(len(observations), bool) if placed is None else placed[observations.target]
     at = targets.position_mm[observations.target[rows]]
     by_arm = flange.position_mm[rows] + (flange.rotation[rows] @ at[..., None])[..., 0]

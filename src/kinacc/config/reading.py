@@ -119,12 +119,11 @@ def value_of(
             for number, item in enumerate(node.value):
                 lines[(*path, number)] = item.start_mark.line + 1
             return [plain(item, (*path, number)) for number, item in enumerate(node.value)]
-        if not isinstance(node, yaml.MappingNode):
+        if isinstance(node, yaml.ScalarNode):
             return _scalar(node)
         mapping: dict[Any, Any] = {}
         for key_node, value_node in node.value:
-            is_plain = isinstance(key_node, yaml.ScalarNode)
-            key = _scalar(key_node) if is_plain else "<values>"
+            key = _scalar(key_node) if isinstance(key_node, yaml.ScalarNode) else "<values>"
             here, line = (*path, key), key_node.start_mark.line + 1
             if key in mapping:
                 what = f"{key!r} is given twice, first in line {lines[here]}"
@@ -140,9 +139,8 @@ def value_of(
             depth += isinstance(event, yaml.CollectionStartEvent)
             depth -= isinstance(event, yaml.CollectionEndEvent)
             if depth > _DEEPEST or number > 2 * _MOST_VALUES:
-                where = f"{name}:{event.start_mark.line + 1}"
                 allowed = f"at most {_DEEPEST} levels and {_MOST_VALUES} values"
-                raise InputError(Problem(where, "holds too much", allowed))
+                raise InputError(Problem(name, "holds too much", allowed))
         node = yaml.compose(text, Loader=_LOADER)
     except (yaml.YAMLError, ValueError) as error:
         mark = getattr(error, "problem_mark", None)
