@@ -9,9 +9,7 @@ How a scan is exact without a run at every bound. For a fixed history the reject
 falls as the bound grows, and the point to measure again is the largest of functions linear in
 the bound. So if both decisions agree at the two ends of an interval of bounds, every bound inside
 takes the same path. Where they do not, the interval is cut in half; the other piece waits and later
-resumes from the history it shares. Decisions
-closer than rounding and the table of :func:`_about` could turn (``guard``, ``margin``) are left to
-single bounds, which are decided without the table.
+resumes from the history it shares. Decisions closer than rounding are left to single bounds.
 """
 
 from __future__ import annotations
@@ -27,22 +25,6 @@ from kinacc.compiled import compiled
 READS, SIZE, WEIGHT = 0, 1, 2
 _ROOT_2_OVER_PI = math.sqrt(2.0 / math.pi)
 _SERIES_BELOW = 0.02
-_NODES_PER_UNIT = 128
-_ABOUT = 1e-10  # at most this far off is _about
-
-
-def _nodes() -> np.ndarray:
-    """Chi distribution of three degrees of freedom at 0, 1 / 128, .. 10, and its slope there.
-
-    (n, 2): the value, and the slope times the distance of two nodes.
-    """
-    r = np.arange(10 * _NODES_PER_UNIT + 1) / _NODES_PER_UNIT
-    slope = _ROOT_2_OVER_PI * r * r * np.exp(-0.5 * r * r)
-    value = [math.erf(x * math.sqrt(0.5)) - _ROOT_2_OVER_PI * x * math.exp(-0.5 * x * x) for x in r]
-    return np.stack([value, slope / _NODES_PER_UNIT], axis=1)
-
-
-_TABLE = _nodes()
 _M0 = np.uint64(0xD2E7470EE14C6C93)
 _M1 = np.uint64(0xCA5A826395121157)
 _W0 = np.uint64(0x9E3779B97F4A7C15)
@@ -133,136 +115,47 @@ def chi2_3(x):
 
 
 @compiled
-def _about(size, weight, eta, squared):
-    """1 - p-hat of one point, from a table of cubics: a measurement comes out larger so often."""
-    excess = size - eta
-    if excess <= 0.0:
+def _score(state, i, eta):
+    """Distance of a row beyond a bound, in standard deviations: the row of the largest is next."""
+    return (state[i, SIZE] - eta) * state[i, WEIGHT]
+
+
+@compiled
+def _missed(state, i, eta, squared):
+    """1 - p-hat of a point at a bound: a measurement comes out larger so often."""
+    distance = _score(state, i, eta)
+    if distance <= 0.0:
         return 1.0
-    place = excess * weight
-    place = (place if squared else math.sqrt(place)) * _NODES_PER_UNIT
-    if place >= _TABLE.shape[0] - 1:
-        return 0.0
-    node = int(place)
-    t = place - node
-    rise = _TABLE[node + 1, 0] - _TABLE[node, 0]
-    bend = _TABLE[node, 1] - rise
-    other = rise - _TABLE[node + 1, 1]
-    below = _TABLE[node, 0] + t * (rise + (1.0 - t) * (bend * (1.0 - t) + other * t))
-    return max(1.0 - below, 0.0)
+    return 1.0 - chi2_3(distance * distance if squared else distance)
 
 
 @compiled
 def _survival(eta, state, active, squared, miss):
-    """Product of about 1 - p-hat at a bound over the active rows, each kept in ``miss``."""
+    """Product of 1 - p-hat at a bound over the active rows, each kept in ``miss``."""
     survival = 1.0
     for i in active:
-        miss[i] = _about(state[i, SIZE], state[i, WEIGHT], eta, squared)
+        miss[i] = _missed(state, i, eta, squared)
         survival *= miss[i]
     return survival
 
 
 @compiled
-def _exact_survival(eta, state, active, squared):
-    """Product of 1 - p-hat at a bound over the active rows, in the order of their visits."""
-    survival = 1.0
+def _winner(eta, state, active, miss):
+    """Row with the largest score at a bound, the first of equals.
+
+    With it the next largest score, and the product of 1 - p-hat of all others.
+    """
+    row, best, second, others = -1, -np.inf, -np.inf, 1.0
     for i in active:
-        distance = max(state[i, SIZE] - eta, 0.0) * state[i, WEIGHT]
-        survival *= 1.0 - chi2_3(distance * distance if squared else distance)
-    return survival
-
-
-@compiled
-def _side(survival, alpha, guard):
-    """+1 above the threshold, -1 below it, 0 where rounding or the table could decide."""
-    probability = 1.0 - survival
-    if probability > alpha + guard:
-        return 1
-    return -1 if probability < alpha - guard else 0
-
-
-@compiled
-def _winner(eta, state, active):
-    """Row with the largest score at a bound, the first of equals; its score and the next one."""
-    row, best, second = -1, -np.inf, -np.inf
-    for i in active:
-        score = (state[i, SIZE] - eta) * state[i, WEIGHT]
+        score = _score(state, i, eta)
         if score > best:
             row, best, second = i, score, best
         elif score > second:
             second = score
-    return row, best, second
-
-
-@compiled
-def _resume(sizes, sigma, roots, state, path, lowest, rows):
-    """Rebuild the state after the steps of a path; returns (points visited, active rows).
-
-    A row is active if it can still exceed a bound of the interval that begins at ``lowest``: one
-    whose mean lies within has p-hat 0 throughout and is never measured again.
-    """
-    state[:, READS] = 0.0
-    visited = 0
-    for i in path:
-        state[i, READS] += 1.0
-        visited = max(visited, i + 1)
-    count = 0
-    for i in range(visited):
-        v = int(state[i, READS])
-        state[i, SIZE], state[i, WEIGHT] = sizes[i, v - 1], roots[v] / sigma[i]
-        if state[i, SIZE] > lowest:
-            rows[count] = i
-            count += 1
-    return visited, count
-
-
-@compiled
-def _insist(
-    i, bounds, rivals, world, roots, state, at_near, at_far, active, path, steps, setting, guards
-):
-    """Measure row i once, and on while it is sure for every bound that it must be measured again.
-
-    Only row i changes meanwhile, so the other rows are multiplied once. Returns the steps taken and
-    the products of about 1 - p-hat at both ends.
-    """
-    known, sigma, sizes = world[1], world[2], world[7]
-    alpha, squared = setting
-    guard, margin = guards
-    near_eta, far_eta = bounds
-    near_others = far_others = 1.0
-    for row in active:
-        if row != i:
-            near_others *= at_near[row]
-            far_others *= at_far[row]
-    # Smallest scores seen to keep the probability above alpha: a larger one needs no p-hat.
-    near_sure = far_sure = np.inf
-    if _side(max(near_others, far_others), alpha, guard) == 1:
-        near_sure = far_sure = -np.inf
-    v = int(state[i, READS])
-    while True:
-        if v >= known[i]:
-            extend(world, i, v)
-        size = sizes[i, v]
-        v += 1
-        weight = roots[v] / sigma[i]
-        path[steps] = i
-        steps += 1
-        near_score, far_score = (size - near_eta) * weight, (size - far_eta) * weight
-        if steps == path.size or near_score <= rivals[0] + margin:
-            break
-        if far_score <= rivals[1] + margin:
-            break
-        if near_score < near_sure:
-            if _side(near_others * _about(size, weight, near_eta, squared), alpha, guard) != 1:
-                break
-            near_sure = near_score
-        if far_score < far_sure:
-            if _side(far_others * _about(size, weight, far_eta, squared), alpha, guard) != 1:
-                break
-            far_sure = far_score
-    state[i, READS], state[i, SIZE], state[i, WEIGHT] = v, size, weight
-    at_near[i] = _about(size, weight, near_eta, squared)
-    at_far[i] = _about(size, weight, far_eta, squared)
-    return steps, near_others * at_near[i], far_others * at_far[i]
+    for i in active:
+        if i != row:
+            others *= miss[i]
+    return row, second, others
 
 
 @compiled
@@ -274,79 +167,79 @@ def scan(world, bounds, wanted, alpha, squared, roots):
     whether it rejected, its measurements, points visited and rejection probability; and how many
     runs were followed to their end.
     """
-    sigma, sizes = world[2], world[7]
+    known, sigma, sizes = world[1], world[2], world[7]
     points, budget = sigma.size, roots.size - 1
-    state, rows, path = (
-        np.zeros((points, 3)),
-        np.empty(points, np.int64),
-        np.empty(budget, np.int64),
-    )
+    state, rows = np.zeros((points, 3)), np.empty(points, np.int64)
+    path = np.empty(budget, np.int64)
     at_near, at_far = np.ones(points), np.ones(points)
     waiting = np.empty((bounds.size + 1, 3), np.int64)  # near end, far end, steps shared
     waiting[0, 0], waiting[0, 1], waiting[0, 2] = 0, bounds.size - 1, 0
     depth, runs = 1, 0
     margin = 1e-12 * max(bounds.max(), sizes[:, 0].max()) / sigma.min() * roots[budget]
-    guards = 1e-9 + points * _ABOUT + margin, margin
-    setting = alpha, squared
     while depth > 0:
         depth -= 1
         near, far, steps = waiting[depth, 0], waiting[depth, 1], waiting[depth, 2]
-        lowest = min(bounds[near], bounds[far])
-        visited, count = _resume(sizes, sigma, roots, state, path[:steps], lowest, rows)
+        state[:] = 0.0
+        visited = 0
+        for i in path[:steps]:
+            state[i, READS] += 1.0
+            visited = max(visited, i + 1)
+        # A row whose mean lies within all bounds has p-hat 0 and is never measured again.
+        lowest, count = min(bounds[near], bounds[far]), 0
+        for i in range(visited):
+            v = int(state[i, READS])
+            state[i, SIZE], state[i, WEIGHT] = sizes[i, v - 1], roots[v] / sigma[i]
+            if state[i, SIZE] > lowest:
+                rows[count], count = i, count + 1
         near_survival = _survival(bounds[near], state, rows[:count], squared, at_near)
         far_survival = _survival(bounds[far], state, rows[:count], squared, at_far)
+        top, near_rival, far_rival, near_others, far_others = -1, 0.0, 0.0, 1.0, 1.0
         while True:
-            active = rows[:count]
-            side = _side(near_survival, alpha, guards[0])
-            if near != far and (side == 0 or _side(far_survival, alpha, guards[0]) != side):
-                last = near if side == 0 else (near + far) // 2
+            active, eta, far_eta = rows[:count], bounds[near], bounds[far]
+            close = min(abs(1.0 - near_survival - alpha), abs(1.0 - far_survival - alpha))
+            is_sure = close > 1e-9 + margin  # rounding does not decide
+            if near == far and not is_sure:
+                near_survival = _survival(eta, state, active, squared, at_near)
+            rejected = 1.0 - near_survival > alpha
+            alike = is_sure and (1.0 - far_survival > alpha) == rejected
+            i = visited
+            if rejected and (near == far or (alike and steps < budget)):
+                again = top >= 0 and _score(state, top, eta) > near_rival + margin
+                if not (again and _score(state, top, far_eta) > far_rival + margin):
+                    top, near_rival, near_others = _winner(eta, state, active, at_near)
+                    other, far_rival, far_others = _winner(far_eta, state, active, at_far)
+                    alike = alike and other == top
+                    alike = alike and _score(state, top, eta) > near_rival + margin
+                    alike = alike and _score(state, top, far_eta) > far_rival + margin
+                i = top
+            if near != far and not alike:
+                last = (near + far) // 2
                 waiting[depth, 0], waiting[depth, 1], waiting[depth, 2] = last + 1, far, steps
-                depth, far = depth + 1, last
+                depth, far, top = depth + 1, last, -1
                 far_survival = _survival(bounds[far], state, active, squared, at_far)
                 continue
-            if side == 0:
-                near_survival = _exact_survival(bounds[near], state, active, squared)
-            rejected = 1.0 - near_survival > alpha
             if steps == budget or (not rejected and visited == points):
                 break
-            if not rejected:
-                i, visited = visited, visited + 1
-                size, weight = sizes[i, 0], roots[1] / sigma[i]
-                state[i, READS], state[i, SIZE], state[i, WEIGHT] = 1.0, size, weight
-                path[steps], steps = i, steps + 1
-                if size > min(bounds[near], bounds[far]):
-                    rows[count], count = i, count + 1
-                    at_near[i] = _about(size, weight, bounds[near], squared)
-                    at_far[i] = _about(size, weight, bounds[far], squared)
-                    near_survival *= at_near[i]
-                    far_survival *= at_far[i]
-                continue
-            i, best, rival = _winner(bounds[near], state, active)
-            other, far_best, far_rival = _winner(bounds[far], state, active)
-            sure = best - rival > margin
-            if near != far and not (sure and other == i and far_best - far_rival > margin):
-                last = (near + far) // 2 if sure else near
-                waiting[depth, 0], waiting[depth, 1], waiting[depth, 2] = last + 1, far, steps
-                depth, far = depth + 1, last
-                far_survival = _survival(bounds[far], state, active, squared, at_far)
-                continue
-            steps, near_survival, far_survival = _insist(
-                i,
-                (bounds[near], bounds[far]),
-                (rival, far_rival),
-                world,
-                roots,
-                state,
-                at_near,
-                at_far,
-                active,
-                path,
-                steps,
-                setting,
-                guards,
+            v = int(state[i, READS])
+            if v >= known[i]:
+                extend(world, i, v)
+            state[i, READS], state[i, SIZE], state[i, WEIGHT] = (
+                v + 1,
+                sizes[i, v],
+                roots[v + 1] / sigma[i],
             )
+            path[steps], steps = i, steps + 1
+            if not rejected:
+                visited, top = visited + 1, -1
+                near_others, far_others = near_survival, far_survival
+                if state[i, SIZE] > min(eta, far_eta):
+                    rows[count], count = i, count + 1
+            at_near[i] = _missed(state, i, eta, squared)
+            at_far[i] = _missed(state, i, far_eta, squared) if near != far else at_near[i]
+            near_survival, far_survival = near_others * at_near[i], far_others * at_far[i]
         runs += 1
-        probability = 1.0 - _exact_survival(bounds[near], state, active, squared)
         if rejected == wanted:
-            return near, rejected, steps, visited, probability, runs
-    return bounds.size, rejected, steps, visited, probability, runs
+            break
+    place = near if rejected == wanted else bounds.size
+    probability = 1.0 - _survival(bounds[near], state, rows[:count], squared, at_near)
+    return place, rejected, steps, visited, probability, runs
