@@ -15,7 +15,6 @@ from measured_worlds import measured_world
 from oracles import assessors as oracle
 from oracles.worlds import philox_words
 
-from kinacc.assess import invalidation_kernels as kernels
 from kinacc.assess import random_numbers
 from kinacc.assess.invalidation_kernels import chi2_3
 from kinacc.assess.model_invalidation import ModelInvalidation, point_probability
@@ -205,15 +204,6 @@ def test_scans_of_any_world_equal_every_single_run(
         assert run.rejection_probability == pytest.approx(
             steps[-1].rejection_probability, abs=1e-12
         )
-
-
-@pytest.mark.parametrize("squared", [True, False])
-def test_the_table_of_a_scan_is_as_near_as_its_guard_takes_it_to_be(squared):
-    sizes = np.concatenate([np.linspace(-0.1, 11.0, 5003), np.geomspace(1e-12, 200.0, 3001)])
-    about = [kernels._about(size, 1.0, 0.0, squared) for size in sizes]
-    distance = np.maximum(sizes, 0.0)
-    exact = [1.0 - chi2_3(x * x if squared else x) for x in distance]
-    assert np.max(np.abs(np.subtract(about, exact))) < kernels._ABOUT / 2
 
 
 def alone(first):

@@ -19,13 +19,12 @@ import numpy as np
 
 from kinacc.assess.limits import lower_limit_mm, upper_limit_mm
 from kinacc.assess.statement import CANDIDATES, Reason, Statement, Suspicious
-from kinacc.errors import InputError, Problem, refuse
+from kinacc.errors import Problem, refuse
 
 if TYPE_CHECKING:
     from kinacc.assess.reference_poses import Change
 
 _SYMMETRY = 1e-9  # largest asymmetry of a covariance, and spread that counts as equal noise
-_COVARIANCE = "symmetric, positive definite, in mm^2"
 
 
 @dataclass(frozen=True)
@@ -40,21 +39,14 @@ class Candidates:
 
     def __post_init__(self) -> None:
         covariance = np.array(self.covariance_mm2, dtype=float)
-        if covariance.ndim != 3 or covariance.shape[1:] != (3, 3) or not len(covariance):
-            found = f"shape {covariance.shape}"
-            raise InputError(Problem("covariance", found, "(m, 3, 3) with m at least 1, in mm^2"))
-        problems = [
-            Problem(f"covariance of point {row}", said, _COVARIANCE)
-            for row, said in covariance_faults(covariance)
-        ]
+        problems = _check_covariances(covariance, "covariance of point")
         refuse(problems, "these candidates cannot be assessed")
         object.__setattr__(self, "covariance_mm2", covariance)
 
     @classmethod
     def with_equal_noise(cls, sigma_mm: np.ndarray) -> Candidates:
         """Candidates with standard deviations (m,), equal in the three axes."""
-        sigma = np.asarray(sigma_mm, dtype=float)
-        return cls(sigma[:, None, None] ** 2 * np.eye(3))
+        return cls(np.asarray(sigma_mm, dtype=float)[:, None, None] ** 2 * np.eye(3))
 
     @property
     def points(self) -> int:
@@ -114,20 +106,24 @@ class Ledger:
         """Number of readings."""
         return len(self.readings)
 
-    def record(self, point: int, reading_mm, covariance_mm2=None, afresh: bool = False) -> None:
-        """Take one reading, or raise InputError and take nothing.
-
-        ``afresh`` forgets what was read at the point before; it counts as taken all the same.
-        """
-        reading = self._checked(point, reading_mm, covariance_mm2)
+    def record(self, point: int, reading_mm, covariance_mm2=None) -> None:
+        """Take one reading, or raise InputError and take nothing."""
+        points, reading = self.candidates.points, np.asarray(reading_mm, dtype=float)
+        problems = []
+        if not 0 <= point < points:
+            problems.append(Problem("point", f"{point}", f"0 to {points - 1}"))
+        if reading.shape != (3,) or not np.all(np.isfinite(reading)):
+            problems.append(Problem("reading", f"{reading.tolist()}", "three numbers, in mm"))
+        if covariance_mm2 is not None:
+            covariance_mm2 = np.array(covariance_mm2, dtype=float)
+            problems += _check_covariances(covariance_mm2[None], "covariance")
+        refuse(problems, "this reading cannot be recorded")
         if not self.count[point]:
             self.visited.append(point)
-        if afresh:
-            self.count[point], self._weight[point], self._weighted[point] = 0, 0.0, 0.0
         inverse = self.candidates.inverses[point]
         if covariance_mm2 is not None:
             self._unplanned.add(point)
-            inverse = np.linalg.inv(np.asarray(covariance_mm2, dtype=float))
+            inverse = np.linalg.inv(covariance_mm2)
         self.count[point] += 1
         self.readings.append((point, reading.tolist(), covariance_mm2))
         self._weight[point] += inverse
@@ -140,40 +136,37 @@ class Ledger:
     def noise(self, point: int) -> float | np.ndarray:
         """Noise of a point's mean: standard deviation per axis (mm), or covariance (3, 3)."""
         spread, noise = self.spread_mm2[point], self.noise_mm.item(point)
-        return noise if _is_even(spread, noise**2) else spread
+        uneven = np.abs(spread - noise**2 * np.eye(3)).max() > _SYMMETRY * noise**2
+        return spread if uneven else noise
 
     def as_planned(self, point: int) -> bool:
         """Whether all readings of a point came with the covariance planned for it."""
         return point not in self._unplanned
 
+    def covariances(self, places: Iterable[int]) -> np.ndarray:
+        """Covariances (n, 3, 3) of the readings at these places (0 = first)."""
+        read, planned = [self.readings[place] for place in places], self.candidates.covariance_mm2
+        found = [planned[row] if own is None else own for row, _, own in read]
+        return np.array(found).reshape(-1, 3, 3)
+
     def readings_of(self, point: int, number: int) -> tuple[np.ndarray, np.ndarray]:
         """The first readings of a point (number, 3) and their covariances (number, 3, 3)."""
-        planned = self.candidates.covariance_mm2[point]
-        own = [each for each in self.readings if each[0] == point][:number]
-        spread = [planned if covariance is None else covariance for _, _, covariance in own]
-        return np.array([reading for _, reading, _ in own]), np.array(spread, dtype=float)
+        places = [at for at, (row, _, _) in enumerate(self.readings) if row == point][:number]
+        return np.array([self.readings[at][1] for at in places]), self.covariances(places)
 
     def sizes_mm(self) -> np.ndarray:
         """Sizes of the mean readings of the visited points, in visiting order."""
         return np.sqrt(np.sum(self.mean_mm[self.visited] ** 2, axis=1))
 
-    def _checked(self, point, reading_mm, covariance_mm2) -> np.ndarray:
-        """The reading as numbers (3,)."""
-        problems = []
-        points = self.candidates.points
-        if not 0 <= point < points:
-            problems.append(Problem("point", f"{point}", f"0 to {points - 1}"))
-        reading = np.asarray(reading_mm, dtype=float)
-        if reading.shape != (3,) or not np.all(np.isfinite(reading)):
-            problems.append(Problem("reading", f"{reading.tolist()}", "three numbers, in mm"))
-        if covariance_mm2 is not None:
-            covariance = np.asarray(covariance_mm2, dtype=float)
-            faults = [(0, f"shape {covariance.shape}, not (3, 3)")]
-            if covariance.shape == (3, 3):
-                faults = covariance_faults(covariance[None])
-            problems += [Problem("covariance", said, _COVARIANCE) for _, said in faults]
-        refuse(problems, "this reading cannot be recorded")
-        return reading
+    def limits_mm(self, lower: float, upper: float) -> dict[int, tuple[float, float]]:
+        """Limits on the size of every visited point by its mean, for errors allowed to each."""
+        return {
+            row: (
+                lower_limit_mm(self.mean_mm[row], self.noise(row), lower),
+                upper_limit_mm(self.mean_mm[row], self.noise(row), upper),
+            )
+            for row in self.visited
+        }
 
 
 class Campaign:
@@ -219,12 +212,8 @@ class Campaign:
 
         The first reading of a point is a block, all others of it are one.
         """
-        seen: set[int] = set()
-        found = []
-        for row, _, _ in self.ledger.readings:
-            found.append(row if row in seen else -1 - row)
-            seen.add(row)
-        return found
+        rows = [row for row, _, _ in self.ledger.readings]
+        return [row if row in rows[:place] else -1 - row for place, row in enumerate(rows)]
 
     def alarms(self) -> tuple[Reason, ...]:
         """What the readings say against what the statements rest on: codes with their numbers."""
@@ -244,39 +233,41 @@ class Campaign:
         With its confidence each upper limit holds by itself, and all lower limits together. Here
         those of the mean readings alone.
         """
-        visited = self.ledger.visited
-        return self._mean_limits(visited, (1.0 - self.settings.confidence) / max(len(visited), 1))
-
-    def _mean_limits(self, rows: Iterable[int], lower: float) -> dict[int, tuple[float, float]]:
-        """Limits of mean readings; ``lower`` is the error allowed to a lower limit."""
-        upper, ledger = 1.0 - self.settings.confidence, self.ledger
-        found = {}
-        for row in rows:
-            mean, noise = ledger.mean_mm[row], ledger.noise(row)
-            found[row] = lower_limit_mm(mean, noise, lower), upper_limit_mm(mean, noise, upper)
-        return found
+        error = 1.0 - self.settings.confidence
+        return self.ledger.limits_mm(error / max(len(self.ledger.visited), 1), error)
 
 
 FIRST_SHARE = 0.6  # of the budget or the candidates, visited before anything is said
 
 
-def first_points(measurements: int, points: int, share: float) -> int:
-    """How many points are visited before anything is known: all if the budget is 1.5 times them."""
-    if measurements >= 1.5 * points:
-        return points
-    return max(math.ceil(share * min(measurements, points)), 1)
+class OnceAssessor(AdaptiveAssessor, Protocol):
+    """Reads each of the first points once and makes its statements from the ledger."""
+
+    def state(self, ledger: Ledger) -> tuple[Statement, ...]:
+        """The statements that the readings allow, the main one first."""
+        ...
+
+    def begin(self, candidates: Candidates) -> Campaign:
+        """A new campaign."""
+        return OnceCampaign(self, candidates)
 
 
 class OnceCampaign(Campaign):
-    """One reading each of the first points; what is stated is left to the assessor."""
+    """One reading each of the first points."""
 
-    def __init__(self, settings, candidates: Candidates) -> None:
+    settings: OnceAssessor
+
+    def __init__(self, settings: OnceAssessor, candidates: Candidates) -> None:
         super().__init__(settings, candidates)
         self.first = min(settings.measurements, candidates.points)
 
     def next(self) -> int | None:
         """The next point in order."""
         return self.ledger.taken if self.ledger.taken < self.first else None
+
+    def statements(self) -> tuple[Statement, ...]:
+        """Those of the assessor."""
+        return self.settings.state(self.ledger)
 
 
 def about_all_if_all_measured(said: Statement, ledger: Ledger) -> tuple[Statement, ...]:
@@ -288,35 +279,40 @@ def about_all_if_all_measured(said: Statement, ledger: Ledger) -> tuple[Statemen
     return said, Statement(CANDIDATES, value_mm=said.value_mm, withheld=withheld)
 
 
-def _is_even(covariance_mm2: np.ndarray, variance: float) -> bool:
-    """Whether a covariance (3, 3) is equal in all directions."""
-    return bool(np.abs(covariance_mm2 - variance * np.eye(3)).max() <= _SYMMETRY * variance)
-
-
 def covariance_faults(covariance_mm2: np.ndarray) -> list[tuple[int, str]]:
-    """Rows of covariances (n, 3, 3) that are none, each with what is wrong with it."""
-    faults = []
+    """Rows of covariances (n, 3, 3) that are none, each with what is wrong."""
+    if covariance_mm2.shape[1:] != (3, 3) or not len(covariance_mm2):
+        return [(0, f"shape {covariance_mm2.shape[1:]}, not (3, 3)")]
     finite = np.isfinite(covariance_mm2).all(axis=(1, 2))
     safe = np.where(finite[:, None, None], covariance_mm2, np.eye(3))
     scale = np.abs(safe).max(axis=(1, 2))
     skewed = np.abs(safe - np.swapaxes(safe, 1, 2)).max(axis=(1, 2)) > _SYMMETRY * scale
-    smallest = np.linalg.eigvalsh(safe)[:, 0]
-    for row in np.flatnonzero(~finite | skewed | (smallest <= 1e-14 * scale)):
-        if not finite[row]:
-            said = "holds values that are not finite"
-        elif skewed[row]:
-            said = "not symmetric"
-        else:
-            said = f"not positive definite: smallest eigenvalue {smallest[row]:.3g} mm^2"
-        faults.append((int(row), said))
-    return faults
+    flat = np.linalg.eigvalsh(safe)[:, 0] <= 1e-14 * scale
+    faults = {"not finite": ~finite, "not symmetric": skewed, "not positive definite": flat}
+    found = [(int(row), text) for text, bad in faults.items() for row in np.flatnonzero(bad)]
+    return sorted(dict(reversed(found)).items())
 
 
-def check_budget(measurements: int, confidence: float) -> list[Problem]:
-    """What is wrong with a budget and a confidence."""
-    problems = []
-    if not isinstance(measurements, (int, np.integer)) or measurements < 1:
-        problems.append(Problem("measurements", f"{measurements!r}", "a whole number, at least 1"))
-    if not 0.5 <= confidence < 1.0:
-        problems.append(Problem("confidence", f"{confidence!r}", "at least 0.5 and below 1"))
-    return problems
+def _check_covariances(covariance_mm2: np.ndarray, name: str) -> list[Problem]:
+    allowed = "symmetric, positive definite, in mm^2"
+    faults = covariance_faults(covariance_mm2)
+    return [Problem(f"{name} {row}", fault, allowed) for row, fault in faults]
+
+
+def check_settings(settings: AdaptiveAssessor, *stated: tuple[str, bool, str]) -> None:
+    """Raise InputError unless budget, confidence and all (name, holds, allowed) are right."""
+    budget, confidence = settings.measurements, settings.confidence
+    whole = isinstance(budget, (int, np.integer)) and budget >= 1
+    every = (
+        ("measurements", whole, "a whole number, at least 1"),
+        ("confidence", 0.5 <= confidence < 1.0, "at least 0.5 and below 1"),
+        *stated,
+    )
+    refuse(
+        [
+            Problem(name, f"{getattr(settings, name)!r}", allowed)
+            for name, holds, allowed in every
+            if not holds
+        ],
+        f"{settings.name} cannot work with these settings",
+    )

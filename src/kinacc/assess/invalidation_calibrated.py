@@ -13,10 +13,9 @@ from kinacc.assess.adaptive import (
     Candidates,
     about_all_if_all_measured,
 )
-from kinacc.assess.invalidation_full import ChallengeCampaign, invalidation_problems
+from kinacc.assess.invalidation_full import ChallengeCampaign, check_invalidation
 from kinacc.assess.looks import Looks, boundary
 from kinacc.assess.statement import CONFIDENCE, MEASURED, Reason, Statement
-from kinacc.errors import refuse
 
 _FIRST_LOOK = 0.6  # of a point's allowed lower error; every further look has half of what is left
 
@@ -44,7 +43,7 @@ class InvalidationCalibrated(AdaptiveAssessor):
     name: ClassVar[str] = "invalidation_calibrated"
 
     def __post_init__(self) -> None:
-        refuse(invalidation_problems(self), f"{self.name} cannot work with these settings")
+        check_invalidation(self)
 
     def begin(self, candidates: Candidates) -> CalibratedCampaign:
         """Return a new campaign."""

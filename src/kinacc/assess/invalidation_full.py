@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -12,22 +13,18 @@ from kinacc.assess.adaptive import (
     AdaptiveAssessor,
     Campaign,
     Candidates,
-    check_budget,
-    first_points,
+    check_settings,
 )
 from kinacc.assess.limits import BallDistances
 from kinacc.assess.statement import CONFIDENCE, MEASURED, Reason, Statement
-from kinacc.errors import Problem, refuse
 
 _STILL = 0.02  # of the budget: readings between two searches of the smallest bound not rejected
 
 
-def invalidation_problems(settings) -> list[Problem]:
-    """Return what is wrong with budget and share."""
-    problems = check_budget(settings.measurements, settings.confidence)
-    if not 0.0 < settings.visited <= 1.0:
-        problems.append(Problem("visited", f"{settings.visited}", "above 0 and at most 1"))
-    return problems
+def check_invalidation(settings, *stated: tuple[str, bool, str]) -> None:
+    """Raise InputError where settings cannot be used."""
+    share = ("visited", 0.0 < settings.visited <= 1.0, "above 0 and at most 1")
+    check_settings(settings, share, *stated)
 
 
 @dataclass(frozen=True)
@@ -52,10 +49,8 @@ class ModelInvalidationFull(AdaptiveAssessor):
     confidence: ClassVar[float] = CONFIDENCE  # of limits on single points; its statement has none
 
     def __post_init__(self) -> None:
-        problems = invalidation_problems(self)
-        if self.bound_mm is not None and not self.bound_mm > 0.0:
-            problems.append(Problem("bound_mm", f"{self.bound_mm}", "above 0, in mm"))
-        refuse(problems, f"{self.name} cannot work with these settings")
+        bound = self.bound_mm is None or self.bound_mm > 0.0
+        check_invalidation(self, ("bound_mm", bound, "above 0, in mm"))
 
     def begin(self, candidates: Candidates) -> ChallengeCampaign:
         """Return a new campaign."""
@@ -69,7 +64,10 @@ class ChallengeCampaign(Campaign):
 
     def __init__(self, settings, candidates: Candidates, bound_mm: float | None = None) -> None:
         super().__init__(settings, candidates)
-        self.first = first_points(settings.measurements, candidates.points, settings.visited)
+        budget, points = settings.measurements, candidates.points
+        self.first = max(math.ceil(settings.visited * min(budget, points)), 1)
+        if budget >= 1.5 * points:
+            self.first = points
         self._fixed_mm = bound_mm
         self._bound_mm, self._found_at = 0.0, -1
 
@@ -109,24 +107,9 @@ class ChallengeCampaign(Campaign):
         worst = int(np.argmax(beyond if beyond.any() else distances.size_mm))
         return self.ledger.visited[worst]
 
-    def _distances(self) -> BallDistances | EvenDistances:
+    def _distances(self) -> BallDistances:
         visited = self.ledger.visited
-        noises = [self.ledger.noise(point) for point in visited]
-        if all(isinstance(each, float) for each in noises):
-            return EvenDistances(self.ledger.sizes_mm(), np.array(noises))
-        spread = [each**2 * np.eye(3) if isinstance(each, float) else each for each in noises]
-        return BallDistances(self.ledger.mean_mm[visited], np.array(spread))
-
-
-class EvenDistances(NamedTuple):
-    """As :class:`BallDistances` where the noise is equal in all directions: eq. 21 is exact."""
-
-    size_mm: np.ndarray
-    noise_mm: np.ndarray
-
-    def beyond(self, radius_mm: float) -> np.ndarray:
-        """Return the distances (n,) to the ball of this radius; 0 inside."""
-        return np.maximum(self.size_mm - radius_mm, 0.0) / self.noise_mm
+        return BallDistances(self.ledger.mean_mm[visited], self.ledger.spread_mm2[visited])
 
 
 def rejection(distances: np.ndarray) -> float:

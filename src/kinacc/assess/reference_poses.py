@@ -23,7 +23,6 @@ import scipy
 
 from kinacc.assess.adaptive import Ledger
 from kinacc.assess.statement import Reason
-from kinacc.errors import Problem
 
 POSES = 5  # reference poses of a plan with at least four revisits of each
 FALSE_ALARMS = 0.005  # of campaigns without drift or step, all stages together
@@ -87,18 +86,6 @@ def poses_of(references: int) -> int:
     return min(POSES, max(references // 4, 1)) if references else 0
 
 
-def schedule_faults(measurements: int, references: int) -> list[Problem]:
-    """What is wrong with a number of revisits in so many readings."""
-    if not isinstance(references, (int, np.integer)) or references < 0:
-        return [Problem("references", f"{references!r}", "a whole number, 0 or more")]
-    poses = poses_of(references)
-    if (least := references + 2 * poses) > measurements:
-        what = f"{references} revisits of {poses} poses take {least} readings or more"
-        fix = "plan fewer revisits or more readings"
-        return [Problem("references", what, f"{measurements} readings are planned", fix)]
-    return []
-
-
 class Readings(NamedTuple):
     """Readings of reference poses in their order: place, pose, vector (n, 3), covariance."""
 
@@ -115,11 +102,10 @@ class Readings(NamedTuple):
 def planned_readings(plan: Schedule, ledger: Ledger) -> Readings:
     """Of the readings of a ledger, those planned of reference poses."""
     place = [at for at in sorted(plan.row_at) if at < ledger.taken]
-    read, planned = [ledger.readings[at] for at in place], ledger.candidates.covariance_mm2
+    read = [ledger.readings[at] for at in place]
     rows = np.array([row for row, _, _ in read], dtype=np.intp)
     vectors = np.array([vector for _, vector, _ in read]).reshape(-1, 3)
-    covariance = [planned[row] if own is None else own for row, _, own in read]
-    return Readings(np.array(place), rows, vectors, np.array(covariance).reshape(-1, 3, 3))
+    return Readings(np.array(place), rows, vectors, ledger.covariances(place))
 
 
 @dataclass(frozen=True)

@@ -8,15 +8,14 @@ from typing import ClassVar
 
 import numpy as np
 
-from kinacc.assess.adaptive import AdaptiveAssessor, Candidates, OnceCampaign, check_budget
+from kinacc.assess.adaptive import Ledger, OnceAssessor, check_settings
 from kinacc.assess.statement import CONFIDENCE, REGION, Reason, Statement
-from kinacc.errors import Problem, refuse
 
-_LOWER_SLIP = 0.01  # probability that noise alone lifts a reading by more than is taken off it
+_LIFTED = 0.01  # probability that noise alone lifts a reading by more than is taken off it
 
 
 @dataclass(frozen=True)
-class RegionShare(AdaptiveAssessor):
+class RegionShare(OnceAssessor):
     """Read random points once; order statistics bound the size that ``share`` does not exceed.
 
     Upper bound: a reading plus ``deviations`` standard deviations is at least the true size with
@@ -39,50 +38,37 @@ class RegionShare(AdaptiveAssessor):
     name: ClassVar[str] = "region_share"
 
     def __post_init__(self) -> None:
-        problems = check_budget(self.measurements, self.confidence)
-        if not 0.0 < self.share < 1.0:
-            problems.append(Problem("share", f"{self.share}", "above 0 and below 1"))
-        if not self.deviations >= 0.0:
-            problems.append(Problem("deviations", f"{self.deviations}", "0 or more"))
-        refuse(problems, f"{self.name} cannot work with these settings")
+        check_settings(
+            self,
+            ("share", 0.0 < self.share < 1.0, "above 0 and below 1"),
+            ("deviations", self.deviations >= 0.0, "0 or more"),
+        )
 
-    def begin(self, candidates: Candidates) -> RegionShareCampaign:
-        """A new campaign."""
-        return RegionShareCampaign(self, candidates)
-
-
-class RegionShareCampaign(OnceCampaign):
-    """See :class:`RegionShare`."""
-
-    settings: RegionShare
-
-    def statements(self) -> tuple[Statement, ...]:
+    def state(self, ledger: Ledger) -> tuple[Statement, ...]:
         """The bounds, or how many points they need."""
         from scipy.special import bdtr, bdtrc, chdtri, ndtr
 
-        share, error = self.settings.share, 1.0 - self.settings.confidence
-        visited, sizes = self.ledger.visited, self.ledger.sizes_mm()
-        count = len(visited)
-        ranks = np.arange(1, count + 1)
-        met = (1.0 - share) * float(ndtr(self.settings.deviations))
+        error, sizes = 1.0 - self.confidence, ledger.sizes_mm()
+        count, ranks = len(sizes), np.arange(1, len(sizes) + 1)
+        met = (1.0 - self.share) * float(ndtr(self.deviations))
         # The last k such that fewer than k of so many points are met with the error allowed.
         upper = int(np.sum(bdtr(ranks - 1, count, met) <= error))
         if upper == 0:
             needed = math.ceil(math.log(error) / math.log1p(-met))
-            withheld = Reason("few_points", {"read": count, "share": share, "needed": needed})
-            return (Statement(REGION, share=share, withheld=withheld),)
-        passing = (1.0 - share) + share * _LOWER_SLIP
+            few = {"read": count, "share": self.share, "needed": needed}
+            return (Statement(REGION, share=self.share, withheld=Reason("few_points", few)),)
+        passing = (1.0 - self.share) + self.share * _LIFTED
         lower = int(np.sum(bdtrc(ranks - 1, count, passing) > error))  # before the first such k
-        spread = np.sqrt(np.linalg.eigvalsh(self.ledger.spread_mm2[visited])[:, -1])
-        raised = np.sort(sizes + self.settings.deviations * spread)[::-1]
-        lowered = np.sort(sizes - math.sqrt(float(chdtri(3, _LOWER_SLIP))) * spread)[::-1]
+        spread = np.sqrt(np.linalg.eigvalsh(ledger.spread_mm2[ledger.visited])[:, -1])
+        raised = np.sort(sizes + self.deviations * spread)[::-1]
+        lowered = np.sort(sizes - math.sqrt(float(chdtri(3, _LIFTED))) * spread)[::-1]
         said = Statement(
             REGION,
-            value_mm=float(np.quantile(sizes, share)),
+            value_mm=float(np.quantile(sizes, self.share)),
             lower_mm=max(float(lowered[lower]), 0.0) if lower < count else 0.0,
             upper_mm=float(raised[upper - 1]),
-            confidence=self.settings.confidence,
-            share=share,
+            confidence=self.confidence,
+            share=self.share,
             assumption=Reason("drawn_at_random"),
         )
         return (said,)

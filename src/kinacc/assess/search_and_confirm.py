@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from kinacc.assess.adaptive import FIRST_SHARE, AdaptiveAssessor, Candidates, check_budget
+from kinacc.assess.adaptive import FIRST_SHARE, AdaptiveAssessor, Candidates, check_settings
 from kinacc.assess.confirming import ConfirmingCampaign
 from kinacc.assess.counts import excepted, hardly_missed
 from kinacc.assess.noise import (
@@ -25,7 +25,7 @@ from kinacc.assess.reference_poses import (
     Change,
     found,
     planned_readings,
-    schedule_faults,
+    poses_of,
 )
 from kinacc.assess.statement import (
     CANDIDATES,
@@ -38,7 +38,6 @@ from kinacc.assess.statement import (
     Suspicious,
 )
 from kinacc.assess.suspicious_readings import suspicious_readings
-from kinacc.errors import Problem, refuse
 
 VISITED = 0.9  # of the budget, where it is smaller than the number of candidates
 MARGIN = 1.2  # how much larger than stated noise may be that nothing can check
@@ -93,38 +92,29 @@ class SearchAndConfirm(AdaptiveAssessor):
 
     def __post_init__(self) -> None:
         known, arm, freedom = self.noise == KNOWN, self.arm_mm, self.noise_freedom
-        stated = (
+        tested = f"0 without a test before, or at least {FEWEST}; {ENOUGH} are asked for"
+        guarded = "0 where the campaign estimates the noise, by readings that may be wrong"
+        references = isinstance(self.references, (int, np.integer)) and self.references >= 0
+        least = self.references + 2 * poses_of(self.references) if references else 0
+        check_settings(
+            self,
             ("noise", self.noise in (KNOWN, ESTIMATED), f"{KNOWN}, {ESTIMATED}"),
             ("error_of", self.error_of in (MEAN, VISIT), f"{MEAN}, {VISIT}"),
             ("noise_margin", 1.0 <= self.noise_margin <= 10.0, "from 1 to 10"),
             ("allowance_mm", 0.0 <= self.allowance_mm < math.inf, "0 or above, in mm"),
             ("noise_freedom", not (known and freedom), f"0 where noise is {KNOWN}"),
-            (
-                "noise_freedom",
-                known or freedom == 0 or freedom >= FEWEST,
-                f"0 without a test before, or at least {FEWEST}; {ENOUGH} are asked for",
-            ),
-            (
-                "arm_mm",
-                arm is None or self.error_of == VISIT,
-                f"null: error_of is not {VISIT}",
-            ),
+            ("noise_freedom", known or freedom == 0 or freedom >= FEWEST, tested),
+            ("arm_mm", arm is None or self.error_of == VISIT, f"null: error_of is not {VISIT}"),
             ("arm_mm", arm is None or 0.0 <= arm < math.inf, "0 or above, in mm"),
             ("wrong_rate", 0.0 <= self.wrong_rate <= MOST_WRONG, f"from 0 to {MOST_WRONG}"),
+            ("wrong_rate", known or freedom > 0 or not self.wrong_rate, guarded),
+            ("references", references, "a whole number, 0 or more"),
             (
-                "wrong_rate",
-                known or freedom or not self.wrong_rate,
-                "0 where the campaign estimates the noise, by readings that may be wrong",
+                "references",
+                least <= self.measurements,
+                f"fewer: they take {least} readings or more",
             ),
         )
-        problems = check_budget(self.measurements, self.confidence)
-        problems += schedule_faults(self.measurements, self.references)
-        problems += [
-            Problem(name, f"{getattr(self, name)!r}", allowed)
-            for name, holds, allowed in stated
-            if not holds
-        ]
-        refuse(problems, f"{self.name} cannot work with these settings")
 
     def enough_for_all(self, points: int) -> int:
         """Measurements with which the statement on all ``points`` candidates assumes nothing."""

@@ -6,18 +6,16 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from kinacc.assess.adaptive import (
-    AdaptiveAssessor,
-    Candidates,
-    OnceCampaign,
+    Ledger,
+    OnceAssessor,
     about_all_if_all_measured,
-    check_budget,
+    check_settings,
 )
 from kinacc.assess.statement import CONFIDENCE, MEASURED, Reason, Statement
-from kinacc.errors import refuse
 
 
 @dataclass(frozen=True)
-class SingleShot(AdaptiveAssessor):
+class SingleShot(OnceAssessor):
     """Measure each point once, up to ``measurements`` points.
 
     Upper bound: the smallest size such that one reading at a point of that size exceeds what was
@@ -33,32 +31,19 @@ class SingleShot(AdaptiveAssessor):
     name: ClassVar[str] = "single_shot"
 
     def __post_init__(self) -> None:
-        refuse(
-            check_budget(self.measurements, self.confidence),
-            f"{self.name} cannot work with these settings",
-        )
+        check_settings(self)
 
-    def begin(self, candidates: Candidates) -> SingleShotCampaign:
-        """A new campaign."""
-        return SingleShotCampaign(self, candidates)
-
-
-class SingleShotCampaign(OnceCampaign):
-    """See :class:`SingleShot`."""
-
-    settings: SingleShot
-
-    def statements(self) -> tuple[Statement, ...]:
+    def state(self, ledger: Ledger) -> tuple[Statement, ...]:
         """The bound, with the largest reading as the value."""
-        visited, error = self.ledger.visited, 1.0 - self.settings.confidence
-        if not visited:
+        if not ledger.visited:
             return (Statement(MEASURED, withheld=Reason("nothing_measured")),)
-        limits = self._mean_limits(visited, error / self.first).values()
+        error, points = 1.0 - self.confidence, min(self.measurements, ledger.candidates.points)
+        lower, upper = zip(*ledger.limits_mm(error / points, error).values(), strict=True)
         said = Statement(
             MEASURED,
-            value_mm=float(self.ledger.sizes_mm().max()),
-            lower_mm=max(lower for lower, _ in limits),
-            upper_mm=max(upper for _, upper in limits),
-            confidence=self.settings.confidence,
+            value_mm=float(ledger.sizes_mm().max()),
+            lower_mm=max(lower),
+            upper_mm=max(upper),
+            confidence=self.confidence,
         )
-        return about_all_if_all_measured(said, self.ledger)
+        return about_all_if_all_measured(said, ledger)
