@@ -75,7 +75,7 @@ JOINTS = [
 
 
 @pytest.mark.parametrize("wrote", JOINTS, ids=" ".join)
-@pytest.mark.parametrize("reads", ["predict", "compensate --program", "plan-poses --candidates",
+@pytest.mark.parametrize("reads", ["predict", "plan-poses --candidates",
                                    "campaign start --candidates", "compare --joints"])  # fmt: skip
 def test_joints_that_a_command_wrote_are_read_by_the_others(
     folder, written, tmp_path, wrote, reads
@@ -83,7 +83,6 @@ def test_joints_that_a_command_wrote_are_read_by_the_others(
     file = written[wrote]
     words = {
         "predict": ("predict", folder, file, "--model", "dh"),
-        "compensate --program": ("compensate", folder, "--program", file, "--model", "dh"),
         "plan-poses --candidates": ("plan-poses", "mh180", "--candidates", file, "--poses", 7),
         "campaign start --candidates": (
             "campaign", "start", tmp_path / "new", "--calibration", folder, "--model", "dh",
@@ -145,13 +144,12 @@ def test_a_visit_predicted_by_the_calibration_is_no_measurement_of_it(folder, tm
     campaign, visit = tmp_path / "check", tmp_path / "visit.csv"
     begin(folder, campaign, "--drawn", 8)
     assert call("campaign", "next", campaign, "--all", "-o", visit).exit_code == 0
-    for command in (("predict", folder, visit), ("compensate", folder, "--program", visit)):
-        made = tmp_path / f"{command[0]}.csv"
-        assert call(*command, "--model", "dh", "-o", made).exit_code == 0
-        done = call("campaign", "record", campaign, made)
-        assert done.exit_code == 2, done.output
-        assert f"written by kinacc {command[0]}" in done.output
-        assert not (campaign / "readings.jsonl").exists()
+    made = tmp_path / "predict.csv"
+    assert call("predict", folder, visit, "--model", "dh", "-o", made).exit_code == 0
+    done = call("campaign", "record", campaign, made)
+    assert done.exit_code == 2, done.output
+    assert "written by kinacc predict" in done.output
+    assert not (campaign / "readings.jsonl").exists()
 
 
 def test_two_units_that_do_not_say_the_same_are_refused(folder, tmp_path):

@@ -1,62 +1,94 @@
-"""``kinacc compensate``: wanted poses to the joints that reach them."""
+"""``kinacc compensate``: a robot program corrected, or joints that reach wanted poses."""
 
 from __future__ import annotations
 
 import click
 
 from kinacc.cli import choice
-from kinacc.cli.output import answers
+from kinacc.cli.output import TABLES, Output, require_writable
 
 
 @click.command("compensate")
 @choice.calibration_options
 @click.argument("poses", type=click.Path(), required=False)
 @click.option("--pose", multiple=True, help='A pose in mm: "x,y,z,qw,qx,qy,qz".')
-@click.option("--near-deg", help="Joints the posture should be near to, for rows without joints.")
+@click.option("--near-deg", help="Joints that the posture is near to, where none is stated.")
 @click.option(
     "--program",
     type=click.Path(),
-    help="Instead of poses: joints written for the nominal arm, to be corrected.",
+    help="Robot program: .src, .mod, .prg, .ls, .script, .jbi or .csv.",
 )
+@click.option("--tool", "tools", multiple=True, help="Tool of a program: [NUMBER=]x,y,z,a,b,c.")
+@click.option("--base", "bases", multiple=True, help="Base of a program: [NUMBER=]x,y,z,a,b,c.")
+@click.option("--frames", multiple=True, type=click.Path(), help="File with tools and bases.")
+@click.option("--pulses-per-degree", help="Of a Yaskawa job: one number an axis.")
+@click.option("--base-is-fixed", is_flag=True, help="No external axis moves the robot's base.")
+@choice.option("--at-most-mm", type=float, default=20.0, help="Largest change of a position.")
+@click.option("--leave", is_flag=True, help="Write positions that are refused unchanged.")
+@click.option("--dry-run", is_flag=True, help="Write no program, print the corrections.")
+@click.option("--table", type=click.Path(), help="Corrections of a program, as a table.")
+@click.option("--picture", type=click.Path(), help="Corrections of a program, as a picture.")
 @choice.point_options
-@answers(table=True)
-def compensate(
-    folder, model, config, robot, poses, pose, near_deg, program, frame, point, session, out
-) -> None:
-    """Find the joints at which the calibrated arm puts its tool where it is wanted.
+@click.option("--out", "-o", type=click.Path(), help="Program or table to write.")
+@click.option("--json", "as_json", is_flag=True, help="Print the answer as JSON.")
+@click.option("--force", is_flag=True, help="Replace files that are there.")
+def compensate(folder, model, config, robot, poses, pose, near_deg, program, **options) -> None:
+    """Correct a robot program, or find joints that reach poses.
 
-    FOLDER is the results folder of a data set. POSES is a file with x_mm, y_mm,
-    z_mm and qw, qx, qy, qz (or rvx_deg .. a rotation vector, or rx_deg .. intrinsic XYZ angles),
-    or in any form that kinacc init reads: X, Y, Z, A, B, C of KUKA, W, P, R of FANUC. Columns
-    q1_deg and so on, where the file has them, say near which joints the posture is wanted; without
-    them the posture nearest to zero is taken.
-
-    Joints are given only where the forward model was seen to come back to the pose within 1e-6 mm;
-    every other row says in words why it has none. Exit code 1 if a row has none. An arm of four or
-    five axes comes back to the position, and is turned as near as it can be.
+    FOLDER is the results folder of a data set. A program keeps its text; only coordinates change
+    (docs/robot-programs.md). POSES is a file with x_mm, y_mm, z_mm and qw, qx, qy, qz (or
+    rvx_deg .. a rotation vector, or rx_deg .. intrinsic XYZ angles). Columns q1_deg .. are the
+    joints that the posture is near to. Exit code 1 if a position or a row has no joints.
 
     \b
     Example:
+      kinacc compensate results/kr6 --program weld.src -o weld_cal.src
       kinacc compensate results/mh180 --pose "1500,200,900,0,1,0,0"
       kinacc compensate results/ur10_b target_poses.csv -o joints.csv
-      kinacc compensate results/mh180 --program program.csv -o corrected.csv
     """
+    session = options.pop("session")
+    if program is not None:
+        from kinacc.cli import program as programs
+
+        if poses is not None or pose:
+            raise click.UsageError("--program stands alone: give no poses beside it")
+        calibration = choice.calibration_of(folder, model, robot, config, session)
+        programs.correct(calibration, program, near_deg, **options)
+        return
+    _find_joints(folder, model, config, robot, poses, pose, near_deg, session, **options)
+
+
+def _find_joints(
+    folder,
+    model,
+    config,
+    robot,
+    poses,
+    pose,
+    near_deg,
+    session,
+    frame,
+    point,
+    out,
+    as_json,
+    force,
+    **_,
+) -> None:
     from kinacc.cli import rows, target_poses
     from kinacc.deployment.compensate import compensate as joints_for
     from kinacc.deployment.sensitivity import deviations
     from kinacc.progress import reporting
 
+    answer = Output(as_json=as_json, table=out, force=force)
+    require_writable([out], force, TABLES)
     calibration = choice.calibration_of(folder, model, robot, config, session)
-    given = target_poses.poses(calibration, poses, pose, near_deg, program, frame, point)
+    given = target_poses.poses(calibration, poses, pose, near_deg)
     with reporting("compensate", bar=True):
         found = joints_for(
             calibration, given.pose, given.joints, given.directions, frame, point, given.payload
         )
         unlike = target_poses.unlike_measured(calibration, found, point)
-    answer = target_poses.compensated(
-        calibration, given, found, frame, point, unlike, program is not None
-    )
-    out.deliver(answer)
+    answer.deliver(target_poses.compensated(calibration, given, found, frame, point, unlike))
     rows.say_unused(given, calibration)
     rows.warn_unlike(unlike)
     at = target_poses.reached(calibration, found)

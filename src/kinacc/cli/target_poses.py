@@ -23,7 +23,6 @@ from kinacc.deployment.compensate import (
     ROTATION_TOLERANCE_RAD,
     Compensation,
     PoseStatus,
-    programmed,
 )
 from kinacc.deployment.record import Calibration
 from kinacc.errors import InputError, Problem, refuse
@@ -31,7 +30,6 @@ from kinacc.geometry import Pose, rotation_from_quaternion
 from kinacc.kinematics.model import JointState
 from kinacc.measurements.table import numbers_of
 
-_FAR_FROM_PROGRAM_RAD = np.deg2rad(20.0)  # a calibration moves joints by less
 _NUMBERS = "7 numbers: x, y, z in mm, then a unit quaternion w, x, y, z"
 
 
@@ -40,28 +38,19 @@ def poses(
     path: str | None,
     texts: tuple[str, ...],
     near_deg: str | None,
-    program: str | None,
-    frame: str,
-    point: str | None,
 ) -> Rows:
     """Wanted poses and, where given, joints the posture should be near to.
 
     Raises InputError listing all problems.
     """
-    sources = [path is not None, bool(texts), program is not None]
+    sources = [path is not None, bool(texts)]
     if sum(sources) != 1:
         what = "is not given" if not any(sources) else "is given more than once"
         raise InputError(Problem("what is wanted", what, "a file of poses, --pose, or --program"))
     near = None
     if near_deg is not None:
         near = rows.of_arguments((near_deg,), "deg", calibration.robot, "--near-deg")
-    if program is not None:
-        if frame != "base":
-            what = "a program speaks of the robot's own base"
-            raise InputError(Problem("--frame", what, "base"))
-        given = rows.read(program, calibration.robot, answers={})
-        given = replace(given, pose=programmed(calibration, given.joints, point))
-    elif path is not None:
+    if path is not None:
         given = rows.read(path, calibration.robot, joints=False, pose=True)
     else:
         pose = _of_arguments(texts)
@@ -69,7 +58,7 @@ def poses(
     if given.joints is None and near is not None:
         given = replace(given, joints=np.broadcast_to(near, (given.count, near.shape[1])))
     if given.joints is not None:
-        rows.require_within_limits(calibration.robot, given, program or path or "--near-deg")
+        rows.require_within_limits(calibration.robot, given, path or "--near-deg")
     return given
 
 
@@ -80,12 +69,10 @@ def compensated(
     frame: str,
     point: str | None,
     unlike: np.ndarray,
-    is_program: bool = False,
 ) -> Sheet:
     """The sheet of ``kinacc compensate``.
 
-    ``unlike`` (n,): joints that are unlike those measured; ``is_program``: the near joints are a
-    program's.
+    ``unlike`` (n,): joints that are unlike those measured.
     """
     angular = np.where(calibration.robot.dh.prismatic, np.nan, np.rad2deg(np.abs(found.change)))
     largest = np.max(np.nan_to_num(angular, nan=-1.0), axis=1)
@@ -95,7 +82,7 @@ def compensated(
         *joint_fields(calibration.robot.dh.prismatic, found.q_rad),
         Field(
             "status",
-            _words(calibration, found, unlike, is_program),
+            _words(calibration, found, unlike),
             "",
             "why there are joints, or none",
         ),
@@ -135,9 +122,7 @@ def unlike_measured(calibration: Calibration, found: Compensation, point: str | 
     return unlike & ~calibration.outside_range(calibration.robot.dh_joints(found.q_rad)).any(axis=1)
 
 
-def _words(
-    calibration: Calibration, found: Compensation, unlike: np.ndarray, is_program: bool
-) -> np.ndarray:
+def _words(calibration: Calibration, found: Compensation, unlike: np.ndarray) -> np.ndarray:
     words = []
     for row, status in enumerate(found.status):
         joints = joints_in_words(found.offending[row]) if found.offending[row].any() else ""
@@ -156,20 +141,17 @@ def _words(
         }[PoseStatus(status)]
         if status <= PoseStatus.OTHER_POSTURE:
             said += f", extrapolated: {UNLIKE}" if unlike[row] else ""
-            said += _remarks(calibration, found, row, is_program)
+            said += _remarks(calibration, found, row)
         words.append(said)
     return np.array(words, dtype=object)
 
 
-def _remarks(calibration: Calibration, found: Compensation, row: int, is_program: bool) -> str:
+def _remarks(calibration: Calibration, found: Compensation, row: int) -> str:
     """What a person should know before the joints are used."""
     said, off_rad = "", found.rotation_error_rad[row]
     if off_rad > ROTATION_TOLERANCE_RAD:
         axes = calibration.robot.dh.joints
         said += f", turned {1e3 * off_rad:.3g} mrad away: {axes} axes reach no nearer"
-    far = (np.abs(found.change[row]) > _FAR_FROM_PROGRAM_RAD) & ~calibration.robot.dh.prismatic
-    if is_program and far.any():
-        said += f", {joints_in_words(far)} far from the program: a singular or another posture"
     return said
 
 

@@ -1,0 +1,232 @@
+"""Robot programs of the examples: only numbers change, and they bring the real arm to its poses."""
+
+import json
+import re
+import shutil
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from small_arms import BASE, TOOL, calibrated, truth
+
+from kinacc.deployment.programs import compensate_program, read_program
+from kinacc.deployment.programs.orientation import (
+    FIXED,
+    INTRINSIC,
+    KUKA,
+    QUATERNION,
+    VECTOR,
+    Convention,
+)
+from kinacc.deployment.programs.record import NUMBER, POSE, written
+from kinacc.errors import InputError
+from kinacc.geometry import Pose, compose, exp_so3, invert
+from kinacc.kinematics import dh, robot
+
+EXAMPLES = Path(__file__).parents[3] / "examples" / "programs"
+KR6 = str(EXAMPLES / "kr6.yaml")
+ARMS = {
+    "weld.src": KR6,
+    "weld.mod": "irb120",
+    "weld.ls": "fanuc_r2000ic_165f",
+    "weld.script": "ur10",
+    "WELD.JBI": "mh180",
+    "joints.csv": "irb120",
+}
+PULSES = np.array([1500.0, 1500.0, 1500.0, 1200.0, 1200.0, 800.0])
+ANGLES = np.rad2deg(Rotation.from_matrix(TOOL.rotation).as_euler("xyz"))
+LEFT = {"weld.src": 1, "weld.mod": 1, "weld.ls": 1, "weld.script": 1}
+
+
+def corrected(name, model="dh", folder=EXAMPLES, **options):
+    pulses = PULSES if name.endswith("JBI") else None
+    if name == "joints.csv":
+        options = {"tools": {"": np.array([30.0, -20.0, 150.0, *ANGLES])}, **options}
+    arm = calibrated(ARMS[name], model)
+    return arm, compensate_program(arm, folder / name, pulses_per_degree=pulses, **options)
+
+
+def without_numbers(content: bytes) -> str:
+    return re.sub(NUMBER, "#", content.decode("latin-1"))
+
+
+@pytest.mark.parametrize("model", ["dh", "vec"])
+@pytest.mark.parametrize("name", ARMS)
+def test_every_example_is_corrected_and_only_its_numbers_change(name, model):
+    _, found = corrected(name, model)
+    assert not found.refused
+    assert (found.table["status"] == "corrected").all()
+    assert len(found.left) == LEFT.get(name, 0)
+    assert found.table["change_mm"].between(0.05, 20.0).all()
+    for path, content in found.files.items():
+        old = path.read_bytes()
+        assert content != old
+        assert without_numbers(content) == without_numbers(old)
+        assert content.count(b"\r\n") == old.count(b"\r\n")
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_the_real_arm_reaches_the_programmed_poses(name, tmp_path):
+    """The true arm at the joints of the corrected program, seen by the instrument."""
+    arm, found = corrected(name)
+    for each in EXAMPLES.iterdir():
+        shutil.copy(each, tmp_path / each.name)
+    for path, content in found.files.items():
+        (tmp_path / path.name).write_bytes(content)
+    before, after = (_joints_and_poses(arm, folder / name) for folder in (EXAMPLES, tmp_path))
+    wanted = compose(arm.base, before[1])
+    miss = {}
+    for kind, q_rad in (("before", before[0]), ("after", after[0])):
+        at = arm.robot.dh_joints(q_rad)
+        real = compose(BASE, compose(dh.forward(truth(ARMS[name]), at), TOOL))
+        miss[kind] = np.linalg.norm(real.position_mm - wanted.position_mm, axis=1).mean()
+    assert miss["after"] < 1.2 * arm.residual.position_mm
+    assert miss["before"] > 5.0 * miss["after"]
+
+
+def _joints_and_poses(arm, path):
+    """Nominal joints of a program, and the poses of its tool in the robot's base."""
+    from kinacc.deployment.programs.correction import _Correction, language_of
+
+    pulses = PULSES if path.suffix == ".JBI" else None
+    program = read_program(path, (), pulses)
+    work = _Correction(arm, language_of(path), program, None, 20.0)
+    reasons = {}
+    q_rad = work.starts(None, reasons)
+    assert not reasons
+    tool = compose(invert(arm.robot.flange), TOOL)
+    end = dh.forward(arm.robot.dh, arm.robot.dh_joints(q_rad))
+    pose = compose(arm.robot.base, compose(end, arm.robot.flange))
+    return q_rad, compose(pose, tool)
+
+
+def test_frames_that_are_missing_are_asked_for(tmp_path):
+    shutil.copy(EXAMPLES / "weld.ls", tmp_path / "weld.ls")
+    arm = calibrated(ARMS["weld.ls"], "dh")
+    with pytest.raises(InputError, match="--tool"):
+        compensate_program(arm, tmp_path / "weld.ls")
+    given = {"1": np.array([30.0, -20.0, 150.0, -29.0, 1.0, 41.0])}
+    base = {"": np.array([1200.0, -200.0, 300.0, 0.0, 0.0, 10.0])}
+    found = compensate_program(arm, tmp_path / "weld.ls", given, base)
+    assert len(found.table) == 5
+
+
+def test_a_program_is_corrected_once_and_files_are_kept(tmp_path):
+    _, found = corrected("weld.src")
+    out = tmp_path / "weld_cal.src"
+    found.write(out)
+    assert sorted(each.name for each in tmp_path.iterdir()) == [
+        "weld_cal.dat", "weld_cal.src", "weld_cal.src.kinacc.json"
+    ]  # fmt: skip
+    with pytest.raises(InputError, match="--force"):
+        found.write(out)
+    found.write(out, force=True)
+    facts = json.loads((tmp_path / "weld_cal.src.kinacc.json").read_text())
+    assert facts["corrected"] == ["weld_cal.src", "weld_cal.dat"]
+    shutil.copy(EXAMPLES / "$config.dat", tmp_path)
+    for ending in ("src", "dat"):
+        (tmp_path / f"weld_cal.{ending}").rename(tmp_path / f"again.{ending}")
+    with pytest.raises(InputError, match="compensated before"):
+        compensate_program(calibrated(KR6, "dh"), tmp_path / "again.src")
+
+
+def _kuka(tmp_path, *lines):
+    path = tmp_path / "own.src"
+    path.write_text("\n".join(["DEF own()", "$TOOL=$NULLFRAME", "$BASE=$NULLFRAME", *lines, "END"]))
+    return path
+
+
+HOME = "{A1 20, A2 -80, A3 100, A4 10, A5 40, A6 5}"
+
+
+def _home(turn=2):
+    arm = robot.load(KR6)
+    q_rad = np.deg2rad([[20.0, -80.0, 100.0, 10.0, 40.0, 5.0]])
+    numbers = Convention(KUKA).numbers(
+        Pose(*(part[0] for part in robot.forward(arm, q_rad))), np.zeros(6)
+    )
+    values = ",".join(f"{key} {value:.4f}" for key, value in zip("XYZABC", numbers, strict=True))
+    return f"{{{values},S 2,T {turn}}}"
+
+
+@pytest.mark.parametrize(
+    ("line", "reason"),
+    [
+        (f"LIN {_home(turn=10)}", "posture"),  # a turn that axis 4 does not have
+        ("LIN {X 9000,Y 0,Z 500,A 0,B 90,C 0,S 2,T 2}", "cannot reach"),
+        ("$IPO_MODE=#TCP\nLIN {X 500,Y 0,Z 500,A 0,B 90,C 0,S 2,T 2}", "#TCP"),
+        (f"LIN {_home()[:-1]},E1 0}}\nLIN {_home()[:-1]},E1 900}}", "external axes"),
+        ("PTP {A1 20, A2 -80, A3 100, A4 0.0001, A5 40, A6 400}", "limits"),
+    ],
+)
+def test_positions_that_cannot_be_corrected_are_named(tmp_path, line, reason):
+    path = _kuka(tmp_path, f"PTP {HOME}", line)
+    found = compensate_program(calibrated(KR6, "dh"), path)
+    assert found.refused
+    assert all(reason in each.what for each in found.refused)
+    with pytest.raises(
+        InputError, match=f"own.src:{found.refused[0].where.split(':')[1].split()[0]}"
+    ):
+        found.write(tmp_path / "out.src")
+    assert not (tmp_path / "out.src").exists()
+
+
+def test_a_turn_that_the_correction_would_change_is_refused(tmp_path):
+    """Axis 4 within the correction of zero: its turn bit would change for some of these."""
+    arm, path = robot.load(KR6), tmp_path / "own.src"
+    lines = []
+    for a1 in range(-40, 50, 10):
+        q_rad = np.deg2rad([[a1, -80.0, 100.0, 1e-3, 40.0, 5.0]])
+        pose = Pose(*(part[0] for part in robot.forward(arm, q_rad)))
+        values = zip("XYZABC", Convention(KUKA).numbers(pose, np.zeros(6)), strict=True)
+        turn = 2 + (a1 < 0)
+        text = ",".join(f"{key} {value:.6f}" for key, value in values)
+        lines.append(f"LIN {{{text},S 2,T {turn}}}")
+    path = _kuka(tmp_path, *lines)
+    found = compensate_program(calibrated(KR6, "dh"), path)
+    assert found.refused
+    assert all("T bit" in each.what for each in found.refused)
+
+
+def test_changes_beyond_a_limit_are_refused():
+    _, found = corrected("weld.mod", at_most_mm=0.1)
+    assert any("--at-most-mm" in each.what for each in found.refused)
+
+
+@pytest.mark.parametrize("orientation", [KUKA, FIXED, INTRINSIC, QUATERNION, VECTOR])
+def test_frames_come_back_from_their_numbers(orientation):
+    convention, rng = Convention(orientation), np.random.default_rng(1)
+    turns = [exp_so3(rng.normal(size=3)) for _ in range(20)]
+    turns += [Convention(KUKA).pose([0, 0, 0, 20, b, 30]).rotation for b in (90, -90)]
+    turns += [Convention(INTRINSIC).pose([0, 0, 0, 20, b, 30]).rotation for b in (90, -90)]
+    for turn in turns:
+        near = rng.uniform(-180.0, 180.0, 7 if orientation == QUATERNION else 6)
+        numbers = convention.numbers(Pose(turn, np.ones(3)), near)
+        np.testing.assert_allclose(convention.pose(numbers).rotation, turn, atol=2e-8)
+
+
+@pytest.mark.parametrize(
+    ("old", "value", "new"),
+    [
+        ("1.500", 1.49999, "1.500"), ("1.5", 2.25, "2.2500"), ("-.515", -0.25, "-.2500"),
+        ("+2", 3.0, "+3.0000"), ("1.5E-05", 0.001, "0.0010"), ("0,5", 0.75, "0,7500"),
+        ("0.01", -0.00001, "0.0000"), ("7", 7.0, "7"),
+    ],
+)  # fmt: skip
+def test_numbers_keep_their_form(old, value, new):
+    assert written(old, value, 4) == new
+
+
+def test_positions_have_the_frames_of_their_use():
+    program = read_program(EXAMPLES / "weld.src")
+    poses = [each for each in program.positions if each.kind == POSE]
+    assert {(each.tool, each.base) for each in poses} == {("1", "2")}
+    program = read_program(EXAMPLES / "weld.mod")
+    assert [each.name for each in program.positions] == [
+        "p10", "p20", "p30", "jReady", "pList{1}", "pList{2}", "line 18"
+    ]  # fmt: skip
+    assert {each.base for each in program.positions if each.kind == POSE} == {"WTABLE"}
