@@ -1,6 +1,7 @@
 """The public face on a small data set: the same tables and answers as the commands give."""
 
 import numpy as np
+import pandas as pd
 import pytest
 from stages_by_hand import perform
 
@@ -64,6 +65,16 @@ def test_joints_of_a_predicted_pose_reach_it(calibration):
     q_rad = calibration.table("measurements")[[f"q{i}" for i in range(1, 7)]].to_numpy()[:5]
     wanted = calibration.predict(q_rad).pose
     np.testing.assert_allclose(calibration.compensate(wanted, q_rad).q_rad, q_rad, atol=1e-8)
+
+
+def test_a_program_is_corrected(calibration, tmp_path):
+    program = tmp_path / "program.csv"
+    program.write_text("q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n10,5,-20,8,60,15\n")
+    corrected = calibration.compensate_program(program, at_most_mm=30.0)
+    assert list(corrected.table["status"]) == ["corrected"]
+    corrected.write(tmp_path / "corrected.csv")
+    changed = pd.read_csv(tmp_path / "corrected.csv")
+    assert 1e-4 < np.abs(changed.to_numpy() - [10, 5, -20, 8, 60, 15]).max() < 2.0
 
 
 def test_verify_and_compare_find_no_change_in_the_same_readings(calibration, config):

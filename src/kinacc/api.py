@@ -22,7 +22,7 @@ from kinacc.deployment import compare as comparing
 from kinacc.deployment import compensate as compensating
 from kinacc.deployment import folder as results
 from kinacc.deployment import predict as predicting
-from kinacc.deployment import shared_readings
+from kinacc.deployment import programs, shared_readings
 from kinacc.deployment import verify as verifying
 from kinacc.deployment.export import files as exports
 from kinacc.deployment.export import pendant as pendants
@@ -188,6 +188,29 @@ class Calibration:
             Joints (n, k) and a ``PoseStatus`` for each pose.
         """
         return compensating.compensate(self.model, poses, near_rad, s, frame, point)
+
+    def compensate_program(self, path: str | Path, **options: Any) -> programs.CorrectedProgram:
+        """A robot program with coordinates that bring the calibrated robot to its positions.
+
+        Parameters
+        ----------
+        path
+            KUKA .src, ABB .mod, FANUC .ls, Universal Robots .script, Yaskawa .jbi, or .csv.
+        options
+            As in :func:`kinacc.deployment.programs.compensate_program`: ``tools``, ``bases``,
+            ``near_rad``, ``at_most_mm`` and others.
+
+        Returns
+        -------
+        CorrectedProgram
+            ``table`` of corrections; ``write(path)`` writes the program.
+
+        Raises
+        ------
+        InputError
+            For a file that cannot be read, and frames that are missing.
+        """
+        return programs.compensate_program(self.model, path, **options)
 
     def save(self, folder: str | Path) -> Path:
         """Write all tables to a results folder that commands and :func:`load_calibration` read."""

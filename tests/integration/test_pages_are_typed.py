@@ -63,7 +63,6 @@ ASSUMED = {
     "docs/using-a-calibration.md": """
         head -5 examples/data/ur10_tmac/series_B.csv | cut -d, -f1-6 > plan.csv
         kinacc predict results/ur10_b plan.csv -o wanted.csv
-        printf 'q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\\n0,10,-20,0,60,0\\n' > program.csv
         kinacc export results/ur10_b --format yaml --out first
         kinacc export results/ur10_d --format yaml --out second
         python -c "

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
 from dataclasses import replace
 
 import click
@@ -15,8 +16,6 @@ from kinacc.deployment import programs
 from kinacc.deployment.record import Calibration
 from kinacc.errors import InputError, Problem, as_seen, first_few
 from kinacc.measurements.table import numbers_of
-
-_SHOWN = 24
 
 
 def correct(
@@ -67,13 +66,22 @@ def correct(
         at_most_mm,
         base_is_fixed,
     )
-    if table:
-        _write_table(answer, table)
     if picture:
         from kinacc.figures.program import draw
 
         Output(picture=picture).draw(draw(answer.table))
-    _show(answer, as_json)
+    facts = {
+        "language": answer.language,
+        "corrected": int((answer.table["status"] == "corrected").sum()),
+        "refused": [str(problem) for problem in answer.refused],
+        "left": answer.left,
+        "remarks": answer.remarks,
+        "positions": answer.table,
+    }
+    Output(as_json, table).show(facts, answer.table, _lines(answer))
+    if not as_json:
+        for line in _warnings(answer):
+            click.echo(as_seen(line), err=True)
     if not dry_run and out is not None:
         (replace(answer, refused=()) if leave else answer).write(out, force)
         click.echo(f"Written: {out}", err=as_json)
@@ -81,50 +89,25 @@ def correct(
         raise SystemExit(1)
 
 
-def _show(answer: programs.CorrectedProgram, as_json: bool) -> None:
+def _lines(answer: programs.CorrectedProgram) -> Iterator[str]:
     moved = answer.table["status"] == "corrected"
-    if as_json:
-        facts = {
-            "language": answer.language,
-            "corrected": int(moved.sum()),
-            "refused": [str(each) for each in answer.refused],
-            "left": answer.left,
-            "remarks": answer.remarks,
-            "positions": answer.table.to_dict("records"),
-        }
-        Output(as_json=True).say(facts, "")
-        return
-    head = f"{answer.language}: {moved.sum()} of {len(answer.table)} positions corrected"
+    yield f"{answer.language}: {moved.sum()} of {len(answer.table)} positions corrected"
     if moved.any():
         changes = answer.table.loc[moved, "change_mm"]
-        head += f", by {changes.mean():.3g} mm on average, {changes.max():.3g} mm at most"
-    click.echo(head)
-    shown = answer.table.head(_SHOWN).to_string(
-        index=False, float_format="{:.3f}".format, na_rep="-"
-    )
-    click.echo(as_seen(shown))
-    if len(answer.table) > _SHOWN:
-        click.echo(f".. {len(answer.table) - _SHOWN} rows more; --table has them all")
-    for column, bad, words in (
-        ("is_measured_there", False, "outside the measured region; their errors may be larger"),
+        yield f"Change of a position: mean {changes.mean():.3g} mm, largest {changes.max():.3g} mm"
+
+
+def _warnings(answer: programs.CorrectedProgram) -> Iterator[str]:
+    for column, bad, text in (
+        ("is_measured_there", False, "outside the measured region; errors may be larger"),
         ("is_near_singular", True, "near a singular posture"),
     ):
         named = answer.table.loc[answer.table.get(column, pd.Series()).eq(bad), "position"]
         if len(named):
-            click.echo(f"{len(named)} positions {words}: {first_few(list(named))}", err=True)
-    for line in answer.remarks:
-        click.echo(as_seen(line), err=True)
-    for line in answer.left:
-        click.echo(as_seen(f"Not corrected, computed by the program: {line}"), err=True)
-    for problem in answer.refused:
-        click.echo(f"Refused: {problem}", err=True)
-
-
-def _write_table(answer: programs.CorrectedProgram, path: str) -> None:
-    from kinacc.cli.sheet import Field, Sheet
-
-    frame = answer.table
-    Sheet("", {}, [Field(name, frame[name].to_numpy()) for name in frame]).write(path)
+            yield f"{len(named)} positions {text}: {first_few(list(named))}"
+    yield from answer.remarks
+    yield from (f"Computed by the program, not corrected: {line}" for line in answer.left)
+    yield from (f"Refused: {problem}" for problem in answer.refused)
 
 
 def _frames(option: str, texts: tuple[str, ...]) -> dict[str, np.ndarray]:

@@ -11,7 +11,7 @@ from kinacc.figures import style
 def draw(table: pd.DataFrame) -> Figure:
     """Changes in mm and mrad by position; refused positions are marked at zero."""
     with style.house():
-        figure = Figure(figsize=(7.0, 4.0), layout="constrained")
+        figure = Figure(figsize=(7.0, 5.0), layout="constrained")
         axes = figure.subplots(2, 1, sharex=True)
         places = range(len(table))
         refused = [place for place in places if table["status"].iloc[place] != "corrected"]

@@ -17,7 +17,6 @@ import numpy as np
 import pandas as pd
 
 from kinacc.deployment import compensate as inverse
-from kinacc.deployment.applicability import is_measured_there
 from kinacc.deployment.compensate import PoseStatus
 from kinacc.deployment.predict import predict
 from kinacc.deployment.programs import abb, fanuc, kuka, posture, table, universal, yaskawa
@@ -417,8 +416,8 @@ class _Correction:
             "change_mm": shift_mm,
             "change_mrad": 1e3 * turn_rad,
             "largest_joint_change_deg": np.rad2deg(np.abs(q_rad - start).max(axis=1)),
-            "expected_error_mm": np.hypot(np.nan_to_num(known.residual_mm), std),
-            "is_measured_there": is_measured_there(arm, at, _POINT),
+            "expected_error_mm": np.hypot(np.nan_to_num(known.unexplained[:, 0]), std),
+            "is_measured_there": known.near,
             "is_near_singular": np.linalg.svd(slopes, compute_uv=False)[:, -1] < _SINGULAR,
         }
         for key, column in facts.items():
