@@ -11,8 +11,6 @@ import plants
 import pytest
 from good_files import File, measured, simulated
 
-from kinacc.checks.findings import STOPPING
-from kinacc.config.schema import key
 from kinacc.kinematics import robot as robots
 from kinacc.kinematics.robot import forward
 
@@ -180,14 +178,6 @@ def in_sessions(file, counts):
     return file, session.astype(float)
 
 
-def test_sessions_have_bases_of_their_own(tmp_path):
-    file, session = in_sessions(simulated("irb120", poses=100), (60, 40))
-    assert file.but(session=session).check(tmp_path).suspicions == ()
-    rows = np.arange(80, 100)
-    bad = plants.jumped(file, (2.0, -1.0, 1.0), 1.0, rows).but(session=session)
-    only(bad.check(tmp_path), "base_jump", rows)
-
-
 def test_two_jumps_have_sizes_of_their_own(tmp_path):
     file = simulated("irb120", poses=90)
     for begin in (30, 60):
@@ -214,13 +204,6 @@ def test_a_robot_of_the_same_build_and_other_lengths(measured_on, said, tmp_path
     found = only(file.check(tmp_path), "does_not_fit", EVERY(file))
     assert found.values["largest_mm"] > 10.0
     assert found.level == "stops"
-
-
-def test_a_robot_that_is_not_the_one_described(tmp_path):
-    file = replace(good("arm"), robot="meca500")
-    found = {each.kind: each for each in file.check(tmp_path).suspicions}
-    assert set(found) <= {"does_not_fit", "outside_limits"}
-    assert set(found["does_not_fit"].lines) == lines(EVERY(file))
 
 
 @pytest.mark.parametrize("name", ["ur10_a", "ur10_c", "ur10_d", "fanuc"])
@@ -261,7 +244,3 @@ def test_readings_without_noise_of_the_arm_as_described_raise_no_suspicion(seed,
     names = [*(f"q{i}_rad" for i in range(1, 7)), "x_mm", "y_mm", "z_mm"]
     file = File(pd.DataFrame(np.hstack([q, point]), columns=names), "irb120")
     assert file.check(tmp_path).suspicions == ()
-
-
-def test_what_stops_a_workflow_can_be_accepted_in_the_configuration():
-    assert set(key("data_check.accept")["propertyNames"]["enum"]) == set(STOPPING)

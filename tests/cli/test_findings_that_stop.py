@@ -1,6 +1,5 @@
 """A finding that stops the workflow: commands to exclude its rows or to go on all the same."""
 
-import re
 import shlex
 
 import pytest
@@ -56,13 +55,6 @@ def test_the_command_that_goes_on_all_the_same_accepts_the_finding(two_slips):
     assert accepted == {"outliers": "the arm jumps there"}
 
 
-def test_further_rows_join_those_excluded_before(two_slips):
-    call("exclude", "seen.yaml", "--lines", "6", "--reason", "first")
-    call("exclude", "seen.yaml", "--lines", "10-12,7", "--reason", "second")
-    section = load(["seen.yaml"])["seen"]["measurements"]["file"]
-    assert [each["lines"] for each in section["exclude"]] == [[6], [7, 10, 11, 12]]
-
-
 @pytest.mark.parametrize("lines", ["6", "9999", "abc", "", "5-3"])
 def test_lines_that_are_excluded_already_or_none_leave_the_file_as_it_is(two_slips, lines):
     call("exclude", "seen.yaml", "--lines", "6", "--reason", "first")
@@ -81,11 +73,3 @@ def test_rows_are_excluded_in_a_file_written_in_flow_style_too(two_slips):
     assert (two_slips / "seen.yaml").read_text().startswith("# by hand\n")
     section = load(["seen.yaml"])["seen"]["measurements"]["file"]
     assert section["exclude"] == [{"lines": [6, 7], "reason": "by hand: 5 mm"}]
-
-
-def test_init_beside_a_robot_file_of_the_same_name_uses_it(two_slips):
-    robot = (two_slips / "seen.robot.yaml").read_bytes()
-    (two_slips / "seen.yaml").unlink()
-    call("init", "seen.csv", "--robot", "seen.robot.yaml", "--yes")
-    assert (two_slips / "seen.robot.yaml").read_bytes() == robot
-    assert re.search(r"robot: seen\.robot\.yaml", (two_slips / "seen.yaml").read_text())

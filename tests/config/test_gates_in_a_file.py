@@ -2,11 +2,8 @@
 
 import pytest
 
-from kinacc.config.gate_rules import FIGURES
 from kinacc.config.load import load
 from kinacc.errors import InputError
-from kinacc.gate import values
-from kinacc.gate.values import RunTables
 
 END = "datasets: {mh180: {robot: mh180}, other: {robot: mh180}}\n"
 
@@ -21,25 +18,6 @@ def problems(tmp_path, text, end=END):
     with pytest.raises(InputError) as caught:
         loaded(tmp_path, text, end)
     return [str(each) for each in caught.value.problems]
-
-
-def test_the_gates_of_the_issue_are_read_with_what_they_leave_open(tmp_path):
-    gates = loaded(
-        tmp_path,
-        """gates:
-- {name: held out, value: residuals.position.p99, model: selected, at_most_mm: 0.8}
-- {name: not worse, value: residuals.position.mean, against: accepted, allow_mm: 0.02}
-- {name: acceptance, campaign: checks/march, tolerance_mm: 1.0, undecided: warn}
-- {name: paper, claims: agree, except: [map_nonlinear]}
-- {name: data, suspicions: none, on_fail: warn, datasets: [other]}
-""",
-    )
-    own = gates["mh180"]["gates"]
-    assert [each["kind"] for each in own] == ["value", "against", "campaign", "claims"]
-    assert own[0]["at"] == "held_out"
-    assert own[0]["undecided"] == "fail"
-    assert own[1]["beyond_chance"] == 0.99
-    assert [each["name"] for each in gates["other"]["gates"]][-1] == "data"
 
 
 def test_every_mistake_in_gates_is_told_at_once_with_its_place_and_what_is_meant(tmp_path):
@@ -76,19 +54,6 @@ def test_every_mistake_in_gates_is_told_at_once_with_its_place_and_what_is_meant
         assert words in one
 
 
-def test_a_gate_about_a_data_set_that_is_not_there_is_refused(tmp_path):
-    (told,) = problems(tmp_path, "gates: [{name: a, history: holds, datasets: [mh18]}]\n")
-    assert "names mh18" in told
-    assert "mh180, other" in told
-
-
-def test_a_gate_inside_of_a_data_set_names_no_data_sets(tmp_path):
-    end = "datasets:\n  mh180:\n    robot: mh180\n    gates:\n"
-    end += "    - {name: a, history: holds, datasets: [mh180]}\n"
-    (told,) = problems(tmp_path, "", end)
-    assert "cell.yaml:4, datasets.mh180.gates" in told
-
-
 @pytest.mark.parametrize(
     ("tolerance", "gate", "fits"),
     [
@@ -111,17 +76,3 @@ def test_a_gate_without_a_limit_has_that_of_the_tolerance_if_it_is_of_the_same(
     else:
         (told,) = problems(tmp_path, text)
         assert "gates[0]" in told
-
-
-def test_campaigns_are_sought_from_the_folder_of_the_configuration(tmp_path):
-    (tmp_path / "cell").mkdir()
-    path = tmp_path / "cell" / "cell.yaml"
-    path.write_text("gates: [{name: a, campaign: check, tolerance_mm: 1}]\n" + END)
-    assert load([path], folder=tmp_path)["mh180"]["gates"][0]["campaign"] == "cell/check"
-
-
-def test_every_figure_of_the_schema_can_be_asked_for(tmp_path):
-    gate = {"model": "dh", "at": "held_out"}
-    for name in FIGURES:
-        with pytest.raises(InputError, match=r"missing|no such file|no calibration"):
-            values.figure(name, RunTables(tmp_path), gate)

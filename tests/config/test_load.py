@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from kinacc.checks.contradictions import load
-from kinacc.config.schema import defaults, without_execution_keys
+from kinacc.config.schema import defaults
 from kinacc.errors import InputError
 
 ROOT = Path(__file__).parents[2]
@@ -34,12 +34,6 @@ def complaints(*paths, **more) -> list[str]:
     return [str(problem) for problem in caught.value.problems]
 
 
-def the_one(found: list[str], *words: str) -> str:
-    matching = [text for text in found if all(word in text for word in words)]
-    assert len(matching) == 1, f"{words} in {len(matching)} of {found}"
-    return matching[0]
-
-
 def test_the_paper_s_study_is_the_default():
     loaded = load([PAPER])
     assert list(loaded) == ["mh180"]
@@ -49,21 +43,6 @@ def test_the_paper_s_study_is_the_default():
     histories = paper["histories"]
     for name, eta_mm in (("rejected", 0.834), ("larger", 0.844), ("kept", 1.023)):
         assert histories[f"eta_ratio_{name}"] * 0.906 == pytest.approx(eta_mm, abs=1e-6)
-
-
-def test_the_ur10_example_adds_its_data_sets():
-    loaded = load([PAPER, UR10], folder=ROOT)
-    assert list(loaded) == ["mh180", "ur10_b", "ur10_d"]
-    for name, series in (("ur10_b", "series_B.csv"), ("ur10_d", "series_D.csv")):
-        own = loaded[name]
-        assert own["robot"] == "ur10"
-        assert own["measurements"]["file"]["path"].endswith(series)
-        assert own["measurements"]["folds"] == 5
-        assert own["calibration"]["base_and_tool"] == "estimated"
-        assert own["calibration"]["dh"]["hayati_joints"] == [2, 3]
-        assert own["study"] == loaded["mh180"]["study"]
-        assert own["evaluation"]["space"] == "measured"
-    assert loaded["mh180"] == load([PAPER])["mh180"]
 
 
 def test_paths_are_seen_from_the_file_they_stand_in(tmp_path, monkeypatch):
@@ -96,26 +75,6 @@ def test_later_files_replace_values_and_keep_the_rest(config):
     assert loaded["mh180"]["study"]["measurements"] == 200
     assert (loaded["second"]["study"]["repetitions"], loaded["second"]["seed"]) == (3, 9)
     assert loaded["mh180"]["seed"] == defaults()["seed"]
-
-
-def test_a_value_of_the_command_line_is_no_second_file():
-    source = {"measurements": {"source": "synthetic"}}
-    assert load([PAPER], {"datasets": {"mh180": source}})["mh180"]
-    with pytest.raises(InputError) as caught:
-        load([PAPER], {"datasets": {"mh180": {"measurements": {"source": "File"}}}})
-    (problem,) = caught.value.problems
-    assert problem.where == "command line, datasets.mh180.measurements.source"
-
-
-def test_column_names_of_two_data_sets_do_not_mix(config, tmp_path):
-    (tmp_path / "data.csv").write_text("x\n")
-    own = config("""
-        measurements: {file: {path: data.csv, columns: {x: X, y: Y}}}
-        datasets:
-          a: {robot: ur10, measurements: {source: file, file: {columns: {x: east}}}}
-        """)
-    loaded = load([own], folder=tmp_path)
-    assert loaded["a"]["measurements"]["file"]["columns"] == {"x": "east"}
 
 
 OWN = "datasets: {own: {robot: ur10, measurements: {source: file, file: {"
@@ -183,29 +142,6 @@ def test_bad_configuration_is_named_with_its_place(config, text, place, words, t
     assert words in found
 
 
-REPEATED = {
-    "repeated key": ("map:\n  grid_mm: 25\n  grid_mm: 30\n", ("own.yaml:3", "first in line 2")),
-    "repeated section": ("map: {grid_mm: 25}\nmap: {grid_mm: 5}\n", ("own.yaml:2, map", "twice")),
-    "repeated data set": (
-        "datasets:\n  a: {robot: mh180}\n  a: {robot: mh180}\n",
-        ("own.yaml:3, datasets.a", "'a' is given twice"),
-    ),
-}
-
-
-@pytest.mark.parametrize("kind", REPEATED)
-def test_what_yaml_would_silently_overwrite_is_named(config, kind):
-    text, words = REPEATED[kind]
-    the_one(complaints(PAPER, config(text)), *words)
-
-
-def test_a_data_set_measured_in_two_files_is_named(config):
-    own = config("datasets: {mh180: {robot: ur10, measurements: {source: synthetic}}}")
-    text = the_one(complaints(PAPER, own), "two files")
-    assert "own.yaml:1, datasets.mh180.measurements.source" in text
-    assert "config.yaml" in text
-
-
 @pytest.mark.parametrize(
     ("content", "words"),
     [
@@ -226,10 +162,6 @@ def test_what_is_no_configuration_at_all(tmp_path, content, words):
     assert any(words in text and "own.yaml" in text for text in found), found
 
 
-def test_no_data_set_is_a_problem(config):
-    the_one(complaints(config("seed: 1\n")), "no data set is given", "own.yaml")
-
-
 def test_all_problems_come_in_one_message(config):
     own = config("""
         study: {alpha: 2, repetitions: 0, noise_mm: [.nan]}
@@ -242,19 +174,3 @@ def test_all_problems_come_in_one_message(config):
     assert len(found) == 8, found
     lines = [int(text.split("own.yaml:")[1].split(",")[0]) for text in found]
     assert lines == sorted(lines)
-
-
-@pytest.mark.parametrize("text", ["", "limits_deg: [a, b]", "limits_deg: [[1], 2]", "dh: ["])
-def test_faults_of_a_robot_file_are_left_to_its_reader(config, text):
-    robot = config(text, "arm.yaml")
-    own = config(f"datasets: {{own: {{robot: {robot}}}}}")
-    assert load([PAPER, own])["own"]["robot"] == str(robot)
-
-
-def test_execution_keys_stay_out_of_hashes():
-    loaded = load([PAPER])["mh180"]
-    kept = without_execution_keys(loaded)
-    assert "chunks" in loaded["study"]
-    assert "chunks" not in kept["study"]
-    assert kept["study"]["alpha"] == 0.6
-    assert without_execution_keys({"study": {"chunks": 3}}) == {"study": {}}

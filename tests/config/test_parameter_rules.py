@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from kinacc.calibration.constraints import arm_terms, free_parameters, parallel_joints
+from kinacc.calibration.constraints import arm_terms, free_parameters
 from kinacc.config import parameter_rules
 from kinacc.config.settings import Calibration, DhFit
-from kinacc.kinematics.robot import load, shipped
+from kinacc.kinematics.robot import load
 
 
 def joint_rules(content):
@@ -26,13 +26,6 @@ def test_the_rule_that_says_most_holds_in_any_order():
         assert terms.std[2, 1] == 0.5
         assert np.isinf(np.delete(terms.std, 2, axis=0)).all()
         assert terms.free[:, [0, 2, 3]].all()
-
-
-def test_a_rule_for_a_joint_leaves_beta_to_the_hayati_joints():
-    terms = arm_terms(load("mh180").dh, free_parameters(6), joint_rules({"joint 2": "free"}))
-    assert not terms.free[1, 4]
-    terms = arm_terms(load("mh180").dh, free_parameters(6), joint_rules({"joint 2 beta": "free"}))
-    assert terms.free[1, 4]
 
 
 def test_values_are_in_the_units_they_say_and_fix_without_a_prior():
@@ -85,19 +78,3 @@ def test_frames_are_named_as_in_the_tables():
     ]
     with pytest.raises(ValidationError, match="no parameter of frames"):
         Calibration(frames={"joint 3 d": "fixed"}, base_and_tool="estimated")
-
-
-def test_parallel_axes_of_every_shipped_arm():
-    found = {name: parallel_joints(load(name).dh) for name in shipped()}
-    expected = dict.fromkeys(found, (2,)) | {"ur10": (2, 3), "iiwa14": ()}
-    assert {name: found[name] for name in found if "iiwa" not in name} == {
-        name: expected[name] for name in found if "iiwa" not in name
-    }
-    assert all(found[name] == () for name in found if "iiwa" in name)
-
-
-def test_beta_takes_the_place_of_d_where_asked():
-    beside, instead = (free_parameters(6, (2, 3), each) for each in (False, True))
-    assert beside.sum() == 26
-    assert instead.sum() == 24
-    assert not instead[[1, 2], 1].any()

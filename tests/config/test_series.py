@@ -63,14 +63,6 @@ def test_every_line_is_a_data_set_and_the_arm_is_its_newest(written):
     assert flags == [(MARCH, None, None), (MAY, "same", "same"), (JUNE, "moved", "same")]
 
 
-def test_files_are_sought_beside_the_configuration(written, tmp_path, monkeypatch):
-    written(SERIES)
-    (tmp_path / "elsewhere").mkdir()
-    monkeypatch.chdir(tmp_path / "elsewhere")
-    loaded = load(["../tracker.yaml"])
-    assert loaded[MAY]["measurements"]["file"]["path"] == "../may.csv"
-
-
 @pytest.mark.parametrize(
     ("line", "told"),
     [
@@ -102,24 +94,6 @@ def test_a_series_beside_what_is_of_one_file_is_a_contradiction(written):
     top = "measurements: {file: {path: march.csv, exclude: [{lines: 2, reason: bumped}]}}"
     found = complaints(written(series, own, top))
     assert any("beside a series of files" in each for each in found)
-
-
-def test_a_series_of_a_synthetic_arm_is_refused(written):
-    path = written("      - {path: march.csv, date: 2026-03-01}\n")
-    text = Path(path).read_text().replace("source: file, ", "")
-    Path(path).write_text(text)
-    assert complaints(path)
-
-
-def test_a_line_and_a_data_set_of_one_name_are_told_apart_by_a_person(written):
-    more = f"""\
-  {JUNE}:
-    robot: ur10
-    measurements: {{source: file, file: {{path: may.csv}}}}
-    evaluation: {{space: measured}}
-"""
-    (found,) = complaints(written(SERIES, more=more))
-    assert "has the name of another data set" in found
 
 
 def test_a_series_given_in_two_files_is_refused(written, tmp_path):

@@ -40,36 +40,6 @@ def test_the_interval_of_a_mean_is_students_where_errors_are_normal():
     assert least == pytest.approx(now.mean() - before.mean() - 2.33 * spread, abs=0.2 * spread)
 
 
-def test_the_same_poses_show_a_change_that_others_hide():
-    before = sizes(1, 300)
-    now = before + 0.03 + np.random.default_rng(3).normal(scale=0.01, size=300)
-    assert changed("mean", now, before, True).least > 0.02
-    assert changed("mean", now, before).least < 0.0
-
-
-def test_readings_of_one_pose_count_as_one():
-    before, now = np.repeat(sizes(1, 30), 20), np.repeat(sizes(2, 30, 1.4), 20)
-    together = changed("mean", now, before, poses=np.repeat(np.arange(30), 20)).least
-    assert together == pytest.approx(changed("mean", now[::20], before[::20]).least, abs=0.02)
-    assert changed("mean", now, before).least > together + 0.2
-
-
-def test_a_largest_error_compares_at_the_same_poses_only():
-    before = sizes(1, 50)
-    now = np.where(before == before.max(), before + 3.0, before)
-    found = changed("largest", now, before, True)
-    assert found.least == found.difference == pytest.approx(3.0)
-    for other in (sizes(2, 50), sizes(2, 200)):
-        assert np.isnan(changed("largest", other, before).least)
-
-
-@pytest.mark.parametrize(("statistic", "count"), [("mean", 19), ("rms", 8), ("p99", 199)])
-def test_too_few_poses_leave_it_undecided(statistic, count):
-    found = changed(statistic, sizes(1, count, 9.0), sizes(2, 500))
-    assert np.isnan(found.least)
-    assert f"{count} poses" in found.open
-
-
 def test_an_arm_that_is_worse_by_exactly_the_allowance_seldom_fails():
     """At most 1 of 100 is asked for; benchmarks/README.md has more kinds of errors."""
     draw, failed = np.random.default_rng(7), 0

@@ -97,16 +97,6 @@ def test_results_as_the_stages_left_them_pass(here):
     assert [each["dataset"] for each in told("results/mh180").values()] == ["mh180"]
 
 
-@pytest.mark.parametrize(
-    "words", [("nowhere",), ("results", "--config", "nowhere.yaml"), ("results", "--out", "a.doc")]
-)
-def test_what_cannot_be_used_ends_with_2_and_no_traceback(here, words):
-    done = call("check-results", *words)
-    assert done.exit_code == 2
-    assert words[-1].partition(".")[0] in done.output
-    assert "Traceback" not in done.output
-
-
 def _edited(path):
     pq.write_table(pq.read_table(path).slice(1), path)
 
@@ -146,16 +136,6 @@ def test_a_threshold_of_the_configuration_is_held(here, limit_mm, code, verdict)
     assert found["figures"]["value_mm"] == pytest.approx(mean_mm, rel=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("asked", "code", "verdict"),
-    [("fail", 1, "failed"), ("warn", 0, "warned"), ("pass", 0, "undecided")],
-)
-def test_the_configuration_decides_what_too_few_data_mean(here, asked, code, verdict):
-    gate = f"{{name: tail, value: residuals.position.p99, at_most_mm: 50, undecided: {asked}}}"
-    Path("config.yaml").write_text(f"datasets: {{mh180: {{robot: mh180}}}}\ngates: [{gate}]\n")
-    assert told("results", code=code)["tail"]["verdict"] == verdict
-
-
 def test_reports_for_machines_can_be_read_by_them(here):
     names = ["check.json", "metrics.json", "check.xml", "check.md", "check.txt"]
     words = [word for name in names for word in ("--out", name)]
@@ -174,16 +154,6 @@ def test_reports_for_machines_can_be_read_by_them(here):
     assert suite[1].find("failure") is not None
     assert r"| failed | mh180 | a \<b\> & " in Path("check.md").read_text()
     assert Path("check.txt").read_text().startswith("FAIL: results, 1 passed, 1 failed\n")
-
-
-def test_the_same_measurements_have_to_give_the_same_tables(here, made):
-    assert told("results", "--against", made["again"])["accepted run"]["verdict"] == "passed"
-    config = Path("other.yaml")
-    config.write_text((SMALL % WEEKS["first"]).replace("{vec:", "{dh: {truncation: 0.1}, vec:"))
-    calibrated(config, here / "results", ("dh", "residuals", "summary"))
-    found = told("results", "--against", made["again"], code=1)["accepted run"]
-    assert found["figures"]["columns"] > 0
-    assert "dh_covariance" in found["says"]
 
 
 @pytest.mark.parametrize(
@@ -215,17 +185,6 @@ def test_a_knocked_joint_makes_the_accepted_calibration_hold_no_more(made, tmp_p
     assert unchanged["arm"]["verdict"] == "passed"
 
 
-def test_a_parameter_that_moved_beyond_its_uncertainty_is_named(made, here):
-    shutil.copytree(made["next"], "moved")
-    path = Path("moved/mh180/dh_model.parquet")
-    model = pq.read_table(path).to_pandas()
-    offsets = model["theta_offset_rad"] + 50.0 * model["std_theta_offset_rad"] * (model.joint == 4)
-    column_set(path, "theta_offset_rad", offsets)
-    found = told("moved", "--against", "results")["parameters"]
-    assert found["verdict"] == "warned"
-    assert "theta_offset of joint 4" in found["says"]
-
-
 def test_a_run_is_accepted_for_a_reason_and_later_runs_are_compared_with_it(here):
     accept = ("check-results", "results", "--accept", "accepted")
     assert call(*accept).exit_code == 2
@@ -238,18 +197,6 @@ def test_a_run_is_accepted_for_a_reason_and_later_runs_are_compared_with_it(here
     assert told("results", "--against", "accepted")["accepted run"]["verdict"] == "passed"
     assert call(*accept, "--reason", "a second time").exit_code == 0
     assert len(json.loads(Path("accepted/accepted.json").read_text())) == 2
-
-
-def test_what_fails_is_not_accepted_and_no_other_folder_is_overwritten(here):
-    Path("mine").mkdir()
-    Path("mine/thesis.tex").write_text("years of work")
-    assert told("results", "--against", "mine", code=1)["accepted run"]["verdict"] == "failed"
-    words = ("check-results", "results", "--reason", "why not", "--accept")
-    assert call(*words, "mine").exit_code == 2
-    assert [each.name for each in Path("mine").iterdir()] == ["thesis.tex"]
-    Path("results/mh180/frames.parquet").write_bytes(b"PAR1")
-    assert call(*words, "accepted").exit_code == 1
-    assert not Path("accepted").exists()
 
 
 def test_sixty_files_with_one_bit_turned_are_all_found(finished, tmp_path):

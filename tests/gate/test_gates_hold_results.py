@@ -75,26 +75,6 @@ def test_a_figure_is_held_to_its_limit_on_either_side_of_it(tmp_path, statistic,
         assert judged(tmp_path, f"{name}, {limit}", tables).verdict == FAILED
 
 
-def test_a_percentile_is_empirical_or_of_a_distribution_and_says_which(tmp_path):
-    tables = run(tmp_path / "r", vectors(150))
-    one, other = (
-        judged(tmp_path, f"value: residuals.position.{name}, at_most_mm: 9", tables).figures
-        for name in ("p99", "p99_gamma")
-    )
-    assert one["statistic"] == "empirical 99 % quantile"
-    assert other["statistic"] == "99 % gamma quantile"
-    assert one["value_mm"] != other["value_mm"]
-
-
-def test_other_rows_are_asked_for_by_name(tmp_path):
-    errors = vectors(100)
-    tables, sizes = run(tmp_path / "r", errors), np.linalg.norm(errors, axis=1)
-    for at, wanted in {"training": 0.5 * sizes, "validation": sizes[:20]}.items():
-        found = judged(tmp_path, f"{MEAN}, at: {at}, at_most_mm: 9", tables)
-        assert found.figures["value_mm"] == pytest.approx(wanted.mean())
-        assert found.figures["rows"] == len(wanted)
-
-
 @pytest.mark.parametrize(
     ("text", "tolerance", "verdict"),
     [
@@ -139,24 +119,6 @@ def test_any_number_of_a_table_is_held_to_a_limit(tmp_path, row, limit, verdict,
     found = judged(tmp_path, f"table: residuals, row: {row}, column: mean, {limit}", tables)
     assert found.verdict == verdict
     assert key is None or key in found.figures
-
-
-@pytest.mark.parametrize(
-    ("text", "names"),
-    [
-        (f"{MEAN}, at_most_mm: 1", "kinacc calibrate FILE.yaml"),
-        ("claims: agree", "kinacc study FILE.yaml"),
-        ("history: holds", "series"),
-        ("suspicions: none", "kinacc calibrate FILE.yaml"),
-        ("value: bound.upper, at_most_mm: 1", "workflow"),
-        ("campaign: check, tolerance_mm: 1", "kinacc campaign start"),
-        (f"{SINCE}, allow_mm: 0.1", "--accept FOLDER"),
-    ],
-)
-def test_a_gate_whose_table_is_missing_fails_and_names_the_command(tmp_path, text, names):
-    found = judged(tmp_path, text, RunTables(tmp_path / "nothing"))
-    assert found.verdict == FAILED
-    assert names in found.fix
 
 
 @pytest.mark.parametrize(

@@ -77,15 +77,3 @@ def test_files_and_columns_that_are_missing_are_named(tmp_path):
     assert (told.table, told.what) == (before.name, "missing")
     with pytest.raises(InputError, match="holds no table"):
         list(compare_folders(now.parent, before.parent))
-
-
-@pytest.mark.parametrize(("row", "value"), [("text", "other"), ("number", None), ("number", 2.0)])
-def test_words_and_nulls_are_equal_or_differ(tmp_path, row, value):
-    table = {"quantity": ["text", "number"], "number": [1, 2], "parameter": ["one", "one"]}
-    table |= {"value": [1.0, 1.0], "unit": ["mm", "mm"]}
-    column, place = ("parameter", 0) if row == "text" else ("value", 1)
-    now = changed(table, column, place, value)
-    paths = [written(tmp_path / name, "vec_fit", each) for name, each in (("a", table), ("b", now))]
-    assert [each.table for each in compare_tables(*paths)] == ["vec_fit"] * (
-        2 if row == "text" else 1
-    )

@@ -42,12 +42,6 @@ def test_digests_are_those_of_sha256sum(folder):
     }
 
 
-def test_nothing_is_changed_or_outdated_after_a_run(folder):
-    assert list(sums.changed(folder)) == []
-    assert sums.outdated(folder) == []
-    assert sums.changed_since(folder) == []
-
-
 def test_an_edited_file_is_refused_by_its_name_with_what_to_do(folder):
     path = folder / "poses.parquet"
     sums.hold(path, path.read_bytes())
@@ -59,33 +53,8 @@ def test_an_edited_file_is_refused_by_its_name_with_what_to_do(folder):
     assert [problem.where for problem in sums.changed(folder)] == [str(path)]
 
 
-def test_a_missing_file_is_a_problem_and_one_that_no_stage_left_is_refused(folder):
-    (folder / "more.parquet").unlink()
-    assert [problem.where for problem in sums.changed(folder)] == [str(folder / "more.parquet")]
-    with pytest.raises(InputError, match="no digest"):
-        sums.hold(folder / "copied.parquet", b"")
-
-
 def test_a_stage_that_ran_again_makes_what_was_made_from_its_table_outdated(folder):
     leave(folder, "measurements", {"poses.parquet": b"new poses"}, {})
     assert sums.outdated(folder) == ["fit.parquet", "more.parquet"]
     assert [name.rpartition("/")[2] for name in sums.changed_since(folder)] == ["poses.parquet"]
     assert list(sums.changed(folder)) == []
-
-
-@pytest.mark.parametrize("change", ["edited", "removed"])
-def test_a_file_from_outside_that_changed_makes_its_table_outdated(folder, change):
-    file = folder.parents[1] / "poses.csv"
-    file.write_bytes(b"1,2,4\n") if change == "edited" else file.unlink()
-    assert sums.outdated(folder) == ["poses.parquet"]
-
-
-def test_a_list_of_digests_that_is_none_is_named(folder):
-    (folder / "sums" / "fit.sha256").write_text("what is this\n")
-    with pytest.raises(InputError, match=r"fit\.sha256"):
-        sums.stated(folder)
-
-
-def test_a_part_belongs_to_the_folder_of_its_data_set(folder):
-    part = folder / "study_chunk" / "1-of-2.parquet"
-    assert sums.folder_of(part) == folder

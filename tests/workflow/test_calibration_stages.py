@@ -14,11 +14,9 @@ from kinacc.geometry import Pose, compose, exp_so3, quaternion_from_rotation
 from kinacc.kinematics import dh as dh_kinematics
 from kinacc.kinematics import robot
 from kinacc.kinematics import vec as vec_kinematics
-from kinacc.kinematics.tables import frame, models
-from kinacc.study import evaluation
+from kinacc.kinematics.tables import models
 from kinacc.study.in_memory import RUNS
 from kinacc.synthetic import source
-from kinacc.tables.store import to_table
 from kinacc.workflow.data_sets import read_data_sets
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -26,7 +24,6 @@ POSES, AGAIN = 150, 15  # the last poses visit the first ones again
 MARKS = {"kinacc_version": "0", "config_hash": "0", "seed": 1}
 BASE = Pose(exp_so3(np.array([0.2, 1.0, -2.0])), np.array([1500.0, -700.0, 300.0]))
 TOOL = Pose(exp_so3(np.array([0.5, -0.3, 0.1])), np.array([20.0, 30.0, 150.0]))
-NO_TOOL = Pose(np.eye(3), np.zeros(3))
 # Keys of the section calibration that estimate base and tool and fit DH to what was measured.
 MEASURED = {"base_and_tool": "estimated", "dh__fit_to": "measurements"}
 SETTINGS = read_data_sets([ROOT / "config.yaml"]).settings["mh180"]
@@ -80,13 +77,6 @@ def tables():
     return chain(source.split(columns(), SETTINGS))
 
 
-@pytest.fixture(scope="module")
-def placed():
-    """Measurements with a base and a tool that are estimated, and all of their tables."""
-    split = source.split(columns(BASE, TOOL), SETTINGS)
-    return split, chain(split, **MEASURED)
-
-
 def rows(found, comparison, subset="validation"):
     """Statistics of position errors; folds are the index, -1 for all."""
     table = pd.DataFrame(found["residuals"])
@@ -96,11 +86,6 @@ def rows(found, comparison, subset="validation"):
 
 def joints(table):
     return np.stack([table[f"q{i}"] for i in range(1, 7)], axis=1)
-
-
-def test_every_table_is_as_the_contract_says(tables):
-    for name, table in tables.items():
-        assert set(to_table(name, table, MARKS).column_names) >= set(table), name
 
 
 def test_configurations_visited_twice_are_held_out_together(tables):
@@ -145,89 +130,6 @@ def test_rows_of_the_validation_fold_never_reach_the_delivered_models(tables):
     np.testing.assert_array_equal(again["coefficient"], tables["vec_model"]["coefficient"])
 
 
-def test_rank_of_the_vec_is_in_its_table(tables):
-    table = pd.DataFrame(tables["vec_fit"])
-    values = table.drop_duplicates("quantity").set_index("quantity")
-    assert values.loc["rank", "value"] == 36 * 3 - 10
-    assert values.loc["converged", "value"] == 1.0
-    assert (table.quantity == "singular_value").sum() == 108
-    assert values.loc["prior_std", "parameter"] == "j1.delta_x.0"
-
-
-def test_base_and_tool_estimated_and_fitted_to_measurements(placed):
-    _, found = placed
-    names = set(zip(found["frames"]["model"], found["frames"]["frame"], strict=True))
-    assert names == {(model, of) for model in ("vec", "dh", "nominal") for of in ("base", "tool")}
-    got = frame(found["frames"], "dh", "base")
-    assert np.linalg.norm(got.position_mm - BASE.position_mm) < 20.0
-    assert rows(found, "vec_vs_measured").loc[-1, "rms"] < 0.05 * np.sqrt(3) * 1.6
-
-
-def test_masks_priors_loss_and_hayati_angles_come_from_the_configuration(placed):
-    found = chain(
-        placed[0],
-        **MEASURED,
-        frames={"base z": {"value_mm": 300.0}, "tool x": {"prior_std_mm": 50.0}},
-        dh__hayati_joints="auto",
-        dh__loss="huber",
-        dh__parameters={"joint 1 d": "fixed", "joint 4 a": {"value_mm": 0.125}},
-    )
-    table = found["dh_model"]
-    assert table["beta_rad"][1] != 0.0  # axes 2 and 3 are parallel
-    assert np.count_nonzero(table["beta_rad"]) == 1
-    assert (table["d_mm"][0], table["d_mm"][1], table["a_mm"][3]) == (0.0, 0.0, 0.125)
-    assert np.isnan(table["std_d_mm"][:2]).all()
-    for model in ("dh", "nominal"):
-        assert frame(found["frames"], model, "base").position_mm[2] == pytest.approx(300.0)
-    figures = dict(zip(found["dh_fit"]["quantity"], found["dh_fit"]["value"], strict=True))
-    assert 0.05 < figures["loss_scale"] < 1.0
-    assert rows(found, "dh_vs_measured").loc[-1, "rms"] < 1.5
-
-
-def test_a_cylinder_is_assessed_with_bases_and_tools_that_were_estimated(placed):
-    found = placed[1]
-    cylinder = {"inner_radius_mm": 1200.0, "radial_span_mm": 900.0, "bottom_mm": 800.0,
-                "height_mm": 1000.0, "angle_deg": [-25.0, 25.0]}  # fmt: skip
-    changes = {"space": "cylinder", "points_in": "joints", "points": 30, "cylinder": cylinder}
-    points = evaluation.points(found, settings_of("evaluation", **changes))["assessment_points"]
-    of, q, seen = models(found, robot.load("mh180").dh), joints(points), []
-    for name, pose in (
-        ("vec", vec_kinematics.pose(of["vec"], q)),
-        ("dh", dh_kinematics.forward(of["dh"], q)),
-    ):
-        base, tool = (frame(found["frames"], name, which) for which in ("base", "tool"))
-        seen.append(compose(base, compose(pose, tool)).position_mm)  # in the instrument's frame
-    apart = np.linalg.norm(seen[0] - seen[1], axis=1)
-    np.testing.assert_allclose(points["true_error_mm"], apart, rtol=1e-9, atol=1e-9)
-    assert apart.max() < 5.0
-
-
-def test_a_base_all_of_which_is_fixed_is_held_in_every_model():
-    base = Pose(exp_so3(np.array([0.0, 0.0, 0.3])), BASE.position_mm)
-    stated = {f"base {axis}": {"value_mm": base.position_mm[i]} for i, axis in enumerate("xyz")}
-    stated |= {"base rx": "fixed", "base ry": "fixed", "base rz": {"value_rad": 0.3}}
-    found = chain(source.split(columns(base, NO_TOOL), SETTINGS), **MEASURED, frames=stated)
-    for model in ("vec", "dh", "nominal"):
-        at = frame(found["frames"], model, "base")
-        np.testing.assert_allclose(at.position_mm, base.position_mm, atol=1e-9)
-        np.testing.assert_allclose(at.rotation, base.rotation, atol=1e-12)
-
-
-def test_without_folds_there_is_nothing_to_cross_validate():
-    split = source.split(columns(), settings_of("measurements", folds=None, validation_fold=None))
-    assert np.isnan(split["fold"]).all()
-    found = chain(split)
-    assert set(found["residuals"]["subset"]) == {"train"}
-    assert set(found["pose_errors"]["estimate"]) == {"train"}
-
-
-def test_time_blocks_hold_out_runs_of_the_measurement():
-    fold = source.split(columns(), settings_of("measurements", fold_by="time_block"))["fold"]
-    assert (np.diff(fold[:-AGAIN]) >= 0).all()
-    np.testing.assert_array_equal(fold[-AGAIN:], fold[:AGAIN])
-    assert set(fold) == {0, 1, 2, 3, 4}
-
-
 def test_a_session_that_one_fold_holds_alone_always_trains_and_is_named():
     measured = columns(BASE, Pose(np.eye(3), np.array([20.0, 30.0, 150.0])))
     alone = (np.arange(POSES) >= 40) & (np.arange(POSES) < 44)
@@ -242,29 +144,7 @@ def test_a_session_that_one_fold_holds_alone_always_trains_and_is_named():
     assert held_out["ex_mm"].abs().max() < 3.0
 
 
-def test_a_target_seen_in_one_configuration_always_trains():
-    measured = {name: np.concatenate([values, values[:1]]) for name, values in columns().items()}
-    measured["target"][POSES] = "rare"
-    with pytest.warns(UserWarning, match="target rare has fewer than 3 rows"):
-        split = source.split(measured, SETTINGS)
-    # The first configuration is visited again by the first of the last poses.
-    assert np.flatnonzero(np.isnan(split["fold"])).tolist() == [0, POSES - AGAIN, POSES]
-
-
 def test_too_few_poses_for_an_order_are_bad_input():
     few = {name: values[:20] for name, values in columns().items()}
     with pytest.raises(InputError, match=r"96 residual components .* 216 free parameters"):
         RUNS["vec"]({"measurements": source.split(few, SETTINGS)}, settings_of(vec__order=5))
-
-
-@pytest.mark.parametrize(("dataset", "reach_mm"), [("ur10_b", 0.475), ("ur10_d", 0.43)])
-def test_reach_on_the_measured_ur10(dataset, reach_mm, monkeypatch):
-    monkeypatch.chdir(ROOT)
-    measured = read_data_sets([ROOT / "config.yaml", ROOT / "examples" / "ur10.yaml"])
-    found: dict = {}
-    for name in ("measurements", "vec", "dh", "residuals"):
-        found |= RUNS[name](found, measured.settings[dataset])
-    rms = {of: rows(found, f"{of}_vs_measured").loc[-1, "rms"] for of in ("vec", "dh", "nominal")}
-    assert rms["dh"] <= reach_mm
-    assert rms["vec"] <= 0.9 * rms["dh"]
-    assert rms["nominal"] > 0.7
