@@ -70,9 +70,9 @@ def plan(out, **given) -> None:
     if out.picture is not None:
         _draw(found, aim, out)
     if out.table is not None:
-        from kinacc.cli.summary import write
+        from kinacc.cli.output import write_table
 
-        write(found.table, Path(out.table))
+        write_table(found.table, out.table)
     if out.as_json:
         click.echo(json.dumps(plain(asdict(found)), indent=1))
         return

@@ -48,16 +48,17 @@ class Output:
         table: pd.DataFrame,
         lines: Iterable[str] = (),
         shown: pd.DataFrame | None = None,
+        most: int = 24,
     ) -> None:
         """Write ``table``; print ``answer`` as JSON, or ``lines`` and the table.
 
         ``answer`` is the result of the command, a dataclass or a mapping; ``shown`` are the rows
-        of the screen, where they are not those of ``table``.
+        of the screen, where they are not those of ``table``, and ``most`` the number of these.
         """
         if self.table is not None:
             write_table(table, self.table, answer)
         if self.as_json:
-            click.echo(json.dumps(plain(answer), indent=1))
+            click.echo(json.dumps(plain(answer), indent=1, default=str))
             return
         for line in lines:
             click.echo(as_seen(line))
@@ -66,7 +67,7 @@ class Output:
             return
         table = table if shown is None else shown
         if len(table):
-            print_table(table)
+            print_table(table, most)
 
     def say(self, facts: object, words: str) -> None:
         """Print the answer for a machine or for a person."""

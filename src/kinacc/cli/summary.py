@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import io
-import json
 import sys
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -14,7 +12,7 @@ import click
 
 from kinacc.cli import choice
 from kinacc.cli.exit_codes import AGAINST
-from kinacc.cli.output import plain, require_writable
+from kinacc.cli.output import answers, plain
 from kinacc.errors import InputError, Problem
 from kinacc.workflow.data_sets import RESULTS
 
@@ -38,19 +36,8 @@ BOUND, HELD_OUT = "bound", "held-out"
     show_default=True,
     help="Statistic of the verdict: upper bound of the campaign, or 99 % held-out error.",
 )
-@click.option("--verbose", is_flag=True, help="Every statement and population of errors.")
-@click.option("--json", "as_json", is_flag=True, help="JSON of every summary by data set.")
-@click.option("--out", "-o", type=click.Path(), help="Table as .csv, .xlsx or .parquet.")
-@click.option("--force", is_flag=True, help="Replacement of an existing file.")
-def summary(
-    folders: tuple[Path, ...],
-    tolerance_mm: float | None,
-    by: str,
-    verbose: bool,
-    as_json: bool,
-    out: str | None,
-    force: bool,
-) -> None:
+@answers(table=True, verbose=True)
+def summary(folders: tuple[Path, ...], tolerance_mm: float | None, by: str, out) -> None:
     """Summarise the calibration in FOLDER: half a page for one data set, a table for many.
 
     FOLDER is the results folder of a data set, or a folder of these [results]. The exit code is 1
@@ -64,7 +51,6 @@ def summary(
     from kinacc.report import summary as summaries
     from kinacc.report import terminal
 
-    require_writable([out], force, (".csv", ".xlsx", ".parquet"))
     places = summaries.data_set_folders(folders or (Path(RESULTS),))
     found: list[CalibrationSummary | Problem]
     if len(places) == 1:
@@ -79,15 +65,13 @@ def summary(
     if by == HELD_OUT and not any(verdicts):
         what = "is not given, and no configuration has a tolerance of quantile_99"
         raise InputError(Problem("--tolerance-mm", what, "a number, in mm"))
-    if out is not None:
-        write(terminal.fleet_table(found, by, tolerance_mm), Path(out))
-        click.echo(f"{out}: {terminal.counted(len(found), 'calibration')}")
-    elif as_json:
-        click.echo(json.dumps(as_plain(found, by, tolerance_mm), indent=1))
+    table = terminal.fleet_table(found, by, tolerance_mm)
+    if out.table is not None or out.as_json:
+        out.show(as_plain(found, by, tolerance_mm), table)
     elif len(known) == len(found) == 1:
-        terminal.print_summary(known[0], verbose, by, tolerance_mm)
+        terminal.print_summary(known[0], out.verbose, by, tolerance_mm)
     else:
-        terminal.print_fleet(terminal.fleet_table(found, by, tolerance_mm), by)
+        terminal.print_fleet(table, by)
     if len(known) < len(found) or any(each and each.verdict != "accept" for each in verdicts):
         sys.exit(AGAINST)
 
@@ -106,16 +90,3 @@ def as_plain(
         verdict = each.verdict(by, tolerance_mm)
         told[each.name] = plain(asdict(each) | {"verdict": asdict(verdict) if verdict else None})
     return told
-
-
-def write(table, path: Path) -> None:
-    """Write a DataFrame whole as CSV, Excel or Parquet, by the ending of ``path``."""
-    from kinacc.tables.atomic import write_whole
-
-    if path.suffix == ".csv":
-        content = table.to_csv(index=False, float_format="%.12g").encode()
-    else:
-        buffer = io.BytesIO()
-        (table.to_excel if path.suffix == ".xlsx" else table.to_parquet)(buffer, index=False)
-        content = buffer.getvalue()
-    write_whole(path, content)

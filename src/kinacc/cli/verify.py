@@ -124,7 +124,7 @@ def _next(result: Verification, folder: str, again: str) -> Iterator[str]:
     """The next step, and its command."""
     from kinacc.deployment.verify import FAIL, FEW_HELD_OUT, PASS, SET_UP_MOVED
 
-    poses = shlex.join(["kinacc", "show", f"{folder}/measurements", "--columns", "pose,q*"])
+    poses = shlex.join(["kinacc", "show", folder, "measurements", "-o", "poses.csv"])
     if result.verdict == PASS:
         return
     if result.reason == FEW_HELD_OUT:
