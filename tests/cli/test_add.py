@@ -81,15 +81,6 @@ def test_a_third_file_is_one_more_line_and_nothing_else_changes(cell):
     assert os.stat("tracker.yaml").st_mode & 0o777 == 0o640
 
 
-def test_paths_are_as_seen_from_the_configuration(cell, monkeypatch):
-    monkeypatch.chdir(cell / "data")
-    done = call(
-        "add", "../june.csv", "--to", "../tracker.yaml", *JUNE, "--first-date", "2026-03-01"
-    )
-    assert done.exit_code == 0, done.output
-    assert "{path: june.csv, date: 2026-06-02" in (cell / "tracker.yaml").read_text()
-
-
 def test_all_that_is_not_said_is_named_at_once(cell):
     done = added("june.csv")
     assert done.exit_code == 2
@@ -107,36 +98,6 @@ def test_the_day_is_that_of_the_files_own_times(cell):
     done = added("june.csv", *JUNE[2:], "--first-date", "2026-03-01")
     assert done.exit_code == 0, done.output
     assert "date: 2026-06-02" in Path("tracker.yaml").read_text()
-
-
-@pytest.mark.parametrize("cells", [("2026-06-02", "2026-06-03"), ("02/06/2026", "02/06/2026")])
-def test_times_of_two_days_or_of_two_readings_leave_the_day_to_a_person(cell, cells):
-    names, *rows = Path("june.csv").read_text().splitlines()
-    half = len(rows) // 2
-    days = [cells[0]] * half + [cells[1]] * (len(rows) - half)
-    dated = [f"{row},{day}" for row, day in zip(rows, days, strict=True)]
-    Path("june.csv").write_text("\n".join([f"{names},day", *dated]))
-    done = added("june.csv", *JUNE[2:], "--first-date", "2026-03-01")
-    assert done.exit_code == 2
-    assert "--date: is not given" in done.output
-
-
-def test_the_same_readings_twice_are_no_new_line(cell):
-    again = Path("data/march.csv").read_text()
-    Path("copy.csv").write_text(again.replace("\n", "\r\n"))
-    done = added("copy.csv", *JUNE, "--first-date", "2026-03-01")
-    assert done.exit_code == 2
-    assert Path("tracker.yaml").read_text() == HERE
-
-
-def test_a_file_that_cannot_be_read_so_is_refused_with_all_other_problems(cell):
-    text = Path("june.csv").read_text().replace("q6_deg", "wrist")
-    Path("june.csv").write_text(text)
-    done = added("june.csv", *JUNE)
-    assert done.exit_code == 2
-    assert "q6" in done.output
-    assert "--first-date" in done.output
-    assert Path("tracker.yaml").read_text() == HERE
 
 
 def test_another_target_is_refused_where_the_tool_is_the_same(cell):

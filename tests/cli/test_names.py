@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import json
 import re
-import shutil
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -37,34 +36,6 @@ def test_an_export_stays_in_its_folder_whatever_its_name(folder, tmp_path, name)
     assert done.exit_code == 2, done.output
     assert "--name" in done.output
     assert [path for path in tmp_path.rglob("*") if path.is_file()] == []
-
-
-def test_an_export_may_be_named_after_a_version(folder, tmp_path):
-    done = call(
-        "export", folder, "--out", tmp_path, "--name", "Prüfling v1.2-b", "--format", "yaml"
-    )
-    assert done.exit_code == 0, done.output
-    assert (tmp_path / "Prüfling v1.2-b.yaml").is_file()
-
-
-def test_the_name_of_a_results_folder_is_text_in_the_exported_tables(folder, tmp_path):
-    renamed = tmp_path / "cell|3_$x$ *new*"
-    shutil.copytree(folder, renamed)
-    done = call("export", renamed, "--out", tmp_path / "out", "--format", "markdown",
-                "--format", "latex", "--name", "arm")  # fmt: skip
-    assert done.exit_code == 0, done.output
-    shown = (tmp_path / "out" / "arm_tables.md").read_text()
-    assert r"**DH parameters, cell\|3\_\$x\$ \*new\***" in shown
-    printed = (tmp_path / "out" / "arm_tables.tex").read_text()
-    assert r"cell|3\_\$x\$ *new*" in printed
-
-
-def test_a_name_with_two_dashes_is_exported_to_urdf(folder, tmp_path):
-    renamed = tmp_path / "cell---3"
-    shutil.copytree(folder, renamed)
-    done = call("export", renamed, "--out", tmp_path / "out", "--format", "urdf")
-    assert done.exit_code == 0, done.output
-    assert robot.load(tmp_path / "out" / "cell---3.urdf").dh.joints == 6
 
 
 def test_a_campaign_report_shows_names_and_reasons_as_they_were_given(folder, tmp_path):

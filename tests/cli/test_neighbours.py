@@ -121,25 +121,6 @@ def test_rows_without_an_answer_are_told_and_left_out(folder, tmp_path):
     assert "q1_deg, line 3: not a finite number" in done.output
 
 
-def test_the_visit_with_its_readings_beside_it_is_recorded(folder, tmp_path):
-    campaign, visit = tmp_path / "check", tmp_path / "visit.csv"
-    begin(folder, campaign, "--drawn", 8)
-    assert call("campaign", "next", campaign, "--all", "-o", visit).exit_code == 0
-    rows = list(csv.DictReader(visit.open()))
-    for row in rows:
-        row |= {f"{axis}_mm": float(row[f"expected_{axis}_mm"]) + 0.1 for axis in "xyz"}
-    with visit.open("w", newline="") as stream:
-        out = csv.DictWriter(stream, list(rows[0]))
-        out.writeheader()
-        out.writerows(rows)
-    done = call("campaign", "record", campaign, visit)
-    assert done.exit_code == 0, done.output
-    assert "recorded: 8 readings" in done.output
-    done = call("init", visit, "--robot", "mh180", "--out", tmp_path, "--name", "own", "--json")
-    assert done.exit_code == 0, done.output
-    assert "tool" in json.loads(done.stdout)["targets"]
-
-
 def test_a_visit_predicted_by_the_calibration_is_no_measurement_of_it(folder, tmp_path):
     campaign, visit = tmp_path / "check", tmp_path / "visit.csv"
     begin(folder, campaign, "--drawn", 8)
@@ -150,18 +131,6 @@ def test_a_visit_predicted_by_the_calibration_is_no_measurement_of_it(folder, tm
     assert done.exit_code == 2, done.output
     assert "written by kinacc predict" in done.output
     assert not (campaign / "readings.jsonl").exists()
-
-
-def test_two_units_that_do_not_say_the_same_are_refused(folder, tmp_path):
-    file = tmp_path / "joints.csv"
-    head = ",".join(f"q{i}_deg" for i in range(1, 7)) + ",q2_rad"
-    file.write_text(f"{head}\n0,0,0,0,60,0,0\n0,10,0,0,60,0,0.1745329\n0,20,0,0,60,0,0.17\n")
-    done = call("predict", folder, file)
-    assert done.exit_code == 2
-    assert "columns q2_deg and q2_rad, line 4" in done.output
-    assert "20 and 0.17" in done.output
-    file.write_text("\n".join(file.read_text().splitlines()[:3]) + "\n")
-    assert call("predict", folder, file).exit_code == 0
 
 
 def test_measured_errors_of_a_campaign_plan_the_next_one(folder, tmp_path):
@@ -178,12 +147,3 @@ def test_measured_errors_of_a_campaign_plan_the_next_one(folder, tmp_path):
         assert done.exit_code == 0, done.output
         (row,) = json.loads(done.stdout)["rows"]
         assert row["true_mm"] == pytest.approx(0.1 * 3**0.5, abs=1e-6)
-
-
-@pytest.mark.parametrize("text", ["", "[]", "{", "[" * 100_000, '{"rows": []}', '{"rows": "abc"}',
-                                  '{"rows": [1]}', '{"rows": [{"a": 1}, 2]}'])  # fmt: skip
-def test_json_that_holds_no_table_is_refused(folder, tmp_path, text):
-    file = tmp_path / "joints.json"
-    file.write_text(text)
-    done = call("predict", folder, file)
-    assert done.exit_code == 2, done.output

@@ -62,15 +62,6 @@ def test_one_file_fitted_twice_shows_no_change_of_the_arm(results, tmp_path):
     assert told["shifts"][0]["chance_mm"] == 0.0
 
 
-def test_a_file_that_grew_is_told_from_one_that_was_measured_anew(results):
-    told = compared(results, "before", "grown", "--json")
-    assert told["verdict"] == "no change proven"
-    assert told["shared"] == {"count": ROWS, "first": ROWS, "second": 80}
-    told = compared(results, "before", "anew", "--json")
-    assert told["shared"]["count"] == 0
-    assert told["probability"] > 1e-3
-
-
 def joints_of(path, shifts_deg):
     """A file of the first readings, then of as many with joint 2 shifted, per shift."""
     q_deg = tracked("ur10", 80, 21).q[:ROWS]

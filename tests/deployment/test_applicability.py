@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shared_data
-from small_arms import calibrated, joints, measured, measured_at, results_of
+from small_arms import measured_at, results_of
 from stages_by_hand import run_stage
 
 from kinacc.deployment import folder
-from kinacc.deployment.applicability import is_measured_there, share_of_box
+from kinacc.deployment.applicability import is_measured_there
 from kinacc.deployment.folder import calibration
 from kinacc.kinematics import robot
 from kinacc.kinematics.model import JointState
@@ -69,11 +69,3 @@ def test_a_gap_between_two_clusters_of_poses_is_not_where_it_was_measured(model)
     assert not found.outside_range(between).any()
     assert not is_measured_there(found, JointState(between)).any()
     assert is_measured_there(found, JointState(seen.q_rad)).mean() > 0.9
-
-
-def test_a_box_that_was_measured_everywhere_is_where_it_was_measured():
-    found = replace(calibrated("ur10"), fitted=JointState(measured("ur10").q_rad))
-    low, high = joints("ur10", 2000).min(axis=0), joints("ur10", 2000).max(axis=0)
-    assert share_of_box(found, low, high) > 0.9
-    beyond = found.robot.dh_joints(np.stack([low, high + 1.0]))
-    assert not is_measured_there(found, JointState(beyond))[1]

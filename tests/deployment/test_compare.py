@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 import numpy as np
-import pandas as pd
 import pytest
 from small_arms import calibrated, joints, measured, results_of
 
@@ -12,8 +11,6 @@ from kinacc.deployment import compare as comparison
 from kinacc.deployment.folder import calibration
 from kinacc.deployment.record import nominal
 from kinacc.deployment.shared_readings import NONE_SHARED, SharedReadings
-from kinacc.errors import InputError
-from kinacc.figures.comparison import draw
 from kinacc.kinematics import robot
 
 
@@ -100,31 +97,6 @@ def test_another_base_and_tool_are_not_a_change_of_the_arm():
     assert np.isnan([found.probability, *found.shifts["chance_mm"]]).all()
 
 
-def test_poses_beyond_the_range_of_vec_models_are_left_out_and_too_few_are_refused():
-    before, after = calibrated("mh180", "vec", 80, 3), calibrated("mh180", "vec", 80, 4)
-    low, high = (
-        pick([each.model.domain[end] for each in (before, after)], axis=0)
-        for end, pick in ((0, np.max), (1, np.min))
-    )
-    beyond = np.vstack([high + 2.0, low - 2.0, high + 0.5]) @ np.linalg.inv(
-        robot.load("mh180").joint_map.T
-    )
-    within = joints("mh180", 40)
-    q_rad = np.insert(within, [0, 7, 40], beyond, axis=0)
-    found, alone = compare(before, after, q_rad), compare(before, after, within)
-    assert found.poses["pose"].tolist() == [n for n in range(1, 44) if n not in (1, 9, 43)]
-    pd.testing.assert_frame_equal(found.shifts, alone.shifts)
-    with pytest.raises(InputError, match=r"2 of 5 poses .* 5 or more"):
-        compare(before, after, np.vstack([within[:2], beyond]))
-    by_dh = calibrated("mh180", "dh", 80, 3), calibrated("mh180", "dh", 80, 4)
-    assert len(compare(*by_dh, beyond).poses) == 3
-
-
-def test_arms_of_different_kinds_are_refused():
-    with pytest.raises(InputError, match="has 7 joints"):
-        compare(nominal(robot.load("mh180")), nominal(robot.load("iiwa14")), np.zeros((2, 6)))
-
-
 def test_another_geometry_is_another_robot_and_a_calibration_is_not():
     q_rad = joints("irb120", 60)
     arm, other = (nominal(robot.load(name)) for name in ("irb120", "meca500"))
@@ -137,21 +109,3 @@ def test_another_geometry_is_another_robot_and_a_calibration_is_not():
         found = compare(before, each, joints("mh180", 60))
         assert found.verdict != comparison.OTHER_ROBOT
         assert found.robots_apart_mm == 0.0
-
-
-def drawn(found):
-    """Length of the bar, or else the words beside the mark, of every parameter of the picture."""
-    ax = draw(found).axes[0]
-    bars = [bar for group in ax.containers for bar in group]
-    told = {round(bar.get_y() + bar.get_height() / 2): bar.get_width() for bar in bars}
-    told |= {round(text.xy[1]): text.get_text() for text in ax.texts}
-    return {name: told.get(row, "") for row, name in enumerate(found.parameters["name"])}
-
-
-def test_the_picture_of_two_robot_files_shows_the_millimetre_by_which_they_differ():
-    before = nominal(robot.load("mh180"), "before")
-    after = changed(before, j4_d_mm=1.0, j2_alpha_rad=-2e-3)
-    found = compare(before, after, joints("mh180", 60))
-    bars = drawn(found)
-    assert bars["j4.d"] == pytest.approx(1.0)
-    assert bars["j2.alpha"] == pytest.approx(-2.0)  # mrad

@@ -101,14 +101,6 @@ def test_no_single_swap_improves_and_the_best_set_is_near():
     assert 0.8 < min(shares) <= max(shares) <= 1.0 + 1e-12
 
 
-@pytest.mark.parametrize("seed", range(20, 32))
-def test_the_fewest_poses_that_tell_everything(seed):
-    """Without any one of them a direction is lost, which rounding may hide or not."""
-    rows = np.random.default_rng(seed).integers(-2, 3, (30, 3, 7)).astype(float)
-    chosen, _, _ = choose(rows, 3)
-    assert np.linalg.matrix_rank(rows[chosen].reshape(-1, 7)) == 7
-
-
 def test_planned_poses_of_an_arm_beat_random_ones_and_are_driven_on_a_short_way():
     arm = robot.load("ur10")
     joints = spread(arm, 200)

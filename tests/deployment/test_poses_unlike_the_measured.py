@@ -37,17 +37,6 @@ def folder(tmp_path_factory):
     return small_study.run_stages(config, "arm", place / "results", stages)
 
 
-def undetermined(folder, model, frame, *joints):
-    """``undetermined_mm`` of every pose, and everything that was printed."""
-    shown = call(
-        "predict", folder, "--model", model, "--frame", frame, "--json",
-        *(word for each in joints for word in ("--joints-deg", each)),
-    )  # fmt: skip
-    assert shown.exit_code == 0, shown.output
-    rows = json.loads(shown.stdout)["rows"]
-    return [float(row["undetermined_mm"]) for row in rows], shown.stderr
-
-
 @pytest.mark.parametrize("model", ["vec", "dh"])
 @pytest.mark.parametrize("frame", ["instrument", "base"])
 def test_a_pose_unlike_the_measured_ones_is_marked(folder, model, frame):

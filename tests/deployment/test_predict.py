@@ -7,7 +7,6 @@ from small_arms import BASE, TOOL, calibrated, joints, truth
 from kinacc.calibration.frames import MOTIONS
 from kinacc.calibration.uncertainty import is_angle
 from kinacc.deployment.predict import predict
-from kinacc.deployment.record import nominal
 from kinacc.deployment.sensitivity import sensitivity
 from kinacc.geometry import Pose, compose, exp_so3, log_so3
 from kinacc.kinematics import dh, robot
@@ -99,19 +98,3 @@ def test_a_vec_model_says_nothing_outside_its_range_and_dh_says_so():
     extrapolated = predict(calibrated("mh180", "dh"), q_rad)
     assert np.isfinite(extrapolated.pose.position_mm).all()
     assert extrapolated.outside[1, 2]
-
-
-def test_a_nominal_arm_has_a_pose_and_no_deviation():
-    arm = nominal(robot.load("iiwa14"))
-    q_rad = joints("iiwa14", 4)
-    found = predict(arm, q_rad)
-    wanted = robot.forward(arm.robot, q_rad).position_mm
-    np.testing.assert_allclose(found.pose.position_mm, wanted, atol=1e-9)
-    assert np.isnan(found.std).all()
-
-
-def test_reported_joints_go_through_the_joint_map():
-    arm = nominal(robot.load("fanuc_r2000ic_165f"))
-    q_rad = joints("fanuc_r2000ic_165f", 4)
-    wanted = robot.forward(arm.robot, q_rad).position_mm
-    np.testing.assert_allclose(predict(arm, q_rad).pose.position_mm, wanted, atol=1e-9)

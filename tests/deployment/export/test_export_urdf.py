@@ -5,8 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pinocchio as pin
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from kinacc.calibration.hand_eye import closed_form_start
@@ -179,13 +177,3 @@ def test_coupled_joints_are_refused_and_dh_joints_offered():
     text = urdf.text(of(arm, dh_joints=True))
     theirs = seen_by_pinocchio(text, "flange", q_dh, arm.robot.dh.prismatic, names)
     assert_same(arm.pose(JointState(q_dh), "base", "flange"), theirs)
-
-
-@settings(max_examples=200)
-@given(
-    st.tuples(*[st.sampled_from([0.0, 1e-9, -1e-7, 0.3, np.pi / 2, -np.pi / 2, np.pi, 3.0])] * 3)
-)
-def test_roll_pitch_yaw_come_back_upright_and_not(angles):
-    rotation = Rotation.from_euler("xyz", angles).as_matrix()
-    back = Rotation.from_euler("xyz", urdf.rpy(rotation)).as_matrix()
-    assert np.abs(back - rotation).max() < 1e-14

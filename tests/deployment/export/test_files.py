@@ -7,10 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
-from kinacc.cli.group import main
-from kinacc.deployment.export.files import FORMATS, format_named, write
+from kinacc.deployment.export.files import format_named, write
 from kinacc.deployment.export.paper_tables import with_deviation
 from kinacc.deployment.export.source import Source
 from kinacc.deployment.record import TOOL, nominal
@@ -128,30 +126,6 @@ def test_tables_hold_every_residual_and_parameter_in_both_forms():
     assert {line.count(" & ") for line in paper.splitlines() if line.endswith(r"\\")} == {5}
 
 
-def test_in_a_paper_the_selected_model_comes_first_and_what_was_not_fitted_is_called_fixed():
-    arm = bent("ur10")
-    table = model_table(arm)
-    table["d_mm"][1], table["std_d_mm"][[1, 2]] = 0.0, np.nan
-    tables = {
-        "dh_model": table,
-        "residuals": residuals(),
-        "dh_identified": {"parameter": ["j2.d_mm"], "status": ["fixed"]},
-        "model_selection": {
-            "model": np.array(["dh"]),
-            "selected": np.array([1]),
-            "held_out_rms_mm": np.array([0.1]),
-        },
-    }
-    page = written("markdown", arm, **tables)
-    assert page.startswith("**DH model (selected) against measurements, probe**")
-    assert page.count("selected") == 1
-    (second, third) = (line for line in page.splitlines() if line[:4] in ("| 2 ", "| 3 "))
-    assert "| 0 (fixed) |" in second
-    assert "†" not in second
-    assert "†" in third
-    assert "0 (fixed)" in written("latex", arm, **tables)
-
-
 def test_nothing_is_written_over_or_in_part(tmp_path):
     write({"a.txt": "first"}, tmp_path)
     with pytest.raises(InputError, match="--force"):
@@ -160,14 +134,6 @@ def test_nothing_is_written_over_or_in_part(tmp_path):
     assert not (tmp_path / "b.txt").exists()
     assert len(write({"b.txt": "new", "a.txt": "second"}, tmp_path, force=True)) == 2
     assert (tmp_path / "a.txt").read_text() == "second"
-
-
-def test_the_command_names_what_is_missing_and_every_format(tmp_path):
-    done = CliRunner().invoke(main, ["export", str(tmp_path), "--robot", "mh180"])
-    assert done.exit_code == 2
-    for name in ("vec_model", "dh_model", "frames"):
-        assert f"{name}.parquet: no such file" in done.output
-    assert set(FORMATS) == {"csv", "json", "latex", "markdown", "urdf", "yaml"}
 
 
 def test_json_rebuilds_an_arm_whose_first_axis_points_down():
