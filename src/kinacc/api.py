@@ -256,7 +256,9 @@ class Calibration:
         return pendants.fit_pendant(self.tables, self.robot, settings, controller, self.name)
 
 
-def read_measurements(path: str | Path, dataset: str | None = None) -> Measurements:
+def read_measurements(
+    path: str | Path, dataset: str | None = None, settings: Mapping[str, Any] | None = None
+) -> Measurements:
     """Read the measurements that a data set describes.
 
     Parameters
@@ -265,13 +267,16 @@ def read_measurements(path: str | Path, dataset: str | None = None) -> Measureme
         A configuration file, as ``kinacc init`` writes it beside a measured file.
     dataset
         Data set of the file; not needed where it describes one.
+    settings
+        Values in place of those of the file, nested as there, such as
+        ``{"calibration": {"vec": {"order": 5}}}``.
 
     Raises
     ------
     InputError
         Listing what is wrong with settings or measurements, with file, line and column.
     """
-    described = read_data_sets([path]).settings
+    described = read_data_sets([path], settings).settings
     if dataset is None and len(described) > 1:
         raise InputError(Problem(str(path), "describes several data sets", ", ".join(described)))
     name = dataset or next(iter(described))
