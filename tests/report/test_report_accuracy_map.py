@@ -73,13 +73,6 @@ def test_the_cell_of_the_largest_difference_stands_first_with_the_joints_to_driv
     assert cells_of(section)["position"][LARGEST] == pytest.approx(0.9)
 
 
-def test_it_is_said_to_be_about_models_and_not_about_the_robot():
-    section = section_of(made_up())
-    assert "nothing is an error of the robot itself" in read(section).population
-    assert "12 cells" in read(section).population
-    assert "no bound" in read(section).judged
-
-
 def test_cells_that_no_pose_reaches_are_told_apart_from_cells_without_difference():
     table = made_up()
     table["extrapolating"][UNREACHED] = 4
@@ -89,23 +82,3 @@ def test_cells_that_no_pose_reaches_are_told_apart_from_cells_without_difference
     cells = cells_of(section)
     assert np.flatnonzero(np.isnan(cells["position"])).tolist() == [UNREACHED]
     assert cells["joints"][UNREACHED] == ""
-
-
-def test_poses_that_are_only_partly_reached_have_their_share():
-    table = made_up()
-    table["solutions"][0] = 9
-    assert cells_of(section_of(table))["reached"][0] == pytest.approx(50.0)
-
-
-def test_a_space_out_of_reach_is_said_to_be_and_nothing_is_listed():
-    table = made_up()
-    unreached(table, list(range(12)))
-    section = section_of(table)
-    assert "out of the robot's reach" in read(section).paragraphs[0]
-
-
-def test_a_single_cell_is_a_map():
-    one = {name: values[:1] for name, values in made_up().items()}
-    section = section_of(one)
-    assert len(listed_in(section).rows) == 1
-    assert cells_of(section)["position"].tolist() == pytest.approx([0.1])

@@ -6,13 +6,10 @@ from made_up_results import (
     check,
     everything,
     measurements,
-    pose_errors,
     robot,
     selection,
     table,
-    words,
 )
-from parsed import read
 
 from kinacc.report import fit_sections
 
@@ -23,19 +20,6 @@ def section(slides=False, **tables):
 
 def measured(found) -> dict[str, str]:
     return dict(table(found, "What was measured").rows)
-
-
-def test_a_file_without_findings_is_said_to_be_clean():
-    assert "nothing suspicious" in words(section())
-
-
-def test_a_synthetic_arm_has_no_file_to_check():
-    tables = everything()
-    del tables["data_check"]
-    tables["measurements"]["row"][:] = np.nan
-    found = fit_sections.data(tables, robot())
-    assert "no measured file to check" in words(found)
-    assert "of a synthetic arm" in read(found).population
 
 
 def test_findings_stand_the_gravest_first_with_what_to_do_and_why_they_were_accepted():
@@ -54,11 +38,6 @@ def test_findings_stand_the_gravest_first_with_what_to_do_and_why_they_were_acce
     assert found.rows[1][-1] == "–"
     left_out = table(section(data_check=told), "Not used of the measured file")
     assert left_out.rows == (("column temp is not read",),)
-
-
-def test_nobody_accepted_anything_and_no_column_says_so():
-    told = check(("outliers", "warning", "1 row is off", "line 3", None, None, 1))
-    assert len(table(section(data_check=told), "Findings of the check").heads) == 5
 
 
 def test_rows_left_out_are_told_with_their_reason_and_the_selected_models_error():
@@ -96,36 +75,6 @@ def test_a_configuration_the_arm_came_back_to_is_one_of_repeated_readings():
     assert "1 configuration with 3 readings (2 degrees of freedom)" in told
 
 
-def test_nothing_measured_twice_shows_no_noise_and_a_file_may_state_some():
-    readings = measurements([[0.0] * 4, [0.1] * 4], std_x_mm=np.array([0.02, np.nan]))
-    readings["std_y_mm"] = readings["std_z_mm"] = np.array([0.03, 0.03])
-    told = measured(section(measurements=readings))
-    assert told["noise of a reading"].startswith("unknown")
-    stated = told["noise as the file states it"]
-    assert stated == "standard deviation x 0.02, y 0.03, z 0.03 mm (median of 1 reading)"
-
-
-def test_positions_only_say_that_the_turn_of_the_tool_is_judged_nowhere():
-    readings = measurements([[0.0] * 4, [0.1] * 4])
-    for part in "wxyz":
-        readings[f"q{part}"][:] = np.nan
-    assert "not measured" in measured(section(measurements=readings))["orientation"]
-    readings["qw"][0] = 1.0
-    told = measured(section(measurements=readings))["orientation"]
-    assert told == "measured in 1 of 2 readings"
-
-
-def test_rows_held_out_targets_and_sessions_are_counted():
-    readings = measurements([[0.0] * 4, [0.1] * 4, [0.2] * 4])
-    readings["subset"][2] = "validation"
-    readings["target"] = np.array(["A", "B", "A"], dtype=object)
-    readings["session"] = np.array(["Monday", "Monday", "Tuesday"], dtype=object)
-    told = measured(section(measurements=readings))
-    assert told["targets"] == "A (2 readings), B (1 reading)"
-    assert told["sessions"] == "Monday (2 readings), Tuesday (1 reading)"
-    assert told["fitted by the delivered models"].startswith("2 of 3; 1 held out")
-
-
 def test_the_ranges_of_joints_stand_beside_their_limits_deg_and_mm():
     joints = np.array([[-0.5 * TRAVEL_RAD, 0, 0, -20.0], [0.5 * TRAVEL_RAD, 0, 0, 30.0]])
     found = section(slides=True, measurements=measurements(joints))
@@ -133,8 +82,3 @@ def test_the_ranges_of_joints_stand_beside_their_limits_deg_and_mm():
     assert rows[0] == ("1", "deg", "-45.0 to 45.0", "-90.0 to 90.0", "50%")
     assert rows[1][4] == "0%"
     assert rows[3] == ("4", "mm", "-20.0 to 30.0", "-100.0 to 100.0", "25%")
-
-
-def test_one_row_is_enough_for_a_section():
-    found = section(measurements=measurements([[0.0] * 4]), pose_errors=pose_errors(rows=1))
-    assert read(found).population.startswith("1 reading of 1 target at 1 pose of a measured arm")

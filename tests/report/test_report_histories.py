@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import made_up_study as made_up
 import numpy as np
-from parsed import Shown, as_page, read
+from parsed import Shown, read
 
 from kinacc.kinematics import robot
 from kinacc.report import study_sections
@@ -42,14 +42,3 @@ def test_what_became_of_every_bound_stands_in_a_table():
 def test_an_example_that_only_comes_near_to_its_rule_says_so():
     outcomes = tables_of(section_of(rule_met=np.zeros(10)))[0]
     assert outcomes.marked[0].startswith("the nearest there is: first")
-
-
-def test_rows_in_any_order_make_the_same_table():
-    turned = np.arange(10)[::-1]
-    table = made_up.histories()["histories"]
-    changed = {name: values[turned] for name, values in table.items()}
-    assert tables_of(section_of())[0] == tables_of(section_of(**changed))[0]
-
-
-def test_the_page_takes_no_markup_from_a_table():
-    assert "<b>simulation</b>" not in as_page(section_of(rule_met=np.zeros(10)))

@@ -19,12 +19,6 @@ def section(**tables):
     return fit_sections.identifiability(everything() | tables, robot())
 
 
-def test_all_determined_is_said_in_a_sentence():
-    found = section()
-    assert "determine every parameter" in words(found)
-    assert read(found).population.endswith("16 determined by the poses, 4 fixed")
-
-
 def test_what_other_poses_would_show_stands_first_with_what_settles_it():
     told = identified(
         j1__theta_offset_rad=("undetermined", np.nan, ALWAYS),
@@ -37,16 +31,6 @@ def test_what_other_poses_would_show_stands_first_with_what_settles_it():
     assert "kinacc plan-poses" in first[1]
     assert second == (ALWAYS, "no pose of such an arm does: no fault")
     assert "3 undetermined" in read(found).population
-
-
-def test_a_flange_that_points_one_way_is_named_where_poses_show_too_little():
-    tables = everything()
-    joints = tables["measurements"]
-    for n in (2, 3, 4):
-        joints[f"q{n}"] = np.zeros(2)
-    joints["q1"] = np.array([0.0, 0.01])
-    tables["dh_identified"] = identified(tool__z_mm=("undetermined", np.nan, SOMETIMES))
-    assert "same direction" in words(fit_sections.identifiability(tables, robot()))
 
 
 def test_every_parameter_has_its_status_and_standard_deviation():
@@ -70,11 +54,6 @@ def test_how_weakly_a_direction_may_be_seen_is_told_by_the_rank():
     assert "the limit is 0.01" in told
 
 
-def test_all_directions_fitted_leaves_none_to_compare_with():
-    fit = FIT | {"value": np.array([3.0, 0.01, 40.0, 10.0, 4.0])}
-    assert "not fitted" not in words(section(dh_fit=fit))
-
-
 def test_the_closest_pair_comes_first():
     names = ["base.x_mm", "j1.a_mm", "j1.d_mm", "j2.a_mm"]
     matrix = np.diag([1.0, 4.0, 0.0, 9.0])  # j1.d is undetermined: it has no correlation
@@ -85,8 +64,3 @@ def test_the_closest_pair_comes_first():
     assert closest.rows[0] == ("a of joint 2", "a of joint 1", "-0.970")
     assert closest.rows[1] == ("a of joint 1", "base x", "+0.250")
     assert "0.95" in closest.caption
-
-
-def test_one_determined_parameter_has_nothing_to_be_compared_with():
-    found = section(dh_covariance=covariance(["j1.a_mm", "j2.a_mm"], np.diag([1.0, 0.0])))
-    assert not any("correlation" in each.caption for each in read(found).tables)

@@ -14,7 +14,6 @@ from made_up_results import (
     table,
     vec_model,
 )
-from parsed import read
 
 from kinacc.kinematics import vec
 from kinacc.kinematics.dh import PARAMETERS, DHModel, forward
@@ -34,14 +33,6 @@ def test_differences_have_their_unit_and_standard_deviation():
     rows = {row[0]: row[1:] for row in table(section(dh_model=model), "DH parameters").rows}
     assert rows["d of joint 4"][:4] == ("100.0000 mm", "101.5000 mm", "+1.5000 mm", "0.1000 mm")
     assert rows["alpha of joint 2"][2:] == ("-0.4000 mrad", "0.1000 mrad", "identified")
-
-
-def test_an_undetermined_parameter_has_no_standard_deviation():
-    told = identified(j1__d_mm=("undetermined", np.nan, "a sentence"))
-    model = dh_model() | {"std_d_mm": np.array([np.nan, 0.1, 0.1, 0.1])}
-    found = section(dh_model=model, dh_identified=told)
-    rows = {row[0]: row[1:] for row in table(found, "DH parameters").rows}
-    assert rows["d of joint 1"][3:] == ("–", "undetermined")
 
 
 def test_an_angle_beta_that_no_joint_has_is_not_listed_and_a_fixed_length_is():
@@ -71,14 +62,6 @@ def test_what_a_dh_table_can_say_is_left_out_of_the_errors_of_joints():
     assert found["j1.delta_z"] == pytest.approx(0.0, abs=1e-5)
     assert found["j2.eps_x"] == pytest.approx(0.0, abs=1e-4)  # the neighbour's frame
     assert np.ptp(found["j2.eps_z"]) > 500.0  # about its own axis: an eccentric encoder
-
-
-def test_the_linear_part_of_a_sliding_joint_is_its_neighbours_turn():
-    lines = {f"j4__{each}__1": 0.2 for each in ("delta_x", "delta_z", "eps_x")}
-    found, _ = errors(slides=True, vec_model=vec_model(**lines))
-    assert found["j4.delta_x"] == pytest.approx(0.0, abs=1e-6)
-    assert np.ptp(found["j4.delta_z"]) == pytest.approx(0.4)
-    assert np.ptp(found["j4.eps_x"]) == pytest.approx(400.0)
 
 
 def between(slides: bool, joint: int, twist: np.ndarray) -> dict[str, float]:
@@ -133,28 +116,3 @@ def test_the_standard_deviation_is_of_what_is_shown():
     assert [float(each) for each in at_an_end.split(" ± ")] == pytest.approx(
         [value[0], spread[0]], abs=1e-3
     )
-
-
-def test_backlash_and_bending_stand_in_tables_where_they_were_fitted():
-    model = vec_model()
-    extra = {name: each[-1:] for name, each in model.items()}
-    extra |= {"joint": [3], "error": ["eps_z"], "direction": [-1], "order": [0]}
-    extra |= {"coefficient": [0.00025], "std": [0.0001]}
-    model = {name: np.append(each, extra[name]) for name, each in model.items()}
-    bends = dict.fromkeys(
-        ("lever_coefficient_rad_per_mm", "std_lever_coefficient_rad_per_mm"), np.full(2, np.nan)
-    )
-    bends |= {
-        "joint": np.array([2, 3]),
-        "compliance_rad_per_nm": np.array([2e-6, np.nan]),
-        "std_compliance_rad_per_nm": np.array([np.nan, np.nan]),
-    }
-    found = section(vec_model=model, compliance_model=bends)
-    assert table(found, "Offsets by the direction").rows == (
-        ("joint 3", "falling", "+0.2500", "0.1000"),
-    )
-    assert table(found, "Joints that bend").rows == (
-        ("joint 2", "2", "not determined", "urad per N m"),
-    )
-    plain = [each.caption for each in read(section()).tables]
-    assert not any(each.startswith(("Offsets", "Joints that bend")) for each in plain)

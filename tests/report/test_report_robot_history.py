@@ -27,12 +27,6 @@ def test_every_line_has_a_row_with_its_verdict_first():
     assert table.marked == {4: "too few poses"}
 
 
-def test_a_first_line_has_nothing_to_be_held_to():
-    found = section_of(history(1))
-    (words,) = read(found).paragraphs
-    assert words.startswith("The first line of its series")
-
-
 def test_the_first_screen_says_what_the_last_line_says():
     assert sentence(history(4, changed=3)) == (
         "recalibrate: 0.30 mm beyond chance, joint 4, since the calibration of 2026-01-15"

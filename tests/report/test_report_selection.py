@@ -7,7 +7,6 @@ from made_up_results import (
     pose_errors,
     selection,
     table,
-    words,
 )
 from parsed import read
 
@@ -41,22 +40,12 @@ def test_the_selected_model_is_marked_and_its_gain_stands_in_standard_errors():
     assert read(found).population.startswith("position errors at 40 configurations")
 
 
-def test_a_gain_within_its_errors_leaves_dh_selected_and_says_so():
-    found = section(model_selection=selection(0.01, 0.02, "dh"))
-    assert table(found, "Models at held-out poses").marked == {0: "selected"}
-
-
 def test_nothing_held_out_says_that_there_is_nothing_to_judge_by():
     found = section(
         model_selection=selection(np.nan, np.nan, "dh"), pose_errors=pose_errors("train")
     )
     assert read(found).population.startswith("no pose was held out")
     assert table(found, "Models at held-out poses").rows[1][2:] == ("–",) * 5
-
-
-def test_a_stated_order_is_said_to_be_stated():
-    found = section()
-    assert "2, is stated and no other was tried" in words(found)
 
 
 def test_orders_that_were_tried_show_the_chosen_one_and_what_it_was_chosen_by():
@@ -66,15 +55,3 @@ def test_orders_that_were_tried_show_the_chosen_one_and_what_it_was_chosen_by():
     assert tried.marked == {1: "← chosen"}
     chosen = table(found, "Orders chosen")
     assert [row[:2] for row in chosen.rows] == [("all, delivered", "2"), ("without fold 0", "4")]
-
-
-def test_choices_for_folds_alone_stand_in_the_table():
-    found = section(vec_orders=orders(*TRIED[3:]))
-    assert table(found, "Orders chosen").rows[0][0] == "without fold 0"
-
-
-def test_results_without_a_table_of_orders_leave_it_out():
-    tables = everything()
-    del tables["vec_orders"]
-    found = of(tables)
-    assert "stated" not in words(found)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import made_up_study as made_up
-import numpy as np
 from parsed import read
 
 from kinacc.kinematics import robot
@@ -31,22 +30,7 @@ def test_errors_of_measured_poses_are_only_taken_as_true():
     assert "true largest error" not in read(section).captions[0]
 
 
-def test_models_of_a_measured_arm_are_only_taken_as_true():
-    tables = {**made_up.points(), **made_up.study()}
-    tables["measurements"]["row"] = np.arange(3.0)
-    section = study_sections.study(tables, ARM)
-    assert "of models, not measured" in read(section).population
-    assert "taken as true" in read(section).captions[0]
-
-
 def test_each_method_has_its_error_and_how_often_it_is_too_small():
     (table,) = read(section_of()).tables
     assert table.rows[0] == (*("maximum", "0.05", "0.650", "0.400", "0.900", "+0.150", "1 of 4"),)
     assert table.rows[2][-2:] == ("-0.075", "3 of 4")
-
-
-def test_a_study_of_which_only_the_summary_is_left_is_shown_by_it():
-    tables = {**made_up.points(), **made_up.study()}
-    del tables["study"]
-    (table,) = read(study_sections.study(tables, ARM)).tables
-    assert table.rows[0][-1] == "–"
