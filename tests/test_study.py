@@ -198,7 +198,7 @@ def test_settings_are_refused_together(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "noise", [[], [0.0], [-0.1], [np.nan], [1e-8], [0.3, 0.1], [0.1, 0.1 + 1e-9]]
+    "noise", [[], [0.0], [-0.1], [np.nan], [1e-8], [0.3, 0.1]]
 )
 def test_noise_that_means_nothing_is_refused(noise):
     with pytest.raises(InputError, match=r"study\.noise_mm"):

@@ -25,6 +25,7 @@ from kinacc.deployment import predict as predicting
 from kinacc.deployment import programs, shared_readings
 from kinacc.deployment import verify as verifying
 from kinacc.deployment.export import files as exports
+from kinacc.deployment.export import libraries
 from kinacc.deployment.export import pendant as pendants
 from kinacc.deployment.export.source import Source
 from kinacc.deployment.record import Calibration as CalibratedModel
@@ -236,6 +237,28 @@ class Calibration:
         """
         made = exports.contents(Source(self.model, self.tables), formats)
         return [Path(path) for path in exports.write(made, folder, force=True)]
+
+    def to_pinocchio(self) -> Any:
+        """The calibrated DH model as ``pinocchio.Model`` (m, rad; frames ``flange``, ``tool``).
+
+        Joints are those that the controller reports; InputError where these are coupled.
+        """
+        return libraries.to_pinocchio(Source(self.model, self.tables))
+
+    def to_pybotics(self, point: str | None = None) -> Any:
+        """The calibrated DH model as ``pybotics.robot.Robot`` (mm, rad).
+
+        Parameters
+        ----------
+        point
+            A target by name or ``flange``; the tool where not given.
+
+        Returns
+        -------
+        pybotics.robot.Robot
+            Its joints are those of the DH table: ``calibration.robot.dh_joints(q_rad)``.
+        """
+        return libraries.to_pybotics(Source(self.model, self.tables), point)
 
     def values_for(self, controller: str, settings: Mapping | None = None) -> pendants.Pendant:
         """Numbers to enter into a controller: kuka, abb, fanuc, ur, yaskawa, staubli, ros.

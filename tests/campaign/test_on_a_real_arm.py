@@ -110,15 +110,14 @@ def test_a_pose_unlike_all_measured_ones_is_said_to_be_extrapolated(ur10_d, tmp_
     done = call("predict", ur10_d[0], "--model", "dh", *words, "--json")
     assert done.exit_code == 0, done.output
     said = [each["status"] for each in json.loads(done.stdout)["rows"]]
-    assert said == ["ok", "extrapolated: the joints together are unlike those measured"]
-    assert "1 of 2 poses lie where the calibration was not measured" in done.stderr
+    assert [each.partition(":")[0] for each in said] == ["ok", "extrapolated"]
+    assert "1 of 2 poses" in done.stderr
     wanted = tmp_path / "wanted.json"
     wanted.write_text(done.stdout)
     done = call("compensate", ur10_d[0], wanted, "--model", "dh", "--json")
     assert done.exit_code == 0, done.output
     said = [each["status"] for each in json.loads(done.stdout)["rows"]]
-    unlike = "converged, extrapolated: the joints together are unlike those measured"
-    assert said == ["converged", unlike]
+    assert [each.partition(":")[0] for each in said] == ["converged", "converged, extrapolated"]
 
 
 def same(said, wanted):

@@ -46,7 +46,6 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "campaign plan": ("campaign", "plan", *NOISE, "--candidates", "20", "--budget", "10",
                       "--repetitions", "2"),
     "a word that is no command": ("fit", "arm.yaml"),
-    "a command that is gone": ("gate", "results"),
     "a file that is not there": ("check-data", "absent.yaml"),
     "a folder without results": ("summary", "nowhere"),
     "a wrong key": ("check-data", "wrong.yaml"),

@@ -125,7 +125,7 @@ def test_a_repeatability_test_and_a_check_of_the_same_readings_agree(tmp_path):
         f"{tmp_path / 'a.csv'}, orientation: {{kind: none}}}}}}, calibration: {{base_and_tool: "
         "estimated}, evaluation: {space: measured}}}\n"
     )
-    of_poses = told("repeatability", tmp_path / "a.csv", "--rows", "visits")["noise"]["std_mm"]
+    of_poses = told("repeatability", tmp_path / "a.csv", "--rows", "visits")["std_mm"]
     found = checked(config)
     assert found["degrees_of_freedom"] == 60
     assert found["per_axis_mm"] == pytest.approx(np.sqrt(np.mean(np.square(of_poses))), rel=1e-6)

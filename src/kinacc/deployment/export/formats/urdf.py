@@ -54,7 +54,7 @@ def generated(source: Source) -> str:
     robot, dh = calibration.robot, calibration.model
     names = robot.joint_names or tuple(f"joint_{i}" for i in range(1, dh.joints + 1))
     senses = np.ones(dh.joints) if source.dh_joints else _signs(robot)
-    frames, end = _origins(dh)
+    frames, end = origins(dh)
     frames[0] = compose(robot.base, frames[0])
     root = etree.Element("robot", name=_name(source.name))
     about = re.sub("-(?=-)", "- ", source.about)  # XML ends a comment at two of them
@@ -104,8 +104,8 @@ def corrected(source: Source) -> str:
 
     calibration, path = source.calibration, Path(source.urdf_file or "")
     base, tip = _ends_in_file(calibration.robot, path, source.links)
-    plain, _ = _origins(calibration.robot.dh)
-    better, end = _origins(calibration.model)
+    plain, _ = origins(calibration.robot.dh)
+    better, end = origins(calibration.model)
     tree = etree.parse(str(path), etree.XMLParser(resolve_entities=False, no_network=True))
     elements = {each.get("name"): each for each in tree.getroot().findall("joint")}
     frame, before, here, gap = base, invert(base), IDENTITY, IDENTITY
@@ -203,7 +203,7 @@ def _name(text: str) -> str:
     return text.replace(" ", "_")
 
 
-def _origins(dh: DHModel) -> tuple[list[Pose], Pose]:
+def origins(dh: DHModel) -> tuple[list[Pose], Pose]:
     """The chain cut at its axes: k joints in the links before them, the last DH frame in its link.
 
     Link i is what follows joint i: it turns about (or slides along) the z axis of its origin, so
