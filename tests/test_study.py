@@ -197,9 +197,7 @@ def test_settings_are_refused_together(tmp_path):
     assert where == {f"{name}.{key}" for name, keys in sections.items() for key in keys}
 
 
-@pytest.mark.parametrize(
-    "noise", [[], [0.0], [-0.1], [np.nan], [1e-8], [0.3, 0.1]]
-)
+@pytest.mark.parametrize("noise", [[], [0.0], [-0.1], [np.nan], [1e-8], [0.3, 0.1]])
 def test_noise_that_means_nothing_is_refused(noise):
     with pytest.raises(InputError, match=r"study\.noise_mm"):
         load([ROOT / "config.yaml"], {"study": {"noise_mm": noise}}, ROOT)

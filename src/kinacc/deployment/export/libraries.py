@@ -35,7 +35,7 @@ def to_pybotics(source: Source, point: str | None) -> Any:
     from pybotics.tool import Tool
 
     base, parameters, end = modified_dh(source, point)
-    slides = source.calibration.model.prismatic
+    slides = source.dh.prismatic
     links = [
         (PrismaticMDHLink if slide else RevoluteMDHLink)(*row)
         for slide, row in zip(slides, parameters, strict=True)
