@@ -1,51 +1,72 @@
-"""Which of the shipped robots a file was measured on, by fitting each of them."""
+"""Which of the shipped robots a file was measured on, by fitting them."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 
 import numpy as np
 
 from kinacc.errors import InputError
+from kinacc.kinematics.dh import DHModel, forward
 from kinacc.kinematics.robot import load, shipped
 from kinacc.measurements.intake.guess import Guess
-from kinacc.measurements.reader import MeasuredFile, read
+from kinacc.measurements.reader import read
 
 _ROWS = 240
+_TRIED, _POSES = 4, 30  # robots that a linear fit puts first, with this many poses or more
 _SURE = 0.005  # of the points' spread: what an arm that is the one leaves, uncalibrated
 _NEXT = 0.2  # of what the next best leaves
+_SAME_ARM = 1e-6  # of the misfit: two names of one geometry
 
 Progress = Callable[[Iterable, str], Iterable]
 
 
 def fitting(guess: Guess, progress: Progress) -> str | None:
-    """Name of the one shipped robot that fits the file, None where none or several do."""
-    left = []
-    for name in progress(shipped(), "shipped robots tried"):
-        arm = load(name)
-        if arm.dh.joints != guess.joints:
-            continue
-        try:
-            reading = read(guess.section, arm, strict=False)
-        except InputError:
-            return None
-        left.append((_left(reading, arm), name))
-    left.sort()
-    if not left or left[0][0] > _SURE or (len(left) > 1 and left[0][0] > _NEXT * left[1][0]):
-        return None
-    return left[0][1]
+    """Name of the one shipped robot that fits the file, None where none or several do.
 
-
-def _left(reading: MeasuredFile, arm) -> float:
-    """What base and target alone leave of the positions, as a share of their spread.
-
-    The arm is taken as described: corrected, an arm of similar build would fit as well.
+    The arms are taken as described: corrected, an arm of similar build would fit as well. Of
+    robots with equal geometry the first by name is returned.
     """
     from kinacc.checks import readings, robust_fit
 
-    every = readings.merged(readings.of_file(reading, arm))[0]
+    arms = [arm for arm in map(load, shipped()) if arm.dh.joints == guess.joints]
+    if not arms:
+        return None
+    try:
+        every = readings.of_file(read(guess.section, arms[0], strict=False), arms[0])
+    except InputError:
+        return None
+    every = readings.merged(every)[0]
     few = every.select(readings.thinned(np.arange(len(every)), _ROWS))
     point = few.position_mm - np.median(few.position_mm, axis=0)
-    spread = float(np.median(np.linalg.norm(point, axis=1)))
-    fitted = robust_fit.best(few, robust_fit.start(few, arm.dh), strengths=(0.0,))
-    return fitted.sigma_mm / max(spread, 1e-9)
+    spread = max(float(np.median(np.linalg.norm(point, axis=1))), 1e-9)
+    moved = [(arm, replace(few, q_rad=arm.dh_joints(few.q))) for arm in arms]
+    moved.sort(key=lambda pair: _linear_misfit(pair[0].dh, pair[1], spread))
+    misfits = []
+    if len(few) >= _POSES:
+        moved = moved[:_TRIED]
+    for arm, seen in progress(moved, "shipped robots tried"):
+        fitted = robust_fit.best(seen, robust_fit.start(seen, arm.dh), strengths=(0.0,))
+        misfits.append((fitted.sigma_mm / spread, arm.name))
+    misfits.sort()
+    least, name = misfits[0]
+    others = [misfit for misfit, _ in misfits if misfit > (1.0 + _SAME_ARM) * least]
+    return name if least <= _SURE and not (others and least > _NEXT * others[0]) else None
+
+
+def _linear_misfit(model: DHModel, seen, spread: float) -> float:
+    """Misfit of the most measured target, base and tool entering linearly, in spreads.
+
+    ``point = B p + B R t + b`` is linear in B (3, 3), the products of B and t, and b; how far B is
+    from a rotation counts as well.
+    """
+    pairs = np.column_stack([seen.session, seen.target])
+    which, count = np.unique(pairs, axis=0, return_counts=True)
+    one = seen.select(np.flatnonzero((pairs == which[np.argmax(count)]).all(axis=1)))
+    flange = forward(model, one.q_rad)
+    terms = np.hstack([flange.position_mm / spread, flange.rotation.reshape(-1, 9),
+                       np.ones((len(one), 1))])  # fmt: skip
+    found = np.linalg.lstsq(terms, one.position_mm / spread, rcond=1e-9)[0]
+    left = np.linalg.norm(terms @ found - one.position_mm / spread, axis=1)
+    return float(np.median(left) + np.abs(np.linalg.svd(found[:3])[1] - 1.0).max())

@@ -207,7 +207,6 @@ def _robot(guess: Guess, given: str | None, ask: bool) -> tuple[str | None, str]
     """The robot as given, found by fitting, or as answered; None for a template. And why."""
     from kinacc.checks.which_robot import fitting
     from kinacc.cli.init_questions import refuse_unanswered
-    from kinacc.kinematics import robot as robots
     from kinacc.progress import reporting
 
     if given is not None:
@@ -215,9 +214,7 @@ def _robot(guess: Guess, given: str | None, ask: bool) -> tuple[str | None, str]
     with reporting("init", bar=True) as progress:
         found = fitting(guess, progress)
     if ask:
-        names = [n for n in robots.shipped() if robots.load(n).dh.joints == guess.joints]
-        click.echo(f"Shipped robots of {guess.joints} axes: {', '.join(names)}.")
-        question = "Robot (shipped name, robot file, URDF file, or 'new' for a template)"
+        question = "Robot (name in docs/robots.md, robot or URDF file, or 'new' for a form)"
         try:
             answer = click.prompt(question, default=found or "new")
         except click.Abort:

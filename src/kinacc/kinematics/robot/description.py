@@ -319,8 +319,10 @@ def _path(name_or_path: str | Path) -> Path:
         return _SHIPPED / f"{name}.yaml"
     path = Path(name)
     if not os.path.isfile(path):  # false, too, for a name no file can have
-        allowed = f"one of {', '.join(shipped())}, or the path of a robot YAML or URDF"
-        raise InputError(Problem(name, "is neither a shipped robot nor a file", allowed))
+        close = difflib.get_close_matches(name[:100].lower(), shipped(), n=1)
+        allowed = "a name listed in docs/robots.md, or the path of a robot YAML or URDF"
+        fix = f"did you mean {close[0]}?" if close else ""
+        raise InputError(Problem(name, "is neither a shipped robot nor a file", allowed, fix))
     return path
 
 
