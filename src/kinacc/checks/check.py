@@ -51,33 +51,32 @@ def run(inputs: Mapping, settings: Mapping, progress: Progress | None = None) ->
     report = examined(settings, "", progress or (lambda items, words: items))
     if report.stopping:
         title = f"{report.path} is not ready to be fitted"
-        raise InputError([_problem(report.path, each) for each in report.stopping], title)
+        raise InputError(
+            [
+                Problem(
+                    f"{report.path}, {each.where}".removesuffix(", "),
+                    f"{each.kind}: {each.what}",
+                    fix="; or ".join([each.fix, *each.commands()]),
+                )
+                for each in report.stopping
+            ],
+            title,
+        )
     for each in report.suspicions:
         warnings.warn(f"{each.kind}: {each.what}", stacklevel=1)
-    return {
-        "data_check": columns_of(
-            "data_check",
-            [
-                {
-                    "finding": each.kind,
-                    "level": each.level,
-                    "what": each.what,
-                    "lines": each.where if each.lines else None,
-                    "fix": each.fix or None,
-                    "accepted": report.accepted.get(each.kind),
-                    "rows": len(each.lines),
-                }
-                for each in (*report.suspicions, *report.notes)
-            ],
-        )
-    }
-
-
-def _problem(path: str, each: Finding) -> Problem:
-    where = f"{path}, {each.where}" if each.lines else path
-    return Problem(
-        where, f"{each.kind}: {each.what}", fix="; or ".join([each.fix, *each.commands()])
-    )
+    table = [
+        {
+            "finding": each.kind,
+            "level": each.level,
+            "what": each.what,
+            "lines": each.where or None,
+            "fix": each.fix or None,
+            "accepted": report.accepted.get(each.kind),
+            "rows": len(each.lines),
+        }
+        for each in (*report.suspicions, *report.notes)
+    ]
+    return {"data_check": columns_of("data_check", table)}
 
 
 def examined(settings: Mapping, dataset: str, progress: Progress) -> Report:
@@ -104,35 +103,32 @@ def check(
     every = replace(every, earlier=digits.unread(every))
     distances = readings.distances(every)
     by_distances, renamed = moved.by_distances(every, distances)
-    one, cell, away_mm = readings.merged(every)
+    single, cell, away_mm = readings.merged(every)
     scatter = of_measurements(reading.columns, robot)
-    fitted, meaning, found = _meant(one, layout, robot, progress)
-    kinds = {each.kind for each in found}
-    found += by_distances
+    fitted, meaning, findings = _meant(single, layout, robot, progress)
+    kinds = {each.kind for each in findings}
+    findings += by_distances
     if not any(kind.startswith("joint_") for kind in kinds):
-        found += _outside(every, robot)
-    gross = []
-    if "does_not_fit" in kinds:
-        fitted = None
-    else:
+        findings += _outside(every, robot)
+    gross: list[int] = []
+    if "does_not_fit" not in kinds:
         target = renamed.target[np.unique(cell, return_index=True)[1]]
         seen = replace(fitted.seen, target=target, target_names=renamed.target_names)
         fitted, jumps = moved.without_jumps(seen, robot.dh, progress)
-        if jumps and _turned_well(fitted):
-            found = [each for each in found if each.kind != "orientations"]
-        found += jumps
-        found += digits.commanded(fitted, meaning)
-        found += [*rows.found(fitted, meaning, layout), *_largest(fitted)]
+        findings += [*jumps, *_scattered(fitted), *digits.commanded(fitted, meaning)]
+        findings += [*rows.found(fitted, meaning, layout), *_largest(fitted)]
         gross = fitted.seen.lines(fitted.left_mm > _GROSS * fitted.trial.sigma_mm)
     off = np.flatnonzero(away_mm > tails.limit(away_mm, 3))
     if off.size:
-        most_mm = float(away_mm[off].max())
-        found.append(
-            finding("outliers/repeats", every.line[off], count=off.size, largest_mm=most_mm)
+        largest = float(away_mm[off].max())
+        findings.append(
+            finding("outliers/repeats", every.line[off], count=off.size, largest_mm=largest)
         )
-    found += digits.copies(every, scatter.per_axis_mm)
-    facts = coverage.facts_of(every, robot, scatter, distances, fitted)
+    findings += digits.copies(every, scatter.per_axis_mm)
+    fit = None if "does_not_fit" in kinds else fitted
+    facts = coverage.facts_of(every, robot, scatter, distances, fit)
     unread = dict.fromkeys((*reading.notes, *reading.left_out()))
+    lines = np.unique(every.line).size
     return Report(
         dataset,
         path,
@@ -140,88 +136,89 @@ def check(
         coverage.remarks_of(every, scatter, distances),
         tuple(
             replace(each.held_to(gross), row_names=reading.row_names)
-            for each in _once(found, np.unique(every.line).size)
+            for each in _once(findings, lines)
         ),
         (
             *(finding(LEFT_OUT, words=words) for words in unread),
             *coverage.thin(facts["joint_coverage"]),
         ),
-        *(() if fitted is None else (fitted.seen.line, fitted.left_mm)),
+        *(() if fit is None else (fit.seen.line, fit.left_mm)),
     )
 
 
 def _meant(
-    one: Readings, layout: Layout, robot: Robot, progress: Progress
+    single: Readings, layout: Layout, robot: Robot, progress: Progress
 ) -> tuple[Fitted, Meaning, list[Finding]]:
     """The fit of the file as it is meant, its meaning, and findings of all rows."""
-    here = robust_fit.fit(meanings.as_written(robot.joint_map).seen(one), robot.dh)
-    meaning, changes = meanings.find(one, robot, here.trial, progress)
-    fitted = robust_fit.fit(meaning.seen(one), robot.dh) if changes else here
-    spread_mm = meanings.spread_mm(one.position_mm) * meaning.scale
+    fitted = robust_fit.fit(meanings.as_written(robot.joint_map).seen(single), robot.dh)
+    meaning, changes = meanings.find(single, robot, fitted.trial, progress)
+    if changes:
+        fitted = robust_fit.fit(meaning.seen(single), robot.dh)
+    spread_mm = meanings.spread_mm(single.position_mm) * meaning.scale
     if fitted.trial.sigma_mm > meanings.FAR * spread_mm:
-        return fitted, meaning, [*changes, _no_fit(one, fitted, robot, spread_mm)]
-    found = [*changes, *_of_other_lengths(one, fitted, robot)]
+        return fitted, meaning, [*changes, _no_fit(single, fitted, robot, spread_mm)]
+    findings = [*changes, *_of_other_lengths(single, fitted, robot)]
     seen, there = fitted.seen, fitted.seen.has_rotation
     if not there.any():
-        return fitted, meaning, found
+        return fitted, meaning, findings
     way, least, before = orientations.find(
-        one.turns[there], layout, fitted.left.flange[there], seen.target[there]
+        single.turns[there], layout, fitted.left.flange[there], seen.target[there]
     )
-    bad = before > meanings.BAD_RAD
-    if bad and (by_turns := meanings.find_by_turns(one, robot, meaning, least)) is not None:
-        meaning, told = by_turns
-        fitted = robust_fit.fit(meaning.seen(one), robot.dh)
-        return fitted, meaning, [*found, told]
+    if before > meanings.BAD_RAD and (
+        turned := meanings.find_by_turns(single, robot, meaning, least)
+    ):
+        meaning, change = turned
+        return robust_fit.fit(meaning.seen(single), robot.dh), meaning, [*findings, change]
     if way.change is not None:
-        found.append(orientations.told(way.change, one, there, before, least))
+        findings.append(orientations.told(way.change, single, there, before, least))
         rotation = seen.rotation.copy()
-        rotation[there] = meaning.rotations(way.read(one.turns[there]))
+        rotation[there] = meaning.rotations(way.read(single.turns[there]))
         fitted = robust_fit.fit(replace(seen, rotation=rotation), robot.dh)
-    elif bad:
-        degrees = float(np.rad2deg(before))
-        found.append(finding("orientations", one.lines(there), as_written_deg=degrees))
-    return fitted, meaning, found
+    return fitted, meaning, findings
 
 
-def _turned_well(fitted: Fitted) -> bool:
-    """Whether the orientations go with the joints, now that every jump has frames of its own."""
+def _scattered(fitted: Fitted) -> Iterator[Finding]:
+    """Orientations that do not go with the joints, though every jump has frames of its own."""
     there = fitted.seen.has_rotation
-    if not there.any():
-        return False
-    flange, rotation = fitted.left.flange[there], fitted.seen.rotation[there]
-    return orientations.scatter(flange, rotation, fitted.seen.target[there]) < meanings.BAD_RAD
+    if there.any():
+        scatter = orientations.scatter(
+            fitted.left.flange[there], fitted.seen.rotation[there], fitted.seen.target[there]
+        )
+        if scatter > meanings.BAD_RAD:
+            degrees = float(np.rad2deg(scatter))
+            yield finding("orientations", fitted.seen.lines(there), as_written_deg=degrees)
 
 
-def _no_fit(one: Readings, fitted: Fitted, robot: Robot, spread_mm: float) -> Finding:
-    whole_mm = float(np.sum(np.abs(robot.dh.a_mm)) + np.sum(np.abs(robot.dh.d_mm)))
+def _no_fit(single: Readings, fitted: Fitted, robot: Robot, spread_mm: float) -> Finding:
+    whole_mm = float(np.sum(np.abs([robot.dh.a_mm, robot.dh.d_mm])))
     unit = (
         f". The points spread over {spread_mm:.3g} mm, links and offsets of {robot.name} add up "
         f"to {whole_mm:.4g} mm: check the unit of the positions too"
     )
     return finding(
         "does_not_fit",
-        one.lines(),
+        single.lines(),
         robot=robot.name,
         sigma_mm=fitted.trial.sigma_mm,
         more="" if _REACH[0] * whole_mm < spread_mm < _REACH[1] * whole_mm else unit,
     )
 
 
-def _of_other_lengths(one: Readings, fitted: Fitted, robot: Robot) -> Iterator[Finding]:
+def _of_other_lengths(single: Readings, fitted: Fitted, robot: Robot) -> Iterator[Finding]:
     """An arm that fits with other lengths alone is another one of the same build."""
     new, old = (np.stack([arm.a_mm, arm.d_mm]) for arm in (fitted.trial.arm.model, robot.dh))
     apart = np.abs(new - old)
     far = np.argwhere(apart > _OTHER_LENGTHS * np.abs(old).sum())
     if len(far):
-        words = [
+        lengths = [
             f"{'ad'[n]} of joint {joint + 1} {new[n, joint]:.4g} for {old[n, joint]:.4g} mm"
-            for n, joint in sorted(far.tolist(), key=lambda each: -apart[*each])
+            for n, joint in sorted(far.tolist(), key=lambda place: -apart[*place])
         ]
         yield finding(
             "does_not_fit/lengths",
-            one.lines(),
+            single.lines(),
             robot=robot.name,
-            lengths=", ".join(words),
+            lengths=", ".join(lengths),
             largest_mm=float(apart.max()),
         )
 
@@ -229,8 +226,8 @@ def _of_other_lengths(one: Readings, fitted: Fitted, robot: Robot) -> Iterator[F
 def _largest(fitted: Fitted) -> Iterator[Finding]:
     """Readings that are no outliers, and stand apart from the others all the same."""
     good = np.flatnonzero(~fitted.bad)
-    poses, number = np.unique(fitted.seen.pose[good], return_inverse=True)
-    worst = np.zeros(len(poses))
+    number = np.unique(fitted.seen.pose[good], return_inverse=True)[1]
+    worst = np.zeros(number.max(initial=-1) + 1)
     np.maximum.at(worst, number, fitted.left_mm[good])
     if count := tails.detached(worst):
         ordered = np.sort(worst)[::-1]
@@ -256,21 +253,21 @@ def _outside(every: Readings, robot: Robot) -> Iterator[Finding]:
         )
 
 
-def _once(known: list[Finding], lines: int) -> list[Finding]:
+def _once(findings: list[Finding], lines: int) -> list[Finding]:
     """Findings without those another makes needless.
 
     Those of the same kind and of no other rows, and what merely shows (outliers, joints outside
     their limits) in rows of which a fault is known that is not in all ``lines`` of the file.
     """
-    faults = [e for e in known if e.kind not in _SYMPTOMS and len(e.lines) < lines]
+    faults = [e for e in findings if e.kind not in _SYMPTOMS and len(e.lines) < lines]
     named = {line for each in faults for line in each.lines}
-    kept: list[Finding] = []
-    for each in known:
-        own = set(each.lines)
-        rivals = [set(other.lines) for other in kept if other.kind == each.kind]
+    needed: list[Finding] = []
+    for each in findings:
+        rows_ = set(each.lines)
+        rivals = [set(e.lines) for e in needed if e.kind == each.kind]
         # A second jump concerns part of the rows of the first and is another one all the same.
         jump = each.kind in ("base_jump", "target_moved")
-        needless = any(own == other if jump else own <= other for other in rivals)
-        if not needless and not (each.kind in _SYMPTOMS and own <= named):
-            kept.append(each)
-    return kept
+        needless = any(rows_ == rival if jump else rows_ <= rival for rival in rivals)
+        if not needless and not (each.kind in _SYMPTOMS and rows_ <= named):
+            needed.append(each)
+    return needed

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -22,9 +23,9 @@ _PER_POSE = 6  # independent numbers of a rigid body, however many targets it ca
 
 def facts_of(
     every: Readings, robot: Robot, noise: Noise, distances: list[Distance], fitted: Fitted | None
-) -> dict[str, object]:
+) -> dict[str, Any]:
     """What is there, by name; units stand in the names."""
-    facts: dict[str, object] = {
+    facts: dict[str, Any] = {
         "robot": robot.name,
         "rows": int(np.unique(every.line).size),
         "poses": int(np.unique(every.pose).size),
@@ -70,14 +71,18 @@ def _counts(names: tuple[str, ...], number: np.ndarray) -> dict[str, str]:
 
 def _covered(q: np.ndarray, robot: Robot, joint: int) -> dict[str, object]:
     """What a joint went through, ``q`` (n,), and may go through."""
-    factor, unit = (1.0, "mm") if robot.dh.prismatic[joint] else (np.pi / 180.0, "deg")
-    low, high, least, most = (
-        float(each / factor)
-        for each in (q.min(), q.max(), robot.q_min_rad[joint], robot.q_max_rad[joint])
-    )
-    share = (high - low) / (most - least)
-    ends = {"low": low, "high": high, "least": least, "most": most}
-    return {"joint": joint + 1, **ends, "unit": unit, "share": share}
+    ends = np.array([q.min(), q.max(), robot.q_min_rad[joint], robot.q_max_rad[joint]])
+    slides = bool(robot.dh.prismatic[joint])
+    low, high, least, most = (ends if slides else ends * (180.0 / np.pi)).tolist()
+    return {
+        "joint": joint + 1,
+        "low": low,
+        "high": high,
+        "least": least,
+        "most": most,
+        "unit": "mm" if slides else "deg",
+        "share": (high - low) / (most - least),
+    }
 
 
 def remarks_of(every: Readings, noise: Noise, distances: list[Distance]) -> tuple[str, ...]:

@@ -56,6 +56,7 @@ class Report:
 
     def as_dict(self) -> dict[str, object]:
         """For JSON: every finding with all its lines."""
+        keys = ("kind", "level", "what", "fix", "lines")
         return {
             "dataset": self.dataset,
             "path": self.path,
@@ -64,13 +65,9 @@ class Report:
             "remarks": [*self.remarks, *(each.what for each in self.notes)],
             "suspicions": [
                 {
-                    "kind": each.kind,
-                    "level": each.level,
+                    **{key: vars(each)[key] for key in keys},
                     "accepted": self.accepted.get(each.kind),
-                    "what": each.what,
-                    "fix": each.fix,
-                    "lines": each.lines,
-                    "where": each.where if each.lines else None,
+                    "where": each.where or None,
                     **each.values,
                 }
                 for each in self.suspicions
@@ -88,7 +85,6 @@ class Report:
 
 def to_json(reports: Sequence[Mapping]) -> str:
     """All data sets in one object, with the worst verdict; numbers that are not finite are null."""
-    worst = max((VERDICTS.index(each["verdict"]) for each in reports), default=0)
-    told = {"verdict": VERDICTS[worst], "datasets": reports}
-    text = json.dumps(told, default=lambda value: value.tolist())
+    verdict = max((each["verdict"] for each in reports), key=VERDICTS.index, default=VERDICTS[0])
+    text = json.dumps({"verdict": verdict, "datasets": reports}, default=np.ndarray.tolist)
     return json.dumps(json.loads(text, parse_constant=lambda name: None), indent=1)
