@@ -171,8 +171,9 @@ def _meant(
         return robust_fit.fit(meaning.seen(single), robot.dh), meaning, [*findings, change]
     if way.change is not None:
         findings.append(orientations.told(way.change, single, there, before, least))
+    if way.change is not None or meaning.mirrored:
         rotation = seen.rotation.copy()
-        rotation[there] = meaning.rotations(way.read(single.turns[there]))
+        rotation[there] = way.read(single.turns[there])
         fitted = robust_fit.fit(replace(seen, rotation=rotation), robot.dh)
     return fitted, meaning, findings
 

@@ -66,18 +66,12 @@ class Meaning:
         """DH joint values (n, k) of joints as read (n, k)."""
         return (q * self.unit) @ self.matrix.T + self.zero
 
-    def rotations(self, rotation: ndarray) -> ndarray:
-        """Orientations (n, 3, 3) in right-handed coordinates."""
-        return rotation * np.outer(MIRROR, MIRROR) if self.mirrored else rotation
-
     def seen(self, read: Readings) -> Readings:
         """The readings as this meaning has them."""
-        return replace(
-            read,
-            q_rad=self.joints(read.q),
-            position_mm=read.position_mm * self.scale * (MIRROR if self.mirrored else 1.0),
-            rotation=self.rotations(read.rotation),
-        )
+        mirror = MIRROR if self.mirrored else np.ones(3)
+        position_mm = read.position_mm * self.scale * mirror
+        rotation = read.rotation * np.outer(mirror, mirror)
+        return replace(read, q_rad=self.joints(read.q), position_mm=position_mm, rotation=rotation)
 
     def changed(self, change: Finding, **values) -> Meaning:
         """This meaning with one more change."""

@@ -47,54 +47,38 @@ def _explanations(
 ) -> Iterator[tuple[Finding, Readings]]:
     """Every known fault undone in the readings ``rows``."""
     seen = fitted.seen.select(rows)
-    q = seen.q
-    joints, turning = q.shape[1], meaning.unit == 1.0
-
-    def other(q: ndarray) -> Readings:
-        return replace(seen, q_rad=meaning.joints(q))
 
     def moved(position_mm: ndarray, rotation: ndarray = seen.rotation) -> Readings:
         return replace(seen, position_mm=position_mm, rotation=rotation)
 
-    for factor, unit, stated in (
-        (180.0 / np.pi, "radians", "degrees"),
-        (np.pi / 180.0, "degrees", "radians"),
-    ):
+    for stated, factor in (("degrees", 180.0 / np.pi), ("radians", np.pi / 180.0)):
+        unit = {"degrees": "radians", "radians": "degrees"}[stated]
+        q = seen.q * np.where(meaning.unit == 1.0, factor, 1.0)
         change = finding("joint_units", unit=unit, stated=stated, short="")
-        yield change, other(q * np.where(turning, factor, 1.0))
+        yield change, replace(seen, q_rad=meaning.joints(q))
     for factor, unit in ((1e3, "metres"), (1e-3, ""), (25.4, "inches")):
         yield meanings.of_length(unit), moved(factor * seen.position_mm)
-    yield finding("commanded_joints/better"), other(seen.commanded)
+    yield finding("commanded_joints/better"), replace(seen, q_rad=meaning.joints(seen.commanded))
     there = seen.has_rotation
-    if there.any():
-        numbers = seen.turns[there]
-        for way in orientations.simple(layout, numbers):
-            rotation = seen.rotation.copy()
-            rotation[there] = way.read(numbers)
-            yield way.change, moved(seen.position_mm, rotation)
-    for axis, name in enumerate("xyz"):
-        mirror = np.where(np.arange(3) == axis, -1.0, 1.0)
-        position_mm, change = (
-            seen.position_mm * mirror,
-            finding("left_handed/axis", axis=name),
-        )
+    for way in orientations.simple(layout, seen.turns[there]) if there.any() else ():
+        rotation = seen.rotation.copy()
+        rotation[there] = way.read(seen.turns[there])
+        yield way.change, moved(seen.position_mm, rotation)
+    for mirror, name in zip(1.0 - 2.0 * np.eye(3), "xyz", strict=True):
+        change, position_mm = finding("left_handed/axis", axis=name), seen.position_mm * mirror
         yield change, moved(position_mm)
         yield change, moved(position_mm, seen.rotation * np.outer(mirror, mirror))
-    for one in np.unique(fitted.seen.target):
-        number = fitted.seen.target[fitted.seen.target == one][0]
+    for target in np.unique(fitted.seen.target):
         # Readings of the target itself are made to fit nothing.
-        others = (seen.target != number)[:, None]
+        others = (seen.target != target)[:, None]
         swapped = moved(np.where(others, seen.position_mm, np.inf))
-        change = finding("target_swapped", target=seen.target_names[number])
-        yield change, replace(swapped, target=np.full_like(seen.target, one))
-    for joint in range(joints):
-        signs = np.where(np.arange(joints) == joint, -1.0, 1.0)
-        yield finding("joint_sign", joint=joint + 1), other(q * signs)
-    for joint in range(1, joints):
-        for beside in {joint - 1, 1} - {joint}:
-            for sign in (1.0, -1.0):
-                coupled = meanings.coupled(meaning, joint, beside, sign)
-                yield coupled.changes[-1], replace(seen, q_rad=coupled.joints(q))
+        change = finding("target_swapped", target=seen.target_names[target])
+        yield change, replace(swapped, target=np.full_like(seen.target, target))
+    for other in meanings.single(meaning, fitted.trial.nominal.prismatic):
+        change = other.changes[-1]
+        beside = change.values.get("other") in (2, change.values["joint"] - 1)
+        if change.kind == "joint_sign" or (change.kind == "joint_coupling" and beside):
+            yield change, replace(seen, q_rad=other.joints(seen.q))
 
 
 def _outliers(fitted: Fitted, rows: ndarray) -> Iterator[Finding]:

@@ -42,24 +42,55 @@ def check_data(
       kinacc check-data examples/ur10_published.yaml --picture checked.svg
       kinacc check-data config.yaml examples/ur10.yaml --dataset ur10_b --json
     """
-    from kinacc.checks.report import UNUSABLE, to_json
-    from kinacc.errors import InputError
+    from kinacc.checks.check import examined
+    from kinacc.checks.report import UNUSABLE, VERDICTS, to_json
+    from kinacc.cli.output import PICTURES, require_writable
+    from kinacc.errors import InputError, Problem
+    from kinacc.progress import reporting
+
+    files = files or (CONFIG,)
+    code, told, following, sections = 0, [], [], {}
+
+    def unusable(name: str, path: str, error: InputError) -> None:
+        problems = [asdict(each) for each in error.problems]
+        verdict = VERDICTS[UNUSABLE]
+        told.append({"dataset": name, "path": path, "verdict": verdict, "problems": problems})
 
     try:
         if accept is not None:
-            _accept(files or (CONFIG,), dataset, accept, reason)
-        sections = _sections(files or (CONFIG,), dataset)
-        _check_picture(picture, force, list(sections))
+            _accept(files, dataset, accept, reason)
+        sections = _sections(files, dataset)
+        if picture is not None and len(sections) > 1:
+            what = "draws one data set, and there are several"
+            raise InputError(Problem("--picture", what, ", ".join(sections), "give --dataset"))
+        require_writable([picture], force, PICTURES)
     except InputError as error:
         if not as_json:
             raise
-        click.echo(to_json([_unusable(", ".join(files or (CONFIG,)), "", error)]))
-        sys.exit(UNUSABLE)
-    stopped: list[str] = []
-    code = report_on(sections, as_json, picture, stopped, shlex.join((files or (CONFIG,))[:1]))
-    if not as_json and code < UNUSABLE:
-        following = stopped or [shlex.join(["kinacc", "calibrate", *(files or (CONFIG,))])]
-        click.echo("\n  ".join(["next:", *following]))
+        code = UNUSABLE
+        unusable(", ".join(files), "", error)
+    for name, settings in sections.items():
+        try:
+            with reporting(f"check-data {name}", bar=True) as progress:
+                report = examined(settings, name, progress)
+        except InputError as error:
+            code = UNUSABLE
+            unusable(name, settings["measurements"]["file"]["path"], error)
+            if not as_json:
+                click.echo(f"{error}\n", err=True)
+            continue
+        code = max(code, report.code)
+        told.append(report.as_dict())
+        following += [words for each in report.stopping for words in each.commands(files[0])]
+        if picture is not None:
+            _draw(report, picture)
+        if not as_json:
+            click.echo(report.as_text() + "\n")
+    if as_json:
+        click.echo(to_json(told))
+    elif code < UNUSABLE:
+        next_ = following or [shlex.join(["kinacc", "calibrate", *files])]
+        click.echo("\n  ".join(["next:", *next_]))
     sys.exit(code)
 
 
@@ -79,80 +110,23 @@ def _accept(files: tuple[str, ...], dataset: tuple[str, ...], kind: str, reason:
     write_whole(files[0], text.encode())
 
 
-def report_on(
-    sections: dict[str, dict],
-    as_json: bool,
-    picture: str | None = None,
-    stopped: list[str] | None = None,
-    config: str = "FILE.yaml",
-) -> int:
-    """Check data sets (complete configurations by name) and print; returns the exit code.
-
-    ``stopped`` takes the commands to go on with after findings that stop the workflow.
-    """
-    from kinacc.checks.check import examined
-    from kinacc.checks.report import UNUSABLE, to_json
-    from kinacc.errors import InputError
-    from kinacc.progress import reporting
-
-    worst, told = 0, []
-    for name, settings in sections.items():
-        file = settings["measurements"]["file"]
-        try:
-            with reporting(f"check-data {name}", bar=True) as progress:
-                report = examined(settings, name, progress)
-        except InputError as error:
-            worst = UNUSABLE
-            told.append(_unusable(name, file["path"], error))
-            if not as_json:
-                click.echo(f"{error}\n", err=True)
-            continue
-        worst = max(worst, report.code)
-        if picture is not None:
-            _draw(report, picture)
-        told.append(report.as_dict())
-        for each in report.stopping:
-            (stopped if stopped is not None else []).extend(each.commands(config))
-        if not as_json:
-            click.echo(report.as_text() + "\n")
-    if as_json:
-        click.echo(to_json(told))
-    return worst
-
-
 def _sections(files: tuple[str, ...], wanted: tuple[str, ...]) -> dict[str, dict]:
     """The data sets to check: those asked for, or all that are read from a file."""
     from kinacc.checks.contradictions import load
     from kinacc.errors import Problem, refuse
 
     full = load(files)
-    measured = [n for n, c in full.items() if c["measurements"]["source"] == "file"]
-    allowed = ", ".join(measured) or "none of these files' data sets is read from a file"
-    problems = [
-        Problem(
-            "--dataset",
-            f"{name!r} is {'synthetic' if name in full else 'not in the configuration'}",
-            allowed,
-        )
-        for name in wanted
-        if name not in measured
-    ]
-    if not measured and not wanted:
-        what = "no data set is read from a file: there is nothing to check"
-        problems.append(Problem(", ".join(files), what, "measurements.source: file"))
-    refuse(problems)
     # The newest line of a series is the arm's own file.
-    return {name: full[name] for name in wanted or measured if wanted or "series" not in full[name]}
-
-
-def _check_picture(picture: str | None, force: bool, datasets: list[str]) -> None:
-    from kinacc.cli.output import PICTURES, require_writable
-    from kinacc.errors import InputError, Problem
-
-    if picture is not None and len(datasets) > 1:
-        what = "draws one data set, and there are several"
-        raise InputError(Problem("--picture", what, ", ".join(datasets), "choose with --dataset"))
-    require_writable([picture], force, PICTURES)
+    measured = [n for n, c in full.items() if c["measurements"]["source"] == "file"]
+    chosen = wanted or [name for name in measured if "series" not in full[name]]
+    refuse(
+        Problem("--dataset", f"{name!r} is not read from a file", ", ".join(measured))
+        for name in chosen
+        if name not in measured
+    )
+    if not chosen:
+        refuse([Problem(", ".join(files), "no data set is read from a file")])
+    return {name: full[name] for name in chosen}
 
 
 def _draw(report, picture: str) -> None:
@@ -163,12 +137,3 @@ def _draw(report, picture: str) -> None:
     limit_mm = report.facts.get("quick_fit", {}).get("most_expected_mm", float("nan"))
     drawn = draw(report.facts["joint_coverage"], report.line, report.left_mm, limit_mm, suspects)
     Output(picture=picture).draw(drawn)
-
-
-def _unusable(dataset: str, path: str, error) -> dict:
-    return {
-        "dataset": dataset,
-        "path": path,
-        "verdict": "unusable",
-        "problems": [asdict(each) for each in error.problems],
-    }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import click
@@ -22,13 +23,18 @@ def exclude(file: str, lines: str, reason: str, dataset: str | None, as_json: bo
       kinacc exclude tracker.yaml --lines 12,15-18 --reason "reflector moved"
     """
     from kinacc.config.edit import with_added
+    from kinacc.errors import Problem, first_few, refuse
     from kinacc.kinematics import robot
     from kinacc.measurements.reader import excluded_lines, read
     from kinacc.tables.atomic import write_whole
 
     name, settings = measured_data_set(file, dataset)
     section = settings["measurements"]["file"]
-    numbers = _numbers(lines, excluded_lines(section), reason)
+    numbers = _numbers(lines)
+    known = [each for each in numbers if each in excluded_lines(section)]
+    problems = [Problem("--lines", f"{first_few(known)} excluded already")] if known else []
+    problems += [] if reason.strip() else [Problem("--reason", "is empty", "why, in words")]
+    refuse(problems)
     item = {"lines": numbers, "reason": reason}
     read({**section, "exclude": [*section["exclude"], item]}, robot.load(settings["robot"]))
     path = ("datasets", name, "measurements", "file", "exclude")
@@ -46,35 +52,27 @@ def measured_data_set(file: str, dataset: str | None) -> tuple[str, dict]:
     from kinacc.checks.contradictions import load
     from kinacc.errors import InputError, Problem
 
-    full = load([file])
-    names = [
-        name
-        for name, own in full.items()
-        if own["measurements"]["source"] == "file" and "line_of" not in own and "series" not in own
-    ]
-    if dataset not in (names if dataset or len(names) != 1 else [None]):
-        what = "is not given" if dataset is None else f"{dataset!r} is not a data set of one file"
-        raise InputError(Problem("--dataset", what, ", ".join(names) or "a measured file"))
-    name = dataset or names[0]
-    return name, full[name]
+    measured = {
+        name: own
+        for name, own in load([file]).items()
+        if own["measurements"]["source"] == "file" and not {"line_of", "series"} & {*own}
+    }
+    name = dataset or (next(iter(measured)) if len(measured) == 1 else "")
+    if name not in measured:
+        what = f"{name!r} is not a data set of one file" if name else "is not given"
+        raise InputError(Problem("--dataset", what, ", ".join(measured) or "a measured file"))
+    return name, measured[name]
 
 
-def _numbers(text: str, known: dict[int, str], reason: str) -> list[int]:
-    """Line numbers of a text such as 12,15-18. InputError for others, and for those excluded."""
-    from kinacc.errors import InputError, Problem, first_few, refuse
+def _numbers(text: str) -> list[int]:
+    """Line numbers of a text such as 12,15-18. InputError for others."""
+    from kinacc.errors import InputError, Problem
 
-    found: list[int] = []
-    try:
+    numbers: set[int] = set()
+    if re.fullmatch(r"\d{1,9}(-\d{1,9})?(,\d{1,9}(-\d{1,9})?)*", text):
         for part in text.split(","):
             first, _, last = part.partition("-")
-            found += range(int(first), int(last or first) + 1)
-    except ValueError:
-        found = []
-    if not found or len(found) > 100_000:
+            numbers |= {*range(int(first), min(int(last or first), int(first) + 100_000) + 1)}
+    if not numbers:
         raise InputError(Problem("--lines", repr(text), "numbers and ranges such as 12,15-18"))
-    numbers = sorted(set(found))
-    there = [each for each in numbers if each in known]
-    problems = [Problem("--lines", f"{first_few(there)} excluded already")] if there else []
-    problems += [] if reason.strip() else [Problem("--reason", "is empty", "why, in words")]
-    refuse(problems)
-    return numbers
+    return sorted(numbers)

@@ -40,7 +40,7 @@ FIGURES = {
     "data.readings": ("1", "number of readings"),
     "data.poses": ("1", "number of poses"),
     "history.moved": ("mm", "rms movement of the arm since the calibration in force"),
-    "history.beyond_chance": ("mm", "by how much that is beyond chance"),
+    "history.beyond_chance": ("mm", "movement since the calibration in force beyond chance"),
     "history.in_force_mean": (
         "mm",
         "mean position error of the calibration in force at the newest readings",
@@ -65,11 +65,6 @@ Limits = Mapping[str, Any]
 _MODEL = "error model whose errors are meant"
 _AT = "errors at rows each fit had not seen, at those of the validation fold, or at those fitted"
 _MOST, _LEAST = "largest value that passes", "smallest value that passes"
-
-
-def units() -> dict[str, str]:
-    """Unit of every figure that a gate may name; 1 where it is counted."""
-    return {name: unit for name, (unit, _) in FIGURES.items()}
 
 
 def limit_key(word: str, gate: Limits) -> str:

@@ -44,7 +44,7 @@ def load(
     else replaced. ``overrides`` (nested, as from ``--config``) come last. Paths of data and robots
     are relative to the file they stand in, those of ``overrides`` to the current ``folder``, and so
     are those returned. ``contradictions`` (full settings, place, folder) yields what is wrong with
-    settings that are each fine. Every data set has ``robot``, ``seed`` and all sections of
+    settings that are valid one by one. Every data set has ``robot``, ``seed`` and all sections of
     :class:`Settings`, numbers in the units their names carry.
 
     Raises InputError listing every problem in all files.
@@ -53,10 +53,12 @@ def load(
     problems: list[Problem] = []
     for path in paths:
         document, wrong = read(path)
-        if os.path.realpath(Path(path).parent) != os.path.realpath(folder):
-            beside = os.path.relpath(Path(path).absolute().parent, folder)
-            document = replace(document, data=_relocated(document.data, beside, Path(folder)))
-        documents.append(document)
+        beside = os.path.relpath(Path(path).absolute().parent, folder)
+        documents.append(
+            replace(document, data=_relocated(document.data, beside, Path(folder)))
+            if os.path.realpath(Path(path).parent) != os.path.realpath(folder)
+            else document
+        )
         problems += wrong
     if overrides:
         documents.append(Document(COMMAND_LINE, deepcopy(dict(overrides))))
@@ -76,19 +78,24 @@ def load(
             datasets = {}
         for name, own in datasets.items():
             context = {"folder": Path(folder), "dataset": name, "datasets": datasets}
-            found, wrong = _data_set(own, shared, documents, context, contradictions)
-            resolved |= found
-            problems += wrong
+            try:
+                resolved |= _data_set(own, shared, documents, context, contradictions)
+            except InputError as error:
+                problems += error.problems
             if len(problems) > _MOST_PROBLEMS:
                 break
     if problems:
-        problems = sorted(dict.fromkeys(problems), key=_reading_order(documents))
-        if len(problems) > _MOST_PROBLEMS:
-            problems[_MOST_PROBLEMS:] = [Problem(documents[0].name, "more", fix="mend these first")]
+        problems = sorted(dict.fromkeys(problems), key=_line)[:_MOST_PROBLEMS]
         count = len(problems)
         title = f"{count} problem{'s' if count > 1 else ''} in the configuration"
         raise InputError(problems, title)
     return resolved
+
+
+def _line(problem: Problem) -> tuple[str, int]:
+    """File and line of a problem, to sort by."""
+    file, _, rest = problem.where.partition(", ")[0].rpartition(":")
+    return (file, int(rest)) if rest.isdecimal() else (problem.where, 0)
 
 
 def overlay(
@@ -119,113 +126,95 @@ def _relocated(value: Any, beside: str, folder: Path, key: Any = None) -> Any:
     return value if key == "robot" and is_name else near
 
 
-def _reading_order(documents: Sequence[Document]) -> Callable[[Problem], tuple[int, int]]:
-    """Sort key of problems: file by file as given, then line by line."""
-    names = [re.escape(each.name) for each in documents]
-
-    def order(problem: Problem) -> tuple[int, int]:
-        for number, name in enumerate(names):
-            if match := re.match(rf"{name}(?::(\d+))?(?:, |$)", problem.where):
-                return number, int(match[1] or 0)
-        return len(names), 0
-
-    return order
-
-
 def _data_set(
     own: Any,
     shared: Mapping[str, Any],
     documents: Sequence[Document],
     context: Mapping[str, Any],
     contradictions: Contradictions,
-) -> tuple[dict[str, dict[str, Any]], list[Problem]]:
+) -> dict[str, dict[str, Any]]:
     """Full settings of a data set, and of those its series stands for, by name."""
     name = context["dataset"]
 
     def place(path: KeyPath) -> str:
         """Where a key was given last, else where the section was that it would stand in."""
-        for length in range(len(path), -1, -1):
-            for base in (("datasets", name), ()):
-                for document in reversed(documents):
-                    if base + path[:length] and document.gives(base + path[:length]):
-                        return document.place(base + path)
-        raise AssertionError(path)  # the data set itself is given
+        return next(
+            document.place(base + path)
+            for length in range(len(path), -1, -1)
+            for base in (("datasets", name), ())
+            for document in reversed(documents)
+            if base + path[:length] and document.gives(base + path[:length])
+        )
 
     content = overlay(shared, own, _MAPPINGS) if isinstance(own, Mapping) else own
     try:
         whole = Configuration.model_validate({"datasets": {name: content}}, context=context)
     except ValidationError as error:
-        return {}, [*problems_of(error, lambda path: place(path[2:]))]
+        raise InputError(problems_of(error, lambda path: place(path[2:]))) from None
     full, problems = whole.datasets[name].model_dump(by_alias=True), []
     if own.get("gates") and any(each["datasets"] for each in full["gates"]):
         what = "names data sets inside of a data set, which its gates are about alone"
         problems.append(Problem(place(("gates",)), what, fix="leave datasets out of the gate"))
     full["gates"] = [each for each in full["gates"] if name in (each["datasets"] or [name])]
     resolved = series.expanded(name, full)
+    lines = [line.get("path") for line in own.get("series") or ()]
     for each, settings in resolved.items():
         if each != name and each in context["datasets"]:
             what = f"its line {each} has the name of another data set"
             problems.append(Problem(place(("series",)), what, "another name"))
         path = settings["measurements"]["file"]["path"]
-        lines = [line.get("path") for line in own.get("series") or ()]
 
-        def of_line(keys: KeyPath, path: str = path, lines: list[Any] = lines) -> str:
+        def of_line(keys: KeyPath, path: str = path) -> str:
             is_line = path in lines and keys == _IDENTITY[1]
             return place(("series", lines.index(path), "path") if is_line else keys)
 
         problems += contradictions(settings, of_line, context["folder"])
-    return resolved, problems
+    if problems:
+        raise InputError(problems)
+    return resolved
 
 
 def problems_of(error: ValidationError, place: Place) -> Iterator[Problem]:
-    """What pydantic has against settings, with the key that is nearest to an unknown one."""
+    """The problems of a pydantic error, with the key that is nearest to an unknown one."""
     for each in error.errors(include_url=False)[: _MOST_PROBLEMS + 1]:
         more = each.get("ctx", {})
-        path = (*each["loc"], *more.get("keys", ()))
         # Kinds of gates and of values, and keys that are values, are no steps of the file.
+        path = (*each["loc"], *more.get("keys", ()))
         path = tuple(step for step in path if not (isinstance(step, str) and step[:1] == "["))
-        kind, value, message = each["type"], each["input"], each["msg"]
-        message = f"{shown(value)} {message.removeprefix('Input ')}".partition(" or instance of ")[
-            0
-        ]
-        if kind == "missing":
-            yield Problem(place(path[:-1]), f"has no {path[-1]}")
-        elif kind == "extra_forbidden":
-            yield Problem(place(path), f"unknown key {path[-1]!r}", fix=_meant(path))
-        elif kind == "refused":
-            yield Problem(place(path), more["what"], fix=more["fix"])
-        elif kind == "literal_error":
-            words = re.findall(r"'([^']*)'", more["expected"])
-            yield Problem(place(path), message, fix=did_you_mean(value, words))
-        else:
-            yield Problem(place(path), message)
+        message = each["msg"].removeprefix("Input ").partition(" or instance of ")[0]
+        what, fix = f"{shown(each['input'])} {message}", ""
+        if each["type"] == "missing":
+            path, what = path[:-1], f"has no {path[-1]}"
+        elif each["type"] == "extra_forbidden":
+            what, fix = f"unknown key {path[-1]!r}", _meant(path)
+        elif each["type"] == "refused":
+            what, fix = more["what"], more["fix"]
+        elif each["type"] == "literal_error":
+            fix = did_you_mean(each["input"], re.findall(r"'([^']*)'", more["expected"]))
+        yield Problem(place(path), what, fix=fix)
 
 
 def _meant(path: KeyPath) -> str:
     """What to write instead of an unknown key of the settings."""
     path = path[2:] if path[0] == "datasets" else path
-    steps, known = [str(step) for step in path if not isinstance(step, int)], keys()
-    section = ".".join(steps[:-1])
-    there = [each.rpartition(".")[2] for each in known if each.rpartition(".")[0] == section]
-    homes = [each for each in known if each.rpartition(".")[2] == steps[-1]]
-    return (
-        did_you_mean(steps[-1], there)
-        or (homes and f"it belongs at {' or '.join(homes[:3])}")
-        or f"known: {', '.join(there)}"
+    *above, key = [str(step) for step in path if not isinstance(step, int)]
+    known = [each.rpartition(".") for each in keys()]
+    there = [name for section, _, name in known if section == ".".join(above)]
+    homes = ["".join(each) for each in known if each[2] == key][:3]
+    return did_you_mean(key, there) or (
+        f"it belongs at {' or '.join(homes)}" if homes else f"known: {', '.join(there)}"
     )
 
 
 def _given_twice(documents: Sequence[Document]) -> Iterator[Problem]:
+    """Data sets whose measurements are given in two files; the command line replaces on purpose."""
     first: dict[KeyPath, Document] = {}
     for document in documents:
-        datasets = document.data.get("datasets")
-        if document.name == COMMAND_LINE or not isinstance(datasets, Mapping):
-            continue  # replaces values on purpose
-        paths = [("datasets", name, *keys) for name in datasets for keys in _IDENTITY]
-        for path in filter(document.gives, paths):
-            if path in first:
-                what = f"data set {path[1]!r} has its measurements given in two files"
-                allowed = f"once; first in {first[path].place(path)}"
-                fix = "give the second data set a name of its own"
-                yield Problem(document.place(path), what, allowed, fix)
-            first.setdefault(path, document)
+        datasets = document.data.get("datasets") if document.name != COMMAND_LINE else None
+        for name in datasets if isinstance(datasets, Mapping) else ():
+            for path in (("datasets", name, *steps) for steps in _IDENTITY):
+                if document.gives(path) and first.setdefault(path, document) is not document:
+                    what = f"data set {name!r} has its measurements given in two files"
+                    allowed = f"once; first in {first[path].place(path)}"
+                    fix = "give the second data set a name of its own"
+                    yield Problem(document.place(path), what, allowed, fix)

@@ -22,19 +22,22 @@ FLAGS = {
 
 
 def day_of(value: Any) -> str | None:
-    """A day as ISO text, of what YAML makes of it or of text; None for what is no day."""
-    if isinstance(value, date) and not isinstance(value, datetime):
-        return value.isoformat()
+    """A day as ISO text, from a date of YAML or a text as 2026-03-01; None for anything else."""
     try:
-        return date.fromisoformat(value).isoformat() if value[4] == value[7] == "-" else None
-    except (TypeError, ValueError, IndexError):
+        day = value if isinstance(value, date) else date.fromisoformat(value)
+    except (TypeError, ValueError):
         return None
+    is_day = not isinstance(day, datetime) and str(value) == day.isoformat()
+    return day.isoformat() if is_day else None
 
 
 def _day(value: Any) -> str:
     if (day := day_of(value)) is None:
         raise refused(f"{str(value)[:60]!r} is no day", "write a day as 2026-03-01")
     return day
+
+
+Moved = Literal["same", "moved"] | None
 
 
 class Line(Section):
@@ -44,8 +47,8 @@ class Line(Section):
     date: Annotated[str, BeforeValidator(_day)] = setting(
         ..., "day it was measured", allowed="a day as 2026-03-01"
     )
-    base: Literal["same", "moved"] | None = setting(None, f"how {FLAGS['base']}; null in the first")
-    tool: Literal["same", "moved"] | None = setting(None, f"how {FLAGS['tool']}; null in the first")
+    base: Moved = setting(None, f"how {FLAGS['base']}; null in the first")
+    tool: Moved = setting(None, f"how {FLAGS['tool']}; null in the first")
 
 
 def _of_each_other(lines: list[Line]) -> list[Line]:
@@ -53,15 +56,16 @@ def _of_each_other(lines: list[Line]) -> list[Line]:
     ordered = sorted(lines, key=lambda line: line.date)
     paths = [line.path for line in ordered]
     for before, line in pairwise(ordered):
-        number = lines.index(line)
+        what = ""
         if line.date == before.date:
-            raise refused(f"{line.date} is the date of two lines", "", number, "date")
-        for name, how in FLAGS.items():
-            if getattr(line, name) is None:
-                what = f"does not say whether {how} as on {before.date}"
-                raise refused(what, f"write {name}: {SAME}, or {name}: {MOVED}", number)
-        if paths.count(line.path) > 1:
-            raise refused(f"{line.path} stands in two lines", "write every file once", number)
+            what = f"{line.date} is the date of two lines"
+        elif missing := [name for name in FLAGS if getattr(line, name) is None]:
+            how = FLAGS[missing[0]]
+            what = f"does not say whether {how} as on {before.date}: {missing[0]}: same or moved"
+        elif paths.count(line.path) > 1:
+            what = f"{line.path} stands in two lines"
+        if what:
+            raise refused(what, "", lines.index(line))
     return ordered
 
 
@@ -75,18 +79,16 @@ def expanded(name: str, full: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
     the first under ``line_of``, and no gates: these are about the arm as it is now.
     """
     rest = {key: value for key, value in full.items() if key != "series"}
-    measurements = rest["measurements"]
     if not full["series"]:
         return {name: rest}
-    found: dict[str, dict[str, Any]] = {}
+    files: dict[str, dict[str, Any]] = {}
     series: list[dict[str, Any]] = []
     for line in full["series"]:
-        own = f"{name}-{line['date']}"
-        file = {**measurements["file"], "path": line["path"]}
-        found[own] = {**rest, "measurements": {**measurements, "file": file}}
+        file = {**rest["measurements"]["file"], "path": line["path"]}
+        measurements = {**rest["measurements"], "file": file}
         flags = {flag: line[flag] if series else None for flag in FLAGS}
-        series.append({"name": own, "date": line["date"], **flags})
-    newest = {**found[series[-1]["name"]], "series": series}
-    return {name: newest} | {
-        each: {**own, "line_of": name, "gates": []} for each, own in found.items()
-    }
+        series.append({"name": f"{name}-{line['date']}", "date": line["date"], **flags})
+        files[series[-1]["name"]] = {**rest, "measurements": measurements}
+    newest = {**files[series[-1]["name"]], "series": series}
+    lines = {each: {**own, "line_of": name, "gates": []} for each, own in files.items()}
+    return {name: newest} | lines

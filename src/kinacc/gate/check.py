@@ -6,8 +6,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import pandas as pd
-
 from kinacc.config.schema import defaults
 from kinacc.errors import InputError, Problem, first_few
 from kinacc.gate.accepted import compared
@@ -72,43 +70,16 @@ def data_sets_in(results: Path) -> list[str]:
 
 def check_campaign(folder: Path) -> Outcome:
     """Whether the tables of a campaign's report are there, made together and fit their schemas."""
-    problems: list[Problem] = []
-    tables: dict[str, Any] = {}
-    marks = []
-    for artefact in filter(lambda each: each.topic == "campaign", ARTEFACTS.values()):
-        path = folder / artefact.file_name
-        if not path.is_file():
-            problems.append(Problem(str(path), "missing"))
-            continue
-        tables[artefact.name], found = check_file(path, artefact)
-        problems += found
-        if not found:
-            marks.append(store.read_metadata(path))
-    if any(each != marks[0] for each in marks):
-        problems.append(Problem(str(folder), "tables of different states of a campaign"))
-    problems = problems or _contradictions(**tables)
+    own = [each for each in ARTEFACTS.values() if each.topic == "campaign"]
+    problems = [
+        each for artefact in own for each in check_file(folder / artefact.file_name, artefact)
+    ]
+    if not problems:
+        marks = [store.read_metadata(folder / each.file_name) for each in own]
+        if any(each != marks[0] for each in marks):
+            problems.append(Problem(str(folder), "tables of different states of a campaign"))
     says = "tables fit their schemas and each other"
-    return _files(folder, problems, says, len(tables), "run `kinacc campaign report` again")
-
-
-def _contradictions(
-    campaign_points: pd.DataFrame, campaign_readings: pd.DataFrame, campaign_bounds: pd.DataFrame
-) -> list[Problem]:
-    """What the three tables of one campaign state of each other that cannot be."""
-    used = campaign_readings[campaign_readings["used"].notna()]
-    problems = []
-    counts = used["point"].value_counts()
-    for name, count in zip(campaign_points["point"], campaign_points["readings"], strict=True):
-        if counts.get(name, 0) != count:
-            what = f"{count} readings, {counts.get(name, 0)} in campaign_readings"
-            problems.append(Problem(f"campaign_points, point {name}", what))
-    if unknown := sorted({*campaign_readings["point"]} - {*campaign_points["point"]}):
-        what = f"points that are no candidates: {', '.join(unknown[:5])}"
-        problems.append(Problem("campaign_readings", what))
-    if (last := int(campaign_bounds["readings"].max())) != len(used):
-        what = f"ends at {last} readings, {len(used)} were used"
-        problems.append(Problem("campaign_bounds", what))
-    return problems
+    return _files(folder, problems, says, len(own), "run `kinacc campaign report` again")
 
 
 def check_files(folder: Path) -> Outcome:
@@ -148,7 +119,7 @@ def _problems(folder: Path) -> Iterator[Problem]:
             fix = f"rm {path}"
             yield Problem(str(path), "is none of the tables that the stages left", fix=fix)
             continue
-        yield from check_file(path, artefact)[1]
+        yield from check_file(path, artefact)
     yield from _gathered(folder)
 
 

@@ -16,18 +16,17 @@ from kinacc.tables.columns import JOINTS_MAX, JOINTS_MIN, Artefact, Column, join
 from kinacc.tables.contract import PROVENANCE_KEYS
 
 
-def check_file(path: Path, artefact: Artefact) -> tuple[pd.DataFrame | None, list[Problem]]:
-    """The table in a file and its problems; None where it has not the columns of its schema."""
+def check_file(path: Path, artefact: Artefact) -> list[Problem]:
+    """Problems of the table in a file, by its schema."""
     try:
         table = store.read_arrow(path)
         frame = table.to_pandas()
     except (InputError, UnicodeDecodeError, pa.ArrowException) as error:
         found = getattr(error, "problems", [Problem(str(path), f"not readable: {error}")])
-        return None, [replace(problem, fix="") for problem in found]
-    structure = list(_structure(path, artefact, table.schema))
-    if structure:
-        return None, structure
-    problems: list[Problem] = []
+        return [replace(problem, fix="") for problem in found]
+    problems = list(_structure(path, artefact, table.schema))
+    if problems:
+        return problems
     for column in artefact.in_file(joint_count(artefact, frame.columns), frame.columns):
         problems += _values(f"{path}, column {column.name}", column, frame[column.name])
     repeated = frame.duplicated([*artefact.key], keep=False)
@@ -36,7 +35,7 @@ def check_file(path: Path, artefact: Artefact) -> tuple[pd.DataFrame | None, lis
     if repeated.any():
         allowed = f"one row per {', '.join(artefact.key)}"
         problems.append(Problem(str(path), f"same key in {_rows(repeated)}", allowed))
-    return frame, problems
+    return problems
 
 
 def _structure(path: Path, artefact: Artefact, schema: pa.Schema) -> Iterator[Problem]:

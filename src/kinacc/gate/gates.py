@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -20,19 +21,17 @@ from kinacc.tables import sums
 from kinacc.tables.allowed import FINDING_LEVELS, FIRST, HOLDS, LEFT_OUT, RECALIBRATE
 
 Gate = Mapping[str, Any]
+Figures = Mapping[str, Any]
 _ROUNDING = 1e-9
 _MORE = "measure more poses, or set undecided: warn"
 # What a configuration calls a verdict, and the verdict.
+_NONE: Figures = {}
 _MEANT = {"fail": FAILED, "warn": WARNED, "pass": UNDECIDED}
 
 
-class Found(NamedTuple):
-    """What a gate found; see :class:`Outcome`."""
-
-    verdict: str
-    says: str
-    fix: str = ""
-    figures: Mapping[str, Any] = {}
+def _found(verdict: str, says: str, fix: str = "", figures: Figures = _NONE) -> Outcome:
+    """What a gate found, before it is known whose gate it is."""
+    return Outcome("", "", "", verdict, says, fix, figures)
 
 
 def judged(
@@ -48,24 +47,24 @@ def judged(
     of ``broken`` data sets, whose files do not hold, are undecided.
     """
     for name, full in configurations.items():
-        tables = RunTables(results / name)
+        tables = None if name in broken else RunTables(results / name)
         before = None if accepted is None else RunTables(accepted / name)
         for gate in full["gates"]:
-            if name in broken:
-                found = Found(UNDECIDED, "not checked: files of the data set fail their check")
-                yield _outcome(gate, name, found)
-            else:
-                yield of_gate(gate, name, tables, full["tolerance"], before)
+            yield of_gate(gate, name, tables, full["tolerance"], before)
 
 
 def of_gate(
     gate: Gate,
     dataset: str,
-    tables: RunTables,
+    tables: RunTables | None,
     tolerance: Mapping[str, Any],
     accepted: RunTables | None,
 ) -> Outcome:
-    """The outcome of one gate; a missing table is a failure."""
+    """The outcome of one gate; a missing table is a failure. ``tables`` are None if they fail."""
+    kind = "change" if gate["kind"] == "against" else gate["kind"]
+    if tables is None:
+        says = "not checked: files of the data set fail their check"
+        return Outcome(dataset, gate["name"], kind, UNDECIDED, says)
     try:
         if gate["kind"] == "value":
             word, limit, own = limited(gate, tolerance["mm"])
@@ -82,22 +81,17 @@ def of_gate(
             found = of[gate["kind"]](gate, tables)
     except InputError as error:
         first = error.problems[0]
-        found = Found(FAILED, f"{first.where} {first.what}", first.fix)
+        found = _found(FAILED, f"{first.where} {first.what}", first.fix)
     verdict, fix = found.verdict, found.fix
     if verdict == UNDECIDED:
         verdict, fix = _MEANT[gate["undecided"]], fix or _MORE
     if verdict == FAILED:
         verdict = _MEANT[gate["on_fail"]]
-    return _outcome(gate, dataset, found._replace(verdict=verdict, fix=fix))
+    fix = "" if verdict == PASSED else fix
+    return replace(found, dataset=dataset, name=gate["name"], kind=kind, verdict=verdict, fix=fix)
 
 
-def _outcome(gate: Gate, dataset: str, found: Found) -> Outcome:
-    kind = "change" if gate["kind"] == "against" else gate["kind"]
-    fix = "" if found.verdict == PASSED else found.fix
-    return Outcome(dataset, gate["name"], kind, found.verdict, found.says, fix, found.figures)
-
-
-def _value(found: Figure, word: str, limit: float, own: bool = True) -> Found:
+def _value(found: Figure, word: str, limit: float, own: bool = True) -> Outcome:
     whose = "" if own else " (the tolerance of the configuration)"
     asked = f"{word.replace('_', ' ')} {found.worded(limit)} allowed{whose}"
     figures = {f"value{found.key}": found.size, f"{word}{found.key}": limit, "of": found.called}
@@ -105,16 +99,16 @@ def _value(found: Figure, word: str, limit: float, own: bool = True) -> Found:
     held = found.size <= limit if word == LIMITS[0] else found.size >= limit
     if found.open and (held or np.isnan(found.size)):
         says = f"undecided: {found.called}: {found.open}; {asked}"
-        return Found(UNDECIDED, says, figures=figures)
+        return _found(UNDECIDED, says, figures=figures)
     says = f"{found.called} is {found.worded(found.size)}; {asked}"
     fix = f"off by {found.worded(abs(found.size - limit))}"
-    return Found(PASSED if held else FAILED, says, fix, figures)
+    return _found(PASSED if held else FAILED, says, fix, figures)
 
 
-def _change(gate: Gate, dataset: str, tables: RunTables, accepted: RunTables | None) -> Found:
+def _change(gate: Gate, dataset: str, tables: RunTables, accepted: RunTables | None) -> Outcome:
     if accepted is None or not accepted.folder.is_dir():
         fix = 'accept one: kinacc check-results RESULTS --accept FOLDER --reason ".."'
-        return Found(FAILED, f"no accepted run of {dataset}", fix)
+        return _found(FAILED, f"no accepted run of {dataset}", fix)
     name, asked, allowed = gate["value"], gate["beyond_chance"], gate[limit_key("allow", gate)]
     now, before = (figure(name, each, gate) for each in (tables, accepted))
     first, second = (sample(name, each, gate) for each in (tables, accepted))
@@ -141,16 +135,16 @@ def _change(gate: Gate, dataset: str, tables: RunTables, accepted: RunTables | N
         f"the accepted run's {before.worded(before.size)}; {now.worded(allowed)} worse is allowed"
     )
     if found.open:
-        return Found(UNDECIDED, f"undecided: {says}; {found.open}", "", figures)
+        return _found(UNDECIDED, f"undecided: {says}; {found.open}", "", figures)
     if found.least != found.difference:
         poses = f"{first.count} poses of the same measurements"
         poses = poses if paired else f"{first.count} and {second.count} poses"
         says += f"; at least {now.worded(found.least)} worse ({asked:.4g} confidence, {poses})"
     fix = f"kinacc check-results --against {accepted.folder.parent} lists what changed"
-    return Found(FAILED if found.least > allowed else PASSED, says, fix, figures)
+    return _found(FAILED if found.least > allowed else PASSED, says, fix, figures)
 
 
-def _campaign(gate: Gate, dataset: str, tables: RunTables, tolerance: Mapping[str, Any]) -> Found:
+def _campaign(gate: Gate, dataset: str, tables: RunTables, tolerance: Mapping[str, Any]) -> Outcome:
     from kinacc.campaign.folder import open_
     from kinacc.report.summary import BOUND, summarise
 
@@ -160,7 +154,7 @@ def _campaign(gate: Gate, dataset: str, tables: RunTables, tolerance: Mapping[st
     known = summary.largest_error
     if known is None:
         fix = f"begin one on it: kinacc campaign start FOLDER --calibration {tables.folder}"
-        return Found(FAILED, "; ".join(summary.remarks), fix)
+        return _found(FAILED, "; ".join(summary.remarks), fix)
     allowed = tolerance["mm"] if gate["tolerance_mm"] is None else gate["tolerance_mm"]
     judged_as = summary.verdict(BOUND, allowed)
     assert judged_as is not None  # a tolerance is given
@@ -177,20 +171,20 @@ def _campaign(gate: Gate, dataset: str, tables: RunTables, tolerance: Mapping[st
         if asked is not None and known.confidence < asked - _ROUNDING:
             says = f"campaign {place} has {known.confidence:.0%} confidence, {asked:.0%} asked for"
             fix = "begin a campaign with that confidence, or ask for the campaign's"
-            return Found(FAILED, says, fix, figures)
+            return _found(FAILED, says, fix, figures)
     says = "; ".join([says, *summary.remarks, *known.against])
     verdict = {ACCEPT: PASSED, REJECT: FAILED}.get(judged_as.verdict, UNDECIDED)
-    return Found(verdict, says, f"kinacc campaign status {place}", figures)
+    return _found(verdict, says, f"kinacc campaign status {place}", figures)
 
 
-def _claims(gate: Gate, tables: RunTables) -> Found:
+def _claims(gate: Gate, tables: RunTables) -> Outcome:
     table = tables["claims"].set_index("claim")
     excepted = gate["except"]
     unknown = [each for each in excepted if each not in table.index]
     if unknown:
         close = [near for each in unknown if (near := nearest(each, tuple(table.index)))]
         fix = f"did you mean {first_few(close)}?" if close else "kinacc show RESULTS claims"
-        return Found(FAILED, f"except names no claim: {first_few(unknown)}", fix)
+        return _found(FAILED, f"except names no claim: {first_few(unknown)}", fix)
     # Sentences that chose a reading of the paper are no evidence.
     verdict = table["verdict"][~table["used_to_choose"].astype(bool)]
     known = verdict.index.isin(excepted)
@@ -206,13 +200,13 @@ def _claims(gate: Gate, tables: RunTables) -> Found:
     figures = {"claims": len(verdict), "agree": agree, "differ": left + differ,
                "differ_not_excepted": left}  # fmt: skip
     fix = f"kinacc show {tables.folder} claims"
-    return Found(FAILED if left else PASSED, "; ".join(says), fix, figures)
+    return _found(FAILED if left else PASSED, "; ".join(says), fix, figures)
 
 
-def _suspicions(gate: Gate, tables: RunTables) -> Found:
+def _suspicions(gate: Gate, tables: RunTables) -> Outcome:
     measurements = tables["measurements"]
     if "row" not in measurements or measurements["row"].isna().all():
-        return Found(PASSED, "simulated measurements: no file to check", "", {"suspicions": 0})
+        return _found(PASSED, "simulated measurements: no file to check", "", {"suspicions": 0})
     table = tables["data_check"]
     table = table[(table["finding"] != LEFT_OUT) & (table["level"] != FINDING_LEVELS[-1])]
     known = table["accepted"].fillna("").astype(bool)
@@ -222,10 +216,10 @@ def _suspicions(gate: Gate, tables: RunTables) -> Found:
     if len(left):
         says += f": {first_few(list(left['finding'] + ': ' + left['what']), 3)}"
     fix = "correct the file, or give a reason in data_check.accept and set suspicions: known"
-    return Found(FAILED if len(left) else PASSED, says, fix, figures)
+    return _found(FAILED if len(left) else PASSED, says, fix, figures)
 
 
-def _history(gate: Gate, tables: RunTables) -> Found:
+def _history(gate: Gate, tables: RunTables) -> Outcome:
     table = tables["history"]
     columns = {name: table[name].to_numpy() for name in table}
     last = table.iloc[-1]
@@ -234,4 +228,4 @@ def _history(gate: Gate, tables: RunTables) -> Found:
     verdicts = {FIRST: PASSED, HOLDS: PASSED, RECALIBRATE: FAILED}
     verdict = verdicts.get(str(last["verdict"]), UNDECIDED)
     fix = "" if verdict == UNDECIDED else "calibrate the arm anew, or find out what moved"
-    return Found(verdict, f"{last['series']}: {sentence(columns)}", fix, figures)
+    return _found(verdict, f"{last['series']}: {sentence(columns)}", fix, figures)

@@ -15,7 +15,7 @@ import pandas as pd
 
 from kinacc.calibration.summary import selected
 from kinacc.config.error_models import MEASURED, Comparison, model_name
-from kinacc.config.gate_rules import COMPARED, units
+from kinacc.config.gate_rules import COMPARED, FIGURES
 from kinacc.errors import InputError, Problem, first_few
 from kinacc.gate.chance import STATISTICS, Sample
 from kinacc.measurements.folds import configurations_of
@@ -30,18 +30,11 @@ _AT = {
     "validation": "of the fold kept for validation",
     "training": "at rows that were fitted",
 }
-_HISTORY = {  # column of the table and meaning
-    "moved": ("moved_mm", "rms movement of the arm since the calibration in force"),
-    "beyond_chance": ("beyond_mm", "movement since the calibration in force beyond chance"),
-    "in_force_mean": (
-        "in_force_mean_mm",
-        "mean position error of the calibration in force at the newest readings",
-    ),
-    "in_force_p99": (
-        "in_force_quantile_99_mm",
-        "empirical 99 % quantile of the position errors of the calibration in force at the newest "
-        "readings",
-    ),
+_HISTORY = {
+    "moved": "moved_mm",
+    "beyond_chance": "beyond_mm",
+    "in_force_mean": "in_force_mean_mm",
+    "in_force_p99": "in_force_quantile_99_mm",
 }
 
 
@@ -130,19 +123,17 @@ def sample(name: str, tables: RunTables, gate: Mapping[str, Any]) -> Sample:
 
 def figure(name: str, tables: RunTables, gate: Mapping[str, Any]) -> Figure:
     """The figure of a name. Raises Absent where its table is missing."""
-    unit, (topic, _, word) = units()[name], name.partition(".")
+    (unit, meaning), (topic, _, word) = FIGURES[name], name.partition(".")
     if name.startswith(COMPARED):
         return _of_errors(name, tables, gate, unit)
     if topic == "bound":
         return _of_bound(tables, unit, word)
     if topic == "history":
-        column, called = _HISTORY[word]
-        size = float(tables["history"][column].iloc[-1])
+        size = float(tables["history"][_HISTORY[word]].iloc[-1])
         why = "the history has no earlier calibration in force" if np.isnan(size) else ""
-        return Figure(size, unit, called, open=why)
+        return Figure(size, unit, meaning, open=why)
     pose = tables["measurements"]["pose"]
-    return Figure(float(len(pose) if word == "readings" else pose.nunique()), unit,
-                  f"number of {word}")  # fmt: skip
+    return Figure(float(len(pose) if word == "readings" else pose.nunique()), unit, meaning)
 
 
 def cell(tables: RunTables, gate: Mapping[str, Any]) -> Figure:
