@@ -21,7 +21,7 @@ from kinacc.gate.values import SELECTED, RunTables
 from kinacc.tables import sums
 from kinacc.tables.allowed import MOVED, OPEN, RECALIBRATE, SAME
 from kinacc.tables.atomic import unfinished, write_whole
-from kinacc.tables.comparison import compare_tables
+from kinacc.tables.comparison import compare_folders
 
 NOTE = "accepted.json"
 # Of held-out errors; with the test of the arm, 1 % of weeks without a change are called worse.
@@ -81,7 +81,7 @@ def compared(now: Path, before: Path, rotation_weight_mm_per_rad: float) -> Iter
         says = f"no accepted run of {now.name} in {before.parent}"
         yield outcome("accepted run", FAILED, says, accepting)
     elif measured[0] == measured[1]:
-        found = _differences(now, before)
+        found = [*compare_folders(before, now)]
         says = "same measurements, and every table agrees within its tolerance"
         if found:
             says = f"same measurements, but {len(found)} columns differ: {first_few(found)}"
@@ -101,16 +101,6 @@ def compared(now: Path, before: Path, rotation_weight_mm_per_rad: float) -> Iter
         says = f"{len(moved)} DH parameters moved by more than {_FAR:g} standard deviations"
         says += f": {first_few(moved)}" if moved else ""
         yield outcome("parameters", WARNED if moved else PASSED, says, moved=len(moved))
-
-
-def _differences(now: Path, before: Path) -> list[str]:
-    found: list[str] = []
-    for path in sorted(before.glob("*.parquet")):
-        if (now / path.name).is_file():
-            found += map(str, compare_tables(path, now / path.name))
-        else:
-            found.append(f"{path.name} is missing")
-    return found
 
 
 def _errors(now: Path, before: Path, _: float) -> tuple[str, str, dict[str, Any]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from itertools import groupby
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -75,22 +76,16 @@ class Column:
     @property
     def limits(self) -> str:
         """What the column may hold, in words."""
-        parts = []
-        if self.choices:
-            parts.append(", ".join(str(choice) for choice in self.choices))
-        if self.pattern:
-            parts.append(f"text like {self.pattern}")
-        if self.low is not None and self.high is not None:
-            parts.append(f"{self.low:g} to {self.high:g}")
-        elif self.low is not None:
-            parts.append(f"at least {self.low:g}")
-        elif self.high is not None:
-            parts.append(f"at most {self.high:g}")
-        if self.nullable:
-            parts += ["null"] if parts else ["any", "null"]
-        if self.may_be_absent:
-            parts.append("absent")
-        return " or ".join(parts)
+        bounds = {"at least": self.low, "at most": self.high}
+        limits = [f"{words} {limit:g}" for words, limit in bounds.items() if limit is not None]
+        parts = [
+            ", ".join(map(str, self.choices)),
+            f"text like {self.pattern}" if self.pattern else "",
+            ", ".join(limits),
+            "null" if self.nullable else "",
+            "absent" if self.may_be_absent else "",
+        ]
+        return " or ".join(filter(None, parts))
 
 
 @dataclass(frozen=True)
@@ -118,15 +113,9 @@ class Artefact:
     def for_joints(self, joints: int) -> tuple[Column, ...]:
         """The columns of an arm with this many joints, in file order."""
         expanded: list[Column] = []
-        block: list[Column] = []
-        for column in (*self.columns, None):
-            if column is not None and column.per_joint:
-                block.append(column)
-                continue
-            expanded += [each.numbered(j + 1) for each in block for j in range(joints)]
-            block = []
-            if column is not None:
-                expanded.append(column)
+        for per_joint, block in groupby(self.columns, key=lambda column: column.per_joint):
+            numbers = range(1, joints + 1) if per_joint else [0]
+            expanded += [each.numbered(n) if n else each for each in block for n in numbers]
         return tuple(expanded)
 
     @property

@@ -60,9 +60,7 @@ class Difference:
         return text if self.largest is None else f"{text}, at most {self.largest:.3g} {self.unit}"
 
 
-def compare_folders(
-    before: Path, now: Path, tolerances: Mapping[str, float] | None = None
-) -> Iterator[Difference]:
+def compare_folders(before: Path, now: Path) -> Iterator[Difference]:
     """Differences of all tables below two folders; see :func:`compare_tables`.
 
     Tables that only ``now`` has do not count. Raises InputError where ``before`` has no table.
@@ -75,7 +73,7 @@ def compare_folders(
         if not other.is_file():
             yield Difference(str(path.relative_to(before)), "", "missing")
             continue
-        yield from compare_tables(path, other, tolerances)
+        yield from compare_tables(path, other)
 
 
 def compare_tables(

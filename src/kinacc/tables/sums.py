@@ -37,11 +37,9 @@ def folder_of(path: Path | str) -> Path:
 
 def stated(folder: Path | str) -> dict[str, str]:
     """Digests of all files that the stages of a data set left, by name in its folder."""
-    found = {}
-    for name, value in _lines(Path(folder)):
-        if not value.startswith(_READ):
-            found[name] = value
-    return found
+    paths = sorted((Path(folder) / FOLDER).glob("*.sha256"))
+    lines = [line for path in paths for line in _parsed(path)]
+    return {name: value for name, value in lines if not value.startswith(_READ)}
 
 
 def outdated(folder: Path | str) -> list[str]:
@@ -54,13 +52,6 @@ def changed_since(folder: Path | str) -> list[str]:
     folder = Path(folder)
     names = {name for name, _ in _changed_reads(folder)}
     return sorted(os.path.relpath(folder / name) for name in names)
-
-
-def read_by(folder: Path | str, stage: str) -> set[str]:
-    """Digests of the files that a stage of a data set read."""
-    path = Path(folder) / FOLDER / f"{stage}.sha256"
-    lines = _parsed(path) if path.is_file() else ()
-    return {value for _, value in lines if value.startswith(_READ)}
 
 
 def _changed_reads(folder: Path) -> Iterator[tuple[str, list[str]]]:
@@ -105,11 +96,6 @@ def changed(folder: Path | str) -> Iterable[Problem]:
             yield Problem(str(path), "missing", fix="run the workflow again")
         elif digest(path.read_bytes()) != left:
             yield Problem(str(path), "changed since its stage wrote it", fix=fix)
-
-
-def _lines(folder: Path) -> Iterable[tuple[str, str]]:
-    for path in sorted((folder / FOLDER).glob("*.sha256")):
-        yield from _parsed(path)
 
 
 def _parsed(path: Path) -> Iterable[tuple[str, str]]:
