@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.stats import kstest
 
-from kinacc.campaign import consistency, folder, words
-from kinacc.campaign.consistency import in_words, scatter
+from kinacc.campaign import folder
+from kinacc.campaign.consistency import nearness, scatter
 from kinacc.campaign.instrument import instruments
 from kinacc.campaign.reading import Reading
 from kinacc.campaign.state import Told, restore
@@ -40,9 +40,7 @@ def test_the_chi_square_is_calibrated(plan):
 
 def test_noise_stated_too_small_or_too_large_is_told(plan):
     assert scatter(read(plan, 2.0)).too_large
-    assert "cannot be relied on" in in_words(scatter(read(plan, 2.0)))
     assert scatter(read(plan, 0.4)).too_small
-    assert "wider than they need be" in in_words(scatter(read(plan, 0.4)))
 
 
 def test_a_point_read_twice_says_nothing_for_the_first_reading_chose_it(plan):
@@ -102,15 +100,10 @@ def test_noise_stated_far_above_noise_and_errors_is_told_for_bounds_may_fall_sho
     plan = make_plan(assessor)
     state, largest_mm = near(plan, 0.006, 0.005)  # 0.05 mm is stated
     assert all((said.upper_mm < largest_mm) == short for said in state.statements())
-    (told,) = consistency.remarks(state)
-    assert "The noise is stated too large" in told
-    assert "cannot be relied on" in told
-    assert told in words.standing(state)
-    assert "too small" not in " ".join(words.statements(state))
+    assert nearness(state).too_small
 
 
 def test_readings_of_a_perfect_arm_with_the_noise_stated_are_not_called_too_near(make_plan):
     plan = make_plan()
-    found = [consistency.too_near(near(plan, 0.0, 0.05, seed)[0]) for seed in range(60)]
-    assert found == [None] * 60
-    assert consistency.remarks(restore(plan, [])) == []
+    assert not any(nearness(near(plan, 0.0, 0.05, seed)[0]).too_small for seed in range(60))
+    assert nearness(restore(plan, [])) is None

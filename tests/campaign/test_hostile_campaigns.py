@@ -99,9 +99,6 @@ def test_a_reading_that_is_none_of_this_campaign_is_refused_with_its_line(begun,
         [], "x", 5, {}, {"kind": "other"}, {"kind": []}, {"kind": "readings"},
         {"kind": "readings", "readings": [5]}, {"kind": "readings", "readings": [], "at": "noon"},
         {"kind": "readings", "readings": [], "at": "2026-01-01T00:00:00"},
-        {"kind": "readings", "readings": [], "file": "a", "path": 5},
-        {"kind": "readings", "readings": [], "file": "a", "was": [1]},
-        {"kind": "readings", "readings": [], "was": 5},
         {"kind": "strike", "reading": 1, "reason": "x"}, {"kind": "leave_out", "point": 8,
         "reason": "x"}, {"kind": "leave_out", "point": 0}, {"kind": "leave_out", "point": [],
         "reason": "x"}, {"kind": "leave_out", "point": 0.5, "reason": "x"},
@@ -110,12 +107,6 @@ def test_a_reading_that_is_none_of_this_campaign_is_refused_with_its_line(begun,
 )  # fmt: skip
 def test_an_entry_that_says_nothing_is_refused_with_its_line(begun, entry):
     assert "readings.jsonl, line 1: is no entry of this campaign" in said_of(begun, entry)
-
-
-def test_all_entries_that_say_nothing_are_named(begun):
-    said = said_of(begun, {"kind": "other"}, {"kind": "strike", "reading": 5, "reason": "x"})
-    assert "line 1" in said
-    assert "line 2" in said
 
 
 def test_an_entry_nested_deeply_is_a_message(begun):

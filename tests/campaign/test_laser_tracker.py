@@ -92,18 +92,6 @@ def test_a_plan_with_a_laser_tracker_is_read_as_it_was_written(begun):
     np.testing.assert_array_equal(again.covariance_mm2, plan.covariance_mm2)
 
 
-def test_the_start_says_where_a_laser_tracker_is_taken_to_stand(calibration, tmp_path):
-    done = call("campaign", "start", tmp_path / "check", "--calibration", calibration, "--robot",
-                "mh180", "--model", "dh", "--instrument", f"tracker={LASER}")  # fmt: skip
-    assert done.exit_code == 0, done.output
-    plan = campaigns.open_(tmp_path / "check").plan
-    apart = np.linalg.norm(plan.points.modelled_mm - plan.to_base.position_mm, axis=1) * 1e-3
-    said = f"tracker: {apart.min():.2f} m to {apart.max():.2f} m from the candidates"
-    assert said in done.output
-    most = np.sqrt(np.linalg.eigvalsh(plan.covariance_mm2).max())
-    assert f"tracker ({most:.3g} mm per axis at the farthest candidate, less nearer" in done.output
-
-
 def test_a_tracker_without_its_distance_from_the_arm_is_asked_about(
     calibration, tmp_path, monkeypatch
 ):

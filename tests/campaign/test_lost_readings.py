@@ -22,7 +22,7 @@ def test_a_cut_off_reading_is_told_and_can_be_recorded_again(begun):
     journal.write_bytes(journal.read_bytes()[:-9])
     shown = call("campaign", "status", folder)
     assert "was cut off" in shown.output
-    assert "1 of 20 readings taken" in shown.output
+    assert standing(folder)["readings"] == 1
     arm.reads[arm.row[arm.plan.points.number(second)]] = 0
     done = call("campaign", "record", folder, "--position-mm", arm.position(second))
     assert done.exit_code == 0
@@ -41,7 +41,7 @@ def test_a_report_kept_elsewhere_tells_that_its_last_readings_were_taken_away(be
     told = re.search(r"7 readings; SHA-256 of readings.jsonl (\w{64})", text)[1]
     assert told == hashlib.sha256((folder / "readings.jsonl").read_bytes()).hexdigest()
     known = ("verify", folder, "--sha256", told, "--readings", 7)
-    assert "it holds what was reported" in call("campaign", *known).output
+    assert call("campaign", *known).output.startswith("PASS")
     recorded(folder, arm, 1)
     assert call("campaign", *known).exit_code == 0
     for name, content in earlier.items():  # the folder as it was before the two readings
@@ -57,16 +57,16 @@ def test_a_report_kept_elsewhere_tells_that_its_last_readings_were_taken_away(be
 def test_a_clock_that_went_back_is_asked_about_before_a_reading_is_taken(begun, monkeypatch):
     folder = begun("--noise-mm", SIGMA_MM, "--frame", "base")
     recorded(folder, arm := Arm(folder), 2)
-    label = standing(folder)["next"]
+    label = standing(folder)["next_point"]
     reading = ("--point", label, "--position-mm", arm.position(label))
     with monkeypatch.context() as patched:
         patched.setattr(campaigns, "_stamp", _in_1999(campaigns._stamp))
         said = refused(folder, "record", folder, *reading)
-        assert "the clock of this computer: says 1999-12-31" in said
+        assert "the clock of this computer: is at 1999-12-31" in said
         assert call("campaign", "record", folder, *reading, "--accept-implausible").exit_code == 0
     recorded(folder, arm, 1)
     call("campaign", "report", folder)
-    assert "clock was set in between" in (folder / "report" / "report.md").read_text()
+    assert "clock: set back" in (folder / "report" / "report.md").read_text()
 
 
 def _in_1999(stamp):
@@ -75,11 +75,11 @@ def _in_1999(stamp):
 
 def test_a_reading_from_beyond_all_rooms_is_never_taken(begun, tmp_path):
     folder = begun("--noise-mm", SIGMA_MM, "--frame", "base")
-    label = standing(folder)["next"]
+    label = standing(folder)["next_point"]
     file = tmp_path / "far.csv"
     file.write_text(f"pose,x_mm,y_mm,z_mm\n{label},1e308,0,0\n")
     said = refused(folder, "record", folder, file, "--accept-implausible")
-    assert "three numbers within 1e+06 mm" in said
+    assert "within 1e+06" in said
 
 
 def test_a_candidate_with_spaces_about_its_name_can_be_recorded(calibration, tmp_path):
@@ -92,7 +92,7 @@ def test_a_candidate_with_spaces_about_its_name_can_be_recorded(calibration, tmp
                 "--model", "dh", "--candidates", joints, "--budget", 4, "--noise-mm", SIGMA_MM,
                 "--frame", "base", "--sure")  # fmt: skip
     assert done.exit_code == 0, done.output
-    label = standing(folder)["next"]
+    label = standing(folder)["next_point"]
     assert label == label.strip()
     plan = campaigns.open_(folder).plan
     seen = ",".join(map(repr, map(float, plan.points.modelled_mm[plan.points.number(label)])))

@@ -10,8 +10,7 @@ from command_line import call
 
 from kinacc.assess.registry import ADAPTIVE
 from kinacc.assess.simulate import conduct
-from kinacc.assess.statement import MEASURED, Reason, Statement
-from kinacc.campaign import folder, words
+from kinacc.campaign import folder
 from kinacc.campaign.plan import fixed_visit, from_json, to_json
 from kinacc.campaign.reading import Reading
 from kinacc.campaign.state import restore
@@ -74,8 +73,7 @@ def test_part_of_a_visit_by_travel_says_nothing_of_the_region(make_plan, make_wo
     assert plan.by_travel
     for said in restore(plan, entries[:-1]).statements():
         assert np.isnan(said.upper_mm)
-        text = words.reason(said.withheld)
-        assert text == "1 points of the first visit, made in order of travel, are left"
+        assert (said.withheld.code, said.withheld.numbers["left"]) == ("first_visit_by_travel", 1)
     assert not any("travel" in str(said.withheld) for said in restore(plan, entries).statements())
     at_random = replace(plan, route=plan.order[: len(plan.route)])
     begun = restore(at_random, entries_of(at_random, make_world(at_random))[:-1])
@@ -135,7 +133,7 @@ def test_a_point_left_out_is_never_asked_for_and_the_visit_stays_random(make_pla
     assert gone not in rows
     assert set(rows[:first]) == set(kept[:first])
     np.testing.assert_array_equal(rows[first:], kept[first:])
-    entries = [folder.leave_out_entry(gone, "hidden")]
+    entries = [{"kind": "leave_out", "point": gone, "reason": "hidden"}]
     asked = set()
     world = make_world(plan, frozenset([gone]))
     while (state := restore(plan, entries)).asked is not None:
@@ -158,24 +156,6 @@ def test_another_instrument_counts_with_its_own_covariance(make_plan, make_world
     place = int(np.flatnonzero(by_tracker.rows == by_tracker.told[10].reading.point)[0])
     assert by_tracker.campaign.ledger.noise_mm[place] == pytest.approx(0.05)
     assert with_camera.campaign.ledger.noise_mm[place] == pytest.approx(0.5)
-
-
-def test_bounds_that_contradict_each_other_are_told(make_plan):
-    said = Statement(MEASURED, 1.0, 1.2, 1.1, 0.95)
-    assert "contradict each other" in words.statement(said, restore(make_plan(), []))
-
-
-def test_an_estimate_above_its_upper_bound_is_told(make_plan):
-    state = restore(make_plan(), [])
-    said = Statement(MEASURED, 1.006, 0.970, 0.989, 0.95, assumption=Reason("drawn_at_random"))
-    text = words.statement(said, state)
-    assert (
-        "(estimated at 1.006 mm), if the points were drawn at random from the region. The" in text
-    )
-    assert "The estimate lies above the upper" in text
-    assert text.endswith("wrong.")
-    usual = words.statement(Statement(MEASURED, 0.98, 0.970, 0.989, 0.95), state)
-    assert usual.endswith("(estimated at 0.980 mm).")
 
 
 def test_a_plan_comes_back_to_the_last_bit(make_plan):
@@ -201,7 +181,7 @@ def test_predictions_recorded_as_readings_bound_nothing(make_plan, name, tmp_pat
     for command in ("status", "report"):
         done = call("campaign", command, path)
         assert done.exit_code == 0, done.output
-        assert "equals the predicted position to the last digit" in done.output
+        assert "equal the predicted positions" in done.output
         assert " at most " not in done.output
 
 

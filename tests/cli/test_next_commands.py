@@ -77,7 +77,7 @@ def test_what_campaign_start_names_next_runs_as_printed(calibration, tmp_path):
     done = call("campaign", "start", folder, "--calibration", calibration, "--model", "dh",
                 "--drawn", 5, "--budget", 5, "--noise-mm", 0.05)  # fmt: skip
     assert done.exit_code == 0, done.output
-    line = re.search(r"^next: (.*)$", done.output, re.MULTILINE)[1]
+    line = re.search(r"^Next: (.*)$", done.output, re.MULTILINE)[1]
     shown = run(line)
     assert shown.exit_code == 0, line
     assert "reading 1 of 5" in shown.output

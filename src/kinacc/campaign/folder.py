@@ -1,4 +1,4 @@
-"""A campaign's folder: started once, opened, written to under its lock."""
+"""The folder of a campaign: started once, read, and written to under its lock."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from kinacc import __version__
 from kinacc.campaign import journal, plan, state
 from kinacc.campaign.plan import Plan
 from kinacc.campaign.reading import Reading
-from kinacc.campaign.state import LEAVE_OUT, READINGS, STRIKE, State
+from kinacc.campaign.state import READINGS, State
 from kinacc.config import json_files
 from kinacc.errors import InputError, Problem, refuse
 from kinacc.tables.atomic import write_whole
@@ -22,7 +22,7 @@ _CLOCKS_DIFFER = timedelta(minutes=10)  # of two computers that write to one cam
 
 @dataclass(frozen=True)
 class Opened:
-    """A campaign as read: its folder, plan, journal and the digest both hang on."""
+    """A campaign as read: its folder, plan, journal and the digest of the plan."""
 
     folder: Path
     plan: Plan
@@ -30,20 +30,21 @@ class Opened:
     digest: str
 
     def state(self, watch=None) -> State:
-        """Where it stands; ``watch`` as in ``kinacc.campaign.state.restore``."""
-        return state.restore(self.plan, self.journal.entries, watch)
+        """Return its state; ``watch`` as in ``kinacc.campaign.state.restore``."""
+        where = str(self.folder / journal.JOURNAL)
+        return state.restore(self.plan, self.journal.entries, watch, where)
 
     @property
     def recorded(self) -> tuple[str, ...]:
-        """When its entries were made, as the journal has it."""
+        """The times of its entries."""
         return tuple(str(each["at"]) for each in self.journal.entries if "at" in each)
 
     def clock_went_back(self) -> list[Problem]:
-        """What is wrong with the time of this computer, if it lies before the last entry's."""
+        """Return the problem that the time of this computer lies before the last entry's."""
         last, now = max(self.recorded, default=""), _stamp()
         if not last or now >= _stamp(datetime.fromisoformat(last) - _CLOCKS_DIFFER):
             return []
-        what = f"says {now}, and the campaign has an entry of {last}"
+        what = f"is at {now}, and the campaign has an entry of {last}"
         fix = "set the clock; where that entry's was wrong, give --accept-implausible"
         return [Problem("the clock of this computer", what, fix=fix)]
 
@@ -58,7 +59,7 @@ def _stamp(time: datetime | None = None) -> str:
 
 
 def in_the_way(folder: Path | str) -> list[Problem]:
-    """Files of a campaign that a folder holds already."""
+    """Return a problem for each file of a campaign that a folder holds already."""
     paths = [Path(folder) / name for name in (journal.PLAN, journal.JOURNAL)]
     what = "a campaign is there already"
     return [Problem(str(path), what, "a new folder") for path in paths if path.exists()]
@@ -79,10 +80,8 @@ def open_(folder: Path | str) -> Opened:
         raise InputError(Problem(str(path), "no such file: no campaign is there", fix=fix))
     text = json_files.bytes_of(path)
     digest = plan.digest(text)
-    begun, journal_at = plan.from_json(text, str(path)), folder / journal.JOURNAL
-    known = journal.read(journal_at, digest)
-    state.require_readable(begun, known.entries, str(journal_at))
-    return Opened(folder, begun, known, digest)
+    begun = plan.from_json(text, str(path))
+    return Opened(folder, begun, journal.read(folder / journal.JOURNAL, digest), digest)
 
 
 @contextmanager
@@ -103,60 +102,60 @@ def require_method(opened: Opened) -> None:
 
 
 def marks_of(opened: Opened) -> dict[str, object]:
-    """What the tables of a campaign are marked with: the plan counts as the configuration."""
-    own = {"kinacc_version": __version__, "config_hash": opened.digest}
-    return {**own, "seed": opened.plan.seed}
+    """Return the provenance of the tables: the plan counts as the configuration."""
+    marks = {"kinacc_version": __version__, "config_hash": opened.digest}
+    return {**marks, "seed": opened.plan.seed}
 
 
 def doubts(opened: Opened) -> list[str]:
-    """What to know of a campaign as it was read: another version, a last line that was cut off."""
-    lines = []
+    """Return what is unusual: begun with another version, or a last line that was cut off."""
     begun = opened.plan.about.get("kinacc_version", "an earlier version")
-    if begun != __version__:
-        lines.append(f"begun with kinacc {begun}, this is {__version__}: bounds may differ")
+    lines = [f"begun with kinacc {begun}, this is {__version__}"] if begun != __version__ else []
     if opened.journal.cut_off:
         lines.append(
-            "the last entry was cut off while it was written and never confirmed; it is left out: "
-            "look whether the last reading has to be recorded again"
+            "the last entry was cut off while written and never confirmed: is the last reading to "
+            "be recorded again?"
         )
     return lines
 
 
-def held_to(opened: Opened, sha256: str | None, readings: int | None) -> list[Problem]:
-    """What speaks against a journal being the one of a report, or going on from it.
+@dataclass(frozen=True)
+class Verification:
+    """Whether a journal is whole, and continues the one of a report; ``problems`` where not."""
 
-    ``readings``: how many the report states; ``sha256``: of the journal up to them.
+    campaign: str
+    entries: int
+    readings: int
+    sha256: str
+    problems: tuple[str, ...]
+
+
+def verify(opened: Opened, sha256: str | None = None, readings: int | None = None) -> Verification:
+    """Compare a journal with what a report states of it.
+
+    ``readings``: their number; ``sha256``: of the journal up to them. Checksums of the lines are
+    checked where a journal is opened.
     """
-    path, known = str(opened.folder / journal.JOURNAL), opened.journal
+    known = opened.journal
     counts = [state.readings_in(known.entries[:end]) for end in range(len(known.entries) + 1)]
-    if readings is not None and counts[-1] < readings:
-        return [Problem(path, f"{counts[-1]} readings", f"{readings} as reported")]
     ends = [end for end, count in enumerate(counts) if readings is None or count == readings]
-    if sha256 is not None and sha256 not in map(known.sha256, ends):
-        what = "is not the journal of that report: it was shortened or rewritten"
-        return [Problem(path, what, f"its SHA-256 is {known.sha256()}")]
-    return []
+    problems = []
+    if readings is not None and counts[-1] < readings:
+        problems.append(f"{counts[-1]} readings, {readings} reported")
+    elif sha256 is not None and sha256 not in map(known.sha256, ends):
+        problems.append("not the journal of that report: it was shortened or rewritten")
+    return Verification(
+        opened.digest, len(known.entries), counts[-1], known.sha256(), tuple(problems)
+    )
 
 
 def readings_entry(
-    readings: Sequence[Reading],
-    file: str | None = None,
-    path: str | None = None,
+    readings: Sequence[Reading], file: str | None = None, path: str | None = None
 ) -> dict:
-    """The entry of readings that are taken together.
+    """Return the entry of readings that are taken together.
 
     ``file`` is the digest of their file, ``path`` where it lies from the campaign's folder.
     """
     entry: dict = {"kind": READINGS, "readings": [each.as_entry() for each in readings]}
     entry |= {"file": file} if file is not None else {}
     return entry | ({"path": path} if path is not None else {})
-
-
-def strike_entry(number: int, reason: str) -> dict:
-    """The entry of a reading declared void, by its number from 1."""
-    return {"kind": STRIKE, "reading": number, "reason": reason}
-
-
-def leave_out_entry(point: int, reason: str) -> dict:
-    """The entry of a point that cannot be measured."""
-    return {"kind": LEAVE_OUT, "point": point, "reason": reason}

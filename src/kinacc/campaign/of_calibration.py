@@ -1,4 +1,4 @@
-"""What campaigns say of the largest error of one calibration."""
+"""The campaigns of one calibration and their bounds on its largest error."""
 
 from __future__ import annotations
 
@@ -10,81 +10,57 @@ from pathlib import Path
 
 import numpy as np
 
-from kinacc.assess.statement import CANDIDATES, TARGETS, Statement
 from kinacc.campaign import folder
 from kinacc.campaign.journal import JOURNAL, PLAN
-from kinacc.campaign.state import State
+from kinacc.campaign.plan import Plan
+from kinacc.campaign.status import CampaignStatus, status
 from kinacc.deployment import folder as results
 from kinacc.errors import InputError
 from kinacc.kinematics import robot
 from kinacc.kinematics.model import JointState
 from kinacc.tables.columns import Columns
 
-_ORDER = (CANDIDATES, *(each for each in reversed(TARGETS) if each != CANDIDATES))
 _SAME_MM = 1e-6  # modelled positions that differ by less are of one model
 
 
 @dataclass(frozen=True)
-class Assessed:
-    """A campaign at its place, how it stands, and what it says: of all candidates if it can.
-
-    ``recorded`` is when its last entry was made; empty where there is none.
-    """
-
-    place: Path
-    state: State
-    said: Statement | None
-    recorded: str = ""
-
-    @property
-    def next_command(self) -> str:
-        """What goes on with the campaign, or ends it."""
-        going = self.state.asked is not None
-        return shlex.join(["kinacc", "campaign", "next" if going else "report", str(self.place)])
-
-
-@dataclass(frozen=True)
 class Sought:
-    """The campaign of a calibration, if there is one, and what stood in the way of others."""
+    """The status of the campaign of a calibration, if there is one, and what hides others."""
 
-    assessed: Assessed | None
+    status: CampaignStatus | None
     remarks: tuple[str, ...] = ()
 
 
 def sought(name: str, tables: Mapping[str, Columns], places: Iterable[Path]) -> Sought:
-    """The campaign of the calibration ``name`` among the folders ``places``, the one read last.
+    """Return the campaign of the calibration ``name`` among the folders ``places``, the newest.
 
-    ``tables`` are those of its results folder, ``places`` what :func:`journal.of_results` finds.
-    Campaigns keep where their model saw the
-    candidates, so that one begun before the arm was calibrated anew is told from one that speaks
-    of the models now there.
+    ``tables`` are those of its results folder, ``places`` those of :func:`journal.of_results`. A
+    campaign holds the positions that its model predicts: one that was begun with an earlier
+    calibration of that name is left out.
     """
     remarks = []
-    found = sorted(set(places), key=_last_reading, reverse=True)
-    for number, place in enumerate(found, 1):
+    newest = sorted(set(places), key=_last_reading, reverse=True)
+    for number, place in enumerate(newest, 1):
         try:
             opened = folder.open_(place)
             if not _is_of(opened.plan, tables):
                 remarks.append(f"campaign {place} was begun with another calibration of {name}")
                 continue
-            state = opened.state()
+            found = status(opened, opened.state())
         except InputError:
             command = shlex.join(["kinacc", "campaign", "status", str(place)])
             remarks.append(f"campaign {place} cannot be read: {command}")
             continue
-        if others := [str(each) for each in found[number:]]:
+        if others := [str(each) for each in newest[number:]]:
             remarks.append(f"there are older campaigns: {', '.join(others)}")
-        said = sorted(state.statements(), key=lambda each: _ORDER.index(each.target))
-        recorded = max(opened.recorded, default="")
-        return Sought(Assessed(place, state, said[0] if said else None, recorded), tuple(remarks))
+        return Sought(found, tuple(remarks))
     return Sought(None, tuple(remarks))
 
 
 def finished(tables: Mapping[str, Columns], model: str, places: Iterable[Path]) -> float:
-    """Upper bound, mm, of the last campaign on a calibration's ``model`` that came to its end.
+    """Return the upper bound, mm, of the last finished campaign on a calibration's ``model``.
 
-    The last by the times of its journal, so that it is the same wherever its folder is copied to.
-    NaN where there is none; one that cannot be read is none.
+    The last by the times of its journal. NaN where there is none.
     """
     ended = []
     for place in places:
@@ -92,11 +68,10 @@ def finished(tables: Mapping[str, Columns], model: str, places: Iterable[Path]) 
             opened = folder.open_(place)
             if opened.plan.about["model"] != model or not _is_of(opened.plan, tables):
                 continue
-            state = opened.state()
-            said = min(state.statements(), key=lambda each: _ORDER.index(each.target), default=None)
-            whole = said is not None and np.isfinite(said.upper_mm) and not said.excepted
-            if state.asked is None and said is not None and whole:
-                ended.append((max(opened.recorded, default=""), said.upper_mm))
+            found = status(opened, opened.state())
+            bound = found.of_all
+            if found.next_point is None and np.isfinite(bound.upper_mm) and not bound.excepted:
+                ended.append((found.recorded, bound.upper_mm))
     return max(ended, default=("", np.nan))[1]
 
 
@@ -106,7 +81,7 @@ def _last_reading(place: Path) -> float:
     return (journal if journal.is_file() else place / PLAN).stat().st_mtime
 
 
-def _is_of(plan, tables: Mapping[str, Columns]) -> bool:
+def _is_of(plan: Plan, tables: Mapping[str, Columns]) -> bool:
     """Whether the model the campaign judges is the one that the tables hold now."""
     try:
         arm = robot.of_text(str(tables["robot"]["description"][0]), "robot.parquet")

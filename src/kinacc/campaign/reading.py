@@ -1,8 +1,9 @@
-"""Readings: what is checked before one is taken, and what it says of the model's error."""
+"""Readings: their error and covariance, and the checks before one is taken."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +13,8 @@ from kinacc.campaign.plan import Plan
 from kinacc.errors import Problem
 
 _FARTHEST_MM = 1e6  # no instrument measures an arm from a kilometre away
+_USUAL_READINGS = 10  # that show which size is usual
+_UNUSUAL, _FEWEST_SIGMAS = 6.0, 10.0  # times the median size, and standard deviations
 
 
 @dataclass(frozen=True)
@@ -19,8 +22,8 @@ class Reading:
     """One reading as it goes into the journal.
 
     ``position_mm`` (3,) in the frame of ``instrument``; ``joints`` (k,) as the controller reported
-    them on the spot, None where not noted; ``std`` is a text of 1, 3 or 9 numbers where this
-    reading's noise is not the instrument's.
+    them (rad, mm), None where not noted; ``std``: 1, 3 or 9 numbers as text where the noise of this
+    reading is not the instrument's.
     """
 
     point: int
@@ -29,8 +32,13 @@ class Reading:
     joints: np.ndarray | None = None
     std: str | None = None
 
+    @property
+    def digits(self) -> tuple:
+        """Point, instrument and position to the last digit."""
+        return self.point, self.instrument, *self.position_mm.tolist()
+
     def as_entry(self) -> dict:
-        """The reading in plain numbers."""
+        """Return the reading in plain numbers."""
         entry = {
             "point": self.point,
             "position_mm": [float(each) for each in self.position_mm],
@@ -38,25 +46,27 @@ class Reading:
         }
         if self.joints is not None:
             entry["joints"] = [float(each) for each in self.joints]
-        if self.std is not None:
-            entry["std"] = self.std
-        return entry
+        return entry | ({"std": self.std} if self.std is not None else {})
 
     @classmethod
-    def of_entry(cls, entry: Mapping) -> Reading:
-        """The reading that ``as_entry`` wrote."""
+    def of_entry(cls, entry: Mapping, plan: Plan) -> Reading:
+        """Return the reading that ``as_entry`` wrote; ValueError where it is none of the plan."""
         joints = entry.get("joints")
-        return cls(
+        found = cls(
             int(entry["point"]),
             np.array(entry["position_mm"], dtype=float),
             entry["instrument"],
             None if joints is None else np.array(joints, dtype=float),
             entry.get("std"),
         )
+        if not 0 <= found.point < len(plan.points) or faults_of(plan, found, ""):
+            raise ValueError(f"no reading of this campaign: {entry}")
+        plan.instrument(found.instrument)
+        return found
 
 
 def error_mm(plan: Plan, reading: Reading) -> np.ndarray:
-    """Measured minus modelled position (3,), robot's base."""
+    """Return measured minus modelled position (3,), robot's base."""
     measured = reading.position_mm
     if plan.instrument(reading.instrument).frame == INSTRUMENT:
         measured = plan.to_base.rotation @ measured + plan.to_base.position_mm
@@ -64,122 +74,89 @@ def error_mm(plan: Plan, reading: Reading) -> np.ndarray:
 
 
 def covariance_mm2(plan: Plan, reading: Reading) -> np.ndarray:
-    """Covariance (3, 3) of the reading in the robot's base."""
+    """Return the covariance (3, 3) of the reading in the robot's base."""
     unplanned = unplanned_mm2(plan, reading)
     return plan.covariance_mm2[reading.point] if unplanned is None else unplanned
 
 
 def unplanned_mm2(plan: Plan, reading: Reading) -> np.ndarray | None:
-    """Covariance (3, 3) of the reading in the robot's base; None where it is the planned one."""
+    """Return the covariance (3, 3) in the robot's base; None where it is the planned one."""
     instrument = plan.instrument(reading.instrument)
     if reading.std is not None:
-        own = covariance_of(reading.std, "reading", [])
-        instrument = instrument.of_reading(own)
+        instrument = instrument.of_reading(covariance_of(reading.std, "reading", []))
     elif instrument is plan.instruments[0]:
         return None
     return instrument.in_base(plan.to_base, plan.points.modelled_mm[[reading.point]])[0]
 
 
-def entry_faults(plan: Plan, reading: Reading) -> list[str]:
-    """What keeps an entry of a journal from being a reading of this campaign."""
-    known = {each.name for each in plan.instruments}
-    joints, std = reading.joints, reading.std
-    wrong: list[Problem] = []
-    if std is not None:
-        covariance_of(std, "standard deviation", wrong)
-    faults = {
-        f"point {reading.point}": 0 <= reading.point < len(plan.points),
-        f"instrument {reading.instrument!r}": reading.instrument in known,
-        f"position {reading.position_mm}": _is_place(reading.position_mm, 3),
-        f"joints {joints}": joints is None or _is_place(joints, len(plan.slides)),
-        f"standard deviation {std!r}": not wrong,
-    }
-    return [what for what, fits in faults.items() if not fits]
-
-
-def _is_place(values: np.ndarray, count: int) -> bool:
-    """Whether these are ``count`` numbers within all lengths and angles."""
-    return values.shape == (count,) and bool((np.abs(values) <= _FARTHEST_MM).all())
-
-
 def point_at(plan: Plan, joints: np.ndarray) -> int | None:
-    """The candidate whose joints all lie within the tolerance of these (k,); None for none."""
-    apart = np.abs(_in_tolerances(plan, joints)).max(axis=1)
+    """Return the candidate whose joints all lie within the tolerance of these (k,), or None."""
+    apart = np.abs((joints - plan.points.joints) / _tolerance(plan)).max(axis=1)
     nearest = int(np.argmin(apart))
     return nearest if apart[nearest] <= 1.0 else None
 
 
-def problems_of(
-    plan: Plan,
-    reading: Reading,
-    where: str,
-    left_out: frozenset[int] = frozenset(),
-    accept_implausible: bool = False,
-    unusual_mm: float = np.inf,
-) -> list[Problem]:
-    """Everything that speaks against taking a reading.
-
-    ``unusual_mm``: size of an error beyond which a reading is asked about, being unlike the others.
-    """
-    problems = []
-    label = plan.points.label[reading.point]
-    if reading.point in left_out:
-        problems.append(Problem(where, f"point {label} was left out of the campaign"))
-    if not _is_place(reading.position_mm, 3):
-        said = ", ".join(f"{each:g}" for each in reading.position_mm)
-        allowed = f"three numbers within {_FARTHEST_MM:g} mm"
-        problems.append(Problem(where, f"measured position ({said})", allowed))
-    if reading.joints is not None:
-        problems += _wrong_joints(plan, reading, where)
+def faults_of(plan: Plan, reading: Reading, where: str) -> list[Problem]:
+    """Return why numbers cannot be a reading."""
+    problems: list[Problem] = []
+    for name, values, count in (
+        ("measured position", reading.position_mm, 3),
+        ("joints", reading.joints, len(plan.slides)),
+    ):
+        if values is None:
+            continue
+        if values.shape != (count,) or not (np.abs(values) <= _FARTHEST_MM).all():
+            text = ", ".join(f"{each:g}" for each in values.ravel())
+            allowed = f"{count} numbers within {_FARTHEST_MM:g}"
+            problems.append(Problem(where, f"{name} ({text})", allowed))
     if reading.std is not None:
         covariance_of(reading.std, f"{where}, standard deviation", problems)
-    if problems or accept_implausible:
-        return problems
-    size = float(np.linalg.norm(error_mm(plan, reading)))
-    if size > plan.limits.implausible_mm:
-        problems.append(
-            Problem(
-                where,
-                f"{size:.3f} mm from where the model has point {label}",
-                f"at most {plan.limits.implausible_mm:g} mm",
-                "another pose, target, unit or frame? If the reading was repeated and stands, "
-                "give --accept-implausible: to drop it for its size would make the bound wrong",
-            )
-        )
-    elif size > unusual_mm:
-        problems.append(
-            Problem(
-                where,
-                f"{size:.3f} mm from where the model has point {label}, unlike the readings so far",
-                f"at most {unusual_mm:.3g} mm without being asked about",
-                "read the point again; what stands is recorded with --accept-implausible: to drop "
-                "it for its size would make the bound wrong",
-            )
-        )
     return problems
 
 
-def _wrong_joints(plan: Plan, reading: Reading, where: str) -> list[Problem]:
-    if not np.all(np.isfinite(reading.joints)):
-        return [Problem(where, "joints that are no numbers", "finite numbers")]
-    off = _in_tolerances(plan, reading.joints)[reading.point]
-    if np.abs(off).max() <= 1.0:
-        return []
-    worst = int(np.argmax(np.abs(off)))
-    unit, factor = ("mm", 1.0) if plan.slides[worst] else ("deg", 180.0 / np.pi)
-    asked = plan.points.joints[reading.point, worst] * factor
-    found = reading.joints[worst] * factor
-    other = point_at(plan, reading.joints)
-    hint = "" if other is None else f"these are the joints of point {plan.points.label[other]}"
+def problems_of(
+    plan: Plan, reading: Reading, where: str, most_mm: float, accept_implausible: bool = False
+) -> list[Problem]:
+    """Return everything that is wrong with a reading; errors above ``most_mm`` are implausible."""
+    if problems := faults_of(plan, reading, where):
+        return problems
     label = plan.points.label[reading.point]
-    allowed = f"{asked:.4f} {unit} within {_tolerance(plan)[worst] * factor:g} {unit}"
-    what = f"joint {worst + 1} at {found:.4f} {unit} is not that of point {label}"
-    return [Problem(where, what, allowed, hint)]
+    if reading.joints is not None:
+        tolerance = _tolerance(plan)
+        off = np.abs(reading.joints - plan.points.joints[reading.point]) / tolerance
+        if off.max() > 1.0:
+            worst = int(np.argmax(off))
+            unit, factor = ("mm", 1.0) if plan.slides[worst] else ("deg", 180.0 / math.pi)
+            known = point_at(plan, reading.joints)
+            wanted = plan.points.joints[reading.point, worst] * factor
+            return [
+                Problem(
+                    where,
+                    f"joint {worst + 1} at {reading.joints[worst] * factor:.4f} {unit} is not that "
+                    f"of point {label}",
+                    f"{wanted:.4f} {unit} within {tolerance[worst] * factor:g} {unit}",
+                    "" if known is None else f"these joints are point {plan.points.label[known]}",
+                )
+            ]
+    size = float(np.linalg.norm(error_mm(plan, reading)))
+    if size <= most_mm or accept_implausible:
+        return []
+    fix = (
+        "check pose, target, unit and frame, and read again; --accept-implausible takes a reading "
+        "that stands (dropping it for its size makes the bound wrong)"
+    )
+    what = f"{size:.3f} mm from the model at point {label}"
+    return [Problem(where, what, f"at most {most_mm:.3g} mm", fix)]
 
 
-def _in_tolerances(plan: Plan, joints: np.ndarray) -> np.ndarray:
-    """Distance (m, k) of every candidate's joints from these, in tolerances."""
-    return (joints - plan.points.joints) / _tolerance(plan)
+def most_plausible_mm(plan: Plan, sizes_mm: Sequence[float]) -> float:
+    """Return the largest error that is plausible after readings of ``sizes_mm``."""
+    usable = [size for size in sizes_mm if np.isfinite(size)]
+    if len(usable) < _USUAL_READINGS:
+        return plan.limits.implausible_mm
+    sigma = math.sqrt(np.trace(plan.covariance_mm2, axis1=1, axis2=2).max())
+    unusual = max(_UNUSUAL * float(np.median(usable)), _FEWEST_SIGMAS * sigma)
+    return min(plan.limits.implausible_mm, unusual)
 
 
 def _tolerance(plan: Plan) -> np.ndarray:

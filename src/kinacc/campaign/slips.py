@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kinacc.campaign import words
 from kinacc.campaign.instrument import Instrument, noise
 from kinacc.campaign.plan import Plan
 from kinacc.errors import Problem
@@ -25,8 +24,6 @@ _MUCH_NOISE = 2.0  # times what the calibration left unexplained, noise included
 _MUCH_NOISE_MM = 1.0  # where nothing is known of the calibration
 _LITTLE_NOISE = 0.8  # of the scatter that was measured
 _USUAL_READINGS = 10  # that say what size is usual
-_UNUSUAL = 6.0  # times the median size
-_FEWEST_SIGMAS = 10.0  # a reading is not unusual within so much noise
 _TOO_FEW = "the calibration does not tell it: too few repeats"
 
 
@@ -144,7 +141,8 @@ def of_distance(begun: Plan) -> list[Problem]:
     for each in begun.instruments:
         if each.laser is None:
             continue
-        least, most = words.distances_m(begun)
+        apart = np.linalg.norm(begun.points.modelled_mm - begun.to_base.position_mm, axis=1)
+        least, most = 1e-3 * float(apart.min()), 1e-3 * float(apart.max())
         if least >= _NEAREST_M and most <= _FARTHEST_M:
             continue
         what = f"{least:.2f} m to {most:.2f} m from the candidates, by the calibration"
@@ -155,10 +153,3 @@ def of_distance(begun: Plan) -> list[Problem]:
         allowed = f"{_NEAREST_M:g} m to {_FARTHEST_M:g} m"
         problems.append(Problem(f"laser tracker {each.name}", what, allowed, fix))
     return problems
-
-
-def unusual_mm(sizes_mm: Sequence[float], noise_mm: float) -> float:
-    """Size beyond which a reading is unusual after readings of ``sizes_mm``; inf where few are."""
-    if len(sizes_mm) < _USUAL_READINGS:
-        return math.inf
-    return max(_UNUSUAL * float(np.median(sizes_mm)), _FEWEST_SIGMAS * noise_mm)

@@ -1,4 +1,4 @@
-"""Whether a tolerance is kept, and whose it is: one verdict, one sentence, wherever it is told."""
+"""Verdicts on a tolerance: by held-out errors, or by the bound of a campaign."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from kinacc.assess.conformity import ACCEPT, REJECT, UNDECIDED, decide
 from kinacc.assess.statement import Statement
 from kinacc.calibration.summary import LARGE_SHARE, Tolerance
-from kinacc.campaign import words
+from kinacc.campaign.reasons import reason
 
 BOUND, MEAN = "bound", "mean"
 OF_CONFIGURATION, OF_CAMPAIGN = "the configuration's", "the campaign's"
@@ -40,10 +40,4 @@ def by_bound(tolerance_mm: float, said: Statement | None, in_doubt: bool) -> tup
     if said is None:
         return UNDECIDED, "no campaign bounds it"
     decided = decide(said, tolerance_mm)
-    return decided.verdict, words.reason(decided.reason) or ""
-
-
-def in_words(tolerance: Tolerance, whose: str, judged: tuple[str, str]) -> str:
-    """The tolerance, whose it is, and whether it is kept."""
-    says, because = judged
-    return f"Tolerance {tolerance} ({whose}): {says}, {because}."
+    return decided.verdict, reason(decided.reason)

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Mapping
-from dataclasses import asdict, replace
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,7 +13,7 @@ import pandas as pd
 
 from kinacc.cli import choice
 from kinacc.cli.choice import option
-from kinacc.cli.output import Output, answers, plain
+from kinacc.cli.output import Output, answers
 
 if TYPE_CHECKING:
     from kinacc.campaign.planning import Aim, BudgetPlan
@@ -23,15 +22,10 @@ if TYPE_CHECKING:
 DEFAULT_ERRORS = ("smooth", "workshop", "defect")
 SHARES = (0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0)  # of the candidates: budgets by default
 _MOST_READINGS = 50_000_000  # a gigabyte: any pose may be read again and again
-_SHOWN = {
-    "errors": "errors",
-    "budget": "budget",
-    "true_mm": "largest\nerror mm",
-    "excepted": "excepted",
-    "width_median_mm": "width mm\nmedian",
-    "width_q95_mm": "width mm\n95 %",
-    "holding": "bounds\nhold",
-}
+_SHOWN = (
+    *("errors", "budget", "true_mm", "excepted", "width_median_mm", "width_q95_mm"),
+    *("holding", "judged"),
+)
 
 
 @click.command("plan")
@@ -69,14 +63,10 @@ def plan(out, **given) -> None:
         found = plan_budget(fields, points, covariance, assessors, aim, *runs)
     if out.picture is not None:
         _draw(found, aim, out)
-    if out.table is not None:
-        from kinacc.cli.output import write_table
-
-        write_table(found.table, out.table)
-    if out.as_json:
-        click.echo(json.dumps(plain(asdict(found)), indent=1))
-        return
-    _print(found, aim)
+    shown = [each for each in _SHOWN if each != "excepted" or found.table[each].any()]
+    shown += ["within"] if aim.width_mm is not None else []
+    shown += ["accept", "reject", "undecided"] if aim.tolerance_mm is not None else []
+    out.show(found, found.table, _lines(found, aim), found.table[shown])
 
 
 def _question(given: Mapping) -> tuple:
@@ -198,40 +188,20 @@ def _errors_of_folder(path: Path, point: str | None) -> ErrorField:
     )
 
 
-def _print(found: BudgetPlan, aim: Aim) -> None:
-    """The budget, then a row for each kind of errors and budget."""
-    from kinacc.cli.frame import as_rich
-    from kinacc.report import terminal
-
-    console = terminal.screen(terminal.WIDTH)
-    console.print(_verdict(found, aim), soft_wrap=True)
-    console.print(
+def _lines(found: BudgetPlan, aim: Aim) -> Iterator[str]:
+    """The budget, the simulation, and how near an upper bound can come."""
+    yield _verdict(found, aim)
+    yield (
         f"Simulated: {found.repetitions} campaigns a row with {found.assessor}, largest error of "
-        f"{found.target} among {found.candidates}, noise {terminal.size(max(found.noise_mm))} mm.",
-        soft_wrap=True,
+        f"{found.target} among {found.candidates}, noise {max(found.noise_mm):.3g} mm."
     )
-    shown = dict(_SHOWN)
-    if not any(row.excepted for row in found.rows):
-        del shown["excepted"]
-    table = found.table
-    table["holding"] = [f"{row.holding} of {row.judged}" for row in found.rows]
-    if aim.width_mm is not None:
-        shown["within"] = "within"
-    if aim.tolerance_mm is not None:
-        shown |= {each: each for each in ("accept", "reject", "undecided")}
-    console.print(as_rich(table, shown))
-    if "excepted" in shown:
-        console.print(
-            "excepted: candidates that the bound leaves out; the largest error is that of the rest."
-        )
     if judged := [row for row in found.rows if np.isfinite(row.attainable_mm)]:
         most = max(row.budget for row in judged)
         worst = max((r for r in judged if r.budget == most), key=lambda row: row.excess_mm)
-        console.print(
+        yield (
             f"Mean excess of the upper bound with {most} readings (errors: {worst.errors}): "
-            f"{terminal.size(worst.excess_mm)} mm. With all errors known beforehand: "
-            f"{terminal.size(worst.attainable_mm)} mm. Limit of any reliable bound: "
-            f"{terminal.size(worst.proven_mm)} mm."
+            f"{worst.excess_mm:.3g} mm. With all errors known beforehand: "
+            f"{worst.attainable_mm:.3g} mm. Limit of any reliable bound: {worst.proven_mm:.3g} mm."
         )
 
 

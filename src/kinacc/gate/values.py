@@ -183,18 +183,15 @@ def _of_bound(tables: RunTables, unit: str, word: str) -> Figure:
     known = folder.read_tables(tables.folder, "robot")
     name, places = tables.folder.resolve().name, journal.of_results(tables.folder)
     sought = of_calibration.sought(name, known, places)
-    found = sought.assessed
+    found = sought.status
     if found is None:
         what = "; ".join(sought.remarks) or "no campaign on this calibration"
         fix = f"kinacc campaign start FOLDER --calibration {tables.folder}"
         raise Absent(Problem(str(tables.folder), what, fix=fix))
-    size, why = np.nan, "its campaign has no upper bound so far"
-    about: dict[str, Any] = {"campaign": str(found.place)}
-    if found.said:
-        size = found.said.upper_mm
-        about["confidence"] = found.said.confidence
-        why = why if np.isnan(size) else ""
-        if found.said.excepted:
-            why = f"its upper bound leaves {found.said.excepted} candidates out"
-    called = f"{word} bound on the largest error, by campaign {found.place}"
-    return Figure(size, unit, called, about, why)
+    bound = found.of_all
+    why = "" if np.isfinite(bound.upper_mm) else "its campaign has no upper bound so far"
+    if bound.excepted:
+        why = f"its upper bound leaves {bound.excepted} candidates out"
+    about: dict[str, Any] = {"campaign": found.folder, "confidence": bound.confidence}
+    called = f"{word} bound on the largest error, by campaign {found.folder}"
+    return Figure(bound.upper_mm, unit, called, about, why)

@@ -45,9 +45,9 @@ def run(inputs: Mapping, settings: Mapping) -> Page:
     arm = robot.of_text(str(tables["robot"]["description"][0]), "robot.parquet")
     sections = [make(tables, arm) for needed, make in _OF_THE_FIT if needed in tables]
     sections.append(fit_sections.selection(tables, terminal.selection(summary)))
-    assessed = of_calibration.sought(name, tables, places).assessed
+    assessed = of_calibration.sought(name, tables, places).status
     if assessed is not None:
-        opened = campaigns.open_(assessed.place)
+        opened = campaigns.open_(assessed.folder)
         sections.append(campaign.section(opened, *report.tables(opened)))
     sections += [make(tables, arm) for needed, make in _OF_THE_STUDY if needed in tables]
     return Page(first_screen(summary, settings.get("outdated", ())), sections)

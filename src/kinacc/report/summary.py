@@ -16,8 +16,9 @@ from kinacc.assess.statement import CANDIDATES, Statement
 from kinacc.calibration import identifiability, misfit
 from kinacc.calibration import summary as figures
 from kinacc.calibration.summary import Tolerance
-from kinacc.campaign import instrument, journal, of_calibration, tolerance, words
+from kinacc.campaign import journal, of_calibration, tolerance
 from kinacc.campaign.of_calibration import Sought
+from kinacc.campaign.status import CampaignStatus
 from kinacc.config.error_models import ERROR_MODELS, MEASURED, NOMINAL, PLAINEST, model_name
 from kinacc.deployment import applicability
 from kinacc.deployment import folder as results
@@ -411,7 +412,7 @@ def summarise(
         compliance=tuple(compliance(tables.get("compliance_model"))),
         noise_mm=fits[0].noise.per_axis_mm,
         held_out_over_noise={each.model: each.ratio for each in fits},
-        largest_error=_largest(sought),
+        largest_error=_largest(sought.status),
         remarks=sought.remarks,
         tolerance=tolerance_of(tables),
         claims=_claims(tables) if synthetic else None,
@@ -612,42 +613,29 @@ def compliance(table: Mapping | None) -> Iterator[JointCompliance]:
             yield JointCompliance(int(table["joint"][i]), *values)
 
 
-def _largest(sought: Sought) -> LargestError | None:
-    found = sought.assessed
+def _largest(found: CampaignStatus | None) -> LargestError | None:
     if found is None:
         return None
-    said, plan, state = found.said, found.state.plan, found.state
-    against = (
-        *words.against([] if said is None else [said], state),
-        *words.begun_against(plan),
-    )
-    missing = float("nan")
-    numbers = (
-        [missing] * 4
-        if said is None
-        else [said.value_mm, said.lower_mm, said.upper_mm, said.confidence]
-    )
+    bound = found.of_all
     return LargestError(
-        campaign=str(found.place),
-        model=str(plan.about["model"]),
-        point=str(plan.about["point"]),
-        target="" if said is None else words.about(said, state),
-        candidates=len(plan.points) - len(state.left_out),
-        readings=state.taken,
-        budget=plan.assessor.measurements,
+        campaign=found.folder,
+        model=found.model,
+        point=found.point,
+        target=bound.about,
+        candidates=found.candidates,
+        readings=found.readings,
+        budget=found.budget,
         recorded=found.recorded[:_DAY],
-        value_mm=float(numbers[0]),
-        lower_mm=float(numbers[1]),
-        upper_mm=float(numbers[2]),
-        confidence=float(numbers[3]),
-        excepted=0 if said is None else said.excepted,
-        tolerance_mm=plan.limits.tolerance_mm,
-        statement="No bound so far: too few readings."
-        if said is None
-        else words.statement(said, state),
-        conditions="" if said is None or np.isnan(said.upper_mm) else words.conditions(said, state),
-        against=against,
-        noise={each.name: instrument.noise(each) for each in plan.instruments},
+        value_mm=bound.value_mm,
+        lower_mm=bound.lower_mm,
+        upper_mm=bound.upper_mm,
+        confidence=bound.confidence,
+        excepted=bound.excepted,
+        tolerance_mm=bound.tolerance_mm,
+        statement=bound.text,
+        conditions=found.assumes,
+        against=(*found.against, *found.overruled),
+        noise=found.noise,
         next_command=found.next_command,
     )
 
@@ -699,11 +687,11 @@ def _written(folder: Path) -> str:
 
 
 def _next_steps(folder: Path, tables: Tables, arm: Robot, sought: Sought) -> Iterable[NextStep]:
-    if sought.assessed is not None:
-        yield NextStep("continue the campaign", sought.assessed.next_command)
+    if sought.status is not None:
+        yield NextStep("continue the campaign", sought.status.next_command)
     calibration = results.calibration(tables, arm)
     chosen = [] if calibration.choice == PLAINEST else ["--model", calibration.choice]
-    if sought.assessed is None:
+    if sought.status is None:
         campaign = ["kinacc", "campaign", "start", _free("check", folder)]
         campaign += ["--calibration", str(folder), "--noise-mm", "NOISE", "--budget"]
         purpose = "bound the largest error; NOISE is the standard deviation of a reading in mm"

@@ -145,7 +145,7 @@ def notes(summary: CalibrationSummary, most: int | None) -> dict[str, list[str]]
     found = summary.largest_error
     campaign = [*summary.remarks]
     if found is not None:
-        campaign += [f"Assumes: {found.conditions}."] if found.conditions else []
+        campaign += [found.conditions] if found.conditions else []
         campaign += [*found.against, f"{found.readings} of {found.budget} readings"]
         if found.model != summary.selected:
             campaign.append(f"About the {model_name(found.model)} model, which is not selected.")

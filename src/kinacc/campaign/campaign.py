@@ -1,0 +1,344 @@
+"""A measuring campaign from Python: the functions behind ``kinacc campaign``."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike
+
+from kinacc.campaign import folder as folders
+from kinacc.campaign import reading as checks
+from kinacc.campaign.instrument import INSTRUMENT
+from kinacc.campaign.plan import Plan
+from kinacc.campaign.reading import Reading
+from kinacc.campaign.state import LEAVE_OUT, STRIKE, State
+from kinacc.campaign.status import Bound, CampaignStatus, status
+from kinacc.errors import InputError, Problem, refuse
+from kinacc.geometry import invert
+
+
+@dataclass(frozen=True)
+class NextPose:
+    """The pose to measure next.
+
+    ``joints`` (k,): reported joints, rad (mm where a joint slides); ``directions`` (k,) of travel
+    on arrival, None where they do not matter; ``expected_mm`` (3,): modelled position in ``frame``
+    (``base`` or ``instrument``), that of the readings; ``times_read``: readings of it so far.
+    """
+
+    point: str
+    joints: np.ndarray
+    directions: np.ndarray | None
+    expected_mm: np.ndarray
+    frame: str
+    times_read: int
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """Readings taken: their ``numbers``, ``points`` and sizes ``error_mm`` of their errors.
+
+    ``skipped``: problems of rows that were not taken; ``known``: numbers of readings that rows of
+    the file repeat.
+    """
+
+    numbers: tuple[int, ...]
+    points: tuple[str, ...]
+    error_mm: tuple[float, ...]
+    skipped: tuple[str, ...]
+    known: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class RowsOfFile:
+    """Rows of a file, readings or what is wrong with them, each with its place in words.
+
+    ``digest`` of the file and its ``path`` from the folder of the campaign.
+    """
+
+    rows: Sequence[Reading | Problem]
+    places: Sequence[str]
+    digest: str
+    path: str
+
+
+class Campaign:
+    """A measuring campaign in a folder.
+
+    Parameters
+    ----------
+    folder : path
+        Folder of a campaign that was started.
+
+    Raises
+    ------
+    InputError
+        Where there is no campaign, or its files are damaged.
+
+    Examples
+    --------
+    >>> import kinacc
+    >>> campaign = kinacc.Campaign("check")  # doctest: +SKIP
+    >>> pose = campaign.next_pose()  # doctest: +SKIP
+    >>> campaign.add_reading([812.31, -40.02, 655.90])  # doctest: +SKIP
+    >>> campaign.bounds()[0].upper_mm  # doctest: +SKIP
+    """
+
+    def __init__(self, folder: Path | str) -> None:
+        self.folder = Path(folder)
+        self._load()
+
+    def _load(self) -> None:
+        self.opened = folders.open_(self.folder)
+        self.state: State = self.opened.state()
+
+    @property
+    def plan(self) -> Plan:
+        """The plan: candidates and their order, instruments, assessor, limits."""
+        return self.opened.plan
+
+    def next_pose(self) -> NextPose | None:
+        """Return the pose to measure next; None where no further reading is wanted."""
+        folders.require_method(self.opened)
+        point, points = self.state.asked, self.plan.points
+        if point is None:
+            return None
+        return NextPose(
+            points.label[point],
+            points.joints[point],
+            None if points.directions is None else points.directions[point],
+            self._expected_mm([point])[0],
+            self.plan.instruments[0].frame,
+            sum(each.reading.point == point for each in self.state.told),
+        )
+
+    def visit(self, every: bool = True) -> pd.DataFrame:
+        """Return the poses to measure now, a row each, in order.
+
+        ``every``: all that are measured whatever is read; else the next one alone. Columns pose,
+        q1_deg, q1_rad (q1_mm where a joint slides) .., s1 .. (travel), expected_x_mm ...
+        """
+        folders.require_method(self.opened)
+        plan, asked = self.plan, self.state.asked
+        wanted = [] if asked is None else self.state.ahead() if every else [asked]
+        if asked is not None and asked not in wanted:
+            wanted = [asked, *wanted]
+        joints, points = plan.points.joints[wanted], plan.points
+        columns: dict[str, object] = {"pose": [points.label[each] for each in wanted]}
+        for joint, slides in enumerate(plan.slides):
+            name, values = f"q{joint + 1}", joints[:, joint]
+            columns |= (
+                {f"{name}_mm": values}
+                if slides
+                else {f"{name}_deg": np.rad2deg(values), f"{name}_rad": values}
+            )
+        if points.directions is not None:
+            directions = points.directions[wanted]
+            columns |= {f"s{joint + 1}": each for joint, each in enumerate(directions.T)}
+        expected_mm = self._expected_mm(wanted)
+        columns |= {f"expected_{axis}_mm": expected_mm[:, i] for i, axis in enumerate("xyz")}
+        return pd.DataFrame(columns)
+
+    def add_reading(
+        self,
+        position_mm: ArrayLike,
+        point: str | None = None,
+        joints: ArrayLike | None = None,
+        instrument: str | None = None,
+        std_mm: str | None = None,
+        accept_implausible: bool = False,
+        again: bool = False,
+    ) -> Recorded:
+        """Record a reading; when this returns, it is on disk.
+
+        Parameters
+        ----------
+        position_mm : (3,) array
+            Measured position in the frame of the instrument.
+        point : str, optional
+            Candidate that was measured, by default the next one.
+        joints : (k,) array, optional
+            Reported joints, rad (mm where a joint slides).
+        instrument : str, optional
+            Instrument, by default the first.
+        std_mm : str, optional
+            Noise of this reading where it is not the instrument's: 1, 3 or 9 numbers.
+        accept_implausible, again : bool
+            Take a reading of any size, or one that repeats an earlier one to the last digit.
+
+        Raises
+        ------
+        InputError
+            For a reading that is refused; nothing is written.
+        """
+        with folders.writing(self.folder) as opened:
+            state, plan = opened.state(), opened.plan
+            asked = state.asked if point is None else plan.points.number(point)
+            if asked is None:
+                what = "no further reading is needed" if point is None else f"{point!r} is unknown"
+                raise InputError(Problem("point", what, fix="name a candidate"), _NOTHING)
+            name = plan.instrument(instrument).name
+            values = np.asarray(position_mm, dtype=float).reshape(-1)
+            at = None if joints is None else np.asarray(joints, dtype=float).reshape(-1)
+            found = Reading(asked, values, name, at, std_mm)
+            rows = RowsOfFile([found], ["the reading"], "", "")
+            recorded = _record(opened, state, rows, accept_implausible, again, skip_bad=False)
+        self._load()
+        return recorded
+
+    def add_readings(
+        self,
+        rows: RowsOfFile,
+        accept_implausible: bool = False,
+        again: bool = False,
+        skip_bad: bool = False,
+    ) -> Recorded:
+        """Record the rows of a file that are new, all or none of them; see ``add_reading``.
+
+        A row that equals a recorded reading to the last digit is known. ``skip_bad`` takes the good
+        rows. Raises InputError where a row is wrong, where none is new, and where readings of the
+        same file have no row any more.
+        """
+        with folders.writing(self.folder) as opened:
+            recorded = _record(opened, opened.state(), rows, accept_implausible, again, skip_bad)
+        self._load()
+        return recorded
+
+    def leave_out(self, point: str, reason: str) -> None:
+        """Leave a point without readings out, for a reason that is not its error."""
+        with folders.writing(self.folder) as opened:
+            state, number = opened.state(), opened.plan.points.number(point)
+            have = [e for e in (*state.told, *state.in_hand) if e.reading.point == number]
+            problems = {
+                "is no candidate": number is None,
+                f"has {len(have)} readings: without it a large error could be hidden": bool(have),
+                "was left out before": number in state.left_out,
+                "is one of the last 2 candidates": len(state.rows) <= 2,
+            }
+            _refuse(f"point {point}", problems, reason)
+            opened.write({"kind": LEAVE_OUT, "point": number, "reason": reason.strip()})
+        self._load()
+
+    def strike(self, number: int, reason: str) -> None:
+        """Declare a reading void, for a reason that is not its size."""
+        with folders.writing(self.folder) as opened:
+            state = opened.state()
+            problems = {
+                "was struck before": number in {each.number for each, _ in state.struck},
+                f"does not exist ({state.numbered} readings)": not 1 <= number <= state.numbered,
+            }
+            _refuse(f"reading {number}", problems, reason)
+            opened.write({"kind": STRIKE, "reading": number, "reason": reason.strip()})
+        self._load()
+
+    def bounds(self, tolerance_mm: float | None = None) -> tuple[Bound, ...]:
+        """Return the bounds on the largest error, the main one first."""
+        return self.status(tolerance_mm).bounds
+
+    def status(self, tolerance_mm: float | None = None) -> CampaignStatus:
+        """Return bounds, verdict, assumptions and remarks; ``tolerance_mm`` in place of its own."""
+        return status(self.opened, self.state, tolerance_mm)
+
+    def _expected_mm(self, points: list[int]) -> np.ndarray:
+        """Modelled positions (n, 3) in the frame of the readings, which is one for all."""
+        modelled = self.plan.points.modelled_mm[points]
+        if self.plan.instruments[0].frame != INSTRUMENT:
+            return modelled
+        back = invert(self.plan.to_base)
+        return modelled @ back.rotation.T + back.position_mm
+
+
+_NOTHING = "Nothing was recorded"
+
+
+def _record(
+    opened: folders.Opened,
+    state: State,
+    file: RowsOfFile,
+    accept_implausible: bool,
+    again: bool,
+    skip_bad: bool,
+) -> Recorded:
+    plan = opened.plan
+    problems = [] if accept_implausible else opened.clock_went_back()
+    refuse(problems, _NOTHING)
+    readings = {i: row for i, row in enumerate(file.rows) if isinstance(row, Reading)}
+    known = _known_rows(readings, state, file.path, again) if file.digest else {}
+    sizes = [float(np.linalg.norm(each.error_mm)) for each in (*state.told, *state.in_hand)]
+    with np.errstate(over="ignore", invalid="ignore"):
+        sizes += [
+            float(np.linalg.norm(checks.error_mm(plan, row)))
+            for row in readings.values()
+            if file.digest and row.position_mm.shape == (3,)
+        ]
+    most_mm = checks.most_plausible_mm(plan, sizes)
+    earlier: dict[tuple, str] = {}
+    if not file.digest:
+        earlier = {e.reading.digits: f"reading {e.number}" for e in (*state.told, *state.in_hand)}
+    good: list[Reading] = []
+    for i, (row, place) in enumerate(zip(file.rows, file.places, strict=True)):
+        if isinstance(row, Problem):
+            problems.append(row)
+            continue
+        if i not in known:
+            wrong = checks.problems_of(plan, row, place, most_mm, accept_implausible)
+            if row.point in state.left_out:
+                label = plan.points.label[row.point]
+                wrong.append(Problem(place, f"point {label} was left out of the campaign"))
+            if row.digits in earlier and not again:
+                what = f"equals {earlier[row.digits]} to the last digit"
+                wrong.append(Problem(place, what, fix="--again takes it as a reading of its own"))
+            good += [] if wrong else [row]
+            problems += wrong
+        earlier.setdefault(row.digits, place)
+    if file.digest and not again:
+        here = {each.number for each in (*state.told, *state.in_hand)}
+        missing = (state.imports.get(file.path, set()) & here).difference(known.values())
+        if missing:
+            what = f"does not hold {_listed(missing)} any more, recorded from it before"
+            fix = "bring the rows back, strike the readings, or give --again"
+            problems.append(Problem(file.path, what, fix=fix))
+            skip_bad = False
+    if not good and not problems:
+        what = f"has no new row: {_listed(known.values())} recorded before"
+        raise InputError(Problem(file.path, what), _NOTHING)
+    if problems and not (skip_bad and good):
+        raise InputError(problems, _NOTHING)
+    opened.write(folders.readings_entry(good, file.digest or None, file.path or None))
+    numbers = range(state.numbered + 1, state.numbered + 1 + len(good))
+    errors = (float(np.linalg.norm(checks.error_mm(plan, each))) for each in good)
+    skipped = tuple(map(str, problems))
+    points = tuple(plan.points.label[each.point] for each in good)
+    return Recorded(tuple(numbers), points, tuple(errors), skipped, tuple(sorted(known.values())))
+
+
+def _known_rows(
+    rows: Mapping[int, Reading], state: State, path: str, again: bool
+) -> dict[int, int]:
+    """Numbers of the readings that rows repeat to the last digit, each reading once.
+
+    With ``again`` only readings of the same file are known.
+    """
+    own = state.imports.get(path, set())
+    waiting: dict[tuple, list[int]] = {}
+    for each in (*state.told, *state.in_hand, *(each for each, _ in state.struck)):
+        if each.number in own or not again:
+            waiting.setdefault(each.reading.digits, []).append(each.number)
+    return {i: numbers.pop(0) for i, row in rows.items() if (numbers := waiting.get(row.digits))}
+
+
+def _listed(numbers) -> str:
+    """Numbers of readings: ``readings 1, 2, 3``."""
+    shown = ", ".join(map(str, sorted(numbers)))
+    return f"reading{'s' if ',' in shown else ''} {shown}"
+
+
+def _refuse(where: str, problems: Mapping[str, bool], reason: str) -> None:
+    found = [Problem(where, what) for what, is_so in problems.items() if is_so]
+    if not reason.strip():
+        found.append(Problem("--reason", "is empty"))
+    refuse(found, "Nothing was changed")

@@ -1,0 +1,145 @@
+"""The status of a campaign: bounds with their limits, verdicts, and texts with their conditions."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import kinacc
+from kinacc.assess.attainable import width_limits
+from kinacc.assess.simulate import carry_on
+from kinacc.campaign import folder, journal
+from kinacc.campaign.folder import Opened
+from kinacc.campaign.plan import Limits
+from kinacc.campaign.reading import Reading
+from kinacc.campaign.reasons import ADVICE, REASONS
+from kinacc.campaign.state import restore
+from kinacc.campaign.status import assumptions, status
+from kinacc.cli.output import plain
+
+
+@pytest.fixture
+def measured(make_plan, make_world):
+    """The status of a campaign with so many readings of a world, and its plan."""
+
+    def make(readings=999, points=40, budget=120, tolerance_mm=None, off_mm=None, **settings):
+        limits = Limits(np.deg2rad(0.02), 10.0, tolerance_mm)
+        plan = make_plan(points=points, budget=budget, limits=limits, **settings)
+        world, rows, taken = make_world(plan), plan.visiting(frozenset()), []
+
+        def read(row, visit):
+            error = world.reading_mm(row, visit) + (off_mm(len(taken)) if off_mm else 0.0)
+            point = int(rows[row])
+            taken.append(Reading(point, plan.points.modelled_mm[point] + error, "tracker"))
+            return error
+
+        carry_on(plan.assessor.begin(plan.candidates(rows)), read, limit=readings)
+        entries = (folder.readings_entry(taken),)
+        opened = Opened(Path("check"), plan, journal.Journal(entries, "ab", (), 0), "ab")
+        return status(opened, restore(plan, entries)), plan
+
+    return make
+
+
+def test_every_reason_has_a_text_and_no_text_is_left_over():
+    sources = (path.read_text() for path in Path(kinacc.__file__).parent.rglob("*.py"))
+    codes = {c for text in sources for c in re.findall(r"Reason\(\s*\"(\w+)\"", text)}
+    assert set(REASONS) == codes | {"noise_tested", "noise_estimated"}
+    assert set(ADVICE) < set(REASONS)
+
+
+def test_limits_of_a_finished_campaign_are_those_of_the_true_errors(measured, errors_mm):
+    found, _ = measured()
+    sizes = np.linalg.norm(errors_mm(40), axis=1)
+    true = width_limits(sizes, 0.05, 120, 0.05)
+    for each in found.bounds:
+        assert each.attainable_mm == pytest.approx(true.attainable_mm, rel=0.15)
+        assert each.proven_mm == pytest.approx(true.proven_mm, rel=0.15)
+        assert each.attainable_lower_mm == pytest.approx(true.lower_mm, rel=1e-3)
+        assert each.lower_mm <= sizes.max() <= each.upper_mm
+
+
+def test_few_readings_state_no_bound_and_no_limit(measured):
+    found, _ = measured(3)
+    assert found.next_point is not None
+    assert found.assumes == ""
+    for each in found.bounds:
+        assert math.isnan(each.upper_mm)
+        assert math.isnan(each.attainable_mm)
+        assert each.withheld
+    json.dumps(plain(found.bounds[0].__dict__))
+
+
+@pytest.mark.parametrize(
+    ("tolerance_mm", "verdict"), [(2.0, "accept"), (0.1, "reject"), (1.19, "undecided")]
+)
+def test_the_verdict_is_the_headline(measured, tolerance_mm, verdict):
+    found, _ = measured(tolerance_mm=tolerance_mm)
+    bound = found.bound
+    if verdict == "undecided":
+        assert bound.lower_mm < tolerance_mm < bound.upper_mm
+    assert bound.verdict == verdict
+    assert found.headline.startswith(verdict.upper())
+    assert f"{tolerance_mm:g} mm" in found.headline
+    if verdict == "accept":
+        assert f"upper bound {bound.upper_mm:.3f} mm, 95 % confidence" in found.headline
+
+
+def test_the_text_has_every_number_and_condition(measured):
+    found, plan = measured(error_of="visit", arm_mm=0.03, allowance_mm=0.02, wrong_rate=0.01)
+    bound = found.bound
+    assert found.headline == bound.text
+    for part in (f"at most {bound.upper_mm:.3f} mm", f"at least {bound.lower_mm:.3f} mm",
+                 "94 % confidence", "these 40 candidates", "95 % of future visits"):  # fmt: skip
+        assert part in bound.text
+    for part in ("0.05 mm per axis", "at most 1 % wrong", "at most 0.02 mm", "independent normal"):
+        assert part in found.assumes
+    assert "0.03 mm" in " ".join(assumptions(found, plan))
+
+
+def test_a_bound_on_all_but_some_is_named_so_and_the_estimate_is_called_low(measured):
+    found, _ = measured(points=60, budget=40)
+    bound = found.of_all
+    assert bound.excepted == 3
+    assert "all but 3 of these 60 candidates" in bound.text
+    assert f"{bound.unmeasured} of 60 are not measured" in bound.text
+
+
+def test_bounds_as_small_as_the_noise_do_not_hold_for_less_noise(measured, make_plan):
+    found, plan = measured()
+    assert "at most 0.05 mm" in found.assumes
+    coarse = replace(plan.instruments[0], covariance_mm2=0.5**2 * np.eye(3))
+    plan = replace(plan, instruments=(coarse,))
+    readings = [
+        Reading(point, at + np.random.default_rng(point).normal(0.0, 0.5, 3), "tracker")
+        for point, at in enumerate(plan.points.modelled_mm)
+    ]
+    entries = (folder.readings_entry(readings * 1),)
+    opened = Opened(Path("check"), plan, journal.Journal(entries, "ab", (), 0), "ab")
+    found = status(opened, restore(plan, entries))
+    assert found.bound.upper_mm > 1.5 or "exactly 0.5 mm" in found.assumes
+
+
+@pytest.mark.parametrize(
+    ("change", "code"),
+    [
+        ({"points": 40, "budget": 100, "references": 20,
+          "off_mm": lambda n: np.array([4e-3 * n, 0, 0])}, "drift"),
+        ({"points": 40, "budget": 100, "off_mm": lambda n: 0.8 * (n == 70)}, "wrong_readings"),
+        ({"points": 8, "budget": 60,
+          "off_mm": lambda n: np.random.default_rng(n).normal(0.0, 0.4, 3)}, "scatter"),
+    ],
+)  # fmt: skip
+def test_readings_against_an_assumption_withhold_the_bounds(measured, change, code):
+    found, _ = measured(**change, tolerance_mm=5.0)
+    assert found.headline.startswith("NO BOUND")
+    assert found.advice == (ADVICE[code],)
+    assert all(math.isnan(each.upper_mm) for each in found.bounds)
+    if code == "wrong_readings":
+        assert "reading 71 at point" in found.against[1]
