@@ -28,7 +28,7 @@ def numbers(config: Mapping, measurements: Mapping) -> dict[str, float]:
     """Reproduced number of every judged claim, by claim id, for ``measurements`` columns."""
     start = {"measurements": in_memory.without_folds(measurements)}
     tables = in_memory.run(STAGES, config, start)
-    return {claim.id: claim.compute(tables).value for claim in judged()}
+    return {claim.id: claim.compute(tables) for claim in judged()}
 
 
 def excess(found: Mapping[str, float]) -> dict[str, float]:

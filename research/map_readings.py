@@ -61,7 +61,7 @@ def judged_arms(reading: Reading, config: Mapping, arms: int, seeds: int) -> Ite
         tables = in_memory.run((*ALWAYS, "accuracy_map"), own, start)
         drawn = tables["accuracy_map"]
         for claim in map_claims():
-            finding = claim.compute(tables)
+            value = claim.compute(tables)
             yield {
                 "reference_frame": reading.reference_frame,
                 "reference_orientation": reading.orientation,
@@ -69,8 +69,8 @@ def judged_arms(reading: Reading, config: Mapping, arms: int, seeds: int) -> Ite
                 "seed": each.draw.seed,
                 "reached": float(np.sum(drawn["solutions"]) / np.sum(drawn["wanted"])),
                 "claim": claim.id,
-                "reproduced": finding.value,
-                "verdict": verdict(claim, finding),
+                "reproduced": value,
+                "verdict": verdict(claim, value),
             }
 
 

@@ -47,7 +47,7 @@ def row(tables, claim: str, **options) -> dict[str, object]:
     return {name: values[place] for name, values in columns.items()}
 
 
-STUDY_CLAIMS = [claim.id for claim in all_claims() if claim.evidence == ("study_summary",)]
+STUDY_CLAIMS = [claim.id for claim in all_claims() if claim.evidence == "study_summary"]
 
 
 @pytest.mark.parametrize("claim", STUDY_CLAIMS)
@@ -174,7 +174,7 @@ def joined(*parts):
     return {"histories": {k: np.concatenate([p[k] for p in parts]) for k in parts[0]}}
 
 
-HISTORY_CLAIMS = [claim.id for claim in all_claims() if claim.evidence == ("histories",)]
+HISTORY_CLAIMS = [claim.id for claim in all_claims() if claim.evidence == "histories"]
 GOOD_HISTORIES = joined(
     history(REJECTED, [0.1, 0.2, 0.9, 0.9], [0.1, 0.5, 0.7, 0.8], 0.8, [1, 1, 1, 2], [0, 1, 2, 2]),
     history(LARGER, [0.1, 0.2, 0.9], [0.1, 0.5, 0.6], 0.85),

@@ -3,75 +3,67 @@
 from __future__ import annotations
 
 import math
+import operator
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
 
 from kinacc.tables.columns import Columns
 
 Tables = Mapping[str, Columns]
-
-
-@dataclass(frozen=True)
-class Finding:
-    """A statistic and, for a sentence, whether the sentence holds (None: cannot be told)."""
-
-    value: float
-    holds: bool | None = None
+Statistic = Callable[[Tables], float]
+SENTENCES = Path(__file__).with_name("sentences.yaml")
+_RULES: dict[str, Callable[[float, float], bool]] = {
+    ">": operator.gt,
+    ">=": operator.ge,
+    "<": operator.lt,
+    "<=": operator.le,
+    "+-": lambda value, limit: abs(value) <= limit,
+}
 
 
 @dataclass(frozen=True)
 class Claim:
     """One checkable statement.
 
-    ``statistic`` says in words what is computed and when the statement holds; ``evidence`` names
-    the artefacts it is computed from and nothing else. A claim with a ``paper`` value agrees when
-    the value is met within ``tolerance`` (same unit); a sentence agrees when its finding holds.
-    ``arm_specific`` claims compare with the paper's own arm and say nothing on another robot. A
-    sentence that was ``used_to_choose`` a reading of the paper is no evidence for it.
+    ``statistic`` says in words what ``compute`` computes (NaN where it cannot) and when the
+    statement holds; ``evidence`` is the artefact it is computed from. A claim with a ``paper``
+    value agrees when the value is met within ``tolerance`` (same unit); a sentence agrees when its
+    value ``holds`` (a rule and its limit, as ``> 0``). ``arm_specific`` claims compare with the
+    paper's own arm and say nothing on another robot. A sentence that was ``used_to_choose`` a
+    reading of the paper is no evidence for it.
     """
 
     id: str
     statement: str
     statistic: str
-    evidence: tuple[str, ...]
-    compute: Callable[[Tables], Finding]
+    evidence: str
+    compute: Statistic
     paper: float = math.nan
     tolerance: float = math.nan
+    holds: str = ""
     arm_specific: bool = False
     used_to_choose: bool = False
 
 
-def verdict(claim: Claim, finding: Finding) -> str:
-    """``agrees``, ``differs`` or ``not comparable`` for a finding under the claim's own rule."""
-    if finding.holds is not None:
-        return "agrees" if finding.holds else "differs"
-    if math.isnan(finding.value) or math.isnan(claim.tolerance):
+def sentences(section: str, compute: Mapping[str, Statistic]) -> list[Claim]:
+    """Claims of a section of ``sentences.yaml``, with the function that computes each."""
+    stated: dict[str, dict[str, Any]] = yaml.safe_load(SENTENCES.read_text("utf-8"))[section]
+    return [Claim(name, compute=compute[name], **fields) for name, fields in stated.items()]
+
+
+def verdict(claim: Claim, value: float) -> str:
+    """``agrees``, ``differs`` or ``not comparable`` for a value under the claim's own rule."""
+    if math.isnan(value) or not (claim.holds or claim.tolerance >= 0.0):
         return "not comparable"
-    # A value on the tolerance's edge agrees: the tolerance is part of the claim, rounding is not.
-    slack = 1e-12 * max(1.0, abs(claim.paper))
-    return "agrees" if abs(finding.value - claim.paper) <= claim.tolerance + slack else "differs"
-
-
-def above(value: float, limit: float) -> Finding:
-    """Holds when the value exceeds the limit; a NaN cannot be told."""
-    return Finding(value, None if math.isnan(value) else value > limit)
-
-
-def below(value: float, limit: float) -> Finding:
-    """Holds when the value stays under the limit; a NaN cannot be told."""
-    return Finding(value, None if math.isnan(value) else value < limit)
-
-
-def within(value: float, limit: float) -> Finding:
-    """Holds when the value's magnitude is at most the limit; a NaN cannot be told."""
-    return Finding(value, None if math.isnan(value) else abs(value) <= limit)
-
-
-def positive(value: float) -> Finding:
-    """Holds when the value is above zero; a NaN cannot be told."""
-    return above(value, 0.0)
-
-
-def negative(value: float) -> Finding:
-    """Holds when the value is below zero; a NaN cannot be told."""
-    return below(value, 0.0)
+    if claim.holds:
+        rule, limit = claim.holds.split()
+        agrees = _RULES[rule](value, float(limit))
+    else:
+        # A value on the tolerance's edge agrees: the tolerance is part of the claim.
+        slack = 1e-12 * max(1.0, abs(claim.paper))
+        agrees = abs(value - claim.paper) <= claim.tolerance + slack
+    return "agrees" if agrees else "differs"

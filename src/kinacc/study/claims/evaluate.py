@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-import numpy as np
+import pandas as pd
 
-from kinacc.study.claims.claim import Claim, Finding, Tables, verdict
+from kinacc.study.claims.claim import Claim, Tables, verdict
 from kinacc.study.claims.history_sentences import history_claims
 from kinacc.study.claims.map_sentences import map_claims
 from kinacc.study.claims.numbers import number_claims
@@ -30,44 +30,35 @@ def evaluate(
     compares with the paper's arm while ``paper_arm`` is false, is ``not comparable``. ``shares``
     gives per claim how often it held over further draws of the synthetic arm.
     """
-    rows = [_row(claim, tables, paper_arm, shares or {}) for claim in all_claims()]
+    rows = []
+    for claim in all_claims():
+        judged = claim.evidence in tables and (paper_arm or not claim.arm_specific)
+        value = float(claim.compute(tables)) if judged else math.nan
+        rows.append(
+            {
+                "claim": claim.id,
+                "statement": claim.statement,
+                "statistic": claim.statistic,
+                "evidence": f"{claim.evidence}.parquet",
+                "paper": claim.paper,
+                "reproduced": value,
+                "tolerance": claim.tolerance,
+                "verdict": verdict(claim, value),
+                "share": (shares or {}).get(claim.id, math.nan),
+                "used_to_choose": claim.used_to_choose,
+            }
+        )
     return columns_of("claims", rows)
 
 
-def _row(claim: Claim, tables: Tables, paper_arm: bool, shares: Mapping[str, float]) -> dict:
-    missing = [name for name in claim.evidence if name not in tables]
-    if missing or (claim.arm_specific and not paper_arm):
-        finding, judged = Finding(math.nan), "not comparable"
-    else:
-        finding = claim.compute(tables)
-        judged = verdict(claim, finding)
-    return {
-        "claim": claim.id,
-        "statement": claim.statement,
-        "statistic": claim.statistic,
-        "evidence": ", ".join(f"{name}.parquet" for name in claim.evidence),
-        "paper": claim.paper,
-        "reproduced": finding.value,
-        "tolerance": claim.tolerance,
-        "verdict": judged,
-        "share": shares.get(claim.id, math.nan),
-        "used_to_choose": claim.used_to_choose,
-    }
-
-
-def shares_of(robustness: Columns) -> dict[str, float]:
-    """Share of the draws, among those where a claim could be judged, in which it agreed."""
-    shares = {}
-    for claim in all_claims():
-        verdicts = robustness["verdict"][robustness["claim"] == claim.id]
-        judged = verdicts[verdicts != "not comparable"]
-        if judged.size:
-            shares[claim.id] = float(np.mean(judged == "agrees"))
-    return shares
-
-
 def table_of(inputs: Mapping, settings: Mapping) -> dict[str, Mapping]:
-    """Return ``claims``; numbers of Tables I to III are compared on the paper's arm only."""
-    tables = {name: table for name, table in inputs.items() if name != "robustness"}
-    shares = shares_of(inputs["robustness"]) if "robustness" in inputs else None
+    """Return ``claims``; numbers of Tables I to III are compared on the paper's arm only.
+
+    A share is that of the further draws on which the claim could be judged.
+    """
+    tables, shares = dict(inputs), None
+    if (robustness := tables.pop("robustness", None)) is not None:
+        draws = pd.DataFrame({name: robustness[name] for name in ("claim", "verdict")})
+        judged = draws[draws["verdict"] != "not comparable"]
+        shares = judged["verdict"].eq("agrees").groupby(judged["claim"]).mean().to_dict()
     return {"claims": evaluate(tables, paper_arm=settings["robot"] == "mh180", shares=shares)}
