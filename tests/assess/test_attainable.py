@@ -10,7 +10,7 @@ import pytest
 from scipy import integrate, optimize, special
 
 from kinacc.assess.adaptive import Candidates
-from kinacc.assess.attainable import best_counts, limits_of, proven_excess_mm, width_limits
+from kinacc.assess.attainable import limits_of, proven_excess_mm, width_limits
 from kinacc.assess.search_and_confirm import SearchAndConfirm
 from kinacc.assess.statement import CANDIDATES, MEASURED, REGION, Statement
 
@@ -77,36 +77,6 @@ def test_the_proven_excess_is_the_integral_of_what_readings_can_pay_for(field):
     for readings in (10, 30):
         said = proven_excess_mm(sizes, noise, readings, ERROR)
         assert said == pytest.approx(proven_slowly(sizes, noise, readings), rel=2e-3)
-
-
-def test_no_fixed_design_has_less_than_what_is_proven():
-    rng = np.random.default_rng(5)
-    for _ in range(40):
-        points = int(rng.integers(1, 40))
-        sizes, noise = rng.gamma(1.0, 0.3, points), rng.uniform(0.05, 0.3, points)
-        readings = points + int(rng.integers(0, 4 * points))
-        limits = width_limits(sizes, noise, readings, ERROR)
-        assert 0.0 < limits.proven_mm < limits.attainable_mm < math.inf
-
-
-def test_one_point_leaves_nothing_between_what_is_proven_and_attained():
-    size, noise = np.array([5.0]), 0.01
-    expected = noise / 3.0 * (Z * (1.0 - ERROR) + math.exp(-0.5 * Z * Z) / math.sqrt(2 * math.pi))
-    limits = width_limits(size, noise, 9, ERROR)
-    assert limits.attainable_mm == pytest.approx(expected, rel=1e-2)
-    # The divergence counts what rules of a changing number of readings could save; at most that.
-    assert 0.7 * expected < limits.proven_mm <= limits.attainable_mm
-    assert limits.lower_mm == pytest.approx(Z * noise / 3.0)
-
-
-def test_fewer_readings_than_points_leave_no_bound_at_all():
-    sizes = np.linspace(0.1, 1.0, 200)
-    limits = width_limits(sizes, 0.1, 150, ERROR)
-    assert limits == (math.inf, math.inf, math.inf)
-    with pytest.raises(ValueError, match="at least once"):
-        best_counts(sizes, 0.1, 150, ERROR)
-    # Who may miss 5 % of the points may leave some of them unread.
-    assert proven_excess_mm(sizes, 0.1, 195, ERROR) < math.inf
 
 
 def test_limits_are_told_of_statements_on_the_mean_error_of_all_their_points_alone():

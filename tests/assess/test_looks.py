@@ -48,12 +48,6 @@ def test_walks_drawn_at_random_cross_the_boundary_as_often_as_is_allowed(extra, 
     assert crossed(looks.counts.tolist(), 0.95 * looks.z, rng, rate, scale) > ERROR + CLOSE
 
 
-def test_scores_of_which_the_first_may_be_wrong_cross_as_often_as_is_allowed():
-    counts = (8, 15, 30, 60)
-    z = boundary(counts, ERROR, early=0.0, late=3.0, rate=0.01).z
-    assert crossed(counts, z, np.random.default_rng(2), 0.01) == pytest.approx(ERROR, abs=3e-3)
-
-
 @pytest.mark.parametrize("error", [0.01, 0.05, 0.2])
 def test_the_boundary_of_two_looks_is_that_of_a_normal_pair(error):
     """The mean of two readings and the first of them are correlated by the root of a half."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -18,7 +17,6 @@ from oracles.worlds import philox_words
 from kinacc.assess import random_numbers
 from kinacc.assess.invalidation_kernels import chi2_3
 from kinacc.assess.model_invalidation import ModelInvalidation, point_probability
-from kinacc.assess.outlier_rejection import LIMITS, OutlierRejection
 from kinacc.assess.random_numbers import key_of
 from kinacc.assess.world import drawn_world
 from kinacc.errors import InputError
@@ -156,19 +154,6 @@ def check(world, distance: str, covariance: str, **more) -> np.ndarray:
     return flags
 
 
-@pytest.mark.parametrize("noise_mm", [0.05, 0.15, 0.3])
-@pytest.mark.parametrize(("distance", "covariance"), SWITCHES)
-def test_scans_of_the_study_equal_every_single_run(noise_mm, distance, covariance):
-    flips = []
-    for repetition in range(3):
-        error = field(repetition, 200)
-        world = drawn_world(error, noise_mm, key_of(7, repetition), 200)
-        flags = check(world, distance, covariance)
-        flips.append(np.count_nonzero(flags[1:] != flags[:-1]))
-    # The decision is not monotone in the bound: a bisection could not have found the same.
-    assert noise_mm < 0.3 or max(flips) > 2
-
-
 @settings(max_examples=60)
 @given(
     seed=st.integers(0, 2**32),
@@ -206,61 +191,6 @@ def test_scans_of_any_world_equal_every_single_run(
         )
 
 
-def alone(first):
-    return measured_world(first, np.zeros((len(first), 0, 3)), 0.1)
-
-
-@st.composite
-def readings(draw):
-    """First readings (m, 3): smooth, heavy-tailed, or tied, one point included."""
-    seed, m = draw(st.integers(0, 2**32 - 1)), draw(st.sampled_from([1, 2, 3, 10, 60, 250]))
-    kind = draw(st.sampled_from(["normal", "heavy", "tied"]))
-    rng = np.random.default_rng(seed)
-    values = rng.normal(size=(m, 3)) * draw(st.sampled_from([0.05, 0.4, 2.0]))
-    if kind == "heavy":
-        values *= rng.pareto(2, size=(m, 1)) + 0.1
-    if kind == "tied":
-        values = values[rng.integers(0, m, m)]
-    return values
-
-
-@pytest.mark.parametrize("rule", ["normal", "gamma", "iqr"])
-@settings(max_examples=80)
-@given(first=readings(), budget=st.sampled_from([1, 5, 200]))
-def test_outlier_rejection_equals_the_oracle(rule, first, budget):
-    magnitudes = [oracle.norm(row) for row in first.tolist()[:budget]]
-    result = OutlierRejection(measurements=budget, outlier_rule=rule).assess(alone(first))
-    if len(set(magnitudes)) == 1:
-        # No spread: the limit equals the readings up to round-off and nothing is an outlier.
-        assert result.assessed_mm == pytest.approx(magnitudes[0], rel=1e-12)
-        return
-    limit = oracle.outlier_limit(magnitudes, rule)
-    assert LIMITS[rule](np.array(magnitudes)) == pytest.approx(limit, rel=1e-8)
-    if any(abs(value - limit) < 1e-9 * limit for value in magnitudes):
-        return  # a reading on the limit to the last digit may fall on either side
-    assert result.assessed_mm == pytest.approx(
-        oracle.outlier_rejection(magnitudes, rule), rel=1e-15
-    )
-    assert result.measurements == result.points_visited == min(budget, len(first))
-
-
-def shell(points: int, size_mm: float = 1.0) -> np.ndarray:
-    """Errors of one magnitude in random directions."""
-    error = np.random.default_rng(5).normal(size=(points, 3))
-    return size_mm * error / np.linalg.norm(error, axis=1)[:, None]
-
-
-def test_rejection_at_one_point_and_one_measurement_has_the_rate_eq_22_gives():
-    # At the true bound one measurement rejects when its excess beyond eta passes the alpha quantile
-    # of chi(3). For sigma much smaller than eta the excess is one-dimensional normal.
-    median_of_chi_square_3 = 2.365974
-    assessor = paper.assessor("model_invalidation", measurements=1, alpha=0.5)
-    worlds = (drawn_world(shell(1), 1e-4, key_of(4, r), 1) for r in range(4000))
-    rate = np.mean([assessor.run(world, 1.0).rejected for world in worlds])
-    expected = 0.5 * math.erfc(math.sqrt(median_of_chi_square_3 / 2))
-    assert rate == pytest.approx(expected, abs=4 * math.sqrt(expected / 4000))
-
-
 @given(key0=words, key1=words, visit=st.integers(0, 1000), point=st.integers(0, 10**6))
 def test_words_are_those_of_numpy_philox(key0, key1, visit, point):
     mine = random_numbers.philox(
@@ -285,9 +215,3 @@ def test_what_makes_no_world_is_refused(given, where):
     with pytest.raises(InputError) as caught:
         drawn_world(*given, *(key_of(1), 2)[len(given) - 2 :])
     assert [problem.where for problem in caught.value.problems] == [where]
-
-
-def test_a_world_with_too_few_repeats_is_refused_by_the_method_that_repeats():
-    world = drawn_world(shell(4), 0.1, key_of(1), 3)
-    with pytest.raises(InputError, match="10 readings a point"):
-        paper.assessor("model_invalidation", measurements=10).assess(world)

@@ -8,19 +8,15 @@ from __future__ import annotations
 
 import math
 from fractions import Fraction
-from math import comb
 
 import numpy as np
 import pytest
-from scipy.stats import ncx2
 
 from kinacc.assess.adaptive import Candidates
 from kinacc.assess.counts import excepted
-from kinacc.assess.population import largest_size, reading_densities
 from kinacc.assess.random_numbers import key_of
 from kinacc.assess.search_and_confirm import SearchAndConfirm
-from kinacc.assess.simulate import conduct, truth_mm
-from kinacc.assess.statement import CANDIDATES, MEASURED, Reason, Statement
+from kinacc.assess.simulate import conduct
 from kinacc.assess.world import drawn_world
 
 ERROR, SIGMA_MM = 0.05, 0.1
@@ -130,15 +126,6 @@ def test_the_recommended_bound_on_all_but_a_few_candidates_holds_whatever_is_mis
     assert held / draws >= 0.95 - 3.5 * math.sqrt(0.05 * 0.95 / draws)
 
 
-def test_the_population_shrinks_the_largest_of_many_noisy_readings():
-    rng = np.random.default_rng(9)
-    errors = np.linalg.norm(0.4 * directions(200) + 0.3 * rng.normal(size=(200, 3)), axis=1)
-    found = largest_size(errors, np.full(200, 0.3), 0)
-    assert 0.4 < found.quantile_mm(0.5) < 0.8 * errors.max()
-    exact = largest_size(errors, np.full(200, 1e-4), 0)
-    assert exact.quantile_mm(0.5) == pytest.approx(errors.max(), rel=0.01)
-
-
 def test_a_point_whose_readings_differ_in_noise_keeps_its_bound():
     errors, chance, draws = (
         directions(4) * np.array([1.0, 0.01, 0.01, 0.01])[:, None],
@@ -160,36 +147,3 @@ def test_a_point_whose_readings_differ_in_noise_keeps_its_bound():
     most = 0.05 * draws + 3.5 * math.sqrt(0.05 * 0.95 * draws)
     assert 0 < too_small <= most
     assert too_large <= most
-
-
-def test_a_budget_too_small_to_speak_of_all_candidates_is_told_what_would_do():
-    """The recommended assessor, 95 %: two of a hundred may be missed; else all but a few."""
-
-    def said(measurements):
-        return SearchAndConfirm(measurements).shortfall(100, 6)
-
-    assert said(98) is None
-    for few in (97, 60, 12):
-        seen = SearchAndConfirm(few).visit(100)
-        missed = [Fraction(comb(100 - k, seen), comb(100, seen)) for k in range(1, 101 - seen)]
-        left = next(k for k, chance in enumerate(missed) if chance <= Fraction(25, 1000))
-        assert said(few) == Reason("excepted_ahead", {"enough": 98, "excepted": left})
-
-
-def test_statements_are_held_to_what_they_speak_of():
-    size = np.array([0.2, 0.9, 0.4])
-    assert truth_mm(Statement(CANDIDATES, 1.0), size, [0, 2]) == 0.9
-    assert truth_mm(Statement(MEASURED, 1.0), size, [0, 2]) == 0.4
-    assert np.isnan(truth_mm(Statement(MEASURED, 1.0), size, None))
-
-
-def test_densities_of_readings_are_noncentral_chi_up_to_a_factor():
-    x, noise = np.array([[0.05], [0.4], [1.3]]), np.array([[0.1], [0.3], [0.05]])
-    true = np.linspace(0.01, 1.5, 40)
-    ours = reading_densities(x, noise, true)
-    exact = ncx2.pdf((x / noise) ** 2, 3, (true / noise) ** 2)
-    exact /= exact.max(axis=1, keepdims=True)
-    assert ours == pytest.approx(exact, rel=1e-6, abs=1e-15)
-    zero, small = reading_densities(np.array([[0.0], [1e-6]]), np.full((2, 1), 0.2), true)
-    assert zero == pytest.approx(np.exp(-0.5 * (true**2 - true[0] ** 2) / 0.2**2), rel=1e-9)
-    assert zero == pytest.approx(small, rel=1e-4)

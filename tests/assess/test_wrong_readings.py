@@ -8,18 +8,16 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 from scipy.optimize import brentq, minimize
-from scipy.stats import binom, chi2, norm
+from scipy.stats import norm
 
 from kinacc.assess.adaptive import Candidates
 from kinacc.assess.looks import boundary
 from kinacc.assess.search_and_confirm import SearchAndConfirm
 from kinacc.assess.wrong_readings import (
-    at_most_wrong,
     clip_of,
     guarded_lower_mm,
     guarded_upper_mm,
 )
-from kinacc.errors import InputError
 
 POINTS, BUDGET, LARGEST = 60, 120, 6.0
 RATE = 0.02
@@ -73,13 +71,6 @@ def test_the_lower_limit_holds_whatever_wrong_readings_say():
         along[rng.random(40) < 0.05] = 1e6
         above += guarded_lower_mm(along, np.full(40, 0.5), z, 0.05) > 3.0
     assert 0.03 < above / 2000 < 0.05 + 3.0 * math.sqrt(0.05 * 0.95 / 2000)
-
-
-@pytest.mark.parametrize("readings", [1, 50, 200])
-def test_so_many_wrong_readings_are_exceeded_seldom(readings):
-    found = at_most_wrong(readings, 0.01, 0.005)
-    assert binom.sf(found, readings, 0.01) <= 0.005
-    assert found == 0 or binom.sf(found - 1, readings, 0.01) > 0.005
 
 
 def run(seed, wrong, measurements=BUDGET, tied=6, tested=1.0, **settings):
@@ -139,33 +130,6 @@ def test_bounds_hold_as_stated_where_some_readings_go_wrong(wrong, rate, tied):
     assert max(too_low, too_high) <= most
 
 
-@pytest.mark.parametrize("low", [0.02, 0.5])
-def test_a_guard_takes_the_upper_limit_of_a_noise_that_was_tested_before(low):
-    """The test of 60 degrees of freedom found less noise than there is, by chance."""
-    tested = math.sqrt(chi2.ppf(low, 60) / 60)
-    most = math.sqrt(60 / chi2.ppf(0.01, 60))
-    assert tested * most > 1.0
-    settings = {"noise": "estimated", "noise_freedom": 60, "wrong_rate": RATE, "tied": 1}
-    missed = 0
-    for seed in range(12):
-        said = run(seed, at_random(RATE), tested=tested, **settings).statements()[1]
-        assert said.noise.code == "noise_limited"
-        assert said.noise.numbers == {"factor": pytest.approx(most), "freedom": 60}
-        assert said.confidence == pytest.approx(0.95 - RATE)
-        missed += not said.lower_mm <= LARGEST <= said.upper_mm
-    assert missed <= 3
-
-
-def test_the_guard_is_no_excuse_for_a_wide_bound():
-    def widths(**settings):
-        said = [run(seed, lambda *_: None, **settings).statements()[1] for seed in range(6)]
-        return np.mean([(s.upper_mm - LARGEST, LARGEST - s.lower_mm) for s in said], axis=0)
-
-    upper, lower = widths(wrong_rate=RATE) / widths()
-    assert upper < 1.35
-    assert lower < 1.5
-
-
 @pytest.mark.parametrize("guard", [{}, {"wrong_rate": RATE}], ids=["plain", "guarded"])
 def test_a_target_that_slipped_once_is_named_and_without_a_guard_no_bound_is_stated(guard):
     campaign = run(4, slipped(90), **guard)
@@ -184,16 +148,6 @@ def test_a_target_that_slipped_once_is_named_and_without_a_guard_no_bound_is_sta
         assert math.isnan(said.lower_mm)
 
 
-@pytest.mark.parametrize("rate", [0.0, RATE])
-def test_a_single_reading_far_off_bounds_nothing_from_below_where_it_may_be_wrong(rate):
-    far = {7: np.array([40.0, 0.0, 0.0])}
-    campaign = run(2, lambda number, *_: far.get(number), POINTS, wrong_rate=rate)
-    said = campaign.statements()[0]
-    assert (said.lower_mm > LARGEST) == (rate == 0.0)
-    assert said.upper_mm > LARGEST
-    assert rate == 0.0 or {lower for lower, _ in campaign.point_limits().values()} == {0.0}
-
-
 def test_a_reference_pose_read_wrong_once_is_no_moved_tripod_and_a_moved_tripod_is_one():
     settings = {"wrong_rate": RATE, "references": 20}
     number = sorted(run(5, slipped(), **settings).plan.row_at)[12] + 1
@@ -202,10 +156,5 @@ def test_a_reference_pose_read_wrong_once_is_no_moved_tripod_and_a_moved_tripod_
     assert moved.statements()[1].withheld.code == "step"
 
 
-@pytest.mark.parametrize(
-    "settings",
-    [{"wrong_rate": 0.3}, {"wrong_rate": -0.1}, {"wrong_rate": 0.01, "noise": "estimated"}],
-)
-def test_a_guard_that_cannot_be_kept_is_refused(settings):
-    with pytest.raises(InputError, match="wrong_rate"):
-        SearchAndConfirm(BUDGET, **settings)
+def test_where_all_is_noise_hardly_any_reading_is_named():
+    assert sum(bool(run(seed, slipped()).suspicious()) for seed in range(30)) <= 1

@@ -57,12 +57,6 @@ def test_files_carry_no_date_no_version_and_no_picture_but_the_maps(rendered):
         assert len(files["pdf"]) < 250_000
 
 
-def test_every_format_order_and_choice_gives_the_same_bytes():
-    every = save.render(fig1.draw(), save.FORMATS)
-    assert save.render(fig1.draw(), ["pdf"])["pdf"] == every["pdf"]
-    assert save.render(fig1.draw(), ["png", "svg"])["svg"] == every["svg"]
-
-
 def test_write_leaves_all_or_nothing(tmp_path):
     paths = {kind: tmp_path / "a folder" / f"fig1.{kind}" for kind in save.FORMATS}
     save.write(fig1.draw(), paths)

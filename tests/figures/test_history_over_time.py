@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 from figure_words import problems, said
 from made_up_history import history
 
-from kinacc.errors import InputError
 from kinacc.figures import history_over_time
 
 
@@ -22,13 +20,6 @@ def test_a_history_can_be_read_however_long_it_is(lines, changed):
     assert f"{table['date'][0]}" in words
 
 
-def test_what_nobody_stated_is_not_drawn():
-    table = history(4, temperature_c=np.nan)
-    figure = history_over_time.draw(table)
-    assert len(figure.axes) == 2
-    assert "tolerance" not in said(figure)
-
-
 def test_a_change_stands_above_what_chance_shows():
     figure = history_over_time.draw(history(8, changed=5))
     moved = figure.axes[1]
@@ -36,10 +27,3 @@ def test_a_change_stands_above_what_chance_shows():
     assert marks["recalibrate"] == pytest.approx([0.45])
     assert marks["what chance shows at most"] == pytest.approx([0.15] * 7)
     assert moved.get_ylim()[1] > 0.45
-
-
-def test_a_column_that_is_missing_is_named():
-    table = history(2)
-    del table["chance_mm"]
-    with pytest.raises(InputError, match="chance_mm"):
-        history_over_time.draw(table)

@@ -174,10 +174,6 @@ def point_probability(distance: float, axes: int, kind: str) -> float:
     return _cache[key]
 
 
-def largest_first_reading(reading: Reading, order: Sequence[int], budget: int) -> float:
-    return max(norm(reading(j, 1)) for j in list(order)[:budget])
-
-
 def decisions(rejects: Callable[[float], bool], top: float) -> list[bool]:
     """Whether each bound k x 1 um, k = 0, 1, ... up to just above the largest single reading, is
     rejected: the whole scan, from which both scan readings follow."""

@@ -5,14 +5,12 @@ from __future__ import annotations
 import copy
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
 import pytest
 
 from kinacc.config.schema import defaults
-from kinacc.study import in_memory, robustness
+from kinacc.study import robustness
 from kinacc.synthetic import accepted
-from research import arm_search, fig3_readings
 from research.map_readings import READINGS, SENTENCES, judged_arms, shares
 
 CHOICE = Path(__file__).parents[2] / "research" / "data" / "map_choice.csv"
@@ -39,20 +37,6 @@ def test_the_reading_of_the_configuration_has_the_shipped_arm_and_its_verdicts(c
     assert chosen["reference_frame"] == reading.reference_frame
 
 
-def test_another_reading_has_arms_that_meet_the_paper_under_its_own_plan(config):
-    number = next(i for i, each in enumerate(READINGS) if each.reference_frame == "base")
-    rows = pd.DataFrame(judged_arms(READINGS[number], config, 1, 30))
-    (seed,) = rows["seed"].unique()
-    own = READINGS[number].of(config)
-    bench = arm_search.bench_of(own)
-    again = arm_search.trial(bench, int(seed))
-    assert again.accepted
-    assert not any(arm_search.trial(bench, earlier).accepted for earlier in range(int(seed)))
-    seen = arm_search.measured(bench, again.draw)
-    shipped = in_memory.run(("measurements",), config, {})["measurements"]
-    assert not np.allclose(seen["q6"], shipped["q6"])
-
-
 def some_arms() -> pd.DataFrame:
     """Two arms of every reading, from the last to the first; on one arm every sentence holds."""
     rows = [
@@ -75,30 +59,3 @@ def test_shares_are_counted_over_the_arms_where_a_sentence_can_be_judged():
     unjudged = (table["claim"] == SENTENCES[0]) & (table["seed"] == 7)
     table.loc[unjudged, "verdict"] = "not comparable"
     assert (shares(table).holds[:, 0] == 1.0).all()
-
-
-def test_a_reading_for_which_no_arm_is_found_has_no_share():
-    found = shares(some_arms()[:0])
-    assert found.arms.tolist() == [0] * len(READINGS)
-    assert np.isnan(found.holds).all()
-
-
-def test_the_picture_names_every_reading_and_writes_every_share():
-    figure = fig3_readings.draw(some_arms(), dataset="mh180")
-    words = [text.get_text() for text in figure.axes[0].texts]
-    assert words.count("50 %") == len(READINGS) * (len(SENTENCES) + 1)
-    assert sum("9 turns" in each for each in words) == len(READINGS) / 2
-
-
-def test_an_arm_left_unmeasured_would_not_have_been_accepted(config):
-    bench = arm_search.bench_of(config)
-    # Of all shipped arms the one that is predicted to be farthest off.
-    assert arm_search.trial(bench, 145).accepted
-    left_out = [
-        each.draw
-        for each in (arm_search.trial(bench, seed) for seed in range(6))
-        if not each.numbers
-    ]
-    assert left_out
-    for draw in left_out:
-        assert not arm_search.judged(bench, draw).accepted

@@ -10,7 +10,7 @@ import pytest
 
 from kinacc.study.claims.evaluate import all_claims
 from kinacc.study.claims.numbers import number_claims
-from research import claims_over_choices, reasons
+from research import reasons
 from research.claims_page import claims_page
 from research.open_choices import OPEN
 
@@ -74,18 +74,6 @@ def test_the_choice_that_decides_a_claim_is_named_first_with_its_shares():
     assert not any(row["decides"] for row in others)
 
 
-def test_a_property_of_the_arm_that_decides_is_named():
-    choices, factors, _ = planted(lambda _, stands_out, rng: stands_out > 1.15)
-    first = rows_of(choices, factors)[0]
-    assert (first["factor"], first["kind"], first["decides"]) == (
-        "largest_over_second",
-        "property",
-        1,
-    )
-    assert first["most_value"].startswith("above 1.")
-    assert first["difference"] > 0.8
-
-
 @pytest.mark.parametrize("share", [0.1, 0.5, 0.9])
 def test_chance_is_not_named_as_a_reason(share):
     choices, factors, _ = planted(lambda _, __, rng: rng.random() < share)
@@ -107,16 +95,6 @@ def test_where_a_claim_holds_follows_from_its_shares_over_arms_and_choices(agree
     assert holds_of(choices) == wanted
 
 
-def test_runs_that_could_not_be_judged_do_not_count():
-    choices, factors, _ = planted(lambda *_: True)
-    mine = (choices["claim"] == CLAIM) & choices["run"].between(1100, 1999)
-    choices.loc[mine, "verdict"] = "not comparable"
-    table = reasons.shares(choices)
-    place = list(table["claim"]).index(CLAIM)
-    assert (table["all_and_arm_runs"][place], table["all_and_arm_share"][place]) == (100, 1.0)
-    assert all(row["most_runs"] <= 100 for row in rows_of(choices, factors))
-
-
 def test_the_page_says_where_every_sentence_holds_and_what_decides_it():
     choices, factors, _ = planted(lambda order, _, rng: order != "8")
     text = claims_page(choices, factors)
@@ -129,20 +107,6 @@ def test_the_page_says_where_every_sentence_holds_and_what_decides_it():
     for choice in OPEN:
         assert f"| `{choice.name}` |" in text
     assert "in 100% of the runs below that and in 100% of those above" in text
-
-
-def test_the_picture_has_a_row_for_every_sentence_and_a_square_where_a_choice_decides():
-    choices, factors, _ = planted(lambda order, _, rng: order != "8")
-    figure = claims_over_choices.draw(reasons.shares(choices), reasons.reasons(choices, factors))
-    left, right = figure.axes
-    names = [label.get_text() for label in left.get_yticklabels()]
-    sentences = [claim.id for claim in all_claims() if claim.id not in NUMBERS]
-    assert names == [name.replace("_", " ") for name in sentences]
-    (squares,) = right.collections
-    columns = [label.get_text() for label in right.get_xticklabels()]
-    assert [(columns[int(x)], sentences[int(y)]) for x, y in squares.get_offsets()] == [
-        ("vec order", CLAIM)
-    ]
 
 
 def test_the_page_in_the_documentation_is_what_its_tables_say():

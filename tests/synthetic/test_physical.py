@@ -46,14 +46,6 @@ def test_backlash_follows_travel_and_closes_under_load():
     assert forth[1] < 0.5 * arm_of.beyond.backlash_rad[1]
 
 
-def test_drift_starts_at_nothing_and_settles():
-    only = _only(physical_robot(0, Scales(0.0, 0.0, 1.0, 1.0)), "drift")
-    q_rad = np.zeros((1, 6))
-    at = lambda hours: physical.beyond_errors(only, TABLE_II, visits(q_rad, 1, hours))[0]  # noqa: E731
-    assert np.array_equal(at(0.0), np.zeros((6, 6)))
-    assert np.allclose(at(100.0), only.drift)
-
-
 def test_ripple_turns_with_the_motor():
     only = _only(physical_robot(0, Scales(0.0, 0.0, 1.0, 1.0)), "ripple_rad")
     q_rad = np.full((1, 6), 0.3)
@@ -79,13 +71,6 @@ def test_smooth_errors_are_waves_over_the_working_range():
             assert found[joint, error] == pytest.approx(wanted, abs=1e-15)
 
 
-def test_draws_repeat_and_differ():
-    one, same, other = (physical_robot(seed, Scales(1, 1, 1, 1)) for seed in (7, 7, 8))
-    assert np.array_equal(one.smooth.amplitude, same.smooth.amplitude)
-    assert np.array_equal(one.beyond.ripple_phase_rad, same.beyond.ripple_phase_rad)
-    assert not np.array_equal(one.smooth.phase_rad, other.smooth.phase_rad)
-
-
 def test_tracker_noise_has_the_stated_size(arm):
     run = calibration_run(arm, 2000, seed=4)
     still = physical_robot(4, NOTHING)
@@ -102,11 +87,6 @@ def test_plan_is_inside_the_limits_and_both_wrists_are_used(arm):
     radius = np.hypot(position[:, 0], position[:, 1])
     assert radius.min() >= plan.SPACE.inner_radius_mm - 1e-6
     assert radius.max() <= plan.SPACE.outer_radius_mm + 1e-6
-
-
-def test_travel_directions_are_those_of_the_way_there():
-    q_rad = np.array([[0.1] * 6, [0.2] * 6, [-0.3] * 6])
-    assert plan.directions(q_rad)[:, 0].tolist() == [1, 1, -1]
 
 
 def _only(arm, name: str):

@@ -73,7 +73,11 @@ def _residual(comparison: str, quantity: str, column: str) -> Statistic:
     def compute(tables: Tables) -> float:
         rows = tables["residuals"]
         chosen = np.isnan(np.asarray(rows["fold"], dtype=float))
-        for name, value in (("comparison", comparison), ("subset", "train"), ("quantity", quantity)):
+        for name, value in (
+            ("comparison", comparison),
+            ("subset", "train"),
+            ("quantity", quantity),
+        ):
             chosen &= np.asarray(rows[name]) == value
         return float(rows[column][chosen][0]) if chosen.any() else math.nan
 

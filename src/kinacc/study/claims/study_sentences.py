@@ -46,9 +46,7 @@ def study_claims() -> list[Claim]:
         "outlier_rejection_grows_with_noise": lambda c: c.mean[OUTLIER].diff().min(),
         "outlier_rejection_below_at_low_noise": lambda c: c.bias[OUTLIER].iloc[0],
         "outlier_rejection_above_at_high_noise": lambda c: c.bias[OUTLIER].iloc[-1],
-        "outlier_rejection_smaller_spread": lambda c: (
-            (c.spread[OUTLIER] / c.spread[MAXIMUM]).max()
-        ),
+        "outlier_rejection_smaller_spread": lambda c: (c.spread[OUTLIER] / c.spread[MAXIMUM]).max(),
         "outlier_rejection_more_even": lambda c: (
             abs(c.log_skew[OUTLIER]) - abs(c.log_skew[MAXIMUM])
         ),

@@ -4,6 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from oracles.assessors import gamma_fit
+from scipy import stats
 from scipy.special import digamma
 from scipy.stats import gamma as reference
 
@@ -22,20 +26,6 @@ def test_likelihood_equations_hold(shape):
     assert quantile(fitted, 0.99) == pytest.approx(expected, rel=1e-12)
 
 
-def test_the_unit_of_the_sample_does_not_matter():
-    x = np.random.default_rng(2).gamma(5.36, 0.08, 200)
-    assert gamma99(1e9 * x) == pytest.approx(1e9 * gamma99(x), rel=1e-12)
-
-
-def test_tables_of_the_paper_have_quantiles_of_a_gamma_of_their_mean():
-    # Table III, position: mean 0.405 mm and 99 % gamma 0.918 mm imply a shape near 5.36.
-    assert quantile(fit_like(5.36, 0.405), 0.99) == pytest.approx(0.918, abs=0.002)
-
-
-def fit_like(shape, mean):
-    return fit(np.array([1.0]))._replace(shape=shape, scale=mean / shape, mean=mean)
-
-
 def test_one_value_repeated_is_its_own_quantile():
     assert gamma99([0.3]) == 0.3
     assert gamma99([0.1] * 7) == pytest.approx(0.1, rel=1e-15)
@@ -47,3 +37,23 @@ def test_one_value_repeated_is_its_own_quantile():
 def test_samples_without_a_maximum_are_refused(sample):
     with pytest.raises(InputError, match="likelihood has no maximum"):
         fit(sample)
+
+
+@settings(max_examples=60)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    n=st.integers(3, 600),
+    shape=st.floats(0.3, 40),
+    scale=st.sampled_from([1e-3, 0.1, 1.0, 50.0]),
+)
+def test_gamma_fit_and_quantile_equal_scipy(seed, n, shape, scale):
+    sample = np.random.default_rng(seed).gamma(shape, scale, n)
+    expected_shape, _, expected_scale = gamma_fit(sample)
+    fitted = fit(sample)
+    assert fitted.shape == pytest.approx(expected_shape, rel=1e-8)
+    assert fitted.scale == pytest.approx(expected_scale, rel=1e-8)
+    expected = stats.gamma.ppf(0.99, expected_shape, scale=expected_scale)
+    assert gamma99(sample) == pytest.approx(expected, rel=1e-9)
+    assert quantile(fitted, 0.5) == pytest.approx(
+        stats.gamma.median(expected_shape, scale=expected_scale), rel=1e-8
+    )

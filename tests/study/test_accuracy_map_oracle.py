@@ -52,41 +52,32 @@ def models(arms) -> accuracy_map.Models:
     )
 
 
+TILTED = oracle.rot_z(0.3)[:3, :3] @ REFERENCE @ oracle.rot_z(-0.2)[:3, :3]
+
+
 @pytest.mark.parametrize(
-    ("angle_deg", "radius", "height"),
-    [(15, 1500.0, 200.0), (60, 1950.0, 0.0), (30, 1200.0, 0.0), (0, 2600.0, 500.0)],
-    ids=["inside", "outer", "inner", "beyond_reach"],
-)
-def test_cell_equals_brute_force(arms, models, angle_deg, radius, height):
+    ("angle_deg", "radius", "height", "frame"),
+    [(15, 1500.0, 200.0, "slice"), (60, 1950.0, 0.0, "slice"), (30, 1200.0, 0.0, "slice"),
+     (0, 2600.0, 500.0, "slice"), (40, 1700.0, 300.0, "base")],
+    ids=["inside", "outer", "inner", "beyond_reach", "held to a workpiece"],
+)  # fmt: skip
+def test_cell_equals_brute_force(arms, models, angle_deg, radius, height, frame):
     angle = math.radians(angle_deg)
     cells = region.Cells(np.array([angle]), np.array([radius]), np.array([height]))
     rotations = region.orientations(TURN, "signs_and_zero")
-    wanted = accuracy_map.PosesWanted(CYLINDER, REFERENCE, rotations, "dh")
+    attitude = in_slice = REFERENCE
+    if frame == "base":
+        attitude, in_slice = TILTED, oracle.rot_z(-angle)[:3, :3] @ TILTED
+    wanted = accuracy_map.PosesWanted(CYLINDER, attitude, rotations, "dh", frame)
     found = accuracy_map.accuracy_map(robot.load("mh180"), models, cells, wanted)
-    position, turn, name, count = maps.cell(arms, LIMITS, angle, radius, height, REFERENCE, TURN)
-    assert found.wanted[0] == 18
-    assert found.solutions[0] == count
+    position, turn, name, count = maps.cell(arms, LIMITS, angle, radius, height, in_slice, TURN)
+    assert (found.wanted[0], found.solutions[0]) == (18, count)
+    largest = found.position_max_mm[0], found.orientation_max_mrad[0]
     if count == 0:
-        assert np.isnan([found.position_max_mm[0], found.orientation_max_mrad[0]]).all()
+        assert np.isnan(largest).all()
         assert found.worst_branch[0] is None
         return
-    assert found.position_max_mm[0] == pytest.approx(position, abs=1e-7)
-    assert found.orientation_max_mrad[0] == pytest.approx(turn, abs=1e-7)
-    assert found.worst_branch[0] == name
-
-
-def test_cell_held_to_a_workpiece_equals_brute_force(arms, models):
-    angle, radius, height = math.radians(40), 1700.0, 300.0
-    tilted = oracle.rot_z(0.3)[:3, :3] @ REFERENCE @ oracle.rot_z(-0.2)[:3, :3]
-    cells = region.Cells(np.array([angle]), np.array([radius]), np.array([height]))
-    rotations = region.orientations(TURN, "signs_and_zero")
-    wanted = accuracy_map.PosesWanted(CYLINDER, tilted, rotations, "dh", "base")
-    found = accuracy_map.accuracy_map(robot.load("mh180"), models, cells, wanted)
-    in_slice = oracle.rot_z(-angle)[:3, :3] @ tilted
-    position, turn, name, count = maps.cell(arms, LIMITS, angle, radius, height, in_slice, TURN)
-    assert found.solutions[0] == count > 0
-    assert found.position_max_mm[0] == pytest.approx(position, abs=1e-7)
-    assert found.orientation_max_mrad[0] == pytest.approx(turn, abs=1e-7)
+    assert largest == pytest.approx((position, turn), abs=1e-7)
     assert found.worst_branch[0] == name
 
 

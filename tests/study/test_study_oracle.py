@@ -82,17 +82,6 @@ def test_every_row_of_a_small_study_equals_the_oracle(rows):
         assert (rows["measurements"][i], rows["points_visited"][i]) == (measurements, points)
 
 
-def test_parts_of_the_study_join_to_the_whole(rows):
-    parts = [
-        simulated(small_errors(), NOISE[::-1], monte_carlo.part_of(3, n, 2), SMALL, seed=99)
-        for n in (2, 1)
-    ]
-    joined = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-    joined, whole = monte_carlo.ordered(joined), monte_carlo.ordered(rows)
-    for name in whole:
-        assert [str(x) for x in joined[name]] == [str(x) for x in whole[name]]
-
-
 def test_a_shuffled_visit_takes_the_same_readings_in_another_order(rows):
     study = {**SMALL, "measurements": 5, "visiting_order": "shuffled"}
     shuffled = simulated(small_errors(), NOISE[:1], range(1), study, seed=99)
@@ -107,46 +96,29 @@ def test_a_shuffled_visit_takes_the_same_readings_in_another_order(rows):
 
 
 def test_summary_and_readings_are_plain_statistics_of_the_rows(rows):
-    default = monte_carlo.default_reading(rows, SMALL)
-    assert len(default["assessed_mm"]) == 2 * 3 * 3
-    summary = monte_carlo.summary(default, 0.07)
-    assert len(summary["assessor"]) == 6
-    for i, (assessor, noise) in enumerate(
-        zip(summary["assessor"], summary["noise_mm"], strict=True)
-    ):
-        values = [
-            float(rows["assessed_mm"][j])
-            for j in range(len(rows["assessed_mm"]))
-            if rows["assessor"][j] == assessor
-            and rows["noise_mm"][j] == noise
-            and text(rows, "outlier_rule", j) in {None, "normal"}
-            and text(rows, "distance", j) in {None, "squared"}
-            and text(rows, "covariance", j) in {None, "r"}
-            and text(rows, "search", j) in {None, "from_above"}
-        ]
-        assert len(values) == summary["repetitions"][i] == 3
-        mean = math.fsum(values) / 3
-        assert summary["mean_mm"][i] == pytest.approx(mean, rel=1e-13)
-        assert (summary["min_mm"][i], summary["max_mm"][i]) == (min(values), max(values))
-        assert summary["bias_mm"][i] == pytest.approx(mean - 0.07, abs=1e-14)
-        rmse = math.sqrt(math.fsum((v - 0.07) ** 2 for v in values) / 3)
-        assert summary["rmse_mm"][i] == pytest.approx(rmse, rel=1e-12)
-    ablation = monte_carlo.readings(rows, 0.07)
-    # Three readings of outlier rejection and twelve of model invalidation per noise.
-    assert len(ablation["assessor"]) == 2 * 15
-    for i in range(30):
-        values = [
-            float(rows["assessed_mm"][j])
-            for j in range(len(rows["assessed_mm"]))
-            if rows["noise_mm"][j] == ablation["noise_mm"][i]
-            and all(
-                text(rows, name, j) == text(ablation, name, i)
-                for name in ("assessor", "outlier_rule", "distance", "covariance", "search")
-            )
-        ]
-        assert len(values) == 3
-        assert ablation["mean_mm"][i] == pytest.approx(math.fsum(values) / 3, rel=1e-13)
-        assert ablation["bias_mm"][i] == pytest.approx(math.fsum(values) / 3 - 0.07, abs=1e-14)
+    """Six rows of three values; thirty of the readings, three and twelve a noise and assessor."""
+    switches = {"outlier_rule": "normal", "distance": "squared", "covariance": "r"}
+    usual = switches | {"search": "from_above"}
+    summary = monte_carlo.summary(monte_carlo.default_reading(rows, SMALL), 0.07)
+    for table, count in ((summary, 6), (monte_carlo.readings(rows, 0.07), 30)):
+        assert len(table["assessor"]) == count
+        for i in range(count):
+            wanted = {name: text(table, name, i) for name in usual} if count == 30 else usual
+            values = [
+                float(value)
+                for j, value in enumerate(rows["assessed_mm"])
+                if (rows["assessor"][j], rows["noise_mm"][j])
+                == (table["assessor"][i], table["noise_mm"][i])
+                and all(text(rows, name, j) in (None, word) for name, word in wanted.items())
+            ]
+            mean = math.fsum(values) / 3
+            assert len(values) == 3
+            assert table["mean_mm"][i] == pytest.approx(mean, rel=1e-13)
+            assert table["bias_mm"][i] == pytest.approx(mean - 0.07, abs=1e-14)
+            assert (table["min_mm"][i], table["max_mm"][i]) == (min(values), max(values))
+            if count == 6:
+                rmse = math.sqrt(math.fsum((v - 0.07) ** 2 for v in values) / 3)
+                assert table["rmse_mm"][i] == pytest.approx(rmse, rel=1e-12)
 
 
 def test_a_full_size_simulation_stands_just_above_its_highest_rejected_bound():
@@ -234,17 +206,15 @@ def test_histories_are_the_first_runs_of_the_studys_worlds_that_satisfy_the_rule
     )
     assert {str(x) for x in table["example"]} == set(HISTORY_RATIOS)
     for name, ratio in HISTORY_RATIOS.items():
-        where = [i for i, x in enumerate(table["example"]) if str(x) == name]
         run = history_runs(error, 3, found[name])[name]
         assert run.rejected == (name == "rejected")
-        assert len(run.steps) == len(where)
-        for i, step in zip(where, run.steps, strict=True):
-            assert table["eta_mm"][i] == pytest.approx(0.906 * ratio, rel=1e-12)
-            assert (table["noise_mm"][i], table["alpha"][i]) == (0.3, 0.6)
-            assert table["iteration"][i] == step.iteration
-            assert table["point"][i] == step.point + 500
-            assert table["repeat"][i] == step.repeat
-            assert table["measured_mm"][i] == pytest.approx(step.measured, abs=1e-12)
-            assert table["averaged_mm"][i] == pytest.approx(step.averaged, abs=1e-12)
-            assert table["true_mm"][i] == pytest.approx(true[step.point], abs=1e-12)
-            assert table["rejection_probability"][i] == pytest.approx(step.probability, abs=1e-11)
+        expected = [
+            (0.906 * ratio, 0.3, 0.6, step.iteration, step.point + 500, step.repeat, step.measured,
+             step.averaged, true[step.point], step.probability)
+            for step in run.steps
+        ]  # fmt: skip
+        where = table["example"] == name
+        columns = ("eta_mm", "noise_mm", "alpha", "iteration", "point", "repeat", "measured_mm",
+                   "averaged_mm", "true_mm", "rejection_probability")  # fmt: skip
+        rows = np.transpose([np.asarray(table[each][where], dtype=float) for each in columns])
+        np.testing.assert_allclose(rows, expected, rtol=0, atol=1e-11)

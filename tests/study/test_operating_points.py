@@ -6,36 +6,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_accuracy_map import ARM, DOWN, NINE, RANGE, SPACE, TABLE_II, WANTED, wavy
+from test_accuracy_map import ARM, RANGE, SPACE, TABLE_II, WANTED, wavy
 from two_models import two_models
 
 from kinacc.errors import InputError
-from kinacc.geometry import IDENTITY
-from kinacc.kinematics import dh, region, vec
+from kinacc.kinematics import dh, region
 from kinacc.kinematics.inverse import limits
 from kinacc.study import operating_points
 
 TRUE = wavy()
 MODELS = two_models(TRUE, TABLE_II)
-
-
-@pytest.mark.parametrize("sequence", region.SEQUENCES)
-def test_points_in_space_lie_in_it_with_the_orientations_of_the_set(sequence):
-    q = operating_points.in_space(ARM, MODELS, WANTED, sequence, 200)
-    assert q.shape == (200, 6)
-    pose = dh.forward(TABLE_II, q)
-    grown = replace(SPACE, inner_radius_mm=1199.999, radial_span_mm=900.002)
-    assert region.contains(grown, pose.position_mm).all()
-    angle = np.arctan2(pose.position_mm[:, 1], pose.position_mm[:, 0])
-    cells = region.Cells(angle, np.ones(200), np.ones(200))
-    allowed = np.stack(
-        [region.tool_poses(cells, DOWN, turn).rotation for turn in NINE.rotation], axis=1
-    )
-    distance = np.abs(allowed - pose.rotation[:, None]).max(axis=(2, 3)).min(axis=1)
-    assert distance.max() < 1e-8
-    assert 80 < np.sum(q[:, 4] > 0) < 120  # both wrists, evenly
-    assert limits.within_limits(ARM, q).all()
-    assert limits.within(q, *RANGE).all()
 
 
 def test_points_of_one_wrist_have_joint_5_on_one_side():
@@ -53,21 +33,6 @@ def test_a_longer_set_begins_with_the_shorter_one():
     short = operating_points.in_space(ARM, MODELS, WANTED, "sobol", 64)
     long = operating_points.in_space(ARM, MODELS, WANTED, "sobol", 128)
     assert np.abs(long[:64] - short).max() < 1e-9
-
-
-def test_errors_are_vec_minus_dh_of_each_ones_tool():
-    q = operating_points.in_space(ARM, MODELS, WANTED, "halton", 20)
-    tool = np.array([10.0, 20.0, 30.0])
-    travel = np.array([1, -1, 0, 1, -1, 1])
-    tools = (IDENTITY._replace(position_mm=each) for each in (tool, 2 * tool))
-    models = two_models(TRUE, TABLE_II, *tools, travel)
-    points = operating_points.with_errors(models, q)
-    true = vec.pose(TRUE, q, np.tile(travel, (20, 1)))
-    modelled = dh.forward(TABLE_II, q)
-    expected = true.position_mm + true.rotation @ tool
-    expected -= modelled.position_mm + modelled.rotation @ (2 * tool)
-    assert np.allclose(points.error_mm, expected, atol=1e-9)
-    assert (points.travel == travel).all()
 
 
 def test_points_in_joints_lie_in_the_box_and_in_the_cylinder():

@@ -1,0 +1,74 @@
+"""The map against a loop that does one cell, one pose and one search at a time."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from two_models import two_models
+
+from kinacc.geometry import Pose, rotation_y
+from kinacc.kinematics import dh, region, robot, vec
+from kinacc.study import accuracy_map as maps
+
+ARM = robot.load("mh180")
+SPACE = region.Cylinder(1200.0, 900.0, 0.0, 500.0, 0.0, np.pi / 3)
+DOWN = region.reference_rotation(np.deg2rad([180.0, 0.0, 0.0]))
+NINE = region.orientations(np.pi / 4, "signs_and_zero")
+WANTED = maps.PosesWanted(SPACE, DOWN, NINE, "dh")
+TABLE_II = dh.DHModel(
+    [0.001, -1.568, 0.001, -3.142, -3.141, 0.002],
+    [-1.157, -0.898, 0.066, -1226.154, -0.104, -224.698],
+    [323.453, 1151.356, 299.501, 0.029, 0.026, 0.028],
+    [-1.573, 3.140, -1.571, -1.571, -1.571, 3.142],
+    np.zeros(6),
+)
+RANGE = np.deg2rad([-20, -40, -90, -190, -130, -190]), np.deg2rad([80, 70, 30, 190, 130, 190])
+
+
+def wavy(fitted=RANGE) -> vec.VECModel:
+    empty = vec.without_errors(TABLE_II, *fitted, 5)
+    noise = np.random.default_rng(3).normal(size=empty.coefficients.shape)
+    scale = np.array([0.05] * 3 + [1e-4] * 3)[:, None]
+    offsets = np.full((6, 2), [-5e-5, 5e-5])
+    return replace(empty, coefficients=noise * scale, direction_offsets_rad=offsets)
+
+
+TOOL = Pose(rotation_y(np.array(0.2)), np.array([20.0, -10.0, 150.0]))
+OTHER_TOOL = Pose(rotation_y(np.array(0.2003)), np.array([20.1, -10.0, 150.1]))
+
+
+def test_unreachable_cells_are_marked_and_the_others_not_touched():
+    cells = region.Cells(np.zeros(3), np.array([1500.0, 2600.0, 4000.0]), np.zeros(3))
+    found = maps.accuracy_map(ARM, two_models(wavy(), TABLE_II), cells, WANTED)
+    assert found.solutions[0] == 18
+    assert 0 < found.solutions[1] < 18
+    assert np.isfinite(found.position_max_mm[1])
+    assert found.solutions[2] == 0
+    assert np.isnan(found.position_max_mm[2])
+    assert np.isnan(found.orientation_max_mrad[2])
+    assert found.worst_branch[2] is None
+    assert found.orientation_worst_branch[2] is None
+    assert np.isnan(found.worst_q_rad[2]).all()
+    assert np.isfinite(found.worst_q_rad[:2]).all()
+    alone = region.Cells(*(axis[:1] for axis in cells))
+    first = maps.accuracy_map(ARM, two_models(wavy(), TABLE_II), alone, WANTED)
+    assert first.position_max_mm[0] == found.position_max_mm[0]
+
+
+def test_poses_beyond_the_fitted_range_are_counted_and_left_out():
+    lower, upper = (np.array(bound) for bound in RANGE)
+    upper[4] = np.deg2rad(10.0)  # leaves only one wrist
+    cells = region.grid(SPACE, np.array([0.2]), 300.0)
+    found = maps.accuracy_map(ARM, two_models(wavy((lower, upper)), TABLE_II), cells, WANTED)
+    assert (found.solutions == 9).all()
+    assert (found.extrapolating == 9).all()
+    assert all(name.endswith("front-up-flip") for name in found.worst_branch)
+
+
+def test_no_error_where_the_models_agree():
+    same = two_models(vec.without_errors(TABLE_II, *RANGE, 2), TABLE_II)
+    cells = region.grid(SPACE, np.array([0.0]), 300.0)
+    found = maps.accuracy_map(ARM, same, cells, WANTED)
+    assert found.position_max_mm.max() < 1e-9
+    assert found.orientation_max_mrad.max() < 1e-6
