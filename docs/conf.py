@@ -56,6 +56,8 @@ def _made_of_the_page(app: object, page: str, source: list[str]) -> None:
         source[0] += reference.settings()
     if page == "docs/artifacts":
         source[0] += reference.tables()
+    if page == "docs/robots":
+        source[0] += reference.robots()
 
 
 def _with_contents(section: str) -> str:

@@ -1,10 +1,11 @@
-"""What the site adds to commands.md, configuration.md and artifacts.md, from the code."""
+"""What the site adds to pages of commands, settings, tables and robots, from the code."""
 
 import click
 
 from kinacc.cli.group import SECTIONS, main
 from kinacc.config.schema import json_schema
 from kinacc.config.settings import Configuration
+from kinacc.kinematics import robot
 from kinacc.tables.contract import ARTEFACTS
 
 
@@ -70,6 +71,13 @@ def tables():
         head = ("column", "type", "unit", "allowed", "same within", "meaning")
         parts.append(_table(head, rows))
     return "\n".join(parts)
+
+
+def robots():
+    """A table of the shipped robots."""
+    arms = [robot.load(name) for name in robot.shipped()]
+    rows = ((f"`{arm.name}`", str(arm.dh.joints), arm.source, arm.date) for arm in arms)
+    return "\n## Sources\n\n" + _table(("name", "axes", "source", "date"), rows)
 
 
 def _table(head, rows):

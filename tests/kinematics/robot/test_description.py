@@ -214,7 +214,8 @@ def test_too_few_and_too_many_joints_are_refused(arm):
     assert "has 3 joints" in faults(arm, GOOD.removesuffix(last))
 
 
-def test_an_unknown_robot_names_those_there_are():
+def test_an_unknown_robot_names_the_nearest():
     with pytest.raises(InputError) as refusal:
-        robot.load("mh999")
+        robot.load("irb121")
     assert "irb120" in str(refusal.value)
+    assert "ur3" not in str(refusal.value)

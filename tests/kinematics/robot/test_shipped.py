@@ -9,6 +9,7 @@ for the couplings below. All angles are multiples of 90 deg (the packages round 
 
 from __future__ import annotations
 
+import re
 from datetime import date
 from pathlib import Path
 
@@ -19,6 +20,7 @@ from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 
 from kinacc.kinematics import dh, robot
+from kinacc.measurements.intake.write import template_text
 
 URDF = dict(list(pd.read_csv(Path(__file__).with_name("urdf_joints.csv")).groupby("robot")))
 AXES = {sign + name: s * axis for name, axis in zip("xyz", np.eye(3), strict=True)
@@ -73,6 +75,8 @@ def by_urdf(name: str, q_rad: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def test_every_shipped_robot_is_held_here_and_names_its_source():
     assert set(robot.shipped()) == set(URDF)
+    page = (Path(__file__).parents[3] / "docs" / "robots.md").read_text(encoding="utf-8")
+    assert [name for name in URDF if f"`{name}`" not in page] == []
     assert len(URDF) >= 45
     for name in robot.shipped():
         arm = robot.load(name)
@@ -108,3 +112,20 @@ def test_reach_is_the_makers(name):
     q = np.random.default_rng(0).uniform(-np.pi, np.pi, (2000, arm.dh.joints))
     best = minimize(lambda x: -apart(x[None])[0], q[np.argmax(apart(q))], method="Powell")
     assert -best.fun == pytest.approx(reach, abs=within)
+
+
+@pytest.mark.parametrize(
+    ("name", "lengths"),
+    [("irb120", (290, 0, 270, 70, 302, 72)), ("irb4600_60_205", (495, 175, 900, 175, 960, 135))],
+)
+def test_the_form_is_the_arm_whose_lengths_are_filled_in(name, lengths):
+    lines = template_text("form", 6).splitlines()
+    for letter, length in zip("ABCDEF", lengths, strict=True):
+        at = next(i for i, line in enumerate(lines) if re.search(f"[da]: {letter}", line))
+        key = re.search(f"([da]): {letter}", lines[at])[1]
+        lines[at] = lines[at].replace(f"{key}_mm: 100", f"{key}_mm: {length}")
+    arm, q_rad = robot.of_text("\n".join(lines), "form.yaml"), np.linspace(-1.0, 1.0, 6)
+    position, rotation = by_urdf(name, q_rad)
+    pose = robot.forward(arm, q_rad)
+    assert np.abs(pose.position_mm[0] - position).max() < 1e-6
+    assert np.abs(pose.rotation[0] - rotation).max() < 1e-9

@@ -94,17 +94,30 @@ def coupled_text(text: str, joint_map: Sequence[Sequence[float]], why: str) -> s
     return f"{text.rstrip()}\n# {why}\njoint_map: [{rows}]\n"
 
 
+# theta offset, d, a, alpha of six axes with a spherical wrist, and the lengths of the drawing.
+_SIX = (
+    (0, 100, 100, -90, "d: A, a: B"),
+    (-90, 0, 100, 0, "a: C"),
+    (0, 0, 100, -90, "a: D; d: axis 4 sideways, to the left"),
+    (0, 100, 0, 90, "d: E"),
+    (0, 0, 0, -90, "no length"),
+    (180, 100, 0, 0, "d: F"),
+)
+
+
 def template_text(name: str, joints: int) -> str:
     """A robot file to be filled in: an arm of ``joints`` rows that is no arm yet."""
-    row = "  - {theta_offset_deg: 0, d_mm: 0, a_mm: 100, alpha_deg: 90, sign: 1, "
-    row += "limits_deg: [-360, 360]} # joint"
-    rows = "\n".join(f"{row} {number}" for number in range(1, joints + 1))
+    form = _SIX if joints == len(_SIX) else ((0, 0, 100, 90, "joint"),) * joints
+    rows = "".join(
+        f"  - {{theta_offset_deg: {theta}, d_mm: {d}, a_mm: {a}, alpha_deg: {alpha}, sign: 1, "
+        f"limits_deg: [-360, 360]}} # {number}, {lengths}\n"
+        for number, (theta, d, a, alpha, lengths) in enumerate(form, 1)
+    )
     return (
-        "# FILL IN: lengths and angles of the arm's data sheet, row by row (docs/robots.md).\n"
-        "# sign: -1 where the controller counts against the row's axis. Until then check-data\n"
-        "# says that the robot does not fit.\n"
-        f"{_yaml({'name': name})}source: FILL IN where the figures come from\n"
-        f"convention: standard # or modified (Craig)\ndh:\n{rows}\n"
+        "# FILL IN lengths and limits of the data sheet, named by the drawing in docs/robots.md.\n"
+        "# sign: -1 where the controller counts against the drawing. theta_offset_deg: less sign\n"
+        "# times the angle that the controller shows in the drawn pose. check-data then tries it.\n"
+        f"{_yaml({'name': name})}source: FILL IN where the figures come from\ndh:\n{rows}"
     )
 
 
