@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from kinacc.calibration.summary import LARGE_SHARE
 from kinacc.campaign import folder as campaigns
 from kinacc.campaign import of_calibration, report
 from kinacc.kinematics import robot
@@ -58,19 +57,11 @@ def first_screen(summary: CalibrationSummary, left_out: Sequence[str] = ()) -> F
 
     ``left_out``: tables made from others than those now there.
     """
-    turned = summary.orientation_errors()
-    columns = [["model", "model"]]
-    for unit in ("mm", "mrad") if turned else ("mm",):
-        for name, key in (("mean", "mean"), (f"{LARGE_SHARE:.0%}", "quantile_99"),
-                          ("largest", "largest")):  # fmt: skip
-            columns.append([f"{name}, {unit}", f"{key}_{unit}", ""])
-    rows = []
-    for model, errors in summary.position_errors().items():
-        row = {"model": summary.label(model)}
-        for part in filter(None, (errors, turned.get(model))):
-            for key in ("mean", "quantile_99", "largest"):
-                row[f"{key}_{part.unit}"] = terminal.size(getattr(part, key))
-        rows.append(row | ({"remark": "selected"} if model == summary.selected else {}))
+    errors = summary.error_table()
+    columns = [["model", "model"], *([name, name, ""] for name in errors.columns[1:])]
+    rows = errors.to_dict("records")
+    for model, row in zip(errors.index, rows, strict=True):
+        row |= {"remark": "selected"} if model == summary.selected else {}
     where = "held-out" if summary.is_held_out else "fitted"
     count = terminal.counted(summary.best.n, "reading")
     steps = [text for step in summary.next_steps for text in (f"{step.purpose}:", step.command)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import shlex
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -22,11 +23,8 @@ from kinacc.campaign.status import CampaignStatus
 from kinacc.config.error_models import ERROR_MODELS, MEASURED, NOMINAL, PLAINEST, model_name
 from kinacc.deployment import applicability
 from kinacc.deployment import folder as results
-from kinacc.deployment.record import Calibration
 from kinacc.errors import InputError, Problem, refuse
-from kinacc.geometry import quaternion_from_rotation
 from kinacc.kinematics import robot
-from kinacc.kinematics.model import JointState
 from kinacc.kinematics.robot import Robot
 from kinacc.measurements.row_names import RowNames
 from kinacc.report.history_lines import sentence
@@ -49,10 +47,9 @@ ON_PAGE = (
     *(f"{kind}_{what}" for kind in ERROR_MODELS for what in ("fit", "covariance")),
     *("study", "study_summary", "readings", "histories"),
 )
+STATISTICS = {"mean": "mean", f"{figures.LARGE_SHARE:.0%}": "quantile_99", "largest": "largest"}
 _TOLERANCE_OF = {BOUND: "bound", HELD_OUT: "quantile_99"}
-_READINGS = 300  # of a campaign over the 200 candidates that are drawn
 _DAY = 10  # characters of a time
-_LEAST_RANGE, _METRE_MM = 1e-9, 1e3
 _NOTE = FINDING_LEVELS[-1]
 Tables = Mapping[str, Columns]
 
@@ -279,6 +276,20 @@ class CalibrationSummary:
         """Position errors of the selected model."""
         return self.position_errors()[self.selected]
 
+    def error_table(self) -> pd.DataFrame:
+        """Errors of every model at the rows of ``best``: model, then statistics by name and unit.
+
+        The index holds the models; numbers are texts of three significant digits.
+        """
+        turned, rows = self.orientation_errors(), {}
+        for model, errors in self.position_errors().items():
+            row = {"model": self.label(model)}
+            for part in filter(None, (errors, turned.get(model))):
+                for name, key in STATISTICS.items():
+                    row[f"{name}, {part.unit}"] = size(getattr(part, key))
+            rows[model] = row
+        return pd.DataFrame.from_dict(rows, orient="index").fillna("")
+
     def label(self, model: str) -> str:
         """A model's name with its order, or with the frames that were fitted."""
         if model == NOMINAL:
@@ -324,6 +335,13 @@ class CalibrationSummary:
         if not self.is_held_out:
             return {}
         return {"n": best.n, "mean": best.mean, "quantile_99": best.quantile_99}
+
+
+def size(value: float) -> str:
+    """A number with three significant digits, without an exponent."""
+    if not math.isfinite(value) or value == 0.0:
+        return f"{value:.3g}"
+    return f"{value:.{max(0, 2 - math.floor(math.log10(abs(value))))}f}"
 
 
 def read_tables(
@@ -687,39 +705,25 @@ def _written(folder: Path) -> str:
 
 
 def _next_steps(folder: Path, tables: Tables, arm: Robot, sought: Sought) -> Iterable[NextStep]:
+    place = shlex.quote(str(folder))
     if sought.status is not None:
         yield NextStep("continue the campaign", sought.status.next_command)
-    calibration = results.calibration(tables, arm)
-    chosen = [] if calibration.choice == PLAINEST else ["--model", calibration.choice]
-    if sought.status is None:
-        campaign = ["kinacc", "campaign", "start", _free("check", folder)]
-        campaign += ["--calibration", str(folder), "--noise-mm", "NOISE", "--budget"]
-        purpose = "bound the largest error; NOISE is the standard deviation of a reading in mm"
-        yield NextStep(purpose, shlex.join([*campaign, str(_READINGS)]))
-    export = ["kinacc", "export", str(folder), *chosen, "--out", _free("exported", folder)]
-    yield NextStep("files of the model for controllers and simulators", shlex.join(export))
+    else:
+        yield NextStep(
+            "bound the largest error; NOISE is the standard deviation of a reading in mm",
+            f"kinacc campaign start check --calibration {place} --noise-mm NOISE --budget 300",
+        )
     yield NextStep(
-        "joints that put the tool at a pose", shlex.join(_compensate(folder, calibration, tables))
+        "a robot program, corrected",
+        f"kinacc compensate {place} --program PROGRAM -o CORRECTED",
     )
-
-
-def _compensate(folder: Path, calibration: Calibration, tables: Tables) -> list[str]:
-    """An example for ``kinacc compensate``: a measured pose far from singular and from limits."""
-    arm = calibration.robot
-    joints = figures.reported_joints(tables["measurements"], len(arm.q_min_rad))
-    spread = np.abs(joints - joints.mean(axis=0)) / (np.ptp(joints, axis=0) + _LEAST_RANGE)
-    inner = joints[np.argsort(spread.max(axis=1), kind="stable")[: len(joints) // 4 + 1]]
-    slopes = calibration.joint_jacobian(JointState(arm.dh_joints(inner)))
-    slopes[:, :3] /= _METRE_MM  # a millimetre counts as a milliradian
-    near = inner[np.argmax(np.linalg.svd(slopes, compute_uv=False)[:, -1])]
-    pose = calibration.pose(JointState(arm.dh_joints(near[None])))
-    numbers = [f"{each:.1f}" for each in pose.position_mm[0]]
-    numbers += [f"{each:.4f}" for each in quaternion_from_rotation(pose.rotation[0])]
-    shown = np.where(arm.dh.prismatic, near, np.rad2deg(near)).round() + 0.0  # no minus zero
-    command = ["kinacc", "compensate", str(folder), "--pose", ",".join(numbers)]
-    return [*command, "--near-deg", ",".join(f"{each:.0f}" for each in shown)]
-
-
-def _free(name: str, folder: Path) -> str:
-    """The name of a new folder here, with that of the results where it is taken."""
-    return name if not Path(name).exists() else f"{name}_{folder.resolve().name}"
+    chosen = results.calibration(tables, arm).choice
+    model = "" if chosen == PLAINEST else f" --model {chosen}"
+    yield NextStep(
+        "files of the model for simulators",
+        f"kinacc export {place}{model} --out exported",
+    )
+    yield NextStep(
+        "values to enter into the controller: kuka, abb, fanuc, ur, yaskawa, staubli or ros",
+        f"kinacc export {place} --for CONTROLLER --out pendant",
+    )

@@ -17,9 +17,11 @@ from kinacc.config.error_models import NOMINAL, PLAINEST, model_name
 from kinacc.errors import Problem, as_seen
 from kinacc.report.summary import (
     BOUND,
+    STATISTICS,
     CalibrationSummary,
     Verdict,
     read_tables,
+    size,
     summarise,
     summarise_all,
 )
@@ -28,7 +30,6 @@ FEW = 4  # data sets whose summaries are printed one after another
 WIDTH = 100
 _MOST = 3  # findings, rows and parameters without --verbose
 _FEW_SHARE = 0.01
-_STATISTICS = ("mean", "quantile_99", "largest")
 
 
 class _Console(Console):
@@ -283,13 +284,6 @@ def counted(number: float, noun: str) -> str:
     return f"{number:.0f} {noun}{'' if number == 1 else 's'}"
 
 
-def size(value: float) -> str:
-    """A number with three significant digits, without an exponent."""
-    if not math.isfinite(value) or value == 0.0:
-        return f"{value:.3g}"
-    return f"{value:.{max(0, 2 - math.floor(math.log10(abs(value))))}f}"
-
-
 def _cell(value: object, name: str) -> str:
     if isinstance(value, float):
         if math.isnan(value):
@@ -300,28 +294,21 @@ def _cell(value: object, name: str) -> str:
 
 def _error_table(summary: CalibrationSummary, verbose: bool) -> Table:
     table = Table(box=None, pad_edge=False)
-    where = "held-out" if summary.is_held_out else "training"
-    rows = summary.best.n
-    table.add_column(f"{where.capitalize()} errors ({counted(rows, 'reading')})", no_wrap=True)
-    turned = summary.orientation_errors()
-    units = ["mm", "mrad"] if turned else ["mm"]
-    for unit in units:
-        for name in ("mean", f"{LARGE_SHARE:.0%}", "largest"):
-            table.add_column(f"{name}\n{unit}", justify="right", no_wrap=True)
+    where = "Held-out" if summary.is_held_out else "Training"
+    table.add_column(f"{where} errors ({counted(summary.best.n, 'reading')})", no_wrap=True)
+    errors = summary.error_table()
+    for name in errors.columns[1:]:
+        table.add_column(name.replace(", ", "\n"), justify="right", no_wrap=True)
     table.add_column("", no_wrap=True)
-    for model, errors in summary.position_errors().items():
-        parts = [errors, turned[model]] if model in turned else [errors]
-        cells = [size(getattr(part, name)) for part in parts for name in _STATISTICS]
-        mark = "<- selected" if model == summary.selected else ""
-        cells += [""] * (len(_STATISTICS) * len(units) - len(cells))
-        table.add_row(as_seen(summary.label(model)), *cells, mark)
+    for model, row in errors.iterrows():
+        table.add_row(*map(as_seen, row), "<- selected" if model == summary.selected else "")
     if verbose:
         for each in summary.errors:
             if each.quantity != "position" or each in summary.position_errors().values():
                 continue
             of = "" if each.reference == "measured" else f" to {model_name(each.reference)}"
             called = f"{each.estimate.replace('_', '-')}: {model_name(each.model)}{of}"
-            table.add_row(called, *(size(getattr(each, name)) for name in _STATISTICS))
+            table.add_row(called, *(size(getattr(each, key)) for key in STATISTICS.values()))
     return table
 
 
