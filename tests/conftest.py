@@ -51,7 +51,6 @@ SLOW = (
     "campaign/test_on_a_real_arm.py",
     "campaign/test_planning.py",
     "campaign/test_state.py",
-    "checks/test_advice_on_misread_files.py",
     "checks/test_check_data.py",
     "cli/test_init.py",
     "cli/test_init_readings.py",

@@ -123,6 +123,17 @@ def test_a_measured_file_with_a_description(folder, text, encoding):
     taken_or_refused("check-data", folder / "own.yaml")
 
 
+@settings(max_examples=12)
+@given(st.integers(0, 18), CHANGES)
+def test_a_measured_parquet_file(folder, column, how):
+    names, *rows = (line.split(",") for line in SERIES.split())
+    values = [[float(cell) for cell in cells] for cells in zip(*rows, strict=True)]
+    table = pa.table(dict(zip(names, values, strict=True)))
+    pq.write_table(changed(table, column, how), folder / "poses.parquet")
+    (folder / "parquet.yaml").write_text(CONFIG.replace(DATA, "poses.parquet"))
+    taken_or_refused("check-data", folder / "parquet.yaml")
+
+
 @settings(max_examples=100)
 @given(edited(CONFIG.replace("series_B", "absent")))
 def test_a_configuration(folder, text):

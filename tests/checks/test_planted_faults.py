@@ -9,10 +9,12 @@ import numpy as np
 import pandas as pd
 import plants
 import pytest
+import yaml
 from good_files import File, measured, simulated
 
 from kinacc.kinematics import robot as robots
 from kinacc.kinematics.robot import forward
+from kinacc.measurements.intake.write import shipped_text
 
 EVERY, SOME, LATE = plants.every, plants.some, plants.late
 
@@ -243,4 +245,22 @@ def test_readings_without_noise_of_the_arm_as_described_raise_no_suspicion(seed,
     point = forward(robots.load("irb120"), q).position_mm
     names = [*(f"q{i}_rad" for i in range(1, 7)), "x_mm", "y_mm", "z_mm"]
     file = File(pd.DataFrame(np.hstack([q, point]), columns=names), "irb120")
+    assert file.check(tmp_path).suspicions == ()
+
+
+def test_the_joint_map_that_is_advised_mends_a_coupling(tmp_path):
+    file = plants.coupled(good("arm"), EVERY(good("arm")))
+    found = only(file.check(tmp_path), "joint_coupling", EVERY(file))
+    assert (found.values["joint"], found.values["other"]) == (3, 2)
+    (tmp_path / "own.yaml").write_text(
+        f"{shipped_text('irb120')}\njoint_map: {yaml.safe_load(found.values['map'])}\n"
+    )
+    assert replace(file, robot=tmp_path / "own.yaml").check(tmp_path).suspicions == ()
+
+
+def test_sound_rows_that_alone_show_a_movement_are_no_slips(tmp_path):
+    # Every fifth pose of a measured UR10 whose joint 4 has moved by 1 mrad: no other pose is near
+    # the last two, and without them nothing tells where they are to within 0.3 m.
+    file = measured("ur10_d").rows(slice(0, 299, 5))
+    file = file.but(q4_deg=file.columns["q4_deg"] + np.rad2deg(1e-3))
     assert file.check(tmp_path).suspicions == ()

@@ -6,42 +6,11 @@ import cases
 import numpy as np
 import pytest
 
-from kinacc.calibration import delivered
-from kinacc.calibration.residuals import errors
 from kinacc.deployment.export.files import contents, read_source
 from kinacc.deployment.folder import recorded_robot
-from kinacc.kinematics import robot
-from kinacc.tables import store
 from kinacc.tables.comparison import compare_tables
 
 STAGES = [(name, stage) for name, stages in cases.DATA_SETS.items() for stage in stages]
-
-
-# Fits that stand still instead of converging end in a flat valley, where rounding of the machine
-# decides: their coefficients are compared by the poses that they predict, in mm and mrad.
-STOOD_STILL_WITHIN = 1e-4
-VEC_PARTS = ("vec_model", "vec_frames")
-
-
-def stood_still(folder):
-    """Whether the VEC fit of a golden folder stopped where its objective moved no more."""
-    if not (folder / "vec_fit.parquet").is_file():
-        return False
-    table = store.read(folder / "vec_fit.parquet")
-    quantity, value = np.asarray(table["quantity"]), np.asarray(table["value"], dtype=float)
-    return value[quantity == "converged"].item() == 0.0
-
-
-def vec_errors(data, name, folder):
-    """Differences (n, 6) of measured poses and those of the VEC model of a folder, mm and mrad."""
-    settings = data.settings[name]
-    arm = robot.load(settings["robot"])
-    tables = {"measurements": store.read(cases.RESULTS / name / "measurements.parquet")}
-    tables |= {each: store.read(folder / f"{each}.parquet") for each in VEC_PARTS}
-    every, _ = delivered.observed(tables, arm)
-    found = errors(delivered.delivered_fits(tables, arm, every), every)
-    vec = found["vec_vs_measured"]
-    return np.hstack([vec.position_mm, 1e3 * np.nan_to_num(vec.rotation_rad)])
 
 
 @pytest.fixture(scope="module")
@@ -55,17 +24,11 @@ def test_a_stage_makes_its_golden_tables(name, stage, data, tmp_path):
     made = cases.run_stage(data, name, stage, cases.RESULTS / name)
     cases.write_tables(made, tmp_path)
     golden = cases.RESULTS / name
-    still = stood_still(golden)
-    within = dict.fromkeys(made, STOOD_STILL_WITHIN) if still and stage == "residuals" else None
-    differences = []
-    for table in made:
-        differences += compare_tables(
-            golden / f"{table}.parquet", tmp_path / f"{table}.parquet", within
-        )
-    if still and stage == "fit_vec":
-        differences = [each for each in differences if each.table not in VEC_PARTS]
-        apart = np.abs(vec_errors(data, name, tmp_path) - vec_errors(data, name, golden))
-        assert apart.max() < STOOD_STILL_WITHIN
+    differences = [
+        each
+        for table in made
+        for each in compare_tables(golden / f"{table}.parquet", tmp_path / f"{table}.parquet")
+    ]
     assert not differences, "\n".join(map(str, differences))
 
 

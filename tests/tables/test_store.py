@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from kinacc.errors import InputError
 from kinacc.tables import store
 from kinacc.tables.atomic import replacing
-from kinacc.tables.contract import PROVENANCE_KEYS, columns_of
+from kinacc.tables.contract import PROVENANCE_KEYS
 
 PROVENANCE = {"kinacc_version": "0.1.0", "config_hash": "c", "seed": 7}
 
@@ -113,26 +113,6 @@ def test_a_failure_while_writing_leaves_nothing_and_two_writers_do_not_meet(tmp_
             quick.write_text("quick")
         assert path.read_text() == "quick"
     assert path.read_text() == "slow"
-
-
-NUMBERS = st.one_of(st.none(), st.floats(allow_nan=False, allow_infinity=False))
-WHOLE = st.one_of(st.none(), st.integers(1, 2**53))
-TEXTS = st.one_of(st.none(), st.text())
-ROWS = st.lists(st.tuples(st.just("q"), WHOLE, TEXTS, NUMBERS, st.just("mm")), max_size=40)
-
-
-@settings(max_examples=60, deadline=None)
-@given(ROWS)
-def test_any_numbers_and_texts_come_back(rows):
-    made = columns_of("vec_fit", rows)
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "vec_fit.parquet"
-        store.write_table(path, "vec_fit", made, PROVENANCE)
-        plain, back = pq.read_table(path), store.read(path)
-    assert [tuple(row.values()) for row in plain.to_pylist()] == rows
-    for name, values in back.items():
-        assert made[name].dtype == values.dtype
-        np.testing.assert_array_equal(made[name], values)
 
 
 @settings(max_examples=300, deadline=5000)

@@ -13,10 +13,7 @@ from kinacc.checks.findings import Finding, finding
 from kinacc.checks.meanings import Meaning
 from kinacc.checks.readings import Readings
 from kinacc.checks.robust_fit import Fitted
-from kinacc.kinematics import dh
 from kinacc.measurements.layout import Layout
-
-_CHANCE = 0.01  # that a wrong explanation fits
 
 
 def found(fitted: Fitted, meaning: Meaning, layout: Layout) -> list[Finding]:
@@ -82,54 +79,16 @@ def _explanations(
 
 
 def _outliers(fitted: Fitted, rows: ndarray) -> Iterator[Finding]:
-    """What no fault explains; told apart where one joint standing elsewhere explains it."""
-    joint, off = _one_joint(fitted, rows)
+    """What no fault explains."""
     seen = fitted.seen
-    for each in np.unique(joint[joint >= 0]):
-        lines = seen.lines(rows[joint == each])
-        yield finding(
-            "commanded_joints/one",
-            lines,
-            joint=int(each + 1),
-            count=len(lines),
-            largest_deg=float(np.rad2deg(np.abs(off[joint == each]).max())),
-        )
-    rest = rows[joint < 0]
-    if rest.size:
-        worst, angle = rest[np.argmax(fitted.left_mm[rest])], fitted.left_rad[rest].max()
+    if rows.size:
+        worst, angle = rows[np.argmax(fitted.left_mm[rows])], fitted.left_rad[rows].max()
         yield finding(
             "outliers",
-            seen.lines(rest),
-            count=rest.size,
+            seen.lines(rows),
+            count=rows.size,
             turned=f" and {1e3 * angle:.3g} mrad" if angle > fitted.limit_rad else "",
             row=seen.row_names.one(seen.line[worst]),
             largest_mm=float(fitted.left_mm[worst]),
             limit_mm=fitted.limit_mm,
         )
-
-
-def _one_joint(fitted: Fitted, rows: ndarray) -> tuple[ndarray, ndarray]:
-    """Joint (m,) whose displacement alone explains a reading, -1 where none, and by how much."""
-    seen, arm = fitted.seen.select(rows), fitted.trial.arm
-    left = robust_fit.residuals(arm, seen)
-    jacobian = dh.joint_jacobian(arm.model, seen.q_rad)
-    base = arm.frames.bases.rotation[seen.session]
-    swing = left.flange @ arm.frames.targets.position_mm[seen.target][..., None]
-    axes = base @ jacobian[:, 3:]
-    moves = base @ jacobian[:, :3] + np.cross(axes, swing, axis=1)
-    turned = seen.has_rotation
-    # Positions and orientations in units of what they may be off.
-    share = np.where(turned, 1.0 / fitted.limit_rad, 0.0)[:, None, None]
-    directions = np.concatenate([moves / fitted.limit_mm, axes * share], axis=1)
-    turn = np.nan_to_num(left.turn_rad) * share[..., 0]
-    error = np.concatenate([left.position_mm / fitted.limit_mm, turn], axis=1)
-    weight = np.maximum(np.sum(directions**2, axis=1), 1e-12)
-    by = -np.einsum("nij,ni->nj", directions, error) / weight
-    rest = np.linalg.norm(error[..., None] + by[:, None] * directions, axis=1)
-    # A line is hit by chance with the share of directions that pass so near it.
-    size = np.maximum(np.linalg.norm(error, axis=1), 1.0)
-    chance = jacobian.shape[2] * size ** -np.where(turned, 5.0, 2.0)
-    best = np.argmin(rest, axis=1)
-    place = np.arange(len(rows)), best
-    good = (rest[place] < 1.0) & (chance < _CHANCE)
-    return np.where(good, best, -1), by[place]

@@ -15,9 +15,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, Field, model_serializer
+from pydantic import AfterValidator, Field
 
-from kinacc.config.fields import Or, Section, Text, refused
+from kinacc.config.fields import Or, Text, refused
 
 FREE, FIXED = "free", "fixed"
 JOINTS, FRAMES = "joints", "frames"
@@ -34,25 +34,6 @@ _NAMES = {
     JOINTS: "d, joint 3, joint 3 d and the like, with theta, d, a, alpha, beta",
     FRAMES: "base, base rz, tool x and the like, with x, y, z, rx, ry, rz",
 }
-_Value = Annotated[float | None, Field(gt=-1e100, lt=1e100)]  # beyond, squares overflow
-_Std = Annotated[float | None, Field(gt=0, lt=1e100)]
-
-
-class Known(Section):
-    """A value, a standard deviation about it, or both; each in one unit."""
-
-    value_mm: _Value = None
-    value_rad: _Value = None
-    value_mrad: _Value = None
-    value_deg: _Value = None
-    prior_std_mm: _Std = None
-    prior_std_rad: _Std = None
-    prior_std_mrad: _Std = None
-    prior_std_deg: _Std = None
-
-    @model_serializer
-    def _stated(self) -> dict[str, float]:
-        return {key: value for key, value in vars(self).items() if value is not None}
 
 
 @dataclass(frozen=True)
@@ -83,12 +64,10 @@ def rules(content: Mapping[str, Any]) -> list[Rule]:
         known: dict[str, dict[str, float]] = {"value": {}, "prior_std": {}}
         for key, number in state.items() if isinstance(state, Mapping) else ():
             kind, _, short = key.rpartition("_")
-            unit_, factor = _UNITS[short]
-            known[kind][unit_] = factor * number
+            known[kind][_UNITS[short][0]] = _UNITS[short][1] * number
         is_free = state == FREE or bool(known["prior_std"])
-        joint, frame, parameter = _subject(name) or (None, None, None)
-        value, std = known["value"], known["prior_std"]
-        found.append(Rule(name, joint, frame, parameter, is_free, value, std))
+        subject = _subject(name) or (None, None, None)
+        found.append(Rule(name, *subject, is_free, known["value"], known["prior_std"]))
     return found
 
 
@@ -98,28 +77,38 @@ def _check(about: str) -> AfterValidator:
     def check(content: dict[str, Any]) -> dict[str, Any]:
         subjects: list[Any] = []
         for name, state in content.items():
-            subject = _subject(name)
+            subject, fix = _subject(name), ""
+            stated = [] if isinstance(state, str) else [key.rpartition("_") for key in state]
+            kinds = [(kind, _UNITS[short][0]) for kind, _, short in stated]
+            parameter = subject[2] if subject else None
+            units = {parameter and unit(parameter)}
+            wrong = [k for k, u in kinds if (parameter or k == "value") and u not in units]
             if subject is None or (subject[1] is not None) != (about == FRAMES):
+                what = f"{name!r} is no parameter of {about}"
                 other = KEYS[JOINTS if about == FRAMES else FRAMES]
                 fix = f"give {_NAMES[about]}; others belong in {other}"
-                raise refused(f"{name!r} is no parameter of {about}", fix, name)
-            if subject in subjects:
-                raise refused(f"{name!r} is said twice, in two spellings", "", name)
-            subjects.append(subject)
-            stated = [] if isinstance(state, str) else list(state.model_dump())
-            kinds = [(key.rpartition("_")[0], _UNITS[key.rpartition("_")[2]][0]) for key in stated]
-            if len({*kinds}) < len(kinds) or (not stated and not isinstance(state, str)):
-                raise refused("states nothing, or the same in two units", "", name)
-            for key, (kind, unit_) in zip(stated, kinds, strict=True):
-                if (subject[2] or kind == "value") and unit(subject[2] or "") != unit_:
-                    what = f"{key}, but {subject[2] or 'no one parameter'} is named"
-                    raise refused(what, "name one parameter, and its unit", name)
+            elif subject in subjects:
+                what = f"{name!r} is said twice, in two spellings"
+            elif len({*kinds}) < len(kinds) or not (stated or isinstance(state, str)):
+                what = "states nothing, or the same in two units"
+            elif wrong:
+                what = f"{wrong[0]} of {parameter or 'no one parameter'} is named in another unit"
+                fix = "name one parameter, and its unit"
+            elif any(k == "prior_std" and state["_".join((k, u))] <= 0.0 for k, _, u in stated):
+                what = "a standard deviation should be greater than 0"
+            else:
+                subjects.append(subject)
+                continue
+            raise refused(what, fix, name)
         return content
 
     return AfterValidator(check)
 
 
-_State = Annotated[Known, Or((FREE, FIXED))]
+_Key = Annotated[str, Field(pattern="^(value|prior_std)_(mm|rad|mrad|deg)$")]
+# Beyond, squares overflow.
+_Known = dict[_Key, Annotated[float, Field(gt=-1e100, lt=1e100)]]
+_State = Annotated[_Known, Or((FREE, FIXED))]
 JointRules = Annotated[dict[Text, _State], _check(JOINTS)]
 FrameRules = Annotated[dict[Text, _State], _check(FRAMES)]
 

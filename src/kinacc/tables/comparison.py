@@ -6,7 +6,7 @@ Counts, codes, verdicts and words are compared exactly, numbers within the toler
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -76,14 +76,8 @@ def compare_folders(before: Path, now: Path) -> Iterator[Difference]:
         yield from compare_tables(path, other)
 
 
-def compare_tables(
-    before: Path, now: Path, tolerances: Mapping[str, float] | None = None
-) -> Iterator[Difference]:
-    """Differences of two tables of one artefact.
-
-    ``tolerances`` by ``<table>.<column>`` or ``<table>`` replace those of the contract. Raises
-    InputError for a file that is no table.
-    """
+def compare_tables(before: Path, now: Path) -> Iterator[Difference]:
+    """Differences of two tables of one artefact. Raises InputError for a file that is no table."""
     name = before.stem if before.stem in ARTEFACTS else before.parent.name
     artefact = ARTEFACTS.get(name)
     old, new = map(store.read_table, (before, now))
@@ -99,10 +93,9 @@ def compare_tables(
             yield Difference(name, "", f"{len(only)} rows {which}, first {_row(key, only[0])}")
     common = old.index.intersection(new.index)
     old, new = old.loc[common], new.loc[common]
-    own = tolerances or {}
     for column in old.columns.intersection(new.columns).difference(key, sort=False):
         contract = known.get(column)
-        allowed = own.get(f"{name}.{column}", own.get(name, _tolerance(contract, old, column)))
+        allowed = _tolerance(contract, old, column)
         one, other = old[column], new[column]
         differs = (one.isna() != other.isna()).to_numpy()
         both = (one.notna() & other.notna()).to_numpy()
