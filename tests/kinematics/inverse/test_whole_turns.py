@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from kinacc.kinematics.inverse.limits import take_turns
+from kinacc.kinematics import dh, inverse, robot
+from kinacc.kinematics.inverse.limits import reported_joints, take_turns
 
 TURN = 2.0 * np.pi
 
@@ -55,3 +56,14 @@ def test_half_a_turn_is_half_a_turn_forwards_and_a_slide_stays_where_it_is():
     taken = take_turns(q, limits, prismatic=np.array([False, True]))
     np.testing.assert_allclose(taken[:, 0], np.pi)
     np.testing.assert_array_equal(taken[:, 1], q[:, 1])
+
+
+@pytest.mark.parametrize("name", ["fanuc_lrmate200id", "fanuc_m710ic_50", "irb2400_12_155"])
+def test_every_posture_within_the_limits_of_coupled_joints_is_found_there(name):
+    arm = robot.load(name)
+    own = np.random.default_rng(0).uniform(arm.q_min_rad, arm.q_max_rad, (60, 6))
+    found = inverse.solve(arm, arm.dh, dh.forward(arm.dh, arm.dh_joints(own)))
+    reported = reported_joints(arm, found.q_rad)
+    gap = reported - own[:, None]
+    same = np.abs(gap - TURN * np.rint(gap / TURN)).max(axis=-1) < 1e-6
+    assert (same & (found.status == inverse.Status.FOUND)).any(axis=1).all()

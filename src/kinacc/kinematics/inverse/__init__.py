@@ -175,7 +175,8 @@ class _Onto(NamedTuple):
     def turns(self, q_rad: np.ndarray) -> np.ndarray:
         """Joints (..., k) on the turns ``limits.take_turns`` prefers."""
         box, slides = limits.dh_limits(self.robot), self.robot.dh.prismatic
-        return limits.take_turns(q_rad, box, self.preferred_rad, slides)
+        turned = limits.take_turns(q_rad, box, self.preferred_rad, slides)
+        return limits.take_coupled_turns(self.robot, turned)
 
     def converge(self, goal: Pose, start: np.ndarray, first: int) -> tuple[np.ndarray, np.ndarray]:
         """Joints (m, k) on their final turns and convergence (m,), from starts (m, k).

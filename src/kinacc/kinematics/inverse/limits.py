@@ -67,6 +67,20 @@ def within(q_rad: np.ndarray, lower_rad: np.ndarray, upper_rad: np.ndarray) -> n
     return inside.all(axis=-1)
 
 
+def take_coupled_turns(robot: Robot, q_rad: np.ndarray) -> np.ndarray:
+    """DH joints (..., k) moved by whole turns of reported, coupled joints that are then allowed."""
+    whole, coupled = np.rint(robot.joint_map), ~uncoupled(robot)
+    if not coupled.any() or not np.array_equal(whole, robot.joint_map):
+        return q_rad
+    reported = reported_joints(robot, q_rad)
+    low, high = robot.q_min_rad - _ROUND_OFF_RAD, robot.q_max_rad + _ROUND_OFF_RAD
+    up = np.ceil(np.maximum(low - reported, 0.0) / _TWO_PI)
+    down = np.ceil(np.maximum(reported - high, 0.0) / _TWO_PI)
+    moved = reported + _TWO_PI * (up - down)
+    fits = coupled & (moved >= low) & (moved <= high)
+    return q_rad + _TWO_PI * (np.where(fits, up - down, 0.0) @ whole.T)
+
+
 def take_turns(
     q_rad: np.ndarray,
     limits_rad: tuple[np.ndarray, np.ndarray],
