@@ -19,8 +19,8 @@ _FLAG = click.Choice([SAME, MOVED])
 @option("--to", "config", required=True, type=click.Path(), help="Configuration file of the arm.")
 @option("--dataset", help="Data set of the configuration; needed if there are several.")
 @option("--date", help="Day it was measured, as 2026-06-02. [as times in the file say]")
-@option("--base", type=_FLAG, help="Robot and instrument since the newest line.")
-@option("--tool", type=_FLAG, help="Tool or targets since the newest line.")
+@option("--base", type=_FLAG, required=True, help="Robot and instrument since the newest line.")
+@option("--tool", type=_FLAG, required=True, help="Tool or targets since the newest line.")
 @option("--first-date", help="Day of the file that is there, where it is no series yet.")
 @answers()
 def add(measurement_file, config, dataset, date, base, tool, first_date, out) -> None:
@@ -35,8 +35,7 @@ def add(measurement_file, config, dataset, date, base, tool, first_date, out) ->
     """
     from kinacc.deployment import adding
 
-    moved = {"base": base, "tool": tool}
-    result = adding.add(measurement_file, config, dataset, date, moved, first_date)
+    result = adding.add(measurement_file, config, base, tool, dataset, date, first_date)
     following = shlex.join(["kinacc", "calibrate", config])
     lines = [f"{config}, series of {result.dataset}:", *(f"  - {line}" for line in result.written)]
     out.say(asdict(result), "\n".join([*lines, f"Next: {following}"]))

@@ -17,7 +17,7 @@ import numpy as np
 import pandas as pd
 
 from kinacc.calibration.fitting import fit_frames
-from kinacc.calibration.frames import Frames, frame_terms, known, stacked
+from kinacc.calibration.frames import frame_terms, known
 from kinacc.calibration.models import Fit
 from kinacc.calibration.observations import Observations, from_columns
 from kinacc.calibration.one_thread import one_thread
@@ -28,7 +28,14 @@ from kinacc.deployment import folder, history_model
 from kinacc.deployment.history_model import Setup, joined
 from kinacc.deployment.record import Calibration
 from kinacc.deployment.shared_readings import known_readings
-from kinacc.deployment.verify import LEAST_HELD_OUT, covers, held_out_vectors
+from kinacc.deployment.verify import (
+    BASE,
+    LEAST_HELD_OUT,
+    TOOL,
+    covers,
+    frames_at,
+    held_out_vectors,
+)
 from kinacc.errors import FitError, InputError
 from kinacc.kinematics import robot as robots
 from kinacc.kinematics.robot import carried
@@ -92,14 +99,12 @@ def history(sessions: Sequence[Session], rotation_weight_mm_per_rad: float, seed
         setup = Setup(
             setup.same_base & (session.base == SAME), setup.same_tool & (session.tool == SAME)
         )
-        row = {name: getattr(session, name) for name in ("date", "digest", "base", "tool")} | {
+        names = ("date", "digest", "base", "tool", "temperature_c", "bound_mm", "tolerance_mm")
+        row = {name: getattr(session, name) for name in names} | {
             "series": session.name,
             "rows": len(session.observations),
             "configurations": _count(session.observations),
             "model": session.calibration.choice,
-            "temperature_c": session.temperature_c,
-            "bound_mm": session.bound_mm,
-            "tolerance_mm": session.tolerance_mm,
             "verdict": FIRST,
             **_sizes("held_out", session.held_out_mm),
         }
@@ -108,8 +113,8 @@ def history(sessions: Sequence[Session], rotation_weight_mm_per_rad: float, seed
         rows.append(row)
         if row["verdict"] in (FIRST, RECALIBRATE):
             force, setup = session, Setup(True, True)
-    names = [each.name for each in ARTEFACTS["history"].columns]
-    return columns_of("history", [[row.get(name) for name in names] for row in rows])
+    columns = [each.name for each in ARTEFACTS["history"].columns]
+    return columns_of("history", [[row.get(name) for name in columns] for row in rows])
 
 
 @dataclass(frozen=True)
@@ -131,11 +136,10 @@ class _Comparison:
         row: dict[str, Any] = {}
         try:
             row |= _sizes("in_force", self.errors_mm(force, session, setup))
-            few = [each for each in (force, session) if _count(each.observations) < LEAST_HELD_OUT]
-            if few:
-                known = f", {shared.sum()} readings known before left out" if shared.any() else ""
-                what = f"fewer than {LEAST_HELD_OUT} configurations in {few[0].name}{known}"
-                return row | {"verdict": OPEN, "reason": what}
+            for each in (force, session):
+                if _count(each.observations) < LEAST_HELD_OUT:
+                    what = f"fewer than {LEAST_HELD_OUT} configurations in {each.name}"
+                    return row | {"verdict": OPEN, "reason": what}
             return row | self.moved(force, session, setup)
         except (FitError, InputError) as problem:
             return row | {"verdict": OPEN, "reason": str(problem)}
@@ -145,39 +149,34 @@ class _Comparison:
         """What moved, what chance shows, and the verdict. Raises FitError."""
         prismatic = session.calibration.robot.dh.prismatic
         first, second = _thinned(force.observations), _thinned(session.observations)
-        both = joined(first, second, setup)
-        pair = self._about(force, both, len(first))
+        pair = self._about(force, joined(first, second, setup), len(first))
         misfit = 1.0
         if pair.has_other_poses:
-            shown = [self.understated(each, setup) for each in (force, session)]
-            misfit = history_model.misfit_factor(*shown)
-        found = history_model.moved(pair, misfit, self._rng(force.name, session.name))
-        moved_mm, chance_mm = found.moved_mm, found.chance_mm(LEVEL)
+            halves = [self.understated(each, setup) for each in (force, session)]
+            misfit = history_model.misfit_factor(*halves)
+        movement = history_model.moved(pair, misfit, self._rng(force.name, session.name))
+        moved_mm, chance_mm = movement.moved_mm, movement.chance_mm(LEVEL)
         row = {
             "moved_mm": moved_mm,
             "chance_mm": chance_mm,
             "beyond_mm": max(0.0, moved_mm - chance_mm),
-            "probability": found.probability,
-            "verdict": HOLDS,
+            "probability": movement.probability,
         }
-        there = _share_inside(session.observations.q_rad, force.observations.q_rad, prismatic)
-        if there < ENOUGH:
-            what = (
-                f"only {there:.0%} of the readings lie in the joint ranges of {force.name}: errors "
-                "of a calibration where nothing was measured are no change"
-            )
+        inside = _share_inside(session.observations.q_rad, force.observations.q_rad, prismatic)
+        if inside < ENOUGH:
+            what = f"only {inside:.0%} of the readings lie in the joint ranges of {force.name}"
             return row | {"verdict": OPEN, "reason": what}
         if moved_mm > chance_mm:
-            joint = history_model.joint_of(found, prismatic)
+            joint = history_model.joint_of(movement, prismatic)
             return row | {"verdict": RECALIBRATE, "joint": joint}
         held_out_mm = float(np.mean(force.held_out_mm)) if len(force.held_out_mm) else np.inf
         if chance_mm > held_out_mm:
             what = (
-                f"chance alone shows up to {chance_mm:.2f} mm, more than the held-out error of the "
-                f"calibration in force ({held_out_mm:.2f} mm on average)"
+                f"a change below {chance_mm:.2f} mm would not be seen; the mean held-out error of "
+                f"the calibration in force is {held_out_mm:.2f} mm"
             )
             return row | {"verdict": OPEN, "reason": what}
-        return row
+        return row | {"verdict": HOLDS}
 
     @one_thread
     def understated(self, session: Session, setup: Setup) -> float:
@@ -201,49 +200,31 @@ class _Comparison:
         return history_model.about(model, frames, series, first, weight)
 
     def errors_mm(self, force: Session, session: Session, setup: Setup) -> np.ndarray:
-        """Position errors (n,) of the calibration in force where its model says something.
+        """Position errors (n,) of the calibration in force where its model covers the joints.
 
         Base and tool that were moved are fitted to the rows outside each fold, to all without.
         """
-        model, seen = force.calibration.model, session.observations
+        calibration, seen = force.calibration, session.observations
+        kind, model = calibration.choice, calibration.model
         seen = seen.select(covers(model, seen.q_rad).all(axis=1))
-        found = [np.zeros(0)]
+        moved = [BASE] * (not setup.same_base or len(seen.session_names) > 1)
+        moved += [TOOL] * (
+            not setup.same_tool or not {*seen.target_names} <= {*calibration.targets}
+        )
+        bases, sizes = [calibration] * len(seen.session_names), [np.zeros(0)]
         for fold in np.unique(seen.fold):
             tried = seen.fold == fold
             train = seen.select(~tried if fold >= 0 else tried)
             if len(train):
-                kind, frames = (
-                    force.calibration.choice,
-                    self._frames(force.calibration, train, setup),
-                )
-                off = errors({kind: Fit(model, frames)}, seen.select(tried))[
-                    Comparison(MEASURED, kind).name
-                ]
-                found.append(np.linalg.norm(off.position_mm, axis=1))
-        return np.concatenate(found)
-
-    def _frames(self, calibration: Calibration, seen: Observations, setup: Setup) -> Frames:
-        """Base and targets by the calibration, what was moved as ``seen`` shows it."""
-        targets, tool = calibration.targets, carried(calibration.robot)
-        stated = Frames(
-            stacked([calibration.base] * len(seen.session_names)),
-            stacked([targets.get(name, tool) for name in seen.target_names]),
-        )
-        terms = frame_terms(seen, stated)
-        kept = {name for name in seen.target_names if setup.same_tool and name in targets}
-        kept |= {"base"} if setup.same_base and len(seen.session_names) == 1 else set()
-        free = np.array([name.rpartition(".")[0] not in kept for name in terms.names])
-        if not free.any():
-            return stated
-        weight = self.rotation_weight_mm_per_rad
-        terms = replace(terms, free=free)
-        return fit_frames(
-            seen, calibration.model, rotation_weight_mm_per_rad=weight, frame_terms=terms
-        )
+                frames = frames_at(bases, train, moved, self.rotation_weight_mm_per_rad)
+                off = errors({kind: Fit(model, frames)}, seen.select(tried))
+                position_mm = off[Comparison(MEASURED, kind).name].position_mm
+                sizes.append(np.linalg.norm(position_mm, axis=1))
+        return np.concatenate(sizes)
 
     def _rng(self, *names: str) -> np.random.Generator:
-        words = hashlib.sha256("\n".join(names).encode()).digest()
-        return np.random.default_rng([self.seed, *words])
+        digest = hashlib.sha256("\n".join(names).encode()).digest()
+        return np.random.default_rng([self.seed, *digest])
 
 
 def _thinned(observations: Observations) -> Observations:
