@@ -74,9 +74,14 @@ def _find_joints(
     force,
     **_,
 ) -> None:
+    import numpy as np
+
     from kinacc.cli import rows, target_poses
+    from kinacc.deployment.applicability import is_measured_there
     from kinacc.deployment.compensate import compensate as joints_for
+    from kinacc.deployment.predict import pose_columns
     from kinacc.deployment.sensitivity import deviations
+    from kinacc.kinematics.model import JointState
     from kinacc.progress import reporting
 
     answer = Output(as_json=as_json, table=out, force=force)
@@ -87,10 +92,17 @@ def _find_joints(
         found = joints_for(
             calibration, given.pose, given.joints, given.directions, frame, point, given.payload
         )
-        unlike = target_poses.unlike_measured(calibration, found, point)
-    answer.deliver(target_poses.compensated(calibration, given, found, frame, point, unlike))
+        q_dh = calibration.robot.dh_joints(found.q_rad)
+        there = np.isfinite(q_dh).all(axis=1)
+        at = JointState(q_dh[there])
+        unlike = ~calibration.outside_range(q_dh).any(axis=1) & there
+        unlike[there] &= ~is_measured_there(calibration, at, point)
+    table = target_poses.answer_table(calibration, given, found, unlike)
+    facts = calibration.facts(frame, point)
+    title = "{calibration}: joints for {point} ({orientation} orientation), {frame} frame, {model}"
+    shown = table.drop(columns=[*pose_columns(given.pose)])
+    answer.show(facts | {"rows": table}, table, [title.format(**facts)], shown)
     rows.say_unused(given, calibration)
     rows.warn_unlike(unlike)
-    at = target_poses.reached(calibration, found)
     rows.warn_undetermined(deviations(calibration, at, frame, point)[1][:, 0], frame)
     rows.end_where_missing(found.q_rad, "joints")

@@ -22,7 +22,6 @@ from kinacc.tables.atomic import write_whole
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from kinacc.cli.sheet import Sheet
     from kinacc.report.page import Page
 
 TABLES = (".csv", ".json", ".parquet", ".xlsx")
@@ -72,21 +71,6 @@ class Output:
     def say(self, facts: object, words: str) -> None:
         """Print the answer for a machine or for a person."""
         click.echo(json.dumps(plain(facts), indent=1) if self.as_json else words)
-
-    def deliver(self, sheet: Sheet, words: str = "") -> None:
-        """Write the table; print it, and ``words`` below it, where no file or machine takes it."""
-        if self.table is not None:
-            sheet.write(self.table)
-        if self.as_json:
-            click.echo(sheet.as_json())
-            return
-        if self.table is None:
-            click.echo(sheet.as_text())
-        else:
-            named = f"{sheet.title}\n{len(sheet)} rows: " if sheet.title else ""
-            click.echo(f"{named}{self.table}")
-        if words:
-            click.echo(words)
 
     def draw(self, figure: Figure) -> None:
         """Write the picture."""

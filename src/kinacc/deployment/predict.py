@@ -64,15 +64,13 @@ class Prediction:
 
     def table(self) -> pd.DataFrame:
         """One row a pose: position, quaternion, standard deviations (mm, mrad), status."""
-        known = np.isfinite(self.pose.position_mm[:, 0])
-        quaternion = np.full((len(known), 4), np.nan)
-        quaternion[known] = quaternion_from_rotation(self.pose.rotation[known])
         std = self.std * [1.0, 1.0, 1.0, 1e3, 1e3, 1e3]
+        names = [
+            f"std_{name}" for name in ("x_mm", "y_mm", "z_mm", "rx_mrad", "ry_mrad", "rz_mrad")
+        ]
         columns = {
-            **dict(zip(("x_mm", "y_mm", "z_mm"), self.pose.position_mm.T, strict=True)),
-            **dict(zip(("qw", "qx", "qy", "qz"), quaternion.T, strict=True)),
-            **dict(zip(("std_x_mm", "std_y_mm", "std_z_mm"), std[:, :3].T, strict=True)),
-            **dict(zip(("std_rx_mrad", "std_ry_mrad", "std_rz_mrad"), std[:, 3:].T, strict=True)),
+            **pose_columns(self.pose),
+            **dict(zip(names, std.T, strict=True)),
             "std_position_mm": self.std_position_mm,
             "std_orientation_mrad": np.linalg.norm(std[:, 3:], axis=1),
         }
@@ -80,6 +78,15 @@ class Prediction:
             values = getattr(self, name)
             columns |= {f"{name}_mm": values[:, 0], f"{name}_mrad": 1e3 * values[:, 1]}
         return pd.DataFrame({**columns, "status": self.status})
+
+
+def pose_columns(pose: Pose) -> dict[str, np.ndarray]:
+    """Columns x_mm .. and qw .. of poses (n, ...), NaN where there is none."""
+    known = np.isfinite(pose.position_mm[:, 0])
+    quaternion = np.full((len(known), 4), np.nan)
+    quaternion[known] = quaternion_from_rotation(pose.rotation[known])
+    names = ("x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz")
+    return dict(zip(names, np.hstack([pose.position_mm, quaternion]).T, strict=True))
 
 
 def predict(
