@@ -1,0 +1,96 @@
+"""Controllers into which values are typed: they send the true arm to poses in a BASE frame.
+
+``values``: typed numbers by group and name. ``joints`` of an arm are those the pendant shows before
+anything was typed; they drive the true arm. Conventions are those of the makers' manuals.
+"""
+
+from __future__ import annotations
+
+import json
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from oracles.controllers.arms import ARMS, Arm, errors, frame
+
+TURNS = {  # of the numbers of a frame behind x, y, z
+    "kuka": lambda v: Rotation.from_euler("ZYX", v, degrees=True),
+    "abb": lambda v: Rotation.from_quat(v, scalar_first=True),
+    "fanuc": lambda v: Rotation.from_euler("xyz", v, degrees=True),
+    "yaskawa": lambda v: Rotation.from_euler("xyz", v, degrees=True),
+    "ur": Rotation.from_rotvec,
+    "staubli": lambda v: Rotation.from_euler("XYZ", v, degrees=True),
+}
+STAUBLI = Arm(
+    "tx2_90_like",
+    ((0, 478, 50, -90), (-90, 50, 425, 0), (90, 0, 0, 90), (0, 425, 0, -90), (0, 0, 0, 90),
+     (0, 100, 0, 0)),
+    np.eye(6), (0.0,) * 6,
+    (0, 10, 80, 10, 50, 20), (60, 30, 25, 50, 30, 80), ARMS["abb"].limits, errors(6),
+)  # fmt: skip
+MAKERS = {
+    **{name: ARMS[name] for name in ("kuka", "abb", "fanuc", "ur", "yaskawa")},
+    "staubli": STAUBLI,
+}
+
+
+class _Shifted(Arm):
+    """``errors`` (6, 6) are additions to theta, d, a, b, alpha, beta of its rows; rad and mm."""
+
+    def pose(self, shown: np.ndarray, true: bool = False) -> np.ndarray:
+        here = np.eye(4)
+        for (theta, d, a, alpha), more, q in zip(self.rows, self.errors, shown, strict=True):
+            here = here @ frame(turn=Rotation.from_euler("z", q + np.deg2rad(theta) + more[0]))
+            here = here @ frame(a + more[2], more[3], d + more[1])
+            turn = Rotation.from_euler("XY", [np.deg2rad(alpha) + more[4], more[5]])
+            here = here @ frame(turn=turn)
+        return here
+
+
+def as_frame(maker: str, numbers: dict[str, float]) -> np.ndarray:
+    """The matrix of typed numbers of a frame."""
+    values = np.array([*numbers.values()])
+    length = 1e3 if maker == "ur" else 1.0
+    return frame(*(length * values[:3]), TURNS[maker](values[3:]))
+
+
+def joints_for(
+    maker: str, arm: Arm, typed: dict[str, dict[str, float]], file: Path, goal: np.ndarray, near
+) -> np.ndarray:
+    """Joints (6,) of the arm as first mastered when its controller is sent to ``goal`` in BASE."""
+    tool, base = (as_frame(maker, typed[group]) for group in ("TOOL tool", "BASE"))
+    flange = base @ goal @ np.linalg.inv(tool)
+    if maker == "ur":
+        rows = _mounting(file.with_suffix(".conf"))
+        return _Shifted(**{**vars(arm), "errors": rows}).joints(flange, near)
+    if maker == "staubli":
+        rows = _array(file.with_suffix(".cfx"))
+        return _Shifted(**{**vars(arm), "errors": rows}).joints(flange, near)
+    # Every axis was driven to minus the value and mastered there as 0.
+    zeros = np.deg2rad([*typed["joint zeros"].values()])
+    return arm.joints(flange, near + zeros) - zeros
+
+
+def _mounting(file: Path) -> np.ndarray:
+    lines = dict(line.split(" = ") for line in file.read_text().splitlines() if " = " in line)
+    rows = np.zeros((6, 6))
+    for column, (name, unit) in {
+        0: ("delta_theta", 1.0), 1: ("delta_d", 1e3), 2: ("delta_a", 1e3), 4: ("delta_alpha", 1.0),
+    }.items():  # fmt: skip
+        rows[:, column] = unit * np.array(json.loads(lines[name]))
+    return rows
+
+
+def _array(file: Path) -> np.ndarray:
+    names = {
+        "theta": np.pi / 180,
+        "d": 1,
+        "a": 1,
+        "b": 1,
+        "alpha": np.pi / 180,
+        "beta": np.pi / 180,
+    }
+    every = ET.parse(file).getroot()
+    return np.array([[unit * float(row.get(key)) for key, unit in names.items()] for row in every])
