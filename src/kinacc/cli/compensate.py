@@ -24,7 +24,6 @@ from kinacc.cli.output import TABLES, Output, require_writable
 @click.option("--pulses-per-degree", help="Of a Yaskawa job: one number an axis.")
 @click.option("--base-is-fixed", is_flag=True, help="No external axis moves the robot's base.")
 @choice.option("--at-most-mm", type=float, default=20.0, help="Largest change of a position.")
-@click.option("--leave", is_flag=True, help="Write positions that are refused unchanged.")
 @click.option("--dry-run", is_flag=True, help="Write no program, print the corrections.")
 @click.option("--table", type=click.Path(), help="Corrections of a program, as a table.")
 @click.option("--picture", type=click.Path(), help="Corrections of a program, as a picture.")

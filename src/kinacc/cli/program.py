@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator
-from dataclasses import replace
 
 import click
 import numpy as np
@@ -28,7 +27,6 @@ def correct(
     pulses_per_degree: str | None,
     base_is_fixed: bool,
     at_most_mm: float,
-    leave: bool,
     dry_run: bool,
     table: str | None,
     picture: str | None,
@@ -43,58 +41,46 @@ def correct(
         raise InputError(Problem("--frame", "programs are in the robot's own base", "base"))
     require_writable([table], force, TABLES)
     require_writable([picture], force, PICTURES)
-    near = None
-    if near_deg is not None:
-        near = rows.of_arguments((near_deg,), "deg", calibration.robot, "--near-deg")[0]
-    pulses = None if pulses_per_degree is None else _pulses(pulses_per_degree)
-    given = {"tool": _frames("--tool", tools), "base": _frames("--base", bases)}
-    if sys.stdin.isatty():
-        found = programs.read_program(program, frames, pulses)
-        for kind, name in programs.frames_missing(found):
-            if name not in given[kind] and "" not in given[kind]:
-                text = click.prompt(f"{kind} {name} (six numbers, mm and deg)")
-                given[kind][name] = _numbers(f"--{kind}", text)
+    near = near_deg and rows.of_arguments((near_deg,), "deg", calibration.robot, "--near-deg")[0]
     answer = programs.compensate_program(
         calibration,
         program,
-        given["tool"],
-        given["base"],
+        _frames("--tool", tools),
+        _frames("--base", bases),
         frames,
         near,
-        pulses,
+        pulses_per_degree and np.array(numbers_of(pulses_per_degree)),
         point,
         at_most_mm,
         base_is_fixed,
+        _asked if sys.stdin.isatty() else None,
     )
     if picture:
         from kinacc.figures.program import draw
 
         Output(picture=picture).draw(draw(answer.table))
+    moved = answer.table["status"] == "corrected"
+    changes = answer.table.get("change_mm", pd.Series(0.0, moved.index))[moved]
+    lines = [
+        f"{answer.language}: {moved.sum()} of {len(moved)} positions corrected",
+        f"Change of a position: mean {changes.mean():.3g} mm, largest {changes.max():.3g} mm",
+    ]
     facts = {
         "language": answer.language,
-        "corrected": int((answer.table["status"] == "corrected").sum()),
+        "corrected": int(moved.sum()),
         "refused": [str(problem) for problem in answer.refused],
         "left": answer.left,
         "remarks": answer.remarks,
         "positions": answer.table,
     }
-    Output(as_json, table).show(facts, answer.table, _lines(answer))
-    if not as_json:
-        for line in _warnings(answer):
-            click.echo(as_seen(line), err=True)
-    if not dry_run and out is not None:
-        (replace(answer, refused=()) if leave else answer).write(out, force)
-        click.echo(f"Written: {out}", err=as_json)
-    if answer.refused and not leave:
+    Output(as_json, table).show(facts, answer.table, lines if moved.any() else lines[:1])
+    for line in () if as_json else _warnings(answer):
+        click.echo(as_seen(line), err=True)
+    if answer.refused:
         raise SystemExit(1)
-
-
-def _lines(answer: programs.CorrectedProgram) -> Iterator[str]:
-    moved = answer.table["status"] == "corrected"
-    yield f"{answer.language}: {moved.sum()} of {len(answer.table)} positions corrected"
-    if moved.any():
-        changes = answer.table.loc[moved, "change_mm"]
-        yield f"Change of a position: mean {changes.mean():.3g} mm, largest {changes.max():.3g} mm"
+    if not dry_run and out is not None:
+        answer.write(out, force)
+        click.echo(f"Written: {out}", err=as_json)
 
 
 def _warnings(answer: programs.CorrectedProgram) -> Iterator[str]:
@@ -119,15 +105,12 @@ def _frames(option: str, texts: tuple[str, ...]) -> dict[str, np.ndarray]:
     return given
 
 
+def _asked(kind: str, name: str) -> np.ndarray:
+    return _numbers(f"--{kind}", click.prompt(f"{kind} {name} (six numbers, mm and deg)"))
+
+
 def _numbers(option: str, text: str) -> np.ndarray:
     values = numbers_of(text)
     if len(values) not in (6, 7):
         raise InputError(Problem(option, repr(text), "six numbers, mm and deg"))
     return np.array(values)
-
-
-def _pulses(text: str) -> np.ndarray:
-    values = np.array(numbers_of(text))
-    if len(values) == 0 or not np.all(values != 0.0):
-        raise InputError(Problem("--pulses-per-degree", repr(text), "one number an axis"))
-    return values

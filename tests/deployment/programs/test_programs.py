@@ -22,9 +22,9 @@ from kinacc.deployment.programs.orientation import (
     VECTOR,
     Convention,
 )
-from kinacc.deployment.programs.record import NUMBER, POSE, written
+from kinacc.deployment.programs.record import NUMBER, _written
 from kinacc.errors import InputError
-from kinacc.geometry import Pose, compose, exp_so3, invert
+from kinacc.geometry import IDENTITY, Pose, compose, exp_so3, invert
 from kinacc.kinematics import dh, robot
 
 EXAMPLES = Path(__file__).parents[3] / "examples" / "programs"
@@ -90,13 +90,21 @@ def test_the_real_arm_reaches_the_programmed_poses(name, tmp_path):
 
 def _joints_and_poses(arm, path):
     """Nominal joints of a program, and the poses of its tool in the robot's base."""
-    from kinacc.deployment.programs.correction import _Correction, language_of
+    from kinacc.deployment.programs import correction
 
     pulses = PULSES if path.suffix == ".JBI" else None
-    program = read_program(path, (), pulses)
-    work = _Correction(arm, language_of(path), program, None, 20.0)
+    language, program = read_program(path, (), pulses)
+    positions = program.positions
+    tools, bases = (
+        [
+            program.frames.get((kind, getattr(each, kind) or ""), IDENTITY)
+            for each in program.positions
+        ]
+        for kind in ("tool", "base")
+    )
+    convention = program.convention or language.convention
     reasons = {}
-    q_rad = work.starts(None, reasons)
+    q_rad = correction._starts(arm, language, convention, positions, tools, bases, None, reasons)
     assert not reasons
     tool = compose(invert(arm.robot.flange), TOOL)
     end = dh.forward(arm.robot.dh, arm.robot.dh_joints(q_rad))
@@ -126,7 +134,7 @@ def test_a_program_is_corrected_once_and_files_are_kept(tmp_path):
         found.write(out)
     found.write(out, force=True)
     facts = json.loads((tmp_path / "weld_cal.src.kinacc.json").read_text())
-    assert facts["corrected"] == ["weld_cal.src", "weld_cal.dat"]
+    assert facts["from"] == ["weld.src", "weld.dat"]
     shutil.copy(EXAMPLES / "$config.dat", tmp_path)
     for ending in ("src", "dat"):
         (tmp_path / f"weld_cal.{ending}").rename(tmp_path / f"again.{ending}")
@@ -158,8 +166,8 @@ def _home(turn=2):
     [
         (f"LIN {_home(turn=10)}", "posture"),  # a turn that axis 4 does not have
         ("LIN {X 9000,Y 0,Z 500,A 0,B 90,C 0,S 2,T 2}", "cannot reach"),
-        ("$IPO_MODE=#TCP\nLIN {X 500,Y 0,Z 500,A 0,B 90,C 0,S 2,T 2}", "#TCP"),
-        (f"LIN {_home()[:-1]},E1 0}}\nLIN {_home()[:-1]},E1 900}}", "external axes"),
+        ("$IPO_MODE=#TCP\nLIN {X 500,Y 0,Z 500,A 0,B 90,C 0,S 2,T 2}", "stands still"),
+        (f"LIN {_home()[:-1]},E1 0}}\nLIN {_home()[:-1]},E1 900}}", "external axis"),
         ("PTP {A1 20, A2 -80, A3 100, A4 0.0001, A5 40, A6 400}", "limits"),
     ],
 )
@@ -218,15 +226,56 @@ def test_frames_come_back_from_their_numbers(orientation):
     ],
 )  # fmt: skip
 def test_numbers_keep_their_form(old, value, new):
-    assert written(old, value, 4) == new
+    assert _written(old, value, 4) == new
 
 
 def test_positions_have_the_frames_of_their_use():
-    program = read_program(EXAMPLES / "weld.src")
-    poses = [each for each in program.positions if each.kind == POSE]
+    _, program = read_program(EXAMPLES / "weld.src")
+    poses = [each for each in program.positions if each.scale is None]
     assert {(each.tool, each.base) for each in poses} == {("1", "2")}
-    program = read_program(EXAMPLES / "weld.mod")
+    _, program = read_program(EXAMPLES / "weld.mod")
     assert [each.name for each in program.positions] == [
         "p10", "p20", "p30", "jReady", "pList{1}", "pList{2}", "line 18"
     ]  # fmt: skip
-    assert {each.base for each in program.positions if each.kind == POSE} == {"WTABLE"}
+    assert {each.base for each in program.positions if each.scale is None} == {"WTABLE"}
+
+
+def _read(tmp_path, name, text, **files):
+    for file, content in {name: text, **files}.items():
+        (tmp_path / file).write_text(content)
+    return read_program(tmp_path / name, (), np.ones(6))[1]
+
+
+def test_frames_that_a_program_changes_are_refused(tmp_path):
+    target = "[[9,0,9],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]"
+    program = _read(tmp_path, "own.mod", f"""
+      PERS wobjdata w:=[FALSE,TRUE,"",[[1,0,8],[0,0,1,0]],[[0,0,0],[1,0,0,0]]];
+      w.uframe.trans:=p;
+      MoveL {target},v50,fine,tool0\\WObj:=w;
+      MoveL {target},v50,fine,tool0;""")  # fmt: skip
+    assert [bool(each.refused) for each in program.positions] == [True, False]
+    frame = "{X 1,Y 2,Z 3,A 0,B 0,C 0}"
+    program = _read(
+        tmp_path,
+        "own.src",
+        f"""BASE_DATA[2]={frame}
+BAS(#TOOL,0)\nBAS(#BASE,2)\nLIN {frame}
+BASE_DATA[2].z=BASE_DATA[2].z+155\nBAS(#BASE,0)\nLIN {frame}""",
+    )
+    assert [bool(each.refused) for each in program.positions] == [True, False]
+
+
+def test_shifts_of_a_job_are_no_positions(tmp_path):
+    program = _read(tmp_path, "own.jbi", """///TOOL 0\n///POSTYPE BASE\n///RECTAN
+P0000=0.5,-151,-1,0,0,0\nP00100=275.0,0,875,180,45,0\n//INST
+MOVJ P100 VJ=10.00\nSFTON P000""")  # fmt: skip
+    assert [each.name for each in program.positions] == ["P00100"]
+
+
+def test_waypoints_of_polyscope_start_from_their_joints(tmp_path):
+    program = _read(tmp_path, "own.script", """  global A_p=p[-.12,-.43,.14,0,3.11,.04]
+  global A_q=[0.98, -1.29, 2.28, -2.52, -1.55, -0.57]
+  movej(get_inverse_kin(A_p, qnear=A_q), a=1.39, v=1.04)
+  movel(A_p, 1.2, 0.1)""")  # fmt: skip
+    (position,) = program.positions
+    assert (position.name, position.near_rad[1]) == ("A_p", -1.29)

@@ -5,17 +5,7 @@ from kinacc.deployment.programs.correction import (
     LANGUAGES,
     CorrectedProgram,
     compensate_program,
-    frames_missing,
-    language_of,
     read_program,
 )
 
-__all__ = [
-    "AT_MOST_MM",
-    "LANGUAGES",
-    "CorrectedProgram",
-    "compensate_program",
-    "frames_missing",
-    "language_of",
-    "read_program",
-]
+__all__ = ["AT_MOST_MM", "LANGUAGES", "CorrectedProgram", "compensate_program", "read_program"]

@@ -4,286 +4,205 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
 from kinacc.deployment.programs.orientation import KUKA, Convention
 from kinacc.deployment.programs.record import (
-    JOINTS,
+    BASE,
+    CHANGED,
+    NO_FRAMES,
     NUMBER,
-    POSE,
+    SEVERAL,
+    STILL,
+    TOOL,
+    Frames,
     Language,
     Place,
     Position,
     Program,
-    Reading,
     Source,
     blanked,
-    unused,
 )
-from kinacc.geometry import IDENTITY, Pose
 
 CONVENTION = Convention(KUKA)
-_AXES = tuple(f"A{number}" for number in range(1, 7))
-_FRAME = ("X", "Y", "Z", "A", "B", "C")
+_FRAME, _AXES = list("XYZABC"), [f"A{number}" for number in range(1, 7)]
 _AGGREGATE = re.compile(r"\{\s*(?:\w+\s*:)?([^{}]*)\}")
 _PART = re.compile(rf"(\w+)(?:\[\])?\s+({NUMBER}|'[BH][0-9A-F]+'|[^,\s][^,]*)", re.I)
-_MOTION = re.compile(r"^\s*(S?PTP|S?LIN|S?CIRC|SPL)(_REL)?\b(.*)", re.I)
-_ASSIGNED = re.compile(
-    r"^\s*(?:DECL\s+)?(?:GLOBAL\s+)?(?:CONST\s+)?(?:\w+\s+)?"
-    r"(\$?\w+(?:\s*\[\s*\d+\s*\])?)\s*=",
+_MOTION = re.compile(r"\s*(S?PTP|S?LIN|S?CIRC|SPL)(_REL)?\b(.*)", re.I)
+_ASSIGNED = re.compile(r"\s*(?:\w+\s+)*(\$?\w+(?:\s*\[\s*\d+\s*\])?)\s*=", re.I)
+_DATA = re.compile(r"\s*(?:DECL\s+\w+\s+)?(TOOL|BASE)_DATA\s*\[\s*(\d+)\s*\]\s*=", re.I)
+_SET = re.compile(
+    r"BAS\s*\(\s*#(TOOL|BASE)\s*,\s*(\d+)|"
+    r"\$(TOOL|BASE)\s*=\s*(?:(?:TOOL|BASE)_DATA\s*\[\s*(\d+)|S\w+\s*\(\s*(\w+)|(\$?\w*))",
     re.I,
 )
-_NUMBERED = re.compile(r"BAS\s*\(\s*#(TOOL|BASE)\s*,\s*(\d+)\s*\)|\$(TOOL|BASE)\s*=\s*(\S.*)", re.I)
-_NAMES = re.compile(r"\$?[A-Z_]\w*(?:\s*\[\s*\w+\s*\])?", re.I)
-_EMPTY = ("$NULLFRAME",)
+_CHANGED = re.compile(r"\b(TOOL|BASE)_DATA\s*\[\s*(\d+)\s*\]\s*(?:\.\w+\s*=|=\s*[^\s{])", re.I)
+_MOVED = re.compile(r"\$(?:TOOL|BASE)\.\w+\s*=", re.I)
+_COMPONENT = re.compile(r"\s*\w+(?:\[\w+\])?\.(?:[XYZABC]|A[1-6])\s*=", re.I)
+Parts = dict[str, tuple[str, Place]]
 
 
-@dataclass
-class _Aggregate:
-    """A ``{..}`` of a line: its components by name, and where their values stand."""
-
-    source: int
-    line: int
-    start: int
-    end: int
-    parts: dict[str, tuple[str, Place]]
-
-    def has(self, names: Sequence[str]) -> bool:
-        """Whether all these components are there, as numbers."""
-        return all(
-            name in self.parts and re.fullmatch(NUMBER, self.parts[name][0]) for name in names
-        )
-
-    def values(self, names: Sequence[str]) -> np.ndarray:
-        return np.array([float(self.parts[name][0]) for name in names])
-
-
-@dataclass
-class _Frames:
-    """Tool and base in force, as names; None where the program does not say."""
+class _State(NamedTuple):
+    """Tool and base in force by name, None where not stated; why positions are refused."""
 
     tool: str | None = None
     base: str | None = None
     refused: str = ""
 
 
-@dataclass
-class _Walk:
-    """What was found so far."""
+def frames_of(source: Source) -> Frames:
+    """TOOL_DATA and BASE_DATA, and frames written in assignments to $TOOL and $BASE."""
+    frames = {}
+    for at, text in _lines(source.text):
+        found = _DATA.match(text) or re.match(r"\s*\$(TOOL|BASE)()\s*=\s*\{", text, re.I)
+        for parts in _aggregates(at, text) if found else ():
+            if (places := _places(parts, _FRAME)) is not None:
+                name = str(int(found[2])) if found[2] else source.where(at)
+                frames[found[1].lower(), name] = CONVENTION.pose(source.values(places))
+    return frames
 
-    frames: dict[tuple[str, str], Pose] = field(default_factory=lambda: unused())
-    data: dict[str, _Frames] = field(default_factory=dict)
-    declared: dict[str, Position] = field(default_factory=dict)
-    inline: list[Position] = field(default_factory=list)
-    uses: dict[str, list[_Frames]] = field(default_factory=dict)
-    left: list[str] = field(default_factory=list)
 
-
-def read(reading: Reading) -> Program:
+def read(sources: Sequence[Source], frames: Frames, _: np.ndarray | None) -> Program:
     """Positions of a KRL program."""
-    walk = _Walk()
-    for source in reading.frame_files:
-        _frames_of(walk, source)
-    data_first = sorted(enumerate(reading.sources), key=lambda each: each[1].path.suffix.lower())
-    for number, source in data_first:
-        _read_file(walk, number, source)
-    positions = [*_placed(walk), *walk.inline]
-    positions.sort(key=lambda each: (-each.source, each.line, each.places[0]))
-    return Program(reading.sources, tuple(positions), walk.frames, tuple(walk.left))
+    data: dict[str, _State] = {}
+    declared: dict[str, Position] = {}
+    uses: dict[str, set[_State]] = {}
+    inline, left, changed = [], [], set()
+    for source in sorted(sources, key=lambda source: source.path.suffix.lower()):  # .dat first
+        state = _State()
+        for at, text in _lines(source.text):
+            aggregates = list(_aggregates(at, text))
+            where = f"{source.where(at)}: {text.strip()}"
+            state = _in_force(state, text, data, source.where(at))
+            changed |= {(kind.lower(), str(int(n))) for kind, n in _CHANGED.findall(text)}
+            if motion := _MOTION.match(text):
+                target = re.split(r"\bWITH\b|\bC_\w+", re.sub(r"\{[^}]*\}", "", motion[3]))[0]
+                named = [each for each in re.findall(r"\w+", motion[3].upper()) if each in data]
+                now = data[named[0]] if named else state
+                if motion[2] or ":" in target:
+                    left.append(where)
+                    continue
+                for parts in aggregates[: 2 if "CIRC" in motion[1].upper() else 1]:
+                    position = _position(f"line {where.split(':')[1]}", source, parts)
+                    if position is None:
+                        left.append(where)
+                    else:
+                        inline.append(replace(position, **now._asdict()))
+                for name in re.findall(r"\$?\b[A-Z_]\w*", target.upper()):
+                    uses.setdefault(name, set()).add(now)
+            elif _COMPONENT.match(text):
+                left.append(where)
+            elif aggregates and (assigned := _ASSIGNED.match(text)):
+                name = re.sub(r"\s", "", assigned[1].upper())
+                numbers = {key: value for key, (value, _) in aggregates[0].items()}
+                if "TOOL_NO" in numbers and "BASE_NO" in numbers:
+                    still = STILL if "#TCP" in numbers.get("IPO_FRAME", "").upper() else ""
+                    data[name] = _State(numbers["TOOL_NO"], numbers["BASE_NO"], still)
+                elif name[0] != "$" and "_DATA" not in name:
+                    position = _position(name, source, aggregates[0])
+                    if position and (name in declared or re.search(r"\}\s*:", text)):
+                        left.append(where)
+                    elif position:
+                        declared[name] = position
+    positions = []
+    for name, position in declared.items():
+        alone = data.get("F" + name[1:]) if name[0] == "X" else None
+        ways = uses.get(name.split("[")[0]) or {alone or _State()}
+        several = {"refused": SEVERAL} if len(ways) > 1 else {}
+        positions.append(replace(position, **{**next(iter(ways))._asdict(), **several}))
+    order = [source.path for source in sources]
+    every = [
+        replace(each, refused=CHANGED) if {(TOOL, each.tool), (BASE, each.base)} & changed else each
+        for each in (*positions, *inline)
+    ]
+    every.sort(key=lambda each: (-order.index(each.source.path), each.places[0]))
+    return Program(sources, every, {**NO_FRAMES, **frames}, left)
 
 
 def posture(sides: Sequence[bool], q_deg: np.ndarray) -> tuple[str, ...]:
     """Status bits 0 to 2 and turn bits of the six axes."""
     is_ahead, is_above, _ = sides
-    a5 = q_deg[4]
-    bent_back = -180.0 <= a5 < 0.0 or a5 >= 180.0
+    bent_back = -180.0 <= q_deg[4] < 0.0 or q_deg[4] >= 180.0
     bits = (not is_ahead, is_above, bent_back)
-    status = tuple(f"S bit {number} {int(bit)}" for number, bit in enumerate(bits))
-    return (*status, *(f"T bit {axis} {int(angle < 0.0)}" for axis, angle in enumerate(q_deg[:6])))
+    status = [f"S bit {number} {int(bit)}" for number, bit in enumerate(bits)]
+    return (*status, *(f"T bit {axis} {int(angle < 0.0)}" for axis, angle in enumerate(q_deg)))
 
 
-def _lines(text: str) -> Iterator[tuple[int, int, str]]:
-    """Number, offset and text of each line, comments and strings blank."""
-    offset = 0
-    for number, line in enumerate(text.splitlines(keepends=True), 1):
-        yield number, offset, blanked(line, r'"[^"\r\n]*"', r";.*", r"^\s*&.*")
-        offset += len(line)
+def _lines(text: str) -> Iterator[tuple[int, str]]:
+    """Offset and text of each line, comments and strings blank."""
+    at = 0
+    for line in text.splitlines(keepends=True):
+        yield at, blanked(line, r'"[^"\r\n]*"', r";.*", r"^\s*&.*")
+        at += len(line)
 
 
-def _aggregates(source: int, line: int, offset: int, text: str) -> Iterator[_Aggregate]:
+def _aggregates(at: int, text: str) -> Iterator[Parts]:
+    """Components of each ``{..}`` of a line by name, with the places of their values."""
     for found in _AGGREGATE.finditer(text):
-        parts = {}
-        for part in _PART.finditer(text, found.start(1), found.end(1)):
-            start = offset + part.start(2)
-            value = part[2].strip()
-            parts[part[1].upper()] = (value, Place(start, start + len(value)))
-        yield _Aggregate(source, line, found.start(), found.end(), parts)
+        parts = _PART.finditer(text, *found.span(1))
+        yield {
+            part[1].upper(): (part[2].strip(), (at + part.start(2), at + part.end(2)))
+            for part in parts
+        }
 
 
-def _frames_of(walk: _Walk, source: Source) -> None:
-    """TOOL_DATA and BASE_DATA of a $config.dat."""
-    for number, offset, line in _lines(source.text):
-        named = re.match(r"\s*(?:DECL\s+\w+\s+)?(TOOL|BASE)_DATA\s*\[\s*(\d+)\s*\]\s*=", line, re.I)
-        for each in _aggregates(0, number, offset, line) if named else ():
-            if each.has(_FRAME):
-                frame = CONVENTION.pose(each.values(_FRAME))
-                walk.frames[named[1].lower(), str(int(named[2]))] = frame
+def _places(parts: Parts, keys: Sequence[str]) -> list[Place] | None:
+    """Where the numbers of components are; None where one is missing or no number."""
+    if all(re.fullmatch(NUMBER, parts.get(key, ("",))[0]) for key in keys):
+        return [parts[key][1] for key in keys]
+    return None
 
 
-def _read_file(walk: _Walk, number: int, source: Source) -> None:
-    now = _Frames()
-    _frames_of(walk, source)
-    for line, offset, text in _lines(source.text):
-        found = list(_aggregates(number, line, offset, text))
-        now = _frames_in_force(walk, now, text, found, f"{source.path.name}:{line}")
-        where = f"{source.path.name}:{line}"
-        if motion := _MOTION.match(text):
-            _move(walk, now, motion, found, where)
-        elif assigned := _ASSIGNED.match(text):
-            _declare(walk, assigned, text, found, where)
-        elif re.search(r"\bX\w*\.[XYZABC]\s*=|\w+\.A[1-6]\s*=", text, re.I):
-            walk.left.append(f"{where}: {text.strip()}")
-
-
-def _frames_in_force(
-    walk: _Walk, now: _Frames, text: str, found: list[_Aggregate], where: str
-) -> _Frames:
+def _in_force(state: _State, text: str, data: dict[str, _State], where: str) -> _State:
     """The frames after a line that may set them."""
-    if re.search(r"#TCP\b", text, re.I) and "IPO" in text.upper():
-        now = replace(now, refused="the tool stands still (#TCP)")
-    elif re.search(r"\$IPO_MODE\s*=\s*#BASE\b", text, re.I):
-        now = replace(now, refused="")
     if active := re.search(r"\bFDAT_ACT\s*=\s*(\w+)", text, re.I):
-        return walk.data.get(active[1].upper(), _Frames())
-    for setting in _NUMBERED.finditer(text):
-        kind = (setting[1] or setting[3]).lower()
-        name = setting[2]
-        if name is None:
-            name = _frame_name(walk, kind, setting[4].strip(), found, where)
+        return data.get(active[1].upper(), _State())
+    if _MOVED.search(text):
+        return state._replace(refused=CHANGED)
+    if mode := re.search(r"\bIPO_MODE\s*=\s*#(TCP|BASE)\b", text, re.I):
+        state = state._replace(refused=STILL if mode[1].upper() == "TCP" else "")
+    for found in _SET.finditer(text):
+        kind, number = (found[1] or found[3]).lower(), found[2] or found[4]
+        if found[5]:
+            name = getattr(data.get(found[5].upper(), _State()), kind)
+        elif number or found[6].upper() == "$NULLFRAME":
+            name = str(int(number or 0))
         else:
-            name = str(int(name))
-        now = replace(now, **{kind: name})
-    return now
+            name = found[6] or where
+        state = state._replace(**{kind: name})
+    return state
 
 
-def _frame_name(
-    walk: _Walk, kind: str, value: str, found: list[_Aggregate], where: str
-) -> str | None:
-    """What an assignment to $TOOL or $BASE names; a frame written there is entered."""
-    if listed := re.match(r"(?:TOOL|BASE)_DATA\s*\[\s*(\d+)\s*\]\s*$", value, re.I):
-        return str(int(listed[1]))
-    if data := re.match(r"S(?:TOOL2?|BASE)\s*\(\s*(\w+)", value, re.I):
-        return getattr(walk.data.get(data[1].upper(), _Frames()), kind)
-    if value.upper().startswith(_EMPTY):
-        walk.frames[kind, "$NULLFRAME"] = IDENTITY
-        return "$NULLFRAME"
-    if value.startswith("{") and found and found[0].has(_FRAME):
-        walk.frames[kind, where] = CONVENTION.pose(found[0].values(_FRAME))
-        return where
-    return value
-
-
-def _move(walk: _Walk, now: _Frames, motion: re.Match, found: list[_Aggregate], where: str) -> None:
-    """Positions written in a motion, and the use of those that are named."""
-    rest = motion[3]
-    outside = re.split(r"\bWITH\b|\bC_\w+", re.sub(r"\{[^}]*\}", "", rest), flags=re.I)[0]
-    names = [name.upper().replace(" ", "") for name in _NAMES.findall(outside)]
-    data = [walk.data[name] for name in _names_of_data(walk, rest)]
-    frames = data[0] if data else now
-    if motion[2] or ":" in outside:
-        walk.left.append(f"{where}: {motion[0].strip()}")
-    else:
-        for each in found[: 2 if "CIRC" in motion[1].upper() else 1]:
-            position = _position(f"line {each.line}", each)
-            if position is None:
-                walk.left.append(f"{where}: {motion[0].strip()}")
-            else:
-                walk.inline.append(_framed(position, frames))
-    for name in names:
-        walk.uses.setdefault(name, []).append(frames)
-        walk.uses.setdefault(name.split("[")[0], []).append(frames)
-
-
-def _names_of_data(walk: _Walk, text: str) -> list[str]:
-    return [name for name in map(str.upper, re.findall(r"\w+", text)) if name in walk.data]
-
-
-def _declare(
-    walk: _Walk, assigned: re.Match, text: str, found: list[_Aggregate], where: str
-) -> None:
-    """A position or motion data that a line declares or sets."""
-    name = assigned[1].upper().replace(" ", "")
-    if re.match(r"\$|TOOL_DATA|BASE_DATA|LOAD_DATA", name) or not found:
-        return
-    each = found[0]
-    if "TOOL_NO" in each.parts and "BASE_NO" in each.parts:
-        tool, base = (each.parts[key][0] for key in ("TOOL_NO", "BASE_NO"))
-        still = each.parts.get("IPO_FRAME", ("",))[0].strip().upper() == "#TCP"
-        walk.data[name] = _Frames(tool, base, "the tool stands still (#TCP)" if still else "")
-    elif position := _position(name, each):
-        if text[each.end :].strip().startswith(":") or name in walk.declared:
-            walk.left.append(f"{where}: {text.strip()}")
-        else:
-            walk.declared[name] = position
-
-
-def _position(name: str, each: _Aggregate) -> Position | None:
+def _position(name: str, source: Source, parts: Parts) -> Position | None:
     """The position of an aggregate; None where some of its numbers are missing."""
-    external = [key for key in each.parts if re.fullmatch(r"E[1-6]", key) and each.has([key])]
-    outer = tuple(each.values(external))
-    keys = _FRAME if each.has(_FRAME) else _AXES
-    if not each.has(keys):
-        return None
-    places = tuple(each.parts[key][1] for key in keys)
-    values = each.values(keys)
-    is_pose = keys == _FRAME
-    stated = _stated(each) if is_pose else None
-    kind = POSE if is_pose else JOINTS
-    return Position(
-        name, each.source, each.line, kind, places, values, (4,) * 6, posture=stated, external=outer
-    )
+    places = _places(parts, _FRAME)
+    outer = [parts[key][0] for key in parts if re.fullmatch(r"E[1-6]", key)]
+    moves = any(re.fullmatch(NUMBER, each) and float(each) for each in outer)
+    if places is not None:
+        stated = _stated(*(_whole(parts.get(key, ("",))[0]) for key in "ST"))
+        return Position(name, source, places, 4, posture=stated, moves_outside=moves)
+    places = _places(parts, _AXES)
+    return None if places is None else Position(name, source, places, 4, 1.0)
 
 
-def _stated(each: _Aggregate) -> tuple[str | None, ...] | None:
+def _stated(s: int | None, t: int | None) -> tuple[str | None, ...] | None:
     """Status and turn in the words of ``posture``."""
-    s, t = (_whole(each.parts[key][0]) if key in each.parts else None for key in "ST")
     if s is None and t is None:
         return None
     status = [None if s is None else f"S bit {bit} {s >> bit & 1}" for bit in range(3)]
-    turns = [None if t is None else f"T bit {bit} {t >> bit & 1}" for bit in range(6)]
-    return (*status, *turns)
+    return (*status, *(None if t is None else f"T bit {bit} {t >> bit & 1}" for bit in range(6)))
 
 
 def _whole(text: str) -> int | None:
-    base = {"'B": 2, "'H": 16}.get(text[:2].upper())
-    if base:
-        return int(text[2:].rstrip("'"), base)
+    if text[:2].upper() in ("'B", "'H"):
+        return int(text[2:-1], 2 if text[1].upper() == "B" else 16)
     return int(float(text)) if re.fullmatch(NUMBER, text) else None
 
 
-def _framed(position: Position, frames: _Frames) -> Position:
-    return replace(position, tool=frames.tool, base=frames.base, refused=frames.refused)
-
-
-def _placed(walk: _Walk) -> list[Position]:
-    """Declared positions with the frames of the motions that use them, or of their own data."""
-    positions = []
-    for name, position in walk.declared.items():
-        used = walk.uses.get(name) or walk.uses.get(name.split("[")[0]) if "[" in name else None
-        used = used or walk.uses.get(name)
-        own = walk.data.get("F" + name[1:]) if name.startswith("X") else None
-        ways = {(each.tool, each.base, each.refused) for each in used or ([own] if own else [])}
-        if len(ways) > 1:
-            what = "is used with different tools or bases"
-            positions.append(replace(position, refused=what))
-        else:
-            frames = _Frames(*next(iter(ways))) if ways else _Frames()
-            positions.append(_framed(position, frames))
-    return positions
-
-
 LANGUAGE = Language(
-    "KUKA KRL", (".src", ".dat"), CONVENTION, read, posture, (".src", ".dat"), ("$config.dat",)
-)
+    "KUKA KRL", (".src", ".dat"), CONVENTION, read, frames_of, posture, (".src", ".dat"),
+    ("$config.dat",),
+)  # fmt: skip

@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-import warnings
 from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from kinacc.errors import InputError, Problem
-from kinacc.geometry import Pose, log_so3, quaternion_from_rotation, rotation_from_quaternion
+from kinacc.geometry import Pose
 
-KUKA, FIXED, INTRINSIC = "A, B, C", "W, P, R", "intrinsic x, y, z"
-QUATERNION, VECTOR = "q1 .. q4", "rotation vector"
-_AXES = {KUKA: "ZYX", FIXED: "xyz", INTRINSIC: "XYZ"}
+KUKA, FIXED, INTRINSIC = "ZYX", "xyz", "XYZ"
+QUATERNION, VECTOR = "quaternion", "rotation vector"
 _UNIT = 1e-3
-_TURN = 360.0
-_LOCKED = 1e-7
 
 
 class Convention(NamedTuple):
@@ -37,54 +33,34 @@ class Convention(NamedTuple):
         if self.orientation == QUATERNION:
             length = np.linalg.norm(turn)
             if abs(length - 1.0) > _UNIT:
-                what = f"the quaternion {list(map(float, turn))} has length {length:.4g}"
-                raise InputError(Problem("orientation", what, "length 1"))
-            return Pose(rotation_from_quaternion(turn / length), position)
-        angles = self.angle_deg * turn
-        if self.orientation == VECTOR:
-            return Pose(Rotation.from_rotvec(angles, degrees=True).as_matrix(), position)
-        axes = _AXES[self.orientation]
-        return Pose(Rotation.from_euler(axes, angles, degrees=True).as_matrix(), position)
+                raise InputError(Problem("quaternion", f"has length {length:.4g}", "length 1"))
+            rotation = Rotation.from_quat(turn, scalar_first=True)
+        elif self.orientation == VECTOR:
+            rotation = Rotation.from_rotvec(self.angle_deg * turn, degrees=True)
+        else:
+            rotation = Rotation.from_euler(self.orientation, self.angle_deg * turn, degrees=True)
+        return Pose(rotation.as_matrix(), position)
 
     def numbers(self, pose: Pose, near: np.ndarray) -> np.ndarray:
         """The numbers of a frame, of equal ones those nearest to ``near``."""
-        near = np.asarray(near[3:])
-        position = pose.position_mm / self.length_mm
+        near, rotation = np.asarray(near[3:]), Rotation.from_matrix(pose.rotation)
+        unit, turns = 1.0, 360.0
         if self.orientation == QUATERNION:
-            turn = quaternion_from_rotation(pose.rotation)
-            return np.concatenate([position, -turn if turn @ near < 0.0 else turn])
-        near = self.angle_deg * near
-        if self.orientation == VECTOR:
-            vector = np.rad2deg(log_so3(pose.rotation))
-            angle = np.linalg.norm(vector)
-            axis = vector / angle if angle > 0.0 else vector
-            ways = [axis * (angle + whole * _TURN) for whole in (-1, 0, 1)]
+            quaternion = rotation.as_quat(scalar_first=True)
+            ways = [quaternion, -quaternion]
+        elif self.orientation == VECTOR:
+            unit, vector = self.angle_deg, rotation.as_rotvec(degrees=True)
+            axis = vector / max(np.linalg.norm(vector), 1e-12)
+            ways = [vector + turn * axis for turn in (0.0, -turns, turns)]
         else:
-            a, b, c = _euler(pose.rotation, _AXES[self.orientation], near)
+            unit = self.angle_deg
+            a, b, c = rotation.as_euler(self.orientation, degrees=True, suppress_warnings=True)
             ways = [np.array([a, b, c]), np.array([a + 180.0, 180.0 - b, c + 180.0])]
-            ways = [way + _TURN * np.rint((near - way) / _TURN) for way in ways]
-        best = min(ways, key=lambda way: np.linalg.norm(way - near))
-        return np.concatenate([position, best / self.angle_deg])
+            ways = [way + turns * np.rint((unit * near - way) / turns) for way in ways]
+        best = min(ways, key=lambda way: np.linalg.norm(way - unit * near))
+        return np.concatenate([pose.position_mm / self.length_mm, best / unit])
 
     def typed(self, numbers: np.ndarray) -> Pose:
-        """A frame as --tool and --base give it, in mm and degrees.
-
-        Six numbers; where the controller writes quaternions, fixed x, y, z angles or seven numbers.
-        """
-        numbers = np.asarray(numbers, dtype=float)
-        if self.orientation == QUATERNION and len(numbers) == 6:
-            return Convention(FIXED).pose(numbers)
-        return Convention(self.orientation).pose(numbers)
-
-
-def _euler(rotation: np.ndarray, axes: str, near: np.ndarray) -> np.ndarray:
-    """Angles about three axes; where the first and the last turn alike, the last as in ``near``."""
-    if axes.islower():
-        return _euler(rotation, axes[::-1].upper(), near[::-1])[::-1]
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UserWarning)  # at a middle angle of 90 deg, mended below
-        a, b, c = Rotation.from_matrix(rotation).as_euler(axes, degrees=True)
-    if np.cos(np.deg2rad(b)) < _LOCKED:
-        sign = np.sign(b) if axes == "ZYX" else -np.sign(b)
-        a, c = a + sign * (near[2] - c), near[2]
-    return np.array([a, b, c])
+        """A frame as a person gives it, in mm and degrees; fixed angles for a quaternion."""
+        is_short = self.orientation == QUATERNION and len(numbers) == 6
+        return Convention(FIXED if is_short else self.orientation).pose(np.asarray(numbers, float))

@@ -13,99 +13,65 @@ from kinacc.kinematics import dh
 from kinacc.kinematics.inverse import limits, solve
 from kinacc.kinematics.robot import Robot
 
-Named = Callable[[Sequence[bool], np.ndarray], tuple[str, ...]]
-_STATED_DEG = 0.02  # a program's rounded numbers move a joint across a boundary by no more
+Posture = Callable[[Sequence[bool], np.ndarray], tuple[str, ...]]
+Stated = tuple[str | None, ...]
+_ROUNDING_DEG = 0.02  # a program's rounded numbers move a joint across a boundary by no more
 
 
-def sides(robot: Robot, q_rad: np.ndarray) -> np.ndarray:
-    """Sides (n, 3) of an arm of six turning joints at reported joints (n, 6).
+def unmatched(
+    robot: Robot, posture: Posture, stated: Stated, q_rad: np.ndarray, slack_deg: float = 1e-6
+) -> str:
+    """Parts of the posture at joints (k,) that are not as stated, joints moved by the slack.
 
-    Whether the wrist is in front of axis 1, axis 3 above the line from axis 2 to the wrist (as of
-    an upright arm that reaches forward), and joint 5 positive. Front is the base's x axis at zero
-    of joint 1.
+    Sides are those of an arm of six turning joints: whether the wrist is in front of axis 1, axis 3
+    above the line from axis 2 to the wrist (as of an upright arm that reaches forward), and joint 5
+    positive. Front is the base's x axis at zero of joint 1.
     """
-    q_rad = np.atleast_2d(q_rad)
-    frames = dh.chain(robot.dh, robot.dh_joints(q_rad))
-    frames = compose(robot.base, frames)
-    zero = compose(robot.base, dh.chain(robot.dh, robot.dh_joints(0.0 * q_rad)))
-    # The first frame turns with joint 1 alone.
-    turn = frames.rotation[:, 1] @ np.swapaxes(zero.rotation[:, 1], 1, 2)
-    front, left = turn[:, :, 0], turn[:, :, 1]
-    shoulder, elbow, wrist = (frames.position_mm[:, place] for place in (1, 2, 4))
-    arm = np.cross(elbow - shoulder, wrist - elbow)
-    ahead = np.sum(front * (wrist - frames.position_mm[:, 0]), axis=1) >= 0.0
-    return np.stack([ahead, np.sum(arm * left, axis=1) > 0.0, q_rad[:, 4] > 0.0], axis=1)
+    poses = np.stack([q_rad, 0.0 * q_rad])
+    frames = compose(robot.base, dh.chain(robot.dh, robot.dh_joints(poses)))
+    place = frames.position_mm[0]
+    front, left, _ = (frames.rotation[0, 1] @ frames.rotation[1, 1].T).T  # turned by joint 1 alone
+    arm = np.cross(place[2] - place[1], place[4] - place[2])
+    names = []
+    for slack in (0.0, slack_deg, -slack_deg):
+        q_deg = np.rad2deg(q_rad) + slack
+        sides = front @ (place[4] - place[0]) >= 0.0, arm @ left > 0.0, q_deg[4] > 0.0
+        names.append(posture(sides, q_deg))
+    parts = zip(stated, *names, strict=True)
+    return ", ".join(now for wanted, now, *near in parts if wanted not in (None, now, *near))
 
 
-def changed(robot: Robot, posture: Named, stated: tuple, q_rad: np.ndarray) -> str:
-    """The parts of the posture at joints (k,) that are not as stated, in the controller's words."""
-    now = posture(sides(robot, q_rad)[0], np.rad2deg(q_rad))
-    apart = [part for part, wanted in zip(now, stated, strict=True) if wanted not in (None, part)]
-    return ", ".join(apart)
-
-
-def _has(posture: Named, stated: tuple, flags: np.ndarray, q_rad: np.ndarray) -> bool:
-    """Whether joints (k,) with their sides are in a posture, but for rounding of the program."""
-    near = []
-    for slack_deg in (0.0, _STATED_DEG, -_STATED_DEG):
-        moved = np.rad2deg(q_rad) + slack_deg
-        near.append(posture((flags[0], flags[1], moved[4] > 0.0), moved))
-    parts = zip(stated, *near, strict=True)
-    return all(wanted is None or wanted in names for wanted, *names in parts)
-
-
-def postures_of(robot: Robot, flange: Pose) -> list[np.ndarray]:
-    """Reported joints (m, k) of every posture and turn within the limits, by flange pose (n, ...).
-
-    Poses are in the robot's base frame.
-    """
+def postures_of(robot: Robot, flange: Pose) -> np.ndarray:
+    """Reported joints (n, m, k) of all postures at flange poses (n, ...); NaN where not reached."""
     goal = compose(invert(robot.base), compose(flange, invert(robot.flange)))
-    found = solve(robot, robot.dh, goal).q_rad
-    turns = 2.0 * np.pi * np.array([0, -1, 1, -2, 2])
-    every = []
-    for ways in found:
-        reported = limits.reported_joints(robot, ways[np.isfinite(ways).all(axis=1)])
-        several = []
-        for q_rad in reported:
-            columns = [
-                [
-                    v
-                    for v in value + (0.0 if slides else turns) * np.ones(5)
-                    if low - 1e-9 <= v <= high + 1e-9
-                ]
-                for value, slides, low, high in zip(
-                    q_rad, robot.dh.prismatic, robot.q_min_rad, robot.q_max_rad, strict=True
-                )
-            ]
-            several += list(product(*map(dict.fromkeys, columns)))
-        every.append(np.array(several).reshape(-1, robot.dh.joints))
-    return every
+    return limits.reported_joints(robot, solve(robot, robot.dh, goal).q_rad)
 
 
 def choose(
     robot: Robot,
     ways: np.ndarray,
-    posture: Named | None,
-    stated: tuple[str | None, ...] | None,
+    posture: Posture | None,
+    stated: Stated | None,
     near_rad: np.ndarray | None,
 ) -> np.ndarray:
-    """Of joints ``ways`` (m, k) those in the stated posture, nearest to ``near_rad``.
+    """Of postures (m, k) on all turns within the limits the one stated, nearest to ``near_rad``.
 
     Raises InputError where there are none, or several and nothing to choose by.
     """
+    turns = [(0.0,) if slides else 2.0 * np.pi * np.arange(-2, 3) for slides in robot.dh.prismatic]
+    ways = ways[np.isfinite(ways).all(axis=1)]
+    ways = (ways[:, None] + np.array([*product(*turns)])).reshape(-1, robot.dh.joints)
+    inside = (ways >= robot.q_min_rad - 1e-9) & (ways <= robot.q_max_rad + 1e-9)
+    ways = ways[inside.all(axis=1)]
     if len(ways) == 0:
-        raise InputError(Problem("position", "the nominal arm cannot reach it within its limits"))
+        raise InputError(Problem("", "the nominal arm cannot reach it within its limits"))
     if stated is not None and posture is not None:
-        flags = sides(robot, ways)
-        fits = [_has(posture, stated, *each) for each in zip(flags, ways, strict=True)]
+        fits = [not unmatched(robot, posture, stated, way, _ROUNDING_DEG) for way in ways]
         if not any(fits):
             words = ", ".join(filter(None, stated))
-            what = f"the nominal arm cannot reach it in the posture {words}"
-            raise InputError(Problem("position", what))
+            raise InputError(Problem("", f"the nominal arm cannot reach it in the posture {words}"))
         ways = ways[fits]
-    if near_rad is None:
-        if len(ways) > 1 and stated is None:
-            fix = "give joints to start from: --near-deg"
-            raise InputError(Problem("position", "no posture is stated", fix=fix))
-        near_rad = np.zeros(ways.shape[1])
+    elif near_rad is None and len(ways) > 1:
+        raise InputError(Problem("", "no posture is stated; give joints to start from: --near-deg"))
+    near_rad = np.zeros(ways.shape[1]) if near_rad is None else near_rad
     return ways[np.argmin(np.max(np.abs(ways - near_rad), axis=1).round(9))]

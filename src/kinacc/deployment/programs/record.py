@@ -8,9 +8,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
@@ -19,9 +18,14 @@ from kinacc.errors import InputError, Problem
 from kinacc.geometry import IDENTITY, Pose
 
 NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
-POSE, JOINTS = "pose", "joints"
-TOOL, BASE = "tool", "base"
 _NUMBER = re.compile(NUMBER)
+TOOL, BASE = "tool", "base"
+CHANGED = "the program changes its tool or base"
+SEVERAL = "is used with different tools or bases"
+STILL = "the tool stands still"
+Place = tuple[int, int]
+Frames = dict[tuple[str, str], Pose]
+NO_FRAMES: Frames = {(kind, "0"): IDENTITY for kind in (TOOL, BASE)}
 
 
 @dataclass(frozen=True)
@@ -36,88 +40,88 @@ class Source:
         """The file's bytes as text; InputError for a file of two bytes a character."""
         content = path.read_bytes()
         if b"\0" in content[:4096]:
-            raise InputError(
-                Problem(str(path), "is no text of one byte a character", "ASCII, UTF-8, Windows")
-            )
+            raise InputError(Problem(str(path), "is no text of one byte a character"))
         return cls(path, content.decode("latin-1"))
 
-    def line(self, offset: int) -> int:
-        """Number of the line at an offset, from 1."""
-        return self.text.count("\n", 0, offset) + 1
+    def where(self, at: int) -> str:
+        """File and line of an offset."""
+        return f"{self.path.name}:{self.text.count(chr(10), 0, at) + 1}"
+
+    def numbers(self, start: int, end: int) -> list[Place]:
+        """Places of the numbers between two offsets."""
+        return [found.span() for found in _NUMBER.finditer(self.text, start, end)]
+
+    def values(self, places: Iterable[Place]) -> np.ndarray:
+        """The numbers at places."""
+        return np.array([float(self.text[slice(*place)].replace(",", ".")) for place in places])
 
 
-class Place(NamedTuple):
-    """Where a number stands: offsets in the text."""
-
-    start: int
-    end: int
-
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Position:
     """One position of a program.
 
-    ``numbers`` are those written, in the language's units: a position and an orientation, or
-    joints; ``decimals`` the digits after the point that a new number has at least. ``scale``
-    (k,): written units per degree (mm where a joint slides) of joints. ``tool`` and ``base`` name
-    frames of the program, None where the program does not state one. ``posture`` is compared with
-    ``Language.posture``, None where none is stated. ``external``: axes beyond the arm. ``refused``:
-    why this position cannot be corrected.
+    ``places``: of its numbers in ``source``, in the language's units: a pose, or joints where
+    ``scale`` is given: written units per degree (mm where a joint slides). ``decimals``: digits
+    after the point that new numbers have at least. ``tool`` and ``base`` name frames of the
+    program, None where it states none. ``posture`` is compared with ``Language.posture``, None
+    where none is stated; ``near_rad``: joints near to it. ``moves_outside``: an external axis is
+    not at zero. ``refused``: why it cannot be corrected.
     """
 
     name: str
-    source: int
-    line: int
-    kind: str
-    places: tuple[Place, ...]
-    numbers: np.ndarray
-    decimals: tuple[int, ...]
+    source: Source
+    places: Sequence[Place]
+    decimals: Sequence[int] | int
+    scale: np.ndarray | float | None = None
     tool: str | None = None
     base: str | None = None
     posture: tuple[str | None, ...] | None = None
-    external: tuple[float, ...] = ()
-    scale: np.ndarray | float = 1.0
+    near_rad: np.ndarray | None = None
+    moves_outside: bool = False
     refused: str = ""
+
+    @property
+    def numbers(self) -> np.ndarray:
+        """The numbers as written."""
+        return self.source.values(self.places)
+
+    @property
+    def where(self) -> str:
+        """File and line."""
+        return self.source.where(self.places[0][0])
 
 
 @dataclass(frozen=True)
 class Program:
-    """What was read: files, positions in their order, frames by kind and name.
+    """A program as read.
 
-    ``left``: statements whose positions are computed by the program and stay as they are.
-    ``convention``: that of this file, where it is not the one of its language.
+    ``frames``: tools and bases by kind and name. ``left``: statements whose positions the program
+    computes. ``convention``: that of this file, where files of the language differ.
     """
 
-    sources: tuple[Source, ...]
-    positions: tuple[Position, ...]
-    frames: Mapping[tuple[str, str], Pose] = field(default_factory=dict)
-    left: tuple[str, ...] = ()
+    sources: Sequence[Source]
+    positions: Sequence[Position]
+    frames: Frames
+    left: Sequence[str] = ()
     convention: Convention | None = None
-
-
-@dataclass(frozen=True)
-class Reading:
-    """What a language is given beside the program: further files with frames, and a pulse scale."""
-
-    sources: tuple[Source, ...]
-    frame_files: tuple[Source, ...] = ()
-    pulses_per_degree: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
 class Language:
     """One language: how its programs are read and its numbers are meant.
 
-    ``partners``: endings of files read and written together with the program; ``frame_files``:
-    names, in lower case, of files with frames that are looked for in the program's folder.
-    ``posture``: what the controller calls the posture, from the sides (front, elbow up, wrist of
-    joint 5 positive) and the joints in degrees.
+    ``read(sources, frames, pulses_per_degree)`` gives a Program; ``frames(source)`` the tools and
+    bases that a file holds. ``partners``: endings of files written together with the program;
+    ``frame_files``: names, in lower case, of files with frames beside it. ``posture``: what the
+    controller calls the posture, from the sides (front, elbow up, wrist of joint 5 positive) and
+    the joints in degrees.
     """
 
     name: str
     endings: tuple[str, ...]
     convention: Convention
-    read: Callable[[Reading], Program]
+    read: Callable[[Sequence[Source], Frames, np.ndarray | None], Program]
+    frames: Callable[[Source], Frames] = lambda source: {}
     posture: Callable[[Sequence[bool], np.ndarray], tuple[str, ...]] | None = None
     partners: tuple[str, ...] = ()
     frame_files: tuple[str, ...] = ()
@@ -130,54 +134,33 @@ def blanked(text: str, *patterns: str) -> str:
     return text
 
 
-def numbers_in(text: str, start: int, end: int) -> list[Place]:
-    """Places of the numbers between two offsets."""
-    return [Place(*found.span()) for found in _NUMBER.finditer(text, start, end)]
+def replaced(source: Source, new: Mapping[Position, np.ndarray]) -> bytes:
+    """The file with new numbers of its positions."""
+    changes = [
+        (place, _written(source.text[slice(*place)], value, least))
+        for position, values in new.items()
+        if position.source is source
+        for place, value, least in zip(
+            position.places, values, np.broadcast_to(position.decimals, len(values)), strict=True
+        )
+    ]
+    parts, done = [], 0
+    for (start, end), number in sorted(changes):
+        parts += [source.text[done:start], number]
+        done = end
+    return "".join([*parts, source.text[done:]]).encode("latin-1")
 
 
-def values_at(text: str, places: Iterable[Place]) -> np.ndarray:
-    """The numbers at places."""
-    return np.array([float(text[place.start : place.end]) for place in places])
-
-
-def written(old: str, value: float, least: int) -> str:
-    """A number in the form of the old one: its digits after the point, at least ``least``.
+def _written(old: str, value: float, least: int) -> str:
+    """A number in the form of the old one, with as many digits after the point and ``least``.
 
     The old text where it is the same number to that many digits.
     """
-    if "," in old:
-        return written(old.replace(",", "."), value, least).replace(".", ",")
-    point = re.search(r"\.(\d*)", old)
-    is_short = "e" not in old.lower()
-    decimals = max(least, len(point[1]) if point and is_short else 0)
-    if abs(value - float(old)) < 0.5 * 10.0**-decimals:
+    point = re.search(r"[.,](\d*)", old)
+    decimals = max(least, len(point[1]) if point and "e" not in old.lower() else 0)
+    if abs(value - float(old.replace(",", "."))) < 0.5 * 10.0**-decimals:
         return old
-    text = f"{value:.{decimals}f}"
-    if float(text) == 0.0:
-        text = text.lstrip("-")
-    if old.startswith("+") and not text.startswith("-"):
-        text = "+" + text
-    return re.sub(r"^([-+]?)0\.", r"\1.", text) if re.match(r"[-+]?\.", old) else text
-
-
-def replaced(program: Program, new: Mapping[int, np.ndarray]) -> list[bytes]:
-    """The files with new numbers, by number of the position."""
-    changes: list[list[tuple[Place, str]]] = [[] for _ in program.sources]
-    for number, values in new.items():
-        position = program.positions[number]
-        text = program.sources[position.source].text
-        for place, value, least in zip(position.places, values, position.decimals, strict=True):
-            changes[position.source].append((place, written(text[slice(*place)], value, least)))
-    files = []
-    for source, made in zip(program.sources, changes, strict=True):
-        parts, done = [], 0
-        for place, text in sorted(made):
-            parts += [source.text[done : place.start], text]
-            done = place.end
-        files.append("".join([*parts, source.text[done:]]).encode("latin-1"))
-    return files
-
-
-def unused(*kinds: str) -> dict[tuple[str, str], Pose]:
-    """Frames of number 0, which every controller has as the identity."""
-    return {(kind, "0"): IDENTITY for kind in kinds or (TOOL, BASE)}
+    text = f"{value:{'+' if old[0] == '+' else ''}.{decimals}f}"
+    text = text.lstrip("-") if float(text) == 0.0 else text
+    text = re.sub(r"^([-+]?)0\.", r"\1.", text) if re.match(r"[-+]?\.", old) else text
+    return text.replace(".", ",") if "," in old else text

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -16,112 +17,72 @@ from kinacc.deployment.programs.orientation import (
 )
 from kinacc.deployment.programs.record import (
     BASE,
-    JOINTS,
     NUMBER,
-    POSE,
+    Frames,
     Language,
-    Place,
     Position,
     Program,
-    Reading,
     Source,
 )
 from kinacc.errors import InputError, Problem
 from kinacc.geometry import IDENTITY
 
-_DECIMALS = 6
-_DEGREES = {"deg": 1.0, "rad": 180.0 / np.pi, "": 1.0}
-_LENGTHS = {"mm": 1.0, "m": 1e3, "": 1.0}
+_UNITS = {"deg": 1.0, "rad": 180.0 / np.pi, "mm": 1.0, "m": 1e3, "": 1.0}
 _TURNS = {
-    QUATERNION: ("qw", "qx", "qy", "qz"),
-    VECTOR: ("rvx", "rvy", "rvz"),
-    INTRINSIC: ("rx", "ry", "rz"),
-    KUKA: ("a", "b", "c"),
-    FIXED: ("w", "p", "r"),
+    QUATERNION: ["qw", "qx", "qy", "qz"],
+    VECTOR: ["rvx", "rvy", "rvz"],
+    INTRINSIC: ["rx", "ry", "rz"],
+    KUKA: ["a", "b", "c"],
+    FIXED: ["w", "p", "r"],
 }
+_COLUMN = re.compile(r"(\w+?)(?:_|\s*[\[(])(mm|m|deg|rad)[\])]?")
 
 
-def read(reading: Reading) -> Program:
+def read(sources: Sequence[Source], frames: Frames, _: np.ndarray | None) -> Program:
     """Positions of a CSV file: joints where it has them, else poses in the robot's base."""
-    (source,) = reading.sources
-    lines = source.text.splitlines(keepends=True)
-    head = lines[0].removeprefix("\xef\xbb\xbf") if lines else ""
-    delimiter = next((mark for mark in ";\t" if mark in head), ",")
-    columns = [_named(cell) for cell in head.split(delimiter)]
-    names = [name for name, _ in columns]
-    joints = [name for name in names if re.fullmatch(r"q[1-9]", name)]
-    if twice := {name for name in names if name and names.count(name) > 1}:
-        raise InputError(Problem(f"{source.path}:1", f"has two columns of {', '.join(twice)}"))
-    convention, keys = None, sorted(joints)
-    units = dict(columns)
-    if not joints:
-        turn = next((key for key, own in _TURNS.items() if all(n in names for n in own)), None)
-        if turn is None or not all(name in names for name in "xyz"):
+    (source,) = sources
+    head, *lines = source.text.splitlines(keepends=True) or [""]
+    mark = next((mark for mark in ";\t" if mark in head), ",")
+    cells = [cell.strip('\xef\xbb\xbf" \r\n').lower() for cell in head.split(mark)]
+    columns = [_COLUMN.fullmatch(cell) for cell in cells]
+    names = [found[1] if found else cell for found, cell in zip(columns, cells, strict=True)]
+    unit = {found[1]: _UNITS[found[2]] for found in columns if found}
+    keys = sorted(name for name in names if re.fullmatch(r"q[1-9]", name))
+    convention = scale = None
+    if keys:
+        scale = np.array([1.0 / unit.get(key, 1.0) for key in keys])
+    else:
+        kinds = [kind for kind, turn in _TURNS.items() if {*"xyz", *turn} <= set(names)]
+        if not kinds:
             allowed = "q1_deg .., or x_mm .. with qw .., rvx_deg .., rx_deg .., a .. c or w, p, r"
             raise InputError(Problem(f"{source.path}:1", "names no columns of positions", allowed))
-        keys = ["x", "y", "z", *_TURNS[turn]]
-        degrees = 1.0 if turn == QUATERNION else _DEGREES[units[keys[-1]]]
-        convention = Convention(turn, _LENGTHS[units["x"]], degrees)
-    positions, offset = [], len(lines[0])
-    for number, line in enumerate(lines[1:], 2):
+        keys = [*"xyz", *_TURNS[kinds[0]]]
+        convention = Convention(kinds[0], unit.get("x", 1.0), unit.get(keys[-1], 1.0))
+    if twice := {key for key in keys if names.count(key) > 1}:
+        raise InputError(Problem(f"{source.path}:1", f"has two columns of {', '.join(twice)}"))
+    positions, at = [], len(head)
+    for number, line in enumerate(lines, 2):
         if line.strip():
-            cells = _cells(source, number, line, offset, delimiter)
-            positions.append(_position(source, number, cells, names, keys, units, bool(joints)))
-        offset += len(line)
-    return Program(reading.sources, tuple(positions), {(BASE, ""): IDENTITY}, convention=convention)
+            places = _places(line, mark, at)
+            where = f"{source.path}:{number}"
+            if len(places) != len(names):
+                raise InputError(Problem(where, f"has {len(places)} cells", f"{len(names)}"))
+            row = dict(zip(names, places, strict=True))
+            for key in keys:
+                text = source.text[slice(*row[key])]
+                if not re.fullmatch(NUMBER, text.replace(",", ".")):
+                    raise InputError(Problem(f"{where}, column {key}", f"{text!r} is no number"))
+            label = source.text[slice(*row["pose"])] if "pose" in row else f"line {number}"
+            own = [row[key] for key in keys]
+            positions.append(Position(label, source, own, 6, scale, tool="", base=""))
+        at += len(line)
+    return Program(sources, positions, {**frames, (BASE, ""): IDENTITY}, convention=convention)
 
 
-def _named(cell: str) -> tuple[str, str]:
-    """Name and unit of a column."""
-    text = cell.strip().strip('"').lower()
-    found = re.fullmatch(r"(\w+?)(?:_|\s*[\[(])(mm|m|deg|rad)[\])]?", text)
-    return (found[1], found[2]) if found else (text, "")
-
-
-def _cells(source: Source, number: int, line: str, offset: int, delimiter: str) -> list[Place]:
-    if '"' in line and delimiter in "".join(re.findall(r'"([^"]*)"', line)):
-        raise InputError(Problem(f"{source.path}:{number}", "has a delimiter within quotes"))
-    places = []
-    for cell in line.rstrip("\r\n").split(delimiter):
-        text = cell.strip().strip('"')
-        start = offset + cell.find(text)
-        places.append(Place(start, start + len(text)))
-        offset += len(cell) + 1
-    return places
-
-
-def _position(
-    source: Source,
-    number: int,
-    cells: list[Place],
-    names: list[str],
-    keys: list[str],
-    units: dict[str, str],
-    is_joints: bool,
-) -> Position:
-    where = f"{source.path}:{number}"
-    if len(cells) < len(names):
-        raise InputError(Problem(where, f"has {len(cells)} cells", f"{len(names)}, as the head"))
-    places = tuple(cells[names.index(key)] for key in keys)
-    texts = [source.text[slice(*place)].replace(",", ".") for place in places]
-    for key, text in zip(keys, texts, strict=True):
-        if not re.fullmatch(NUMBER, text):
-            raise InputError(Problem(f"{where}, column {key}", f"{text!r} is no number"))
-    label = source.text[slice(*cells[names.index("pose")])] if "pose" in names else f"line {number}"
-    factors = {**_DEGREES, **_LENGTHS}
-    scale = np.array([1.0 / factors[units[key]] for key in keys]) if is_joints else 1.0
-    return Position(
-        label,
-        0,
-        number,
-        JOINTS if is_joints else POSE,
-        places,
-        np.array([float(text) for text in texts]),
-        (_DECIMALS,) * len(keys),
-        None if is_joints else "",
-        "",
-        scale=scale,
-    )
+def _places(line: str, mark: str, at: int) -> list[tuple[int, int]]:
+    """Where the cells of a line are, without spaces and quotes around them."""
+    found = re.finditer(rf'[ \t]*"?([^{mark}"\r\n]*?)"?\s*(?:{mark}|$)', line.rstrip("\r\n"))
+    return [(at + cell.start(1), at + cell.end(1)) for cell in found][: line.count(mark) + 1]
 
 
 LANGUAGE = Language("CSV", (".csv",), Convention(FIXED), read)

@@ -3,117 +3,82 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
-from dataclasses import replace
+from collections.abc import Sequence
 
 import numpy as np
 
 from kinacc.deployment.programs.orientation import VECTOR, Convention
 from kinacc.deployment.programs.record import (
     BASE,
-    JOINTS,
     NUMBER,
-    POSE,
+    SEVERAL,
     TOOL,
+    Frames,
     Language,
     Position,
     Program,
-    Reading,
+    Source,
     blanked,
-    numbers_in,
-    values_at,
 )
-from kinacc.geometry import IDENTITY, Pose
+from kinacc.geometry import IDENTITY
 
 CONVENTION = Convention(VECTOR, 1e3, 180.0 / np.pi)
-_SIX = rf"\s*{NUMBER}\s*(?:,\s*{NUMBER}\s*){{5}}"
-_LIST = re.compile(rf"(p?)\[{_SIX}\]")
+_SIX = rf"(p?)\[\s*{NUMBER}\s*(?:,\s*{NUMBER}\s*){{5}}\]"
+_ASSIGNED = re.compile(rf"^[ \t]*(?:global\s+|local\s+)?(\w+)\s*=\s*({_SIX})", re.M)
 _CALL = re.compile(r"\b(move[jlpc]|set_tcp)\s*\(")
-_ASSIGNED = re.compile(rf"^[ \t]*(?:global\s+|local\s+)?(\w+)\s*=\s*(p?)\[{_SIX}\]", re.M)
-_COMPUTED = re.compile(r"\b(?:pose_trans|pose_add|get_inverse_kin)\b")
-_DECIMALS = (6,) * 6
+_ARGUMENT = re.compile(
+    rf"\s*(get_inverse_kin\s*\(\s*)?(?:({_SIX})|(\w+))\s*(?:,\s*(?:qnear\s*=\s*)?(\w+)\s*)?[,)]"
+)
 
 
-def read(reading: Reading) -> Program:
+def read(sources: Sequence[Source], frames: Frames, _: np.ndarray | None) -> Program:
     """Positions of a script: the targets of its moves, written there or in a variable."""
-    (source,) = reading.sources
+    (source,) = sources
     text = blanked(source.text, r"#.*", r'"[^"\r\n]*"')
-    assigned = {found[1]: found for found in _ASSIGNED.finditer(text)}
-    frames: dict[tuple[str, str], Pose] = {(BASE, ""): IDENTITY}
-    tool, places, left = None, {}, []
-    for found in _CALL.finditer(text):
-        arguments = list(_arguments(text, found.end()))
-        line = source.line(found.start())
-        if found[1] == "set_tcp":
-            tool = _tool(text, arguments, assigned, frames, line)
-            continue
-        for start, end in arguments[: 2 if found[1] == "movec" else 1]:
-            argument = text[start:end].strip()
-            named = assigned.get(argument)
-            listed = _LIST.fullmatch(argument)
-            if named is None and listed is None:
-                left.append(f"{source.path.name}:{line}: {found[1]}({argument}")
-                continue
-            at = named.start(2) if named else text.index(argument, start)
-            is_pose = bool((named or listed)[2 if named else 1])
-            places.setdefault((at, is_pose, argument if named else ""), set()).add(tool)
-    left += [
-        f"{source.path.name}:{source.line(found.start())}: {name} is set more than once"
-        for name in assigned
-        for found in list(_ASSIGNED.finditer(text))[:-1]
-        if found[1] == name and found.start() != assigned[name].start()
-    ]
-    positions = []
-    for (at, is_pose, name), tools in sorted(places.items()):
-        numbers = tuple(numbers_in(text, at, text.index("]", at)))
-        line = source.line(at)
-        position = Position(
-            name or f"line {line}",
-            0,
-            line,
-            POSE if is_pose else JOINTS,
-            numbers,
-            values_at(text, numbers),
-            _DECIMALS,
-            next(iter(tools)),
-            "",
-            scale=np.pi / 180.0,
-        )
-        if len(tools) > 1:
-            position = replace(position, refused="is used with different tools")
-        positions.append(position)
-    return Program(reading.sources, tuple(positions), frames, tuple(left))
-
-
-def _tool(text: str, arguments: list, assigned: dict, frames: dict, line: int) -> str:
-    """Enter the frame of a set_tcp; its name."""
-    start, end = arguments[0] if arguments else (0, 0)
-    argument = text[start:end].strip()
-    found = assigned.get(argument) or _LIST.fullmatch(argument)
-    if found is None:
-        return argument
-    at = start if found.re is _LIST else found.start(2)
-    numbers = numbers_in(text, at, text.index("]", at))
-    name = f"set_tcp in line {line}"
-    frames[TOOL, name] = CONVENTION.pose(values_at(text, numbers))
-    return name
-
-
-def _arguments(text: str, start: int) -> Iterator[tuple[int, int]]:
-    """Offsets of the arguments of a call, from behind its opening bracket."""
-    depth, begin = 0, start
-    for at in range(start, len(text)):
-        sign = text[at]
-        if sign in "([":
-            depth += 1
-        elif sign in ")]":
-            if depth == 0:
-                yield begin, at
-                return
-            depth -= 1
-        elif sign == "," and depth == 0:
-            yield begin, at
-            begin = at + 1
+    named: dict[str, list[tuple[int, int]]] = {}
+    for each in _ASSIGNED.finditer(text):
+        named.setdefault(each[1], []).append(each.span(2))
+    frames = {**frames, (BASE, ""): IDENTITY}
+    tool, uses, near, left = None, {}, {}, []
+    for call in _CALL.finditer(text):
+        at, where = call.end(), source.where(call.start())
+        for _number in range(2 if call[1] == "movec" else 1):
+            found = _ARGUMENT.match(text, at)
+            spans = (
+                [found.span(2)] if found and found[2] else named.get(found[4], []) if found else []
+            )
+            if call[1] == "set_tcp":
+                tool = f"set_tcp in line {where.split(':')[1]}" if spans else "set_tcp"
+                if len(spans) == 1:
+                    frames[TOOL, tool] = CONVENTION.pose(source.values(source.numbers(*spans[0])))
+            elif not spans:
+                left.append(f"{where}: {text[call.start() :].splitlines()[0]}")
+                break
+            for span in spans if call[1] != "set_tcp" else ():
+                uses.setdefault(span, set()).add(tool)
+                if found[1] and found[5] in named:
+                    near[span] = source.values(source.numbers(*named[found[5]][-1]))
+            at = found.end() if found else at
+    names = {span: name for name, spans in named.items() for span in spans}
+    return Program(
+        sources,
+        [
+            Position(
+                names.get(span, f"line {source.where(span[0]).split(':')[1]}"),
+                source,
+                source.numbers(*span),
+                6,
+                None if text[span[0]] == "p" else np.pi / 180.0,
+                next(iter(tools)),
+                "",
+                near_rad=near.get(span),
+                refused=SEVERAL if len(tools) > 1 else "",
+            )
+            for span, tools in sorted(uses.items())
+        ],
+        frames,
+        left,
+    )
 
 
 LANGUAGE = Language("URScript", (".script", ".urscript"), CONVENTION, read)

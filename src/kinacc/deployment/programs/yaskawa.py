@@ -4,109 +4,33 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
-from kinacc.deployment.programs.frame_files import frames_of
 from kinacc.deployment.programs.orientation import FIXED, Convention
 from kinacc.deployment.programs.record import (
     BASE,
-    JOINTS,
-    POSE,
+    NO_FRAMES,
     TOOL,
+    Frames,
     Language,
     Position,
     Program,
-    Reading,
-    numbers_in,
-    values_at,
+    Source,
 )
 from kinacc.errors import InputError, Problem
 from kinacc.geometry import IDENTITY
 
 CONVENTION = Convention(FIXED)
-_POSITION = re.compile(r"(B?C|P|BP|EC|EX)(\d+)\s*=")
-_ROBOT = "ROBOT"
-
-
-def read(reading: Reading) -> Program:
-    """Positions of a job; those of base and station axes stay as they are."""
-    (source,) = reading.sources
-    frames = {(TOOL, "0"): IDENTITY, (BASE, _ROBOT): IDENTITY}
-    frames.update(frames_of(reading.frame_files, CONVENTION))
-    state = {"TOOL": "0", "USER": None, "POSTYPE": "", "RCONF": None, "unit": ""}
-    positions, base_axes, left = [], {}, []
-    offset = 0
-    for number, line in enumerate(source.text.splitlines(keepends=True), 1):
-        text = line.strip()
-        if text.startswith("//INST"):
-            left += _computed(source.text[offset:], number, source.path.name)
-            break
-        if text.startswith("///"):
-            word, _, rest = text[3:].partition(" ")
-            if word in ("PULSE", "RECTAN", "ANGLE"):
-                state["unit"] = word
-            elif word == "TOOL":
-                state["TOOL"] = str(int(rest.split(",")[0]))
-            elif word in state:
-                state[word] = rest.strip()
-        elif found := _POSITION.match(text):
-            start = offset + line.index("=") + 1
-            places = numbers_in(source.text, start, offset + len(line))
-            values = values_at(source.text, places)
-            if found[1].startswith(("B", "E")):
-                base_axes[found[2]] = (*base_axes.get(found[2], ()), *values)
-            else:
-                positions.append(_position(found[0][:-1].strip(), number, places, values, state))
-        offset += len(line)
-    positions = [
-        replace(each, external=(*each.external, *base_axes.get(re.sub(r"\D", "", each.name), ())))
-        for each in positions
-    ]
-    if any(each.kind == JOINTS for each in positions):
-        positions = _scaled(positions, reading)
-    return Program(reading.sources, tuple(positions), frames, tuple(left))
-
-
-def _position(name: str, line: int, places: list, values: np.ndarray, state: dict) -> Position:
-    kind = POSE if state["unit"] == "RECTAN" else JOINTS
-    decimals = (3, 3, 3, 4, 4, 4) if kind == POSE else (0,) * len(places)
-    base, stated, refused = None, None, ""
-    if kind == POSE:
-        reference = state["POSTYPE"].upper()
-        if reference == "USER":
-            base = str(int(state["USER"] or 0))
-        elif reference in ("ROBOT", "BASE"):
-            base = _ROBOT
-        else:
-            refused = f"positions of the kind {reference or 'not stated'} cannot be corrected"
-        stated = _stated(state["RCONF"])
-    used = 6 if kind == POSE else len(places)
-    return Position(
-        name,
-        0,
-        line,
-        kind,
-        tuple(places[:used]),
-        values[:used],
-        decimals,
-        state["TOOL"],
-        base,
-        stated,
-        tuple(values[used:]),
-        refused=refused,
-    )
-
-
-def _stated(text: str | None) -> tuple[str | None, ...] | None:
-    if not text:
-        return None
-    bits = [int(bit) for bit in text.split(",")[:6]]
-    names = [pair[bit] for pair, bit in zip(_WORDS, bits, strict=False)]
-    return (*names, *(None,) * (6 - len(names)))
-
-
+_POSITION = re.compile(r"^(B?C|B?P|E[CX])(\d+)\s*=(.*)|^///(\w+)(.*)", re.M)
+_BLOCK = re.compile(r"^//(TOOL|UFRAME)\s+(\d+)(.*?)(?=^//(?!/)|\Z)", re.M | re.S)
+_ROW = {
+    "TOOL": re.compile(r"^[-+.\d][^\r\n/]*", re.M),
+    "UFRAME": re.compile(r"^/{3,4}BUSER\s+[^\r\n]*", re.M),
+}
+_MOVE = re.compile(r"\s*S?MOV[JLCS]\b.*?\bP0*(\d+)\b")
+_VARIABLE = re.compile(r"\bP0*(\d+)\b")
+_COMPUTED = re.compile(r"\s*(?:IMOV|SFTON|CNVRT|MULMAT|SETE)\b")
 _WORDS = (
     ("flip", "no flip"),
     ("upper arm", "lower arm"),
@@ -117,47 +41,106 @@ _WORDS = (
 )
 
 
+def frames_of(source: Source) -> Frames:
+    """Tools of TOOL.CND, user frames of UFRAME.CND."""
+    frames = {}
+    for block in _BLOCK.finditer(source.text):
+        row = _ROW[block[1]].search(source.text, *block.span(3))
+        places = source.numbers(*row.span()) if row else []
+        if len(places) >= 6:
+            kind = TOOL if block[1] == "TOOL" else BASE
+            frames[kind, str(int(block[2]))] = CONVENTION.pose(source.values(places[:6]))
+    return frames
+
+
+def read(
+    sources: Sequence[Source], frames: Frames, pulses_per_degree: np.ndarray | None
+) -> Program:
+    """Positions of a job; those of base and station axes, and shifts, stay as they are."""
+    (source,) = sources
+    start = source.text.find("//INST")
+    end = len(source.text) if start < 0 else start
+    instructions = source.text[end:].splitlines()
+    targets = {int(found[1]) for line in instructions if (found := _MOVE.match(line))}
+    others = {
+        int(name)
+        for line in instructions
+        if not _MOVE.match(line)
+        for name in _VARIABLE.findall(line)
+    }
+    left, at = [], end
+    for line in source.text[end:].splitlines(keepends=True):
+        if _COMPUTED.match(line):
+            left.append(f"{source.where(at)}: {line.strip()}")
+        at += len(line)
+    state: dict[str, str] = {}
+    positions, moving = [], set()
+    for found in _POSITION.finditer(source.text, 0, end):
+        kind, name, word = found[1], found[2], found[4]
+        if word:
+            state[word] = found[5].strip()
+            state["unit"] = word if word in ("PULSE", "RECTAN") else state.get("unit", "PULSE")
+            continue
+        places = source.numbers(*found.span(3))
+        if kind[0] in "BE":
+            moving |= {name} if source.values(places).any() else set()
+        elif kind == "C" or int(name) in targets - others:
+            positions.append((kind + name, places, dict(state)))
+    return Program(
+        sources,
+        [
+            _position(source, *each, pulses_per_degree, each[0].lstrip("CP") in moving)
+            for each in positions
+        ],
+        {**NO_FRAMES, (BASE, "ROBOT"): IDENTITY, (BASE, "BASE"): IDENTITY, **frames},
+        left,
+    )
+
+
+def _position(
+    source: Source, name: str, places: list, state: dict, pulses: np.ndarray | None, moves: bool
+) -> Position:
+    if state.get("unit") != "RECTAN":
+        if pulses is None:
+            fix = "give --pulses-per-degree, one number an axis (S, L, U, R, B, T)"
+            raise InputError(Problem(str(source.path), "positions are in pulses", fix=fix))
+        scale = np.asarray(pulses)
+        return Position(name, source, places[: len(scale)], 0, scale)
+    reference = state.get("POSTYPE", "").upper()
+    base = str(int(state.get("USER") or 0)) if reference == "USER" else reference
+    known = reference in ("USER", "ROBOT", "BASE")
+    return Position(
+        name,
+        source,
+        places[:6],
+        (3, 3, 3, 4, 4, 4),
+        tool=str(int(state.get("TOOL", "0").split(",")[0])),
+        base=base,
+        posture=_stated(state.get("RCONF")),
+        moves_outside=moves or bool(source.values(places[6:]).any()),
+        refused="" if known else f"is in the frame {reference or 'of its axes'}",
+    )
+
+
+def _stated(text: str | None) -> tuple[str | None, ...] | None:
+    if not text:
+        return None
+    bits = [*map(int, text.split(",")[:6])]
+    return (
+        *(pair[bit] for pair, bit in zip(_WORDS, bits, strict=False)),
+        *(None,) * (6 - len(bits)),
+    )
+
+
 def posture(sides: Sequence[bool], q_deg: np.ndarray) -> tuple[str, ...]:
     """Flip by the R axis, upper arm, front, and turns of R, T and S."""
     is_ahead, is_above, _ = sides
     r = (q_deg[3] + 180.0) % 360.0 - 180.0
-    bits = (not -90.0 < r <= 90.0, not is_above, not is_ahead)
     turned = [not -180.0 < q_deg[axis] <= 180.0 for axis in (3, 5, 0)]
-    return tuple(pair[int(bit)] for pair, bit in zip(_WORDS, (*bits, *turned), strict=True))
-
-
-def _scaled(positions: list[Position], reading: Reading) -> list[Position]:
-    """Joints with pulses a degree; InputError where no scale is known."""
-    scale = reading.pulses_per_degree
-    if scale is None:
-        what = "positions are in pulses"
-        fix = "give --pulses-per-degree, one number an axis (S, L, U, R, B, T)"
-        raise InputError(Problem(str(reading.sources[0].path), what, fix=fix))
-    scaled = []
-    for each in positions:
-        if each.kind == JOINTS:
-            count = len(scale)
-            each = replace(
-                each,
-                places=each.places[:count],
-                numbers=each.numbers[:count],
-                decimals=each.decimals[:count],
-                external=(*each.numbers[count:], *each.external),
-                scale=np.asarray(scale),
-            )
-        scaled.append(each)
-    return scaled
-
-
-def _computed(text: str, first: int, name: str) -> list[str]:
-    """Moves by a shift or to a variable that the job computes."""
-    found = []
-    for number, line in enumerate(text.splitlines(), first):
-        if re.match(r"\s*(IMOV|SFTON|CNVRT|MULMAT|SETE)\b", line):
-            found.append(f"{name}:{number}: {line.strip()}")
-    return found
+    bits = (not -90.0 < r <= 90.0, not is_above, not is_ahead, *turned)
+    return tuple(pair[int(bit)] for pair, bit in zip(_WORDS, bits, strict=True))
 
 
 LANGUAGE = Language(
-    "Yaskawa JBI", (".jbi",), CONVENTION, read, posture, (), ("tool.cnd", "uframe.cnd")
+    "Yaskawa JBI", (".jbi",), CONVENTION, read, frames_of, posture, (), ("tool.cnd", "uframe.cnd")
 )
