@@ -155,62 +155,143 @@ def posture(arm: Arm, shown: np.ndarray) -> tuple[bool, bool]:
     return bool(flat[4][0] < 0.0), bool(upper[1] * fore[0] - upper[0] * fore[1] > 0.0)
 
 
-def _decimal(values, digits: str = ".6f") -> list[str]:
-    return [f"{value:{digits}}" for value in values]
+def _filled(text: str, points: np.ndarray, **forms: Callable) -> str:
+    """The text with each mark ``@X`` replaced by ``forms["X"]`` of the next point."""
+    left = iter(points)
+    return re.sub("@([A-Z])", lambda mark: forms[mark[1]](next(left)), text)
+
+
+def _named(names: str, values) -> str:
+    return ",".join(f"{name} {value}" for name, value in zip(names.split(), values, strict=True))
+
+
+KUKA_DATA = """&ACCESS RVP
+DEFDAT  WELD
+;FOLD EXTERNAL DECLARATIONS
+;ENDFOLD
+DECL E6POS XP1={@P,%E}
+DECL E6POS XP2={@P,%E}
+DECL E6POS XP3={@P,%E}
+DECL E6POS XP4={@P,%E}
+DECL E6POS XP5={@P,%E}
+DECL POS XP6={@P}
+GLOBAL FRAME XF1={@F}
+DECL E6AXIS XJ1={@J,%E}
+DECL AXIS XJ2={@J}
+DECL FDAT FP1={TOOL_NO 1,BASE_NO 1,IPO_FRAME #BASE,POINT2[] " ",TQ_STATE FALSE}
+ENDDAT
+"""
+KUKA_SOURCE = """&ACCESS RVP
+&REL 3
+DEF weld ( )
+; Schwei\xdfnaht, X 12.0 bleibt
+$TOOL={%TOOL}
+$BASE = {%BASE}
+$VEL.CP=0.25
+PTP {@J,%E}
+PTP XJ1
+PTP XJ2 C_PTP
+PTP XP1
+LIN XP2 C_DIS
+CIRC XP3, XP4
+SPLINE
+  SPL XP5
+ENDSPLINE
+LIN XP6
+LIN XF1
+PTP {@P,%E} C_DIS
+LIN {@P,%E} C_DIS
+SLIN {@P,%E} C_DIS
+SPTP {@P,%E} C_DIS
+LIN {@F}
+CIRC {@P}, {@P}
+PTP {E6POS: @P}
+PTP {E6AXIS: @J}
+PTP {E6AXIS: @J}
+WAIT SEC 0.5
+END
+"""
 
 
 def kuka(arm: Arm, points: np.ndarray, tool: np.ndarray, base: np.ndarray) -> Program:
     """KRL: .src and .dat, declared and inline, of all types."""
     program = Program(arm, "kuka", tool, base)
-    outer = "E1 0.0,E2 0.0,E3 0.0,E4 0.0,E5 0.0,E6 0.0"
 
-    def named(names: str, values) -> str:
-        return ",".join(f"{a} {v}" for a, v in zip(names.split(), values, strict=True))
+    def place(q) -> str:
+        return _named("X Y Z A B C", program.add(q))
 
-    def pose(q, with_posture: bool = True) -> str:
-        text = named("X Y Z A B C", program.add(q))
-        if not with_posture:
-            return text
+    def pose(q) -> str:
         behind, above = posture(arm, q)
         status = behind + 2 * above + 4 * (q[4] < 0.0)
         turn = sum(1 << axis for axis in range(6) if q[axis] < 0.0)
-        return f"{text},S {status},T {turn}"
+        return f"{place(q)},S {status},T {turn}"
 
     def joints(q) -> str:
-        return named("A1 A2 A3 A4 A5 A6", program.add(q, True))
+        return _named("A1 A2 A3 A4 A5 A6", program.add(q, True))
 
-    frames = [
-        named("X Y Z A B C", _decimal(program.convention.of_pose(each))) for each in (tool, base)
-    ]
-    p = iter(points)
-    data = ["&ACCESS RVP", "DEFDAT  WELD", ";FOLD EXTERNAL DECLARATIONS", ";ENDFOLD"]
-    for number in range(1, 6):
-        data.append(f"DECL E6POS XP{number}={{{pose(next(p))},{outer}}}")
-    data.append(f"DECL POS XP6={{{pose(next(p))}}}")
-    data.append(f"GLOBAL FRAME XF1={{{pose(next(p), False)}}}")
-    data.append(f"DECL E6AXIS XJ1={{{joints(next(p))},{outer}}}")
-    data.append(f"DECL AXIS XJ2={{{joints(next(p))}}}")
-    data.append('DECL FDAT FP1={TOOL_NO 1,BASE_NO 1,IPO_FRAME #BASE,POINT2[] " ",TQ_STATE FALSE}')
-    data.append("ENDDAT")
-    lines = ["&ACCESS RVP", "&REL 3", "DEF weld ( )", "; Schwei\xdfnaht, X 12.0 bleibt",
-             "$TOOL={" + frames[0] + "}", "$BASE = {" + frames[1] + "}",
-             "$VEL.CP=0.25", f"PTP {{{joints(next(p))},{outer}}}", "PTP XJ1", "PTP XJ2 C_PTP",
-             "PTP XP1", "LIN XP2 C_DIS", "CIRC XP3, XP4", "SPLINE", "  SPL XP5", "ENDSPLINE",
-             "LIN XP6", "LIN XF1"]  # fmt: skip
-    for word in ("PTP", "LIN", "SLIN", "SPTP"):
-        lines.append(f"{word} {{{pose(next(p))},{outer}}} C_DIS")
-    lines.append(f"LIN {{{pose(next(p), False)}}}")
-    lines.append(f"CIRC {{{pose(next(p))}}}, {{{pose(next(p))}}}")
-    lines.append(f"PTP {{E6POS: {pose(next(p))}}}")
-    lines += [f"PTP {{E6AXIS: {joints(each)}}}" for each in p]
-    lines += ["WAIT SEC 0.5", "END"]
-    program.files = {".src": "\r\n".join(lines) + "\r\n", ".dat": "\r\n".join(data) + "\r\n"}
+    both = _filled(KUKA_DATA + KUKA_SOURCE, points, P=pose, F=place, J=joints)
+    for mark, frames in (("%TOOL", tool), ("%BASE", base)):
+        values = [f"{value:.6f}" for value in program.convention.of_pose(frames)]
+        both = both.replace(mark, _named("X Y Z A B C", values))
+    both = both.replace("%E", _named("E1 E2 E3 E4 E5 E6", ["0.0"] * 6)).replace("\n", "\r\n")
+    data, end, source = both.partition("ENDDAT\r\n")
+    program.files = {".src": source, ".dat": data + end}
     return program
+
+
+RAPID = """%%%
+  VERSION:1
+  LANGUAGE:ENGLISH
+%%%
+MODULE Weld
+  PERS tooldata tGun:=[TRUE,%TOOL,[1,[0,0,1],[1,0,0,0],0,0,0]];
+  PERS wobjdata wTab:=[FALSE,TRUE,"",%BASE,[[0,0,0],[1,0,0,0]]];
+  ! caf\xe9: [[1,2,3],[1,0,0,0]] stays
+  CONST robtarget p10:=@P;
+  LOCAL CONST robtarget p20:=@P;
+  CONST robtarget p30:=@P;
+  CONST robtarget p40:=@P;
+  CONST robtarget p50:=@P;
+  CONST robtarget p60:=@P;
+  CONST robtarget p70:=@P;
+  CONST robtarget p80:=@P;
+  CONST robtarget p90:=@P;
+  CONST jointtarget j10:=@J;
+  CONST jointtarget j20:=@J;
+  CONST jointtarget j30:=@J;
+  PROC main()
+    ConfL\\Off;
+    MoveAbsJ j10\\NoEOffs,v1000,z50,tGun;
+    MoveAbsJ j20\\NoEOffs,v1000,z50,tGun;
+    MoveAbsJ j30\\NoEOffs,v1000,z50,tGun;
+    MoveJ p10,v500,z10,%F;
+    MoveJ p20,v500,z10,%F;
+    MoveJ p30,v500,z10,%F;
+    MoveL p40,v200,fine,%F;
+    MoveL p50,v200,fine,%F;
+    MoveL p60,v200,fine,%F;
+    MoveL p70,v200,fine,%F;
+    MoveC p80,p90,v100,z5,%F;
+    MoveL @P,v200,z1,%F;
+    MoveL @P,v200,z1,%F;
+    MoveL @P,v200,z1,%F;
+    MoveL @P,v200,z1,%F;
+    MoveC @P,
+      @P,v100,fine,%F;
+    MoveAbsJ @J,v1000,fine,tGun;
+    MoveAbsJ @J,v1000,fine,tGun;
+    WaitTime 0.5;
+  ENDPROC
+ENDMODULE
+"""
 
 
 def abb(arm: Arm, points: np.ndarray, tool: np.ndarray, base: np.ndarray) -> Program:
     """RAPID: declared and inline targets, with tool and work object of the module."""
-    program, p = Program(arm, "abb", tool, base), iter(points)
+    program = Program(arm, "abb", tool, base)
+
+    def framed(values) -> str:
+        return f"[{','.join(values[:3])}],[{','.join(values[3:])}]"
 
     def pose(q) -> str:
         values = program.add(q)
@@ -218,38 +299,16 @@ def abb(arm: Arm, points: np.ndarray, tool: np.ndarray, base: np.ndarray) -> Pro
         quadrants = [int(np.floor(np.rad2deg(q[axis]) / 90.0)) for axis in (0, 3, 5)]
         conf = [*quadrants, 4 * behind + 2 * (not above) + (q[4] <= 0.0)]
         outer = "[9E+09,9E+09,9E+09,9E+09,9E+09,9E+09]"
-        place, turn = ",".join(values[:3]), ",".join(values[3:])
-        return f"[[{place}],[{turn}],[{','.join(map(str, conf))}],{outer}]"
+        return f"[{framed(values)},[{','.join(map(str, conf))}],{outer}]"
 
     def joints(q) -> str:
         return f"[[{','.join(program.add(q, True))}],[9E9,9E9,9E9,9E9,9E9,9E9]]"
 
-    def fixed(each) -> str:
-        numbers = _decimal(program.convention.of_pose(each), ".9f")
-        return f"[[{','.join(numbers[:3])}],[{','.join(numbers[3:])}]]"
-
-    lines = ["%%%", "  VERSION:1", "  LANGUAGE:ENGLISH", "%%%", "MODULE Weld",
-             f"  PERS tooldata tGun:=[TRUE,{fixed(tool)},[1,[0,0,1],[1,0,0,0],0,0,0]];",
-             f'  PERS wobjdata wTab:=[FALSE,TRUE,"",{fixed(base)},[[0,0,0],[1,0,0,0]]];',
-             "  ! caf\xe9: [[1,2,3],[1,0,0,0]] stays"]  # fmt: skip
-    for number in range(10, 100, 10):
-        word = "LOCAL CONST" if number == 20 else "CONST"
-        lines.append(f"  {word} robtarget p{number}:={pose(next(p))};")
-    for number in (10, 20, 30):
-        lines.append(f"  CONST jointtarget j{number}:={joints(next(p))};")
-    frames = "tGun\\WObj:=wTab"
-    lines += ["  PROC main()", "    ConfL\\Off;"]
-    lines += [f"    MoveAbsJ j{number}\\NoEOffs,v1000,z50,tGun;" for number in (10, 20, 30)]
-    lines += [f"    MoveJ p{number},v500,z10,{frames};" for number in (10, 20, 30)]
-    lines += [f"    MoveL p{number},v200,fine,{frames};" for number in (40, 50, 60, 70)]
-    lines.append(f"    MoveC p80,p90,v100,z5,{frames};")
-    for _ in range(4):
-        lines.append(f"    MoveL {pose(next(p))},v200,z1,{frames};")
-    lines.append(f"    MoveC {pose(next(p))},")
-    lines.append(f"      {pose(next(p))},v100,fine,{frames};")
-    lines += [f"    MoveAbsJ {joints(each)},v1000,fine,tGun;" for each in p]
-    lines += ["    WaitTime 0.5;", "  ENDPROC", "ENDMODULE"]
-    program.files = {".mod": "\n".join(lines) + "\n"}
+    text = _filled(RAPID, points, P=pose, J=joints).replace("%F", "tGun\\WObj:=wTab")
+    for mark, frames in (("%TOOL", tool), ("%BASE", base)):
+        values = [f"{value:.9f}" for value in program.convention.of_pose(frames)]
+        text = text.replace(mark, f"[{framed(values)}]")
+    program.files = {".mod": text}
     return program
 
 
@@ -284,31 +343,37 @@ def fanuc(arm: Arm, points: np.ndarray, tool: np.ndarray, base: np.ndarray) -> P
     return program
 
 
+URSCRIPT = """def weld():
+  set_tcp(p[%TOOL])
+  # p[0.1, 0.2, 0.3, 0, 0, 0] in a comment
+  movej(@J, a=1.4, v=1.05)
+  global start_p=@P
+  home_q = @J
+  movel(start_p, a=1.2, v=0.25)
+  movej(home_q, a=1.4, v=1.05, r=0.02)
+%MOVES  movel(@J, a=1.2, v=0.25)
+  movel(@J, a=1.2, v=0.25)
+  sleep(0.5)
+end
+"""
+URSCRIPT_MOVES = """  movej(@P, a=1.4, v=1.05)
+  movel(@P, a=1.2, v=0.25, t=0, r=0.01)
+  movep(@P, a=1.2, v=0.25, r=0.005)
+  movec(@P, @P, a=1.2, v=0.1, r=0.005, mode=1)
+"""
+
+
 def ur(arm: Arm, points: np.ndarray, tool: np.ndarray, base: np.ndarray) -> Program:
     """URScript: poses and joints, in variables and inline."""
-    program, p = Program(arm, "ur", tool, np.eye(4)), iter(points)
-
-    def pose(q) -> str:
-        return f"p[{', '.join(program.add(q))}]"
-
-    def joints(q) -> str:
-        return f"[{', '.join(program.add(q, True))}]"
-
-    tcp = ", ".join(_decimal(program.convention.of_pose(tool), ".9f"))
-    lines = ["def weld():", f"  set_tcp(p[{tcp}])", "  # p[0.1, 0.2, 0.3, 0, 0, 0] in a comment"]
-    lines.append(f"  movej({joints(next(p))}, a=1.4, v=1.05)")
-    lines.append(f"  global start_p={pose(next(p))}")
-    lines.append(f"  home_q = {joints(next(p))}")
-    lines.append("  movel(start_p, a=1.2, v=0.25)")
-    lines.append("  movej(home_q, a=1.4, v=1.05, r=0.02)")
-    for _ in range(3):
-        lines.append(f"  movej({pose(next(p))}, a=1.4, v=1.05)")
-        lines.append(f"  movel({pose(next(p))}, a=1.2, v=0.25, t=0, r=0.01)")
-        lines.append(f"  movep({pose(next(p))}, a=1.2, v=0.25, r=0.005)")
-        lines.append(f"  movec({pose(next(p))}, {pose(next(p))}, a=1.2, v=0.1, r=0.005, mode=1)")
-    lines += [f"  movel({joints(each)}, a=1.2, v=0.25)" for each in p]
-    lines += ["  sleep(0.5)", "end"]
-    program.files = {".script": "\n".join(lines) + "\n"}
+    program = Program(arm, "ur", tool, np.eye(4))
+    text = _filled(
+        URSCRIPT.replace("%MOVES", 3 * URSCRIPT_MOVES),
+        points,
+        P=lambda q: f"p[{', '.join(program.add(q))}]",
+        J=lambda q: f"[{', '.join(program.add(q, True))}]",
+    )
+    tcp = ", ".join(f"{value:.9f}" for value in program.convention.of_pose(tool))
+    program.files = {".script": text.replace("%TOOL", tcp)}
     return program
 
 
