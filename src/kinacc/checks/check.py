@@ -54,27 +54,27 @@ def run(inputs: Mapping, settings: Mapping, progress: Progress | None = None) ->
         raise InputError(
             [
                 Problem(
-                    f"{report.path}, {each.where}".removesuffix(", "),
-                    f"{each.kind}: {each.what}",
-                    fix="; or ".join([each.fix, *each.commands()]),
+                    f"{report.path}, {item.where}".removesuffix(", "),
+                    f"{item.kind}: {item.what}",
+                    fix="; or ".join([item.fix, *item.commands()]),
                 )
-                for each in report.stopping
+                for item in report.stopping
             ],
             title,
         )
-    for each in report.suspicions:
-        warnings.warn(f"{each.kind}: {each.what}", stacklevel=1)
+    for item in report.suspicions:
+        warnings.warn(f"{item.kind}: {item.what}", stacklevel=1)
     table = [
         {
-            "finding": each.kind,
-            "level": each.level,
-            "what": each.what,
-            "lines": each.where or None,
-            "fix": each.fix or None,
-            "accepted": report.accepted.get(each.kind),
-            "rows": len(each.lines),
+            "finding": item.kind,
+            "level": item.level,
+            "what": item.what,
+            "lines": item.where or None,
+            "fix": item.fix or None,
+            "accepted": report.accepted.get(item.kind),
+            "rows": len(item.lines),
         }
-        for each in (*report.suspicions, *report.notes)
+        for item in (*report.suspicions, *report.notes)
     ]
     return {"data_check": columns_of("data_check", table)}
 
@@ -106,15 +106,15 @@ def check(
     single, cell, away_mm = readings.merged(every)
     scatter = of_measurements(reading.columns, robot)
     fitted, meaning, findings = _meant(single, layout, robot, progress)
-    kinds = {each.kind for each in findings}
+    kinds = {item.kind for item in findings}
     findings += by_distances
     if not any(kind.startswith("joint_") for kind in kinds):
         findings += _outside(every, robot)
     gross: list[int] = []
     if "does_not_fit" not in kinds:
         target = renamed.target[np.unique(cell, return_index=True)[1]]
-        seen = replace(fitted.seen, target=target, target_names=renamed.target_names)
-        fitted, jumps = moved.without_jumps(seen, robot.dh, progress)
+        observed = replace(fitted.seen, target=target, target_names=renamed.target_names)
+        fitted, jumps = moved.without_jumps(observed, robot.dh, progress)
         findings += [*jumps, *_scattered(fitted), *digits.commanded(fitted, meaning)]
         findings += [*rows.found(fitted, meaning, layout), *_largest(fitted)]
         gross = fitted.seen.lines(fitted.left_mm > _GROSS * fitted.trial.sigma_mm)
@@ -135,11 +135,11 @@ def check(
         facts,
         coverage.remarks_of(every, scatter, distances),
         tuple(
-            replace(each.held_to(gross), row_names=reading.row_names)
-            for each in _once(findings, lines)
+            replace(item.held_to(gross), row_names=reading.row_names)
+            for item in _once(findings, lines)
         ),
         (
-            *(finding(LEFT_OUT, words=words) for words in unread),
+            *(finding(LEFT_OUT, words=text) for text in unread),
             *coverage.thin(facts["joint_coverage"]),
         ),
         *(() if fit is None else (fit.seen.line, fit.left_mm)),
@@ -158,11 +158,11 @@ def _meant(
     if fitted.trial.sigma_mm > meanings.FAR * spread_mm:
         return fitted, meaning, [*changes, _no_fit(single, fitted, robot, spread_mm)]
     findings = [*changes, *_of_other_lengths(single, fitted, robot)]
-    seen, there = fitted.seen, fitted.seen.has_rotation
+    observed, there = fitted.seen, fitted.seen.has_rotation
     if not there.any():
         return fitted, meaning, findings
     way, least, before = orientations.find(
-        single.turns[there], layout, fitted.left.flange[there], seen.target[there]
+        single.turns[there], layout, fitted.left.flange[there], observed.target[there]
     )
     if before > meanings.BAD_RAD and (
         turned := meanings.find_by_turns(single, robot, meaning, least)
@@ -172,9 +172,9 @@ def _meant(
     if way.change is not None:
         findings.append(orientations.told(way.change, single, there, before, least))
     if way.change is not None or meaning.mirrored:
-        rotation = seen.rotation.copy()
+        rotation = observed.rotation.copy()
         rotation[there] = way.read(single.turns[there])
-        fitted = robust_fit.fit(replace(seen, rotation=rotation), robot.dh)
+        fitted = robust_fit.fit(replace(observed, rotation=rotation), robot.dh)
     return fitted, meaning, findings
 
 
@@ -243,14 +243,14 @@ def _largest(fitted: Fitted) -> Iterator[Finding]:
 
 def _outside(every: Readings, robot: Robot) -> Iterator[Finding]:
     """Rows in which a joint is beyond its limits."""
-    for each in outside_limits(robot, every.q, LIMIT_SLACK):
+    for item in outside_limits(robot, every.q, LIMIT_SLACK):
         yield finding(
             "outside_limits",
-            every.line[each.rows],
-            joint=each.joint,
-            largest=each.values[np.argmax(np.abs(each.values))],
-            unit=each.unit,
-            allowed=each.allowed,
+            every.line[item.rows],
+            joint=item.joint,
+            largest=item.values[np.argmax(np.abs(item.values))],
+            unit=item.unit,
+            allowed=item.allowed,
         )
 
 
@@ -261,14 +261,14 @@ def _once(findings: list[Finding], lines: int) -> list[Finding]:
     their limits) in rows of which a fault is known that is not in all ``lines`` of the file.
     """
     faults = [e for e in findings if e.kind not in _SYMPTOMS and len(e.lines) < lines]
-    named = {line for each in faults for line in each.lines}
+    named = {line for item in faults for line in item.lines}
     needed: list[Finding] = []
-    for each in findings:
-        rows_ = set(each.lines)
-        rivals = [set(e.lines) for e in needed if e.kind == each.kind]
+    for item in findings:
+        rows_ = set(item.lines)
+        rivals = [set(e.lines) for e in needed if e.kind == item.kind]
         # A second jump concerns part of the rows of the first and is another one all the same.
-        jump = each.kind in ("base_jump", "target_moved")
+        jump = item.kind in ("base_jump", "target_moved")
         needless = any(rows_ == rival if jump else rows_ <= rival for rival in rivals)
-        if not needless and not (each.kind in _SYMPTOMS and rows_ <= named):
-            needed.append(each)
+        if not needless and not (item.kind in _SYMPTOMS and rows_ <= named):
+            needed.append(item)
     return needed

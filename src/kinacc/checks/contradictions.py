@@ -35,19 +35,19 @@ def load(
 def contradictions(full: Mapping[str, Any], place: Place, folder: Path) -> Iterator[Problem]:
     """Contradictions in the full settings of a data set; paths are relative to ``folder``."""
     is_file = full["measurements"]["source"] == "file"
-    found = _file(full["measurements"]["file"], folder) if is_file else _synthetic(full)
-    for keys, *words in (*found, *_arm(full, folder)):
-        yield Problem(place(keys), *words)
+    results = _file(full["measurements"]["file"], folder) if is_file else _synthetic(full)
+    for keys, *text in (*results, *_arm(full, folder)):
+        yield Problem(place(keys), *text)
 
 
 def _synthetic(full: Mapping[str, Any]) -> Found:
     robot = full["robot"]
     if robot != "mh180" and (ROBOTS / f"{robot}.yaml").is_file():
-        what = f"synthetic, but there is no synthetic {robot}"
-        yield ("measurements", "source"), what, "robot: mh180, or a measured file"
+        message = f"synthetic, but there is no synthetic {robot}"
+        yield ("measurements", "source"), message, "robot: mh180, or a measured file"
     if full["calibration"]["base_and_tool"] == "estimated":
-        what = "estimated, but the synthetic arm is measured in its own base frame"
-        yield ("calibration", "base_and_tool"), what, "fixed"
+        message = "estimated, but the synthetic arm is measured in its own base frame"
+        yield ("calibration", "base_and_tool"), message, "fixed"
 
 
 def _file(file: Mapping[str, Any], folder: Path) -> Found:
@@ -55,9 +55,9 @@ def _file(file: Mapping[str, Any], folder: Path) -> Found:
     for keys in (("path",), ("joints", "path")):
         path = file["path"] if keys == ("path",) else file["joints"]["path"]
         if path is None and keys == ("path",):
-            what = "file, but measurements.file.path is not given"
+            message = "file, but measurements.file.path is not given"
             allowed = "path of a CSV, text, Excel or Parquet file"
-            yield ("measurements", "source"), what, allowed
+            yield ("measurements", "source"), message, allowed
         elif path is not None and not os.path.isfile(folder / path):
             source = file["source"] and f"the data comes from: {' '.join(file['source'].split())}"
             fix = source or "write where the data comes from into measurements.file.source"
@@ -66,8 +66,8 @@ def _file(file: Mapping[str, Any], folder: Path) -> Found:
     if delimiter in (decimal, thousands) and _quoted(folder, file):
         delimiter = None
     if decimal == delimiter or thousands in {decimal, delimiter} - {None}:
-        key, mark = ("decimal", decimal) if decimal == delimiter else ("thousands", thousands)
-        yield (*_FILE, key), f"{mark!r} is also the delimiter or the decimal mark", "another mark"
+        key, label = ("decimal", decimal) if decimal == delimiter else ("thousands", thousands)
+        yield (*_FILE, key), f"{label!r} is also the delimiter or the decimal mark", "another mark"
 
 
 def _quoted(folder: Path, file: Mapping[str, Any]) -> bool:
@@ -91,14 +91,14 @@ def _arm(full: Mapping[str, Any], folder: Path) -> Found:
     joints = arm.dh.joints
     hayati = calibration["dh"]["hayati_joints"]
     if hayati != "auto" and max(hayati, default=0) > joints:
-        what = f"{robot} has no joint {max(hayati)}"
-        yield ("calibration", "dh", "hayati_joints"), what, f"1 to {joints}"
+        message = f"{robot} has no joint {max(hayati)}"
+        yield ("calibration", "dh", "hayati_joints"), message, f"1 to {joints}"
     for kind in asked_for(calibration):
         if kind not in ALWAYS:
-            for keys, *words in loaded(ESTIMATORS[kind]).contradictions(calibration, arm):
-                yield ("calibration", kind, *keys), *words
-    for rule, *words in strangers(rules(calibration["dh"]["parameters"]), joints):
-        yield ("calibration", "dh", "parameters", rule.name), *words
+            for keys, *text in loaded(ESTIMATORS[kind]).contradictions(calibration, arm):
+                yield ("calibration", kind, *keys), *text
+    for rule, *text in strangers(rules(calibration["dh"]["parameters"]), joints):
+        yield ("calibration", "dh", "parameters", rule.name), *text
     ranges = ("calibration", "vec", "joint_range"), ("evaluation", "joint_box", "joints_deg")
     boxes = (calibration["vec"]["joint_range"], box["joints_deg"])
     for keys, pairs in zip(ranges, boxes, strict=True):
@@ -108,5 +108,5 @@ def _arm(full: Mapping[str, Any], folder: Path) -> Found:
             limits = np.round(np.degrees([arm.q_min_rad, arm.q_max_rad]).T, 9).tolist()
             for number, (pair, (low, high)) in enumerate(zip(pairs, limits, strict=True), 1):
                 if not arm.dh.prismatic[number - 1] and not low <= pair[0] < pair[1] <= high:
-                    what = f"{pair} reaches beyond the limits of joint {number} of {robot}"
-                    yield keys, what, f"{low:g} to {high:g} deg"
+                    message = f"{pair} reaches beyond the limits of joint {number} of {robot}"
+                    yield keys, message, f"{low:g} to {high:g} deg"

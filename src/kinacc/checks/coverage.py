@@ -47,13 +47,13 @@ def facts_of(
     if distances:
         facts["target_distances"] = [
             {
-                "from": every.target_names[each.one],
-                "to": every.target_names[each.other],
-                "mm": each.middle_mm,
-                "std_mm": each.std_mm,
-                "noise_per_target_mm": each.std_mm / np.sqrt(2.0),
+                "from": every.target_names[item.one],
+                "to": every.target_names[item.other],
+                "mm": item.middle_mm,
+                "std_mm": item.std_mm,
+                "noise_per_target_mm": item.std_mm / np.sqrt(2.0),
             }
-            for each in distances
+            for item in distances
         ]
     if fitted is not None:
         facts["quick_fit"] = {
@@ -91,7 +91,7 @@ def remarks_of(every: Readings, noise: Noise, distances: list[Distance]) -> tupl
     if len(every.target_names) > 1:
         remarks.append("targets of one pose share the arm's error and are no independent samples")
     if noise.freedom and distances:
-        between = float(np.median([each.std_mm for each in distances])) / np.sqrt(2.0)
+        between = float(np.median([item.std_mm for item in distances])) / np.sqrt(2.0)
         if between < 0.5 * noise.per_axis_mm:
             remarks.append(
                 f"repeats scatter by {noise.per_axis_mm:.3g} mm per axis, targets against each "
@@ -106,26 +106,26 @@ def thin(coverage: list[dict]) -> list[Finding]:
     return [
         finding(
             "thin_coverage",
-            joint=each["joint"],
-            share=each["share"],
-            percent=f"{100.0 * each['share']:.2g}",
+            joint=item["joint"],
+            share=item["share"],
+            percent=f"{100.0 * item['share']:.2g}",
         )
-        for each in coverage
-        if each["share"] < _WEAK
+        for item in coverage
+        if item["share"] < _WEAK
     ]
 
 
 def few_poses(columns: Columns, robot: Robot, calibration: Mapping) -> list[Finding]:
     """Whether the VEC model has more coefficients than the poses give independent numbers."""
-    seen = from_columns({**columns, "fold": np.full(len(columns["pose"]), np.nan)}, robot)
-    fit = VECEstimator.of(calibration, robot, seen)
+    observed = from_columns({**columns, "fold": np.full(len(columns["pose"]), np.nan)}, robot)
+    fit = VECEstimator.of(calibration, robot, observed)
     same = folds.configurations_of(columns)
     # A target adds three components to a pose, an orientation three; repeats add none.
-    pairs, first = np.unique(np.stack([same, seen.target]), axis=1, return_index=True)
+    pairs, first = np.unique(np.stack([same, observed.target]), axis=1, return_index=True)
     turned = np.zeros(same.max() + 1)
-    np.maximum.at(turned, pairs[0], 3.0 * seen.has_rotation[first])
+    np.maximum.at(turned, pairs[0], 3.0 * observed.has_rotation[first])
     components = np.minimum(3.0 * np.bincount(pairs[0]) + turned, _PER_POSE)
-    frames = int(fit.common.terms(seen).free.sum()) if fit.common.frames_estimated else 0
+    frames = int(fit.common.terms(observed).free.sum()) if fit.common.frames_estimated else 0
     if components.sum() >= fit.required + frames:
         return []
     few = finding(

@@ -52,12 +52,12 @@ def copies(every: Readings, noise_mm: float) -> Iterator[Finding]:
             "duplicate_rows", line[again], count=again.size, row=row, first_copied_line=first
         )
     there = every.earlier > 0
-    again, at = np.unique(every.line[there], return_index=True)
+    again, place = np.unique(every.line[there], return_index=True)
     if again.size:
-        first = every.earlier[there][at]
+        first = every.earlier[there][place]
         pairs = zip(again, first, strict=True)
-        told = [f"{names.one(line)} repeats {names.number(of)}" for line, of in pairs]
-        yield finding("repeated_reading", again, pairs=first_few(told, 4))
+        texts = [f"{names.one(line)} repeats {names.number(of)}" for line, of in pairs]
+        yield finding("repeated_reading", again, pairs=first_few(texts, 4))
 
 
 def unread(every: Readings) -> ndarray:
@@ -104,14 +104,14 @@ def commanded(fitted: Fitted, meaning: Meaning) -> Iterator[Finding]:
 
     By the commanded joints, where the file has them too, else by round numbers.
     """
-    seen, arm = fitted.seen, fitted.trial.arm
-    both = np.isfinite(seen.commanded).all(axis=1)
+    observed, arm = fitted.seen, fitted.trial.arm
+    both = np.isfinite(observed.commanded).all(axis=1)
     if not both.any():
-        yield from _round(fitted, np.rad2deg(seen.q[:, ~fitted.trial.nominal.prismatic]))
+        yield from _round(fitted, np.rad2deg(observed.q[:, ~fitted.trial.nominal.prismatic]))
         return
     read, sent = (
-        robust_fit.residuals(arm, replace(seen, q_rad=meaning.joints(joints))).position_mm
-        for joints in (seen.q, np.where(both[:, None], seen.commanded, seen.q))
+        robust_fit.residuals(arm, replace(observed, q_rad=meaning.joints(joints))).position_mm
+        for joints in (observed.q, np.where(both[:, None], observed.commanded, observed.q))
     )
     apart = np.linalg.norm(sent - read, axis=1)
     # What is apart everywhere (a following error of a few um) is how the arm is.
@@ -119,7 +119,7 @@ def commanded(fitted: Fitted, meaning: Meaning) -> Iterator[Finding]:
     limit_mm = max(np.nan_to_num(usual, posinf=0.0), fitted.limit_mm)
     rows = np.flatnonzero(both & (apart > limit_mm))
     if rows.size:
-        lines = seen.lines(rows)
+        lines = observed.lines(rows)
         nearer = np.mean(np.linalg.norm(sent[rows], axis=1) < fitted.left_mm[rows]) > 0.5
         yield finding(
             "commanded_joints/apart",
@@ -130,36 +130,38 @@ def commanded(fitted: Fitted, meaning: Meaning) -> Iterator[Finding]:
         )
     sigma = robust_fit.sigma_of(sent[both])
     if sigma < 0.7 * robust_fit.sigma_of(read[both]):
-        yield finding("commanded_joints/exchanged", seen.lines(both), sigma=f"{sigma:.3g}")
+        yield finding("commanded_joints/exchanged", observed.lines(both), sigma=f"{sigma:.3g}")
 
 
 def _round(fitted: Fitted, q_deg: ndarray) -> Iterator[Finding]:
     """Rows on round numbers where the others are not, which fit worse; or all on a coarse grid."""
-    q_deg, left, seen = q_deg[:, np.ptp(q_deg, axis=0) > 0.0], fitted.left_mm, fitted.seen
+    q_deg, remaining, observed = q_deg[:, np.ptp(q_deg, axis=0) > 0.0], fitted.left_mm, fitted.seen
     if q_deg.shape[1] < 2:
         return
     for grid in _GRIDS_DEG:
         on, fine = _on(q_deg, grid), ~_on(q_deg, grid / _FINER)
         if len(np.unique(q_deg[on], axis=0)) < _FEWEST or fine.sum() < len(on) / 2:
             continue
-        worse = float(np.median(left[on]) / np.median(left[fine]))
-        ranked = scipy.stats.mannwhitneyu(left[on], left[fine], alternative="greater").pvalue
+        worse = float(np.median(remaining[on]) / np.median(remaining[fine]))
+        ranked = scipy.stats.mannwhitneyu(
+            remaining[on], remaining[fine], alternative="greater"
+        ).pvalue
         if worse > _WORSE and ranked < _RANKED:
-            lines = seen.lines(on)
+            lines = observed.lines(on)
             times = f"{worse:.2g}"
             yield finding("commanded_joints", lines, grid_deg=grid, count=len(lines), times=times)
             return
     grid = next((grid for grid in _GRIDS_DEG[:4] if _on(q_deg, grid).all()), None)
     if grid is not None:
         arm, slides = fitted.trial.arm, fitted.trial.nominal.prismatic
-        off = np.random.default_rng(0).uniform(-0.5, 0.5, seen.q_rad.shape) * np.deg2rad(grid)
-        there = robust_fit.residuals(arm, replace(seen, q_rad=seen.q_rad + off * ~slides))
+        off = np.random.default_rng(0).uniform(-0.5, 0.5, observed.q_rad.shape) * np.deg2rad(grid)
+        there = robust_fit.residuals(arm, replace(observed, q_rad=observed.q_rad + off * ~slides))
         apart = there.predicted.position_mm - fitted.left.predicted.position_mm
         rounding = float(np.median(np.linalg.norm(apart, axis=1)))
-        error = float(np.sqrt(np.median(left**2)))
+        error = float(np.sqrt(np.median(remaining**2)))
         if _FITTED_AWAY < error / rounding < 1.5:
-            words = {"error": f"{error:.3g}", "rounding": f"{rounding:.3g}"}
-            yield finding("commanded_joints/all", seen.lines(), grid_deg=grid, **words)
+            text = {"error": f"{error:.3g}", "rounding": f"{rounding:.3g}"}
+            yield finding("commanded_joints/all", observed.lines(), grid_deg=grid, **text)
 
 
 def _on(q_deg: ndarray, grid: float) -> ndarray:
@@ -211,9 +213,9 @@ def step_between(cells: Sequence[object], unit: float, decimal: str) -> float:
         if not value.is_finite() or abs(value.adjusted()) > _MOST_DIGITS:
             return 0.0
         values.append(value)
-    digits = max((-int(each.as_tuple().exponent) for each in values), default=0)
-    whole = [int(each.scaleb(digits)) for each in values]
-    return unit * math.gcd(*(each - whole[0] for each in whole)) * 10.0**-digits
+    digits = max((-int(item.as_tuple().exponent) for item in values), default=0)
+    whole = [int(item.scaleb(digits)) for item in values]
+    return unit * math.gcd(*(item - whole[0] for item in whole)) * 10.0**-digits
 
 
 def cost(model: DHModel, q: ndarray, step: float) -> Rounding:

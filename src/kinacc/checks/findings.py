@@ -61,8 +61,8 @@ class Finding:
     def at(self, lines: Iterable[int], detail: str = "", **values) -> Finding:
         """The finding at these lines, with more numbers; ``detail`` is appended to its message."""
         values = {**self.values, **values}
-        what = self.what + detail.format(**values)
-        return replace(self, what=what, lines=tuple(np.unique([*lines]).tolist()), values=values)
+        message = self.what + detail.format(**values)
+        return replace(self, what=message, lines=tuple(np.unique([*lines]).tolist()), values=values)
 
     def held_to(self, gross: Iterable[int]) -> Finding:
         """The finding with its level; rows at the lines ``gross`` are too far off for any fit."""
@@ -83,6 +83,6 @@ class Finding:
 
 def finding(key: str, lines: Iterable[int] = (), **values) -> Finding:
     """The finding ``key`` of ``TEXTS`` at ``lines``, each named once and in order."""
-    what, fix = (text.format(**values) for text in TEXTS[key])
+    message, fix = (text.format(**values) for text in TEXTS[key])
     kind = key.partition("/")[0]
-    return Finding(kind, what, fix, values, level=NOTE if kind in _NOTES else WARNING).at(lines)
+    return Finding(kind, message, fix, values, level=NOTE if kind in _NOTES else WARNING).at(lines)

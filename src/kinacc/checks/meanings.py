@@ -145,21 +145,21 @@ def coupled(meaning: Meaning, joint: int, other: int, sign: float) -> Meaning:
 def single(meaning: Meaning, slides: ndarray) -> Iterator[Meaning]:
     """Every meaning one change of the joints away: signs, couplings, zeros, order."""
     joints = range(len(slides))
-    signed = {each.values["joint"] for each in meaning.changes if each.kind == "joint_sign"}
+    signed = {item.values["joint"] for item in meaning.changes if item.kind == "joint_sign"}
     yield from (of_signs(meaning, (joint,)) for joint in joints if joint + 1 not in signed)
-    for joint, other in permutations(joints, 2):
-        if not slides[[joint, other]].any():
-            yield from (coupled(meaning, joint, other, sign) for sign in (1.0, -1.0))
+    for joint, second in permutations(joints, 2):
+        if not slides[[joint, second]].any():
+            yield from (coupled(meaning, joint, second, sign) for sign in (1.0, -1.0))
     for joint in joints[1:-1]:  # of the first and last, base and tool take it up
         for zero_deg in () if slides[joint] else (90.0, -90.0, 180.0):
             zero = meaning.zero + np.deg2rad(zero_deg) * (np.array(joints) == joint)
             change = finding("joint_zero", joint=joint + 1, zero_deg=zero_deg)
             yield meaning.changed(change, zero=zero)
-    for joint, other in combinations(joints, 2):
-        if slides[joint] == slides[other]:
+    for joint, second in combinations(joints, 2):
+        if slides[joint] == slides[second]:
             order = np.array(joints)
-            order[[joint, other]] = other, joint
-            change = finding("joint_order", joint=joint + 1, other=other + 1)
+            order[[joint, second]] = second, joint
+            change = finding("joint_order", joint=joint + 1, other=second + 1)
             yield meaning.changed(change, matrix=meaning.matrix[:, order])
 
 
@@ -171,9 +171,9 @@ class Misfit:
     robot: Robot
 
     def __call__(self, meaning: Meaning) -> float:
-        left = np.linalg.norm(self._left(meaning).position_mm, axis=1)
+        remaining = np.linalg.norm(self._left(meaning).position_mm, axis=1)
         points = meaning.seen(self.read).position_mm
-        return float(np.quantile(left, _MAJORITY)) / max(spread_mm(points), 1e-12)
+        return float(np.quantile(remaining, _MAJORITY)) / max(spread_mm(points), 1e-12)
 
     def turns(self, meaning: Meaning) -> float:
         """Scatter of the orientations seen from the flange, placed by the positions alone, rad."""
@@ -182,15 +182,15 @@ class Misfit:
 
     def ratio(self, meaning: Meaning) -> float:
         """Spread of the measured points over that of the flange."""
-        seen = meaning.seen(self.read)
-        flange = dh.forward(self.robot.dh, seen.q_rad).position_mm
-        return spread_mm(seen.position_mm) / max(spread_mm(flange), 1e-12)
+        observed = meaning.seen(self.read)
+        flange = dh.forward(self.robot.dh, observed.q_rad).position_mm
+        return spread_mm(observed.position_mm) / max(spread_mm(flange), 1e-12)
 
     def _left(self, meaning: Meaning) -> robust_fit.Residuals:
-        seen = meaning.seen(self.read)
-        seen = replace(seen, rotation=np.full_like(seen.rotation, np.nan))
-        begin = robust_fit.start(seen, self.robot.dh, draws=0, stretches=())
-        return robust_fit.residuals(begin, seen)
+        observed = meaning.seen(self.read)
+        observed = replace(observed, rotation=np.full_like(observed.rotation, np.nan))
+        begin = robust_fit.start(observed, self.robot.dh, draws=0, stretches=())
+        return robust_fit.residuals(begin, observed)
 
 
 def find(
@@ -208,11 +208,11 @@ def find(
     part = _largest_session(read, np.arange(len(read)))
     misfit = Misfit(part.select(thinned(np.arange(len(part)), _TRIED_ROWS)), robot)
     least, tried = misfit(here), {}
-    for value, each in _searched(misfit, here, written.sigma_mm < _GOOD * spread, progress):
+    for value, item in _searched(misfit, here, written.sigma_mm < _GOOD * spread, progress):
         # A meaning that is found again is kept with the fewest changes.
-        numbers = (each.matrix.tobytes(), each.unit.tobytes(), each.zero.tobytes())
-        tried.setdefault((*numbers, each.scale, each.mirrored), (value, each))
-    better = [(value, each) for value, each in tried.values() if value < _PROMISING * least]
+        numbers = (item.matrix.tobytes(), item.unit.tobytes(), item.zero.tobytes())
+        tried.setdefault((*numbers, item.scale, item.mirrored), (value, item))
+    better = [(value, item) for value, item in tried.values() if value < _PROMISING * least]
     if not better:
         return here, ()
     best = min(value for value, _ in better)
@@ -221,33 +221,35 @@ def find(
     close.sort(key=lambda pair: (*_simplicity(pair[1]), pair[0]))
     many = part.select(thinned(np.arange(len(part)), _FITTED_ROWS))
     fitted = [
-        (_left_mm(many, robot, each), each)
-        for _, each in progress(close[:_FITTED], "likely ways to read the columns fitted")
+        (_left_mm(many, robot, item), item)
+        for _, item in progress(close[:_FITTED], "likely ways to read the columns fitted")
     ]
     smallest = min(value for value, _ in fitted)
     if smallest >= _BETTER * _left_mm(many, robot, here) or smallest > FAR * spread:
         return here, ()
-    left, found = next((value, each) for value, each in fitted if value < _AS_GOOD * smallest)
-    own = {change.what for change in found.changes}
+    remaining, results = next(
+        (value, item) for value, item in fitted if value < _AS_GOOD * smallest
+    )
+    subset = {change.what for change in results.changes}
     others = [[change.what for change in e.changes] for v, e in fitted if v < _AS_GOOD * smallest]
-    rivals = [" and ".join(w for w in e if w not in own) for e in others if not own <= set(e)]
+    rivals = [" and ".join(w for w in e if w not in subset) for e in others if not subset <= set(e)]
     rivals = list(dict.fromkeys(filter(None, rivals)))[:3]
     detail = " ({as_written_mm:.3g} mm per axis as written, {found_mm:.3g} mm so{equal})"
     equal = f"; as well explained by: {', or '.join(rivals)}" if rivals else ""
-    alone = len(found.changes) == 1 and found.changes[0].kind == "joint_coupling" and not rivals
-    more = {"joint_map": found.matrix.tolist()} if alone else {}
+    alone = len(results.changes) == 1 and results.changes[0].kind == "joint_coupling" and not rivals
+    more = {"joint_map": results.matrix.tolist()} if alone else {}
     findings = [
         change.at(
             read.lines(),
             detail,
             as_written_mm=written.sigma_mm,
-            found_mm=left * found.scale,
+            found_mm=remaining * results.scale,
             equal=equal,
             **more,
         )
-        for change in found.changes
+        for change in results.changes
     ]
-    return found, tuple(findings)
+    return results, tuple(findings)
 
 
 def find_by_turns(
@@ -261,15 +263,17 @@ def find_by_turns(
     part = _largest_session(read, np.flatnonzero(read.has_rotation))
     misfit = Misfit(part.select(thinned(np.arange(len(part)), _TURNED_ROWS)), robot)
     limit = _AS_GOOD * max(misfit(here), _SHOWN)
-    rivals = [each for each in single(here, robot.dh.prismatic) if misfit(each) < limit]
-    tried = [(misfit.turns(each), each) for each in rivals]
+    rivals = [item for item in single(here, robot.dh.prismatic) if misfit(item) < limit]
+    tried = [(misfit.turns(item), item) for item in rivals]
     least = min((value for value, _ in tried), default=np.inf)
     if not least <= min(orientations.BETTER * misfit.turns(here), _AS_GOOD * least_rad):
         return None
     # The common changes come first: of those that do about as well, the first.
-    value, found = next(pair for pair in tried if pair[0] < _AS_GOOD * least)
-    told = orientations.told(found.changes[-1], read, read.has_rotation, misfit.turns(here), value)
-    return found, told
+    value, results = next(pair for pair in tried if pair[0] < _AS_GOOD * least)
+    texts = orientations.told(
+        results.changes[-1], read, read.has_rotation, misfit.turns(here), value
+    )
+    return results, texts
 
 
 def _largest_session(read: Readings, rows: ndarray) -> Readings:
@@ -296,9 +300,9 @@ def _searched(
     slides, tried = misfit.robot.dh.prismatic, []
     rounds = [single(here, slides)] if good else _rounds(misfit, here, tried)
     for rivals in rounds:
-        found = [(misfit(each), each) for each in progress(list(rivals), _TRIED)]
-        yield from found
-        tried += found
+        results = [(misfit(item), item) for item in progress(list(rivals), _TRIED)]
+        yield from results
+        tried += results
         if not good and min((value for value, _ in tried), default=np.inf) < _SURE:
             return
 
@@ -308,30 +312,30 @@ def _rounds(misfit: Misfit, here: Meaning, tried: list) -> Iterator[Iterable[Mea
     slides = misfit.robot.dh.prismatic
     units = [
         scaled
-        for each in of_units(here, misfit.read.q, slides)
-        for scaled in of_scale(each, misfit.ratio(each))
+        for item in of_units(here, misfit.read.q, slides)
+        for scaled in of_scale(item, misfit.ratio(item))
     ]
-    left = finding("left_handed")
-    yield units + [each.changed(left, mirrored=True) for each in units]
+    remaining = finding("left_handed")
+    yield units + [item.changed(remaining, mirrored=True) for item in units]
     roots = (units or [here])[:3]
-    yield [each for root in roots for each in single(root, slides)]
+    yield [item for root in roots for item in single(root, slides)]
     joints = range(len(slides))
     signs = [some for count in joints[1:] for some in combinations(joints, count + 1)]
     yield [of_signs(root, some) for root in roots for some in signs]
     for _ in range(2):
         front: list[tuple[float, Meaning]] = []
-        for value, each in sorted(tried, key=lambda pair: pair[0]):
+        for value, item in sorted(tried, key=lambda pair: pair[0]):
             # Meanings that cannot be told apart count once.
-            apart = all(value > 1.02 * other for other, _ in front)
-            if apart and not each.mirrored and len(front) < _FRONT:
-                front.append((value, each))
-        yield [each for _, root in front for each in single(root, slides)]
+            apart = all(value > 1.02 * second for second, _ in front)
+            if apart and not item.mirrored and len(front) < _FRONT:
+                front.append((value, item))
+        yield [item for _, root in front for item in single(root, slides)]
 
 
 def _left_mm(read: Readings, robot: Robot, meaning: Meaning) -> float:
     """Standard deviation per axis left by the corrected arm, in the file's own lengths."""
-    seen = meaning.seen(read)
-    return robust_fit.best(seen, robust_fit.start(seen, robot.dh)).sigma_mm / meaning.scale
+    observed = meaning.seen(read)
+    return robust_fit.best(observed, robust_fit.start(observed, robot.dh)).sigma_mm / meaning.scale
 
 
 def spread_mm(points: ndarray) -> float:

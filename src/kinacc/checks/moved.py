@@ -59,10 +59,10 @@ def without_jumps(
     return fitted, list(_findings(whole, fitted, jumps)) if jumps else []
 
 
-def _labels(seen: Readings, target: int | None) -> tuple[str, ndarray, tuple]:
+def _labels(observed: Readings, target: int | None) -> tuple[str, ndarray, tuple]:
     """What the base (None) or a target is numbered by: its field, the numbers, their names."""
     kind = "session" if target is None else "target"
-    return kind, getattr(seen, kind), getattr(seen, f"{kind}_names")
+    return kind, getattr(observed, kind), getattr(observed, f"{kind}_names")
 
 
 def _linearised(fitted: Fitted) -> tuple[Readings, ndarray, ndarray, Linear]:
@@ -89,25 +89,25 @@ def _places(fitted: Fitted) -> list[tuple[int, int | None]]:
         return []
     few, design, residual, linear = _linearised(fitted)
     slots, places = linear.frames.slots, []
-    for kind, number, at in slots:
+    for kind, number, position in slots:
         target, width = (None, 6) if kind == "bases" else (number, 3)
         rows = np.flatnonzero(_labels(few, target)[1] == number)
         if len(rows) < 4 * _FEWEST:
             continue
-        columns, own, inside = (
-            design[rows][:, :, at[:width]],
+        columns, subset, inside = (
+            design[rows][:, :, position[:width]],
             design[rows],
             slice(_FEWEST, len(rows) - _FEWEST + 1),
         )
-        gains, steps, inner = _gains(columns, residual[rows], own, linear.inverse)
+        gains, steps, inner = _gains(columns, residual[rows], subset, linear.inverse)
         place = _FEWEST + int(np.argmax(gains[inside]))
         after = (np.arange(len(rows)) >= place)[:, None]
         rest = residual[rows] - columns @ steps[place] * after
-        rest = rest + own @ (linear.inverse @ inner[place])
+        rest = rest + subset @ (linear.inverse @ inner[place])
         reference = scipy.special.chdtri(width, tails.FAMILY_WISE / (len(rows) * len(slots)))
         for along in (*few.q_rad[rows].T, *few.position_mm[rows].T):
             order = np.argsort(along, kind="stable")
-            steps_along = _gains(columns[order], rest[order], own[order], linear.inverse)[0]
+            steps_along = _gains(columns[order], rest[order], subset[order], linear.inverse)[0]
             reference = max(reference, steps_along[inside].max())
         if gains[place] > _EXCESS * reference:
             places.append((gains[place] / reference, int(fitted.chosen[rows[place]]), target))
@@ -140,32 +140,32 @@ def _parted(
 
     The reading is the one that parts the two frames best.
     """
-    seen, rows = _split(fitted.seen, row, target)
-    again = fit(seen, model)
-    kind, labels, _ = _labels(seen, target)
+    observed, rows = _split(fitted.seen, row, target)
+    again = fit(observed, model)
+    kind, labels, _ = _labels(observed, target)
     frames = _labels(fitted.seen, target)[1][row], labels[row]
     both = np.flatnonzero(np.isin(labels, frames))
     costs = []
     for frame in frames:
-        part = replace(seen.select(both), **{kind: np.full(len(both), frame)})
-        left = np.linalg.norm(robust_fit.residuals(again.trial.arm, part).position_mm, axis=1)
-        costs.append(np.append(0.0, np.minimum(left, _CAP * again.trial.sigma_mm)))
+        part = replace(observed.select(both), **{kind: np.full(len(both), frame)})
+        remaining = np.linalg.norm(robust_fit.residuals(again.trial.arm, part).position_mm, axis=1)
+        costs.append(np.append(0.0, np.minimum(remaining, _CAP * again.trial.sigma_mm)))
     place = int(np.argmin(np.cumsum(costs[0]) - np.cumsum(costs[1])))
-    if min(len(np.unique(seen.pose[side])) for side in np.split(both, [place])) < _FEWEST:
+    if min(len(np.unique(observed.pose[side])) for side in np.split(both, [place])) < _FEWEST:
         return None
     if both[place] != row:
-        seen, rows = _split(fitted.seen, both[place], target)
-        again = fit(seen, model)
+        observed, rows = _split(fitted.seen, both[place], target)
+        again = fit(observed, model)
     return again, (target, rows)
 
 
-def _split(seen: Readings, row: int, target: int | None) -> tuple[Readings, ndarray]:
+def _split(observed: Readings, row: int, target: int | None) -> tuple[Readings, ndarray]:
     """Frames split before reading ``row``: a new base for the rest of its session, or target."""
-    kind, label, names = _labels(seen, target)
-    own = label[row] if target is None else target
-    rows = (np.arange(len(seen)) >= row) & (label == own)
-    split = {kind: np.where(rows, len(names), label), f"{kind}_names": (*names, names[own])}
-    return replace(seen, **split), np.flatnonzero(rows)
+    kind, label, names = _labels(observed, target)
+    subset = label[row] if target is None else target
+    rows = (np.arange(len(observed)) >= row) & (label == subset)
+    split = {kind: np.where(rows, len(names), label), f"{kind}_names": (*names, names[subset])}
+    return replace(observed, **split), np.flatnonzero(rows)
 
 
 def _share_left(before: Fitted, after: Fitted, rows: ndarray) -> float:
@@ -183,13 +183,13 @@ def _share_left(before: Fitted, after: Fitted, rows: ndarray) -> float:
 
 def _findings(whole: Fitted, fitted: Fitted, jumps: list[Jump]) -> Iterator[Finding]:
     """Jumps of base and targets; a drift in place of the jumps of a base that drifts."""
-    seen, frames = fitted.seen, fitted.trial.arm.frames
+    observed, frames = fitted.seen, fitted.trial.arm.frames
     drifts = _drifts_mm(whole, fitted)
     for name, drift in drifts.items():
-        own = [seen.session_names[each] == name for each in seen.session]
-        yield finding("drift", seen.line[own], by=_signed(drift), drift_mm=drift.tolist())
+        subset = [observed.session_names[item] == name for item in observed.session]
+        yield finding("drift", observed.line[subset], by=_signed(drift), drift_mm=drift.tolist())
     for target, rows in jumps:
-        _, label, names = _labels(seen, target)
+        _, label, names = _labels(observed, target)
         name = names[label[rows[0]]]
         if target is None and name in drifts:
             continue
@@ -203,11 +203,11 @@ def _findings(whole: Fitted, fitted: Fitted, jumps: list[Jump]) -> Iterator[Find
             motion = compose(new, invert(old))
             shift = middle - motion.rotation.T @ (middle - motion.position_mm)
             turn = float(np.linalg.norm(log_so3(motion.rotation)))
-        first = int(seen.line[rows[0]])
+        first = int(observed.line[rows[0]])
         yield finding(
             "base_jump" if target is None else "target_moved",
-            seen.lines(rows),
-            row=seen.row_names.one(first),
+            observed.lines(rows),
+            row=observed.row_names.one(first),
             target=name or "",
             by=_signed(shift),
             first_line=first,
@@ -229,10 +229,10 @@ def _drifts_mm(whole: Fitted, split: Fitted) -> dict[str | None, ndarray]:
     few, design, residual, linear = _linearised(whole)
     drifts: dict[str | None, ndarray] = {}
     for base, name in enumerate(few.session_names):
-        rows, at = np.flatnonzero(few.session == base), linear.frames.slots[base][2]
-        columns, rest = design[rows][:, :, at], (residual[rows], design[rows], linear.inverse)
+        rows, place = np.flatnonzero(few.session == base), linear.frames.slots[base][2]
+        columns, rest = design[rows][:, :, place], (residual[rows], design[rows], linear.inverse)
         part = split.seen.session[whole.chosen[rows]]
-        jumps = [columns * (part == each)[:, None, None] for each in np.unique(part)[1:]]
+        jumps = [columns * (part == item)[:, None, None] for item in np.unique(part)[1:]]
         if jumps:
             time = np.linspace(-0.5, 0.5, len(rows))[:, None, None]
             gains, motion, _ = _gains(columns * time, *rest)

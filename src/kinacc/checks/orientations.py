@@ -45,7 +45,7 @@ def scatter(flange: ndarray, rotation: ndarray, target: ndarray) -> float:
     ``flange`` and ``rotation`` (n, 3, 3) in the instrument's frame, none of them missing.
     """
     turns = np.swapaxes(flange, 1, 2) @ rotation
-    angles = [_angles(turns[target == each]) for each in np.unique(target)]
+    angles = [_angles(turns[target == item]) for item in np.unique(target)]
     return float(np.quantile(np.concatenate(angles), _MAJORITY))
 
 
@@ -102,8 +102,8 @@ def _backwards(turn: Turn) -> Iterator[Turn]:
         before = turn.change
         if before is None:
             return change
-        what, fix = f"{before.what}, and {change.what}", f"{before.fix}; {change.fix}"
-        return replace(before, what=what, fix=fix, values={})
+        message, fix = f"{before.what}, and {change.what}", f"{before.fix}; {change.fix}"
+        return replace(before, what=message, fix=fix, values={})
 
     change = finding("transposed_rotation")
     yield Turn(joined(change), lambda raw: np.swapaxes(turn.read(raw), 1, 2))
@@ -140,7 +140,7 @@ def _readings(layout: Layout) -> Iterator[Turn]:
         yield Turn(change, lambda raw: rotations(raw[:, order], vector))
 
 
-def _euler(layout: Layout, convention: str, order: list[int], words: str) -> Turn:
+def _euler(layout: Layout, convention: str, order: list[int], text: str) -> Turn:
     """Euler angles of a convention, of which ``order`` are the raw columns."""
     euler = layout.orientation == "euler"
     here = in_order_of(layout.convention) if euler else ANGLES
@@ -149,10 +149,10 @@ def _euler(layout: Layout, convention: str, order: list[int], words: str) -> Tur
     setting |= {} if columns == list(in_order_of(convention)) else {"e": columns}
     stated = f"of convention {layout.convention}" if euler else "rotation vectors"
     change = finding(
-        "euler_convention", convention=convention, order=words, stated=stated, setting=setting
+        "euler_convention", convention=convention, order=text, stated=stated, setting=setting
     )
-    other = replace(layout, orientation="euler", convention=convention)
-    return Turn(change, lambda raw: rotations(raw[:, order], other))
+    second = replace(layout, orientation="euler", convention=convention)
+    return Turn(change, lambda raw: rotations(raw[:, order], second))
 
 
 def _angles(turns: ndarray) -> ndarray:

@@ -85,23 +85,23 @@ def merged(every: Readings) -> tuple[Readings, ndarray, ndarray]:
     away[count == 1] = np.nan
     alone = (count > 2) & (away > tails.limit(away[count > 2], 3))
     cell = pd.factorize(np.where(alone, len(cell) + np.arange(len(cell)), cell))[0]
-    one = every.select(np.unique(cell, return_index=True)[1])
-    if len(one) == len(every):
-        return one, cell, away
+    first = every.select(np.unique(cell, return_index=True)[1])
+    if len(first) == len(every):
+        return first, cell, away
     values = np.column_stack([every.position_mm, every.rotation.reshape(-1, 9)])
     medians = pd.DataFrame(values).groupby(cell).median().to_numpy()
     several = np.bincount(cell) > 1
     turned = several & np.isfinite(medians[:, 3])
-    rotation = one.rotation.copy()
+    rotation = first.rotation.copy()
     rotation[turned] = nearest_rotation(medians[turned, 3:].reshape(-1, 3, 3))
     ends = np.cumsum(np.bincount(cell))[:-1]
-    one = replace(
-        one,
-        position_mm=np.where(several[:, None], medians[:, :3], one.position_mm),
+    first = replace(
+        first,
+        position_mm=np.where(several[:, None], medians[:, :3], first.position_mm),
         rotation=rotation,
         drawn=texts(np.split(every.line[np.argsort(cell, kind="stable")], ends)),
     )
-    return one, cell, away
+    return first, cell, away
 
 
 def grouped(*labels: ndarray) -> ndarray:
@@ -128,16 +128,16 @@ class Distance:
 
 def distances(every: Readings) -> list[Distance]:
     """Distances of all pairs of targets that were seen together often enough to compare."""
-    found = []
-    for one, other, rows in _side_by_side(every):
+    results = []
+    for first, second, rows in _side_by_side(every):
         if len(rows) >= 3:
             rows = rows[np.argsort(every.line[rows[:, 0]], kind="stable")]
             ends = every.position_mm[rows]
             length = np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1)
             middle = float(np.median(length))
             std = float(np.median(np.abs(length - middle))) / _MEDIAN_1D
-            found.append(Distance(one, other, rows, length, middle, std))
-    return found
+            results.append(Distance(first, second, rows, length, middle, std))
+    return results
 
 
 def _side_by_side(every: Readings) -> list[tuple[int, int, ndarray]]:
@@ -158,6 +158,6 @@ def thinned(rows: ndarray, most: int) -> ndarray:
 
 def nearest_rotation(matrix: ndarray) -> ndarray:
     """Rotations nearest to ``matrix`` (..., 3, 3)."""
-    left, _, right = np.linalg.svd(matrix)
-    left[..., 2] *= np.sign(np.linalg.det(left @ right))[..., None]
-    return left @ right
+    remaining, _, right = np.linalg.svd(matrix)
+    remaining[..., 2] *= np.sign(np.linalg.det(remaining @ right))[..., None]
+    return remaining @ right

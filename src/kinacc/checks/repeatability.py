@@ -97,7 +97,7 @@ def parts(read: Repeated) -> Parts:
     visit_mm, readings, side_of = _visits(read)
     side_mm, visits = means(visit_mm, side_of)
     pose_of = _larger(read.side, read.pose)
-    (within, seen), (between, returned), (across, sides) = levels = [
+    (within, observed), (between, returned), (across, sides) = levels = [
         scatter(read.position_mm, read.visit),
         scatter(visit_mm, side_of),
         scatter(side_mm, pose_of),
@@ -108,17 +108,17 @@ def parts(read: Repeated) -> Parts:
     deeper = means(1.0 / readings[:, None], side_of)[0][:, 0] / visits
     of_side_below = _share(deeper, pose_of, sides)
     unknown = np.full((3, 3), np.nan)
-    instrument = within if seen else unknown
+    instrument = within if observed else unknown
     if not returned:
         return Parts(instrument, unknown, unknown, unknown, 0.0)
     arm = _no_less_than_zero(between - of_visit * within)
     side = _no_less_than_zero(across - of_side * arm - of_side_below * within)
     shares = (1.0 - of_visit + of_side * of_visit - of_side_below, 1.0 - of_side, 1.0)
     terms = np.array([c * np.trace(square) for c, (square, _) in zip(shares, levels, strict=True)])
-    own = np.array([freedom for _, freedom in levels])
-    spread = np.sum(terms[own > 0] ** 2 / own[own > 0])
-    freedom = terms[own > 0].sum() ** 2 / spread if spread > 0.0 else returned
-    whole = within * bool(seen) + arm + side * bool(sides)
+    subset = np.array([freedom for _, freedom in levels])
+    spread = np.sum(terms[subset > 0] ** 2 / subset[subset > 0])
+    freedom = terms[subset > 0].sum() ** 2 / spread if spread > 0.0 else returned
+    whole = within * bool(observed) + arm + side * bool(sides)
     return Parts(instrument, arm, side if sides else unknown, whole, float(freedom))
 
 
@@ -174,33 +174,35 @@ def differ_by_pose(read: Repeated, resolution_mm: ndarray) -> tuple[float, ndarr
     freedom = 3.0 * np.bincount(pose_of, count - 1)
     least = np.sum(np.linalg.solve(root, np.diag(resolution_mm / math.sqrt(12.0))) ** 2) / 3.0
     with np.errstate(invalid="ignore", divide="ignore"):
-        own = np.maximum(square / freedom, max(least, 1e-12))
-    own[freedom == 0] = np.nan
-    told = freedom > 0
-    if told.sum() < 2:
-        return math.nan, np.sqrt(own)
-    nu, s2 = freedom[told], own[told]
+        subset = np.maximum(square / freedom, max(least, 1e-12))
+    subset[freedom == 0] = np.nan
+    texts = freedom > 0
+    if texts.sum() < 2:
+        return math.nan, np.sqrt(subset)
+    nu, s2 = freedom[texts], subset[texts]
     middle = np.sum(nu * s2) / nu.sum()
     statistic = nu.sum() * math.log(middle) - float(np.sum(nu * np.log(s2)))
     correction = 1.0 + (np.sum(1.0 / nu) - 1.0 / nu.sum()) / (3.0 * (len(nu) - 1))
-    return float(chdtrc(len(nu) - 1, statistic / correction)), np.sqrt(own / middle)
+    return float(chdtrc(len(nu) - 1, statistic / correction)), np.sqrt(subset / middle)
 
 
 def groups(read: Repeated) -> list[Group]:
     """Every pose from every side, with ISO 9283's repeatability of its visits."""
     visit_mm, readings, side_of = _visits(read)
-    found = []
+    results = []
     for side, pose in enumerate(_larger(read.side, read.pose)):
-        own, std = visit_mm[side_of == side], np.full(3, np.nan)
+        subset, std = visit_mm[side_of == side], np.full(3, np.nan)
         middle = spread = math.nan
-        length = np.linalg.norm(own - own.mean(axis=0), axis=1)
-        if len(own) > 1:
-            std, middle = np.std(own, axis=0, ddof=1), float(length.mean())
-        if len(own) >= _FEWEST_VISITS:
+        length = np.linalg.norm(subset - subset.mean(axis=0), axis=1)
+        if len(subset) > 1:
+            std, middle = np.std(subset, axis=0, ddof=1), float(length.mean())
+        if len(subset) >= _FEWEST_VISITS:
             spread = float(np.std(length, ddof=1))
-        seen = int(readings[side_of == side].sum())
-        found.append(Group(int(pose), side, len(own), seen, std, middle, middle + 3.0 * spread))
-    return found
+        observed = int(readings[side_of == side].sum())
+        results.append(
+            Group(int(pose), side, len(subset), observed, std, middle, middle + 3.0 * spread)
+        )
+    return results
 
 
 def pooled_rp(read: Repeated) -> tuple[float, float]:
@@ -214,8 +216,8 @@ def pooled_rp(read: Repeated) -> tuple[float, float]:
     if not many.any():
         return math.nan, math.nan
     length = np.linalg.norm(visit_mm - mean[side_of], axis=1)[many]
-    own = np.unique(side_of[many], return_inverse=True)[1]
-    square = scatter(length[:, None], own)[0].item()
+    subset = np.unique(side_of[many], return_inverse=True)[1]
+    square = scatter(length[:, None], subset)[0].item()
     return float(length.mean()), float(length.mean() + 3.0 * math.sqrt(square))
 
 
@@ -224,7 +226,11 @@ def between_sides_mm(read: Repeated) -> float:
     visit_mm, _, side_of = _visits(read)
     side_mm, pose_of = means(visit_mm, side_of)[0], _larger(read.side, read.pose)
     pairs = [side_mm[pose_of == pose] for pose in np.unique(pose_of)]
-    apart = [np.linalg.norm(own[:, None] - own, axis=2).max() for own in pairs if len(own) > 1]
+    apart = [
+        np.linalg.norm(subset[:, None] - subset, axis=2).max()
+        for subset in pairs
+        if len(subset) > 1
+    ]
     return float(max(apart, default=math.nan))
 
 

@@ -62,15 +62,15 @@ class Report:
             "path": self.path,
             "verdict": VERDICTS[self.code],
             "facts": self.facts,
-            "remarks": [*self.remarks, *(each.what for each in self.notes)],
+            "remarks": [*self.remarks, *(item.what for item in self.notes)],
             "suspicions": [
                 {
-                    **{key: vars(each)[key] for key in keys},
-                    "accepted": self.accepted.get(each.kind),
-                    "where": each.where or None,
-                    **each.values,
+                    **{key: vars(item)[key] for key in keys},
+                    "accepted": self.accepted.get(item.kind),
+                    "where": item.where or None,
+                    **item.values,
                 }
-                for each in self.suspicions
+                for item in self.suspicions
             ],
         }
 
@@ -85,6 +85,6 @@ class Report:
 
 def to_json(reports: Sequence[Mapping]) -> str:
     """All data sets in one object, with the worst verdict; numbers that are not finite are null."""
-    verdict = max((each["verdict"] for each in reports), key=VERDICTS.index, default=VERDICTS[0])
+    verdict = max((item["verdict"] for item in reports), key=VERDICTS.index, default=VERDICTS[0])
     text = json.dumps({"verdict": verdict, "datasets": reports}, default=np.ndarray.tolist)
     return json.dumps(json.loads(text, parse_constant=lambda name: None), indent=1)

@@ -121,13 +121,13 @@ def fit(seen: Readings, model: DHModel) -> Fitted:
     """The robust fit of at most ``_FITTED_ROWS`` readings, and what it leaves of all."""
     chosen = thinned(np.arange(len(seen)), _FITTED_ROWS)
     few = seen.select(chosen)
-    found = best(few, start(few, model))
-    left = residuals(found.arm, seen)
+    results = best(few, start(few, model))
+    remaining = residuals(results.arm, seen)
     lengths = []
-    for part, residual in ((slice(0, 3), left.position_mm), (slice(3, 6), left.turn_rad)):
+    for part, residual in ((slice(0, 3), remaining.position_mm), (slice(3, 6), remaining.turn_rad)):
         length = np.linalg.norm(residual, axis=1)
         without, over = (
-            np.linalg.norm(each[:, part], axis=1) for each in (found.left_out, found.judged)
+            np.linalg.norm(item[:, part], axis=1) for item in (results.left_out, results.judged)
         )
         # A reading that alone determines something lies anywhere without it, however sound it is:
         # it is far only where it is so too over what the fit without it leaves open.
@@ -136,15 +136,15 @@ def fit(seen: Readings, model: DHModel) -> Fitted:
         lengths.append(length)
     limits = [tails.limit(length, 3) for length in lengths]
     left_rad = np.where(np.isfinite(lengths[1]), lengths[1], -1.0)
-    return Fitted(seen, chosen, found, left, lengths[0], left_rad, *limits)
+    return Fitted(seen, chosen, results, remaining, lengths[0], left_rad, *limits)
 
 
 def residuals(arm: Arm, seen: Readings, flange: Pose | None = None) -> Residuals:
     """What ``arm`` leaves of the readings; ``flange`` (n) where the model's poses are known."""
     flange = flange or dh.forward(arm.model, seen.q_rad)
-    base = Pose(*(each[seen.session] for each in arm.frames.bases))
+    base = Pose(*(item[seen.session] for item in arm.frames.bases))
     flange = compose(base, flange)
-    predicted = compose(flange, Pose(*(each[seen.target] for each in arm.frames.targets)))
+    predicted = compose(flange, Pose(*(item[seen.target] for item in arm.frames.targets)))
     turn, there = np.full((len(seen), 3), np.nan), seen.has_rotation
     turn[there] = log_so3(predicted.rotation[there] @ np.swapaxes(seen.rotation[there], 1, 2))
     return Residuals(predicted.position_mm - seen.position_mm, turn, predicted, flange.rotation)
@@ -289,12 +289,14 @@ class Linear:
             whole = (1.0 + _OFF_ZERO) * np.eye(6 * size)
             rest = whole - open_there * share[rows].reshape(len(rows), 1, -1)
             rest = np.linalg.pinv(rest, rcond=1e-12)
-            left = rest @ plain[rows].reshape(len(rows), -1, 1)
+            remaining = rest @ plain[rows].reshape(len(rows), -1, 1)
             spread = rest @ open_there
             value, axes = np.linalg.eigh(0.5 * (spread + np.swapaxes(spread, 1, 2)))
             over = np.sqrt(1.0 + np.maximum(value, 0.0))[:, :, None]
-            plain[rows] = left.reshape(*rows.shape, 6)
-            judged[rows] = (axes @ (np.swapaxes(axes, 1, 2) @ left / over)).reshape(*rows.shape, 6)
+            plain[rows] = remaining.reshape(*rows.shape, 6)
+            judged[rows] = (axes @ (np.swapaxes(axes, 1, 2) @ remaining / over)).reshape(
+                *rows.shape, 6
+            )
         unit = np.where(np.repeat([[True], [False]], 3) | seen.has_rotation[:, None], unit, np.nan)
         return plain * unit, judged * unit
 
@@ -327,27 +329,29 @@ def start(
     largest = np.argmax(np.bincount(seen.session))
     part = seen.select(thinned(np.flatnonzero(seen.session == largest), _START_ROWS))
     flange = dh.forward(model, part.q_rad)
-    found, least = None, np.inf
+    results, least = None, np.inf
     for rows in _draws(part, draws, stretches):
         for _ in range(_REFINEMENTS):
-            at = Pose(*(each[rows] for each in flange))
-            arm = Arm(model, closed_form_start(part.select(rows), at))
+            place = Pose(*(item[rows] for item in flange))
+            arm = Arm(model, closed_form_start(part.select(rows), place))
             misfit = np.linalg.norm(residuals(arm, part, flange).position_mm, axis=1)
             middle = float(np.quantile(misfit, _JUDGED))
             if middle >= least:
                 break
-            found, least = arm, middle
+            results, least = arm, middle
             rows = np.argsort(misfit)[: max(int(_KEPT * len(misfit)), _DRAWN)]
-    frames = _placed(found, part, flange, least) if len(seen.target_names) > 1 else found.frames
+    frames = _placed(results, part, flange, least) if len(seen.target_names) > 1 else results.frames
     targets = frames.targets
-    for other in np.unique(seen.session[seen.session != largest]):
-        own = seen.select(seen.session == other)
-        at, rows = dh.forward(model, own.q_rad), np.arange(len(own))
+    for second in np.unique(seen.session[seen.session != largest]):
+        subset = seen.select(seen.session == second)
+        place, rows = dh.forward(model, subset.q_rad), np.arange(len(subset))
         for _ in range(_REFINEMENTS):
-            base = base_from_targets(own.select(rows), Pose(*(e[rows] for e in at)), targets)
-            frames.bases.rotation[other], frames.bases.position_mm[other] = base
-            misfit = np.linalg.norm(residuals(Arm(model, frames), own, at).position_mm, axis=1)
-            rows = np.argsort(misfit)[: max(int(_KEPT * len(own)), min(len(own), 4))]
+            base = base_from_targets(subset.select(rows), Pose(*(e[rows] for e in place)), targets)
+            frames.bases.rotation[second], frames.bases.position_mm[second] = base
+            misfit = np.linalg.norm(
+                residuals(Arm(model, frames), subset, place).position_mm, axis=1
+            )
+            rows = np.argsort(misfit)[: max(int(_KEPT * len(subset)), min(len(subset), 4))]
     return Arm(model, frames)
 
 
@@ -367,17 +371,17 @@ def _draws(part: Readings, draws: int, stretches: tuple[int, ...]) -> Iterator[n
 def _placed(arm: Arm, part: Readings, flange: Pose, usual_mm: float) -> Frames:
     """Frames with targets that were in none of the readings chosen put where theirs have them."""
     misfit = np.linalg.norm(residuals(arm, part, flange).position_mm, axis=1)
-    base = Pose(*(each[part.session[0]] for each in arm.frames.bases))
+    base = Pose(*(item[part.session[0]] for item in arm.frames.bases))
     there = (part.position_mm - base.position_mm) @ base.rotation - flange.position_mm
     there = (np.swapaxes(flange.rotation, 1, 2) @ there[..., None])[..., 0]
-    targets = Pose(*(each.copy() for each in arm.frames.targets))
-    for each in np.unique(part.target):
-        of = part.target == each
+    targets = Pose(*(item.copy() for item in arm.frames.targets))
+    for item in np.unique(part.target):
+        of = part.target == item
         if np.median(misfit[of]) > _ASTRAY * usual_mm:
-            targets.position_mm[each] = np.median(there[of], axis=0)
+            targets.position_mm[item] = np.median(there[of], axis=0)
             of &= part.has_rotation
             if of.any():
                 turned = np.swapaxes(base.rotation @ flange.rotation[of], 1, 2)
                 turned = np.median(turned @ part.rotation[of], axis=0)
-                targets.rotation[each] = nearest_rotation(turned)
+                targets.rotation[item] = nearest_rotation(turned)
     return Frames(arm.frames.bases, targets)

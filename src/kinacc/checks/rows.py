@@ -22,10 +22,10 @@ def found(fitted: Fitted, meaning: Meaning, layout: Layout) -> list[Finding]:
     if not bad.size:
         return []
     open_rows, findings, lines = bad, [], fitted.seen.lines
-    for change, seen in _explanations(fitted, meaning, layout, bad):
-        left = robust_fit.residuals(fitted.trial.arm, seen)
-        near = np.linalg.norm(left.position_mm, axis=1) <= fitted.limit_mm
-        near &= ~(np.linalg.norm(left.turn_rad, axis=1) > fitted.limit_rad)
+    for change, observed in _explanations(fitted, meaning, layout, bad):
+        remaining = robust_fit.residuals(fitted.trial.arm, observed)
+        near = np.linalg.norm(remaining.position_mm, axis=1) <= fitted.limit_mm
+        near &= ~(np.linalg.norm(remaining.turn_rad, axis=1) > fitted.limit_rad)
         rows = np.intersect1d(open_rows, bad[near])
         if rows.size:
             change = replace(change, fix="correct these rows, or exclude them", values={})
@@ -43,52 +43,55 @@ def _explanations(
     fitted: Fitted, meaning: Meaning, layout: Layout, rows: ndarray
 ) -> Iterator[tuple[Finding, Readings]]:
     """Every known fault undone in the readings ``rows``."""
-    seen = fitted.seen.select(rows)
+    observed = fitted.seen.select(rows)
 
-    def moved(position_mm: ndarray, rotation: ndarray = seen.rotation) -> Readings:
-        return replace(seen, position_mm=position_mm, rotation=rotation)
+    def moved(position_mm: ndarray, rotation: ndarray = observed.rotation) -> Readings:
+        return replace(observed, position_mm=position_mm, rotation=rotation)
 
     for stated, factor in (("degrees", 180.0 / np.pi), ("radians", np.pi / 180.0)):
         unit = {"degrees": "radians", "radians": "degrees"}[stated]
-        q = seen.q * np.where(meaning.unit == 1.0, factor, 1.0)
+        q = observed.q * np.where(meaning.unit == 1.0, factor, 1.0)
         change = finding("joint_units", unit=unit, stated=stated, short="")
-        yield change, replace(seen, q_rad=meaning.joints(q))
+        yield change, replace(observed, q_rad=meaning.joints(q))
     for factor, unit in ((1e3, "metres"), (1e-3, ""), (25.4, "inches")):
-        yield meanings.of_length(unit), moved(factor * seen.position_mm)
-    yield finding("commanded_joints/better"), replace(seen, q_rad=meaning.joints(seen.commanded))
-    there = seen.has_rotation
-    for way in orientations.simple(layout, seen.turns[there]) if there.any() else ():
-        rotation = seen.rotation.copy()
-        rotation[there] = way.read(seen.turns[there])
-        yield way.change, moved(seen.position_mm, rotation)
+        yield meanings.of_length(unit), moved(factor * observed.position_mm)
+    yield (
+        finding("commanded_joints/better"),
+        replace(observed, q_rad=meaning.joints(observed.commanded)),
+    )
+    there = observed.has_rotation
+    for way in orientations.simple(layout, observed.turns[there]) if there.any() else ():
+        rotation = observed.rotation.copy()
+        rotation[there] = way.read(observed.turns[there])
+        yield way.change, moved(observed.position_mm, rotation)
     for mirror, name in zip(1.0 - 2.0 * np.eye(3), "xyz", strict=True):
-        change, position_mm = finding("left_handed/axis", axis=name), seen.position_mm * mirror
+        change, position_mm = finding("left_handed/axis", axis=name), observed.position_mm * mirror
         yield change, moved(position_mm)
-        yield change, moved(position_mm, seen.rotation * np.outer(mirror, mirror))
+        yield change, moved(position_mm, observed.rotation * np.outer(mirror, mirror))
     for target in np.unique(fitted.seen.target):
         # Readings of the target itself are made to fit nothing.
-        others = (seen.target != target)[:, None]
-        swapped = moved(np.where(others, seen.position_mm, np.inf))
-        change = finding("target_swapped", target=seen.target_names[target])
-        yield change, replace(swapped, target=np.full_like(seen.target, target))
-    for other in meanings.single(meaning, fitted.trial.nominal.prismatic):
-        change = other.changes[-1]
+        others = (observed.target != target)[:, None]
+        swapped = moved(np.where(others, observed.position_mm, np.inf))
+        change = finding("target_swapped", target=observed.target_names[target])
+        yield change, replace(swapped, target=np.full_like(observed.target, target))
+    for second in meanings.single(meaning, fitted.trial.nominal.prismatic):
+        change = second.changes[-1]
         beside = change.values.get("other") in (2, change.values["joint"] - 1)
         if change.kind == "joint_sign" or (change.kind == "joint_coupling" and beside):
-            yield change, replace(seen, q_rad=other.joints(seen.q))
+            yield change, replace(observed, q_rad=second.joints(observed.q))
 
 
 def _outliers(fitted: Fitted, rows: ndarray) -> Iterator[Finding]:
     """What no fault explains."""
-    seen = fitted.seen
+    observed = fitted.seen
     if rows.size:
         worst, angle = rows[np.argmax(fitted.left_mm[rows])], fitted.left_rad[rows].max()
         yield finding(
             "outliers",
-            seen.lines(rows),
+            observed.lines(rows),
             count=rows.size,
             turned=f" and {1e3 * angle:.3g} mrad" if angle > fitted.limit_rad else "",
-            row=seen.row_names.one(seen.line[worst]),
+            row=observed.row_names.one(observed.line[worst]),
             largest_mm=float(fitted.left_mm[worst]),
             limit_mm=fitted.limit_mm,
         )

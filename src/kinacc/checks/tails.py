@@ -66,6 +66,6 @@ def _freedom(ratio: float, dimensions: int) -> float:
     low, high = _LEAST_FREEDOM, _MOST_FREEDOM
     for _ in range(40):
         middle = 0.5 * (low + high)
-        found = _length(_BULK, dimensions, middle) / _length(0.5, dimensions, middle)
-        low, high = (middle, high) if found > ratio else (low, middle)
+        results = _length(_BULK, dimensions, middle) / _length(0.5, dimensions, middle)
+        low, high = (middle, high) if results > ratio else (low, middle)
     return 0.5 * (low + high)

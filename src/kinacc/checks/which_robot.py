@@ -46,8 +46,8 @@ def fitting(guess: Guess, progress: Progress) -> str | None:
     misfits = []
     if len(few) >= _POSES:
         moved = moved[:_TRIED]
-    for arm, seen in progress(moved, "shipped robots tried"):
-        fitted = robust_fit.best(seen, robust_fit.start(seen, arm.dh), strengths=(0.0,))
+    for arm, observed in progress(moved, "shipped robots tried"):
+        fitted = robust_fit.best(observed, robust_fit.start(observed, arm.dh), strengths=(0.0,))
         misfits.append((fitted.sigma_mm / spread, arm.name))
     misfits.sort()
     least, name = misfits[0]
@@ -55,18 +55,18 @@ def fitting(guess: Guess, progress: Progress) -> str | None:
     return name if least <= _SURE and not (others and least > _NEXT * others[0]) else None
 
 
-def _linear_misfit(model: DHModel, seen, spread: float) -> float:
+def _linear_misfit(model: DHModel, observed, spread: float) -> float:
     """Misfit of the most measured target, base and tool entering linearly, in spreads.
 
     ``point = B p + B R t + b`` is linear in B (3, 3), the products of B and t, and b; how far B is
     from a rotation counts as well.
     """
-    pairs = np.column_stack([seen.session, seen.target])
+    pairs = np.column_stack([observed.session, observed.target])
     which, count = np.unique(pairs, axis=0, return_counts=True)
-    one = seen.select(np.flatnonzero((pairs == which[np.argmax(count)]).all(axis=1)))
-    flange = forward(model, one.q_rad)
+    first = observed.select(np.flatnonzero((pairs == which[np.argmax(count)]).all(axis=1)))
+    flange = forward(model, first.q_rad)
     terms = np.hstack([flange.position_mm / spread, flange.rotation.reshape(-1, 9),
-                       np.ones((len(one), 1))])  # fmt: skip
-    found = np.linalg.lstsq(terms, one.position_mm / spread, rcond=1e-9)[0]
-    left = np.linalg.norm(terms @ found - one.position_mm / spread, axis=1)
-    return float(np.median(left) + np.abs(np.linalg.svd(found[:3])[1] - 1.0).max())
+                       np.ones((len(first), 1))])  # fmt: skip
+    results = np.linalg.lstsq(terms, first.position_mm / spread, rcond=1e-9)[0]
+    remaining = np.linalg.norm(terms @ results - first.position_mm / spread, axis=1)
+    return float(np.median(remaining) + np.abs(np.linalg.svd(results[:3])[1] - 1.0).max())

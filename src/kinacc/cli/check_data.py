@@ -49,20 +49,20 @@ def check_data(
     from kinacc.progress import reporting
 
     files = files or (CONFIG,)
-    code, told, following, sections = 0, [], [], {}
+    code, texts, following, sections = 0, [], [], {}
 
     def unusable(name: str, path: str, error: InputError) -> None:
-        problems = [asdict(each) for each in error.problems]
+        problems = [asdict(item) for item in error.problems]
         verdict = VERDICTS[UNUSABLE]
-        told.append({"dataset": name, "path": path, "verdict": verdict, "problems": problems})
+        texts.append({"dataset": name, "path": path, "verdict": verdict, "problems": problems})
 
     try:
         if accept is not None:
             _accept(files, dataset, accept, reason)
         sections = _sections(files, dataset)
         if picture is not None and len(sections) > 1:
-            what = "draws one data set, and there are several"
-            raise InputError(Problem("--picture", what, ", ".join(sections), "give --dataset"))
+            message = "draws one data set, and there are several"
+            raise InputError(Problem("--picture", message, ", ".join(sections), "give --dataset"))
         require_writable([picture], force, PICTURES)
     except InputError as error:
         if not as_json:
@@ -80,14 +80,14 @@ def check_data(
                 click.echo(f"{error}\n", err=True)
             continue
         code = max(code, report.code)
-        told.append(report.as_dict())
-        following += [words for each in report.stopping for words in each.commands(files[0])]
+        texts.append(report.as_dict())
+        following += [text for item in report.stopping for text in item.commands(files[0])]
         if picture is not None:
             _draw(report, picture)
         if not as_json:
             click.echo(report.as_text() + "\n")
     if as_json:
-        click.echo(to_json(told))
+        click.echo(to_json(texts))
     elif code < UNUSABLE:
         next_ = following or [shlex.join(["kinacc", "calibrate", *files])]
         click.echo("\n  ".join(["next:", *next_]))
@@ -133,7 +133,7 @@ def _draw(report, picture: str) -> None:
     from kinacc.cli.output import Output
     from kinacc.figures.checked_data import draw
 
-    suspects = {each.kind: each.lines for each in report.suspicions}
+    suspects = {item.kind: item.lines for item in report.suspicions}
     limit_mm = report.facts.get("quick_fit", {}).get("most_expected_mm", float("nan"))
     drawn = draw(report.facts["joint_coverage"], report.line, report.left_mm, limit_mm, suspects)
     Output(picture=picture).draw(drawn)

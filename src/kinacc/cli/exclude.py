@@ -31,7 +31,7 @@ def exclude(file: str, lines: str, reason: str, dataset: str | None, as_json: bo
     name, settings = measured_data_set(file, dataset)
     section = settings["measurements"]["file"]
     numbers = _numbers(lines)
-    known = [each for each in numbers if each in excluded_lines(section)]
+    known = [entry for entry in numbers if entry in excluded_lines(section)]
     problems = [Problem("--lines", f"{first_few(known)} excluded already")] if known else []
     problems += [] if reason.strip() else [Problem("--reason", "is empty", "why, in words")]
     refuse(problems)
@@ -53,14 +53,14 @@ def measured_data_set(file: str, dataset: str | None) -> tuple[str, dict]:
     from kinacc.errors import InputError, Problem
 
     measured = {
-        name: own
-        for name, own in load([file]).items()
-        if own["measurements"]["source"] == "file" and not {"line_of", "series"} & {*own}
+        name: subset
+        for name, subset in load([file]).items()
+        if subset["measurements"]["source"] == "file" and not {"line_of", "series"} & {*subset}
     }
     name = dataset or (next(iter(measured)) if len(measured) == 1 else "")
     if name not in measured:
-        what = f"{name!r} is not a data set of one file" if name else "is not given"
-        raise InputError(Problem("--dataset", what, ", ".join(measured) or "a measured file"))
+        message = f"{name!r} is not a data set of one file" if name else "is not given"
+        raise InputError(Problem("--dataset", message, ", ".join(measured) or "a measured file"))
     return name, measured[name]
 
 

@@ -43,11 +43,11 @@ def with_added(text: str, path: Path, value: Any, name: str, without: Path = ())
             return changed
     except (yaml.YAMLError, TypeError, AttributeError, KeyError):
         pass
-    what = f"cannot be changed safely at {'.'.join(path)}"
+    message = f"cannot be changed safely at {'.'.join(path)}"
     instead = f", in place of {'.'.join(without)}" if without else ""
     items = [value] if isinstance(value, Mapping) else value
-    fix = f"add by hand{instead}: {' '.join(f'- {flow(each)}' for each in items)}"
-    raise InputError(Problem(name, what, fix=fix))
+    fix = f"add by hand{instead}: {' '.join(f'- {flow(item)}' for item in items)}"
+    raise InputError(Problem(name, message, fix=fix))
 
 
 def flow(value: Any) -> str:
@@ -73,18 +73,18 @@ def _without(text: str, data: Any, path: Path) -> str:
 
 def _joined(text: str, data: Any, path: Path, value: Any) -> str:
     """The text with a value behind what is at a path; ``data``, its values, get it too."""
-    own, node, depth = _deepest(text, data, path)
+    subset, node, depth = _deepest(text, data, path)
     rest = path[depth:]
     for key in rest[:-1]:
-        own[key] = own.get(key) or {}
-        own = own[key]
+        subset[key] = subset.get(key) or {}
+        subset = subset[key]
     if rest:
-        before = own.get(rest[-1]) or type(value)()
-        own[rest[-1]] = {**before, **value} if isinstance(value, Mapping) else [*before, *value]
-    elif isinstance(own, dict):
-        own.update(value)
+        before = subset.get(rest[-1]) or type(value)()
+        subset[rest[-1]] = {**before, **value} if isinstance(value, Mapping) else [*before, *value]
+    elif isinstance(subset, dict):
+        subset.update(value)
     else:
-        own.extend(value)
+        subset.extend(value)
     whole, _, _ = _deepest(text, data, path[:depth])
     if node.flow_style or not node.value:
         return text[: node.start_mark.index] + flow(whole) + text[node.end_mark.index :]
@@ -96,9 +96,9 @@ def _joined(text: str, data: Any, path: Path, value: Any) -> str:
         lines.append(f"{indent}{key}:")
         indent += "  "
     if isinstance(value, Mapping):
-        lines += [f"{indent}{flow(key)}: {flow(each)}" for key, each in value.items()]
+        lines += [f"{indent}{flow(key)}: {flow(item)}" for key, item in value.items()]
     else:
-        lines += [f"{indent}- {flow(each)}" for each in value]
+        lines += [f"{indent}- {flow(item)}" for item in value]
     while isinstance(node, yaml.CollectionNode) and not node.flow_style and node.value:
         last = node.value[-1]  # block nodes end at what follows: their last value does not
         node = last[1] if isinstance(last, tuple) else last
@@ -111,10 +111,10 @@ def _deepest(text: str, data: Any, path: Path) -> tuple[Any, Any, int]:
     """Values and YAML node of the deepest list or mapping on a path, and how deep it is."""
     node: Any = yaml.compose(text, Loader=yaml.SafeLoader)
     for depth, key in enumerate(path):
-        found = {each.value: inner for each, inner in node.value}.get(key)
-        if not isinstance(found, yaml.CollectionNode):
+        results = {item.value: inner for item, inner in node.value}.get(key)
+        if not isinstance(results, yaml.CollectionNode):
             return data, node, depth
-        node, data = found, data[key]
+        node, data = results, data[key]
     return data, node, len(path)
 
 

@@ -44,8 +44,8 @@ ERROR_MODELS = {
         "kinacc.calibration.vec_estimator:VECEstimator",
     ),
 }
-MODELS = {kind: each.model for kind, each in ERROR_MODELS.items()}
-ESTIMATORS = {kind: each.estimator for kind, each in ERROR_MODELS.items()}
+MODELS = {kind: item.model for kind, item in ERROR_MODELS.items()}
+ESTIMATORS = {kind: item.estimator for kind, item in ERROR_MODELS.items()}
 PLAINEST = next(iter(ERROR_MODELS))
 FITTED = tuple(reversed(ERROR_MODELS))  # in this order
 ALWAYS = tuple(kind for kind in FITTED if not ERROR_MODELS[kind].asked_by)
@@ -80,8 +80,8 @@ def register(kind: str, model: type, estimator: type) -> None:
 def comparisons(models: Collection[str]) -> tuple[Comparison, ...]:
     """What is compared with what where there are these ``models``, in the order of the tables."""
     there = {*models, MEASURED}
-    own = tuple(Comparison(MEASURED, kind) for kind in OWN)
-    return tuple(each for each in (*own, *COMPARISONS) if there >= set(each))
+    subset = tuple(Comparison(MEASURED, kind) for kind in OWN)
+    return tuple(item for item in (*subset, *COMPARISONS) if there >= set(item))
 
 
 def model_name(model: str) -> str:

@@ -57,7 +57,7 @@ def refused(what: str, fix: str = "", *keys: str | int) -> PydanticCustomError:
 
 def distinct(items: list[Any]) -> list[Any]:
     """The items. Raises where one stands there more than once."""
-    if repeated := [each for each, count in Counter(items).items() if count > 1]:
+    if repeated := [item for item, count in Counter(items).items() if count > 1]:
         raise refused(f"names {first_few(repeated)} more than once")
     return items
 
@@ -77,17 +77,17 @@ class Or:
     def __get_pydantic_core_schema__(
         self, source: Any, handler: GetCoreSchemaHandler
     ) -> core_schema.CoreSchema:
-        words = core_schema.literal_schema([*self.words])
+        text = core_schema.literal_schema([*self.words])
         kind = handler(source)
         return core_schema.tagged_union_schema(
-            {"[word]": words, "[value]": kind},
+            {"[word]": text, "[value]": kind},
             lambda value: "[word]" if isinstance(value, str) else "[value]",
         )
 
     def __get_pydantic_json_schema__(
         self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict[str, Any]:
-        return {"anyOf": [handler(each) for each in schema["choices"].values()]}
+        return {"anyOf": [handler(item) for item in schema["choices"].values()]}
 
 
 Text = Annotated[str, Field(min_length=1)]

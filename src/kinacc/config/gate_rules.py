@@ -32,9 +32,9 @@ _STATISTICS = {
 }
 # Figures that a gate may name, with unit (1 where it is counted) and meaning.
 FIGURES = {
-    f"{COMPARED}{quantity}.{statistic}": (unit, words.format(f"{quantity} error"))
+    f"{COMPARED}{quantity}.{statistic}": (unit, text.format(f"{quantity} error"))
     for quantity, unit in (("position", "mm"), ("orientation", "mrad"))
-    for statistic, words in _STATISTICS.items()
+    for statistic, text in _STATISTICS.items()
 } | {
     "bound.upper": ("mm", "upper bound of the newest campaign on this calibration"),
     "data.readings": ("1", "number of readings"),
@@ -95,7 +95,7 @@ def _known(figure: str) -> str:
 
 def _data_sets(names: list[str], info: ValidationInfo) -> list[str]:
     known = (info.context or {}).get("datasets", names)
-    if unknown := [each for each in names if each not in known]:
+    if unknown := [item for item in names if item not in known]:
         there = first_few([*map(str, known)], 10)
         raise refused(f"names {first_few(unknown)}, which no data set is called", f"known: {there}")
     return names
@@ -132,11 +132,11 @@ class Gate(Section):
         """Raise where there are two limits, or one in another unit than the gate's figure."""
         right = [limit_key(word, vars(self)) for word in words]
         named = [f"{word}{ending}" for word in words for ending in _ENDINGS.values()]
-        named = [each for each in named if vars(self).get(each) is not None]
+        named = [item for item in named if vars(self).get(item) is not None]
         if len(named) > 1 or not {*named} <= {*right} or len(named) < needed:
             unit = FIGURES[vars(self)["value"]][0]
-            what = f"{' and '.join(named) or 'no limit'}, where the figure is in {unit}"
-            raise refused(what, f"give one of {' or '.join(right)}")
+            message = f"{' and '.join(named) or 'no limit'}, where the figure is in {unit}"
+            raise refused(message, f"give one of {' or '.join(right)}")
 
 
 class Value(Gate):
@@ -199,8 +199,8 @@ class Against(Gate):
     @model_validator(mode="after")
     def _allowance(self) -> Self:
         if not self.value.startswith(COMPARED):
-            what = f"chance cannot be told of {self.value}"
-            raise refused(what, f"give a figure that begins with {COMPARED}")
+            message = f"chance cannot be told of {self.value}"
+            raise refused(message, f"give a figure that begins with {COMPARED}")
         self.one_limit("allow", needed=True)
         return self
 
@@ -247,20 +247,20 @@ class History(Gate):
 
 # A change has the key ``value`` as well: it comes first.
 KINDS = {
-    each.__name__.lower(): each
-    for each in (Against, Value, Table, Campaign, Claims, Suspicions, History)
+    item.__name__.lower(): item
+    for item in (Against, Value, Table, Campaign, Claims, Suspicions, History)
 }
 
 
 def _kind(gate: Any) -> str:
-    kinds = [each for each in KINDS if each in gate] if isinstance(gate, dict) else [gate.kind]
+    kinds = [item for item in KINDS if item in gate] if isinstance(gate, dict) else [gate.kind]
     return f"[{kinds[0]}]"
 
 
 def _of_one_kind(gate: Any) -> Any:
-    kinds = {each for each in KINDS if isinstance(gate, dict) and each in gate}
+    kinds = {item for item in KINDS if isinstance(gate, dict) and item in gate}
     if len(kinds - ({"value"} if "against" in kinds else {*()})) != 1:
-        close = [did_you_mean(each, KINDS) for each in gate] if isinstance(gate, dict) else []
+        close = [did_you_mean(item, KINDS) for item in gate] if isinstance(gate, dict) else []
         fix = f"give one of {', '.join(KINDS)}"
         fix = next(filter(None, [] if kinds else close), fix)
         raise refused(f"{shown(gate)} is not of one kind", fix)
@@ -268,7 +268,7 @@ def _of_one_kind(gate: Any) -> Any:
 
 
 def _names_once(gates: list[Gate]) -> list[Gate]:
-    distinct([each.name for each in gates])
+    distinct([item.name for item in gates])
     return gates
 
 
@@ -301,5 +301,5 @@ def require_limits(gates: Sequence[Gate], tolerance_mm: float | None, of: str) -
         else:
             continue
         if open_ and (tolerance_mm is None or OF_TOLERANCE[of] != figure):
-            what = f"has no limit, and tolerance has none for {figure}"
-            raise refused(what, "write one into the gate", "gates", number)
+            message = f"has no limit, and tolerance has none for {figure}"
+            raise refused(message, "write one into the gate", "gates", number)

@@ -64,22 +64,24 @@ def load(
         documents.append(Document(COMMAND_LINE, deepcopy(dict(overrides))))
     if not documents:
         raise InputError(Problem("configuration", "no file given", fix="give config.yaml"))
-    merged = reduce(overlay, (each.data for each in documents))
+    merged = reduce(overlay, (item.data for item in documents))
     resolved: dict[str, dict[str, Any]] = {}
     if merged or not problems:
         problems += _given_twice(documents)
         shared = {key: value for key, value in merged.items() if key != "datasets"}
         datasets = merged.get("datasets")
         if not isinstance(datasets, Mapping) or not 0 < len(datasets) <= _MOST_DATASETS:
-            what = "no data set is given" if not datasets else "is no mapping of data sets by name"
+            message = (
+                "no data set is given" if not datasets else "is no mapping of data sets by name"
+            )
             allowed = f"datasets: with a section for each of at most {_MOST_DATASETS}"
             where = next((e.place(("datasets",)) for e in documents if "datasets" in e.data), None)
-            problems.append(Problem(where or documents[0].name, what, allowed))
+            problems.append(Problem(where or documents[0].name, message, allowed))
             datasets = {}
-        for name, own in datasets.items():
+        for name, subset in datasets.items():
             context = {"folder": Path(folder), "dataset": name, "datasets": datasets}
             try:
-                resolved |= _data_set(own, shared, documents, context, contradictions)
+                resolved |= _data_set(subset, shared, documents, context, contradictions)
             except InputError as error:
                 problems += error.problems
             if len(problems) > _MOST_PROBLEMS:
@@ -116,9 +118,9 @@ def overlay(
 def _relocated(value: Any, beside: str, folder: Path, key: Any = None) -> Any:
     """Values whose files, named from the folder ``beside``, are as seen from ``folder``."""
     if isinstance(value, dict):
-        return {name: _relocated(each, beside, folder, name) for name, each in value.items()}
+        return {name: _relocated(item, beside, folder, name) for name, item in value.items()}
     if isinstance(value, list):
-        return [_relocated(each, beside, folder) for each in value]
+        return [_relocated(item, beside, folder) for item in value]
     if key not in _FILES or not isinstance(value, str) or not value or os.path.isabs(value):
         return value
     near = os.path.normpath(f"{beside}/{value}").replace(os.sep, "/")
@@ -127,7 +129,7 @@ def _relocated(value: Any, beside: str, folder: Path, key: Any = None) -> Any:
 
 
 def _data_set(
-    own: Any,
+    subset: Any,
     shared: Mapping[str, Any],
     documents: Sequence[Document],
     context: Mapping[str, Any],
@@ -146,22 +148,22 @@ def _data_set(
             if base + path[:length] and document.gives(base + path[:length])
         )
 
-    content = overlay(shared, own, _MAPPINGS) if isinstance(own, Mapping) else own
+    content = overlay(shared, subset, _MAPPINGS) if isinstance(subset, Mapping) else subset
     try:
         whole = Configuration.model_validate({"datasets": {name: content}}, context=context)
     except ValidationError as error:
         raise InputError(problems_of(error, lambda path: place(path[2:]))) from None
     full, problems = whole.datasets[name].model_dump(by_alias=True), []
-    if own.get("gates") and any(each["datasets"] for each in full["gates"]):
-        what = "names data sets inside of a data set, which its gates are about alone"
-        problems.append(Problem(place(("gates",)), what, fix="leave datasets out of the gate"))
-    full["gates"] = [each for each in full["gates"] if name in (each["datasets"] or [name])]
+    if subset.get("gates") and any(item["datasets"] for item in full["gates"]):
+        message = "names data sets inside of a data set, which its gates are about alone"
+        problems.append(Problem(place(("gates",)), message, fix="leave datasets out of the gate"))
+    full["gates"] = [item for item in full["gates"] if name in (item["datasets"] or [name])]
     resolved = series.expanded(name, full)
-    lines = [line.get("path") for line in own.get("series") or ()]
-    for each, settings in resolved.items():
-        if each != name and each in context["datasets"]:
-            what = f"its line {each} has the name of another data set"
-            problems.append(Problem(place(("series",)), what, "another name"))
+    lines = [line.get("path") for line in subset.get("series") or ()]
+    for item, settings in resolved.items():
+        if item != name and item in context["datasets"]:
+            message = f"its line {item} has the name of another data set"
+            problems.append(Problem(place(("series",)), message, "another name"))
         path = settings["measurements"]["file"]["path"]
 
         def of_line(keys: KeyPath, path: str = path) -> str:
@@ -176,31 +178,31 @@ def _data_set(
 
 def problems_of(error: ValidationError, place: Place) -> Iterator[Problem]:
     """The problems of a pydantic error, with the key that is nearest to an unknown one."""
-    for each in error.errors(include_url=False)[: _MOST_PROBLEMS + 1]:
-        more = each.get("ctx", {})
+    for item in error.errors(include_url=False)[: _MOST_PROBLEMS + 1]:
+        more = item.get("ctx", {})
         # Kinds of gates and of values, and keys that are values, are no steps of the file.
-        path = (*each["loc"], *more.get("keys", ()))
+        path = (*item["loc"], *more.get("keys", ()))
         path = tuple(step for step in path if not (isinstance(step, str) and step[:1] == "["))
-        message = each["msg"].removeprefix("Input ").partition(" or instance of ")[0]
-        what, fix = f"{shown(each['input'])} {message}", ""
-        if each["type"] == "missing":
-            path, what = path[:-1], f"has no {path[-1]}"
-        elif each["type"] == "extra_forbidden":
-            what, fix = f"unknown key {path[-1]!r}", _meant(path)
-        elif each["type"] == "refused":
-            what, fix = more["what"], more["fix"]
-        elif each["type"] == "literal_error":
-            fix = did_you_mean(each["input"], re.findall(r"'([^']*)'", more["expected"]))
-        yield Problem(place(path), what, fix=fix)
+        message = item["msg"].removeprefix("Input ").partition(" or instance of ")[0]
+        reason, fix = f"{shown(item['input'])} {message}", ""
+        if item["type"] == "missing":
+            path, reason = path[:-1], f"has no {path[-1]}"
+        elif item["type"] == "extra_forbidden":
+            reason, fix = f"unknown key {path[-1]!r}", _meant(path)
+        elif item["type"] == "refused":
+            reason, fix = more["what"], more["fix"]
+        elif item["type"] == "literal_error":
+            fix = did_you_mean(item["input"], re.findall(r"'([^']*)'", more["expected"]))
+        yield Problem(place(path), reason, fix=fix)
 
 
 def _meant(path: KeyPath) -> str:
     """What to write instead of an unknown key of the settings."""
     path = path[2:] if path[0] == "datasets" else path
     *above, key = [str(step) for step in path if not isinstance(step, int)]
-    known = [each.rpartition(".") for each in keys()]
+    known = [item.rpartition(".") for item in keys()]
     there = [name for section, _, name in known if section == ".".join(above)]
-    homes = ["".join(each) for each in known if each[2] == key][:3]
+    homes = ["".join(item) for item in known if item[2] == key][:3]
     return did_you_mean(key, there) or (
         f"it belongs at {' or '.join(homes)}" if homes else f"known: {', '.join(there)}"
     )
@@ -214,7 +216,7 @@ def _given_twice(documents: Sequence[Document]) -> Iterator[Problem]:
         for name in datasets if isinstance(datasets, Mapping) else ():
             for path in (("datasets", name, *steps) for steps in _IDENTITY):
                 if document.gives(path) and first.setdefault(path, document) is not document:
-                    what = f"data set {name!r} has its measurements given in two files"
+                    message = f"data set {name!r} has its measurements given in two files"
                     allowed = f"once; first in {first[path].place(path)}"
                     fix = "give the second data set a name of its own"
-                    yield Problem(document.place(path), what, allowed, fix)
+                    yield Problem(document.place(path), message, allowed, fix)

@@ -74,8 +74,8 @@ def _column(name: Any) -> Any:
 def _ours_first(names: Any) -> Any:
     for name, of_file in names.items() if isinstance(names, dict) else ():
         if not any(map(_is_column, names)) and _is_column(of_file):
-            what = f"the file's names stand first, as in {name}: {of_file}"
-            raise refused(what, f"turn them all round, as in {of_file}: {name}")
+            message = f"the file's names stand first, as in {name}: {of_file}"
+            raise refused(message, f"turn them all round, as in {of_file}: {name}")
     return names
 
 
@@ -350,6 +350,6 @@ class Measurements(Section):
     @model_validator(mode="after")
     def _fold_is_there(self) -> Self:
         if self.validation_fold is not None and self.validation_fold >= (self.folds or 0):
-            what = f"there is no fold {self.validation_fold}, with folds: {shown(self.folds)}"
-            raise refused(what, "folds count from 0; null for none", "validation_fold")
+            message = f"there is no fold {self.validation_fold}, with folds: {shown(self.folds)}"
+            raise refused(message, "folds count from 0; null for none", "validation_fold")
         return self

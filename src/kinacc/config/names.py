@@ -36,7 +36,7 @@ def not_in_a_line(where: str, name: str) -> list[Problem]:
 
 def in_markdown(text: str) -> str:
     """Text that Markdown shows as it is, within a line, a cell of a table or a heading."""
-    line = "".join(" " if _unseen(each) else each for each in text)
+    line = "".join(" " if _unseen(item) else item for item in text)
     return _MARKS.sub(r"\\\g<0>", line)
 
 

@@ -59,7 +59,7 @@ class Rule:
 
 def rules(content: Mapping[str, Any]) -> list[Rule]:
     """Rules of a valid mapping of names to ``free``, ``fixed``, or values and priors by unit."""
-    found = []
+    results = []
     for name, state in content.items():
         known: dict[str, dict[str, float]] = {"value": {}, "prior_std": {}}
         for key, number in state.items() if isinstance(state, Mapping) else ():
@@ -67,8 +67,8 @@ def rules(content: Mapping[str, Any]) -> list[Rule]:
             known[kind][_UNITS[short][0]] = _UNITS[short][1] * number
         is_free = state == FREE or bool(known["prior_std"])
         subject = _subject(name) or (None, None, None)
-        found.append(Rule(name, *subject, is_free, known["value"], known["prior_std"]))
-    return found
+        results.append(Rule(name, *subject, is_free, known["value"], known["prior_std"]))
+    return results
 
 
 def _check(about: str) -> AfterValidator:
@@ -84,22 +84,24 @@ def _check(about: str) -> AfterValidator:
             units = {parameter and unit(parameter)}
             wrong = [k for k, u in kinds if (parameter or k == "value") and u not in units]
             if subject is None or (subject[1] is not None) != (about == FRAMES):
-                what = f"{name!r} is no parameter of {about}"
-                other = KEYS[JOINTS if about == FRAMES else FRAMES]
-                fix = f"give {_NAMES[about]}; others belong in {other}"
+                message = f"{name!r} is no parameter of {about}"
+                second = KEYS[JOINTS if about == FRAMES else FRAMES]
+                fix = f"give {_NAMES[about]}; others belong in {second}"
             elif subject in subjects:
-                what = f"{name!r} is said twice, in two spellings"
+                message = f"{name!r} is said twice, in two spellings"
             elif len({*kinds}) < len(kinds) or not (stated or isinstance(state, str)):
-                what = "states nothing, or the same in two units"
+                message = "states nothing, or the same in two units"
             elif wrong:
-                what = f"{wrong[0]} of {parameter or 'no one parameter'} is named in another unit"
+                message = (
+                    f"{wrong[0]} of {parameter or 'no one parameter'} is named in another unit"
+                )
                 fix = "name one parameter, and its unit"
             elif any(k == "prior_std" and state["_".join((k, u))] <= 0.0 for k, _, u in stated):
-                what = "a standard deviation should be greater than 0"
+                message = "a standard deviation should be greater than 0"
             else:
                 subjects.append(subject)
                 continue
-            raise refused(what, fix, name)
+            raise refused(message, fix, name)
         return content
 
     return AfterValidator(check)
@@ -146,12 +148,12 @@ def unit(parameter: str) -> str:
 
 def _subject(name: str) -> tuple[int | None, str | None, str | None] | None:
     """Joint, frame and parameter a name stands for; None where it stands for none."""
-    words = " ".join(name.split())
-    lower = words.lower().removesuffix("_mm").removesuffix("_rad")
+    text = " ".join(name.split())
+    lower = text.lower().removesuffix("_mm").removesuffix("_rad")
     if lower in _PARAMETERS:
         return None, None, _PARAMETERS[lower]
-    if match := _JOINT.fullmatch(words.lower()):
+    if match := _JOINT.fullmatch(text.lower()):
         is_known = match[2] is None or match[2] in _PARAMETERS
         return (int(match[1]), None, _PARAMETERS.get(match[2])) if is_known else None
-    match = _FRAME.fullmatch(words)
+    match = _FRAME.fullmatch(text)
     return (None, match[1], _COMPONENTS.get(match[2])) if match else None

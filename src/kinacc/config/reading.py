@@ -78,8 +78,8 @@ def read(path: Path | str) -> tuple[Document, list[Problem]]:
     try:
         return parsed(content.decode("utf-8-sig"), name)
     except UnicodeDecodeError as error:
-        what = f"is not text in UTF-8 (byte {error.start})"
-        return Document(name, {}), [Problem(name, what, "a YAML file")]
+        message = f"is not text in UTF-8 (byte {error.start})"
+        return Document(name, {}), [Problem(name, message, "a YAML file")]
 
 
 def parsed(text: str, name: str) -> tuple[Document, list[Problem]]:
@@ -91,8 +91,8 @@ def parsed(text: str, name: str) -> tuple[Document, list[Problem]]:
     except InputError as error:
         return Document(name, {}), [*error.problems]
     if not isinstance(data, dict):
-        what = "is empty" if data is None else "holds no keys"
-        return Document(name, {}), [Problem(name, what, "a mapping such as seed: 1")]
+        message = "is empty" if data is None else "holds no keys"
+        return Document(name, {}), [Problem(name, message, "a mapping such as seed: 1")]
     return Document(name, data, lines), problems
 
 
@@ -113,8 +113,8 @@ def value_of(
         nonlocal count
         count += 1
         if count > _MOST_VALUES or len(path) > _DEEPEST:  # aliases may stand for themselves
-            what = "its aliases (*name) stand for too many values, or for themselves"
-            raise InputError(Problem(name, what, f"at most {_MOST_VALUES} values"))
+            message = "its aliases (*name) stand for too many values, or for themselves"
+            raise InputError(Problem(name, message, f"at most {_MOST_VALUES} values"))
         if isinstance(node, yaml.SequenceNode):
             for number, item in enumerate(node.value):
                 lines[(*path, number)] = item.start_mark.line + 1
@@ -126,8 +126,8 @@ def value_of(
             key = _scalar(key_node) if isinstance(key_node, yaml.ScalarNode) else "<values>"
             here, line = (*path, key), key_node.start_mark.line + 1
             if key in mapping:
-                what = f"{key!r} is given twice, first in line {lines[here]}"
-                problems.append(Problem(f"{name}:{line}, {dotted(here)}", what, "once"))
+                message = f"{key!r} is given twice, first in line {lines[here]}"
+                problems.append(Problem(f"{name}:{line}, {dotted(here)}", message, "once"))
             else:
                 lines[here] = line
                 mapping[key] = plain(value_node, here)
@@ -143,9 +143,9 @@ def value_of(
                 raise InputError(Problem(name, "holds too much", allowed))
         node = yaml.compose(text, Loader=_LOADER)
     except (yaml.YAMLError, ValueError) as error:
-        mark = getattr(error, "problem_mark", None)
+        label = getattr(error, "problem_mark", None)
         reason = getattr(error, "problem", None) or str(error).splitlines()[0]
-        where = name if mark is None else f"{name}:{mark.line + 1}"
+        where = name if label is None else f"{name}:{label.line + 1}"
         fix = "indent with blanks, not tabs" if "\\t" in reason else ""
         raise InputError(Problem(where, f"is not YAML: {reason}", fix=fix)) from None
     return None if node is None else plain(node, ())

@@ -14,7 +14,7 @@ def of_section(record: type[Record], section: Mapping[str, Any]) -> Record:
 
     Lists become tuples. The section's other values are left out; TypeError where one is missing.
     """
-    named = (each.name for each in fields(record) if each.name in section)  # type: ignore[arg-type]
+    named = (item.name for item in fields(record) if item.name in section)  # type: ignore[arg-type]
     return record(**{name: _fixed(section[name]) for name in named})
 
 

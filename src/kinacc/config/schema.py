@@ -24,14 +24,14 @@ def json_schema(model: type[BaseModel] = Settings) -> Node:
 @cache
 def keys(model: type[BaseModel] = DataSet) -> dict[str, Node]:
     """Schema of every section and key by its path: ``study.alpha``, no places in lists."""
-    found: dict[str, Node] = {}
+    results: dict[str, Node] = {}
     definitions = json_schema(model).get("$defs", {})
 
     def walk(node: Node, path: str) -> None:
         if "$ref" in node:
             node = definitions[node["$ref"].rpartition("/")[2]] | node
         if path:
-            found.setdefault(path, node)
+            results.setdefault(path, node)
         for name, inner in node.get("properties", {}).items():
             walk(inner, f"{path}.{name}".lstrip("."))
         parts = [node["items"]] if "items" in node else []
@@ -39,7 +39,7 @@ def keys(model: type[BaseModel] = DataSet) -> dict[str, Node]:
             walk(inner, path)
 
     walk(json_schema(model), "")
-    return found
+    return results
 
 
 def key(path: str) -> Node:
@@ -54,14 +54,14 @@ def defaults(model: type[Section] = Settings) -> dict[str, Any]:
 
 def without_execution_keys(values: Mapping[str, Any], path: str = "") -> dict[str, Any]:
     """Settings without the keys that change only how a run is carried out, for hashing."""
-    kept: dict[str, Any] = {}
+    selected: dict[str, Any] = {}
     for name, value in values.items():
         here = f"{path}.{name}".lstrip(".")
         node = keys().get(here, {})
         if not node.get("execution"):
             is_section = isinstance(value, Mapping) and "properties" in node
-            kept[name] = without_execution_keys(value, here) if is_section else value
-    return kept
+            selected[name] = without_execution_keys(value, here) if is_section else value
+    return selected
 
 
 if __name__ == "__main__":

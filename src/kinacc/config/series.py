@@ -56,16 +56,16 @@ def _of_each_other(lines: list[Line]) -> list[Line]:
     ordered = sorted(lines, key=lambda line: line.date)
     paths = [line.path for line in ordered]
     for before, line in pairwise(ordered):
-        what = ""
+        message = ""
         if line.date == before.date:
-            what = f"{line.date} is the date of two lines"
+            message = f"{line.date} is the date of two lines"
         elif missing := [name for name in FLAGS if getattr(line, name) is None]:
             how = FLAGS[missing[0]]
-            what = f"does not say whether {how} as on {before.date}: {missing[0]}: same or moved"
+            message = f"does not say whether {how} as on {before.date}: {missing[0]}: same or moved"
         elif paths.count(line.path) > 1:
-            what = f"{line.path} stands in two lines"
-        if what:
-            raise refused(what, "", lines.index(line))
+            message = f"{line.path} stands in two lines"
+        if message:
+            raise refused(message, "", lines.index(line))
     return ordered
 
 
@@ -90,5 +90,5 @@ def expanded(name: str, full: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
         series.append({"name": f"{name}-{line['date']}", "date": line["date"], **flags})
         files[series[-1]["name"]] = {**rest, "measurements": measurements}
     newest = {**files[series[-1]["name"]], "series": series}
-    lines = {each: {**own, "line_of": name, "gates": []} for each, own in files.items()}
+    lines = {item: {**subset, "line_of": name, "gates": []} for item, subset in files.items()}
     return {name: newest} | lines

@@ -204,8 +204,8 @@ class Calibration(Section):
     @model_validator(mode="after")
     def _frames_are_estimated(self) -> Self:
         if self.frames and self.base_and_tool == "fixed":
-            what = f"{', '.join(self.frames)}, but base and tool are not estimated"
-            raise refused(what, "set calibration.base_and_tool: estimated", "frames")
+            message = f"{', '.join(self.frames)}, but base and tool are not estimated"
+            raise refused(message, "set calibration.base_and_tool: estimated", "frames")
         return self
 
 
@@ -379,8 +379,8 @@ class Histories(Section):
     @model_validator(mode="after")
     def _larger(self) -> Self:
         if self.eta_ratio_larger <= self.eta_ratio_rejected:
-            what = f"{self.eta_ratio_larger:g} is not larger than eta_ratio_rejected"
-            raise refused(what, "", "eta_ratio_larger")
+            message = f"{self.eta_ratio_larger:g} is not larger than eta_ratio_rejected"
+            raise refused(message, "", "eta_ratio_larger")
         return self
 
 
@@ -441,12 +441,12 @@ class Settings(Section):
         """Settings of different sections that cannot be together."""
         cylinder = self.evaluation.cylinder
         low, high = cylinder.angle_deg
-        outside = [each for each in self.map.slices_deg if not low <= each <= high]
+        outside = [item for item in self.map.slices_deg if not low <= item <= high]
         if self.evaluation.space == "cylinder" and outside:
-            what = f"slices at {outside} deg lie outside of {low:g} to {high:g} deg"
-            raise refused(what, "see evaluation.cylinder.angle_deg", "map", "slices_deg")
+            message = f"slices at {outside} deg lie outside of {low:g} to {high:g} deg"
+            raise refused(message, "see evaluation.cylinder.angle_deg", "map", "slices_deg")
         name = (info.context or {}).get("dataset")
-        about = [each for each in self.gates if name in (each.datasets or (name,))]
+        about = [item for item in self.gates if name in (item.datasets or (name,))]
         require_limits(about, self.tolerance.mm, self.tolerance.of)
         return self
 
@@ -482,11 +482,11 @@ class DataSet(Settings):
     def _of_one_kind(self) -> Self:
         source, file = self.measurements.source, self.measurements.file
         if self.series and source == "synthetic":
-            what = "synthetic, but a series is of measured files"
-            raise refused(what, "write file", "measurements", "source")
+            message = "synthetic, but a series is of measured files"
+            raise refused(message, "write file", "measurements", "source")
         if self.series and (file.path or file.exclude or file.joints.path):
-            what = "path, exclude or joints.path of one file, beside a series of files"
-            raise refused(what, "write the file as a line of the series", "measurements", "file")
+            message = "path, exclude or joints.path of one file, beside a series of files"
+            raise refused(message, "write the file as a line of the series", "measurements", "file")
         return self
 
 

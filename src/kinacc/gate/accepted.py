@@ -41,8 +41,8 @@ def accept(results: Path, folder: Path, datasets: Sequence[str], reason: str) ->
     if note.is_file():
         known = json.loads(note.read_text("utf-8"))
     elif folder.exists() and any(folder.iterdir()):
-        what = f"holds no accepted run, and is not empty: {NOTE} is missing"
-        raise InputError(Problem(str(folder), what, "a folder of its own"))
+        message = f"holds no accepted run, and is not empty: {NOTE} is missing"
+        raise InputError(Problem(str(folder), message, "a folder of its own"))
     for name in datasets:
         new, target = unfinished(folder / name), folder / name
         for path in sorted((results / name).rglob("*")):
@@ -76,18 +76,18 @@ def compared(now: Path, before: Path, rotation_weight_mm_per_rad: float) -> Iter
         return Outcome(now.name, name, "accepted", verdict, says, fix, figures)
 
     accepting = f'kinacc check-results {now.parent} --accept {before.parent} --reason ".."'
-    measured = [sums.stated(each).get("measurements.parquet") for each in (now, before)]
+    measured = [sums.stated(item).get("measurements.parquet") for item in (now, before)]
     if not (before / "measurements.parquet").is_file():
         says = f"no accepted run of {now.name} in {before.parent}"
         yield outcome("accepted run", FAILED, says, accepting)
     elif measured[0] == measured[1]:
-        found = [*compare_folders(before, now)]
+        results = [*compare_folders(before, now)]
         says = "same measurements, and every table agrees within its tolerance"
-        if found:
-            says = f"same measurements, but {len(found)} columns differ: {first_few(found)}"
-        fix = f"if intended: {accepting}" if found else ""
-        verdict = FAILED if found else PASSED
-        yield outcome("accepted run", verdict, says, fix, columns=len(found))
+        if results:
+            says = f"same measurements, but {len(results)} columns differ: {first_few(results)}"
+        fix = f"if intended: {accepting}" if results else ""
+        verdict = FAILED if results else PASSED
+        yield outcome("accepted run", verdict, says, fix, columns=len(results))
     else:
         compare = f"kinacc compare {before} {now}"
         for name, of in (("held-out errors", _errors), ("arm", _arm)):
@@ -140,8 +140,8 @@ def _arm(
     """
     names = ("robot", "measurements", "pose_errors")
     sessions = [
-        history.session_of(folder.read_tables(each, *names), name, name, MOVED, SAME)
-        for name, each in (("1 accepted", before), ("2 now", now))
+        history.session_of(folder.read_tables(item, *names), name, name, MOVED, SAME)
+        for name, item in (("1 accepted", before), ("2 now", now))
     ]
     rows = history.history(sessions, rotation_weight_mm_per_rad, _SEED)
     row = {name: values[1] for name, values in rows.items()}
@@ -158,7 +158,7 @@ def _arm(
 
 def _moved_parameters(now: Path, before: Path) -> Iterator[str]:
     """DH parameters that moved by more than their uncertainty, given the model."""
-    new, old = (RunTables(each)["dh_model"] for each in (now, before))
+    new, old = (RunTables(item)["dh_model"] for item in (now, before))
     for name in ("theta_offset_rad", "d_mm", "a_mm", "alpha_rad", "beta_rad"):
         change = new[name] - old[name]
         std = np.hypot(new[f"std_{name}"], old[f"std_{name}"])  # NaN where undetermined

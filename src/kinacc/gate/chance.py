@@ -104,11 +104,11 @@ def _resampled(
     sizes = np.concatenate([now.sizes, before.sizes])
     place = np.unique(both, return_inverse=True)[1]
     groups = [np.unique(place)] if paired else [np.unique(place[is_now]), np.unique(place[~is_now])]
-    found = []
+    results = []
     for _ in range(_RESAMPLES):
         chosen = np.concatenate([draw.choice(group, len(group)) for group in groups])
         times = np.bincount(chosen, minlength=place.max() + 1)[place]
-        values = [sizes[own].repeat(times[own]) for own in (is_now, ~is_now)]
+        values = [sizes[subset].repeat(times[subset]) for subset in (is_now, ~is_now)]
         if all(map(len, values)):
-            found.append(of(values[0]) - of(values[1]))
-    return np.array(found)
+            results.append(of(values[0]) - of(values[1]))
+    return np.array(results)

@@ -49,14 +49,14 @@ def check_results(
     if not names:
         raise InputError(Problem(str(results), "holds no data set", "a folder of results"))
     outcomes = [check_files(results / name) for name in names]
-    broken = {each.dataset for each in outcomes if each.verdict == FAILED}
-    chosen = {name: own for name, own in configurations.items() if name in names}
+    broken = {item.dataset for item in outcomes if item.verdict == FAILED}
+    chosen = {name: subset for name, subset in configurations.items() if name in names}
     outcomes += judged(results, chosen, against, broken)
     if against is not None:
         for name in names:
             if name not in broken:
-                own = configurations.get(name, defaults())["calibration"]
-                weight = own["rotation_weight_mm_per_rad"]
+                subset = configurations.get(name, defaults())["calibration"]
+                weight = subset["rotation_weight_mm_per_rad"]
                 outcomes += compared(results / name, against / name, weight)
     return CheckReport(str(results), str(against or ""), tuple(outcomes))
 
@@ -65,21 +65,21 @@ def data_sets_in(results: Path) -> list[str]:
     """Names of the data sets in a results folder."""
     if not results.is_dir():
         raise InputError(Problem(str(results), "no such folder", fix="name a results folder"))
-    return sorted(each.parent.name for each in results.glob(f"*/{sums.FOLDER}"))
+    return sorted(item.parent.name for item in results.glob(f"*/{sums.FOLDER}"))
 
 
 def check_campaign(folder: Path) -> Outcome:
     """Whether the tables of a campaign's report are there, made together and fit their schemas."""
-    own = [each for each in ARTEFACTS.values() if each.topic == "campaign"]
+    subset = [item for item in ARTEFACTS.values() if item.topic == "campaign"]
     problems = [
-        each for artefact in own for each in check_file(folder / artefact.file_name, artefact)
+        item for artefact in subset for item in check_file(folder / artefact.file_name, artefact)
     ]
     if not problems:
-        marks = [store.read_metadata(folder / each.file_name) for each in own]
-        if any(each != marks[0] for each in marks):
+        marks = [store.read_metadata(folder / item.file_name) for item in subset]
+        if any(item != marks[0] for item in marks):
             problems.append(Problem(str(folder), "tables of different states of a campaign"))
     says = "tables fit their schemas and each other"
-    return _files(folder, problems, says, len(own), "run `kinacc campaign report` again")
+    return _files(folder, problems, says, len(subset), "run `kinacc campaign report` again")
 
 
 def check_files(folder: Path) -> Outcome:
@@ -107,15 +107,15 @@ def _problems(folder: Path) -> Iterator[Problem]:
     if not (folder / sums.FOLDER).is_dir():
         yield Problem(str(folder), f"has no {sums.FOLDER}", fix="run the workflow")
         return
-    left = sums.stated(folder)
+    remaining = sums.stated(folder)
     yield from sums.changed(folder)
     for name in _NEEDED:
-        if f"{name}.parquet" not in left:
+        if f"{name}.parquet" not in remaining:
             yield Problem(str(folder / f"{name}.parquet"), "missing", fix="run the workflow")
     for path in sorted(folder.rglob("*.parquet")):
         relative = path.relative_to(folder)
         artefact = ARTEFACTS.get(relative.stem if len(relative.parts) == 1 else relative.parts[0])
-        if artefact is None or relative.as_posix() not in left:
+        if artefact is None or relative.as_posix() not in remaining:
             fix = f"rm {path}"
             yield Problem(str(path), "is none of the tables that the stages left", fix=fix)
             continue
@@ -132,9 +132,9 @@ def _gathered(folder: Path) -> Iterator[Problem]:
     paths = sorted((folder / sums.FOLDER).glob("*.sha256"))
     listed = {path: set(path.read_bytes().splitlines()) for path in paths}
     for line in sorted(lines.difference(*listed.values())):
-        what = f"lists {line.decode(errors='replace')!r}, which no stage left"
-        yield Problem(str(whole), what, fix="run the workflow again")
-    for path, own in listed.items():
-        if own & lines and own - lines:
+        message = f"lists {line.decode(errors='replace')!r}, which no stage left"
+        yield Problem(str(whole), message, fix="run the workflow again")
+    for path, subset in listed.items():
+        if subset & lines and subset - lines:
             fix = f"rm {path}, then run the workflow again"
             yield Problem(str(path), f"changed since {whole.name} was gathered", fix=fix)

@@ -22,8 +22,8 @@ def check_file(path: Path, artefact: Artefact) -> list[Problem]:
         table = store.read_arrow(path)
         frame = table.to_pandas()
     except (InputError, UnicodeDecodeError, pa.ArrowException) as error:
-        found = getattr(error, "problems", [Problem(str(path), f"not readable: {error}")])
-        return [replace(problem, fix="") for problem in found]
+        results = getattr(error, "problems", [Problem(str(path), f"not readable: {error}")])
+        return [replace(problem, fix="") for problem in results]
     problems = list(_structure(path, artefact, table.schema))
     if problems:
         return problems
@@ -45,16 +45,16 @@ def _structure(path: Path, artefact: Artefact, schema: pa.Schema) -> Iterator[Pr
         return
     expected = store.arrow_schema(artefact.name, joints, given=schema.names)
     for name in dict.fromkeys([*expected.names, *schema.names]):
-        found, wanted = (
-            _words(each.field(name)) if each.names.count(name) == 1 else "not there once"
-            for each in (schema, expected)
+        results, wanted = (
+            _words(item.field(name)) if item.names.count(name) == 1 else "not there once"
+            for item in (schema, expected)
         )
-        if found != wanted:
-            yield Problem(f"{path}, column {name}", found, wanted)
+        if results != wanted:
+            yield Problem(f"{path}, column {name}", results, wanted)
     metadata = schema.metadata or {}
-    given = sorted(key.decode(errors="replace") for key, value in metadata.items() if value)
-    if given != sorted(PROVENANCE_KEYS) or len(metadata) != len(given):
-        yield Problem(str(path), f"schema metadata {given}", ", ".join(PROVENANCE_KEYS))
+    supplied = sorted(key.decode(errors="replace") for key, value in metadata.items() if value)
+    if supplied != sorted(PROVENANCE_KEYS) or len(metadata) != len(supplied):
+        yield Problem(str(path), f"schema metadata {supplied}", ", ".join(PROVENANCE_KEYS))
 
 
 def _words(field: pa.Field) -> str:
@@ -66,27 +66,27 @@ def _words(field: pa.Field) -> str:
 
 
 def _values(where: str, column: Column, values: pd.Series) -> Iterator[Problem]:
-    given = values.dropna()
-    if len(given) < len(values) and not column.nullable:
+    supplied = values.dropna()
+    if len(supplied) < len(values) and not column.nullable:
         yield Problem(where, f"null in {_rows(values.isna())}", "a value in every row")
     if column.kind == "text":
-        good = given.str.strip() != ""
+        good = supplied.str.strip() != ""
         if column.pattern:
-            good &= given.str.fullmatch(column.pattern)
+            good &= supplied.str.fullmatch(column.pattern)
     else:
-        given = given.astype(float)
+        supplied = supplied.astype(float)
         slack = 1e-9 * max(abs(column.low or 0.0), abs(column.high or 0.0))
         low, high = (
             default if limit is None else limit
             for limit, default in ((column.low, -np.inf), (column.high, np.inf))
         )
-        good = np.isfinite(given) & given.between(low - slack, high + slack)
+        good = np.isfinite(supplied) & supplied.between(low - slack, high + slack)
     if column.choices:
-        good &= given.isin(column.choices)
+        good &= supplied.isin(column.choices)
     if not good.all():
         wrong = (~good).reindex(values.index, fill_value=False)
-        what = f"{values[wrong].iloc[0]} in {_rows(wrong)}"
-        yield Problem(where, what, f"{column.limits} {column.unit}".strip())
+        message = f"{values[wrong].iloc[0]} in {_rows(wrong)}"
+        yield Problem(where, message, f"{column.limits} {column.unit}".strip())
 
 
 def _rows(mask: pd.Series) -> str:

@@ -67,41 +67,45 @@ def of_gate(
         return Outcome(dataset, gate["name"], kind, UNDECIDED, says)
     try:
         if gate["kind"] == "value":
-            word, limit, own = limited(gate, tolerance["mm"])
-            found = _value(figure(gate["value"], tables, gate), word, limit, own)
+            word, limit, subset = limited(gate, tolerance["mm"])
+            results = _value(figure(gate["value"], tables, gate), word, limit, subset)
         elif gate["kind"] == "table":
             word = LIMITS[gate[LIMITS[0]] is None]
-            found = _value(cell(tables, gate), word, gate[word])
+            results = _value(cell(tables, gate), word, gate[word])
         elif gate["kind"] == "against":
-            found = _change(gate, dataset, tables, accepted)
+            results = _change(gate, dataset, tables, accepted)
         elif gate["kind"] == "campaign":
-            found = _campaign(gate, dataset, tables, tolerance)
+            results = _campaign(gate, dataset, tables, tolerance)
         else:
             of = {"claims": _claims, "suspicions": _suspicions, "history": _history}
-            found = of[gate["kind"]](gate, tables)
+            results = of[gate["kind"]](gate, tables)
     except InputError as error:
         first = error.problems[0]
-        found = _found(FAILED, f"{first.where} {first.what}", first.fix)
-    verdict, fix = found.verdict, found.fix
+        results = _found(FAILED, f"{first.where} {first.what}", first.fix)
+    verdict, fix = results.verdict, results.fix
     if verdict == UNDECIDED:
         verdict, fix = _MEANT[gate["undecided"]], fix or _MORE
     if verdict == FAILED:
         verdict = _MEANT[gate["on_fail"]]
     fix = "" if verdict == PASSED else fix
-    return replace(found, dataset=dataset, name=gate["name"], kind=kind, verdict=verdict, fix=fix)
+    return replace(results, dataset=dataset, name=gate["name"], kind=kind, verdict=verdict, fix=fix)
 
 
-def _value(found: Figure, word: str, limit: float, own: bool = True) -> Outcome:
-    whose = "" if own else " (the tolerance of the configuration)"
-    asked = f"{word.replace('_', ' ')} {found.worded(limit)} allowed{whose}"
-    figures = {f"value{found.key}": found.size, f"{word}{found.key}": limit, "of": found.called}
-    figures |= found.about
-    held = found.size <= limit if word == LIMITS[0] else found.size >= limit
-    if found.open and (held or np.isnan(found.size)):
-        says = f"undecided: {found.called}: {found.open}; {asked}"
+def _value(results: Figure, word: str, limit: float, subset: bool = True) -> Outcome:
+    owner = "" if subset else " (the tolerance of the configuration)"
+    asked = f"{word.replace('_', ' ')} {results.worded(limit)} allowed{owner}"
+    figures = {
+        f"value{results.key}": results.size,
+        f"{word}{results.key}": limit,
+        "of": results.called,
+    }
+    figures |= results.about
+    held = results.size <= limit if word == LIMITS[0] else results.size >= limit
+    if results.open and (held or np.isnan(results.size)):
+        says = f"undecided: {results.called}: {results.open}; {asked}"
         return _found(UNDECIDED, says, figures=figures)
-    says = f"{found.called} is {found.worded(found.size)}; {asked}"
-    fix = f"off by {found.worded(abs(found.size - limit))}"
+    says = f"{results.called} is {results.worded(results.size)}; {asked}"
+    fix = f"off by {results.worded(abs(results.size - limit))}"
     return _found(PASSED if held else FAILED, says, fix, figures)
 
 
@@ -110,18 +114,18 @@ def _change(gate: Gate, dataset: str, tables: RunTables, accepted: RunTables | N
         fix = 'accept one: kinacc check-results RESULTS --accept FOLDER --reason ".."'
         return _found(FAILED, f"no accepted run of {dataset}", fix)
     name, asked, allowed = gate["value"], gate["beyond_chance"], gate[limit_key("allow", gate)]
-    now, before = (figure(name, each, gate) for each in (tables, accepted))
-    first, second = (sample(name, each, gate) for each in (tables, accepted))
+    now, before = (figure(name, item, gate) for item in (tables, accepted))
+    first, second = (sample(name, item, gate) for item in (tables, accepted))
     digest = sums.stated(tables.folder).get("measurements.parquet")
     paired = digest is not None and digest == sums.stated(accepted.folder).get(
         "measurements.parquet"
     )
-    found = chance.change(name.rpartition(".")[2], first, second, paired, asked)
+    results = chance.change(name.rpartition(".")[2], first, second, paired, asked)
     figures = {
         f"value{now.key}": now.size,
         f"accepted{now.key}": before.size,
-        f"worse_by{now.key}": found.difference,
-        f"worse_by_at_least{now.key}": found.least,
+        f"worse_by{now.key}": results.difference,
+        f"worse_by_at_least{now.key}": results.least,
         f"allowed{now.key}": allowed,
         "beyond_chance": asked,
         "of": now.called,
@@ -129,19 +133,20 @@ def _change(gate: Gate, dataset: str, tables: RunTables, accepted: RunTables | N
         "accepted_rows": before.about["rows"],
         **now.about,
     }
-    worse = "worse" if found.difference >= 0.0 else "better"
+    worse = "worse" if results.difference >= 0.0 else "better"
+    by = now.worded(abs(results.difference))
     says = (
-        f"{now.called} is {now.worded(now.size)}, {now.worded(abs(found.difference))} {worse} than "
+        f"{now.called} is {now.worded(now.size)}, {by} {worse} than "
         f"the accepted run's {before.worded(before.size)}; {now.worded(allowed)} worse is allowed"
     )
-    if found.open:
-        return _found(UNDECIDED, f"undecided: {says}; {found.open}", "", figures)
-    if found.least != found.difference:
+    if results.open:
+        return _found(UNDECIDED, f"undecided: {says}; {results.open}", "", figures)
+    if results.least != results.difference:
         poses = f"{first.count} poses of the same measurements"
         poses = poses if paired else f"{first.count} and {second.count} poses"
-        says += f"; at least {now.worded(found.least)} worse ({asked:.4g} confidence, {poses})"
+        says += f"; at least {now.worded(results.least)} worse ({asked:.4g} confidence, {poses})"
     fix = f"kinacc check-results --against {accepted.folder.parent} lists what changed"
-    return _found(FAILED if found.least > allowed else PASSED, says, fix, figures)
+    return _found(FAILED if results.least > allowed else PASSED, says, fix, figures)
 
 
 def _campaign(gate: Gate, dataset: str, tables: RunTables, tolerance: Mapping[str, Any]) -> Outcome:
@@ -180,9 +185,9 @@ def _campaign(gate: Gate, dataset: str, tables: RunTables, tolerance: Mapping[st
 def _claims(gate: Gate, tables: RunTables) -> Outcome:
     table = tables["claims"].set_index("claim")
     excepted = gate["except"]
-    unknown = [each for each in excepted if each not in table.index]
+    unknown = [item for item in excepted if item not in table.index]
     if unknown:
-        close = [near for each in unknown if (near := nearest(each, tuple(table.index)))]
+        close = [near for item in unknown if (near := nearest(item, tuple(table.index)))]
         fix = f"did you mean {first_few(close)}?" if close else "kinacc show RESULTS claims"
         return _found(FAILED, f"except names no claim: {first_few(unknown)}", fix)
     # Sentences that chose a reading of the paper are no evidence.
@@ -194,13 +199,13 @@ def _claims(gate: Gate, tables: RunTables) -> Outcome:
         "not comparable": verdict.index[~verdict.isin(["agrees", "differs"])],
         "excepted, though they agree": verdict.index[(verdict == "agrees") & known],
     }
-    agree, (left, differ, *_) = int((verdict == "agrees").sum()), map(len, lists.values())
+    agree, (remaining, differ, *_) = int((verdict == "agrees").sum()), map(len, lists.values())
     says = [f"{agree} of {len(verdict)} claims agree"]
-    says += [f"{words}: {first_few(list(names))}" for words, names in lists.items() if len(names)]
-    figures = {"claims": len(verdict), "agree": agree, "differ": left + differ,
-               "differ_not_excepted": left}  # fmt: skip
+    says += [f"{text}: {first_few(list(names))}" for text, names in lists.items() if len(names)]
+    figures = {"claims": len(verdict), "agree": agree, "differ": remaining + differ,
+               "differ_not_excepted": remaining}  # fmt: skip
     fix = f"kinacc show {tables.folder} claims"
-    return _found(FAILED if left else PASSED, "; ".join(says), fix, figures)
+    return _found(FAILED if remaining else PASSED, "; ".join(says), fix, figures)
 
 
 def _suspicions(gate: Gate, tables: RunTables) -> Outcome:
@@ -210,13 +215,13 @@ def _suspicions(gate: Gate, tables: RunTables) -> Outcome:
     table = tables["data_check"]
     table = table[(table["finding"] != LEFT_OUT) & (table["level"] != FINDING_LEVELS[-1])]
     known = table["accepted"].fillna("").astype(bool)
-    left = table if gate["suspicions"] == "none" else table[~known]
+    remaining = table if gate["suspicions"] == "none" else table[~known]
     figures = {"suspicions": len(table), "accepted": int(known.sum())}
-    says = f"{len(left)} suspicions" + (f", {known.sum()} accepted" if known.any() else "")
-    if len(left):
-        says += f": {first_few(list(left['finding'] + ': ' + left['what']), 3)}"
+    says = f"{len(remaining)} suspicions" + (f", {known.sum()} accepted" if known.any() else "")
+    if len(remaining):
+        says += f": {first_few(list(remaining['finding'] + ': ' + remaining['what']), 3)}"
     fix = "correct the file, or give a reason in data_check.accept and set suspicions: known"
-    return _found(FAILED if len(left) else PASSED, says, fix, figures)
+    return _found(FAILED if len(remaining) else PASSED, says, fix, figures)
 
 
 def _history(gate: Gate, tables: RunTables) -> Outcome:

@@ -40,5 +40,5 @@ class CheckReport:
     outcomes: tuple[Outcome, ...]
 
     def __post_init__(self) -> None:
-        failed = any(each.verdict == FAILED for each in self.outcomes)
+        failed = any(item.verdict == FAILED for item in self.outcomes)
         object.__setattr__(self, "passed", not failed)

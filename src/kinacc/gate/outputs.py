@@ -18,23 +18,23 @@ _TEXTS = (".xml", ".md", ".txt")  # each by its template
 
 def as_json(report: CheckReport) -> str:
     """The report as it is; numbers that are not finite are null."""
-    found = asdict(report)
-    for each in found["outcomes"]:
-        for name, value in each["figures"].items():
+    results = asdict(report)
+    for item in results["outcomes"]:
+        for name, value in item["figures"].items():
             if isinstance(value, float) and not math.isfinite(value):
-                each["figures"][name] = None
-    return json.dumps(found, indent=1, allow_nan=False) + "\n"
+                item["figures"][name] = None
+    return json.dumps(results, indent=1, allow_nan=False) + "\n"
 
 
 def as_metrics(report: CheckReport) -> str:
     """All numbers, flat, by ``<data set>/<check>/<figure>``."""
-    found = {
-        f"{each.dataset}/{each.name}/{name}": value
-        for each in report.outcomes
-        for name, value in each.figures.items()
+    results = {
+        f"{item.dataset}/{item.name}/{name}": value
+        for item in report.outcomes
+        for name, value in item.figures.items()
         if isinstance(value, (int, float)) and math.isfinite(value)
     }
-    return json.dumps(found, indent=1) + "\n"
+    return json.dumps(results, indent=1) + "\n"
 
 
 def as_text(report: CheckReport, ending: str = ".txt") -> str:
@@ -55,8 +55,8 @@ def as_text(report: CheckReport, ending: str = ".txt") -> str:
 
 
 def _cell(text: str) -> str:
-    kept = as_seen(text).replace("\n", " ").replace("\\", "\\\\")
-    return re.sub(r"([|`<>*_\[\]#])", r"\\\1", kept)
+    selected = as_seen(text).replace("\n", " ").replace("\\", "\\\\")
+    return re.sub(r"([|`<>*_\[\]#])", r"\\\1", selected)
 
 
 def write(report: CheckReport, path: Path) -> None:

@@ -85,9 +85,9 @@ class RunTables(dict[str, pd.DataFrame]):
         sizes = np.linalg.norm(table[names], axis=1)
         known = np.isfinite(sizes)
         if not known.any():
-            what = f"has no {quantity} errors of model {model} at rows {at.replace('_', ' ')}"
+            message = f"has no {quantity} errors of model {model} at rows {at.replace('_', ' ')}"
             fix = "name another model or other rows"
-            raise Absent(Problem("pose_errors.parquet", what, fix=fix))
+            raise Absent(Problem("pose_errors.parquet", message, fix=fix))
         rows = table["row"].to_numpy()[known]
         return Sample(sizes[known], configurations_of(self["measurements"])[rows])
 
@@ -144,8 +144,8 @@ def cell(tables: RunTables, gate: Mapping[str, Any]) -> Figure:
     artefact, column = gate["table"], gate["column"]
     table, where = tables[artefact], f"{artefact}.parquet"
     if unknown := [name for name in (*gate["row"], column) if name not in table]:
-        what = f"has no column {first_few(unknown)}"
-        raise InputError(Problem(where, what, first_few(list(table), 30)))
+        message = f"has no column {first_few(unknown)}"
+        raise InputError(Problem(where, message, first_few(list(table), 30)))
     for name, value in gate["row"].items():
         table = table[table[name].isna() if value is None else table[name] == value]
     if len(table) != 1:
@@ -153,7 +153,7 @@ def cell(tables: RunTables, gate: Mapping[str, Any]) -> Figure:
         raise InputError(Problem(where, f"has {len(table)} such rows", "one row", fix))
     row = table.iloc[0]
     known = ARTEFACTS[artefact].for_joints(joint_count(ARTEFACTS[artefact], table.columns))
-    unit = next(each.unit for each in known if each.name == column)
+    unit = next(item.unit for item in known if item.name == column)
     unit = str(row["unit"]) if unit == "see unit" else unit
     size = pd.to_numeric(row[column], errors="coerce")
     where = ", ".join(f"{name} {value}" for name, value in gate["row"].items())
@@ -164,9 +164,9 @@ def cell(tables: RunTables, gate: Mapping[str, Any]) -> Figure:
 def _of_errors(name: str, tables: RunTables, gate: Mapping[str, Any], unit: str) -> Figure:
     _, quantity, statistic = name.split(".")
     sizes, model = sample(name, tables, gate).sizes, tables.model(gate["model"])
-    of, words = STATISTICS[statistic]
-    called = f"{words} of the {quantity} errors {_AT[gate['at']]} ({model_name(model)} model)"
-    about = {"model": model, "statistic": words, "at": gate["at"], "rows": len(sizes)}
+    of, text = STATISTICS[statistic]
+    called = f"{text} of the {quantity} errors {_AT[gate['at']]} ({model_name(model)} model)"
+    about = {"model": model, "statistic": text, "at": gate["at"], "rows": len(sizes)}
     size, why = of(sizes), ""
     if statistic == "p99" and len(sizes) < FEWEST_OF_QUANTILE:
         others = "a limit on mean, rms, largest or p99_gamma needs fewer"
@@ -182,16 +182,16 @@ def _of_bound(tables: RunTables, unit: str, word: str) -> Figure:
 
     known = folder.read_tables(tables.folder, "robot")
     name, places = tables.folder.resolve().name, journal.of_results(tables.folder)
-    sought = of_calibration.sought(name, known, places)
-    found = sought.status
-    if found is None:
-        what = "; ".join(sought.remarks) or "no campaign on this calibration"
+    required = of_calibration.sought(name, known, places)
+    results = required.status
+    if results is None:
+        message = "; ".join(required.remarks) or "no campaign on this calibration"
         fix = f"kinacc campaign start FOLDER --calibration {tables.folder}"
-        raise Absent(Problem(str(tables.folder), what, fix=fix))
-    bound = found.of_all
+        raise Absent(Problem(str(tables.folder), message, fix=fix))
+    bound = results.of_all
     why = "" if np.isfinite(bound.upper_mm) else "its campaign has no upper bound so far"
     if bound.excepted:
         why = f"its upper bound leaves {bound.excepted} candidates out"
-    about: dict[str, Any] = {"campaign": found.folder, "confidence": bound.confidence}
-    called = f"{word} bound on the largest error, by campaign {found.folder}"
+    about: dict[str, Any] = {"campaign": results.folder, "confidence": bound.confidence}
+    called = f"{word} bound on the largest error, by campaign {results.folder}"
     return Figure(bound.upper_mm, unit, called, about, why)

@@ -77,7 +77,7 @@ class Column:
     def limits(self) -> str:
         """What the column may hold, in words."""
         bounds = {"at least": self.low, "at most": self.high}
-        limits = [f"{words} {limit:g}" for words, limit in bounds.items() if limit is not None]
+        limits = [f"{text} {limit:g}" for text, limit in bounds.items() if limit is not None]
         parts = [
             ", ".join(map(str, self.choices)),
             f"text like {self.pattern}" if self.pattern else "",
@@ -106,16 +106,16 @@ class Artefact:
 
     def in_file(self, joints: int, names: Iterable[str]) -> tuple[Column, ...]:
         """The columns a file has that is given those of these ``names``."""
-        given = set(names)
+        supplied = set(names)
         every = self.for_joints(joints)
-        return tuple(each for each in every if not each.may_be_absent or each.name in given)
+        return tuple(item for item in every if not item.may_be_absent or item.name in supplied)
 
     def for_joints(self, joints: int) -> tuple[Column, ...]:
         """The columns of an arm with this many joints, in file order."""
         expanded: list[Column] = []
         for per_joint, block in groupby(self.columns, key=lambda column: column.per_joint):
             numbers = range(1, joints + 1) if per_joint else [0]
-            expanded += [each.numbered(n) if n else each for each in block for n in numbers]
+            expanded += [item.numbered(n) if n else item for item in block for n in numbers]
         return tuple(expanded)
 
     @property

@@ -69,11 +69,11 @@ def compare_folders(before: Path, now: Path) -> Iterator[Difference]:
     if not paths:
         raise InputError(Problem(str(before), "holds no table", "a folder of results"))
     for path in paths:
-        other = now / path.relative_to(before)
-        if not other.is_file():
+        second = now / path.relative_to(before)
+        if not second.is_file():
             yield Difference(str(path.relative_to(before)), "", "missing")
             continue
-        yield from compare_tables(path, other)
+        yield from compare_tables(path, second)
 
 
 def compare_tables(before: Path, now: Path) -> Iterator[Difference]:
@@ -84,11 +84,11 @@ def compare_tables(before: Path, now: Path) -> Iterator[Difference]:
     for column in old.columns.symmetric_difference(new.columns):
         yield Difference(name, str(column), "missing" if column in old else "new")
     joints = joint_count(artefact, old.columns) if artefact else 0
-    known = {each.name: each for each in artefact.for_joints(joints)} if artefact else {}
-    key = [each for each in (artefact.key if artefact else ()) if each in old and each in new]
+    known = {item.name: item for item in artefact.for_joints(joints)} if artefact else {}
+    key = [item for item in (artefact.key if artefact else ()) if item in old and item in new]
     old, new = _keyed(old, key, name), _keyed(new, key, name)
-    for which, one, other in (("missing", old, new), ("new", new, old)):
-        only = one.index.difference(other.index)
+    for which, single, second in (("missing", old, new), ("new", new, old)):
+        only = single.index.difference(second.index)
         if len(only):
             yield Difference(name, "", f"{len(only)} rows {which}, first {_row(key, only[0])}")
     common = old.index.intersection(new.index)
@@ -96,22 +96,22 @@ def compare_tables(before: Path, now: Path) -> Iterator[Difference]:
     for column in old.columns.intersection(new.columns).difference(key, sort=False):
         contract = known.get(column)
         allowed = _tolerance(contract, old, column)
-        one, other = old[column], new[column]
-        differs = (one.isna() != other.isna()).to_numpy()
-        both = (one.notna() & other.notna()).to_numpy()
+        single, second = old[column], new[column]
+        differs = (single.isna() != second.isna()).to_numpy()
+        both = (single.notna() & second.notna()).to_numpy()
         largest = None
-        if one.dtype.kind in "fiu" and other.dtype.kind in "fiu":
-            apart = np.abs(other.to_numpy(float) - one.to_numpy(float))
+        if single.dtype.kind in "fiu" and second.dtype.kind in "fiu":
+            apart = np.abs(second.to_numpy(float) - single.to_numpy(float))
             beyond = both & ~(apart <= allowed)
             largest = float(np.max(apart[beyond], initial=0.0))
         else:
-            beyond = both & (one.to_numpy(object) != other.to_numpy(object))
+            beyond = both & (single.to_numpy(object) != second.to_numpy(object))
         differs = differs | beyond
         if differs.any():
             first = int(np.argmax(differs))
             unit = contract.unit if contract and contract.unit != "1" else ""
-            values = (int(differs.sum()), _row(key, old.index[first]), one.iloc[first])
-            yield Difference(name, str(column), "", *values, other.iloc[first], largest, unit)
+            values = (int(differs.sum()), _row(key, old.index[first]), single.iloc[first])
+            yield Difference(name, str(column), "", *values, second.iloc[first], largest, unit)
 
 
 def _keyed(table: pd.DataFrame, key: list[str], name: str) -> pd.DataFrame:
@@ -128,8 +128,8 @@ def _keyed(table: pd.DataFrame, key: list[str], name: str) -> pd.DataFrame:
 
 def _row(key: list[str], values: object) -> str:
     values = values if isinstance(values, tuple) else (values,)
-    told = [f"{name}={value}" for name, value in zip(key, values, strict=False) if value != ""]
-    return ", ".join(told) or str(values[0])
+    texts = [f"{name}={value}" for name, value in zip(key, values, strict=False) if value != ""]
+    return ", ".join(texts) or str(values[0])
 
 
 def _tolerance(column: Column | None, rows: pd.DataFrame, name: str) -> np.ndarray | float:

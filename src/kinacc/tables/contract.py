@@ -26,24 +26,24 @@ _UNITS = {"text": "", "int": "1", "int8": "1", "bool": "1"}
 _LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 
-def _column(name: str, told: dict[str, Any]) -> Column:
-    kind, choices = told.pop("kind", "float"), told.pop("choices", ())
+def _column(name: str, details: dict[str, Any]) -> Column:
+    kind, choices = details.pop("kind", "float"), details.pop("choices", ())
     choices = getattr(allowed, choices) if isinstance(choices, str) else tuple(choices)
-    absent = told.pop("absent", False)
-    told["optional"] = told.get("optional", absent)
-    told["nullable"] = told.get("nullable", told["optional"])
-    unit = told.pop("unit", None) or _UNITS[kind]
-    return Column(name, kind, unit, may_be_absent=absent, choices=choices, **told)
+    absent = details.pop("absent", False)
+    details["optional"] = details.get("optional", absent)
+    details["nullable"] = details.get("nullable", details["optional"])
+    unit = details.pop("unit", None) or _UNITS[kind]
+    return Column(name, kind, unit, may_be_absent=absent, choices=choices, **details)
 
 
 def _artefacts(topic: str) -> Iterable[Artefact]:
     path = Path(__file__).parent / "schemas" / f"{topic}.yaml"
-    for name, told in yaml.load(path.read_text(encoding="utf-8"), Loader=_LOADER).items():
-        columns = tuple(_column(*each) for each in told.pop("columns").items())
-        yield Artefact(name, topic, columns=columns, key=tuple(told.pop("key")), **told)
+    for name, details in yaml.load(path.read_text(encoding="utf-8"), Loader=_LOADER).items():
+        columns = tuple(_column(*item) for item in details.pop("columns").items())
+        yield Artefact(name, topic, columns=columns, key=tuple(details.pop("key")), **details)
 
 
-ARTEFACTS = {each.name: each for topic in TOPICS for each in _artefacts(topic)}
+ARTEFACTS = {item.name: item for topic in TOPICS for item in _artefacts(topic)}
 
 
 def columns_of(artefact: str, rows: Iterable[Mapping[str, Any] | Sequence[Any]]) -> Columns:
@@ -52,17 +52,17 @@ def columns_of(artefact: str, rows: Iterable[Mapping[str, Any] | Sequence[Any]])
     A row holds its values by column name, or one after the other as the contract has its columns.
     Whole numbers that may be null are held as floats. Without rows the columns are empty.
     """
-    given: list[Any] = list(rows)
+    supplied: list[Any] = list(rows)
     contract = ARTEFACTS[artefact]
     names = [column.name for column in contract.columns]
-    if given and isinstance(given[0], Mapping):
-        names = list(given[0])
-        given = [[row[name] for name in names] for row in given]
+    if supplied and isinstance(supplied[0], Mapping):
+        names = list(supplied[0])
+        supplied = [[row[name] for name in names] for row in supplied]
     known = {column.name: column for column in contract.for_joints(joint_count(contract, names))}
     kinds = {"float": np.float64, "int": np.int64, "int8": np.int8, "bool": np.bool_}
     columns: Columns = {}
     for place, name in enumerate(names):
-        kind, cells = known[name].kind, [row[place] for row in given]
+        kind, cells = known[name].kind, [row[place] for row in supplied]
         is_real = known[name].nullable
         columns[name] = (
             texts(cells) if kind == "text" else np.array(cells, kinds["float" if is_real else kind])

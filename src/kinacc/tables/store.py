@@ -187,8 +187,8 @@ def read(path: Path | str, any_type: bool = False) -> Columns:
     try:
         return columns_in(read_arrow(path, any_type=any_type))
     except (OverflowError, ValueError) as error:  # a day that no calendar has
-        what = f"not a readable Parquet file: {error}"
-        raise InputError(Problem(str(path), what, fix=remake(path))) from None
+        message = f"not a readable Parquet file: {error}"
+        raise InputError(Problem(str(path), message, fix=remake(path))) from None
 
 
 def columns_in(table: pa.Table) -> Columns:
@@ -222,17 +222,17 @@ def read_arrow(path: Path | str, content: bytes | None = None, any_type: bool = 
             if not (pa.types.is_integer(field.type) or pa.types.is_floating(field.type))
             and field.type not in known
         )
-        groups = [footer.row_group(each) for each in range(footer.num_row_groups)]
+        groups = [footer.row_group(item) for item in range(footer.num_row_groups)]
         # No text is longer than all of a group; one that is held once may stand in every row.
-        longest = max((each.total_byte_size for each in groups), default=0)
+        longest = max((item.total_byte_size for item in groups), default=0)
         at_once = _MOST_BYTES // (10 * (longest + 16 * max(len(schema), 1)))
         batches, held = [], 0
         for batch in file.iter_batches(min(at_once, 65_536) or 1, use_threads=False):
             batches.append(batch)
             held += max(batch.nbytes, 8 * batch.num_rows * len(schema))
             if held > _MOST_BYTES:
-                what = f"holds more than {_MOST_BYTES // 1_000_000} MB"
-                raise InputError(Problem(str(path), what, "a smaller table", remake(path)))
+                message = f"holds more than {_MOST_BYTES // 1_000_000} MB"
+                raise InputError(Problem(str(path), message, "a smaller table", remake(path)))
         return pa.Table.from_batches(batches, schema)
 
     return _open(path, unpacked, content)
@@ -272,16 +272,16 @@ def _open(
         with pq.ParquetFile(source, page_checksum_verification=True) as file:
             return opening(file)
     except InputError as error:
-        raise InputError([replace(each, fix=remake(path)) for each in error.problems]) from None
+        raise InputError([replace(item, fix=remake(path)) for item in error.problems]) from None
     except FileNotFoundError:
         raise InputError(Problem(str(path), "no such file", fix=remake(path))) from None
     except (pa.ArrowException, OSError, ValueError, OverflowError) as error:
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-        what = f"not a readable Parquet file: {reason}"
-        raise InputError(Problem(str(path), what, fix=remake(path))) from None
+        message = f"not a readable Parquet file: {reason}"
+        raise InputError(Problem(str(path), message, fix=remake(path))) from None
 
 
 def rows(mask: np.ndarray) -> str:
     """The first rows (from 0) a mask marks, in words."""
-    found = np.flatnonzero(mask)
-    return f"row{'s' if found.size > 1 else ''} {first_few(found.tolist())}"
+    results = np.flatnonzero(mask)
+    return f"row{'s' if results.size > 1 else ''} {first_few(results.tolist())}"

@@ -32,7 +32,7 @@ def text_of(written: Mapping[str, bytes], read: Mapping[str, str]) -> bytes:
 def folder_of(path: Path | str) -> Path:
     """Folder of the data set that a file belongs to: the nearest one above with sums."""
     path = Path(path)
-    return next((each for each in path.parents if (each / FOLDER).is_dir()), path.parent)
+    return next((item for item in path.parents if (item / FOLDER).is_dir()), path.parent)
 
 
 def stated(folder: Path | str) -> dict[str, str]:
@@ -44,7 +44,7 @@ def stated(folder: Path | str) -> dict[str, str]:
 
 def outdated(folder: Path | str) -> list[str]:
     """Names of files that were made from files which have changed since, or are gone."""
-    return sorted({made for _, whole in _changed_reads(Path(folder)) for made in whole})
+    return sorted({created for _, whole in _changed_reads(Path(folder)) for created in whole})
 
 
 def changed_since(folder: Path | str) -> list[str]:
@@ -59,10 +59,10 @@ def _changed_reads(folder: Path) -> Iterator[tuple[str, list[str]]]:
     now = stated(folder)
     for path in sorted((folder / FOLDER).glob("*.sha256")):
         lines = list(_parsed(path))
-        left = [name for name, value in lines if not value.startswith(_READ)]
+        remaining = [name for name, value in lines if not value.startswith(_READ)]
         for name, value in lines:
             if value.startswith(_READ) and value != f"{_READ}{_digest_now(folder, name, now)}":
-                yield name, left
+                yield name, remaining
 
 
 def _digest_now(folder: Path, name: str, stated_now: Mapping[str, str]) -> str:
@@ -77,24 +77,24 @@ def hold(path: Path | str, content: bytes) -> None:
     """Raise InputError where a file is not as its stage left it."""
     folder = folder_of(path)
     name = Path(path).relative_to(folder).as_posix()
-    left = stated(folder).get(name)
+    remaining = stated(folder).get(name)
     fix = f"rm {path}, then run the workflow again"
-    if left is None and (folder / FOLDER).is_dir():
-        what = f"has no digest in {folder / FOLDER}"
-        raise InputError(Problem(str(path), what, fix=fix))
-    if left is not None and left != digest(content):
+    if remaining is None and (folder / FOLDER).is_dir():
+        message = f"has no digest in {folder / FOLDER}"
+        raise InputError(Problem(str(path), message, fix=fix))
+    if remaining is not None and remaining != digest(content):
         raise InputError(Problem(str(path), "changed since its stage wrote it", fix=fix))
 
 
 def changed(folder: Path | str) -> Iterable[Problem]:
     """Every file of a data set that is missing or not as its stage left it."""
     folder = Path(folder)
-    for name, left in stated(folder).items():
+    for name, remaining in stated(folder).items():
         path = folder / name
         fix = f"rm {path}, then run the workflow again"
         if not path.is_file():
             yield Problem(str(path), "missing", fix="run the workflow again")
-        elif digest(path.read_bytes()) != left:
+        elif digest(path.read_bytes()) != remaining:
             yield Problem(str(path), "changed since its stage wrote it", fix=fix)
 
 
