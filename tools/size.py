@@ -1,4 +1,4 @@
-"""Print the size of all tracked Python, room by room, beside the budgets.
+"""Print the size of all tracked Python, room by room; budgets of the parts.
 
 A size is a number of AST nodes without docstrings, so that cramming lines wins nothing; beside it
 stand lines. Rules of Snakemake count in lines, pages of ``docs`` written by hand in words.
@@ -9,25 +9,6 @@ import subprocess
 from collections import defaultdict
 from pathlib import Path
 
-# Orders of size of the rooms of src/kinacc, in lines.
-ROOMS = {
-    "tables": 1000,
-    "config": 800,
-    "kinematics": 3200,
-    "measurements": 3500,
-    "calibration": 3400,
-    "checks": 2200,
-    "assess": 3600,
-    "study": 2600,
-    "campaign": 2000,
-    "deployment": 4700,
-    "gate": 900,
-    "figures": 1700,
-    "report": 1500,
-    "workflow": 600,
-    "cli": 3000,
-    "(top)": 400,
-}
 # The most each part may come to: where it stands, its budget, and the unit of the budget.
 PARTS = {
     "src and scripts": (("src", "workflow"), 290_000, "nodes"),
@@ -43,12 +24,8 @@ DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
 def node_count(source):
     """Number of AST nodes of Python source, without docstrings."""
     nodes = list(ast.walk(ast.parse(source)))
-    documented = [node for node in nodes if isinstance(node, DOCUMENTED)]
-    return len(nodes) - 2 * sum(ast.get_docstring(n, clean=False) is not None for n in documented)
-
-
-def is_python(path, source):
-    return path.suffix == ".py" or (source.startswith("#!") and "python" in source.split("\n")[0])
+    documented = (ast.get_docstring(n, clean=False) for n in nodes if isinstance(n, DOCUMENTED))
+    return len(nodes) - 2 * sum(each is not None for each in documented)
 
 
 def room_of(path):
@@ -66,7 +43,8 @@ def sizes(top):
         if path.suffix not in {"", ".py", ".smk", ".md"} or not (top / path).is_file():
             continue
         source = (top / path).read_text(encoding="utf-8", errors="replace")
-        if is_python(path, source):
+        script = source.startswith("#!") and "python" in source.split("\n")[0]
+        if path.suffix == ".py" or script:
             rooms[room_of(path)][0] += node_count(source)
             rooms[room_of(path)][1] += len(source.splitlines())
         elif path.suffix == ".smk" or path.name == "Snakefile":
@@ -79,16 +57,14 @@ def sizes(top):
 def main():
     rooms, rules, words = sizes(Path(__file__).resolve().parent.parent)
     totals = {part: [0, 0] for part in PARTS}
-    print(f"{'room':24}{'nodes':>10}{'lines':>10}{'budget':>16}")
+    print(f"{'room':24}{'nodes':>10}{'lines':>10}")
     for room, size in sorted(rooms.items()):
-        budget = ROOMS.get(room.removeprefix("src/kinacc/"))
-        print(f"{room:24}{size[0]:10,}{size[1]:10,}{f'{budget:,} lines' if budget else '':>16}")
+        print(f"{room:24}{size[0]:10,}{size[1]:10,}")
         for part, (folders, _, _) in PARTS.items():
             if room.partition("/")[0] in folders:
                 totals[part] = [old + new for old, new in zip(totals[part], size, strict=True)]
     totals["research"][1] += rules.pop("research", 0)
     totals["Snakefile and rules"][1] = sum(rules.values())
-    print()
     for part, (_, budget, unit) in PARTS.items():
         size = f"{words:20,}" if unit == "words" else "{:10,}{:10,}".format(*totals[part])
         print(f"{part:24}{size}{f'{budget:,} {unit}':>16}")

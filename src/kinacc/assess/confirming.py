@@ -1,79 +1,89 @@
-"""Campaigns that visit points first and then confirm those that may be the largest."""
+"""A campaign that visits points first and then confirms those that may be the largest."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kinacc.assess.adaptive import Campaign, Candidates
+from kinacc.assess.adaptive import FIRST_SHARE, Campaign, Candidates
+from kinacc.assess.counts import excepted
 from kinacc.assess.looks import EARLY, Looks, boundary, look_counts
 from kinacc.assess.lower_average import SHARE, LowerAverage, direction_of
-from kinacc.assess.noise import NoisePlan
-from kinacc.assess.reference_poses import schedule
+from kinacc.assess.noise import KNOWN, CampaignNoise, factor_limit, noise_plan
+from kinacc.assess.population import largest_size
+from kinacc.assess.reference_poses import Change, found, planned_readings, schedule
+from kinacc.assess.statement import CANDIDATES, MEAN, MEASURED, Reason, Statement, Suspicious
+from kinacc.assess.suspicious_readings import suspicious_readings
 from kinacc.assess.wrong_readings import at_most_wrong
 
+if TYPE_CHECKING:
+    from kinacc.assess.search_and_confirm import SearchAndConfirm
+
+MISSED = 0.5  # of the allowed error, where candidates are left that may hold the largest
 _VISIT_PART = 0.05  # of the lower bound's error, for single points until the average speaks
 _ONCE = 0.6  # of the upper bound's error for the visit, where hardly any reading comes after it
 _FEW = 0.25  # of the visit: with fewer readings after it, the visit has more of the error
 
 
-class ConfirmingCampaign(Campaign):
+class SearchAndConfirmCampaign(Campaign):
     """A visit of ``first`` points, then blocks of readings up to a point's next look.
 
     After every block the point with the largest upper limit is read, among those whose next look
     the readings left can reach. What the block begins with is the point of the largest mean, its
     readings count for the lower bound; where no more readings are left than must still count, that
     point is read. Decisions go by means of whole blocks and planned noise: scatter within a block
-    has no part in them. ``references`` readings beside these go to reference poses, in their places
-    of the sequence whatever is read.
+    has no part in them. Beside these, readings go to reference poses, in their places of the
+    sequence whatever is read.
     """
 
-    def __init__(
-        self,
-        settings,
-        candidates: Candidates,
-        first: int,
-        noise: NoisePlan | None = None,
-        wrong_rate: float = 0.0,
-        references: int = 0,
-    ) -> None:
+    settings: SearchAndConfirm
+
+    def __init__(self, settings: SearchAndConfirm, candidates: Candidates) -> None:
         super().__init__(settings, candidates)
-        noise = noise or NoisePlan()
-        self.first, self.noise_plan, self.factor = first, noise, noise.margin
-        self.wrong_rate = wrong_rate
-        self.plan = schedule(settings.measurements, candidates.points, references)
+        points, rate = candidates.points, settings.wrong_rate
+        self.first = settings.visit(points)
+        noise = noise_plan(settings, self.first)
+        self.noise_plan, self.factor, self.allowed = noise, noise.margin, 1.0 - settings.confidence
+        self.plan = schedule(settings.measurements, points, settings.references)
         self.reference_poses = self.plan.poses
-        self.extra = max(settings.measurements - first - references, 0)
-        allowed = noise.mean_share * (1.0 - settings.confidence)
+        self.extra = max(settings.measurements - self.first - settings.references, 0)
+        allowed = noise.mean_share * self.allowed
         self.counts = look_counts(self.extra)
         wanted = math.floor(SHARE * self.extra) if self.extra > 1 else 0
-        self.lower_error = (1.0 - _VISIT_PART) * allowed if wanted else 0.0
-        upper = self.boundary_of(allowed)
+        lower_error = (1.0 - _VISIT_PART) * allowed if wanted else 0.0
         # Where the noise is an estimate, half of the error of single points is for its limit.
-        self.single_error = allowed - self.lower_error
+        self.single_error = allowed - lower_error
         single = self.single_error * (1.0 if math.isinf(noise.freedom) else 0.5)
-        each = single / max(min(first, candidates.points), 1)
-        shares = _first_most(np.diff(np.array(self.counts) / self.counts[-1], prepend=0.0))
+        each = single / max(min(self.first, points), 1)
+        shares = np.diff(np.array(self.counts) / self.counts[-1], prepend=0.0)
+        if len(shares) > 1:  # half for the first look
+            shares = np.append(0.5, 0.5 * shares[1:] / shares[1:].sum())
+        else:
+            shares = np.ones(1)
         wrong = 0
-        if wrong_rate:
+        if rate:
             # Half of the error of single points is for more wrong readings than are counted on.
             each *= 0.5
-            wrong = at_most_wrong(settings.measurements, wrong_rate, 0.5 * self.single_error)
-        self.average = LowerAverage(wanted, self.lower_error, noise.freedom, wrong_rate)
-        self.looks = Looks(self.ledger, upper, each, shares, self.factor, wrong_rate, wrong)
-        self._row, self._left, self._counted = -1, 0, False
+            wrong = at_most_wrong(settings.measurements, rate, 0.5 * self.single_error)
+        self.average = LowerAverage(wanted, lower_error, noise.freedom, rate)
+        upper = self.boundary_of(allowed)
+        self.looks = Looks(self.ledger, upper, each, shares, self.factor, rate, wrong)
         self.blocks: list[int] = []  # of every reading in order the number of its block
+        self.noise = CampaignNoise(settings, noise, self.ledger, self.blocks, self.first)
+        self._row, self._left, self._counted = -1, 0, False
         self._block, self._begins = 0, True
         self._direction = [1.0, 0.0, 0.0]
-        self._mean_mm = [[0.0] * 3] * candidates.points  # at the ends of blocks
-        self._size_mm = np.full(candidates.points, -1.0)  # of these
+        self._mean_mm = [[0.0] * 3] * points  # at the ends of blocks
+        self._size_mm = np.full(points, -1.0)  # of these
 
     def boundary_of(self, error: float, freedom: float = math.inf):
         """The boundary of the looks of this campaign for an error of the upper limits."""
         few = max(1.0 - self.extra / (_FEW * max(self.first, 1)), 0.0)
         early = EARLY + (_ONCE - EARLY) * few
-        return boundary(self.counts, error, freedom, early, rate=self.wrong_rate)
+        return boundary(self.counts, error, freedom, early, rate=self.settings.wrong_rate)
 
     def visit(self) -> tuple[int, ...]:
         """The first rows, with the reference poses in their places."""
@@ -94,11 +104,16 @@ class ConfirmingCampaign(Campaign):
         super().record(point, reading_mm, covariance_mm2)
         is_due = self.looks.missing(point) == 0
         in_block = bool(self._left) and point == self._row
-        self.blocks.append(self._block_of(in_block and not is_planned))
+        if not in_block or is_planned:
+            self.blocks.append(-len(self.blocks) - 1)
+        else:
+            self._block, self._begins = self._block + self._begins, False
+            self.blocks.append(self._block)
         if in_block:
             self._left -= 1
             if self._counted and not is_planned:
-                noise = self._noise_along(point, covariance_mm2)
+                along, spread = np.array(self._direction), self.ledger.covariances([taken])[0]
+                noise = math.sqrt(float(along @ spread @ along))
                 self.average.record(point, self._direction, self.ledger.readings[-1][1], noise)
                 # A bound stated inside a block is of a mean of its own: a new block begins.
                 self._begins = self.average.at_stage
@@ -115,14 +130,6 @@ class ConfirmingCampaign(Campaign):
     def reading_blocks(self) -> list[int]:
         """Of every reading in order the number of its block."""
         return self.blocks
-
-    def _block_of(self, in_block: bool) -> int:
-        """The number of a reading's block: that under way, or one of its own."""
-        if not in_block:
-            return -len(self.blocks) - 1
-        if self._begins:
-            self._block, self._begins = self._block + 1, False
-        return self._block
 
     def _begin_block(self, left: int) -> None:
         """Choose where the next readings are taken, and how many of them."""
@@ -146,16 +153,103 @@ class ConfirmingCampaign(Campaign):
         self._row, self._left, self._begins = row, count, True
         self._direction = direction_of(self._mean_mm[row])
 
-    def _noise_along(self, point: int, covariance_mm2) -> float:
-        """Standard deviation of a reading along the direction of its block."""
-        planned = self.ledger.candidates.covariance_mm2[point]
-        own = planned if covariance_mm2 is None else covariance_mm2
-        along = np.array(self._direction)
-        return math.sqrt(float(along @ np.asarray(own) @ along))
+    def statements(self) -> tuple[Statement, ...]:
+        """On the measured points, and on all candidates."""
+        ledger, settings = self.ledger, self.settings
+        seen, points = len(ledger.visited), ledger.candidates.points
+        if (left := max(math.ceil(FIRST_SHARE * self.first), 1) - seen) > 0:
+            early = Reason("first_visit", {"left": left})
+            return Statement(MEASURED, withheld=early), Statement(CANDIDATES, withheld=early)
+        posterior = largest_size(ledger.sizes_mm(), ledger.noise_mm[ledger.visited], points - seen)
+        value_mm = posterior.quantile_mm(0.5, measured_only=True)
+        measured = Statement(MEASURED, value_mm, error_of=settings.error_of)
+        everywhere = replace(measured, target=CANDIDATES, value_mm=posterior.quantile_mm(0.5))
+        if missing := self.noise.missing():
+            return replace(measured, withheld=missing), replace(everywhere, withheld=missing)
+        noise = self.noise.taken(self.allowed)
+        if against := self._withheld():
+            stated = [replace(each, withheld=against) for each in (measured, everywhere)]
+        else:
+            bounds = {
+                "lower_mm": self._lower_mm(),
+                "upper_mm": self._upper_mm(self.allowed, value_mm),
+                "confidence": settings.confidence - settings.wrong_rate,
+            }
+            stated = [replace(each, **bounds) for each in (measured, everywhere)]
+            if seen < points:
+                left = excepted(points, seen, MISSED * self.allowed)
+                least = 0.0 if left else everywhere.value_mm
+                upper_mm = self._upper_mm((1.0 - MISSED) * self.allowed, least)
+                stated[1] = replace(stated[1], upper_mm=upper_mm, excepted=left)
+        stated = [replace(each, noise=noise.said) for each in stated]
+        if settings.error_of != MEAN:
+            arms_mm = self.noise.arms_mm(noise)
+            stated = [each.of_future_visits(arms_mm) for each in stated]
+        return tuple(stated)
 
+    def change(self) -> Change | None:
+        """What the reference poses show of a drift or step; None where too few are read."""
+        if self.ledger.taken < self.plan.poses or not self.plan.poses:
+            return None
+        tested = math.inf if self.settings.noise == KNOWN else self.settings.noise_freedom
+        return found(self.plan, planned_readings(self.plan, self.ledger), tested)
 
-def _first_most(shares: np.ndarray) -> np.ndarray:
-    """Parts of a point's allowed lower error by look, half of it for the first."""
-    if len(shares) == 1:
-        return np.ones(1)
-    return np.concatenate([[0.5], 0.5 * shares[1:] / shares[1:].sum()])
+    def point_limits(self) -> dict[int, tuple[float, float]]:
+        """The limits that hold at every look, with the noise as bounds take it."""
+        if self.noise.missing():
+            return dict.fromkeys(self.ledger.visited, (0.0, math.inf))
+        upper = self._limits_mm(self.allowed).tolist()
+        lower = self.looks.lower_limits_mm(self._single_factor()).tolist()
+        if self.settings.wrong_rate:
+            lower = [0.0] * len(lower)  # any single point may have been read wrong
+        return {row: (lower[row], upper[row]) for row in self.ledger.visited}
+
+    def alarms(self) -> tuple[Reason, ...]:
+        """What the readings say against what the bounds rest on."""
+        alarms: tuple[Reason, ...] = ()
+        if suspicious := self.suspicious():
+            first = {"readings": len(suspicious), "number": suspicious[0].number}
+            alarms = (Reason("wrong_readings", first),)
+        # A few wrong readings look like too much scatter: what tells more comes first.
+        if (change := self.change()) is not None and change.is_found:
+            alarms += (change.reason,)
+        return (*alarms, *self.noise.alarms())
+
+    def suspicious(self) -> tuple[Suspicious, ...]:
+        """Readings that stand apart from others of their point."""
+        if self.noise.missing():
+            return ()
+        # Where all readings scatter more than stated, none is wrong for doing so too.
+        factor = max(self.noise.taken(self.allowed).value, self.noise.usual_scatter())
+        planned = self.extra + self.settings.references
+        return suspicious_readings(
+            self.ledger, self.blocks, self.counts, planned, factor, self.noise_plan.freedom
+        )
+
+    def _withheld(self) -> Reason | None:
+        """The alarm by which bounds are withheld; wrong readings are none where guarded against."""
+        guarded = "wrong_readings" if self.settings.wrong_rate else ""
+        return next((each for each in self.alarms() if each.code != guarded), None)
+
+    def _limits_mm(self, error: float) -> np.ndarray:
+        """Upper limits (m,) of single points for an allowed error."""
+        plan, own = self.noise_plan, self.noise.taken(error).own
+        return self.looks.limits_mm(self.boundary_of(plan.mean_share * error, plan.freedom), own)
+
+    def _single_factor(self) -> np.ndarray:
+        """Factors (m,) on the noise that lower limits of single points rest on."""
+        noise = self.noise.taken(self.allowed)
+        return noise.own * factor_limit(noise.freedom, 1.0 - 0.5 * self.single_error)
+
+    def _upper_mm(self, error: float, value_mm: float) -> float:
+        """The largest upper limit of the visited points for an allowed error."""
+        # Where unlucky readings put the bound below the likely size, that is the better bound.
+        largest = max(float(self._limits_mm(error)[self.ledger.visited].max()), value_mm)
+        return largest + self.settings.allowance_mm
+
+    def _lower_mm(self) -> float:
+        if self.average.has_spoken:
+            found_mm = self.average.bound_mm(self.noise.taken(self.allowed).own)
+        else:
+            found_mm = self.looks.largest_lower_mm(self._single_factor())
+        return max(found_mm - self.settings.allowance_mm, 0.0)

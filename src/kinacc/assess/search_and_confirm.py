@@ -3,46 +3,21 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
-from kinacc.assess.adaptive import FIRST_SHARE, AdaptiveAssessor, Candidates, check_settings
-from kinacc.assess.confirming import ConfirmingCampaign
+from kinacc.assess.adaptive import AdaptiveAssessor, Candidates, check_settings
+from kinacc.assess.confirming import MISSED, SearchAndConfirmCampaign
 from kinacc.assess.counts import excepted, hardly_missed
-from kinacc.assess.noise import (
-    ENOUGH,
-    ESTIMATED,
-    FEWEST,
-    KNOWN,
-    CampaignNoise,
-    factor_limit,
-    noise_plan,
-)
-from kinacc.assess.population import LargestSize, largest_size
-from kinacc.assess.reference_poses import (
-    Change,
-    found,
-    planned_readings,
-    poses_of,
-)
-from kinacc.assess.statement import (
-    CANDIDATES,
-    CONFIDENCE,
-    MEAN,
-    MEASURED,
-    VISIT,
-    Reason,
-    Statement,
-    Suspicious,
-)
-from kinacc.assess.suspicious_readings import suspicious_readings
+from kinacc.assess.noise import ENOUGH, ESTIMATED, FEWEST, KNOWN
+from kinacc.assess.reference_poses import poses_of
+from kinacc.assess.statement import CONFIDENCE, MEAN, VISIT, Reason
 
 VISITED = 0.9  # of the budget, where it is smaller than the number of candidates
 MARGIN = 1.2  # how much larger than stated noise may be that nothing can check
 MOST_WRONG = 0.1  # of the readings: with more, clipped scores tell hardly anything
-_MISSED = 0.5  # of the allowed error, where candidates are left that may hold the largest
 
 
 @dataclass(frozen=True)
@@ -109,16 +84,12 @@ class SearchAndConfirm(AdaptiveAssessor):
             ("wrong_rate", 0.0 <= self.wrong_rate <= MOST_WRONG, f"from 0 to {MOST_WRONG}"),
             ("wrong_rate", known or freedom > 0 or not self.wrong_rate, guarded),
             ("references", references, "a whole number, 0 or more"),
-            (
-                "references",
-                least <= self.measurements,
-                f"fewer: they take {least} readings or more",
-            ),
+            ("references", least <= self.measurements, f"fewer: they take {least} readings"),
         )
 
     def enough_for_all(self, points: int) -> int:
         """Measurements with which the statement on all ``points`` candidates assumes nothing."""
-        return hardly_missed(points, _MISSED * (1.0 - self.confidence))
+        return hardly_missed(points, MISSED * (1.0 - self.confidence))
 
     def visit(self, points: int) -> int:
         """How many of the candidates are visited in any case."""
@@ -134,159 +105,9 @@ class SearchAndConfirm(AdaptiveAssessor):
         enough = self.enough_for_all(points) + self.references
         if self.measurements >= enough:
             return None
-        left = excepted(points, self.visit(points), _MISSED * (1.0 - self.confidence))
+        left = excepted(points, self.visit(points), MISSED * (1.0 - self.confidence))
         return Reason("excepted_ahead", {"enough": enough, "excepted": left})
 
     def begin(self, candidates: Candidates) -> SearchAndConfirmCampaign:
         """A new campaign."""
         return SearchAndConfirmCampaign(self, candidates)
-
-
-class SearchAndConfirmCampaign(ConfirmingCampaign):
-    """See :class:`SearchAndConfirm`."""
-
-    settings: SearchAndConfirm
-
-    def __init__(self, settings: SearchAndConfirm, candidates: Candidates) -> None:
-        first = settings.visit(candidates.points)
-        super().__init__(
-            settings,
-            candidates,
-            first,
-            noise_plan(settings, first),
-            settings.wrong_rate,
-            settings.references,
-        )
-        self.noise = CampaignNoise(settings, self.noise_plan, self.ledger, self.blocks, first)
-        self._alarmed: tuple[int, tuple[Reason, ...]] = (-1, ())  # after so many readings
-        self._changed: tuple[int, Change | None] = (-1, None)
-        self._speaks_from = max(math.ceil(FIRST_SHARE * first), 1)
-
-    def statements(self) -> tuple[Statement, ...]:
-        """On the measured points, and on all candidates."""
-        seen = len(self.ledger.visited)
-        if seen < self._speaks_from:
-            left = Reason("first_visit", {"left": self._speaks_from - seen})
-            return Statement(MEASURED, withheld=left), Statement(CANDIDATES, withheld=left)
-        against = self.noise.missing() or self._withheld()
-        posterior = self._posterior()
-        value_mm = posterior.quantile_mm(0.5, measured_only=True)
-        if against:
-            both = (MEASURED, value_mm), (CANDIDATES, posterior.quantile_mm(0.5))
-            return tuple(self._as_asked(Statement(*each, withheld=against)) for each in both)
-        said = Statement(
-            MEASURED,
-            value_mm=value_mm,
-            lower_mm=self._lower_mm(),
-            upper_mm=self._upper_mm(1.0 - self.settings.confidence, value_mm),
-            confidence=self.settings.confidence - self.settings.wrong_rate,
-        )
-        both = said, self._about_candidates(said, posterior.quantile_mm(0.5))
-        return tuple(self._as_asked(each) for each in both)
-
-    def change(self) -> Change | None:
-        """What the reference poses show of a drift or step; None where too few are read."""
-        if self.ledger.taken < self.plan.poses or not self.plan.poses:
-            return None
-        if self._changed[0] != self.ledger.taken:
-            tested = math.inf if self.settings.noise == KNOWN else self.settings.noise_freedom
-            told = found(self.plan, planned_readings(self.plan, self.ledger), tested)
-            self._changed = self.ledger.taken, told
-        return self._changed[1]
-
-    def point_limits(self) -> dict[int, tuple[float, float]]:
-        """The limits that hold at every look, with the noise as bounds take it."""
-        if self.noise.missing():
-            return dict.fromkeys(self.ledger.visited, (0.0, math.inf))
-        error = 1.0 - self.settings.confidence
-        upper, single = self._limits_mm(error), self._single_factor()
-        lower = self.looks.lower_limits_mm(single)
-        if self.settings.wrong_rate:
-            lower = np.zeros_like(lower)  # any single point may have been read wrong
-        return {row: (float(lower[row]), float(upper[row])) for row in self.ledger.visited}
-
-    def _as_asked(self, said: Statement) -> Statement:
-        """A statement with the noise it rests on, and on future visits where these are meant."""
-        if self.noise.missing():
-            return replace(said, error_of=self.settings.error_of)
-        noise = self.noise.taken(1.0 - self.settings.confidence)
-        said = replace(said, noise=noise.said)
-        if self.settings.error_of == MEAN:
-            return said
-        return said.of_future_visits(self.noise.arms_mm(noise))
-
-    def _limits_mm(self, error: float) -> np.ndarray:
-        """Upper limits (m,) of single points for an allowed error."""
-        plan, own = self.noise_plan, self.noise.taken(error).own
-        return self.looks.limits_mm(self.boundary_of(plan.mean_share * error, plan.freedom), own)
-
-    def _single_factor(self) -> np.ndarray:
-        """Factors (m,) on the noise that lower limits of single points rest on."""
-        noise = self.noise.taken(1.0 - self.settings.confidence)
-        return noise.own * factor_limit(noise.freedom, 1.0 - 0.5 * self.single_error)
-
-    def alarms(self) -> tuple[Reason, ...]:
-        """What the readings say against what the bounds rest on."""
-        if self._alarmed[0] != self.ledger.taken:
-            self._alarmed = self.ledger.taken, self._alarms()
-        return self._alarmed[1]
-
-    def _alarms(self) -> tuple[Reason, ...]:
-        found: tuple[Reason, ...] = ()
-        if suspicious := self.suspicious():
-            first = {"readings": len(suspicious), "number": suspicious[0].number}
-            found = (Reason("wrong_readings", first),)
-        # A few wrong readings look like too much scatter: what tells more comes first.
-        change = self.change()
-        drift = (change.reason,) if change is not None and change.is_found else ()
-        return (*found, *drift, *self.noise.alarms())
-
-    def suspicious(self) -> tuple[Suspicious, ...]:
-        """Readings that stand apart from others of their point."""
-        if self.noise.missing():
-            return ()
-        # Where all readings scatter more than stated, none is wrong for doing so too.
-        taken = self.noise.taken(1.0 - self.settings.confidence).value
-        return suspicious_readings(
-            self.ledger,
-            self.blocks,
-            self.counts,
-            self.extra + self.settings.references,
-            max(taken, self.noise.usual_scatter()),
-            self.noise_plan.freedom,
-        )
-
-    def _withheld(self) -> Reason | None:
-        """The alarm by which bounds are withheld; wrong readings are none where guarded against."""
-        guarded = self.settings.wrong_rate > 0.0
-        told = (each for each in self.alarms() if not (guarded and each.code == "wrong_readings"))
-        return next(told, None)
-
-    def _upper_mm(self, error: float, value_mm: float) -> float:
-        """The largest upper limit of the visited points for an allowed error."""
-        # Where unlucky readings put the bound below the likely size, that is the better bound.
-        largest = max(float(self._limits_mm(error)[self.ledger.visited].max()), value_mm)
-        return largest + self.settings.allowance_mm
-
-    def _lower_mm(self) -> float:
-        if self.average.has_spoken:
-            own = self.noise.taken(1.0 - self.settings.confidence).own
-            found = self.average.bound_mm(own)
-        else:
-            found = self.looks.largest_lower_mm(self._single_factor())
-        return max(found - self.settings.allowance_mm, 0.0)
-
-    def _about_candidates(self, said: Statement, value_mm: float) -> Statement:
-        points, seen = self.ledger.candidates.points, len(self.ledger.visited)
-        allowed = 1.0 - self.settings.confidence
-        known = replace(said, target=CANDIDATES, value_mm=value_mm)
-        if seen == points:
-            return known
-        left = excepted(points, seen, _MISSED * allowed)
-        upper_mm = self._upper_mm((1.0 - _MISSED) * allowed, 0.0 if left else value_mm)
-        return replace(known, upper_mm=upper_mm, excepted=left)
-
-    def _posterior(self) -> LargestSize:
-        ledger = self.ledger
-        unmeasured = ledger.candidates.points - len(ledger.visited)
-        return largest_size(ledger.sizes_mm(), ledger.noise_mm[ledger.visited], unmeasured)

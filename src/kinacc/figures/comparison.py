@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
@@ -14,7 +12,6 @@ from kinacc.figures import style
 
 _FAR = 3.0  # standard deviations
 _SYMBOLS = {"theta_offset": "θ", "d": "d", "a": "a", "alpha": "α", "beta": "β"}
-_HATCHED: dict[str, Any] = {"hatch": "////", "ec": "white", "lw": 0}
 
 
 def draw(found: Difference) -> Figure:
@@ -34,43 +31,25 @@ def draw(found: Difference) -> Figure:
 
 
 def _parameters(ax: Axes, parameters: pd.DataFrame) -> None:
-    """Changes in standard deviations; in mm and mrad where none has a standard deviation."""
+    """Changes in standard deviations; a change without one stands in words on the middle line."""
     places, sigmas = np.arange(len(parameters)), parameters["sigmas"].to_numpy()
-    change = parameters["difference"].to_numpy()
-    change = np.where(np.abs(change) > ROUNDING, change, 0.0)
     known = np.isfinite(sigmas)
-    if known.any():
-        far = known & (np.abs(sigmas) > _FAR)
-        crossed, label = (
-            ~known,
-            "standard deviations)\n×: without one; the change, if any, beside it",
-        )
-        limit = max(_FAR * 1.5, 1.1 * np.abs(sigmas[known]).max())
-        ax.axvspan(-_FAR, _FAR, color=style.FAINT, alpha=0.5, lw=0)
-        ax.barh(places[known & ~far], sigmas[known & ~far], 0.62, color=style.BLUE)
-        ax.barh(places[far], sigmas[far], 0.62, color=style.VERMILION, **_HATCHED)
-        # Without a standard deviation there is no place on this axis: the change stands beside it.
-        for place in places[crossed & (change != 0.0)]:
+    far = np.abs(sigmas) > _FAR
+    limit = max(_FAR * 1.5, 1.1 * np.abs(sigmas[known]).max(initial=0.0))
+    ax.axvspan(-_FAR, _FAR, color=style.FAINT, alpha=0.5, lw=0)
+    ax.barh(places[known & ~far], sigmas[known & ~far], 0.62, color=style.BLUE)
+    ax.barh(places[far], sigmas[far], 0.62, color=style.VERMILION, hatch="////", ec="white", lw=0)
+    for place, row in zip(places, parameters.itertuples(), strict=True):
+        if not known[place] and abs(row.difference) > ROUNDING:
             ax.annotate(
-                f"{change[place]:+.3g} {parameters['unit'][place]}", (0.0, place), xytext=(4, 0),
+                f"{row.difference:+.3g} {row.unit}", (0.0, place), xytext=(4, 0),
                 textcoords="offset points", va="center", fontsize=style.SMALL_PT,
                 color=style.MUTED,
             )  # fmt: skip
-        at = np.zeros(len(places))
-    else:
-        crossed = (parameters["undetermined"] != "").to_numpy()
-        limit = 1.1 * float(np.max(np.abs(change), initial=0.0)) or 1.0
-        looks = {"mm": {"color": style.BLUE}, "mrad": {"color": style.ORANGE, **_HATCHED}}
-        looks = {unit: look for unit, look in looks.items() if unit in set(parameters["unit"])}
-        for unit, look in looks.items():
-            rows = (parameters["unit"] == unit).to_numpy()
-            ax.barh(places[rows], change[rows], 0.62, label=unit, **look)
-        label = f"{', '.join(looks)}{'; ×: undetermined' * bool(crossed.any())})"
-        ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2)
-        at = change
-    ax.plot(at[crossed], places[crossed], "x", color=style.MUTED, ms=4)
+    ax.plot(np.zeros(sum(~known)), places[~known], "x", color=style.MUTED, ms=4)
     ax.axvline(0.0, color=style.MUTED, lw=0.6)
-    ax.set(xlim=(-limit, limit), xlabel=f"Change ({label}", ylim=(len(places) - 0.4, -0.6))
+    ax.set(xlim=(-limit, limit), ylim=(len(places) - 0.4, -0.6))
+    ax.set_xlabel("Change (standard deviations)\n×: without one; the change, if any, beside it")
     names = [name.partition(".") for name in parameters["name"]]
     ax.set_yticks(places, [f"{_SYMBOLS[name]}$_{{{joint[1:]}}}$" for joint, _, name in names])
     ax.tick_params(axis="y", length=0)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from itertools import product
 from typing import Any
 
 import numpy as np
@@ -11,8 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
-from matplotlib.transforms import Bbox
-from mpl_toolkits.mplot3d import Axes3D, proj3d
+from mpl_toolkits.mplot3d import Axes3D
 from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 
 from kinacc.errors import InputError, Problem
@@ -21,7 +19,7 @@ from kinacc.kinematics import dh, tables
 from kinacc.kinematics import robot as robots
 
 JOINT_SHARE = 0.03  # of the reach: half the length of the thickest joint
-LEGEND_IN, MARGIN_IN, NAME_IN = 0.34, 0.04, 0.2  # heights below and around the axes, and above
+LEGEND_IN = 0.34  # height below the axes
 VIEW_DEG = (24.0, -58.0)  # elevation, azimuth
 LINK, JOINT = "#f2a93b", "#5b6470"
 
@@ -80,7 +78,7 @@ def draw(
     }
     with style.house():
         figure = style.new_figure(style.SINGLE_COLUMN_IN, 3.2 + LEGEND_IN, arranged=False)
-        ax: Axes3D = figure.add_axes((-0.06, 0.03, 1.06, 1.0), projection="3d")
+        ax: Axes3D = figure.add_axes((-0.04, 0.13, 1.04, 0.86), projection="3d")
         ax.computed_zorder = False
         ax.set_autoscale_on(False)
         ax.view_init(*VIEW_DEG)
@@ -96,7 +94,6 @@ def draw(
         every = np.concatenate(seen)
         _bar(ax, [[0, 0, every[:, 2].min()], [0, 0, 0]], style.MUTED, 0.8, ls=(0, (6, 2, 1, 2)))
         _frame_axes(ax, every)
-        _fill(figure, ax, NAME_IN if dataset else MARGIN_IN)
         columns = len(legend) - 1
         figure.legend(legend.values(), legend.keys(), loc="lower left", ncols=columns)
         style.name_dataset(figure, dataset)
@@ -149,7 +146,7 @@ def _frame_axes(ax: Axes3D, points: np.ndarray) -> None:
     """Set equal scales around everything drawn, and name the axes."""
     margin = 0.06 * np.ptp(points, axis=0).max()
     low, high = points.min(axis=0) - margin, points.max(axis=0) + margin
-    ax.set_box_aspect(high - low, zoom=1.0)
+    ax.set_box_aspect(high - low, zoom=0.9)
     ax.tick_params(pad=-2, labelsize=style.SMALL_PT)
     ax.tick_params(axis="z", pad=2)
     for name, axis, *ends in zip("xyz", (ax.xaxis, ax.yaxis, ax.zaxis), low, high, strict=True):
@@ -159,24 +156,3 @@ def _frame_axes(ax: Axes3D, points: np.ndarray) -> None:
         axis.set_pane_color((0.97, 0.97, 0.97, 1.0))
         axis._axinfo["grid"].update(color="#e3e3e3", linewidth=0.5)
         axis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10], min_n_ticks=3))
-
-
-def _fill(figure: Figure, ax: Axes3D, top_in: float) -> None:
-    """Scale and move the axes until what they draw just fills the figure.
-
-    Text keeps its size while the axes grow, so one step does not suffice; two do.
-    """
-    size = np.array(figure.get_size_inches())
-    low, high = np.array([MARGIN_IN, LEGEND_IN]) / size, 1 - np.array([MARGIN_IN, top_in]) / size
-    for _ in range(2):
-        figure.draw_without_rendering()
-        corners = np.array(list(product(ax.get_xlim(), ax.get_ylim(), ax.get_zlim())))
-        flat = np.transpose(proj3d.proj_transform(*corners.T, ax.get_proj())[:2])
-        box = Bbox.null()
-        box.update_from_data_xy(ax.transData.transform(flat))
-        labels = [axis.get_tightbbox() for axis in (ax.xaxis, ax.yaxis, ax.zaxis)]
-        drawn = Bbox.union([box, *labels]).transformed(figure.transFigure.inverted())
-        place = ax.get_position(original=True)
-        scale = np.min((high - low) / drawn.size)
-        shift = (low + high) / 2 - scale * (drawn.min + drawn.max) / 2
-        ax.set_position((*(scale * place.min + shift), *(scale * place.size)))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -35,10 +34,8 @@ VERDICTS = {
     RECALIBRATE: (style.VERMILION, "D", 5.0, "recalibrate"),
     OPEN: (style.MUTED, "X", 5.0, "cannot be told"),
 }
-_MANY = 24  # lines: markers get smaller
 _ROOM_DAYS = 20.0  # beside a history of one line
 _LEAST_SPAN_C = 1.0  # either way: less is no change worth a look
-_DAYS_APART = 0.14  # of the history, where every day has room for its own label
 
 
 def run(inputs: Mapping, settings: Mapping) -> Figure:
@@ -65,8 +62,7 @@ def draw(history: Mapping, *, dataset: str | None = None) -> Figure:
         _errors(panels[0], lines)
         _moved(panels[1], lines)
         if len(warm):
-            size = 3.0 if len(lines) <= _MANY else 1.5
-            panels[2].plot(lines["temperature_c"], "o-", color=style.PURPLE, ms=size, lw=0.9)
+            panels[2].plot(lines["temperature_c"], "o-", color=style.PURPLE, ms=2.0, lw=0.9)
             middle, span = 0.5 * (warm.min() + warm.max()), warm.max() - warm.min()
             half = max(0.6 * span, _LEAST_SPAN_C)
             panels[2].set(ylabel="°C", ylim=(middle - half, middle + half))
@@ -81,37 +77,29 @@ def draw(history: Mapping, *, dataset: str | None = None) -> Figure:
 
 def _errors(ax: Axes, lines: pd.DataFrame) -> None:
     """Mean and 99 % as lines, the largest as marks, of both calibrations at each line's poses."""
-    size = 3.5 if len(lines) <= _MANY else 1.8
-    shown = [*COLUMNS[7:], "tolerance_mm"]
     for which, colour, point, label in _CALIBRATIONS:
         for name, line, width, marker, face in _STATISTICS:
             values = lines[f"{which}_{name}_mm"].dropna()
             if len(values):
                 ax.plot(
-                    values, ls=line, lw=width, color=colour, marker=marker or point,
-                    ms=size + 0.5 * bool(marker), mfc=face or colour, mew=0.8,
-                    label=None if face else label,
+                    values, ls=line, lw=width, color=colour, marker=marker or point, ms=3.0,
+                    mfc=face or colour, mew=0.8, label=None if face else label,
                 )  # fmt: skip
-    limits = lines["tolerance_mm"]
-    if limits.notna().any():
-        look = style.LIMIT | {"color": style.INK}
-        ax.step(lines.index, limits, where="mid", label="tolerance", **look)
-        if len(lines) == 1:
-            ax.axhline(limits.iloc[0], **look)
-    ax.set(ylabel="Position error (mm)", ylim=(0.0, 1.08 * lines[shown].max(axis=None) or 1.0))
-    grey: dict[str, Any] = {"color": style.MUTED, "marker": "o", "ms": 3}
-    ax.plot([], [], ls="-", label="mean", **grey)
-    ax.plot([], [], ls=_STATISTICS[1][1], mfc="white", label="99 %", **grey)
-    ax.plot([], [], ls="none", label="largest", mew=0.8, **grey | {"marker": "x", "ms": 3.5})
-    style.legend_above(ax, 7, borderaxespad=0.1)
+    if lines["tolerance_mm"].notna().any():
+        look = style.LIMIT | {"color": style.INK, "marker": "_"}
+        ax.plot(lines["tolerance_mm"], label="tolerance", **look)
+    top = lines[[*COLUMNS[7:], "tolerance_mm"]].max(axis=None)
+    ax.set(ylabel="Position error (mm)", ylim=(0.0, 1.08 * top or 1.0))
+    ax.locator_params(axis="y", nbins=6)
+    style.legend_above(ax, 3, "mean; dashed, with open marks: 99 %; crosses: largest")
 
 
 def _moved(ax: Axes, lines: pd.DataFrame) -> None:
     """Movement since the calibration in force, marked by verdict, above what chance moves."""
-    moved, chance, few = lines["moved_mm"], lines["chance_mm"].dropna(), len(lines) <= _MANY
+    moved, chance = lines["moved_mm"], lines["chance_mm"].dropna()
     if len(chance):
         ax.plot(
-            chance, ls="none", marker="_", ms=11 if few else 5, mew=1.4, color=style.MUTED,
+            chance, ls="none", marker="_", ms=7, mew=1.4, color=style.MUTED,
             label="what chance shows at most",
         )  # fmt: skip
         ax.vlines(chance.index, 0.0, chance, color=style.FAINT, lw=3.0, zorder=0.6)
@@ -121,7 +109,7 @@ def _moved(ax: Axes, lines: pd.DataFrame) -> None:
         own = at[lines["verdict"] == name]
         if len(own):
             ax.plot(
-                own, ls="none", marker=marker, ms=size * (1.0 if few else 0.7), color=colour,
+                own, ls="none", marker=marker, ms=size, color=colour,
                 mec="white", mew=0.4, label=label, clip_on=False, zorder=3,
             )  # fmt: skip
     for day, joint in lines["joint"][lines["verdict"] == RECALIBRATE].dropna().items():
@@ -133,20 +121,14 @@ def _moved(ax: Axes, lines: pd.DataFrame) -> None:
         )  # fmt: skip
     highest = np.nanmax([*moved, *chance, 0.0])
     ax.set(ylabel="Moved (mm rms)", ylim=(0.0, 1.15 * highest or 1.0))
-    if moved.isna().all():
-        ax.set_yticks([0.0])
     style.legend_above(ax, 7, borderaxespad=0.1)
 
 
 def _dates(ax: Axes, lines: pd.DataFrame) -> None:
     """Days as a reader writes them, with room at both ends."""
-    date, days = lines.index.to_numpy(), lines["date"].to_list()
-    room = max(0.03 * float(np.ptp(date)), _ROOM_DAYS if len(date) == 1 else 1.0)
-    ax.set_xlim(date.min() - room, date.max() + room)
-    if len(date) == 1 or np.diff(date).min() > _DAYS_APART * np.ptp(date):
-        ax.set_xticks(date, days)
-        return
+    room = max(0.03 * float(np.ptp(lines.index)), _ROOM_DAYS if len(lines) == 1 else 1.0)
+    ax.set_xlim(lines.index.min() - room, lines.index.max() + room)
     locator = AutoDateLocator(minticks=3, maxticks=9)
     ax.xaxis.set_major_locator(locator)
     ax.xaxis.set_major_formatter(ConciseDateFormatter(locator, show_offset=False))
-    ax.set_xlabel(f"{days[0]} to {days[-1]}")
+    ax.set_xlabel(f"{lines['date'].iloc[0]} to {lines['date'].iloc[-1]}")
