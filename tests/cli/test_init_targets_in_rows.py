@@ -43,7 +43,7 @@ def test_groups_from_two_places_of_the_tracker_are_no_targets(tmp_path):
     x, y, z = IT.point.T
     points = grouped(IT.point, np.stack([-y + 900.0, x, z], axis=1))
     said = refused(written(tmp_path, joints_csv=JOINTS, tracker_csv=points))
-    assert "rows of equal joints lie more than 5 mm apart" in said
+    assert "over 5 mm apart" in said
 
 
 def in_one_nest(radius, **more):
@@ -60,9 +60,8 @@ def in_one_nest(radius, **more):
 
 def test_a_reflector_of_another_radius_is_a_target_of_its_own(tmp_path):
     text = in_one_nest([19.05] * 12 + [6.35] * (COUNT - 12))
-    section, told = described(written(tmp_path, cell_csv=text))
+    section, _ = described(written(tmp_path, cell_csv=text))
     assert targets(section) == {"19.05": 12, "6.35": COUNT - 12}
-    assert "centres elsewhere" in " ".join(told["told"])
 
 
 def test_radii_that_were_measured_scatter_and_are_one_reflector(tmp_path):

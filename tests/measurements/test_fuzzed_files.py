@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 
 from kinacc.errors import InputError
 from kinacc.kinematics import robot
-from kinacc.measurements.intake import guess, own_names
+from kinacc.measurements.intake import guess
 from kinacc.measurements.reader import read
 
 ARM = robot.load("ur10")
@@ -93,7 +93,10 @@ def look(*paths: Path) -> None:
     for reader in (
         lambda: read(guess.look(paths if len(paths) > 1 else paths[0]).section, ARM, strict=False),
         lambda: read({"path": str(paths[0])}, ARM),
-        *(lambda need=need: own_names.read(paths[0], {}, need) for need in ("joints", "poses")),
+        *(
+            lambda need=need: guess.under_our_names(guess.look(paths[0], {}, need))
+            for need in ("joints", "poses")
+        ),
     ):
         with suppress(InputError):
             reader()

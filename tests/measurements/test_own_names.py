@@ -96,7 +96,7 @@ def test_what_is_open_is_asked_about(tmp_path):
         rows.read(two, ARM)
     names = [f"{ball}_{a} [mm]" for ball in ("m1", "m2") for a in "XYZ"]
     several = table(tmp_path, names, POSE.position_mm, POSE.position_mm + 5.0 * POSE.rotation[:, 0])
-    with pytest.raises(InputError, match="several points: m1, m2"):
+    with pytest.raises(InputError, match="--take 'm1_X \\[mm\\]' or --take"):
         rows.open_table(several)
     two = table(tmp_path, [f"{side}_j{n}_deg" for side in ("left", "right") for n in range(1, 7)],
                 Q_DEG, Q_DEG + 1.0)  # fmt: skip

@@ -15,16 +15,8 @@ from numpy import ndarray
 from kinacc.checks.findings import Finding, finding
 from kinacc.checks.readings import Readings, nearest_rotation
 from kinacc.measurements.layout import ANGLES, Layout, in_order_of
-from kinacc.measurements.orientation import rotations
+from kinacc.measurements.orientation import CONVENTIONS, rotations
 
-CONVENTIONS = tuple(
-    order if intrinsic else order.lower()
-    for intrinsic in (True, False)
-    for order in (
-        *("XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX"),
-        *("XYX", "XZX", "YXY", "YZY", "ZXZ", "ZYZ"),
-    )
-)
 BETTER = 0.5  # of the scatter as written
 _LARGEST_RAD = 0.35  # scatter of a right reading, the arm being off by what it may be
 _MAJORITY = 0.7

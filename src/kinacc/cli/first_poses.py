@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 if TYPE_CHECKING:
     from kinacc.measurements.intake.guess import Guess
@@ -23,17 +24,16 @@ def first_poses(reading: MeasuredFile, prismatic: np.ndarray) -> list[dict[str, 
     shown = []
     for pose in list(dict.fromkeys(columns["pose"].tolist()))[:_POSES]:
         rows = np.flatnonzero(columns["pose"] == pose)
-        of_target = columns["target"][rows].astype(str)
-        _, first, times = np.unique(of_target, return_index=True, return_counts=True)
-        line = int(columns["row"][rows[0]])
+        _, first, times = np.unique(
+            columns["target"][rows].astype(str), return_index=True, return_counts=True
+        )
         q = np.array([columns[f"q{i + 1}"][rows[0]] for i in range(len(prismatic))])
+        line = int(columns["row"][rows[0]])
         shown.append(
             {
                 "line": line,
                 "where": reading.row_names.one(line),
-                "joints": [
-                    float(f"{value:.4f}") for value in np.where(prismatic, q, np.rad2deg(q))
-                ],
+                "joints": np.round(np.where(prismatic, q, np.rad2deg(q)), 4).tolist(),
                 "targets": [_target(columns, row) for row in rows[np.sort(first)]],
                 "again": int(times.max()) - 1,
             }
@@ -52,33 +52,29 @@ def poses_without_robot(guess: Guess) -> list[dict[str, object]]:
 
 
 def _target(columns, row: int) -> dict[str, object]:
-    told: dict[str, object] = {"target": str(columns["target"][row])}
-    for axis in "xyz":
-        told[f"{axis}_mm"] = float(f"{columns[f'{axis}_mm'][row]:.4f}")
-    w, *vector = (float(columns[f"q{part}"][row]) for part in "wxyz")
-    if np.isfinite(w):
-        length = float(np.linalg.norm(vector))
-        axis = np.array(vector) / length if length > 1e-12 else np.array([0.0, 0.0, 1.0])
-        axis = axis if w >= 0.0 else -axis
-        told["turned_deg"] = float(f"{np.rad2deg(2.0 * np.arctan2(length, abs(w))):.4f}")
-        told["about"] = [float(f"{part:.4f}") for part in axis]
-    return told
+    target: dict[str, object] = {"target": str(columns["target"][row])}
+    target |= {f"{a}_mm": round(float(columns[f"{a}_mm"][row]), 4) for a in "xyz"}
+    quaternion = [float(columns[f"q{part}"][row]) for part in "xyzw"]
+    if np.isfinite(quaternion).all():
+        vector = Rotation.from_quat(quaternion).as_rotvec(degrees=True)
+        angle = float(np.linalg.norm(vector))
+        axis = vector / angle if angle > 0.0 else np.array([0.0, 0.0, 1.0])
+        target |= {"turned_deg": round(angle, 4), "about": np.round(axis, 4).tolist()}
+    return target
 
 
 def in_words(shown: list[dict]) -> list[str]:
     """The poses as lines of text."""
     lines = ["the first poses, as they are understood (joints in deg, positions in mm):"]
     for pose in shown:
-        joints = ", ".join(f"{value:.3f}" for value in pose["joints"])
-        lines.append(f"  {pose['where']}: joints {joints}")
-        for each in pose["targets"]:
-            point = ", ".join(f"{each[f'{axis}_mm']:.3f}" for axis in "xyz")
+        lines.append(f"  {pose['where']}: joints {', '.join(f'{q:.3f}' for q in pose['joints'])}")
+        for target in pose["targets"]:
+            point = ", ".join(f"{target[f'{axis}_mm']:.3f}" for axis in "xyz")
             turn = ""
-            if "about" in each:
-                about = ", ".join(f"{part:.3f}" for part in each["about"])
-                turn = f", turned by {each['turned_deg']:.3f} deg about ({about})"
-            lines.append(f"    {each['target']} at {point}{turn}")
+            if "about" in target:
+                about = ", ".join(f"{part:.3f}" for part in target["about"])
+                turn = f", turned by {target['turned_deg']:.3f} deg about ({about})"
+            lines.append(f"    {target['target']} at {point}{turn}")
         if pose["again"]:
-            more = "more reading" if pose["again"] == 1 else "more readings"
-            lines.append(f"    and {pose['again']} {more} of it")
+            lines.append(f"    more readings of it: {pose['again']}")
     return lines

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -84,25 +85,31 @@ def init(measurement_files: tuple[str, ...], out: Output, **options) -> None:
       kinacc init joints.csv points.csv --join Name=Point
     """
     from kinacc.cli.first_poses import first_poses, poses_without_robot
-    from kinacc.cli.init_questions import asked, looked, poses_to_ask_about
+    from kinacc.cli.init_questions import asked, guessed
     from kinacc.cli.init_remarks import remarks_on, rounded
+    from kinacc.errors import InputError
     from kinacc.kinematics import robot as robots
     from kinacc.measurements.intake.write import plain_name
     from kinacc.tables.atomic import replacing
 
     ask = not (options["yes"] or out.as_json)
-    guess = _stated(looked(measurement_files, options, ask), options)
+    answers = {key: value for key, value in options.items() if value not in (None, ())}
+    guess = guessed(measurement_files, answers, ask)
     name = options["name"] or plain_name(guess.table.path)
     folder = Path(options["folder"])
     paths = folder / f"{name}.yaml", folder / f"{name}.robot.yaml"
     _refuse(paths[: 1 if _is_robot_file(options["robot"]) else 2], name, out.force)
-    seen = poses_to_ask_about(guess) if ask else []
-    _show(seen, out)
+    first_shown: list[dict] = []
     if ask:
-        guess = asked(guess, options["robot"])
+        if guess.assumed:
+            with suppress(InputError):  # joints that slide are not to be read without their robot
+                first_shown = poses_without_robot(guess)
+        _show(first_shown, out)
+        if changed := asked(guess, options["robot"]):
+            guess = guessed(measurement_files, answers | changed, ask)
     robot, chosen = _robot(guess, options["robot"], ask)
-    own, text = _robot_file(robot, guess.joints, name, paths[1])
-    report, shown = None, []
+    robot_path, text = _robot_file(robot, guess.joints, name, paths[1])
+    report, remarks = None, []
     if robot is not None:
         arm = robots.load(robot)
         guess, report, reading = _tried(guess, arm, name)
@@ -110,17 +117,17 @@ def init(measurement_files: tuple[str, ...], out: Output, **options) -> None:
             text, arm, guess = _coupled(text, arm, guess, coupling)
             guess, report, reading = _tried(guess, arm, name)
         shown = first_poses(reading, arm.dh.prismatic)
+        remarks = [*remarks_on(guess, report), *rounded(guess, reading, arm)]
     else:
         shown = poses_without_robot(guess)
-    if shown != seen:  # answers, or the readings, say otherwise than the names did
+    if shown != first_shown:  # answers, or the readings, show more than the names did
         _show(shown, out)
     texts = {} if text is None else {paths[1]: text}
-    texts[paths[0]] = _dataset(paths[0], name, own, guess, report, chosen)
+    texts[paths[0]] = _dataset(paths[0], name, robot_path, guess, report, chosen)
     with replacing(list(texts)) as parts:
         for part, text in zip(parts, texts.values(), strict=True):
             part.write_text(text, encoding="utf-8")
-    remarks = [] if robot is None else [*remarks_on(guess, report), *rounded(guess, reading, arm)]
-    _tell(out, guess, robot or own, chosen, report, list(texts), paths[0], shown, remarks)
+    _tell(out, guess, robot or robot_path, chosen, report, list(texts), paths[0], shown, remarks)
 
 
 def _show(shown: list[dict], out: Output) -> None:
@@ -151,36 +158,6 @@ def _robot_file(robot: str | None, joints: int, name: str, path: Path) -> tuple[
     if Path(robot).suffix.lower() in (".urdf", ".xml", ".xacro"):
         return str(path), write.urdf_text(robots.load(robot).name, Path(robot), path.parent)
     return robot, None
-
-
-def _stated(guess: Guess, options: dict) -> Guess:
-    """The guess with what the options say, which is no assumption then."""
-    from kinacc.cli.init_questions import orientation_of
-    from kinacc.errors import Problem, refuse
-
-    units = {name: options[name] for name in ("joint_unit", "length_unit", "angle_unit")}
-    units = {name: unit for name, unit in units.items() if unit}
-    problems = []
-    for name, given in units.items():
-        unit, listed = guess.stated.get(name, ("", ""))
-        if unit not in ("", given):
-            where = f"--{name.replace('_', '-')} {given}"
-            what = f"columns {listed} of {guess.section['path']} say {unit}"
-            fix = (
-                "leave the option out, or correct the names where they are the ones that are wrong"
-            )
-            problems.append(Problem(where, what, "the same in both places", fix))
-    refuse(problems)
-    settings: dict = {name: unit for name, unit in units.items() if name != "angle_unit"}
-    turn = {"unit": units["angle_unit"]} if "angle_unit" in units else {}
-    known = set(units)
-    if options["orientation"]:
-        turn |= orientation_of(options["orientation"])
-        known |= {"orientation", "order"}
-    if turn:
-        settings["orientation"] = turn
-    kept = {k: v for k, v in guess.assumed.items() if k not in known}
-    return replace(guess.but(settings), assumed=kept)
 
 
 def _refuse(paths, name: str, force: bool) -> None:
@@ -242,8 +219,8 @@ def _tried(guess: Guess, robot, name: str) -> tuple[Guess, Report, MeasuredFile]
             layout = Layout.of(guess.section)
             report = check.check(reading, layout, robot, name, guess.section["path"], progress)
             settings = _contradicted(guess, report)
-            told = (*guess.told, *reading.notes)
-            guess = replace(guess, told=tuple(dict.fromkeys(told)))
+            notes = (*guess.notes, *reading.notes)
+            guess = replace(guess, notes=tuple(dict.fromkeys(notes)))
             if not settings:
                 break
             guess = _set_right(guess, settings)
@@ -278,45 +255,36 @@ def _coupled(text: str, arm: Robot, guess: Guess, coupling: Finding) -> tuple:
     from kinacc.measurements.intake.write import coupled_text
 
     matrix = coupling.values["joint_map"]
-    found = f"found by trying it on the readings: {coupling.what}"
-    told = f"joint_map of the robot file that is written couples joints, {found}"
-    text = coupled_text(text, matrix, f"Joints are coupled, {found}.")
+    why = f"found by trying it on the readings: {coupling.what}"
+    note = f"joint_map of the robot file that is written couples joints, {why}"
+    text = coupled_text(text, matrix, f"Joints are coupled, {why}.")
     arm = replace(arm, joint_map=np.array(matrix, dtype=float))
-    return text, arm, replace(guess, told=(*guess.told, told))
-
-
-def _turned_round(guess: Guess) -> Guess:
-    """The guess with horizontal angles counted the other way."""
-    ways = guess.section["directions"]
-    clockwise = ways["horizontal"] == "counterclockwise"
-    ways = ways | {"horizontal": "clockwise" if clockwise else "counterclockwise"}
-    told = f"horizontal angles count {ways['horizontal']}, seen from above: found by trying"
-    kept = {k: v for k, v in guess.assumed.items() if k != "horizontal"}
-    return replace(guess.but({"directions": ways}), assumed=kept, told=(*guess.told, told))
+    return text, arm, replace(guess, notes=(*guess.notes, note))
 
 
 def _set_right(guess: Guess, settings: dict) -> Guess:
+    """The guess with settings that the readings show, in place of the assumed ones."""
     settings = dict(settings)
+    shown = {key: value for key, value in settings.items() if key in guess.assumed}
     if "horizontal" in settings:
-        return _turned_round(guess)
-    in_order = settings.pop("e", None)
-    if in_order:
+        ways = guess.section["directions"]
+        clockwise = ways["horizontal"] == "counterclockwise"
+        shown["horizontal"] = "clockwise" if clockwise else "counterclockwise"
+        settings = {"directions": ways | {"horizontal": shown["horizontal"]}}
+    if in_order := settings.pop("e", None):
         columns = dict(guess.section["columns"])
         unit = guess.section["orientation"]["unit"]
         angles = [columns.pop(name, f"{name}_{unit}") for name in in_order]
         columns |= {f"e{number}": column for number, column in enumerate(angles, 1)}
         settings["columns"] = columns
-    found = {key: settings[key] for key in settings if key in guess.assumed}
     if "orientation" in settings:
         turn = settings["orientation"]
         key = "angle_unit" if "unit" in turn else "order" if "order" in turn else "orientation"
-        found[key] = " ".join(str(each) for each in turn.values())
-    kept = {k: v for k, v in guess.assumed.items() if k not in found}
-    told = [
-        f"{key.replace('_', ' ')} {value}: found by trying it on the readings"
-        for key, value in found.items()
-    ]
-    return replace(guess.but(settings), assumed=kept, told=(*guess.told, *told))
+        shown[key] = " ".join(map(str, turn.values()))
+    assumed = {key: text for key, text in guess.assumed.items() if key not in shown}
+    notes = [f"{key.replace('_', ' ')} {value}: found by trying it on the readings"
+             for key, value in shown.items()]  # fmt: skip
+    return replace(guess.but(settings), assumed=assumed, notes=(*guess.notes, *notes))
 
 
 def _how(report: Report | None) -> str:
@@ -332,91 +300,73 @@ def _dataset(
     from kinacc.measurements.intake.write import dataset_text, seen_from
 
     note = [f"Written by kinacc init. Robot: {chosen}."]
-    how = _how(report).capitalize()
-    note += [f"{how}: {words}." for words in guess.assumed.values()]
-    note += [f"Not read: {', '.join(names)} ({why})." for names, why in guess.unused() if why]
+    note += [f"{_how(report).capitalize()}: {text}." for text in guess.assumed.values()]
+    note += [f"Not read: {names} ({why})." for why, names in _unread(guess).items() if why]
     check = shlex.join(["kinacc", "check-data", str(path)])
     note.append(f"Everything not given here is as in config.yaml.\n    {check}")
     configurations = _FOLDS_UNKNOWN if report is None else int(report.facts["poses"])
     robot = robot if robot in shipped() else seen_from(path.parent, robot)
-    seen = {"path": seen_from(path.parent, guess.section["path"])}
-    if "joints" in guess.section:
-        joints = guess.section["joints"]
-        seen["joints"] = joints | {"path": seen_from(path.parent, joints["path"])}
-    guess = guess.but(seen)
-    return dataset_text(name, robot, guess, configurations, "\n".join(note))
+    files = {"path": seen_from(path.parent, guess.section["path"])}
+    if joints := guess.section.get("joints"):
+        files["joints"] = joints | {"path": seen_from(path.parent, joints["path"])}
+    return dataset_text(name, robot, guess.but(files), configurations, "\n".join(note))
 
 
-def _listed(names) -> str:
-    columns = [name.column for name in names]
-    return f"{columns[0]} .. {columns[-1]}" if len(columns) > 4 else ", ".join(columns)
-
-
-def _point(target: dict) -> str:
-    return _listed([target[axis] for axis in "xyz"])
-
-
-def _turned(guess: Guess) -> str:
-    """The columns of the orientation of the first target that has one."""
-    for target in guess.found.targets.values():
-        names = [n for q, n in target.items() if q[0] in "rq"]
-        if names and guess.section["orientation"]["kind"] != "none":
-            return f": {_listed(names)}"
-    return ""
+def _unread(guess: Guess) -> dict[str, str]:
+    """Columns that are not read, by the reason."""
+    unused = guess.unused()
+    reasons = dict.fromkeys(unused.values())
+    return {why: ", ".join(n for n in unused if unused[n] == why) for why in reasons}
 
 
 def _tell(
     out: Output, guess, robot, chosen, report, written, dataset: Path, shown=(), remarks=()
 ) -> None:
+    """Print the answer."""
+    from kinacc.measurements.intake.groups import listed
+
     commands = [shlex.join(["kinacc", name, str(dataset)]) for name in ("check-data", "calibrate")]
+    columns, section, unused = guess.columns, guess.section, guess.unused()
+    kinds = [] if report is None else [finding.kind for finding in report.suspicions]
     answer = {
         "written": [str(path) for path in written],
         "robot": robot,
         "robot_because": chosen,
         "joints": guess.joints,
-        "targets": list(guess.targets),
-        "file": guess.section,
+        "targets": list(columns.targets),
+        "file": section,
         "assumed": guess.assumed,
-        "told": list(guess.told),
-        "unused_columns": [name for names, _ in guess.unused() for name in names],
-        "left_aside": [
-            {"columns": list(names), "because": why} for names, why in guess.unused() if why
-        ],
-        "suspicions": [] if report is None else [s.kind for s in report.suspicions],
+        "told": list(guess.notes),
+        "unused_columns": unused,
+        "suspicions": kinds,
         "remarks": list(remarks),
         "first_poses": list(shown),
         "next": commands,
     }
-    section, turn = guess.section, guess.section["orientation"]
-    lines = [
-        *(f"file: {words}" for words in guess.told),
-        f"robot: {robot} ({chosen})",
-        f"joints: {guess.joints}, in {section['joint_unit']}: {_listed(guess.found.joints)}",
-    ]
-    if guess.found.commanded:
-        lines.append(f"joints as commanded: {_listed(guess.found.commanded)}")
-    targets = [f"{name} ({_point(each)})" for name, each in guess.found.targets.items()]
-    lines.append(f"targets, in {section['length_unit']}: {', '.join(targets)}")
+    turn = section["orientation"]
     kind = f"Euler angles {turn['convention']}" if turn["kind"] == "euler" else turn["kind"]
     unit = f", in {turn['unit']}" if turn["kind"] in ("euler", "rotation_vector") else ""
-    lines.append(f"orientation: {kind}{unit}{_turned(guess)}")
-    if guess.found.single:
-        named = (f"{name} ({each.column})" for name, each in guess.found.single.items())
-        lines.append(f"also read: {', '.join(named)}")
-    for words in guess.assumed.values():
-        lines.append(f"{_how(report)}: {words}")
-    for names, why in guess.unused():
-        lines.append(f"columns not used: {', '.join(names)}" + (f" ({why})" if why else ""))
-    if report is not None and report.suspicions:
-        kinds = ", ".join(dict.fromkeys(each.kind for each in report.suspicions))
-        lines.append(f"suspicions: {kinds} (check-data says more)")
-    for words in remarks:
-        lines.append(f"note: {words}")
-    for path in written:
-        lines.append(f"written: {path}")
-    if report is None:
-        lines.append("fill in the robot file first")
-    lines.append("next:")
-    for command in commands:
-        lines.append(f"  {command}")
-    out.say(answer, "\n".join(lines))
+    targets = [f"{name} ({listed([target[axis].column for axis in 'xyz'])})"
+               for name, target in columns.targets.items()]  # fmt: skip
+    joints = listed([name.column for name in columns.joints])
+    lines = [
+        *(f"file: {text}" for text in guess.notes),
+        f"robot: {robot} ({chosen})",
+        f"joints: {guess.joints}, in {section['joint_unit']}: {joints}",
+        f"targets, in {section['length_unit']}: {', '.join(targets)}",
+        f"orientation: {kind}{unit}",
+    ]
+    also = [f"{quantity} ({name.column})" for quantity, name in columns.single.items()]
+    also += [f"commanded joints ({listed([n.column for n in columns.commanded])})"] * bool(
+        columns.commanded
+    )
+    lines += [f"also read: {', '.join(also)}"] if also else []
+    lines += [f"{_how(report)}: {text}" for text in guess.assumed.values()]
+    lines += [f"columns not used: {names}" + (f" ({why})" if why else "")
+              for why, names in _unread(guess).items()]  # fmt: skip
+    if kinds:
+        lines.append(f"suspicions: {', '.join(dict.fromkeys(kinds))} (details: check-data)")
+    lines += [f"note: {text}" for text in remarks]
+    lines += [f"written: {path}" for path in written]
+    lines += ["fill in the robot file first"] if report is None else []
+    out.say(answer, "\n".join([*lines, "next:", *(f"  {command}" for command in commands)]))

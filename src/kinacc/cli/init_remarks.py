@@ -22,7 +22,7 @@ def remarks_on(guess: Guess, report: Report | None) -> list[str]:
 
     fit = report.facts.get("quick_fit") if report else None
     left = fit["left_per_axis_mm"] if isinstance(fit, Mapping) else None
-    points = [target[axis].column for target in guess.found.targets.values() for axis in "xyz"]
+    points = [target[axis].column for target in guess.columns.targets.values() for axis in "xyz"]
     unit = 1.0 if guess.section["length_unit"] == "mm" else 1000.0
     step = smallest_step([guess.table.columns[name] for name in points], unit, guess.table.decimal)
     # Rounding alone leaves 0.3 of a step.
@@ -44,7 +44,7 @@ def rounded(guess: Guess, reading: MeasuredFile, arm: Robot) -> list[str]:
     if guess.section.get("pulses_per_deg") or arm.dh.prismatic.any():
         return []
     unit = 1.0 if guess.section["joint_unit"] == "deg" else 180.0 / np.pi
-    cells = [guess.table.columns[name.column] for name in guess.found.joints]
+    cells = [guess.table.columns[name.column] for name in guess.columns.joints]
     step = digits.smallest_step(cells, unit, guess.table.decimal)
     if step <= 0.0:
         return []

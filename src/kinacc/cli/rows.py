@@ -32,7 +32,7 @@ from kinacc.measurements.layout import (
     listed,
     names_of,
 )
-from kinacc.measurements.table import RawTable, numbers, numbers_of
+from kinacc.measurements.table import RawTable, frame, numbers, numbers_of
 
 if TYPE_CHECKING:
     from kinacc.deployment.record import Calibration
@@ -301,10 +301,10 @@ class Quantities:
 def open_table(path: str | Path, need: str = "points", answers: Mapping | None = None) -> RawTable:
     """A file of ``need`` (joints, points or poses) under our names.
 
-    A file of others' names is read as ``kinacc init`` reads it; how is told on the error stream.
-    ``answers`` to what it leaves open, by option. What commands write is read as well: JSON, units
-    that stand in the description of a Parquet column, and text of a CSV with the apostrophe that
-    keeps it from being a formula.
+    A file of other names is read as ``kinacc init`` reads it; how is printed on the error stream.
+    ``answers`` to what it leaves open, by option. Files that commands write are read as well: JSON,
+    units that stand in the description of a Parquet column, and text of a CSV with the apostrophe
+    that keeps it from being a formula.
     """
     path = Path(path)
     refuse_other_files(path)
@@ -312,7 +312,10 @@ def open_table(path: str | Path, need: str = "points", answers: Mapping | None =
         return _of_json(path)
     if path.suffix.lower() in PARQUET:
         return _with_units(load(path))
-    if path.suffix.lower() not in EXCEL:
+    if path.suffix.lower() in EXCEL:
+        if _OWN_NAMES[need].search(" ".join((table := load(path)).columns)):
+            return table
+    else:
         with path.open(encoding="utf-8-sig", errors="replace") as file:
             head, first = file.readline(_HEAD), file.readline(_HEAD)
         if _OWN_NAMES[need].search(head):
@@ -320,15 +323,13 @@ def open_table(path: str | Path, need: str = "points", answers: Mapping | None =
             comma = delimiter == ";" and "," in first and "." not in first
             table = load(path, Layout(delimiter, "," if comma else "."))
             return replace(table, columns=table.columns.map(of_csv))
-    elif _OWN_NAMES[need].search(" ".join((table := load(path)).columns)):
-        return table
-    from kinacc.measurements.intake import own_names
+    from kinacc.measurements.intake import guess as guesses
 
     given = {key: value for key, value in (answers or {}).items() if value}
-    table, told = own_names.read(path, given, need)
-    for line in told:
+    guess = guesses.look(path, given, need)
+    for line in (*guess.notes, *guess.assumed.values(), *guesses.summary(guess)):
         click.echo(f"{path}: {line}", err=True)
-    return table
+    return guesses.under_our_names(guess)
 
 
 def _of_json(path: Path) -> RawTable:
@@ -336,12 +337,11 @@ def _of_json(path: Path) -> RawTable:
     try:
         content = json_files.bytes_of(path)
         rows = json_files.values_of(content, str(path), parse_int=_whole)["rows"]
-        names = list(rows[0])
-        columns = {name: [row.get(name) for row in rows] for name in names}
+        columns = {name: [row.get(name) for row in rows] for name in rows[0]}
     except (ValueError, KeyError, IndexError, TypeError, AttributeError, RecursionError):
-        what, allowed = "holds no rows", "a table of rows, as commands write with -o NAME.json"
-        raise InputError(Problem(str(path), what, allowed)) from None
-    return RawTable.of(str(path), columns, np.arange(1, len(rows) + 1))
+        allowed = "a table of rows, as commands write with -o NAME.json"
+        raise InputError(Problem(str(path), "holds no rows", allowed)) from None
+    return RawTable(str(path), frame(columns), np.arange(1, len(rows) + 1))
 
 
 def _whole(digits: str) -> int | float:
@@ -353,15 +353,13 @@ def _with_units(table: RawTable) -> RawTable:
     campaigns it stands in the columns' descriptions."""
     import pyarrow.parquet as pq
 
-    schema = pq.read_schema(table.path)
-
-    def called(name: str) -> str:
-        unit = ((schema.field(name).metadata or {}).get(b"unit") or b"").decode(errors="replace")
-        whole = f"{name}_{unit}"
-        is_joint = re.fullmatch(r"q\d+", name) and unit in (*ANGLE, *LENGTH)
-        return whole if is_joint and whole not in table.columns else name
-
-    return replace(table, columns=table.columns.rename(columns=called))
+    names = {}
+    for field in pq.read_schema(table.path):
+        unit = ((field.metadata or {}).get(b"unit") or b"").decode(errors="replace")
+        if re.fullmatch(r"q\d+", field.name) and unit in (*ANGLE, *LENGTH):
+            names[field.name] = f"{field.name}_{unit}"
+    fresh = {name: whole for name, whole in names.items() if whole not in table.columns}
+    return replace(table, columns=table.columns.rename(columns=fresh))
 
 
 def say_unused(given: Rows, calibration: Calibration) -> None:

@@ -1,6 +1,6 @@
-"""What a column's name says: its words, its unit, and what its numbers are.
+"""The meaning of a column's name: its terms, its unit, and whether its numbers were measured.
 
-The words stand in ``words.yaml``, in small letters without accents.
+The vocabulary is ``words.yaml``, in small letters without accents.
 """
 
 from __future__ import annotations
@@ -9,28 +9,46 @@ import re
 import unicodedata
 from collections.abc import Collection
 from dataclasses import dataclass
+from importlib.resources import files
+from typing import Any
 
-from kinacc.measurements.words import WORDS
+import yaml
 
-# What the numbers of a column are, by a word of its name.
+
+def _sets(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _sets(entry) for key, entry in value.items()}
+    return frozenset(value.split()) if isinstance(value, str) else value
+
+
+_PLAIN = yaml.load(
+    files(__package__).joinpath("words.yaml").read_text(encoding="utf-8"),
+    Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader),
+)
+# A folded text is a set of words, a list and a mapping stay as they are.
+WORDS: dict[str, Any] = {
+    key: value if key in ("letters", "japanese") else _sets(value) for key, value in _PLAIN.items()
+}
+
+# What the numbers of a column are, by a term of its name.
 MEASURED = "measured"
 REPORTED = "reported"  # read back, where there are commands; measured, where there is a nominal
-PLAIN = "plain"  # no word says
-OPEN = "open"  # a word that means one thing here and another there
+PLAIN = "plain"  # no term decides
+OPEN = "open"  # a term with more than one meaning
 CALCULATED = "calculated by the controller"
 NOMINAL = "nominal"
 DEVIATION = "a deviation"
 SPREAD = "an uncertainty"
 OTHER = "another quantity"
 
-_ROLE = {word: role for role, words in WORDS["roles"].items() for word in words}
+_ROLE = {word: role for role, terms in WORDS["roles"].items() for word in terms}
 _COMMANDS = WORDS["roles"][NOMINAL] | WORDS["commands"]
-# Types of RAPID: what a value is written as, and not whether it was wanted or measured.
+# Types of RAPID: how a value is written, not whether it was wanted or measured.
 _TYPES = frozenset(("jointtarget", "robtarget"))
 _LETTERS_ALONE = {"d": DEVIATION, "δ": DEVIATION, "u": SPREAD, "σ": SPREAD}
 _OPEN_ALONE = frozenset("esvtnm")
 
-UNITS = {word: unit for unit, words in WORDS["units"].items() for word in words}
+UNITS = {word: unit for unit, terms in WORDS["units"].items() for word in terms}
 KNOWN = frozenset((*UNITS, *UNITS.values())) - {"?"}
 _ONLY_LAST = ("m", "c", "turn", "count", "nm")  # words of another meaning elsewhere
 _BRACKET = re.compile(r"[\[({<]\s*([^\[({<\])}>]*?)\s*[\])}>]")
@@ -39,10 +57,9 @@ _HUMP = re.compile(
     r"(?<=[a-zà-öø-ÿ]{2})(?=[A-ZÀ-ÖØ-Þ])|(?<=[A-ZÀ-ÖØ-Þ])(?=[A-ZÀ-ÖØ-Þ][a-zà-öø-ÿ]{2})"
 )
 _SIGNS = str.maketrans({"º": "°", "˚": "°", "∆": "Δ", "µ": "μ", "ß": "ss"})
-_NO_UNIT = "-/ ?\ufffd"  # no more is left of a degree sign in the wrong encoding
+_NO_UNIT = "-/ ?\ufffd"  # no more remains of a degree sign in the wrong encoding
 _AXIS = re.compile(r"(?:rv|r|q)?[xyzw]|q|j")
 _COVERAGE = re.compile(r"(?<![^\W_])k\s*=\s*([123])(?!\d|[.,]\d)", re.IGNORECASE)  # (k=2)
-_T_MAC = re.compile(r"t-mac", re.IGNORECASE)
 _JOINED = re.compile(r"(.{1,4}?)(mm|deg|rad|grad|cm|um|μm)")
 _JAPANESE = re.compile("|".join(sorted(WORDS["japanese"], key=len, reverse=True)))
 _WIDE = {code: code - 0xFEE0 for code in range(0xFF01, 0xFF5F)} | {0x3000: " "}
@@ -50,72 +67,76 @@ _WIDE = {code: code - 0xFEE0 for code in range(0xFF01, 0xFF5F)} | {0x3000: " "}
 
 @dataclass(frozen=True)
 class Name:
-    """A column's name taken apart: ``words`` in small letters, ``unit`` or empty.
+    """A column's name taken apart: ``terms`` in small letters, ``unit`` or empty.
 
-    ``unit`` is as the file writes it where it is not known. ``spelled`` are the words as the file
-    writes them. ``coverage``: the k of an uncertainty, 0 where none is said.
+    ``unit`` is as the file writes it where it is not known. ``spelled`` are the terms as the file
+    writes them. ``coverage``: the k of an uncertainty, 0 where none is stated.
     """
 
     column: str
-    words: tuple[str, ...]
+    terms: tuple[str, ...]
     unit: str
     spelled: tuple[str, ...] = ()
     coverage: int = 0
 
     def without(self, place: int) -> tuple[str, ...]:
-        """The words but the one at ``place``."""
-        return self.words[:place] + self.words[place + 1 :]
+        """The terms but the one at ``place``."""
+        return self.terms[:place] + self.terms[place + 1 :]
 
 
 def name_of(column: str, unit: str = "") -> Name:
-    """The name taken apart; ``unit`` is what a line of units says of it."""
+    """The name taken apart; ``unit`` is that of a line of units."""
     covered = _COVERAGE.search(f"{column} {unit}")
     stated = [unit_of(_COVERAGE.sub("", unit))]
-    text = _T_MAC.sub("tmac", _in_english(_COVERAGE.sub("", column)).translate(_SIGNS))
+    text = _in_english(_COVERAGE.sub("", column)).translate(_SIGNS)
+    text = re.sub("t-mac", "tmac", text, flags=re.IGNORECASE)
 
     def put_aside(bracket: re.Match[str]) -> str:
-        if _says_more(bracket[1]):
-            return bracket[0]
-        stated.append(unit_of(bracket[1]))
+        inside = bracket[1]
+        parts = [plain(word) for word in _WORD.findall(inside)]
+        known = [p.isdigit() or p in _ROLE or _AXIS.fullmatch(p) for p in parts]
+        if not inside or (parts and all(known) and plain(inside) not in UNITS):
+            return bracket[0]  # an index, an axis or a word such as Actual
+        stated.append(unit_of(inside))
         return " "
 
     text = _BRACKET.sub(put_aside, text)
-    words = [pair for part in _HUMP.split(text) for each in _WORD.findall(part)
-             for pair in _parted(each)]  # fmt: skip
-    kept = []
-    for place, (word, spelled) in enumerate(words):
-        last = place == len(words) - 1 and place > 0
-        named = UNITS.get(word, "")
+    pairs = [pair for part in _HUMP.split(text) for word in _WORD.findall(part)
+             for pair in _parted(word)]  # fmt: skip
+    terms = []
+    for place, (word, spelled) in enumerate(pairs):
+        last = place == len(pairs) - 1 and place > 0
+        unit_name = UNITS.get(word, "")
         if word == "in":
             stated += ["inch"] if last and not any(stated) else []
-        elif named and (last or word not in _ONLY_LAST) and named != "C" and len(words) > 1:
-            stated.append(spelled if named == "?" else named)
+        elif unit_name and (last or word not in _ONLY_LAST) and unit_name != "C" and len(pairs) > 1:
+            stated.append(spelled if unit_name == "?" else unit_name)
         else:
-            kept.append((word, spelled))
+            terms.append((word, spelled))
     return Name(
         column,
-        tuple(word for word, _ in kept),
+        tuple(word for word, _ in terms),
         " or ".join(dict.fromkeys(filter(None, stated))),
-        tuple(spelled for _, spelled in kept),
+        tuple(spelled for _, spelled in terms),
         int(covered[1]) if covered else 0,
     )
 
 
 def unit_of(text: str) -> str:
-    """The unit a cell such as [mm] or deg states, as the file writes it where it is not known."""
+    """The unit that a cell such as [mm] or deg states, as written where it is not known."""
     text = _in_english(text)
     inside = _BRACKET.search(text)
     word = (inside[1] if inside else text).strip()
     if not word.strip(_NO_UNIT):
         return ""
-    named = "inch" if plain(word) == "in" else UNITS.get(plain(word), "")
-    return named if named not in ("", "?") else word
+    unit = "inch" if plain(word) == "in" else UNITS.get(plain(word), "")
+    return unit if unit not in ("", "?") else word
 
 
 def plain(word: str) -> str:
     """A word in small letters without accents."""
     apart = unicodedata.normalize("NFKD", word.translate(_SIGNS))
-    return "".join(each for each in apart if not unicodedata.combining(each)).lower()
+    return "".join(letter for letter in apart if not unicodedata.combining(letter)).lower()
 
 
 def _in_english(text: str) -> str:
@@ -123,18 +144,11 @@ def _in_english(text: str) -> str:
     if text.isascii():
         return text
     english = WORDS["japanese"]
-    return _JAPANESE.sub(lambda found: f" {english[found[0]]} ", text.translate(_WIDE))
-
-
-def _says_more(inside: str) -> bool:
-    """Whether what stands in brackets is an index, an axis or a word such as Actual, no unit."""
-    words = [plain(word) for word in _WORD.findall(inside)]
-    known = [w.isdigit() or w in _ROLE or _AXIS.fullmatch(w) for w in words]
-    return not inside or (bool(words) and all(known) and plain(inside) not in UNITS)
+    return _JAPANESE.sub(lambda match: f" {english[match[0]]} ", text.translate(_WIDE))
 
 
 def _parted(spelled: str) -> list[tuple[str, str]]:
-    """A word, parted where an axis is written together with what it is: dX, Xsoll, rxdeg."""
+    """A word, parted where an axis is written together with its meaning: dX, Xsoll, rxdeg."""
     word = plain(spelled)
     if not word:  # an accent alone
         return []
@@ -148,49 +162,49 @@ def _parted(spelled: str) -> list[tuple[str, str]]:
             return [(parts[0], spelled[:cut]), (parts[1], spelled[cut:])]
     for size in (3, 2, 1):
         stem, head, tail = word[:-size], word[:size], word[-size:]
-        told = stem if stem in _ROLE or stem in WORDS["place"] else WORDS["letters"].get(stem, "")
-        if _AXIS.fullmatch(tail) and told:
-            return [(told, spelled[:-size]), (tail, spelled[-size:])]
+        known = stem if stem in _ROLE or stem in WORDS["place"] else WORDS["letters"].get(stem, "")
+        if _AXIS.fullmatch(tail) and known:
+            return [(known, spelled[:-size]), (tail, spelled[-size:])]
         if _AXIS.fullmatch(head) and word[size:] in _ROLE and len(word) > size + 1:
             return [(head, spelled[:size]), (word[size:], spelled[size:])]
     return [(word, spelled)]
 
 
-def role(words: Collection[str]) -> str:
-    """What the words say the numbers are; ``PLAIN`` where none of them speaks."""
-    said = {_ROLE.get(word, _LETTERS_ALONE.get(word)) for word in words} - {None}
+def role(terms: Collection[str]) -> str:
+    """What the numbers are by the terms; ``PLAIN`` where none of them decides."""
+    roles = {_ROLE.get(term, _LETTERS_ALONE.get(term)) for term in terms} - {None}
     # "position error" is no position, "std dev" no deviation.
-    for each in (OTHER, SPREAD, DEVIATION):
-        if each in said:
-            return each
-    if MEASURED in said:
-        said = {_ROLE.get(word) for word in words if word not in _TYPES}
-        return OPEN if {NOMINAL, CALCULATED} & said else MEASURED
-    if NOMINAL in said:
-        return OPEN if REPORTED in said else NOMINAL
-    if CALCULATED in said:
+    for first in (OTHER, SPREAD, DEVIATION):
+        if first in roles:
+            return first
+    if MEASURED in roles:
+        roles = {_ROLE.get(term) for term in terms if term not in _TYPES}
+        return OPEN if {NOMINAL, CALCULATED} & roles else MEASURED
+    if NOMINAL in roles:
+        return OPEN if REPORTED in roles else NOMINAL
+    if CALCULATED in roles:
         return CALCULATED
-    if REPORTED in said:
+    if REPORTED in roles:
         # The controller's own forward kinematics: actual_TCP_pose.
-        return CALCULATED if WORDS["frame"] & set(words) else OPEN if OPEN in said else REPORTED
-    return OPEN if OPEN in said or _OPEN_ALONE & set(words) else PLAIN
+        return CALCULATED if WORDS["frame"] & {*terms} else OPEN if OPEN in roles else REPORTED
+    return OPEN if OPEN in roles or _OPEN_ALONE & {*terms} else PLAIN
 
 
-def speaks(word: str) -> bool:
-    """Whether a word says what numbers are, and so is no part of a target's name."""
-    return word in _ROLE and word not in WORDS["reflectors"] | WORDS["frame"]
+def decides(term: str) -> bool:
+    """Whether a term is about the role of numbers, and so is no part of a target's name."""
+    return term in _ROLE and term not in WORDS["reflectors"] | WORDS["frame"]
 
 
-def commands(words: Collection[str]) -> bool:
-    """Whether words of joints say that these were commanded."""
-    return role(words) in (NOMINAL, OPEN) and bool(_COMMANDS & set(words))
+def commands(terms: Collection[str]) -> bool:
+    """Whether terms of joints mean commanded ones."""
+    return role(terms) in (NOMINAL, OPEN) and bool(_COMMANDS & {*terms})
 
 
-def is_own_pose(words: Collection[str]) -> bool:
-    """Whether the words are those of a pose that the controller calculates from its joints."""
-    return bool(WORDS["frame"] & set(words)) and REPORTED in map(_ROLE.get, words)
+def is_controller_pose(terms: Collection[str]) -> bool:
+    """Whether the terms are those of a pose that the controller calculates from its joints."""
+    return bool(WORDS["frame"] & {*terms}) and REPORTED in map(_ROLE.get, terms)
 
 
-def is_frame(words: Collection[str]) -> bool:
-    """Whether the words are what the tool centre point is called, and nothing else."""
-    return bool(words) and set(words) <= WORDS["frame"]
+def is_frame(terms: Collection[str]) -> bool:
+    """Whether the terms name the tool centre point, and nothing else."""
+    return bool(terms) and {*terms} <= WORDS["frame"]

@@ -11,9 +11,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kinacc.errors import InputError, Problem
-from kinacc.measurements.column_names import DEVIATION, MEASURED, NOMINAL, REPORTED, name_of, role
+from kinacc.measurements.column_names import (
+    DEVIATION,
+    MEASURED,
+    NOMINAL,
+    REPORTED,
+    WORDS,
+    name_of,
+    role,
+)
 from kinacc.measurements.table import RawTable, frame
-from kinacc.measurements.words import WORDS
 
 AXES = "XYZ"
 
@@ -31,7 +38,7 @@ def axis_of(cell: object) -> str:
     """X, Y or Z, empty where a cell is none of them."""
     if not isinstance(cell, str) or len(cell) > 40:
         return ""
-    words = {*name_of(cell).words} - WORDS["axis"] or {cell.strip().lower()}
+    words = {*name_of(cell).terms} - WORDS["axis"] or {cell.strip().lower()}
     return words.pop().upper() if len(words) == 1 and words <= {*"xyz"} else ""
 
 
@@ -46,7 +53,7 @@ def report_of(table: RawTable) -> Report | None:
     if axis is None:
         return None
     filled = {n: [c for c in table.columns[n] if not table.is_gap(c)] for n in table.columns}
-    roles = {name: role(name_of(name).words) for name in filled if name != axis}
+    roles = {name: role(name_of(name).terms) for name in filled if name != axis}
     values = [
         name
         for name, said in roles.items()

@@ -1,7 +1,6 @@
 """A measurement file as a table of named columns: text, a workbook, Parquet, a robot's program.
 
-Text is parted by the ``csv`` module and not by pandas, which fills rows that are cut off without a
-word.
+Text is parted by the ``csv`` module: pandas fills rows that are cut off without a message.
 """
 
 from __future__ import annotations
@@ -14,12 +13,13 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
 from kinacc.errors import InputError, Problem
 from kinacc.measurements import robot_programs
-from kinacc.measurements.grid import Row, Words, refuse_too_much, tabled
+from kinacc.measurements.grid import Row, tabled
 from kinacc.measurements.layout import FEATURES, SPHERICAL, Layout
-from kinacc.measurements.table import ALLOWED, MOST_BYTES, MOST_ROWS, SMALLER, RawTable
+from kinacc.measurements.table import RawTable, frame
 
 BLANKS = "blanks"
 GROUPS, POINT = ("Collection", "Group"), "Point"  # columns of a list of points without names
@@ -32,32 +32,42 @@ _OTHERS = {
     ".pdf": "a PDF file",
     ".docx": "a text document",
 }
-_LOOKED_AT = 100_000  # characters
 _KINDS = "a CSV, text, Excel (.xlsx) or Parquet file"
+# What is held at once; calibrations are made from some hundred to some ten thousand rows.
+MOST_ROWS, MOST_COLUMNS, MOST_CELLS = 1_000_000, 10_000, 10_000_000
+MOST_BYTES, _MOST_UNPACKED = 500_000_000, 150_000_000  # a sheet of a million cells has some 40 MB
 _MOST_LINES = MOST_ROWS + 10_000  # titles and the like beside
-_LAST_ROW = 1_048_576  # that a workbook can have
-_MOST_UNPACKED = 150_000_000  # bytes; a sheet of a million cells has some 40 MB
+_WITH_BRACKETS = re.compile(r"(?:\{[^{}]*\}|\[(?:[^\[\]]|\[[^\[\]]*\])*\]|\S)+")
 
 
 def load(path: str | Path, layout: Layout | None = None, source: str | None = None) -> RawTable:
     """Read a file that is written so. Raises InputError where it is missing, empty or ragged.
 
-    ``source``: where the data comes from, said when the file is missing.
+    ``source``: where the data comes from, for the message on a missing file.
     """
     path, layout = Path(path), layout or Layout()
     refuse_other_files(path, source)
     if path.suffix.lower() in PARQUET:
         table = _of_parquet(path)
     elif path.suffix.lower() in EXCEL:
-        table = _of_workbook(path, layout)
+        with Workbook(path) as book:
+            sheet = layout.sheet or book.sheets[0]
+            if sheet not in book.sheets:
+                where = f"{path}: measurements.file.sheet"
+                raise InputError(Problem(where, f"no sheet {sheet!r}", ", ".join(book.sheets)))
+            rows = book.rows(sheet)
+        table = tabled(f"{path}, sheet {sheet!r}", rows, layout, sheet=True)
     elif (program := robot_programs.read(path)) is not None:
         return program
     else:
-        table = tabled(str(path), rows_of_text(path, layout), layout)
+        refuse_large(path)
+        with opened(path, layout.encoding) as stream:
+            rows = list(_limited(rows_of_lines(stream, layout.delimiter, str(path)), str(path)))
+        table = tabled(str(path), rows, layout)
         if layout.encoding == "utf-8" and any("\ufffd" in name for name in table.columns):
-            told = "names of columns hold characters that are not UTF-8: set "
-            told += "measurements.file.encoding, such as latin-1 or cp932"
-            table = replace(table, notes=(*table.notes, told))
+            note = "names of columns hold characters that are not UTF-8: set "
+            note += "measurements.file.encoding, such as latin-1 or cp932"
+            table = replace(table, notes=(*table.notes, note))
     table = robot_programs.expanded(table)
     if layout.layout == FEATURES:
         from kinacc.measurements.features import by_feature
@@ -75,9 +85,8 @@ def quotes_numbers(path: Path, layout: Layout) -> bool:
     if path.suffix.lower() in (*EXCEL, *PARQUET):
         return True
     with opened(path, layout.encoding) as stream:
-        text = stream.read(_LOOKED_AT)
-    number = rf'"\s*[+\-−]?\d[\d.,\'\s]*{re.escape(layout.delimiter)}\d[\d.,]*\s*"'
-    return bool(re.search(number, text))
+        text = stream.read(100_000)
+    return bool(re.search(rf'"\s*[+\-−]?\d[\d.\']*{re.escape(layout.delimiter)}\d', text))
 
 
 def refuse_other_files(path: Path, source: str | None = None) -> None:
@@ -87,15 +96,26 @@ def refuse_other_files(path: Path, source: str | None = None) -> None:
         origin = f"the data comes from: {source}" if source else "check measurements.file.path"
         raise InputError(Problem(str(path), "no such file", _KINDS, origin))
     if kind := _OTHERS.get(suffix):
-        text = suffix in (".pdf", ".docx")
-        fix = "export it as CSV" if text else "save it as .xlsx or as CSV"
+        fix = "save it as .xlsx or export it as CSV"
         raise InputError(Problem(str(path), f"is {kind}, which is not read", _KINDS, fix))
 
 
 def opened(path: Path, encoding: str):
-    """A text file in one of our encodings; what is none of its characters becomes U+FFFD."""
+    """A text file in one of our encodings; bytes that are none of its characters become U+FFFD."""
     codec = {"utf-8": "utf-8-sig", "latin-1": "cp1252"}.get(encoding, encoding)
     return open(path, newline="", encoding=codec, errors="replace")
+
+
+def _refuse_too_much(path: str, amount: str) -> None:
+    allowed = f"at most {MOST_ROWS} rows, {MOST_COLUMNS} columns, {MOST_CELLS} cells and "
+    allowed += f"{MOST_BYTES // 1_000_000} MB unpacked"
+    fix = "give the rows and columns of the measurements alone"
+    raise InputError(Problem(path, amount, allowed, fix))
+
+
+def _refuse_shape(path: str, rows: int, columns: int, cells: int) -> None:
+    if rows > MOST_ROWS or columns > MOST_COLUMNS or cells > MOST_CELLS:
+        _refuse_too_much(path, f"{rows} rows of {columns} columns")
 
 
 def refuse_large(path: Path) -> None:
@@ -105,22 +125,16 @@ def refuse_large(path: Path) -> None:
         with open(path, "rb") as file:
             lines = sum(chunk.count(b"\n") for chunk in iter(lambda: file.read(1 << 20), b""))
     if size > MOST_BYTES or lines > _MOST_LINES:
-        what = f"{lines} lines" if lines else f"{size / 1e6:.0f} MB"
-        raise InputError(Problem(str(path), what, ALLOWED, SMALLER))
-
-
-def rows_of_text(path: Path, layout: Layout) -> Iterator[Row]:
-    """Rows of a text file. Raises InputError where there is too much of it."""
-    refuse_large(path)
-    with opened(path, layout.encoding) as stream:
-        yield from _limited(rows_of_lines(stream, layout.delimiter, str(path)), str(path))
+        _refuse_too_much(str(path), f"{lines} lines" if lines else f"{size / 1e6:.0f} MB")
 
 
 def rows_of_lines(lines: Iterable[str], delimiter: str, path: str) -> Iterator[Row]:
     """Rows of the lines of a text, blank ones too."""
     if delimiter == BLANKS:
         for number, line in enumerate(lines, 1):
-            yield number, Words(line.removeprefix("\ufeff"))
+            text = line.removeprefix("\ufeff")
+            brackets = "{" in text or "[" in text
+            yield number, _WITH_BRACKETS.findall(text) if brackets else text.split()
         return
     reader = csv.reader(lines, delimiter=delimiter)
     try:
@@ -136,26 +150,11 @@ def rows_of_lines(lines: Iterable[str], delimiter: str, path: str) -> Iterator[R
 
 def _limited(rows: Iterable[Row], path: str) -> Iterator[Row]:
     """The rows, as long as they are not too many. Raises InputError then."""
-    cells_ = 0
+    held = 0
     for count, (line, cells) in enumerate(rows):
-        cells_ += len(cells)
-        refuse_too_much(path, count, len(cells), cells_)
+        held += len(cells)
+        _refuse_shape(path, count, len(cells), held)
         yield line, cells
-
-
-def _of_workbook(path: Path, layout: Layout) -> RawTable:
-    """The rows of the sheet, of the first where none is named."""
-    with Workbook(path) as book:
-        sheet = book.sheets[0] if layout.sheet is None else layout.sheet
-        if sheet not in book.sheets:
-            where, what = f"{path}: measurements.file.sheet", f"there is no sheet {sheet!r}"
-            raise InputError(Problem(where, what, ", ".join(book.sheets)))
-        rows = book.rows(sheet)
-    from openpyxl.utils import get_column_letter
-
-    width = len(rows[0][1]) if rows else 0
-    letters = [get_column_letter(number) for number in range(1, width + 1)]
-    return tabled(f"{path}, sheet {sheet!r}", rows, layout, letters)
 
 
 class Workbook:
@@ -165,21 +164,18 @@ class Workbook:
     """
 
     def __init__(self, path: Path) -> None:
-        import openpyxl
-
         self.path = str(path)
         try:
             with zipfile.ZipFile(path) as archive:
-                size = sum(each.file_size for each in archive.infolist())
-            if size > _MOST_UNPACKED:
-                raise InputError(Problem(self.path, f"{size / 1e6:.0f} MB", ALLOWED, SMALLER))
-            self._book = openpyxl.load_workbook(path, read_only=True, data_only=True)
-        except InputError:
-            raise
+                size = sum(part.file_size for part in archive.infolist())
+            if size <= _MOST_UNPACKED:
+                self._file = pd.ExcelFile(path, engine="openpyxl")
         except Exception as error:  # a damaged part of a workbook raises whatever it meets
             raise self._unreadable(error) from None
-        shown = [each for each in self._book.worksheets if each.sheet_state == "visible"]
-        self.sheets = [each.title for each in shown]
+        if size > _MOST_UNPACKED:
+            _refuse_too_much(self.path, f"{size / 1e6:.0f} MB")
+        sheets = self._file.book.worksheets
+        self.sheets = [sheet.title for sheet in sheets if sheet.sheet_state == "visible"]
         if not self.sheets:
             raise InputError(Problem(self.path, "has no sheet with cells", "a sheet with a table"))
 
@@ -187,41 +183,30 @@ class Workbook:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._book.close()
+        self._file.close()
 
     def rows(self, sheet: str, most: int = MOST_ROWS) -> list[Row]:
         """The first rows of a sheet that are not blank, each with its number, of equal length."""
-        found: list[Row] = []
-        worksheet = self._book[sheet]
-        worksheet.reset_dimensions()  # what a workbook says of its size may be wrong
-        held = 0
         try:
-            for number, values in enumerate(worksheet.iter_rows(values_only=True), 1):
-                held += len(values)
-                refuse_too_much(self.path, len(found), 0, held // 3)  # blank ones, by their places
-                cells = [_cell(value) for value in values]
-                while cells and cells[-1] is None:
-                    cells.pop()
-                refuse_too_much(self.path, number * (number > _LAST_ROW), len(cells), 0)
-                if cells and len(found) < most:
-                    found.append((number, cells))
-                elif len(found) >= most:
-                    break
-        except InputError:
-            raise
+            cells = pd.read_excel(
+                self._file, sheet, header=None, dtype=object, na_filter=False, nrows=most + 1
+            )
         except Exception as error:
             raise self._unreadable(error) from None
-        width = max((len(cells) for _, cells in found), default=0)
-        refuse_too_much(self.path, len(found), width, width * len(found))
-        return [(line, cells + [None] * (width - len(cells))) for line, cells in found]
+        _refuse_shape(self.path, len(cells) if most == MOST_ROWS else 0, cells.shape[1], cells.size)
+        rows = [[_cell(value) for value in row] for row in cells.itertuples(index=False)]
+        width = max((place + 1 for row in rows for place, cell in enumerate(row)
+                     if cell is not None), default=0)  # fmt: skip
+        return [(number, row[:width]) for number, row in enumerate(rows, 1)
+                if any(cell is not None for cell in row)]  # fmt: skip
 
     def _unreadable(self, error: Exception) -> InputError:
         reason = str(error).splitlines()[0][:200] if str(error) else type(error).__name__
         with open(self.path, "rb") as file:
             if file.read(4) == b"\xd0\xcf\x11\xe0":
                 reason = "it is locked by a password, or of the old Excel format under a new name"
-        what = f"cannot be read as a workbook: {reason}"
-        return InputError(Problem(self.path, what, "an .xlsx file", "save it as .xlsx or CSV"))
+        message = f"cannot be read as a workbook: {reason}"
+        return InputError(Problem(self.path, message, "an .xlsx file", "save it as .xlsx or CSV"))
 
 
 def _cell(value: object) -> object:
@@ -239,13 +224,11 @@ def _of_parquet(path: Path) -> RawTable:
     try:
         with pq.ParquetFile(path) as file:
             schema, footer = file.schema_arrow, file.metadata
-        rows, width = footer.num_rows, footer.num_columns
-        refuse_too_much(where, rows, width, rows * width)
-        groups = footer.num_row_groups
+        rows, width, groups = footer.num_rows, footer.num_columns, footer.num_row_groups
+        _refuse_shape(where, rows, width, rows * width)
         sizes = [footer.row_group(n).total_byte_size for n in range(min(groups, MOST_ROWS))]
         if groups > MOST_ROWS // 100 or sum(sizes) > MOST_BYTES:
-            what = f"{sum(sizes) / 1e6:.0f} MB in {groups} groups of rows"
-            raise InputError(Problem(where, what, ALLOWED, SMALLER))
+            _refuse_too_much(where, f"{sum(sizes) / 1e6:.0f} MB in {groups} groups of rows")
         if doubled := sorted({n for n in schema.names if schema.names.count(n) > 1}):
             raise InputError(Problem(where, f"column names given twice: {', '.join(doubled)}"))
         flat = [field.name for field in schema if not pa.types.is_nested(field.type)]
@@ -265,7 +248,7 @@ def _of_parquet(path: Path) -> RawTable:
         else [f"<{field.type}>"] * rows  # one cell of a list may hold a million values
         for field in schema
     }
-    return RawTable.of(where, columns, np.arange(1, rows + 1))
+    return RawTable(where, frame(columns), np.arange(1, rows + 1))
 
 
 def _cells(column, where: str) -> list:
@@ -276,18 +259,17 @@ def _cells(column, where: str) -> list:
     import pyarrow as pa
 
     try:
-        if pa.types.is_dictionary(column.type):
-            cells: list = []
-            for chunk in column.chunks:
-                words = chunk.dictionary.to_pylist()
-                places = chunk.indices.to_pylist()
-                size = sum(len(str(words[place])) for place in places if place is not None)
-                if size > MOST_BYTES:
-                    what = f"texts of {size / 1e6:.0f} MB in one column"
-                    raise InputError(Problem(where, what, ALLOWED, SMALLER))
-                cells += [None if place is None else words[place] for place in places]
-            return cells
-        return column.to_pylist()
+        if not pa.types.is_dictionary(column.type):
+            return column.to_pylist()
+        cells: list = []
+        for chunk in column.chunks:
+            texts = [*chunk.dictionary.to_pylist(), None]
+            places = [len(texts) - 1 if p is None else p for p in chunk.indices.to_pylist()]
+            size = sum(len(str(texts[place])) for place in places)
+            if size > MOST_BYTES:
+                _refuse_too_much(where, f"texts of {size / 1e6:.0f} MB in one column")
+            cells += [texts[place] for place in places]
+        return cells
     except (pa.ArrowException, ArithmeticError, LookupError, ValueError):
         # A date outside the calendar, text that is not UTF-8.
         return [f"<{column.type}>"] * len(column)

@@ -321,9 +321,9 @@ class _Finder:
         parts = {c: c.rpartition("_") for c in map(str, self.table.columns)}
         own = {split(ours)[0] or TOOL: column for column, (ours, _, unit) in parts.items()
                if unit in LENGTH and split(ours)[1] == "x"}  # fmt: skip
-        says = {name: column_names.role(name_of(f"{name} x").words) for name in own}
+        says = {name: column_names.role(name_of(f"{name} x").terms) for name in own}
         read = [n for n in own if says[n] in _READ or n in named]
-        frames = [n for n in own if n not in read and column_names.is_frame(name_of(n).words)]
+        frames = [n for n in own if n not in read and column_names.is_frame(name_of(n).terms)]
         if not read and not named and len(frames) == 1:
             read = frames  # the tool centre point, under its usual name
         unclear = [n for n in own if n not in read and says[n] == column_names.OPEN]

@@ -8,6 +8,14 @@ from scipy.spatial.transform import Rotation
 from kinacc.geometry import exp_so3, rotation_from_quaternion, skew
 from kinacc.measurements.layout import Layout
 
+CONVENTIONS = tuple(
+    order if intrinsic else order.lower()
+    for intrinsic in (True, False)
+    for order in (
+        *("XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX"),
+        *("XYX", "XZX", "YXY", "YZY", "ZXZ", "ZYZ"),
+    )
+)
 _SMALL_ANGLE_RAD = 1e-6
 
 

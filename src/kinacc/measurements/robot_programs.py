@@ -73,7 +73,7 @@ def read(path: Path) -> RawTable | None:
         raise InputError(Problem(f"{path}: lines {first_few([*odd])}", what, "4 to 7 joints"))
     columns = {"name": [name for name, _, _ in found]}
     columns |= {names[n]: [repr(joints[n]) for _, _, joints in found] for n in range(widths[0])}
-    return RawTable.of(str(path), columns, lines, notes=notes)
+    return RawTable(str(path), frame(columns), lines, notes=notes)
 
 
 def _of_abb(text: str) -> list[Position]:
@@ -140,18 +140,28 @@ def numbers_within(cell: object) -> int:
     return len(_LISTED.findall(text)) if _LIST.fullmatch(text) else 0
 
 
-def names_of_cells(cells: Sequence, word: str) -> str:
-    """What a column of cells such as {E6AXIS: A1 10, ..} is called behind ``word``; may be empty.
+def names_of_rows(rows: Sequence[Sequence]) -> tuple[str, ...]:
+    """Names of columns whose cells name their parts, as {E6AXIS: A1 10, ..}: by the word before.
 
-    A frame that no word calls measured is one of the controller's.
+    A first column of texts names the poses; a frame that no word calls measured is one of the
+    controller's. Nothing where a column of numbers has no name.
     """
-    found = [_KIND.match(str(cell).strip()) for cell in cells]
-    kinds = {each[1].upper() if each else "" for each in found}
-    if not kinds <= {"E6AXIS", "AXIS", "E6POS", "POS", "FRAME"}:
-        return ""
-    if kinds <= {"E6AXIS", "AXIS"}:
-        return f"{word} joints".strip()
-    return f"{word} position" if word else "TCP position"
+    names: list[str] = []
+    word = ""
+    for place, column in enumerate(zip(*rows, strict=True)):
+        matches = [_KIND.match(str(cell).strip()) for cell in column]
+        kinds = {match[1].upper() if match else "" for match in matches}
+        if kinds <= {"E6AXIS", "AXIS"}:
+            name, word = f"{word} joints".strip(), ""
+        elif kinds <= {"E6POS", "POS", "FRAME"}:
+            name, word = f"{word} position" if word else "TCP position", ""
+        elif any(re.fullmatch(_NUMBER, str(cell).strip()) for cell in column):
+            return ()
+        else:
+            name = "Point" if place == 0 else f"word {place + 1}"
+            word = str(column[0]) if len({*column}) == 1 else ""
+        names.append(name)
+    return tuple(names) if len({*names}) == len(names) else ()
 
 
 def _of_list(text: str) -> dict[str, float]:

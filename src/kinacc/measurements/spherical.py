@@ -12,10 +12,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kinacc.errors import Problem, refuse
-from kinacc.measurements.column_names import MEASURED, PLAIN, REPORTED, Name, name_of, role
+from kinacc.measurements.column_names import MEASURED, PLAIN, REPORTED, WORDS, Name, name_of, role
 from kinacc.measurements.layout import LENGTH, Directions
 from kinacc.measurements.table import RawTable, frame, numbers
-from kinacc.measurements.words import WORDS
 
 PER_UNIT = {"deg": np.pi / 180.0, "gon": np.pi / 200.0, "rad": 1.0}
 _WORDS = WORDS["spherical"]
@@ -44,23 +43,23 @@ class Reading:
     @property
     def vertical_from(self) -> str:
         """What the name of the vertical angle says that it is counted from, empty for nothing."""
-        words = {*self.vertical.words}
+        words = {*self.vertical.terms}
         return next((each for each in ("horizon", "zenith") if words & _WORDS[each]), "")
 
     @property
     def is_geodetic(self) -> bool:
         """Whether the name of the horizontal angle is that of a theodolite."""
-        return bool({*self.horizontal.words} & _WORDS["theodolite"])
+        return bool({*self.horizontal.terms} & _WORDS["theodolite"])
 
 
 def readings_of(names: Sequence[Name]) -> list[Reading]:
     """Spherical readings among columns; none where one names x, y and z, or a part is missing."""
-    if {*"xyz"} <= {word for name in names for word in name.words}:
+    if {*"xyz"} <= {word for name in names for word in name.terms}:
         return []
     parts: dict[tuple[str, ...], dict[str, Name]] = {}
     for name in names:
         whole = "".join(name.spelled).lower()  # Az is no acceleration along z here
-        words = (whole,) if whole in _PARTS else name.words
+        words = (whole,) if whole in _PARTS else name.terms
         own = [w for w in words if w in _PARTS and w not in _WORDS["filling"]]
         said = {_PARTS[word] for word in own or words if word in _PARTS}
         if len(said) == 1:

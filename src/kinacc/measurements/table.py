@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import datetime
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -11,8 +10,8 @@ import numpy as np
 import pandas as pd
 
 from kinacc.errors import Problem
+from kinacc.measurements.column_names import WORDS
 from kinacc.measurements.row_names import RowNames
-from kinacc.measurements.words import WORDS
 
 # What instruments, controllers and spreadsheets write where there is nothing.
 _NOTHING = frozenset(WORDS["nothing"])
@@ -22,16 +21,6 @@ _LARGEST_CELL = 1e75  # its fourth power is still a float
 _LARGEST = 1e12  # beyond all lengths and angles
 _SHOWN = 5  # rows named per problem; the rest is counted
 _BLANKS = re.compile(r"[\u00a0\u2007\u2009\u202f]")  # blanks that keep a number on one line
-_DATE = re.compile(r"\d{1,4}[./-]\d{1,2}[./-]\d{1,4}(?:[ T].*)?|\d{1,2}[.-]? ?[^\W\d_]{3,9}\.?")
-
-# What is held at once; calibrations are made from some hundred to some ten thousand rows.
-MOST_ROWS, MOST_COLUMNS, MOST_CELLS = 1_000_000, 10_000, 10_000_000
-MOST_BYTES = 500_000_000
-ALLOWED = (
-    f"at most {MOST_ROWS} rows, {MOST_COLUMNS} columns, {MOST_CELLS} cells and "
-    f"{MOST_BYTES // 1_000_000} MB unpacked"
-)
-SMALLER = "give the rows and columns of the measurements alone"
 
 
 @dataclass(frozen=True)
@@ -40,10 +29,10 @@ class RawTable:
 
     ``path`` names the file, with the sheet where it has several. ``line`` (n,) is the line of the
     file a row stands on, its row in a sheet or its number from 1 in a Parquet file. ``units`` are
-    those stated under the names or behind the numbers, by column. ``notes`` say what of the file is
-    no row, ``not_rows`` are its lines. ``letters`` of the columns of a sheet. ``pose_name`` are
+    those stated under the names or behind the numbers, by column. ``notes`` name what of the file
+    is no row, ``not_rows`` are its lines. ``letters`` of the columns of a sheet. ``pose_name`` are
     names of poses by line. Where joints stand in another file, ``points_file`` is that of the
-    lines, and ``key`` its column that says which joints are those of a point.
+    lines, and ``key`` its column by which joints belong to a point.
     """
 
     path: str
@@ -59,17 +48,12 @@ class RawTable:
     points_file: str = ""
     key: str | None = None
 
-    @classmethod
-    def of(cls, path: str, columns: Mapping[str, Sequence], line, **more) -> RawTable:
-        """A table of columns of cells, which stay what they are."""
-        return cls(path, frame(columns), np.asarray(line), **more)
-
     def __len__(self) -> int:
         return len(self.line)
 
     @staticmethod
     def is_gap(cell: object) -> bool:
-        """Whether a cell is empty, or says so in one of the ways of programs and people."""
+        """Whether a cell is empty, or holds one of the words that programs and people write."""
         if isinstance(cell, str):
             if "1" <= cell[:1] <= "9" or len(word := cell.strip()) > _LONGEST_NOTHING:
                 return False
@@ -90,12 +74,12 @@ class RawTable:
 
     def select(self, rows: np.ndarray) -> RawTable:
         """The table of the rows at indices ``rows``."""
-        kept = self.columns.iloc[rows].reset_index(drop=True)
-        return replace(self, columns=kept, line=self.line[rows])
+        columns = self.columns.iloc[rows].reset_index(drop=True)
+        return replace(self, columns=columns, line=self.line[rows])
 
     @property
     def row_names(self) -> RowNames:
-        """What its rows are called; a sheet has rows and no lines."""
+        """Names of its rows; a sheet has rows and no lines."""
         return RowNames(self.pose_name, self.points_file, "row" if self.letters else "line")
 
     def rows_in_words(self, rows: np.ndarray) -> str:
@@ -104,8 +88,8 @@ class RawTable:
 
     def with_pose_names(self, column: str) -> RawTable:
         """The table, with the names of poses in ``column``; mere numbers are none."""
-        cells, numbers_ = self.columns[column], self.values(column)
-        parts = zip(self.line.tolist(), cells, numbers_, strict=True)
+        cells, values = self.columns[column], self.values(column)
+        parts = zip(self.line.tolist(), cells, values, strict=True)
         named = {n: str(c).strip() for n, c, v in parts if v != v and not self.is_gap(c)}
         return replace(self, pose_name=named)
 
@@ -116,8 +100,8 @@ class RawTable:
 
     def where(self, column: str, rows: np.ndarray | None = None) -> str:
         """The place of a column, at the rows of these indices, for a problem."""
-        told = "" if rows is None else f", {self.rows_in_words(rows)}"
-        return f"{self.path}: column {self.column_in_words(column)}{told}"
+        lines = "" if rows is None else f", {self.rows_in_words(rows)}"
+        return f"{self.path}: column {self.column_in_words(column)}{lines}"
 
 
 def frame(columns: Mapping[str, Sequence]) -> pd.DataFrame:
@@ -135,34 +119,15 @@ def numbers(table: RawTable, name: str, problems: list[Problem], *, gaps: bool =
     if gaps and bad.size:
         bad = bad[[not table.is_gap(table.columns[name][row]) for row in bad]]
     if bad.size:
-        problems.append(_no_numbers(table, name, bad))
+        cells = table.columns[name][bad].tolist()
+        shown = ", ".join(repr(cell)[:60] for cell in cells[:_SHOWN])
+        other = "," if table.decimal == "." else "."
+        fix = "correct the cells"
+        if np.isfinite(_converted(cells, other, None)).any():
+            fix += f", or set measurements.file.decimal or .thousands to {other!r}"
+        where, allowed = table.where(name, bad), f"numbers with decimal mark {table.decimal!r}"
+        problems.append(Problem(where, f"not a finite number: {shown}", allowed, fix))
     return values
-
-
-def _no_numbers(table: RawTable, name: str, bad: np.ndarray) -> Problem:
-    cells = table.columns[name][bad].tolist()
-    dates = all(map(_is_date, cells))
-    shown = ", ".join(text if len(text) <= 60 else f"{text[:57]}..." for text in
-                      (str(c) if dates else repr(c) for c in cells[:_SHOWN]))  # fmt: skip
-    other = "," if table.decimal == "." else "."
-    what, fix = f"not a finite number: {shown}", "correct the cells"
-    if dates:
-        what = f"a date where a number is expected: {shown}"
-        fix = "a spreadsheet may have made it of a number: export the file anew, columns as text"
-    elif np.isfinite(_converted(cells, other, None)).any():
-        fix += f", or set measurements.file.decimal to {other!r}"
-        fix += f" or measurements.file.thousands to {other!r}" if table.thousands is None else ""
-    elif all(map(table.is_gap, cells)):
-        fix = "fill the cells in"
-    return Problem(
-        table.where(name, bad), what, f"numbers with decimal mark {table.decimal!r}", fix
-    )
-
-
-def _is_date(cell: object) -> bool:
-    if isinstance(cell, str):
-        return len(cell) < 40 and bool(_DATE.fullmatch(cell.strip()))
-    return isinstance(cell, (datetime.date, datetime.time))
 
 
 def numbers_of(text: str) -> np.ndarray:
@@ -181,13 +146,13 @@ def numbers_of(text: str) -> np.ndarray:
 
 def _converted(cells: list, decimal: str, thousands: str | None) -> np.ndarray:
     """Cells as floats (n,), NaN where one is none."""
-    try:
+    try:  # all at once
         text = "\n".join(cells) if thousands is None else "_"
         if "_" not in text and not (decimal == "," and "." in text):
-            words = text.replace("\u2212", "-").replace(decimal, ".").split("\n")
-            if len(words) == len(cells):
-                return np.array([float(word) for word in words])
-    except (TypeError, ValueError):  # values of a Parquet file or of a sheet; a word
+            parts = text.replace("\u2212", "-").replace(decimal, ".").split("\n")
+            if len(parts) == len(cells):
+                return np.array([float(part) for part in parts])
+    except (TypeError, ValueError):
         pass
     return np.array([_number(cell, decimal, thousands) for cell in cells], dtype=float)
 

@@ -1,4 +1,4 @@
-"""Times of rows in seconds, where they are good enough to tell one pose from the next; days."""
+"""Times of rows in seconds, where they are good enough to part one pose from the next; days."""
 
 from __future__ import annotations
 
@@ -13,15 +13,12 @@ from kinacc.errors import Problem
 from kinacc.measurements.table import RawTable
 
 _CLOCK = r"(?:(\S+)[ T])?(\d{1,2}):(\d{2}):(\d{2}(?:[.,]\d+)?) ?(?:Z|[+-]\d{2}:?\d{2})?"
-_SPOILT = {
-    r"\d(?:[.,]\d+)?[eE]\+?\d+": "a spreadsheet has rounded these times",
-    r"\d{1,2}:\d{2}[.,]\d+": "times without hours",  # 07:41.5, as shown of 10:07:41.5
-    r"(?:\S+[ T])?\d{1,2}:\d{2}": "times without seconds",
-}
+# A spreadsheet has rounded them (2,02E+13), or shows them without hours or seconds.
+_SPOILT = r"\d(?:[.,]\d+)?[eE]\+?\d+|\d{1,2}:\d{2}[.,]\d+|(?:\S+[ T])?\d{1,2}:\d{2}"
 _DATES = ("%Y-%m-%d", "%d.%m.%Y", "%Y/%m/%d", "%d/%m/%Y", "%m/%d/%Y", "%d.%m.%y")
 # Numbers that can be no seconds of this century are milli-, micro- or nanoseconds.
 _LATEST_S = 4.2e9
-_OWN_UNITS = {"ms": 1e-3, "us": 1e-6, "µs": 1e-6, "μs": 1e-6, "ns": 1e-9}
+_UNITS = {"ms": 1e-3, "us": 1e-6, "µs": 1e-6, "μs": 1e-6, "ns": 1e-9}
 _DAY = re.compile(r"(\d{1,4}[-./]\d{1,2}[-./]\d{2,4})(?:[T ].*)?")
 _YEARS = (1990, 2100)  # of measurements; others are numbers that look like a day
 
@@ -30,44 +27,37 @@ def seconds(table: RawTable, column: str, problems: list[Problem]) -> np.ndarray
     """Times (n,) in s from some zero; what a spreadsheet has made of them is a problem."""
     fix = "export the times again, with hours and seconds, as text or as a number of seconds"
     texts = pd.Series(table.texts(column), dtype=object)
-    for spoilt, what in _SPOILT.items():
-        if (bad := texts[texts.str.fullmatch(spoilt)]).size:
-            problems.append(Problem(table.where(column), f"{what}: {bad.iloc[0]}", fix=fix))
-            return np.full(len(table), np.nan)
+    if (bad := texts[texts.str.fullmatch(_SPOILT)]).size:
+        message = f"times that are rounded, or without hours or seconds: {bad.iloc[0]}"
+        problems.append(Problem(table.where(column), message, fix=fix))
+        return np.full(len(table), np.nan)
     values = table.values(column)
     if np.isfinite(values).any():
-        units = [u for u in re.findall(r"[^\W\d_]+", column) if u in _OWN_UNITS]
+        units = [u for u in re.findall(r"[^\W\d_]+", column) if u in _UNITS]
         largest = np.nanmax(np.abs(values), initial=0.0)
-        factors = (1.0, 1e-3, 1e-6, 1e-9)
-        fit = next((f for f in factors if largest * f < _LATEST_S), 1e-9)
-        values = values * (_OWN_UNITS[units[0]] if units else fit)
+        fit = next((f for f in (1.0, 1e-3, 1e-6) if largest * f < _LATEST_S), 1e-9)
+        values = values * (_UNITS[units[0]] if units else fit)
     else:
-        values = _of_clock(texts)
+        parts = texts.str.extract(f"^{_CLOCK}$")
+        clock = parts[[1, 2, 3]].replace(",", ".", regex=True).astype(float)
+        values = (clock * [3600.0, 60.0, 1.0]).sum(axis=1, skipna=False).to_numpy()
+        dates = parts[0].dropna()
+        if len(dates):
+            spans = {tuple((days - days[0]).days) for days in _dates(dates.tolist())}
+            of_row = np.full(len(texts), np.nan)
+            if len(spans) == 1:
+                of_row[dates.index] = spans.pop()
+            values = values + of_row * 86400.0
     if np.unique(values[np.isfinite(values)]).size < 2:
-        what = f"holds no times that differ, or dates that can be read in two ways: {texts[0]}"
-        problems.append(Problem(table.where(column), what, "2026-03-01 12:30:05.2", fix))
+        message = f"holds no times that differ, or dates of several readings: {texts[0]}"
+        problems.append(Problem(table.where(column), message, "2026-03-01 12:30:05.2", fix))
     return values
 
 
-def _of_clock(texts: pd.Series) -> np.ndarray:
-    """Times of the day (n,), of days where there are dates, in s; NaN where they are none."""
-    parts = texts.str.extract(f"^{_CLOCK}$")
-    clock = parts[[1, 2, 3]].replace(",", ".", regex=True).astype(float)
-    values = (clock * [3600.0, 60.0, 1.0]).sum(axis=1, skipna=False).to_numpy()
-    dates = parts[0].dropna()
-    if dates.empty:
-        return values
-    spans = {tuple((each - each[0]).days) for each in _read(dates.tolist())}
-    days = np.full(len(texts), np.nan)
-    if len(spans) == 1:
-        days[dates.index] = spans.pop()
-    return values + days * 86400.0
-
-
-def _read(words: Collection[str]) -> list[pd.DatetimeIndex]:
+def _dates(texts: Collection[str]) -> list[pd.DatetimeIndex]:
     """Dates by every form in which all of them are dates of measurements."""
-    found = [pd.to_datetime(list(words), format=form, errors="coerce") for form in _DATES]
-    return [f for f in found if ((f.year >= _YEARS[0]) & (f.year <= _YEARS[1])).all()]
+    forms = [pd.to_datetime([*texts], format=form, errors="coerce") for form in _DATES]
+    return [f for f in forms if ((f.year >= _YEARS[0]) & (f.year <= _YEARS[1])).all()]
 
 
 def days(table: RawTable) -> list[str]:
@@ -75,16 +65,15 @@ def days(table: RawTable) -> list[str]:
 
     None where no column holds dates alone, or where they can be read as those of other days.
     """
-    found: set[str] = set()
+    known: set[str] = set()
     for column in table.columns:
         cells = [c for c in table.columns[column] if str(c).strip()]
         stated = {c.date().isoformat() for c in cells if isinstance(c, datetime)}
-        words = [_DAY.fullmatch(str(c).strip()) for c in cells if not isinstance(c, datetime)]
-        if not all(words):
+        texts = [_DAY.fullmatch(str(c).strip()) for c in cells if not isinstance(c, datetime)]
+        if not all(texts):
             continue
-        ways = {
-            tuple(sorted({*each.strftime("%Y-%m-%d")})) for each in _read([w[1] for w in words])
-        }
-        if not words or len(ways) == 1:
-            found |= stated.union(*ways)
-    return sorted(found)
+        forms = _dates([match[1] for match in texts if match])
+        ways = {tuple(sorted({*form.strftime("%Y-%m-%d")})) for form in forms}
+        if not texts or len(ways) == 1:
+            known |= stated.union(*ways)
+    return sorted(known)

@@ -61,8 +61,10 @@ def test_units_by_name_and_by_size(file):
 
 def test_targets_keep_their_names_and_every_column_read_is_named(file):
     head = "config,repeat,q1_deg,q2_deg,q3_deg,q4_deg,mA_x_mm,mA_y_mm,mA_z_mm,b_x_mm,b_y_mm,b_z_mm"
-    found = guess.look(file(head + "\n" + "1,0,10,20,30,40,1,2,3,4,5,6\n" * 3))
-    assert found.targets == ("mA", "b")
+    points = ["1,2,3,1,2,9", "1,2,3,1,8,3", "1,2,3,7,2,3"]  # 6 mm apart, in another direction each
+    rows = "".join(f"{n},0,10,20,30,4{n},{p}\n" for n, p in enumerate(points))
+    found = guess.look(file(f"{head}\n{rows}"))
+    assert list(found.columns.targets) == ["mA", "b"]
     assert found.section["targets"] == ["mA", "b"]
     columns = found.section["columns"]
     assert (columns["pose"], columns["q4"], columns["b_z"]) == ("config", "q4_deg", "b_z_mm")

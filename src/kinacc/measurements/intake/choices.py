@@ -1,23 +1,29 @@
-"""What a file leaves open before its columns are looked at, with the options that decide."""
+"""What a file leaves open, with the options that decide."""
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from kinacc.errors import InputError, Problem
 
+TAKE = "--take"
+
 
 @dataclass(frozen=True)
 class Choice:
-    """A question: ``about`` what, and what each of the ``answers`` to ``option`` would mean.
+    """A question ``about`` a file, and the meaning of each of the ``answers`` to ``option``.
 
     ``option`` is that of ``kinacc init``, such as --decimal; ``key`` its name among the answers.
+    ``several``: more than one column may be taken; ``without``: none of them is an answer too.
     """
 
     option: str
     about: str
     answers: Mapping[str, str]
+    several: bool = False
+    without: bool = False
 
     @property
     def key(self) -> str:
@@ -31,9 +37,10 @@ class Undecided(InputError):
     def __init__(self, path: str, choices: Sequence[Choice]) -> None:
         self.choices = tuple(choices)
         problems = []
-        for each in self.choices:
-            meant = "; ".join(f"{value}: {words}" for value, words in each.answers.items())
-            told = [value if value.isalnum() else f'"{value}"' for value in each.answers]
-            ways = " or ".join(f"{each.option} {value}" for value in told)
-            problems.append(Problem(path, f"{each.about}: {meant}", fix=f"give {ways}"))
+        for choice in self.choices:
+            meant = "; ".join(f"{value}: {text}" for value, text in choice.answers.items())
+            ways = [f"{choice.option} {shlex.quote(value)}" for value in choice.answers]
+            ways += ["--orientation none"] if choice.without else []
+            fix = f"give {' or '.join(ways)}"
+            problems.append(Problem(path, f"{choice.about}: {meant}", fix=fix))
         super().__init__(problems, f"{path} leaves open how it is to be read")

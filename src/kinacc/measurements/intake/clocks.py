@@ -1,8 +1,6 @@
-"""The constant offset between the clocks of two files, from when the arm stood still."""
+"""The offset between the clocks of two files: points are measured where the arm stands still."""
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -10,55 +8,40 @@ from kinacc.measurements.joining import STILL_RAD
 
 _FEWEST = 4
 _SHARE = 0.6  # of the points, that must fall where the arm stood still
-_RIVAL = 0.85  # of the best: another offset that explains as much, with other joints
+_RIVAL = 0.85  # of the most points: another offset explains as much
 _SHORTEST_S = 0.3  # of a standstill in a record that runs on
 _MOST = 4_000_000
 
 
-@dataclass(frozen=True)
-class Offset:
-    """Seconds to add to a point's time; ``residual_s`` how far it may be off or scatters.
+def offsets(points_s: np.ndarray, stands: np.ndarray, within_s: float) -> list[float]:
+    """Seconds to add to times of points (n,) so that most fall into standstills (m, 2).
 
-    ``matched`` points of all; ``rivals`` other offsets that give other joints to as many points.
+    The best first; behind it others that give other joints to as many points. Empty for none.
     """
-
-    offset_s: float
-    within_s: float
-    residual_s: float
-    matched: int
-    rivals: tuple[float, ...]
-
-
-def offset(points_s: np.ndarray, joints_s: np.ndarray, q_rad: np.ndarray) -> Offset | None:
-    """The offset of points (n,) to joints (m,) and (m, k); None where no offset explains them."""
-    stands, within = standstills(joints_s, q_rad)
     points_s = points_s[np.isfinite(points_s)]
     if min(len(points_s), len(stands)) < _FEWEST or len(points_s) * len(stands) > _MOST:
-        return None
-    # Every point at every standstill is an interval of offsets; they are counted at its ends.
-    ends = (stands[None, :, :] - points_s[:, None, None]).reshape(-1, 2)
-    edges, step = ends.T.ravel(), np.repeat([1, -1], len(ends))
-    order = np.lexsort((-step, edges))
-    edges, count = edges[order], np.cumsum(step[order])
-    widths = np.append(np.diff(edges), 0.0)
-    best = int(count.max())
-    if best < max(_FEWEST, _SHARE * len(points_s)):
-        return None
-    chosen = max(np.flatnonzero(count == best), key=lambda place: widths[place])
-    middles = edges + 0.5 * widths
-    shift, residual = float(middles[chosen]), float(0.5 * widths[chosen])
-    own = _stand_of(points_s + shift, stands)
-    rivals: list[float] = []
-    for other in middles[(count >= _RIVAL * best) & (widths > 0.0)].tolist():
-        theirs = _stand_of(points_s + other, stands)
-        both = (own >= 0) & (theirs >= 0)
-        differs = np.sum(own[both] != theirs[both]) > 0.2 * max(both.sum(), 1)
-        if differs and all(abs(other - each) > 2 * within for each in rivals):
-            rivals.append(other)
-    if np.ptp(stands, axis=1).max() <= 2.0 * within * (1 + 1e-9):  # a row for every pose
-        apart = stands.mean(axis=1)[own[own >= 0]] - points_s[own >= 0]
-        shift, residual = float(np.median(apart)), float(np.std(apart))
-    return Offset(round(shift, 3), within, residual, best, tuple(rivals))
+        return []
+    starts, ends = np.sort((stands.T[:, None, :] - points_s[:, None]).reshape(2, -1))
+    edges = np.unique(np.append(starts, ends))
+    middle = 0.5 * (edges[1:] + edges[:-1])
+    count = np.searchsorted(starts, middle) - np.searchsorted(ends, middle)
+    if count.max() < max(_FEWEST, _SHARE * len(points_s)):
+        return []
+
+    def stand(offset: float) -> np.ndarray:
+        place = np.searchsorted(stands[:, 0], points_s + offset, side="right") - 1
+        return np.where((place >= 0) & (points_s + offset <= stands[place, 1]), place, -1)
+
+    order = np.lexsort((-np.diff(edges), -count))
+    best = [float(middle[order[0]])]
+    joints = stand(best[0])
+    for offset in middle[order[count[order] >= _RIVAL * count.max()]].tolist():
+        theirs = stand(offset)
+        both = (joints >= 0) & (theirs >= 0)
+        apart = min(abs(offset - other) for other in best) > 2.0 * within_s
+        if apart and np.sum((joints != theirs) & both) > 0.2 * max(both.sum(), 1):
+            best.append(offset)
+    return [round(offset, 3) for offset in best]
 
 
 def standstills(time_s: np.ndarray, q_rad: np.ndarray) -> tuple[np.ndarray, float]:
@@ -73,12 +56,5 @@ def standstills(time_s: np.ndarray, q_rad: np.ndarray) -> tuple[np.ndarray, floa
         long &= time[ends] - time[starts] >= _SHORTEST_S
         stands = np.stack([time[starts[long]], time[ends[long]]], axis=1)
         return stands, max(2.0 * float(np.median(gaps)), 0.05)
-    within = 0.25 * float(np.min(gaps[gaps > 0.0], initial=np.inf))
+    within = 0.25 * float(np.min(gaps[gaps > 0.0], initial=np.inf))  # single rows, far apart
     return np.stack([time - within, time + within], axis=1), within
-
-
-def _stand_of(times: np.ndarray, stands: np.ndarray) -> np.ndarray:
-    """Number (n,) of the standstill at each time, -1 for none."""
-    place = np.searchsorted(stands[:, 0], times, side="right") - 1
-    inside = (place >= 0) & (times <= stands[np.maximum(place, 0), 1])
-    return np.where(inside, place, -1)

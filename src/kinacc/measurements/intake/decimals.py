@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from functools import cache
 
 from kinacc.measurements.column_names import name_of
 from kinacc.measurements.intake.choices import Choice
@@ -17,14 +16,13 @@ _HUGE = re.compile(r"\d(?:[.,]\d+)?E\+?[1-9]\d", re.IGNORECASE)  # 2,02103E+13: 
 _SHAPED = re.compile(
     rf"[+\-−]?(?:\d+(?:(?:{_BLANK}|[.,'\u2019])\d+)*[.,]?|[.,]\d+)(?:[eE][+\-−]?\d+)?"
 )
-_SHAPES = {  # of a cell with mark m
-    # No thousands are written so.
-    "decides": r"(?:\d{4,}m\d*|0\d*m\d*|m\d+|\d+m(?:\d{1,2}|\d{4,})?)(?:[eE][+\-−]?\d+)?"
-    r"|\d+m\d*[eE][+\-−]?\d+",
-    "grouped": r"\d{1,3}(?:m\d{3}){2,}",  # no decimals are written so
-    "both": r"\d{1,3}(?:m\d{3})+o\d*",  # thousands by the mark, decimals by the other
-    "open": r"[1-9]\d{0,2}m\d{3}",
-}
+# Cells with mark m (and the other mark o).
+_DECIMAL = (  # no thousands are written so
+    r"(?:\d{4,}m\d*|0\d*m\d*|m\d+|\d+m(?:\d{1,2}|\d{4,})?)(?:[eE][+\-−]?\d+)?|\d+m\d*[eE][+\-−]?\d+"
+)
+_GROUPED = r"\d{1,3}(?:m\d{3}){2,}"  # no decimals are written so
+_BOTH = r"\d{1,3}(?:m\d{3})+o\d*"  # thousands by m, decimals by o
+_EITHER = r"[1-9]\d{0,2}m\d{3}"
 
 
 def shaped_as_number(cell: str) -> bool:
@@ -35,86 +33,61 @@ def shaped_as_number(cell: str) -> bool:
 def marks_of(
     columns: Mapping[str, Sequence], given: Mapping[str, str], blanks_part: bool = False
 ) -> tuple[str, str | None, Choice | None]:
-    """The two marks of the text cells of a table, or what has to be asked first.
+    """The two marks of the text cells of a table, or the question to ask first.
 
     ``given``: decimal and thousands as answered.
     """
-    texts = {str(name): _text(columns[name]) for name in columns}
-    texts = {name: text for name, text in texts.items() if text}
-    decided = {m: cell for m in _ENDS if (cell := _decides(m, texts))}
-    decimal = given.get("decimal") or "".join(decided)
+    by_column = {str(name): _text(columns[name]) for name in columns}
+    text = "\n".join(filter(None, by_column.values()))
+
+    def first(shape: str, mark: str, other: str = ".", among: str = text) -> str:
+        shape = shape.replace("m", _BETWEEN[mark]).replace("o", _BETWEEN[other])
+        match = re.search(rf"^[+\-−]?(?:{shape})$", among, re.MULTILINE)
+        return match[0].strip() if match else ""
+
+    decisive = {}
+    for mark, other in (_ENDS, _ENDS[::-1]):
+        both = [first(_BOTH, between, mark) for between in (other, " ", "'")]
+        if cell := next(filter(None, (first(_DECIMAL, mark), first(_GROUPED, other), *both)), ""):
+            decisive[mark] = cell
+    decimal = given.get("decimal") or "".join(decisive)
     if len(decimal) > 1:
         about = "some numbers have a decimal point, some a decimal comma; one kind can be read"
-        return ".", None, Choice("--decimal", about, {m: f"as in {decided[m]}" for m in _ENDS})
+        return ".", None, Choice("--decimal", about, {m: f"as in {decisive[m]}" for m in _ENDS})
     if not decimal:
-        commas = [name for name, text in texts.items() if _search("open", ",", text)]
-        points = [name for name, text in texts.items() if _search("open", ".", text)
-                  and re.search(r"^[+\-−]?[1-9]\d{0,2}$", text, re.MULTILINE)]  # fmt: skip
-        decimal = _by_angles(texts) if commas or points else "."
-        if not decimal:
-            mark, name = (",", commas[0]) if commas else (".", points[0])
-            cell = _search("open", mark, texts[name])
-            answers = {mark: f"{cell} is {cell.replace(mark, '.')}"}
-            answers["." if mark == "," else ","] = f"{cell} is {cell.replace(mark, '')}"
-            about = f"column {name} does not tell whether {cell} has decimals or thousands"
+        angles = "\n".join(t for name, t in by_column.items() if name_of(name).unit == "deg")
+        whole = re.search(r"^[+\-−]?[1-9]\d{0,2}$", text, re.MULTILINE)
+        unclear = first(_EITHER, ",") or (whole and first(_EITHER, ".")) or ""
+        mark = "," if "," in unclear else "."
+        large = [cell for cell in angles.split("\n") if first(_EITHER, mark, among=cell)]
+        if not unclear or any(int(re.sub(r"\D", "", cell)) > _MOST_DEG for cell in large):
+            decimal = mark  # no joint turns by thousands of degrees
+        else:
+            answers = {mark: f"{unclear} is {unclear.replace(mark, '.')}"}
+            answers["." if mark == "," else ","] = f"{unclear} is {unclear.replace(mark, '')}"
+            about = f"{unclear} may have decimals or thousands"
             return ".", None, Choice("--decimal", about, answers)
     if "thousands" in given:
         return decimal, None if given["thousands"] == "none" else given["thousands"], None
     other = "," if decimal == "." else "."
-    if "decimal" in given and any(_search("open", other, text) for text in texts.values()):
+    if "decimal" in given and first(_EITHER, other):
         return decimal, other, None  # by the answer it stands between thousands
     marks = [m for m in _BETWEEN if m != decimal and not (m == " " and blanks_part)]
     for mark in marks:
-        if any(_search("grouped", mark, t) or _search("both", mark, t, decimal)
-               for t in texts.values()):  # fmt: skip
+        if first(_GROUPED, mark) or first(_BOTH, mark, decimal):
             return decimal, mark, None
-    for mark in marks:
-        cells = {n: cell for n, text in texts.items() if (cell := _search("open", mark, text))}
-        for name, cell in cells.items():
-            if mark not in _ENDS:  # blanks and apostrophes stand between thousands, nowhere else
-                return decimal, mark, None
-            about = f"column {name} holds {cell} where the decimal mark of the file is {decimal}"
-            answers = {mark: f"{cell} is {cell.replace(mark, '')}", "none": "it is a slip"}
-            return decimal, None, Choice("--thousands", about, answers)
+        if mark not in _ENDS and first(_EITHER, mark):
+            return decimal, mark, None  # blanks and apostrophes stand between thousands alone
+    if other in marks and (cell := first(_EITHER, other)):
+        about = f"the cell {cell} stands where the decimal mark of the file is {decimal}"
+        answers = {other: f"{cell} is {cell.replace(other, '')}", "none": "it is an error"}
+        return decimal, None, Choice("--thousands", about, answers)
     return decimal, None, None
 
 
 def _text(cells: Sequence) -> str:
     """Cells that are text, a line each; a column of names and rounded time stamps are left out."""
-    told = [each.strip() for each in cells if isinstance(each, str)]
-    told = [each for each in told if each and not _HUGE.fullmatch(each)]
-    numeric = sum(map(shaped_as_number, told[:200]))
-    return "\n".join(told) if numeric and 2 * numeric >= len(told[:200]) else ""
-
-
-@cache
-def _pattern(kind: str, mark: str, other: str = ".") -> re.Pattern:
-    shape = _SHAPES[kind].replace("m", _BETWEEN[mark]).replace("o", _BETWEEN[other])
-    return re.compile(rf"^[+\-−]?(?:{shape})$", re.MULTILINE)
-
-
-def _search(kind: str, mark: str, text: str, other: str = ".") -> str:
-    found = _pattern(kind, mark, other).search(text)
-    return found[0].strip() if found else ""
-
-
-def _decides(mark: str, texts: Mapping[str, str]) -> str:
-    """A cell that can only be read with the mark before decimals."""
-    other = "." if mark == "," else ","
-    for text in texts.values():
-        if mark in text or other in text:
-            grouped = [_search("both", each, text, mark) for each in (other, " ", "'")]
-            tried = [_search("decides", mark, text), _search("grouped", other, text), *grouped]
-            if found := next(filter(None, tried), ""):
-                return found
-    return ""
-
-
-def _by_angles(texts: Mapping[str, str]) -> str:
-    """The mark that stands before decimals because joints do not turn by thousands of degrees."""
-    for mark in _ENDS:
-        for name, text in texts.items():
-            cells = _pattern("open", mark).findall(text) if name_of(name).unit == "deg" else ()
-            if any(float(re.sub(r"\D", "", cell)) > _MOST_DEG for cell in cells):
-                return mark
-    return ""
+    texts = [cell.strip() for cell in cells if isinstance(cell, str)]
+    texts = [text for text in texts if text and not _HUGE.fullmatch(text)]
+    numeric = sum(map(shaped_as_number, texts[:200]))
+    return "\n".join(texts) if numeric and 2 * numeric >= len(texts[:200]) else ""

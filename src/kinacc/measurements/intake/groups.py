@@ -1,37 +1,53 @@
-"""Columns of a foreign file that go together, and what their names say of them.
+"""Columns of a foreign file that belong together: joints, points, orientations, uncertainties.
 
-Columns that go together differ in one word only: a number for joints, x, y and z for points. What a
-group holds is told by its other words.
+They differ in one term only: a number for joints, x, y and z for points. The other terms decide
+what a group is.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+import re
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import combinations, pairwise
+from itertools import combinations
 
 import numpy as np
 
-from kinacc.measurements import column_names
-from kinacc.measurements.column_names import OPEN, OTHER, PLAIN, SPREAD, Name, role, speaks
-from kinacc.measurements.layout import TOOL
-from kinacc.measurements.words import WORDS
+from kinacc.measurements.column_names import (
+    CALCULATED,
+    MEASURED,
+    NOMINAL,
+    OPEN,
+    OTHER,
+    PLAIN,
+    REPORTED,
+    SPREAD,
+    WORDS,
+    Name,
+    commands,
+    decides,
+    is_controller_pose,
+    role,
+)
+from kinacc.measurements.layout import ANGLE, LENGTH, TOOL
 
-JOINTS, POINT, TURN, POSE, RADIUS = "joints", "point", "orientation", "pose", "radius"
-SPREADS = "spread"
+JOINTS, POINT, TURN, POSE, RADIUS = "joints", "a position", "an orientation", "a pose", "a radius"
+UNCERTAINTY = "an uncertainty"
+PULSES = ("pulse", "pulses", "count", "counts", "tick", "ticks")
 Values = Callable[[Name], np.ndarray]
 
-_TURN_WORDS, _QUATERNION_WORDS = WORDS["turn"], WORDS["quaternion"]
+_UNITS = {JOINTS: {**ANGLE, **LENGTH}, POINT: LENGTH, TURN: ANGLE}
 _UNIT_LENGTH = 2e-3  # how far from 1 the length of a quaternion may be, as written
+_TURNED = WORDS["turn"] | WORDS["quaternion"] | WORDS["vector"]
 
 
 @dataclass(frozen=True)
 class Group:
-    """Columns that go together.
+    """Columns that belong together.
 
     ``kind`` is one of those above; ``role`` one of those of names; ``columns`` by our names (q1, x,
-    rx, qw, quat1, std_x); ``turn`` kind and convention of orientations; ``weak`` where nothing says
-    that they are joints, or that a spread is one standard deviation.
+    rx, qw, quat1, std_x); ``turn`` kind and convention of orientations; ``weak`` where no name
+    states that they are joints, or that an uncertainty is one standard deviation.
     """
 
     kind: str
@@ -47,18 +63,37 @@ class Group:
         return tuple(name.column for name in self.columns.values())
 
     @property
-    def units(self) -> tuple[str, ...]:
-        """The units its columns state, each once."""
-        return tuple(dict.fromkeys(name.unit for name in self.columns.values()))
+    def units(self) -> set[str]:
+        """The units that its columns state; "" where one of them states none."""
+        return {name.unit for name in self.columns.values()}
 
     @property
-    def words(self) -> tuple[str, ...]:
-        """The words of its first column."""
-        return next(iter(self.columns.values())).words
+    def terms(self) -> tuple[str, ...]:
+        """The terms of its first column."""
+        return next(iter(self.columns.values())).terms
 
-    def in_words(self) -> str:
+    @property
+    def text(self) -> str:
         """The columns, the inner ones of many left out."""
         return listed(self.names)
+
+    @property
+    def wrong_units(self) -> set[str]:
+        """Units that a group of its kind cannot have; pulses are units of joints."""
+        units = self.units - {""}
+        if self.kind == JOINTS and units and not units & {*ANGLE}:  # not all joints slide
+            return {unit for unit in units if unit.lower() not in PULSES}
+        return units - {*_UNITS.get(self.kind, units)}
+
+    @property
+    def why_unread(self) -> str:
+        """Why it is not read."""
+        if self.kind == POSE or (self.kind == POINT and is_controller_pose(self.terms)):
+            return "the controller's own forward kinematics, never a measurement"
+        if self.wrong_units and self.role in (PLAIN, OPEN, REPORTED, MEASURED):
+            return f"{self.kind} in {' and '.join(sorted(self.wrong_units))}"
+        chosen = self.role in (PLAIN, OPEN, REPORTED, MEASURED)
+        return "other columns are read" if chosen else self.role
 
 
 def listed(names: Sequence[str]) -> str:
@@ -66,228 +101,173 @@ def listed(names: Sequence[str]) -> str:
     return f"{names[0]} .. {names[-1]}" if len(names) > 4 else ", ".join(names)
 
 
-def found(names: Sequence[Name], values: Values | None = None) -> list[Group]:
-    """Every group of the columns, whatever it holds."""
-    groups = [*_numbered(names, values), *_named(names), *_by_axis(names)]
-    points = {
-        each.columns["x"].without(each.words.index("x")) for each in groups if each.kind == POINT
-    }
-    groups += _by_word(names, points)
+def all_groups(names: Sequence[Name], values: Values | None = None) -> list[Group]:
+    """Every group of the columns."""
+    groups = [*_numbered(names, values), *_named_joints(names), *_by_axis(names)]
+    points = {tuple(t for t in g.terms if t != "x") for g in groups if g.kind == POINT}
+    for *letters, convention in WORDS["angles"]:
+        for terms, _, columns in _alike(names, "|".join(letters)):
+            # Single letters are angles beside x, y, z alone.
+            if len(columns) == 3 and (len(letters[0]) > 1 or terms in points):
+                known = role(terms)
+                before, kind = ("std_", UNCERTAINTY) if known == SPREAD else ("", TURN)
+                turned = {f"{before}r{axis}": columns[letter]
+                          for axis, letter in zip("xyz", letters, strict=True)}  # fmt: skip
+                target = _target(columns[letters[0]], terms=terms)
+                groups.append(Group(kind, known, target, turned, ("euler", convention), True))
     for name in names:
-        if WORDS["radius"] & {*name.words}:  # open where the name says that points are no centres
-            said = OPEN if WORDS["not_corrected"] & {*name.words} else OTHER
-            groups.append(Group(RADIUS, said, "", {"radius": name}))
+        if WORDS["radius"] & {*name.terms}:  # open where the points may be no centres
+            known = OPEN if WORDS["not_corrected"] & {*name.terms} else OTHER
+            groups.append(Group(RADIUS, known, "", {"radius": name}))
     return groups
 
 
-def is_pulse(unit: str) -> bool:
-    """Whether a unit is pulses of a motor, which mean nothing without their number per degree."""
-    return unit.lower() in ("pulse", "pulses", "count", "counts", "tick", "ticks")
+def _alike(
+    names: Sequence[Name], label: str, stem: str = ""
+) -> Iterator[tuple[tuple[str, ...], str, dict[str, Name]]]:
+    """Terms, stem and columns by label of names that differ in the label alone.
 
-
-def is_deviation(name: Name) -> bool:
-    """Whether a column by itself says how far off a point was: error, 3D deviation."""
-    told = {w for w in name.words if w not in WORDS["filling"] | {"d", "total"} and not w.isdigit()}
-    said = role(name.words) == column_names.DEVIATION or {*name.words} == {"deviation"}
-    return (
-        said and len(told) <= 1 and not WORDS["external"] & told and name.unit not in ("deg", "rad")
-    )
+    ``label`` and the ``stem`` in front of it are regular expressions of terms, joined by _. Where a
+    label is there twice (X and x_mm), columns of one unit and spelling belong together.
+    """
+    pattern = re.compile(rf"(?<![^_])({stem})({label})(?![^_])")
+    groups: dict[tuple, dict[str, list[Name]]] = {}
+    for name in names:
+        joined = "_".join(name.terms)
+        for match in pattern.finditer(joined):
+            key = (joined[: match.start()], joined[match.end() :], match[1])
+            groups.setdefault(key, {}).setdefault(match[2], []).append(name)
+    for (before, behind, stem_), columns in groups.items():
+        terms = tuple(filter(None, (*before.split("_"), *behind.split("_"))))
+        twice = any(len(columns_) > 1 for columns_ in columns.values())
+        rows: dict[tuple, dict[str, Name]] = {}
+        for text, columns_ in columns.items():
+            for name in columns_:
+                spelled = [s for t, s in zip(name.terms, name.spelled, strict=True) if t in terms]
+                small = any(s.islower() for s in name.spelled)
+                kind = (name.unit, *spelled, small) if twice else ()
+                rows.setdefault(kind, {})[text] = name
+        for row in rows.values():
+            yield terms, stem_, row
 
 
 def _numbered(names: Sequence[Name], values: Values | None) -> Iterator[Group]:
-    """Columns that differ in a number counting 0.. or 1..: joints, quaternions, poses."""
-    labels = [
-        (name, place, str(int(word)), "")
-        for name in names
-        for place, word in enumerate(name.words)
-        if word.isdecimal() and len(word) <= 2
-    ]
-    for words, _, columns in _alike(labels):
-        numbers = sorted(map(int, columns))
-        if numbers[0] > 1 or numbers != list(range(numbers[0], numbers[0] + len(numbers))):
+    """Columns that differ in a number counting from 0 or 1: joints, quaternions, poses."""
+    for terms, _, columns in _alike(names, r"\d{1,2}"):
+        by_number = {int(number): name for number, name in columns.items()}
+        first, about = min(by_number), {*terms}
+        if first > 1 or {*by_number} != {*range(first, first + len(by_number))}:
             continue
-        row, about = [columns[str(number)] for number in numbers], {*words}
-        in_angles = {name.unit for name in row} in ({"deg"}, {"rad"})
-        if len(row) == 4 and (turn := _quaternion(row, about, values)):
-            yield turn
+        row = [by_number[number] for number in sorted(by_number)]
+        if len(row) == 4 and _is_quaternion(row, about, values):
+            known = role([t for t in row[0].terms if t not in WORDS["quaternion"]])
+            turned = {f"quat{number}": name for number, name in enumerate(row, 1)}
+            yield Group(TURN, known, _target(row[0], True), turned, ("quaternion", "XYZ"))
         elif (
             len(row) == 6
             and about & WORDS["pose_of_controller"]
             and not about & {"joint", "joints"}
         ):
-            yield Group(POSE, role(words), "", dict(zip("123456", row, strict=True)))
-        elif len(row) == 3 and about & (_TURN_WORDS - WORDS["joint"]) and in_angles:
+            yield Group(POSE, role(terms), "", dict(zip("123456", row, strict=True)))
+        elif len(row) == 3 and about & (WORDS["turn"] - WORDS["joint"]):
             turned = dict(zip(("rx", "ry", "rz"), row, strict=True))
-            yield Group(TURN, role(words), _target(row[0], drop=True), turned, ("euler", "XYZ"))
+            if {name.unit for name in row} in ({"deg"}, {"rad"}):
+                yield Group(TURN, role(terms), _target(row[0], True), turned, ("euler", "XYZ"))
         elif 4 <= len(row) <= 7:
             known = bool(about & WORDS["joint"]) and not about & WORDS["external"]
             if known or len(row) >= 6:
-                yield _joints(row, words, weak=not known)
+                yield _joints(row, terms, weak=not known)
 
 
-def _quaternion(row: list[Name], about: set[str], values: Values | None) -> Group | None:
-    """Four numbered columns as a quaternion, where their names or their length say so."""
-    said = bool(about & (_QUATERNION_WORDS - {"q"}))
-    if not said and not about & {"q", "rot", "rotation", "ori", "orient", "orientation"}:
-        return None
-    unit = said
-    if values is not None:
-        length = np.sqrt(sum(values(name) ** 2 for name in row))
-        length = length[np.isfinite(length)]
-        unit = length.size > 0 and bool(np.mean(np.abs(length - 1.0) < _UNIT_LENGTH) > 0.9)
-    if not unit and not said:
-        return None
-    told = role([w for w in row[0].words if w not in _QUATERNION_WORDS]) if unit else OTHER
-    columns = {f"quat{number}": name for number, name in enumerate(row, 1)}
-    return Group(TURN, told, _target(row[0], drop=True), columns, ("quaternion", "XYZ"))
+def _is_quaternion(row: list[Name], about: set[str], values: Values | None) -> bool:
+    """Whether four numbered columns are a quaternion, by their terms and their length."""
+    stated = bool(about & (WORDS["quaternion"] - {"q"}))
+    if values is None or not about & (WORDS["quaternion_or_joint"] | WORDS["quaternion"]):
+        return stated
+    length = np.sqrt(sum(values(name) ** 2 for name in row))
+    length = length[np.isfinite(length)]
+    return length.size > 0 and bool(np.mean(np.abs(length - 1.0) < _UNIT_LENGTH) > 0.9)
 
 
-def _joints(row: Sequence[Name], words: Sequence[str], weak: bool = False) -> Group:
-    rest = [w for w in words if w not in WORDS["joint"] | WORDS["filling"] and not w.isdigit()]
-    rest = [w for w in rest if role([w]) != column_names.CALCULATED]
-    said = role(rest)
-    if weak and WORDS["external"] & {*words}:
-        said = OTHER
-    elif column_names.commands(rest):
-        said = column_names.NOMINAL
-    elif said == column_names.MEASURED:
-        said = column_names.REPORTED
-    target = "" if all(map(speaks, rest)) else "_".join(rest)
-    return Group(JOINTS, said, target, {f"q{n}": name for n, name in enumerate(row, 1)}, weak=weak)
+def _joints(row: Sequence[Name], terms: Sequence[str], weak: bool = False) -> Group:
+    rest = [t for t in terms if t not in WORDS["joint"] | WORDS["filling"] and not t.isdigit()]
+    rest = [t for t in rest if role([t]) != CALCULATED]
+    known = role(rest)
+    if weak and WORDS["external"] & {*terms}:
+        known = OTHER
+    elif commands(rest):
+        known = NOMINAL
+    elif known == MEASURED:
+        known = REPORTED
+    columns = {f"q{number}": name for number, name in enumerate(row, 1)}
+    return Group(JOINTS, known, "", columns, weak=weak)
 
 
-def _named(names: Sequence[Name]) -> Iterator[Group]:
+def _named_joints(names: Sequence[Name]) -> Iterator[Group]:
     """Joints by the names that those of some arms have."""
     taken: set[str] = set()
     for series in WORDS["named_joints"]:
-        rows: dict[tuple[str, ...], dict[str, list[Name]]] = {}
-        for name in names:
-            for joint in series:
-                words = joint.split("_")
-                rest = tuple(w for w in name.words if w not in (*words, "joint", "j"))
-                known = all(w in WORDS["joint"] or role([w]) != PLAIN for w in rest)
-                own = {*words} <= {*name.words} and name.column not in taken
-                if own and (len(joint) > 1 or known):
-                    rows.setdefault(rest, {}).setdefault(joint, []).append(name)
-        for rest, row in rows.items():
-            # The shoulder of one series is part of the other's names.
-            if len(row) == len(series) and all(len(each) == 1 for each in row.values()):
-                columns = [row[joint][0] for joint in series]
-                taken |= {name.column for name in columns}
-                yield _joints(columns, rest)
+        free = [name for name in names if name.column not in taken]
+        for terms, _, columns in _alike(free, "|".join(series)):
+            letters = len(series[0]) == 1
+            known = all(t in WORDS["joint"] or role([t]) != PLAIN for t in terms)
+            if {*columns} == {*series} and (known or not letters):
+                taken |= {name.column for name in columns.values()}
+                yield _joints([columns[joint] for joint in series], terms)
 
 
 def _by_axis(names: Sequence[Name]) -> Iterator[Group]:
-    """Points, orientations and their spreads: columns that differ in x, y, z (and w) alone."""
-    labels = [
-        (name, place, word[-1], word[:-1])
-        for name in names
-        for place, word in enumerate(name.words)
-        if word[-1] in "xyzw" and word[:-1] in ("", "r", "q", "rv")
-    ]
-    for words, stem, axes in _alike(labels):
+    """Points, orientations and their uncertainties: columns that differ in x, y, z (and w)."""
+    for terms, stem, axes in _alike(names, "[xyzw]", "rv|r|q|"):
         if not {*"xyz"} <= {*axes}:
             continue
-        about, one = {*words}, axes["x"]
-        is_turn = stem in ("r", "rv") or bool(about & _TURN_WORDS)
+        about, first = {*terms}, axes["x"]
+        is_turn = stem in ("r", "rv") or bool(about & WORDS["turn"])
         vector = stem == "rv" or (bool(about & WORDS["vector"]) and is_turn)
-        said = role([w for w in words if not (vector and w == "vector")])
-        letters = [w for w in one.words[one.words.index(f"{stem}x") + 1 :] if len(w) == 1]
-        if said == PLAIN and any(w.isalpha() and w not in _TURN_WORDS for w in letters):
-            said = OPEN  # x_n, x_c: what the letter means is anyone's guess
-        if stem == "q" or about & _QUATERNION_WORDS or (is_turn and "w" in axes and not stem):
+        known = role([t for t in terms if not (vector and t == "vector")])
+        letters = [t for t in first.terms[first.terms.index(f"{stem}x") + 1 :] if len(t) == 1]
+        if known == PLAIN and any(t.isalpha() and t not in WORDS["turn"] for t in letters):
+            known = OPEN  # x_n, x_c: the meaning of the letter is open
+        if stem == "q" or about & WORDS["quaternion"] or (is_turn and "w" in axes and not stem):
             if "w" in axes:
                 columns = {f"q{axis}": axes[axis] for axis in "wxyz"}
-                yield Group(TURN, said, _target(one, drop=True), columns, ("quaternion", "XYZ"))
+                yield Group(TURN, known, _target(first, True), columns, ("quaternion", "XYZ"))
             continue
         units = {axes[axis].unit for axis in "xyz"} - {""}
-        is_turn = is_turn or (bool(units) and units <= {"deg", "rad"})
-        before = ("std_" if said == SPREAD else "") + ("r" if is_turn else "")
+        is_turn = is_turn or (bool(units) and units <= {*ANGLE})
+        before = ("std_" if known == SPREAD else "") + ("r" if is_turn else "")
         columns = {f"{before}{axis}": axes[axis] for axis in "xyz"}
-        kind = SPREADS if said == SPREAD else TURN if is_turn else POINT
+        kind = UNCERTAINTY if known == SPREAD else TURN if is_turn else POINT
         turn = ("rotation_vector" if vector else "euler" if kind == TURN else "none", "XYZ")
-        target = _target(one, drop=is_turn)
-        yield Group(kind, said, target, columns, turn, kind == SPREADS and not _one_sigma(one))
+        # One standard deviation is no interval, and no multiple of it.
+        sigma = about & WORDS["one_sigma"] or {"standard", "deviation"} <= about
+        weak = not sigma or any(term.isdigit() for term in terms)
+        yield Group(kind, known, _target(first, is_turn), columns, turn, weak)
 
 
-def _by_word(names: Sequence[Name], points: set[tuple[str, ...]]) -> Iterator[Group]:
-    """Orientations by the names of their angles; single letters only beside x, y, z."""
-    for *letters, convention in WORDS["angles"]:
-        labels = [
-            (name, place, word, "")
-            for name in names
-            for place, word in enumerate(name.words)
-            if word in letters
-        ]
-        for words, _, columns in _alike(labels):
-            if len(columns) < 3 or (len(letters[0]) == 1 and tuple(words) not in points):
-                continue
-            said = role(words)
-            before, kind = ("std_", SPREADS) if said == SPREAD else ("", TURN)
-            parts = [columns[letter] for letter in letters]
-            turned = dict(zip((f"{before}r{axis}" for axis in "xyz"), parts, strict=True))
-            target = _target_of(parts[0], words)
-            yield Group(kind, said, target, turned, ("euler", convention), kind == SPREADS)
+def _target(name: Name, is_turn: bool = False, terms: Sequence[str] | None = None) -> str:
+    """Name of a target from ``terms`` of a column, those of all its columns where not given."""
+    if terms is None:
+        gone = _TURNED if is_turn else frozenset()
+        gone |= {name.terms[-1]} if is_turn and name.terms[-1].isdigit() else frozenset()
+        terms = [t for t in name.terms if (t[-1] not in "xyzw" or len(t) > 2) and t not in gone]
+    spelling = dict(zip(name.terms, name.spelled, strict=True))
+    target = ""
+    for spelled in (spelling[t] for t in terms if not decides(t) and t not in WORDS["filling"]):
+        # As in the file: smr1, and not smr_1.
+        target += spelled if not target or f"{target}{spelled}" in name.column else f"_{spelled}"
+    return target or TOOL
 
 
-def _alike(labels: Iterable) -> Iterator[tuple[tuple[str, ...], str, dict[str, Name]]]:
-    """Words, stem and columns by label of names that differ in the label alone.
-
-    ``labels``: name, place of the word, label and stem. Where a label is there twice (X and x_mm),
-    columns of one unit and spelling go together.
-    """
-    groups: dict[tuple, dict[str, list[Name]]] = {}
-    for name, place, label, stem in labels:
-        groups.setdefault((name.without(place), place, stem), {}).setdefault(label, []).append(name)
-    for (words, place, stem), columns in groups.items():
-        twice = any(len(each) > 1 for each in columns.values())
-        kinds: dict[tuple, dict[str, Name]] = {}
-        for label, each in columns.items():
-            for name in each:
-                spelled = name.spelled[:place] + name.spelled[place + 1 :]
-                kind = (name.unit, spelled, name.spelled[place].isupper()) if twice else ()
-                kinds.setdefault(kind, {})[label] = name
-        for row in kinds.values():
-            yield words, stem, row
-
-
-def _target(one: Name, drop: bool = False) -> str:
-    """Name of a target from the words its columns share; ``drop`` those of orientations too."""
-    words = [w for w in one.words if w[-1] not in "xyzw" or len(w) > 2]
-    if drop:
-        gone = _TURN_WORDS | _QUATERNION_WORDS | WORDS["vector"]
-        gone = gone | {one.words[-1]} if one.words[-1].isdigit() else gone
-        words = [w for w in words if w not in gone]
-    return _target_of(one, words)
-
-
-def _target_of(one: Name, words: Sequence[str]) -> str:
-    spelling = dict(zip(one.words, one.spelled, strict=True))
-    name = ""
-    for spelled in (spelling[w] for w in words if not speaks(w) and w not in WORDS["filling"]):
-        # As the file has it: smr1, and not smr_1.
-        name += spelled if not name or f"{name}{spelled}" in one.column else f"_{spelled}"
-    return name or TOOL
-
-
-def _one_sigma(one: Name) -> bool:
-    """Whether a spread is one standard deviation: no interval, no multiple of it."""
-    words, sigma = one.words, WORDS["one_sigma"]
-    if not ({*words} & sigma or {"standard", "deviation"} <= {*words}):
-        return False
-    near = [*pairwise(words), *pairwise(words[::-1])]
-    return not any(beside.isdigit() for word, beside in near if word in sigma)
-
-
-def same(one: Group, other: Group, values: Values | None) -> bool:
+def same(a: Group, b: Group, values: Values | None) -> bool:
     """Whether two groups hold the same numbers, their units aside."""
-    if values is None or {*one.columns} != {*other.columns}:
+    if values is None or {*a.columns} != {*b.columns}:
         return False
-    a = np.stack([values(name) for name in one.columns.values()])
-    b = np.stack([values(other.columns[key]) for key in one.columns])
-    off = 2e-6 * max(np.nanmax(np.abs(b), initial=0.0), 1e-9)
+    here = np.stack([values(name) for name in a.columns.values()])
+    there = np.stack([values(b.columns[key]) for key in a.columns])
+    off = 2e-6 * max(np.nanmax(np.abs(there), initial=0.0), 1e-9)
     factors = (1.0, np.pi / 180.0, 180.0 / np.pi, 1e-3, 1e3)
-    return any(np.allclose(a * factor, b, 0.0, off, equal_nan=True) for factor in factors)
+    return any(np.allclose(here * factor, there, 0.0, off, equal_nan=True) for factor in factors)
 
 
 def rigid(groups: Sequence[Group], values: Values | None) -> bool:
@@ -301,12 +281,12 @@ def rigid(groups: Sequence[Group], values: Values | None) -> bool:
     return all(keeps_distance(a, b) for a, b in combinations(points, 2))
 
 
-def keeps_distance(one: np.ndarray, other: np.ndarray) -> bool:
+def keeps_distance(a: np.ndarray, b: np.ndarray) -> bool:
     """Whether two points (n, 3), NaN where unread, keep their distance and turn about each other.
 
-    Fewer than three readings of both tell nothing.
+    Fewer than three readings of both are too few.
     """
-    apart = (one - other)[np.isfinite(one - other).all(axis=1)]
+    apart = (a - b)[np.isfinite(a - b).all(axis=1)]
     if len(apart) < 3:
         return False
     length = np.linalg.norm(apart, axis=1)

@@ -3,317 +3,405 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from kinacc.errors import InputError, Problem, refuse
 from kinacc.measurements.column_names import NOMINAL, Name
-from kinacc.measurements.intake import columns, no_reading, pairs, targets_in_rows, text
-from kinacc.measurements.intake.choices import Choice, Undecided
-from kinacc.measurements.intake.columns import NO_SIGMA, NamedColumns
-from kinacc.measurements.intake.groups import is_pulse, listed
-from kinacc.measurements.layout import ANGLE, LENGTH, TOOL, Layout, find
-from kinacc.measurements.table import RawTable
+from kinacc.measurements.faults import BEYOND, is_no_coordinate, none_read
+from kinacc.measurements.intake import pairs, targets_in_rows
+from kinacc.measurements.intake.choices import TAKE, Choice, Undecided
+from kinacc.measurements.intake.columns import ABOUT_JOINTS, NamedColumns
+from kinacc.measurements.intake.groups import JOINTS, POINT, POSE, PULSES, listed
+from kinacc.measurements.layout import ANGLE, LENGTH, TOOL, Layout, find, in_order_of
+from kinacc.measurements.orientation import CONVENTIONS, rotations
+from kinacc.measurements.table import RawTable, frame
 
+MEASUREMENTS, POINTS, POSES = "measurements", "points", "poses"
 FULL_TURN_RAD = 2.0 * np.pi * 1.05
 _LARGEST_M = 50.0  # no instrument stands further away
 _MOST_DEG = 7200.0  # no joint turns further
-_UNITS = {  # usual and small unit, and the largest number that is taken for the small one
-    "joint_unit": ("deg", "rad", FULL_TURN_RAD),
-    "length_unit": ("mm", "m", _LARGEST_M),
-    "angle_unit": ("deg", "rad", FULL_TURN_RAD),
+_FAR = 1.5  # times the extent of the other points
+# By setting: the units that are known, the usual and the small one, and the largest number that is
+# taken for the small one.
+_UNITS: dict[str, tuple[Mapping, str, str, float]] = {
+    "joint_unit": (ANGLE, "deg", "rad", FULL_TURN_RAD),
+    "length_unit": (LENGTH, "mm", "m", _LARGEST_M),
+    "angle_unit": (ANGLE, "deg", "rad", FULL_TURN_RAD),
+}
+# Options that answer what was assumed, and the answers there are.
+OPTIONS: dict[str, tuple[str, tuple[str, ...]]] = {
+    "joint_unit": ("--joint-unit", ("deg", "rad")),
+    "length_unit": ("--length-unit", ("mm", "m")),
+    "angle_unit": ("--angle-unit", ("deg", "rad")),
+    "orientation": ("--orientation", ("none", "quaternion", "rotation_vector", *CONVENTIONS)),
+    "order": ("--orientation", ("quaternion", "quaternion_xyzw")),
+    "horizontal": ("--horizontal", ("clockwise", "counterclockwise")),
 }
 
 
 @dataclass(frozen=True)
 class Guess:
-    """What ``measurements.file`` would say, and what of it the file does not.
+    """A ``measurements.file`` section, and what of it the file does not state.
 
-    ``assumed`` are words on settings taken by default or by the size of numbers, by setting:
-    joint_unit, length_unit, angle_unit, orientation, order. ``stated``: columns that state a unit,
-    by setting. ``found`` is what the columns were recognised as; its questions are open. ``told``
-    are words on what else is known of the file.
+    ``assumed``: settings taken by default or by the size of numbers, with a text on each (see
+    ``OPTIONS``). ``columns``: their meaning. ``notes``: facts on how the file was read.
     """
 
     section: dict[str, Any]
     table: RawTable
-    found: NamedColumns
+    columns: NamedColumns
     assumed: dict[str, str] = field(default_factory=dict)
-    stated: dict[str, tuple[str, str]] = field(default_factory=dict)
-    told: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
     @property
     def joints(self) -> int:
         """Number of joints."""
-        return len(self.found.joints)
-
-    @property
-    def targets(self) -> tuple[str, ...]:
-        """Names of the targets."""
-        return tuple(self.found.targets)
+        return len(self.columns.joints)
 
     def but(self, settings: Mapping[str, Any]) -> Guess:
         """The guess with other settings; ``orientation`` is taken key by key."""
         turn = self.section["orientation"] | settings.get("orientation", {})
         return replace(self, section=self.section | {**settings, "orientation": turn})
 
-    def unused(self) -> tuple[tuple[tuple[str, ...], str], ...]:
-        """Columns the section does not have read, as the reader itself sees it, and why (or "").
+    def unused(self) -> dict[str, str]:
+        """Columns that the reader does not use by the section, and why ("" where unknown).
 
         Raises InputError where the reader cannot follow the section.
         """
-        problems = []
-        slides = np.array([name.unit in LENGTH for name in self.found.joints])
+        problems: list[Problem] = []
+        slides = np.array([name.unit in LENGTH for name in self.columns.joints])
         read = find(self.table, Layout.of(self.section), slides, problems)
         refuse(problems, f"{self.table.path} cannot be described")
-        left = list(read.unused(self.table))
-        told = []
-        for group, why in self.found.aside:
-            if {*group.names} <= {*left}:
-                told.append((group.names, why))
-                left = [name for name in left if name not in group.names]
-        return (*told, (tuple(left), "")) if left else tuple(told)
+        why = {name: g.why_unread for g in self.columns.aside for name in g.names}
+        return {name: why.get(name, "") for name in read.unused(self.table)}
+
+
+def orientation_of(word: str) -> dict[str, str]:
+    """The settings that ``--orientation`` stands for; InputError for no such word."""
+    if word in ("none", "quaternion", "rotation_vector"):
+        return {"kind": word}
+    if word == "quaternion_xyzw":
+        return {"kind": "quaternion", "order": "xyzw"}
+    if word in CONVENTIONS:
+        return {"kind": "euler", "convention": word}
+    allowed = f"none, quaternion, quaternion_xyzw, rotation_vector, {', '.join(CONVENTIONS)}"
+    raise InputError(Problem("--orientation", repr(word), allowed))
 
 
 def look(
     path: str | Path | Sequence[str | Path],
-    take: Sequence[str] = (),
-    turned: bool = True,
-    answers: Mapping[str, str] | None = None,
+    answers: Mapping[str, Any] | None = None,
+    need: str = MEASUREMENTS,
 ) -> Guess:
-    """The best guess at a file; what it leaves open stands in ``found.questions``.
+    """The best guess at a file.
 
-    ``take``: columns that are read whatever their names say, each for all that go with it;
-    ``turned``: orientations are wanted; ``answers`` to choices, by key. Two paths are joints and
-    points of the same poses, as are two sheets of a workbook. Raises Undecided where a choice is
-    open, InputError where joints or positions cannot be found, where units contradict each other,
-    and where ``take`` names what cannot be read.
+    Two paths are joints and points of the same poses, as are two sheets of a workbook. ``answers``
+    to choices by key, ``take`` (columns that are read whatever their names mean) and units among
+    them. ``need``: measurements (joints and points), or joints, points (measured) or poses (wanted)
+    alone. Raises Undecided where a choice is open, InputError where the needed columns are missing,
+    where units contradict each other, and where ``take`` names columns that cannot be read.
     """
-    answers, sheets = answers or {}, ()
-    if isinstance(path, (str, Path)):
-        sheets = pairs.sheets_apart(Path(path), answers)
-    pair = None
-    if sheets or not isinstance(path, (str, Path)):
-        pair = pairs.look([path, path] if sheets else path, take, turned, answers, sheets)
-        path = pair.path
-    path = str(path)
-    looked = pair.points if pair else text.look(path, answers)
-    table, sigma = pair.table if pair else looked.table, answers.get("sigma", "")
-    found = pair.found if pair else columns.of_table(table, take, turned, sigma)
-    per_deg, told = pulses(found, table, answers)
-    _refuse(path, table, found, take)
-    void: list[float] = [] if found.questions else _no_reading(table, found, answers)
+    answers = answers or {}
+    looked = pairs.look(path, answers, need == POSES)
+    table, columns = looked.table, _needed(looked.columns, need)
+    questions = list(columns.questions)
+    if need in (POINTS, POSES) and len(columns.targets) > 1 and not questions:
+        meant = {t["x"].column: name for name, t in columns.targets.items()}
+        questions = [Choice(TAKE, f"several points: {', '.join(columns.targets)}", meant)]
+    if questions:
+        raise Undecided(table.path, questions)
+    _refuse_missing(looked.path, table, columns, answers.get("take", ()), need)
+    notes = [*looked.notes, *table.notes]
+    per_deg = _pulses(columns, table, answers)
+    void = _no_reading(table, columns, answers) if need == MEASUREMENTS else []
 
     def values(name: Name) -> np.ndarray:
-        # What says that nothing was read tells nothing of units and distances.
-        every = table.values(name.column)
-        return np.where(np.isin(every, void), np.nan, every)
+        # Numbers in place of a reading are no lengths.
+        numbers = table.values(name.column)
+        return np.where(np.isin(numbers, void), np.nan, numbers)
 
-    problems = []
-    units = Units(table.path, values, problems, dict(looked.assumed), above=looked.stated)
-    turning = [name for name in found.joints if name.unit not in LENGTH and not per_deg]
-    first = next(iter(found.targets.values()))
-    joint_unit = units.of(turning, "joint_unit")
-    length_unit = units.of(
-        [t[axis] for t in found.targets.values() for axis in "xyz"], "length_unit"
-    )
-    angle_unit = units.of([n for q, n in first.items() if q in ("rx", "ry", "rz")], "angle_unit")
-    apart: tuple[str, ...] = ()
-    q_rad = np.stack([values(name) for name in found.joints], axis=1)
-    q_rad = q_rad * ANGLE[joint_unit] / np.array(per_deg or 1.0)
-    if not found.questions:
-        point = np.stack([values(first[axis]) for axis in "xyz"], axis=1) * LENGTH[length_unit]
-        found, apart = targets_in_rows.told_apart(table, found, q_rad, point, values)
-    kind, convention = found.turn
+    problems: list[Problem] = []
+    assumed = dict(looked.assumed)
+
+    def unit_of(names: Sequence[Name], setting: str) -> str:
+        return _unit(names, setting, table, values, answers, looked.stated, assumed, problems)
+
+    turning = [name for name in columns.joints if name.unit not in LENGTH and not per_deg]
+    first = next(iter(columns.targets.values()), {})
+    joint_unit = unit_of(turning, "joint_unit")
+    points = [t[axis] for t in columns.targets.values() for axis in "xyz"]
+    length_unit = unit_of(points, "length_unit")
+    angle_unit = unit_of([n for q, n in first.items() if q in ("rx", "ry", "rz")], "angle_unit")
+    if need != MEASUREMENTS and joint_unit == "rad" and "joint_unit" in assumed:
+        meant = {"rad": "radians", "deg": "degrees, of an arm that hardly moves"}
+        raise Undecided(table.path, [Choice("--joint-unit", assumed["joint_unit"], meant)])
+    refuse(problems, f"{table.path} cannot be described")
+    section: dict[str, Any] = {"path": looked.path, **looked.written.written()}
+    if need == MEASUREMENTS:
+        q_rad = np.stack([values(name) for name in columns.joints], axis=1)
+        q_rad = q_rad * ANGLE[joint_unit] / np.array(per_deg or 1.0)
+        point_mm = np.stack([values(first[axis]) for axis in "xyz"], axis=1) * LENGTH[length_unit]
+        columns = targets_in_rows.with_targets(table, columns, q_rad, point_mm)
+        if targets_in_rows.counts_readings(table, columns, q_rad):
+            section["repeats_in_names"] = True
+    kind, convention = columns.turn
     orientation = {"kind": kind, "convention": convention, "unit": angle_unit}
     if kind == "euler":
-        words = f"the orientations are Euler angles of convention {convention}"
-        units.assumed["orientation"] = words
+        assumed["orientation"] = f"the orientations are Euler angles of convention {convention}"
     if "quat1" in first:
         orientation["order"] = "wxyz"
         parts = ", ".join(first[f"quat{number}"].column for number in range(1, 5))
-        units.assumed["order"] = f"{parts} are w, x, y, z of the quaternion"
-    mapping = _mapping(path, found, joint_unit, length_unit, angle_unit, problems)
-    refuse(problems, f"{path} cannot be described")
-    section: dict[str, Any] = {
-        "path": path,
-        **looked.written.written(),
+        assumed["order"] = f"{parts} are w, x, y, z of the quaternion"
+    if word := answers.get("orientation"):
+        orientation |= orientation_of(word)
+        assumed = {k: v for k, v in assumed.items() if k not in ("orientation", "order")}
+    section |= {
         "no_reading": void,
-        "sigma": _sigma(path, found, sigma),
+        "sigma": _sigma(looked.path, columns, answers.get("sigma", "")),
         "joint_unit": joint_unit,
         "length_unit": length_unit,
         "orientation": orientation,
-        "targets": list(found.targets),
-        "columns": mapping,
+        "targets": list(columns.targets),
+        "columns": _mapping(looked.path, columns, joint_unit, length_unit, angle_unit, problems),
     }
-    section |= {"pulses_per_deg": list(per_deg)} if per_deg else {}
-    section |= {"joints": pair.joints} if pair else {}
-    again, words = targets_in_rows.counted(table, found, q_rad)
-    section |= {"repeats_in_names": True} if again else {}
-    every = (*looked.told, *table.notes, *(pair.told if pair else ()), *told, *apart, *words)
-    return Guess(section, table, found, units.assumed, units.stated, tuple(dict.fromkeys(every)))
+    refuse(problems, f"{looked.path} cannot be described")
+    section |= {"pulses_per_deg": per_deg} if per_deg else {}
+    section |= {"joints": looked.joints} if looked.joints else {}
+    return Guess(section, table, columns, assumed, tuple(dict.fromkeys(notes)))
 
 
-def _sigma(path: str, found: NamedColumns, given: str) -> int:
-    """How many standard deviations the uncertainties that are read are, by name or by answer."""
-    spreads = [n for t in found.targets.values() for q, n in t.items() if q.startswith("std_")]
-    said = {name.coverage for name in spreads}
-    answered = {int(given)} if given not in ("", "none") else set()
-    if len(said) > 1 or len((said - {0}) | answered) > 1:
-        what = f"not all of {', '.join(n.column for n in spreads)} are so many standard deviations"
-        where = f"--sigma {given}" if given else path
-        fix = "give --sigma none, which reads none of them"
-        raise InputError(Problem(where, what, "one number for all of them", fix))
-    return max((said - {0}) | answered, default=1)
+def _needed(columns: NamedColumns, need: str) -> NamedColumns:
+    """The columns that are needed, with the questions on them; others come along if certain."""
+    if need == MEASUREMENTS:
+        return columns
+    open_joints = [q for q in columns.questions if q.about.startswith(ABOUT_JOINTS)]
+    rest = [q for q in columns.questions if q not in open_joints]
+    about = open_joints if need == JOINTS else rest
+    asked = tuple(question for question in about if len(question.answers) > 1)
+    columns = replace(columns, questions=asked)
+    if need == JOINTS:
+        return replace(columns, targets={}, turn=("none", "XYZ"), commanded=())
+    return replace(columns, joints=(), commanded=()) if open_joints else columns
 
 
-def sigma_choice(guess: Guess) -> Choice | None:
-    """The question how many standard deviations an uncertainty is, where the file has some."""
-    names = ", ".join(n for group, why in guess.found.aside if why == NO_SIGMA for n in group.names)
-    meant = {"1": "one standard deviation", "2": "two", "none": "they are not read"}
-    about = f"{names} do not tell how many standard deviations they are"
-    return Choice("--sigma", about, meant) if names else None
-
-
-def pulses(
-    found: NamedColumns, table: RawTable, answers: Mapping[str, str]
-) -> tuple[tuple[float, ...], tuple[str, ...]]:
-    """Pulses of every joint's motor in a degree, empty where joints are angles; words on it.
-
-    Raises Undecided where that was not answered, InputError where the answer does not fit.
-    """
-    given, joints = answers.get("pulses_per_deg"), found.joints
-    if found.questions or not joints:
-        return (), ()
-    about = f"{listed([name.column for name in joints])} are pulses of the motors"
-    if given is None:
-        most = max(np.nanmax(np.abs(table.values(n.column)), initial=0.0) for n in joints)
-        if is_pulse(joints[0].unit) or (not joints[0].unit and most >= _MOST_DEG):
-            meant = {",".join("ABCDEFG"[: len(joints)]): "pulses of each joint in a degree"}
-            raise Undecided(table.path, [Choice("--pulses-per-deg", about, meant)])
-        return (), ()
-    try:
-        per_deg = tuple(float(each) for each in given.split(","))
-    except ValueError:
-        per_deg = ()
-    if len(per_deg) != len(joints) or 0.0 in per_deg or not np.isfinite(per_deg).all():
-        allowed = f"{len(joints)} numbers parted by commas, none 0"
-        raise InputError(Problem("--pulses-per-deg", repr(given), allowed))
-    return per_deg, (f"{about}, turned into degrees as answered",)
-
-
-def _no_reading(table: RawTable, found: NamedColumns, answers: Mapping) -> list[float]:
-    """Numbers that say that nothing was read, as answered or as found."""
-    given = [w for w in answers.get("no_reading", "").replace(" ", "").split(",") if w]
-    try:
-        known = [float(each) for each in given if each != "none"]
-    except ValueError:
-        what = f"{answers['no_reading']!r} is no number"
-        allowed = "a number such as 9999.999, or none"
-        raise InputError(Problem("--no-reading", what, allowed)) from None
-
-    def stacked(names) -> np.ndarray:
-        return np.stack([table.values(name.column) for name in names], axis=1)
-
-    points = {
-        name: stacked(target[axis] for axis in "xyz") for name, target in found.targets.items()
-    }
-    none = no_reading.found(
-        points, stacked(found.joints), table.rows_in_words, known, "none" not in given
-    )
-    if isinstance(none, Choice):
-        raise Undecided(table.path, [none])
-    return none
-
-
-def _refuse(path: str, table: RawTable, found: NamedColumns, take: Sequence[str]) -> None:
+def _refuse_missing(
+    path: str, table: RawTable, columns: NamedColumns, take: Sequence[str], need: str
+) -> None:
     problems = []
     for column in take:
         if column not in table.columns:
-            what = f"{path} has no such column"
-            problems.append(Problem(f"--take {column}", what, ", ".join(table.columns)))
-        elif column not in found.read():
-            why = next((f": {why}" for group, why in found.aside if column in group.names), "")
+            message = f"{path} has no such column"
+            problems.append(Problem(f"--take {column}", message, ", ".join(table.columns)))
+        elif column not in columns.read() and need == MEASUREMENTS:
+            why = next((f": {g.why_unread}" for g in columns.aside if column in g.names), "")
             allowed = "one column of joints, of a point or of an orientation"
             problems.append(Problem(f"--take {column}", f"cannot be read{why}", allowed))
-    joints = (found.joints, "no columns of 4 to 7 joints", ("joints",), "q1_deg ..")
-    points = (found.targets, "no columns of a measured point", ("point", "pose"), "x_mm ..")
-    for _, what, kinds, names in (each for each in (joints, points) if not each[0]):
-        left = [(group, why) for group, why in found.aside if group.kind in kinds]
-        told = "; ".join(f"{group.in_words()}: {why}" for group, why in left)
-        takes = [g.names[0] for g, _ in left if g.kind == "point" and g.role == NOMINAL][:1]
-        fix = f"name them {names}, or give joints and points as two files: init JOINTS POINTS"
-        fix += "".join(f"; --take {shlex.quote(name)} reads them all the same" for name in takes)
-        problems.append(Problem(path, f"{what} were found ({told})", fix=fix))
+    joints = (columns.joints, "no columns of 4 to 7 joints", (JOINTS,), "q1_deg ..")
+    points = (columns.targets, "no columns of a measured point", (POINT, POSE), "x_mm ..")
+    wanted = {JOINTS: (joints,), POINTS: (points,), POSES: (points,)}.get(need, (joints, points))
+    for there, message, kinds, names in wanted:
+        if there:
+            continue
+        spare = [group for group in columns.aside if group.kind in kinds]
+        why = "; ".join(f"{group.text}: {group.why_unread}" for group in spare)
+        fix = f"name them {names} (also by --names), or give joints and points as two files"
+        nominal = [g.names[0] for g in spare if g.kind == POINT and g.role == NOMINAL][:1]
+        fix += "".join(f"; --take {shlex.quote(name)} reads them all the same" for name in nominal)
+        why = f" ({why})" if why else f" in {', '.join(table.columns)}"
+        problems.append(Problem(path, f"{message} were found{why}", fix=fix))
     refuse(problems, f"{path} cannot be described")
 
 
-@dataclass
-class Units:
-    """Units of columns: those they state, or those the size of their numbers speaks for."""
+def _sigma(path: str, columns: NamedColumns, given: str) -> int:
+    """How many standard deviations the uncertainties that are read are, by name or by answer."""
+    spreads = [n for t in columns.targets.values() for q, n in t.items() if q.startswith("std_")]
+    coverage = {name.coverage for name in spreads}
+    answered = {int(given)} if given not in ("", "none") else set()
+    if len(coverage) > 1 or len((coverage - {0}) | answered) > 1:
+        message = (
+            f"not all of {', '.join(n.column for n in spreads)} are so many standard deviations"
+        )
+        where = f"--sigma {given}" if given else path
+        fix = "give --sigma none, which reads none of them"
+        raise InputError(Problem(where, message, "one number for all of them", fix))
+    return max((coverage - {0}) | answered, default=1)
 
-    path: str
-    values: Callable[[Name], np.ndarray]
-    problems: list[Problem]
-    assumed: dict[str, str] = field(default_factory=dict)
-    stated: dict[str, tuple[str, str]] = field(default_factory=dict)
-    above: Mapping[str, str] = field(default_factory=dict)
-    given: Mapping[str, str] = field(default_factory=dict)  # asks for one unit for all
 
-    def of(self, names: Sequence[Name], setting: str) -> str:
-        """The unit of columns; what is wrong with it is a problem."""
-        usual, small, largest = _UNITS[setting]
-        if not names:
-            return usual
-        known = LENGTH if setting == "length_unit" else ANGLE
-        words = listed([name.column for name in names])
-        most = max(np.nanmax(np.abs(self.values(name)), initial=0.0) for name in names)
-        above = self.above.get(setting.removesuffix("_unit"), "")  # in a line around the rows
-        given = self.given.get(setting)
-        unit = given or next((n.unit for n in names if n.unit), above)
-        if self.given and (odd := {n.unit for n in names} - {"", unit}):
-            what = f"are in {' and '.join(sorted({*odd, unit}))}"
-            self.problems.append(Problem(f"{self.path}: columns {words}", what, "one unit for all"))
-        if not unit:
-            unit = small if most <= largest else usual
-            self.assumed[setting] = f"{words} are in {unit}: the largest number is {most:.4g}"
-            return unit
-        self.stated[setting] = (unit, words)
-        where = f"{self.path}: columns {', '.join(name.column for name in names)}"
-        if unit not in known:
-            self.problems.append(Problem(where, f"are in {unit}", " or ".join(known)))
-        elif unit == "m" and most > largest:
-            what = f"are in m, and the largest number is {most:.4g}"
-            self.problems.append(Problem(where, what, f"at most {largest:g} m"))
-        return unit if unit in known else usual
+def is_pulse(name: Name) -> bool:
+    """Whether a column holds pulses of a motor, which need their number in a degree."""
+    return name.unit.lower() in PULSES
+
+
+def _pulses(columns: NamedColumns, table: RawTable, answers: Mapping) -> list[float]:
+    """Pulses of every joint's motor in a degree, empty where joints are angles."""
+    given, joints = answers.get("pulses_per_deg"), columns.joints
+    if not joints:
+        return []
+    if given is None:
+        most = max(np.nanmax(np.abs(table.values(n.column)), initial=0.0) for n in joints)
+        if is_pulse(joints[0]) or (not joints[0].unit and most >= _MOST_DEG):
+            about = f"{listed([name.column for name in joints])} are pulses of the motors"
+            meant = {",".join("ABCDEFG"[: len(joints)]): "pulses of each joint in a degree"}
+            raise Undecided(table.path, [Choice("--pulses-per-deg", about, meant)])
+        return []
+    try:
+        per_deg = [float(number) for number in given.split(",")]
+    except ValueError:
+        per_deg = []
+    if len(per_deg) != len(joints) or 0.0 in per_deg or not np.isfinite(per_deg).all():
+        allowed = f"{len(joints)} numbers parted by commas, none 0"
+        raise InputError(Problem("--pulses-per-deg", repr(given), allowed))
+    return per_deg
+
+
+def _no_reading(table: RawTable, columns: NamedColumns, answers: Mapping) -> list[float]:
+    """Numbers in place of a reading, as answered or as certain; raises Undecided on others.
+
+    Certain is a number in all three coordinates and far from all other points.
+    """
+    given = [w for w in answers.get("no_reading", "").replace(" ", "").split(",") if w]
+    try:
+        void = [float(word) for word in given if word != "none"]
+    except ValueError:
+        allowed = "a number such as 9999.999, or none"
+        message = f"{answers['no_reading']!r} is no number"
+        raise InputError(Problem("--no-reading", message, allowed)) from None
+    for name, target in columns.targets.items():
+        points = np.stack([table.values(target[axis].column) for axis in "xyz"], axis=1)
+        alike = points[(points == points[:, :1]).all(axis=1), 0]
+        large = np.unique(points[np.abs(points) >= 999.0])
+        numbers = {*alike.tolist(), *filter(is_no_coordinate, large.tolist())}
+        unread = np.any([none_read(points, number) for number in numbers], axis=0)
+        others = points[~unread & np.isfinite(points).all(axis=1)]
+        centre = np.median(others, axis=0) if len(others) else np.zeros(3)
+        extent = np.max(np.linalg.norm(others - centre, axis=1), initial=0.0)
+        for number in sorted(numbers - {*void}):
+            rows = none_read(points, number)
+            far = np.linalg.norm(number - centre) > _FAR * extent and len(others) > 2
+            if abs(number) >= BEYOND or (far and (points[rows] == number).all()):
+                void.append(number)
+            elif "none" not in given:
+                before = "".join(f"{word}," for word in given)
+                meant = {f"{before}{number:.10g}": "nothing was read there",
+                         f"{before}none": "it was read so"}  # fmt: skip
+                where = table.rows_in_words(np.flatnonzero(rows))
+                about = f"the point of {name} is {number:.10g} in x, y or z of {where}"
+                raise Undecided(table.path, [Choice("--no-reading", about, meant)])
+    return sorted(void)
+
+
+def _unit(
+    names: Sequence[Name], setting: str, table: RawTable, values, answers, above, assumed, problems
+) -> str:
+    """The unit of columns: as stated, as answered, or by the size of their numbers.
+
+    ``above``: the units of lines around the rows. What is assumed and what is wrong is added.
+    """
+    known, usual, small, largest = _UNITS[setting]
+    if not names:
+        return usual
+    text = listed([name.column for name in names])
+    most = max(np.nanmax(np.abs(values(name)), initial=0.0) for name in names)
+    given = answers.get(setting)
+    stated = {name.unit for name in names} - {""}
+    where = f"{table.path}: columns {', '.join(name.column for name in names)}"
+    if len(stated) > 1 or (given and stated - {given}):
+        option = f" ({OPTIONS[setting][0]} {given})" if given else ""
+        message = f"are in {' and '.join(sorted({*stated, *filter(None, [given])}))}{option}"
+        problems.append(Problem(where, message, "one unit for all"))
+    unit = given or next(iter(stated), above.get(setting.removesuffix("_unit"), ""))
+    if not unit:
+        unit = small if most <= largest else usual
+        assumed[setting] = f"{text} are in {unit}: the largest number is {most:.4g}"
+    elif unit not in known:
+        problems.append(Problem(where, f"are in {unit}", " or ".join(known)))
+    elif unit == "m" and most > largest:
+        message = f"are in m, and the largest number is {most:.4g}"
+        problems.append(Problem(where, message, f"at most {largest:g} m"))
+    return unit if unit in known else usual
 
 
 def _mapping(
-    path: str, found: NamedColumns, joint_unit: str, length_unit: str, angle_unit: str, problems
+    path: str, columns: NamedColumns, joint_unit: str, length_unit: str, angle_unit: str, problems
 ) -> dict[str, str]:
     """Our names and the file's, of every column that is read."""
     mapping: dict[str, str] = {}
 
     def put(ours: str, name: Name, unit: str) -> None:
-        if name.unit in ("", unit) or not unit or is_pulse(name.unit):
+        if name.unit in ("", unit) or not unit or is_pulse(name):
             mapping[ours] = name.column
-        elif name.column != f"{ours}_{name.unit}":  # our own name says its unit
-            what = f"is in {name.unit}, others of its kind are in {unit}"
+        elif name.column != f"{ours}_{name.unit}":  # our own name states its unit
+            message = f"is in {name.unit}, others of its kind are in {unit}"
             fix = "export all of them in one unit"
-            problems.append(Problem(f"{path}: column {name.column}", what, unit, fix))
+            problems.append(Problem(f"{path}: column {name.column}", message, unit, fix))
 
-    for suffix, names in (("", found.joints), ("_cmd", found.commanded)):
+    for suffix, names in (("", columns.joints), ("_cmd", columns.commanded)):
         for number, name in enumerate(names, 1):
             put(f"q{number}{suffix}", name, length_unit if name.unit in LENGTH else joint_unit)
-    for target, parts in found.targets.items():
+    for target, parts in columns.targets.items():
         for quantity, name in parts.items():
             turned = quantity.removeprefix("std_").startswith("r")
             unit = "" if quantity[0] == "q" else angle_unit if turned else length_unit
             put(quantity if target == TOOL else f"{target}_{quantity}", name, unit)
-    for quantity, name in found.single.items():
+    for quantity, name in columns.single.items():
         put(quantity, name, length_unit if quantity.startswith("payload_") else "")
     return mapping
+
+
+def under_our_names(guess: Guess) -> RawTable:
+    """The table with its columns under our names, with units: q1_deg, x_mm, rvx_rad, pose."""
+    section, table, columns = guess.section, guess.table, guess.columns
+    named: dict[str, Sequence] = {}
+    per_deg = section.get("pulses_per_deg") or [None] * guess.joints
+    for number, (name, count) in enumerate(zip(columns.joints, per_deg, strict=True), 1):
+        unit = name.unit if name.unit in LENGTH else section["joint_unit"]
+        cells = table.columns[name.column]
+        named[f"q{number}_{unit}"] = cells if count is None else table.values(name.column) / count
+    target = next(iter(columns.targets.values()), {})
+    for axis in "xyz" if target else "":
+        named[f"{axis}_{section['length_unit']}"] = table.columns[target[axis].column]
+    turn = [quantity for quantity in target if quantity[0] in "qr"]
+    kind, convention = columns.turn
+    if turn and kind == "quaternion":
+        for ours, quantity in zip(("qw", "qx", "qy", "qz"), turn, strict=True):
+            named[ours] = table.columns[target[quantity].column]
+    elif turn:
+        order = in_order_of(convention) if kind == "euler" else turn
+        angles = np.stack([table.values(target[quantity].column) for quantity in order], axis=1)
+        angles = angles * ANGLE[section["orientation"]["unit"]]
+        turned = rotations(angles, Layout(orientation=kind, convention=convention))
+        vectors = Rotation.from_matrix(turned).as_rotvec().T
+        named |= {f"rv{axis}_rad": vector for axis, vector in zip("xyz", vectors, strict=True)}
+    named |= {quantity: table.columns[name.column] for quantity, name in columns.single.items()}
+    used = columns.read()
+    spare = [name for name in table.columns if name not in used and name not in named]
+    for name in spare if "pose" not in named else ():
+        texts = table.texts(name)
+        if (
+            np.isnan(table.values(name)).all()
+            and ":" not in "".join(texts)
+            and (len({*texts}) == len(texts) and not table.gaps(name).any())
+        ):
+            named["pose"] = table.columns[name]
+            break
+    return replace(table, columns=frame(named | {n: table.columns[n] for n in spare}))
+
+
+def summary(guess: Guess) -> list[str]:
+    """What the columns were read as, a line each."""
+    columns, (kind, convention) = guess.columns, guess.columns.turn
+    target = next(iter(columns.targets.values()), {})
+    turn = [name.column for quantity, name in target.items() if quantity[0] in "qr"]
+    turned = f"w, x, y, z of a {kind}" if kind == "quaternion" else f"{kind} {convention}"
+    parts = {
+        "joints": [name.column for name in columns.joints],
+        "point": [target[axis].column for axis in "xyz" if target],
+        turned: turn,
+    }
+    return [f"{listed(names)}: read as {text}" for text, names in parts.items() if names]

@@ -1,4 +1,4 @@
-"""Where the names of a file stand above its rows of numbers, and what the lines above them say."""
+"""Where the names of a file stand above its rows of numbers, and what the lines above state."""
 
 from __future__ import annotations
 
@@ -14,17 +14,9 @@ from kinacc.measurements.layout import ANGLE, LENGTH
 from kinacc.measurements.robot_programs import numbers_within
 
 _UNITS = re.compile(
-    r"\b(?:units?|einheit(?:en)?|unit[eéà]s?|unidad(?:es)?|単位)\b[^:=\n]{0,20}[:=]\s*([^;\n#]+)",
-    re.IGNORECASE,
-)
-_IN_UNITS = re.compile(
-    r"\b(?:values|data|coordinates|positions|points|lengths|dimensions|werte|koordinaten|punkte)\b"
-    r"[^.;\n]{0,20}\bin\s+([^.;\n]{1,30})",
-    re.IGNORECASE,
-)
-_FRAME = re.compile(
-    r"\b(?:working frame|coordinate (?:frame|system)|frame|koordinatensystem|bezugssystem)\b"
-    r"\s*[:=]\s*([^\n;]+)",
+    r"\b(?:units?|einheit(?:en)?|unit[eéà]s?|unidad(?:es)?|単位)\b[^:=\n]{0,20}[:=]\s*([^;\n#]+)"
+    r"|\b(?:values|data|coordinates|positions|points|lengths|dimensions|werte|koordinaten|punkte"
+    r"|units)\b[^.;\n]{0,20}\bin\s+([^.;\n]{1,30})",
     re.IGNORECASE,
 )
 
@@ -62,9 +54,8 @@ def head_of(rows: Sequence[Row], delimiter: str, sheet: bool = False) -> Head | 
     ``sheet``: the rows are those of a sheet, of any width.
     """
     counts = [numbers_in(cells) for _, cells in rows]
-    remarks = [
-        c > 1 and is_comment(cells, delimiter) for c, (_, cells) in zip(counts, rows, strict=True)
-    ]
+    remarks = [count > 1 and is_comment(cells, delimiter)
+               for count, (_, cells) in zip(counts, rows, strict=True)]  # fmt: skip
     if 2 * sum(remarks) < sum(count > 1 for count in counts):  # else the points are called so
         counts = [0 if out else count for count, out in zip(counts, remarks, strict=True)]
     many = [number for number, count in enumerate(counts) if count > 1]
@@ -76,10 +67,7 @@ def head_of(rows: Sequence[Row], delimiter: str, sheet: bool = False) -> Head | 
     usual = sorted(counts[number] for number in many)[len(many) // 2]
     first = next(number for number in many if 2 * counts[number] >= usual)
     above = [
-        number
-        for number in range(first)
-        if _can_name(rows[number][1], rows[first][1], width, delimiter, sheet)
-        and numbers_in(header_cells(rows[number][1], width)) <= 1
+        n for n in range(first) if _can_name(rows[n][1], rows[first][1], width, delimiter, sheet)
     ]
     units = 0
     while above and _are_units(rows[above[-1]][1]):
@@ -90,71 +78,65 @@ def head_of(rows: Sequence[Row], delimiter: str, sheet: bool = False) -> Head | 
     most = max(len(filled(rows[number][1])) for number in above)
     place = max(number for number in above if 2 * len(filled(rows[number][1])) >= most)
     line, cells = rows[place][0], header_cells(rows[place][1], width)
-    over = header_cells(rows[place - 1][1], width) if place else []
-    if _are_units(over) and len(over) == width == len(cells):
-        joined = [f"{n} [{u}]" if u.strip("-/ ") else n for n, u in zip(cells, over, strict=True)]
-        return Head(line, first, units, width, tuple(joined))
-    told, grouped = filled(cells), filled(over)
-    if len({*told}) < len(told) and grouped and not is_comment(rows[place - 1][1], delimiter):
-        if len({*grouped}) == len(grouped) == len(told):
-            return Head(rows[place - 1][0], first, units + 1, width)
-        joined, group = [], ""
+    over = rows[place - 1][1] if place else []
+    if (
+        len({*filled(cells)}) < len(filled(cells))
+        and filled(over)
+        and not is_comment(over, delimiter)
+    ):
+        names, group = [], ""
         for number, name in enumerate(cells):  # names under those of groups: Measured over X, Y, Z
-            group = over[number] if number < len(over) and over[number] else group
-            joined.append(f"{group} {name}".strip())
-        if len({*joined}) == len(joined):
-            return Head(line, first, units, width, tuple(joined))
+            group = (
+                str(over[number] or "").strip() if number < len(over) and over[number] else group
+            )
+            names.append(f"{group} {name}".strip())
+        if len({*names}) == len(names):
+            return Head(line, first, units, width, tuple(names))
     return Head(line, first, units, width)
 
 
 def _in_remark(rows: Sequence[Row], width: int, delimiter: str) -> tuple[str, ...] | None:
-    """Names that stand behind a sign of remarks in the last line above the numbers."""
+    """Names that stand behind a sign of remarks in the last lines above the numbers."""
     for _, cells in rows[::-1][:3]:
         if not is_comment(cells, delimiter):
             continue
         first = cells[0].lstrip(" #%/!")
         names = header_cells([first, *cells[1:]] if first else cells[1:], width)
-        # The sign by itself is what a column of numbers is called.
+        # The sign by itself may be the name of a column of numbers.
         names = cells if not first and len(names) < width == len(cells) else names
         names = [name.strip() for name in names]
-        if len(names) == width and all(names) and not numbers_in(names):
-            return tuple(names) if len({*names}) == width else None
+        if len({*names}) == len(names) == width and all(names) and not numbers_in(names):
+            return tuple(names)
     return None
 
 
 def _can_name(cells: list, numbers: list, width: int, delimiter: str, sheet: bool) -> bool:
-    if not filled(cells) or is_comment(cells, delimiter):
+    if not filled(cells) or is_comment(cells, delimiter) or numbers_in(cells) > 1:
         return False
     if sheet:
         beside = [name for name, cell in zip(cells, numbers, strict=False) if cell is not None]
         return 2 * sum(isinstance(name, str) for name in beside) >= len(filled(numbers))
-    told = len(cells)
-    while not cells[told - 1].strip():
-        told -= 1
-    return len(header_cells(cells, width)) == width or told in (
-        width,
-        width - (not numbers[-1].strip()),
-    )
+    count = max(place + 1 for place, cell in enumerate(cells) if cell.strip())
+    fits = len(header_cells(cells, width)) == width
+    return fits or count in (width, width - (not numbers[-1].strip()))
 
 
 def _are_units(cells: Sequence) -> bool:
-    told = [str(cell).strip() for cell in cells if cell is not None and str(cell).strip("-/ ")]
-    units = [plain(cell.strip("[](){}<> ")) for cell in told]
-    return bool(told) and all(unit in UNITS or unit == "in" for unit in units)
+    texts = [str(cell).strip() for cell in cells if cell is not None and str(cell).strip("-/ ")]
+    units = [plain(text.strip("[](){}<> ")) for text in texts]
+    return bool(texts) and all(unit in UNITS or unit == "in" for unit in units)
 
 
 def stated_above(texts: Sequence[str]) -> dict[str, str]:
-    """Units of lengths and angles, and the frame, that the lines around the rows state."""
-    found: dict[str, str] = {}
+    """Units of lengths and angles that the lines around the rows state."""
+    stated: dict[str, str] = {}
     for text in texts:
-        for listed in (*_UNITS.findall(text), *_IN_UNITS.findall(text)):
-            for word in map(plain, re.findall(r"[^\W\d_]+|°", listed)):
+        for match in _UNITS.finditer(text):
+            for word in map(plain, re.findall(r"[^\W\d_]+|°", match[1] or match[2])):
                 unit = "inch" if word == "in" else UNITS.get(word, "")
                 unit = word if unit == "?" else unit
                 if unit in (*LENGTH, "µm"):
-                    found.setdefault("length", unit)
+                    stated.setdefault("length", unit)
                 elif unit in (*ANGLE, "gon", "mrad"):
-                    found.setdefault("angle", unit)
-        if frame := _FRAME.search(text):
-            found.setdefault("frame", frame[1].strip(" ,\t\"'"))
-    return found
+                    stated.setdefault("angle", unit)
+    return stated

@@ -1,9 +1,9 @@
-"""Two files as one: which of them holds the joints, and what says which rows belong together."""
+"""One file, or two as one: the file of the joints, and how its rows belong to the points."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -11,19 +11,24 @@ from typing import Any
 import numpy as np
 
 from kinacc.errors import InputError, Problem, refuse
-from kinacc.measurements import joining
-from kinacc.measurements.column_names import OTHER, Name, name_of
+from kinacc.measurements.column_names import OTHER, WORDS, name_of
 from kinacc.measurements.files import EXCEL
 from kinacc.measurements.intake import clocks, columns, text
 from kinacc.measurements.intake.choices import Choice, Undecided
-from kinacc.measurements.intake.columns import NamedColumns
 from kinacc.measurements.intake.groups import Group
 from kinacc.measurements.intake.text import Looked
-from kinacc.measurements.joining import NAME, ORDER, TIME, labels
+from kinacc.measurements.joining import (
+    NAME,
+    ORDER,
+    TIME,
+    beside_name,
+    joined,
+    joint_values,
+    labels,
+    rows_by_name,
+)
 from kinacc.measurements.layout import ANGLE, LENGTH, Join
-from kinacc.measurements.table import RawTable
 from kinacc.measurements.times import seconds
-from kinacc.measurements.words import WORDS
 
 _FEWEST_NAMES = 0.05  # of the rows: targets of a pose stand in rows of their own
 _SHARE = 0.5  # of the points: fewer in common are no key
@@ -31,227 +36,190 @@ _WRITTEN = ("delimiter", "decimal", "thousands", "skip_lines", "skip_under_names
             "sheet", "names")  # fmt: skip
 
 
-@dataclass(frozen=True)
-class Pair:
-    """Two files as one ``table``, what its columns are, and the section of its joints' file.
-
-    ``points``: how the file of the points at ``path`` is written.
-    """
-
-    path: str
-    points: Looked
-    table: RawTable
-    found: NamedColumns
-    joints: dict[str, Any]
-    told: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class _File:
-    path: str
-    looked: Looked
-    table: RawTable
-    names: list[Name]
-    found: NamedColumns
-
-
-def sheets_apart(path: Path, answers: Mapping[str, str]) -> tuple[str, ...]:
-    """The sheets of joints and of points of a workbook that holds both once and apart; or none."""
-    if path.suffix.lower() not in EXCEL or "sheet" in answers or not path.is_file():
-        return ()
-    found = {
-        sheet: columns.recognise(list(map(name_of, named)))
-        for sheet, named in text.names_of_sheets(path).items()
-    }
-    joints = [sheet for sheet, each in found.items() if each.joints]
-    points = [sheet for sheet, each in found.items() if each.targets]
-    return (*joints, *points) if len(joints) == len(points) == 1 and joints != points else ()
-
-
 def look(
-    paths: Sequence[str | Path],
-    take: Sequence[str],
-    turned: bool,
-    answers: Mapping[str, str],
-    sheets: Sequence[str] = (),
-) -> Pair:
-    """One view of two files, or of two ``sheets`` of one that is named twice.
+    path: str | Path | Sequence[str | Path], answers: Mapping[str, Any], wanted: bool = False
+) -> Looked:
+    """One view of a file, of two files, or of two sheets of a workbook, with their columns.
 
-    Raises InputError where they cannot be joined, Undecided if asked.
+    ``wanted``: nominal poses are read. Raises InputError where the files cannot be joined,
+    Undecided where a choice is open.
     """
-    said = [{**answers, "sheet": sheet} for sheet in sheets] or [answers] * len(paths)
+    paths = [path] if isinstance(path, (str, Path)) else [*path]
     files = []
-    for path, own in zip(paths, said, strict=True):
-        looked = text.look(path, own)
-        named = [column for column in take if column in looked.table.columns]
-        found = columns.of_table(looked.table, named, turned, own.get("sigma", ""))
-        files.append(_File(str(path), looked, looked.table, columns.names_in(looked.table), found))
-    joints, points = _sorted(files)
-    how, told = _join(joints, points, answers)
-    table = joining.joined(points.table, joints.table, how)
-    own = {n.column: replace(n, column=joining.beside_name(n.column, points.table))
-           for n in joints.names}  # fmt: skip
-    both = {part: tuple(own[n.column] for n in getattr(joints.found, part))
+    for name, sheet in [(p, None) for p in paths] if len(paths) > 1 else _sheets(paths[0], answers):
+        given = answers if sheet is None else {**answers, "sheet": sheet}
+        looked = text.look(name, given)
+        take = [column for column in answers.get("take", ()) if column in looked.table.columns]
+        turned, sigma = answers.get("orientation") != "none", answers.get("sigma", "")
+        meaning = columns.of_table(looked.table, take, turned, sigma, wanted)
+        files.append(replace(looked, columns=meaning))
+    return files[0] if len(files) == 1 else _together(files, answers)
+
+
+def _sheets(path: str | Path, answers: Mapping) -> list[tuple[str | Path, str | None]]:
+    """The file, twice with a sheet where a workbook holds joints and points on two sheets."""
+    if Path(path).suffix.lower() in EXCEL and "sheet" not in answers and Path(path).is_file():
+        sheets = {
+            sheet: columns.recognise([*map(name_of, names)])
+            for sheet, names in text.names_of_sheets(Path(path)).items()
+        }
+        joints = [sheet for sheet, meaning in sheets.items() if meaning.joints]
+        points = [sheet for sheet, meaning in sheets.items() if meaning.targets]
+        if len(joints) == len(points) == 1 and joints != points:
+            return [(path, joints[0]), (path, points[0])]
+    return [(path, None)]
+
+
+def _together(files: Sequence[Looked], answers: Mapping[str, Any]) -> Looked:
+    holding = [file for file in files if file.columns.joints]
+    if len(holding) == 2:  # a controller's log may hold points too, a tracker's file no joints
+        holding = [file for file in files if not file.columns.targets]
+    if len(holding) != 1:
+        message = "both hold joints" if files[0].columns.joints else "hold no joints"
+        paths = " and ".join(file.table.path for file in files)
+        allowed = "joints in one file, measured points in the other"
+        raise InputError(Problem(paths, message, allowed))
+    joints, points = holding[0], next(file for file in files if file is not holding[0])
+    if not points.columns.targets:
+        message = "no columns of a measured point were found"
+        raise InputError(Problem(points.table.path, message, "x, y, z"))
+    how, note = _join(joints, points, answers)
+    names = {n.column: replace(n, column=beside_name(n.column, points.table))
+             for n in columns.names_in(joints.table)}  # fmt: skip
+    read = {part: tuple(names[n.column] for n in getattr(joints.columns, part))
             for part in ("joints", "commanded")}  # fmt: skip
-    key = {"pose": own[how.key]} if how.by == NAME else {}
-    used = {n.column for n in (*joints.found.joints, *joints.found.commanded)} | {how.key}
-    spare = [Group("", OTHER, "", {n.column: own[n.column]}) for n in joints.names
-             if n.column not in used]  # fmt: skip
-    found = replace(
-        points.found,
-        **both,
-        single=points.found.single | key,
-        aside=(*points.found.aside, *((group, "of the file of joints") for group in spare)),
+    used = {n.column for n in (*joints.columns.joints, *joints.columns.commanded)} | {how.key}
+    spare = [Group("", OTHER, "", {c: name}) for c, name in names.items() if c not in used]
+    about = columns.ABOUT_JOINTS
+    meaning = replace(
+        points.columns,
+        **read,
+        single=points.columns.single | ({"pose": names[how.key]} if how.by == NAME else {}),
+        aside=(*points.columns.aside, *spare),
         questions=(
-            *(q for q in joints.found.questions if q.about == "the joints"),
-            *(q for q in points.found.questions if q.about != "the joints"),
+            *(q for q in joints.columns.questions if q.about.startswith(about)),
+            *(q for q in points.columns.questions if not q.about.startswith(about)),
         ),
     )
-    written = joints.looked.written.written()
+    written = joints.written.written()
     section = {"path": joints.path, **vars(how), **{name: written[name] for name in _WRITTEN}}
-    return Pair(points.path, points.looked, table, found, section, (*joints.looked.told, *told))
+    notes = (*points.notes, *joints.notes, *note)
+    table = joined(points.table, joints.table, how)
+    return replace(points, table=table, columns=meaning, joints=section, notes=notes)
 
 
-def _sorted(files: Sequence[_File]) -> tuple[_File, _File]:
-    """The file of the joints and that of the points."""
-    holding = [each for each in files if each.found.joints]
-    if len(holding) == 2:  # a controller's log may hold points too, a tracker's file no joints
-        holding = [each for each in files if not each.found.targets]
-    if len(holding) != 1:
-        what = "both hold joints" if files[0].found.joints else "hold no joints"
-        paths = " and ".join(each.table.path for each in files)
-        raise InputError(Problem(paths, what, "joints in one file, measured points in the other"))
-    points = files[1 - files.index(holding[0])]
-    if not points.found.targets:
-        what = "no columns of a measured point were found"
-        raise InputError(Problem(points.table.path, what, "x, y, z"))
-    return holding[0], points
-
-
-def _join(joints: _File, points: _File, answers: Mapping[str, str]) -> tuple[Join, tuple[str, ...]]:
+def _join(joints: Looked, points: Looked, answers: Mapping) -> tuple[Join, tuple[str, ...]]:
     """How the rows belong together, as answered or as the files leave no doubt."""
     given = answers.get("join")
     if given == ORDER:
-        return Join(ORDER), ("joints and points are joined by their order, as answered",)
+        return Join(ORDER), ()
     if given and given != TIME:
         key, _, other = given.partition("=")
         return Join(NAME, key, other or key), ()
-    if given != TIME and (found := _by_names(joints, points)):
-        return found
+    if given != TIME and (how := _by_names(joints, points)):
+        count = int(np.sum(rows_by_name(points.table, joints.table, how) >= 0))
+        note = f"joined where {how.key} of {joints.table.path} is {how.key_of_points} of "
+        note += f"{points.table.path}: {count} of {len(points.table)} points have joints"
+        return how, (note,)
     times = _times(joints), _times(points)
     if all(times):
-        return _by_clock(joints, points, times[0], times[1], answers)
-    count, others = len(points.table), len(joints.table)
-    if count == others:
+        return _by_clock(joints, points, *times, answers)
+    if len(points.table) == len(joints.table):
         raise _undecided(joints, points, {})
-    what = f"nothing says which of its {count} points belong to which of the {others} joints of "
+    message = f"the joints of its {len(points.table)} points among the {len(joints.table)} of "
+    message += f"{joints.table.path} are unknown"
     fix = "add a column with the names of poses, or with times, to both; --join A=B names them"
-    raise InputError(Problem(points.table.path, f"{what}{joints.table.path}", fix=fix))
+    raise InputError(Problem(points.table.path, message, fix=fix))
 
 
-def _by_names(joints: _File, points: _File) -> tuple[Join, tuple[str, ...]] | None:
+def _by_names(joints: Looked, points: Looked) -> Join | None:
     """The columns whose names of poses are those of the other file. Asks where several differ."""
-    named: list[tuple[Join, np.ndarray]] = []
-    counted: list[tuple[Join, np.ndarray]] = []
+    certain: list[tuple[int, Join, bytes]] = []
+    counting: list[tuple[int, Join, bytes]] = []
     for key in _keys(joints):
         for other in _keys(points):
             how = Join(NAME, key, other)
             try:
-                row = joining.by_name(points.table, joints.table, how)
+                row = rows_by_name(points.table, joints.table, how)
             except InputError:
                 continue
-            if np.sum(row >= 0) >= max(_SHARE * min(len(row), len(joints.table)), 2):
-                (counted if _counts_rows(how, joints, points) else named).append((how, row))
-    if not named and not counted:
-        return None
-    chosen = named or counted
-    first, row = max(chosen, key=lambda way: int(np.sum(way[1] >= 0)))
-    rivals = [how for how, other in chosen if not np.array_equal(other, row)]
+            count = int(np.sum(row >= 0))
+            if count >= max(_SHARE * min(len(row), len(joints.table)), 2):
+                ways = counting if _counts_rows(how, joints, points) else certain
+                ways.append((count, how, row.tobytes()))
+    ways = sorted(certain or counting, key=lambda way: -way[0])
     # A count of rows is no name: a point that was left out shifts all behind it.
-    if rivals or not named:
-        raise _undecided(joints, points, {
-            f"{how.key}={how.key_of_points}": f"{how.key} of the joints is {how.key_of_points}"
-            for how in (first, *rivals)})  # fmt: skip
-    told = f"joined where {first.key} of {joints.table.path} is {first.key_of_points} of "
-    told += f"{points.table.path}: {np.sum(row >= 0)} of {len(row)} points have joints"
-    return first, (told,)
+    if ways and (not certain or len({rows for *_, rows in ways}) > 1):
+        meant = {f"{how.key}={how.key_of_points}": f"{how.key} of the joints is {how.key_of_points}"
+                 for _, how, _ in ways}  # fmt: skip
+        raise _undecided(joints, points, meant)
+    return ways[0][1] if ways else None
 
 
-def _keys(file: _File) -> list[str]:
+def _keys(file: Looked) -> list[str]:
     """Columns that may name poses: texts or whole numbers that hardly repeat, and no times."""
-    used = {name.column for name in (*file.found.joints, *file.found.commanded)}
-    used |= {n.column for target in file.found.targets.values() for n in target.values()}
-    found = []
-    for name in file.names:
-        told = labels(file.table.columns[name.column])
-        timed = bool(WORDS["time"] & {*name.words}) or any(":" in each for each in told)
-        numbers = file.table.values(name.column)
-        parts = np.isfinite(numbers) & ~np.array([each.isdigit() for each in told])
-        if name.column in used or name.unit or timed or parts.any():
+    meaning = file.columns
+    used = {name.column for name in (*meaning.joints, *meaning.commanded)}
+    used |= {n.column for target in meaning.targets.values() for n in target.values()}
+    keys = []
+    for name in columns.names_in(file.table):
+        names = labels(file.table.columns[name.column])
+        timed = bool(WORDS["time"] & {*name.terms}) or any(":" in label for label in names)
+        numbers = np.isfinite(file.table.values(name.column))
+        whole = np.array([label.isdigit() for label in names])
+        if name.column in used or name.unit or timed or (numbers & ~whole).any():
             continue
-        if len({*told}) > max(_FEWEST_NAMES * len(told), 1):
-            found.append(name.column)
-    return found
+        if len({*names}) > max(_FEWEST_NAMES * len(names), 1):
+            keys.append(name.column)
+    return keys
 
 
-def _counts_rows(how: Join, joints: _File, points: _File) -> bool:
-    """Whether both keys only count rows: as many of both are poses where a word says so."""
-    same = len(joints.table) == len(points.table)
+def _counts_rows(how: Join, joints: Looked, points: Looked) -> bool:
+    """Whether both keys only count rows: as many of both are poses where a term states it."""
+    as_many = len(joints.table) == len(points.table)
     for file, key in ((joints, how.key), (points, how.key_of_points)):
-        told = labels(file.table.columns[key])
-        counts = [int(each) for each in told if each.isdecimal() and len(each) <= 100]
-        steps = {b - a for a, b in pairwise(counts)}
-        named = same and WORDS["pose_names"] & {*name_of(key).words}
-        if len(counts) < len(told) or steps != {1} or named:
+        names = labels(file.table.columns[key])
+        counts = [int(name) for name in names if name.isdecimal() and len(name) <= 100]
+        is_named = as_many and WORDS["pose_names"] & {*name_of(str(key)).terms}
+        if len(counts) < len(names) or {b - a for a, b in pairwise(counts)} != {1} or is_named:
             return False
     return True
 
 
-def _times(file: _File) -> str:
+def _times(file: Looked) -> str:
     """The column that holds times, empty where there is none."""
-    timed = (
-        n for n in file.names if WORDS["time"] & {*n.words} and n.unit not in {**ANGLE, **LENGTH}
-    )
-    return next((name.column for name in timed), "")
+    names = (n for n in columns.names_in(file.table) if n.unit not in {**ANGLE, **LENGTH})
+    return next((n.column for n in names if WORDS["time"] & {*n.terms}), "")
 
 
 def _by_clock(
-    joints: _File, points: _File, key: str, other: str, answers: Mapping[str, str]
+    joints: Looked, points: Looked, key: str, other: str, answers: Mapping
 ) -> tuple[Join, tuple[str, ...]]:
-    problems = []
+    problems: list[Problem] = []
     there, here = seconds(joints.table, key, problems), seconds(points.table, other, problems)
     refuse(problems, "the times are no key")
     good = np.isfinite(there)
-    times, q = there[good], joining.joint_values(joints.table)[good]
-    found, given = clocks.offset(here, times, q), answers.get("clock_offset")
-    if given is not None:
+    stands, within = clocks.standstills(there[good], joint_values(joints.table)[good])
+    if (given := answers.get("clock_offset")) is not None:
         try:
-            shift = float(given)
+            return Join(TIME, key, other, float(given), within), ()
         except ValueError:
             raise InputError(Problem("--clock-offset", repr(given), "seconds")) from None
-        within = found.within_s if found else clocks.standstills(times, q)[1]
-        return Join(TIME, key, other, shift, within), (f"clock offset {shift:g} s, as answered",)
-    if found is None or found.rivals:
-        rivals = (found.offset_s, *found.rivals)[:4] if found else ()
-        ways = {f"{each:.3f}": f"points are {each:.3f} s earlier" for each in rivals}
-        fit = (
-            "fit several offsets between the two clocks" if found else "fit no offset of the clocks"
-        )
-        about = f"{other} of {points.table.path} and the standstills by {key} of "
-        about += f"{joints.table.path} {fit}"
-        ways = ways or {"0": "both clocks showed the same"}
-        raise Undecided(points.table.path, [Choice("--clock-offset", about, ways)])
-    told = (
-        f"joined by time: {found.offset_s:g} s are added to {other} of {points.table.path}, known "
-        f"to {found.residual_s:.2g} s from {found.matched} of {len(here)} points at standstill"
-    )
-    return Join(TIME, key, other, found.offset_s, found.within_s), (told,)
+    ways = clocks.offsets(here, stands, within)
+    if len(ways) != 1:
+        about = f"{'several' if ways else 'no'} offsets of the clocks put {other} of "
+        about += f"{points.table.path} at the standstills by {key} of {joints.table.path}"
+        meant = {f"{way:.3f}": f"{way:.3f} s are added to times of points" for way in ways[:4]}
+        meant = meant or {"0": "both clocks showed the same"}
+        raise Undecided(points.table.path, [Choice("--clock-offset", about, meant)])
+    note = f"joined by time: {ways[0]:g} s are added to {other} of {points.table.path}"
+    return Join(TIME, key, other, ways[0], within), (note,)
 
 
-def _undecided(joints: _File, points: _File, ways: dict[str, str]) -> Undecided:
+def _undecided(joints: Looked, points: Looked, ways: dict[str, str]) -> Undecided:
     """The question which rows belong together; the order is an answer where there are as many."""
     count, others = len(points.table), len(joints.table)
     ways |= {ORDER: "the first row belongs to the first, and so on"} if count == others else {}
-    about = f"nothing says for certain which joints of {joints.table.path} ({others} rows) belong "
-    about += f"to which points ({count} rows)"
+    about = f"nothing decides which joints of {joints.table.path} ({others} rows) belong to which "
+    about += f"points ({count} rows)"
     return Undecided(points.table.path, [Choice("--join", about, ways)])

@@ -1,143 +1,111 @@
-"""Rows of one pose: which column tells their targets apart, and whether its names count them."""
+"""Rows of one pose: the column that names their targets, and names that count readings."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterable, Sequence
 from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
+import pandas as pd
 
 from kinacc.errors import InputError, Problem
-from kinacc.measurements.column_names import Name, name_of
+from kinacc.measurements.column_names import WORDS, name_of
 from kinacc.measurements.intake.columns import NamedColumns
 from kinacc.measurements.intake.groups import RADIUS, keeps_distance
 from kinacc.measurements.reader import AGAIN
 from kinacc.measurements.table import RawTable
-from kinacc.measurements.words import WORDS
 
-_APART_MM = 5.0  # readings of one target of a pose lie nearer to each other
+_APART_MM = 5.0  # readings of one target of a pose lie nearer to one another
 _STILL_RAD = 5e-4
 _MOST_TARGETS = 24
 _SAME_RADIUS = 0.05  # of the largest: radii that were measured scatter
 _ALLOWED = "a column target that names the reflector of every row"
-Told = tuple[NamedColumns, tuple[str, ...]]
 
 
-def told_apart(
-    table: RawTable, found: NamedColumns, q_rad: np.ndarray, point: np.ndarray,
-    values: Callable[[Name], np.ndarray],
-) -> Told:  # fmt: skip
-    """The columns with that of the targets, where one is needed, and what to say of it.
+def with_targets(
+    table: RawTable, columns: NamedColumns, q_rad: np.ndarray, point_mm: np.ndarray
+) -> NamedColumns:
+    """The columns with that of the targets, where rows of one pose need one.
 
-    ``q_rad`` (n, k) and ``point`` (n, 3) in mm. Raises InputError where rows are of several targets
-    and no column names them.
+    ``q_rad`` (n, k), ``point_mm`` (n, 3). Raises InputError where rows are of several targets and
+    no column names them.
     """
-    if len(found.targets) != 1:
-        return found, ()
-    keys: Iterable[Hashable] = map(tuple, q_rad.tolist())
-    if "pose" in found.single:
-        several = [found.single[n].column for n in ("pose", "session") if n in found.single]
-        keys = zip(*(table.texts(name) for name in several), strict=True)
-    poses = [rows for rows in _rows_of(keys) if np.isfinite(q_rad[rows]).all()]
-    if not all(np.ptp(q_rad[each], axis=0).max() < _STILL_RAD for each in poses):
-        poses = []
-    for group, _ in found.aside:
-        if group.kind == RADIUS:
-            size = values(group.columns["radius"])
-            spread = np.ptp(size[np.isfinite(size)]) if np.isfinite(size).any() else 0.0
-            if spread > _SAME_RADIUS * np.nanmax(np.abs(size), initial=0.0):
-                return _by_radius(table, found, group.names[0], size, point, poses)
-    if "target" in found.single or not _apart(point, poses):
-        return found, ()
+    if len(columns.targets) != 1:
+        return columns
+    named = [columns.single[n].column for n in ("pose", "session") if n in columns.single]
+    keys = table.columns[named].astype(str) if "pose" in columns.single else pd.DataFrame(q_rad)
+    pose = keys.groupby([*keys.columns], sort=False).ngroup().to_numpy()
+    pose = np.where(np.isfinite(q_rad).all(axis=1), pose, -1)
+    if np.max(_spans(q_rad, pose), initial=0.0) > _STILL_RAD:
+        pose = np.full(len(pose), -1)
+    target = columns.single.get("target")
+    radius = next((g.names[0] for g in columns.aside if g.kind == RADIUS), None)
+    size = np.nan_to_num(table.values(radius)) if radius else np.zeros(len(table))
+    if np.ptp(size) > _SAME_RADIUS * np.max(size):
+        # A reflector of another radius has its centre elsewhere in the same nest.
+        if target:
+            wrong = pd.Series(size).groupby(table.texts(target.column)).nunique().max() > 1
+        else:
+            of_radius = np.where(pose < 0, -1, pd.factorize(size)[0] * len(pose) + pose)
+            wrong = _are_apart(point_mm, of_radius) or len({*size}) > _MOST_TARGETS
+        if wrong:
+            message = "the radius of the reflectors changes, so that their centres lie elsewhere"
+            raise InputError(Problem(table.where(radius), message, _ALLOWED))
+        return columns if target else _with_target(columns, radius)
+    if target or not _are_apart(point_mm, pose):
+        return columns
     ways: dict[tuple, str] = {}
-    for column in (each for each in table.columns if each not in found.read()):
-        labels = table.texts(column)
-        if _tells(labels, point, poses):
-            ways.setdefault(tuple(map(labels.index, labels)), column)
+    for column in (name for name in table.columns if name not in columns.read()):
+        labels = np.array(table.texts(column), dtype=object)
+        if _names_targets(labels, point_mm, pose):
+            ways.setdefault(tuple(pd.factorize(labels)[0]), column)
     if len(ways) != 1:
-        names = f"each of {', '.join(ways.values())} may name" if ways else "no column names"
-        what = (
-            f"rows of equal joints lie more than {_APART_MM:g} mm apart, and {names} their target"
-        )
-        raise InputError(Problem(table.path, what, _ALLOWED, "a column session names set-ups"))
-    return _with_target(found, next(iter(ways.values())), "keep their distances to each other")
+        known = f"{' and '.join(ways.values())} may name" if ways else "no column names"
+        message = f"rows of equal joints lie over {_APART_MM:g} mm apart, and {known} their target"
+        raise InputError(Problem(table.path, message, _ALLOWED, "a column session names set-ups"))
+    return _with_target(columns, *ways.values())
 
 
-def _with_target(found: NamedColumns, column: str, why: str) -> Told:
-    """The columns, and ``column`` as that of the targets."""
-    told = f"{column} names the targets, which {why}"
-    return replace(found, single=found.single | {"target": name_of(column)}), (told,)
+def _with_target(columns: NamedColumns, column: str) -> NamedColumns:
+    return replace(columns, single=columns.single | {"target": name_of(column)})
 
 
-def _by_radius(
-    table: RawTable, found: NamedColumns, column: str, size: np.ndarray, point: np.ndarray, poses
-) -> Told:
-    """A reflector of another radius has its centre elsewhere in the same nest."""
-    if "target" in found.single:
-        labels = table.texts(found.single["target"].column)
-        wrong = len({*zip(labels, size.tolist(), strict=True)}) > len({*labels})
-    else:  # readings of a pose and of one radius that are not those of one point
-        alike = [[row for row in rows if size[row] == one] for rows in poses for one in {*size}]
-        wrong = _apart(point, [e for e in alike if e]) or len({*size}) > _MOST_TARGETS
-    if wrong:
-        what = "the radius of the reflectors changes, so that their centres lie elsewhere"
-        raise InputError(Problem(table.where(column), what, _ALLOWED))
-    if "target" in found.single:
-        return found, ()
-    return _with_target(found, column, "have their centres elsewhere in the same nest")
+def _spans(values: np.ndarray, group: np.ndarray) -> np.ndarray:
+    """Largest extent along an axis of ``values`` (n, k) in every group of several rows."""
+    frame = pd.DataFrame(values[group >= 0]).groupby(group[group >= 0])
+    return (frame.max() - frame.min()).max(axis=1)[frame.size() > 1].dropna().to_numpy()
 
 
-def _rows_of(keys: Iterable[Hashable]) -> list[list[int]]:
-    """Rows of every key that has several."""
-    rows: dict[Hashable, list[int]] = {}
-    for row, key in enumerate(keys):
-        rows.setdefault(key, []).append(row)
-    return [each for each in rows.values() if len(each) > 1]
-
-
-def _apart(point: np.ndarray, poses: Sequence[Sequence[int]]) -> bool:
-    """Whether rows of a pose are, as a rule, far from each other."""
-    spans = np.array([np.ptp(point[rows], axis=0).max() for rows in poses])
-    spans = spans[np.isfinite(spans)]
+def _are_apart(point_mm: np.ndarray, group: np.ndarray) -> bool:
+    """Whether rows of a group are, as a rule, far from one another."""
+    spans = _spans(point_mm, group)
     return bool(spans.size) and float(np.median(spans)) > _APART_MM
 
 
-def _tells(labels: Sequence[str], point: np.ndarray, poses: Sequence[Sequence[int]]) -> bool:
+def _names_targets(labels: np.ndarray, point_mm: np.ndarray, pose: np.ndarray) -> bool:
     """Whether labels stand for points of one body, each read about once in most poses."""
-    names = list(dict.fromkeys(labels))
-    if not 2 <= len(names) <= _MOST_TARGETS:
+    if not 2 <= len({*labels}) <= _MOST_TARGETS:
         return False
-    place = np.full((len(names), len(poses), 3), np.nan)
-    for pose, rows in enumerate(poses):
-        for row in rows:
-            own = place[names.index(labels[row]), pose]
-            if np.isfinite(own).all() and np.abs(point[row] - own).max() > _APART_MM:
-                return False
-            own[:] = point[row]
-    return all(keeps_distance(one, other) for one, other in combinations(place, 2))
+    rows = pose >= 0
+    by_label = pd.DataFrame(point_mm[rows]).groupby([pose[rows], labels[rows]])
+    if (by_label.max() - by_label.min()).max().max() > _APART_MM:
+        return False
+    first = by_label.first().unstack()
+    places = [first.xs(label, axis=1, level=1).to_numpy() for label in {*labels[rows]}]
+    return all(keeps_distance(a, b) for a, b in combinations(places, 2))
 
 
-def counted(
-    table: RawTable, found: NamedColumns, q_rad: np.ndarray
-) -> tuple[bool, tuple[str, ...]]:
-    """Whether numbers behind the names of poses count readings of them, and what to say of it.
+def counts_readings(table: RawTable, columns: NamedColumns, q_rad: np.ndarray) -> bool:
+    """Whether numbers behind the names of poses count readings of them: P12_1, P12_2.
 
     Readings that came from other directions stay poses of their own: as repeats they would scatter
     by the arm's backlash.
     """
-    told = table.texts(found.single["pose"].column) if "pose" in found.single else []
-    poses = [AGAIN.sub("", each) for each in told]
-    if any(a == b for a, b in zip(told, poses, strict=True)) or len({*told}) < len(told):
-        return False, ()
-    several = _rows_of(poses)
-    if not several or not all(np.ptp(q_rad[r], axis=0).max() < _STILL_RAD for r in several):
-        return False, ()
-    for column in (each for each in table.columns if each not in found.read()):
-        cells = table.texts(column)
-        about = WORDS["approach"] & {*name_of(column).words}
-        if about and any(len({cells[row] for row in rows}) > 1 for rows in several):
-            told_ = f"{column} differs between readings of a pose: they stay poses of their own. "
-            told_ += "Columns s1 .. would say from which side each joint came (-1, 0, 1)"
-            return False, (told_,)
-    return True, ()
+    names = table.texts(columns.single["pose"].column) if "pose" in columns.single else []
+    poses = [AGAIN.sub("", name) for name in names]
+    if any(a == b for a, b in zip(names, poses, strict=True)) or len({*names}) < len(names):
+        return False
+    if any(WORDS["approach"] & {*name_of(column).terms} for column in table.columns):
+        return False
+    spans = _spans(q_rad, pd.factorize(np.array(poses, dtype=object))[0])
+    return bool(spans.size) and float(spans.max()) < _STILL_RAD
