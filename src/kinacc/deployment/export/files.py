@@ -39,20 +39,17 @@ def contents(
 
     Raises InputError for what cannot be exported.
     """
-    arm = source.calibration
-    if name is None:
-        refuse(names.not_in_a_line("the results folder", arm.name), "Nothing was written")
-    else:
-        refuse(names.not_of_a_file("--name", name), "Nothing was written")
-    able = formats_of(arm.choice)
-    wrong = [each for each in dict.fromkeys(formats) if each not in able]
-    what, fix = f"cannot carry a {arm.choice} model", f"or give --model {PLAINEST}"
-    refuse(
-        [Problem(f"--format {each}", what, ", ".join(able), fix) for each in wrong],
-        "Nothing was written",
-    )
+    arm, able = source.calibration, formats_of(source.calibration.choice)
     # A name of its own, so that the DH files may stand beside it.
     stem = name or (arm.name if arm.choice == PLAINEST else f"{arm.name}_{arm.choice}")
+    what, fix = f"cannot carry a {arm.choice} model", f"or give --model {PLAINEST}"
+    problems = names.not_of_a_file("--name", stem if name is None else name)
+    problems += [
+        Problem(f"--format {each}", what, ", ".join(able), fix)
+        for each in formats
+        if each not in able
+    ]
+    refuse(problems, "Nothing was written")
     modules = [format_named(each) for each in dict.fromkeys(formats or able)]
     return {f"{stem}{each.ENDING}": each.text(source) for each in modules}
 
@@ -76,33 +73,27 @@ def read_source(
 
 def notes(source: Source) -> list[str]:
     """What the poses leave open, and the model that was selected instead of the one written."""
-    said, arm = [], source.calibration
-    told = source.tables.get(f"{PLAINEST}_identified")
-    weak = [] if told is None else identifiability.weak(identifiability.listed(told))
+    lines, identified = [], source.tables.get(f"{PLAINEST}_identified")
+    weak = identifiability.weak(identifiability.listed(identified)) if identified else []
     if weak:
-        more = f" (and {len(weak) - 1} more)" if len(weak) > 1 else ""
-        said.append(f"warning: valid for poses like the measured ones: {weak[0]}{more}")
+        lines = [f"warning: valid for poses like the measured ones: {'; '.join(weak)}"]
     selected = results.selected_model(source.tables)
-    if selected != arm.choice:
-        rms = {model: results.residual(source.tables, model) for model in (arm.choice, selected)}
-        errors = ", ".join(
-            f"{model_name(model)} {left.position_mm:.3f} mm rms"
-            for model, left in rms.items()
-            if left is not None
-        )
-        said.append(f"note: {model_name(selected)} was selected (--model {selected}): {errors}")
-    return said
+    if selected != source.calibration.choice:
+        lines.append(f"note: {model_name(selected)} was selected (--model {selected})")
+    return lines
 
 
 def write(made: Mapping[str, str], target: Path | str, force: bool = False) -> list[str]:
     """Write files into a folder, all or none; InputError for those already there."""
     paths = [Path(target) / name for name in made]
-    there = [
-        Problem(str(path), "is there already", fix="give --force to replace it")
-        for path in paths
-        if path.exists() and not force
-    ]
-    refuse(there, "Nothing was written")
+    refuse(
+        [
+            Problem(str(path), "is there already", fix="give --force to replace it")
+            for path in paths
+            if path.exists() and not force
+        ],
+        "Nothing was written",
+    )
     with replacing(paths) as temporary:
         for part, text in zip(temporary, made.values(), strict=True):
             part.write_text(text, encoding="utf-8")

@@ -19,25 +19,25 @@ def text(source: Source) -> str:
 
     What is of no joint, as of base and tool, stands in the row of the last one.
     """
-    dh, told = source.dh, source.calibration.left_open or ()
+    dh, left_open = source.dh, source.calibration.left_open or ()
     names = [name.replace("_rad", "_deg") for name in PARAMETERS]
     stds, nominals = ([f"{which}_{name}" for name in names] for which in ("std", "nominal"))
     factor = np.array([180.0 / np.pi if name.endswith("_rad") else 1.0 for name in PARAMETERS])
-    fitted, given = (
-        np.stack([getattr(model, name) for name in PARAMETERS], axis=1) * factor
+    fitted, nominal = (
+        np.stack([getattr(model, name) for name in PARAMETERS], axis=1)
         for model in (dh, source.calibration.robot.dh)
     )
-    values = np.concatenate([fitted, source.std * factor, given], axis=1)
-    joints_of = [set(map(int, re.findall(r"joint (\d+)", text))) for text in told]
+    values = np.concatenate([part * factor for part in (fitted, source.std, nominal)], axis=1)
+    texts: list[list[str]] = [[] for _ in range(dh.joints)]
+    for sentence in left_open:
+        for joint in {*map(int, re.findall(r"joint (\d+)", sentence))} or {dh.joints}:
+            texts[joint - 1].append(sentence)
+    texts[-1] += source.orientation_lines
     note = in_csv(in_words([source.misfit]))
     rows: list[list[object]] = [
         ["joint", "type", *names, *stds, *nominals, "undetermined", "std_note"]
     ]
-    for joint in range(1, dh.joints + 1):
-        is_last = joint == dh.joints
-        pairs = zip(told, joints_of, strict=True)
-        own = [each for each, joints in pairs if joint in joints or (is_last and not joints)]
-        own += source.orientation_lines if is_last else []
-        numbers = ("" if np.isnan(x) else f"{x:.12g}" for x in values[joint - 1])
-        rows.append([joint, kind(dh, joint - 1), *numbers, in_csv("; ".join(own)), note])
+    for joint, (numbers, about) in enumerate(zip(values, texts, strict=True)):
+        cells = ("" if np.isnan(x) else f"{x:.12g}" for x in numbers)
+        rows.append([joint + 1, kind(dh, joint), *cells, in_csv("; ".join(about)), note])
     return csv_text(rows)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 
-import numpy as np
+import pandas as pd
 
 from kinacc.deployment.export.source import CONVENTION, Source, kind, number
 from kinacc.geometry import Pose, quaternion_from_rotation
@@ -50,16 +50,10 @@ def text(source: Source) -> str:
         "provenance": source.provenance,
     }
     if arm.model.table is None:
-        table = source.tables[f"{arm.choice}_model"]
-        rows = {name: [_cell(each) for each in values] for name, values in table.items()}
+        table = pd.DataFrame(dict(source.tables[f"{arm.choice}_model"]))
+        rows = table.astype(object).where(table.notna(), None).to_dict("list")
         content |= {"error_model": arm.choice, "error_model_table": rows}
     return json.dumps(content, indent=1) + "\n"
-
-
-def _cell(value: object) -> object:
-    if isinstance(value, str) or value is None:
-        return value
-    return int(value) if isinstance(value, np.integer) else number(float(value))
 
 
 def _frame(pose: Pose) -> dict[str, list[float]]:
