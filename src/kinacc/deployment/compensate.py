@@ -13,6 +13,7 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+import pandas as pd
 
 from kinacc.deployment.record import Calibration
 from kinacc.errors import InputError, Problem
@@ -84,38 +85,42 @@ def compensate(
     if not known.all():
         shown = ", ".join(str(row) for row in np.flatnonzero(~known)[:5])
         raise InputError(Problem("wanted poses", f"no number in row {shown}", "finite poses"))
-    robot, count = calibration.robot, len(wanted.position_mm)
+    robot, every = calibration.robot, np.arange(len(wanted.position_mm))
     carried, origin = calibration.point(point), calibration.origin(frame)
     goal = compose(invert(origin), compose(wanted, invert(carried)))
     given = near_rad is not None
-    near = np.zeros(robot.dh.joints) if near_rad is None else np.atleast_2d(near_rad)
-    near = np.broadcast_to(near, (count, robot.dh.joints))
+    near = np.broadcast_to(0.0 if near_rad is None else near_rad, (len(every), robot.dh.joints))
     like = JointState(robot.dh_joints(near), None if s is None else np.asarray(s), payload)
     arm = _Goals(calibration, goal, near, like, carried)
-    every = np.arange(count)
-    found = arm.judged(robot.dh_joints(near), every)
-    left = ~((found.status <= PoseStatus.EXTRAPOLATED) & (found.movement <= SAME_POSTURE_RAD))
-    more = arm.judged(*arm.postures(every[left] if given else every))
-    found = _Judged(*map(np.concatenate, zip(found, more, strict=True))) if given else more
-    best = found.best(count, given)
-    hit = found.status != PoseStatus.NOT_REACHED
-    nearest = np.full(count, np.inf)
-    np.minimum.at(nearest, found.row[hit], found.movement[hit])
-    status = best.status.copy()
-    usable = status <= PoseStatus.EXTRAPOLATED
-    status[usable & given & (best.movement > nearest + SAME_RAD)] = PoseStatus.OTHER_POSTURE
-    reported = limits.reported_joints(robot, best.q_dh)
+    more, tried = every, []
+    if given:
+        first = arm.judged(robot.dh_joints(near), every)
+        good = first["status"] <= PoseStatus.EXTRAPOLATED
+        more, tried = every[~(good & (first["movement"] <= SAME_POSTURE_RAD))], [first]
+    tried = pd.concat([*tried, arm.judged(*arm.postures(more))], ignore_index=True)
+    hit, status = tried["status"] != PoseStatus.NOT_REACHED, tried["status"]
+    nearest = tried[hit].groupby("row")["movement"].min().reindex(every, fill_value=np.inf)
+    cost = np.minimum(tried["movement"], 99.0) + 1e3 * (status > PoseStatus.EXTRAPOLATED)
+    cost += 200.0 * ((status == PoseStatus.EXTRAPOLATED) & (not given))
+    tried["cost"] = cost.where(hit, 1e6 + np.minimum(tried["off_mm"], 1e8))
+    best = tried.sort_values("cost", kind="stable").drop_duplicates("row")
+    best = best.set_index("row").reindex(every)
+    status = best["status"].fillna(PoseStatus.NOT_REACHED)
+    farther = (status <= PoseStatus.EXTRAPOLATED) & (best["movement"] > nearest + SAME_RAD)
+    status = status.mask(farther & given, PoseStatus.OTHER_POSTURE).to_numpy(int)
+    q_dh = best[[*range(robot.dh.joints)]].to_numpy(float)
+    reported = limits.reported_joints(robot, q_dh)
     outside = np.where(
         (status == PoseStatus.OUTSIDE_LIMITS)[:, None],
         ~_within_each(calibration, reported),
-        calibration.outside_range(best.q_dh),
+        calibration.outside_range(q_dh),
     )
     q_rad = np.where((status <= PoseStatus.OTHER_POSTURE)[:, None], reported, np.nan)
     return Compensation(
         q_rad,
         status,
-        best.off_mm,
-        best.angle_rad,
+        best["off_mm"].fillna(np.inf).to_numpy(),
+        best["angle_rad"].fillna(np.inf).to_numpy(),
         outside & (status != PoseStatus.NOT_REACHED)[:, None],
         q_rad - near if given else np.full(q_rad.shape, np.nan),
     )
@@ -126,34 +131,6 @@ def programmed(calibration: Calibration, q_rad: np.ndarray, point: str | None = 
     robot = calibration.robot
     end = dh.forward(robot.dh, robot.dh_joints(np.atleast_2d(q_rad)))
     return compose(robot.base, compose(end, calibration.programmed_point(point)))
-
-
-class _Judged(NamedTuple):
-    """Refined DH joints (m, k) for goals ``row`` (m,), status, what is left, largest movement."""
-
-    row: np.ndarray
-    q_dh: np.ndarray
-    status: np.ndarray
-    off_mm: np.ndarray
-    angle_rad: np.ndarray
-    movement: np.ndarray
-
-    def best(self, count: int, given: bool) -> _Judged:
-        """Of ``count`` goals the best each: usable before not, then near before far."""
-        missed = self.status == PoseStatus.NOT_REACHED
-        cost = np.minimum(self.movement, 99.0) + 1e3 * (self.status > PoseStatus.EXTRAPOLATED)
-        cost += 200.0 * ((self.status == PoseStatus.EXTRAPOLATED) & (not given))
-        cost = np.where(missed, 1e6 + np.minimum(self.off_mm, 1e8), cost)
-        order = np.lexsort([cost, self.row])
-        rows, first = np.unique(self.row[order], return_index=True)
-        chosen = order[first]
-        full = [np.full((count, *each.shape[1:]), np.inf) for each in self]
-        for column, values in zip(full, self, strict=True):
-            column[rows] = values[chosen]
-        status = np.full(count, int(PoseStatus.NOT_REACHED))
-        status[rows] = self.status[chosen]
-        full[1][~np.isin(np.arange(count), rows)] = np.nan
-        return _Judged(*full)._replace(status=status)
 
 
 @dataclass(frozen=True)
@@ -182,9 +159,10 @@ class _Goals:
     def wanted(self) -> Pose:
         return compose(self.goal, self.carried)
 
-    def judged(self, start: np.ndarray, rows: np.ndarray) -> _Judged:
+    def judged(self, start: np.ndarray, rows: np.ndarray) -> pd.DataFrame:
         """Joints refined from ``start`` (m, k) onto the goals ``rows`` (m,), verified forward.
 
+        Columns: row, status, what is left, the largest movement of a joint, and joints 0 ..
         A start so far from limits or covered range that no refinement brings it back is judged as
         it stands.
         """
@@ -219,7 +197,16 @@ class _Goals:
         refined = np.where(hit, refined, PoseStatus.NOT_REACHED)
         apart = np.abs(reported - self.near[rows]) / limits.travel_unit(robot)
         status = np.where(hopeless, status, refined)
-        return _Judged(rows, q_dh, status, off, angle, np.max(apart, axis=1))
+        return pd.DataFrame(
+            {
+                "row": rows,
+                "status": status,
+                "off_mm": off,
+                "angle_rad": angle,
+                "movement": np.max(apart, axis=1),
+                **dict(enumerate(q_dh.T)),
+            }
+        )
 
     def postures(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Starts (m, k) in every posture of the plain arm at goals ``rows``, and their goals."""
@@ -264,15 +251,11 @@ class _Goals:
         if not kinds or model.table is not None:
             return self._onto(model, start, rows, None)
         # Directions and payloads differ by row, and a refinement takes one state.
-        found = np.empty_like(start)
-        _, first, group = np.unique(
-            np.hstack(kinds), axis=0, return_index=True, return_inverse=True
-        )
-        for number, one in enumerate(first):
-            own = np.flatnonzero(group.ravel() == number)
-            state = like.select(slice(one, one + 1))
-            found[own] = self._onto(model, start[own], rows[own], state)
-        return found
+        refined = np.empty_like(start)
+        for _, group in pd.DataFrame(np.hstack(kinds)).groupby([*range(np.hstack(kinds).shape[1])]):
+            at = group.index.to_numpy()
+            refined[at] = self._onto(model, start[at], rows[at], like.select(at[:1]))
+        return refined
 
     def _onto(
         self, model: ErrorModel, start: np.ndarray, rows: np.ndarray, like: JointState | None
