@@ -10,7 +10,6 @@ import pytest
 
 from kinacc.calibration import fitting
 from kinacc.calibration.constraints import free_parameters
-from kinacc.calibration.identifiability import weak
 from kinacc.calibration.observations import full_poses
 from kinacc.deployment.planning import (
     choose,
@@ -43,24 +42,6 @@ def test_the_rank_is_that_of_a_fit_to_the_same_poses(name, hayati):
     )
     assert shown.rank == 12 + fit.solution.spectrum.rank
     assert shown.rows.shape == (120, 6, shown.rank)
-
-
-def test_what_no_candidate_shows_is_listed():
-    arm = robot.load("mh180")
-    joints = spread(arm, 100)
-    sentences = information(arm, joints, paper.experiment(TOOL)).left_open.sentences
-    assert set(sentences) >= {
-        "theta of joint 1 +1 mrad, base rz -1 mrad: no pose separates these",
-        "d of joint 2 +1 mm, d of joint 3 +1 mm: no pose separates these",
-    }
-    joints[:, 3] = 0.3
-    poor = weak(information(arm, joints, paper.experiment(TOOL)).left_open.sentences)
-    assert poor
-    assert all("joint 3" in line or "joint 4" in line for line in poor)
-    on_axis = Pose(np.eye(3), np.array([0.0, 0.0, 100.0]))
-    ur10 = robot.load("ur10")
-    shown = information(ur10, spread(ur10, 100), paper.experiment(on_axis, orientation=False))
-    assert "theta of joint 6 +1 mrad: no pose separates these" in shown.left_open.sentences
 
 
 def test_candidates_are_where_they_were_asked_to_be():

@@ -49,25 +49,6 @@ def test_sensitivities_are_the_finite_differences_of_the_pose(model, frame, poin
         np.testing.assert_allclose(slopes[:, 3:, column], turn, rtol=1e-5, atol=1e-8)
 
 
-@pytest.mark.parametrize("model", ["dh", "vec"])
-@pytest.mark.parametrize("frame", ["base", "instrument"])
-@pytest.mark.parametrize("point", ["tool", "flange"])
-def test_joint_jacobians_are_the_finite_differences_of_the_pose(model, frame, point):
-    arm, step = calibrated("mh180", model), 1e-6
-    q_rad = joints("mh180", 4, seed=9)
-    s = np.sign(np.random.default_rng(5).normal(size=q_rad.shape))
-    slopes = arm.joint_jacobian(JointState(q_rad, s), frame, point)
-    for joint in range(q_rad.shape[1]):
-        moved = step * np.eye(q_rad.shape[1])[joint]
-        low, high = (
-            arm.pose(JointState(q_rad + sign * moved, s), frame, point) for sign in (-1, 1)
-        )
-        shift = (high.position_mm - low.position_mm) / (2 * step)
-        turn = log_so3(high.rotation @ np.swapaxes(low.rotation, 1, 2)) / (2 * step)
-        np.testing.assert_allclose(slopes[:, :3, joint], shift, atol=1e-5)
-        np.testing.assert_allclose(slopes[:, 3:, joint], turn, atol=1e-8)
-
-
 def test_predictions_are_as_far_off_as_they_say():
     """Forty calibrations of one arm: errors over standard deviations have unit variance."""
     q_rad = joints("mh180", 12, seed=21)

@@ -112,10 +112,15 @@ def test_a_generated_file_moves_as_the_calibrated_arm(name):
     q_rad = some_joints(arm.robot)
     names = [f"joint_{i}" for i in range(1, arm.robot.dh.joints + 1)]
     names = [each.replace(" ", "_") for each in arm.robot.joint_names] or names
-    text = urdf.text(of(arm))
-    for link, point in (("tool", "tool"), ("flange", "flange")):
-        theirs = seen_by_pinocchio(text, link, q_rad, arm.robot.dh.prismatic, names)
-        assert_same(arm.pose(JointState(q_rad @ arm.robot.joint_map.T), "base", point), theirs)
+    q_dh = q_rad @ arm.robot.joint_map.T
+    if coupled := not np.array_equal(np.abs(arm.robot.joint_map), np.eye(len(names))):
+        with pytest.raises(InputError, match="--dh-joints"):
+            urdf.text(of(arm))
+    text = urdf.text(of(arm, dh_joints=coupled))
+    for link in ("tool", "flange"):
+        shown = q_dh if coupled else q_rad
+        theirs = seen_by_pinocchio(text, link, shown, arm.robot.dh.prismatic, names)
+        assert_same(arm.pose(JointState(q_dh), "base", link), theirs)
 
 
 @pytest.mark.parametrize("robot_from", ["file", "shipped"])
@@ -163,17 +168,3 @@ def test_another_arm_is_refused_with_the_distance(tmp_path):
     path.write_text(text.replace("0.5723", "0.5713"))
     with pytest.raises(InputError, match=r"differs from ur10 by up to .* mm"):
         urdf.text(of(bent(robot.load("ur10")), path, "w3"))
-
-
-def test_coupled_joints_are_refused_and_dh_joints_offered():
-    arm = bent(robot.load("fanuc_r2000ic_165f"))
-    coupled = arm.robot.joint_map.copy()
-    coupled[2, 1] = 1.0
-    arm = replace(arm, robot=replace(arm.robot, joint_map=coupled))
-    with pytest.raises(InputError, match="--dh-joints"):
-        urdf.text(of(arm))
-    q_dh = np.random.default_rng(0).uniform(-1, 1, (5, 6))
-    names = [each.replace(" ", "_") for each in arm.robot.joint_names]
-    text = urdf.text(of(arm, dh_joints=True))
-    theirs = seen_by_pinocchio(text, "flange", q_dh, arm.robot.dh.prismatic, names)
-    assert_same(arm.pose(JointState(q_dh), "base", "flange"), theirs)
