@@ -11,11 +11,13 @@ _ELSEWHERE = {
     "Robot": "kinacc.kinematics.robot",
     "read_table": "kinacc.tables.store",
     "plan_poses": "kinacc.deployment.planning",
+    "Campaign": "kinacc.campaign.campaign",
     "evaluate_assessors": "kinacc.study.evaluate_assessors",
     "register_error_model": "kinacc.calibration.own_model",
 }
 __all__ = [
     "Calibration",
+    "Campaign",
     "Measurements",
     "Pose",
     "Robot",
@@ -42,6 +44,7 @@ if TYPE_CHECKING:
         verify,
     )
     from kinacc.calibration.own_model import register_error_model
+    from kinacc.campaign.campaign import Campaign
     from kinacc.deployment.planning import plan_poses
     from kinacc.geometry import Pose
     from kinacc.kinematics.robot import Robot

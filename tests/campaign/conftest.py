@@ -80,7 +80,7 @@ def begun(calibration, tmp_path):
     def start(*more, points=20, budget=20):
         folder = tmp_path / f"campaign {len(list(tmp_path.iterdir()))}"
         done = call("campaign", "start", folder, "--calibration", calibration, "--robot", "mh180",
-                    "--model", "dh", "--drawn", points, "--budget", budget, *more)  # fmt: skip
+                    "--model", "dh", "--candidates", points, "--budget", budget, *more)  # fmt: skip
         assert done.exit_code == 0, done.output
         return folder
 

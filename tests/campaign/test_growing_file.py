@@ -24,8 +24,8 @@ class Day:
         self.folder = folder / "a check"
         self.file = folder / "readings.csv"
         done = call("campaign", "start", self.folder, "--calibration", calibration, "--model", "dh",
-                    "--drawn", 12, "--budget", 40, "--instrument", "tracker=0.05", "--instrument",
-                    "camera=0.1", "--frame", "base")  # fmt: skip
+                    "--candidates", 12, "--budget", 40, "--instrument", "tracker=0.05",
+                    "--instrument", "camera=0.1", "--frame", "base")  # fmt: skip
         assert done.exit_code == 0, done.output
         shown = call("campaign", "next", self.folder, "--all", "--json").stdout
         self.visit = json.loads(shown)["rows"]

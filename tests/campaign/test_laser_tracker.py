@@ -92,19 +92,6 @@ def test_a_plan_with_a_laser_tracker_is_read_as_it_was_written(begun):
     np.testing.assert_array_equal(again.covariance_mm2, plan.covariance_mm2)
 
 
-def test_a_tracker_without_its_distance_from_the_arm_is_asked_about(
-    calibration, tmp_path, monkeypatch
-):
-    monkeypatch.setattr("kinacc.campaign.slips._NEAREST_M", 30.0)
-    words = ["campaign", "start", tmp_path / "check", "--calibration", calibration, "--robot",
-             "mh180", "--model", "dh", "--instrument", f"tracker={LASER}"]  # fmt: skip
-    done = call(*words)
-    assert done.exit_code == 2
-    assert "its head has to be the origin of the frame of its readings" in done.output
-    assert not (tmp_path / "check").exists()
-    assert call(*words, "--sure").exit_code == 0
-
-
 @pytest.mark.parametrize(
     ("text", "said"),
     [

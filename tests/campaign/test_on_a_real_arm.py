@@ -66,7 +66,7 @@ def begun(ur10_d, folder, *more):
 
 def start(ur10_d, folder, *more):
     return call("campaign", "start", folder, "--calibration", ur10_d[0], "--model", "dh",
-                "--drawn", 20, "--noise-mm", 0.05, *more)  # fmt: skip
+                "--candidates", 20, "--noise-mm", 0.05, *more)  # fmt: skip
 
 
 def test_a_box_of_joints_that_was_hardly_measured_is_asked_about(ur10_d, tmp_path):
@@ -74,13 +74,12 @@ def test_a_box_of_joints_that_was_hardly_measured_is_asked_about(ur10_d, tmp_pat
     folder = tmp_path / "campaign"
     done = start(ur10_d, folder, "--region", "fitted")
     assert done.exit_code == 2
-    assert "20 of 20 candidates lie where the calibration was not measured" in done.output
+    assert "candidates: 20 of 20" in done.output
     assert "--region measured" in done.output
     assert not folder.exists()
     done = start(ur10_d, folder, "--region", "fitted", "--sure", "--json")
     assert done.exit_code == 0, done.output
-    assert json.loads(done.stdout)["prediction"]["not_measured"] == 20
-    assert "warning: 20 of 20 candidates" in done.stderr
+    assert json.loads(done.stdout)["far_from_data"] == 20
 
 
 def test_candidates_of_a_thin_series_are_drawn_where_it_was_measured(ur10_d, tmp_path):
@@ -88,7 +87,7 @@ def test_candidates_of_a_thin_series_are_drawn_where_it_was_measured(ur10_d, tmp
     for name, more in (("one", ()), ("same", ()), ("other", ("--seed", 1))):
         done = start(ur10_d, tmp_path / name, "--json", *more)
         assert done.exit_code == 0, done.output
-        assert json.loads(done.stdout)["prediction"]["not_measured"] == 0
+        assert json.loads(done.stdout)["far_from_data"] == 0
         assert not done.stderr
         plans.append(campaigns.open_(tmp_path / name).plan)
     assert plans[0].about["candidates"] == "drawn between neighbouring measured poses"

@@ -183,36 +183,24 @@ def test_poses_that_were_read_once_say_nothing_of_the_noise():
 def test_repeats_are_offered_as_noise_along_the_axes_of_the_instrument():
     told = slips.noise_by_repeats(noise_of(50, 6, np.array([0.05, 0.1, 0.2]), sessions=2))
     count, groups, std_mm = re.search(
-        r"(\d+) readings at (\d+) .* scatter by (\S+) mm", told
+        r"(\d+) readings .* at (\d+) .* scatter by (\S+) mm", told
     ).groups()
     assert (count, groups) == ("600", "50")
     found = [float(each) for each in std_mm.split(",")]
     assert found == pytest.approx([0.05, 0.1, 0.2], rel=0.1)
-    assert "no new set-up of instrument or target" in " ".join(told.split())
 
 
 @pytest.mark.parametrize(("poses", "times"), [(120, 1), (9, 2)])
 def test_where_hardly_any_joints_were_read_again_the_calibration_tells_no_noise(poses, times):
-    told = slips.noise_by_repeats(noise_of(poses, times, 0.06))
-    assert "scatter by" not in told
-    assert "too few repeats" in told
+    assert slips.noise_by_repeats(noise_of(poses, times, 0.06)) == ""
 
 
 def test_a_campaign_without_noise_is_told_what_its_calibration_knows_of_it(start, tmp_path):
     for done in (start(), call("campaign", "plan"), call("campaign", "plan", "--errors", tmp_path)):
         assert done.exit_code == 2
         assert "noise: is not given; give it in one of three ways:" in done.output
-        lines = [each.strip() for each in done.output.splitlines()]
-        ways = (
-            "a test (the surest): visit 20 poses",
-            "an estimate: --noise-mm MM --noise",
-            "a num",
-        )
-        for way in ways:
-            assert sum(each.startswith(way) for each in lines) == 1
-    said = start().output
-    assert "too few repeats" in said
-    assert max(map(len, said.splitlines())) <= 100
+        for way in ("kinacc repeatability FILE", "--noise estimate", "--noise-mm MM"):
+            assert way in done.output
     assert not (tmp_path / "check").exists()
 
 

@@ -25,11 +25,11 @@ def written(folder, tmp_path_factory):
     """A file of every command that writes joints or poses, in every form, by command and kind."""
     base = tmp_path_factory.mktemp("written by others")
     campaign = base / "check"
-    begin(folder, campaign, "--drawn", 8)
+    begin(folder, campaign, "--candidates", 8)
     record_all(campaign, base / "readings.csv")
     assert call("campaign", "report", campaign).exit_code == 0
     again = base / "again"
-    begin(folder, again, "--drawn", 8)
+    begin(folder, again, "--candidates", 8)
     made = {}
     for kind in KINDS:
         commands = {
@@ -123,7 +123,7 @@ def test_rows_without_an_answer_are_told_and_left_out(folder, tmp_path):
 
 def test_a_visit_predicted_by_the_calibration_is_no_measurement_of_it(folder, tmp_path):
     campaign, visit = tmp_path / "check", tmp_path / "visit.csv"
-    begin(folder, campaign, "--drawn", 8)
+    begin(folder, campaign, "--candidates", 8)
     assert call("campaign", "next", campaign, "--all", "-o", visit).exit_code == 0
     made = tmp_path / "predict.csv"
     assert call("predict", folder, visit, "--model", "dh", "-o", made).exit_code == 0
@@ -135,7 +135,7 @@ def test_a_visit_predicted_by_the_calibration_is_no_measurement_of_it(folder, tm
 
 def test_measured_errors_of_a_campaign_plan_the_next_one(folder, tmp_path):
     campaign = tmp_path / "check"
-    begin(folder, campaign, "--drawn", 12)
+    begin(folder, campaign, "--candidates", 12)
     record_all(campaign, tmp_path / "readings.csv")
     assert call("campaign", "report", campaign).exit_code == 0
     points = campaign / "report" / "campaign_points.parquet"

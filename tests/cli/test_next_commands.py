@@ -75,7 +75,7 @@ def test_what_init_writes_into_its_file_and_its_json_runs_as_printed(described, 
 def test_what_campaign_start_names_next_runs_as_printed(calibration, tmp_path):
     folder = tmp_path / "my arm's check"
     done = call("campaign", "start", folder, "--calibration", calibration, "--model", "dh",
-                "--drawn", 5, "--budget", 5, "--noise-mm", 0.05)  # fmt: skip
+                "--candidates", 5, "--budget", 5, "--noise-mm", 0.05)  # fmt: skip
     assert done.exit_code == 0, done.output
     line = re.search(r"^Next: (.*)$", done.output, re.MULTILINE)[1]
     shown = run(line)

@@ -3,7 +3,7 @@
 import pytest
 
 from kinacc.assess.search_and_confirm import SearchAndConfirm
-from kinacc.cli.campaign_options import with_references
+from kinacc.campaign.plan import with_references
 
 
 @pytest.mark.parametrize(

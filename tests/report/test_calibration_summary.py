@@ -39,7 +39,7 @@ def fleet(study, tmp_path, monkeypatch):
 
 def campaign(name, readings=8, noise=0.05, model="dh", more=(), off_mm=0.0):
     """A campaign of five candidates on a robot that is off, so many of its readings taken."""
-    words = ("--model", model, "--drawn", 5, "--budget", 8, "--noise-mm", noise, *more)
+    words = ("--model", model, "--candidates", 5, "--budget", 8, "--noise-mm", noise, *more)
     folder, place = f"results/{name}", f"check_{name}"
     begun = call("campaign", "start", place, "--calibration", folder, *words)
     assert begun.exit_code == 0, begun.output

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from kinacc import __version__
 from kinacc.assess.adaptive import AdaptiveAssessor, Candidates
 from kinacc.campaign.instrument import Instrument
 from kinacc.campaign.plan import Limits, Plan, Points
@@ -71,6 +72,7 @@ def plan_of(
     """
     order = np.random.default_rng(seed).permutation(len(points))
     to_base = _to_base(arm)
+    instruments = [each.placed(to_base, points.modelled_mm) for each in instruments]
     noise = instruments[0].in_base(to_base, points.modelled_mm)
     begun = assessor.begin(Candidates(noise[order]))
     route = order[: begun.first]
@@ -83,21 +85,32 @@ def plan_of(
     )  # fmt: skip
 
 
-def placed(
-    arm: Calibration, instruments: Sequence[Instrument], points: Points
-) -> tuple[Instrument, ...]:
-    """The instruments, with the largest noise that each has at any of the candidates."""
-    return tuple(each.placed(_to_base(arm), points.modelled_mm) for each in instruments)
+def about(arm: Calibration, point: str | None, source: str) -> dict[str, str]:
+    """What a campaign is about; ``source`` of its candidates."""
+    return {
+        "robot": arm.robot.name,
+        "calibration": arm.name,
+        "model": arm.choice,
+        "point": point or arm.default_point,
+        "candidates": source,
+        "kinacc_version": __version__,
+    }
 
 
-def plausible_mm(arm: Calibration, instruments: Sequence[Instrument]) -> float:
+def unexplained_mm(arm: Calibration) -> float:
+    """The rms position error that the calibration left, noise included; NaN where not known."""
+    return arm.residual.position_mm if arm.residual else np.nan
+
+
+def plausible_mm(arm: Calibration, instruments: Sequence[Instrument], points: Points) -> float:
     """Size of an error beyond which a reading is more likely to be of another pose, mm.
 
     Twenty times what the calibration left unexplained, and ten standard deviations of the
     noisiest instrument; at least 5 mm, and 50 mm for a model that was never fitted.
     """
-    noise = max(np.sqrt(np.linalg.eigvalsh(each.covariance_mm2)[-1]) for each in instruments)
-    left = arm.residual.position_mm if arm.residual else np.nan
+    used = [each.placed(_to_base(arm), points.modelled_mm) for each in instruments]
+    noise = max(np.sqrt(np.linalg.eigvalsh(each.covariance_mm2)[-1]) for each in used)
+    left = unexplained_mm(arm)
     usual = 50.0 if not np.isfinite(left) else max(5.0, 20.0 * left)
     return float(f"{usual + 10.0 * noise:.3g}")
 

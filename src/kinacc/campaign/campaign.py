@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
+from kinacc.assess.registry import RECOMMENDED
+from kinacc.campaign import begin, slips
 from kinacc.campaign import folder as folders
 from kinacc.campaign import reading as checks
-from kinacc.campaign.instrument import INSTRUMENT
-from kinacc.campaign.plan import Plan
+from kinacc.campaign.instrument import INSTRUMENT, Instrument, covariance_of
+from kinacc.campaign.plan import Limits, Plan, assessor_of, with_references
 from kinacc.campaign.reading import Reading
 from kinacc.campaign.state import LEAVE_OUT, STRIKE, State
 from kinacc.campaign.status import Bound, CampaignStatus, status
+from kinacc.deployment.record import Calibration
 from kinacc.errors import InputError, Problem, refuse
 from kinacc.geometry import invert
 
@@ -66,6 +70,14 @@ class RowsOfFile:
     path: str
 
 
+class CalibratedRobot(Protocol):
+    """A calibration with its model: ``kinacc.Calibration``."""
+
+    @property
+    def model(self) -> Calibration:
+        """The selected model."""
+
+
 class Campaign:
     """A measuring campaign in a folder.
 
@@ -82,7 +94,9 @@ class Campaign:
     Examples
     --------
     >>> import kinacc
-    >>> campaign = kinacc.Campaign("check")  # doctest: +SKIP
+    >>> calibration = kinacc.load_calibration("results/tracker")  # doctest: +SKIP
+    >>> candidates = calibration.table("measurements")[joints].to_numpy()  # doctest: +SKIP
+    >>> campaign = kinacc.Campaign.start("check", calibration, candidates, 0.03)  # doctest: +SKIP
     >>> pose = campaign.next_pose()  # doctest: +SKIP
     >>> campaign.add_reading([812.31, -40.02, 655.90])  # doctest: +SKIP
     >>> campaign.bounds()[0].upper_mm  # doctest: +SKIP
@@ -91,6 +105,66 @@ class Campaign:
     def __init__(self, folder: Path | str) -> None:
         self.folder = Path(folder)
         self._load()
+
+    @classmethod
+    def start(
+        cls, folder: Path | str, calibration: CalibratedRobot, candidates: ArrayLike,
+        noise_mm: ArrayLike, budget: int = 200, *, point: str | None = None,
+        frame: str = INSTRUMENT, tolerance_mm: float | None = None, seed: int = 0,
+        assessor: str = RECOMMENDED, settings: Mapping[str, object] | None = None,
+    ) -> Campaign:  # fmt: skip
+        """Start a campaign in a folder.
+
+        Parameters
+        ----------
+        folder : path
+            New folder.
+        calibration : kinacc.Calibration
+            Calibrated robot whose largest error is bounded.
+        candidates : (m, k) array
+            Reported joints, rad (mm where a joint slides), chosen without regard to errors.
+        noise_mm : float, (3,) or (3, 3) array
+            Standard deviation of a reading per axis, mm, or covariance, mm^2.
+        budget : int
+            Readings in all.
+        point : str, optional
+            Target that is measured.
+        frame : str
+            Frame of the readings: ``instrument`` or ``base``.
+        tolerance_mm : float, optional
+            Largest error allowed.
+        seed : int
+            Seed of the order of the candidates.
+        assessor : str
+            Name of the assessor.
+        settings : mapping, optional
+            Settings of the assessor.
+
+        Raises
+        ------
+        InputError
+            For candidates the model does not cover, a wrong noise, or a folder in use.
+        """
+        arm, problems = calibration.model, list[Problem]()
+        noise = np.asarray(noise_mm, dtype=float)
+        text = ",".join(map(repr, noise.ravel().tolist()))
+        covariance = covariance_of(text, "noise_mm", problems)
+        refuse(problems)
+        used = [Instrument(INSTRUMENT, covariance, frame)]
+        joints = np.asarray(candidates, dtype=float)
+        labels = [str(number) for number in range(1, len(joints) + 1)]
+        points = begin.points_of(arm, joints, labels, None, point)
+        settings = {"measurements": budget, **(settings or {})}
+        made = assessor_of(assessor, settings)
+        made = with_references(made, len(points), settings.get("references"))
+        limits = Limits(np.deg2rad(0.02), begin.plausible_mm(arm, used, points), tolerance_mm)
+        at, about = np.zeros(joints.shape[1]), begin.about(arm, point, "given as an array")
+        plan = begin.plan_of(arm, points, made, used, limits, seed, at, about)
+        doubts = slips.of_noise(used, begin.unexplained_mm(arm))
+        doubts += slips.of_candidates(arm, points, point)
+        overruled = tuple(f"{each.where}: {each.what}" for each in doubts)
+        folders.start(folder, replace(plan, overruled=overruled))
+        return cls(folder)
 
     def _load(self) -> None:
         self.opened = folders.open_(self.folder)

@@ -104,7 +104,7 @@ def require_method(opened: Opened) -> None:
 def marks_of(opened: Opened) -> dict[str, object]:
     """Return the provenance of the tables: the plan counts as the configuration."""
     marks = {"kinacc_version": __version__, "config_hash": opened.digest}
-    return {**marks, "seed": opened.plan.seed}
+    return {**marks, "seed": opened.plan.seed, "journal": opened.journal.sha256()}
 
 
 def doubts(opened: Opened) -> list[str]:

@@ -1,114 +1,73 @@
-"""Values that are allowed and look like slips: they are asked about before they are taken.
-
-And what is known of the noise before it is stated: it is offered, and never taken by itself.
-"""
+"""Doubts about a campaign before it starts: its noise, and candidates far from the data."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from kinacc.calibration.noise import Noise, of_measurements
 from kinacc.campaign.instrument import Instrument, noise
-from kinacc.campaign.plan import Plan
+from kinacc.campaign.plan import Points
+from kinacc.deployment.applicability import LIKE_FITTED, is_measured_there, position_std_mm
+from kinacc.deployment.record import Calibration
 from kinacc.errors import Problem
+from kinacc.kinematics import robot
+from kinacc.kinematics.model import JointState
+from kinacc.tables import store
 
-if TYPE_CHECKING:
-    from kinacc.calibration.noise import Noise
-
-_NEAREST_M, _FARTHEST_M = 0.3, 80.0  # at which laser trackers measure
 _MUCH_NOISE = 2.0  # times what the calibration left unexplained, noise included
 _MUCH_NOISE_MM = 1.0  # where nothing is known of the calibration
 _LITTLE_NOISE = 0.8  # of the scatter that was measured
-_USUAL_READINGS = 10  # that say what size is usual
-_TOO_FEW = "the calibration does not tell it: too few repeats"
+_FEWEST_FREEDOM = 10  # degrees of freedom that show a noise
+_FAR_SHARE = 0.1  # of the candidates
+WAYS_TO_NOISE = """give it in one of three ways:
+      a test (the surest): visit 20 poses three times each, leaving them between,
+        run kinacc repeatability FILE -o noise.json, then --repeatability noise.json
+      an estimate: --noise-mm MM --noise estimate (MM is a guess)
+      a number: --noise-mm MM, or --covariance-mm2, or --instrument NAME=MM"""
 
 
 def of_noise(instruments: Sequence[Instrument], left_mm: float = math.nan) -> list[Problem]:
-    """Noise larger than the error a calibration left unexplained, ``left_mm`` (rms).
-
-    That error holds the noise of the readings it was found by.
-    """
+    """Return a problem for noise larger than the rms error ``left_mm`` of the calibration."""
     known = math.isfinite(left_mm) and left_mm > 0.0
     most_mm = _MUCH_NOISE * left_mm if known else _MUCH_NOISE_MM
-    problems = []
-    for each in instruments:
-        size_mm = math.sqrt(float(np.trace(each.covariance_mm2)))
-        if size_mm <= most_mm:
-            continue
-        than = (
-            f"than the {left_mm:.3g} mm that the calibration left" if known else "than trackers do"
+    than = f"than the {left_mm:.3g} mm that the calibration left" if known else "than trackers do"
+    return [
+        Problem(
+            f"noise of {each.name}",
+            f"{noise(each)}: the readings would scatter more {than}",
+            "millimetres",
+            "are micrometres meant? Then it is "
+            f"{1e-3 * np.sqrt(np.diag(each.covariance_mm2)).max():g} mm. --sure takes it as it is",
         )
-        what = f"{noise(each)}: the readings would scatter more {than}"
-        std = float(np.sqrt(np.diag(each.covariance_mm2)).max())
-        fix = f"are micrometres meant? Then it is {1e-3 * std:g} mm. --sure takes it as it is"
-        problems.append(Problem(f"noise of {each.name}", what, "millimetres", fix))
-    return problems
+        for each in instruments
+        if math.sqrt(np.trace(each.covariance_mm2)) > most_mm
+    ]
 
 
-def of_repeats(instruments: Sequence[Instrument], calibration: Path) -> list[Problem]:
-    """The same as :func:`of_little_noise` of a results folder; nothing where it has no readings."""
-    known = _noise_of(calibration)
-    return of_little_noise(instruments, known) if known else []
+def of_little_noise(instruments: Sequence[Instrument], known: Noise | None) -> list[Problem]:
+    """Return a problem for noise smaller than that of the readings of the calibration."""
+    if known is None or known.freedom < _FEWEST_FREEDOM:
+        return []
+    return [
+        Problem(
+            f"noise of {each.name}",
+            f"{noise(each)}: readings of the calibration at equal joints scatter by "
+            f"{known.per_axis_mm:.3g} mm per axis ({known.freedom} degrees of freedom)",
+            fix=f"include how the arm repeats a pose: {known.per_axis_mm:.2g} mm or more; --sure "
+            "takes it as it is",
+        )
+        for each in instruments
+        if math.sqrt(np.trace(each.covariance_mm2) / 3.0) < _LITTLE_NOISE * known.per_axis_mm
+    ]
 
 
-def ways_to_noise(known: Sequence[str], several: bool) -> str:
-    """How to say what the noise is, in short lines, and what is ``known`` of it.
-
-    ``several``: instruments may be named.
-    """
-    named = ", or --instrument NAME=MM" if several else ""
-    return "\n".join(
-        [
-            "give it in one of three ways:",
-            "      a test (the surest): visit 20 poses three times each, leaving them between,",
-            "        run kinacc repeatability FILE -o noise.json, then --repeatability noise.json",
-            "      an estimate: --noise-mm MM --noise estimate",
-            "        (MM is a guess; the readings of the campaign then tell the noise)",
-            f"      a number: --noise-mm MM, or --covariance-mm2{named}",
-            *(f"    {each}" for each in known),
-        ]
-    )
-
-
-def noise_known(calibration: Path) -> str:
-    """The same as :func:`noise_by_repeats` of a results folder."""
-    known = _noise_of(calibration)
-    return noise_by_repeats(known) if known else _TOO_FEW
-
-
-def noise_by_repeats(known: Noise) -> str:
-    """The noise of the readings of a calibration, and what it does not contain, in short lines."""
-    brief = noise_in_brief(known)
-    if not brief:
-        return _TOO_FEW
-    return (
-        f"of the calibration, {brief}\n"
-        "      along x,y,z of the instrument: the noise is that or more, as they may have been\n"
-        "      read back to back, without coming back to the pose, and hold no new set-up of\n"
-        "      instrument or target"
-    )
-
-
-def noise_in_brief(known: Noise) -> str:
-    """By how much readings of one configuration scatter; empty where there are too few."""
-    if known.freedom < _USUAL_READINGS or not (known.std_mm > 0.0).all():
-        return ""
-    std_mm = ",".join(f"{each:.2g}" for each in known.std_mm)
-    where = f"{known.readings} readings at {known.configurations} configurations"
-    return f"{where} scatter by {std_mm} mm"
-
-
-def _noise_of(calibration: Path) -> Noise | None:
-    """The noise of the readings in a results folder; None where it has no readings."""
-    from kinacc.calibration.noise import of_measurements
-    from kinacc.kinematics import robot
-    from kinacc.tables import store
-
-    paths = [calibration / f"{name}.parquet" for name in ("measurements", "robot")]
+def noise_of(results: Path) -> Noise | None:
+    """Return the noise of the readings in a results folder; None where it has no readings."""
+    paths = [results / f"{name}.parquet" for name in ("measurements", "robot")]
     if not all(path.is_file() for path in paths):
         return None
     measured, described = map(store.read, paths)
@@ -116,40 +75,37 @@ def _noise_of(calibration: Path) -> Noise | None:
     return of_measurements(measured, arm)
 
 
-def of_little_noise(instruments: Sequence[Instrument], known: Noise) -> list[Problem]:
-    """Noise stated smaller than that of the readings of the calibration."""
-    problems = []
-    for each in instruments:
-        std_mm = math.sqrt(float(np.trace(each.covariance_mm2)) / 3.0)
-        if known.freedom < _USUAL_READINGS or std_mm >= _LITTLE_NOISE * known.per_axis_mm:
-            continue
-        what = (
-            f"{noise(each)}: readings of the calibration at equal joints scatter by "
-            f"{known.per_axis_mm:.3g} mm per axis ({known.freedom} degrees of freedom)"
-        )
-        fix = (
-            f"the noise has to hold how the arm repeats a pose: give {known.per_axis_mm:.2g}, or "
-            "more; --sure takes it as it is"
-        )
-        problems.append(Problem(f"noise of {each.name}", what, fix=fix))
-    return problems
+def noise_by_repeats(known: Noise | None) -> str:
+    """Return the scatter of repeated readings of a calibration; empty where there are too few."""
+    if known is None or known.freedom < _FEWEST_FREEDOM or not (known.std_mm > 0.0).all():
+        return ""
+    std_mm = ",".join(f"{each:.2g}" for each in known.std_mm)
+    return (
+        f"{known.readings} readings of the calibration at {known.configurations} configurations "
+        f"scatter by {std_mm} mm along x,y,z of the instrument: a lower limit of the noise"
+    )
 
 
-def of_distance(begun: Plan) -> list[Problem]:
-    """Laser trackers that stand where none does, as where the origin of a frame is no tracker."""
-    problems = []
-    for each in begun.instruments:
-        if each.laser is None:
-            continue
-        apart = np.linalg.norm(begun.points.modelled_mm - begun.to_base.position_mm, axis=1)
-        least, most = 1e-3 * float(apart.min()), 1e-3 * float(apart.max())
-        if least >= _NEAREST_M and most <= _FARTHEST_M:
-            continue
-        what = f"{least:.2f} m to {most:.2f} m from the candidates, by the calibration"
-        fix = (
-            "its head has to be the origin of the frame of its readings; else state the noise "
-            "otherwise. --sure takes it as it is"
-        )
-        allowed = f"{_NEAREST_M:g} m to {_FARTHEST_M:g} m"
-        problems.append(Problem(f"laser tracker {each.name}", what, allowed, fix))
-    return problems
+def far_from_data(arm: Calibration, points: Points, point: str | None) -> np.ndarray:
+    """Return which candidates (m,) lie where the calibration was not measured."""
+    if arm.known is None or arm.residual is None or not np.isfinite(arm.residual.position_mm):
+        return np.zeros(len(points), dtype=bool)
+    return ~is_measured_there(arm, _at(arm, points), point)
+
+
+def of_candidates(arm: Calibration, points: Points, point: str | None) -> list[Problem]:
+    """Return a problem where more than a tenth of the candidates lie far from measured poses."""
+    far = int(np.sum(far_from_data(arm, points, point)))
+    if far <= _FAR_SHARE * len(points):
+        return []
+    largest_mm = float(np.max(position_std_mm(arm, _at(arm, points), point)))
+    what = (
+        f"{far} of {len(points)} lie outside the joint ranges of the calibration, or have a larger "
+        f"standard deviation than {LIKE_FITTED:.0%} of its poses (up to {largest_mm:.3g} mm)"
+    )
+    fix = "--region measured draws them between measured poses; --sure takes them as they are"
+    return [Problem("candidates", what, f"at most {_FAR_SHARE:.0%} of them", fix)]
+
+
+def _at(arm: Calibration, points: Points) -> JointState:
+    return JointState(arm.robot.dh_joints(points.joints), points.directions)

@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING
 import click
 import pandas as pd
 
-from kinacc.cli import campaign_plan, campaign_record, choice
+from kinacc.cli import campaign_plan, campaign_record, campaign_start
 from kinacc.cli.choice import option
 from kinacc.cli.exit_codes import AGAINST
-from kinacc.cli.file_options import joint_file_options
 from kinacc.cli.group import InOrder
 from kinacc.cli.output import Output, answers, require_writable, write_table
 
@@ -42,70 +41,6 @@ def campaign() -> None:
       kinacc campaign record check --position-mm "812.31,-40.02,655.90"
       kinacc campaign status check
     """
-
-
-@campaign.command("start")
-@click.argument("folder", type=click.Path(file_okay=False))
-@option("--calibration", required=True, type=click.Path(), help="Results folder of the arm.")
-@choice.SELECTED
-@choice.ROBOT
-@choice.NAMING
-@choice.SESSION
-@choice.POINT
-@option("--candidates", type=click.Path(), help="File of joints that may be measured.")
-@joint_file_options
-@option("--drawn", default=200, type=click.IntRange(1, 20_000),
-        help="Candidates drawn where there is no file.")  # fmt: skip
-@option(
-    "--region",
-    type=click.Choice(["measured", "configured", "fitted", "limits"]),
-    help="Draw between neighbouring measured poses, or evenly from the configured evaluation "
-    "space, the joint ranges the calibration covers, or the joint limits. [configured if there is "
-    "a configuration with a space, fitted with --joints-deg, else measured]",
-)
-@option("--joints-deg", help='Ranges to draw from, e.g. "-90:90,-60:60,...".')
-@option("--inside-mm", help='Where the tool may be in the base: "x0:x1,y0:y1,z0:z1".')
-@option("--instrument", multiple=True,
-        help="NAME=noise, NAME=three or NAME=nine numbers, NAME=laser:KEY=.. (see above); may be "
-        "repeated.")  # fmt: skip
-@option("--frame", type=click.Choice(["instrument", "base"]), default="instrument",
-        help="Frame of readings and covariances.")  # fmt: skip
-@choice.campaign_options
-@option("--budget", default=200, type=click.IntRange(max=1_000_000), help="Readings in all.")
-@option("--joint-tolerance-deg", default=0.02, type=float,
-        help="How far reported joints may be from those asked for.")  # fmt: skip
-@option("--implausible-mm", type=float, help="Error beyond which a reading is refused.")
-@option("--from-deg", help="Joints the arm starts at. [zero]")
-@option("--visit", type=click.Choice(["travel", "random"]), default="travel",
-        help="Order of the first visit.")  # fmt: skip
-@answers("Print what was begun as JSON.")
-def start(out, **given) -> None:
-    """Begin a campaign in FOLDER: nothing of this can be changed once there are readings.
-
-    Candidates are the joint configurations the statement is about: rows of a file in any form that
-    `kinacc init` reads, robots' programs included (of q1_deg .. also s1 .., directions of travel),
-    or drawn. Their order is random, by the seed, and knows nothing of the errors. Where more than a
-    tenth of them lie where the calibration was not measured, that is asked about.
-
-    The noise must hold all that differs between readings of one pose: the instrument, its target,
-    and how well the arm repeats the pose. `kinacc repeatability` tells it of repeated readings.
-
-    A laser tracker's noise grows with the distance: give standard deviations along the beam
-    (range_mm, range_um_per_m) and across it (angle_mm, angle_um_per_m), and how the arm repeats a
-    pose (repeat_mm). Half of what makers state as MPE or as two standard deviations is meant. Its
-    head is the origin of the frame of the calibration's readings.
-
-    \b
-    Example:
-      kinacc campaign start check --calibration results/ur10_d --noise-mm 0.05 --budget 200
-      kinacc campaign start check --calibration results/ur10_d \\
-          --instrument tracker=laser:range_mm=0.008,angle_um_per_m=5,repeat_mm=0.03
-      kinacc campaign start check --calibration results/mh180 --candidates points.csv \\
-          --instrument tracker=0.03 --instrument camera=0.1,0.1,0.3 --tolerance-mm 0.8
-    """
-    from kinacc.cli import campaigns
-
-    campaigns.start(given, out)
 
 
 @campaign.command("next")
@@ -341,4 +276,5 @@ def _say_doubts(found: Campaign) -> None:
 
 
 campaign.add_command(campaign_plan.plan)
+campaign.add_command(campaign_start.start)
 campaign.add_command(campaign_record.record)

@@ -72,6 +72,7 @@ def plan(out, **given) -> None:
 def _question(given: Mapping) -> tuple:
     """Fields, number of candidates, covariance and assessors of the options."""
     from kinacc.campaign import known_noise, slips
+    from kinacc.campaign.plan import with_references
     from kinacc.cli import campaign_options
     from kinacc.errors import Problem, gathered, refuse
     from kinacc.study import fields
@@ -85,16 +86,11 @@ def _question(given: Mapping) -> tuple:
     with gathered(problems):
         tested = campaign_options.tested_noise(given["repeatability"])
     with gathered(problems):
-        instruments = campaign_options.instruments(
-            given["noise_mm"],
-            given["covariance_mm2"],
-            resolution_mm=given["resolution_mm"],
-            calibrations=folders,
-            tested=tested,
-        )
+        instruments = campaign_options.instruments(given, tested, folders)
         if not given["sure"]:
             problems += [*slips.of_noise(instruments), *known_noise.doubts(tested)]
-            problems += [each for path in folders for each in slips.of_repeats(instruments, path)]
+            for path in folders:
+                problems += slips.of_little_noise(instruments, slips.noise_of(path))
     lengths = ("width_mm", "tolerance_mm", "largest_mm")
     problems += campaign_options.not_positive(**{name: given[name] for name in lengths})
     budgets = sorted({*(given["budget"] or [max(round(s * points), 2) for s in SHARES])})
@@ -102,12 +98,10 @@ def _question(given: Mapping) -> tuple:
         what = f"{points} candidates with up to {budgets[-1]} readings each"
         allowed = f"a product of at most {_MOST_READINGS:,}"
         problems.append(Problem("--candidates, --budget", what, allowed))
-    name, *method = (given[each] for each in ("assessor", "confidence", "settings"))
     for budget in budgets:
         with gathered(problems):
-            asked = campaign_options.workshop(given)
-            made = campaign_options.assessor(name, budget, *method, asked=asked, tested=tested)
-            assessors.append(campaign_options.with_references(made, points, given["references"]))
+            made = campaign_options.assessor(given, budget, tested)
+            assessors.append(with_references(made, points, given["references"]))
     for errors in named:
         with gathered(problems):
             chosen.append(errors_of(errors, given["point"]))
