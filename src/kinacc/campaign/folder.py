@@ -102,9 +102,9 @@ def require_method(opened: Opened) -> None:
 
 
 def marks_of(opened: Opened) -> dict[str, object]:
-    """Return the provenance of the tables: the plan counts as the configuration."""
-    marks = {"kinacc_version": __version__, "config_hash": opened.digest}
-    return {**marks, "seed": opened.plan.seed, "journal": opened.journal.sha256()}
+    """Return the provenance of the tables: plan and journal count as the configuration."""
+    made_of = plan.digest(f"{opened.digest} {opened.journal.sha256()}".encode())
+    return {"kinacc_version": __version__, "config_hash": made_of, "seed": opened.plan.seed}
 
 
 def doubts(opened: Opened) -> list[str]:
