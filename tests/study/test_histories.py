@@ -6,7 +6,7 @@ import numpy as np
 import paper_settings as paper
 import pytest
 
-from kinacc.assess.model_invalidation import Invalidation
+from kinacc.assess.model_invalidation import ModelInvalidation
 from kinacc.config.records import of_section
 from kinacc.study import histories as stage
 from kinacc.study.histories import (
@@ -22,7 +22,7 @@ from kinacc.study.monte_carlo import Visits
 
 SEED = 3
 STUDY = of_section(Visits, paper.study())
-ASSESSOR = of_section(Invalidation, paper.study())
+ASSESSOR = of_section(ModelInvalidation, paper.study())
 
 
 def settings(**changes) -> HistorySettings:
@@ -75,7 +75,7 @@ def test_where_no_simulation_obeys_the_rule_the_nearest_is_shown_and_says_so():
 @pytest.mark.parametrize(("points", "budget"), [(1, 1), (1, 20), (8, 3), (8, 30)])
 def test_any_number_of_points_and_any_budget(points, budget):
     study = paper.study(measurements=budget, visiting_order="shuffled")
-    visits, assessor = of_section(Visits, study), of_section(Invalidation, study)
+    visits, assessor = of_section(Visits, study), of_section(ModelInvalidation, study)
     table = histories(ERROR[:points], settings(simulations_searched=20), visits, assessor, SEED)
     for example in (REJECTED, LARGER, KEPT):
         assert 1 <= of(table, example)["iteration"].size <= budget

@@ -10,7 +10,7 @@ import pytest
 from oracles import assessors as oracle
 from oracles import worlds
 
-from kinacc.assess.model_invalidation import Invalidation
+from kinacc.assess.model_invalidation import ModelInvalidation
 from kinacc.config.records import of_section
 from kinacc.study import monte_carlo
 from kinacc.study.histories import HistorySettings, histories
@@ -200,7 +200,7 @@ def test_histories_are_the_first_runs_of_the_studys_worlds_that_satisfy_the_rule
         error,
         of_section(HistorySettings, paper.histories(simulations_searched=200, **ratios)),
         of_section(monte_carlo.Visits, study),
-        of_section(Invalidation, study),
+        of_section(ModelInvalidation, study),
         seed=3,
         point=np.arange(60) + 500,
     )

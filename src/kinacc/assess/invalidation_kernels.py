@@ -3,7 +3,7 @@
 All compiled code is in this one file: numba's cache is aware of changes in the file of the function
 called, not in files that function's helpers come from. The first part draws the readings, on which
 see :mod:`kinacc.assess.random_numbers`. The plain twin of a run at one bound is
-:func:`kinacc.assess.model_invalidation.Invalidation.history`.
+:func:`kinacc.assess.model_invalidation.ModelInvalidation.history`.
 
 How a scan is exact without a run at every bound. For a fixed history the rejection probability
 falls as the bound grows, and the point to measure again is the largest of functions linear in

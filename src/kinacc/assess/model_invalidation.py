@@ -47,13 +47,51 @@ class Step(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Invalidation:
-    """Runs at one bound; the fields are those of :class:`ModelInvalidation`."""
+class ModelInvalidation(Assessor):
+    """Settings of the assessor.
+
+    measurements: budget of a run; alpha: threshold on the rejection probability (eq. 22);
+    distance: ``squared`` (the squared Mahalanobis distance into the chi-square distribution) or
+    ``as_printed`` (its root, eqs. 18 and 20); covariance: ``r`` (Sigma / r) or ``sqrt_r`` (eq. 24
+    as printed); search: ``from_above`` (1 um above the highest rejected bound of the 1 um grid),
+    ``from_below`` (lowest bound of the grid that is not rejected) or ``bisection`` (between 0 and
+    the largest first reading, to 1 um).
+    """
 
     measurements: int
     alpha: float
     distance: str
     covariance: str
+    search: str
+    name: ClassVar[str] = "model_invalidation"
+    switches: ClassVar[dict[str, tuple[str, ...]]] = {
+        "distance": DISTANCES,
+        "covariance": COVARIANCES,
+        "search": SEARCHES,
+    }
+
+    def assess(self, world: World) -> Assessment:
+        """Search the assessed accuracy; measurements and points are those of the run at it."""
+        eta = self.assessed_mm(world)
+        outcome = self.run(world, eta)
+        return Assessment(eta, outcome.measurements, outcome.points_visited)
+
+    def assessed_mm(self, world: World) -> float:
+        """The bound the search arrives at, mm."""
+        if self.search == "bisection":
+            low, high = 0.0, float(world.magnitudes_mm(self.measurements).max())
+            while high - low > 1.0 / GRID_PER_MM:
+                middle = 0.5 * (low + high)
+                low, high = (middle, high) if self.run(world, middle).rejected else (low, middle)
+            return high
+        bounds = np.arange(self.top(world) + 1) / GRID_PER_MM
+        if self.search == "from_below":
+            return self._scan(world, bounds, False)[0] / GRID_PER_MM
+        return (bounds.size - self._scan(world, bounds[::-1].copy(), True)[0]) / GRID_PER_MM
+
+    def top(self, world: World) -> int:
+        """Grid bound at or above every first reading: no run at it can reject."""
+        return math.ceil(float(world.magnitudes_mm(self.measurements).max()) * GRID_PER_MM)
 
     def run(self, world: World, eta_mm: float) -> Run:
         """One sequential run at the bound eta."""
@@ -112,50 +150,6 @@ class Invalidation:
                     "give more repeats or a smaller budget",
                 )
             )
-
-
-@dataclass(frozen=True)
-class ModelInvalidation(Invalidation, Assessor):
-    """Settings of the assessor.
-
-    measurements: budget of a run; alpha: threshold on the rejection probability (eq. 22);
-    distance: ``squared`` (the squared Mahalanobis distance into the chi-square distribution) or
-    ``as_printed`` (its root, eqs. 18 and 20); covariance: ``r`` (Sigma / r) or ``sqrt_r`` (eq. 24
-    as printed); search: ``from_above`` (1 um above the highest rejected bound of the 1 um grid),
-    ``from_below`` (lowest bound of the grid that is not rejected) or ``bisection`` (between 0 and
-    the largest first reading, to 1 um).
-    """
-
-    search: str
-    name: ClassVar[str] = "model_invalidation"
-    switches: ClassVar[dict[str, tuple[str, ...]]] = {
-        "distance": DISTANCES,
-        "covariance": COVARIANCES,
-        "search": SEARCHES,
-    }
-
-    def assess(self, world: World) -> Assessment:
-        """Search the assessed accuracy; measurements and points are those of the run at it."""
-        eta = self.assessed_mm(world)
-        outcome = self.run(world, eta)
-        return Assessment(eta, outcome.measurements, outcome.points_visited)
-
-    def assessed_mm(self, world: World) -> float:
-        """The bound the search arrives at, mm."""
-        if self.search == "bisection":
-            low, high = 0.0, float(world.magnitudes_mm(self.measurements).max())
-            while high - low > 1.0 / GRID_PER_MM:
-                middle = 0.5 * (low + high)
-                low, high = (middle, high) if self.run(world, middle).rejected else (low, middle)
-            return high
-        bounds = np.arange(self.top(world) + 1) / GRID_PER_MM
-        if self.search == "from_below":
-            return self._scan(world, bounds, False)[0] / GRID_PER_MM
-        return (bounds.size - self._scan(world, bounds[::-1].copy(), True)[0]) / GRID_PER_MM
-
-    def top(self, world: World) -> int:
-        """Grid bound at or above every first reading: no run at it can reject."""
-        return math.ceil(float(world.magnitudes_mm(self.measurements).max()) * GRID_PER_MM)
 
 
 def mahalanobis_excess(

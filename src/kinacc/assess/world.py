@@ -99,18 +99,13 @@ def drawn_world(
     return draw(error[index], np.broadcast_to(sigma, points)[index], key, visits, index)
 
 
-def draw(error_mm, sigma_mm, key, visits: int, index, lost: World | None = None) -> World:
-    """As :func:`drawn_world`, rows already in visiting order and known to be good.
-
-    ``lost`` is a world of the same shape that nobody needs any more, whose memory is drawn into.
-    """
+def draw(error_mm, sigma_mm, key, visits: int, index) -> World:
+    """As :func:`drawn_world`, rows already in visiting order and known to be good."""
     from kinacc.assess.random_numbers import extend_all
 
     points = index.size
-    if lost is None:  # repeats stay untouched until asked for
-        readings, sizes = np.empty((points, visits, 3)), np.empty((points, visits))
-    else:
-        readings, sizes = lost.readings_mm, lost.sizes_mm
+    # Repeats stay untouched until asked for.
+    readings, sizes = np.empty((points, visits, 3)), np.empty((points, visits))
     known, sums = np.zeros(points, np.int64), np.zeros((points, 3))
     world = World(readings, known, sigma_mm, error_mm, key, index, sums, sizes)
     extend_all(world.arrays, 0)

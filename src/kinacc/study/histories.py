@@ -10,9 +10,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
+import pandas as pd
 from numpy.typing import ArrayLike
 
-from kinacc.assess.model_invalidation import Invalidation, Step
+from kinacc.assess.model_invalidation import ModelInvalidation
 from kinacc.assess.world import World, checked_errors, error_vectors
 from kinacc.config.records import of_section
 from kinacc.study.monte_carlo import Visits, world_of
@@ -72,7 +73,7 @@ def histories(
     error_mm: ArrayLike,
     settings: HistorySettings,
     visits: Visits,
-    assessor: Invalidation,
+    assessor: ModelInvalidation,
     seed: int,
     point: ArrayLike | None = None,
     progress=None,
@@ -86,20 +87,34 @@ def histories(
     errors = checked_errors(error_mm)
     numbers = np.arange(errors.shape[0]) if point is None else np.asarray(point, np.int64)
     sizes = np.sqrt(np.sum(errors**2, axis=1))
-    found: list[dict] = []
+    tables = []
     for example in examples(errors, settings, visits, assessor, seed, progress):
         world = world_of(errors, settings.noise_mm, example.simulation, visits, seed)
-        steps = assessor.history(world, example.eta_mm)
-        rows = world.index[[step.row for step in steps]]
-        found += _rows(example, steps, numbers[rows], sizes[rows], settings, assessor)
-    return columns_of("histories", found)
+        steps = pd.DataFrame(assessor.history(world, example.eta_mm))
+        rows = world.index[steps["row"]]
+        columns = {
+            "example": example.name,
+            "simulation": example.simulation,
+            "rule": example.rule,
+            "rule_met": int(example.rule_met),
+            "noise_mm": settings.noise_mm,
+            "alpha": assessor.alpha,
+            "distance": assessor.distance,
+            "covariance": assessor.covariance,
+            "iteration": np.arange(len(steps)) + 1,
+            "point": numbers[rows],
+            "eta_mm": example.eta_mm,
+            "true_mm": sizes[rows],
+        }
+        tables.append(steps.drop(columns="row").assign(**columns))
+    return columns_of("histories", pd.concat(tables).to_dict("records"))
 
 
 def examples(
     error_mm: np.ndarray,
     settings: HistorySettings,
     visits: Visits,
-    assessor: Invalidation,
+    assessor: ModelInvalidation,
     seed: int,
     progress=None,
 ) -> list[Example]:
@@ -110,14 +125,8 @@ def examples(
     """
     sizes = np.sqrt(np.sum(error_mm**2, axis=1))
     truth, worst = float(sizes.max()), int(sizes.argmax())
-    eta, larger, kept = (
-        truth * ratio
-        for ratio in (
-            settings.eta_ratio_rejected,
-            settings.eta_ratio_larger,
-            settings.eta_ratio_kept,
-        )
-    )
+    eta, larger = truth * settings.eta_ratio_rejected, truth * settings.eta_ratio_larger
+    kept = truth * settings.eta_ratio_kept
 
     def rejects(world: World) -> bool:
         return assessor.run(world, eta).rejected
@@ -138,53 +147,17 @@ def examples(
     def search(name: str, bound: float, wanted: Callable, less: Callable) -> Example:
         second = None
         simulations = range(settings.simulations_searched)
-        world = None
-        for simulation in (
-            progress(simulations, "simulations searched") if progress else simulations
-        ):
-            world = world_of(error_mm, settings.noise_mm, simulation, visits, seed, world)
+        for number in progress(simulations, "simulations searched") if progress else simulations:
+            world = world_of(error_mm, settings.noise_mm, number, visits, seed)
             if wanted(world):
-                return Example(name, simulation, bound, RULES[name], True)
+                return Example(name, number, bound, RULES[name], True)
             if second is None and less(world):
-                second = simulation
-        if second is None:
-            return Example(name, 0, bound, FALLBACKS[name][1], False)
-        return Example(name, second, bound, FALLBACKS[name][0], False)
+                second = number
+        return Example(name, second or 0, bound, FALLBACKS[name][second is None], False)
 
     fig5 = search(REJECTED, eta, shows_fig5, rejects)
     fig6 = search(KEPT, kept, shows_fig6, keeps)
     return [fig5, Example(LARGER, fig5.simulation, larger, RULES[LARGER], fig5.rule_met), fig6]
-
-
-def _rows(
-    example: Example,
-    steps: list[Step],
-    point: np.ndarray,
-    true_mm: np.ndarray,
-    settings: HistorySettings,
-    assessor: Invalidation,
-) -> list[dict]:
-    return [
-        {
-            "example": example.name,
-            "simulation": example.simulation,
-            "rule": example.rule,
-            "rule_met": int(example.rule_met),
-            "noise_mm": settings.noise_mm,
-            "alpha": assessor.alpha,
-            "distance": assessor.distance,
-            "covariance": assessor.covariance,
-            "iteration": place + 1,
-            "point": point[place],
-            "repeat": step.repeat,
-            "eta_mm": example.eta_mm,
-            "measured_mm": step.measured_mm,
-            "averaged_mm": step.averaged_mm,
-            "true_mm": true_mm[place],
-            "rejection_probability": step.rejection_probability,
-        }
-        for place, step in enumerate(steps)
-    ]
 
 
 def run(inputs: Mapping, settings: Mapping, progress=None) -> dict[str, dict]:
@@ -195,7 +168,7 @@ def run(inputs: Mapping, settings: Mapping, progress=None) -> dict[str, dict]:
         error_mm,
         of_section(HistorySettings, settings["histories"]),
         of_section(Visits, settings["study"]),
-        of_section(Invalidation, settings["study"]),
+        of_section(ModelInvalidation, settings["study"]),
         settings["seed"],
         points["point"],
         progress,

@@ -74,22 +74,20 @@ def world_of(
     repetition: int,
     visits: Visits,
     seed: int,
-    lost: World | None = None,
 ) -> World:
     """The world of one simulation: true errors (m, 3), robot base frame, mm, plus its noise.
 
-    Holds the points the budget can reach, in visiting order. ``lost``: a world of the same points
-    and visits that is not needed any more, whose memory is used again.
+    Holds the points the budget can reach, in visiting order.
     """
     from kinacc.assess.random_numbers import key_of
 
-    entropy = (seed, _nanometres(noise_mm), repetition)
+    entropy = (seed, round(float(noise_mm) * NM_PER_MM), repetition)
     order = np.arange(error_mm.shape[0])
     if visits.visiting_order == "shuffled":
         order = np.random.default_rng([*entropy, _SHUFFLE]).permutation(order)
     order = order[: visits.measurements]
     sigma = np.full(order.size, float(noise_mm))
-    return draw(error_mm[order], sigma, key_of(*entropy), visits.measurements, order, lost)
+    return draw(error_mm[order], sigma, key_of(*entropy), visits.measurements, order)
 
 
 def simulate(
@@ -110,9 +108,9 @@ def simulate(
     """
     errors = checked_errors(error_mm)
     jobs = [(noise, repetition) for noise in noise_mm for repetition in repetitions]
-    rows, world = [], None
+    rows = []
     for noise, repetition in progress(jobs, "simulations", len(jobs)) if progress else jobs:
-        world = world_of(errors, noise, repetition, visits, seed, world)
+        world = world_of(errors, noise, repetition, visits, seed)
         for each in assessors:
             switches = {switch: getattr(each, switch, None) for switch in SWITCHES}
             row = assessed_row(noise, repetition, each, world)
@@ -194,10 +192,6 @@ def true_accuracy_mm(true_error_mm: ArrayLike) -> float:
             Problem("true_error_mm", "no values, or values that are not finite", "numbers in mm")
         )
     return float(values.max())
-
-
-def _nanometres(noise_mm: float) -> int:
-    return round(float(noise_mm) * NM_PER_MM)
 
 
 def simulated(inputs: Mapping, settings: Mapping, progress=None) -> dict[str, dict]:
