@@ -52,6 +52,9 @@ scattergather:
 
 
 include: "workflow/rules/common.smk"
+include: "workflow/rules/calibration.smk"
+include: "workflow/rules/assessment.smk"
+include: "workflow/rules/pages.smk"
 
 
 rule all:
@@ -73,11 +76,6 @@ rule robustness:
     input:
         rules.all.input,
         [[*tables(dataset, "robustness").values()] for dataset in data.told if not data.is_measured(dataset)],
-
-
-include: "workflow/rules/calibration.smk"
-include: "workflow/rules/assessment.smk"
-include: "workflow/rules/pages.smk"
 
 
 onstart:

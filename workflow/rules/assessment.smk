@@ -1,6 +1,12 @@
 # From the models to the assessed accuracy: map (Fig. 3), operating points, study (Fig. 4), histories, claims.
 
 
+def studied(dataset):
+    """Tables of the study of a data set."""
+    found = tables(dataset, "assessment_points", "study", "study_summary", "readings", "histories")
+    return found | mapped(dataset) | ({} if data.is_measured(dataset) else tables(dataset, "claims"))
+
+
 rule accuracy_map:
     """the largest error over the slices of the evaluation space (Fig. 3)"""
     input:

@@ -1,5 +1,13 @@
 # Pictures, the page of a data set and the digests of all its files.
 
+FIGURES = ("fig1", "fig2", "fig4", "fig5", "fig6")  # each drawn by kinacc.figures.<name>
+
+
+def study_of(dataset):
+    """Every file of the study of a data set, and its page."""
+    drawn = pictures(dataset, *FIGURES, *(["fig3"] if mapped(dataset) else []))
+    return [*(studied(dataset) | drawn).values(), f"{RESULTS}/{dataset}/report.html"]
+
 
 rule figures:
     """Figs. 1, 2, 4, 5 and 6"""
@@ -11,7 +19,7 @@ rule figures:
         study_summary="results/{dataset}/study_summary.parquet",
         histories="results/{dataset}/histories.parquet",
     output:
-        **pictures("{dataset}", "fig1", "fig2", "fig4", "fig5", "fig6"),
+        **pictures("{dataset}", *FIGURES),
         sums="results/{dataset}/sums/figures.sha256",
     log:
         "results/{dataset}/logs/figures.log",
