@@ -104,7 +104,7 @@ rule histories:
     conda:
         "../envs/kinacc.yaml"
     params:
-        **job("histories.py", "seed histories", study="measurements alpha distance covariance visiting_order"),
+        **job("histories.py", "seed histories", study="measurements alpha distance covariance search visiting_order"),
     message:
         "{wildcards.dataset}: following single model invalidations (Figs. 5 and 6)"
     script:
