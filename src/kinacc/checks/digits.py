@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from decimal import Decimal, InvalidOperation
 
 import numpy as np
 import scipy
@@ -29,7 +28,6 @@ _RANKED = 1e-3  # significance of that
 _EXACT = 1e-6  # of the grid
 _FITTED_AWAY = 0.3  # of the errors that rounding makes: what a fit of few poses leaves of them
 _MOST_POSES = 200
-_MOST_DIGITS = 30  # before or behind the mark: beyond all that is measured
 _STEP = 1e-4  # of a difference quotient, rad
 
 
@@ -204,18 +202,13 @@ def step_between(cells: Sequence[object], unit: float, decimal: str) -> float:
     ``unit`` is that of the file in the unit wanted. Zero where all are equal, or a cell is no
     number.
     """
-    values = []
-    for cell in cells:
-        try:
-            value = Decimal(str(cell).strip().replace("\u2212", "-").replace(decimal, "."))
-        except InvalidOperation:
-            return 0.0
-        if not value.is_finite() or abs(value.adjusted()) > _MOST_DIGITS:
-            return 0.0
-        values.append(value)
-    digits = max((-int(item.as_tuple().exponent) for item in values), default=0)
-    whole = [int(item.scaleb(digits)) for item in values]
-    return unit * math.gcd(*(item - whole[0] for item in whole)) * 10.0**-digits
+    texts = [str(cell).strip().replace("\u2212", "-").replace(decimal, ".") for cell in cells]
+    digits = max((len(text.partition(".")[2]) for text in texts), default=0)
+    try:
+        whole = [round(float(text) * 10.0**digits) for text in texts]
+    except (ValueError, OverflowError):
+        return 0.0
+    return unit * math.gcd(*(number - whole[0] for number in whole)) * 10.0**-digits
 
 
 def cost(model: DHModel, q: ndarray, step: float) -> Rounding:
