@@ -11,7 +11,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from small_arms import BASE, TOOL, calibrated, truth
+from small_arms import TOOL, calibrated
 
 from kinacc.deployment.programs import compensate_program, read_program
 from kinacc.deployment.programs.orientation import (
@@ -24,8 +24,8 @@ from kinacc.deployment.programs.orientation import (
 )
 from kinacc.deployment.programs.record import NUMBER, _written
 from kinacc.errors import InputError
-from kinacc.geometry import IDENTITY, Pose, compose, exp_so3, invert
-from kinacc.kinematics import dh, robot
+from kinacc.geometry import Pose, exp_so3
+from kinacc.kinematics import robot
 
 EXAMPLES = Path(__file__).parents[3] / "examples" / "programs"
 KR6 = str(EXAMPLES / "kr6.yaml")
@@ -67,49 +67,6 @@ def test_every_example_is_corrected_and_only_its_numbers_change(name, model):
         assert content != old
         assert without_numbers(content) == without_numbers(old)
         assert content.count(b"\r\n") == old.count(b"\r\n")
-
-
-@pytest.mark.parametrize("name", ARMS)
-def test_the_real_arm_reaches_the_programmed_poses(name, tmp_path):
-    """The true arm at the joints of the corrected program, seen by the instrument."""
-    arm, found = corrected(name)
-    for each in EXAMPLES.iterdir():
-        shutil.copy(each, tmp_path / each.name)
-    for path, content in found.files.items():
-        (tmp_path / path.name).write_bytes(content)
-    before, after = (_joints_and_poses(arm, folder / name) for folder in (EXAMPLES, tmp_path))
-    wanted = compose(arm.base, before[1])
-    miss = {}
-    for kind, q_rad in (("before", before[0]), ("after", after[0])):
-        at = arm.robot.dh_joints(q_rad)
-        real = compose(BASE, compose(dh.forward(truth(ARMS[name]), at), TOOL))
-        miss[kind] = np.linalg.norm(real.position_mm - wanted.position_mm, axis=1).mean()
-    assert miss["after"] < 1.2 * arm.residual.position_mm
-    assert miss["before"] > 5.0 * miss["after"]
-
-
-def _joints_and_poses(arm, path):
-    """Nominal joints of a program, and the poses of its tool in the robot's base."""
-    from kinacc.deployment.programs import correction
-
-    pulses = PULSES if path.suffix == ".JBI" else None
-    language, program = read_program(path, (), pulses)
-    positions = program.positions
-    tools, bases = (
-        [
-            program.frames.get((kind, getattr(each, kind) or ""), IDENTITY)
-            for each in program.positions
-        ]
-        for kind in ("tool", "base")
-    )
-    convention = program.convention or language.convention
-    reasons = {}
-    q_rad = correction._starts(arm, language, convention, positions, tools, bases, None, reasons)
-    assert not reasons
-    tool = compose(invert(arm.robot.flange), TOOL)
-    end = dh.forward(arm.robot.dh, arm.robot.dh_joints(q_rad))
-    pose = compose(arm.robot.base, compose(end, arm.robot.flange))
-    return q_rad, compose(pose, tool)
 
 
 def test_frames_that_are_missing_are_asked_for(tmp_path):

@@ -6,9 +6,17 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+import pandas as pd
+import yaml
 
-from kinacc.deployment.export.formats.urdf import rpy
+from kinacc.deployment.programs.orientation import (
+    FIXED,
+    INTRINSIC,
+    KUKA,
+    QUATERNION,
+    VECTOR,
+    Convention,
+)
 from kinacc.errors import InputError, Problem
 from kinacc.geometry import Pose, compose, rotation_x, rotation_y, rotation_z
 from kinacc.kinematics import dh
@@ -20,6 +28,7 @@ from kinacc.kinematics.robot.axes import Axes, chain_of
 Numbers = dict[str, tuple[float, str]]  # by name: value and unit
 
 ZEROS = PARAMETERS[:1]
+_RAD = 180.0 / np.pi
 _PARALLEL = 1e-12  # sine of an angle between axes, below which a common normal has no direction
 _UR_LINKS = ("shoulder", "upper_arm", "forearm", "wrist_1", "wrist_2", "wrist_3")
 _UR_ALPHA = np.deg2rad([90.0, 0.0, 0.0, 90.0, -90.0, 0.0])
@@ -30,9 +39,9 @@ class Controller:
     """What a controller takes.
 
     ``takes``: the DH parameters it can be given; ``arm``: their numbers for a fitted model of a
-    robot; ``group``: what these are called; ``frame``: the numbers of a frame. ``text``: lines to
-    paste, of all numbers by group, in a file of the name's ``ending`` where there is one. ``enter``
-    and ``remark``: where the numbers belong, and what cannot be written.
+    robot; ``group``: what these are called; ``frame``: the numbers of a frame. ``text``: the file
+    of ``ending`` that the controller reads, where it reads one. ``enter`` and ``remark``: where the
+    numbers belong, and what cannot be written.
     """
 
     name: str
@@ -42,7 +51,7 @@ class Controller:
     frame: Callable[[Pose], Numbers]
     enter: str
     remark: str = ""
-    text: Callable[[dict[str, Numbers]], str] = lambda numbers: ""
+    text: Callable[[Numbers], str] = lambda numbers: ""
     ending: str = ""
 
 
@@ -57,36 +66,17 @@ def _zeros(names: Sequence[str]) -> Callable[[Robot, DHModel], Numbers]:
     return numbers
 
 
-def _frame(
-    names: str, turn: Callable[[np.ndarray], np.ndarray], unit: str, length: str = "mm"
-) -> Callable[[Pose], Numbers]:
+def _frame(names: str, convention: Convention) -> Callable[[Pose], Numbers]:
+    """Names and numbers of a frame; units by those of the convention."""
+    length, turn = ("mm", "deg") if convention.length_mm == 1.0 else ("m", "rad")
+    units = [length] * 3 + ["" if convention.orientation == QUATERNION else turn] * 4
+
     def numbers(pose: Pose) -> Numbers:
-        position = pose.position_mm * (1e-3 if length == "m" else 1.0)
-        units = [length] * 3 + [unit] * 4
-        values = [*position, *turn(pose.rotation)]
-        return dict(zip(names.split(), zip(values, units, strict=False), strict=True))
+        values = convention.numbers(pose, np.zeros(len(names.split())))
+        pairs = zip(map(float, values), units, strict=False)
+        return dict(zip(names.split(), pairs, strict=True))
 
     return numbers
-
-
-def _zyx(rotation: np.ndarray) -> np.ndarray:
-    return np.rad2deg(rpy(rotation))[::-1]
-
-
-def _fixed_xyz(rotation: np.ndarray) -> np.ndarray:
-    return np.rad2deg(rpy(rotation))
-
-
-def _moving_xyz(rotation: np.ndarray) -> np.ndarray:
-    return -np.rad2deg(rpy(rotation.T))
-
-
-def _quaternion(rotation: np.ndarray) -> np.ndarray:
-    return Rotation.from_matrix(rotation).as_quat(canonical=True, scalar_first=True)
-
-
-def _rotation_vector(rotation: np.ndarray) -> np.ndarray:
-    return Rotation.from_matrix(rotation).as_rotvec()
 
 
 def require_plain_joints(robot: Robot, name: str) -> None:
@@ -153,63 +143,36 @@ def _ros(robot: Robot, model: DHModel) -> Numbers:
     return numbers
 
 
-_ros_frame = _frame("x y z roll pitch yaw", rpy, "rad", "m")
+_ros_frame = _frame("x y z roll pitch yaw", Convention(FIXED, 1e3, _RAD))
 
 
-def _list(numbers: Numbers, digits: str = ".6f") -> str:
-    return ", ".join(f"{value:{digits}}" for value, _ in numbers.values())
+def _by_joint(numbers: Numbers) -> pd.DataFrame:
+    """Numbers named name[joint], a row a joint."""
+    index = pd.MultiIndex.from_tuples([tuple(key.rstrip("]").split("[")) for key in numbers])
+    table = pd.Series([value for value, _ in numbers.values()], index).unstack(0)
+    return table[list(index.get_level_values(0).unique())]
 
 
-def _kuka_text(numbers: dict[str, Numbers]) -> str:
-    lines, counts = [], {"TOOL": 0, "BASE": 0}
-    for group, frame in numbers.items():
-        kind = group.split()[0]
-        if kind not in counts:
-            for number, (value, _) in enumerate(frame.values(), 1):
-                lines.append(f"; $MAMES[{number}]: present value {value:+.6f}")
-            continue
-        counts[kind] += 1
-        inside = ",".join(f"{name} {value:.6f}" for name, (value, _) in frame.items())
-        lines.append(f"{kind}_DATA[{counts[kind]}]={{{inside}}}")
-    return "\n".join(lines)
+def _ur_text(numbers: Numbers) -> str:
+    columns = _by_joint(numbers).items()
+    rows = [f"{name} = [ {', '.join(f'{x:.17g}' for x in values)}]" for name, values in columns]
+    return "\n".join(["[mounting]", *rows])
 
 
-def _abb_text(numbers: dict[str, Numbers]) -> str:
-    lines = []
-    for group, frame in numbers.items():
-        kind, _, name = group.partition(" ")
-        if kind in ("TOOL", "BASE"):
-            data = f"t_{name}.tframe" if kind == "TOOL" else f"w_{name or 'base'}.uframe"
-            values = _list(frame, ".9g").split(", ")
-            lines.append(f"{data} := [[{', '.join(values[:3])}], [{', '.join(values[3:])}]];")
-    return "\n".join(lines)
+def _staubli_text(numbers: Numbers) -> str:
+    rows = [
+        f'  <DH index="{joint}" ' + " ".join(f'{key}="{x:.9f}"' for key, x in row.items()) + " />"
+        for joint, (_, row) in enumerate(_by_joint(numbers).iterrows())
+    ]
+    return "\n".join(['<DhArray name="dhOffset">', *rows, "</DhArray>"])
 
 
-def _ur_text(numbers: dict[str, Numbers]) -> str:
-    lines, deltas = ["[mounting]"], numbers["DH deltas"]
-    for name in ("delta_theta", "delta_a", "delta_d", "delta_alpha"):
-        of_name = {key: x for key, x in deltas.items() if key.startswith(f"{name}[")}
-        lines.append(f"{name} = [ {_list(of_name, '.17g')}]")
-    return "\n".join(lines)
-
-
-def _staubli_text(numbers: dict[str, Numbers]) -> str:
-    rows: dict[str, list[str]] = {}
-    for key, (value, _) in numbers["DH offsets"].items():
-        name, joint = key.rstrip("]").split("[")
-        rows.setdefault(joint, []).append(f'{name}="{value:.9f}"')
-    lines = [f'  <DH index="{int(i) - 1}" {" ".join(each)} />' for i, each in rows.items()]
-    return "\n".join(['<DhArray name="dhOffset">', *lines, "</DhArray>"])
-
-
-def _ros_text(numbers: dict[str, Numbers]) -> str:
-    lines, links = ["kinematics:"], dict[str, list[str]]()
-    for key, (value, _) in numbers["joint origins"].items():
+def _ros_text(numbers: Numbers) -> str:
+    links: dict[str, dict[str, float]] = {}
+    for key, (value, _) in numbers.items():
         link, name = key.split()
-        links.setdefault(link, []).append(f"    {name}: {value:.17g}")
-    for link, rows in links.items():
-        lines += [f"  {link}:", *rows]
-    return "\n".join([*lines, "  hash: calib_kinacc"])
+        links.setdefault(link, {})[name] = value
+    return yaml.safe_dump({"kinematics": {**links, "hash": "calib_kinacc"}}, sort_keys=False)
 
 
 CONTROLLERS = {
@@ -218,29 +181,27 @@ CONTROLLERS = {
         ZEROS,
         "joint zeros",
         _zeros([f"A{i}" for i in range(1, 8)]),
-        _frame("X Y Z A B C", _zyx, "deg"),
+        _frame("X Y Z A B C", Convention(KUKA)),
         "Joint zeros: add to $MAMES of each axis in the machine data, or drive every axis to minus "
         "the value and master it there as 0. TOOL and BASE: Start-up, Calibrate, Numeric input.",
-        text=_kuka_text,
     ),
     "abb": Controller(
         "ABB",
         ZEROS,
         "joint zeros",
         _zeros([f"axis {i}" for i in range(1, 8)]),
-        _frame("x y z q1 q2 q3 q4", _quaternion, ""),
+        _frame("x y z q1 q2 q3 q4", Convention(QUATERNION)),
         "Joint zeros: jog every axis to minus the value, then Calibration, Fine calibration. "
         "TOOL: tframe of the tooldata; BASE: uframe of the wobjdata (robhold FALSE).",
         "Absolute Accuracy files (absacc, .cfg of CalibWare) cannot be written: their format is "
         "ABB's own. Switch Absolute Accuracy off, or its errors are corrected twice.",
-        _abb_text,
     ),
     "fanuc": Controller(
         "FANUC",
         ZEROS,
         "joint zeros",
         _zeros([f"J{i}" for i in range(1, 8)]),
-        _frame("X Y Z W P R", _fixed_xyz, "deg"),
+        _frame("X Y Z W P R", Convention(FIXED)),
         "Joint zeros: jog all joints to 0, then SINGLE AXIS MASTER with the value as MSTR POS. "
         "TOOL: UTOOL, direct entry; BASE: UFRAME, direct entry.",
     ),
@@ -249,7 +210,7 @@ CONTROLLERS = {
         PARAMETERS,
         "DH deltas",
         _ur,
-        _frame("x y z rx ry rz", _rotation_vector, "rad", "m"),
+        _frame("x y z rx ry rz", Convention(VECTOR, 1e3, _RAD)),
         "DH deltas: they replace those in section [mounting] of /root/.urcontrol/calibration.conf; "
         "keep its other lines. TOOL: set_tcp; BASE: a plane feature.",
         "Large delta_d of joints 2 to 4 are usual: their axes are nearly parallel.",
@@ -261,7 +222,7 @@ CONTROLLERS = {
         ZEROS,
         "joint zeros",
         _zeros("SLURBTE"),
-        _frame("X Y Z Rx Ry Rz", _fixed_xyz, "deg"),
+        _frame("X Y Z Rx Ry Rz", Convention(FIXED)),
         "Joint zeros: jog every axis to minus the value, then ROBOT, HOME POSITION, register it. "
         "TOOL: tool file; BASE: user frame, as coordinates in the robot frame.",
     ),
@@ -270,7 +231,7 @@ CONTROLLERS = {
         PARAMETERS,
         "DH offsets",
         _staubli,
-        _frame("x y z rx ry rz", _moving_xyz, "deg"),
+        _frame("x y z rx ry rz", Convention(INTRINSIC)),
         "DH offsets: array dhOffset of /usr/configs/arm.cfx; they are added to the standard DH "
         "table of the robot file. TOOL: trsf of the tool; BASE: trsf of the frame.",
         text=_staubli_text,

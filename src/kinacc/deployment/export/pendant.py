@@ -56,7 +56,8 @@ class Pendant:
     TOOL in the flange for every target; BASE, the instrument's frame in the robot's base, for every
     session. Old values: the nominal arm, with base and tool fitted to the same poses. ``errors``:
     the model of these numbers first, then the calibrated and the nominal one. ``left_out``: fitted
-    parameters that the controller does not take. ``text``: lines to paste, or a file of ``ending``.
+    parameters that the controller does not take. ``text``: a file of ``ending``, where the
+    controller reads one.
     """
 
     controller: str
@@ -158,7 +159,7 @@ def fit_pendant(
         ),
         maker.enter,
         maker.remark,
-        maker.text(new),
+        maker.text(new[maker.group]),
         maker.ending,
     )
 
@@ -185,8 +186,7 @@ def _mean_error(model: str, errors: residuals.Errors, subset: str) -> MeanError:
 
 def _recorded(tables: Tables, kind: str, model: str) -> MeanError:
     """The error of a model as the table of residuals has it, held out where it was."""
-    names = ("comparison", "subset", "quantity", "fold", "mean", "n")
-    table = pd.DataFrame({name: tables["residuals"][name] for name in names})
+    table = pd.DataFrame(tables["residuals"])
     table = table[(table["comparison"] == f"{kind}_vs_measured") & table["fold"].isna()]
     subset = max(table["subset"])  # validation, where there is one
     rows = table[table["subset"] == subset].set_index("quantity")

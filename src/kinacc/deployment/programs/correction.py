@@ -33,6 +33,7 @@ from kinacc.deployment.programs.orientation import Convention
 from kinacc.deployment.programs.record import (
     BASE,
     TOOL,
+    Frames,
     Language,
     Position,
     Program,
@@ -53,16 +54,10 @@ LANGUAGES: tuple[Language, ...] = tuple(
 AT_MOST_MM = 20.0
 _RECORD = ".kinacc.json"
 _SAME_TOOL_MM, _SAME_TOOL_RAD = 5.0, np.deg2rad(1.0)
-_SAME_MM, _SAME_RAD = 1e-6, 1e-9  # a pose that is no other
+_SAME = 1e-6  # mm and mrad: a pose that is no other
 _SINGULAR = 0.02  # smallest singular value of the Jacobian in rad and units of the reach
 _POINT = "tool of the program"
 _TRACK = "an external axis is not at zero (--base-is-fixed: none moves the robot's base)"
-_REASONS = {
-    PoseStatus.OTHER_POSTURE: "the calibrated arm reaches it only in another posture",
-    PoseStatus.OUTSIDE_LIMITS: "the corrected joints are beyond the limits",
-    PoseStatus.OUTSIDE_RANGE: "a joint is outside the range that the model covers",
-    PoseStatus.NOT_REACHED: "the calibrated arm cannot reach it",
-}
 Ask = Callable[[str, str], np.ndarray]
 
 
@@ -119,22 +114,19 @@ def read_program(
     if language is None:
         known = ", ".join(ending for each in LANGUAGES for ending in each.endings)
         raise InputError(Problem(str(path), f"ends in {ending!r}: no robot language", known))
-    beside = sorted(each for each in path.parent.glob("*") if each.is_file() and each != path)
-    partners = [
-        each
-        for each in beside
-        if each.stem.lower() == path.stem.lower() and each.suffix.lower() in language.partners
-    ]
-    named = [each for each in beside if each.name.lower() in language.frame_files]
-    sources = [Source.read(each) for each in (path, *partners)]
+    beside = {each.name.lower(): each for each in path.parent.iterdir() if each != path}
+    partners = [path.stem.lower() + suffix for suffix in language.partners]
+    sources = [Source.read(each) for each in (path, *(beside[n] for n in partners if n in beside))]
+    named = [beside[name] for name in language.frame_files if name in beside]
     frames = {}
     for source in [*(Source.read(Path(each)) for each in (*named, *frame_files)), *sources]:
-        is_yaml = source.path.suffix.lower() in (".yaml", ".yml")
-        own = frames_of(source, language.convention) if is_yaml else language.frames(source)
-        frames.update(own)
+        is_yaml = source.path.suffix.lower() == ".yaml"
+        frames |= frames_of(source, language.convention) if is_yaml else language.frames(source)
     program = language.read(sources, frames, pulses_per_degree)
     if not program.positions:
-        raise InputError(Problem(str(path), "has no positions that can be corrected"))
+        computed = [Problem(line, "is computed by the program") for line in program.left]
+        what = "has no positions that can be corrected"
+        raise InputError([Problem(str(path), what), *computed])
     return language, program
 
 
@@ -178,60 +170,63 @@ def compensate_program(
     language, program = read_program(path, frame_files, pulses_per_degree)
     convention = program.convention or language.convention
     _refuse_second_time(program)
-    frames = _all_frames(program, language, {TOOL: tools or {}, BASE: bases or {}}, ask)
+    frames = _all_frames(program, convention, {TOOL: tools or {}, BASE: bases or {}}, ask)
     positions, robot = program.positions, calibration.robot
     tool, base = (
         [frames.get((kind, getattr(each, kind) or ""), IDENTITY) for each in positions]
         for kind in (TOOL, BASE)
     )
-    reasons = {number: each.refused for number, each in enumerate(positions) if each.refused}
+    wanted = [
+        None if each.scale is not None else compose(b, convention.pose(each.numbers, each.where))
+        for each, b in zip(positions, base, strict=True)
+    ]
+    flange = [
+        None if a is None else compose(a, invert(b)) for a, b in zip(wanted, tool, strict=True)
+    ]
+    reasons: dict[int, str] = {}
+    ways, q_rad, near = _ways(robot, flange), [], near_rad
     for number, each in enumerate(positions):
-        if each.moves_outside and each.scale is None and not base_is_fixed:
-            reasons.setdefault(number, _TRACK)
-    start = _starts(calibration, language, convention, positions, tool, base, near_rad, reasons)
+        try:
+            if each.moves_outside and each.scale is None and not base_is_fixed:
+                raise InputError(Problem("", _TRACK))
+            q_rad.append(_start(robot, language, each, ways[number], near))
+            near = q_rad[-1]
+        except InputError as error:
+            reasons[number] = error.problems[0].what
+            q_rad.append(np.full(robot.dh.joints, np.nan))
+    start, remarks, parts = np.array(q_rad), [], []
+    for name in dict.fromkeys(each.tool for each in positions):
+        group = [n for n, each in enumerate(positions) if each.tool == name and n not in reasons]
+        if group:
+            own = frames.get((TOOL, name or ""), IDENTITY)
+            carried, remark = _carried(calibration, own, point)
+            remarks += [f"Tool {name or ''}: {remark}"] if remark else []
+            parts.append(_corrected(calibration, start[group], carried, own).set_axis(group))
+    facts = pd.concat(parts).reindex(range(len(positions))) if parts else pd.DataFrame()
+    new: dict[Position, np.ndarray] = {}
+    for number in sorted(set(range(len(positions))) - set(reasons)):
+        each, row = positions[number], facts.loc[number]
+        posture_now = each.posture and language.posture
+        if row["outcome"] > PoseStatus.EXTRAPOLATED:
+            name = PoseStatus(row["outcome"]).name
+            reasons[number] = f"the calibrated arm: {name.lower().replace('_', ' ')}"
+        elif row["change_mm"] > at_most_mm:
+            reasons[number] = f"would move by {row['change_mm']:.3g} mm (--at-most-mm)"
+        elif each.scale is not None:
+            new[each] = row["q_rad"] / _unit(robot) * each.scale
+        elif posture_now and (
+            apart := posture.unmatched(robot, posture_now, each.posture, row["q_rad"])
+        ):
+            reasons[number] = f"the posture would change: {apart}"
+        elif max(row["change_mm"], row["change_mrad"]) > _SAME:
+            new[each] = convention.numbers(compose(invert(base[number]), row["pose"]), each.numbers)
     rows = pd.DataFrame({
         "position": [each.name for each in positions],
         "file": [each.where for each in positions],
         "kind": ["pose" if each.scale is None else "joints" for each in positions],
+        **{key: facts[key] for key in facts.columns if key not in ("q_rad", "pose", "outcome")},
+        "status": [reasons.get(number, "corrected") for number in range(len(positions))],
     })  # fmt: skip
-    new: dict[Position, np.ndarray] = {}
-    remarks = []
-    for name in dict.fromkeys(each.tool for each in positions):
-        group = [n for n, each in enumerate(positions) if each.tool == name and n not in reasons]
-        if not group:
-            continue
-        own = frames.get((TOOL, name or ""))
-        carried, remark = _carried(calibration, own, point)
-        remarks += [f"Tool {name or ''}: {remark}"] if remark else []
-        facts, q_rad, pose = _corrected(calibration, start[group], carried, own or IDENTITY)
-        rows.loc[group, list(facts)] = facts.set_axis(group)
-        for place, number in enumerate(group):
-            position, status = positions[number], facts["status"].iloc[place]
-            if status in _REASONS:
-                reasons[number] = _REASONS[PoseStatus(status)]
-            elif facts["change_mm"].iloc[place] > at_most_mm:
-                reasons[number] = (
-                    f"would move by {facts['change_mm'].iloc[place]:.3g} mm (--at-most-mm)"
-                )
-            elif position.scale is not None:
-                new[position] = q_rad[place] / _unit(robot) * position.scale
-            elif (
-                position.posture
-                and language.posture
-                and (
-                    apart := posture.unmatched(
-                        robot, language.posture, position.posture, q_rad[place]
-                    )
-                )
-            ):
-                reasons[number] = f"the posture would change: {apart}"
-            else:
-                moved = facts["change_mm"].iloc[place], facts["change_mrad"].iloc[place]
-                local = compose(invert(base[number]), Pose(*(part[place] for part in pose)))
-                is_same = moved[0] < _SAME_MM and 1e-3 * moved[1] < _SAME_RAD
-                numbers = position.numbers
-                new[position] = numbers if is_same else convention.numbers(local, numbers)
-    rows["status"] = [reasons.get(number, "corrected") for number in range(len(positions))]
     return CorrectedProgram(
         language.name,
         f"{calibration.name}, {calibration.choice}",
@@ -259,73 +254,54 @@ def _refuse_second_time(program: Program) -> None:
             raise InputError(Problem(str(path), f"was compensated before ({mark.name})", fix=fix))
 
 
-def _all_frames(program: Program, language: Language, given: Mapping, ask: Ask | None) -> dict:
+def _all_frames(
+    program: Program, convention: Convention, given: Mapping, ask: Ask | None
+) -> Frames:
     """The program's frames and those a person gave; InputError naming those that are missing."""
-    convention = program.convention or language.convention
     frames, problems = dict(program.frames), []
     poses = [each for each in program.positions if each.scale is None and not each.refused]
     wanted = {(kind, getattr(each, kind) or "") for each in poses for kind in (TOOL, BASE)}
-    if "" in given[TOOL]:
-        wanted.add((TOOL, ""))
+    wanted |= {(TOOL, "")} if "" in given[TOOL] else set()
     for kind, name in sorted(wanted - set(frames)):
         numbers = given[kind].get(name, given[kind].get(""))
         if numbers is None and ask is not None:
             numbers = ask(kind, name)
-        if numbers is not None:
+        if numbers is None:
+            fix = f'give --{kind} "{name and name + "="}x,y,z,.." (mm, deg) or --frames FILE'
+            what = f"{kind} {name or 'of its positions'} is not in the program"
+            problems.append(Problem(str(program.sources[0].path), what, fix=fix))
+        else:
             frames[kind, name] = convention.typed(numbers)
-            continue
-        what = f"{kind} {name} is not in the program" if name else f"no {kind} is stated"
-        label = f"{name}=" if name else ""
-        fix = (
-            f'give --{kind} "{label}x,y,z,.." (mm, deg: {convention.orientation}) or --frames FILE'
-        )
-        problems.append(Problem(str(program.sources[0].path), what, fix=fix))
     refuse(problems, "Frames are missing")
     return frames
 
 
-def _starts(
-    calibration: Calibration,
-    language: Language,
-    convention: Convention,
-    positions: list[Position],
-    tool: list[Pose],
-    base: list[Pose],
+def _ways(robot: Robot, flange: list[Pose | None]) -> list[np.ndarray | None]:
+    """Reported joints (m, k) of all postures at flange poses."""
+    known = [pose for pose in flange if pose is not None]
+    if not known:
+        return flange
+    stacked = Pose(*(np.stack(part) for part in zip(*known, strict=True)))
+    found = iter(posture.postures_of(robot, stacked))
+    return [None if pose is None else next(found) for pose in flange]
+
+
+def _start(
+    robot: Robot, language: Language, position: Position, ways: np.ndarray | None,
     near: np.ndarray | None,
-    reasons: dict[int, str],
-) -> np.ndarray:
-    """Reported joints (n, k) of the nominal arm at the positions; NaN where refused."""
-    robot = calibration.robot
-    q_rad = np.full((len(positions), robot.dh.joints), np.nan)
-    flange: dict[int, Pose] = {}
-    for number, each in enumerate(positions):
-        if number not in reasons and each.scale is None:
-            try:
-                pose = compose(base[number], convention.pose(each.numbers))
-                flange[number] = compose(pose, invert(tool[number]))
-            except InputError as error:
-                reasons[number] = str(error.problems[0])
-    stacked = [np.stack(part) for part in zip(*flange.values(), strict=True)]
-    ways = (
-        dict(zip(flange, posture.postures_of(robot, Pose(*stacked)), strict=True)) if flange else {}
-    )
-    for number, each in enumerate(positions):
-        if number in ways:
-            own = near if each.near_rad is None else each.near_rad
-            try:
-                q_rad[number] = posture.choose(
-                    robot, ways[number], language.posture, each.posture, own
-                )
-            except InputError as error:
-                reasons[number] = error.problems[0].what
-        elif number not in reasons:
-            if len(each.numbers) != robot.dh.joints:
-                reasons[number] = f"has {len(each.numbers)} joints, not {robot.dh.joints}"
-                continue
-            q_rad[number] = each.numbers / each.scale * _unit(robot)
-            if not limits.within(q_rad[number], robot.q_min_rad, robot.q_max_rad):
-                reasons[number] = "its joints are beyond the limits"
-        near = q_rad[number] if np.isfinite(q_rad[number]).all() else near
+) -> np.ndarray:  # fmt: skip
+    """Reported joints (k,) of the nominal arm at a position; InputError where it is refused."""
+    if position.refused:
+        raise InputError(Problem("", position.refused))
+    if ways is not None:
+        near = near if position.near_rad is None else position.near_rad
+        return posture.choose(robot, ways, language.posture, position.posture, near)
+    if len(position.places) != robot.dh.joints:
+        what = f"has {len(position.places)} joints, not {robot.dh.joints}"
+        raise InputError(Problem("", what))
+    q_rad = position.numbers / position.scale * _unit(robot)
+    if not limits.within(q_rad, robot.q_min_rad, robot.q_max_rad):
+        raise InputError(Problem("", "its joints are beyond the limits"))
     return q_rad
 
 
@@ -334,18 +310,15 @@ def _unit(robot: Robot) -> np.ndarray:
     return np.where(robot.dh.prismatic, 1.0, np.pi / 180.0)
 
 
-def _carried(calibration: Calibration, tool: Pose | None, point: str | None) -> tuple[Pose, str]:
+def _carried(calibration: Calibration, tool: Pose, point: str | None) -> tuple[Pose, str]:
     """The program's tool on the calibrated arm, in the last frame of its model, and a remark."""
-    flange = compose(_moved(calibration), calibration.robot.flange)
-    mounted = compose(flange, tool or IDENTITY)
-    if tool is None or point == FLANGE:
-        return mounted, ""
+    mounted = compose(compose(_moved(calibration), calibration.robot.flange), tool)
     for target in [point] if point else calibration.targets:
         place = calibration.point(target)
         if calibration.orientation_source(target) != MEASURED:
             place = Pose(mounted.rotation, place.position_mm)
         gap_mm, gap_rad = _apart(place, mounted)
-        if point or (gap_mm <= _SAME_TOOL_MM and gap_rad <= _SAME_TOOL_RAD):
+        if target != FLANGE and (point or (gap_mm <= _SAME_TOOL_MM and gap_rad <= _SAME_TOOL_RAD)):
             gap = f"{gap_mm:.3g} mm and {1e3 * gap_rad:.3g} mrad"
             remark = f"the calibrated {target}, {gap} from the controller's tool, takes its place"
             return place, f"{remark} (--point flange: the controller's tool)."
@@ -363,40 +336,38 @@ def _moved(calibration: Calibration) -> Pose:
 
 def _corrected(
     calibration: Calibration, start: np.ndarray, carried: Pose, tool: Pose
-) -> tuple[pd.DataFrame, np.ndarray, Pose]:
-    """Facts of positions of one tool, corrected joints (n, k), nominal poses there (n, ...)."""
+) -> pd.DataFrame:
+    """Outcomes of positions of one tool: corrected joints, nominal poses there, changes."""
     robot, anchor = calibration.robot, calibration.anchor
     if anchor is not None:
         place = compose(invert(_moved(calibration)), carried)
         anchor = replace(anchor, targets={**anchor.targets, _POINT: place})
     targets = {**calibration.targets, _POINT: carried}
     arm = replace(calibration, targets=targets, anchor=anchor)
-    wanted = _nominal(calibration, start, tool)
+    wanted = _nominal(robot, start, tool)
     found = inverse.compensate(arm, wanted, start, point=_POINT)
-    usable = found.status <= PoseStatus.EXTRAPOLATED
-    q_rad = np.where(usable[:, None], found.q_rad, start)
-    new = _nominal(calibration, q_rad, tool)
+    q_rad = np.where(np.isfinite(found.q_rad), found.q_rad, start)
+    new = _nominal(robot, q_rad, tool)
     shift_mm, turn_rad = _apart(new, wanted)
     known = predict(arm, q_rad, point=_POINT)
     slopes = dh.joint_jacobian(robot.dh, robot.dh_joints(q_rad))
     slopes[:, :3] /= np.sum(np.abs(robot.dh.a_mm) + np.abs(robot.dh.d_mm))
-    facts = pd.DataFrame({
+    errors_mm = np.nan_to_num([known.unexplained[:, 0], known.std_position_mm])
+    return pd.DataFrame({
+        "q_rad": list(q_rad),
+        "pose": [Pose(*parts) for parts in zip(*new, strict=True)],
+        "outcome": found.status,
         "change_mm": shift_mm,
         "change_mrad": 1e3 * turn_rad,
         "largest_joint_change_deg": np.rad2deg(np.abs(q_rad - start).max(axis=1)),
-        "expected_error_mm": np.hypot(
-            np.nan_to_num(known.unexplained[:, 0]), np.nan_to_num(known.std_position_mm)
-        ),
+        "expected_error_mm": np.hypot(*errors_mm),
         "is_measured_there": known.near,
         "is_near_singular": np.linalg.svd(slopes, compute_uv=False)[:, -1] < _SINGULAR,
-        "status": found.status,
     })  # fmt: skip
-    return facts, q_rad, new
 
 
-def _nominal(calibration: Calibration, q_rad: np.ndarray, tool: Pose) -> Pose:
+def _nominal(robot: Robot, q_rad: np.ndarray, tool: Pose) -> Pose:
     """Poses (n, ...) of the tool that the nominal arm takes at reported joints (n, k)."""
-    robot = calibration.robot
     end = compose(robot.base, dh.forward(robot.dh, robot.dh_joints(q_rad)))
     return compose(compose(end, robot.flange), tool)
 

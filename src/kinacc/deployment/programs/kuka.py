@@ -126,9 +126,16 @@ def posture(sides: Sequence[bool], q_deg: np.ndarray) -> tuple[str, ...]:
     """Status bits 0 to 2 and turn bits of the six axes."""
     is_ahead, is_above, _ = sides
     bent_back = -180.0 <= q_deg[4] < 0.0 or q_deg[4] >= 180.0
-    bits = (not is_ahead, is_above, bent_back)
-    status = [f"S bit {number} {int(bit)}" for number, bit in enumerate(bits)]
-    return (*status, *(f"T bit {axis} {int(angle < 0.0)}" for axis, angle in enumerate(q_deg)))
+    status = (not is_ahead) + 2 * is_above + 4 * bent_back
+    return _bits(status, sum(int(angle < 0.0) << axis for axis, angle in enumerate(q_deg)))
+
+
+def _bits(status: int, turn: int) -> tuple[str, ...]:
+    return tuple(
+        f"{name} bit {bit} {number >> bit & 1}"
+        for name, number, count in (("S", status, 3), ("T", turn, 6))
+        for bit in range(count)
+    )
 
 
 def _lines(text: str) -> Iterator[tuple[int, str]]:
@@ -178,28 +185,19 @@ def _in_force(state: _State, text: str, data: dict[str, _State], where: str) -> 
 
 def _position(name: str, source: Source, parts: Parts) -> Position | None:
     """The position of an aggregate; None where some of its numbers are missing."""
-    places = _places(parts, _FRAME)
     outer = [parts[key][0] for key in parts if re.fullmatch(r"E[1-6]", key)]
     moves = any(re.fullmatch(NUMBER, each) and float(each) for each in outer)
-    if places is not None:
-        stated = _stated(*(_whole(parts.get(key, ("",))[0]) for key in "ST"))
+    if (places := _places(parts, _FRAME)) is not None:
+        stated = _bits(*(_whole(parts[key][0]) for key in "ST")) if {*"ST"} <= set(parts) else None
         return Position(name, source, places, 4, posture=stated, moves_outside=moves)
     places = _places(parts, _AXES)
     return None if places is None else Position(name, source, places, 4, 1.0)
 
 
-def _stated(s: int | None, t: int | None) -> tuple[str | None, ...] | None:
-    """Status and turn in the words of ``posture``."""
-    if s is None and t is None:
-        return None
-    status = [None if s is None else f"S bit {bit} {s >> bit & 1}" for bit in range(3)]
-    return (*status, *(None if t is None else f"T bit {bit} {t >> bit & 1}" for bit in range(6)))
-
-
-def _whole(text: str) -> int | None:
-    if text[:2].upper() in ("'B", "'H"):
-        return int(text[2:-1], 2 if text[1].upper() == "B" else 16)
-    return int(float(text)) if re.fullmatch(NUMBER, text) else None
+def _whole(text: str) -> int:
+    """A status or turn: 6, 'B110' or 'H6'."""
+    base = {"'B": 2, "'H": 16}.get(text[:2].upper(), 10)
+    return int(text.strip("'BbHh") if base != 10 else text, base)
 
 
 LANGUAGE = Language(

@@ -27,13 +27,13 @@ class Convention(NamedTuple):
     length_mm: float = 1.0
     angle_deg: float = 1.0
 
-    def pose(self, numbers: np.ndarray) -> Pose:
+    def pose(self, numbers: np.ndarray, where: str = "orientation") -> Pose:
         """The frame of written numbers; InputError for a quaternion far from length 1."""
         position, turn = self.length_mm * np.asarray(numbers[:3]), np.asarray(numbers[3:])
         if self.orientation == QUATERNION:
             length = np.linalg.norm(turn)
             if abs(length - 1.0) > _UNIT:
-                raise InputError(Problem("quaternion", f"has length {length:.4g}", "length 1"))
+                raise InputError(Problem(where, f"has a quaternion of length {length:.4g}", "1"))
             rotation = Rotation.from_quat(turn, scalar_first=True)
         elif self.orientation == VECTOR:
             rotation = Rotation.from_rotvec(self.angle_deg * turn, degrees=True)

@@ -24,13 +24,10 @@ from kinacc.geometry import IDENTITY
 CONVENTION = Convention(FIXED)
 _POSITION = re.compile(r"^(B?C|B?P|E[CX])(\d+)\s*=(.*)|^///(\w+)(.*)", re.M)
 _BLOCK = re.compile(r"^//(TOOL|UFRAME)\s+(\d+)(.*?)(?=^//(?!/)|\Z)", re.M | re.S)
-_ROW = {
-    "TOOL": re.compile(r"^[-+.\d][^\r\n/]*", re.M),
-    "UFRAME": re.compile(r"^/{3,4}BUSER\s+[^\r\n]*", re.M),
-}
-_MOVE = re.compile(r"\s*S?MOV[JLCS]\b.*?\bP0*(\d+)\b")
-_VARIABLE = re.compile(r"\bP0*(\d+)\b")
-_COMPUTED = re.compile(r"\s*(?:IMOV|SFTON|CNVRT|MULMAT|SETE)\b")
+_ROW = re.compile(r"^(?:/{3,4}BUSER\s+)?[-+.\d][^\r\n/]*", re.M)
+_MOVE = re.compile(r"^\s*S?MOV[JLCS]\b.*?\bP(\d+)\b", re.M)
+_OTHER = re.compile(r"^(?!\s*S?MOV[JLCS]\b).*", re.M)
+_COMPUTED = re.compile(r"^\s*(?:IMOV|SFTON|CNVRT|MULMAT|SETE)\b.*", re.M)
 _WORDS = (
     ("flip", "no flip"),
     ("upper arm", "lower arm"),
@@ -45,7 +42,7 @@ def frames_of(source: Source) -> Frames:
     """Tools of TOOL.CND, user frames of UFRAME.CND."""
     frames = {}
     for block in _BLOCK.finditer(source.text):
-        row = _ROW[block[1]].search(source.text, *block.span(3))
+        row = _ROW.search(source.text, *block.span(3))
         places = source.numbers(*row.span()) if row else []
         if len(places) >= 6:
             kind = TOOL if block[1] == "TOOL" else BASE
@@ -58,21 +55,14 @@ def read(
 ) -> Program:
     """Positions of a job; those of base and station axes, and shifts, stay as they are."""
     (source,) = sources
-    start = source.text.find("//INST")
-    end = len(source.text) if start < 0 else start
-    instructions = source.text[end:].splitlines()
-    targets = {int(found[1]) for line in instructions if (found := _MOVE.match(line))}
-    others = {
-        int(name)
-        for line in instructions
-        if not _MOVE.match(line)
-        for name in _VARIABLE.findall(line)
-    }
-    left, at = [], end
-    for line in source.text[end:].splitlines(keepends=True):
-        if _COMPUTED.match(line):
-            left.append(f"{source.where(at)}: {line.strip()}")
-        at += len(line)
+    end = source.text.find("//INST") % (len(source.text) + 1)
+    instructions = source.text[end:]
+    targets = set(map(int, _MOVE.findall(instructions)))
+    targets -= set(map(int, re.findall(r"\bP(\d+)\b", "\n".join(_OTHER.findall(instructions)))))
+    left = [
+        f"{source.where(found.end())}: {found[0].strip()}"
+        for found in _COMPUTED.finditer(source.text, end)
+    ]
     state: dict[str, str] = {}
     positions, moving = [], set()
     for found in _POSITION.finditer(source.text, 0, end):
@@ -84,7 +74,7 @@ def read(
         places = source.numbers(*found.span(3))
         if kind[0] in "BE":
             moving |= {name} if source.values(places).any() else set()
-        elif kind == "C" or int(name) in targets - others:
+        elif kind == "C" or int(name) in targets:
             positions.append((kind + name, places, dict(state)))
     return Program(
         sources,
