@@ -45,8 +45,8 @@ def correct(
     answer = programs.compensate_program(
         calibration,
         program,
-        _frames("--tool", tools),
-        _frames("--base", bases),
+        _frames(tools),
+        _frames(bases),
         frames,
         near,
         pulses_per_degree and np.array(numbers_of(pulses_per_degree)),
@@ -59,21 +59,13 @@ def correct(
         from kinacc.figures.program import draw
 
         Output(picture=picture).draw(draw(answer.table))
-    moved = answer.table["status"] == "corrected"
-    changes = answer.table.get("change_mm", pd.Series(0.0, moved.index))[moved]
+    changes = answer.table.query("status == 'corrected'").get("change_mm", pd.Series([0.0]))
     lines = [
-        f"{answer.language}: {moved.sum()} of {len(moved)} positions corrected",
-        f"Change of a position: mean {changes.mean():.3g} mm, largest {changes.max():.3g} mm",
+        f"{answer.language}: {len(answer.table) - len(answer.refused)} of {len(answer.table)} "
+        f"positions corrected; change: mean {changes.mean():.3g} mm, largest {changes.max():.3g} mm"
     ]
-    facts = {
-        "language": answer.language,
-        "corrected": int(moved.sum()),
-        "refused": [str(problem) for problem in answer.refused],
-        "left": answer.left,
-        "remarks": answer.remarks,
-        "positions": answer.table,
-    }
-    Output(as_json, table).show(facts, answer.table, lines if moved.any() else lines[:1])
+    facts = {name: value for name, value in vars(answer).items() if name != "files"}
+    Output(as_json, table).show(facts, answer.table, lines)
     for line in () if as_json else _warnings(answer):
         click.echo(as_seen(line), err=True)
     if answer.refused:
@@ -84,33 +76,23 @@ def correct(
 
 
 def _warnings(answer: programs.CorrectedProgram) -> Iterator[str]:
-    for column, bad, text in (
-        ("is_measured_there", False, "outside the measured region; errors may be larger"),
-        ("is_near_singular", True, "near a singular posture"),
+    table = answer.table.reindex(columns=["position", "is_measured_there", "is_near_singular"])
+    for named, text in (
+        (table[table["is_measured_there"].eq(False)], "outside the measured region"),
+        (table[table["is_near_singular"].eq(True)], "near a singular posture"),
     ):
-        named = answer.table.loc[answer.table.get(column, pd.Series()).eq(bad), "position"]
         if len(named):
-            yield f"{len(named)} positions {text}: {first_few(list(named))}"
+            yield f"{len(named)} positions {text}: {first_few(list(named['position']))}"
     yield from answer.remarks
     yield from (f"Computed by the program, not corrected: {line}" for line in answer.left)
     yield from (f"Refused: {problem}" for problem in answer.refused)
 
 
-def _frames(option: str, texts: tuple[str, ...]) -> dict[str, np.ndarray]:
+def _frames(texts: tuple[str, ...]) -> dict[str, np.ndarray]:
     """Frames by name; the name is empty where a frame is for all."""
-    given = {}
-    for text in texts:
-        name, _, numbers = text.rpartition("=")
-        given[name.strip()] = _numbers(option, numbers)
-    return given
+    parts = (text.rpartition("=") for text in texts)
+    return {name.strip(): np.array(numbers_of(numbers)) for name, _, numbers in parts}
 
 
 def _asked(kind: str, name: str) -> np.ndarray:
-    return _numbers(f"--{kind}", click.prompt(f"{kind} {name} (six numbers, mm and deg)"))
-
-
-def _numbers(option: str, text: str) -> np.ndarray:
-    values = numbers_of(text)
-    if len(values) not in (6, 7):
-        raise InputError(Problem(option, repr(text), "six numbers, mm and deg"))
-    return np.array(values)
+    return np.array(numbers_of(click.prompt(f"{kind} {name} (six numbers, mm and deg)")))

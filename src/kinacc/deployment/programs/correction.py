@@ -176,32 +176,30 @@ def compensate_program(
         [frames.get((kind, getattr(each, kind) or ""), IDENTITY) for each in positions]
         for kind in (TOOL, BASE)
     )
-    wanted = [
-        None if each.scale is not None else compose(b, convention.pose(each.numbers, each.where))
-        for each, b in zip(positions, base, strict=True)
-    ]
+    poses = [number for number, each in enumerate(positions) if each.scale is None]
     flange = [
-        None if a is None else compose(a, invert(b)) for a, b in zip(wanted, tool, strict=True)
+        compose(compose(base[n], convention.pose(each.numbers, each.where)), invert(tool[n]))
+        for n, each in enumerate(positions)
+        if each.scale is None
     ]
+    ways = dict(zip(poses, posture.postures_of(robot, flange), strict=True))
     reasons: dict[int, str] = {}
-    ways, q_rad, near = _ways(robot, flange), [], near_rad
+    q_rad, near = np.full((len(positions), robot.dh.joints), np.nan), near_rad
     for number, each in enumerate(positions):
         try:
-            if each.moves_outside and each.scale is None and not base_is_fixed:
+            if each.moves_outside and number in ways and not base_is_fixed:
                 raise InputError(Problem("", _TRACK))
-            q_rad.append(_start(robot, language, each, ways[number], near))
-            near = q_rad[-1]
+            near = q_rad[number] = _start(robot, language, each, ways.get(number), near)
         except InputError as error:
             reasons[number] = error.problems[0].what
-            q_rad.append(np.full(robot.dh.joints, np.nan))
-    start, remarks, parts = np.array(q_rad), [], []
+    remarks, parts = [], []
     for name in dict.fromkeys(each.tool for each in positions):
         group = [n for n, each in enumerate(positions) if each.tool == name and n not in reasons]
         if group:
             own = frames.get((TOOL, name or ""), IDENTITY)
             carried, remark = _carried(calibration, own, point)
             remarks += [f"Tool {name or ''}: {remark}"] if remark else []
-            parts.append(_corrected(calibration, start[group], carried, own).set_axis(group))
+            parts.append(_corrected(calibration, q_rad[group], carried, own).set_axis(group))
     facts = pd.concat(parts).reindex(range(len(positions))) if parts else pd.DataFrame()
     new: dict[Position, np.ndarray] = {}
     for number in sorted(set(range(len(positions))) - set(reasons)):
@@ -274,16 +272,6 @@ def _all_frames(
             frames[kind, name] = convention.typed(numbers)
     refuse(problems, "Frames are missing")
     return frames
-
-
-def _ways(robot: Robot, flange: list[Pose | None]) -> list[np.ndarray | None]:
-    """Reported joints (m, k) of all postures at flange poses."""
-    known = [pose for pose in flange if pose is not None]
-    if not known:
-        return flange
-    stacked = Pose(*(np.stack(part) for part in zip(*known, strict=True)))
-    found = iter(posture.postures_of(robot, stacked))
-    return [None if pose is None else next(found) for pose in flange]
 
 
 def _start(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import yaml
 
 from kinacc.deployment.programs.orientation import Convention
@@ -14,7 +15,7 @@ def frames_of(source: Source, convention: Convention) -> Frames:
     try:
         content = yaml.safe_load(source.text)
         return {
-            (kind, str(number)): convention.typed(numbers)
+            (kind, str(number)): convention.typed(np.array(numbers, float))
             for kind in (TOOL, BASE)
             for number, numbers in content.get(f"{kind}s", {}).items()
         }

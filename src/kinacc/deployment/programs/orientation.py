@@ -63,4 +63,6 @@ class Convention(NamedTuple):
     def typed(self, numbers: np.ndarray) -> Pose:
         """A frame as a person gives it, in mm and degrees; fixed angles for a quaternion."""
         is_short = self.orientation == QUATERNION and len(numbers) == 6
-        return Convention(FIXED if is_short else self.orientation).pose(np.asarray(numbers, float))
+        if len(numbers) != (7 if self.orientation == QUATERNION and not is_short else 6):
+            raise InputError(Problem("frame", f"has {len(numbers)} numbers", "6, mm and deg"))
+        return Convention(FIXED if is_short else self.orientation).pose(numbers)

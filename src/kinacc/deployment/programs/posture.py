@@ -41,9 +41,12 @@ def unmatched(
     return ", ".join(now for wanted, now, *near in parts if wanted not in (None, now, *near))
 
 
-def postures_of(robot: Robot, flange: Pose) -> np.ndarray:
-    """Reported joints (n, m, k) of all postures at flange poses (n, ...); NaN where not reached."""
-    goal = compose(invert(robot.base), compose(flange, invert(robot.flange)))
+def postures_of(robot: Robot, flange: Sequence[Pose]) -> Sequence[np.ndarray]:
+    """Reported joints (m, k) of all postures at flange poses; NaN where not reached."""
+    if not flange:
+        return []
+    stacked = Pose(*(np.stack(part) for part in zip(*flange, strict=True)))
+    goal = compose(invert(robot.base), compose(stacked, invert(robot.flange)))
     return limits.reported_joints(robot, solve(robot, robot.dh, goal).q_rad)
 
 
@@ -63,15 +66,13 @@ def choose(
     ways = (ways[:, None] + np.array([*product(*turns)])).reshape(-1, robot.dh.joints)
     inside = (ways >= robot.q_min_rad - 1e-9) & (ways <= robot.q_max_rad + 1e-9)
     ways = ways[inside.all(axis=1)]
-    if len(ways) == 0:
-        raise InputError(Problem("", "the nominal arm cannot reach it within its limits"))
+    words = "within its limits"
     if stated is not None and posture is not None:
         fits = [not unmatched(robot, posture, stated, way, _ROUNDING_DEG) for way in ways]
-        if not any(fits):
-            words = ", ".join(filter(None, stated))
-            raise InputError(Problem("", f"the nominal arm cannot reach it in the posture {words}"))
-        ways = ways[fits]
+        ways, words = ways[fits], f"in the posture {', '.join(filter(None, stated))}"
     elif near_rad is None and len(ways) > 1:
         raise InputError(Problem("", "no posture is stated; give joints to start from: --near-deg"))
+    if len(ways) == 0:
+        raise InputError(Problem("", f"the nominal arm cannot reach it {words}"))
     near_rad = np.zeros(ways.shape[1]) if near_rad is None else near_rad
     return ways[np.argmin(np.max(np.abs(ways - near_rad), axis=1).round(9))]

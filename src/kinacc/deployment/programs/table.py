@@ -17,7 +17,6 @@ from kinacc.deployment.programs.orientation import (
 )
 from kinacc.deployment.programs.record import (
     BASE,
-    NUMBER,
     Frames,
     Language,
     Position,
@@ -58,24 +57,20 @@ def read(sources: Sequence[Source], frames: Frames, _: np.ndarray | None) -> Pro
             raise InputError(Problem(f"{source.path}:1", "names no columns of positions", allowed))
         keys = [*"xyz", *_TURNS[kinds[0]]]
         convention = Convention(kinds[0], unit.get("x", 1.0), unit.get(keys[-1], 1.0))
-    if twice := {key for key in keys if names.count(key) > 1}:
-        raise InputError(Problem(f"{source.path}:1", f"has two columns of {', '.join(twice)}"))
     positions, at = [], len(head)
     for number, line in enumerate(lines, 2):
-        if line.strip():
-            places = _places(line, mark, at)
-            where = f"{source.path}:{number}"
-            if len(places) != len(names):
-                raise InputError(Problem(where, f"has {len(places)} cells", f"{len(names)}"))
-            row = dict(zip(names, places, strict=True))
-            for key in keys:
-                text = source.text[slice(*row[key])]
-                if not re.fullmatch(NUMBER, text.replace(",", ".")):
-                    raise InputError(Problem(f"{where}, column {key}", f"{text!r} is no number"))
-            label = source.text[slice(*row["pose"])] if "pose" in row else f"line {number}"
-            own = [row[key] for key in keys]
-            positions.append(Position(label, source, own, 6, scale, tool="", base=""))
+        row = dict(zip(names, _places(line, mark, at), strict=False))
         at += len(line)
+        if not line.strip():
+            continue
+        try:
+            label = source.text[slice(*row["pose"])] if "pose" in names else f"line {number}"
+            own = [row[key] for key in keys]
+            source.values(own)
+        except (KeyError, ValueError):
+            what = f"has no number in a column of {', '.join(keys)}"
+            raise InputError(Problem(f"{source.path}:{number}", what)) from None
+        positions.append(Position(label, source, own, 6, scale, tool="", base=""))
     return Program(sources, positions, {**frames, (BASE, ""): IDENTITY}, convention=convention)
 
 
