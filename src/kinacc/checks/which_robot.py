@@ -22,21 +22,20 @@ _SAME_ARM = 1e-6  # of the misfit: two names of one geometry
 Progress = Callable[[Iterable, str], Iterable]
 
 
-def fitting(guess: Guess, progress: Progress) -> str | None:
-    """Name of the one shipped robot that fits the file, None where none or several do.
+def fitting(guess: Guess, progress: Progress) -> list[str]:
+    """Names of the shipped robots that fit the file: one, or those of equal geometry; or none.
 
-    The arms are taken as described: corrected, an arm of similar build would fit as well. Of
-    robots with equal geometry the first by name is returned.
+    The arms are taken as described: corrected, an arm of similar build would fit as well.
     """
     from kinacc.checks import readings, robust_fit
 
     arms = [arm for arm in map(load, shipped()) if arm.dh.joints == guess.joints]
     if not arms:
-        return None
+        return []
     try:
         every = readings.of_file(read(guess.section, arms[0], strict=False), arms[0])
     except InputError:
-        return None
+        return []
     every = readings.merged(every)[0]
     few = every.select(readings.thinned(np.arange(len(every)), _ROWS))
     point = few.position_mm - np.median(few.position_mm, axis=0)
@@ -50,9 +49,10 @@ def fitting(guess: Guess, progress: Progress) -> str | None:
         fitted = robust_fit.best(observed, robust_fit.start(observed, arm.dh), strengths=(0.0,))
         misfits.append((fitted.sigma_mm / spread, arm.name))
     misfits.sort()
-    least, name = misfits[0]
-    others = [misfit for misfit, _ in misfits if misfit > (1.0 + _SAME_ARM) * least]
-    return name if least <= _SURE and not (others and least > _NEXT * others[0]) else None
+    least = misfits[0][0]
+    same = [name for misfit, name in misfits if misfit <= (1.0 + _SAME_ARM) * least]
+    others = [misfit for misfit, _ in misfits[len(same) :]]
+    return [] if least > _SURE or (others and least > _NEXT * others[0]) else same
 
 
 def _linear_misfit(model: DHModel, observed, spread: float) -> float:

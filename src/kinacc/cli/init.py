@@ -193,13 +193,15 @@ def _robot(guess: Guess, given: str | None, ask: bool) -> tuple[str | None, str]
     if ask:
         question = "Robot (name in docs/robots.md, robot or URDF file, or 'new' for a form)"
         try:
-            answer = click.prompt(question, default=found or "new")
+            answer = click.prompt(question, default=found[0] if found else "new")
         except click.Abort:
             refuse_unanswered(guess, {}, None)
         return (None, "a template to fill in") if answer == "new" else (answer, "as answered")
-    if found is None:
+    if not found:
         return None, "none of the shipped robots fits; a template to fill in"
-    return found, "the only shipped robot that fits the readings"
+    if len(found) > 1:
+        return found[0], f"fits the readings, as does {', '.join(found[1:])} (--robot)"
+    return found[0], "the only shipped robot that fits the readings"
 
 
 def _tried(guess: Guess, robot, name: str) -> tuple[Guess, Report, MeasuredFile]:
