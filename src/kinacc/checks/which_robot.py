@@ -41,7 +41,7 @@ def fitting(guess: Guess, progress: Progress) -> list[str]:
     point = few.position_mm - np.median(few.position_mm, axis=0)
     spread = max(float(np.median(np.linalg.norm(point, axis=1))), 1e-9)
     moved = [(arm, replace(few, q_rad=arm.dh_joints(few.q))) for arm in arms]
-    moved.sort(key=lambda pair: _linear_misfit(pair[0].dh, pair[1], spread))
+    moved.sort(key=lambda pair: linear_misfit(pair[0].dh, pair[1], spread))
     misfits = []
     if len(few) >= _POSES:
         moved = moved[:_TRIED]
@@ -55,7 +55,7 @@ def fitting(guess: Guess, progress: Progress) -> list[str]:
     return [] if least > _SURE or (others and least > _NEXT * others[0]) else same
 
 
-def _linear_misfit(model: DHModel, observed, spread: float) -> float:
+def linear_misfit(model: DHModel, observed, spread: float) -> float:
     """Misfit of the most measured target, base and tool entering linearly, in spreads.
 
     ``point = B p + B R t + b`` is linear in B (3, 3), the products of B and t, and b; how far B is
