@@ -87,7 +87,10 @@ def test_on_a_phone_nothing_stands_out_to_the_side(chromium, path, dark):
             document.querySelectorAll("details").forEach((each) => { each.open = true; });
             const out = [...document.querySelectorAll("body *")].filter((each) =>
               !each.parentElement.closest(".wide") && each.getBoundingClientRect().right > 391);
-            return [document.documentElement.scrollWidth, ...out.map((each) => each.outerHTML)];
+            const cut = [...document.querySelectorAll(".wide")].filter((each) =>
+              each.scrollWidth > each.clientWidth);
+            return [document.documentElement.scrollWidth,
+              ...[...out, ...cut].map((each) => each.outerHTML)];
         """)
     assert wide == [PHONE[0]]
 

@@ -166,7 +166,7 @@ def notes(summary: CalibrationSummary, most: int | None) -> dict[str, list[str]]
         "Measured range": _ranges(summary),
         "Poorly determined": _poorly_determined(summary, most),
         "Unidentifiable": _first(list(summary.unidentifiable), most)
-        + (["No pose separates these; enter a value."] if summary.unidentifiable else []),
+        + (["Enter known values (calibration.dh.parameters, calibration.frames)."] if summary.unidentifiable else []),
         "Noise": _noise(summary),
         "Model difference": [
             f"{size(mm)} mm at most, DH to VEC, {where}"
