@@ -32,3 +32,12 @@ def test_figure_4_with_an_assessor_of_ones_own(monkeypatch):
     # Fig. 4 of the workflow, docs/the-paper.md.
     assert bias["maximum"].iloc[-1] + 0.916 == pytest.approx(1.442, abs=1e-3)
     assert len(left["figure"].axes[0].containers) == 4
+
+
+def test_a_tracker_file_leads_to_a_bound_that_the_measured_errors_keep(monkeypatch):
+    left = run("tracker_to_bound.ipynb", monkeypatch)
+    predicted = left["calibration"].predict(left["joints"], frame="instrument")
+    error_mm = np.linalg.norm(predicted.pose.position_mm - left["points_mm"], axis=1).max()
+    bound = left["bound"]
+    assert bound.points == len(left["joints"])
+    assert bound.lower_mm < error_mm < bound.upper_mm
