@@ -30,6 +30,7 @@ FEW = 4  # data sets whose summaries are printed one after another
 WIDTH = 100
 _MOST = 3  # findings, rows and parameters without --verbose
 _FEW_SHARE = 0.01
+_ENTER = "Enter known values (calibration.dh.parameters, calibration.frames)."
 
 
 class _Console(Console):
@@ -165,8 +166,8 @@ def notes(summary: CalibrationSummary, most: int | None) -> dict[str, list[str]]
         "Joint compliance": [_compliance(each) for each in summary.compliance],
         "Measured range": _ranges(summary),
         "Poorly determined": _poorly_determined(summary, most),
-        "Unidentifiable": _first(list(summary.unidentifiable), most)
-        + (["Enter known values (calibration.dh.parameters, calibration.frames)."] if summary.unidentifiable else []),
+        "Unidentifiable": summary.unidentifiable
+        and [*_first(list(summary.unidentifiable), most), _ENTER],
         "Noise": _noise(summary),
         "Model difference": [
             f"{size(mm)} mm at most, DH to VEC, {where}"
