@@ -314,7 +314,7 @@ def test_a_report_holds_its_contract_and_the_numbers_of_status(begun):
     (made / "campaign_points.parquet").write_bytes(before["campaign_points.parquet"])
     done = call("check-results", made)
     assert done.exit_code == 1
-    assert "campaign_points" in done.output
+    assert "different states" in done.output
 
 
 def test_a_folder_that_cannot_be_written_is_named(calibration, tmp_path):

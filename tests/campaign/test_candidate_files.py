@@ -2,23 +2,14 @@
 
 from __future__ import annotations
 
-import json
-
 import numpy as np
 import pytest
-from command_line import call, small_study
-from openpyxl import Workbook
+from command_line import call
 
 from kinacc.campaign import folder as campaigns
 from kinacc.tables import store
 
 COUNT = 12
-
-
-@pytest.fixture(scope="module")
-def calibration(tmp_path_factory):
-    """Results of a small synthetic study, made by the workflow's own stages."""
-    return small_study(tmp_path_factory.mktemp("study"))
 
 
 @pytest.fixture(scope="module")
@@ -59,17 +50,6 @@ def test_a_german_export_in_degrees_with_decimal_commas(start, joints, tmp_path)
     assert "decimal commas" in done.stderr
 
 
-def test_a_sheet_whose_header_says_radians(start, joints, tmp_path):
-    file, book = tmp_path / "candidates.xlsx", Workbook()
-    book.active.append([f"Joint {number} [rad]" for number in range(1, 7)])
-    for row in joints:
-        book.active.append([float(each) for each in row])
-    book.save(file)
-    done, plan = start(file)
-    assert done.exit_code == 0, done.output
-    same(plan, joints)
-
-
 def test_a_program_of_the_robot_with_its_names_of_positions(start, joints, tmp_path):
     file = tmp_path / "check.mod"
     lines = [
@@ -97,21 +77,6 @@ def test_joints_without_a_unit_that_may_be_either_are_asked_about(start, joints,
     same(plan, joints, 8)
 
 
-def test_two_readings_of_the_joints_are_asked_about(start, joints, tmp_path):
-    file = tmp_path / "log.csv"
-    names = [f"{which}_{axis}_deg" for which in ("left_q", "right_q") for axis in range(1, 7)]
-    both = np.rad2deg(np.hstack([joints, joints[::-1]]))
-    lines = [",".join(f"{each:.10f}" for each in row) for row in both]
-    file.write_text("\n".join([",".join(names), *lines]) + "\n")
-    done, plan = start(file)
-    assert done.exit_code == 2
-    assert plan is None
-    assert "--take left_q_1_deg or --take right_q_1_deg" in done.output
-    done, plan = start(file, "--take", "right_q_1_deg")
-    assert done.exit_code == 0, done.output
-    same(plan, joints[::-1])
-
-
 def test_a_file_without_joints_names_what_it_has(start, tmp_path):
     file = tmp_path / "points.csv"
     file.write_text("x_mm,y_mm,z_mm\n1,2,3\n4,5,6\n7,8,9\n")
@@ -120,16 +85,3 @@ def test_a_file_without_joints_names_what_it_has(start, tmp_path):
     assert plan is None
     assert "no columns of 4 to 7 joints" in done.output
     assert "x_mm, y_mm, z_mm" in done.output
-
-
-def test_poses_are_planned_from_a_robots_program_too(joints, tmp_path):
-    file = tmp_path / "reach.mod"
-    lines = [
-        f"CONST jointtarget a{number}:=[[{','.join(f'{each:.6f}' for each in row)}],[9E9,9E9]];"
-        for number, row in enumerate(np.rad2deg(joints), 1)
-    ]
-    file.write_text("\n".join(lines) + "\n")
-    names = {f"a{number}" for number in range(1, COUNT + 1)}
-    done = call("plan-poses", "mh180", "--candidates", file, "--poses", 10, "--json")
-    assert done.exit_code == 0, done.output
-    assert {each["candidate"] for each in json.loads(done.stdout)["rows"]} <= names

@@ -8,7 +8,6 @@ from scipy.stats import kstest
 
 from kinacc.campaign import folder
 from kinacc.campaign.consistency import nearness, scatter
-from kinacc.campaign.instrument import instruments
 from kinacc.campaign.reading import Reading
 from kinacc.campaign.state import Told, restore
 
@@ -65,16 +64,6 @@ def test_points_read_again_for_being_large_do_not_pass_for_scatter(make_plan):
         assert found.freedom >= 36
         probabilities.append(found.probability)
     assert kstest(probabilities, "uniform").pvalue > 0.01
-
-
-def test_readings_count_with_their_own_noise(make_plan):
-    plan = make_plan(texts=("camera=0.05,0.05,0.15", "rough=1"))
-    assert len(instruments(("camera=0.05,0.05,0.15", "rough=1"), "base")) == 2
-    state = read(plan, 1.0)
-    rough = [each.reading.as_entry() | {"instrument": "rough"} for each in state.in_hand]
-    rough += [each.reading.as_entry() | {"instrument": "rough"} for each in state.told]
-    found = scatter(restore(plan, [{"kind": "readings", "readings": rough}]))
-    assert found.too_small
 
 
 def near(plan, error_mm, noise_mm, seed=0):

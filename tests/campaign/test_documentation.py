@@ -5,9 +5,6 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-import pytest
-from command_line import call
-
 from kinacc.cli.group import main
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "campaigns.md"
@@ -34,12 +31,3 @@ def test_every_command_and_option_on_the_page_exists():
 def test_the_pictures_are_there():
     for name in re.findall(r"\]\(([\w-]+\.png)\)", PAGE.read_text(encoding="utf-8")):
         assert (PAGE.parent / name).stat().st_size > 1000
-
-
-@pytest.mark.parametrize(
-    "name", ["start", "next", "record", "leave-out", "strike", "status", "report"]
-)
-def test_help_has_an_example(name):
-    shown = call("campaign", name, "--help")
-    assert shown.exit_code == 0
-    assert f"kinacc campaign {name} " in shown.output.split("Example:")[1]

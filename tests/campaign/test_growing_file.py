@@ -6,15 +6,9 @@ import json
 
 import numpy as np
 import pytest
-from command_line import call, small_study
+from command_line import call
 
 HEAD = "pose,x_mm,y_mm,z_mm"
-
-
-@pytest.fixture(scope="module")
-def calibration(tmp_path_factory):
-    """Results of a small synthetic study, made by the workflow's own stages."""
-    return small_study(tmp_path_factory.mktemp("study"))
 
 
 class Day:
@@ -112,25 +106,6 @@ def test_an_old_row_that_was_changed_is_asked_about(day, changed, appended):
     assert day.taken() == 3 + appended
 
 
-def test_rows_of_a_file_that_was_written_over_are_taken_on_request(day):
-    day.takes([day.row(0) for _ in range(3)], 3)
-    second = [day.row(0) for _ in range(3)]
-    assert "readings 1, 2, 3 any more" in day.refuses(second)
-    day.takes(second, 3, "--again")
-    assert day.taken() == 6
-
-
-def test_a_row_that_got_another_point_or_instrument_is_asked_about(day):
-    rows = [day.row(place) for place in range(4)]
-    head = HEAD + ",instrument"
-    day.takes([f"{each},tracker" for each in rows[:3]], 3, head=head)
-    now = [f"{each},tracker" for each in rows]
-    moved = day.visit[7]["pose"] + rows[1][rows[1].index(",") :]
-    for row in (f"{moved},tracker", now[1].replace("tracker", "camera")):
-        said = day.refuses([now[0], row, *now[2:]], "--accept-implausible", head=head)
-        assert "reading 2 any more" in said
-
-
 def test_rows_that_repeat_to_the_last_digit_are_asked_about_and_can_be_taken(day):
     rows = [day.row(place) for place in range(3)]
     day.takes(rows[:2], 2)
@@ -149,20 +124,6 @@ def test_a_row_whose_reading_was_struck_does_not_come_back(day):
     day.strike(2)
     day.takes(rows, 1)
     assert day.taken() == 2
-
-
-def test_rows_in_another_order_are_the_same(day):
-    rows = [day.row(place) for place in range(5)]
-    day.takes(rows[:4], 4)
-    day.takes([*rows[3::-1], rows[4]], 1)
-
-
-def test_a_second_round_in_a_file_of_its_own_is_new_and_a_copy_is_known(day):
-    rows = [day.row(place) for place in range(4)]
-    day.takes(rows, 4)
-    second = day.file.parent / "second"
-    day.takes([day.row(place) for place in range(4)], 4, file=second / "readings.csv")
-    day.takes([*rows, day.row(5)], 1, file=second / "copy.csv")
 
 
 def test_a_reading_given_alone_and_written_down_as_well_is_taken_once(day):

@@ -53,28 +53,6 @@ def test_a_journal_that_is_no_file_is_told_at_once(tmp_path, made):
         journal.read(path, SEED)
 
 
-def test_a_journal_larger_than_any_campaigns_is_told_before_it_is_read(tmp_path):
-    path = tmp_path / "j"
-    path.touch()
-    os.truncate(path, 10**12)
-    with pytest.raises(InputError, match="1000000 MB"):
-        journal.read(path, SEED)
-
-
-def test_a_file_system_without_locks_is_told_as_that(tmp_path, monkeypatch):
-    import fcntl
-
-    def none(*_):
-        raise OSError(errno.ENOLCK, "No locks available")
-
-    monkeypatch.setattr(fcntl, "flock", none)
-    with (
-        pytest.raises(InputError, match=r"holds no locks: No locks available.*local disk"),
-        journal.writing(tmp_path),
-    ):
-        pass
-
-
 def test_zeros_left_by_a_power_cut_are_no_line(tmp_path):
     path = tmp_path / "j"
     written(path, 2)

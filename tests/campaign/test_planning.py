@@ -68,7 +68,7 @@ def test_a_plan_for_single_visits_is_held_to_what_95_percent_of_visits_keep():
 def test_a_plan_has_the_excess_of_bounds_that_know_the_errors():
     errors, noise = field(), 0.05**2 * np.eye(3)
     budgets = (SearchAndConfirm(measurements=30), SearchAndConfirm(measurements=60))
-    few, enough = plan_budget([errors], 40, noise, budgets, Aim(), 2, 9).rows
+    few, enough = plan_budget([errors], 40, noise, budgets, Aim(), 2, 9).rows.itertuples()
     chosen = [np.random.default_rng([9, 0, each]).permutation(100)[:40] for each in range(2)]
     known = [width_limits(errors.size_mm[each], 0.05, 60, 0.05) for each in chosen]
     assert enough.attainable_mm == pytest.approx(np.mean([each.attainable_mm for each in known]))
@@ -79,7 +79,8 @@ def test_a_plan_has_the_excess_of_bounds_that_know_the_errors():
 
 def test_the_single_shot_bound_holds_as_often_as_it_says():
     noise, aim = 0.1**2 * np.eye(3), Aim(target=MEASURED)
-    (row,) = plan_budget([field()], 30, noise, [SingleShot(measurements=30)], aim, 200, 4).rows
+    plan = plan_budget([field()], 30, noise, [SingleShot(measurements=30)], aim, 200, 4)
+    (row,) = plan.rows.itertuples()
     assert row.holding / row.judged >= 0.95 - 3.0 * math.sqrt(0.95 * 0.05 / 200)
     assert row.stated == 1.0
 
@@ -101,7 +102,7 @@ def test_rows_count_what_is_stated_wanted_held_and_decided():
         (1.3, 2.0, 1.5, "reject"),
         (0.9, math.nan, 1.0, "undecided"),
     )
-    row = planning._row("x", 10, table, Aim(width_mm=0.5, tolerance_mm=1.2))
+    row = pd.Series(planning._row("x", 10, table, Aim(width_mm=0.5, tolerance_mm=1.2)))
     assert (row.stated, row.within, row.reached) == (0.75, 0.5, 2)
     assert (row.holding, row.judged) == (2, 3)
     # Clopper, Pearson: 3 p^2 - 2 p^3 = 0.025 below; p^3 = 0.975 above
@@ -114,21 +115,16 @@ def test_rows_count_what_is_stated_wanted_held_and_decided():
 
 def test_bounds_that_contradict_each_other_are_no_width_below_zero():
     table = runs((1.1, 0.9, 1.0, "undecided"), (0.9, 1.2, 1.0, "undecided"))
-    row = planning._row("x", 10, table, Aim())
+    row = pd.Series(planning._row("x", 10, table, Aim()))
     assert (row.width_q05_mm, row.width_q95_mm) == pytest.approx((0.0, 0.3))
 
 
 def test_the_budget_named_is_enough_on_all_errors_and_beyond():
     aim = Aim(width_mm=0.5, power=0.8)
-    table = runs((0.9, 1.1, 1.0, "undecided"))
 
     def enough(**shares):
-        rows = [
-            planning._row(errors, budget, table, aim)
-            for errors in shares
-            for budget in (10, 20, 30)
-        ]
-        return smallest_budget(rows, aim, [share for each in shares.values() for share in each])
+        budgets = pd.Series([10, 20, 30] * len(shares))
+        return smallest_budget(budgets, pd.Series(np.concatenate([*shares.values()])), aim)
 
     assert enough(a=[0.9, 0.9, 0.9], b=[0.1, 0.8, 1.0]) == 20
     assert enough(a=[0.9, 0.9, 0.9], b=[0.9, 0.1, 1.0]) == 30

@@ -11,7 +11,7 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from command_line import call, small_study
+from command_line import call
 
 from kinacc.calibration import noise
 from kinacc.calibration.observations import full_poses
@@ -20,12 +20,6 @@ from kinacc.campaign import slips
 from kinacc.campaign.instrument import instruments
 from kinacc.geometry import Pose, exp_so3
 from kinacc.kinematics import dh, robot
-
-
-@pytest.fixture(scope="module")
-def calibration(tmp_path_factory):
-    """Results of a small synthetic study, made by the workflow's own stages."""
-    return small_study(tmp_path_factory.mktemp("study"))
 
 
 @pytest.fixture
@@ -97,21 +91,6 @@ def test_a_reading_three_mm_off_where_less_than_one_is_usual_is_asked_about(visi
     assert call("campaign", "record", folder, path, "--accept-implausible").exit_code == 0
 
 
-def test_a_row_of_readings_is_named_by_the_pose_of_its_file_too(calibration, tmp_path):
-    draw = np.random.default_rng(2).uniform(-40.0, 40.0, (12, 6))
-    names = [f"corner {row}" for row in range(len(draw))]
-    lines = [",".join(["pose", *(f"q{i}_deg" for i in range(1, 7))])]
-    lines += [",".join([n, *map(str, q)]) for n, q in zip(names, draw, strict=True)]
-    (tmp_path / "poses.csv").write_text("\n".join(lines) + "\n")
-    done = call("campaign", "start", tmp_path / "check", "--calibration", calibration, "--robot",
-                "mh180", "--candidates", tmp_path / "poses.csv", "--noise-mm", 0.05, "--model",
-                "dh", "--budget", 12, "--sure")  # fmt: skip
-    assert done.exit_code == 0, done.output
-    path = written(tmp_path / "readings.csv", [(name, 9, 9, 9) for name in names])
-    said = call("campaign", "record", tmp_path / "check", path).output
-    assert "readings.csv, line 4 (corner 2): " in said
-
-
 def test_one_reading_at_a_time_is_held_to_those_before_it(visited, tmp_path):
     folder, rows = visited
     path = written(tmp_path / "readings.csv", rows[:20])
@@ -174,10 +153,6 @@ def test_noise_below_the_scatter_of_repeated_readings_is_asked_about(sessions):
     (problem,) = slips.of_little_noise(instruments(["tracker=0.03"], "base"), known)
     assert "scatter by 0.0" in problem.what
     assert not slips.of_little_noise(instruments(["tracker=0.06"], "base"), known)
-
-
-def test_poses_that_were_read_once_say_nothing_of_the_noise():
-    assert not slips.of_little_noise(instruments(["t=0.03"], "base"), noise_of(120, 1, 0.06))
 
 
 def test_repeats_are_offered_as_noise_along_the_axes_of_the_instrument():

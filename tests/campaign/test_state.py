@@ -80,21 +80,6 @@ def test_part_of_a_visit_by_travel_says_nothing_of_the_region(make_plan, make_wo
     assert not any("travel" in str(said.withheld) for said in begun.statements())
 
 
-def test_the_route_reorders_the_first_visit_only(make_plan):
-    plan = make_plan(points=60, budget=60)
-    rows, first = plan.visiting(frozenset()), len(plan.route)
-    assert first == 59  # of 60: 2 % may be missed
-    assert set(rows[:first]) == set(plan.order[:first])
-    np.testing.assert_array_equal(rows[:first], plan.route)
-    np.testing.assert_array_equal(rows[first:], plan.order[first:])
-
-
-def test_the_order_of_the_candidates_knows_the_seed_alone(make_plan):
-    same, other = make_plan(seed=3), make_plan(seed=4)
-    np.testing.assert_array_equal(make_plan(seed=3).order, same.order)
-    assert not np.array_equal(other.order, same.order)
-
-
 def test_readings_taken_ahead_change_nothing(make_plan, make_world):
     plan = make_plan()
     world = make_world(plan)
@@ -183,11 +168,3 @@ def test_predictions_recorded_as_readings_bound_nothing(make_plan, name, tmp_pat
         assert done.exit_code == 0, done.output
         assert "equal the predicted positions" in done.output
         assert " at most " not in done.output
-
-
-def test_a_reading_a_trifle_off_its_prediction_is_a_reading(make_plan):
-    plan = make_plan(points=12, budget=14)
-    seen_mm = plan.points.modelled_mm.copy()
-    seen_mm[3, 0] += 1e-9
-    said = restore(plan, [entry_at(plan, seen_mm)]).statements()
-    assert not any(each.withheld for each in said)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
+from pydantic import BaseModel, FiniteFloat
 
 from kinacc.assess.adaptive import covariance_faults
 from kinacc.assess.noise import ENOUGH, FEWEST
@@ -31,36 +32,39 @@ class KnownNoise:
     poses_differ: str
 
 
+class _Noise(BaseModel):
+    covariance_mm2: list[list[FiniteFloat]]
+    freedom: FiniteFloat
+
+
+class _File(BaseModel):
+    format: Literal["kinacc repeatability 1"]
+    file: str
+    noise: _Noise | None
+    poses_differ: str | None
+
+
 def read(path: str | Path) -> KnownNoise:
-    """The noise of a file. Raises InputError where it tells none."""
-    path = Path(path)
-    if not path.is_file():
-        raise InputError(Problem(f"--repeatability {path}", "no such file", fix=_FIX))
-    problem = Problem(f"--repeatability {path}", "is no answer of kinacc repeatability", fix=_FIX)
+    """Return the noise of a file. Raises InputError where it has none."""
+    where = f"--repeatability {path}"
     try:
-        content = json_files.values_of(json_files.bytes_of(path), str(path))
-        if not isinstance(content, Mapping) or content.get("format") != FORMAT:
-            raise InputError(problem)
-        noise = content["noise"]
-        if noise is None:
-            what = "tells no noise: no pose was left and come back to"
-            raise InputError(Problem(f"--repeatability {path}", what, fix=_FIX))
-        covariance = np.array(noise["covariance_mm2"], dtype=float).reshape(3, 3)
-        freedom, source = int(float(noise["freedom"])), str(content["file"])
-        poses_differ = str(content["poses_differ"] or "")
-    except (ArithmeticError, LookupError, TypeError, ValueError):
-        raise InputError(problem) from None
-    wrong = [said for _, said in covariance_faults(covariance[None])]
-    problems = [Problem(f"--repeatability {path}", said, fix=_FIX) for said in wrong]
+        found = _File.model_validate(json_files.values_of(json_files.bytes_of(path), str(path)))
+        covariance = np.array(found.noise.covariance_mm2 if found.noise else np.eye(3))
+        covariance = covariance.reshape(3, 3)
+    except OSError:
+        raise InputError(Problem(where, "no such file", fix=_FIX)) from None
+    except (RecursionError, ValueError):
+        what = "is no answer of kinacc repeatability"
+        raise InputError(Problem(where, what, fix=_FIX)) from None
+    if found.noise is None:
+        raise InputError(Problem(where, "has no noise: no pose was visited again", fix=_FIX))
+    problems = [Problem(where, fault, fix=_FIX) for _, fault in covariance_faults(covariance[None])]
+    freedom = int(found.noise.freedom)
     if freedom < FEWEST:
-        what, allowed = (
-            f"{freedom} degrees of freedom",
-            f"at least {FEWEST}; {ENOUGH} are asked for",
-        )
-        fix = f"visit more poses of {source} again, leaving them between, and {_FIX}"
-        problems.append(Problem(f"--repeatability {path}", what, allowed, fix))
+        allowed = f"at least {FEWEST}; {ENOUGH} are wanted"
+        problems.append(Problem(where, f"{freedom} degrees of freedom", allowed, _FIX))
     refuse(problems)
-    return KnownNoise(covariance, freedom, source, poses_differ)
+    return KnownNoise(covariance, freedom, found.file, found.poses_differ or "")
 
 
 def doubts(known: KnownNoise | None) -> list[Problem]:

@@ -14,7 +14,6 @@ _FORM = (
     f"{PREFIX}range_mm=..,range_um_per_m=..,angle_mm=..,angle_um_per_m=..,repeat_mm=.., standard "
     "deviations (0 where a key is left out; 1 um/m is 1 urad)"
 )
-_LARGEST = 1e3
 _SMALLEST_MM = 1e-9  # below the size of an atom; squares of less vanish
 
 
@@ -63,28 +62,17 @@ class LaserTracker:
 
 
 def of_text(text: str, where: str, problems: list[Problem]) -> LaserTracker | None:
-    """A tracker of a text that begins with ``laser:``; None with what is wrong noted."""
+    """Return a tracker of a text that begins with ``laser:``; None with what is wrong noted."""
     known = [each.name for each in fields(LaserTracker)]
-    found: dict[str, float] = {}
-    wrong: list[Problem] = []
-    for part in filter(None, map(str.strip, text.removeprefix(PREFIX).split(","))):
-        name, _, value = (each.strip() for each in part.partition("="))
-        values = numbers_of(value)
-        if name not in known:
-            wrong.append(Problem(where, f"{name!r} is not there", ", ".join(known)))
-        elif name in found:
-            wrong.append(Problem(where, f"{name} is given twice"))
-        elif values.size != 1 or not 0.0 <= values[0] <= _LARGEST:
-            wrong.append(Problem(where, repr(part), f"{name}=NUMBER, 0 to {_LARGEST:g}"))
-        found.setdefault(name, float(values[0]) if values.size == 1 else np.nan)
-    for side in ("range", "angle"):
-        given = [found.get(f"{side}_{unit}", 0.0) for unit in ("mm", "um_per_m")]
-        if not wrong and given[0] + given[1] < _SMALLEST_MM:
-            what = f"neither {side}_mm nor {side}_um_per_m is above 0"
-            wrong.append(Problem(where, what, _FORM, "no instrument is without noise"))
-    if "repeat_mm" not in found:
-        what = "repeat_mm is not given, and how the arm repeats a pose is part of the noise"
-        fix = "standard deviation per axis, as kinacc repeatability tells it; 0 if it is nothing"
-        wrong.append(Problem(where, what, _FORM, fix))
-    problems += wrong
-    return None if wrong else LaserTracker(**{name: found.get(name, 0.0) for name in known})
+    parts = [part.partition("=")[::2] for part in text.removeprefix(PREFIX).split(",")]
+    values = {name.strip(): numbers_of(value) for name, value in parts}
+    wrong = [name for name in values if name not in known]
+    wrong += [name for name, each in values.items() if each.size != 1 or not 0 <= each[0] < 1e3]
+    wrong += ["repeat_mm"] if "repeat_mm" not in values else []
+    if not wrong and len(values) == len(parts):
+        found = LaserTracker(**{name: float(values.get(name, [0.0])[0]) for name in known})
+        if (np.array(found._std_mm(np.array([1e3]))) > _SMALLEST_MM).all():
+            return found
+        wrong = ["range and angle must be above 0"]
+    problems.append(Problem(where, f"{text!r} ({', '.join(wrong) or 'a key twice'})", _FORM))
+    return None

@@ -7,14 +7,15 @@ import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields, replace
 from functools import cached_property
+from typing import Any, Literal
 
 import numpy as np
-from pydantic import ValidationError
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
 
 from kinacc.assess.adaptive import AdaptiveAssessor, Candidates
 from kinacc.assess.registry import ADAPTIVE
 from kinacc.assess.statement import CANDIDATES, TARGETS
-from kinacc.campaign.instrument import BASE, INSTRUMENT, Instrument
+from kinacc.campaign.instrument import Instrument
 from kinacc.campaign.laser_tracker import LaserTracker
 from kinacc.config import json_files
 from kinacc.config.load import problems_of
@@ -189,109 +190,140 @@ def _is_like(value: object, default: object) -> bool:
     """Whether a value is of the kind of a setting's default; a number where that tells none."""
     if isinstance(default, (str, bool)):
         return type(value) is type(default)
-    return _is_number(value) or value is default
+    number = isinstance(value, (int, float)) and not isinstance(value, bool)
+    return number or value is default
 
 
-def _is_number(value: object) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool)
+_Vector = list[FiniteFloat]
 
 
-def numbers(value: object) -> np.ndarray:
-    """Nested lists of numbers as an array; ValueError where they hold anything else."""
-    found = np.array(value)
-    if found.dtype.kind not in "iuf":
-        raise ValueError("text or nothing in place of numbers")
-    return found.astype(float)
+class _Strict(BaseModel):
+    model_config = ConfigDict(strict=True)
+
+
+class _Point(_Strict):
+    label: str
+    joints: _Vector
+    directions: list[int] | None
+    modelled_mm: _Vector
+    slope: list[_Vector]
+
+
+class _Instrument(_Strict):
+    name: str
+    frame: Literal["base", "instrument"]
+    covariance_mm2: list[_Vector]
+    laser: dict[str, FiniteFloat] | None = None
+    resolution_mm: FiniteFloat = 0.0
+
+
+class _File(_Strict):
+    """The file of a plan."""
+
+    format: Literal[1]
+    method: int = 1
+    about: dict[str, str]
+    assessor: dict[str, Any]
+    instruments: list[_Instrument] = Field(min_length=1)
+    to_base: dict[str, list]
+    arm: dict[str, Any]
+    limits: dict[str, FiniteFloat | str | None]
+    seed: int = Field(ge=0)
+    order: list[int]
+    route: list[int]
+    overruled: list[str] = []
+    points: list[_Point]
 
 
 def to_json(plan: Plan) -> bytes:
-    """The plan as text; ``from_json`` gives back equal numbers."""
-    points = [
-        {
-            "label": plan.points.label[i],
-            "joints": plan.points.joints[i].tolist(),
-            "directions": None
-            if plan.points.directions is None
-            else plan.points.directions[i].tolist(),
-            "modelled_mm": plan.points.modelled_mm[i].tolist(),
-            "slope": plan.points.slope[i].tolist(),
-        }
-        for i in range(len(plan.points))
-    ]
+    """Return the plan as text; ``from_json`` gives back equal numbers."""
+    points, directions = plan.points, plan.points.directions
     content = {
         "format": FORMAT,
         "method": plan.method,
         "about": dict(plan.about),
         "assessor": {"name": plan.assessor.name, "settings": asdict(plan.assessor)},
-        "instruments": [
-            {
-                "name": each.name,
-                "frame": each.frame,
-                "covariance_mm2": each.covariance_mm2.tolist(),
-                **({"laser": asdict(each.laser)} if each.laser else {}),
-                **({"resolution_mm": each.resolution_mm} if each.resolution_mm else {}),
-            }
-            for each in plan.instruments
-        ],
+        "instruments": list(map(asdict, plan.instruments)),
         "to_base": {
-            "rotation": plan.to_base.rotation.tolist(),
-            "position_mm": plan.to_base.position_mm.tolist(),
+            "rotation": plan.to_base.rotation,
+            "position_mm": plan.to_base.position_mm,
         },
-        "arm": {"prismatic": plan.slides.tolist()},
+        "arm": {"prismatic": plan.slides},
         "limits": asdict(plan.limits),
         "seed": plan.seed,
-        "order": plan.order.tolist(),
-        "route": plan.route.tolist(),
-        **({"overruled": list(plan.overruled)} if plan.overruled else {}),
+        "order": plan.order,
+        "route": plan.route,
+        "overruled": plan.overruled,
+        "points": [
+            {
+                "label": label,
+                "joints": points.joints[i],
+                "directions": None if directions is None else directions[i],
+                "modelled_mm": points.modelled_mm[i],
+                "slope": points.slope[i],
+            }
+            for i, label in enumerate(points.label)
+        ],
     }
-    lines = [json.dumps({key: content[key]})[1:-1] for key in content]
-    rows = ",\n  ".join(json.dumps(each) for each in points)
-    return ("{" + ",\n ".join(lines) + ',\n "points": [\n  ' + rows + "]}\n").encode()
+    return (json.dumps(content, default=lambda array: array.tolist()) + "\n").encode()
 
 
 def from_json(text: bytes, where: str) -> Plan:
-    """The plan written by ``to_json``. Raises InputError where it cannot be read."""
+    """Return the plan written by ``to_json``. Raises InputError where it cannot be read."""
     try:
-        content = json_files.values_of(text, where)
-        if content["format"] != FORMAT:
-            what = f"format {content['format']!r}"
-            raise InputError(Problem(where, what, f"format {FORMAT}", "use a later kinacc"))
-        return _checked(_plan(content))
-    except (
-        ArithmeticError,
-        AttributeError,
-        LookupError,
-        RecursionError,
-        TypeError,
-        ValueError,
-    ) as error:
-        what = f"is no campaign: {type(error).__name__}: {error}"
+        return _plan(_File.model_validate(json_files.values_of(text, where)))
+    except (LookupError, RecursionError, TypeError, ValueError) as error:
+        what = f"is no campaign: {' '.join(str(error).split())[:200]}"
         raise InputError(Problem(where, what, fix="bring it back from a copy")) from None
 
 
-def _plan(content: Mapping) -> Plan:
-    points = content["points"]
-    directed = points[0]["directions"] is not None
-    return Plan(
-        Points(
-            tuple(each["label"] for each in points),
-            numbers([each["joints"] for each in points]),
-            np.array([each["directions"] for each in points], np.int8) if directed else None,
-            numbers([each["modelled_mm"] for each in points]),
-            numbers([each["slope"] for each in points]),
-        ),
-        np.array(content["order"], dtype=int),
-        np.array(content["route"], dtype=int),
-        _kept_assessor(**content["assessor"]),
-        tuple(map(_instrument, content["instruments"])),
-        Pose(*(numbers(content["to_base"][each]) for each in ("rotation", "position_mm"))),
-        np.array(content["arm"]["prismatic"], dtype=bool),
-        Limits(**content["limits"]),
-        content["seed"],
-        content["about"],
-        tuple(map(str, content.get("overruled", ()))),
-        content.get("method", 1),
+def _plan(file: _File) -> Plan:
+    rows = file.points
+    points = Points(
+        tuple(each.label for each in rows),
+        np.array([each.joints for each in rows], dtype=float),
+        None
+        if rows[0].directions is None
+        else np.array([each.directions for each in rows], np.int8),
+        np.array([each.modelled_mm for each in rows], dtype=float),
+        np.array([each.slope for each in rows], dtype=float),
     )
+    count, joints = points.joints.shape
+    to_base = Pose(*(np.array(file.to_base[key], float) for key in ("rotation", "position_mm")))
+    slides = np.array(file.arm["prismatic"], dtype=bool)
+    instruments = tuple(
+        Instrument(
+            each.name,
+            np.array(each.covariance_mm2, dtype=float).reshape(3, 3),
+            each.frame,
+            LaserTracker(**each.laser) if each.laser else None,
+            each.resolution_mm,
+        )
+        for each in file.instruments
+    )
+    limits = Limits(**file.limits)
+    shapes = {
+        "points": (points.modelled_mm.shape, (count, 3)),
+        "slopes": (points.slope.shape, (count, 3, joints)),
+        "directions": (np.shape(points.directions), (count, joints)),
+        "order": (sorted(file.order), list(range(count))),
+        "route": (sorted({*file.route} - {*file.order}), []),
+        "to_base": (to_base.rotation.shape + to_base.position_mm.shape, (3, 3, 3)),
+        "arm": (slides.shape, (joints,)),
+        "about": ({*_ABOUT} - {*file.about}, set()),
+        "target": (limits.target in TARGETS, True),
+        "limits": (isinstance(limits.joint_rad + limits.implausible_mm, float), True),
+    }
+    if points.directions is None:
+        del shapes["directions"]
+    for name, (shape, wanted) in shapes.items():
+        if shape != wanted:
+            raise ValueError(f"{name} does not fit the rest")
+    return Plan(
+        points, np.array(file.order), np.array(file.route), _kept_assessor(**file.assessor),
+        instruments, to_base, slides, limits, file.seed, file.about, tuple(file.overruled),
+        file.method,
+    )  # fmt: skip
 
 
 # Settings that earlier plans state, with the defaults they had.
@@ -299,58 +331,10 @@ _FORMER = {"correct_drift": False, "assume": "nothing", "isolation": 1.25, "crow
 
 
 def _kept_assessor(name: str, settings: Mapping[str, object]) -> AdaptiveAssessor:
-    used = [each for each, value in _FORMER.items() if settings.get(each, value) != value]
+    used = [key for key, value in _FORMER.items() if settings.get(key, value) != value]
     fix = "begin a new campaign; readings can be recorded in it again"
-    refuse(Problem(f"setting {each}", "is gone from kinacc", fix=fix) for each in used)
+    refuse(Problem(f"setting {key}", "is gone from kinacc", fix=fix) for key in used)
     return assessor_of(name, {k: value for k, value in settings.items() if k not in _FORMER})
-
-
-def _instrument(entry: Mapping) -> Instrument:
-    return Instrument(
-        entry["name"],
-        numbers(entry["covariance_mm2"]),
-        entry["frame"],
-        LaserTracker(**entry["laser"]) if "laser" in entry else None,
-        entry.get("resolution_mm", 0.0),
-    )
-
-
-def _checked(plan: Plan) -> Plan:
-    """The plan, where its arrays fit each other; ValueError where they do not."""
-    points, (count, joints) = plan.points, plan.points.joints.shape
-    fits = {
-        "points": points.modelled_mm.shape == (count, 3)
-        and all(isinstance(each, str) for each in points.label)
-        and points.slope.shape == (count, 3, joints)
-        and (points.directions is None or points.directions.shape == (count, joints))
-        and all(np.isfinite(each).all() for each in (points.joints, points.slope)),
-        "order": np.array_equal(np.sort(plan.order), np.arange(count)),
-        "route": np.isin(plan.route, plan.order).all(),
-        "instruments": bool(plan.instruments)
-        and all(
-            each.covariance_mm2.shape == (3, 3)
-            and np.isfinite(each.covariance_mm2).all()
-            and isinstance(each.name, str)
-            and each.frame in (BASE, INSTRUMENT)
-            and _is_number(each.resolution_mm)
-            and (each.laser is None or all(map(_is_number, asdict(each.laser).values())))
-            for each in plan.instruments
-        ),
-        "to_base": plan.to_base.rotation.shape == (3, 3) and plan.to_base.position_mm.shape == (3,),
-        "arm": plan.slides.shape == (joints,),
-        "about": isinstance(plan.about, Mapping)
-        and all(isinstance(plan.about.get(each), str) for each in _ABOUT),
-    }
-    fits["method"] = isinstance(plan.method, int)
-    fits["seed"] = isinstance(plan.seed, int) and plan.seed >= 0
-    aims = [each for each in (plan.limits.tolerance_mm, plan.limits.width_mm) if each is not None]
-    fits["limits"] = plan.limits.target in TARGETS and all(
-        map(_is_number, (plan.limits.joint_rad, plan.limits.implausible_mm, *aims))
-    )
-    for name, fit in fits.items():
-        if not fit:
-            raise ValueError(f"{name} does not fit the rest")
-    return plan
 
 
 def digest(text: bytes) -> str:

@@ -38,8 +38,8 @@ class Aim:
 
 
 @dataclass(frozen=True)
-class BudgetRow:
-    """Simulated campaigns of one budget on one kind of errors.
+class BudgetPlan:
+    """Answer of ``kinacc campaign plan``: ``rows``, one for each kind of errors and budget.
 
     ``true_mm``: mean largest error of the candidates that the bound is on (all but ``excepted``).
     ``width_*_mm``: quantiles of upper minus lower bound; 0 where they contradict each other,
@@ -49,35 +49,6 @@ class BudgetRow:
     ``holding`` of ``judged`` hold, with exact 95 % limits of the share. ``within``: share as narrow
     as wanted. ``accept``, ``reject``, ``undecided``: shares decided so. ``reached``: campaigns that
     reach the aim; ``reached_low``: the share that they show with 97.5 % confidence.
-    """
-
-    errors: str
-    budget: int
-    readings: float
-    true_mm: float
-    excepted: int
-    width_q05_mm: float
-    width_median_mm: float
-    width_q95_mm: float
-    excess_mm: float
-    attainable_mm: float
-    proven_mm: float
-    stated: float
-    holding: int
-    judged: int
-    holds_low: float
-    holds_high: float
-    within: float
-    accept: float
-    reject: float
-    undecided: float
-    reached: int
-    reached_low: float
-
-
-@dataclass(frozen=True)
-class BudgetPlan:
-    """Answer of ``kinacc campaign plan``: a row for each kind of errors and budget.
 
     ``budget``: the smallest that reaches the aim in the share ``power`` of the simulated campaigns
     on all errors, as every larger one does; ``budget_shown``: the smallest for which so many
@@ -95,12 +66,7 @@ class BudgetPlan:
     seed: int
     budget: int | None
     budget_shown: int | None
-    rows: tuple[BudgetRow, ...]
-
-    @property
-    def table(self) -> pd.DataFrame:
-        """The rows as a table; an infinite width is NaN."""
-        return pd.DataFrame(self.rows).replace(math.inf, math.nan)
+    rows: pd.DataFrame
 
 
 def plan_budget(
@@ -143,16 +109,15 @@ def plan_budget(
     """
     runs = simulate(fields, candidates, covariance_mm2, assessors, repetitions, seed, aim, progress)
     groups = runs.groupby(["errors", "budget"], sort=False)
-    rows = tuple(_row(str(key[0]), int(key[1]), group, aim) for key, group in groups)
-    aims = (aim.width_mm, aim.tolerance_mm, aim.power, repetitions, seed)
+    rows = pd.DataFrame([_row(str(key[0]), int(key[1]), group, aim) for key, group in groups])
     return BudgetPlan(
         assessors[0].name,
         candidates,
         tuple(np.sqrt(np.diag(covariance_mm2)).tolist()),
         aim.target,
-        *aims,
-        smallest_budget(rows, aim, [row.reached / repetitions for row in rows]),
-        smallest_budget(rows, aim, [row.reached_low for row in rows]),
+        *(aim.width_mm, aim.tolerance_mm, aim.power, repetitions, seed),
+        smallest_budget(rows["budget"], rows["reached"] / repetitions, aim),
+        smallest_budget(rows["budget"], rows["reached_low"], aim),
         rows,
     )
 
@@ -222,21 +187,21 @@ def simulate(
     return pd.DataFrame(runs)
 
 
-def smallest_budget(rows: Sequence[BudgetRow], aim: Aim, shares: Sequence[float]) -> int | None:
+def smallest_budget(budget: pd.Series, share: pd.Series, aim: Aim) -> int | None:
     """Return the smallest budget from which on all errors have the wanted share; None if none.
 
-    ``shares``: of the campaigns of each row.
+    ``budget`` and ``share``: of campaigns that reach the aim, a value for each row.
     """
     enough = None
-    for budget in sorted({row.budget for row in rows}, reverse=True) if aim.is_set else ():
-        of_budget = (s for row, s in zip(rows, shares, strict=True) if row.budget == budget)
-        if min(of_budget) < aim.power:
+    worst = share.groupby(budget).min().sort_index(ascending=False)
+    for each, lowest in worst.items() if aim.is_set else ():
+        if lowest < aim.power:
             break
-        enough = budget
+        enough = int(each)
     return enough
 
 
-def _row(errors: str, budget: int, runs: pd.DataFrame, aim: Aim) -> BudgetRow:
+def _row(errors: str, budget: int, runs: pd.DataFrame, aim: Aim) -> dict:
     count, stated = len(runs), runs[runs["upper_mm"].notna()]
     above_mm = stated["upper_mm"] - stated["true_mm"]
     holding, judged = int((above_mm >= 0.0).sum()), len(stated)
@@ -248,26 +213,26 @@ def _row(errors: str, budget: int, runs: pd.DataFrame, aim: Aim) -> BudgetRow:
     ordered = np.sort(runs["width_mm"])  # of order, without interpolation: some are infinite
     widths = [float(ordered[math.ceil(share * count) - 1]) for share in (0.05, 0.5, 0.95)]
     low, high = binomial_interval(holding, judged) if judged else (math.nan, math.nan)
-    return BudgetRow(
-        errors=errors,
-        budget=budget,
-        readings=float(runs["readings"].mean()),
-        true_mm=float(runs["true_mm"].mean()),
-        excepted=int(runs["excepted"].max()),
-        width_q05_mm=widths[0],
-        width_median_mm=widths[1],
-        width_q95_mm=widths[2],
-        excess_mm=float(above_mm.mean()),
-        attainable_mm=float(stated["attainable_mm"].mean()),
-        proven_mm=float(stated["proven_mm"].mean()),
-        stated=judged / count,
-        holding=holding,
-        judged=judged,
-        holds_low=low,
-        holds_high=high,
-        within=within / count,
-        undecided=undecided,
-        reached=min(reached),
-        reached_low=binomial_interval(min(reached), count)[0],
+    return {
+        "errors": errors,
+        "budget": budget,
+        "readings": float(runs["readings"].mean()),
+        "true_mm": float(runs["true_mm"].mean()),
+        "excepted": int(runs["excepted"].max()),
+        "width_q05_mm": widths[0],
+        "width_median_mm": widths[1],
+        "width_q95_mm": widths[2],
+        "excess_mm": float(above_mm.mean()),
+        "attainable_mm": float(stated["attainable_mm"].mean()),
+        "proven_mm": float(stated["proven_mm"].mean()),
+        "stated": judged / count,
+        "holding": holding,
+        "judged": judged,
+        "holds_low": low,
+        "holds_high": high,
+        "within": within / count,
+        "undecided": undecided,
+        "reached": min(reached),
+        "reached_low": binomial_interval(min(reached), count)[0],
         **decided,
-    )
+    }

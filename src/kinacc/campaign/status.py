@@ -241,50 +241,39 @@ def percent(share: float) -> str:
 def _bound(
     said: Statement, state: State, candidates: int, tolerance_mm: float | None, overstated: bool
 ) -> Bound:
-    ledger = state.campaign.ledger
-    visited = len(ledger.visited)
-    none = math.nan
-    judged = (
-        Decision("", none, none, none, none, Reason("between"))
-        if tolerance_mm is None
-        else decide(said, tolerance_mm)
-    )
+    visited, nan = len(state.campaign.ledger.visited), math.nan
     limits = limits_now(said, state)
+    judged = Decision("", nan, nan, nan, nan, Reason("between"))
+    if tolerance_mm is not None:
+        judged = decide(said, tolerance_mm)
     doubt = ""
     if said.upper_mm < said.lower_mm:
         doubt = "the bounds contradict each other"
     elif said.value_mm > said.upper_mm:
         doubt = "the estimate lies above the upper bound, which cannot be relied on"
     if doubt:
-        doubt += (
-            ": noise overstated, or these are no readings"
-            if overstated
-            else ": noise understated, or one of the few campaigns that the confidence leaves out"
-        )
+        kind = "overstated" if overstated else "understated"
+        doubt += f": noise {kind}, or one of the few campaigns that the confidence leaves out"
+    copied = (
+        "target", "share", "value_mm", "lower_mm", "upper_mm", "confidence", "excepted", "error_of",
+    )  # fmt: skip
     return Bound(
-        target=said.target,
         points=visited if said.target == MEASURED else candidates,
-        share=said.share,
-        value_mm=said.value_mm,
-        lower_mm=said.lower_mm,
-        upper_mm=said.upper_mm,
-        confidence=said.confidence,
-        excepted=said.excepted,
         unmeasured=candidates - visited if said.target == CANDIDATES else 0,
-        error_of=said.error_of,
         withheld=reason(said.withheld),
         assumption=reason(said.assumption),
         noise=reason(said.noise),
         doubt=doubt,
         tolerance_mm=tolerance_mm,
-        verdict=judged.verdict,
         reason=reason(judged.reason) if judged.verdict else "",
-        guard_band_mm=judged.guard_band_mm,
-        acceptance_limit_mm=judged.acceptance_limit_mm,
-        risk=judged.risk,
         attainable_mm=limits.attainable_mm,
         proven_mm=limits.proven_mm,
         attainable_lower_mm=limits.lower_mm,
+        **{name: getattr(said, name) for name in copied},
+        **{
+            name: getattr(judged, name)
+            for name in ("verdict", "guard_band_mm", "acceptance_limit_mm", "risk")
+        },
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -9,7 +10,6 @@ from typing import TYPE_CHECKING
 
 import click
 import numpy as np
-import pandas as pd
 
 from kinacc.cli import choice
 from kinacc.cli.choice import option
@@ -63,10 +63,11 @@ def plan(out, **given) -> None:
         found = plan_budget(fields, points, covariance, assessors, aim, *runs)
     if out.picture is not None:
         _draw(found, aim, out)
-    shown = [each for each in _SHOWN if each != "excepted" or found.table[each].any()]
+    table = found.rows.replace(math.inf, math.nan)
+    shown = [each for each in _SHOWN if each != "excepted" or table[each].any()]
     shown += ["within"] if aim.width_mm is not None else []
     shown += ["accept", "reject", "undecided"] if aim.tolerance_mm is not None else []
-    out.show(found, found.table, _lines(found, aim), found.table[shown])
+    out.show(found, table, _lines(found, aim), table[shown])
 
 
 def _question(given: Mapping) -> tuple:
@@ -189,13 +190,15 @@ def _lines(found: BudgetPlan, aim: Aim) -> Iterator[str]:
         f"Simulated: {found.repetitions} campaigns a row with {found.assessor}, largest error of "
         f"{found.target} among {found.candidates}, noise {max(found.noise_mm):.3g} mm."
     )
-    if judged := [row for row in found.rows if np.isfinite(row.attainable_mm)]:
-        most = max(row.budget for row in judged)
-        worst = max((r for r in judged if r.budget == most), key=lambda row: row.excess_mm)
+    judged = found.rows.dropna(subset="attainable_mm")
+    if len(judged):
+        last = judged[judged["budget"] == judged["budget"].max()]
+        worst = last.loc[last["excess_mm"].idxmax()]
         yield (
-            f"Mean excess of the upper bound with {most} readings (errors: {worst.errors}): "
-            f"{worst.excess_mm:.3g} mm. With all errors known beforehand: "
-            f"{worst.attainable_mm:.3g} mm. Limit of any reliable bound: {worst.proven_mm:.3g} mm."
+            f"Mean excess of the upper bound with {worst['budget']} readings (errors: "
+            f"{worst['errors']}): {worst['excess_mm']:.3g} mm. With all errors known beforehand: "
+            f"{worst['attainable_mm']:.3g} mm. Limit of any reliable bound: "
+            f"{worst['proven_mm']:.3g} mm."
         )
 
 
@@ -203,7 +206,6 @@ def _draw(found: BudgetPlan, aim: Aim, out: Output) -> None:
     """Draw width and share of campaigns that reach the aim against the budget."""
     from kinacc.figures import campaign_plan
 
-    table = pd.DataFrame(found.rows)
     curves = [
         campaign_plan.Curve(
             str(name),
@@ -211,7 +213,7 @@ def _draw(found: BudgetPlan, aim: Aim, out: Output) -> None:
             group[["width_q05_mm", "width_median_mm", "width_q95_mm"]].to_numpy(),
             group["reached"].to_numpy() / found.repetitions,
         )
-        for name, group in table.groupby("errors", sort=False)
+        for name, group in found.rows.groupby("errors", sort=False)
     ]
     power = aim.power if aim.is_set else None
     out.draw(campaign_plan.draw(curves, aim.width_mm, power, found.budget_shown or found.budget))
@@ -223,11 +225,13 @@ def _verdict(found: BudgetPlan, aim: Aim) -> str:
     wanted = [f"bounds at most {aim.width_mm:g} mm apart"] if aim.width_mm is not None else []
     wanted += [f"a decision on {aim.tolerance_mm:g} mm"] if aim.tolerance_mm is not None else []
     goal = " and ".join(wanted)
-    budget = found.budget_shown or found.budget or max(row.budget for row in found.rows)
-    worst = min((r for r in found.rows if r.budget == budget), key=lambda row: row.reached)
+    rows = found.rows
+    budget = found.budget_shown or found.budget or int(rows["budget"].max())
+    of_budget = rows[rows["budget"] == budget]
+    worst = of_budget.loc[of_budget["reached"].idxmin()]
     count = (
-        f"{worst.reached} of {found.repetitions} simulated campaigns (errors: {worst.errors}; at "
-        f"least {worst.reached_low:.0%} with 97.5 % confidence)"
+        f"{worst['reached']} of {found.repetitions} simulated campaigns (errors: "
+        f"{worst['errors']}; at least {worst['reached_low']:.0%} with 97.5 % confidence)"
     )
     if found.budget is None:
         return f"No budget up to {budget} gives {goal} in {aim.power:.0%} of campaigns: {count}."
