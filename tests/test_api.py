@@ -85,6 +85,25 @@ def test_verify_and_compare_find_no_change_in_the_same_readings(calibration, con
     assert kinacc.compare(calibration, calibration).shared.all_of_both
 
 
+def test_measured_files_are_read_without_a_configuration(tmp_path):
+    q_rad = np.random.default_rng(1).uniform(-1.5, 1.5, (40, 6)).round(4)
+    point = kinacc.Robot.from_name("ur10").forward(q_rad).position_mm
+    table = pd.DataFrame(np.hstack([q_rad, point / 1000.0]), columns=[*"123456", *"XYZ"])
+    table.columns = [*(f"J{n}" for n in range(1, 7)), *(f"{axis} [m]" for axis in "XYZ")]
+    table.to_csv(path := tmp_path / "tracker.csv", sep=";", index=False)
+    for robot in ("ur10", None):
+        read = kinacc.read_measurements(path, robot=robot, settings={"seed": 5})
+        assert (read.name, read.robot.name, read.settings["seed"]) == ("tracker", "ur10", 5)
+        np.testing.assert_allclose(read.table[[f"q{n}" for n in range(1, 7)]], q_rad)
+        np.testing.assert_allclose(read.table[["x_mm", "y_mm", "z_mm"]], point, atol=1e-9)
+    table[["DX", "DY", "DZ"]] = table[["X [m]", "Y [m]", "Z [m]"]] + 0.1
+    table.rename(columns=lambda name: name.replace("D", "raw ")).to_csv(path, index=False)
+    with pytest.raises(kinacc.errors.InputError, match="take"):
+        kinacc.read_measurements(path, robot="ur10")
+    read = kinacc.read_measurements(path, robot="ur10", take=["X [m]"])
+    np.testing.assert_allclose(read.table["x_mm"], point[:, 0], atol=1e-9)
+
+
 def test_rows_taken_out_are_not_fitted(config):
     measured = kinacc.read_measurements(config)
     fewer = kinacc.Measurements(

@@ -14,9 +14,11 @@ import pandas as pd
 from kinacc import __version__
 from kinacc.calibration import error_model, residual_tables
 from kinacc.calibration.misfit import misfit
-from kinacc.checks import check
+from kinacc.checks import check, contradictions
+from kinacc.checks.described import describe_files
 from kinacc.config import schema
 from kinacc.config.error_models import PLAINEST, asked_for
+from kinacc.config.load import overlay
 from kinacc.config.schema import defaults
 from kinacc.deployment import compare as comparing
 from kinacc.deployment import compensate as compensating
@@ -39,7 +41,7 @@ from kinacc.tables import store, sums
 from kinacc.tables.atomic import write_together
 from kinacc.tables.columns import Columns
 from kinacc.workflow.code import config_hash
-from kinacc.workflow.data_sets import DataSets, read_data_sets
+from kinacc.workflow.data_sets import DataSets, data_sets, read_data_sets
 from kinacc.workflow.outdated import CALIBRATION
 
 Setup = Literal["same", "moved"]
@@ -280,28 +282,45 @@ class Calibration:
 
 
 def read_measurements(
-    path: str | Path, dataset: str | None = None, settings: Mapping[str, Any] | None = None
+    *paths: str | Path,
+    robot: str | None = None,
+    dataset: str | None = None,
+    settings: Mapping[str, Any] | None = None,
+    **answers: Any,
 ) -> Measurements:
-    """Read the measurements that a data set describes.
+    """Read measured files, or the measurements that a data set describes.
 
     Parameters
     ----------
-    path
-        A configuration file, as ``kinacc init`` writes it beside a measured file.
+    paths
+        A file with joints and measured points (CSV, text, Excel, Parquet), or two files, one of
+        each; or a configuration file (.yaml), as ``kinacc init`` writes it.
+    robot
+        Of measured files: a shipped name, a robot file or a URDF file. [the shipped robot that
+        fits]
     dataset
-        Data set of the file; not needed where it describes one.
+        Data set of a configuration file; not needed where it describes one.
     settings
         Values in place of those of the file, nested as there, such as
         ``{"calibration": {"vec": {"order": 5}}}``.
+    **answers
+        What measured files leave open, by the option of ``kinacc init``: ``joint_unit="rad"``,
+        ``orientation="ZYX"``, ``take=["X", "q1"]``, ``join="order"``.
 
     Raises
     ------
     InputError
-        Listing what is wrong with settings or measurements, with file, line and column.
+        Listing what is wrong with settings or measurements, with file, line and column; or the
+        questions that measured files leave open, with their answers.
     """
-    described = read_data_sets([path], settings).settings
+    if paths and all(Path(path).suffix in (".yaml", ".yml") for path in paths):
+        described = read_data_sets(paths, settings).settings
+    else:
+        content = {"datasets": describe_files(paths, robot, answers)}
+        described = data_sets(contradictions.load([], overlay(content, settings or {}))).settings
     if dataset is None and len(described) > 1:
-        raise InputError(Problem(str(path), "describes several data sets", ", ".join(described)))
+        where = ", ".join(map(str, paths))
+        raise InputError(Problem(where, "describes several data sets", ", ".join(described)))
     name = dataset or next(iter(described))
     if name not in described:
         raise InputError(Problem("dataset", f"no data set {name!r}", ", ".join(described)))

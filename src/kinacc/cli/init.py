@@ -84,6 +84,7 @@ def init(measurement_files: tuple[str, ...], out: Output, **options) -> None:
       kinacc init log.csv --take actual_q_0 --take X
       kinacc init joints.csv points.csv --join Name=Point
     """
+    from kinacc.checks.described import coupling_of
     from kinacc.cli.first_poses import first_poses, poses_without_robot
     from kinacc.cli.init_questions import asked, guessed
     from kinacc.cli.init_remarks import remarks_on, rounded
@@ -113,7 +114,7 @@ def init(measurement_files: tuple[str, ...], out: Output, **options) -> None:
     if robot is not None:
         arm = robots.load(robot)
         guess, report, reading = _tried(guess, arm, name)
-        if text is not None and (coupling := _coupling(report)) is not None:
+        if text is not None and (coupling := coupling_of(report)) is not None:
             text, arm, guess = _coupled(text, arm, guess, coupling)
             guess, report, reading = _tried(guess, arm, name)
         shown = first_poses(reading, arm.dh.prismatic)
@@ -204,50 +205,13 @@ def _robot(guess: Guess, given: str | None, ask: bool) -> tuple[str | None, str]
     return found[0], "the only shipped robot that fits the readings"
 
 
-def _tried(guess: Guess, robot, name: str) -> tuple[Guess, Report, MeasuredFile]:
-    """The guess held against the readings: what was assumed and contradicts them is set right."""
-    from kinacc.checks import check
-    from kinacc.errors import InputError, Problem
-    from kinacc.measurements.layout import Layout
-    from kinacc.measurements.reader import read
+def _tried(guess: Guess, arm: Robot, name: str) -> tuple[Guess, Report, MeasuredFile]:
+    """The guess corrected by the readings, the check of them, and what was read."""
+    from kinacc.checks.described import corrected
     from kinacc.progress import reporting
 
-    if robot.dh.joints != guess.joints:
-        what = f"{robot.name} has {robot.dh.joints} joints, the file {guess.joints}"
-        raise InputError(Problem("--robot", what))
     with reporting(f"init {name}", bar=True) as progress:
-        for _ in range(3):
-            reading = read(guess.section, robot, strict=False)
-            layout = Layout.of(guess.section)
-            report = check.check(reading, layout, robot, name, guess.section["path"], progress)
-            settings = _contradicted(guess, report)
-            notes = (*guess.notes, *reading.notes)
-            guess = replace(guess, notes=tuple(dict.fromkeys(notes)))
-            if not settings:
-                break
-            guess = _set_right(guess, settings)
-    return guess, report, reading
-
-
-def _contradicted(guess: Guess, report: Report) -> dict:
-    """Settings that were assumed and that the readings contradict, as they should be."""
-    settings: dict = {}
-    for each in report.suspicions:
-        if each.kind == "left_handed" and "horizontal" in guess.assumed:
-            return {"horizontal": ""}
-        wanted = dict(each.values.get("setting", {}))
-        turn = dict(wanted.pop("orientation", {}))
-        about = "angle_unit" if "unit" in turn else "order" if "order" in turn else "orientation"
-        if turn and about in guess.assumed:
-            settings |= {"orientation": turn}
-            settings |= {"e": wanted["e"]} if "e" in wanted else {}
-        settings |= {k: v for k, v in wanted.items() if k in guess.assumed}
-    return settings
-
-
-def _coupling(report: Report) -> Finding | None:
-    """The coupling of two joints that alone explains the readings, where there is one."""
-    return next((each for each in report.suspicions if "joint_map" in each.values), None)
+        return corrected(guess, arm, name, progress)
 
 
 def _coupled(text: str, arm: Robot, guess: Guess, coupling: Finding) -> tuple:
@@ -262,31 +226,6 @@ def _coupled(text: str, arm: Robot, guess: Guess, coupling: Finding) -> tuple:
     text = coupled_text(text, matrix, f"Joints are coupled, {why}.")
     arm = replace(arm, joint_map=np.array(matrix, dtype=float))
     return text, arm, replace(guess, notes=(*guess.notes, note))
-
-
-def _set_right(guess: Guess, settings: dict) -> Guess:
-    """The guess with settings that the readings show, in place of the assumed ones."""
-    settings = dict(settings)
-    shown = {key: value for key, value in settings.items() if key in guess.assumed}
-    if "horizontal" in settings:
-        ways = guess.section["directions"]
-        clockwise = ways["horizontal"] == "counterclockwise"
-        shown["horizontal"] = "clockwise" if clockwise else "counterclockwise"
-        settings = {"directions": ways | {"horizontal": shown["horizontal"]}}
-    if in_order := settings.pop("e", None):
-        columns = dict(guess.section["columns"])
-        unit = guess.section["orientation"]["unit"]
-        angles = [columns.pop(name, f"{name}_{unit}") for name in in_order]
-        columns |= {f"e{number}": column for number, column in enumerate(angles, 1)}
-        settings["columns"] = columns
-    if "orientation" in settings:
-        turn = settings["orientation"]
-        key = "angle_unit" if "unit" in turn else "order" if "order" in turn else "orientation"
-        shown[key] = " ".join(map(str, turn.values()))
-    assumed = {key: text for key, text in guess.assumed.items() if key not in shown}
-    notes = [f"{key.replace('_', ' ')} {value}: found by trying it on the readings"
-             for key, value in shown.items()]  # fmt: skip
-    return replace(guess.but(settings), assumed=assumed, notes=(*guess.notes, *notes))
 
 
 def _how(report: Report | None) -> str:

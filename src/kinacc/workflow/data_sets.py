@@ -99,9 +99,14 @@ def read_data_sets(
     Raises InputError listing every problem in them.
     """
     from kinacc.checks.contradictions import load
+
+    return data_sets(load([Path(path) for path in paths], _values(overrides or {})), absolute)
+
+
+def data_sets(full: Mapping[str, dict[str, Any]], absolute: bool = False) -> DataSets:
+    """The data sets of full settings by name. Raises InputError listing every problem in them."""
     from kinacc.config.schema import without_execution_keys
 
-    full = load([Path(path) for path in paths], _values(overrides or {}))
     first = next(iter(full.values()))
     problems = [
         Problem(f"datasets.{name}.figures.formats", "differ from data set to data set", "one list")

@@ -20,8 +20,8 @@ _AS_USUAL = {**Layout().written(), "no_reading": [], "sigma": 1}
 _FEW_POSES = 60  # below, every configuration is held out once
 
 
-def dataset_text(name: str, robot: str, guess: Guess, configurations: int, note: str) -> str:
-    """The data set as a configuration file."""
+def dataset_content(robot: str, guess: Guess, poses: int) -> dict[str, Any]:
+    """The settings of a data set as in the configuration; ``poses``: how many were measured."""
     section = guess.section
     file = {k: v for k, v in section.items() if k not in _AS_USUAL or v != _AS_USUAL[k]}
     turn = section["orientation"]
@@ -36,13 +36,13 @@ def dataset_text(name: str, robot: str, guess: Guess, configurations: int, note:
         file["joints"] = {k: v for k, v in joints.items() if k not in spare}
     if not file["columns"]:
         del file["columns"]
-    few = configurations < _FEW_POSES  # one configuration held out at a time
-    content = {
+    few = poses < _FEW_POSES  # one configuration held out at a time
+    return {
         "robot": robot,
         "measurements": {
             "source": "file",
             "file": file,
-            "folds": configurations if few else defaults()["measurements"]["folds"],
+            "folds": poses if few else defaults()["measurements"]["folds"],
             "validation_fold": None,  # every row fits the delivered models; folds judge them
         },
         "calibration": {
@@ -52,8 +52,12 @@ def dataset_text(name: str, robot: str, guess: Guess, configurations: int, note:
         },
         "evaluation": {"space": "measured"},
     }
+
+
+def dataset_text(name: str, robot: str, guess: Guess, poses: int, note: str) -> str:
+    """The data set as a configuration file."""
     head = "".join(f"# {line}".rstrip() + "\n" for line in note.splitlines())
-    return f"{head}\n{_yaml({'datasets': {name: content}})}"
+    return f"{head}\n{_yaml({'datasets': {name: dataset_content(robot, guess, poses)}})}"
 
 
 class _Dumper(yaml.SafeDumper):
