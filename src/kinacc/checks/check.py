@@ -113,11 +113,11 @@ def check(
     gross: list[int] = []
     if "does_not_fit" not in kinds:
         target = renamed.target[np.unique(cell, return_index=True)[1]]
-        observed = replace(fitted.seen, target=target, target_names=renamed.target_names)
+        observed = replace(fitted.readings, target=target, target_names=renamed.target_names)
         fitted, jumps = moved.without_jumps(observed, robot.dh, progress)
         findings += [*jumps, *_scattered(fitted), *digits.commanded(fitted, meaning)]
-        findings += [*rows.found(fitted, meaning, layout), *_largest(fitted)]
-        gross = fitted.seen.lines(fitted.left_mm > _GROSS * fitted.trial.sigma_mm)
+        findings += [*rows.explained(fitted, meaning, layout), *_largest(fitted)]
+        gross = fitted.readings.lines(fitted.left_mm > _GROSS * fitted.trial.sigma_mm)
     off = np.flatnonzero(away_mm > tails.limit(away_mm, 3))
     if off.size:
         largest = float(away_mm[off].max())
@@ -142,7 +142,7 @@ def check(
             *(finding(LEFT_OUT, words=text) for text in unread),
             *coverage.thin(facts["joint_coverage"]),
         ),
-        *(() if fit is None else (fit.seen.line, fit.left_mm)),
+        *(() if fit is None else (fit.readings.line, fit.left_mm)),
     )
 
 
@@ -150,27 +150,27 @@ def _meant(
     single: Readings, layout: Layout, robot: Robot, progress: Progress
 ) -> tuple[Fitted, Meaning, list[Finding]]:
     """The fit of the file as it is meant, its meaning, and findings of all rows."""
-    fitted = robust_fit.fit(meanings.as_written(robot.joint_map).seen(single), robot.dh)
+    fitted = robust_fit.fit(meanings.as_written(robot.joint_map).applied(single), robot.dh)
     meaning, changes = meanings.find(single, robot, fitted.trial, progress)
     if changes:
-        fitted = robust_fit.fit(meaning.seen(single), robot.dh)
+        fitted = robust_fit.fit(meaning.applied(single), robot.dh)
     spread_mm = meanings.spread_mm(single.position_mm) * meaning.scale
     if fitted.trial.sigma_mm > meanings.FAR * spread_mm:
         return fitted, meaning, [*changes, _no_fit(single, fitted, robot, spread_mm)]
     findings = [*changes, *_of_other_lengths(single, fitted, robot)]
-    observed, there = fitted.seen, fitted.seen.has_rotation
+    observed, there = fitted.readings, fitted.readings.has_rotation
     if not there.any():
         return fitted, meaning, findings
     way, least, before = orientations.find(
-        single.turns[there], layout, fitted.left.flange[there], observed.target[there]
+        single.turns[there], layout, fitted.residuals.flange[there], observed.target[there]
     )
     if before > meanings.BAD_RAD and (
         turned := meanings.find_by_turns(single, robot, meaning, least)
     ):
         meaning, change = turned
-        return robust_fit.fit(meaning.seen(single), robot.dh), meaning, [*findings, change]
+        return robust_fit.fit(meaning.applied(single), robot.dh), meaning, [*findings, change]
     if way.change is not None:
-        findings.append(orientations.told(way.change, single, there, before, least))
+        findings.append(orientations.change_finding(way.change, single, there, before, least))
     if way.change is not None or meaning.mirrored:
         rotation = observed.rotation.copy()
         rotation[there] = way.read(single.turns[there])
@@ -180,14 +180,16 @@ def _meant(
 
 def _scattered(fitted: Fitted) -> Iterator[Finding]:
     """Orientations that do not go with the joints, though every jump has frames of its own."""
-    there = fitted.seen.has_rotation
+    there = fitted.readings.has_rotation
     if there.any():
         scatter = orientations.scatter(
-            fitted.left.flange[there], fitted.seen.rotation[there], fitted.seen.target[there]
+            fitted.residuals.flange[there],
+            fitted.readings.rotation[there],
+            fitted.readings.target[there],
         )
         if scatter > meanings.BAD_RAD:
             degrees = float(np.rad2deg(scatter))
-            yield finding("orientations", fitted.seen.lines(there), as_written_deg=degrees)
+            yield finding("orientations", fitted.readings.lines(there), as_written_deg=degrees)
 
 
 def _no_fit(single: Readings, fitted: Fitted, robot: Robot, spread_mm: float) -> Finding:
@@ -227,14 +229,14 @@ def _of_other_lengths(single: Readings, fitted: Fitted, robot: Robot) -> Iterato
 def _largest(fitted: Fitted) -> Iterator[Finding]:
     """Readings that are no outliers, and stand apart from the others all the same."""
     good = np.flatnonzero(~fitted.bad)
-    number = np.unique(fitted.seen.pose[good], return_inverse=True)[1]
+    number = np.unique(fitted.readings.pose[good], return_inverse=True)[1]
     worst = np.zeros(number.max(initial=-1) + 1)
     np.maximum.at(worst, number, fitted.left_mm[good])
     if count := tails.detached(worst):
         ordered = np.sort(worst)[::-1]
         yield finding(
             "largest_rows",
-            fitted.seen.lines(good[worst[number] >= ordered[count - 1]]),
+            fitted.readings.lines(good[worst[number] >= ordered[count - 1]]),
             count=count,
             errors=", ".join(f"{value:.3g}" for value in ordered[:count]),
             next=f"{ordered[count]:.3g}",

@@ -50,8 +50,8 @@ def facts_of(
     if distances:
         facts["target_distances"] = [
             {
-                "from": every.target_names[item.one],
-                "to": every.target_names[item.other],
+                "from": every.target_names[item.first],
+                "to": every.target_names[item.second],
                 "mm": item.middle_mm,
                 "std_mm": item.std_mm,
                 "noise_per_target_mm": item.std_mm / np.sqrt(2.0),

@@ -102,7 +102,7 @@ def commanded(fitted: Fitted, meaning: Meaning) -> Iterator[Finding]:
 
     By the commanded joints, where the file has them too, else by round numbers.
     """
-    observed, arm = fitted.seen, fitted.trial.arm
+    observed, arm = fitted.readings, fitted.trial.arm
     both = np.isfinite(observed.commanded).all(axis=1)
     if not both.any():
         yield from _round(fitted, np.rad2deg(observed.q[:, ~fitted.trial.nominal.prismatic]))
@@ -133,7 +133,11 @@ def commanded(fitted: Fitted, meaning: Meaning) -> Iterator[Finding]:
 
 def _round(fitted: Fitted, q_deg: ndarray) -> Iterator[Finding]:
     """Rows on round numbers where the others are not, which fit worse; or all on a coarse grid."""
-    q_deg, remaining, observed = q_deg[:, np.ptp(q_deg, axis=0) > 0.0], fitted.left_mm, fitted.seen
+    q_deg, remaining, observed = (
+        q_deg[:, np.ptp(q_deg, axis=0) > 0.0],
+        fitted.left_mm,
+        fitted.readings,
+    )
     if q_deg.shape[1] < 2:
         return
     for grid in _GRIDS_DEG:
@@ -154,7 +158,7 @@ def _round(fitted: Fitted, q_deg: ndarray) -> Iterator[Finding]:
         arm, slides = fitted.trial.arm, fitted.trial.nominal.prismatic
         off = np.random.default_rng(0).uniform(-0.5, 0.5, observed.q_rad.shape) * np.deg2rad(grid)
         there = robust_fit.residuals(arm, replace(observed, q_rad=observed.q_rad + off * ~slides))
-        apart = there.predicted.position_mm - fitted.left.predicted.position_mm
+        apart = there.predicted.position_mm - fitted.residuals.predicted.position_mm
         rounding = float(np.median(np.linalg.norm(apart, axis=1)))
         error = float(np.sqrt(np.median(remaining**2)))
         if _FITTED_AWAY < error / rounding < 1.5:

@@ -58,7 +58,7 @@ class Finding:
         """The lines in words; empty where it is about no lines."""
         return self.row_names.spans(self.lines) if self.lines else ""
 
-    def at(self, lines: Iterable[int], detail: str = "", **values) -> Finding:
+    def of_lines(self, lines: Iterable[int], detail: str = "", **values) -> Finding:
         """The finding at these lines, with more numbers; ``detail`` is appended to its message."""
         values = {**self.values, **values}
         message = self.what + detail.format(**values)
@@ -85,4 +85,6 @@ def finding(key: str, lines: Iterable[int] = (), **values) -> Finding:
     """The finding ``key`` of ``TEXTS`` at ``lines``, each named once and in order."""
     message, fix = (text.format(**values) for text in TEXTS[key])
     kind = key.partition("/")[0]
-    return Finding(kind, message, fix, values, level=NOTE if kind in _NOTES else WARNING).at(lines)
+    return Finding(kind, message, fix, values, level=NOTE if kind in _NOTES else WARNING).of_lines(
+        lines
+    )

@@ -66,7 +66,7 @@ class Meaning:
         """DH joint values (n, k) of joints as read (n, k)."""
         return (q * self.unit) @ self.matrix.T + self.zero
 
-    def seen(self, read: Readings) -> Readings:
+    def applied(self, read: Readings) -> Readings:
         """The readings as this meaning has them."""
         mirror = MIRROR if self.mirrored else np.ones(3)
         position_mm = read.position_mm * self.scale * mirror
@@ -172,22 +172,22 @@ class Misfit:
 
     def __call__(self, meaning: Meaning) -> float:
         remaining = np.linalg.norm(self._left(meaning).position_mm, axis=1)
-        points = meaning.seen(self.read).position_mm
+        points = meaning.applied(self.read).position_mm
         return float(np.quantile(remaining, _MAJORITY)) / max(spread_mm(points), 1e-12)
 
     def turns(self, meaning: Meaning) -> float:
         """Scatter of the orientations seen from the flange, placed by the positions alone, rad."""
-        rotation = meaning.seen(self.read).rotation
+        rotation = meaning.applied(self.read).rotation
         return orientations.scatter(self._left(meaning).flange, rotation, self.read.target)
 
     def ratio(self, meaning: Meaning) -> float:
         """Spread of the measured points over that of the flange."""
-        observed = meaning.seen(self.read)
+        observed = meaning.applied(self.read)
         flange = dh.forward(self.robot.dh, observed.q_rad).position_mm
         return spread_mm(observed.position_mm) / max(spread_mm(flange), 1e-12)
 
     def _left(self, meaning: Meaning) -> robust_fit.Residuals:
-        observed = meaning.seen(self.read)
+        observed = meaning.applied(self.read)
         observed = replace(observed, rotation=np.full_like(observed.rotation, np.nan))
         begin = robust_fit.start(observed, self.robot.dh, draws=0, stretches=())
         return robust_fit.residuals(begin, observed)
@@ -239,7 +239,7 @@ def find(
     alone = len(results.changes) == 1 and results.changes[0].kind == "joint_coupling" and not rivals
     more = {"joint_map": results.matrix.tolist()} if alone else {}
     findings = [
-        change.at(
+        change.of_lines(
             read.lines(),
             detail,
             as_written_mm=written.sigma_mm,
@@ -270,7 +270,7 @@ def find_by_turns(
         return None
     # The common changes come first: of those that do about as well, the first.
     value, results = next(pair for pair in tried if pair[0] < _AS_GOOD * least)
-    texts = orientations.told(
+    texts = orientations.change_finding(
         results.changes[-1], read, read.has_rotation, misfit.turns(here), value
     )
     return results, texts
@@ -334,7 +334,7 @@ def _rounds(misfit: Misfit, here: Meaning, tried: list) -> Iterator[Iterable[Mea
 
 def _left_mm(read: Readings, robot: Robot, meaning: Meaning) -> float:
     """Standard deviation per axis left by the corrected arm, in the file's own lengths."""
-    observed = meaning.seen(read)
+    observed = meaning.applied(read)
     return robust_fit.best(observed, robust_fit.start(observed, robot.dh)).sigma_mm / meaning.scale
 
 

@@ -34,17 +34,19 @@ Jump = tuple[int | None, ndarray]  # a target, None for the base, that is elsewh
 
 
 def without_jumps(
-    seen: Readings, model: DHModel, progress: Progress
+    observed: Readings, model: DHModel, progress: Progress
 ) -> tuple[Fitted, list[Finding]]:
     """The fit with every jump of base or target taken out, one after the other, and these."""
-    whole = fitted = fit(seen, model)
+    whole = fitted = fit(observed, model)
     jumps: list[Jump] = []
     # Poses of equal joints are one: read often, they make no jump any surer.
-    few = len(np.unique(np.round(seen.q_rad, 6), axis=0)) < _FEW
+    few = len(np.unique(np.round(observed.q_rad, 6), axis=0)) < _FEW
     for _ in progress(range(_MOST_SPLITS), "searches for a moved instrument or target"):
         best, least = None, _PLAIN if few else 1.0
         for row, kind in _places(fitted):
-            others = np.unique(fitted.seen.target[fitted.seen.session == fitted.seen.session[row]])
+            others = np.unique(
+                fitted.readings.target[fitted.readings.session == fitted.readings.session[row]]
+            )
             for target in dict.fromkeys((kind, None, *others.tolist())):
                 split = _parted(fitted, row, target, model)
                 share = _share_left(fitted, split[0], split[1][1]) if split else np.inf
@@ -70,8 +72,8 @@ def _linearised(fitted: Fitted) -> tuple[Readings, ndarray, ndarray, Linear]:
 
     Weighted design (m, 6, P), residuals (m, 6), and the linearisation itself.
     """
-    trial, few = fitted.trial, fitted.seen.select(fitted.chosen)
-    linear = Linear.at(few, trial.arm, trial.nominal, trial.strength, huber=True)
+    trial, few = fitted.trial, fitted.readings.select(fitted.chosen)
+    linear = Linear.of(few, trial.arm, trial.nominal, trial.strength, huber=True)
     root = np.sqrt(linear.weights)
     design = linear.design * root[..., None]
     return few, design, linear.residual * root + design @ linear.step, linear
@@ -140,10 +142,10 @@ def _parted(
 
     The reading is the one that parts the two frames best.
     """
-    observed, rows = _split(fitted.seen, row, target)
+    observed, rows = _split(fitted.readings, row, target)
     again = fit(observed, model)
     kind, labels, _ = _labels(observed, target)
-    frames = _labels(fitted.seen, target)[1][row], labels[row]
+    frames = _labels(fitted.readings, target)[1][row], labels[row]
     both = np.flatnonzero(np.isin(labels, frames))
     costs = []
     for frame in frames:
@@ -154,7 +156,7 @@ def _parted(
     if min(len(np.unique(observed.pose[side])) for side in np.split(both, [place])) < _FEWEST:
         return None
     if both[place] != row:
-        observed, rows = _split(fitted.seen, both[place], target)
+        observed, rows = _split(fitted.readings, both[place], target)
         again = fit(observed, model)
     return again, (target, rows)
 
@@ -183,7 +185,7 @@ def _share_left(before: Fitted, after: Fitted, rows: ndarray) -> float:
 
 def _findings(whole: Fitted, fitted: Fitted, jumps: list[Jump]) -> Iterator[Finding]:
     """Jumps of base and targets; a drift in place of the jumps of a base that drifts."""
-    observed, frames = fitted.seen, fitted.trial.arm.frames
+    observed, frames = fitted.readings, fitted.trial.arm.frames
     drifts = _drifts_mm(whole, fitted)
     for name, drift in drifts.items():
         subset = [observed.session_names[item] == name for item in observed.session]
@@ -199,7 +201,7 @@ def _findings(whole: Fitted, fitted: Fitted, jumps: list[Jump]) -> Iterator[Find
         shift, turn = new.position_mm - old.position_mm, 0.0
         if target is None:
             # How far points in the middle of the readings went.
-            middle = fitted.left.predicted.position_mm[rows].mean(axis=0)
+            middle = fitted.residuals.predicted.position_mm[rows].mean(axis=0)
             motion = compose(new, invert(old))
             shift = middle - motion.rotation.T @ (middle - motion.position_mm)
             turn = float(np.linalg.norm(log_so3(motion.rotation)))
@@ -231,7 +233,7 @@ def _drifts_mm(whole: Fitted, split: Fitted) -> dict[str | None, ndarray]:
     for base, name in enumerate(few.session_names):
         rows, place = np.flatnonzero(few.session == base), linear.frames.slots[base][2]
         columns, rest = design[rows][:, :, place], (residual[rows], design[rows], linear.inverse)
-        part = split.seen.session[whole.chosen[rows]]
+        part = split.readings.session[whole.chosen[rows]]
         jumps = [columns * (part == item)[:, None, None] for item in np.unique(part)[1:]]
         if jumps:
             time = np.linspace(-0.5, 0.5, len(rows))[:, None, None]
@@ -255,15 +257,15 @@ def by_distances(every: Readings, distances: list[Distance]) -> tuple[list[Findi
         # The target that most of the changed distances have in common.
         counts = np.zeros(len(names))
         for distance, _, size in steps:
-            counts[[distance.one, distance.other]] += 1.0 + 1e-3 * min(abs(size), 100.0)
+            counts[[distance.first, distance.second]] += 1.0 + 1e-3 * min(abs(size), 100.0)
         target = int(np.argmax(counts))
-        mine = [step for step in steps if target in (step[0].one, step[0].other)]
+        mine = [step for step in steps if target in (step[0].first, step[0].second)]
         steps = [step for step in steps if step not in mine]
         first = int(line[mine[0][0].rows[mine[0][1]][0]])
         rows = (every.target == target) & (line >= first)
         numbers = np.where(rows, len(moved.target_names), moved.target)
         moved = replace(moved, target=numbers, target_names=(*moved.target_names, names[target]))
-        changes = (f"{n:+.3g} mm to {names[d.one + d.other - target]}" for d, _, n in mine)
+        changes = (f"{n:+.3g} mm to {names[d.first + d.second - target]}" for d, _, n in mine)
         findings.append(
             finding(
                 "target_moved/distances",

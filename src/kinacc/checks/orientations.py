@@ -60,12 +60,14 @@ def find(
     return written, here, here
 
 
-def told(change: Finding, read: Readings, there: ndarray, before: float, least: float) -> Finding:
+def change_finding(
+    change: Finding, read: Readings, there: ndarray, before: float, least: float
+) -> Finding:
     """The finding of a change that brings orientations (mask ``there``) together; scatters, rad."""
     detail = " (seen from the flange they scatter by {as_written_deg:.3g} deg as written, by "
     detail += "{found_deg:.3g} deg so)"
     degrees = {"as_written_deg": float(np.rad2deg(before)), "found_deg": float(np.rad2deg(least))}
-    return change.at(read.lines(there), detail, **degrees)
+    return change.of_lines(read.lines(there), detail, **degrees)
 
 
 def simple(layout: Layout, raw: ndarray) -> Iterator[Turn]:

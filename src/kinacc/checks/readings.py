@@ -112,14 +112,14 @@ def grouped(*labels: ndarray) -> ndarray:
 
 @dataclass(frozen=True)
 class Distance:
-    """Distance between targets ``one`` and ``other``, row by row in the order of the file.
+    """Distance between targets ``first`` and ``second``, row by row in the order of the file.
 
     ``rows`` (m, 2) indices of the two readings, ``length_mm`` (m,); ``middle_mm`` and robust
     ``std_mm`` over all of them.
     """
 
-    one: int
-    other: int
+    first: int
+    second: int
     rows: ndarray
     length_mm: ndarray
     middle_mm: float

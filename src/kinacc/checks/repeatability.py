@@ -122,21 +122,21 @@ def parts(read: Repeated) -> Parts:
     return Parts(instrument, arm, side if sides else unknown, whole, float(freedom))
 
 
-def noise_of(found: Parts, resolution_mm: ndarray) -> Noise | None:
+def noise_of(results: Parts, resolution_mm: ndarray) -> Noise | None:
     """The noise of a reading, no less than the rounding of ``resolution_mm`` (3,).
 
     None where it is not told. Equal along the axes, with three times their degrees of freedom,
     unless they are shown to differ: then a covariance, every direction with the degrees of one.
     """
-    if not found.freedom:
+    if not results.freedom:
         return None
-    by_axis = differ_by_axis(found.whole, found.freedom)
+    by_axis = differ_by_axis(results.whole, results.freedom)
     is_even = not by_axis < EQUAL
-    whole = np.eye(3) * np.trace(found.whole) / 3.0 if is_even else found.whole
+    whole = np.eye(3) * np.trace(results.whole) / 3.0 if is_even else results.whole
     least = resolution_mm**2 / 12.0
     least = np.full(3, least.max()) if is_even else least
     lacking = np.maximum(least - np.diag(whole), 0.0)
-    freedom = (3.0 if is_even else 1.0) * found.freedom
+    freedom = (3.0 if is_even else 1.0) * results.freedom
     return Noise(whole + np.diag(lacking), freedom, by_axis, is_even, lacking > 0.0)
 
 

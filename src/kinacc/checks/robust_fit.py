@@ -96,16 +96,16 @@ class Trial:
 
 @dataclass(frozen=True)
 class Fitted:
-    """The fit of all readings ``seen``, ``chosen`` (m,) of them, and what it leaves.
+    """The fit of all readings ``readings``, ``chosen`` (m,) of them, and what it leaves.
 
     ``left_mm`` and ``left_rad`` (n,): lengths of the residuals, configurations left out where they
     were fitted, -1 without orientation; ``limit_mm`` and ``limit_rad`` what they may be.
     """
 
-    seen: Readings
+    readings: Readings
     chosen: ndarray
     trial: Trial
-    left: Residuals
+    residuals: Residuals
     left_mm: ndarray
     left_rad: ndarray
     limit_mm: float
@@ -117,12 +117,12 @@ class Fitted:
         return (self.left_mm > self.limit_mm) | (self.left_rad > self.limit_rad)
 
 
-def fit(seen: Readings, model: DHModel) -> Fitted:
+def fit(observed: Readings, model: DHModel) -> Fitted:
     """The robust fit of at most ``_FITTED_ROWS`` readings, and what it leaves of all."""
-    chosen = thinned(np.arange(len(seen)), _FITTED_ROWS)
-    few = seen.select(chosen)
+    chosen = thinned(np.arange(len(observed)), _FITTED_ROWS)
+    few = observed.select(chosen)
     results = best(few, start(few, model))
-    remaining = residuals(results.arm, seen)
+    remaining = residuals(results.arm, observed)
     lengths = []
     for part, residual in ((slice(0, 3), remaining.position_mm), (slice(3, 6), remaining.turn_rad)):
         length = np.linalg.norm(residual, axis=1)
@@ -136,18 +136,18 @@ def fit(seen: Readings, model: DHModel) -> Fitted:
         lengths.append(length)
     limits = [tails.limit(length, 3) for length in lengths]
     left_rad = np.where(np.isfinite(lengths[1]), lengths[1], -1.0)
-    return Fitted(seen, chosen, results, remaining, lengths[0], left_rad, *limits)
+    return Fitted(observed, chosen, results, remaining, lengths[0], left_rad, *limits)
 
 
-def residuals(arm: Arm, seen: Readings, flange: Pose | None = None) -> Residuals:
+def residuals(arm: Arm, observed: Readings, flange: Pose | None = None) -> Residuals:
     """What ``arm`` leaves of the readings; ``flange`` (n) where the model's poses are known."""
-    flange = flange or dh.forward(arm.model, seen.q_rad)
-    base = Pose(*(item[seen.session] for item in arm.frames.bases))
+    flange = flange or dh.forward(arm.model, observed.q_rad)
+    base = Pose(*(item[observed.session] for item in arm.frames.bases))
     flange = compose(base, flange)
-    predicted = compose(flange, Pose(*(item[seen.target] for item in arm.frames.targets)))
-    turn, there = np.full((len(seen), 3), np.nan), seen.has_rotation
-    turn[there] = log_so3(predicted.rotation[there] @ np.swapaxes(seen.rotation[there], 1, 2))
-    return Residuals(predicted.position_mm - seen.position_mm, turn, predicted, flange.rotation)
+    predicted = compose(flange, Pose(*(item[observed.target] for item in arm.frames.targets)))
+    turn, there = np.full((len(observed), 3), np.nan), observed.has_rotation
+    turn[there] = log_so3(predicted.rotation[there] @ np.swapaxes(observed.rotation[there], 1, 2))
+    return Residuals(predicted.position_mm - observed.position_mm, turn, predicted, flange.rotation)
 
 
 def sigma_of(vectors: ndarray) -> float:
@@ -158,12 +158,12 @@ def sigma_of(vectors: ndarray) -> float:
     return max(float(np.quantile(length, _QUANTILE)) / _QUANTILE_3D, _LEAST_SIGMA)
 
 
-def best(seen: Readings, begin: Arm, strengths: tuple[float, ...] = STRENGTHS) -> Trial:
+def best(observed: Readings, begin: Arm, strengths: tuple[float, ...] = STRENGTHS) -> Trial:
     """The fit whose strength predicts configurations left out best."""
     chosen, least, cap, arm = None, np.inf, None, begin
-    number = np.unique(seen.pose, return_inverse=True)[1]
+    number = np.unique(observed.pose, return_inverse=True)[1]
     for strength in strengths:
-        trial = reweighted(seen, arm, begin.model, strength, huber=True)
+        trial = reweighted(observed, arm, begin.model, strength, huber=True)
         if chosen is not None and _far(trial.arm.model, begin.model):
             continue
         arm, cap = trial.arm, cap or _CAP * trial.sigma_mm
@@ -175,15 +175,15 @@ def best(seen: Readings, begin: Arm, strengths: tuple[float, ...] = STRENGTHS) -
         elif score > 1.5 * least:
             break
     corrections = 5 * begin.model.joints if chosen.strength > 0.0 else 0
-    frames = 6 * len(seen.session_names) + 3 * len(seen.target_names)
-    if 3 * len(seen) < _READ_PER_PARAMETER * (frames + corrections):
+    frames = 6 * len(observed.session_names) + 3 * len(observed.target_names)
+    if 3 * len(observed) < _READ_PER_PARAMETER * (frames + corrections):
         return chosen
-    final = reweighted(seen, chosen.arm, begin.model, chosen.strength)
+    final = reweighted(observed, chosen.arm, begin.model, chosen.strength)
     return chosen if _far(final.arm.model, begin.model) else final
 
 
 def reweighted(
-    seen: Readings, begin: Arm, nominal: DHModel, strength: float, huber: bool = False
+    observed: Readings, begin: Arm, nominal: DHModel, strength: float, huber: bool = False
 ) -> Trial:
     """Robust fit from ``begin`` with corrections of about ``strength`` (mm, mrad) to nominal.
 
@@ -191,12 +191,12 @@ def reweighted(
     """
     arm = begin
     for _ in range(_ITERATIONS):
-        step = Linear.at(seen, arm, nominal, strength, huber)
+        step = Linear.of(observed, arm, nominal, strength, huber)
         arm, moved = step.taken(arm)
         if moved < _SETTLED * min(step.sigma_mm, 1.0):
             break
-    step = Linear.at(seen, arm, nominal, strength, huber)
-    plain, judged = step.left_out(seen)
+    step = Linear.of(observed, arm, nominal, strength, huber)
+    plain, judged = step.left_out(observed)
     return Trial(arm, nominal, step.sigma_mm, step.sigma_rad, strength, plain, judged)
 
 
@@ -225,22 +225,24 @@ class Linear:
     sigma_rad: float
 
     @classmethod
-    def at(cls, seen: Readings, arm: Arm, nominal: DHModel, strength: float, huber: bool) -> Linear:
+    def of(
+        cls, observed: Readings, arm: Arm, nominal: DHModel, strength: float, huber: bool
+    ) -> Linear:
         """The linearisation of an arm that leans on ``nominal``."""
         # A target that moved has two numbers and one name.
-        named = replace(seen, target_names=tuple(map(str, range(len(seen.target_names)))))
+        named = replace(observed, target_names=tuple(map(str, range(len(observed.target_names)))))
         frames = FrameParameters.of(named, arm.frames, None)
         free = np.full(nominal.start.size, strength > 0.0)
         system = PoseSystem(named, flange_model(nominal, free), frames, 1.0)
-        there = np.repeat([np.ones(len(seen), bool), seen.has_rotation], 3, axis=0).T
-        design, residual = np.zeros((len(seen), 6, system.size)), np.zeros((len(seen), 6))
+        there = np.repeat([np.ones(len(observed), bool), observed.has_rotation], 3, axis=0).T
+        design, residual = np.zeros((len(observed), 6, system.size)), np.zeros((len(observed), 6))
         blocks = [*system.blocks(np.concatenate([frames.begin, arm.model.start[free]]))]
         residual[there], design[there] = (
             np.concatenate(part) for part in zip(*blocks, strict=True)
         )
         vectors = np.where(there, residual, np.nan)
         sigma_mm, sigma_rad = (sigma_of(vectors[:, part]) for part in _PARTS)
-        weights = np.zeros((len(seen), 6))
+        weights = np.zeros((len(observed), 6))
         for part, sigma in zip(_PARTS, (sigma_mm, sigma_rad), strict=True):
             if np.isfinite(sigma):
                 weights[:, part] = _weight(vectors[:, part], sigma, huber) / sigma**2
@@ -269,7 +271,7 @@ class Linear:
         moved = float(np.abs(self.step / scale).max())
         return Arm(model, self.frames.frames(self.frames.begin + of_frames)), moved
 
-    def left_out(self, seen: Readings) -> tuple[ndarray, ndarray]:
+    def left_out(self, observed: Readings) -> tuple[ndarray, ndarray]:
         """Residuals (n, 6), mm and rad, of every reading with its configuration left out.
 
         Then the same over what the fit without it leaves open there: as wide as ``sigma`` for a
@@ -278,8 +280,8 @@ class Linear:
         unit = np.nan_to_num(np.repeat([self.sigma_mm, self.sigma_rad], 3), nan=1.0)
         plain, judged = self.residual / unit, self.residual / unit
         scaled, share = self.design / unit[:, None], self.weights * unit**2
-        order = np.argsort(seen.pose, kind="stable")
-        sizes = np.unique(seen.pose, return_counts=True)[1]
+        order = np.argsort(observed.pose, kind="stable")
+        sizes = np.unique(observed.pose, return_counts=True)[1]
         begins = np.cumsum(sizes) - sizes
         for size in np.unique(sizes):
             rows = order[begins[sizes == size][:, None] + np.arange(size)]
@@ -297,7 +299,9 @@ class Linear:
             judged[rows] = (axes @ (np.swapaxes(axes, 1, 2) @ remaining / over)).reshape(
                 *rows.shape, 6
             )
-        unit = np.where(np.repeat([[True], [False]], 3) | seen.has_rotation[:, None], unit, np.nan)
+        unit = np.where(
+            np.repeat([[True], [False]], 3) | observed.has_rotation[:, None], unit, np.nan
+        )
         return plain * unit, judged * unit
 
 
@@ -319,15 +323,15 @@ def _weight(vectors: ndarray, sigma: float, huber: bool) -> ndarray:
 
 
 def start(
-    seen: Readings, model: DHModel, draws: int = _DRAWS, stretches: tuple[int, ...] = _STRETCHES
+    observed: Readings, model: DHModel, draws: int = _DRAWS, stretches: tuple[int, ...] = _STRETCHES
 ) -> Arm:
     """Bases and targets to start from, though part of the readings may be wrong.
 
     Of closed forms on all readings of the largest session, on stretches of it and on random draws,
     the one that fits the better two fifths best.
     """
-    largest = np.argmax(np.bincount(seen.session))
-    part = seen.select(thinned(np.flatnonzero(seen.session == largest), _START_ROWS))
+    largest = np.argmax(np.bincount(observed.session))
+    part = observed.select(thinned(np.flatnonzero(observed.session == largest), _START_ROWS))
     flange = dh.forward(model, part.q_rad)
     results, least = None, np.inf
     for rows in _draws(part, draws, stretches):
@@ -340,10 +344,12 @@ def start(
                 break
             results, least = arm, middle
             rows = np.argsort(misfit)[: max(int(_KEPT * len(misfit)), _DRAWN)]
-    frames = _placed(results, part, flange, least) if len(seen.target_names) > 1 else results.frames
+    frames = (
+        _placed(results, part, flange, least) if len(observed.target_names) > 1 else results.frames
+    )
     targets = frames.targets
-    for second in np.unique(seen.session[seen.session != largest]):
-        subset = seen.select(seen.session == second)
+    for second in np.unique(observed.session[observed.session != largest]):
+        subset = observed.select(observed.session == second)
         place, rows = dh.forward(model, subset.q_rad), np.arange(len(subset))
         for _ in range(_REFINEMENTS):
             base = base_from_targets(subset.select(rows), Pose(*(e[rows] for e in place)), targets)

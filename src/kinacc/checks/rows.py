@@ -16,12 +16,12 @@ from kinacc.checks.robust_fit import Fitted
 from kinacc.measurements.layout import Layout
 
 
-def found(fitted: Fitted, meaning: Meaning, layout: Layout) -> list[Finding]:
+def explained(fitted: Fitted, meaning: Meaning, layout: Layout) -> list[Finding]:
     """Findings of all bad readings, one per kind of explanation; the rest are outliers."""
     bad = np.flatnonzero(fitted.bad)
     if not bad.size:
         return []
-    open_rows, findings, lines = bad, [], fitted.seen.lines
+    open_rows, findings, lines = bad, [], fitted.readings.lines
     for change, observed in _explanations(fitted, meaning, layout, bad):
         remaining = robust_fit.residuals(fitted.trial.arm, observed)
         near = np.linalg.norm(remaining.position_mm, axis=1) <= fitted.limit_mm
@@ -30,9 +30,11 @@ def found(fitted: Fitted, meaning: Meaning, layout: Layout) -> list[Finding]:
         if rows.size:
             change = replace(change, fix="correct these rows, or exclude them", values={})
             largest_mm = float(fitted.left_mm[rows].max())
-            findings.append(change.at(lines(rows), " in these rows", largest_error_mm=largest_mm))
+            findings.append(
+                change.of_lines(lines(rows), " in these rows", largest_error_mm=largest_mm)
+            )
             open_rows = np.setdiff1d(open_rows, rows)
-    stale = open_rows[fitted.seen.earlier[open_rows] > 0]
+    stale = open_rows[fitted.readings.earlier[open_rows] > 0]
     if stale.size:
         findings.append(finding("repeated_reading/off", lines(stale), count=stale.size))
         open_rows = np.setdiff1d(open_rows, stale)
@@ -43,7 +45,7 @@ def _explanations(
     fitted: Fitted, meaning: Meaning, layout: Layout, rows: ndarray
 ) -> Iterator[tuple[Finding, Readings]]:
     """Every known fault undone in the readings ``rows``."""
-    observed = fitted.seen.select(rows)
+    observed = fitted.readings.select(rows)
 
     def moved(position_mm: ndarray, rotation: ndarray = observed.rotation) -> Readings:
         return replace(observed, position_mm=position_mm, rotation=rotation)
@@ -68,7 +70,7 @@ def _explanations(
         change, position_mm = finding("left_handed/axis", axis=name), observed.position_mm * mirror
         yield change, moved(position_mm)
         yield change, moved(position_mm, observed.rotation * np.outer(mirror, mirror))
-    for target in np.unique(fitted.seen.target):
+    for target in np.unique(fitted.readings.target):
         # Readings of the target itself are made to fit nothing.
         others = (observed.target != target)[:, None]
         swapped = moved(np.where(others, observed.position_mm, np.inf))
@@ -83,7 +85,7 @@ def _explanations(
 
 def _outliers(fitted: Fitted, rows: ndarray) -> Iterator[Finding]:
     """What no fault explains."""
-    observed = fitted.seen
+    observed = fitted.readings
     if rows.size:
         worst, angle = rows[np.argmax(fitted.left_mm[rows])], fitted.left_rad[rows].max()
         yield finding(

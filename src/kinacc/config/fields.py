@@ -50,9 +50,9 @@ def setting(
     return Field(default, description=about, json_schema_extra=extra, **more)
 
 
-def refused(what: str, fix: str = "", *keys: str | int) -> PydanticCustomError:
+def refused(message: str, fix: str = "", *keys: str | int) -> PydanticCustomError:
     """An error of a validator: what is wrong, what to do, and the keys below where it stands."""
-    return PydanticCustomError("refused", "{what}", {"what": what, "fix": fix, "keys": keys})
+    return PydanticCustomError("refused", "{what}", {"what": message, "fix": fix, "keys": keys})
 
 
 def distinct(items: list[Any]) -> list[Any]:
@@ -72,12 +72,12 @@ def _rising(values: list[float]) -> list[float]:
 class Or:
     """Beside what a key takes otherwise: one of these words."""
 
-    words: tuple[str, ...]
+    literals: tuple[str, ...]
 
     def __get_pydantic_core_schema__(
         self, source: Any, handler: GetCoreSchemaHandler
     ) -> core_schema.CoreSchema:
-        text = core_schema.literal_schema([*self.words])
+        text = core_schema.literal_schema([*self.literals])
         kind = handler(source)
         return core_schema.tagged_union_schema(
             {"[word]": text, "[value]": kind},

@@ -116,13 +116,13 @@ FrameRules = Annotated[dict[Text, _State], _check(FRAMES)]
 
 
 def strangers(
-    found: Sequence[Rule], joints: int, frames: Mapping[str, Sequence[str]] | None = None
+    results: Sequence[Rule], joints: int, frames: Mapping[str, Sequence[str]] | None = None
 ) -> Iterator[tuple[Rule, str, str]]:
     """Rules about what an arm of ``joints`` has not: the rule, what is wrong, what there is.
 
     ``frames``: the components of every estimated frame; None where that is not known yet.
     """
-    for rule in found:
+    for rule in results:
         if rule.joint is not None and not 1 <= rule.joint <= joints:
             yield rule, f"there is no joint {rule.joint}", f"joints 1 to {joints}"
         if rule.frame is None or frames is None:
@@ -133,10 +133,10 @@ def strangers(
 
 
 def rule_for(
-    found: Sequence[Rule], parameter: str, joint: int | None = None, frame: str | None = None
+    results: Sequence[Rule], parameter: str, joint: int | None = None, frame: str | None = None
 ) -> Rule | None:
     """The rule that says most about ``parameter`` of a joint (1-based) or of a frame."""
-    about = [rule for rule in found if rule.parameter in (None, parameter)]
+    about = [rule for rule in results if rule.parameter in (None, parameter)]
     about = [rule for rule in about if rule.frame == frame and rule.joint in (None, joint)]
     return max(about, key=lambda rule: rule.weight, default=None)
 

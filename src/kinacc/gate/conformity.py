@@ -43,7 +43,7 @@ def _structure(path: Path, artefact: Artefact, schema: pa.Schema) -> Iterator[Pr
     if artefact.has_joints and not JOINTS_MIN <= joints <= JOINTS_MAX:
         yield Problem(str(path), f"{joints} joints", f"{JOINTS_MIN} to {JOINTS_MAX} joints")
         return
-    expected = store.arrow_schema(artefact.name, joints, given=schema.names)
+    expected = store.arrow_schema(artefact.name, joints, names=schema.names)
     for name in dict.fromkeys([*expected.names, *schema.names]):
         results, wanted = (
             _words(item.field(name)) if item.names.count(name) == 1 else "not there once"

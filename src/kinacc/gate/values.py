@@ -67,15 +67,15 @@ class RunTables(dict[str, pd.DataFrame]):
         """The error model of a gate; the selected one for ``selected``."""
         return selected(self["model_selection"]) if named == SELECTED else named
 
-    def errors(self, model: str, at: str, quantity: str) -> Sample:
+    def errors(self, model: str, place: str, quantity: str) -> Sample:
         """Sizes of a model's errors, mm or mrad, at the rows at which every model was tried.
 
-        ``at``: held_out, every row by a fit without it; validation, the rows of the fold kept for
-        it; training, rows that were fitted. Raises Absent where there are none.
+        ``place``: held_out, every row by a fit without it; validation, rows of the validation fold;
+        training, rows that were fitted. Raises Absent where there are none.
         """
         table = self["pose_errors"]
-        table = table[table["estimate"] == ("train" if at == "training" else "cross_validated")]
-        if at == "validation":
+        table = table[table["estimate"] == ("train" if place == "training" else "cross_validated")]
+        if place == "validation":
             table = table[table["subset"] == "validation"]
         tried = table.groupby("row")["comparison"].nunique()
         common = tried.index[tried == table["comparison"].nunique()]
@@ -85,7 +85,7 @@ class RunTables(dict[str, pd.DataFrame]):
         sizes = np.linalg.norm(table[names], axis=1)
         known = np.isfinite(sizes)
         if not known.any():
-            message = f"has no {quantity} errors of model {model} at rows {at.replace('_', ' ')}"
+            message = f"has no {quantity} errors of model {model} at rows {place.replace('_', ' ')}"
             fix = "name another model or other rows"
             raise Absent(Problem("pose_errors.parquet", message, fix=fix))
         rows = table["row"].to_numpy()[known]

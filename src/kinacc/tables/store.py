@@ -75,14 +75,14 @@ def arrow_schema(
     artefact: str,
     joints: int = 0,
     provenance: Mapping[str, object] | None = None,
-    given: Iterable[str] | None = None,
+    names: Iterable[str] | None = None,
 ) -> pa.Schema:
     """Arrow schema of an artefact for an arm of ``joints`` joints, unit and meaning included.
 
-    ``given``: names of columns there are, where some may be absent.
+    ``names``: of columns there are, where some may be absent.
     """
     contract = artefact_named(artefact)
-    columns = contract.for_joints(joints) if given is None else contract.in_file(joints, given)
+    columns = contract.for_joints(joints) if names is None else contract.in_file(joints, names)
     fields = [
         pa.field(
             column.name,
