@@ -1,12 +1,16 @@
-"""Arms of five makers with errors of their own, by 4 x 4 matrices; angles in rad, lengths in mm."""
+"""Shipped arms of five makers with errors, by 4 x 4 matrices; angles in rad, lengths in mm."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
+import yaml
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
+
+ROBOTS = Path(__file__).parents[3] / "src" / "kinacc" / "kinematics" / "robots"
 
 
 def frame(x=0.0, y=0.0, z=0.0, turn=None) -> np.ndarray:
@@ -98,56 +102,24 @@ def errors(seed: int, zeros: float = 1.0, lengths: float = 1.0) -> np.ndarray:
     return found
 
 
-def _signs(*signs: float) -> np.ndarray:
-    return np.diag(np.array(signs, dtype=float))
+def _shipped(name: str, middle: tuple, half: tuple, seed: int, flange: tuple = (0.0,) * 6) -> Arm:
+    """The arm of a shipped robot file, read without the package."""
+    content = yaml.safe_load((ROBOTS / f"{name}.yaml").read_text())
+    keys = ("theta_offset_deg", "d_mm", "a_mm", "alpha_deg")
+    rows = tuple(tuple(row[key] for key in keys) for row in content["dh"])
+    signs = np.diag([row.get("sign", 1) for row in content["dh"]])
+    matrix = np.array(content.get("joint_map", signs), dtype=float)
+    limits = tuple(map(tuple, content["limits_deg"]))
+    return Arm(name, rows, matrix, flange, middle, half, limits, errors(seed))
 
 
-def _coupled(matrix: np.ndarray, joint: int, to: int, by: float) -> np.ndarray:
-    found = matrix.copy()
-    found[joint - 1, to - 1] = by
-    return found
-
-
-_WIDE = ((-185, 185), (-155, 155), (-190, 190), (-350, 350), (-125, 125), (-350, 350))
-
-KUKA = Arm(
-    "kr6_like",
-    ((0, 400, 25, -90), (0, 0, 455, 0), (-90, 0, 35, -90), (0, 420, 0, 90), (0, 0, 0, -90),
-     (180, 70, 0, 0)),
-    _signs(-1, 1, 1, -1, 1, -1),
-    (0.0, 0.0, 10.0, 0.0, 0.0, 180.0),
-    (0, -75, 85, 10, 60, 20), (60, 25, 25, 60, 35, 90), _WIDE, errors(1),
-)  # fmt: skip
-ABB = Arm(
-    "irb2400_like",
-    ((0, 615, 100, -90), (-90, 0, 705, 0), (0, 0, 135, -90), (0, 755, 0, 90), (0, 0, 0, -90),
-     (180, 85, 0, 0)),
-    _coupled(_signs(1, 1, 1, 1, 1, 1), 3, 2, -1.0),
-    (0.0,) * 6,
-    (0, 20, 20, 10, 50, 20), (60, 30, 25, 50, 30, 80), _WIDE, errors(2),
-)  # fmt: skip
-FANUC = Arm(
-    "m20_like",
-    ((0, 525, 150, -90), (-90, 0, 790, 0), (0, 0, 250, -90), (0, 835, 0, 90), (0, 0, 0, -90),
-     (180, 100, 0, 180)),
-    _coupled(_signs(1, 1, -1, -1, -1, -1), 3, 2, -1.0),
-    (0.0,) * 6,
-    (0, 20, -10, 10, -70, 20), (60, 25, 20, 50, 30, 80), _WIDE, errors(3),
-)  # fmt: skip
-UR = Arm(
-    "ur10_like",
-    ((0, 127.3, 0, 90), (0, 0, -612, 0), (0, 0, -572.3, 0), (0, 163.941, 0, 90),
-     (0, 115.7, 0, -90), (0, 92.2, 0, 0)),
-    _signs(1, 1, 1, 1, 1, 1),
-    (0.0,) * 6,
-    (0, -80, 90, -100, -80, 0), (70, 30, 35, 40, 35, 90), ((-360, 360),) * 6, errors(4),
-)  # fmt: skip
-YASKAWA = Arm(
-    "gp25_like",
-    ((0, 505, 150, -90), (-90, 0, 760, 180), (0, 0, -200, 90), (0, -795, 0, -90), (0, 0, 0, 90),
-     (0, -100, 0, 180)),
-    _signs(1, 1, 1, -1, 1, -1),
-    (0.0,) * 6,
-    (0, 10, -10, 10, 65, 20), (60, 30, 25, 50, 30, 80), _WIDE, errors(5),
-)  # fmt: skip
-ARMS = {"kuka": KUKA, "abb": ABB, "fanuc": FANUC, "ur": UR, "yaskawa": YASKAWA}
+_TURNED = (0.0, 0.0, 10.0, 0.0, 0.0, 180.0)
+ARMS = {
+    "kuka": _shipped(
+        "kr6_r900_sixx", (0, -75, 85, 10, 60, 20), (60, 25, 25, 60, 35, 90), 1, _TURNED
+    ),
+    "abb": _shipped("irb2400_12_155", (0, 20, 20, 10, 50, 20), (60, 30, 25, 50, 30, 80), 2),
+    "fanuc": _shipped("fanuc_m20ia", (0, 20, -10, 10, -70, 20), (60, 25, 20, 50, 30, 80), 3),
+    "ur": _shipped("ur10", (0, -80, 90, -100, -80, 0), (70, 30, 35, 40, 35, 90), 4),
+    "yaskawa": _shipped("gp25", (0, 10, -10, 10, 65, 20), (60, 30, 25, 50, 30, 80), 5),
+}
