@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -73,33 +73,28 @@ def read(sources: Sequence[Source], frames: Frames, _: np.ndarray | None) -> Pro
     (source,) = sources
     text, at = _plain(source), 0
     found = {each.start(): each.end() for each in _TARGET.finditer(text)}
-    places: dict[str, list[int]] = {}
-    labels: dict[int, str] = {}
-    uses: dict[int, set[tuple[str | None, str]]] = {}
+    names: dict[int, str] = {}
+    uses: dict[int, set[tuple[str | None, str | None]]] = {}
     left, refused = [], {}
     for data in _FRAME_DATA.finditer(text):
-        held, fixed = data[3].upper(), (data[4] or "").upper()
-        if (held == "FALSE") if data[1] else (held == "TRUE" or fixed == "FALSE"):
+        flags = data[3].upper(), data[1] or (data[4] or "").upper()
+        if flags[0] == ("FALSE" if data[1] else "TRUE") or flags[1] == "FALSE":
             refused[data[2].upper()] = STILL
     for statement in text.split(";"):
         end = at + len(statement)
         here = [start for start in found if at <= start < end]
         if named := _TARGET_DATA.search(statement):
-            places[named[1].upper()] = here
-            several = len(here) > 1
-            for number, start in enumerate(here, 1):
-                labels[start] = f"{named[1]}{{{number}}}" if several else named[1]
+            names |= dict.fromkeys(here, named[1])
         elif _MOVE.match(statement):
             bare = re.sub(r"\[.*?\](?=\s*[,\\])|\(.*\)", "", statement, flags=re.S)
             last = re.match(r"\s*(\w+)", bare.split(",")[-1])
             work = re.search(r"\\WObj\s*:=\s*(\w+)", statement, re.I)
             way = last and last[1].upper(), work[1].upper() if work else "WOBJ0"
-            names = map(str.upper, re.findall(r"(?<!\\)\b[A-Za-z]\w*", bare))
-            for start in [*here, *(start for name in names for start in places.get(name, ()))]:
+            words = {*re.findall(r"(?<!\\)\b[A-Z]\w*", bare.upper())}
+            for start in [*here, *(at for at, name in names.items() if name.upper() in words)]:
                 uses.setdefault(start, set()).add(way)
         else:
-            for start in here:
-                del found[start]
+            found = {start: last for start, last in found.items() if start not in here}
         if _COMPUTED.search(statement):
             first = at + len(statement) - len(statement.lstrip())
             left.append(f"{source.where(first)}: {' '.join(statement.split())}")
@@ -111,7 +106,9 @@ def read(sources: Sequence[Source], frames: Frames, _: np.ndarray | None) -> Pro
         ways = uses.get(start, {(None, None)})
         tool, base = next(iter(ways))
         why = SEVERAL if len(ways) > 1 else refused.get(tool) or refused.get(base) or ""
-        name = labels.get(start, f"line {source.where(start).split(':')[1]}")
+        array = [each for each, name in names.items() if name == names.get(start)]
+        index = f"{{{array.index(start) + 1}}}" if len(array) > 1 else ""
+        name = names.get(start, f"line {source.where(start).split(':')[1]}") + index
         position = _position(name, source, source.numbers(start, end))
         positions.append(replace(position, tool=tool, base=base, refused=why))
     return Program(sources, positions, frames, left)
@@ -119,15 +116,18 @@ def read(sources: Sequence[Source], frames: Frames, _: np.ndarray | None) -> Pro
 
 def _position(name: str, source: Source, places: list) -> Position:
     values = source.values(places)
-    moves = bool(np.any((np.abs(values[-6:]) < _UNUSED) & (values[-6:] != 0.0)))
+    outer = values[-6:]
+    moves = bool(np.any((np.abs(outer) < _UNUSED) & (outer != 0.0)))
     if len(places) == 12:
         return Position(name, source, places[:6], 4, 1.0, moves_outside=moves)
-    stated = tuple(
-        f"{word} {int(value)}"
-        for word, value in zip(("cf1", "cf4", "cf6", "cfx"), values[7:11], strict=True)
-    )
+    stated = _words(values[7:11])
     decimals = (3, 3, 3, 9, 9, 9, 9)
     return Position(name, source, places[:7], decimals, posture=stated, moves_outside=moves)
+
+
+def _words(numbers: Iterable[float]) -> tuple[str, ...]:
+    names = zip(("cf1", "cf4", "cf6", "cfx"), numbers, strict=True)
+    return tuple(f"{name} {int(number)}" for name, number in names)
 
 
 def _plain(source: Source) -> str:
@@ -136,9 +136,9 @@ def _plain(source: Source) -> str:
 
 def posture(sides: Sequence[bool], q_deg: np.ndarray) -> tuple[str, ...]:
     """Quadrants of axes 1, 4 and 6, and the number of the eight postures."""
-    quadrants = [f"cf{axis} {int(np.floor(q_deg[axis - 1] / 90.0))}" for axis in (1, 4, 6)]
     is_ahead, is_above, is_positive = sides
-    return (*quadrants, f"cfx {4 * (not is_ahead) + 2 * (not is_above) + (not is_positive)}")
+    number = 4 * (not is_ahead) + 2 * (not is_above) + (not is_positive)
+    return _words([*np.floor(q_deg[[0, 3, 5]] / 90.0), number])
 
 
 LANGUAGE = Language(

@@ -68,58 +68,58 @@ def frames_of(source: Source) -> Frames:
 def read(sources: Sequence[Source], frames: Frames, _: np.ndarray | None) -> Program:
     """Positions of a KRL program."""
     data: dict[str, _State] = {}
-    declared: dict[str, Position] = {}
     uses: dict[str, set[_State]] = {}
-    inline, left, changed = [], [], set()
-    for source in sorted(sources, key=lambda source: source.path.suffix.lower()):  # .dat first
+    found: dict[str, Position] = {}
+    left, changed = [], set()
+    for source in sorted(sources, key=_ending):  # .dat first
         state = _State()
         for at, text in _lines(source.text):
-            aggregates = list(_aggregates(at, text))
-            where = f"{source.where(at)}: {text.strip()}"
-            state = _in_force(state, text, data, source.where(at))
+            aggregates, place = list(_aggregates(at, text)), source.where(at)
+            where = f"{place}: {text.strip()}"
+            state = _in_force(state, text, data, place)
             changed |= {(kind.lower(), str(int(n))) for kind, n in _CHANGED.findall(text)}
             if motion := _MOTION.match(text):
                 target = re.split(r"\bWITH\b|\bC_\w+", re.sub(r"\{[^}]*\}", "", motion[3]))[0]
-                named = [each for each in re.findall(r"\w+", motion[3].upper()) if each in data]
-                now = data[named[0]] if named else state
-                if motion[2] or ":" in target:
+                named = [
+                    data[each] for each in re.findall(r"\w+", motion[3].upper()) if each in data
+                ]
+                names = re.findall(r"\$?\b[A-Z_]\w*", target.upper())
+                inline = {
+                    f"line {place.split(':')[1]}{' end' * number}": _position(source, parts)
+                    for number, parts in enumerate(aggregates[: 1 + ("CIRC" in motion[1].upper())])
+                }
+                if motion[2] or ":" in target or None in inline.values():
                     left.append(where)
                     continue
-                for parts in aggregates[: 2 if "CIRC" in motion[1].upper() else 1]:
-                    position = _position(f"line {where.split(':')[1]}", source, parts)
-                    if position is None:
-                        left.append(where)
-                    else:
-                        inline.append(replace(position, **now._asdict()))
-                for name in re.findall(r"\$?\b[A-Z_]\w*", target.upper()):
-                    uses.setdefault(name, set()).add(now)
+                found |= inline
+                for name in (*names, *inline):
+                    uses.setdefault(name, set()).add((named or [state])[0])
             elif _COMPONENT.match(text):
                 left.append(where)
             elif aggregates and (assigned := _ASSIGNED.match(text)):
-                name = re.sub(r"\s", "", assigned[1].upper())
-                numbers = {key: value for key, (value, _) in aggregates[0].items()}
-                if "TOOL_NO" in numbers and "BASE_NO" in numbers:
-                    still = STILL if "#TCP" in numbers.get("IPO_FRAME", "").upper() else ""
-                    data[name] = _State(numbers["TOOL_NO"], numbers["BASE_NO"], still)
-                elif name[0] != "$" and "_DATA" not in name:
-                    position = _position(name, source, aggregates[0])
-                    if position and (name in declared or re.search(r"\}\s*:", text)):
+                name, parts = re.sub(r"\s", "", assigned[1].upper()), aggregates[0]
+                if {"TOOL_NO", "BASE_NO"} <= set(parts):
+                    still = "#TCP" in parts.get("IPO_FRAME", ("",))[0].upper()
+                    numbers = parts["TOOL_NO"][0], parts["BASE_NO"][0]
+                    data[name] = _State(*numbers, STILL if still else "")
+                elif name[0] != "$" and "_DATA" not in name and (own := _position(source, parts)):
+                    if name in found or re.search(r"\}\s*:", text):
                         left.append(where)
-                    elif position:
-                        declared[name] = position
+                    else:
+                        found[name] = own
     positions = []
-    for name, position in declared.items():
-        alone = data.get("F" + name[1:]) if name[0] == "X" else None
-        ways = uses.get(name.split("[")[0]) or {alone or _State()}
-        several = {"refused": SEVERAL} if len(ways) > 1 else {}
-        positions.append(replace(position, **{**next(iter(ways))._asdict(), **several}))
-    order = [source.path for source in sources]
-    every = [
-        replace(each, refused=CHANGED) if {(TOOL, each.tool), (BASE, each.base)} & changed else each
-        for each in (*positions, *inline)
-    ]
-    every.sort(key=lambda each: (-order.index(each.source.path), each.places[0]))
-    return Program(sources, every, {**NO_FRAMES, **frames}, left)
+    for name, position in found.items():
+        ways = uses.get(name.split("[")[0]) or {data.get(f"F{name[1:]}", _State())}
+        tool, base, why = next(iter(ways))
+        if len(ways) > 1 or {(TOOL, tool), (BASE, base)} & changed:
+            why = SEVERAL if len(ways) > 1 else CHANGED
+        positions.append(replace(position, name=name, tool=tool, base=base, refused=why))
+    positions.sort(key=lambda each: (_ending(each.source), each.places[0]))
+    return Program(sources, positions, {**NO_FRAMES, **frames}, left)
+
+
+def _ending(source: Source) -> str:
+    return source.path.suffix.lower()
 
 
 def posture(sides: Sequence[bool], q_deg: np.ndarray) -> tuple[str, ...]:
@@ -183,15 +183,15 @@ def _in_force(state: _State, text: str, data: dict[str, _State], where: str) -> 
     return state
 
 
-def _position(name: str, source: Source, parts: Parts) -> Position | None:
+def _position(source: Source, parts: Parts) -> Position | None:
     """The position of an aggregate; None where some of its numbers are missing."""
     outer = [parts[key][0] for key in parts if re.fullmatch(r"E[1-6]", key)]
     moves = any(re.fullmatch(NUMBER, each) and float(each) for each in outer)
     if (places := _places(parts, _FRAME)) is not None:
         stated = _bits(*(_whole(parts[key][0]) for key in "ST")) if {*"ST"} <= set(parts) else None
-        return Position(name, source, places, 4, posture=stated, moves_outside=moves)
+        return Position("", source, places, 4, posture=stated, moves_outside=moves)
     places = _places(parts, _AXES)
-    return None if places is None else Position(name, source, places, 4, 1.0)
+    return None if places is None else Position("", source, places, 4, 1.0)
 
 
 def _whole(text: str) -> int:

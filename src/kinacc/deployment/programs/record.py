@@ -7,8 +7,10 @@ comes back unchanged, whatever the encoding and the line ends.
 from __future__ import annotations
 
 import re
+from bisect import bisect
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -45,7 +47,11 @@ class Source:
 
     def where(self, at: int) -> str:
         """File and line of an offset."""
-        return f"{self.path.name}:{self.text.count(chr(10), 0, at) + 1}"
+        return f"{self.path.name}:{bisect(self._ends, at) + 1}"
+
+    @cached_property
+    def _ends(self) -> list[int]:
+        return [found.end() for found in re.finditer("\n", self.text)]
 
     def numbers(self, start: int, end: int) -> list[Place]:
         """Places of the numbers between two offsets."""

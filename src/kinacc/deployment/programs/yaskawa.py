@@ -106,20 +106,16 @@ def _position(
         (3, 3, 3, 4, 4, 4),
         tool=str(int(state.get("TOOL", "0").split(",")[0])),
         base=base,
-        posture=_stated(state.get("RCONF")),
+        posture=_named([*map(int, rconf.split(",")[:6])])
+        if (rconf := state.get("RCONF"))
+        else None,
         moves_outside=moves or bool(source.values(places[6:]).any()),
         refused="" if known else f"is in the frame {reference or 'of its axes'}",
     )
 
 
-def _stated(text: str | None) -> tuple[str | None, ...] | None:
-    if not text:
-        return None
-    bits = [*map(int, text.split(",")[:6])]
-    return (
-        *(pair[bit] for pair, bit in zip(_WORDS, bits, strict=False)),
-        *(None,) * (6 - len(bits)),
-    )
+def _named(bits: Sequence[int]) -> tuple[str, ...]:
+    return tuple(pair[int(bit)] for pair, bit in zip(_WORDS, bits, strict=False))
 
 
 def posture(sides: Sequence[bool], q_deg: np.ndarray) -> tuple[str, ...]:
@@ -127,8 +123,7 @@ def posture(sides: Sequence[bool], q_deg: np.ndarray) -> tuple[str, ...]:
     is_ahead, is_above, _ = sides
     r = (q_deg[3] + 180.0) % 360.0 - 180.0
     turned = [not -180.0 < q_deg[axis] <= 180.0 for axis in (3, 5, 0)]
-    bits = (not -90.0 < r <= 90.0, not is_above, not is_ahead, *turned)
-    return tuple(pair[int(bit)] for pair, bit in zip(_WORDS, bits, strict=True))
+    return _named([not -90.0 < r <= 90.0, not is_above, not is_ahead, *turned])
 
 
 LANGUAGE = Language(
