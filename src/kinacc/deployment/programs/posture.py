@@ -37,7 +37,7 @@ def unmatched(
         q_deg = np.rad2deg(q_rad) + slack
         sides = front @ (place[4] - place[0]) >= 0.0, arm @ left > 0.0, q_deg[4] > 0.0
         names.append(posture(sides, q_deg))
-    parts = zip(stated, *names, strict=True)
+    parts = zip(stated, *names, strict=False)  # some programs state the first parts alone
     return ", ".join(now for wanted, now, *near in parts if wanted not in (None, now, *near))
 
 

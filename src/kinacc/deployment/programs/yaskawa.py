@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -96,7 +96,7 @@ def _position(
             raise InputError(Problem(str(source.path), "positions are in pulses", fix=fix))
         scale = np.asarray(pulses)
         return Position(name, source, places[: len(scale)], 0, scale)
-    reference = state.get("POSTYPE", "").upper()
+    reference, rconf = state.get("POSTYPE", "").upper(), state.get("RCONF")
     base = str(int(state.get("USER") or 0)) if reference == "USER" else reference
     known = reference in ("USER", "ROBOT", "BASE")
     return Position(
@@ -106,15 +106,13 @@ def _position(
         (3, 3, 3, 4, 4, 4),
         tool=str(int(state.get("TOOL", "0").split(",")[0])),
         base=base,
-        posture=_named([*map(int, rconf.split(",")[:6])])
-        if (rconf := state.get("RCONF"))
-        else None,
+        posture=_named(map(int, rconf.split(","))) if rconf else None,
         moves_outside=moves or bool(source.values(places[6:]).any()),
         refused="" if known else f"is in the frame {reference or 'of its axes'}",
     )
 
 
-def _named(bits: Sequence[int]) -> tuple[str, ...]:
+def _named(bits: Iterable[int]) -> tuple[str, ...]:
     return tuple(pair[int(bit)] for pair, bit in zip(_WORDS, bits, strict=False))
 
 
