@@ -33,7 +33,7 @@ def describe_files(
     files
         A file with joints and measured points, or two files, one of each.
     robot
-        A shipped name, a robot file or a URDF file; None for the shipped robot that fits.
+        A shipped name, a robot file or a URDF file; None for a shipped robot that fits.
     answers
         What the files leave open, by the option of ``kinacc init``: joint_unit, length_unit,
         orientation, take, join, clock_offset, decimal, sheet and so on.
@@ -53,10 +53,13 @@ def describe_files(
     def silent(items: Iterable, _: str) -> Iterable:
         return items
 
-    robot = robot or fitting(guess, silent)
     if robot is None:
-        fix = "give robot: " + ", ".join(robots.shipped()) + ", a robot file or a URDF file"
-        raise InputError(Problem(guess.table.path, "no shipped robot fits the readings", fix=fix))
+        if not (fit := fitting(guess, silent)):
+            fix = "give robot: a name in docs/robots.md, a robot file or a URDF file"
+            raise InputError(
+                Problem(guess.table.path, "no shipped robot fits the readings", fix=fix)
+            )
+        robot = fit[0]
     name = plain_name(guess.table.path)
     guess, report, _ = corrected(guess, robots.load(robot), name, silent)
     if (coupling := coupling_of(report)) is not None:
