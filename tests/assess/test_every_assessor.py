@@ -27,9 +27,6 @@ from kinacc.errors import InputError
 
 BOUNDING = [SingleShot, InvalidationCalibrated, SearchAndConfirm]
 LIVE = [paper.assessor(name, measurements=40) for name in ADAPTIVE]
-TAKEN, REFUSED = "taken", "refused"
-WITH_CONFIDENCE = ("region_share", "single_shot", "invalidation_calibrated", "search_and_confirm")
-WITH_VISITED = ("model_invalidation_full", "invalidation_calibrated")
 
 
 def directions(points: int, seed: int = 5) -> np.ndarray:
@@ -212,33 +209,6 @@ def test_full_invalidation_states_what_the_papers_states_where_noise_is_equal():
     said_mm = full.statements()[0].value_mm
     assert max(reads.values()) > 1
     assert rejection((1.0 - 1e-5) * said_mm) > 0.6 >= rejection((1.0 + 1e-5) * said_mm)
-
-
-LIMITS = [
-    *((name, "measurements", 0, REFUSED) for name in ADAPTIVE),
-    *((name, "confidence", 1.0, REFUSED) for name in WITH_CONFIDENCE),
-    *((name, "visited", 1.1, REFUSED) for name in WITH_VISITED),
-    ("single_shot", "confidence", 0.5, TAKEN),
-    ("region_share", "share", 1.0, REFUSED),
-    ("region_share", "deviations", 0.0, TAKEN),
-    ("gamma_quantile", "share", 0.0, REFUSED),
-    ("model_invalidation_full", "bound_mm", 0.0, REFUSED),
-]
-
-
-@pytest.mark.parametrize(("name", "key", "value", "verdict"), LIMITS)
-def test_the_limits_of_a_setting(name, key, value, verdict):
-    settings = {"measurements": 40} | {key: value}
-    if verdict == TAKEN:
-        assert getattr(paper.assessor(name, **settings), key) == value
-        return
-    with pytest.raises(InputError) as caught:
-        paper.assessor(name, **settings)
-    (problem,) = caught.value.problems
-    assert problem.where == key
-    assert str(value) in problem.what
-    assert problem.allowed
-    assert name in str(caught.value)
 
 
 @pytest.mark.parametrize(

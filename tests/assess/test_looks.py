@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 import pytest
-from scipy.stats import multivariate_normal, norm
 
 from kinacc.assess.looks import boundary, look_counts
 from kinacc.assess.lower_average import LowerAverage
@@ -46,16 +45,6 @@ def test_walks_drawn_at_random_cross_the_boundary_as_often_as_is_allowed(extra, 
     share = crossed(looks.counts.tolist(), looks.z, rng, rate, scale)
     assert share == pytest.approx(ERROR, abs=3e-3 if rate else CLOSE + 5e-4)
     assert crossed(looks.counts.tolist(), 0.95 * looks.z, rng, rate, scale) > ERROR + CLOSE
-
-
-@pytest.mark.parametrize("error", [0.01, 0.05, 0.2])
-def test_the_boundary_of_two_looks_is_that_of_a_normal_pair(error):
-    """The mean of two readings and the first of them are correlated by the root of a half."""
-    at = boundary((1, 2), error, late=None).z[0]
-    both = multivariate_normal([0.0, 0.0], [[1.0, np.sqrt(0.5)], [np.sqrt(0.5), 1.0]])
-    assert 0.9 * error < 2.0 * norm.sf(at) - both.cdf([-at, -at]) < error
-    assert boundary((1,), error, late=None).z == pytest.approx(norm.isf(error), abs=0.02)
-    assert boundary((1, 2), error, late=None).alone == pytest.approx(norm.isf(error / 2))
 
 
 def share_false(size, z, counts, choose, campaigns, rng):

@@ -188,17 +188,6 @@ def said(seed, measurements=70, **given):
     return carried_on(seed, measurements, **given).statements()[1]
 
 
-def test_a_repeatability_test_before_serves_at_once():
-    early = said(1, 90, limit=40, noise="estimated", noise_freedom=60)
-    assert early.withheld is None
-    assert early.noise.code == "noise_tested"
-    known = said(1, 90, limit=40, noise_margin=1.0)
-    assert known.upper_mm < early.upper_mm < 1.1 * known.upper_mm
-    assert 0.6 * known.lower_mm < early.lower_mm < known.lower_mm
-    wrong = said(1, 90, times=2.0, noise="estimated", noise_freedom=60).withheld
-    assert wrong.code in ("scatter", "wrong_readings")
-
-
 @pytest.mark.parametrize("noise", ["known", "estimated"])
 def test_a_bound_on_a_future_visit_is_that_on_the_mean_and_the_arms_own_scatter(noise):
     of_mean = said(4, 90, noise=noise)

@@ -19,7 +19,6 @@ from kinacc.assess.invalidation_kernels import chi2_3
 from kinacc.assess.model_invalidation import ModelInvalidation, point_probability
 from kinacc.assess.random_numbers import key_of
 from kinacc.assess.world import drawn_world
-from kinacc.errors import InputError
 from kinacc.study import monte_carlo
 
 PAPER = monte_carlo.ASSESSORS
@@ -197,21 +196,3 @@ def test_words_are_those_of_numpy_philox(key0, key1, visit, point):
         np.uint64(key0), np.uint64(key1), np.uint64(visit), np.uint64(point)
     )
     assert [int(x) for x in mine] == philox_words([key0, key1], visit, point)
-
-
-@pytest.mark.parametrize(
-    ("given", "where"),
-    [
-        ((np.zeros((0, 3)), 0.1), "true errors"),
-        ((np.zeros((4, 2)), 0.1), "true errors"),
-        ((np.full((4, 3), np.nan), 0.1), "true errors"),
-        ((np.ones((4, 3)), 0.0), "noise"),
-        ((np.ones((4, 3)), [0.1, 0.1]), "noise"),
-        ((np.ones((3, 3)), 0.1, key_of(1), 2, [0, 1, 1]), "visiting order"),
-        ((np.ones((3, 3)), 0.1, key_of(1), 0), "visits"),
-    ],
-)
-def test_what_makes_no_world_is_refused(given, where):
-    with pytest.raises(InputError) as caught:
-        drawn_world(*given, *(key_of(1), 2)[len(given) - 2 :])
-    assert [problem.where for problem in caught.value.problems] == [where]

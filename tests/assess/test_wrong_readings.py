@@ -148,13 +148,5 @@ def test_a_target_that_slipped_once_is_named_and_without_a_guard_no_bound_is_sta
         assert math.isnan(said.lower_mm)
 
 
-def test_a_reference_pose_read_wrong_once_is_no_moved_tripod_and_a_moved_tripod_is_one():
-    settings = {"wrong_rate": RATE, "references": 20}
-    number = sorted(run(5, slipped(), **settings).plan.row_at)[12] + 1
-    assert run(5, slipped(number), **settings).statements()[1].withheld is None
-    moved = run(5, slipped(*range(81, BUDGET + 1)), **settings)
-    assert moved.statements()[1].withheld.code == "step"
-
-
 def test_where_all_is_noise_hardly_any_reading_is_named():
     assert sum(bool(run(seed, slipped()).suspicious()) for seed in range(30)) <= 1

@@ -36,19 +36,15 @@ def test_fig1_probability_is_the_chi_square_tail_of_the_paper(measured_mm):
     assert abs(case.candidate_mm) == pytest.approx(min(abs(measured_mm), 1.0))
 
 
-def test_fig2_has_equal_scales_three_ticks_an_axis_and_shows_all_points():
+def test_fig2_shows_all_points():
     q_rad = np.radians(np.random.default_rng(4).uniform(-60, 60, (40, 6)))
     figure = fig2.draw(robot.load("ur10").dh, q_rad, tool_mm=np.array([0.0, 30.0, 120.0]))
     assert problems(figure) == []
     assert "40 operating points" in said(figure)
     (ax,) = figure.axes
     limits = np.array([ax.get_xlim(), ax.get_ylim(), ax.get_zlim()])
-    spans = np.ptp(limits, axis=1)
-    assert ax._box_aspect / spans == pytest.approx(np.full(3, ax._box_aspect[0] / spans[0]))
     points = np.transpose(ax.collections[0]._offsets3d)
     assert np.all((points > limits[:, 0]) & (points < limits[:, 1]))
-    for axis, (low, high) in zip((ax.xaxis, ax.yaxis, ax.zaxis), limits, strict=True):
-        assert sum(low <= tick <= high for tick in axis.get_major_locator()()) >= 3
     with pytest.raises(InputError, match="assessment_points"):
         fig2.draw(robot.load("mh180").dh, np.full((3, 6), np.nan))
 
@@ -92,15 +88,6 @@ def test_fig4_bars_reach_from_the_smallest_to_the_largest_beside_the_truth(table
     assert ends == pytest.approx(np.stack([table["min_mm"], table["max_mm"]], axis=1)[mine])
     implied = np.median(table["mean_mm"] - table["bias_mm"])
     assert f"True accuracy\n{implied:.3f} mm" in said(figure)
-
-
-def test_fig4_survives_missing_values_and_lines_that_end_at_the_same_height(tables):
-    table = tables["study_summary"]
-    table["mean_mm"][[0, 7]], table["min_mm"][3] = np.nan, np.nan
-    assert problems(fig4.draw(table)) == []
-    alike = {name: column[:6] for name, column in table.items()}
-    alike |= {"assessor": np.array([f"new_method_{i}" for i in range(6)]), "noise_mm": np.ones(6)}
-    assert problems(fig4.draw(alike | {"mean_mm": np.full(6, 0.9)})) == []
 
 
 def example(tables, rows=200, **columns):

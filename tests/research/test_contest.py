@@ -106,30 +106,3 @@ def test_an_assessor_that_claims_too_much_is_caught():
     found = verdict_of(graded(upper_mm=[1.2, 1.2, 1.2, 1.2, 0.9]))
     assert (found["rejected"], found["below"]) == (1, 1)
     assert found["worst_holds"] == pytest.approx(0.8)
-
-
-def test_a_bound_of_all_points_but_some_is_held_to_the_largest_of_these(field):
-    cell, plain = contest.Cell(field, 30, 0.05), contest.Setup()
-    everyone = contest.Contest(SMALL, 5, ("search_and_confirm",), paper.study())
-    rows = contest.campaigns(contest.Job(cell, 20, plain), range(3), everyone)
-    rows = rows[rows["target"] == "candidates"]
-    left = rows["excepted"].to_numpy()
-    assert left.min() > 0
-    size = np.sort(field.size_mm)[::-1]
-    assert rows["true_mm"].tolist() == [size[0]] * 3
-    assert rows["bounded_mm"].tolist() == size[left].tolist()
-    summed = one_cell(rows)
-    assert summed["upper_holds"] == np.mean(rows["upper_mm"] >= size[left])
-    assert summed["lower_holds"] == np.mean(rows["lower_mm"] <= size[0])
-    assert summed["excepted"] == left.mean()
-
-
-def test_lower_bounds_that_claim_too_much_are_caught_and_silence_is_not():
-    found = verdict_of(graded(lower_mm=[0.9, 0.9, 0.9, 0.9, 1.1]))
-    assert (found["rejected"], found["lower_rejected"]) == (0, 1)
-    assert found["lower_worst"] == pytest.approx(0.8)
-    silent = graded(upper_mm=[1.2, np.nan, np.nan, np.nan, 0.9], alarmed=[0, 1, 1, 1, 0])
-    found = verdict_of(silent, 1)
-    assert found["worst_holds"] == pytest.approx(1 / 2)
-    assert found["worst_begun"] == pytest.approx(4 / 5)
-    assert found["alarmed"] == pytest.approx(3 / 5)

@@ -64,11 +64,3 @@ def test_poses_beyond_the_fitted_range_are_counted_and_left_out():
     assert (found.solutions == 9).all()
     assert (found.extrapolating == 9).all()
     assert all(name.endswith("front-up-flip") for name in found.worst_branch)
-
-
-def test_no_error_where_the_models_agree():
-    same = two_models(vec.without_errors(TABLE_II, *RANGE, 2), TABLE_II)
-    cells = region.grid(SPACE, np.array([0.0]), 300.0)
-    found = maps.accuracy_map(ARM, same, cells, WANTED)
-    assert found.position_max_mm.max() < 1e-9
-    assert found.orientation_max_mrad.max() < 1e-6

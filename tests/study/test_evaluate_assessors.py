@@ -13,7 +13,6 @@ from kinacc.assess.maximum import Maximum
 from kinacc.assess.single_shot import SingleShot
 from kinacc.assess.statement import Statement
 from kinacc.errors import InputError
-from kinacc.figures import fig4
 from kinacc.study import monte_carlo
 from kinacc.study.evaluate_assessors import assess_worlds, evaluate_assessors
 
@@ -81,15 +80,6 @@ def test_honest_bounds_cover_and_bounds_shrunk_by_a_fifth_are_shown_to_fail():
     # One world for all: the same readings have the same largest.
     assert honest["mean_mm"] == pytest.approx(maximum["mean_mm"], rel=1e-9)
     assert honest["width_mm"] > shrunk["width_mm"] > 0.0
-
-
-def test_the_table_is_what_fig_4_draws():
-    paper_three = monte_carlo.assessors(paper.study(), all_readings=False)
-    table = evaluate_assessors(ERRORS, [*paper_three, LargestReading()], [0.1, 0.2], 40, 3, 1)
-    figure = fig4.draw({name: table[name].to_numpy() for name in table}, true_accuracy_mm=TRUE)
-    drawn = [text.get_text() for text in figure.axes[0].texts]
-    assert any("Largest" in each for each in drawn)
-    assert len(figure.axes[0].containers) == 4
 
 
 @pytest.mark.parametrize(

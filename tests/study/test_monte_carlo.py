@@ -85,17 +85,6 @@ def test_a_simulation_does_not_know_its_neighbours(rows):
     assert not np.array_equal(other["assessed_mm"], alone["assessed_mm"])
 
 
-@pytest.mark.parametrize("switch", ["outlier_rule", "distance", "covariance", "search"])
-def test_the_default_reading_follows_the_configuration(rows, switch):
-    values = sorted({value for value in rows[switch] if value is not None})
-    means = set()
-    for value in values:
-        study = default_reading(rows, paper.study(**{switch: value}))
-        assert study["noise_mm"].size == 2 * 4 * 3
-        means.add(float(study["assessed_mm"].mean()))
-    assert len(means) == len(values)
-
-
 @pytest.mark.parametrize(("points", "budget"), [(1, 1), (1, 30), (40, 1), (40, 15), (15, 40)])
 @pytest.mark.parametrize("order", ["sequence", "shuffled"])
 def test_any_number_of_points_and_any_budget(points, budget, order):

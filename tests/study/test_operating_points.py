@@ -29,12 +29,6 @@ def test_points_of_one_wrist_have_joint_5_on_one_side():
     assert side["noflip"] | side["flip"] == side["both"]
 
 
-def test_a_longer_set_begins_with_the_shorter_one():
-    short = operating_points.in_space(ARM, MODELS, WANTED, "sobol", 64)
-    long = operating_points.in_space(ARM, MODELS, WANTED, "sobol", 128)
-    assert np.abs(long[:64] - short).max() < 1e-9
-
-
 def test_points_in_joints_lie_in_the_box_and_in_the_cylinder():
     everything = ARM.q_min_rad, ARM.q_max_rad
     q = operating_points.in_joints(ARM, MODELS, everything, "sobol", 100, SPACE)

@@ -46,16 +46,6 @@ def test_backlash_follows_travel_and_closes_under_load():
     assert forth[1] < 0.5 * arm_of.beyond.backlash_rad[1]
 
 
-def test_ripple_turns_with_the_motor():
-    only = _only(physical_robot(0, Scales(0.0, 0.0, 1.0, 1.0)), "ripple_rad")
-    q_rad = np.full((1, 6), 0.3)
-    later = q_rad + 2.0 * np.pi / only.gear_ratio
-    first = physical.beyond_errors(only, TABLE_II, visits(q_rad))
-    assert np.allclose(first, physical.beyond_errors(only, TABLE_II, visits(later)), atol=1e-15)
-    between = physical.beyond_errors(only, TABLE_II, visits(q_rad + np.pi / only.gear_ratio))
-    assert np.abs(between - first)[0, :, 5].min() > 1e-6
-
-
 def test_smooth_errors_are_waves_over_the_working_range():
     smooth = physical_robot(0, Scales(1.0, 1.0, 0.0, 0.0)).smooth
     share = 0.3

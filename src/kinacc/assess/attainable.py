@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from kinacc.assess.limits import reading_below
 from kinacc.assess.statement import MEAN, MEASURED, REGION, Statement
 
 _NODES = 96  # of a quadrature, densest at its beginning
@@ -115,7 +116,7 @@ def mean_excess_mm(
     sizes, spread = sizes_mm[reaches > 0.0], spread[reaches > 0.0]  # others are never the largest
     gaps, weights = _quadrature(float(reaches.max()))
     shortest = _short_length((top + gaps)[:, None] / spread, error)
-    return float(weights @ (1.0 - _length_below(shortest, sizes / spread).prod(axis=1)))
+    return float(weights @ (1.0 - reading_below(shortest, sizes / spread).prod(axis=1)))
 
 
 def proven_excess_mm(
@@ -180,19 +181,6 @@ def _quadrature(end: float) -> tuple[np.ndarray, np.ndarray]:
     nodes, weights = _legendre()
     share = 0.5 * (nodes + 1.0)
     return end * share**3, end * 1.5 * share**2 * weights
-
-
-def _length_below(lengths: np.ndarray, sizes: np.ndarray) -> np.ndarray:
-    """Probability of a length of N(size, 1) in three dimensions: the noncentral chi function."""
-    from scipy.special import ndtr
-
-    near, mirrored = lengths - sizes, lengths + sizes
-    size = np.maximum(sizes, 1e-4)  # below, the limit for size 0 is met to 1e-8
-    # [phi(x - s) - phi(x + s)] / s, without cancellation where sizes are small.
-    density = np.exp(-0.5 * near * near) * -np.expm1(-2.0 * lengths * size)
-    return np.maximum(
-        ndtr(near) - ndtr(-mirrored) - density / (size * math.sqrt(2.0 * math.pi)), 0.0
-    )
 
 
 def _short_length(sizes: np.ndarray, error: float) -> np.ndarray:

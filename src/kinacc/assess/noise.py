@@ -97,14 +97,6 @@ def contrasts(ledger: Ledger, blocks: Sequence[int]) -> Contrasts:
     return Contrasts(np.array(rows, dtype=np.int64), np.array(places, dtype=np.int64), found)
 
 
-def planned_freedom(spare: int) -> int:
-    """Degrees of freedom that ``spare`` readings beyond the visit bring, whatever is decided.
-
-    A block has two readings or more, but for a few; so half of all others tell of the noise.
-    """
-    return 3 * max((spare - _SINGLES + 1) // 2, 0)
-
-
 def largest_factor(
     candidates: Candidates, rows: np.ndarray, readings_mm: np.ndarray, error: float
 ) -> float:
@@ -146,7 +138,10 @@ class NoisePlan:
 
 def noise_plan(settings: SearchAndConfirm, first: int) -> NoisePlan:
     """Of a campaign that visits ``first`` points."""
-    within = planned_freedom(max(settings.measurements - first - settings.references, 0))
+    # Sure to come whatever is decided: a block has two readings or more, but for a few; so half of
+    # all others tell of the noise.
+    spare = settings.measurements - first - settings.references
+    within = 3 * max((spare - _SINGLES + 1) // 2, 0)
     tested = settings.noise_freedom
     if settings.noise == KNOWN:
         return NoisePlan(margin=1.0 if within >= MOST else settings.noise_margin)
@@ -326,25 +321,20 @@ def scatter_alarm(
     many times that noise the bounds allow for; ``false``: the probability that noise as stated is
     ever called larger. Ratio of two likelihoods: noise 1.2 times as large as allowed for (1.5 times
     where it was tested) over noise as large. Where it is no larger the ratio's mean never exceeds
-    1, so it ever exceeds 1/p with a probability of p at most (Ville's inequality).
+    1, so it ever exceeds 1/p with a probability of p at most (Ville's inequality). With a noise
+    that was tested, both likelihoods are averaged over all sizes of it.
     """
-    ratios = larger_over_stated(found.squares / margin**2, tested)
+    total = np.cumsum(found.squares) / margin**2
+    freedom = 3.0 * np.arange(1, len(total) + 1)
+    if math.isinf(tested):
+        ratios = 0.5 * total * (1.0 - 1.0 / _LARGER**2) - freedom * math.log(_LARGER)
+    else:
+        nearer = np.log((tested + total) / (tested + total / _LARGER_THAN_TESTED**2))
+        ratios = 0.5 * (tested + freedom) * nearer - freedom * math.log(_LARGER_THAN_TESTED)
     if ratios.max(initial=-math.inf) < -math.log(false):
         return None
     ratio = math.sqrt(float(np.mean(found.squares)) / 3.0)
     return Reason("scatter", {"ratio": ratio, "freedom": found.freedom})
-
-
-def larger_over_stated(squares: np.ndarray, tested: float) -> np.ndarray:
-    """Logarithm of the ratio of :func:`scatter_alarm` after each of the squared contrasts (n,).
-
-    With a noise that was tested, both likelihoods are averaged over all sizes of it.
-    """
-    freedom, total = 3.0 * np.arange(1, len(squares) + 1), np.cumsum(squares)
-    if math.isinf(tested):
-        return 0.5 * total * (1.0 - 1.0 / _LARGER**2) - freedom * math.log(_LARGER)
-    nearer = np.log((tested + total) / (tested + total / _LARGER_THAN_TESTED**2))
-    return 0.5 * (tested + freedom) * nearer - freedom * math.log(_LARGER_THAN_TESTED)
 
 
 def tails_alarm(found: Contrasts) -> Reason | None:
