@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinacc.kinematics import dh
 from kinacc.kinematics.model import JointState
 from kinacc.kinematics.vec import VECModel
 
@@ -69,14 +68,14 @@ def linearise(
     vec_train = (vec_all * weights[:, None]).reshape(-1, size)
     gram = vec_train.T @ vec_train / noise_mm**2
     gram[np.diag_indices(size)] += prior_std**-2
-    dh_all = dh.parameter_jacobian(empty.dh, q_rad[train])[..., :4].reshape(-1, 6, 24)
+    dh_all = _dh_slopes(empty, q_rad[train]).reshape(-1, 6, 24)
     dh_train = (dh_all * weights[:, None]).reshape(-1, 24)
     # At rest between both directions: the mean of what each of them gives.
     one_way = np.ones(points_rad.shape)
     vec_points = (
         sum(empty.linearised(JointState(points_rad, s))[1] for s in (-one_way, one_way)) / 2
     )
-    dh_points = dh.parameter_jacobian(empty.dh, points_rad)[:, :3, :, :4]
+    dh_points = _dh_slopes(empty, points_rad)[:, :3]
     return Response(
         train=train,
         weights=weights,
@@ -87,6 +86,12 @@ def linearise(
         vec_points=vec_points[:, :3].reshape(-1, size),
         dh_points=dh_points.reshape(-1, 24),
     )
+
+
+def _dh_slopes(empty: VECModel, q_rad: np.ndarray) -> np.ndarray:
+    """Jacobian (n, 6, 6, 4) of the DH arm in theta, d, a and alpha."""
+    slopes = empty.dh.linearised(JointState(q_rad))[1]
+    return slopes.reshape(len(q_rad), 6, -1, 5)[..., :4]
 
 
 def answer(response: Response, errors: np.ndarray) -> Answer:

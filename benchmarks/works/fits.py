@@ -113,13 +113,11 @@ def _dh(smoke: bool) -> Callable[[], tuple[float, int]]:
 def _scipy(smoke: bool, analytic: bool) -> Callable[[], tuple[float, None]]:
     from scipy.optimize import least_squares
 
-    from kinacc.calibration import fitting
     from kinacc.calibration.frames import FrameParameters
     from kinacc.calibration.system import PoseSystem
 
     nominal, free, seen, frames = _full_poses(60 if smoke else 500)
-    flange = fitting.flange_model(nominal, free.ravel())
-    system = PoseSystem(seen, flange, FrameParameters.none(frames), WEIGHT)
+    system = PoseSystem(seen, nominal, free.ravel(), FrameParameters.none(frames), WEIGHT)
     start, scale = (
         nominal.start[free.ravel()],
         np.tile([1e-3, 1.0, 1.0, 1e-3, 1e-3], len(free))[free.ravel()],

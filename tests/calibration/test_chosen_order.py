@@ -64,9 +64,9 @@ def test_differences_of_evidence_are_those_of_the_marginal_likelihood():
     got = {}
     for prior in (Prior(0.2, 0.2e-3, 0.7, 1e-4), Prior(0.5, 0.5e-3, 1.0, 1e-4)):
         empty = vec.without_errors(ARM.dh, LOW, HIGH, 2)
-        _, flange = vec_fit.flange_model(seen, empty)
-        system = vec_fit.PoseSystem(seen, flange, FrameParameters.none(known()), WEIGHT)
-        rows = [*system.blocks(np.zeros(flange.size))]
+        free = vec_fit.informed(seen, empty)
+        system = vec_fit.PoseSystem(seen, empty, free, FrameParameters.none(known()), WEIGHT)
+        rows = [*system.blocks(np.zeros(free.sum()))]
         residual, jacobian = (np.concatenate(each) for each in zip(*rows, strict=True))
         order = np.tile(np.arange(3), 36)
         flat = jacobian[:, order == 0]

@@ -32,16 +32,16 @@ def system_of(name, kind, sessions=2, estimated=True, count=12):
     if not estimated:
         parameters = FrameParameters.none(anchor)
     if name == "dh":
-        model = fitting.flange_model(ARM.dh, np.ones(30, dtype=bool))
+        model, free = ARM.dh, np.ones(30, dtype=bool)
         at, unit = ARM.dh.start, np.tile([1e-2, 1.0, 1.0, 1e-2, 1e-2], 6)
     else:
-        empty = vec.without_errors(ARM.dh, ARM.q_min_rad, ARM.q_max_rad, 2)
-        free, model = vec_fit.flange_model(seen, empty)
-        at, unit = np.zeros(model.size), 10.0 * vec_fit.scales(empty)[free]
+        model = vec.without_errors(ARM.dh, ARM.q_min_rad, ARM.q_max_rad, 2)
+        free = vec_fit.informed(seen, model)
+        at, unit = np.zeros(free.sum()), 10.0 * fitting.scales(model)[free]
     turned = np.where(parameters.angle, 0.2, 10.0)
     x = np.concatenate([parameters.begin, at])
     x = x + np.concatenate([turned, unit]) * rng.normal(size=x.size)
-    return PoseSystem(seen, model, parameters, WEIGHT), x
+    return PoseSystem(seen, model, free, parameters, WEIGHT), x
 
 
 @pytest.mark.parametrize("name", ["dh", "vec"])
@@ -78,7 +78,7 @@ def test_residual_is_model_minus_measurement_in_the_robot_base():
     system, x = system_of("dh", simulated.POSE, sessions=1)
     frames = system.frames.frames(x[: system.frames.size])
     seen = system.observations
-    flange = system.model.pose(x[system.frames.size :], seen.at)
+    flange = system.model.with_parameters(x[system.frames.size :]).pose(seen.at)
     model, measured = compose(flange, frames.tool), compose(invert(frames.base), seen.measured)
     wanted = []
     for row in range(len(seen)):

@@ -87,9 +87,7 @@ class ComplianceEstimator(Estimator):
         """Number of free parameters."""
         return self.dh.size + int(np.isfinite(self.stiff.coefficients).sum())
 
-    def fit(
-        self, observations: Observations, others: Mapping[str, Fit], near: Fit | None = None
-    ) -> ModelFit:
+    def fit(self, observations: Observations, others: Mapping[str, Fit]) -> ModelFit:
         """The bent arm closest to the measurements, whatever the DH model follows."""
         arm = self.dh.arm
         nominal = replace(self.stiff, dh=arm.nominal)

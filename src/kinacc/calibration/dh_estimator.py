@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar, Self
 
 import numpy as np
@@ -77,9 +77,7 @@ class DHEstimator(Estimator):
         """Numbers that a fit needs beside those for base and targets: of few, priors make up."""
         return self.size if self.follows_vec else 0
 
-    def fit(
-        self, observations: Observations, others: Mapping[str, Fit], near: Fit | None = None
-    ) -> ModelFit:
+    def fit(self, observations: Observations, others: Mapping[str, Fit]) -> ModelFit:
         """The DH model; base and targets are those of the VEC model where it follows that."""
         frames, terms = self.common.frames(observations)
         followed = others["vec"] if self.follows_vec else None
@@ -112,7 +110,7 @@ class DHEstimator(Estimator):
             frame_terms=terms,
             loss=self.loss,
         )
-        return fitted.with_frames(followed.frames) if followed else fitted
+        return replace(fitted, frames=followed.frames) if followed else fitted
 
     def tables(
         self, fitted: ModelFit, known: Uncertainty, observations: Observations

@@ -15,12 +15,12 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from kinacc.calibration.fitting import distinct, once
+from kinacc.calibration.fitting import distinct, once, scales
 from kinacc.calibration.frames import FrameParameters
 from kinacc.calibration.observations import Observations
 from kinacc.calibration.one_thread import one_thread
 from kinacc.calibration.system import PoseSystem
-from kinacc.calibration.vec_fit import Prior, flange_model, scales
+from kinacc.calibration.vec_fit import Prior, informed
 from kinacc.kinematics import vec
 from kinacc.kinematics.vec import VECModel
 
@@ -144,14 +144,14 @@ class _Linear:
 
     def _system(self, order: int) -> tuple[PoseSystem, np.ndarray, int]:
         empty = vec.without_errors(self.empty.dh, self.empty.q_min_rad, self.empty.q_max_rad, order)
-        free, flange = flange_model(self.observations, empty)
-        system = PoseSystem(self.observations, flange, self.parameters, self.weight, self.root)
+        free = informed(self.observations, empty)
+        system = PoseSystem(self.observations, empty, free, self.parameters, self.weight, self.root)
         scale = np.concatenate([self.parameters.scale, scales(empty)[free], [1.0]])
         scale[: self.parameters.size] *= self.parameters.free
         return system, scale, len(scale) - 1 - self.motions * order
 
     def _start(self, system: PoseSystem) -> np.ndarray:
-        return np.concatenate([self.parameters.begin, np.zeros(system.model.size)])
+        return np.concatenate([self.parameters.begin, np.zeros(system.free.sum())])
 
     def _misfit(self, system: PoseSystem, step: np.ndarray) -> np.ndarray:
         """Squared position errors (n,) of a step, by the linear model, rows unweighted."""

@@ -19,10 +19,10 @@ from kinacc.calibration.observations import Observations
 from kinacc.calibration.one_thread import one_thread
 from kinacc.calibration.robust import Weights
 from kinacc.calibration.solve import TOUCH_SQUARED, Solution, Task, minimise_robust
-from kinacc.calibration.system import FlangeModel, PoseSystem, require_enough
+from kinacc.calibration.system import PoseSystem, require_enough
 from kinacc.calibration.uncertainty import scale_of
 from kinacc.geometry import Pose
-from kinacc.kinematics.model import ErrorModel, JointState
+from kinacc.kinematics.model import ErrorModel
 from kinacc.measurements.folds import configurations
 
 # Of the best-seen motion of base and targets. Axes tilted by a mrad, as those of every arm are,
@@ -32,10 +32,8 @@ FRAME_PRIOR_UNITS = 10.0  # mm and mrad about the starting frames, where priors 
 _PART = 0.1  # of a unit motion that a target must have to be what is held
 _SAME = 6  # digits to which parts are equal
 MORE_POSES = "measure more poses"
-SURPLUS, LEAST_NOISE_MM = (
-    2,
-    0.03,
-)  # with fewer residuals a parameter, noise is taken as this at least
+# With fewer residuals a parameter than the first, noise is at least the second.
+SURPLUS, LEAST_NOISE_MM = 2, 0.03
 
 
 @dataclass(frozen=True)
@@ -55,68 +53,6 @@ class ModelFit:
     solution: Solution
     parameters: FrameParameters
     weights: Weights | None = None
-
-    def with_frames(self, frames: Frames) -> ModelFit:
-        """The same arm seen through other frames."""
-        return replace(self, frames=frames)
-
-
-@dataclass(frozen=True)
-class Unknowns:
-    """Free parameters (P,) of a model: how they move it, where they start, and what is known.
-
-    ``nominal``: where they stay without data and what priors expect; ``prior_std``: inf for none;
-    ``scale``: displacements that count as much as one mm. ``name`` is that of the fit.
-    ``held``: priors hold every parameter, no direction is truncated; ``few``: of fewer residuals
-    than parameters, too.
-    """
-
-    name: str
-    flange: FlangeModel
-    start: np.ndarray
-    nominal: np.ndarray
-    prior_std: np.ndarray
-    scale: np.ndarray
-    held: bool = False
-    few: bool = False
-    fix: str = MORE_POSES
-
-
-@one_thread
-def solved(
-    observations: Observations,
-    unknowns: Unknowns,
-    parameters: FrameParameters,
-    *,
-    rotation_weight_mm_per_rad: float,
-    threshold: float = 0.0,
-    loss: str = robust.SQUARES,
-) -> tuple[Frames, Solution, Weights | None]:
-    """Base, targets and ``unknowns`` closest to ``observations``.
-
-    Raises FitError, and InputError where there are fewer residuals than parameters.
-    """
-    flange, frames = unknowns.flange, parameters
-    own = 0 if unknowns.few else flange.size
-    few = unknowns.few and observations.components < SURPLUS * (frames.size + flange.size)
-    require_enough(observations, frames.size + own, unknowns.name, unknowns.fix)
-    frame_std = frames.std
-    system = PoseSystem(observations, flange, frames, rotation_weight_mm_per_rad)
-    if unknowns.held:
-        system = system.weighted(once(observations))
-        frame_std = np.where(np.isfinite(frame_std), frame_std, FRAME_PRIOR_UNITS * frames.scale)
-    task = Task(
-        unknowns.name,
-        system,
-        np.concatenate([frames.begin, unknowns.start]),
-        np.concatenate([frames.mean, unknowns.nominal]),
-        np.concatenate([frame_std, unknowns.prior_std]),
-        np.concatenate([frames.scale, unknowns.scale]),
-        None if unknowns.held else threshold,
-        LEAST_NOISE_MM**2 if few else 1e-8,
-    )
-    solution, weights = minimise_robust(task, loss)
-    return frames.frames(solution.x[: frames.size]), solution, weights
 
 
 def once(observations: Observations) -> np.ndarray:
@@ -148,43 +84,54 @@ def fit(
     *,
     free: np.ndarray,
     rotation_weight_mm_per_rad: float,
-    threshold: float,
+    threshold: float = 0.0,
     frames: Frames | None = None,
-    start: ErrorModel | None = None,
+    begin: Frames | None = None,
+    frame_terms: FrameTerms | None = None,
     std: np.ndarray | None = None,
     scale: np.ndarray | None = None,
-    frame_terms: FrameTerms | None = None,
     loss: str = robust.SQUARES,
     held: bool = False,
+    few: bool | None = None,
     name: str = "DH fit",
+    fix: str = MORE_POSES,
 ) -> ModelFit:
-    """Model of the ``free`` (P,) or (k, 5) parameters closest to ``observations``.
+    """Fit the free parameters of a model, and base and targets, to observations.
 
     Parameters
     ----------
-    observations
+    observations : Observations
         Measured points and poses.
-    nominal
-        Where parameters stay without data, and what priors expect; ``start``: where a fit begins,
-        if elsewhere.
-    free
-        True for parameters that are estimated.
-    rotation_weight_mm_per_rad
+    nominal : ErrorModel
+        The arm with P parameters where a fit starts, where parameters stay without data, and what
+        priors expect.
+    free : numpy.ndarray
+        True for parameters that are estimated, shape (P,) or (k, 5).
+    rotation_weight_mm_per_rad : float
         Position error that weighs as much as one radian.
-    threshold
+    threshold : float
         Directions of singular value below this share of the largest stay nominal, where no prior
-        speaks of them.
-    frames
-        Base and targets where they are known. None: both are estimated, from a closed form and
-        under ``frame_terms``.
-    std
+        holds them.
+    frames : Frames, optional
+        Base and targets where they are known. Else both are estimated under ``frame_terms``, from
+        ``begin`` or a closed form.
+    std : numpy.ndarray, optional
         Standard deviations of priors, of the shape of ``free`` in mm and rad, inf for none.
-    scale
-        Displacements (P,) that count as one mm; by the units of the parameters where not given.
-    loss
-        See ``robust``.
-    held
+    scale : numpy.ndarray, optional
+        Displacements that count as one mm, shape (P,); by the names of the parameters if not given.
+    loss : str
+        One of ``robust``: squares, huber, tukey.
+    held : bool
         Priors hold every parameter and no direction is truncated.
+    few : bool, optional
+        Fewer residuals than parameters are enough; as ``held`` if not given.
+    name, fix : str
+        The fit, and what to do where there is too little data, in messages.
+
+    Returns
+    -------
+    ModelFit
+        The model, its frames, and the figures of the fit.
 
     Raises
     ------
@@ -193,62 +140,50 @@ def fit(
     InputError
         There are fewer residuals than parameters.
     """
-    begin = start or nominal
-    mask, fixed = free.ravel(), nominal.start
-    if scale is None:
-        scale = np.array([scale_of(each) for each in nominal.names])
+    weight, mask = rotation_weight_mm_per_rad, free.ravel()
     std = np.full(free.shape, np.inf) if std is None else np.where(free, std, np.inf)
-    unknowns = Unknowns(
+    scale = scales(nominal) if scale is None else scale
+    few, size = held if few is None else few, int(mask.sum())
+    require_enough(observations, 0 if few else size, name, fix)
+    parameters = (
+        FrameParameters.none(frames)
+        if frames is not None
+        else placed(observations, nominal, frame_terms, weight, begin)
+    )
+    place = parameters.size
+    require_enough(observations, place + (0 if few else size), name, fix)
+    system = PoseSystem(observations, nominal, mask, parameters, weight)
+    frame_std, least_variance = parameters.std, 1e-8
+    if held:
+        system = system.weighted(once(observations))
+        loose = FRAME_PRIOR_UNITS * parameters.scale
+        frame_std = np.where(np.isfinite(frame_std), frame_std, loose)
+        if few and observations.components < SURPLUS * system.size:
+            least_variance = LEAST_NOISE_MM**2
+    task = Task(
         name,
-        flange_model(nominal, mask),
-        begin.start[mask],
-        fixed[mask],
-        std.ravel()[mask],
-        scale[mask],
-        held,
-        held,
+        system,
+        np.concatenate([parameters.begin, nominal.start[mask]]),
+        np.concatenate([parameters.mean, nominal.start[mask]]),
+        np.concatenate([frame_std, std.ravel()[mask]]),
+        np.concatenate([parameters.scale, scale[mask]]),
+        None if held else threshold,
+        least_variance,
     )
-    require_enough(observations, 0 if held else unknowns.flange.size, name, MORE_POSES)
-    if frames is None:
-        parameters = placed(observations, begin, frame_terms, rotation_weight_mm_per_rad, nominal)
-    else:
-        parameters = FrameParameters.none(frames)
-    found, solution, weights = solved(
-        observations,
-        unknowns,
-        parameters,
-        rotation_weight_mm_per_rad=rotation_weight_mm_per_rad,
-        threshold=threshold,
-        loss=loss,
-    )
-    vector, deviation = fixed.copy(), np.full(fixed.size, np.nan)
-    vector[mask] = solution.x[parameters.size :]
-    deviation[mask] = solution.std[parameters.size :]
+    solution, weights = minimise_robust(task, loss)
+    vector, deviation = nominal.start.copy(), np.full(mask.size, np.nan)
+    vector[mask], deviation[mask] = solution.x[place:], solution.std[place:]
     return ModelFit(
-        nominal.with_parameters(vector), found, deviation.reshape(free.shape), free, std, solution,
-        parameters, weights,
+        nominal.with_parameters(vector), parameters.frames(solution.x[:place]),
+        deviation.reshape(free.shape), free, std, solution, parameters, weights,
     )  # fmt: skip
 
 
-def flange_model(nominal: ErrorModel, free: np.ndarray) -> FlangeModel:
-    """The arm as a function of its ``free`` (P,) parameters, the others nominal."""
-    fixed = nominal.start
-
-    def model(x: np.ndarray) -> ErrorModel:
-        vector = fixed.copy()
-        vector[free] = x
-        return nominal.with_parameters(vector)
-
-    chosen = np.flatnonzero(free)
-
-    def linearised(x: np.ndarray, at: JointState) -> tuple[Pose, np.ndarray]:
-        pose, jacobian = model(x).linearised(at)
-        return pose, jacobian.transpose(2, 1, 0)[chosen]
-
-    return FlangeModel(int(free.sum()), lambda x, at: model(x).pose(at), linearised)
+def scales(model: ErrorModel) -> np.ndarray:
+    """Displacements (P,) of the parameters of a model that count as one mm."""
+    return np.array([scale_of(name) for name in model.names])
 
 
-@one_thread
 def fit_frames(
     observations: Observations,
     model: ErrorModel,
@@ -256,13 +191,15 @@ def fit_frames(
     rotation_weight_mm_per_rad: float,
     frame_terms: FrameTerms | None = None,
 ) -> Frames:
-    """Base and targets of ``observations``, the arm held at ``model``. Raises FitError."""
-    nothing, held = np.zeros(0), FlangeModel(0, lambda x, at: model.pose(at))
-    unknowns = Unknowns("fit of base and tool", held, *[nothing] * 4)
-    parameters = placed(observations, model, frame_terms, rotation_weight_mm_per_rad)
-    return solved(
-        observations, unknowns, parameters, rotation_weight_mm_per_rad=rotation_weight_mm_per_rad
-    )[0]
+    """Fit base and targets of ``observations``, the arm held at ``model``. Raises FitError."""
+    return fit(
+        observations,
+        model,
+        free=np.zeros(len(model.start), dtype=bool),
+        rotation_weight_mm_per_rad=rotation_weight_mm_per_rad,
+        frame_terms=frame_terms,
+        name="fit of base and tool",
+    ).frames
 
 
 def placed(
@@ -270,15 +207,14 @@ def placed(
     arm: ErrorModel,
     terms: FrameTerms | None,
     rotation_weight_mm_per_rad: float,
-    described: ErrorModel | None = None,
     start: Frames | None = None,
 ) -> FrameParameters:
     """Parameters of base and targets under ``terms``, from ``start`` or a closed form for ``arm``.
 
-    Motions that poses of the arm as ``described`` (``arm`` where not given) show less than
-    ``SHOWN`` of the best-seen one, and no prior speaks of, are held: as many places of targets as
-    there are such motions stay where they are stated, and the others follow; where no target takes
-    part, the base stays. So all models of the same poses hold the same.
+    Motions that poses of the arm show less than ``SHOWN`` of the best-seen one, and no prior holds,
+    are held: as many places of targets as there are such motions stay where they are stated, and
+    the others follow; where no target takes part, the base stays. So all models of the same poses
+    hold the same.
     """
     if start is None:
         start = closed_form_start(observations, arm.pose(observations.at))
@@ -286,10 +222,9 @@ def placed(
             measured = orientations_measured(observations)[:, None, None]
             turned = np.where(measured, start.targets.rotation, terms.stated.targets.rotation)
             start = replace(start, targets=Pose(turned, start.targets.position_mm))
-    described = described or arm
     found = FrameParameters.of(observations, start, terms)
-    nothing = FlangeModel(0, lambda x, at: described.pose(at))
-    system = PoseSystem(observations, nothing, found, rotation_weight_mm_per_rad)
+    still = np.zeros(len(arm.start), dtype=bool)
+    system = PoseSystem(observations, arm, still, found, rotation_weight_mm_per_rad)
     keep = np.flatnonzero(found.free)
     gram = system.normal(found.begin)[0, :-1, :-1] * np.outer(found.scale, found.scale)
     values, vectors = np.linalg.eigh(gram[np.ix_(keep, keep)])

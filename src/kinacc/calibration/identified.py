@@ -7,7 +7,7 @@ from itertools import compress
 
 import numpy as np
 
-from kinacc.calibration.fitting import ModelFit, flange_model
+from kinacc.calibration.fitting import ModelFit
 from kinacc.calibration.identifiability import (
     FIXED,
     IDENTIFIED,
@@ -85,8 +85,7 @@ def unseen_anywhere(fit: ModelFit, observations: Observations, threshold: float)
     cannot be seen is null to rounding.
     """
     seen = _everywhere(fit, observations)
-    flange = flange_model(fit.model, fit.free.ravel())
-    system = PoseSystem(seen, flange, fit.parameters, UNSEEN_WEIGHT)
+    system = PoseSystem(seen, fit.model, fit.free.ravel(), fit.parameters, UNSEEN_WEIGHT)
     return undetermined(system, fit.solution.x, fit.solution.scale, threshold)
 
 

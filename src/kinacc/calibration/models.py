@@ -115,13 +115,8 @@ class Estimator:
         """The estimator with what such tables chose without seeing ``fold`` (None: all seen)."""
         return self
 
-    def fit(
-        self, observations: Observations, others: Mapping[str, Fit], near: Fit | None = None
-    ) -> ModelFit:
-        """The model of ``observations``; ``others`` are fitted already. Raises FitError.
-
-        ``near``: a fit like this one to nearly the same observations, which may save steps.
-        """
+    def fit(self, observations: Observations, others: Mapping[str, Fit]) -> ModelFit:
+        """The model of ``observations``; ``others`` are fitted already. Raises FitError."""
         raise NotImplementedError
 
     def tables(self, fitted: Any, known: Uncertainty, observations: Observations) -> dict:
@@ -140,7 +135,6 @@ def estimators(calibration: Mapping, arm: Robot, every: Observations) -> dict[st
 def fit_all(
     observations: Observations,
     estimators: Iterable[Estimator],
-    near: Mapping[str, Fit] | None = None,
 ) -> dict[str, Fit]:
     """Models by kind, and the nominal one, fitted to ``observations``; see ``Estimator.fit``."""
     fits: dict[str, Fit] = {}
@@ -149,7 +143,7 @@ def fit_all(
         if not nominal:
             arm, frames = each.common.nominal, nominal_frames(observations, each.common)
             nominal[NOMINAL] = Fit(arm, frames)
-        fitted = each.fit(observations, fits | nominal, near[each.kind] if near else None)
+        fitted = each.fit(observations, fits | nominal)
         fits[each.kind] = Fit(fitted.model, fitted.frames)
     return fits | nominal
 

@@ -57,9 +57,7 @@ class OwnEstimator(Estimator):
         """Number of free parameters."""
         return len(self.model(self.common.nominal).start)
 
-    def fit(
-        self, observations: Observations, others: Mapping[str, Fit], near: Fit | None = None
-    ) -> ModelFit:
+    def fit(self, observations: Observations, others: Mapping[str, Fit]) -> ModelFit:
         """The model closest to the measurements."""
         nominal = self.model(self.common.nominal)
         frames, terms = self.common.frames(observations)

@@ -37,7 +37,7 @@ def run(inputs: Mapping, settings: Mapping, progress=None) -> dict[str, Columns]
         if np.array_equal(every.fold != fold, train):
             return delivered
         own = [each.chosen(inputs, fold) for each in fitted_by.values()]
-        return fit_all(observations, own, delivered)
+        return fit_all(observations, own)
 
     folds = [int(fold) for fold in np.unique(every.fold) if fold >= 0]
     counted = progress(folds, "shares of the poses held out") if progress else folds

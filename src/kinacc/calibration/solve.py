@@ -37,7 +37,6 @@ TOUCH_SQUARED = 1e-4  # a parameter is undetermined if a truncated direction hol
 MOVES_SQUARED = 0.25  # what moves a known frame by half as much as itself is known too
 MAX_PASSES = 100
 SETTLED = 1e-4  # mm and mrad by which a pass of a robust loss may still move a parameter
-_PANEL, _ROWS = 16, 384  # columns and rows reduced at once
 SCALE_PASSES = 20  # after these the scale of a loss is held, so that no cycle can form
 
 
@@ -116,7 +115,7 @@ class Task:
     def active(self) -> np.ndarray:
         """True (P,) for parameters that are estimated."""
         free = self.system.frames.free
-        return np.append(free, np.ones(self.system.model.size, dtype=bool))
+        return np.append(free, np.ones(self.system.free.sum(), dtype=bool))
 
 
 def minimise(task: Task) -> Solution:
@@ -453,17 +452,14 @@ def singular_values(
     digits below 1e-7 of the largest, unlike through the normal equations.
     """
     active = np.ones(system.size, dtype=bool) if active is None else active
-    size = int(active.sum())
-    factor = np.zeros((size, size), order="F")
-    for _, jacobian in system.blocks(x):
-        rows = (jacobian * scale)[:, active]
-        for begin in range(0, len(rows), _ROWS):  # few at a time stay in the cache
-            some = np.array(rows[begin : begin + _ROWS], order="F")
-            factor = scipy.linalg.lapack.dtpqrt(
-                0, min(_PANEL, size), factor, some, overwrite_a=1, overwrite_b=1
-            )[0]
+    factor = np.zeros((0, int(active.sum())))
+    for columns, _ in system.columns(x):
+        rows = columns.reshape(len(columns), -1)[:-1][active] * scale[active, None]
+        factor = np.concatenate([factor.T, rows], axis=1).T  # by columns, as LAPACK wants them
+        (factor,) = scipy.linalg.qr(factor, mode="r", overwrite_a=True, check_finite=False)
+        factor = factor[: factor.shape[1]]
     frames = int(active[: system.frames.size].sum())
-    return np.linalg.svd(np.triu(factor)[frames:, frames:], compute_uv=False)
+    return np.linalg.svd(factor[frames:, frames:], compute_uv=False)
 
 
 def undetermined(

@@ -98,9 +98,7 @@ class VECEstimator(Estimator):
             prior = evidence.prior_of(std_mm, decay, self.prior.offset_rad)
         return replace(self, order=order, prior=prior)
 
-    def fit(
-        self, observations: Observations, others: Mapping[str, Fit], near: Fit | None = None
-    ) -> ModelFit:
+    def fit(self, observations: Observations, others: Mapping[str, Fit]) -> ModelFit:
         """The VEC model on the nominal arm, base and targets starting where that has them."""
         frames, terms = self._begin(observations, others)
         return vec_fit.fit(

@@ -15,7 +15,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy import ndarray
 
-from kinacc.calibration.fitting import flange_model
 from kinacc.calibration.frames import FrameParameters, Frames
 from kinacc.calibration.hand_eye import base_from_targets, closed_form_start
 from kinacc.calibration.system import PoseSystem
@@ -233,7 +232,7 @@ class Linear:
         named = replace(observed, target_names=tuple(map(str, range(len(observed.target_names)))))
         frames = FrameParameters.of(named, arm.frames, None)
         free = np.full(nominal.start.size, strength > 0.0)
-        system = PoseSystem(named, flange_model(nominal, free), frames, 1.0)
+        system = PoseSystem(named, nominal, free, frames, 1.0)
         there = np.repeat([np.ones(len(observed), bool), observed.has_rotation], 3, axis=0).T
         design, residual = np.zeros((len(observed), 6, system.size)), np.zeros((len(observed), 6))
         blocks = [*system.blocks(np.concatenate([frames.begin, arm.model.start[free]]))]

@@ -121,24 +121,6 @@ class ComplianceModel(ErrorModel):
             moments[:, joint, 1] = self.gravity @ _chain.cross(axis, walk.end.p_mm - origin)
         return moments
 
-    def joint_jacobian(self, at: JointState) -> np.ndarray:
-        """Jacobian (n, 6, k) of ``pose`` in the joints."""
-        moving = np.arange(self.joints), np.where(self.dh.prismatic, 1, 0)  # theta, or d
-        by_joint = self._give_slopes(at)[:, :, *moving]
-        bent = _dh.joint_jacobian(self.dh, at.q_rad + self._give(self.moments(at)))
-        return bent + bent @ by_joint
-
-    def linearised(self, at: JointState) -> tuple[Pose, np.ndarray]:
-        """Poses (n, ...) and their Jacobian (n, 6, P) in the parameters."""
-        moments = self.moments(at)
-        q_rad = at.q_rad + self._give(moments)
-        bent = _dh.joint_jacobian(self.dh, q_rad)
-        pose, of_dh = self.dh.linearised(JointState(q_rad))
-        of_dh = of_dh + bent @ self._give_slopes(at).reshape(len(at), self.joints, -1)
-        joint, kind = np.nonzero(np.isfinite(self.coefficients))
-        own = bent[:, :, joint] * moments[:, None, joint, kind]
-        return pose, np.concatenate([of_dh, own], axis=2)
-
     def to_columns(self, std: np.ndarray) -> dict[str, np.ndarray]:
         """The table ``compliance_model``: ``std`` (P,), NaN where undetermined."""
         split = len(self.dh.names)
@@ -174,21 +156,6 @@ class ComplianceModel(ErrorModel):
     def _give(self, moments: np.ndarray) -> np.ndarray:
         """Angles (n, k) by which joints give way under moments (n, k, 2)."""
         return np.sum(moments * np.nan_to_num(self.coefficients), axis=2)
-
-    def _give_slopes(self, at: JointState) -> np.ndarray:
-        """Derivatives (n, k, k, 5) of the angles by which joints give way, in the DH parameters.
-
-        By central differences: a milliradian of give makes what these lose smaller than rounding.
-        """
-        start, slopes = self.dh.start, []
-        for shift in np.diag(np.where(np.array(self.dh.units) == "rad", 1e-5, 1e-2)):
-            ends = [
-                replace(self, dh=self.dh.with_parameters(start + way * shift))
-                for way in (1.0, -1.0)
-            ]
-            ahead, behind = (model._give(model.moments(at)) for model in ends)
-            slopes.append((ahead - behind) / (2.0 * shift.max()))
-        return np.stack(slopes, axis=2).reshape(len(at), self.joints, self.joints, -1)
 
 
 def _place(frames: _chain.Columns, centre: np.ndarray) -> np.ndarray:

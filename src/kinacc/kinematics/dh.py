@@ -103,10 +103,11 @@ class DHModel(ErrorModel):
         """Jacobian (n, 6, k) of ``pose`` in the joints."""
         return joint_jacobian(self, at.q_rad)
 
-    def linearised(self, at: JointState) -> tuple[Pose, np.ndarray]:
-        """Poses (n, ...) and their Jacobian (n, 6, 5k) in the parameters."""
-        pose, jacobian = pose_and_parameter_jacobian(self, at.q_rad)
-        return pose, jacobian.reshape(len(at), 6, -1)
+    def motions(self, at: JointState) -> tuple[Pose, np.ndarray, np.ndarray, None]:
+        """Motions (5k, 6, n) of the flange by the parameters, exact."""
+        walk = _chain.Walk(self, at.q_rad)
+        moved = walk.by_parameters().reshape(5 * self.joints, 6, -1)
+        return walk.pose, moved, np.arange(5 * self.joints), None
 
     def to_columns(self, std: np.ndarray) -> dict[str, np.ndarray]:
         """The table ``dh_model``: parameters and their ``std`` (5k,), NaN where undetermined."""
@@ -152,34 +153,8 @@ def joint_jacobian(model: DHModel, q_rad: np.ndarray) -> np.ndarray:
     Columns of prismatic joints are per mm.
     """
     q_rad = np.atleast_2d(np.asarray(q_rad, dtype=float))
-    if len(q_rad) > _BLOCK:
-        return np.concatenate([joint_jacobian(model, part) for part in _blocks(q_rad)])
     walk = _chain.Walk(model, q_rad)
     moved = np.empty((model.joints, 6, len(q_rad)))
     for joint, into in enumerate(moved):
         walk.by_joint(joint, into)
     return np.ascontiguousarray(moved.transpose(2, 1, 0))
-
-
-def parameter_jacobian(model: DHModel, q_rad: np.ndarray) -> np.ndarray:
-    """Jacobian (n, 6, k, 5) of the flange pose in the parameters, ordered as ``PARAMETERS``.
-
-    Rows as in ``joint_jacobian``; columns per rad for angles and per mm for lengths.
-    """
-    return pose_and_parameter_jacobian(model, q_rad)[1]
-
-
-def pose_and_parameter_jacobian(model: DHModel, q_rad: np.ndarray) -> tuple[Pose, np.ndarray]:
-    """``forward`` and ``parameter_jacobian`` in one pass."""
-    q_rad = np.atleast_2d(np.asarray(q_rad, dtype=float))
-    if len(q_rad) > _BLOCK:
-        parts = [pose_and_parameter_jacobian(model, part) for part in _blocks(q_rad)]
-        poses, jacobians = zip(*parts, strict=True)
-        pose = Pose(*(np.concatenate(each) for each in zip(*poses, strict=True)))
-        return pose, np.concatenate(jacobians)
-    walk = _chain.Walk(model, q_rad)
-    return walk.pose, np.ascontiguousarray(walk.by_parameters().transpose(3, 2, 0, 1))
-
-
-def _blocks(q_rad: np.ndarray) -> list[np.ndarray]:
-    return [q_rad[begin : begin + _BLOCK] for begin in range(0, len(q_rad), _BLOCK)]

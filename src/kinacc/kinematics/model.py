@@ -92,11 +92,29 @@ class ErrorModel:
         """Poses (n, ...)."""
         raise NotImplementedError
 
+    def motions(self, at: JointState) -> tuple[Pose, np.ndarray, np.ndarray, np.ndarray | None]:
+        """Poses (n, ...) and how the parameters move the flange.
+
+        Returns
+        -------
+        pose : Pose
+            Poses (n, ...).
+        motions : numpy.ndarray
+            E motions, shape (E, 6, n): mm and rad per unit, robot base.
+        of : numpy.ndarray
+            Which motion each parameter makes, shape (P,).
+        factors : numpy.ndarray or None
+            How much of it, shape (P, n); None: one.
+        """
+        step = np.array([_STEPS.get(unit, _COEFFICIENT_STEP) for unit in self.units])
+        moved = _differences(lambda x: self.with_parameters(x).pose(at), self.start, step)
+        return self.pose(at), moved.transpose(2, 1, 0), np.arange(step.size), None
+
     def linearised(self, at: JointState) -> tuple[Pose, np.ndarray]:
         """Poses (n, ...) and their Jacobian (n, 6, P) in the parameters."""
-        poses = self.pose(at)
-        step = np.array([_STEPS.get(unit, _COEFFICIENT_STEP) for unit in self.units])
-        return poses, _differences(lambda x: self.with_parameters(x).pose(at), self.start, step)
+        pose, motions, of, factors = self.motions(at)
+        slopes = motions[of] if factors is None else motions[of] * factors[:, None]
+        return pose, np.ascontiguousarray(slopes.transpose(2, 1, 0))
 
     def joint_jacobian(self, at: JointState) -> np.ndarray:
         """Jacobian (n, 6, k) of ``pose`` in the joints."""

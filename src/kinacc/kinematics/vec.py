@@ -102,18 +102,21 @@ class VECModel(ErrorModel):
             into += np.einsum("ern,ne->rn", by_errors, slopes[:, joint])
         return np.ascontiguousarray(moved.transpose(2, 1, 0))
 
-    def linearised(self, at: JointState) -> tuple[Pose, np.ndarray]:
-        """Poses (n, ...) and their Jacobian (n, 6, P) in the coefficients. Exact."""
-        moving, count, cut = walk(self, at.q_rad, at.s), len(at), self.coefficients.size
-        jacobian = np.zeros((count, 6, cut + self.direction_offsets_rad.size))
-        expanded = jacobian[:, :, :cut].reshape(count, 6, *self.coefficients.shape)
-        elementary = moving.by_errors().transpose(3, 2, 0, 1)
-        basis = chebyshev_basis(self, at.q_rad)
-        np.multiply(elementary[..., None], basis[:, None, :, None, :], out=expanded)
-        if at.s is not None:
-            offsets = jacobian[:, :, cut:].reshape(count, 6, self.joints, 2)
-            np.multiply(elementary[..., 5, None], direction_basis(at.s)[:, None], out=offsets)
-        return moving.pose, jacobian
+    def motions(self, at: JointState) -> tuple[Pose, np.ndarray, np.ndarray, np.ndarray]:
+        """The joints' errors (6k, 6, n), spread over their Chebyshev polynomials. Exact."""
+        moving, (joints, count, terms) = walk(self, at.q_rad, at.s), self.coefficients.shape
+        s = np.zeros(at.q_rad.shape) if at.s is None else at.s
+        basis = chebyshev_basis(self, at.q_rad).transpose(1, 2, 0)
+        basis = np.repeat(basis, count, axis=0).reshape(-1, len(at))
+        travelled = direction_basis(s).transpose(1, 2, 0).reshape(-1, len(at))
+        about_z = count * np.arange(joints) + ERRORS.index("eps_z")
+        of = np.append(np.repeat(np.arange(joints * count), terms), np.repeat(about_z, 2))
+        return (
+            moving.pose,
+            moving.by_errors().reshape(joints * count, 6, -1),
+            of,
+            np.append(basis, travelled, axis=0),
+        )
 
     def to_columns(self, std: np.ndarray) -> dict[str, np.ndarray]:
         """The table ``vec_model``: coefficients of both directions, then offsets that have a std.

@@ -17,6 +17,7 @@ from kinacc.config.error_models import MEASURED, PLAINEST, Comparison, model_nam
 from kinacc.errors import InputError, Problem
 from kinacc.kinematics import dh
 from kinacc.kinematics import robot as robots
+from kinacc.kinematics.model import JointState
 from kinacc.study.operating_points import readings_of
 from kinacc.synthetic import plan
 from kinacc.synthetic.accepted import accepted_draw
@@ -206,7 +207,8 @@ def _quiet_visits(q_rad: np.ndarray) -> Visits:
 def _beyond_dh(arm: PhysicalRobot, q_rad, error_mm, fitted: slice) -> np.ndarray:
     """What DH parameters and base, fitted by linear least squares, leave of small errors."""
     count = len(q_rad)
-    parameters = dh.parameter_jacobian(arm.dh, q_rad)[:, :3, :, :4].reshape(count, 3, -1)
+    parameters = arm.dh.linearised(JointState(q_rad))[1].reshape(count, 6, -1, 5)
+    parameters = parameters[:, :3, :, :4].reshape(count, 3, -1)
     tip_mm = dh.forward(arm.dh, q_rad).position_mm
     turns = np.stack([np.cross(axis, tip_mm) for axis in np.eye(3)], axis=2)
     shifts = np.broadcast_to(np.eye(3), (count, 3, 3))
