@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import cast
 
 import numpy as np
 
@@ -134,8 +135,8 @@ def _with_centred_offsets(fit: ModelFit, observations: Observations, std: np.nda
     A gauge: it changes no pose of a joint whose every observation travels in a known direction.
     Without it the prior splits the constant between both, and a pose at s = 0 loses a part.
     """
-    joints, errors, terms = fit.model.coefficients.shape
-    split, free, frames = fit.model.coefficients.size, fit.free, fit.parameters.size
+    empty, free, frames = cast(VECModel, fit.model), fit.free, fit.parameters.size
+    (joints, errors, terms), split = empty.coefficients.shape, empty.coefficients.size
     place, solution = frames + np.cumsum(free) - 1, fit.solution
     if not free[split:].any():
         return replace(fit, prior_std=std)
