@@ -105,9 +105,8 @@ def choose(
         if stated is None:
             if order in begin:
                 at = np.array([begin[order].log_ratio, begin[order].prior.decay])
-            least, at = _best(normal, count, degree, at)
-            width = float(np.exp(at[0])) * _negative(at, normal, count, degree)[2]
-            prior = prior_of(width, float(at[1]), offset_rad)
+            least, at, noise = _best(normal, count, degree, at)
+            prior = prior_of(float(np.exp(at[0])) * noise, float(at[1]), offset_rad)
         else:
             prior, noise = stated, 0.1
             for _ in range(_STATED_STEPS):
@@ -193,16 +192,22 @@ class _Linear:
 
 def _best(
     normal: np.ndarray, count: float, degree: np.ndarray, start: np.ndarray
-) -> tuple[float, np.ndarray]:
-    """Least negative log evidence, and the log of width over noise and the fall that reach it."""
+) -> tuple[float, np.ndarray, float]:
+    """Least negative log evidence, the log of width over noise and the fall there, and the noise."""
     bounds = [tuple(np.log(WIDTHS)), FALLS]
     if degree[-1] == 1:
         bounds[1] = (start[1], start[1])  # nothing falls
+    noise: dict[bytes, float] = {}
+
+    def value(at: np.ndarray) -> tuple[float, np.ndarray]:
+        least, slopes, noise[at.tobytes()] = _negative(at, normal, count, degree)
+        return least, slopes
+
     found = scipy.optimize.minimize(
-        lambda at: _negative(at, normal, count, degree)[:2], start, jac=True, method="L-BFGS-B",
-        bounds=bounds, options={"ftol": 1e-6, "gtol": 1.0, "maxiter": 30},
+        value, start, jac=True, method="L-BFGS-B", bounds=bounds,
+        options={"ftol": 1e-6, "gtol": 1.0, "maxiter": 30},
     )  # fmt: skip
-    return float(found.fun), found.x
+    return float(found.fun), found.x, noise[found.x.tobytes()]
 
 
 def _negative(
@@ -221,8 +226,8 @@ def _negative(
     step = scipy.linalg.cho_solve((factor, True), gradient, check_finite=False)
     misfit = max(normal[0, 0] - gradient @ step, np.finfo(float).tiny)
     value = 0.5 * count * np.log(misfit) + np.sum(np.log(np.diag(factor)))
-    inverse, _ = scipy.linalg.lapack.dpotri(factor, lower=1)
+    root, _ = scipy.linalg.lapack.dtrtri(factor, lower=1, overwrite_c=1)
     # What data decide of each coefficient, less its square beside its prior.
-    share = 1.0 - np.diag(inverse) - count / misfit * step**2
+    share = 1.0 - np.einsum("ij,ij->j", root, root) - count / misfit * step**2
     slopes = np.array([np.sum(share), np.sum(share * (degree - 1.0)) / at[1]])
     return value, slopes, float(np.sqrt(misfit / count))

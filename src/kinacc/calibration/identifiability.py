@@ -167,9 +167,13 @@ def _beside(rows: np.ndarray, exact: np.ndarray, among: np.ndarray) -> np.ndarra
 
 
 def _sparse(rows: np.ndarray, among: np.ndarray) -> np.ndarray:
-    """The same space by directions that share no pivot ``among`` (P,), to a largest part of 1."""
+    """The same space by directions that share no pivot ``among`` (P,), to a largest part of 1.
+
+    In the order of their pivots.
+    """
     if not len(rows):
         return rows
-    left, upper, _ = scipy.linalg.qr(rows[:, among], mode="economic", pivoting=True)
+    left, upper, pivot = scipy.linalg.qr(rows[:, among], mode="economic", pivoting=True)
     mixed = scipy.linalg.solve_triangular(upper[:, : len(rows)], left.T @ rows)
+    mixed = mixed[np.argsort(pivot[: len(rows)])]
     return mixed / np.abs(mixed).max(axis=1, keepdims=True)
