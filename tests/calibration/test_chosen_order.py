@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 import shared_data
@@ -164,30 +162,7 @@ def made_up(folder, poses, repeats=1, noise_mm=0.05):
     return read(folder / "own.csv", "irb120", 40, "{kind: none}", folder)
 
 
-def test_ten_readings_of_a_configuration_carry_no_higher_order_than_one(tmp_path):
-    # They are 3 * 50 numbers, and order 3 has 144 coefficients beside base and target.
-    assert max(orders(*made_up(tmp_path, poses=50, repeats=10))["order"]) == 2
-
-
 def test_the_search_ends_where_high_orders_gain_nothing(tmp_path):
     table = orders(*made_up(tmp_path, poses=600))
     assert set(chosen(table)) <= {1, 2}
     assert max(table["order"]) <= 6  # 600 poses can carry 40
-
-
-def test_a_fold_that_carries_less_than_all_rows_has_an_order_of_its_own(tmp_path):
-    """40 positions carry order 2; the 32 that are left without a fold carry order 1."""
-    settings, rows = made_up(tmp_path, poses=40)
-    table = orders(settings, rows)
-    highest = {
-        fold: max(np.asarray(table["order"])[np.asarray(table["fold"]) == fold])
-        for fold in range(5)
-    }
-    assert set(highest.values()) == {1}
-    arm = robot.load(settings["robot"])
-    every, _ = delivered.observed({"measurements": rows}, arm)
-    estimator = models.estimators(settings["calibration"], arm, every)["vec"]
-    for fold in range(5):
-        own = estimator.chosen({"vec_orders": table}, fold)
-        assert own.fit(every.select(every.fold != fold), {}).model.order == 1
-    assert replace(own, order=2).size == 108

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 from kinacc.calibration import models, tables, uncertainty
-from kinacc.calibration.compliance_fit import ComplianceEstimator
 from kinacc.calibration.observations import Observations
 from kinacc.config.schema import defaults
 from kinacc.kinematics import robot
@@ -120,18 +119,6 @@ def test_loads_that_change_separate_compliance_from_weight():
     assert np.all(apart < 4.0 * std + 0.05 * SOFT[1:3])
 
 
-def test_rows_that_state_no_load_carry_that_of_the_settings():
-    payload = np.full((60, 4), np.nan)
-    payload[:30] = [100.0, 0.0, 0.0, 100.0]
-    same = {"mass_kg": 100.0, "centre_mm": [0.0, 0.0, 100.0]}
-    seen = measured(STIFF, np.nan_to_num(payload), 60)
-    object.__setattr__(seen, "payload", payload)
-    made = models.estimators(settings(links=False, payload=same), ARM, seen)["compliance"]
-    assert made.size == models.estimators(settings(links=False), ARM, seen)["dh"].size + 2
-    made = models.estimators(settings(links=False), ARM, seen)["compliance"]
-    assert made.size == models.estimators(settings(links=False), ARM, seen)["dh"].size + 4
-
-
 def test_a_joint_that_gravity_does_not_turn_is_undetermined_and_stays_stiff():
     seen = measured(SOFT)
     found = fitted(seen, joints=(1, 2, 3))  # axis 1 is upright
@@ -160,18 +147,3 @@ def test_what_bends_is_selected_by_rows_held_out_and_what_does_not_is_not(compli
     )
     table = selection_columns(seen, held_out)
     assert table["model"][table["selected"] == 1].tolist() == [chosen]
-
-
-def problems_of(arm, **changes):
-    calibration = defaults()["calibration"]
-    calibration["compliance"] |= {"joints": [2], "gravity": [0.0, 0.0, -1.0]} | changes
-    found = ComplianceEstimator.contradictions(calibration, arm)
-    return {where[-1]: what for where, what, _ in found}
-
-
-def test_links_and_gravity_that_do_not_belong_to_the_arm_are_named():
-    link = {"mass_kg": 1.0, "centre_mm": [0.0, 0.0, 0.0]}
-    assert problems_of(ARM, links=[link] * 6) == {}
-    assert problems_of(ARM, links=[link] * 5) == {"links": "5 links for the 6 joints of mh180"}
-    assert problems_of(ARM, gravity=[0.0, 0.0, 0.0]) == {"gravity": "has no direction"}
-    assert problems_of(ARM, gravity=[0.0, 1e-3, 0.0]) == {}

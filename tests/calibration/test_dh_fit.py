@@ -115,13 +115,3 @@ def test_antiparallel_lengths_move_as_little_as_their_difference_asks():
     assert np.isfinite(found.std[:, :4][others]).all()
     assert np.isnan(found.std[:, 4]).all()  # no Hayati term was asked for
     assert found.solution.spectrum.rank == 23
-
-
-def test_base_and_tool_alone_are_found_again():
-    arm = robot.load("ur10")
-    rng = np.random.default_rng(6)
-    base, tool = anywhere(rng, 1000.0), anywhere(rng, 50.0)
-    q, seen = measured(arm.dh, base, tool, rng)
-    found = fitting.fit_frames(full_poses(q, seen), arm.dh, rotation_weight_mm_per_rad=WEIGHT)
-    np.testing.assert_allclose(found.base.position_mm, base.position_mm, atol=0.2)
-    np.testing.assert_allclose(found.tool.position_mm, tool.position_mm, atol=0.1)

@@ -77,13 +77,3 @@ def test_every_model_of_an_automatic_calibration_ends(size):
     found = mean_errors(arm, seen.select(slice(size)), test, "vec", "dh")
     assert np.isfinite(found).all()
     assert found[1] <= found[2] * (1.0 + 1e-9)
-
-
-def test_few_parameters_of_many_are_said_to_rest_on_their_prior():
-    arm, seen = positions("mh180")
-    train = seen.select(slice(8))
-    estimator = models.estimators(settings(), arm, train)["dh"]
-    fitted = estimator.fit(train, {})
-    assert np.isfinite(fitted.prior_std[fitted.free]).all()
-    assert np.isfinite(fitted.std[fitted.free]).all()
-    assert (fitted.std <= fitted.prior_std * (1.0 + 1e-9))[fitted.free].all()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -40,16 +39,6 @@ def test_rows_of_one_configuration_share_a_fold(plan, count, seed):
     assert fold.max() < count
 
 
-@settings(max_examples=60, deadline=None)
-@given(plans(), st.integers(2, 7))
-def test_sizes_differ_by_no_more_than_the_largest_configuration(plan, count):
-    _, q, pose, _ = plan
-    configuration = folds.configurations(pose, q, 0.1 * DEGREE)
-    sizes = np.bincount(folds.assign(configuration, count, 1), minlength=count)
-    assert sizes.sum() == len(q)
-    assert sizes.max() - sizes.min() <= np.bincount(configuration).max()
-
-
 @settings(max_examples=40, deadline=None)
 @given(plans())
 def test_configurations_are_a_partition_no_pair_within_tolerance_breaks(plan):
@@ -63,19 +52,6 @@ def test_configurations_are_a_partition_no_pair_within_tolerance_breaks(plan):
     # Numbered by first appearance.
     _, first = np.unique(found, return_index=True)
     assert np.all(np.diff(first) > 0)
-
-
-def test_targets_of_a_pose_stay_together_even_if_its_joints_were_read_apart():
-    q = np.array([[0.0] * 6, [0.5] * 6, [0.0] * 6, [0.9] * 6])
-    assert folds.configurations(np.array([3, 3, 7, 8]), q, 1e-3).tolist() == [0, 0, 0, 1]
-
-
-def test_seed_decides_and_nothing_else():
-    configuration = np.arange(100)
-    first = folds.assign(configuration, 5, 1)
-    np.testing.assert_array_equal(first, folds.assign(configuration, 5, 1))
-    assert np.any(first != folds.assign(configuration, 5, 2))
-    np.testing.assert_array_equal(np.bincount(first), [20] * 5)
 
 
 def test_fewer_configurations_than_folds_leave_folds_empty():
@@ -96,11 +72,6 @@ def test_time_blocks_are_runs_of_first_visits(plan, count):
         assert len(set(fold[configuration == label])) == 1
 
 
-def test_time_blocks_are_even_and_contiguous_without_revisits():
-    fold = folds.blocks(np.repeat(np.arange(40), 3), 5)
-    np.testing.assert_array_equal(fold, np.repeat(np.arange(5), 24))
-
-
 def test_a_label_of_one_fold_alone_must_train():
     fold = np.array([0, 0, 1, 1, 1, 1, 1, 1, 1])
     label = np.array(["a", "a", "a", "a", "a", "b", "b", "b", "b"])
@@ -112,12 +83,6 @@ def test_a_label_of_one_fold_alone_must_train():
     np.testing.assert_array_equal(found[1].rows, [0, 0, 0, 0, 1, 1, 1, 1, 1])
 
 
-def test_a_label_with_enough_rows_outside_each_fold_is_held_out():
-    fold, label = np.array([0, 0, 0, 1, 1, 1, 1, 0]), np.array([*"aaaaaa", "b", "b"])
-    found = folds.always_trained(fold, {"target": label}, np.arange(8))
-    assert [each.value for each in found] == ["b"]
-
-
 def test_neighbours_are_found_across_a_full_turn():
     rng = np.random.default_rng(5)
     near = 2.0 * np.pi * rng.integers(0, 3, (60, 3)) / 3.0 + rng.normal(0.0, 0.02, (60, 3))
@@ -126,25 +91,3 @@ def test_neighbours_are_found_across_a_full_turn():
     found = np.sort(folds.neighbours(near, 0.03), axis=1)
     assert len(wanted) > 10
     np.testing.assert_array_equal(np.unique(found, axis=0), wanted)
-
-
-def test_rows_chosen_are_told_apart_as_if_there_were_no_others():
-    rng = np.random.default_rng(6)
-    q = rng.integers(0, 4, (80, 2)) * 0.1 + rng.normal(0.0, 0.01, (80, 2))
-    pose = rng.integers(0, 60, 80)
-    pairs = folds.neighbours(q, 0.02)
-    for rows in (np.arange(80), np.arange(0, 80, 2), np.flatnonzero(rng.random(80) < 0.3)):
-        wanted = folds.configurations(pose[rows], q[rows], 0.02)
-        np.testing.assert_array_equal(folds.configurations_among(rows, pose, pairs), wanted)
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_poses_joined_by_a_long_chain_of_revisits_are_one_configuration(seed):
-    order = np.random.default_rng(seed).permutation(3000)
-    chain = np.stack([order[:-1], order[1:]], axis=1)
-    apart = np.delete(chain, 1500, axis=0)
-    pose = np.arange(3000)
-    assert not folds.configurations_among(pose, pose, chain).any()
-    found = folds.configurations_among(pose, pose, apart)
-    assert np.array_equal(found == found[order[0]], np.isin(pose, order[:1501]))
-    assert found.max() == 1

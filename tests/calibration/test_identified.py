@@ -8,11 +8,10 @@ import pytest
 from simulated import POINT, POSE, THREE, disturbed, joints, measure
 
 from kinacc.calibration import constraints, fitting, identifiability, identified, uncertainty
-from kinacc.calibration.frames import MOTIONS, known
+from kinacc.calibration.frames import known
 from kinacc.calibration.identifiability import LeftOpen
 from kinacc.config import parameter_rules
-from kinacc.geometry import Pose, compose, exp_so3
-from kinacc.kinematics import dh, robot
+from kinacc.kinematics import robot
 
 
 def asked(name, kind=POSE, sessions=1, instead=False, rules=None, moving=None, poses=80):
@@ -87,55 +86,6 @@ def test_a_wrist_that_always_points_one_way_leaves_base_and_tool_open():
     place = known.names.index("t0.z_mm")
     left_open = identified.left_open(fit, known, data)
     assert set(left_open.structural[left_open.members[:, place]]) == {True, False}
-
-
-@pytest.mark.parametrize("name", ["mh180", "iiwa14", "meca500"])
-def test_every_undetermined_parameter_has_a_statement_and_no_other(name):
-    found, fit = asked(name, THREE)
-    assert (found.statement.notna() == (found.status != "identified")).all()
-    undetermined = found.status[list(fit.model.names)].isin(["undetermined", "fixed"])
-    np.testing.assert_array_equal(np.isnan(fit.std.ravel()), undetermined)
-
-
-def test_a_prior_is_named_and_settles_what_hung_on_it():
-    found, _ = asked("mh180", rules={"joint 2 d": {"prior_std_mm": 0.5}})
-    assert found.statement["j2.d_mm"] == "known beforehand to 0.5 mm"
-    assert found.status["j2.d_mm"] == "prior"
-    assert found.status["j3.d_mm"] == "identified"
-
-
-@pytest.mark.parametrize("kind", [POSE, POINT])
-def test_directions_in_words_move_no_pose_anywhere(kind):
-    """The twin of the sentences: finite steps along each structural direction."""
-    arm, rng = robot.load("ur10"), np.random.default_rng(3)
-    free = constraints.free_parameters(6, (2, 3))
-    data = measure(disturbed(arm.dh, free, rng), joints(arm, 80, rng), kind, rng)
-    fit = fitting.fit(data, arm.dh, free=free, rotation_weight_mm_per_rad=500.0, threshold=1e-3)
-    told = uncertainty.of_fit(fit, data.target_names)
-    left_open = identified.left_open(fit, told, data)
-    directions = left_open.directions[left_open.structural]
-    assert len(directions) == 8
-    arm_part = directions[:, len(told.names) - int(free.sum()) :]
-    step = np.where(np.tile([1, 0, 0, 1, 1], 6)[free.ravel()], 1e-3, 1.0) * 1e-3
-    q = rng.uniform(-3, 3, (50, 6))
-
-    def moved(frame, pose, direction):
-        at = [
-            direction[told.names.index(f"{frame}.{m}")] if f"{frame}.{m}" in told.names else 0.0
-            for m in MOTIONS
-        ]
-        at = np.array(at) * 1e-3 * np.repeat([1.0, 1e-3], 3)
-        return Pose(exp_so3(at[3:]) @ pose.rotation, pose.position_mm + at[:3])
-
-    before = compose(fit.frames.base, compose(dh.forward(fit.model, q), fit.frames.tool))
-    for direction, own in zip(directions, arm_part, strict=True):
-        vector = fit.model.start
-        vector[free.ravel()] += step * own
-        model = fit.model.with_parameters(vector)
-        base = moved("base", fit.frames.base, direction)
-        tool = moved("t0", fit.frames.tool, direction)
-        after = compose(base, compose(dh.forward(model, q), tool))
-        assert np.abs(after.position_mm - before.position_mm).max() < 2e-6
 
 
 OF_ARM = ("base.z_mm", "base.rz_rad", "j1.d_mm", "j1.a_mm", "j2.d_mm", "j3.d_mm", "j3.a_mm")

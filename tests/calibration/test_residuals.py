@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
 from kinacc.calibration import residuals
 from kinacc.calibration.frames import Frames
@@ -40,29 +39,6 @@ def measured(shift_mm, turn_rad):
     return full_poses(Q, compose(BASE, off))
 
 
-def test_statistics_of_known_vectors():
-    vectors = np.array([[3.0, 4.0, 0.0], [0.0, 0.0, 2.0], [1.0, 2.0, 2.0], [np.nan] * 3])
-    found = residuals.statistics(vectors)
-    assert (found.n, found.max) == (3, 5.0)
-    assert found.mean == pytest.approx(10.0 / 3.0)
-    assert found.rms == pytest.approx(np.sqrt((25 + 4 + 9) / 3))
-    assert found.gamma99 > found.max
-
-
-def test_gamma_quantile_of_gamma_magnitudes():
-    rng = np.random.default_rng(1)
-    magnitude = rng.gamma(5.36, 0.076, 200_000)
-    direction = rng.normal(size=(len(magnitude), 3))
-    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
-    found = residuals.statistics(magnitude[:, None] * direction)
-    assert found.gamma99 == pytest.approx(np.quantile(magnitude, 0.99), rel=0.01)
-
-
-def test_no_vector_gives_no_statistics_and_a_zero_one_no_gamma():
-    assert residuals.statistics(np.full((3, 3), np.nan)) is None
-    assert np.isnan(residuals.statistics(np.zeros((2, 3))).gamma99)
-
-
 def test_errors_are_measured_minus_model_in_the_robot_base():
     shift, turn = np.array([0.5, -0.2, 0.1]), np.array([1e-3, -2e-3, 5e-4])
     found = residuals.errors(fitted(), measured(shift, turn))
@@ -70,24 +46,6 @@ def test_errors_are_measured_minus_model_in_the_robot_base():
         np.testing.assert_allclose(found[name].position_mm, np.tile(shift, (COUNT, 1)), atol=1e-9)
         np.testing.assert_allclose(found[name].rotation_rad, np.tile(turn, (COUNT, 1)), atol=1e-12)
     np.testing.assert_allclose(found["dh_vs_vec"].position_mm, 0.0, atol=1e-9)
-
-
-def test_vec_and_dh_meet_in_one_frame_whatever_base_each_was_fitted_with():
-    shift = np.array([1.0, 2.0, -3.0])
-    found = residuals.errors(fitted(shift), measured(0.0, np.zeros(3)))
-    wanted = np.tile(BASE.rotation.T @ shift, (COUNT, 1))
-    np.testing.assert_allclose(found["dh_vs_vec"].position_mm, wanted, atol=1e-9)
-    np.testing.assert_allclose(found["vec_vs_measured"].position_mm, -wanted, atol=1e-9)
-
-
-def test_position_only_rows_have_no_orientation_error():
-    seen = measured(np.zeros(3), np.zeros(3))
-    blind = seen.rotation.copy()
-    blind[::2] = np.nan
-    found = residuals.errors(fitted(), replace(seen, rotation=blind))["dh_vs_measured"]
-    assert np.isnan(found.rotation_rad[::2]).all()
-    assert np.isfinite(found.rotation_rad[1::2]).all()
-    assert np.isfinite(found.position_mm).all()
 
 
 def test_every_row_is_judged_by_a_model_that_has_not_seen_its_fold():

@@ -8,17 +8,12 @@ import numpy as np
 import pytest
 import simulated
 
-from kinacc.calibration import fitting, models, residuals
+from kinacc.calibration import fitting
 from kinacc.calibration.constraints import free_parameters
-from kinacc.calibration.dh_estimator import DHEstimator
-from kinacc.calibration.models import Common
-from kinacc.calibration.vec_estimator import VECEstimator
-from kinacc.calibration.vec_fit import Prior
 from kinacc.kinematics import robot
 
 ARM = robot.load("ur10")
 FREE = free_parameters(6, (2, 3))
-COMMON = Common(ARM.dh, 500.0, True)
 
 
 def observed(kind, sessions, count=120, seed=0, noise_mm=0.02):
@@ -50,14 +45,3 @@ def test_a_session_of_three_poses_is_placed():
     few = (seen.session == 0) | (np.cumsum(seen.session == 1) <= 3)
     found = fit(seen.select(few))
     assert np.sqrt(found.solution.variance) < 0.03
-
-
-def test_errors_of_every_session_are_in_its_own_base():
-    seen = observed(simulated.POSE, 3, noise_mm=1e-4)
-    span = seen.q_rad.min(axis=0), seen.q_rad.max(axis=0)
-    by_vec = VECEstimator(COMMON, span, 1, Prior(0.3, 3e-4, 0.7, 3e-4), (1,), True, False)
-    by_dh = DHEstimator(COMMON, False, (2, 3), False, (), "squares", 1e-2)
-    fitted = models.fit_all(seen, [by_vec, by_dh])
-    errors = residuals.errors(fitted, seen)
-    assert np.abs(errors["dh_vs_measured"].position_mm).max() < 0.03
-    assert np.abs(errors["dh_vs_vec"].position_mm).max() < 0.03

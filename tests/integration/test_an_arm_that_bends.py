@@ -18,9 +18,8 @@ from command_line import call
 from oracles import compliant_arm
 from oracles.compliant_arm import Arm, Body, Described
 from scipy.stats import chi2
-from stages_by_hand import perform, run_stage
+from stages_by_hand import perform
 
-from kinacc.report.summary import summarise
 from kinacc.tables.store import read
 
 POSES = 60
@@ -224,26 +223,6 @@ def test_without_masses_one_coefficient_per_lever_comes_back(tmp_path):
     require_right_uncertainty(deviations, 2)
 
 
-def test_one_payload_for_all_rows_is_carried_by_the_lever_and_fitted_fits_say_so(tmp_path):
-    """A load at the last frame adds its weight times compliance to the coefficient, unseparated."""
-    load = Body(120.0)
-    per_mm = {joint: PER_LEVER[joint] + BENT[joint] * load.mass_kg * 9.80665e-3 for joint in (2, 3)}
-    cell = mh180(11, (load,))
-    written(tmp_path / "poses.csv", cell, 11)
-    settings = {"joints": [2, 3], "payload": in_words(load)}
-    done = made("residuals", configured(tmp_path, cell.robot, settings, folds=3))
-    found, covariance = tables_of(done, "compliance_model", "compliance_covariance")
-    spread = deviation(found, covariance, {"lever_coefficient_rad_per_mm": per_mm})
-    assert spread < chi2.ppf(0.999, 2)
-    for name in ("compliance_rad_per_nm", "std_compliance_rad_per_nm", "link_mass_kg"):
-        assert np.isnan(found[name]).all(), name
-    said = call("summary", done)
-    assert said.exit_code == 0, said.output
-    told = " ".join(said.output.split())
-    for word in ("product", "compliance", "payload"):
-        assert word in told, said.output
-
-
 def test_a_payload_that_changes_tells_stiffness_from_moment(tmp_path):
     heavy = Body(160.0, (30.0, -20.0, 200.0))
     deviations = []
@@ -339,24 +318,6 @@ def test_an_arm_that_bends_is_told_from_held_out_poses(finished):
     assert found["selected"] == "compliance"
     assert found["dh"] > 10.0 * noise_mm
     assert 0.8 * noise_mm < found["compliance"] < 1.4 * noise_mm
-
-
-def test_the_answer_on_the_fits_shows_the_model_beside_the_others(finished):
-    known = summarise(finished[1])
-    assert known.selected == "compliance"
-    held_out = {name: each.mean for name, each in known.position_errors().items()}
-    assert set(held_out) == {"nominal", "dh", "compliance", "vec"}
-    assert held_out["compliance"] == min(held_out.values())
-
-
-def test_an_arm_that_rests_in_full_equilibrium_is_met_to_first_order(tmp_path):
-    """What bending does to the levers moves this arm by 0.02 mm where bending moves it by 7 mm."""
-    cell = replace(fanuc(22, (GRIPPER,)), at_rest=True)
-    written(tmp_path / "poses.csv", cell, 22)
-    settings = stated_masses(cell, payload=in_words(GRIPPER))
-    found = selection(made("residuals", configured(tmp_path, cell.robot, settings, folds=3)))
-    assert found["selected"] == "compliance"
-    assert found["compliance"] < 1.4 * math.sqrt(3.0) * NOISE_MM
 
 
 def told_by(folder: Path) -> tuple[Arm, np.ndarray, np.ndarray]:
@@ -469,89 +430,3 @@ def test_compensated_joints_bring_the_bent_arm_to_the_wanted_pose(finished, tmp_
     for pose, q in zip(wanted, cell.dh_joints(corrected), strict=True):
         there = base @ compliant_arm.flange(arm, q, GRIPPER) @ tool
         assert there[:3, 3] == pytest.approx(pose[:3, 3], abs=1e-5)
-
-
-def test_a_joint_that_has_become_softer_is_named_by_the_comparison(finished, tmp_path):
-    cell, folder = finished
-    softer = {**BENT, 2: 1.1 * BENT[2]}
-    worn = replace(cell, arm=replace(cell.arm, compliance=softer))
-    written(tmp_path / "poses.csv", worn, 23)
-    settings = stated_masses(cell, payload=in_words(GRIPPER))
-    later = made("residuals", configured(tmp_path, cell.robot, settings, folds=3))
-    done = call("compare", folder, later, "--model", "compliance", "--json")
-    assert done.exit_code == 0, done.output
-    rows = {row["name"]: row for row in yaml.safe_load(done.stdout)["parameters"]}
-    sigmas = {name: abs(row["sigmas"] or 0.0) for name, row in rows.items()}
-    assert sigmas["j2.compliance_rad_per_nm"] > 10.0
-    assert max(sigmas, key=sigmas.get) == "j2.compliance_rad_per_nm"
-    assert sigmas["j3.compliance_rad_per_nm"] < 4.0
-
-
-def test_a_format_that_cannot_carry_bending_says_so(finished, tmp_path):
-    words = ("--model", "compliance", "--format", "urdf", "--out", tmp_path / "exported")
-    done = call("export", finished[1], *words)
-    assert "No such option" not in done.output
-    assert "Traceback" not in done.output
-    assert "compliance" in done.output
-    assert "urdf" in done.output.lower()
-
-
-@pytest.mark.parametrize("word", ["payload", "Nutzlast", "charge"])
-def test_init_takes_payloads_under_names_people_use(tmp_path, word):
-    cell = fanuc(3, (NONE, GRIPPER))
-    path = written(tmp_path / "poses.csv", cell, 3, with_payload=True)
-    path.write_text(path.read_text().replace("payload_", f"{word}_"))
-    done = call("init", path, "--out", tmp_path, "--robot", cell.robot, "--name", NAME, "--yes")
-    assert done.exit_code == 0, done.output
-    config = tmp_path / f"{NAME}.yaml"
-    done = run_stage("measurements", "--config", config, "--results", tmp_path / "results")
-    assert done.exit_code == 0, done.output
-    (table,) = tables_of(tmp_path / "results" / NAME, "measurements")
-    assert table["payload_kg"].tolist() == [load.mass_kg for load in cell.payloads]
-    assert table["payload_x_mm"].tolist() == [load.centre_mm[0] for load in cell.payloads]
-    assert len(table["pose"]) == POSES, "the payload is taken for a measured target"
-
-
-PORTAL = """\
-name: portal
-source: made up
-date: 2026-11-22
-dh:
-  - {theta_offset_deg: 0, d_mm: 400, a_mm: 100, alpha_deg: -90, limits_deg: [-170, 170]}
-  - {theta_offset_deg: -90, d_mm: 0, a_mm: 600, alpha_deg: 0, limits_deg: [-90, 90]}
-  - {theta_offset_deg: 0, d_mm: 0, a_mm: 100, alpha_deg: -90, limits_deg: [-90, 90]}
-  - {joint: prismatic, theta_offset_deg: 0, d_mm: 300, a_mm: 0, alpha_deg: 90, limits_mm: [0, 400]}
-  - {theta_offset_deg: 0, d_mm: 0, a_mm: 0, alpha_deg: -90, limits_deg: [-120, 120]}
-  - {theta_offset_deg: 0, d_mm: 90, a_mm: 0, alpha_deg: 0, limits_deg: [-180, 180]}
-"""
-
-
-def test_settings_of_a_bending_arm_that_cannot_be_are_told_all_at_once(tmp_path):
-    (tmp_path / "portal.yaml").write_text(PORTAL)
-    cell = fanuc(1, (NONE,))
-    written(tmp_path / "poses.csv", cell, 1)
-    wrong = {
-        "joints": [2, 4, 7],
-        "gravity": [0, 0, 0],
-        "links": [in_words(body) for body in FANUC_LINKS[:2]],
-        "payload": {"mass_kg": -12.5},
-    }
-    of_the_arm = ("no joint 7", "joint 4", "compliance.gravity", "compliance.links")
-    for expected in (("-12.5",), of_the_arm):  # it has six joints, and the fourth slides
-        config = configured(tmp_path, str(tmp_path / "portal.yaml"), wrong)
-        done = run_stage("measurements", "--config", config, "--results", tmp_path / "results")
-        assert done.exit_code != 0
-        assert [words for words in expected if words not in done.output] == [], done.output
-        assert not (tmp_path / "results").exists()
-        wrong["payload"] = {"mass_kg": 12.5}
-
-
-def test_a_link_of_negative_mass_is_refused(tmp_path):
-    cell = fanuc(1, (NONE,))
-    written(tmp_path / "poses.csv", cell, 1)
-    links = [in_words(body) for body in (*FANUC_LINKS[:5], Body(-3.25))]
-    config = configured(tmp_path, cell.robot, {"joints": [2], "links": links})
-    done = run_stage("measurements", "--config", config, "--results", tmp_path / "results")
-    assert done.exit_code != 0
-    assert "compliance.links" in done.output, done.output
-    assert "-3.25" in done.output, done.output

@@ -3,18 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections import defaultdict
 
 import numpy as np
 import pytest
-from oracles import assessors, fits, kinematics, maps, small_study, tables, worlds
+from oracles import assessors, kinematics, small_study, tables
 
-SEED = 4711
-WEIGHT = 500.0
-THRESHOLD = 1e-4
-DH_UNIT = np.tile([1e-3, 1.0, 1.0, 1e-3], 6)
-DH_FREE = np.tile([True, True, True, True, False], 6)
-STATISTICS = ("mean", "max", "rms", "gamma99")
 PAPER = {
     ("table1", "vec_vs_measured", "position"): (0.705, 1.635, 1.731),
     ("table1", "vec_vs_measured", "orientation"): (1.487, 3.149, 3.248),
@@ -63,178 +56,10 @@ def test_the_vec_acts_on_the_nominal_arm_and_covers_the_measured_joints(models, 
         assert row["q_max_rad"] >= max(q)
 
 
-def test_dh_model_is_the_least_squares_fit_to_the_vec_at_the_training_poses(models, measurements):
-    train = [row for row in measurements if row["subset"] == "train"]
-    q = [tables.joints(row) for row in train]
-    wanted = [models.flange("vec", tables.joints(r), tables.directions(r)) for r in train]
-    nominal = np.array(models.nominal).ravel()
-
-    def function(x):
-        table = nominal.copy()
-        table[DH_FREE] = x
-        table = table.reshape(6, 5)
-        return fits.residual(lambda i: kinematics.dh_forward(table, q[i]), wanted, WEIGHT)
-
-    found = np.array(models.dh).ravel()
-    # At the optimum one more step from there leads nowhere.
-    expected = fits.truncated_fit(
-        function, nominal[DH_FREE], DH_UNIT, THRESHOLD, start=found[DH_FREE], iterations=1
-    )
-    assert not found[~DH_FREE].any()
-    assert np.abs((found[DH_FREE] - expected["x"]) / DH_UNIT).max() < 1e-4
-
-
 # --- residuals ------------------------------------------------------------------------------------
 
 
-def pooled(rows, comparison, subset, quantity, fold=None):
-    chosen = [
-        row
-        for row in rows
-        if (row["comparison"], row["subset"], row["quantity"], row["fold"])
-        == (comparison, subset, quantity, fold)
-    ]
-    assert len(chosen) == 1
-    return chosen[0]
-
-
-COMPARISONS = ["vec_vs_measured", "dh_vs_vec", "dh_vs_measured", "nominal_vs_measured"]
-
-
-@pytest.mark.parametrize("comparison", COMPARISONS)
-def test_training_residuals(finished, models, measurements, comparison):
-    rows = tables.rows(finished, "residuals")
-    train = [row for row in measurements if row["subset"] == "train"]
-    both = tables.magnitudes(models, train, comparison)
-    for quantity, unit, values in zip(
-        ("position", "orientation"), ("mm", "mrad"), both, strict=True
-    ):
-        row = pooled(rows, comparison, "train", quantity)
-        assert (row["n"], row["unit"]) == (len(values), unit)
-        expected = tables.statistics(values)
-        for name in STATISTICS:
-            assert row[name] == pytest.approx(expected[name], rel=1e-7)
-
-
-@pytest.mark.parametrize("comparison", COMPARISONS)
-def test_validation_residuals_are_statistics_of_the_held_out_errors(
-    finished, models, measurements, comparison
-):
-    residuals = tables.rows(finished, "residuals")
-    errors = [
-        row
-        for row in tables.rows(finished, "pose_errors")
-        if (row["comparison"], row["estimate"]) == (comparison, "cross_validated")
-    ]
-    assert sorted(row["row"] for row in errors) == list(range(len(measurements)))
-    for quantity, columns in (
-        ("position", ("ex_mm", "ey_mm", "ez_mm")),
-        ("orientation", ("rx_mrad", "ry_mrad", "rz_mrad")),
-    ):
-        sizes = defaultdict(list)
-        for row in errors:
-            assert row["fold"] == measurements[row["row"]]["fold"]
-            size = math.sqrt(math.fsum(row[c] ** 2 for c in columns))
-            sizes[row["fold"]].append(size)
-            sizes[None].append(size)
-        for fold in {row["fold"] for row in residuals if row["subset"] == "validation"}:
-            row = pooled(residuals, comparison, "validation", quantity, fold)
-            assert row["n"] == len(sizes[fold])
-            expected = tables.statistics(sizes[fold])
-            for name in STATISTICS:
-                assert row[name] == pytest.approx(expected[name], rel=1e-7)
-    # The held-out fold of the delivered models can be recomputed from the models themselves.
-    for row in errors:
-        if row["fold"] != 1:
-            continue
-        position, turn = tables.magnitudes(models, [measurements[row["row"]]], comparison)
-        found = math.dist((row["ex_mm"], row["ey_mm"], row["ez_mm"]), (0, 0, 0))
-        assert found == pytest.approx(position[0], abs=1e-8)
-        found = math.dist((row["rx_mrad"], row["ry_mrad"], row["rz_mrad"]), (0, 0, 0))
-        assert found == pytest.approx(turn[0], abs=1e-8)
-
-
-def test_training_error_vectors_are_in_the_robot_base(finished, models, measurements):
-    seen = 0
-    for row in tables.rows(finished, "pose_errors"):
-        if row["estimate"] != "train" or row["row"] % 7:
-            continue
-        source = measurements[row["row"]]
-        left, right = row["comparison"].split("_vs_")
-        q, s = tables.joints(source), tables.directions(source)
-        first = models.tool(left, q, s, source["target"])
-        if right == "measured":
-            reading, _ = tables.measured_frame(source)
-            second = np.linalg.inv(models.frames[left, "base"]) @ reading
-        else:
-            second = models.tool(right, q, s, source["target"])
-        gap = second[:3, 3] - first[:3, 3]
-        found = np.array([row["ex_mm"], row["ey_mm"], row["ez_mm"]])
-        # Truth minus model: the sign assessment_points states.
-        np.testing.assert_allclose(found, gap, rtol=0, atol=1e-8)
-        seen += 1
-    assert seen >= 4 * 15
-
-
 # --- accuracy map and assessment points -----------------------------------------------------------
-
-
-def arms(models) -> maps.Arms:
-    order = max(row["order"] for row in models.vec)
-    series, offsets = np.zeros((6, 6, order + 1)), np.zeros((6, 2))
-    low, high = np.zeros(6), np.zeros(6)
-    for row in models.vec:
-        i = row["joint"] - 1
-        low[i], high[i] = row["q_min_rad"], row["q_max_rad"]
-        if row["direction"] == 0:
-            j = kinematics.ERROR_NAMES.index(row["error"])
-            series[i, j, row["order"]] = row["coefficient"]
-        else:
-            assert (row["error"], row["order"]) == ("eps_z", 0)
-            offsets[i, 0 if row["direction"] < 0 else 1] = row["coefficient"]
-    return maps.Arms(
-        dh=np.array(models.dh),
-        nominal=np.array(models.nominal),
-        series=series,
-        low=low,
-        high=high,
-        dh_tool=models.frames["dh", "tool"],
-        true_tool=models.frames["vec", "tool"],
-        s=(0,) * 6,
-        offsets=offsets,
-    )
-
-
-def test_map_cells(finished, models):
-    rows = tables.rows(finished, "accuracy_map")
-    assert len(rows) == 2 * 5 * 4
-    assert {row["slice_deg"] for row in rows} == {0.0, 30.0}
-    reference = kinematics.rot_x(math.pi)[:3, :3]
-    limits = np.radians(kinematics.MH180_LIMITS_DEG).T
-    reached = [row for row in rows if row["solutions"] > 0]
-    assert reached
-    for row in [
-        *reached[:: max(1, len(reached) // 4)],
-        *[r for r in rows if not r["solutions"]][:1],
-    ]:
-        assert row["wanted"] == 18
-        position, turn, name, count = maps.cell(
-            arms(models),
-            limits,
-            math.radians(row["slice_deg"]),
-            row["radius_mm"],
-            row["height_mm"],
-            reference,
-            math.radians(45),
-        )
-        assert row["solutions"] == count
-        assert row["worst_branch"] == name
-        if count:
-            assert row["position_max_mm"] == pytest.approx(position, abs=1e-6)
-            assert row["orientation_max_mrad"] == pytest.approx(turn, abs=1e-6)
-        else:
-            assert row["position_max_mm"] is None
-            assert row["orientation_max_mrad"] is None
 
 
 def test_assessment_points(finished, models):
@@ -260,95 +85,6 @@ def test_assessment_points(finished, models):
 def true_errors(finished) -> np.ndarray:
     rows = tables.rows(finished, "assessment_points")
     return np.array([[row["ex_mm"], row["ey_mm"], row["ez_mm"]] for row in rows])
-
-
-def test_study_rows_follow_from_the_assessment_points_and_the_seed(finished):
-    error = true_errors(finished)
-    rows = tables.rows(finished, "study")
-    assert len(rows) == 2 * 3 * 3
-    for row in rows:
-        noise = row["noise_mm"]
-        reading = worlds.simulation(error.tolist(), noise, row["repetition"], SEED)
-        sizes = [assessors.norm(reading(j, 1)) for j in range(24)]
-        if row["assessor"] == "maximum":
-            expected = assessors.maximum(sizes)
-        elif row["assessor"] == "outlier_rejection":
-            expected = assessors.outlier_rejection(sizes, "normal")
-        else:
-            expected = row["assessed_mm"]
-            k = round(expected * 1000)
-            assert expected == pytest.approx(k / 1000, abs=1e-12)
-
-            def rejects(bound, reading=reading, noise=noise):
-                return assessors.invalidation_run(
-                    reading, range(24), [noise] * 24, bound / 1000, 24
-                ).rejected
-
-            assert rejects(k - 1)
-            assert not any(rejects(b) for b in range(k, math.ceil(max(sizes) * 1000) + 1, 5))
-        assert row["assessed_mm"] == pytest.approx(expected, rel=1e-10)
-
-
-def test_summary_is_about_the_study_and_the_largest_true_error(finished):
-    truth = max(assessors.norm(e) for e in true_errors(finished).tolist())
-    study = tables.rows(finished, "study")
-    summary = tables.rows(finished, "study_summary")
-    assert len(summary) == 3 * 2
-    for row in summary:
-        values = [
-            r["assessed_mm"]
-            for r in study
-            if (r["assessor"], r["noise_mm"]) == (row["assessor"], row["noise_mm"])
-        ]
-        assert row["repetitions"] == len(values) == 3
-        mean = math.fsum(values) / 3
-        assert row["mean_mm"] == pytest.approx(mean, rel=1e-12)
-        assert (row["min_mm"], row["max_mm"]) == (min(values), max(values))
-        assert row["bias_mm"] == pytest.approx(mean - truth, abs=1e-12)
-        rmse = math.sqrt(math.fsum((v - truth) ** 2 for v in values) / 3)
-        assert row["rmse_mm"] == pytest.approx(rmse, rel=1e-10)
-    readings = tables.rows(finished, "readings")
-    assert len(readings) == 2 * 15
-    default = {
-        "outlier_rejection": ("normal", None, None, None),
-        "model_invalidation": (None, "squared", "r", "from_above"),
-    }
-    for row in readings:
-        switches = tuple(row[n] for n in ("outlier_rule", "distance", "covariance", "search"))
-        if switches == default[row["assessor"]]:
-            same = [
-                r
-                for r in summary
-                if (r["assessor"], r["noise_mm"]) == (row["assessor"], row["noise_mm"])
-            ]
-            for name in ("mean_mm", "min_mm", "max_mm", "bias_mm"):
-                assert row[name] == same[0][name]
-
-
-def test_histories_are_runs_of_the_studys_worlds(finished):
-    error = true_errors(finished)
-    sizes = [assessors.norm(e) for e in error.tolist()]
-    shown = defaultdict(list)
-    for row in tables.rows(finished, "histories"):
-        shown[row["example"]].append(row)
-    assert {"rejected", "not_rejected"} <= set(shown)
-    for rows in shown.values():
-        eta, noise = rows[0]["eta_mm"], rows[0]["noise_mm"]
-        for repetition in range(30):
-            reading = worlds.simulation(error.tolist(), noise, repetition, SEED)
-            if assessors.norm(reading(rows[0]["point"], 1)) == pytest.approx(
-                rows[0]["measured_mm"], abs=1e-10
-            ):
-                break
-        else:
-            pytest.fail("no simulation of the study shows this history")
-        run = assessors.invalidation_run(reading, range(24), [noise] * 24, eta, 24)
-        assert len(run.steps) == len(rows)
-        for row, step in zip(rows, run.steps, strict=True):
-            assert (row["point"], row["repeat"]) == (step.point, step.repeat)
-            assert row["averaged_mm"] == pytest.approx(step.averaged, abs=1e-10)
-            assert row["true_mm"] == pytest.approx(sizes[step.point], abs=1e-10)
-            assert row["rejection_probability"] == pytest.approx(step.probability, abs=1e-9)
 
 
 # --- claims ---------------------------------------------------------------------------------------
