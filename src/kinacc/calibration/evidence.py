@@ -193,7 +193,7 @@ class _Linear:
 def _best(
     normal: np.ndarray, count: float, degree: np.ndarray, start: np.ndarray
 ) -> tuple[float, np.ndarray, float]:
-    """Least negative log evidence, the log of width over noise and the fall there, and the noise."""
+    """Least negative log evidence, log of width over noise and fall there, and the noise."""
     bounds = [tuple(np.log(WIDTHS)), FALLS]
     if degree[-1] == 1:
         bounds[1] = (start[1], start[1])  # nothing falls
