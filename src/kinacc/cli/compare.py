@@ -65,7 +65,8 @@ def compare(first, second, joints, count, model, robot, config, out) -> None:
 
 def _calibration(place: str, model: str, robot: str | None, config: tuple[str, ...]) -> Calibration:
     """The calibration of a results folder, or the robot of a file."""
-    from kinacc.deployment.folder import misfit_of
+    from kinacc.calibration.misfit import misfit
+    from kinacc.deployment.folder import read_tables
     from kinacc.deployment.record import nominal
     from kinacc.errors import InputError, Problem
     from kinacc.kinematics import robot as robots
@@ -73,7 +74,8 @@ def _calibration(place: str, model: str, robot: str | None, config: tuple[str, .
     path = Path(place)
     if path.is_dir():
         found = choice.calibration_of(path, model, robot, config)
-        return replace(found, name=place, misfit=misfit_of(path, found.choice))
+        tables = read_tables(path)
+        return replace(found, name=place, misfit=misfit(tables, found.robot, found.choice))
     if path.is_file() or place in robots.shipped():
         return replace(nominal(robots.load(place), place), choice="dh")
     raise InputError(Problem(place, "no such file or folder", "a results folder, a robot file"))

@@ -9,8 +9,6 @@ import numpy as np
 import pandas as pd
 
 from kinacc.calibration import identifiability
-from kinacc.calibration.misfit import Misfit, misfit
-from kinacc.calibration.noise import UNKNOWN
 from kinacc.calibration.observations import from_columns
 from kinacc.calibration.uncertainty import Uncertainty
 from kinacc.config.error_models import ALWAYS, ERROR_MODELS, PLAINEST
@@ -22,7 +20,6 @@ from kinacc.kinematics.dh import PARAMETERS, DHModel
 from kinacc.kinematics.robot import Robot
 from kinacc.tables import store
 from kinacc.tables.allowed import SUBSETS
-from kinacc.tables.columns import joint_count
 
 Tables = Mapping[str, Mapping[str, np.ndarray]]
 
@@ -42,64 +39,32 @@ def read_tables(folder: Path | str, *more: str) -> dict[str, dict[str, np.ndarra
     names (_mm, _rad). Raises InputError naming all tables that are missing or damaged.
     """
     paths = {name: Path(folder) / f"{name}.parquet" for name in (*_NEEDED, *_WANTED, *more)}
-    refuse(
-        [
-            Problem(str(paths[name]), "no such file", fix="run the workflow first")
-            for name in _NEEDED
-            if not paths[name].is_file()
-        ],
-        f"{folder} holds no calibration",
-    )
-    problems: list[Problem] = []
+    problems = [
+        Problem(str(paths[name]), "no such file", fix="run the workflow first")
+        for name in _NEEDED
+        if not paths[name].is_file()
+    ]
     tables = {}
     for name, path in paths.items():
         with gathered(problems):
             if path.is_file():
-                tables[name] = _Table(name, path)
-    refuse(problems, f"{folder} cannot be used")
+                tables[name] = store.read(path)
+    refuse(problems, f"{folder} holds no calibration that can be used")
     return tables
 
 
-class _Table(dict[str, np.ndarray]):
-    """Columns of a table of results; a missing column is an InputError."""
-
-    def __init__(self, name: str, path: Path) -> None:
-        super().__init__(store.read(path))
-        self.path, contract = path, store.artefact_named(name)
-        wrong = [
-            f"column {column.name} holds {'text' if column.kind != 'text' else 'numbers'}"
-            for column in contract.for_joints(joint_count(contract, self))
-            if column.name in self
-            and (self[column.name].dtype == object) != (column.kind == "text")
-        ]
-        if not contract.may_be_empty and not len(next(iter(self.values()), ())):
-            wrong.append("has no rows")
-        refuse([Problem(str(path), what, fix=store.remake(path)) for what in wrong])
-
-    def __missing__(self, name: str) -> np.ndarray:
-        what = f"has no column {name}"
-        raise InputError(Problem(str(self.path), what, fix=store.remake(self.path)))
-
-
 def recorded_robot(folder: Path | str) -> Robot | None:
-    """The robot a results folder was made with; None where it does not say.
+    """The robot a results folder was made with; None where it has no table of it.
 
-    Raises InputError where what it says cannot be read.
+    Raises InputError where that table cannot be read.
     """
     path = Path(folder) / "robot.parquet"
     if not path.is_file():
         return None
-    return robots.of_text(str(_Table("robot", path)["description"][0]), str(path))
-
-
-def misfit_of(folder: Path | str, model: str) -> Misfit:
-    """Held-out error and noise of a model in a results folder."""
-    robot = recorded_robot(folder)
-    if robot is None:
-        return Misfit(model, np.nan, UNKNOWN)
-    paths = {name: Path(folder) / f"{name}.parquet" for name in ("measurements", "model_selection")}
-    tables = {name: store.read(path) for name, path in paths.items() if path.is_file()}
-    return misfit(tables, robot, model)
+    description = next(iter(store.read(path).get("description", ())), None)
+    if not isinstance(description, str):
+        raise InputError(Problem(str(path), "has no description", fix=store.remake(path)))
+    return robots.of_text(description, str(path))
 
 
 def calibration(
@@ -112,8 +77,21 @@ def calibration(
     """The calibration in ``tables`` (``read_tables``): ``model``, or the one selected.
 
     ``session`` chooses the base where several were measured; the first where not given.
-    Raises InputError where the robot is not the one the tables were made with.
+    Raises InputError where the robot is not the one the tables were made with, and where these
+    cannot be used.
     """
+    try:
+        return _calibration(tables, robot, model, name, session)
+    except InputError:
+        raise
+    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
+        what = f"tables cannot be used: {error}"
+        raise InputError(Problem(f"results {name}", what, fix="run kinacc calibrate")) from None
+
+
+def _calibration(
+    tables: Tables, robot: Robot, model: str | None, name: str, session: str | None
+) -> Calibration:
     choice = selected_model(tables) if model is None else model
     made = model_tables.models(tables, robot.dh)
     if choice not in made:
@@ -131,6 +109,8 @@ def calibration(
     if "measurements" in tables:
         measured = from_columns(tables["measurements"], robot)
         fitted = measured.at.select(np.asarray(tables["measurements"]["subset"]) == SUBSETS[0])
+        if not len(fitted):
+            raise ValueError("measurements without fitted rows")
         known = np.unique(measured.target[measured.has_rotation])
         turned = frozenset(measured.target_names[target] for target in known)
     return Calibration(
@@ -140,7 +120,7 @@ def calibration(
         model=made[choice],
         base=bases[1],
         base_name="base" if number == 0 else f"base{number + 1}",
-        anchor=calibration(tables, robot, PLAINEST, name, session) if anchored else None,
+        anchor=_calibration(tables, robot, PLAINEST, name, session) if anchored else None,
         left_open=None if identified is None else tuple(identifiability.listed(identified)),
         targets={
             target: model_tables.frame(frames, choice, target)
@@ -240,22 +220,19 @@ def require_same_robot(recorded: Robot, given: Robot, place: str) -> None:
     }
     for what, (one, two) in pairs.items():
         if not np.allclose(one, two, rtol=_SAME, atol=_SAME):
-            raise InputError(
-                Problem(place, f"was made with another robot than {given.name}: {what}")
-            )
+            raise _another_robot(place, given, what)
 
 
-def _require_same_arm(nominal: DHModel, robot: Robot, name: str) -> None:
-    place = f"results {name}".strip()
-    what, fix = f"was made with another robot than {robot.name}", "give its robot (--robot)"
+def _require_same_arm(nominal: DHModel, robot: Robot, place: str) -> None:
     if nominal.joints != robot.dh.joints:
-        what = f"{what}: {nominal.joints} joints, not {robot.dh.joints}"
-        raise InputError(Problem(place, what, fix=fix))
+        raise _another_robot(place, robot, f"{nominal.joints} joints, not {robot.dh.joints}")
     for parameter in PARAMETERS:
         one, two = getattr(nominal, parameter), getattr(robot.dh, parameter)
         if (apart := np.flatnonzero(np.abs(one - two) > _SAME * (1.0 + np.abs(two)))).size:
-            joint = apart[0]
-            what = (
-                f"{what}: {parameter} of joint {joint + 1} {one[joint]:.9g}, not {two[joint]:.9g}"
-            )
-            raise InputError(Problem(place, what, fix=fix))
+            what = f"{one[apart[0]]:.9g}, not {two[apart[0]]:.9g}"
+            raise _another_robot(place, robot, f"{parameter} of joint {apart[0] + 1} {what}")
+
+
+def _another_robot(place: str, robot: Robot, what: str) -> InputError:
+    text = f"was made with another robot than {robot.name}: {what}"
+    return InputError(Problem(place or "results", text, fix="give its robot (--robot)"))
