@@ -73,9 +73,11 @@ def _calibration(place: str, model: str, robot: str | None, config: tuple[str, .
 
     path = Path(place)
     if path.is_dir():
-        found = choice.calibration_of(path, model, robot, config)
+        calibration = choice.calibration_of(path, model, robot, config)
         tables = read_tables(path)
-        return replace(found, name=place, misfit=misfit(tables, found.robot, found.choice))
+        return replace(
+            calibration, name=place, misfit=misfit(tables, calibration.robot, calibration.choice)
+        )
     if path.is_file() or place in robots.shipped():
         return replace(nominal(robots.load(place), place), choice="dh")
     raise InputError(Problem(place, "no such file or folder", "a results folder, a robot file"))
@@ -90,7 +92,7 @@ def _joints(both, places: tuple[str, str], path: str | None, count: int) -> np.n
     from kinacc.study.operating_points import spread_rows
     from kinacc.tables import store
 
-    robots = [each.robot for each in both]
+    robots = [item.robot for item in both]
     if path is not None:
         return rows.read(path, robots[0]).joints
     names = [f"q{joint + 1}" for joint in range(robots[0].dh.joints)]

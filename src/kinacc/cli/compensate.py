@@ -86,22 +86,22 @@ def _find_joints(
     answer = Output(as_json=as_json, table=out, force=force)
     require_writable([out], force, TABLES)
     calibration = choice.calibration_of(folder, model, robot, config, session)
-    given = target_poses.poses(calibration, poses, pose, near_deg)
+    inputs = target_poses.poses(calibration, poses, pose, near_deg)
     with reporting("compensate", bar=True):
-        found = joints_for(
-            calibration, given.pose, given.joints, given.directions, frame, point, given.payload
+        result = joints_for(
+            calibration, inputs.pose, inputs.joints, inputs.directions, frame, point, inputs.payload
         )
-        q_dh = calibration.robot.dh_joints(found.q_rad)
+        q_dh = calibration.robot.dh_joints(result.q_rad)
         there = np.isfinite(q_dh).all(axis=1)
-        at = JointState(q_dh[there])
+        state = JointState(q_dh[there])
         unlike = ~calibration.outside_range(q_dh).any(axis=1) & there
-        unlike[there] &= ~is_measured_there(calibration, at, point)
-    table = target_poses.answer_table(calibration, given, found, unlike)
+        unlike[there] &= ~is_measured_there(calibration, state, point)
+    table = target_poses.answer_table(calibration, inputs, result, unlike)
     facts = calibration.facts(frame, point)
     title = "{calibration}: joints for {point} ({orientation} orientation), {frame} frame, {model}"
-    shown = table.drop(columns=[*pose_columns(given.pose)])
+    shown = table.drop(columns=[*pose_columns(inputs.pose)])
     answer.show(facts | {"rows": table}, table, [title.format(**facts)], shown)
-    rows.say_unused(given, calibration)
+    rows.say_unused(inputs, calibration)
     rows.warn_unlike(unlike)
-    rows.warn_undetermined(deviations(calibration, at, frame, point)[1][:, 0], frame)
-    rows.end_where_missing(found.q_rad, "joints")
+    rows.warn_undetermined(deviations(calibration, state, frame, point)[1][:, 0], frame)
+    rows.end_where_missing(result.q_rad, "joints")

@@ -91,8 +91,8 @@ def export(
     paths = write(contents(source, wanted, name), target, out.force)
     reason = choice.say_outdated(folder)
     out.say({"files": paths, **({"outdated": reason} if reason else {})}, "\n".join(paths))
-    for each in notes(source):
-        click.echo(each, err=True)
+    for item in notes(source):
+        click.echo(item, err=True)
 
 
 def _to_controller(folder, target, maker, name, robot, config, out) -> None:
@@ -108,13 +108,13 @@ def _to_controller(folder, target, maker, name, robot, config, out) -> None:
     data_set = Path(folder).resolve().name
     arm = choice.robot_of(folder, robot, config)
     settings = calibration_settings(Path(folder), config)
-    found = fit_pendant(results.read_tables(folder), arm, settings, maker, data_set)
+    result = fit_pendant(results.read_tables(folder), arm, settings, maker, data_set)
     stem = f"{name or data_set}_{maker}"
-    files = {f"{stem}.html": pendant_page(found)}
-    if found.ending:
-        files[f"{stem}{found.ending}"] = found.text + "\n"
+    files = {f"{stem}.html": pendant_page(result)}
+    if result.ending:
+        files[f"{stem}{result.ending}"] = result.text + "\n"
     paths = write(files, target, out.force)
     choice.say_outdated(folder)
-    lines = [f"Mean position error at {found.errors[0].points} {found.errors[0].poses}:"]
-    lines += [f"  {each.model}: {each.position_mm:.3f} mm" for each in found.errors]
-    out.say({**asdict(found), "files": paths}, "\n".join([*lines, *paths]))
+    lines = [f"Mean position error at {result.errors[0].points} {result.errors[0].poses}:"]
+    lines += [f"  {item.model}: {item.position_mm:.3f} mm" for item in result.errors]
+    out.say({**asdict(result), "files": paths}, "\n".join([*lines, *paths]))

@@ -100,8 +100,8 @@ def answers(
     """
     options = [click.option("--json", "as_json", is_flag=True, help=as_json)]
     if table:
-        words = "Write to a .csv, .xlsx, .json or .parquet file."
-        options.insert(0, click.option("--out", "-o", "table", type=click.Path(), help=words))
+        texts = "Write to a .csv, .xlsx, .json or .parquet file."
+        options.insert(0, click.option("--out", "-o", "table", type=click.Path(), help=texts))
     if verbose:
         options.append(click.option("--verbose", is_flag=True, help="Every row and detail."))
     if page:
@@ -109,8 +109,8 @@ def answers(
     if picture:
         options.insert(0, click.option("--picture", type=click.Path(), help=picture))
     if table or picture or page or force:
-        words = force or "Replace a file that is there."
-        options.append(click.option("--force", is_flag=True, help=words))
+        texts = force or "Replace a file that is there."
+        options.append(click.option("--force", is_flag=True, help=texts))
 
     def decorate(command: Callable) -> Callable:
         @wraps(command)
@@ -180,15 +180,15 @@ def _shown(value: object) -> str:
 def plain(value: Any) -> Any:
     """What JSON holds, of results however nested; None for a number that is not finite."""
     if is_dataclass(value):
-        value = {each.name: getattr(value, each.name) for each in fields(value)}
+        value = {item.name: getattr(value, item.name) for item in fields(value)}
     elif isinstance(value, pd.DataFrame):
         value = value.to_dict("records")
     elif isinstance(value, (np.ndarray, np.generic)):
         value = value.tolist()
     if isinstance(value, Mapping):
-        return {key: plain(each) for key, each in value.items()}
+        return {key: plain(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
-        return [plain(each) for each in value]
+        return [plain(item) for item in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
@@ -197,7 +197,7 @@ def require_writable(
 ) -> None:
     """Raise InputError where a file could not or should not be written."""
     problems = []
-    for path in [Path(each) for each in paths if each is not None]:
+    for path in [Path(item) for item in paths if item is not None]:
         if path.is_dir():
             problems.append(Problem(str(path), "is a folder", "a file"))
             continue

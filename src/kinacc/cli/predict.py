@@ -47,16 +47,20 @@ def predict(
 
     calibration = choice.calibration_of(folder, model, robot, config, session)
     arm = calibration.robot
-    given = rows.given_joints(arm, joints, joints_deg, joints_rad, joint_answers(file))
+    inputs = rows.given_joints(arm, joints, joints_deg, joints_rad, joint_answers(file))
     with reporting("predict", bar=True):
-        found = poses_at(calibration, given.joints, given.directions, frame, point, given.payload)
-    named = pd.DataFrame({"row": given.label, **rows.joint_columns(arm.dh.prismatic, given.joints)})
-    table = named.join(found.table())
+        result = poses_at(
+            calibration, inputs.joints, inputs.directions, frame, point, inputs.payload
+        )
+    named = pd.DataFrame(
+        {"row": inputs.label, **rows.joint_columns(arm.dh.prismatic, inputs.joints)}
+    )
+    table = named.join(result.table())
     facts = calibration.facts(frame, point)
     shown = table if out.verbose else table[["row", *_SHOWN]]
     title = "{calibration}: {point} ({orientation} orientation), {frame} frame, {model} model"
     out.show(facts | {"rows": table}, table, [title.format(**facts)], shown)
-    rows.say_unused(given, calibration)
+    rows.say_unused(inputs, calibration)
     rows.warn_unlike(table["status"] != "ok")
     rows.warn_undetermined(table["undetermined_mm"], frame)
-    rows.end_where_missing(found.pose.position_mm, "a pose")
+    rows.end_where_missing(result.pose.position_mm, "a pose")

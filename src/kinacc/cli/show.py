@@ -45,11 +45,11 @@ def find(path: Path, name: str | None) -> Path:
     """The file or folder meant. Raises InputError with what is there instead."""
     asked = path / (name or "")
     named = asked.with_name(f"{asked.name}.parquet") if asked.name else asked
-    if place := next((each for each in (asked, named) if each.is_file()), None):
+    if place := next((item for item in (asked, named) if item.is_file()), None):
         return place
     if asked.is_dir():
         return asked
-    there = sorted(each.stem for each in asked.parent.glob("*") if each.name[0] != ".")
+    there = sorted(item.stem for item in asked.parent.glob("*") if item.name[0] != ".")
     close = nearest(asked.stem, tuple(there))
     fix = f"did you mean {asked.with_name(close)}?" if close else ""
     raise InputError(Problem(str(asked), "no such table or folder", first_few(there, 30), fix))
@@ -66,10 +66,10 @@ def listing(folder: Path) -> pd.DataFrame:
             rows.append((path.stem, "", error.problems[0].what))
     if rows:
         return pd.DataFrame(rows, columns=["table", "rows", "meaning"])
-    within = [(each.name, len([*each.glob("*.parquet")])) for each in sorted(folder.iterdir())]
+    within = [(item.name, len([*item.glob("*.parquet")])) for item in sorted(folder.iterdir())]
     if not any(count for _, count in within):
         raise InputError(Problem(str(folder), "holds no table", "the folder of a data set"))
-    return pd.DataFrame([each for each in within if each[1]], columns=["folder", "tables"])
+    return pd.DataFrame([item for item in within if item[1]], columns=["folder", "tables"])
 
 
 def frame(table: pa.Table, path: Path) -> pd.DataFrame:
@@ -78,8 +78,8 @@ def frame(table: pa.Table, path: Path) -> pd.DataFrame:
         table.validate(full=True)
         return table.to_pandas()
     except (ValueError, pa.ArrowException) as error:
-        what = f"cannot be shown: {error}"
-        raise InputError(Problem(str(path), what, fix=store.remake(path))) from None
+        message = f"cannot be shown: {error}"
+        raise InputError(Problem(str(path), message, fix=store.remake(path))) from None
 
 
 def described(path: Path) -> pd.DataFrame:

@@ -52,27 +52,27 @@ def summary(folders: tuple[Path, ...], tolerance_mm: float | None, by: str, out)
     from kinacc.report import terminal
 
     places = summaries.data_set_folders(folders or (Path(RESULTS),))
-    found: list[CalibrationSummary | Problem]
+    result: list[CalibrationSummary | Problem]
     if len(places) == 1:
         try:
-            found = [summaries.summarise(places[0], outdated=choice.say_outdated(places[0]))]
+            result = [summaries.summarise(places[0], outdated=choice.say_outdated(places[0]))]
         except InputError as error:
-            found = [error.problems[0]]
+            result = [error.problems[0]]
     else:
-        found = summaries.summarise_all(places)
-    known = [each for each in found if not isinstance(each, Problem)]
-    verdicts = [each.verdict(by, tolerance_mm) for each in known]
+        result = summaries.summarise_all(places)
+    known = [item for item in result if not isinstance(item, Problem)]
+    verdicts = [item.verdict(by, tolerance_mm) for item in known]
     if by == HELD_OUT and not any(verdicts):
-        what = "is not given, and no configuration has a tolerance of quantile_99"
-        raise InputError(Problem("--tolerance-mm", what, "a number, in mm"))
-    table = terminal.fleet_table(found, by, tolerance_mm)
+        message = "is not given, and no configuration has a tolerance of quantile_99"
+        raise InputError(Problem("--tolerance-mm", message, "a number, in mm"))
+    table = terminal.fleet_table(result, by, tolerance_mm)
     if out.table is not None or out.as_json:
-        out.show(as_plain(found, by, tolerance_mm), table)
-    elif len(known) == len(found) == 1:
+        out.show(as_plain(result, by, tolerance_mm), table)
+    elif len(known) == len(result) == 1:
         terminal.print_summary(known[0], out.verbose, by, tolerance_mm)
     else:
         terminal.print_fleet(table, by)
-    if len(known) < len(found) or any(each and each.verdict != "accept" for each in verdicts):
+    if len(known) < len(result) or any(item and item.verdict != "accept" for item in verdicts):
         sys.exit(AGAINST)
 
 
@@ -82,11 +82,15 @@ def as_plain(
     tolerance_mm: float | None = None,
 ) -> dict[str, dict]:
     """Summaries by name of the data set as JSON has them, each with its verdict."""
-    told = {}
-    for each in found:
-        if isinstance(each, Problem):
-            told[Path(each.where.removesuffix("/summary.parquet")).name] = {"problem": str(each)}
+    reported = {}
+    for item in found:
+        if isinstance(item, Problem):
+            reported[Path(item.where.removesuffix("/summary.parquet")).name] = {
+                "problem": str(item)
+            }
             continue
-        verdict = each.verdict(by, tolerance_mm)
-        told[each.name] = plain(asdict(each) | {"verdict": asdict(verdict) if verdict else None})
-    return told
+        verdict = item.verdict(by, tolerance_mm)
+        reported[item.name] = plain(
+            asdict(item) | {"verdict": asdict(verdict) if verdict else None}
+        )
+    return reported

@@ -39,21 +39,23 @@ def poses(
     """
     sources = [path is not None, bool(texts)]
     if sum(sources) != 1:
-        what = "is not given" if not any(sources) else "is given more than once"
-        raise InputError(Problem("what is wanted", what, "a file of poses, --pose, or --program"))
+        message = "is not given" if not any(sources) else "is given more than once"
+        raise InputError(
+            Problem("what is wanted", message, "a file of poses, --pose, or --program")
+        )
     near = None
     if near_deg is not None:
         near = rows.of_arguments((near_deg,), "deg", calibration.robot, "--near-deg")
     if path is not None:
-        given = rows.read(path, calibration.robot, joints=False, pose=True)
+        inputs = rows.read(path, calibration.robot, joints=False, pose=True)
     else:
         pose = _of_arguments(texts)
-        given = Rows(len(texts), np.arange(1, len(texts) + 1), None, None, pose, ())
-    if given.joints is None and near is not None:
-        given = replace(given, joints=np.broadcast_to(near, (given.count, near.shape[1])))
-    if given.joints is not None:
-        rows.require_within_limits(calibration.robot, given, path or "--near-deg")
-    return given
+        inputs = Rows(len(texts), np.arange(1, len(texts) + 1), None, None, pose, ())
+    if inputs.joints is None and near is not None:
+        inputs = replace(inputs, joints=np.broadcast_to(near, (inputs.count, near.shape[1])))
+    if inputs.joints is not None:
+        rows.require_within_limits(calibration.robot, inputs, path or "--near-deg")
+    return inputs
 
 
 def answer_table(

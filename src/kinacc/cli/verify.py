@@ -79,8 +79,8 @@ def _settings(readings: Path, folder: str, dataset: str | None) -> tuple[str, Ma
     settings = load([str(readings)])
     name = next(iter(settings)) if dataset is None and len(settings) == 1 else dataset
     if name not in settings:
-        what = f"{dataset!r} is none of its data sets" if dataset else "is not given"
-        raise InputError(Problem("--dataset", what, ", ".join(settings)))
+        message = f"{dataset!r} is none of its data sets" if dataset else "is not given"
+        raise InputError(Problem("--dataset", message, ", ".join(settings)))
     return name, settings[name]
 
 

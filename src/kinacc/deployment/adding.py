@@ -83,8 +83,8 @@ def add(
     day = _day("--date", date, path, settings)
     last = lines[-1]["date"] if lines else _day("--first-date", first_date, known[-1], settings)
     if day <= last:
-        what = f"{day} is not after {last}, the day of {known[-1]}"
-        raise InputError(Problem("--date", what, "a later day; write earlier lines by hand"))
+        message = f"{day} is not after {last}, the day of {known[-1]}"
+        raise InputError(Problem("--date", message, "a later day; write earlier lines by hand"))
     _require_alike(path, known, settings, tool)
     new: list[dict[str, Any]] = [
         {"path": _beside(config, path), "date": day, "base": base, "tool": tool}
@@ -141,8 +141,8 @@ def _require_alike(path: str, known: Sequence[str], settings: Mapping, tool: str
         old = measured(name)
         if known_rows(new, old).all():
             raise InputError(Problem(path, f"holds the readings of {name}", "new readings"))
-    one, two = (sorted({*table["target"].tolist()}) for table in (new, old))
-    if one != two and (tool != MOVED or len(one) != len(two)):
+    targets, targets_before = (sorted({*table["target"].tolist()}) for table in (new, old))
+    if targets != targets_before and (tool != MOVED or len(targets) != len(targets_before)):
         fix = "name them in measurements.file.targets or columns"
-        allowed = f"{first_few(two)}, as {known[-1]}"
-        raise InputError(Problem(path, f"has target {first_few(one)}", allowed, fix))
+        allowed = f"{first_few(targets_before)}, as {known[-1]}"
+        raise InputError(Problem(path, f"has target {first_few(targets)}", allowed, fix))

@@ -68,14 +68,14 @@ def is_measured_there(
 
 def measured_by_all(calibrations: Sequence[Calibration], q_rad: np.ndarray) -> np.ndarray:
     """True (n,) where every calibration was measured, over reported joints (n, k)."""
-    found = [
-        is_measured_there(each, JointState(each.robot.dh_joints(q_rad))) for each in calibrations
+    result = [
+        is_measured_there(item, JointState(item.robot.dh_joints(q_rad))) for item in calibrations
     ]
-    return np.all(found, axis=0)
+    return np.all(result, axis=0)
 
 
 def share_of_box(calibration: Calibration, low: np.ndarray, high: np.ndarray) -> float:
     """Share of the box of reported joints (k,), (k,) where the calibration was measured."""
     drawn = low + points("sobol", _DRAWN, len(low)) * (high - low)
-    at = JointState(calibration.robot.dh_joints(drawn))
-    return float(np.mean(is_measured_there(calibration, at)))
+    state = JointState(calibration.robot.dh_joints(drawn))
+    return float(np.mean(is_measured_there(calibration, state)))

@@ -105,12 +105,14 @@ def compare(
     """
     require_alike(first, second)
     both = (first, second)
-    inside = [covers(each.model, each.robot.dh_joints(q_rad)).all(axis=1) for each in both]
+    inside = [covers(item.model, item.robot.dh_joints(q_rad)).all(axis=1) for item in both]
     covered = np.all(inside, axis=0)
     if covered.sum() < min(_FEWEST, len(q_rad)):
-        what = f"{covered.sum()} of {len(q_rad)} poses lie in the joint ranges of both models"
+        message = f"{covered.sum()} of {len(q_rad)} poses lie in the joint ranges of both models"
         fix = "give poses measured by both (--joints FILE), or compare DH models (--model dh)"
-        raise InputError(Problem(f"{first.name}, {second.name}", what, f"{_FEWEST} or more", fix))
+        raise InputError(
+            Problem(f"{first.name}, {second.name}", message, f"{_FEWEST} or more", fix)
+        )
     q_rad = q_rad[covered]
     names = (Path(first.name).name, Path(second.name).name)
     names = names if names[0] != names[1] else (first.name, second.name)
@@ -120,17 +122,17 @@ def compare(
     test, parameters = (np.nan, 0, np.nan), None
     if parametric:
         scale = np.array([scale_of(name) for name in first.model.names])
-        values = [each.model.comparable / scale for each in both]
-        known = [_Knowledge.of(each, scale) for each in both]
+        values = [item.model.comparable / scale for item in both]
+        known = [_Knowledge.of(item, scale) for item in both]
         test = _test(values[1] - values[0], known)
         parameters = _parameters(first.model.names, *values, known)
     before, after = (
-        each.pose(JointState(each.robot.dh_joints(q_rad)), "base", FLANGE) for each in both
+        item.pose(JointState(item.robot.dh_joints(q_rad)), "base", FLANGE) for item in both
     )
     weights = np.array([1.0, 1.0, 1.0, *[rotation_weight_mm_per_rad] * 3])
     moved = [_difference(before, after), _aligned(before, after, weights)]
     scatter = _scatter(both, q_rad, before, weights)
-    nominal = (robots.forward(each.robot, q_rad) for each in both)
+    nominal = (robots.forward(item.robot, q_rad) for item in both)
     apart_mm = _rms(_aligned(*nominal, weights)[:, :3])
     length_mm = float(np.hypot(first.robot.dh.a_mm, first.robot.dh.d_mm).sum())
     enough = float(np.mean(measured)) >= _ENOUGH
@@ -154,28 +156,28 @@ def compare(
         first.choice,
         next(verdict for verdict, holds in verdicts.items() if holds),
         *test,
-        pd.DataFrame([_shift(*each) for each in zip(frames, moved, scatter, strict=True)]),
+        pd.DataFrame([_shift(*item) for item in zip(frames, moved, scatter, strict=True)]),
         parameters,
         pd.DataFrame(poses),
         len(covered),
         apart_mm,
         shared,
-        tuple(each.misfit.ratio if each.misfit else np.nan for each in both),
+        tuple(item.misfit.ratio if item.misfit else np.nan for item in both),
     )
 
 
 def require_alike(first: Calibration, second: Calibration) -> None:
-    """InputError where the joints of two arms do not mean the same."""
-    one, two = first.robot, second.robot
-    what = ""
-    if one.dh.joints != two.dh.joints:
-        what = f"has {two.dh.joints} joints, {first.name} {one.dh.joints}"
-    elif not np.array_equal(one.dh.prismatic, two.dh.prismatic):
-        what = f"has other sliding joints than {first.name}"
-    elif not np.array_equal(one.joint_map, two.joint_map):
-        what = f"has another joint_map than {first.name}"
-    if what:
-        raise InputError(Problem(second.name, what, "the same kind of robot"))
+    """InputError where the joints of after arms do not mean the same."""
+    before, after = first.robot, second.robot
+    message = ""
+    if before.dh.joints != after.dh.joints:
+        message = f"has {after.dh.joints} joints, {first.name} {before.dh.joints}"
+    elif not np.array_equal(before.dh.prismatic, after.dh.prismatic):
+        message = f"has other sliding joints than {first.name}"
+    elif not np.array_equal(before.joint_map, after.joint_map):
+        message = f"has another joint_map than {first.name}"
+    if message:
+        raise InputError(Problem(second.name, message, "the same kind of robot"))
 
 
 class _Knowledge(NamedTuple):
@@ -205,8 +207,8 @@ def _parameters(
     names: tuple[str, ...], one: np.ndarray, two: np.ndarray, known: list[_Knowledge]
 ) -> pd.DataFrame:
     """Parameters ``one`` and ``two`` (P,) in mm and mrad, and what is known of them."""
-    hidden = [np.sum(each.undetermined**2, axis=0) > _TOUCHED for each in known]
-    std = np.sqrt(sum(np.diag(each.covariance) for each in known))
+    hidden = [np.sum(item.undetermined**2, axis=0) > _TOUCHED for item in known]
+    std = np.sqrt(sum(np.diag(item.covariance) for item in known))
     std[np.any(hidden, axis=0)] = np.nan
     table = pd.DataFrame({
         "name": [
@@ -260,8 +262,8 @@ def _frame_slopes(pose: Pose, weights: np.ndarray) -> np.ndarray:
 def _aligned(before: Pose, after: Pose, weights: np.ndarray) -> np.ndarray:
     """Movement (n, 6) that no change of base and end frame explains, least squares."""
     for _ in range(_STEPS):
-        left = (_difference(before, after) * weights).ravel()
-        step = np.linalg.lstsq(_frame_slopes(after, weights), -left, rcond=1e-9)[0]
+        remaining = (_difference(before, after) * weights).ravel()
+        step = np.linalg.lstsq(_frame_slopes(after, weights), -remaining, rcond=1e-9)[0]
         base, end = Pose(exp_so3(step[3:6]), step[:3]), Pose(exp_so3(step[9:12]), step[6:9])
         after = compose(base, compose(after, end))
         if np.abs(step * np.tile([1.0, 1.0, 1.0, 1e3, 1e3, 1e3], 2)).max() < 1e-10:
@@ -274,20 +276,20 @@ def _scatter(both, q_rad: np.ndarray, pose: Pose, weights: np.ndarray) -> list[n
 
     As fitted, and less what base and end frame absorb; None twice without covariances.
     """
-    if any(each.known is None for each in both):
+    if any(item.known is None for item in both):
         return [None, None]
-    states = [JointState(each.robot.dh_joints(q_rad)) for each in both]
+    states = [JointState(item.robot.dh_joints(q_rad)) for item in both]
     moved = np.concatenate(
         [
-            sensitivity(each, at, "base", FLANGE) @ each.root
-            for each, at in zip(both, states, strict=True)
+            sensitivity(item, state, "base", FLANGE) @ item.root
+            for item, state in zip(both, states, strict=True)
         ],
         axis=2,
     )
-    left, values, _ = np.linalg.svd(_frame_slopes(pose, weights), full_matrices=False)
-    left = left[:, values > 1e-9 * values[0]]
-    flat = (moved * weights[:, None]).reshape(len(left), -1)
-    apart = (flat - left @ (left.T @ flat)).reshape(moved.shape) / weights[:, None]
+    remaining, values, _ = np.linalg.svd(_frame_slopes(pose, weights), full_matrices=False)
+    remaining = remaining[:, values > 1e-9 * values[0]]
+    flat = (moved * weights[:, None]).reshape(len(remaining), -1)
+    apart = (flat - remaining @ (remaining.T @ flat)).reshape(moved.shape) / weights[:, None]
     return [moved, apart]
 
 

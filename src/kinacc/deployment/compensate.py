@@ -88,12 +88,12 @@ def compensate(
     robot, every = calibration.robot, np.arange(len(wanted.position_mm))
     carried, origin = calibration.point(point), calibration.origin(frame)
     goal = compose(invert(origin), compose(wanted, invert(carried)))
-    given = near_rad is not None
+    inputs = near_rad is not None
     near = np.broadcast_to(0.0 if near_rad is None else near_rad, (len(every), robot.dh.joints))
     like = JointState(robot.dh_joints(near), None if s is None else np.asarray(s), payload)
     arm = _Goals(calibration, goal, near, like, carried)
     more, tried = every, []
-    if given:
+    if inputs:
         first = arm.judged(robot.dh_joints(near), every)
         good = first["status"] <= PoseStatus.EXTRAPOLATED
         more, tried = every[~(good & (first["movement"] <= SAME_POSTURE_RAD))], [first]
@@ -101,13 +101,13 @@ def compensate(
     hit, status = tried["status"] != PoseStatus.NOT_REACHED, tried["status"]
     nearest = tried[hit].groupby("row")["movement"].min().reindex(every, fill_value=np.inf)
     cost = np.minimum(tried["movement"], 99.0) + 1e3 * (status > PoseStatus.EXTRAPOLATED)
-    cost += 200.0 * ((status == PoseStatus.EXTRAPOLATED) & (not given))
+    cost += 200.0 * ((status == PoseStatus.EXTRAPOLATED) & (not inputs))
     tried["cost"] = cost.where(hit, 1e6 + np.minimum(tried["off_mm"], 1e8))
     best = tried.sort_values("cost", kind="stable").drop_duplicates("row")
     best = best.set_index("row").reindex(every)
     status = best["status"].fillna(PoseStatus.NOT_REACHED)
     farther = (status <= PoseStatus.EXTRAPOLATED) & (best["movement"] > nearest + SAME_RAD)
-    status = status.mask(farther & given, PoseStatus.OTHER_POSTURE).to_numpy(int)
+    status = status.mask(farther & inputs, PoseStatus.OTHER_POSTURE).to_numpy(int)
     q_dh = best[[*range(robot.dh.joints)]].to_numpy(float)
     reported = limits.reported_joints(robot, q_dh)
     outside = np.where(
@@ -122,7 +122,7 @@ def compensate(
         best["off_mm"].fillna(np.inf).to_numpy(),
         best["angle_rad"].fillna(np.inf).to_numpy(),
         outside & (status != PoseStatus.NOT_REACHED)[:, None],
-        q_rad - near if given else np.full(q_rad.shape, np.nan),
+        q_rad - near if inputs else np.full(q_rad.shape, np.nan),
     )
 
 
@@ -177,15 +177,15 @@ class _Goals:
         status = np.where(beyond_limits, PoseStatus.OUTSIDE_LIMITS, PoseStatus.OUTSIDE_RANGE)
         q_dh, worth = start.copy(), np.flatnonzero(~hopeless)
         off, angle = np.full((2, len(start)), np.nan)
-        own = rows[worth]
+        local = rows[worth]
         with np.errstate(all="ignore"):  # far outside its range a model may be no number
-            q_dh[worth] = self._refined(start[worth], own)
-            turned = self._turned(q_dh[worth], own)
+            q_dh[worth] = self._refined(start[worth], local)
+            turned = self._turned(q_dh[worth], local)
             again = np.flatnonzero((np.abs(turned - q_dh[worth]) > 1.0).any(axis=1))
             q_dh[worth[again]] = turned[again]
             if len(again) and is_bounded:  # errors need not repeat after a turn
-                q_dh[worth[again]] = self._refined(turned[again], own[again])
-            off[worth], angle[worth] = self._left(model, q_dh[worth], own)
+                q_dh[worth[again]] = self._refined(turned[again], local[again])
+            off[worth], angle[worth] = self._left(model, q_dh[worth], local)
         turn_rad = FEW_AXES_TURN_RAD if self.has_few_axes else ROTATION_TOLERANCE_RAD
         hit = (off <= POSITION_TOLERANCE_MM) & (angle <= turn_rad)
         reported = limits.reported_joints(robot, q_dh)
@@ -215,16 +215,16 @@ class _Goals:
         if not self.has_few_axes:
             with suppress(InputError):
                 part = Pose(self.goal.rotation[rows], self.goal.position_mm[rows])
-                found = solve(robot, plain, part).q_rad
-                there = np.isfinite(found).all(axis=2)
-                own = np.broadcast_to(rows[:, None], there.shape)[there]
-                return self._turned(found[there], own), own
+                result = solve(robot, plain, part).q_rad
+                there = np.isfinite(result).all(axis=2)
+                local = np.broadcast_to(rows[:, None], there.shape)[there]
+                return self._turned(result[there], local), local
         share = points("sobol", count, robot.dh.joints)
         starts = robot.dh_joints(robot.q_min_rad + share * (robot.q_max_rad - robot.q_min_rad))
-        own = np.repeat(rows, count)
-        q_dh = self._onto(plain, np.tile(starts, (len(rows), 1)), own, None)
-        near = self._left(plain, q_dh, own)[0] <= _NEAR_START_MM
-        return self._turned(q_dh[near], own[near]), own[near]
+        local = np.repeat(rows, count)
+        q_dh = self._onto(plain, np.tile(starts, (len(rows), 1)), local, None)
+        near = self._left(plain, q_dh, local)[0] <= _NEAR_START_MM
+        return self._turned(q_dh[near], local[near]), local[near]
 
     def _turned(self, q_dh: np.ndarray, rows: np.ndarray) -> np.ndarray:
         """Revolute joints on the turn nearest to the given joints that lies within the limits.
@@ -247,14 +247,14 @@ class _Goals:
 
     def _refined(self, start: np.ndarray, rows: np.ndarray) -> np.ndarray:
         model, like = self.calibration.model, self.like.select(rows)
-        kinds = [np.nan_to_num(each) for each in (like.s, like.payload) if each is not None]
+        kinds = [np.nan_to_num(item) for item in (like.s, like.payload) if item is not None]
         if not kinds or model.table is not None:
             return self._onto(model, start, rows, None)
         # Directions and payloads differ by row, and a refinement takes one state.
         refined = np.empty_like(start)
         for _, group in pd.DataFrame(np.hstack(kinds)).groupby([*range(np.hstack(kinds).shape[1])]):
-            at = group.index.to_numpy()
-            refined[at] = self._onto(model, start[at], rows[at], like.select(at[:1]))
+            state = group.index.to_numpy()
+            refined[state] = self._onto(model, start[state], rows[state], like.select(state[:1]))
         return refined
 
     def _onto(
@@ -270,9 +270,9 @@ class _Goals:
         self, model: ErrorModel, q_dh: np.ndarray, rows: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """What is left, (m,) mm and (m,) rad, at DH joints (m, k) of goals ``rows``."""
-        at = compose(model.pose(self.like.select(rows).moved(q_dh)), self.carried)
-        off = np.linalg.norm(at.position_mm - self.wanted.position_mm[rows], axis=1)
-        turned = at.rotation @ np.swapaxes(self.wanted.rotation[rows], 1, 2)
+        state = compose(model.pose(self.like.select(rows).moved(q_dh)), self.carried)
+        off = np.linalg.norm(state.position_mm - self.wanted.position_mm[rows], axis=1)
+        turned = state.rotation @ np.swapaxes(self.wanted.rotation[rows], 1, 2)
         angle = np.linalg.norm(log_so3(turned), axis=1)
         return np.nan_to_num(off, nan=np.inf), np.nan_to_num(angle, nan=np.inf)
 

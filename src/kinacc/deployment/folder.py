@@ -85,26 +85,26 @@ def calibration(
     except InputError:
         raise
     except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
-        what = f"tables cannot be used: {error}"
-        raise InputError(Problem(f"results {name}", what, fix="run kinacc calibrate")) from None
+        message = f"tables cannot be used: {error}"
+        raise InputError(Problem(f"results {name}", message, fix="run kinacc calibrate")) from None
 
 
 def _calibration(
     tables: Tables, robot: Robot, model: str | None, name: str, session: str | None
 ) -> Calibration:
     choice = selected_model(tables) if model is None else model
-    made = model_tables.models(tables, robot.dh)
-    if choice not in made:
-        what = f"{choice!r} is none of these results"
-        raise InputError(Problem("model", what, ", ".join(made)))
-    bounded = next(each for each in made.values() if each.domain is not None)
+    created = model_tables.models(tables, robot.dh)
+    if choice not in created:
+        message = f"{choice!r} is none of these results"
+        raise InputError(Problem("model", message, ", ".join(created)))
+    bounded = next(item for item in created.values() if item.domain is not None)
     _require_same_arm(bounded.dh, robot, name)
     frames, identified = tables["frames"], tables.get(f"{PLAINEST}_identified")
     number = _session_number(frames, choice, session)
     bases = [model_tables.frame(frames, kind, "base", session) for kind in (PLAINEST, choice)]
     # A model with the base of the DH model: neither was fitted with it.
-    same_base = all(np.array_equal(one, two) for one, two in zip(*bases, strict=True))
-    anchored = made[choice].table is None and not same_base
+    same_base = all(np.array_equal(first, two) for first, two in zip(*bases, strict=True))
+    anchored = created[choice].table is None and not same_base
     fitted, turned = None, frozenset()
     if "measurements" in tables:
         measured = from_columns(tables["measurements"], robot)
@@ -117,7 +117,7 @@ def _calibration(
         name=name,
         robot=robot,
         choice=choice,
-        model=made[choice],
+        model=created[choice],
         base=bases[1],
         base_name="base" if number == 0 else f"base{number + 1}",
         anchor=_calibration(tables, robot, PLAINEST, name, session) if anchored else None,
@@ -137,7 +137,7 @@ def _calibration(
 def targets_of(frames: Mapping, model: str) -> list[str]:
     """Names of the targets that a model was fitted with, from the table ``frames``."""
     of_model = np.asarray(frames["model"]) == model
-    return [str(each) for each in np.asarray(frames["frame"])[of_model] if each != "base"]
+    return [str(item) for item in np.asarray(frames["frame"])[of_model] if item != "base"]
 
 
 def _session_number(frames: Mapping, model: str, session: str | None) -> int:
@@ -145,7 +145,7 @@ def _session_number(frames: Mapping, model: str, session: str | None) -> int:
     if session is None or "session" not in frames:
         return 0
     bases = (np.asarray(frames["model"]) == model) & (np.asarray(frames["frame"]) == "base")
-    known = [str(each) for each in np.asarray(frames["session"])[bases] if each is not None]
+    known = [str(item) for item in np.asarray(frames["session"])[bases] if item is not None]
     if session not in known:
         allowed = ", ".join(known) or "none: the data name no sessions"
         raise InputError(Problem("session", f"{session!r} is not there", allowed))
@@ -160,9 +160,9 @@ def selected_model(tables: Tables) -> str:
     if recorded := recorded_model(tables):
         return recorded
     rms = {kind: residual(tables, kind, "validation") for kind in ALWAYS}
-    if any(each is None for each in rms.values()):
-        what = "was not selected, and there are no held-out residuals to choose by"
-        raise InputError(Problem("model", what, ", ".join(MODELS), "give --model"))
+    if any(item is None for item in rms.values()):
+        message = "was not selected, and there are no held-out residuals to choose by"
+        raise InputError(Problem("model", message, ", ".join(MODELS), "give --model"))
     return min(rms, key=lambda kind: rms[kind].position_mm)
 
 
@@ -180,11 +180,11 @@ def residual(tables: Tables, choice: str, subset: str | None = None) -> Residual
     names = ("comparison", "subset", "quantity", "fold", "rms")
     table = pd.DataFrame({name: tables.get("residuals", {}).get(name, []) for name in names})
     pooled = table[(table["comparison"] == f"{choice}_vs_measured") & table["fold"].isna()]
-    for each in ("validation", "train") if subset is None else (subset,):
-        rms = pooled[pooled["subset"] == each].set_index("quantity")["rms"]
+    for item in ("validation", "train") if subset is None else (subset,):
+        rms = pooled[pooled["subset"] == item].set_index("quantity")["rms"]
         if "position" in rms:
             turn = float(rms.get("orientation", np.nan))
-            return Residual(float(rms["position"]), 1e-3 * turn, each)
+            return Residual(float(rms["position"]), 1e-3 * turn, item)
     return None
 
 
@@ -218,19 +218,19 @@ def require_same_robot(recorded: Robot, given: Robot, place: str) -> None:
         "base": (np.column_stack(recorded.base), np.column_stack(given.base)),
         "flange": (np.column_stack(recorded.flange), np.column_stack(given.flange)),
     }
-    for what, (one, two) in pairs.items():
-        if not np.allclose(one, two, rtol=_SAME, atol=_SAME):
-            raise _another_robot(place, given, what)
+    for message, (first, two) in pairs.items():
+        if not np.allclose(first, two, rtol=_SAME, atol=_SAME):
+            raise _another_robot(place, given, message)
 
 
 def _require_same_arm(nominal: DHModel, robot: Robot, place: str) -> None:
     if nominal.joints != robot.dh.joints:
         raise _another_robot(place, robot, f"{nominal.joints} joints, not {robot.dh.joints}")
     for parameter in PARAMETERS:
-        one, two = getattr(nominal, parameter), getattr(robot.dh, parameter)
-        if (apart := np.flatnonzero(np.abs(one - two) > _SAME * (1.0 + np.abs(two)))).size:
-            what = f"{one[apart[0]]:.9g}, not {two[apart[0]]:.9g}"
-            raise _another_robot(place, robot, f"{parameter} of joint {apart[0] + 1} {what}")
+        first, two = getattr(nominal, parameter), getattr(robot.dh, parameter)
+        if (apart := np.flatnonzero(np.abs(first - two) > _SAME * (1.0 + np.abs(two)))).size:
+            message = f"{first[apart[0]]:.9g}, not {two[apart[0]]:.9g}"
+            raise _another_robot(place, robot, f"{parameter} of joint {apart[0] + 1} {message}")
 
 
 def _another_robot(place: str, robot: Robot, what: str) -> InputError:

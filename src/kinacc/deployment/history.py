@@ -79,11 +79,11 @@ def session_of(
     """A line of a series from the tables of its results."""
     arm = robots.of_text(str(tables["robot"]["description"][0]), "robot.parquet")
     calibration, measured = folder.calibration(tables, arm, name=name), tables["measurements"]
-    seen = from_columns(measured, arm)
-    held_out = held_out_vectors(tables["pose_errors"], calibration.choice, len(seen))
+    observed = from_columns(measured, arm)
+    held_out = held_out_vectors(tables["pose_errors"], calibration.choice, len(observed))
     held_out_mm = np.linalg.norm(held_out[np.isfinite(held_out).all(axis=1)], axis=1)
     temperature_c = float(pd.Series(measured.get("temperature_c", []), dtype=float).mean())
-    return Session(name, date, "", base, tool, calibration, seen, held_out_mm, temperature_c)
+    return Session(name, date, "", base, tool, calibration, observed, held_out_mm, temperature_c)
 
 
 def history(sessions: Sequence[Session], rotation_weight_mm_per_rad: float, seed: int) -> Columns:
@@ -131,15 +131,15 @@ class _Comparison:
         Readings that the session in force holds as well are left out.
         """
         series = (session.observations, force.observations)
-        shared = known_readings(*([each.q_rad, each.position_mm] for each in series))
+        shared = known_readings(*([item.q_rad, item.position_mm] for item in series))
         session = replace(session, observations=session.observations.select(~shared))
         row: dict[str, Any] = {}
         try:
             row |= _sizes("in_force", self.errors_mm(force, session, setup))
-            for each in (force, session):
-                if _count(each.observations) < LEAST_HELD_OUT:
-                    what = f"fewer than {LEAST_HELD_OUT} configurations in {each.name}"
-                    return row | {"verdict": OPEN, "reason": what}
+            for item in (force, session):
+                if _count(item.observations) < LEAST_HELD_OUT:
+                    message = f"fewer than {LEAST_HELD_OUT} configurations in {item.name}"
+                    return row | {"verdict": OPEN, "reason": message}
             return row | self.moved(force, session, setup)
         except (FitError, InputError) as problem:
             return row | {"verdict": OPEN, "reason": str(problem)}
@@ -152,7 +152,7 @@ class _Comparison:
         pair = self._about(force, joined(first, second, setup), len(first))
         misfit = 1.0
         if pair.has_other_poses:
-            halves = [self.understated(each, setup) for each in (force, session)]
+            halves = [self.understated(item, setup) for item in (force, session)]
             misfit = history_model.misfit_factor(*halves)
         movement = history_model.moved(pair, misfit, self._rng(force.name, session.name))
         moved_mm, chance_mm = movement.moved_mm, movement.chance_mm(LEVEL)
@@ -164,18 +164,18 @@ class _Comparison:
         }
         inside = _share_inside(session.observations.q_rad, force.observations.q_rad, prismatic)
         if inside < ENOUGH:
-            what = f"only {inside:.0%} of the readings lie in the joint ranges of {force.name}"
-            return row | {"verdict": OPEN, "reason": what}
+            message = f"only {inside:.0%} of the readings lie in the joint ranges of {force.name}"
+            return row | {"verdict": OPEN, "reason": message}
         if moved_mm > chance_mm:
             joint = history_model.joint_of(movement, prismatic)
             return row | {"verdict": RECALIBRATE, "joint": joint}
         held_out_mm = float(np.mean(force.held_out_mm)) if len(force.held_out_mm) else np.inf
         if chance_mm > held_out_mm:
-            what = (
+            message = (
                 f"a change below {chance_mm:.2f} mm would not be seen; the mean held-out error of "
                 f"the calibration in force is {held_out_mm:.2f} mm"
             )
-            return row | {"verdict": OPEN, "reason": what}
+            return row | {"verdict": OPEN, "reason": message}
         return row | {"verdict": HOLDS}
 
     @one_thread
@@ -204,20 +204,20 @@ class _Comparison:
 
         Base and tool that were moved are fitted to the rows outside each fold, to all without.
         """
-        calibration, seen = force.calibration, session.observations
+        calibration, observed = force.calibration, session.observations
         kind, model = calibration.choice, calibration.model
-        seen = seen.select(covers(model, seen.q_rad).all(axis=1))
-        moved = [BASE] * (not setup.same_base or len(seen.session_names) > 1)
+        observed = observed.select(covers(model, observed.q_rad).all(axis=1))
+        moved = [BASE] * (not setup.same_base or len(observed.session_names) > 1)
         moved += [TOOL] * (
-            not setup.same_tool or not {*seen.target_names} <= {*calibration.targets}
+            not setup.same_tool or not {*observed.target_names} <= {*calibration.targets}
         )
-        bases, sizes = [calibration] * len(seen.session_names), [np.zeros(0)]
-        for fold in np.unique(seen.fold):
-            tried = seen.fold == fold
-            train = seen.select(~tried if fold >= 0 else tried)
+        bases, sizes = [calibration] * len(observed.session_names), [np.zeros(0)]
+        for fold in np.unique(observed.fold):
+            tried = observed.fold == fold
+            train = observed.select(~tried if fold >= 0 else tried)
             if len(train):
                 frames = frames_at(bases, train, moved, self.rotation_weight_mm_per_rad)
-                off = errors({kind: Fit(model, frames)}, seen.select(tried))
+                off = errors({kind: Fit(model, frames)}, observed.select(tried))
                 position_mm = off[Comparison(MEASURED, kind).name].position_mm
                 sizes.append(np.linalg.norm(position_mm, axis=1))
         return np.concatenate(sizes)
@@ -231,8 +231,8 @@ def _thinned(observations: Observations) -> Observations:
     """At most ``MOST`` configurations, evenly over the order they were measured in."""
     configuration = configurations(observations.pose, observations.q_rad)
     count = configuration.max() + 1
-    kept = np.linspace(0, count - 1, min(MOST, count)).round().astype(int)
-    return observations.select(np.isin(configuration, kept))
+    retained = np.linspace(0, count - 1, min(MOST, count)).round().astype(int)
+    return observations.select(np.isin(configuration, retained))
 
 
 def _share_inside(q_rad: np.ndarray, ranged_rad: np.ndarray, prismatic: np.ndarray) -> float:

@@ -92,8 +92,8 @@ class Pair:
     @property
     def has_other_poses(self) -> bool:
         """Whether a configuration of one series is none of the other."""
-        one, other = (np.unique(self.cluster[self.second == each]) for each in (False, True))
-        return not np.array_equal(one, other)
+        clusters, later = (np.unique(self.cluster[self.second == item]) for item in (False, True))
+        return not np.array_equal(clusters, later)
 
 
 def about(
@@ -111,9 +111,11 @@ def about(
     empty = vec.without_errors(model, low, high, ORDER)
     free = vec_fit.informed(both, empty)
     coords = FrameParameters.of(both, frames, None)
-    at = np.append(coords.begin, np.zeros(free.sum()))
+    state = np.append(coords.begin, np.zeros(free.sum()))
     system = PoseSystem(both, empty, free, coords, rotation_weight_mm_per_rad)
-    residual, jacobian = (np.concatenate(parts) for parts in zip(*system.blocks(at), strict=True))
+    residual, jacobian = (
+        np.concatenate(parts) for parts in zip(*system.blocks(state), strict=True)
+    )
     row = np.repeat(np.arange(len(both)), 3 + 3 * both.has_rotation)
     of_frames, errors = np.split(jacobian, [coords.size], axis=1)
     count = len(ERRORS) * model.joints * (ORDER + 1)
@@ -179,14 +181,14 @@ def joined(first: Observations, second: Observations, setup: Setup) -> Observati
     }
     for name, same in (("session", setup.same_base), ("target", setup.same_tool)):
         of_first, place = [*getattr(first, f"{name}_names")], []
-        for each in getattr(second, f"{name}_names"):
-            if not same or each not in of_first:
-                of_first.append(each if each not in of_first else f"{each}, second series")
+        for item in getattr(second, f"{name}_names"):
+            if not same or item not in of_first:
+                of_first.append(item if item not in of_first else f"{item}, second series")
                 place.append(len(of_first) - 1)
             else:
-                place.append(of_first.index(each))
-        own = np.array(place, dtype=np.int64)[getattr(second, name)]
-        columns |= {name: np.append(getattr(first, name), own), f"{name}_names": tuple(of_first)}
+                place.append(of_first.index(item))
+        local = np.array(place, dtype=np.int64)[getattr(second, name)]
+        columns |= {name: np.append(getattr(first, name), local), f"{name}_names": tuple(of_first)}
     pose = np.append(first.pose, second.pose + first.pose.max() + 1 - second.pose.min())
     return replace(first, **columns, pose=pose)
 
@@ -237,9 +239,9 @@ def understated(cuts: Sequence[Pair], rng: np.random.Generator) -> float:
     they show beyond chance is misfit that poses of one part do not foretell of another.
     """
     ratios = []
-    for each in cuts:
-        found = moved(each, 1.0, rng)
-        ratios.append(found.moved_mm**2 / np.mean(np.sum(found.chance**2, axis=1)))
+    for item in cuts:
+        result = moved(item, 1.0, rng)
+        ratios.append(result.moved_mm**2 / np.mean(np.sum(result.chance**2, axis=1)))
     return float(np.mean(ratios))
 
 
@@ -260,17 +262,17 @@ def moved(pair: Pair, misfit: float, rng: np.random.Generator) -> Moved:
     grown = pair.constant @ pair.longer * pair.second
     firm = _unit(np.column_stack([pair.frames, pair.constant, grown]))
     free = np.concatenate([firm, change * pair.second[:, None]], axis=1)
-    states = [drift * (pair.second == each)[:, None] for each in (False, True)]
+    states = [drift * (pair.second == item)[:, None] for item in (False, True)]
     warming = int(pair.joint.max(initial=-1)) + 1
     group = np.concatenate([pair.joint, np.full(2 * count, warming)])
     columns = np.concatenate([free, pair.misfit, *states], axis=1)
-    gram, seen = columns.T @ columns, columns.T @ pair.residual
+    gram, observed = columns.T @ columns, columns.T @ pair.residual
     split = free.shape[1]
     gram[np.diag_indices(split)] += _FIRM * gram[:split, :split].diagonal().max()
-    noise, prior = _variances(gram, seen, pair, split, group)
+    noise, prior = _variances(gram, observed, pair, split, group)
     inverse = _inverse(gram + np.diag(np.append(np.zeros(split), noise / prior[group])))
-    found, changes = inverse @ seen, slice(split - count, split)
-    scores = _shares(pair, columns, found, inverse, changes)
+    result, changes = inverse @ observed, slice(split - count, split)
+    scores = _shares(pair, columns, result, inverse, changes)
     blurred = (inverse[changes] @ gram[:, split:]) * np.sqrt(prior[group])
     both = np.intersect1d(pair.cluster[pair.second], pair.cluster[~pair.second])
     scores[~np.isin(np.unique(pair.cluster), both)] *= misfit
@@ -280,7 +282,7 @@ def moved(pair: Pair, misfit: float, rng: np.random.Generator) -> Moved:
     root = vectors * np.sqrt(np.maximum(values, 0.0))
     chance = rng.standard_normal((DRAWS, len(scores))) @ scores
     chance += rng.standard_normal((DRAWS, count)) @ root.T
-    return Moved(directions, found[changes], chance)
+    return Moved(directions, result[changes], chance)
 
 
 def _unit(columns: np.ndarray) -> np.ndarray:
@@ -296,14 +298,14 @@ def _seen_directions(pair: Pair) -> np.ndarray:
     """
     rows = pair.second
     constant = pair.constant[rows]
-    own = np.column_stack([pair.frames[rows][:, pair.own], constant @ pair.longer])
-    left, values, _ = np.linalg.svd(_unit(own), full_matrices=False)
-    left = left[:, values > _FIRM * values[0]]
-    at = (constant - left @ (left.T @ constant))[pair.position[rows]]
-    units = np.tile(UNITS, at.shape[1] // 6)
-    _, values, right = np.linalg.svd(at * units, full_matrices=False)
-    kept = values > _SEEN * values[0]
-    return right[kept] * units / values[kept, None] * np.sqrt(len(at) / 3.0)
+    local = np.column_stack([pair.frames[rows][:, pair.own], constant @ pair.longer])
+    remaining, values, _ = np.linalg.svd(_unit(local), full_matrices=False)
+    remaining = remaining[:, values > _FIRM * values[0]]
+    state = (constant - remaining @ (remaining.T @ constant))[pair.position[rows]]
+    units = np.tile(UNITS, state.shape[1] // 6)
+    _, values, right = np.linalg.svd(state * units, full_matrices=False)
+    retained = values > _SEEN * values[0]
+    return right[retained] * units / values[retained, None] * np.sqrt(len(state) / 3.0)
 
 
 def _variances(
@@ -315,17 +317,17 @@ def _variances(
     inner = gram[split:, split:] - gram[split:, :split] @ free[:, :-1]
     right = seen[split:] - gram[split:, :split] @ free[:, -1]
     square = float(pair.residual @ pair.residual - seen[:split] @ free[:, -1])
-    left = len(pair.residual) - split
-    prior, noise = np.full(group.max() + 1, _START_MM**2), 0.3 * square / left
+    remaining = len(pair.residual) - split
+    prior, noise = np.full(group.max() + 1, _START_MM**2), 0.3 * square / remaining
     for _ in range(_ROUNDS):
         held = noise / prior[group]
         spread = _inverse(inner + np.diag(held))
-        found = spread @ right
+        result = spread @ right
         informed = 1.0 - held * spread.diagonal()
-        unexplained = square - 2.0 * found @ right + found @ inner @ found
-        noise = unexplained / max(left - informed.sum(), 1.0)
-        told = np.bincount(group, informed, len(prior))
-        new = np.bincount(group, found**2, len(prior)) / np.maximum(told, np.finfo(float).tiny)
+        unexplained = square - 2.0 * result @ right + result @ inner @ result
+        noise = unexplained / max(remaining - informed.sum(), 1.0)
+        reported = np.bincount(group, informed, len(prior))
+        new = np.bincount(group, result**2, len(prior)) / np.maximum(reported, np.finfo(float).tiny)
         new = np.maximum(new, _LEAST_MM**2)
         # What is no more than a hundredth of the noise settles nothing.
         counts = np.maximum(new, prior) > 1e-4 * noise
@@ -347,18 +349,18 @@ def _shares(
     pair: Pair, columns: np.ndarray, found: np.ndarray, inverse: np.ndarray, changes: slice
 ) -> np.ndarray:
     """Share (c, d) of every configuration in the change, by residuals of a fit without it."""
-    left, pull = pair.residual - columns @ found, columns @ inverse
+    remaining, pull = pair.residual - columns @ found, columns @ inverse
     order = np.argsort(pair.cluster, kind="stable")
     label, begin, size = np.unique(pair.cluster[order], return_index=True, return_counts=True)
     shares = np.empty((len(label), changes.stop - changes.start))
-    for each in np.unique(size):
-        ours = np.flatnonzero(size == each)
-        rows = order[begin[ours, None] + np.arange(each)]
-        own = np.eye(each) - pull[rows] @ columns[rows].transpose(0, 2, 1)
-        values, vectors = np.linalg.eigh(own)
+    for item in np.unique(size):
+        ours = np.flatnonzero(size == item)
+        rows = order[begin[ours, None] + np.arange(item)]
+        local = np.eye(item) - pull[rows] @ columns[rows].transpose(0, 2, 1)
+        values, vectors = np.linalg.eigh(local)
         # A direction that one configuration alone decides has no residual, with or without it.
         factor = 1.0 / np.where(values > _FIRM, values, 1.0)
-        along = np.einsum("cij,ci->cj", vectors, left[rows]) * factor
+        along = np.einsum("cij,ci->cj", vectors, remaining[rows]) * factor
         away = np.einsum("cij,cj->ci", vectors, along)
         shares[ours] = np.einsum("cid,ci->cd", pull[rows][:, :, changes], away)
     return shares
@@ -372,25 +374,29 @@ def joint_of(found: Moved, prismatic: np.ndarray) -> int | None:
     """
     white = found.white()
     chance = float(np.sum(white**2))
-    seen = scipy.linalg.solve_triangular(white, found.change, lower=True)
+    observed = scipy.linalg.solve_triangular(white, found.change, lower=True)
     slide, turn, along, about_ = (
-        ERRORS.index(each) for each in ("delta_z", "eps_z", "delta_x", "eps_x")
+        ERRORS.index(item) for item in ("delta_z", "eps_z", "delta_x", "eps_x")
     )
     count, size = len(prismatic), len(ERRORS)
     units = np.diag(np.tile(UNITS, count))
     for whole in (False, True):
-        explained, left = np.zeros(count), np.full(count, np.inf)
+        explained, remaining = np.zeros(count), np.full(count, np.inf)
         for joint in range(count):
             link = [size + along, size + about_] if joint + 1 < count else []  # else the tool's
-            own = [slide, turn, *link] if whole else [slide if prismatic[joint] else turn]
-            way = found.along(units[:, [size * joint + each for each in own]])
+            local = [slide, turn, *link] if whole else [slide if prismatic[joint] else turn]
+            way = found.along(units[:, [size * joint + item for item in local]])
             way = way[:, np.linalg.norm(way, axis=0) > _UNSEEN_MM]
-            fit = np.linalg.lstsq(scipy.linalg.solve_triangular(white, way, lower=True), seen)[0]
+            fit = np.linalg.lstsq(scipy.linalg.solve_triangular(white, way, lower=True), observed)[
+                0
+            ]
             beside = found.change - way @ fit
-            explained[joint] = seen @ scipy.linalg.solve_triangular(white, way @ fit, lower=True)
-            left[joint] = beside @ beside
+            explained[joint] = observed @ scipy.linalg.solve_triangular(
+                white, way @ fit, lower=True
+            )
+            remaining[joint] = beside @ beside
         best = int(np.argmax(explained))
-        most = left[best] - chance <= (1.0 - _MOST) * (found.moved_mm**2 - chance)
+        most = remaining[best] - chance <= (1.0 - _MOST) * (found.moved_mm**2 - chance)
         clear = np.sum(np.exp(0.5 * (explained - explained[best]))) <= 1.0 / _CLEAR
         if most and clear and explained[best] > 0.0:
             return best + 1

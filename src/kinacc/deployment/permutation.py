@@ -73,8 +73,8 @@ def compare(held_out: Columns, new: Columns) -> PermutationTest:
     """Test ``new`` configurations, with errors after the fit of what moved, against all."""
     observed = _statistics(new.products.mean(axis=0, keepdims=True), new)
     # The fit made the new errors smaller: this is undone before samples are drawn.
-    kept = 1.0 - new.rank / new.columns[..., 0].size
-    pool = np.concatenate([held_out.products, new.times(kept**-0.5).products])
+    retained = 1.0 - new.rank / new.columns[..., 0].size
+    pool = np.concatenate([held_out.products, new.times(retained**-0.5).products])
     drawn = _statistics(_samples(pool, len(new.columns)), new)
     squares, explained = (np.append(a, b) for a, b in zip(observed[:2], drawn[:2], strict=True))
     scores, along, size = _scores(squares, explained), observed.along[0], observed.size[0]

@@ -149,16 +149,18 @@ def spread(
         Problem(f"joint {joint + 1}", "its range lies outside the limits")
         for joint in np.flatnonzero(low >= high)
     )
-    found, block = np.zeros((0, len(low))), max(count, 1024)
+    result, block = np.zeros((0, len(low))), max(count, 1024)
     for draw in range(_MOST_DRAWS_PER_POSE):
         joints = low + points("sobol", block, len(low), 1 + draw * block) * (high - low)
         if inside is not None:
             joints = joints[inside(tool_positions(robot, joints, tool))]
-        found = np.concatenate([found, joints])
-        if len(found) >= count:
-            return found[:count]
-    what = f"only {len(found)} of {_MOST_DRAWS_PER_POSE * block} joint values put the tool there"
-    raise InputError(Problem("region", what, f"{count} candidates", "enlarge the region"))
+        result = np.concatenate([result, joints])
+        if len(result) >= count:
+            return result[:count]
+    message = (
+        f"only {len(result)} of {_MOST_DRAWS_PER_POSE * block} joint values put the tool there"
+    )
+    raise InputError(Problem("region", message, f"{count} candidates", "enlarge the region"))
 
 
 def between(measured: np.ndarray, unit: np.ndarray, count: int, seed: int) -> np.ndarray:
@@ -171,8 +173,8 @@ def between(measured: np.ndarray, unit: np.ndarray, count: int, seed: int) -> np
 
     different = np.unique(measured, axis=0)
     if len(different) < 2:
-        what = "all measured poses are at the same joints"
-        raise InputError(Problem("region", what, "at least 2 different poses"))
+        message = "all measured poses are at the same joints"
+        raise InputError(Problem("region", message, "at least 2 different poses"))
     random = np.random.default_rng(seed)
     near = cKDTree(different / unit).query(different / unit, min(_NEIGHBOURS + 1, len(different)))
     start = random.integers(len(different), size=count)
@@ -190,7 +192,7 @@ def tool_positions(robot: Robot, joints: np.ndarray, tool: Pose | None) -> np.nd
 def information(robot: Robot, q_rad: np.ndarray, experiment: Experiment) -> Information:
     """Information of poses at reported joints (n, k), rad and mm."""
     beta = {f"j{joint}.beta_rad" for joint in experiment.hayati_joints}
-    names = tuple(each for each in robot.dh.names if not each.endswith("beta_rad") or each in beta)
+    names = tuple(item for item in robot.dh.names if not item.endswith("beta_rad") or item in beta)
     if experiment.frames_estimated:
         motions = frames.MOTIONS if experiment.orientation else frames.MOTIONS[:3]
         base = [f"{frames.BASE}.{motion}" for motion in frames.MOTIONS]
@@ -212,12 +214,12 @@ def information(robot: Robot, q_rad: np.ndarray, experiment: Experiment) -> Info
 def _slopes(arm: Calibration, q_dh: np.ndarray, experiment: Experiment) -> np.ndarray:
     """Movement (n, m, P) of what is measured at DH joints (n, k), per mm or mrad."""
     weight = np.array([1.0, 1.0, 1.0, *[experiment.rotation_weight_mm_per_rad] * 3])
-    seen = 6 if experiment.orientation else 3
-    slopes = np.empty((len(q_dh), seen, len(arm.known.names)))
+    observed = 6 if experiment.orientation else 3
+    slopes = np.empty((len(q_dh), observed, len(arm.known.names)))
     for begin in range(0, len(q_dh), BLOCK):
         block = slice(begin, begin + BLOCK)
         part = sensitivity(arm, JointState(q_dh[block]), "instrument", TOOL)
-        slopes[block] = (part * weight[:, None])[:, :seen] * arm.units
+        slopes[block] = (part * weight[:, None])[:, :observed] * arm.units
     return slopes
 
 
@@ -284,11 +286,11 @@ def shortest_path(distance: np.ndarray) -> np.ndarray:
     2-opt.
     """
     count = len(distance)
-    left, path = np.ones(count, dtype=bool), [0]
-    left[0] = False
-    while left.any():
-        path.append(int(np.argmin(np.where(left, distance[path[-1]], np.inf))))
-        left[path[-1]] = False
+    remaining, path = np.ones(count, dtype=bool), [0]
+    remaining[0] = False
+    while remaining.any():
+        path.append(int(np.argmin(np.where(remaining, distance[path[-1]], np.inf))))
+        remaining[path[-1]] = False
     order = np.array(path)
     first, last = np.triu_indices(count, 1)
     first, last = first[first >= 1], last[first >= 1]

@@ -55,10 +55,10 @@ class Prediction:
         texts = []
         for missing, outside, near in zip(absent, self.outside, self.near, strict=True):
             joints = ", ".join(map(str, np.flatnonzero(outside) + 1))
-            what = f"joint {joints} outside the measured range" if joints else ""
-            what = what or ("" if near else "joints unlike those measured")
+            message = f"joint {joints} outside the measured range" if joints else ""
+            message = message or ("" if near else "joints unlike those measured")
             texts.append(
-                f"{'no prediction' if missing else 'extrapolated'}: {what}" if what else "ok"
+                f"{'no prediction' if missing else 'extrapolated'}: {message}" if message else "ok"
             )
         return texts
 
@@ -118,10 +118,10 @@ def predict(
         For an unknown frame or point.
     """
     q_rad = calibration.robot.dh_joints(np.atleast_2d(q_rad))
-    at = JointState(q_rad, None if s is None else np.asarray(s), payload)
-    count, outside = len(at), calibration.outside_range(at.q_rad)
+    state = JointState(q_rad, None if s is None else np.asarray(s), payload)
+    count, outside = len(state), calibration.outside_range(state.q_rad)
     rows = np.flatnonzero(~(outside.any(axis=1) & (calibration.model.domain is not None)))
-    part, near = at.select(rows), np.zeros(count, dtype=bool)
+    part, near = state.select(rows), np.zeros(count, dtype=bool)
     pose = Pose(np.full((count, 3, 3), np.nan), np.full((count, 3), np.nan))
     pose.rotation[rows], pose.position_mm[rows] = calibration.pose(part, frame, point)
     std, undetermined, unexplained = (np.full((count, size), np.nan) for size in (6, 2, 2))

@@ -161,8 +161,8 @@ class Calibration:
             return np.zeros((0, 0))
         units = self.units
         values, vectors = np.linalg.eigh(self.known.covariance / np.outer(units, units))
-        kept = values > _LEAST_SHARE * max(float(values[-1]), 0.0)
-        return units[:, None] * vectors[:, kept] * np.sqrt(values[kept])
+        retained = values > _LEAST_SHARE * max(float(values[-1]), 0.0)
+        return units[:, None] * vectors[:, retained] * np.sqrt(values[retained])
 
     @property
     def units(self) -> np.ndarray:

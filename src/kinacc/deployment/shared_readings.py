@@ -42,22 +42,22 @@ def known_rows(table: Mapping, earlier: Mapping) -> np.ndarray:
     joints = [name for name in table if name[0] == "q" and name[1:].isdecimal()]
     parts = (joints, ["x_mm", "y_mm", "z_mm"])
     both = [
-        [np.stack([np.asarray(each[name], dtype=float) for name in part], axis=1) for part in parts]
-        for each in (table, earlier)
+        [np.stack([np.asarray(item[name], dtype=float) for name in part], axis=1) for part in parts]
+        for item in (table, earlier)
     ]
     return known_readings(*both)
 
 
 def known_readings(readings: Sequence[np.ndarray], earlier: Sequence[np.ndarray]) -> np.ndarray:
     """The same of joints (n, k) and positions (n, 3) mm, and those of an earlier series."""
-    one, two = (
+    index, index_before = (
         pd.MultiIndex.from_arrays(
             np.hstack([joints.round(_DIGITS + 3), position_mm.round(_DIGITS)]).T + 0.0
         )
         for joints, position_mm in (readings, earlier)
     )
-    known = one.isin(two)
-    return known & (known.sum() >= _COINCIDENCE * min(len(one), len(two)))
+    known = index.isin(index_before)
+    return known & (known.sum() >= _COINCIDENCE * min(len(index), len(index_before)))
 
 
 def shared(first: Mapping | None, second: Mapping | None) -> SharedReadings:

@@ -120,26 +120,27 @@ def verify(
     calibration = folder.calibration(tables, robot)
     kind, model = calibration.choice, calibration.model
     is_known = known_rows(columns, tables.get("measurements", {}))
-    seen = from_columns(columns, robot).select(~is_known)
-    point = next((name for name in seen.target_names if name in calibration.targets), None)
-    near = is_measured_there(calibration, seen.at, point) if len(seen) else is_known[:0]
-    table = model_errors(tables, robot, seen, moved, rotation_weight_mm_per_rad)
-    held_out = _held_out(tables, kind, model, robot, seen, moved) if len(seen) else None
-    rows = _whole_configurations(seen, near & covers(model, seen.q_rad).all(axis=1))
+    observed = from_columns(columns, robot).select(~is_known)
+    point = next((name for name in observed.target_names if name in calibration.targets), None)
+    near = is_measured_there(calibration, observed.at, point) if len(observed) else is_known[:0]
+    table = model_errors(tables, robot, observed, moved, rotation_weight_mm_per_rad)
+    held_out = _held_out(tables, kind, model, robot, observed, moved) if len(observed) else None
+    rows = _whole_configurations(observed, near & covers(model, observed.q_rad).all(axis=1))
     result = Verification(
         UNDECIDED, "", kind, len(is_known), int(is_known.sum()), int(near.sum()), table,
         held_out and _level(held_out),
     )  # fmt: skip
     obstacles = {
-        "the calibration was fitted to all of these readings": not len(seen),
+        "the calibration was fitted to all of these readings": not len(observed),
         SET_UP_MOVED: not moved and table["mean_mm"].min() > _FAR_MM,
         FEW_HELD_OUT: held_out is None or len(held_out.columns) < LEAST_HELD_OUT,
-        "several sessions, each with its own base": BASE in moved and len(seen.session_names) > 1,
+        "several sessions, each with its own base": BASE in moved
+        and len(observed.session_names) > 1,
         "no reading near a measured pose": not len(rows),
     }
     if any(obstacles.values()):
         return replace(result, reason=next(text for text, holds in obstacles.items() if holds))
-    new = seen.select(rows.ravel())
+    new = observed.select(rows.ravel())
     new = replace(new, rotation=np.full_like(new.rotation, np.nan))
     of_sessions = _of_sessions(tables, robot, kind, new.session_names, moved)
     frames = frames_at(of_sessions, new, moved, rotation_weight_mm_per_rad)
@@ -285,8 +286,11 @@ def _of_sessions(
     frames = pd.DataFrame(dict(tables["frames"]))
     measured = frames.loc[frames["frame"] == BASE].get("session", pd.Series()).unique()
     if tuple(sessions) == (None,) and len(measured) > 1:
-        what, allowed = "have no session, and each has its own base", ", ".join(map(str, measured))
-        raise InputError(Problem("the readings", what, f"one of {allowed}"))
+        message, allowed = (
+            "have no session, and each has its own base",
+            ", ".join(map(str, measured)),
+        )
+        raise InputError(Problem("the readings", message, f"one of {allowed}"))
     return [folder.calibration(tables, robot, kind, session=session) for session in sessions]
 
 
@@ -306,7 +310,7 @@ def frames_at(
         calibration.targets.get(name, tool) if TOOL in moved else calibration.point(name)
         for name in names
     ]
-    frames = Frames(stacked([each.base for each in calibrations]), stacked(targets))
+    frames = Frames(stacked([item.base for item in calibrations]), stacked(targets))
     if not moved:
         return frames
     terms = frame_terms(seen, frames)

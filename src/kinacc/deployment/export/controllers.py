@@ -82,8 +82,10 @@ def _frame(names: str, convention: Convention) -> Callable[[Pose], Numbers]:
 def require_plain_joints(robot: Robot, name: str) -> None:
     """InputError where reported joints are not those of the DH table."""
     if not np.array_equal(robot.joint_map, np.eye(robot.dh.joints)):
-        what = f"reports joints with signs or couplings; {name} counts joints as its DH table does"
-        raise InputError(Problem(f"robot {robot.name}", what, fix="use --format urdf"))
+        message = (
+            f"reports joints with signs or couplings; {name} counts joints as its DH table does"
+        )
+        raise InputError(Problem(f"robot {robot.name}", message, fix="use --format urdf"))
 
 
 def _staubli(robot: Robot, model: DHModel) -> Numbers:
@@ -106,9 +108,9 @@ def _ur(robot: Robot, model: DHModel) -> Numbers:
     require_plain_joints(robot, "UR")
     nominal = robot.dh
     if model.joints != len(_UR_ALPHA) or np.abs(nominal.alpha_rad - _UR_ALPHA).max() > 1e-3:
-        what = "has no DH table of UR arms (alpha 90, 0, 0, 90, -90, 0 deg)"
+        message = "has no DH table of UR arms (alpha 90, 0, 0, 90, -90, 0 deg)"
         raise InputError(
-            Problem(f"robot {robot.name}", what, fix="use the table that UR publishes")
+            Problem(f"robot {robot.name}", message, fix="use the table that UR publishes")
         )
     frames = dh.chain(model, np.zeros((1, model.joints)))
     axes = Axes(frames.position_mm[0, :-1], frames.rotation[0, :-1, :, 2])

@@ -29,7 +29,7 @@ def format_named(name: str) -> ModuleType:
 
 def formats_of(model: str) -> tuple[str, ...]:
     """Formats that carry a model."""
-    return tuple(each for each in FORMATS if model == PLAINEST or format_named(each).ANY_MODEL)
+    return tuple(item for item in FORMATS if model == PLAINEST or format_named(item).ANY_MODEL)
 
 
 def contents(
@@ -42,16 +42,16 @@ def contents(
     arm, able = source.calibration, formats_of(source.calibration.choice)
     # A name of its own, so that the DH files may stand beside it.
     stem = name or (arm.name if arm.choice == PLAINEST else f"{arm.name}_{arm.choice}")
-    what, fix = f"cannot carry a {arm.choice} model", f"or give --model {PLAINEST}"
+    message, fix = f"cannot carry a {arm.choice} model", f"or give --model {PLAINEST}"
     problems = names.not_of_a_file("--name", stem if name is None else name)
     problems += [
-        Problem(f"--format {each}", what, ", ".join(able), fix)
-        for each in formats
-        if each not in able
+        Problem(f"--format {item}", message, ", ".join(able), fix)
+        for item in formats
+        if item not in able
     ]
     refuse(problems, "Nothing was written")
-    modules = [format_named(each) for each in dict.fromkeys(formats or able)]
-    return {f"{stem}{each.ENDING}": each.text(source) for each in modules}
+    modules = [format_named(item) for item in dict.fromkeys(formats or able)]
+    return {f"{stem}{item.ENDING}": item.text(source) for item in modules}
 
 
 def read_source(

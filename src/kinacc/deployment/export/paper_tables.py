@@ -48,8 +48,8 @@ def paper_tables(source: Source) -> list[PaperTable]:
         for model in dict.fromkeys(("vec", "dh", *({selected} & set(ERROR_MODELS))))
     }
     between = _residuals(source, "dh_vs_vec", "dh_vec", f"DH model against VEC model, {name}")
-    made = [measured.pop("vec"), _parameters(source), between, *measured.values()]
-    return sorted(made, key=lambda table: table.name != selected)
+    created = [measured.pop("vec"), _parameters(source), between, *measured.values()]
+    return sorted(created, key=lambda table: table.name != selected)
 
 
 def with_deviation(value: float, std: float) -> str:
@@ -80,10 +80,10 @@ def _residuals(source: Source, comparison: str, name: str, caption: str) -> Pape
 
 def _parameters(source: Source) -> PaperTable:
     fitted = pd.DataFrame(dict(source.tables["dh_model"])).sort_values("joint", kind="stable")
-    told = source.tables.get(f"{PLAINEST}_identified", {"parameter": [], "status": []})
-    pairs = zip(told["parameter"], told["status"], strict=True)
+    reported = source.tables.get(f"{PLAINEST}_identified", {"parameter": [], "status": []})
+    pairs = zip(reported["parameter"], reported["status"], strict=True)
     fixed = {str(parameter) for parameter, status in pairs if status == FIXED}
-    shown = [each for each in PARAMETERS if each != "beta_rad" or (fitted[each] != 0.0).any()]
+    shown = [item for item in PARAMETERS if item != "beta_rad" or (fitted[item] != 0.0).any()]
 
     def cell(joint: int, parameter: str, value: float, std: float) -> str:
         nominal = float(getattr(source.calibration.robot.dh, parameter)[joint - 1])
@@ -93,9 +93,9 @@ def _parameters(source: Source) -> PaperTable:
         return f"{value:g} (fixed)" if is_fixed else with_deviation(value, std)
 
     cells = pd.DataFrame({"joint": fitted["joint"].astype(int).astype(str)})
-    for each in shown:
-        columns = zip(fitted["joint"], fitted[each], fitted[f"std_{each}"], strict=True)
-        cells[_HEADS[each]] = [cell(int(joint), each, x, std) for joint, x, std in columns]
+    for item in shown:
+        columns = zip(fitted["joint"], fitted[item], fitted[f"std_{item}"], strict=True)
+        cells[_HEADS[item]] = [cell(int(joint), item, x, std) for joint, x, std in columns]
     worth = misfit(source.tables, source.calibration.robot, PLAINEST)
     notes = [f"One standard deviation behind ±, {in_words([worth])}."]
     marks = "".join(cells.to_numpy().ravel())

@@ -95,8 +95,8 @@ def fit_pendant(
     """
     maker = CONTROLLERS[controller]
     if robot.dh.prismatic.any():
-        what = "has joints that slide: their zeros are lengths, which no export writes"
-        raise InputError(Problem(f"robot {robot.name}", what))
+        message = "has joints that slide: their zeros are lengths, which no export writes"
+        raise InputError(Problem(f"robot {robot.name}", message))
     every, train = delivered.observed(tables, robot)
     estimator = DHEstimator.of(settings, robot, every)
     terms, common = estimator.arm, estimator.common
@@ -118,14 +118,14 @@ def fit_pendant(
         )
 
     def refit(observations: Observations, fold: int) -> dict[str, Fit]:
-        found = fit(observations)
-        return {PLAINEST: Fit(found.model, found.frames)}
+        result = fit(observations)
+        return {PLAINEST: Fit(result.model, result.frames)}
 
     used = every.select(train)
     # Joint 1 moves as the base does, the last joint as the tool: where these are fitted, it stays.
     ends = np.isin(np.arange(robot.dh.joints), (0, robot.dh.joints - 1))[:, None]
     free = free & ~(ends & np.isnan(fit(used).std))
-    found = fit(used)
+    result = fit(used)
     before = models.nominal_frames(used, common)
     folds = [int(fold) for fold in np.unique(every.fold) if fold >= 0]
     comparison = f"{PLAINEST}_vs_measured"
@@ -134,7 +134,7 @@ def fit_pendant(
     else:
         errors, subset = residuals.errors(refit(used, -1), used), "train"
     old = _numbers(maker, robot, robot.dh, before, every)
-    new = _numbers(maker, robot, found.model, found.frames, every)
+    new = _numbers(maker, robot, result.model, result.frames, every)
     taken, selected = free.any(axis=0), selected_model(tables)
     return Pendant(
         maker.name,
@@ -153,9 +153,9 @@ def fit_pendant(
             _recorded(tables, NOMINAL, "nominal, base and tool fitted"),
         ),
         tuple(
-            _STEMS[each]
-            for each, is_taken in zip(PARAMETERS, taken, strict=True)
-            if terms.free[:, PARAMETERS.index(each)].any() and not is_taken
+            _STEMS[item]
+            for item, is_taken in zip(PARAMETERS, taken, strict=True)
+            if terms.free[:, PARAMETERS.index(item)].any() and not is_taken
         ),
         maker.enter,
         maker.remark,
@@ -168,13 +168,13 @@ def _numbers(
     maker: Controller, robot: Robot, model: DHModel, frames: Frames, every: Observations
 ) -> dict[str, Numbers]:
     """All numbers by group: the arm, TOOL of every target, BASE of every session."""
-    found = {maker.group: maker.arm(robot, model)}
+    result = {maker.group: maker.arm(robot, model)}
     for name, turn, place in zip(every.target_names, *frames.targets, strict=True):
-        found[f"TOOL {name}"] = maker.frame(compose(invert(robot.flange), Pose(turn, place)))
+        result[f"TOOL {name}"] = maker.frame(compose(invert(robot.flange), Pose(turn, place)))
     for name, turn, place in zip(every.session_names, *frames.bases, strict=True):
         base = compose(robot.base, invert(Pose(turn, place)))
-        found[f"BASE {name or ''}".strip()] = maker.frame(base)
-    return found
+        result[f"BASE {name or ''}".strip()] = maker.frame(base)
+    return result
 
 
 def _mean_error(model: str, errors: residuals.Errors, subset: str) -> MeanError:

@@ -77,15 +77,15 @@ class Source:
     def orientation_lines(self) -> list[str]:
         """Targets whose orientation no reading has, for a comment; nothing where there are none."""
         arm = self.calibration
-        names = [each for each in arm.targets if arm.orientation_source(each) == STATED]
-        said = "Orientation as stated in the robot file, not measured"
-        return [f"{said}: {', '.join(names)}."] if names else []
+        names = [item for item in arm.targets if arm.orientation_source(item) == STATED]
+        sentence = "Orientation as stated in the robot file, not measured"
+        return [f"{sentence}: {', '.join(names)}."] if names else []
 
     @property
     def left_open_lines(self) -> list[str]:
         """What the poses leave open, under a heading; nothing where they do not."""
-        told = self.calibration.left_open
-        return ["Left open by the poses:", *(f"  {text}" for text in told)] if told else []
+        reported = self.calibration.left_open
+        return ["Left open by the poses:", *(f"  {text}" for text in reported)] if reported else []
 
 
 def number(value: float) -> float | None:

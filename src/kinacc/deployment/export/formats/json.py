@@ -25,7 +25,7 @@ def text(source: Source) -> str:
             row[f"nominal_{name}"] = float(getattr(robot.dh, name)[joint])
             row[f"std_{name}"] = number(source.std[joint, column])
         joints.append(row)
-    left = arm.residual
+    remaining = arm.residual
     content = {
         "name": source.name,
         "robot": robot.name,
@@ -39,11 +39,11 @@ def text(source: Source) -> str:
         "base_in_instrument": _frame(arm.base),
         "targets_in_last_dh_frame": {name: _frame(pose) for name, pose in arm.targets.items()},
         "orientation_of_targets": {name: arm.orientation_source(name) for name in arm.targets},
-        "residual": left
+        "residual": remaining
         and {
-            "subset": left.subset,
-            "position_rms_mm": number(left.position_mm),
-            "orientation_rms_mrad": number(1e3 * left.orientation_rad),
+            "subset": remaining.subset,
+            "position_rms_mm": number(remaining.position_mm),
+            "orientation_rms_mrad": number(1e3 * remaining.orientation_rad),
         },
         "standard_deviations": source.misfit.as_facts(),
         "undetermined": arm.left_open,

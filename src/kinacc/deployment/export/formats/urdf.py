@@ -107,7 +107,7 @@ def corrected(source: Source) -> str:
     plain, _ = origins(calibration.robot.dh)
     better, end = origins(calibration.model)
     tree = etree.parse(str(path), etree.XMLParser(resolve_entities=False, no_network=True))
-    elements = {each.get("name"): each for each in tree.getroot().findall("joint")}
+    elements = {item.get("name"): item for item in tree.getroot().findall("joint")}
     frame, before, here, gap = base, invert(base), IDENTITY, IDENTITY
     tail: list[Joint] = []
     moved = iter(zip(plain, better, strict=True))
@@ -144,8 +144,8 @@ def _ends_in_file(
     """First DH frame in the file's base link, and its tip link in the last DH frame."""
     described = load(path, *links)
     if described.dh.joints != robot.dh.joints:
-        what = f"its chain has {described.dh.joints} moving joints, {robot.name}"
-        raise InputError(Problem(str(path), f"{what} has {robot.dh.joints}"))
+        message = f"its chain has {described.dh.joints} moving joints, {robot.name}"
+        raise InputError(Problem(str(path), f"{message} has {robot.dh.joints}"))
     _signs(robot)  # coupled joints have no URDF
     low, high = np.maximum(robot.q_min_rad, -3.0e3), np.minimum(robot.q_max_rad, 3.0e3)
     share = np.random.default_rng(0).uniform(0.0, 1.0, (_PROBES, len(low)))
@@ -156,12 +156,12 @@ def _ends_in_file(
     options = (robot.base, robot.flange), (start.base, start.tool)
     misfits = []
     for base, tip in options:
-        seen = compose(base, compose(ends, tip))
-        misfits.append(float(np.abs(seen.position_mm - wanted.position_mm).max()))
+        observed = compose(base, compose(ends, tip))
+        misfits.append(float(np.abs(observed.position_mm - wanted.position_mm).max()))
     if min(misfits) > _SAME_ARM_MM:
-        what = f"its arm differs from {robot.name} by up to {min(misfits):.3g} mm"
+        message = f"its arm differs from {robot.name} by up to {min(misfits):.3g} mm"
         allowed = f"the arm that was calibrated, within {_SAME_ARM_MM:g} mm, joints alike"
-        raise InputError(Problem(str(path), what, allowed))
+        raise InputError(Problem(str(path), message, allowed))
     return options[0] if misfits[0] <= 1e-8 else options[int(np.argmin(misfits))]
 
 
@@ -209,13 +209,13 @@ def origins(dh: DHModel) -> tuple[list[Pose], Pose]:
     Link i is what follows joint i: it turns about (or slides along) the z axis of its origin, so
     the arm is ``origin_1 Rz(q_1) origin_2 Rz(q_2) .. end``.
     """
-    found, before = [], IDENTITY
+    result, before = [], IDENTITY
     for joint in range(dh.joints):
         turn = Pose(rotation_z(dh.theta_offset_rad[joint]), np.zeros(3))
-        found.append(compose(before, turn))
+        result.append(compose(before, turn))
         tilt = rotation_x(dh.alpha_rad[joint]) @ rotation_y(dh.beta_rad[joint])
         before = Pose(tilt, np.array([dh.a_mm[joint], 0.0, dh.d_mm[joint]]))
-    return found, before
+    return result, before
 
 
 def _signs(robot: Robot) -> np.ndarray:
