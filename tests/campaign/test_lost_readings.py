@@ -54,25 +54,6 @@ def test_a_report_kept_elsewhere_tells_that_its_last_readings_were_taken_away(be
     assert call("campaign", *known).exit_code == 1
 
 
-def test_a_clock_that_went_back_is_asked_about_before_a_reading_is_taken(begun, monkeypatch):
-    folder = begun("--noise-mm", SIGMA_MM, "--frame", "base")
-    recorded(folder, arm := Arm(folder), 2)
-    label = standing(folder)["next_point"]
-    reading = ("--point", label, "--position-mm", arm.position(label))
-    with monkeypatch.context() as patched:
-        patched.setattr(campaigns, "_stamp", _in_1999(campaigns._stamp))
-        said = refused(folder, "record", folder, *reading)
-        assert "the clock of this computer: is at 1999-12-31" in said
-        assert call("campaign", "record", folder, *reading, "--accept-implausible").exit_code == 0
-    recorded(folder, arm, 1)
-    call("campaign", "report", folder)
-    assert "clock: set back" in (folder / "report" / "report.md").read_text()
-
-
-def _in_1999(stamp):
-    return lambda time=None: stamp(time) if time else "1999-12-31T23:59:59+00:00"
-
-
 def test_a_reading_from_beyond_all_rooms_is_never_taken(begun, tmp_path):
     folder = begun("--noise-mm", SIGMA_MM, "--frame", "base")
     label = standing(folder)["next_point"]

@@ -338,8 +338,7 @@ def _record(
     skip_bad: bool,
 ) -> Recorded:
     plan = opened.plan
-    problems = [] if accept_implausible else opened.clock_went_back()
-    refuse(problems, _NOTHING)
+    problems: list[Problem] = []
     readings = {i: row for i, row in enumerate(file.rows) if isinstance(row, Reading)}
     known = _known_rows(readings, state, file.path, again) if file.digest else {}
     sizes = [float(np.linalg.norm(each.error_mm)) for each in (*state.told, *state.in_hand)]

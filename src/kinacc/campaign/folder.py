@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from datetime import UTC, datetime, timedelta
+from datetime import UTC, datetime
 from pathlib import Path
 
 from kinacc import __version__
@@ -16,8 +16,6 @@ from kinacc.campaign.state import READINGS, State
 from kinacc.config import json_files
 from kinacc.errors import InputError, Problem, refuse
 from kinacc.tables.atomic import write_whole
-
-_CLOCKS_DIFFER = timedelta(minutes=10)  # of two computers that write to one campaign
 
 
 @dataclass(frozen=True)
@@ -39,23 +37,10 @@ class Opened:
         """The times of its entries."""
         return tuple(str(each["at"]) for each in self.journal.entries if "at" in each)
 
-    def clock_went_back(self) -> list[Problem]:
-        """Return the problem that the time of this computer lies before the last entry's."""
-        last, now = max(self.recorded, default=""), _stamp()
-        if not last or now >= _stamp(datetime.fromisoformat(last) - _CLOCKS_DIFFER):
-            return []
-        what = f"is at {now}, and the campaign has an entry of {last}"
-        fix = "set the clock; where that entry's was wrong, give --accept-implausible"
-        return [Problem("the clock of this computer", what, fix=fix)]
-
     def write(self, entry: Mapping) -> None:
         """Append an entry, with the time; on disk when this returns. Only while ``writing``."""
-        stamped = {**entry, "at": _stamp()}
+        stamped = {**entry, "at": datetime.now(UTC).isoformat(timespec="seconds")}
         journal.append(self.folder / journal.JOURNAL, self.journal, stamped)
-
-
-def _stamp(time: datetime | None = None) -> str:
-    return (time or datetime.now(UTC)).isoformat(timespec="seconds")
 
 
 def in_the_way(folder: Path | str) -> list[Problem]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 
@@ -20,22 +19,18 @@ from kinacc.tables.contract import columns_of
 _MOMENTS = 150  # of a campaign at which bounds are stated, at most
 
 
-def tables(opened: Opened, progress: Callable | None = None) -> tuple[State, dict[str, Columns]]:
+def tables(opened: Opened) -> tuple[State, dict[str, Columns]]:
     """Return the state of a campaign, and its tables campaign_points, _readings and _bounds."""
     total = len(opened.state().told)
     pause = max(-(-total // _MOMENTS), 1)
     rows: list[tuple] = []
-    done = iter(progress(range(total), "readings replayed") if progress else range(total))
 
     def watch(campaign: Campaign, _) -> None:
-        next(done, None)
         count = campaign.ledger.taken
         if count % pause == 0 or count == total:
             rows.extend(_bounds(opened, campaign))
 
     state = opened.state(watch)
-    for _ in done:
-        pass
     return state, {
         "campaign_points": _points(state),
         "campaign_readings": _readings(state),
@@ -118,7 +113,6 @@ def facts(opened: Opened, state: State) -> dict[str, str]:
         "readings not requested": str(len(state.in_hand) or ""),
         f"readings beyond {plan.limits.implausible_mm:g} mm": str(sum(large) or ""),
         "recorded": f"{min(times)} to {max(times)}" if times else "",
-        "clock": "" if sorted(times) == list(times) else "set back between two entries",
         "assessor": f"{plan.assessor.name} ({', '.join(f'{k}={v}' for k, v in settings.items())})",
         "files": ", ".join(f"{path or 'unnamed'} ({digest})" for digest, path in files.items()),
         "campaign": f"{opened.digest}, kinacc {__version__}",

@@ -190,7 +190,6 @@ def _write_report(
     from kinacc.errors import InputError, Problem
     from kinacc.figures import campaign as drawing
     from kinacc.figures.save import render
-    from kinacc.progress import reporting
     from kinacc.report.campaign import campaign_page, markdown
     from kinacc.tables.atomic import write_together
     from kinacc.tables.store import content_of, to_table
@@ -204,8 +203,7 @@ def _write_report(
     sheets = {into / f"{name}.{kind}": name for kind in dict.fromkeys(formats) for name in names}
     paths = [*(into / f"{name}.parquet" for name in names), *sheets, *pictures.values(), text]
     require_writable(paths, force)
-    with reporting("report", bar=True) as progress:
-        state, tables = reports.tables(found.opened, progress)
+    state, tables = reports.tables(found.opened)
     marks = marks_of(found.opened)
     contents = {
         into / f"{name}.parquet": content_of(to_table(name, tables[name], marks)) for name in names
