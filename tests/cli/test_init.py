@@ -92,33 +92,6 @@ def test_without_a_terminal_every_question_names_the_option_that_answers_it(fore
     assert "--orientation" not in done.output
 
 
-def test_the_first_poses_are_seen_before_it_is_asked_how_they_are_written(foreign, tmp_path):
-    done = call("init", foreign, "--out", tmp_path, input="rad\nmm\ndeg\nZYX\nirb120\n")
-    shown, asked = (done.output.index(each) for each in ("line 2: joints", "Not stated in the"))
-    assert shown < asked
-
-
-def test_the_first_poses_come_again_only_where_answers_changed_them(foreign, tmp_path):
-    words = ("init", foreign, "--out", tmp_path, "--robot", "irb120")
-    agreed = call(*words, "--orientation", "none", "--name", "a", input="rad\nmm\n")
-    assert agreed.exit_code == 0, agreed.output
-    assert agreed.output.count("line 2: joints") == 1
-    changed = call(*words, "--name", "b", input="rad\nmm\ndeg\nZYX\n")
-    assert changed.exit_code == 0, changed.output
-    assert changed.output.count("line 2: joints") == 2
-
-
-def test_what_is_read_besides_is_said_once(foreign, tmp_path):
-    lines = foreign.read_text(encoding="utf-8").splitlines()
-    rows = [f"{lines[0]};Temp [C]", *(f"{line};20,5" for line in lines[1:])]
-    foreign.write_text("\n".join(rows), encoding="utf-8")
-    done = call(
-        "init", foreign, "--robot", "irb120", "--orientation", "none", "--out", tmp_path, "--yes"
-    )
-    assert done.exit_code == 0, done.output
-    assert done.output.count("temperature") == 1
-
-
 def test_what_stands_above_the_names_is_counted_as_it_is_written_down(foreign, tmp_path):
     from openpyxl import Workbook
 
@@ -176,7 +149,3 @@ def test_measured_files_are_described_without_a_word(path, name, tmp_path):
     assert told["robot"] == name
     assert told["suspicions"] == []
     assert load((tmp_path / "cell.yaml",))["cell"]["measurements"]["source"] == "file"
-
-
-def test_help_has_an_example():
-    assert "kinacc init " in call("init", "--help").output

@@ -114,31 +114,6 @@ RIGHT = {
         (by_axis("Nominal {A} [mm]"), IT.nominal),
     ],
     "uncertainties": [Q, (by_axis("{A}"), IT.measured), (by_axis("U{a}"), IT.spread / 1000)],
-    "German": [
-        (numbered("A{} Istwinkel [°]"), IT.q),
-        (numbered("A{} Sollwinkel [°]"), IT.rounded),
-        (by_axis("{A} Soll [mm]"), IT.nominal),
-        (by_axis("{A} gemessen [mm]"), IT.measured),
-        (by_axis("Abweichung {A} [mm]"), IT.deviation),
-    ],
-    "French": [
-        (numbered("axe {} (degrés)"), IT.q),
-        (by_axis("{A} nominal (mm)"), IT.nominal),
-        (by_axis("{A} mesuré (mm)"), IT.measured),
-        (by_axis("écart {A} (mm)"), IT.deviation),
-    ],
-    "Spanish": [
-        (numbered("J{} (grados)"), IT.q),
-        (by_axis("{A} teórico (mm)"), IT.nominal),
-        (by_axis("desviación {A} (mm)"), IT.deviation),
-        (by_axis("{A} medido (mm)"), IT.measured),
-    ],
-    "Italian": [
-        (numbered("Giunto {} (gradi)"), IT.q),
-        (by_axis("scostamento {A} (mm)"), IT.deviation),
-        (by_axis("{A} nominale (mm)"), IT.nominal),
-        (by_axis("{A} misurato (mm)"), IT.measured),
-    ],
     "Greek letters": [
         Q,
         (by_axis("Δ{a}"), IT.deviation),
@@ -224,16 +199,6 @@ def test_q1_to_q4_beside_joints_are_a_quaternion(file, tmp_path, order):
     found = np.stack([columns[f"q{part}"] for part in "wxyz"], axis=1)
     both = np.abs(np.sum(found * IT.quaternion, axis=1))
     np.testing.assert_allclose(both, 1.0, atol=1e-6)
-
-
-def test_a_drehung_is_an_orientation_and_no_target(file):
-    turn = (by_axis("Drehung {A} [°]"), IT.turn.as_euler("XYZ", degrees=True))
-    section = described(file(Q, (by_axis("{A} [mm]"), IT.measured), turn))
-    assert section["orientation"]["kind"] == "euler"
-    assert section["orientation"]["unit"] == "deg"
-    columns = assert_measured(section)
-    assert set(columns["target"]) == {"tool"}
-    assert np.isfinite(columns["qw"]).all()
 
 
 def test_standard_deviations_are_those_of_the_measured_point(file):
@@ -333,16 +298,6 @@ def test_an_answer_and_an_option_decide_alike(file, tmp_path):
         assert file_section["targets"] == ["tool"]
 
 
-def test_none_of_the_readings_is_an_answer(file, tmp_path):
-    path = file(*ASKED["a tool centre point"])
-    done = call("init", path, "--robot", "ur10", "--out", tmp_path / "a", input="0\n")
-    assert done.exit_code == 2
-    path = file(*ASKED["two orientations"])
-    done = call("init", path, "--robot", "ur10", "--out", tmp_path / "a", input="0\n")
-    assert done.exit_code == 0, done.output
-    assert "orientation: none" in done.output
-
-
 REFUSED = {
     "only the controller's own kinematics": (
         [
@@ -374,19 +329,6 @@ def test_what_cannot_be_read_is_refused_with_its_reason(case, file, tmp_path):
     assert done.exit_code == 2
     assert reason in done.output
     assert not (tmp_path / "cell").exists()
-
-
-@pytest.mark.parametrize(
-    ("option", "unit", "column"),
-    [("--length-unit", "m", "x_mm"), ("--joint-unit", "rad", "q1_deg")],
-)
-def test_an_option_against_the_names_is_refused(file, tmp_path, option, unit, column):
-    path = file(Q, X)
-    done = call("init", path, "--robot", "ur10", "--out", tmp_path / "a", "--yes", option, unit)
-    assert done.exit_code == 2
-    assert f"{option} {unit}" in done.output
-    assert column in done.output
-    assert not (tmp_path / "a").exists()
 
 
 @pytest.mark.parametrize("mapped", [True, False])
@@ -447,9 +389,3 @@ def load_defaults():
 
     section = defaults()["measurements"]["file"]
     return section | {"orientation": section["orientation"] | {"kind": "none"}}
-
-
-def test_points_that_a_controller_calculated_are_remarked_on(file, tmp_path):
-    path = file(Q, (by_axis("{a}_mm"), IT.controller))
-    done = call("init", path, "--robot", "ur10", "--out", tmp_path / "cell", "--yes")
-    assert done.exit_code == 0, done.output

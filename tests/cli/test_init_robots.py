@@ -84,26 +84,15 @@ def test_an_answer_to_the_question_for_pulses_is_as_good_as_the_option(tmp_path)
     assert "pulses_per_deg" in (tmp_path / "cell" / "m.yaml").read_text()
 
 
-def test_fanuc_w_p_r_are_angles_about_fixed_axes(tmp_path):
-    names = [*joints("J{}"), *"XYZWPR"]
-    text = table(names, IT.q, IT.point, IT.turn.as_euler("xyz", degrees=True))
+@pytest.mark.parametrize(
+    ("joint", "letters", "convention"),
+    [("J{}", "WPR", "xyz"), ("A{}", "ABC", "ZYX"), ("JT{}", "OAT", "ZYZ")],
+)
+def test_angles_of_fanuc_kuka_and_kawasaki(joint, letters, convention, tmp_path):
+    names = [*joints(joint), *"XYZ", *letters]
+    text = table(names, IT.q, IT.point, IT.turn.as_euler(convention, degrees=True))
     section, _ = described(written(tmp_path, m_csv=text))
-    assert section["orientation"]["convention"] == "xyz"
-    assert_turned(assert_read(section, IT), IT)
-
-
-def test_kuka_a_b_c_turn_about_z_y_x(tmp_path):
-    names = [*joints("A{}"), *"XYZABC"]
-    text = table(names, IT.q, IT.point, IT.turn.as_euler("ZYX", degrees=True))
-    section, _ = described(written(tmp_path, m_csv=text))
-    assert_turned(assert_read(section, IT), IT)
-
-
-def test_kawasaki_o_a_t_turn_about_z_y_z(tmp_path):
-    names = [*joints("JT{}"), *"XYZOAT"]
-    text = table(names, IT.q, IT.point, IT.turn.as_euler("ZYZ", degrees=True))
-    section, _ = described(written(tmp_path, m_csv=text))
-    assert section["orientation"]["convention"] == "ZYZ"
+    assert section["orientation"]["convention"] == convention
     assert_turned(assert_read(section, IT), IT)
 
 
@@ -149,14 +138,6 @@ def test_targets_keep_the_digit_at_the_end_of_their_names(tmp_path):
     section, told = described(written(tmp_path, m_csv=table(names, IT.q, IT.point, *others)))
     assert told["targets"] == ["smr1", "smr2", "smr3"]
     assert_read(section, IT, target="smr1")
-
-
-def test_a_radius_of_a_reflector_is_no_offset_of_its_centre(tmp_path):
-    names = [*joints("J{} [deg]"), *XYZ, "Radius [mm]"]
-    text = table(names, IT.q, IT.point, np.full(len(IT.q), 19.05))
-    section, told = described(written(tmp_path, m_csv=text))
-    assert_read(section, IT)
-    assert "Radius [mm]" in told["unused_columns"]
 
 
 def test_centres_that_were_not_corrected_are_asked_about(tmp_path):
@@ -237,28 +218,12 @@ def test_a_pose_read_ten_times_is_shown_once_and_its_columns_are_named(tmp_path)
     assert all(lines[i + 3] == "    more readings of it: 9" for i in heads)
 
 
-def test_the_first_poses_are_part_of_the_answer_for_a_program(tmp_path):
-    text = table([*joints("q{}_rad"), "x_m", "y_m", "z_m"], np.deg2rad(IT.q), IT.point / 1000.0)
-    _, told = described(written(tmp_path, m_csv=text))
-    assert [pose["line"] for pose in told["first_poses"]] == [2, 3, 4]
-    np.testing.assert_allclose(told["first_poses"][1]["joints"], IT.q[1], atol=1e-3)
-    assert told["first_poses"][2]["targets"][0]["x_mm"] == pytest.approx(IT.point[2, 0], abs=1e-3)
-
-
 def test_points_a_controller_calculated_are_told_so_though_they_are_rounded(tmp_path):
     text = table([*joints("q{}_deg"), *XYZ], IT.q, np.round(IT.controller, 2))
     _, told = described(written(tmp_path, m_csv=text))
     assert any("closer than an instrument measures" in words for words in told["remarks"])
     _, told = described(written(tmp_path, m_csv=table([*joints("q{}_deg"), *XYZ], IT.q, IT.point)))
     assert not any("closer than" in words for words in told["remarks"])
-
-
-def test_the_first_poses_are_shown_of_an_unknown_robot_too(tmp_path):
-    names = [*joints("q{}_deg")[:5], *XYZ]
-    files = written(tmp_path, m_csv=table(names, IT.q[:, 1:], IT.point))
-    done = call("init", *files, "--out", tmp_path / "cell", "--yes")
-    assert done.exit_code == 0, done.output
-    assert "  line 2: joints " + ", ".join(f"{v:.3f}" for v in IT.q[0, 1:]) in done.output
 
 
 def test_the_direction_a_pose_was_approached_from_is_kept(tmp_path):
@@ -270,12 +235,3 @@ def test_the_direction_a_pose_was_approached_from_is_kept(tmp_path):
     )
     section, _ = described(written(tmp_path, m_csv=text))
     assert len(set(assert_read(section, IT, rows)["pose"].tolist())) == 2 * len(IT.q)
-
-
-def test_points_alone_are_told_to_bring_their_joints(tmp_path):
-    files = written(tmp_path, m_csv=table(["Point", *XYZ], named_rows(), IT.point))
-    assert "or give joints and points" in refused(files)
-
-
-def named_rows():
-    return [f"P{row + 1}" for row in range(len(IT.q))]

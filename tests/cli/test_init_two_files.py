@@ -37,14 +37,6 @@ def test_a_name_joins_whatever_the_order(there, here, tmp_path):
     assert read(section, robot.load("ur10")).columns["row"].tolist() == list(range(2, COUNT + 2))
 
 
-def test_the_order_of_the_files_is_of_no_account(tmp_path):
-    joints = table(["Name", *Q], named("P{}", range(COUNT)), IT.q)
-    points = table(["Name", *XYZ], named("P{}", ORDER), IT.point[ORDER])
-    files = written(tmp_path, tracker_csv=points, joints_csv=joints)
-    section, _ = described(files)
-    assert_read(section, IT, ORDER)
-
-
 def test_what_stays_unmatched_is_printed_with_its_lines(tmp_path):
     rows = np.arange(COUNT)
     joints = table(["Name", *Q], named("P{}", rows[3:]), IT.q[3:])
@@ -200,15 +192,6 @@ def test_joints_that_are_gone_are_named_before_a_run(tmp_path):
         load((tmp_path / "cell" / "m.yaml",))
 
 
-def test_the_data_set_of_two_files_passes_the_check(tmp_path):
-    joints = table(["Name", *Q], named("P{}", range(COUNT)), IT.q)
-    points = table(["Name", *XYZ], named("P{}", ORDER), IT.point[ORDER])
-    described(written(tmp_path, joints_csv=joints, tracker_csv=points))
-    done = call("check-data", tmp_path / "cell" / "m.yaml", "--json")
-    assert "does_not_fit" not in done.output
-    assert done.exit_code in (0, 1)
-
-
 def test_targets_in_rows_of_their_own_share_the_joints_of_their_pose(tmp_path):
     others = [[0, 0, 0], [80, 0, 0], [0, 90, 0], [0, 0, 70]]
     rows = np.repeat(np.arange(COUNT), 4)
@@ -219,11 +202,3 @@ def test_targets_in_rows_of_their_own_share_the_joints_of_their_pose(tmp_path):
     section, _ = described(written(tmp_path, joints_csv=joints, tracker_csv=points))
     assert_read(section, IT, target="A")
     assert len(read(section, robot.load("ur10")).columns["row"]) == 4 * COUNT
-
-
-def test_points_counted_by_a_tracker_that_has_fewer_are_asked_about(tmp_path):
-    joints = table(["Pose", *Q], np.arange(1, COUNT + 1), IT.q)
-    points = table(["Point", *XYZ], np.arange(1, COUNT), IT.point[1:])
-    said = refused(written(tmp_path, joints_csv=joints, tracker_csv=points))
-    assert "--join" in said
-    assert "Pose=Point" in said

@@ -143,11 +143,6 @@ def test_a_quantity_in_two_units_has_to_say_the_same(tmp_path, good, truth):
     assert said in problems_of(tmp_path, good | {"x_m": off})
 
 
-def test_a_mapped_column_that_is_not_there(tmp_path, good):
-    text = problems_of(tmp_path, good, columns={"q1": "base_joint"})
-    assert "column base_joint: is not there" in text
-
-
 def test_bad_cells_of_several_columns_are_all_named(tmp_path, good):
     good = {name: values.astype(object) for name, values in good.items()}
     good["q2_deg"][3] = "no"
@@ -172,53 +167,6 @@ def test_a_quaternion_that_is_not_a_unit(tmp_path, good):
     assert "line 6: quaternion of length 1.00499" in text
 
 
-def test_a_joint_outside_its_limits(tmp_path, good):
-    good["q5_deg"][2] = 361.0
-    text = problems_of(tmp_path, good)
-    assert "column q5_deg, line 4: 361 is outside the joint limits" in text
-    assert "-360 to 360 deg (ur10)" in text
-
-
-def test_metres_under_a_millimetre_name(tmp_path, good):
-    for axis in "xyz":
-        good[f"{axis}_mm"] = good[f"{axis}_mm"] / 1000.0
-    assert "the positions look like metres" in problems_of(tmp_path, good)
-
-
-def test_radians_under_a_degree_name(tmp_path, good):
-    for i in range(1, 7):
-        good[f"q{i}_deg"] = np.deg2rad(good[f"q{i}_deg"])
-    assert "the joints look like radians" in problems_of(tmp_path, good)
-
-
-def test_degrees_under_a_radian_name(tmp_path, good):
-    columns = {
-        name.replace("_deg", "_rad") if name[0] == "q" else name: v for name, v in good.items()
-    }
-    text = problems_of(tmp_path, columns)
-    assert "the column looks like degrees" in text
-
-
-def test_a_travel_direction_that_is_none(tmp_path, good):
-    text = problems_of(tmp_path, good | {"s4": np.full(12, 2)})
-    assert "column s4, lines 2, 3, 4, 5, 6 and 7 more: 2; allowed: -1, 0 or 1" in text
-
-
-def test_a_pose_and_repeat_given_twice(tmp_path, good):
-    columns = good | {"pose": np.zeros(12, int), "repeat": np.minimum(np.arange(12), 10)}
-    assert "line 13: pose 0, repeat 10 is given again" in problems_of(tmp_path, columns)
-
-
-def test_a_seventh_joint_the_robot_has_not(tmp_path, good):
-    text = problems_of(tmp_path, good | {"q7_deg": np.zeros(12)})
-    assert "q7 is there, the robot has 6 joints" in text
-
-
-def test_a_column_mapped_to_two_quantities_is_refused(tmp_path, good):
-    text = problems_of(tmp_path, good, columns={"q1": "q2_deg"})
-    assert "column q2_deg: is taken for 2 quantities, q1 among them" in text
-
-
 def test_a_file_without_orientations_is_told_from_a_missing_column(tmp_path, good):
     bare = {name: column for name, column in good.items() if name[0] != "r"}
     text = problems_of(tmp_path, bare)
@@ -229,12 +177,54 @@ def test_a_file_without_orientations_is_told_from_a_missing_column(tmp_path, goo
                                                         "ry_deg": good["ry_deg"]})  # fmt: skip
 
 
-def test_a_list_of_no_targets_asks_for_a_name(tmp_path, good):
-    assert "no target is asked for" in problems_of(tmp_path, good, targets=[])
+def scaled(columns, letter, factor, unit=""):
+    """Columns of a letter times a factor, under names with another unit."""
+    return {(f"{name[:2]}_{unit}" if unit and name[0] == letter else name):
+            values * factor if name[0] in letter else values
+            for name, values in columns.items()}  # fmt: skip
 
 
-def test_a_pose_number_that_stands_for_its_neighbours_too_is_refused(tmp_path, good):
-    rows = len(good["x_mm"])
-    good["pose"] = np.arange(rows, dtype=float)
-    good["pose"][3] = 1e300
-    assert "column pose, line 5: 1e+300; allowed: whole numbers" in problems_of(tmp_path, good)
+ROWS = np.arange(12)
+FAULTS = {
+    "metres": (lambda good: scaled(good, "xyz", 1e-3), "the positions look like metres"),
+    "radians": (lambda good: scaled(good, "q", np.pi / 180), "the joints look like radians"),
+    "degrees": (lambda good: scaled(good, "q", 1.0, "rad"), "the column looks like degrees"),
+    "a limit": (
+        lambda good: good | {"q5_deg": np.where(ROWS == 2, 361.0, 0.0)},
+        "column q5_deg, line 4: 361 is outside the joint limits",
+    ),
+    "a direction": (
+        lambda good: good | {"s4": np.full(12, 2)},
+        "column s4, lines 2, 3, 4, 5, 6 and 7 more: 2; allowed: -1, 0 or 1",
+    ),
+    "a pose twice": (
+        lambda good: good | {"pose": 0 * ROWS, "repeat": np.minimum(ROWS, 10)},
+        "line 13: pose 0, repeat 10 is given again",
+    ),
+    "a pose of 301 digits": (
+        lambda good: good | {"pose": np.where(ROWS == 3, 1e300, ROWS)},
+        "column pose, line 5: 1e+300; allowed: whole numbers",
+    ),
+    "a seventh joint": (
+        lambda good: good | {"q7_deg": np.zeros(12)},
+        "q7 is there, the robot has 6 joints",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", FAULTS)
+def test_a_fault_is_named_with_its_place(tmp_path, good, case):
+    change, said = FAULTS[case]
+    assert said in problems_of(tmp_path, change(good))
+
+
+@pytest.mark.parametrize(
+    ("section", "said"),
+    [
+        ({"columns": {"q1": "base_joint"}}, "column base_joint: is not there"),
+        ({"columns": {"q1": "q2_deg"}}, "column q2_deg: is taken for 2 quantities, q1 among them"),
+        ({"targets": []}, "no target is asked for"),
+    ],
+)
+def test_settings_that_do_not_fit_the_file_are_named(tmp_path, good, section, said):
+    assert said in problems_of(tmp_path, good, **section)

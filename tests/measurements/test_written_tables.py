@@ -9,7 +9,6 @@ import pytest
 from written_tables import (
     JOINTS,
     POINT_MM,
-    Q_DEG,
     ROWS,
     XYZ,
     assert_is_truth,
@@ -162,15 +161,6 @@ def test_a_thousand_where_all_others_have_none_is_asked_about(tmp_path):
         reading(path, thousands="none")
 
 
-def test_points_and_commas_in_one_file_are_asked_about(tmp_path):
-    rows = [[*row[:6], *(c.replace(".", ",") for c in row[6:])] for row in cells(decimals=2)]
-    path = file(tmp_path, lines(rows, mark=";"))
-    error = undecided(path)
-    assert "--decimal" in str(error)
-    with pytest.raises(InputError, match="not a finite number"):
-        reading(path, decimal=".")
-
-
 FOOTERS = {
     "Mean and Std": [["Mean", *["1.000"] * 8], ["Std", *["0.100"] * 8]],
     "Mittelwert": [["Mittelwert:", *["1.000"] * 8]],
@@ -292,21 +282,3 @@ def test_a_file_without_names_is_read_by_the_names_given(tmp_path):
         looked(path)
     assert_is_truth(reading(path, names=",".join([*(f"q{i}_deg" for i in range(1, 7)),
                                                   "x_mm", "y_mm", "z_mm"])))  # fmt: skip
-
-
-def test_decimal_commas_between_commas_are_refused_with_the_reason(tmp_path):
-    with pytest.raises(InputError, match="decimal commas between commas"):
-        reading(file(tmp_path, lines(cells(decimal=","), mark=",")))
-
-
-@pytest.mark.slow
-def test_a_hundred_thousand_rows_take_seconds(tmp_path):
-    import time
-
-    many = lines(cells() * 7200, mark=";")
-    path = file(tmp_path, many)
-    started = time.process_time()
-    found = looked(path)
-    assert len(found.table) == 7200 * ROWS
-    assert time.process_time() - started < 8.0  # some two on a quiet machine
-    np.testing.assert_allclose(Q_DEG[0, 0], float(found.table.columns[JOINTS[0]][0]))
