@@ -58,8 +58,8 @@ def frames_of(source: Source) -> Frames:
     text = _plain(source)
     for data in _FRAME_DATA.finditer(text):
         poses = [
-            CONVENTION.pose(source.values(source.numbers(*found.span())))
-            for found in re.compile(_FRAME).finditer(text, *data.span())
+            CONVENTION.pose(source.values(source.numbers(*result.span())))
+            for result in re.compile(_FRAME).finditer(text, *data.span())
         ]
         if data[1] and poses:
             frames[TOOL, data[2].upper()] = poses[0]
@@ -71,18 +71,18 @@ def frames_of(source: Source) -> Frames:
 def read(sources: Sequence[Source], frames: Frames, _: np.ndarray | None) -> Program:
     """Positions of a module."""
     (source,) = sources
-    text, at = _plain(source), 0
-    found = {each.start(): each.end() for each in _TARGET.finditer(text)}
+    text, state = _plain(source), 0
+    result = {item.start(): item.end() for item in _TARGET.finditer(text)}
     names: dict[int, str] = {}
     uses: dict[int, set[tuple[str | None, str | None]]] = {}
-    left, refused = [], {}
+    computed, refused = [], {}
     for data in _FRAME_DATA.finditer(text):
         flags = data[3].upper(), data[1] or (data[4] or "").upper()
         if flags[0] == ("FALSE" if data[1] else "TRUE") or flags[1] == "FALSE":
             refused[data[2].upper()] = STILL
     for statement in text.split(";"):
-        end = at + len(statement)
-        here = [start for start in found if at <= start < end]
+        end = state + len(statement)
+        here = [start for start in result if state <= start < end]
         if named := _TARGET_DATA.search(statement):
             names |= dict.fromkeys(here, named[1])
         elif _MOVE.match(statement):
@@ -90,28 +90,31 @@ def read(sources: Sequence[Source], frames: Frames, _: np.ndarray | None) -> Pro
             last = re.match(r"\s*(\w+)", bare.split(",")[-1])
             work = re.search(r"\\WObj\s*:=\s*(\w+)", statement, re.I)
             way = last and last[1].upper(), work[1].upper() if work else "WOBJ0"
-            words = {*re.findall(r"(?<!\\)\b[A-Z]\w*", bare.upper())}
-            for start in [*here, *(at for at, name in names.items() if name.upper() in words)]:
+            texts = {*re.findall(r"(?<!\\)\b[A-Z]\w*", bare.upper())}
+            for start in [
+                *here,
+                *(state for state, name in names.items() if name.upper() in texts),
+            ]:
                 uses.setdefault(start, set()).add(way)
         else:
-            found = {start: last for start, last in found.items() if start not in here}
+            result = {start: last for start, last in result.items() if start not in here}
         if _COMPUTED.search(statement):
-            first = at + len(statement) - len(statement.lstrip())
-            left.append(f"{source.where(first)}: {' '.join(statement.split())}")
+            first = state + len(statement) - len(statement.lstrip())
+            computed.append(f"{source.where(first)}: {' '.join(statement.split())}")
         if changed := _SET.match(statement):
             refused[changed[1].upper()] = CHANGED
-        at = end + 1
+        state = end + 1
     positions = []
-    for start, end in found.items():
+    for start, end in result.items():
         ways = uses.get(start, {(None, None)})
         tool, base = next(iter(ways))
         why = SEVERAL if len(ways) > 1 else refused.get(tool) or refused.get(base) or ""
-        array = [each for each, name in names.items() if name == names.get(start)]
+        array = [item for item, name in names.items() if name == names.get(start)]
         index = f"{{{array.index(start) + 1}}}" if len(array) > 1 else ""
         name = names.get(start, f"line {source.where(start).split(':')[1]}") + index
         position = _position(name, source, source.numbers(start, end))
         positions.append(replace(position, tool=tool, base=base, refused=why))
-    return Program(sources, positions, frames, left)
+    return Program(sources, positions, frames, computed)
 
 
 def _position(name: str, source: Source, places: list) -> Position:

@@ -110,23 +110,23 @@ def read_program(
     """
     path = Path(path)
     ending = path.suffix.lower()
-    language = next((each for each in LANGUAGES if ending in each.endings), None)
+    language = next((item for item in LANGUAGES if ending in item.endings), None)
     if language is None:
-        known = ", ".join(ending for each in LANGUAGES for ending in each.endings)
+        known = ", ".join(ending for item in LANGUAGES for ending in item.endings)
         raise InputError(Problem(str(path), f"ends in {ending!r}: no robot language", known))
-    beside = {each.name.lower(): each for each in path.parent.iterdir() if each != path}
+    beside = {item.name.lower(): item for item in path.parent.iterdir() if item != path}
     partners = [path.stem.lower() + suffix for suffix in language.partners]
-    sources = [Source.read(each) for each in (path, *(beside[n] for n in partners if n in beside))]
+    sources = [Source.read(item) for item in (path, *(beside[n] for n in partners if n in beside))]
     named = [beside[name] for name in language.frame_files if name in beside]
     frames = {}
-    for source in [*(Source.read(Path(each)) for each in (*named, *frame_files)), *sources]:
+    for source in [*(Source.read(Path(item)) for item in (*named, *frame_files)), *sources]:
         is_yaml = source.path.suffix.lower() == ".yaml"
         frames |= frames_of(source, language.convention) if is_yaml else language.frames(source)
     program = language.read(sources, frames, pulses_per_degree)
     if not program.positions:
         computed = [Problem(line, "is computed by the program") for line in program.left]
-        what = "has no positions that can be corrected"
-        raise InputError([Problem(str(path), what), *computed])
+        message = "has no positions that can be corrected"
+        raise InputError([Problem(str(path), message), *computed])
     return language, program
 
 
@@ -173,55 +173,55 @@ def compensate_program(
     frames = _all_frames(program, convention, {TOOL: tools or {}, BASE: bases or {}}, ask)
     positions, robot = program.positions, calibration.robot
     tool, base = (
-        [frames.get((kind, getattr(each, kind) or ""), IDENTITY) for each in positions]
+        [frames.get((kind, getattr(item, kind) or ""), IDENTITY) for item in positions]
         for kind in (TOOL, BASE)
     )
-    poses = [number for number, each in enumerate(positions) if each.scale is None]
+    poses = [number for number, item in enumerate(positions) if item.scale is None]
     flange = [
-        compose(compose(base[n], convention.pose(each.numbers, each.where)), invert(tool[n]))
-        for n, each in enumerate(positions)
-        if each.scale is None
+        compose(compose(base[n], convention.pose(item.numbers, item.where)), invert(tool[n]))
+        for n, item in enumerate(positions)
+        if item.scale is None
     ]
     ways = dict(zip(poses, posture.postures_of(robot, flange), strict=True))
     reasons: dict[int, str] = {}
     q_rad, near = np.full((len(positions), robot.dh.joints), np.nan), near_rad
-    for number, each in enumerate(positions):
+    for number, item in enumerate(positions):
         try:
-            if each.moves_outside and number in ways and not base_is_fixed:
+            if item.moves_outside and number in ways and not base_is_fixed:
                 raise InputError(Problem("", _TRACK))
-            near = q_rad[number] = _start(robot, language, each, ways.get(number), near)
+            near = q_rad[number] = _start(robot, language, item, ways.get(number), near)
         except InputError as error:
             reasons[number] = error.problems[0].what
     remarks, parts = [], []
-    for name in dict.fromkeys(each.tool for each in positions):
-        group = [n for n, each in enumerate(positions) if each.tool == name and n not in reasons]
+    for name in dict.fromkeys(item.tool for item in positions):
+        group = [n for n, item in enumerate(positions) if item.tool == name and n not in reasons]
         if group:
-            own = frames.get((TOOL, name or ""), IDENTITY)
-            carried, remark = _carried(calibration, own, point)
+            mounted = frames.get((TOOL, name or ""), IDENTITY)
+            carried, remark = _carried(calibration, mounted, point)
             remarks += [f"Tool {name or ''}: {remark}"] if remark else []
-            parts.append(_corrected(calibration, q_rad[group], carried, own).set_axis(group))
+            parts.append(_corrected(calibration, q_rad[group], carried, mounted).set_axis(group))
     facts = pd.concat(parts).reindex(range(len(positions))) if parts else pd.DataFrame()
     new: dict[Position, np.ndarray] = {}
     for number in sorted(set(range(len(positions))) - set(reasons)):
-        each, row = positions[number], facts.loc[number]
-        posture_now = each.posture and language.posture
+        item, row = positions[number], facts.loc[number]
+        posture_now = item.posture and language.posture
         if row["outcome"] > PoseStatus.EXTRAPOLATED:
             name = PoseStatus(row["outcome"]).name
             reasons[number] = f"the calibrated arm: {name.lower().replace('_', ' ')}"
         elif row["change_mm"] > at_most_mm:
             reasons[number] = f"would move by {row['change_mm']:.3g} mm (--at-most-mm)"
-        elif each.scale is not None:
-            new[each] = row["q_rad"] / _unit(robot) * each.scale
+        elif item.scale is not None:
+            new[item] = row["q_rad"] / _unit(robot) * item.scale
         elif posture_now and (
-            apart := posture.unmatched(robot, posture_now, each.posture, row["q_rad"])
+            apart := posture.unmatched(robot, posture_now, item.posture, row["q_rad"])
         ):
             reasons[number] = f"the posture would change: {apart}"
         elif max(row["change_mm"], row["change_mrad"]) > _SAME:
-            new[each] = convention.numbers(compose(invert(base[number]), row["pose"]), each.numbers)
+            new[item] = convention.numbers(compose(invert(base[number]), row["pose"]), item.numbers)
     rows = pd.DataFrame({
-        "position": [each.name for each in positions],
-        "file": [each.where for each in positions],
-        "kind": ["pose" if each.scale is None else "joints" for each in positions],
+        "position": [item.name for item in positions],
+        "file": [item.where for item in positions],
+        "kind": ["pose" if item.scale is None else "joints" for item in positions],
         **{key: facts[key] for key in facts.columns if key not in ("q_rad", "pose", "outcome")},
         "status": [reasons.get(number, "corrected") for number in range(len(positions))],
     })  # fmt: skip
@@ -257,8 +257,8 @@ def _all_frames(
 ) -> Frames:
     """The program's frames and those a person gave; InputError naming those that are missing."""
     frames, problems = dict(program.frames), []
-    poses = [each for each in program.positions if each.scale is None and not each.refused]
-    wanted = {(kind, getattr(each, kind) or "") for each in poses for kind in (TOOL, BASE)}
+    poses = [item for item in program.positions if item.scale is None and not item.refused]
+    wanted = {(kind, getattr(item, kind) or "") for item in poses for kind in (TOOL, BASE)}
     wanted |= {(TOOL, "")} if "" in given[TOOL] else set()
     for kind, name in sorted(wanted - set(frames)):
         numbers = given[kind].get(name, given[kind].get(""))
@@ -266,8 +266,8 @@ def _all_frames(
             numbers = ask(kind, name)
         if numbers is None:
             fix = f'give --{kind} "{name and name + "="}x,y,z,.." (mm, deg) or --frames FILE'
-            what = f"{kind} {name or 'of its positions'} is not in the program"
-            problems.append(Problem(str(program.sources[0].path), what, fix=fix))
+            message = f"{kind} {name or 'of its positions'} is not in the program"
+            problems.append(Problem(str(program.sources[0].path), message, fix=fix))
         else:
             frames[kind, name] = convention.typed(numbers)
     refuse(problems, "Frames are missing")
@@ -285,8 +285,8 @@ def _start(
         near = near if position.near_rad is None else position.near_rad
         return posture.choose(robot, ways, language.posture, position.posture, near)
     if len(position.places) != robot.dh.joints:
-        what = f"has {len(position.places)} joints, not {robot.dh.joints}"
-        raise InputError(Problem("", what))
+        message = f"has {len(position.places)} joints, not {robot.dh.joints}"
+        raise InputError(Problem("", message))
     q_rad = position.numbers / position.scale * _unit(robot)
     if not limits.within(q_rad, robot.q_min_rad, robot.q_max_rad):
         raise InputError(Problem("", "its joints are beyond the limits"))
@@ -333,8 +333,8 @@ def _corrected(
     targets = {**calibration.targets, _POINT: carried}
     arm = replace(calibration, targets=targets, anchor=anchor)
     wanted = _nominal(robot, start, tool)
-    found = inverse.compensate(arm, wanted, start, point=_POINT)
-    q_rad = np.where(np.isfinite(found.q_rad), found.q_rad, start)
+    result = inverse.compensate(arm, wanted, start, point=_POINT)
+    q_rad = np.where(np.isfinite(result.q_rad), result.q_rad, start)
     new = _nominal(robot, q_rad, tool)
     shift_mm, turn_rad = _apart(new, wanted)
     known = predict(arm, q_rad, point=_POINT)
@@ -344,7 +344,7 @@ def _corrected(
     return pd.DataFrame({
         "q_rad": list(q_rad),
         "pose": [Pose(*parts) for parts in zip(*new, strict=True)],
-        "outcome": found.status,
+        "outcome": result.status,
         "change_mm": shift_mm,
         "change_mrad": 1e3 * turn_rad,
         "largest_joint_change_deg": np.rad2deg(np.abs(q_rad - start).max(axis=1)),

@@ -31,22 +31,22 @@ _OFFSET = re.compile(r"\b(?:Tool_)?Offset\b|\bINC\b|\bSkip", re.I)
 def read(sources: Sequence[Source], frames: Frames, _: np.ndarray | None) -> Program:
     """Positions of a listing, group 1; other groups stay as they are."""
     (source,) = sources
-    left = [
-        f"{source.where(found.end())}: {' '.join(found[0].split())}"
-        for found in _MOTION.finditer(source.text)
-        if found[1] or _OFFSET.search(found[0])
+    computed = [
+        f"{source.where(result.end())}: {' '.join(result[0].split())}"
+        for result in _MOTION.finditer(source.text)
+        if result[1] or _OFFSET.search(result[0])
     ]
     start = max(source.text.find("/POS"), 0)
-    found = (_position(source, each) for each in _POSITION.finditer(source.text, start))
-    return Program(sources, [each for each in found if each], {**NO_FRAMES, **frames}, left)
+    result = (_position(source, item) for item in _POSITION.finditer(source.text, start))
+    return Program(sources, [item for item in result if item], {**NO_FRAMES, **frames}, computed)
 
 
 def _position(source: Source, found: re.Match) -> Position | None:
-    values = {each[1]: each for each in _VALUE.finditer(source.text, *found.span(2))}
+    values = {item[1]: item for item in _VALUE.finditer(source.text, *found.span(2))}
     number = dict(_NUMBERED.findall(found[2]))
     frames = {"tool": number.get("T"), "base": number.get("F")}
     frames = {kind: None if name == "F" else name for kind, name in frames.items()}  # in force
-    moves = any(float(each[2]) for key, each in values.items() if key[0] == "E")
+    moves = any(float(item[2]) for key, item in values.items() if key[0] == "E")
     is_pose = "X" in values
     keys = list("XYZWPR") if is_pose else sorted(key for key in values if key[0] == "J")
     if not keys or not set(keys) <= set(values):

@@ -56,12 +56,12 @@ class _State(NamedTuple):
 def frames_of(source: Source) -> Frames:
     """TOOL_DATA and BASE_DATA, and frames written in assignments to $TOOL and $BASE."""
     frames = {}
-    for at, text in _lines(source.text):
-        found = _DATA.match(text) or re.match(r"\s*\$(TOOL|BASE)()\s*=\s*\{", text, re.I)
-        for parts in _aggregates(at, text) if found else ():
+    for offset, text in _lines(source.text):
+        result = _DATA.match(text) or re.match(r"\s*\$(TOOL|BASE)()\s*=\s*\{", text, re.I)
+        for parts in _aggregates(offset, text) if result else ():
             if (places := _places(parts, _FRAME)) is not None:
-                name = str(int(found[2])) if found[2] else source.where(at)
-                frames[found[1].lower(), name] = CONVENTION.pose(source.values(places))
+                name = str(int(result[2])) if result[2] else source.where(offset)
+                frames[result[1].lower(), name] = CONVENTION.pose(source.values(places))
     return frames
 
 
@@ -69,12 +69,12 @@ def read(sources: Sequence[Source], frames: Frames, _: np.ndarray | None) -> Pro
     """Positions of a KRL program."""
     data: dict[str, _State] = {}
     uses: dict[str, set[_State]] = {}
-    found: dict[str, Position] = {}
-    left, changed = [], set()
+    result: dict[str, Position] = {}
+    computed, changed = [], set()
     for source in sorted(sources, key=_ending):  # .dat first
         state = _State()
-        for at, text in _lines(source.text):
-            aggregates, place = list(_aggregates(at, text)), source.where(at)
+        for offset, text in _lines(source.text):
+            aggregates, place = list(_aggregates(offset, text)), source.where(offset)
             where = f"{place}: {text.strip()}"
             state = _in_force(state, text, data, place)
             changed |= {(kind.lower(), str(int(n))) for kind, n in _CHANGED.findall(text)}
@@ -89,33 +89,37 @@ def read(sources: Sequence[Source], frames: Frames, _: np.ndarray | None) -> Pro
                     for number, parts in enumerate(aggregates[: 1 + ("CIRC" in motion[1].upper())])
                 }
                 if motion[2] or ":" in target or None in inline.values():
-                    left.append(where)
+                    computed.append(where)
                     continue
-                found |= inline
+                result |= inline
                 for name in (*names, *inline):
                     uses.setdefault(name, set()).add((named or [state])[0])
             elif _COMPONENT.match(text):
-                left.append(where)
+                computed.append(where)
             elif aggregates and (assigned := _ASSIGNED.match(text)):
                 name, parts = re.sub(r"\s", "", assigned[1].upper()), aggregates[0]
                 if {"TOOL_NO", "BASE_NO"} <= set(parts):
                     still = "#TCP" in parts.get("IPO_FRAME", ("",))[0].upper()
                     numbers = parts["TOOL_NO"][0], parts["BASE_NO"][0]
                     data[name] = _State(*numbers, STILL if still else "")
-                elif name[0] != "$" and "_DATA" not in name and (own := _position(source, parts)):
-                    if name in found or re.search(r"\}\s*:", text):
-                        left.append(where)
+                elif (
+                    name[0] != "$"
+                    and "_DATA" not in name
+                    and (position := _position(source, parts))
+                ):
+                    if name in result or re.search(r"\}\s*:", text):
+                        computed.append(where)
                     else:
-                        found[name] = own
+                        result[name] = position
     positions = []
-    for name, position in found.items():
+    for name, position in result.items():
         ways = uses.get(name.split("[")[0]) or {data.get(f"F{name[1:]}", _State())}
         tool, base, why = next(iter(ways))
         if len(ways) > 1 or {(TOOL, tool), (BASE, base)} & changed:
             why = SEVERAL if len(ways) > 1 else CHANGED
         positions.append(replace(position, name=name, tool=tool, base=base, refused=why))
     positions.sort(key=lambda each: (_ending(each.source), each.places[0]))
-    return Program(sources, positions, {**NO_FRAMES, **frames}, left)
+    return Program(sources, positions, {**NO_FRAMES, **frames}, computed)
 
 
 def _ending(source: Source) -> str:
@@ -140,16 +144,16 @@ def _bits(status: int, turn: int) -> tuple[str, ...]:
 
 def _lines(text: str) -> Iterator[tuple[int, str]]:
     """Offset and text of each line, comments and strings blank."""
-    at = 0
+    offset = 0
     for line in text.splitlines(keepends=True):
-        yield at, blanked(line, r'"[^"\r\n]*"', r";.*", r"^\s*&.*")
-        at += len(line)
+        yield offset, blanked(line, r'"[^"\r\n]*"', r";.*", r"^\s*&.*")
+        offset += len(line)
 
 
 def _aggregates(at: int, text: str) -> Iterator[Parts]:
     """Components of each ``{..}`` of a line by name, with the places of their values."""
-    for found in _AGGREGATE.finditer(text):
-        parts = _PART.finditer(text, *found.span(1))
+    for result in _AGGREGATE.finditer(text):
+        parts = _PART.finditer(text, *result.span(1))
         yield {
             part[1].upper(): (part[2].strip(), (at + part.start(2), at + part.end(2)))
             for part in parts
@@ -171,14 +175,14 @@ def _in_force(state: _State, text: str, data: dict[str, _State], where: str) -> 
         return state._replace(refused=CHANGED)
     if mode := re.search(r"\bIPO_MODE\s*=\s*#(TCP|BASE)\b", text, re.I):
         state = state._replace(refused=STILL if mode[1].upper() == "TCP" else "")
-    for found in _SET.finditer(text):
-        kind, number = (found[1] or found[3]).lower(), found[2] or found[4]
-        if found[5]:
-            name = getattr(data.get(found[5].upper(), _State()), kind)
-        elif number or found[6].upper() == "$NULLFRAME":
+    for result in _SET.finditer(text):
+        kind, number = (result[1] or result[3]).lower(), result[2] or result[4]
+        if result[5]:
+            name = getattr(data.get(result[5].upper(), _State()), kind)
+        elif number or result[6].upper() == "$NULLFRAME":
             name = str(int(number or 0))
         else:
-            name = found[6] or where
+            name = result[6] or where
         state = state._replace(**{kind: name})
     return state
 
@@ -186,7 +190,7 @@ def _in_force(state: _State, text: str, data: dict[str, _State], where: str) -> 
 def _position(source: Source, parts: Parts) -> Position | None:
     """The position of an aggregate; None where some of its numbers are missing."""
     outer = [parts[key][0] for key in parts if re.fullmatch(r"E[1-6]", key)]
-    moves = any(re.fullmatch(NUMBER, each) and float(each) for each in outer)
+    moves = any(re.fullmatch(NUMBER, item) and float(item) for item in outer)
     if (places := _places(parts, _FRAME)) is not None:
         stated = _bits(*(_whole(parts[key][0]) for key in "ST")) if {*"ST"} <= set(parts) else None
         return Position("", source, places, 4, posture=stated, moves_outside=moves)

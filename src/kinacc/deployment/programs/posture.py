@@ -30,12 +30,14 @@ def unmatched(
     poses = np.stack([q_rad, 0.0 * q_rad])
     frames = compose(robot.base, dh.chain(robot.dh, robot.dh_joints(poses)))
     place = frames.position_mm[0]
-    front, left, _ = (frames.rotation[0, 1] @ frames.rotation[1, 1].T).T  # turned by joint 1 alone
+    front, computed, _ = (
+        frames.rotation[0, 1] @ frames.rotation[1, 1].T
+    ).T  # turned by joint 1 alone
     arm = np.cross(place[2] - place[1], place[4] - place[2])
     names = []
     for slack in (0.0, slack_deg, -slack_deg):
         q_deg = np.rad2deg(q_rad) + slack
-        sides = front @ (place[4] - place[0]) >= 0.0, arm @ left > 0.0, q_deg[4] > 0.0
+        sides = front @ (place[4] - place[0]) >= 0.0, arm @ computed > 0.0, q_deg[4] > 0.0
         names.append(posture(sides, q_deg))
     parts = zip(stated, *names, strict=False)  # some programs state the first parts alone
     return ", ".join(now for wanted, now, *near in parts if wanted not in (None, now, *near))
@@ -66,13 +68,13 @@ def choose(
     ways = (ways[:, None] + np.array([*product(*turns)])).reshape(-1, robot.dh.joints)
     inside = (ways >= robot.q_min_rad - 1e-9) & (ways <= robot.q_max_rad + 1e-9)
     ways = ways[inside.all(axis=1)]
-    words = "within its limits"
+    texts = "within its limits"
     if stated is not None and posture is not None:
         fits = [not unmatched(robot, posture, stated, way, _ROUNDING_DEG) for way in ways]
-        ways, words = ways[fits], f"in the posture {', '.join(filter(None, stated))}"
+        ways, texts = ways[fits], f"in the posture {', '.join(filter(None, stated))}"
     elif near_rad is None and len(ways) > 1:
         raise InputError(Problem("", "no posture is stated; give joints to start from: --near-deg"))
     if len(ways) == 0:
-        raise InputError(Problem("", f"the nominal arm cannot reach it {words}"))
+        raise InputError(Problem("", f"the nominal arm cannot reach it {texts}"))
     near_rad = np.zeros(ways.shape[1]) if near_rad is None else near_rad
     return ways[np.argmin(np.max(np.abs(ways - near_rad), axis=1).round(9))]

@@ -51,11 +51,11 @@ class Source:
 
     @cached_property
     def _ends(self) -> list[int]:
-        return [found.end() for found in re.finditer("\n", self.text)]
+        return [result.end() for result in re.finditer("\n", self.text)]
 
     def numbers(self, start: int, end: int) -> list[Place]:
         """Places of the numbers between two offsets."""
-        return [found.span() for found in _NUMBER.finditer(self.text, start, end)]
+        return [result.span() for result in _NUMBER.finditer(self.text, start, end)]
 
     def values(self, places: Iterable[Place]) -> np.ndarray:
         """The numbers at places."""

@@ -44,8 +44,8 @@ def read(sources: Sequence[Source], frames: Frames, _: np.ndarray | None) -> Pro
     mark = next((mark for mark in ";\t" if mark in head), ",")
     cells = [cell.strip('\xef\xbb\xbf" \r\n').lower() for cell in head.split(mark)]
     columns = [_COLUMN.fullmatch(cell) for cell in cells]
-    names = [found[1] if found else cell for found, cell in zip(columns, cells, strict=True)]
-    unit = {found[1]: _UNITS[found[2]] for found in columns if found}
+    names = [result[1] if result else cell for result, cell in zip(columns, cells, strict=True)]
+    unit = {result[1]: _UNITS[result[2]] for result in columns if result}
     keys = sorted(name for name in names if re.fullmatch(r"q[1-9]", name))
     convention = scale = None
     if keys:
@@ -57,27 +57,27 @@ def read(sources: Sequence[Source], frames: Frames, _: np.ndarray | None) -> Pro
             raise InputError(Problem(f"{source.path}:1", "names no columns of positions", allowed))
         keys = [*"xyz", *_TURNS[kinds[0]]]
         convention = Convention(kinds[0], unit.get("x", 1.0), unit.get(keys[-1], 1.0))
-    positions, at = [], len(head)
+    positions, state = [], len(head)
     for number, line in enumerate(lines, 2):
-        row = dict(zip(names, _places(line, mark, at), strict=False))
-        at += len(line)
+        row = dict(zip(names, _places(line, mark, state), strict=False))
+        state += len(line)
         if not line.strip():
             continue
         try:
             label = source.text[slice(*row["pose"])] if "pose" in names else f"line {number}"
-            own = [row[key] for key in keys]
-            source.values(own)
+            places = [row[key] for key in keys]
+            source.values(places)
         except (KeyError, ValueError):
-            what = f"has no number in a column of {', '.join(keys)}"
-            raise InputError(Problem(f"{source.path}:{number}", what)) from None
-        positions.append(Position(label, source, own, 6, scale, tool="", base=""))
+            message = f"has no number in a column of {', '.join(keys)}"
+            raise InputError(Problem(f"{source.path}:{number}", message)) from None
+        positions.append(Position(label, source, places, 6, scale, tool="", base=""))
     return Program(sources, positions, {**frames, (BASE, ""): IDENTITY}, convention=convention)
 
 
 def _places(line: str, mark: str, at: int) -> list[tuple[int, int]]:
     """Where the cells of a line are, without spaces and quotes around them."""
-    found = re.finditer(rf'[ \t]*"?([^{mark}"\r\n]*?)"?\s*(?:{mark}|$)', line.rstrip("\r\n"))
-    return [(at + cell.start(1), at + cell.end(1)) for cell in found][: line.count(mark) + 1]
+    result = re.finditer(rf'[ \t]*"?([^{mark}"\r\n]*?)"?\s*(?:{mark}|$)', line.rstrip("\r\n"))
+    return [(at + cell.start(1), at + cell.end(1)) for cell in result][: line.count(mark) + 1]
 
 
 LANGUAGE = Language("CSV", (".csv",), Convention(FIXED), read)

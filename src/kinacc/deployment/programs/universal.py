@@ -36,29 +36,33 @@ def read(sources: Sequence[Source], frames: Frames, _: np.ndarray | None) -> Pro
     (source,) = sources
     text = blanked(source.text, r"#.*", r'"[^"\r\n]*"')
     named: dict[str, list[tuple[int, int]]] = {}
-    for each in _ASSIGNED.finditer(text):
-        named.setdefault(each[1], []).append(each.span(2))
+    for item in _ASSIGNED.finditer(text):
+        named.setdefault(item[1], []).append(item.span(2))
     frames = {**frames, (BASE, ""): IDENTITY}
-    tool, uses, near, left = None, {}, {}, []
+    tool, uses, near, computed = None, {}, {}, []
     for call in _CALL.finditer(text):
-        at, where = call.end(), source.where(call.start())
+        state, where = call.end(), source.where(call.start())
         for _number in range(2 if call[1] == "movec" else 1):
-            found = _ARGUMENT.match(text, at)
+            result = _ARGUMENT.match(text, state)
             spans = (
-                [found.span(2)] if found and found[2] else named.get(found[4], []) if found else []
+                [result.span(2)]
+                if result and result[2]
+                else named.get(result[4], [])
+                if result
+                else []
             )
             if call[1] == "set_tcp":
                 tool = f"set_tcp in line {where.split(':')[1]}" if spans else "set_tcp"
                 if len(spans) == 1:
                     frames[TOOL, tool] = CONVENTION.pose(source.values(source.numbers(*spans[0])))
             elif not spans:
-                left.append(f"{where}: {text[call.start() :].splitlines()[0]}")
+                computed.append(f"{where}: {text[call.start() :].splitlines()[0]}")
                 break
             for span in spans if call[1] != "set_tcp" else ():
                 uses.setdefault(span, set()).add(tool)
-                if found[1] and found[5] in named:
-                    near[span] = source.values(source.numbers(*named[found[5]][-1]))
-            at = found.end() if found else at
+                if result[1] and result[5] in named:
+                    near[span] = source.values(source.numbers(*named[result[5]][-1]))
+            state = result.end() if result else state
     names = {span: name for name, spans in named.items() for span in spans}
     return Program(
         sources,
@@ -77,7 +81,7 @@ def read(sources: Sequence[Source], frames: Frames, _: np.ndarray | None) -> Pro
             for span, tools in sorted(uses.items())
         ],
         frames,
-        left,
+        computed,
     )
 
 

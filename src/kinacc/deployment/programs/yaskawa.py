@@ -59,19 +59,19 @@ def read(
     instructions = source.text[end:]
     targets = set(map(int, _MOVE.findall(instructions)))
     targets -= set(map(int, re.findall(r"\bP(\d+)\b", "\n".join(_OTHER.findall(instructions)))))
-    left = [
-        f"{source.where(found.end())}: {found[0].strip()}"
-        for found in _COMPUTED.finditer(source.text, end)
+    computed = [
+        f"{source.where(result.end())}: {result[0].strip()}"
+        for result in _COMPUTED.finditer(source.text, end)
     ]
     state: dict[str, str] = {}
     positions, moving = [], set()
-    for found in _POSITION.finditer(source.text, 0, end):
-        kind, name, word = found[1], found[2], found[4]
+    for result in _POSITION.finditer(source.text, 0, end):
+        kind, name, word = result[1], result[2], result[4]
         if word:
-            state[word] = found[5].strip()
+            state[word] = result[5].strip()
             state["unit"] = word if word in ("PULSE", "RECTAN") else state.get("unit", "PULSE")
             continue
-        places = source.numbers(*found.span(3))
+        places = source.numbers(*result.span(3))
         if kind[0] in "BE":
             moving |= {name} if source.values(places).any() else set()
         elif kind == "C" or int(name) in targets:
@@ -79,11 +79,11 @@ def read(
     return Program(
         sources,
         [
-            _position(source, *each, pulses_per_degree, each[0].lstrip("CP") in moving)
-            for each in positions
+            _position(source, *item, pulses_per_degree, item[0].lstrip("CP") in moving)
+            for item in positions
         ],
         {**NO_FRAMES, (BASE, "ROBOT"): IDENTITY, (BASE, "BASE"): IDENTITY, **frames},
-        left,
+        computed,
     )
 
 
