@@ -135,18 +135,6 @@ def test_dh_parameter_jacobian_equals_differences(table, q):
 # --- VEC, eqs. 5-6 --------------------------------------------------------------------------------
 
 
-@settings(max_examples=40)
-@given(case=vec_cases())
-def test_vec_joint_jacobian_of_the_projected_pose_equals_differences(case):
-    *parameters, q, s = case
-    analytic = vec_model(*parameters).joint_jacobian(JointState(q[None], s[None]))[0]
-    numeric = oracle.difference_jacobian(
-        lambda x: oracle.projected(oracle.vec_forward(*parameters, x, s)), q, 2e-4
-    )
-    np.testing.assert_allclose(analytic[:3], numeric[:3], rtol=0, atol=2e-6)
-    np.testing.assert_allclose(analytic[3:], numeric[3:], rtol=0, atol=2e-9)
-
-
 @settings(max_examples=8)
 @given(case=vec_cases())
 def test_vec_parameter_jacobian_equals_differences(case):

@@ -96,29 +96,6 @@ def test_stated_masses_give_the_compliance_of_each_joint():
     assert np.sqrt(found.solution.variance) == pytest.approx(NOISE_MM, rel=0.15)
 
 
-def test_without_masses_only_the_product_of_weight_and_compliance_is_fitted(monkeypatch):
-    at_the_end = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 120.0])
-    monkeypatch.setitem(globals(), "MASSES", at_the_end)
-    monkeypatch.setitem(globals(), "CENTRES", np.zeros((6, 3)))
-    found = fitted(measured(SOFT), links=False)
-    product = SOFT[1:3] * 120.0 * 9.80665e-3
-    assert np.isnan(found.model.compliance_rad_per_nm).all()
-    assert np.flatnonzero(np.isfinite(found.model.lever_coefficient_rad_per_mm)).tolist() == [1, 2]
-    apart = np.abs(found.model.lever_coefficient_rad_per_mm[1:3] - product)
-    assert np.all(apart < 4.0 * found.std[-2:])
-    assert np.all(found.std[-2:] < 0.1 * product)
-
-
-def test_loads_that_change_separate_compliance_from_weight():
-    rng = np.random.default_rng(5)
-    payload = np.where(rng.random((150, 1)) < 0.5, [[0.0, 0, 0, 0]], [[150.0, 0, 0, 200.0]])
-    found = fitted(measured(SOFT, payload), links=False)
-    std = found.std[-4:].reshape(2, 2)[:, 0]
-    # Weights spread along the arm are no weight at its end, which leaves a little.
-    apart = np.abs(found.model.compliance_rad_per_nm[1:3] - SOFT[1:3])
-    assert np.all(apart < 4.0 * std + 0.05 * SOFT[1:3])
-
-
 def test_a_joint_that_gravity_does_not_turn_is_undetermined_and_stays_stiff():
     seen = measured(SOFT)
     found = fitted(seen, joints=(1, 2, 3))  # axis 1 is upright
@@ -129,21 +106,3 @@ def test_a_joint_that_gravity_does_not_turn_is_undetermined_and_stays_stiff():
     assert np.isnan(found.model.to_columns(found.std)["std_compliance_rad_per_nm"][0])
     columns = tables.fit_columns("compliance_fit", found, known_of)
     assert "j1.compliance_rad_per_nm" in set(columns["parameter"])
-
-
-@pytest.mark.parametrize(("compliance", "chosen"), [(SOFT, "compliance"), (STIFF, "dh")])
-def test_what_bends_is_selected_by_rows_held_out_and_what_does_not_is_not(compliance, chosen):
-    from kinacc.calibration.model_comparison_columns import selection_columns
-    from kinacc.calibration.residuals import cross_validated
-
-    seen = measured(compliance, count=120)
-    every = models.estimators(settings(), ARM, seen)
-    pair = [every["compliance"], every["dh"]]
-    held_out, _ = cross_validated(
-        seen,
-        lambda train, fold: models.fit_all(train, pair),
-        range(3),
-        ("compliance", "dh", "nominal"),
-    )
-    table = selection_columns(seen, held_out)
-    assert table["model"][table["selected"] == 1].tolist() == [chosen]

@@ -11,7 +11,6 @@ import simulated
 from kinacc.calibration import fitting, vec_fit
 from kinacc.calibration.frames import FrameParameters, Frames
 from kinacc.calibration.system import PoseSystem
-from kinacc.geometry import compose, invert, log_so3
 from kinacc.kinematics import robot, vec
 
 ARM, WEIGHT = robot.load("mh180"), 350.0
@@ -54,18 +53,3 @@ def test_jacobian_is_the_derivative_of_the_residual(name, kind):
         step = 1e-6 * np.eye(x.size)[column]
         slope = (system.residual(x + step) - system.residual(x - step)) / 2e-6
         assert np.abs(jacobian[:, column] - slope).max() < 1e-5 * max(1.0, np.abs(slope).max())
-
-
-def test_residual_is_model_minus_measurement_in_the_robot_base():
-    system, x = system_of("dh", simulated.POSE, sessions=1)
-    frames = system.frames.frames(x[: system.frames.size])
-    seen = system.observations
-    flange = system.model.with_parameters(x[system.frames.size :]).pose(seen.at)
-    model, measured = compose(flange, frames.tool), compose(invert(frames.base), seen.measured)
-    wanted = []
-    for row in range(len(seen)):
-        wanted += [*(model.position_mm[row] - measured.position_mm[row])]
-        if seen.has_rotation[row]:
-            apart = model.rotation[row] @ measured.rotation[row].T
-            wanted += [*(WEIGHT * log_so3(apart[None])[0])]
-    np.testing.assert_allclose(system.residual(x), wanted, atol=1e-9)

@@ -10,7 +10,7 @@ import pytest
 from kinacc.calibration import frames, vec_fit
 from kinacc.calibration.observations import full_poses
 from kinacc.calibration.vec_fit import Prior
-from kinacc.geometry import Pose, compose, exp_so3
+from kinacc.geometry import Pose, exp_so3
 from kinacc.kinematics import robot, vec
 
 WEIGHT = 500.0
@@ -99,28 +99,3 @@ def test_an_unknown_direction_is_the_mean_of_both():
 def fitted_at(true, q):
     """Positions of a model whose offsets are the same in both directions."""
     return vec.pose(true, q, np.ones_like(q, dtype=np.int8)).position_mm
-
-
-def test_base_and_tool_are_estimated_along():
-    base = Pose(exp_so3(np.array([0.2, 1.0, -2.0])), np.array([1500.0, -700.0, 300.0]))
-    tool = Pose(exp_so3(np.array([0.5, -0.3, 0.1])), np.array([20.0, 30.0, 150.0]))
-    true = true_model(3)
-    q = joints(400, 8)
-    seen = compose(base, compose(vec.pose(true, q), tool))
-    start = frames.Frames(
-        Pose(exp_so3(np.full(3, 1e-3)) @ base.rotation, base.position_mm + 2.0),
-        Pose((exp_so3(np.full(3, -1e-3)) @ tool.rotation)[None], tool.position_mm[None] - 2.0),
-    )
-    found = vec_fit.fit(
-        full_poses(q, seen),
-        empty_model(3),
-        prior=PRIOR,
-        rotation_weight_mm_per_rad=WEIGHT,
-        frames=start,
-        frames_free=True,
-    )
-    new = joints(100, 9)
-    wanted = compose(base, compose(vec.pose(true, new), tool)).position_mm
-    flange = vec.pose(found.model, new)
-    got = compose(found.frames.base, compose(flange, found.frames.tool)).position_mm
-    assert np.linalg.norm(got - wanted, axis=1).max() < 1e-3

@@ -239,46 +239,6 @@ def test_a_payload_that_changes_tells_stiffness_from_moment(tmp_path):
     assert measured["payload_z_mm"].tolist() == [load.centre_mm[2] for load in cell.payloads]
 
 
-def test_where_dh_follows_the_vec_model_stiffness_still_follows_the_measurements(tmp_path):
-    """Base and tool known, DH fitted to VEC: what a configuration has that says nothing of them."""
-    known, deviations = np.eye(4), []
-    calibration = {"dh": {"hayati_joints": "auto"}}
-    for seed in range(2):
-        folder = tmp_path / str(seed)
-        folder.mkdir()
-        cell = replace(fanuc(seed, (GRIPPER,)), base=known, tool=known)
-        written(folder / "poses.csv", cell, seed)
-        settings = stated_masses(cell, payload=in_words(GRIPPER))
-        config = configured(folder, cell.robot, settings, calibration=calibration)
-        tables = tables_of(
-            made("compliance_model", config), "compliance_model", "compliance_covariance"
-        )
-        deviations.append(deviation(*tables, {"compliance_rad_per_nm": BENT}))
-    require_right_uncertainty(deviations, 2)
-
-
-@pytest.mark.parametrize(
-    ("mounted", "gravity", "bent"),
-    [
-        ("under the ceiling", (0.0, 0.0, 1.0), BENT),
-        ("on a slope, joint 1 bends too", (0.5, -0.3, -1.2), {1: 3.0e-7, **BENT}),
-    ],
-)
-def test_gravity_is_where_the_configuration_says(tmp_path, mounted, gravity, bent):
-    deviations = []
-    for seed in range(2):
-        folder = tmp_path / str(seed)
-        folder.mkdir()
-        cell = fanuc(seed, (GRIPPER,), bent, gravity)
-        settings = stated_masses(cell, gravity=list(gravity), payload=in_words(GRIPPER))
-        found, covariance = estimated(folder, cell, seed, settings, columns=False)
-        deviations.append(deviation(found, covariance, {"compliance_rad_per_nm": bent}))
-        unit = np.array(gravity) / np.linalg.norm(gravity)
-        told = np.array([found[f"gravity_{axis}"] for axis in "xyz"])
-        np.testing.assert_allclose(told / np.linalg.norm(told, axis=0), np.tile(unit, (6, 1)).T)
-    require_right_uncertainty(deviations, len(bent))
-
-
 def selection(folder: Path) -> dict:
     """Held-out position rms in mm by model, and which one is ``selected``."""
     (table,) = tables_of(folder, "model_selection")

@@ -20,8 +20,6 @@ from oracles import inverse, kinematics, maps, small_study, tables
 
 from kinacc import distributions
 from kinacc.assess import counts, limits
-from kinacc.kinematics import dh
-from kinacc.kinematics.compliance import ComplianceModel
 from kinacc.kinematics.dh import DHModel
 from kinacc.kinematics.model import JointState
 from kinacc.kinematics.vec import VECModel
@@ -51,7 +49,6 @@ calibration: {base_and_tool: estimated, vec: {order: 0}, dh: {fit_to: measuremen
 FREE = np.tile([True] * 4 + [False], 6)
 TURNING = np.zeros(6, dtype=bool)
 STD = ("std_theta_offset_rad", "std_d_mm", "std_a_mm", "std_alpha_rad")
-STATISTICS = ("mean", "max", "rms", "gamma99")
 # Largest difference from 50 digits, its unit, and what makes it that large.
 ALLOWED = {
     # 24 products of matrices on 2.5 m, each rounded to 1.1e-16
@@ -189,27 +186,6 @@ def test_forward_kinematics_of_all_models(arm, paper):
             found["rotation"] += apart(rotation.ravel(), expected[:3, :3].ravel())
     held("forward kinematics, position", found["mm"])
     held("forward kinematics, rotation", found["rotation"])
-
-
-def test_forward_kinematics_of_joints_that_bend(arm):
-    rng = np.random.default_rng(5)
-    compliance, lever = np.full((2, 6), np.nan)
-    compliance[1:3], lever[4] = (1e-6, 3e-6), 2e-6
-    bodies = np.column_stack([rng.uniform(5, 100, 7), rng.normal(size=(7, 3)) * 200])
-    gravity = np.array([0.6, 0.0, -0.8])
-    table = np.vectorize(float)(arm.dh)
-    columns = dict(zip(dh.PARAMETERS, table.T, strict=True))
-    model = ComplianceModel(DHModel(**columns), compliance, lever, gravity, bodies[:6], bodies[6])
-    q = rng.uniform(-1, 1, (3, 6))
-    at = model.pose(JointState(q, np.zeros(q.shape, dtype=np.int8)))
-    found = []
-    for angles, position in zip(q, at.position_mm, strict=True):
-        coefficients = (fd.exact(np.nan_to_num(each)) for each in (compliance, lever))
-        expected = fd.bent_forward(
-            arm.dh, fd.exact(angles), *coefficients, fd.exact(gravity), fd.exact(bodies)
-        )
-        found += apart(position, expected[:3, 3])
-    held("forward kinematics, joints that bend", found)
 
 
 def test_the_vec_fit_is_the_coefficients_of_greatest_posterior_probability(arm, paper):

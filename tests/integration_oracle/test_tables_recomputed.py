@@ -62,23 +62,6 @@ def test_the_vec_acts_on_the_nominal_arm_and_covers_the_measured_joints(models, 
 # --- accuracy map and assessment points -----------------------------------------------------------
 
 
-def test_assessment_points(finished, models):
-    rows = tables.rows(finished, "assessment_points")
-    assert [row["point"] for row in rows] == list(range(24))
-    for row in rows:
-        q, s = tables.joints(row), tables.directions(row)
-        assert s == [0] * 6
-        gap = models.tool("vec", q, s)[:3, 3] - models.tool("dh", q, s)[:3, 3]
-        np.testing.assert_allclose(
-            [row["ex_mm"], row["ey_mm"], row["ez_mm"]], gap, rtol=0, atol=1e-9
-        )
-        assert row["true_error_mm"] == pytest.approx(np.linalg.norm(gap), abs=1e-9)
-        x, y, z = models.tool("dh", q, s)[:3, 3]
-        assert 1200 - 1e-6 <= math.hypot(x, y) <= 2100 + 1e-6
-        assert -1e-9 <= math.atan2(y, x) <= math.radians(60) + 1e-9
-        assert -1e-6 <= z <= 500 + 1e-6
-
-
 # --- study ----------------------------------------------------------------------------------------
 
 
@@ -131,21 +114,6 @@ def other_fold(tmp_path_factory, written):
     config.write_text(settings.replace("validation_fold: 1", "validation_fold: 2"), "utf-8")
     stages = ("measurements", "vec", "dh", "residuals")
     return small_study.run_stages(config, "small", folder / "results", stages)
-
-
-def test_a_written_file_is_read_back(other_fold, written):
-    rows = tables.rows(other_fold, "measurements")
-    assert len(rows) == len(written[1].q_rad)
-    for row, q, frame in zip(rows, written[1].q_rad, written[1].frames, strict=True):
-        np.testing.assert_allclose(tables.joints(row), q, rtol=0, atol=1e-12)
-        reading, full = tables.measured_frame(row)
-        assert full
-        assert row["qw"] >= 0
-        np.testing.assert_allclose(reading, frame, rtol=0, atol=1e-12)
-        assert tables.directions(row) == [0] * 6
-    # Every fifteenth pose is revisited at the end: in the same fold, whichever that is.
-    for first, again in zip(rows[:150:15], rows[150:], strict=True):
-        assert first["fold"] == again["fold"]
 
 
 def test_cross_validated_errors_are_those_of_models_that_never_saw_the_fold(

@@ -74,23 +74,12 @@ def select(
     return Selection(best, int(count), standings)
 
 
-@dataclass(frozen=True)
-class Bias:
-    """Errors in one region of one joint (0-based): mean (3,), its standard error (3,), rms, mm."""
-
-    joint: int
-    low_rad: float
-    high_rad: float
-    n: int
-    mean_mm: np.ndarray
-    std_error_mm: np.ndarray
-    rms_mm: float
-
-
-def bias(errors: Errors, q_rad: np.ndarray) -> Iterator[Bias]:
+def bias(errors: Errors, q_rad: np.ndarray) -> Iterator[tuple]:
     """Errors by region of every joint ``q_rad`` (n, k): where a model leaves something systematic.
 
-    Regions without a row are left out. The standard error takes rows as independent.
+    Rows of ``joint_bias``: joint, range in rad, number of rows, mean and its standard error of
+    three components and rms of the position error in mm. Regions without a row are left out. The
+    standard error takes rows as independent.
     """
     rows = np.isfinite(errors.position_mm).all(axis=1)
     vectors, q_rad = errors.position_mm[rows], q_rad[rows]
@@ -105,7 +94,7 @@ def bias(errors: Errors, q_rad: np.ndarray) -> Iterator[Bias]:
                 error = part.std(axis=0, ddof=1) / np.sqrt(len(part))
             rms = float(np.sqrt(np.mean(np.sum(part**2, axis=1))))
             span = float(edges[number]), float(edges[number + 1])
-            yield Bias(joint, *span, len(part), part.mean(axis=0), error, rms)
+            yield (joint + 1, *span, len(part), *part.mean(axis=0), *error, rms)
 
 
 def worst(errors: Errors, count: int = WORST) -> np.ndarray:

@@ -33,7 +33,8 @@ def columns(
             ("train", seen[name], np.flatnonzero(train)),
             ("cross_validated", held_out[name], np.arange(len(train))),
         ):
-            bias += [(name, estimate, *each) for each in _bias_rows(errors, every.q_rad[rows])]
+            regions = model_comparison.bias(errors, every.q_rad[rows])
+            bias += [(name, estimate, *each) for each in regions]
             if reference == MEASURED:
                 found = _worst_rows(errors, rows, measurements)
                 worst += [(name, estimate, *each) for each in found]
@@ -63,12 +64,6 @@ def selection_columns(every: Observations, held_out: Mapping[str, Errors]) -> Co
         for name, each in found.standings.items()
     ]
     return columns_of("model_selection", rows)
-
-
-def _bias_rows(errors: Errors, q_rad: np.ndarray) -> Iterator[tuple]:
-    for each in model_comparison.bias(errors, q_rad):
-        span = each.joint + 1, each.low_rad, each.high_rad, each.n
-        yield (*span, *each.mean_mm, *each.std_error_mm, each.rms_mm)
 
 
 def _worst_rows(errors: Errors, rows: np.ndarray, measurements: Mapping) -> Iterator[tuple]:

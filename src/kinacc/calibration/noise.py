@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+import pandas as pd
 
 from kinacc.calibration.hand_eye import closed_form_start
 from kinacc.calibration.observations import Observations, from_columns
@@ -87,10 +88,12 @@ def of_readings(observations: Observations, nominal: DHModel) -> Noise:
     rows = np.flatnonzero(np.bincount(group)[group] > 1)
     if not rows.size:
         return UNKNOWN
-    distance = np.linalg.norm(error_mm[rows] - _medians(error_mm[rows], group[rows]), axis=1)
+    repeated = pd.DataFrame(error_mm[rows])
+    medians = repeated.groupby(group[rows]).transform("median").to_numpy()
+    distance = np.linalg.norm(error_mm[rows] - medians, axis=1)
     rows = rows[distance <= _GROSS * max(float(np.median(distance)), 1e-12)]
     rows = rows[np.bincount(group)[group[rows]] > 1]
-    mean_square, freedom = scatter(error_mm[rows], _numbered(group[rows]))
+    mean_square, freedom = scatter(error_mm[rows], pd.factorize(group[rows])[0])
     std_mm = np.sqrt(np.diag(mean_square)) if freedom else np.full(3, np.nan)
     return Noise(std_mm, freedom, len(rows), int(np.unique(same[rows]).size))
 
@@ -107,15 +110,3 @@ def means(values: np.ndarray, group: np.ndarray) -> tuple[np.ndarray, np.ndarray
     count = np.bincount(group)
     sums = [np.bincount(group, column) for column in values.T]
     return np.stack(sums, axis=1) / count[:, None], count
-
-
-def _medians(values: np.ndarray, group: np.ndarray) -> np.ndarray:
-    """Median (n, k) of the group of every row."""
-    found, order = np.empty_like(values), np.argsort(group, kind="stable")
-    for rows in np.split(order, np.flatnonzero(np.diff(group[order])) + 1):
-        found[rows] = np.median(values[rows], axis=0)
-    return found
-
-
-def _numbered(group: np.ndarray) -> np.ndarray:
-    return np.unique(group, return_inverse=True)[1].ravel()
