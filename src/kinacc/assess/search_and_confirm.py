@@ -29,7 +29,7 @@ class SearchAndConfirm(AdaptiveAssessor):
     (:mod:`kinacc.assess.confirming`). With fewer readings than candidates nine tenths of them visit
     new points.
 
-    ``measured``: upper limits that hold at all looks at once (:mod:`kinacc.assess.boundary`), and a
+    ``measured``: upper limits that hold at all looks at once (:mod:`kinacc.assess.looks`), and a
     lower bound by an average of readings along directions seen before
     (:mod:`kinacc.assess.lower_average`). Both hold whatever the errors are, for readings that are
     normal with known covariance (eq. 9). ``candidates``: the same where all are visited. Otherwise
