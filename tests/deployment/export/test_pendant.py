@@ -10,18 +10,9 @@ from command_line import call
 from lxml import etree
 from oracles.controllers.arms import ARMS, errors
 from oracles.controllers.measured import BASE, TOOL
+from oracles.pendants.controllers import as_frame
 from scipy.spatial.transform import Rotation
 from simulated_cells import calibrated
-
-TURNS = {  # of the last three or four numbers of a frame
-    "kuka": lambda v: Rotation.from_euler("ZYX", v, degrees=True),
-    "abb": lambda v: Rotation.from_quat(v, scalar_first=True),
-    "fanuc": lambda v: Rotation.from_euler("xyz", v, degrees=True),
-    "yaskawa": lambda v: Rotation.from_euler("xyz", v, degrees=True),
-    "ur": Rotation.from_rotvec,
-    "staubli": lambda v: Rotation.from_euler("XYZ", v, degrees=True),
-    "ros": lambda v: Rotation.from_euler("xyz", v),
-}
 
 
 def exported(results, maker):
@@ -33,14 +24,6 @@ def exported(results, maker):
     for each in answer["values"]:
         groups.setdefault(each["group"], {})[each["name"]] = each["new"]
     return answer, groups, target
-
-
-def as_matrix(values, maker):
-    numbers = np.array([*values.values()])
-    found = np.eye(4)
-    found[:3, 3] = numbers[:3] * (1e3 if maker in ("ur", "ros") else 1.0)
-    found[:3, :3] = TURNS[maker](numbers[3:]).as_matrix()
-    return found
 
 
 def apart_mm(first, second):
@@ -59,8 +42,8 @@ def test_joint_zeros_tool_and_base_of_an_arm_come_back(tmp_path, maker):
     answer, groups, target = exported(calibrated(tmp_path, arm), maker)
     zeros = np.deg2rad([*groups["joint zeros"].values()])
     np.testing.assert_allclose(arm.matrix @ zeros, truth[:, 0], rtol=0, atol=1e-4)
-    assert apart_mm(as_matrix(groups["TOOL tool"], maker), TOOL) < 0.2
-    assert apart_mm(as_matrix(groups["BASE"], maker), np.linalg.inv(BASE)) < 0.2
+    assert apart_mm(as_frame(maker, groups["TOOL tool"]), TOOL) < 0.2
+    assert apart_mm(as_frame(maker, groups["BASE"]), np.linalg.inv(BASE)) < 0.2
     mine, full, nominal = answer["errors"]
     assert mine["position_mm"] < 1.05 * full["position_mm"] < 0.1 * nominal["position_mm"]
     page = (target / f"arm_{maker}.html").read_text()
