@@ -267,7 +267,7 @@ def test_a_parquet_file_with_a_column_twice_is_refused(tmp_path):
             "--candidates, --budget",
         ),
         (("campaign", "plan", "--noise-mm", "0.05", "--repetitions", 10**9), "--repetitions"),
-        (("campaign", "start", "x", "--candidates", 10**9), "--candidates"),
+        (("campaign", "start", "x", "--budget", 10**9), "--budget"),
     ],
     ids=lambda given: " ".join(map(str, given)) if isinstance(given, tuple) else "",
 )

@@ -75,13 +75,3 @@ def test_joints_without_a_unit_that_may_be_either_are_asked_about(start, joints,
     done, plan = start(file, "--joint-unit", "rad")
     assert done.exit_code == 0, done.output
     same(plan, joints, 8)
-
-
-def test_a_file_without_joints_names_what_it_has(start, tmp_path):
-    file = tmp_path / "points.csv"
-    file.write_text("x_mm,y_mm,z_mm\n1,2,3\n4,5,6\n7,8,9\n")
-    done, plan = start(file)
-    assert done.exit_code == 2
-    assert plan is None
-    assert "no columns of 4 to 7 joints" in done.output
-    assert "x_mm, y_mm, z_mm" in done.output

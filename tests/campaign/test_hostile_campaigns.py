@@ -115,16 +115,6 @@ def test_an_entry_nested_deeply_is_a_message(begun):
     assert "readings.jsonl, line 1" in refusal(begun)
 
 
-@pytest.mark.parametrize("digits", ["１.５", "1_0", "٣"])
-def test_digits_of_other_alphabets_are_no_numbers_of_options(digits):
-    done = call("campaign", "plan", "--noise-mm", digits, "--candidates", 20, "--budget", 20)
-    assert done.exit_code == 2, done.output
-    assert f"noise of instrument: {digits!r}" in done.output
-    done = call("campaign", "plan", "--noise-mm", "0.05", "--candidates", 20, "--budget", digits)
-    assert done.exit_code == 2, done.output
-    assert f"{digits!r} is not a valid number" in done.output
-
-
 @pytest.mark.parametrize(
     ("words", "said"),
     [

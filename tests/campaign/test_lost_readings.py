@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import re
 
-from campaign_on_disk import SIGMA_MM, Arm, recorded, refused, standing
+from campaign_on_disk import SIGMA_MM, Arm, recorded, standing
 from command_line import call
 
 from kinacc.campaign import folder as campaigns
@@ -52,30 +52,3 @@ def test_a_report_kept_elsewhere_tells_that_its_last_readings_were_taken_away(be
     recorded(folder, Arm(folder, 1.1 * SIGMA_MM), 2)  # others in their place
     assert call("campaign", "verify", folder, "--readings", 7).exit_code == 0
     assert call("campaign", *known).exit_code == 1
-
-
-def test_a_reading_from_beyond_all_rooms_is_never_taken(begun, tmp_path):
-    folder = begun("--noise-mm", SIGMA_MM, "--frame", "base")
-    label = standing(folder)["next_point"]
-    file = tmp_path / "far.csv"
-    file.write_text(f"pose,x_mm,y_mm,z_mm\n{label},1e308,0,0\n")
-    said = refused(folder, "record", folder, file, "--accept-implausible")
-    assert "within 1e+06" in said
-
-
-def test_a_candidate_with_spaces_about_its_name_can_be_recorded(calibration, tmp_path):
-    joints = tmp_path / "candidates.csv"
-    names = [f"q{joint}_deg" for joint in range(1, 7)]
-    rows = [f"  sp{n} ,{n},{10 + n},{n},{n},{20 + n},{n}" for n in range(4)]
-    joints.write_text("\n".join(["pose," + ",".join(names), *rows]) + "\n")
-    folder = tmp_path / "spaced"
-    done = call("campaign", "start", folder, "--calibration", calibration, "--robot", "mh180",
-                "--model", "dh", "--candidates", joints, "--budget", 4, "--noise-mm", SIGMA_MM,
-                "--frame", "base", "--sure")  # fmt: skip
-    assert done.exit_code == 0, done.output
-    label = standing(folder)["next_point"]
-    assert label == label.strip()
-    plan = campaigns.open_(folder).plan
-    seen = ",".join(map(repr, map(float, plan.points.modelled_mm[plan.points.number(label)])))
-    done = call("campaign", "record", folder, "--point", f" {label} ", "--position-mm", seen)
-    assert done.exit_code == 0, done.output

@@ -101,18 +101,6 @@ def test_candidates_of_a_thin_series_are_drawn_where_it_was_measured(ur10_d, tmp
     assert wanted.min() - 0.01 < found.min() <= found.max() < wanted.max() + 0.01
 
 
-def test_a_pose_unlike_all_measured_ones_is_said_to_be_extrapolated(ur10_d, tmp_path):
-    measured = store.read(ur10_d[0] / "measurements.parquet")
-    joints = np.rad2deg([measured[f"q{joint}"] for joint in range(1, 7)])
-    inside, among = joints[:, 0], np.median(joints, axis=1)
-    words = [f"--joints-deg={','.join(map(str, each))}" for each in (inside, among)]
-    done = call("predict", ur10_d[0], "--model", "dh", *words, "--json")
-    assert done.exit_code == 0, done.output
-    said = [each["status"] for each in json.loads(done.stdout)["rows"]]
-    assert said == ["ok", "extrapolated: joints unlike those measured"]
-    assert "1 of 2 poses" in done.stderr
-
-
 def same(folder, wanted):
     """Compare the bounds of a status with statements; the bounds at equal points stand once."""
     bounds = json.loads(call("campaign", "status", folder, "--json").stdout)["bounds"]

@@ -25,13 +25,6 @@ def entries_of(plan, world, drift_mm=(0.0, 0.0, 0.0)):
     return entries
 
 
-def test_the_route_begins_with_the_first_of_the_random_order(make_plan):
-    plan = make_plan(**PLANNED)
-    assert set(plan.route[:5]) == set(plan.order[:5])
-    assert sorted(plan.route) == sorted(plan.order[: len(plan.route)])
-    assert plan.by_travel
-
-
 def test_all_that_is_certain_lists_planned_revisits_in_their_places(make_plan, make_world):
     plan = make_plan(**PLANNED)
     entries = entries_of(plan, make_world(plan))

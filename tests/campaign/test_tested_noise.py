@@ -146,12 +146,6 @@ def test_a_file_that_tells_no_noise_is_refused_with_how_to_make_one(tested, cont
     assert "kinacc repeatability FILE -o noise.json" in told
 
 
-def test_a_file_of_a_test_that_is_not_there_is_said_with_other_problems(tmp_path):
-    told = refused("campaign", "plan", "--repeatability", tmp_path / "none.json", "--width-mm", -1)
-    assert "no such file" in told
-    assert "--width-mm" in told
-
-
 def test_readings_of_a_workbook_are_taken_into_a_campaign(begun, tmp_path):
     from openpyxl import Workbook
 
