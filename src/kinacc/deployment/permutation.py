@@ -103,7 +103,7 @@ def smallest_changes(held_out: Columns, count: int) -> tuple[float, np.ndarray]:
         with np.errstate(divide="ignore"):
             needed = np.minimum(limits[0] / drawn.squares, limits[1] / drawn.explained)
         factor = min(float(np.sqrt(np.quantile(needed, POWER))), _TOO_LARGE)
-    size, offsets = drawn.size, []
+    size, offsets = np.maximum(drawn.size, 0.0), []
     for limit, value in zip(limits, drawn[:2], strict=True):
         beyond = np.maximum(limit - value, 0.0)[:, None]  # value + 2 offset along + offset^2 size
         root = np.sqrt(drawn.along**2 + size * beyond) - drawn.along
