@@ -1,10 +1,7 @@
 # From the models to the assessed accuracy: map (Fig. 3), operating points, study (Fig. 4), histories, claims.
 
-
-def studied(dataset):
-    """Tables of the study of a data set."""
-    found = tables(dataset, "assessment_points", "study", "study_summary", "readings", "histories")
-    return found | mapped(dataset) | ({} if data.is_measured(dataset) else tables(dataset, "claims"))
+# Tables of the study, beside the map and, of the paper's arm, its claims.
+STUDY = ("assessment_points", "study", "study_summary", "readings", "histories")
 
 
 rule accuracy_map:

@@ -64,6 +64,12 @@ def calibrated(dataset):
     return found | (tables(dataset, "excluded_rows") if has_excluded else {})
 
 
+def studied(dataset):
+    """Tables of the study of a data set."""
+    found = tables(dataset, *STUDY) | mapped(dataset)
+    return found | ({} if data.is_measured(dataset) else tables(dataset, "claims"))
+
+
 def campaigns(dataset):
     found = campaign_files(campaigns_of(Path(RESULTS, dataset)))
     return {role: os.path.abspath(path) if data.absolute else path for role, path in found.items()}
@@ -92,3 +98,9 @@ def calibration_of(dataset):
     """Every file of the calibration of a data set."""
     drawn = pictures(dataset, "history_over_time") if data.lines(dataset) else {}
     return [*(calibrated(dataset) | summed_up(dataset) | drawn).values()]
+
+
+def study_of(dataset):
+    """Every file of the study of a data set, and its page."""
+    drawn = pictures(dataset, *FIGURES, *(["fig3"] if mapped(dataset) else []))
+    return [*(studied(dataset) | drawn).values(), f"{RESULTS}/{dataset}/report.html"]

@@ -3,12 +3,6 @@
 FIGURES = ("fig1", "fig2", "fig4", "fig5", "fig6")  # each drawn by kinacc.figures.<name>
 
 
-def study_of(dataset):
-    """Every file of the study of a data set, and its page."""
-    drawn = pictures(dataset, *FIGURES, *(["fig3"] if mapped(dataset) else []))
-    return [*(studied(dataset) | drawn).values(), f"{RESULTS}/{dataset}/report.html"]
-
-
 rule figures:
     """Figs. 1, 2, 4, 5 and 6"""
     input:
