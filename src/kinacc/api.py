@@ -303,7 +303,7 @@ def read_measurements(
     settings
         Values in place of those of the file, nested as there, such as
         ``{"calibration": {"vec": {"order": 5}}}``.
-    **answers
+    answers
         What measured files leave open, by the option of ``kinacc init``: ``joint_unit="rad"``,
         ``orientation="ZYX"``, ``take=["X", "q1"]``, ``join="order"``.
 
