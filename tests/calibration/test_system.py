@@ -11,6 +11,7 @@ import simulated
 from kinacc.calibration import fitting, vec_fit
 from kinacc.calibration.frames import FrameParameters, Frames
 from kinacc.calibration.system import PoseSystem
+from kinacc.geometry import log_so3
 from kinacc.kinematics import robot, vec
 
 ARM, WEIGHT = robot.load("mh180"), 350.0
@@ -53,3 +54,36 @@ def test_jacobian_is_the_derivative_of_the_residual(name, kind):
         step = 1e-6 * np.eye(x.size)[column]
         slope = (system.residual(x + step) - system.residual(x - step)) / 2e-6
         assert np.abs(jacobian[:, column] - slope).max() < 1e-5 * max(1.0, np.abs(slope).max())
+
+
+@pytest.mark.parametrize("name", ["dh", "vec"])
+@pytest.mark.parametrize("estimated", [True, False])
+@pytest.mark.parametrize("weighted", [True, False])
+def test_normal_equations_are_those_of_the_written_out_jacobian(name, estimated, weighted):
+    system, x = system_of(name, simulated.POSE, estimated=estimated, count=1100)  # two blocks
+    if weighted:
+        system = system.weighted(np.random.default_rng(1).uniform(size=len(system.observations)))
+    residual, jacobian = (np.concatenate(each) for each in zip(*system.blocks(x), strict=True))
+    np.testing.assert_allclose(residual, system.residual(x), rtol=1e-12)
+    both = np.column_stack([jacobian, residual])
+    turned = system.observations.is_rotation
+    kinds = [both[~turned].T @ both[~turned], both[turned].T @ both[turned]]
+    scale = np.sqrt(np.diag(kinds[0] + kinds[1])) + 1e-30
+    unit = np.outer(scale, scale)
+    np.testing.assert_allclose(system.normal(x, by_kind=True) / unit, kinds / unit, atol=1e-12)
+    np.testing.assert_allclose(system.normal(x)[0] / unit, sum(kinds) / unit, atol=1e-12)
+
+
+def test_motions_of_frames_are_their_finite_differences():
+    system, x = system_of("dh", simulated.POSE)
+    parameters, c = system.frames, x[: system.frames.size]
+    motions, step = parameters.motions(c), 1e-6
+    for column in range(c.size):
+        low, high = (parameters.frames(c + way * np.eye(c.size)[column]) for way in (-step, step))
+        wanted = []
+        for kind in ("bases", "targets"):
+            ahead, behind = getattr(high, kind), getattr(low, kind)
+            shift = ahead.position_mm - behind.position_mm
+            turn = log_so3(ahead.rotation @ np.swapaxes(behind.rotation, 1, 2))
+            wanted.append(np.concatenate([shift, turn], axis=1).ravel() / (2 * step))
+        np.testing.assert_allclose(motions[:, column], np.concatenate(wanted), atol=2e-6)

@@ -7,7 +7,7 @@ from small_arms import calibrated, joints
 from kinacc.deployment.compensate import PoseStatus, compensate, programmed
 from kinacc.deployment.predict import predict
 from kinacc.deployment.record import nominal
-from kinacc.geometry import compose, invert, log_so3
+from kinacc.geometry import Pose, compose, invert, log_so3
 from kinacc.kinematics import robot
 from kinacc.kinematics.model import JointState
 
@@ -78,3 +78,47 @@ def test_a_program_and_the_base_mean_the_same_under_dh_and_vec():
     np.testing.assert_allclose(seen.position_mm, own.position_mm, rtol=0, atol=1e-9)
     std = [predict(arms[1], q_rad, None, frame).std_position_mm for frame in ("base", "instrument")]
     np.testing.assert_allclose(std[0], std[1], rtol=1e-9)
+
+
+def test_without_joints_to_be_near_any_posture_the_data_cover_is_good():
+    arm, q_rad = calibrated("mh180", "dh"), joints("mh180", 20, seed=5)
+    wanted = predict(arm, q_rad).pose
+    found = compensate(arm, wanted)
+    assert (found.status == PoseStatus.CONVERGED).all()
+    assert left(arm, found.q_rad, wanted)[0] < 1e-6
+    assert not arm.outside_range(found.q_rad @ arm.robot.joint_map.T).any()
+    assert np.isnan(found.change).all()
+
+
+def test_every_kind_of_row_without_joints_says_why():
+    arm = calibrated("mh180", "dh")
+    far = Pose(np.eye(3)[None], np.array([[9000.0, 0.0, 0.0]]))
+    found = compensate(arm, far)
+    assert found.status.tolist() == [PoseStatus.NOT_REACHED]
+    assert np.isnan(found.q_rad).all()
+    q_rad = joints("mh180", 1)
+    q_rad[0, 4] = arm.robot.q_max_rad[4] + 0.05  # joint 5 cannot get there, nor its mirror
+    q_rad[0, 3] = arm.robot.q_max_rad[3] - 0.1
+    wanted = arm.pose(JointState(q_rad @ arm.robot.joint_map.T))
+    found = compensate(arm, wanted, q_rad)
+    assert found.status[0] in (PoseStatus.OUTSIDE_LIMITS, PoseStatus.OTHER_POSTURE)
+    if found.status[0] == PoseStatus.OUTSIDE_LIMITS:
+        assert np.isnan(found.q_rad).all()
+        assert found.offending[0, 4]
+
+
+def test_whole_turns_stay_near_the_joints_given():
+    arm, q_rad = nominal(robot.load("mh180")), joints("mh180", 1)
+    q_rad[0] = [0.1, 0.2, 0.3, np.deg2rad(350.0), 1.0, np.deg2rad(-350.0)]
+    wanted = predict(arm, q_rad).pose
+    found = compensate(arm, wanted, q_rad + 0.01)
+    assert found.q_rad[0] == pytest.approx(q_rad[0], abs=1e-8)
+
+
+def test_seven_axes_stay_where_they_are_asked_to():
+    arm, q_rad = nominal(robot.load("iiwa14")), joints("iiwa14", 10)
+    wanted = predict(arm, q_rad).pose
+    found = compensate(arm, wanted, q_rad + 0.05)
+    assert (found.status == PoseStatus.CONVERGED).all()
+    assert left(arm, found.q_rad, wanted)[0] < 1e-6
+    assert np.abs(found.q_rad - q_rad).max() < 0.5

@@ -7,6 +7,7 @@ from small_arms import BASE, TOOL, calibrated, joints, truth
 from kinacc.calibration.frames import MOTIONS
 from kinacc.calibration.uncertainty import is_angle
 from kinacc.deployment.predict import predict
+from kinacc.deployment.record import nominal
 from kinacc.deployment.sensitivity import sensitivity
 from kinacc.geometry import Pose, compose, exp_so3, log_so3
 from kinacc.kinematics import dh, robot
@@ -79,3 +80,29 @@ def test_a_vec_model_says_nothing_outside_its_range_and_dh_says_so():
     extrapolated = predict(calibrated("mh180", "dh"), q_rad)
     assert np.isfinite(extrapolated.pose.position_mm).all()
     assert extrapolated.outside[1, 2]
+
+
+@pytest.mark.parametrize("model", ["dh", "vec"])
+@pytest.mark.parametrize("frame", ["base", "instrument"])
+@pytest.mark.parametrize("point", ["tool", "flange"])
+def test_joint_jacobians_are_the_finite_differences_of_the_pose(model, frame, point):
+    arm, step = calibrated("mh180", model), 1e-6
+    q_rad = joints("mh180", 4, seed=9)
+    s = np.sign(np.random.default_rng(5).normal(size=q_rad.shape))
+    slopes = arm.joint_jacobian(JointState(q_rad, s), frame, point)
+    for joint in range(q_rad.shape[1]):
+        moved = step * np.eye(q_rad.shape[1])[joint]
+        low, high = (
+            arm.pose(JointState(q_rad + sign * moved, s), frame, point) for sign in (-1, 1)
+        )
+        shift = (high.position_mm - low.position_mm) / (2 * step)
+        turn = log_so3(high.rotation @ np.swapaxes(low.rotation, 1, 2)) / (2 * step)
+        np.testing.assert_allclose(slopes[:, :3, joint], shift, atol=1e-5)
+        np.testing.assert_allclose(slopes[:, 3:, joint], turn, atol=1e-8)
+
+
+def test_reported_joints_go_through_the_joint_map():
+    arm = nominal(robot.load("fanuc_r2000ic_165f"))
+    q_rad = joints("fanuc_r2000ic_165f", 4)
+    wanted = robot.forward(arm.robot, q_rad).position_mm
+    np.testing.assert_allclose(predict(arm, q_rad).pose.position_mm, wanted, atol=1e-9)
