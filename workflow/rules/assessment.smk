@@ -1,6 +1,4 @@
 # From the models to the assessed accuracy: map (Fig. 3), operating points, study (Fig. 4), histories, claims.
-
-# Tables of the study, beside the map and, of the paper's arm, its claims.
 STUDY = ("assessment_points", "study", "study_summary", "readings", "histories")
 
 
