@@ -60,9 +60,11 @@ def correct(
 
         Output(picture=picture).draw(draw(answer.table))
     changes = answer.table.query("status == 'corrected'").get("change_mm", pd.Series([0.0]))
+    missed = f", {len(answer.left)} statements not" if answer.left else ""
     lines = [
         f"{answer.language}: {len(answer.table) - len(answer.refused)} of {len(answer.table)} "
-        f"positions corrected; change: mean {changes.mean():.3g} mm, largest {changes.max():.3g} mm"
+        f"positions corrected{missed}; change: mean {changes.mean():.3g} mm, "
+        f"largest {changes.max():.3g} mm"
     ]
     facts = {name: value for name, value in vars(answer).items() if name != "files"}
     Output(as_json, table).show(facts, answer.table, lines)
@@ -84,7 +86,8 @@ def _warnings(answer: programs.CorrectedProgram) -> Iterator[str]:
         if len(named):
             yield f"{len(named)} positions {text}: {first_few(list(named['position']))}"
     yield from answer.remarks
-    yield from (f"Computed by the program, not corrected: {line}" for line in answer.left)
+    reason = "computed by the program, incomplete or defined elsewhere"
+    yield from (f"Not corrected, {reason}: {line}" for line in answer.left)
     yield from (f"Refused: {problem}" for problem in answer.refused)
 
 

@@ -412,7 +412,9 @@ def summarise(
         targets=len(np.unique(np.asarray(measurements["target"]).astype(str))),
         fitted=int(np.sum(np.asarray(measurements["subset"]) == SUBSETS[0])),
         frames_fitted=figures.frames_are_fitted(tables["frames"]),
-        full_pose=any(each.quantity == "orientation" for each in errors),
+        full_pose=any(
+            (each.quantity, each.reference) == ("orientation", MEASURED) for each in errors
+        ),
         selected=best,
         errors=errors,
         selection=tuple(_selection(tables)),

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from small_arms import TOOL, calibrated
 
-from kinacc.deployment.programs import compensate_program, read_program
+from kinacc.deployment.programs import abb, compensate_program, kuka, read_program
 from kinacc.deployment.programs.orientation import (
     FIXED,
     INTRINSIC,
@@ -22,7 +22,7 @@ from kinacc.deployment.programs.orientation import (
     VECTOR,
     Convention,
 )
-from kinacc.deployment.programs.record import NUMBER, _written
+from kinacc.deployment.programs.record import NUMBER, Source, _written
 from kinacc.errors import InputError
 from kinacc.geometry import Pose, exp_so3
 from kinacc.kinematics import robot
@@ -236,3 +236,27 @@ def test_waypoints_of_polyscope_start_from_their_joints(tmp_path):
   movel(A_p, 1.2, 0.1)""")  # fmt: skip
     (position,) = program.positions
     assert (position.name, position.near_rad[1]) == ("A_p", -1.29)
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "expected"),
+    [
+        (
+            "weld.src",
+            "$TOOL = {X 0, Y 0, Z 100, A 0, B 0, C 0}\nDECL E6POS XP[2]\n"
+            "XP[1] = {X 500, Y 0, Z 600, A 0, B 90, C 0}\nPTP HOME\nLIN XP1 C_DIS\nLIN XP[I]\n"
+            "CIRC {X 500, Y 0, Z 600, A 0, B 90, C 0},{X 500, Y 0, Z 600, A 0, B 90, C 0}, CA 90\n",
+            [4, 5],
+        ),
+        (
+            "weld.mod",
+            "CONST robtarget p1:=[[500,0,600],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];\n"
+            "MoveL p1,v100,z10,tool0;\nMoveL p9,v100,z10,tool0;\n",
+            [3],
+        ),
+    ],
+)
+def test_moves_to_positions_that_are_not_there_are_listed(name, text, expected):
+    language = kuka if name.endswith(".src") else abb
+    found = language.read([Source(Path(name), text)], {}, None)
+    assert [int(line.split(":")[1]) for line in found.left] == expected

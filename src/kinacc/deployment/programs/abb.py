@@ -75,7 +75,7 @@ def read(sources: Sequence[Source], frames: Frames, _: np.ndarray | None) -> Pro
     result = {item.start(): item.end() for item in _TARGET.finditer(text)}
     names: dict[int, str] = {}
     uses: dict[int, set[tuple[str | None, str | None]]] = {}
-    computed, refused = [], {}
+    computed, refused, motions = [], {}, []
     for data in _FRAME_DATA.finditer(text):
         flags = data[3].upper(), data[1] or (data[4] or "").upper()
         if flags[0] == ("FALSE" if data[1] else "TRUE") or flags[1] == "FALSE":
@@ -91,6 +91,9 @@ def read(sources: Sequence[Source], frames: Frames, _: np.ndarray | None) -> Pro
             work = re.search(r"\\WObj\s*:=\s*(\w+)", statement, re.I)
             way = last and last[1].upper(), work[1].upper() if work else "WOBJ0"
             texts = {*re.findall(r"(?<!\\)\b[A-Z]\w*", bare.upper())}
+            if not here and not _COMPUTED.search(statement):
+                first = state + len(statement) - len(statement.lstrip())
+                motions.append((f"{source.where(first)}: {' '.join(statement.split())}", texts))
             for start in [
                 *here,
                 *(state for state, name in names.items() if name.upper() in texts),
@@ -104,6 +107,8 @@ def read(sources: Sequence[Source], frames: Frames, _: np.ndarray | None) -> Pro
         if changed := _SET.match(statement):
             refused[changed[1].upper()] = CHANGED
         state = end + 1
+    defined = {name.upper() for name in names.values()}
+    computed += [where for where, texts in motions if not texts & defined]
     positions = []
     for start, end in result.items():
         ways = uses.get(start, {(None, None)})

@@ -70,7 +70,7 @@ def read(sources: Sequence[Source], frames: Frames, _: np.ndarray | None) -> Pro
     data: dict[str, _State] = {}
     uses: dict[str, set[_State]] = {}
     result: dict[str, Position] = {}
-    computed, changed = [], set()
+    computed, changed, motions = [], set(), []
     for source in sorted(sources, key=_ending):  # .dat first
         state = _State()
         for offset, text in _lines(source.text):
@@ -92,6 +92,8 @@ def read(sources: Sequence[Source], frames: Frames, _: np.ndarray | None) -> Pro
                     computed.append(where)
                     continue
                 result |= inline
+                plain = re.findall(r"\$?\b[A-Z_]\w*", re.sub(r"\[.*?\]", "", target.upper()))
+                motions.append((where, {*plain} - {"CA"}))
                 for name in (*names, *inline):
                     uses.setdefault(name, set()).add((named or [state])[0])
             elif _COMPONENT.match(text):
@@ -111,6 +113,8 @@ def read(sources: Sequence[Source], frames: Frames, _: np.ndarray | None) -> Pro
                         computed.append(where)
                     else:
                         result[name] = position
+    defined = {name.split("[")[0] for name in result}
+    computed += [where for where, names in motions if not defined.issuperset(names)]
     positions = []
     for name, position in result.items():
         ways = uses.get(name.split("[")[0]) or {data.get(f"F{name[1:]}", _State())}
