@@ -12,6 +12,7 @@ from kinacc.calibration import delivered, fitting, models, residuals
 from kinacc.calibration.dh_estimator import DHEstimator
 from kinacc.calibration.fitting import ModelFit
 from kinacc.calibration.frames import Frames
+from kinacc.calibration.identifiability import listed
 from kinacc.calibration.models import Fit
 from kinacc.calibration.observations import Observations
 from kinacc.config.error_models import NOMINAL, PLAINEST, model_name
@@ -56,8 +57,8 @@ class Pendant:
     TOOL in the flange for every target; BASE, the instrument's frame in the robot's base, for every
     session. Old values: the nominal arm, with base and tool fitted to the same poses. ``errors``:
     the model of these numbers first, then the calibrated and the nominal one. ``left_out``: fitted
-    parameters that the controller does not take. ``text``: a file of ``ending``, where the
-    controller reads one.
+    parameters that the controller does not take. ``undetermined``: what the poses do not
+    determine, a sentence each. ``text``: a file of ``ending``, where the controller reads one.
     """
 
     controller: str
@@ -66,6 +67,7 @@ class Pendant:
     values: tuple[Value, ...]
     errors: tuple[MeanError, ...]
     left_out: tuple[str, ...]
+    undetermined: tuple[str, ...]
     enter: str
     remark: str
     text: str
@@ -157,6 +159,7 @@ def fit_pendant(
             for item, is_taken in zip(PARAMETERS, taken, strict=True)
             if terms.free[:, PARAMETERS.index(item)].any() and not is_taken
         ),
+        tuple(listed(tables["dh_identified"])),
         maker.enter,
         maker.remark,
         maker.text(new[maker.group]),
