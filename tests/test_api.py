@@ -149,3 +149,16 @@ def test_a_campaign_ends_with_a_bound_on_the_largest_error(calibration, tmp_path
             kinacc.Campaign.start(tmp_path / "other", calibration, q_rad, noise_mm)
     with pytest.raises(kinacc.errors.InputError):
         kinacc.Campaign.start(tmp_path / "check", calibration, q_rad, 0.05)
+
+
+def test_settings_given_in_python_replace_those_of_the_file(config):
+    given = {"calibration": {"vec": {"order": 2}}}
+    assert (
+        kinacc.read_measurements(config, settings=given).settings["calibration"]["vec"]["order"]
+        == 2
+    )
+
+
+def test_values_for_a_controller_need_no_settings(calibration):
+    values = calibration.values_for("kuka").values
+    assert all(np.isfinite(each.new) for each in values)

@@ -270,14 +270,16 @@ class Calibration:
         controller
             One of the names above.
         settings
-            The section ``calibration`` of the data set; the defaults where not given.
+            The section ``calibration`` of the data set; where not given the defaults, with base and
+            tool fitted as they were.
 
         Returns
         -------
         Pendant
             Old and new values, and the mean errors at held-out poses.
         """
-        settings = settings or defaults()["calibration"]
+        fitted = "estimated" if self.summary.frames_fitted else "fixed"
+        settings = settings or defaults()["calibration"] | {"base_and_tool": fitted}
         return pendants.fit_pendant(self.tables, self.robot, settings, controller, self.name)
 
 
@@ -314,10 +316,14 @@ def read_measurements(
         questions that measured files leave open, with their answers.
     """
     if paths and all(Path(path).suffix in (".yaml", ".yml") for path in paths):
-        described = read_data_sets(paths, settings).settings
+        described = read_data_sets(paths).settings
+        if settings:
+            overrides = {"datasets": dict.fromkeys(described, settings)}
+            described = read_data_sets(paths, overrides).settings
     else:
-        content = {"datasets": describe_files(paths, robot, answers)}
-        described = data_sets(contradictions.load([], overlay(content, settings or {}))).settings
+        files = describe_files(paths, robot, answers)
+        content = {name: overlay(item, settings or {}) for name, item in files.items()}
+        described = data_sets(contradictions.load([], {"datasets": content})).settings
     if dataset is None and len(described) > 1:
         where = ", ".join(map(str, paths))
         raise InputError(Problem(where, "describes several data sets", ", ".join(described)))

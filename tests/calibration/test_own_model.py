@@ -9,6 +9,7 @@ import pytest
 import simulated
 from test_few_poses import settings
 
+import kinacc
 from kinacc.calibration import models
 from kinacc.calibration.model_comparison_columns import selection_columns
 from kinacc.calibration.own_model import register_error_model
@@ -94,3 +95,17 @@ def test_a_registered_model_is_fitted_held_out_and_selected(registered):
     assert table["model"][table["selected"] == 1].tolist() == ["ripple"]
     rms = dict(zip(table["model"], table["held_out_rms_mm"], strict=True))
     assert rms["ripple"] < 0.1 < rms["dh"]
+
+
+def test_a_registered_model_is_calibrated_and_saved_as_others_are(registered, tmp_path):
+    (tmp_path / "arm.yaml").write_text(
+        "datasets: {arm: {robot: mh180}}\n"
+        "measurements: {folds: 2, synthetic: {poses: 40}}\ncalibration: {vec: {order: 1}}\n"
+    )
+    calibration = kinacc.calibrate(kinacc.read_measurements(tmp_path / "arm.yaml"))
+    assert "ripple_vs_measured" in set(calibration.residuals["comparison"])
+    folder = calibration.save(tmp_path / "arm")
+    read = kinacc.load_calibration(folder).table("model_selection")
+    assert "ripple" in set(read["model"])
+    own = kinacc.read_table(folder / "ripple_model.parquet")
+    np.testing.assert_array_equal(own["value"], calibration.table("ripple_model")["value"])

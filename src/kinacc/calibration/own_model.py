@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -14,6 +15,8 @@ from kinacc.calibration.observations import Observations
 from kinacc.config import error_models
 from kinacc.kinematics.model import ErrorModel
 from kinacc.kinematics.robot import Robot
+from kinacc.tables.columns import Artefact, Column
+from kinacc.tables.contract import ARTEFACTS
 
 
 def register_error_model(model: type[ErrorModel]) -> type[ErrorModel]:
@@ -37,6 +40,14 @@ def register_error_model(model: type[ErrorModel]) -> type[ErrorModel]:
     """
     own = type(f"{model.__name__}Estimator", (OwnEstimator,), {"kind": model.kind, "model": model})
     error_models.register(model.kind, _with_table(model), own)
+    of_dh = ARTEFACTS["dh_covariance"]
+    for table in (
+        replace(of_dh, name=f"{model.kind}_covariance"),
+        replace(ARTEFACTS["vec_fit"], name=f"{model.kind}_fit"),
+        replace(ARTEFACTS["vec_frames"], name=f"{model.kind}_frames"),
+        Artefact(f"{model.kind}_model", of_dh.topic, "Parameters.", _COLUMNS, ("parameter",)),
+    ):
+        ARTEFACTS[table.name] = table
     return model
 
 
@@ -76,6 +87,12 @@ class OwnEstimator(Estimator):
 
 
 THRESHOLD = 0.01
+_COLUMNS = (
+    Column("parameter", "text", "", "a parameter of the model"),
+    Column("value", "float", "see unit", "its value"),
+    Column("std", "float", "see unit", "its standard deviation", nullable=True),
+    Column("unit", "text", "", "unit of value and standard deviation"),
+)
 
 
 def _with_table(model: type[ErrorModel]) -> type[ErrorModel]:
