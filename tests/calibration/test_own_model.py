@@ -19,6 +19,7 @@ from kinacc.geometry import compose
 from kinacc.kinematics import robot
 from kinacc.kinematics.dh import DHModel
 from kinacc.kinematics.model import ErrorModel
+from kinacc.tables.contract import ARTEFACTS
 
 
 @dataclass(frozen=True)
@@ -58,13 +59,13 @@ class Ripple(ErrorModel):
 @pytest.fixture
 def registered():
     before = [dict(each) for each in (error_models.ERROR_MODELS, error_models.MODELS)]
-    estimators = dict(error_models.ESTIMATORS)
+    estimators, artefacts = dict(error_models.ESTIMATORS), dict(ARTEFACTS)
     register_error_model(Ripple)
     yield
     error_models.OWN.clear()
     for now, then in zip(
-        (error_models.ERROR_MODELS, error_models.MODELS, error_models.ESTIMATORS),
-        (*before, estimators),
+        (error_models.ERROR_MODELS, error_models.MODELS, error_models.ESTIMATORS, ARTEFACTS),
+        (*before, estimators, artefacts),
         strict=True,
     ):
         now.clear()
