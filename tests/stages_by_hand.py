@@ -10,7 +10,7 @@ from types import SimpleNamespace
 from kinacc.calibration import error_model, excluded_rows, residual_tables
 from kinacc.checks import check
 from kinacc.errors import KinaccError
-from kinacc.report import summary
+from kinacc.report import summarise
 from kinacc.study import evaluation, histories, monte_carlo
 from kinacc.study.claims.evaluate import table_of
 from kinacc.synthetic import source
@@ -26,7 +26,7 @@ STAGES = {
     **{kind: partial(error_model.run, kind=kind) for kind in ("vec", "compliance", "dh")},
     "residuals": residual_tables.run,
     "excluded_rows": excluded_rows.run,
-    "summary": summary.run,
+    "summary": summarise.run,
     "accuracy_map": evaluation.mapped,
     "assessment_points": evaluation.points,
     "study": monte_carlo.summed_up,

@@ -35,7 +35,8 @@ from kinacc.errors import InputError, Problem
 from kinacc.geometry import Pose
 from kinacc.kinematics import robot as robots
 from kinacc.kinematics.robot import Robot
-from kinacc.report import summary
+from kinacc.report import summarise
+from kinacc.report.summary import CalibrationSummary
 from kinacc.synthetic import source
 from kinacc.tables import store, sums
 from kinacc.tables.atomic import write_together
@@ -111,9 +112,9 @@ class Calibration:
         return self.model.robot
 
     @cached_property
-    def summary(self) -> summary.CalibrationSummary:
+    def summary(self) -> CalibrationSummary:
         """Held-out errors, selection, data check and what the poses leave open."""
-        return summary.summarise(self.name, self.tables, campaigns=())
+        return summarise.summarise(self.name, self.tables, campaigns=())
 
     @property
     def selected(self) -> str:
@@ -365,7 +366,7 @@ def calibrate(measurements: Measurements) -> Calibration:
     kinds = [kind for kind in asked_for(settings["calibration"]) if kind != PLAINEST]
     for kind in (*kinds, PLAINEST):
         tables |= _as_written(error_model.run(tables, settings, kind))
-    for stage in (residual_tables, summary):
+    for stage in (residual_tables, summarise):
         tables |= _as_written(stage.run(tables, settings))
     data = DataSets({measurements.name: settings}, 1, ())
     made_by = config_hash(data.chosen(measurements.name, *CALIBRATION))
@@ -388,7 +389,7 @@ def load_calibration(folder: str | Path, model: str | None = None) -> Calibratio
         Naming the tables that are missing or damaged.
     """
     folder = Path(folder)
-    tables = results.read_tables(folder, *summary.PAGE_TABLES, *summary.ON_PAGE)
+    tables = results.read_tables(folder, *summarise.PAGE_TABLES, *summarise.ON_PAGE)
     robot, name = results.recorded_robot(folder), folder.resolve().name
     if robot is None:
         raise InputError(Problem(str(folder / "robot.parquet"), "no such file"))

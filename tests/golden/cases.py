@@ -29,7 +29,7 @@ from kinacc.calibration import (  # noqa: E402
 )
 from kinacc.campaign import folder as campaigns  # noqa: E402
 from kinacc.cli.group import main  # noqa: E402
-from kinacc.report import summary  # noqa: E402
+from kinacc.report import summarise  # noqa: E402
 from kinacc.study import (  # noqa: E402
     evaluation,
     histories,
@@ -56,7 +56,7 @@ STAGES: dict[str, tuple[Callable, tuple[str, ...]]] = {
     ),
     "residuals": (residual_tables.run, ("measurements", *MODELS, "vec_orders")),
     "summary": (
-        summary.run,
+        summarise.run,
         ("measurements", "robot", *MODELS, "dh_identified", "pose_errors", "model_selection",
          "vec_fit", "vec_covariance", "dh_fit", "dh_covariance", "vec_orders"),
     ),

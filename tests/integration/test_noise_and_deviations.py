@@ -14,7 +14,7 @@ from stages_by_hand import run_stage
 from kinacc.calibration.misfit import misfit
 from kinacc.geometry import exp_so3
 from kinacc.kinematics import dh, robot
-from kinacc.report.summary import summarise
+from kinacc.report.summarise import summarise
 from kinacc.tables import store
 
 NOISE_MM = np.array([0.02, 0.03, 0.04])  # along the instrument's axes

@@ -13,7 +13,7 @@ from stages_by_hand import run_stage
 
 from kinacc.campaign import of_calibration
 from kinacc.campaign.journal import JOURNAL
-from kinacc.report import summary
+from kinacc.report import summarise
 from kinacc.report.terminal import size
 from kinacc.tables import store
 
@@ -83,7 +83,7 @@ def test_errors_are_those_of_the_pose_errors_of_the_selected_model(fleet):
 
 
 def test_the_table_of_many_holds_the_same_figures(fleet):
-    found = summary.summarise("results/line_a").best
+    found = summarise.summarise("results/line_a").best
     assert call("summary", "-o", "fleet.csv").exit_code == 0
     assert call("summary", "-o", "fleet.xlsx").exit_code == 0
     assert call("summary", "-o", "fleet.xlsx").exit_code == 2  # it is there
@@ -96,12 +96,13 @@ def test_the_table_of_many_holds_the_same_figures(fleet):
 def test_a_campaign_bounds_the_robot_it_is_about_and_no_other(fleet):
     campaign("line_b")
     found = told()
-    bound = found["line_b"]["largest_error"]
+    status = found["line_b"]["campaign"]
+    bound = status["bounds"][0]
     assert 0.0 <= bound["lower_mm"] <= bound["upper_mm"]
-    assert (bound["confidence"], bound["candidates"], bound["readings"]) == (0.95, 5, 8)
+    assert (bound["confidence"], status["candidates"], status["readings"]) == (0.95, 5, 8)
     entry = json.loads(Path("check_line_b/readings.jsonl").read_text().splitlines()[-1])
-    assert entry["entry"]["at"].startswith(bound["recorded"])
-    assert found["line_a"]["largest_error"] is None
+    assert entry["entry"]["at"].startswith(status["recorded"][:10])
+    assert found["line_a"]["campaign"] is None
     assert call("summary", "results/line_b").exit_code == 0
 
 
@@ -119,7 +120,7 @@ def test_the_tolerance_of_a_campaign_counts_where_no_other_is_given(fleet):
 
 
 def test_held_out_errors_are_judged_by_a_tolerance_that_has_to_be_given(fleet):
-    found = summary.summarise("results/line_a").best
+    found = summarise.summarise("results/line_a").best
     few = found.n < 100
     above = verdicts("--by", "held-out", "--tolerance-mm", found.quantile_99 + 1, code=int(few))
     assert above["line_a"] == ("undecided" if few else "accept")
@@ -129,12 +130,12 @@ def test_held_out_errors_are_judged_by_a_tolerance_that_has_to_be_given(fleet):
 
 
 def test_a_history_takes_the_bound_of_a_campaign_that_came_to_its_end(fleet):
-    tables = summary.read_tables("results/line_a")
+    tables = summarise.read_tables("results/line_a")
     campaign("line_a")
     campaign("line_b", readings=7)
     ended, going = (Path(f"check_{name}") for name in ("line_a", "line_b"))
     # Both have the same tables: a campaign is known by the model it judges, not by a name.
-    bound_mm = told()["line_a"]["largest_error"]["upper_mm"]
+    bound_mm = told()["line_a"]["campaign"]["bounds"][0]["upper_mm"]
     assert of_calibration.finished(tables, "dh", [going, ended]) == bound_mm
     assert math.isnan(of_calibration.finished(tables, "dh", [going]))
     assert math.isnan(of_calibration.finished(tables, "vec", [ended]))
@@ -157,7 +158,7 @@ def test_results_without_a_calibration_are_named_and_the_others_summarised(fleet
 
 
 def test_the_order_of_findings_and_what_is_open(study):
-    tables = dict(summary.read_tables(study))
+    tables = dict(summarise.read_tables(study))
     names = ("finding", "level", "what", "lines", "fix", "accepted", "rows")
     rows = [
         ("sparse", "note", "few poses near the limits", "", "", "", 0),
@@ -166,7 +167,7 @@ def test_the_order_of_findings_and_what_is_open(study):
         ("left_out", "note", "column 3 is not used", "", "", "", 0),
     ]
     tables["data_check"] = dict(zip(names, map(list, zip(*rows, strict=True)), strict=True))
-    found = summary.summarise(study, tables, ())
+    found = summarise.summarise(study, tables, ())
     assert [each.finding for each in found.findings] == ["jump", "outlier", "sparse"]
     assert [each.is_open for each in found.findings] == [True, False, False]
     assert found.left_out == ("column 3 is not used",)
@@ -181,15 +182,15 @@ def test_a_joint_bends_where_either_of_its_coefficients_was_fitted():
         "lever_coefficient_rad_per_mm": np.array([nan, nan, 2e-6]),
         "std_lever_coefficient_rad_per_mm": np.array([nan, nan, 1e-7]),
     }
-    two, three = summary.compliance(table)
+    two, three = summarise.compliance(table)
     assert (two.joint, two.compliance_rad_per_nm) == (2, 1e-6)
     assert np.isnan(two.lever_coefficient_rad_per_mm)
     assert (three.joint, three.lever_coefficient_rad_per_mm) == (3, 2e-6)
-    assert list(summary.compliance(None)) == []
+    assert list(summarise.compliance(None)) == []
 
 
 def test_the_stage_writes_the_figures_of_the_record(study):
-    known = summary.summarise(study)
+    known = summarise.summarise(study)
     table = pd.DataFrame(dict(store.read(study / "summary.parquet")))
     found = table.set_index(["topic", "item", "statistic"])["value"]
     assert found["held_out_error", known.selected, "mean"] == known.best.mean

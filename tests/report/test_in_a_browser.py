@@ -115,7 +115,7 @@ def test_on_paper_nothing_is_there_to_be_clicked_and_pictures_are_printed(chromi
 def test_names_that_look_like_code_are_shown_and_never_run(chromium, folder, tmp_path):
     from kinacc.report import dataset
     from kinacc.report.page import html
-    from kinacc.report.summary import read_tables
+    from kinacc.report.summarise import read_tables
 
     tables = dict(read_tables(folder))
     targets = np.resize(np.array(HOSTILE, dtype=object), len(tables["measurements"]["target"]))

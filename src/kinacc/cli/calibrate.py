@@ -49,7 +49,7 @@ def calibrate(words: tuple[str, ...], cores: int | None, as_json: bool) -> None:
     """
     from kinacc.cli.report import written
     from kinacc.cli.summary import as_plain
-    from kinacc.report.summary import summarise_all
+    from kinacc.report.summarise import summarise_all
     from kinacc.report.terminal import FEW, print_summaries
     from kinacc.workflow.data_sets import RESULTS
 

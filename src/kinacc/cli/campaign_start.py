@@ -147,7 +147,7 @@ def start(out: Output, **given) -> None:
 
 def _tolerance_mm(tolerance_mm: float | None, results: Path) -> float | None:
     """The tolerance given, or that of the calibration's configuration where it is of a bound."""
-    from kinacc.report.summary import tolerance_of
+    from kinacc.report.summarise import tolerance_of
     from kinacc.tables import store
 
     path = results / "summary.parquet"

@@ -49,7 +49,7 @@ def written(folder: str, out: str | None = None, without: Collection[str] = ()) 
     from kinacc.campaign.journal import of_results
     from kinacc.report import dataset
     from kinacc.report.page import html
-    from kinacc.report.summary import ON_PAGE, PAGE_TABLES, read_tables
+    from kinacc.report.summarise import ON_PAGE, PAGE_TABLES, read_tables
     from kinacc.tables import sums
     from kinacc.tables.atomic import write_whole
     from kinacc.workflow.data_sets import campaign_files

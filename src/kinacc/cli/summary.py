@@ -48,7 +48,7 @@ def summary(folders: tuple[Path, ...], tolerance_mm: float | None, by: str, out)
       kinacc summary results/ur10_b
       kinacc summary results --tolerance-mm 0.5 -o robots.xlsx
     """
-    from kinacc.report import summary as summaries
+    from kinacc.report import summarise as summaries
     from kinacc.report import terminal
 
     places = summaries.data_set_folders(folders or (Path(RESULTS),))

@@ -151,19 +151,21 @@ def _change(gate: Gate, dataset: str, tables: RunTables, accepted: RunTables | N
 
 def _campaign(gate: Gate, dataset: str, tables: RunTables, tolerance: Mapping[str, Any]) -> Outcome:
     from kinacc.campaign.folder import open_
-    from kinacc.report.summary import BOUND, summarise
+    from kinacc.report.summarise import summarise
+    from kinacc.report.summary import BOUND
 
     place = Path(gate["campaign"])
     open_(place)  # raises where it cannot be used
     summary = summarise(tables.folder, campaigns=[place])
-    known = summary.largest_error
-    if known is None:
+    status = summary.campaign
+    if status is None:
         fix = f"begin one on it: kinacc campaign start FOLDER --calibration {tables.folder}"
         return _found(FAILED, "; ".join(summary.remarks), fix)
     allowed = tolerance["mm"] if gate["tolerance_mm"] is None else gate["tolerance_mm"]
     judged_as = summary.verdict(BOUND, allowed)
     assert judged_as is not None  # a tolerance is given
-    figures = {"tolerance_mm": allowed, "campaign": known.campaign, "readings": known.readings}
+    known = status.of_all
+    figures = {"tolerance_mm": allowed, "campaign": status.folder, "readings": status.readings}
     says = f"campaign {place}: {judged_as.verdict}, {judged_as.reason}"
     if np.isfinite(known.upper_mm):
         figures |= {name: getattr(known, name) for name in ("lower_mm", "confidence")}
@@ -177,7 +179,7 @@ def _campaign(gate: Gate, dataset: str, tables: RunTables, tolerance: Mapping[st
             says = f"campaign {place} has {known.confidence:.0%} confidence, {asked:.0%} asked for"
             fix = "begin a campaign with that confidence, or ask for the campaign's"
             return _found(FAILED, says, fix, figures)
-    says = "; ".join([says, *summary.remarks, *known.against])
+    says = "; ".join([says, *summary.remarks, *summary.doubts])
     verdict = {ACCEPT: PASSED, REJECT: FAILED}.get(judged_as.verdict, UNDECIDED)
     return _found(verdict, says, f"kinacc campaign status {place}", figures)
 

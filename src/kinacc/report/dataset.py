@@ -10,7 +10,8 @@ from kinacc.campaign import of_calibration, report
 from kinacc.kinematics import robot
 from kinacc.report import campaign, fit_sections, study_sections, terminal
 from kinacc.report.page import FirstScreen, Page, Table
-from kinacc.report.summary import CalibrationSummary, summarise
+from kinacc.report.summarise import summarise
+from kinacc.report.summary import CalibrationSummary
 
 # In the order of the page: the table that a section needs, and how it is made.
 _OF_THE_FIT = (

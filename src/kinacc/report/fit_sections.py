@@ -30,7 +30,7 @@ from kinacc.kinematics.vec import VECModel
 from kinacc.measurements.row_names import RowNames
 from kinacc.report import charts
 from kinacc.report.page import Part, records
-from kinacc.report.summary import compliance
+from kinacc.report.summarise import compliance
 from kinacc.tables.allowed import ERRORS, FINDING_LEVELS, LEFT_OUT, SUBSETS
 from kinacc.tables.columns import Columns
 

@@ -15,22 +15,15 @@ from kinacc.assess.conformity import UNDECIDED
 from kinacc.calibration.summary import LARGE_SHARE
 from kinacc.config.error_models import NOMINAL, PLAINEST, model_name
 from kinacc.errors import Problem, as_seen
-from kinacc.report.summary import (
-    BOUND,
-    STATISTICS,
-    CalibrationSummary,
-    Verdict,
-    read_tables,
-    size,
-    summarise,
-    summarise_all,
-)
+from kinacc.report.summarise import read_tables, summarise, summarise_all
+from kinacc.report.summary import BOUND, STATISTICS, CalibrationSummary, Verdict, size
 
 FEW = 4  # data sets whose summaries are printed one after another
 WIDTH = 100
 _MOST = 3  # findings, rows and parameters without --verbose
 _FEW_SHARE = 0.01
-_ENTER = "Enter known values (calibration.dh.parameters, calibration.frames)."
+_DAY = 10  # characters of a time
+_ENTER = "Harmless. Known values can be entered (calibration.dh.parameters, calibration.frames)."
 
 
 class _Console(Console):
@@ -120,11 +113,11 @@ def headline(
         )
     if summary.history:
         texts.append(f"History: {summary.history}.")
-    found = summary.largest_error
-    if found is None:
+    campaign = summary.campaign
+    if campaign is None:
         texts.append("Largest error of the robot: not assessed (no campaign).")
     else:
-        texts.append(f"Campaign {found.campaign}: {found.statement}")
+        texts.append(f"Campaign {campaign.folder}: {campaign.of_all.text}")
     verdicts = [summary.verdict(by, tolerance_mm)]
     if tolerance_mm is None:
         verdicts.append(summary.of_configuration())
@@ -144,13 +137,12 @@ def notes(summary: CalibrationSummary, most: int | None) -> dict[str, list[str]]
         + (f" ({size(each.error_mm)} mm)" if math.isfinite(each.error_mm) else "")
         for each in summary.excluded
     ]
-    found = summary.largest_error
-    campaign = [*summary.remarks]
-    if found is not None:
-        campaign += [found.conditions] if found.conditions else []
-        campaign += [*found.against, f"{found.readings} of {found.budget} readings"]
-        if found.model != summary.selected:
-            campaign.append(f"About the {model_name(found.model)} model, which is not selected.")
+    status, campaign = summary.campaign, [*summary.remarks]
+    if status is not None:
+        campaign += [status.assumes] if status.assumes else []
+        campaign += [*summary.doubts, f"{status.readings} of {status.budget} readings"]
+        if status.model != summary.selected:
+            campaign.append(f"About the {model_name(status.model)} model, which is not selected.")
     claims = summary.claims
     told = {
         "Paper's claims": []
@@ -209,7 +201,8 @@ def fleet_table(
             row: dict[str, object] = {"data_set": place.rpartition("/")[2], "folder": place}
             rows.append(row | {"verdict": UNDECIDED, "reason": str(each)})
             continue
-        best, largest = each.best, each.largest_error
+        best, status = each.best, each.campaign
+        bound = status.of_all if status else None
         judged = each.verdict(by, tolerance_mm) or Verdict("", "", math.nan)
         row = {
             "data_set": each.name,
@@ -219,18 +212,18 @@ def fleet_table(
             "held_out_99_mm": best.quantile_99 if each.is_held_out else math.nan,
             "held_out_largest_mm": best.largest if each.is_held_out else math.nan,
             "held_out_rows": best.n if each.is_held_out else 0,
-            "bound_mm": largest.upper_mm if largest else math.nan,
-            "lower_mm": largest.lower_mm if largest else math.nan,
-            "confidence": largest.confidence if largest else math.nan,
-            "campaign_date": largest.recorded if largest else "",
+            "bound_mm": bound.upper_mm if bound else math.nan,
+            "lower_mm": bound.lower_mm if bound else math.nan,
+            "confidence": bound.confidence if bound else math.nan,
+            "campaign_date": status.recorded[:_DAY] if status else "",
             "file_date": each.written,
             "tolerance_mm": judged.tolerance_mm,
             "reason": judged.reason,
             "open_findings": sum(finding.is_open for finding in each.findings),
-            "campaign": largest.campaign if largest else "",
-            "bound_of": f"{largest.target}, {largest.point}" if largest else "",
-            "assumptions": largest.conditions if largest else "",
-            "remarks": "; ".join([*each.remarks, *(largest.against if largest else ())]),
+            "campaign": status.folder if status else "",
+            "bound_of": f"{bound.about}, {status.point}" if status else "",
+            "assumptions": status.assumes if status else "",
+            "remarks": "; ".join([*each.remarks, *each.doubts]),
             "robot": each.robot,
             "folder": each.folder,
         }

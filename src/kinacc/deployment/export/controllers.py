@@ -213,7 +213,7 @@ CONTROLLERS = {
         "DH deltas",
         _ur,
         _frame("x y z rx ry rz", Convention(VECTOR, 1e3, _RAD)),
-        "DH deltas: they replace those in section [mounting] of /root/.urcontrol/calibration.conf; "
+        "DH deltas: they replace those in section [mounting] of the controller's calibration.conf; "
         "keep its other lines. TOOL: set_tcp; BASE: a plane feature.",
         "Large delta_d of joints 2 to 4 are usual: their axes are nearly parallel.",
         _ur_text,
