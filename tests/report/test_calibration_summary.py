@@ -11,8 +11,10 @@ import pytest
 from command_line import call, small_study
 from stages_by_hand import run_stage
 
+from kinacc.calibration.summary import TABLES
 from kinacc.campaign import of_calibration
 from kinacc.campaign.journal import JOURNAL
+from kinacc.deployment import folder
 from kinacc.report import summarise
 from kinacc.report.terminal import size
 from kinacc.tables import store
@@ -130,7 +132,7 @@ def test_held_out_errors_are_judged_by_a_tolerance_that_has_to_be_given(fleet):
 
 
 def test_a_history_takes_the_bound_of_a_campaign_that_came_to_its_end(fleet):
-    tables = summarise.read_tables("results/line_a")
+    tables = folder.read_tables("results/line_a", *TABLES)
     campaign("line_a")
     campaign("line_b", readings=7)
     ended, going = (Path(f"check_{name}") for name in ("line_a", "line_b"))
@@ -158,7 +160,7 @@ def test_results_without_a_calibration_are_named_and_the_others_summarised(fleet
 
 
 def test_the_order_of_findings_and_what_is_open(study):
-    tables = dict(summarise.read_tables(study))
+    tables = dict(folder.read_tables(study, *summarise.OPTIONAL, *TABLES))
     names = ("finding", "level", "what", "lines", "fix", "accepted", "rows")
     rows = [
         ("sparse", "note", "few poses near the limits", "", "", "", 0),

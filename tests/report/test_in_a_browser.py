@@ -113,11 +113,12 @@ def test_on_paper_nothing_is_there_to_be_clicked_and_pictures_are_printed(chromi
 
 
 def test_names_that_look_like_code_are_shown_and_never_run(chromium, folder, tmp_path):
+    from kinacc.deployment.folder import read_tables
     from kinacc.report import dataset
     from kinacc.report.page import html
-    from kinacc.report.summarise import read_tables
+    from kinacc.report.summarise import ON_PAGE, PAGE_TABLES
 
-    tables = dict(read_tables(folder))
+    tables = dict(read_tables(folder, needed=PAGE_TABLES, optional=ON_PAGE))
     targets = np.resize(np.array(HOSTILE, dtype=object), len(tables["measurements"]["target"]))
     tables["measurements"] = {**tables["measurements"], "target": targets}
     name = " ".join(HOSTILE)

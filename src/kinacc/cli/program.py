@@ -60,7 +60,7 @@ def correct(
 
         Output(picture=picture).draw(draw(answer.table))
     changes = answer.table.query("status == 'corrected'").get("change_mm", pd.Series([0.0]))
-    missed = f", {len(answer.left)} statements not" if answer.left else ""
+    missed = f", {len(answer.not_corrected)} statements not" if answer.not_corrected else ""
     lines = [
         f"{answer.language}: {len(answer.table) - len(answer.refused)} of {len(answer.table)} "
         f"positions corrected{missed}; change: mean {changes.mean():.3g} mm, "
@@ -87,7 +87,7 @@ def _warnings(answer: programs.CorrectedProgram) -> Iterator[str]:
             yield f"{len(named)} positions {text}: {first_few(list(named['position']))}"
     yield from answer.remarks
     reason = "computed by the program, incomplete or defined elsewhere"
-    yield from (f"Not corrected, {reason}: {line}" for line in answer.left)
+    yield from (f"Not corrected, {reason}: {line}" for line in answer.not_corrected)
     yield from (f"Refused: {problem}" for problem in answer.refused)
 
 

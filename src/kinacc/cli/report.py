@@ -47,9 +47,10 @@ def written(folder: str, out: str | None = None, without: Collection[str] = ()) 
     """
     from kinacc import __version__
     from kinacc.campaign.journal import of_results
+    from kinacc.deployment.folder import read_tables
     from kinacc.report import dataset
     from kinacc.report.page import html
-    from kinacc.report.summarise import ON_PAGE, PAGE_TABLES, read_tables
+    from kinacc.report.summarise import ON_PAGE, PAGE_TABLES
     from kinacc.tables import sums
     from kinacc.tables.atomic import write_whole
     from kinacc.workflow.data_sets import campaign_files
@@ -57,7 +58,7 @@ def written(folder: str, out: str | None = None, without: Collection[str] = ()) 
     place = Path(folder)
     reason = choice.say_outdated(folder)
     old = {Path(name).stem for name in sums.outdated(place)} - {Path(_PAGE).stem, *PAGE_TABLES}
-    tables = read_tables(place, PAGE_TABLES, ON_PAGE)
+    tables = read_tables(place, needed=PAGE_TABLES, optional=ON_PAGE)
     shown = {name: table for name, table in tables.items() if name not in {*without, *old}}
     campaigns = {role: Path(path) for role, path in campaign_files(of_results(place)).items()}
     settings = {

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -32,17 +32,25 @@ _WANTED = (
 _SAME = 1e-9
 
 
-def read_tables(folder: Path | str, *more: str) -> dict[str, dict[str, np.ndarray]]:
+def read_tables(
+    folder: Path | str,
+    *more: str,
+    needed: Sequence[str] = _NEEDED,
+    optional: Sequence[str] = _WANTED,
+) -> dict[str, dict[str, np.ndarray]]:
     """The tables of a data set's results folder: columns (rows,) by table and name.
 
-    ``more`` are read where they are there, beside those that every use needs. Units stand in the
-    names (_mm, _rad). Raises InputError naming all tables that are missing or damaged.
+    ``optional`` ones and ``more`` are read where they are there. Units stand in the names (_mm,
+    _rad). Raises InputError naming all ``needed`` tables that are missing, and damaged ones.
     """
-    paths = {name: Path(folder) / f"{name}.parquet" for name in (*_NEEDED, *_WANTED, *more)}
+    folder = Path(folder)
+    paths = {name: folder / f"{name}.parquet" for name in (*needed, *optional, *more)}
+    missing = [name for name in needed if not paths[name].is_file()]
+    if len(missing) == len(needed):
+        message = "holds no calibration" if folder.is_dir() else "no such folder"
+        raise InputError(Problem(str(folder), message, fix="kinacc calibrate FILE.yaml makes one"))
     problems = [
-        Problem(str(paths[name]), "no such file", fix="run the workflow first")
-        for name in _NEEDED
-        if not paths[name].is_file()
+        Problem(str(paths[name]), "no such file", fix="run the workflow first") for name in missing
     ]
     tables = {}
     for name, path in paths.items():

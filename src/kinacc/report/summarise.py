@@ -56,26 +56,6 @@ _NOTE = FINDING_LEVELS[-1]
 Tables = Mapping[str, Columns]
 
 
-def read_tables(
-    folder: Path | str,
-    needed: Sequence[str] = figures.TABLES,
-    optional: Sequence[str] = OPTIONAL,
-) -> dict[str, Columns]:
-    """The tables of a results folder. Raises InputError naming every ``needed`` one missing."""
-    folder = Path(folder)
-    if not any((folder / f"{name}.parquet").is_file() for name in needed):
-        fix = "kinacc calibrate FILE.yaml makes one"
-        what = "holds no calibration" if folder.is_dir() else "no such folder"
-        raise InputError(Problem(str(folder), what, fix=fix))
-    refuse(
-        Problem(str(folder / f"{name}.parquet"), "no such file", fix="run the workflow first")
-        for name in needed
-        if not (folder / f"{name}.parquet").is_file()
-    )
-    paths = {name: folder / f"{name}.parquet" for name in dict.fromkeys((*needed, *optional))}
-    return {name: store.read(path) for name, path in paths.items() if path.is_file()}
-
-
 def summarise(
     folder: Path | str,
     tables: Tables | None = None,
@@ -101,7 +81,8 @@ def summarise(
         Where a table is missing or damaged.
     """
     folder = Path(folder)
-    tables = read_tables(folder) if tables is None else tables
+    if tables is None:
+        tables = results.read_tables(folder, needed=figures.TABLES, optional=OPTIONAL)
     arm = robot.of_text(str(tables["robot"]["description"][0]), "robot.parquet")
     name = folder.resolve().name
     places = journal.of_results(folder) if campaigns is None else campaigns

@@ -12,10 +12,11 @@ from rich.console import Console
 from rich.table import Table
 
 from kinacc.assess.conformity import UNDECIDED
-from kinacc.calibration.summary import LARGE_SHARE
+from kinacc.calibration.summary import LARGE_SHARE, TABLES
 from kinacc.config.error_models import NOMINAL, PLAINEST, model_name
+from kinacc.deployment.folder import read_tables
 from kinacc.errors import Problem, as_seen
-from kinacc.report.summarise import read_tables, summarise, summarise_all
+from kinacc.report.summarise import OPTIONAL, summarise, summarise_all
 from kinacc.report.summary import BOUND, STATISTICS, CalibrationSummary, Verdict, size
 
 FEW = 4  # data sets whose summaries are printed one after another
@@ -76,7 +77,7 @@ def print_summaries(folders: Sequence[Path], without: Sequence[str] = ()) -> Non
         print_fleet(fleet_table(summarise_all(folders), BOUND), BOUND)
         return
     for folder in folders:
-        tables = read_tables(folder)
+        tables = read_tables(folder, needed=TABLES, optional=OPTIONAL)
         shown = {name: table for name, table in tables.items() if name not in without}
         print()
         print_summary(summarise(folder, shown))

@@ -60,7 +60,7 @@ def test_every_example_is_corrected_and_only_its_numbers_change(name, model):
     _, found = corrected(name, model)
     assert not found.refused
     assert (found.table["status"] == "corrected").all()
-    assert len(found.left) == LEFT.get(name, 0)
+    assert len(found.not_corrected) == LEFT.get(name, 0)
     assert found.table["change_mm"].between(0.05, 20.0).all()
     for path, content in found.files.items():
         old = path.read_bytes()
@@ -259,4 +259,4 @@ def test_waypoints_of_polyscope_start_from_their_joints(tmp_path):
 def test_moves_to_positions_that_are_not_there_are_listed(name, text, expected):
     language = kuka if name.endswith(".src") else abb
     found = language.read([Source(Path(name), text)], {}, None)
-    assert [int(line.split(":")[1]) for line in found.left] == expected
+    assert [int(line.split(":")[1]) for line in found.not_corrected] == expected

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -66,7 +66,8 @@ class CorrectedProgram:
     """A program whose positions are corrected.
 
     ``table``: one row a position; ``refused``: positions that could not be corrected, with the
-    reason; ``left``: statements whose positions the program computes, not corrected; ``remarks``:
+    reason; ``not_corrected``: statements whose positions are computed,
+    incomplete or defined elsewhere; ``remarks``:
     tools whose calibrated place is used. ``files``: new contents by the file they come from.
     """
 
@@ -74,7 +75,7 @@ class CorrectedProgram:
     calibration: str
     table: pd.DataFrame
     refused: tuple[Problem, ...]
-    left: tuple[str, ...]
+    not_corrected: tuple[str, ...]
     remarks: tuple[str, ...]
     files: Mapping[Path, bytes]
 
@@ -124,9 +125,9 @@ def read_program(
         frames |= frames_of(source, language.convention) if is_yaml else language.frames(source)
     program = language.read(sources, frames, pulses_per_degree)
     if not program.positions:
-        computed = [Problem(line, "is computed by the program") for line in program.left]
-        message = "has no positions that can be corrected"
-        raise InputError([Problem(str(path), message), *computed])
+        message = "is computed, incomplete or defined elsewhere"
+        computed = [Problem(line, message) for line in program.not_corrected]
+        raise InputError([Problem(str(path), "has no positions that can be corrected"), *computed])
     return language, program
 
 
@@ -176,22 +177,12 @@ def compensate_program(
         [frames.get((kind, getattr(item, kind) or ""), IDENTITY) for item in positions]
         for kind in (TOOL, BASE)
     )
-    poses = [number for number, item in enumerate(positions) if item.scale is None]
-    flange = [
-        compose(compose(base[n], convention.pose(item.numbers, item.where)), invert(tool[n]))
+    flange = {
+        n: compose(compose(base[n], convention.pose(item.numbers, item.where)), invert(tool[n]))
         for n, item in enumerate(positions)
         if item.scale is None
-    ]
-    ways = dict(zip(poses, posture.postures_of(robot, flange), strict=True))
-    reasons: dict[int, str] = {}
-    q_rad, near = np.full((len(positions), robot.dh.joints), np.nan), near_rad
-    for number, item in enumerate(positions):
-        try:
-            if item.moves_outside and number in ways and not base_is_fixed:
-                raise InputError(Problem("", _TRACK))
-            near = q_rad[number] = _start(robot, language, item, ways.get(number), near)
-        except InputError as error:
-            reasons[number] = error.problems[0].what
+    }
+    q_rad, reasons = _starts(robot, language, positions, flange, near_rad, base_is_fixed)
     remarks, parts = [], []
     for name in dict.fromkeys(item.tool for item in positions):
         group = [n for n, item in enumerate(positions) if item.tool == name and n not in reasons]
@@ -233,10 +224,35 @@ def compensate_program(
             Problem(f"{positions[number].where} {positions[number].name}", why)
             for number, why in sorted(reasons.items())
         ),
-        tuple(program.left),
+        tuple(program.not_corrected),
         tuple(remarks),
         {source.path: replaced(source, new) for source in program.sources},
     )
+
+
+def _starts(
+    robot: Robot,
+    language: Language,
+    positions: Sequence[Position],
+    flange: Mapping[int, Pose],
+    near_rad: np.ndarray | None,
+    base_is_fixed: bool,
+) -> tuple[np.ndarray, dict[int, str]]:
+    """Joints (n, k) of the nominal arm at all positions, and why some have none.
+
+    ``flange``: wanted poses of the flange by number, of positions that are no joints.
+    """
+    ways = dict(zip(flange, posture.postures_of(robot, list(flange.values())), strict=True))
+    reasons: dict[int, str] = {}
+    q_rad, near = np.full((len(positions), robot.dh.joints), np.nan), near_rad
+    for number, item in enumerate(positions):
+        try:
+            if item.moves_outside and number in ways and not base_is_fixed:
+                raise InputError(Problem("", _TRACK))
+            near = q_rad[number] = _start(robot, language, item, ways.get(number), near)
+        except InputError as error:
+            reasons[number] = error.problems[0].what
+    return q_rad, reasons
 
 
 def _digest(contents: Iterable[bytes]) -> str:

@@ -101,14 +101,15 @@ class Position:
 class Program:
     """A program as read.
 
-    ``frames``: tools and bases by kind and name. ``left``: statements whose positions the program
-    computes. ``convention``: that of this file, where files of the language differ.
+    ``frames``: tools and bases by kind and name. ``not_corrected``: statements whose positions are
+    computed, incomplete or defined elsewhere. ``convention``: that of this file, where files of the
+    language differ.
     """
 
     sources: Sequence[Source]
     positions: Sequence[Position]
     frames: Frames
-    left: Sequence[str] = ()
+    not_corrected: Sequence[str] = ()
     convention: Convention | None = None
 
 
