@@ -86,13 +86,19 @@ def session_of(
     return Session(name, date, "", base, tool, calibration, observed, held_out_mm, temperature_c)
 
 
-def history(sessions: Sequence[Session], rotation_weight_mm_per_rad: float, seed: int) -> Columns:
+def history(
+    sessions: Sequence[Session],
+    rotation_weight_mm_per_rad: float,
+    seed: int,
+    level: float = LEVEL,
+) -> Columns:
     """The table ``history``: one row a session, in the order of their dates.
 
     The same whatever order they are given in, and a row the same whatever comes after it: all
-    chance follows from ``seed`` and the names of the two series compared.
+    chance follows from ``seed`` and the names of the two series compared. ``level``: share of
+    decisions on an unchanged arm that may be false alarms.
     """
-    comparison = _Comparison(rotation_weight_mm_per_rad, seed, {})
+    comparison = _Comparison(rotation_weight_mm_per_rad, seed, level, {})
     rows: list[dict[str, Any]] = []
     force, setup = None, Setup(True, True)
     for session in sorted(sessions, key=lambda each: each.date):
@@ -123,6 +129,7 @@ class _Comparison:
 
     rotation_weight_mm_per_rad: float
     seed: int
+    level: float
     known: dict[tuple[str, Setup], float]
 
     def row(self, force: Session, session: Session, setup: Setup) -> dict[str, Any]:
@@ -155,7 +162,7 @@ class _Comparison:
             halves = [self.understated(item, setup) for item in (force, session)]
             misfit = history_model.misfit_factor(*halves)
         movement = history_model.moved(pair, misfit, self._rng(force.name, session.name))
-        moved_mm, chance_mm = movement.moved_mm, movement.chance_mm(LEVEL)
+        moved_mm, chance_mm = movement.moved_mm, movement.chance_mm(self.level)
         row = {
             "moved_mm": moved_mm,
             "chance_mm": chance_mm,
