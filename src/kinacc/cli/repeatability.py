@@ -5,23 +5,33 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import click
+import numpy as np
+import pandas as pd
 
+from kinacc.assess.noise import ENOUGH, FEWEST
+from kinacc.calibration.noise import per_axis_mm
+from kinacc.campaign.known_noise import FORMAT
+from kinacc.checks import repeatability as checks
+from kinacc.checks.digits import smallest_step, step_between
+from kinacc.checks.repeatability import Noise, Repeated
 from kinacc.cli.choice import option
 from kinacc.cli.output import answers
-
-if TYPE_CHECKING:
-    import numpy as np
-    import pandas as pd
-
-    from kinacc.checks.repeatability import Noise
-    from kinacc.cli.repeated_rows import Rows
+from kinacc.cli.rows import LENGTH, Quantities, open_table
+from kinacc.errors import InputError, Problem, first_few, refuse
+from kinacc.measurements.layout import columns_of_quantity, listed
+from kinacc.measurements.table import RawTable, numbers
+from kinacc.report.terminal import size
 
 _A_DAY_H = 1.0  # readings of a pose within less time do not show the changes of a day
 _USUAL_VISITS = 30  # of each pose, by ISO 9283
 _LEAST_MM = 1e-6  # no instrument scatters less
+_FARTHEST_MM = 1e6
+_NAMES = {"pose": ("pose",), "side": ("side", "direction"), "visit": ("visit", "approach")}
+_EMPTY = ("", "nan", "None")  # + and - are names of sides
+_SINGLE = ("target", "session", "instrument")
+_HOURS = {"time_s": 1.0 / 3600.0, "time_min": 1.0 / 60.0, "time_h": 1.0}
 
 
 @dataclass(frozen=True)
@@ -94,104 +104,163 @@ def repeatability(file, rows_are, out) -> None:
       kinacc repeatability repeats.csv --rows visits -o noise.json
       kinacc campaign start check --calibration results/ur10_d --repeatability noise.json
     """
-    from kinacc.cli import repeated_rows
-
-    rows = repeated_rows.of_file(file, rows_are)
-    if rows.unused:
-        click.echo(f"not used: {', '.join(rows.unused)}", err=True)
-    result = estimate(rows)
+    result = estimate(*read_repeats(file, rows_are))
     out.show(result, result.rows, [*_lines(result), *result.remarks])
 
 
-def estimate(rows: Rows) -> Repeatability:
-    """Noise and repeatability of readings. InputError where these are equal to the last digit."""
-    import numpy as np
-    import pandas as pd
+def read_repeats(path: str, rows_are: str | None) -> tuple[RawTable, np.ndarray, pd.DataFrame]:
+    """The file, positions (n, 3) in mm, and pose, side, visit and hours of every row.
 
-    from kinacc.campaign.known_noise import FORMAT
-    from kinacc.checks import repeatability as checks
-    from kinacc.errors import InputError, Problem
+    ``rows_are``: whether rows of a pose without a visit are ``visits`` or ``stays``. InputError
+    with all problems.
+    """
+    table = open_table(path)
+    reader = Quantities(table)
+    problems = reader.problems
+    position = reader.group(["x", "y", "z"], [LENGTH] * 3, True)
+    rows = pd.DataFrame({"side": "", "visit": "", "hours": math.nan}, index=range(len(table)))
+    if "pose" not in table.columns:
+        problems.append(Problem(f"{path}: column pose", "is missing", fix=listed(table)))
+    columns = {name: [n for n in names if n in table.columns] for name, names in _NAMES.items()}
+    for name, column in ((name, names[0]) for name, names in columns.items() if names):
+        rows[name] = [str(cell).strip().removesuffix(".0") for cell in table.columns[column]]
+        gaps = np.flatnonzero(rows[name].isin(_EMPTY))
+        if gaps.size:
+            problems.append(Problem(table.where(column, gaps), "an empty cell", fix="fill it in"))
+    for name in table.columns.columns.intersection(_SINGLE):
+        if len(kinds := {*table.texts(name)}) > 1:
+            what, fix = f"holds several: {first_few(sorted(kinds))}", "one file for each"
+            problems.append(Problem(table.where(name), what, "one", fix))
+    if timed := [name for name in (*_HOURS, "time") if name in table.columns]:
+        rows["hours"] = _hours(table, timed[0], problems)
+    if "pose" in rows and not columns["visit"]:
+        again = np.flatnonzero(rows["pose"] == rows["pose"].shift())
+        if rows_are is None and again.size:
+            where = f"{path}: {table.rows_in_words(again)}"
+            what, fix = (
+                "the pose of the row before",
+                "--rows visits, --rows stays or a column visit",
+            )
+            problems.append(Problem(where, what, "whether the arm left the pose", fix))
+        if rows_are != "stays":
+            rows["visit"] = rows.index
+    if position is not None and (far := np.flatnonzero(abs(position).max(1) > _FARTHEST_MM)).size:
+        where = f"{path}: {table.rows_in_words(far)}"
+        problems.append(Problem(where, "a position beyond a kilometre", "x, y, z in mm or m"))
+    if not problems and rows["pose"].is_unique:
+        problems.append(Problem(path, "no pose has more than one reading"))
+    refuse(problems, f"{path} cannot be used")
+    used = reader.used.union(*_NAMES.values(), _SINGLE, _HOURS, ["time"])
+    if unused := [name for name in table.columns if name not in used]:
+        click.echo(f"not used: {', '.join(unused)}", err=True)
+    return table, position, rows
 
-    parts = checks.parts(rows.read)
-    noise = checks.noise_of(parts, rows.resolution_mm)
+
+def _hours(table: RawTable, name: str, problems: list[Problem]) -> np.ndarray:
+    """Hours (n,) of the readings by a column of times."""
+    if name in _HOURS:
+        return numbers(table, name, problems) * _HOURS[name]
+    texts = pd.Series(table.texts(name)).str.replace(r"^(\d):", r"0\1:", regex=True)
+    texts = texts.where(~texts.str.match(r"\d\d:"), "2000-01-01T" + texts)
+    times = pd.to_datetime(texts, format="ISO8601", utc=True, errors="coerce")
+    if (bad := np.flatnonzero(times.isna())).size:
+        what, allowed = f"no time: {texts[bad[0]]!r}", "2026-05-04T13:20:05 or 13:20:05"
+        problems.append(Problem(table.where(name, bad), what, allowed))
+    return ((times - times.min()) / pd.Timedelta(hours=1)).to_numpy()
+
+
+def _steps_mm(table: RawTable) -> np.ndarray:
+    """Steps (3,) of the values of the axes; of equal values, that of the other axes or digits."""
+    steps, digits = np.zeros(3), 0.0
+    for axis, name in enumerate("xyz"):
+        for place in columns_of_quantity(table, name, LENGTH):
+            cells = table.columns[place.column]
+            step = step_between(cells, place.factor, table.decimal)
+            steps[axis] = max(steps[axis], step)
+            digits = max(digits, smallest_step([cells], place.factor, table.decimal))
+    return np.where(steps > 0.0, steps, steps.max() or digits)
+
+
+def estimate(table: RawTable, position_mm: np.ndarray, rows: pd.DataFrame) -> Repeatability:
+    """Noise and repeatability of readings, see :func:`read_repeats`.
+
+    InputError where readings of a pose are equal to the last digit.
+    """
+    keys = ["pose", "side", "visit"]
+    groups = [rows.groupby(keys[:n], sort=False).ngroup().to_numpy() for n in (1, 2, 3)]
+    read, resolution_mm = Repeated(position_mm, *groups), _steps_mm(table)
+    poses = rows["pose"].unique()
+    parts = checks.parts(read)
+    noise = checks.noise_of(parts, resolution_mm)
     std, low, high = [np.full(3, np.nan)] * 3
     if noise is not None:
         std = noise.std_mm
         low, high = checks.limits(std, noise.freedom)
         if not (std > _LEAST_MM).all():
-            what = "readings of a pose are equal to the last digit"
-            raise InputError(Problem(rows.path, what, fix="give readings, not copies"))
-    by_pose, ratio = checks.differ_by_pose(rows.read, rows.resolution_mm)
-    mean_mm, rp_mm = checks.pooled_rp(rows.read)
-    differ, hours = None, math.nan
-    if rows.hours is not None:
-        spans = pd.Series(rows.hours).groupby(rows.read.pose).agg(["size", np.ptp])
-        hours = float(spans["ptp"][spans["size"] > 1].median())
+            raise InputError(Problem(table.path, "readings of a pose are equal to the last digit"))
+    by_pose, ratio = checks.differ_by_pose(read, resolution_mm)
+    mean_mm, rp_mm = checks.pooled_rp(read)
+    differ = None
     if by_pose < checks.UNEQUAL:
         worst = int(np.nanargmax(ratio))
-        differ = f"Poses scatter differently (p = {by_pose:.2g}): pose {rows.poses[worst]} "
+        differ = f"Poses scatter differently (p = {by_pose:.2g}): pose {poses[worst]} "
         differ += f"{ratio[worst]:.2f} times as much as all."
-    groups = checks.groups(rows.read)
-    table = pd.DataFrame(groups).drop(columns="std_mm")
-    table[["std_x_mm", "std_y_mm", "std_z_mm"]] = [group.std_mm for group in groups]
-    table["pose"] = np.array(rows.poses, dtype=object)[table["pose"]]
-    table["side"] = None if rows.sides is None else np.array(rows.sides, object)[table["side"]]
+    spans = rows.groupby("pose")["hours"].agg(["size", np.ptp])
+    hours = float(spans["ptp"][spans["size"] > 1].median())
+    of_sides = checks.groups(read)
+    result = pd.DataFrame(of_sides).drop(columns="std_mm")
+    result[["std_x_mm", "std_y_mm", "std_z_mm"]] = [group.std_mm for group in of_sides]
+    result["pose"] = poses[result["pose"]]
+    result["side"] = rows.drop_duplicates(keys[:2])["side"].replace("", None).to_numpy()
+    remarks = [*_remarks(noise, rows, hours), *([differ] if differ else [])]
+    if (far := checks.far_off(read)).size:
+        remarks.append(f"Far from the other readings of its pose: {table.rows_in_words(far)}.")
     return Repeatability(
-        FORMAT, rows.path, len(rows.poses), int(rows.read.visit.max()) + 1, len(rows.read.pose),
+        FORMAT, table.path, len(poses), int(read.visit.max()) + 1, len(rows),
         noise, std, low, high, np.sqrt(np.diag(parts.instrument)), np.sqrt(np.diag(parts.visits)),
         np.sqrt(np.diag(parts.visits + parts.sides)), mean_mm, rp_mm,
-        checks.between_sides_mm(rows.read), by_pose, differ, rows.resolution_mm, hours,
-        (*_remarks(rows, noise, hours), *filter(None, [differ])), table,
+        checks.between_sides_mm(read), by_pose, differ, resolution_mm, hours, tuple(remarks),
+        result,
     )  # fmt: skip
 
 
-def _remarks(rows: Rows, noise: Noise | None, hours: float) -> Iterator[str]:
+def _remarks(noise: Noise | None, rows: pd.DataFrame, hours: float) -> Iterator[str]:
     """Conditions on the noise."""
-    from kinacc.assess.noise import ENOUGH, FEWEST
-    from kinacc.checks.repeatability import far_off
-    from kinacc.errors import first_few
-
-    if noise is not None:
-        if not noise.is_even:
-            yield f"Axes differ (p = {noise.by_axis:.2g}): the noise is a covariance."
-        if noise.freedom < ENOUGH:
-            more = math.ceil((ENOUGH - noise.freedom) / (3.0 if noise.is_even else 1.0))
-            yield (
-                f"{noise.freedom:.0f} degrees of freedom ({FEWEST} required, {ENOUGH} recommended):"
-                f" measure about {more} more visits."
-            )
-        if noise.rounded.any():
-            yield f"The noise is that of rounding ({max(rows.resolution_mm):.3g} mm steps)."
-        if rows.sides is None:
-            yield "Sides of approach unknown: from all sides the noise may be larger."
-        if not hours >= _A_DAY_H:
-            when = "Times unknown" if math.isnan(hours) else f"A pose takes {60 * hours:.0f} min"
-            yield f"{when}: over a day the noise may be larger."
-    far = far_off(rows.read)
-    if far.size:
-        names = first_few([rows.row_names[row] for row in far])
-        yield f"Far from the other readings of its pose: {names}. Check these rows."
+    if noise is None:
+        return
+    if not noise.is_even:
+        yield f"Axes differ (p = {noise.by_axis:.2g}): the noise is a covariance."
+    if noise.freedom < ENOUGH:
+        more = math.ceil((ENOUGH - noise.freedom) / (3.0 if noise.is_even else 1.0))
+        yield (
+            f"{noise.freedom:.0f} degrees of freedom ({FEWEST} required, {ENOUGH} recommended):"
+            f" measure about {more} more visits."
+        )
+    if noise.rounded.any():
+        yield "The noise is that of rounding."
+    if (rows["side"] == "").all():
+        yield "Sides of approach unknown: from all sides the noise may be larger."
+    if not hours >= _A_DAY_H:
+        when = "Times unknown" if math.isnan(hours) else f"A pose takes {60 * hours:.0f} min"
+        yield f"{when}: over a day the noise may be larger."
 
 
 def _lines(result: Repeatability) -> Iterator[str]:
     """The noise of a reading, its parts, and ISO 9283's repeatability."""
-    from kinacc.calibration.noise import per_axis_mm
-    from kinacc.report.terminal import size
-
     if result.noise is None:
         yield "Noise of a reading: unknown. No pose was left and revisited."
     else:
         axes = [f"{size(std)} mm (95 %: {size(low)} to {size(high)} mm)" for std, low, high in
                 zip(result.std_mm, result.std_low_mm, result.std_high_mm, strict=True)]  # fmt: skip
-        each = f"{axes[0]} per axis" if result.noise.is_even else ", ".join(axes)
-        yield f"Noise of a reading: {each}, {result.noise.freedom:.0f} degrees of freedom."
-    instrument, *arm = map(
-        per_axis_mm, (result.instrument_std_mm, result.one_side_std_mm, result.all_sides_std_mm)
-    )
-    whose = "arm and instrument" if math.isnan(instrument) else "arm"
-    parts = {"instrument": instrument} | dict(
-        zip((f"{whose} from one side", f"{whose} from all sides"), arm, strict=True)
-    )
+        noise = f"{axes[0]} per axis" if result.noise.is_even else ", ".join(axes)
+        yield f"Noise of a reading: {noise}, {result.noise.freedom:.0f} degrees of freedom."
+    instrument = per_axis_mm(result.instrument_std_mm)
+    arm = "arm and instrument" if math.isnan(instrument) else "arm"
+    parts = {
+        "instrument": instrument,
+        f"{arm} from one side": per_axis_mm(result.one_side_std_mm),
+        f"{arm} from all sides": per_axis_mm(result.all_sides_std_mm),
+    }
     known = [f"{name} {size(std)} mm" for name, std in parts.items() if math.isfinite(std)]
     yield f"Standard deviations per axis: {', '.join(known)}."
     if math.isfinite(result.rp_mm):
