@@ -18,7 +18,7 @@ import reference
 
 project = "kinacc"
 copyright = "the kinacc developers"
-extensions = ["myst_parser", "sphinx.ext.autodoc"]
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
 root_doc = "docs/index"
 include_patterns = [
     "*.md",
@@ -33,6 +33,8 @@ myst_heading_anchors = 4  # by the same names as on a code host
 nitpicky = True
 nitpick_ignore_regex = [("py:.*", ".*")]  # types are named, not linked
 autodoc_typehints_format = "short"
+autodoc_member_order = "bysource"
+napoleon_use_ivar = True
 html_theme = "furo"
 html_title = "kinacc"
 html_copy_source = False
@@ -70,8 +72,10 @@ def _with_contents(section: str) -> str:
 
 def _entry(match: re.Match) -> str:
     module, _, name = match[1].rpartition(".")
-    found = inspect.isclass(getattr(import_module(module), name))
-    return f"```{{eval-rst}}\n.. auto{'class' if found else 'function'}:: {match[1]}\n```\n\n"
+    is_class = inspect.isclass(getattr(import_module(module), name))
+    members = "   :members:\n" if is_class and module == "kinacc" else ""
+    kind = "class" if is_class else "function"
+    return f"```{{eval-rst}}\n.. auto{kind}:: {match[1]}\n{members}```\n\n"
 
 
 def setup(app):

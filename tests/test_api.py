@@ -119,15 +119,57 @@ def test_a_robot_by_name_gives_its_flange():
 
 
 def test_values_for_a_controller_state_the_error_of_what_it_takes(calibration):
-    found = calibration.values_for("staubli")
-    assert len(found.values) == 6 * 6 + 2 * 6
-    mine, _, nominal = found.errors
+    pendant = calibration.values_for("staubli")
+    assert len(pendant.values) == 6 * 6 + 2 * 6
+    mine, _, nominal = pendant.errors
     assert mine.position_mm < nominal.position_mm
 
 
 def test_export_writes_files(calibration, tmp_path):
-    (path,) = calibration.export(tmp_path, ["json"])
+    (path,) = calibration.export(tmp_path, "json")
     assert path.is_file()
+
+
+def test_objects_are_shown_in_one_line(calibration, config):
+    measured = kinacc.read_measurements(config)
+    assert repr(measured) == "<Measurements 'arm' of mh180, 60 readings, 60 poses>"
+    assert repr(calibration) == f"<Calibration 'arm' of mh180, {calibration.selected}, 60 readings>"
+    assert repr(measured.robot) == "<Robot 'mh180', 6 joints>"
+
+
+WRONG = {
+    "five joints": lambda calibration, _: calibration.predict(np.zeros(5)),
+    "a text": lambda calibration, _: calibration.predict("home"),
+    "directions of two": lambda calibration, _: calibration.predict(np.zeros((3, 6)), s=[1, 1]),
+    "an unknown frame": lambda calibration, _: calibration.predict(np.zeros(6), frame="world"),
+    "joints to compensate": lambda calibration, _: calibration.compensate(np.zeros((3, 6))),
+    "near joints of five": lambda calibration, _: calibration.compensate(
+        calibration.predict(np.zeros(6)).pose, near_rad=np.zeros(5)
+    ),
+    "no program": lambda calibration, folder: calibration.compensate_program(folder / "a.src"),
+    "no such format": lambda calibration, folder: calibration.export(folder, "docx"),
+    "no such controller": lambda calibration, _: calibration.values_for("arduino"),
+    "no such table": lambda calibration, _: calibration.table("residual"),
+    "a missing file": lambda _, folder: kinacc.calibrate(str(folder / "arm.yaml")),
+    "a folder": lambda _, folder: kinacc.calibrate(folder),
+    "a number": lambda *_: kinacc.calibrate(5),
+    "no paths": lambda *_: kinacc.read_measurements(),
+    "no folder": lambda _, folder: kinacc.load_calibration(folder / "results"),
+    "no calibration": lambda calibration, _: kinacc.compare(calibration, "results/arm"),
+    "joints of five": lambda calibration, _: kinacc.compare(
+        calibration, calibration, np.zeros((2, 5))
+    ),
+    "no campaign": lambda _, folder: kinacc.Campaign(folder),
+    "joints of seven": lambda calibration, _: calibration.robot.forward(np.zeros(7)),
+    "an unknown robot": lambda *_: kinacc.Robot.from_name("ur11x"),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_wrong_values_end_in_one_line(calibration, tmp_path, case):
+    with pytest.raises(kinacc.errors.InputError) as caught:
+        WRONG[case](calibration, tmp_path)
+    assert len(caught.value.problems) == 1
 
 
 def test_a_campaign_ends_with_a_bound_on_the_largest_error(calibration, tmp_path):
@@ -152,13 +194,6 @@ def test_a_campaign_ends_with_a_bound_on_the_largest_error(calibration, tmp_path
 
 
 def test_settings_given_in_python_replace_those_of_the_file(config):
-    given = {"calibration": {"vec": {"order": 2}}}
-    assert (
-        kinacc.read_measurements(config, settings=given).settings["calibration"]["vec"]["order"]
-        == 2
-    )
-
-
-def test_values_for_a_controller_need_no_settings(calibration):
-    values = calibration.values_for("kuka").values
-    assert all(np.isfinite(each.new) for each in values)
+    changed = {"calibration": {"vec": {"order": 2}}}
+    read = kinacc.read_measurements(config, settings=changed)
+    assert read.settings["calibration"]["vec"]["order"] == 2

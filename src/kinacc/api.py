@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
@@ -29,9 +29,10 @@ from kinacc.deployment import verify as verifying
 from kinacc.deployment.export import files as exports
 from kinacc.deployment.export import libraries
 from kinacc.deployment.export import pendant as pendants
+from kinacc.deployment.export.controllers import CONTROLLERS
 from kinacc.deployment.export.source import Source
 from kinacc.deployment.record import Calibration as CalibratedModel
-from kinacc.errors import InputError, Problem
+from kinacc.errors import InputError, Problem, refuse
 from kinacc.geometry import Pose
 from kinacc.kinematics import robot as robots
 from kinacc.kinematics.robot import Robot
@@ -67,12 +68,17 @@ class Measurements:
     """
 
     name: str
-    robot: Robot = field(repr=False)
-    table: pd.DataFrame = field(repr=False)
-    settings: Mapping[str, Any] = field(repr=False)
+    robot: Robot
+    table: pd.DataFrame
+    settings: Mapping[str, Any]
 
     def __len__(self) -> int:
         return len(self.table)
+
+    def __repr__(self) -> str:
+        poses = self.table["pose"].nunique()
+        counts = f"{len(self)} readings, {poses} poses"
+        return f"<Measurements {self.name!r} of {self.robot.name}, {counts}>"
 
     def check(self) -> pd.DataFrame:
         """Findings of the data check, the table ``data_check``.
@@ -102,9 +108,13 @@ class Calibration:
     """
 
     name: str
-    model: CalibratedModel = field(repr=False)
-    tables: Mapping[str, Columns] = field(repr=False)
-    config_hash: str = field(repr=False, default="")
+    model: CalibratedModel
+    tables: Mapping[str, Columns]
+    config_hash: str = ""
+
+    def __repr__(self) -> str:
+        rows = len(self.tables["measurements"]["pose"])
+        return f"<Calibration {self.name!r} of {self.robot.name}, {self.selected}, {rows} readings>"
 
     @property
     def robot(self) -> Robot:
@@ -142,7 +152,7 @@ class Calibration:
         return self.summary.poorly_determined
 
     def table(self, name: str) -> pd.DataFrame:
-        """A table of the results by name."""
+        """A table of the results by name, such as ``residuals``; InputError for others."""
         if name not in self.tables:
             raise InputError(Problem(name, "no such table", ", ".join(self.tables)))
         return pd.DataFrame(self.tables[name])
@@ -168,7 +178,14 @@ class Calibration:
         -------
         Prediction
             Poses (n, ...) in mm, standard deviations, residuals, joints outside the fitted range.
+
+        Raises
+        ------
+        InputError
+            For arrays of another shape, an unknown frame or point.
         """
+        if s is not None:
+            s = _array("s", s, np.shape(np.atleast_2d(q_rad)))
         return predicting.predict(self.model, q_rad, s, frame, point)
 
     def compensate(
@@ -190,7 +207,16 @@ class Calibration:
         -------
         Compensation
             Joints (n, k) and a ``PoseStatus`` for each pose.
+
+        Raises
+        ------
+        InputError
+            For something else than poses, arrays of another shape, an unknown frame or point.
         """
+        _require("poses", poses, Pose)
+        shape = len(poses.position_mm), self.robot.dh.joints
+        near_rad = None if near_rad is None else _array("near_rad", near_rad, shape)
+        s = None if s is None else _array("s", s, shape)
         return compensating.compensate(self.model, poses, near_rad, s, frame, point)
 
     def compensate_program(self, path: str | Path, **options: Any) -> programs.CorrectedProgram:
@@ -214,6 +240,8 @@ class Calibration:
         InputError
             For a file that cannot be read, and frames that are missing.
         """
+        if not Path(path).is_file():
+            raise InputError(Problem(str(path), "no such file", "a robot program"))
         return programs.compensate_program(self.model, path, **options)
 
     def save(self, folder: str | Path) -> Path:
@@ -230,14 +258,22 @@ class Calibration:
         write_together(written | {digests: sums.text_of(contents, {})})
         return folder
 
-    def export(self, folder: str | Path, formats: Sequence[str] = ()) -> list[Path]:
-        """Write the selected model for other programs: yaml, json, csv, urdf, markdown, latex.
+    def export(self, folder: str | Path, formats: str | Sequence[str] = ()) -> list[Path]:
+        """Write the selected model for other programs.
+
+        Parameters
+        ----------
+        folder
+            Folder of the files.
+        formats
+            Some of yaml, json, csv, urdf, markdown and latex; all that fit where not given.
 
         Returns
         -------
         list of Path
             The files written to ``folder``; files of the same names are replaced.
         """
+        formats = [formats] if isinstance(formats, str) else formats
         made = exports.contents(Source(self.model, self.tables), formats)
         return [Path(path) for path in exports.write(made, folder, force=True)]
 
@@ -279,6 +315,8 @@ class Calibration:
         Pendant
             Old and new values, and the mean errors at held-out poses.
         """
+        if controller not in CONTROLLERS:
+            raise InputError(Problem("controller", repr(controller), ", ".join(CONTROLLERS)))
         fitted = "estimated" if self.summary.frames_fitted else "fixed"
         settings = settings or defaults()["calibration"] | {"base_and_tool": fitted}
         return pendants.fit_pendant(self.tables, self.robot, settings, controller, self.name)
@@ -316,7 +354,11 @@ def read_measurements(
         Listing what is wrong with settings or measurements, with file, line and column; or the
         questions that measured files leave open, with their answers.
     """
-    if paths and all(Path(path).suffix in (".yaml", ".yml") for path in paths):
+    if not paths:
+        raise InputError(Problem("paths", "are not given", "a measured file or FILE.yaml"))
+    for path in paths:
+        _require("path", path, (str, Path))
+    if all(Path(path).suffix in (".yaml", ".yml") for path in paths):
         described = read_data_sets(paths).settings
         if settings:
             overrides = {"datasets": dict.fromkeys(described, settings)}
@@ -336,13 +378,14 @@ def read_measurements(
     return Measurements(name, robots.load(settings["robot"]), table, settings)
 
 
-def calibrate(measurements: Measurements) -> Calibration:
+def calibrate(measurements: Measurements | str | Path) -> Calibration:
     """Fit and compare the models of a data set, as ``kinacc calibrate`` does.
 
     Parameters
     ----------
     measurements
-        Measured poses; rows that were taken out of ``table`` are not fitted.
+        Measured poses, or a path that :func:`read_measurements` reads. Rows that were taken out of
+        ``table`` are not fitted.
 
     Returns
     -------
@@ -352,10 +395,14 @@ def calibrate(measurements: Measurements) -> Calibration:
     Raises
     ------
     InputError
-        Listing what the data check found that would spoil a fit.
+        For a file that cannot be read, or listing findings of the data check that would spoil a
+        fit.
     FitError
         Where the data do not determine a fit.
     """
+    if isinstance(measurements, (str, Path)):
+        measurements = read_measurements(measurements)
+    _require("measurements", measurements, Measurements)
     settings = measurements.settings
     tables = _as_written(source.run({}, settings))
     tables["measurements"] = {
@@ -388,6 +435,7 @@ def load_calibration(folder: str | Path, model: str | None = None) -> Calibratio
     InputError
         Naming the tables that are missing or damaged.
     """
+    _require("folder", folder, (str, Path))
     folder = Path(folder)
     tables = results.read_tables(folder, *summarise.PAGE_TABLES, *summarise.ON_PAGE)
     robot, name = results.recorded_robot(folder), folder.resolve().name
@@ -411,9 +459,26 @@ def verify(
     base, tool
         Whether instrument and target stand as they did (``same``) or were set up anew
         (``moved``): what moved is fitted to the readings.
+
+    Returns
+    -------
+    Verification
+        ``verdict`` (pass, fail or undecided) with its reason, and errors (mm, mrad).
+
+    Raises
+    ------
+    InputError
+        For readings of another robot, or other values of ``base`` and ``tool``.
     """
-    given = {verifying.BASE: base, verifying.TOOL: tool}
-    moved = [name for name, setup in given.items() if setup == "moved"]
+    _require("calibration", calibration, Calibration)
+    _require("readings", readings, Measurements)
+    setups = {verifying.BASE: base, verifying.TOOL: tool}
+    refuse(
+        Problem(name, repr(setup), "same, moved")
+        for name, setup in setups.items()
+        if setup not in ("same", "moved")
+    )
+    moved = [name for name, setup in setups.items() if setup == "moved"]
     weight = float(readings.settings["calibration"]["rotation_weight_mm_per_rad"])
     columns = {name: readings.table[name].to_numpy() for name in readings.table}
     return verifying.verify(calibration.tables, calibration.robot, columns, moved, weight)
@@ -429,17 +494,48 @@ def compare(
     first, second
         Two calibrations.
     q_rad
-        (n, k) reported joints at which poses are compared; all measured ones where not given.
+        (n, k) reported joints, rad (mm where a joint slides), at which poses are compared; all
+        measured ones where not given.
+
+    Returns
+    -------
+    Difference
+        ``shifts``, ``poses`` and ``parameters`` as DataFrames, and the readings both share.
+
+    Raises
+    ------
+    InputError
+        For calibrations of different robots, or joints of another shape.
     """
+    _require("first", first, Calibration)
+    _require("second", second, Calibration)
     if q_rad is None:
         names = [f"q{joint + 1}" for joint in range(first.robot.dh.joints)]
         q_rad = np.concatenate(
             [each.table("measurements")[names].to_numpy(dtype=float) for each in (first, second)]
         )
+    first.robot.dh_joints(q_rad)
     measured = first.tables["measurements"], second.tables["measurements"]
     readings = shared_readings.shared(*measured)
     weight = schema.key("calibration.rotation_weight_mm_per_rad")["default"]
     return comparing.compare(first.model, second.model, q_rad, weight, readings)
+
+
+def _require(name: str, value: object, kinds: type | tuple[type, ...]) -> None:
+    """Raise InputError for a value of another type."""
+    if not isinstance(value, kinds):
+        kinds = kinds if isinstance(kinds, tuple) else (kinds,)
+        expected = " or ".join(kind.__name__ for kind in kinds)
+        raise InputError(Problem(name, f"is of type {type(value).__name__}", expected))
+
+
+def _array(name: str, value: object, shape: tuple[int, ...]) -> np.ndarray:
+    """Numbers of a shape, or InputError."""
+    try:
+        return np.broadcast_to(np.asarray(value, dtype=float), shape)
+    except (TypeError, ValueError):
+        received = f"shape {np.shape(value)}"
+        raise InputError(Problem(name, received, f"an array of shape {shape}")) from None
 
 
 def _of_tables(

@@ -70,7 +70,9 @@ class InputError(KinaccError):
 
     def __str__(self) -> str:
         count = len(self.problems)
-        head = self.title or f"{count} problem{'s' if count != 1 else ''} in the input"
+        if count == 1 and not self.title:
+            return str(self.problems[0])
+        head = self.title or f"{count} problems in the input"
         lines = [f"  - {problem}" for problem in self.problems[:_MOST_SHOWN]]
         if count > _MOST_SHOWN:
             lines.append(f"  -{and_more(count - _MOST_SHOWN)}")

@@ -14,7 +14,15 @@ _SMALL_ANGLE_RAD = 1e-4
 
 
 class Pose(NamedTuple):
-    """Frame(s): ``rotation`` (..., 3, 3) and ``position_mm`` (..., 3) in the parent frame."""
+    """Poses of frames in their parent frame.
+
+    Attributes
+    ----------
+    rotation
+        (..., 3, 3) rotation matrices.
+    position_mm
+        (..., 3) origins, mm.
+    """
 
     rotation: np.ndarray
     position_mm: np.ndarray

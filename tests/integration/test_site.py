@@ -54,5 +54,5 @@ def test_every_page_is_there_and_asks_for_nothing_outside(site):
 
 def test_the_names_a_script_imports_stand_there_with_what_they_do(site):
     text = (site / "docs" / "api.html").read_text(encoding="utf-8")
-    assert 'id="kinacc.deployment.predict.predict"' in text
-    assert 'id="kinacc.Calibration"' in text
+    for name in ("deployment.predict.predict", "Calibration.predict", "Campaign.next_pose"):
+        assert f'id="kinacc.{name}"' in text

@@ -106,6 +106,10 @@ class Campaign:
         self.folder = Path(folder)
         self._load()
 
+    def __repr__(self) -> str:
+        readings, candidates = self.status().readings, len(self.plan.points.label)
+        return f"<Campaign {str(self.folder)!r}, {candidates} candidates, {readings} readings>"
+
     @classmethod
     def start(
         cls, folder: Path | str, calibration: CalibratedRobot, candidates: ArrayLike,

@@ -88,8 +88,7 @@ def load(
                 break
     if problems:
         problems = sorted(dict.fromkeys(problems), key=_line)[:_MOST_PROBLEMS]
-        count = len(problems)
-        title = f"{count} problem{'s' if count > 1 else ''} in the configuration"
+        title = f"{len(problems)} problems in the configuration" if len(problems) > 1 else ""
         raise InputError(problems, title)
     return resolved
 

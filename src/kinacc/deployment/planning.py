@@ -108,9 +108,25 @@ class PosePlan:
 def plan_poses(
     robot: Robot, q_rad: np.ndarray, experiment: Experiment, count: int, start_rad: np.ndarray
 ) -> PosePlan:
-    """Choose ``count`` of the candidates ``q_rad`` (n, k), reported joints, from ``start_rad`` on.
+    """Choose poses that determine a calibration, in a short order.
 
-    Raises InputError where so many poses cannot be chosen, or no candidate shows anything.
+    Parameters
+    ----------
+    robot
+        The nominal robot.
+    q_rad
+        (n, k) candidates: joints as the controller reports them, rad (mm where a joint slides).
+    experiment
+        Targets, sessions and parameters of the calibration that is planned.
+    count
+        Number of poses to choose.
+    start_rad
+        (k,) joints from which the robot starts.
+
+    Raises
+    ------
+    InputError
+        Where so many poses cannot be chosen, or the candidates determine no parameter.
     """
     shown = information(robot, q_rad, experiment)
     if shown.rank == 0:

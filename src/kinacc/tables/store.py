@@ -40,9 +40,23 @@ Read = TypeVar("Read")
 
 
 def read_table(path: Path | str) -> pd.DataFrame:
-    """The table in a file; null is NaN, and numbers of a column with nulls are float64.
+    """Read a table of results.
 
-    Raises InputError where the file is absent, damaged, no Parquet or too large.
+    Parameters
+    ----------
+    path
+        A Parquet file, such as ``results/tracker/residuals.parquet``.
+
+    Returns
+    -------
+    DataFrame
+        Null is NaN, and numbers of a column with nulls are float64. Units and meanings of the
+        columns: ``kinacc show FILE --describe``.
+
+    Raises
+    ------
+    InputError
+        Where the file is absent, damaged, no Parquet or too large.
     """
     return read_arrow(path).to_pandas()
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from kinacc.errors import InputError, Problem
 from kinacc.geometry import IDENTITY, Pose, compose
 from kinacc.kinematics import dh as _dh
 from kinacc.kinematics.dh import DHModel
@@ -41,7 +42,18 @@ class Robot:
 
     @classmethod
     def from_name(cls, name: str | Path) -> Robot:
-        """A shipped robot by its name, or the robot of a robot file. Raises InputError."""
+        """Load a shipped robot by its name, or a robot file (YAML, URDF) by its path.
+
+        Raises
+        ------
+        InputError
+            For an unknown name, with the nearest; for a file, with all its problems.
+
+        Examples
+        --------
+        >>> Robot.from_name("ur10")
+        <Robot 'ur10', 6 joints>
+        """
         from kinacc.kinematics.robot.description import load
 
         return load(name)
@@ -50,18 +62,66 @@ class Robot:
     def from_urdf(
         cls, path: str | Path, base_link: str | None = None, tip_link: str | None = None
     ) -> Robot:
-        """The arm of a URDF between two links, its root and end where not given. InputError."""
+        """Load the arm of a URDF file.
+
+        Parameters
+        ----------
+        path
+            The URDF file.
+        base_link, tip_link
+            First and last link of the arm; the root and the end of the tree where not given.
+
+        Raises
+        ------
+        InputError
+            For a file that describes no serial arm of revolute and sliding joints.
+        """
         from kinacc.kinematics.robot import urdf
 
         return urdf.load(path, base_link, tip_link)
 
+    def __repr__(self) -> str:
+        return f"<Robot {self.name!r}, {self.dh.joints} joints>"
+
     def forward(self, q_rad: np.ndarray) -> Pose:
-        """Flange poses (n, ...), mm, in the base frame at reported joints (n, k), nominal."""
+        """Poses of the flange by the nominal model.
+
+        Parameters
+        ----------
+        q_rad
+            (n, k) or (k,) joints as the controller reports them, rad (mm where a joint slides).
+
+        Returns
+        -------
+        Pose
+            (n, ...) poses of the flange in the robot's base frame, mm.
+
+        Raises
+        ------
+        InputError
+            For joints of another shape.
+
+        Examples
+        --------
+        >>> Robot.from_name("ur10").forward([0, 0, 0, 0, 0, 0]).position_mm
+        array([[-1184.3  ,  -256.141,    11.6  ]])
+        """
         return forward(self, q_rad)
 
     def dh_joints(self, reported: np.ndarray) -> np.ndarray:
-        """DH joints (..., k) of reported joints (..., k); ``limits.reported_joints`` goes back."""
-        return np.asarray(reported, dtype=float) @ self.joint_map.T
+        """DH joints (..., k) of reported joints (..., k), rad (mm where a joint slides).
+
+        ``limits.reported_joints`` goes back. InputError for joints of another shape.
+        """
+        try:
+            joints = np.asarray(reported, dtype=float)
+        except (TypeError, ValueError):
+            joints = np.zeros(())
+        if joints.shape[-1:] != (self.dh.joints,):
+            received = f"shape {joints.shape}" if joints.ndim else "no array of numbers"
+            allowed = f"an array (n, {self.dh.joints}) for the joints of {self.name}"
+            raise InputError(Problem("joints", received, allowed))
+        return joints @ self.joint_map.T
 
     def dh_box(self, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Ends (k,), (k,) of the DH joints over a box of reported joints (k,), (k,)."""
