@@ -3,6 +3,8 @@
 # make public-robots  every measured arm in examples/data calibrated blind, and the page about it
 # make check       lint, types and the fast tests, in under a minute; for while one works
 # make test        everything a change has to pass
+# make test-all    also runs on a Slurm, pages in a browser and research; with Debian's slurm-wlm, chromium
+#                  and chromium-driver
 # make size        AST nodes and lines of every room, words of the docs, beside their budgets
 # make bench       times beside other libraries, and the page about them: ten minutes
 # make docs        the pages as a site, docs/_build/index.html; make docs-links asks the network for links
@@ -14,7 +16,7 @@
 # Needs make, git and Python 3.11, 3.12 or 3.13 with its venv module (PYTHON=... to choose one).
 # Each set-up step leaves a stamp named after the content it depends on: finished steps cost nothing.
 
-.PHONY: reproduce robustness public-robots lint check test size bench docs docs-links \
+.PHONY: reproduce robustness public-robots lint check test test-all size bench docs docs-links \
   audit sbom lock clean distclean
 CORES = 2
 PY = .venv/bin/python
@@ -53,11 +55,14 @@ lint: $(KINACC) $(TOOLS)
 	$(PY) -m mypy
 
 check: lint
-	$(PYTEST) -m "not slow"
+	$(PYTEST) -m "not slow and not night"
 
-test: lint $(CLUSTER)
+test: lint
 	$(PY) -m snakefmt --check Snakefile workflow
 	$(PY) -m snakemake --lint
+	$(PYTEST) -m "not night"
+
+test-all: lint $(CLUSTER)
 	$(PYTEST)
 
 # Needs no package: the standard library counts.

@@ -87,6 +87,8 @@ SLOW = (
     "workflow/test_robustness.py",
 )
 _SLOW = tuple(TESTS / name for name in SLOW)
+# For a night (`make test-all`): runs on a cluster, pages in a browser, research.
+NIGHT = tuple(TESTS / name for name in ("report/test_in_a_browser.py", "research", "slurm"))
 
 settings.register_profile("repeatable", derandomize=True, deadline=None, database=None)
 settings.load_profile("repeatable")
@@ -100,17 +102,22 @@ def place(path: Path) -> int:
 
 
 def pytest_ignore_collect(collection_path, config):
-    """Do not even read slow files where their tests are left out."""
-    if config.option.markexpr == "not slow" and place(collection_path) < len(SLOW):
+    """Do not even read files whose tests are left out."""
+    quick = config.option.markexpr == "not slow and not night"
+    if quick and place(collection_path) < len(SLOW):
+        return True
+    if "not night" in config.option.markexpr and any(map(collection_path.is_relative_to, NIGHT)):
         return True
     return None
 
 
 def pytest_collection_modifyitems(items):
-    """Mark the tests of slow files, so that ``-m "not slow"`` leaves them out; longest first."""
+    """Mark the tests of slow files and of the night; longest first."""
     for item in items:
         if place(item.path) < len(SLOW):
             item.add_marker(pytest.mark.slow)
+        if any(map(item.path.is_relative_to, NIGHT)):
+            item.add_marker(pytest.mark.night)
     items.sort(key=lambda item: place(item.path))
 
 
