@@ -19,9 +19,9 @@ class Pose(NamedTuple):
     Attributes
     ----------
     rotation
-        (..., 3, 3) rotation matrices.
+        (n, 3, 3) rotation matrices; other leading axes are allowed.
     position_mm
-        (..., 3) origins, mm.
+        (n, 3) origins, mm.
     """
 
     rotation: np.ndarray

@@ -221,7 +221,7 @@ def test_a_pose_read_ten_times_is_shown_once_and_its_columns_are_named(tmp_path)
 def test_points_a_controller_calculated_are_told_so_though_they_are_rounded(tmp_path):
     text = table([*joints("q{}_deg"), *XYZ], IT.q, np.round(IT.controller, 2))
     _, told = described(written(tmp_path, m_csv=text))
-    assert any("closer than an instrument measures" in words for words in told["remarks"])
+    assert any("closer than instruments measure" in words for words in told["remarks"])
     _, told = described(written(tmp_path, m_csv=table([*joints("q{}_deg"), *XYZ], IT.q, IT.point)))
     assert not any("closer than" in words for words in told["remarks"])
 

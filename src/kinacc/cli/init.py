@@ -3,26 +3,80 @@
 from __future__ import annotations
 
 import shlex
-from contextlib import suppress
-from dataclasses import replace
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 import click
+import numpy as np
 
+from kinacc.checks.described import corrected, coupling_of
+from kinacc.checks.report import Report
+from kinacc.checks.which_robot import fitting
 from kinacc.cli import choice
 from kinacc.cli.choice import option
 from kinacc.cli.file_options import file_options
-from kinacc.cli.output import Output, answers
-
-if TYPE_CHECKING:
-    from kinacc.checks.findings import Finding
-    from kinacc.checks.report import Report
-    from kinacc.kinematics.robot import Robot
-    from kinacc.measurements.intake.guess import Guess
-    from kinacc.measurements.reader import MeasuredFile
+from kinacc.cli.first_poses import first_poses, in_words, poses_without_robot
+from kinacc.cli.init_questions import confirmed, guessed, unanswered
+from kinacc.cli.init_remarks import remarks_on
+from kinacc.cli.output import Output, answers, require_writable
+from kinacc.config.names import LONGEST
+from kinacc.errors import InputError, Problem
+from kinacc.kinematics import robot as robots
+from kinacc.measurements.intake import write
+from kinacc.measurements.intake.groups import listed
+from kinacc.measurements.intake.guess import Guess
+from kinacc.progress import reporting
+from kinacc.tables.atomic import replacing
 
 _FILE = "measurements.file"
+_FOLDS_UNKNOWN = 60
+
+
+@dataclass(frozen=True)
+class Description:
+    """What ``kinacc init`` has written.
+
+    Attributes
+    ----------
+    written
+        The robot file, where one was needed, and the data set.
+    robot, robot_because
+        The robot, None for a form to fill in, and how it was chosen.
+    joints, targets
+        Number of joints and names of the targets.
+    file
+        The section ``measurements.file``.
+    assumed
+        What the file does not state, by setting.
+    told
+        Facts on how the file was read.
+    unused_columns
+        Columns that are not read, with the reason.
+    suspicions
+        Findings of the data check.
+    remarks
+        Limits of the readings that contradict nothing.
+    first_poses
+        The first poses as understood.
+    next
+        The commands that follow.
+    """
+
+    written: list[str]
+    robot: str | None
+    robot_because: str
+    joints: int
+    targets: list[str]
+    file: dict[str, Any]
+    assumed: dict[str, str]
+    told: tuple[str, ...]
+    unused_columns: dict[str, str]
+    suspicions: list[str]
+    remarks: list[str]
+    first_poses: list[dict]
+    next: list[str]
 
 
 @click.command("init")
@@ -84,148 +138,114 @@ def init(measurement_files: tuple[str, ...], out: Output, **options) -> None:
       kinacc init log.csv --take actual_q_0 --take X
       kinacc init joints.csv points.csv --join Name=Point
     """
-    from kinacc.checks.described import coupling_of
-    from kinacc.cli.first_poses import first_poses, poses_without_robot
-    from kinacc.cli.init_questions import asked, guessed
-    from kinacc.cli.init_remarks import remarks_on, rounded
-    from kinacc.errors import InputError
-    from kinacc.kinematics import robot as robots
-    from kinacc.measurements.intake.write import plain_name
-    from kinacc.tables.atomic import replacing
-
     ask = not (options["yes"] or out.as_json)
-    answers = {key: value for key, value in options.items() if value not in (None, ())}
-    guess = guessed(measurement_files, answers, ask)
-    name = options["name"] or plain_name(guess.table.path)
-    folder = Path(options["folder"])
-    paths = folder / f"{name}.yaml", folder / f"{name}.robot.yaml"
-    _refuse(paths[: 1 if _is_robot_file(options["robot"]) else 2], name, out.force)
-    first_shown: list[dict] = []
-    if ask:
-        if guess.assumed:
-            with suppress(InputError):  # joints that slide are not to be read without their robot
-                first_shown = poses_without_robot(guess)
-        _show(first_shown, out)
-        if changed := asked(guess, options["robot"]):
-            guess = guessed(measurement_files, answers | changed, ask)
-    robot, chosen = _robot(guess, options["robot"], ask)
-    robot_path, text = _robot_file(robot, guess.joints, name, paths[1])
+    stated = {key: value for key, value in options.items() if value not in (None, ())}
+    guess = guessed(measurement_files, stated, ask)
+    name = options["name"] or write.plain_name(guess.table.path)
+    if name != write.plain_name(f"{name}.csv"):
+        raise InputError(Problem("--name", name, f"at most {LONGEST} letters, digits, _ and -"))
+    dataset = Path(options["folder"], f"{name}.yaml")
+    robot_file = dataset.with_name(f"{name}.robot.yaml")
+    given = options["robot"]
+    stays = given is not None and Path(given).suffix in (".yaml", ".yml") and Path(given).is_file()
+    require_writable([dataset] if stays else [dataset, robot_file], out.force)
+    if ask and (changed := confirmed(guess, given)):
+        guess = guessed(measurement_files, stated | changed, ask)
+    robot, chosen = _robot(guess, given, ask)
+    text = _robot_text(robot, guess.joints, name, robot_file.parent)
+    texts = {} if text is None else {robot_file: text}
     report, remarks = None, []
-    if robot is not None:
-        arm = robots.load(robot)
-        guess, report, reading = _tried(guess, arm, name)
-        if text is not None and (coupling := coupling_of(report)) is not None:
-            text, arm, guess = _coupled(text, arm, guess, coupling)
-            guess, report, reading = _tried(guess, arm, name)
-        shown = first_poses(reading, arm.dh.prismatic)
-        remarks = [*remarks_on(guess, report), *rounded(guess, reading, arm)]
-    else:
-        shown = poses_without_robot(guess)
-    if shown != first_shown:  # answers, or the readings, show more than the names did
-        _show(shown, out)
-    texts = {} if text is None else {paths[1]: text}
-    texts[paths[0]] = _dataset(paths[0], name, robot_path, guess, report, chosen)
-    with replacing(list(texts)) as parts:
-        for part, text in zip(parts, texts.values(), strict=True):
-            part.write_text(text, encoding="utf-8")
-    _tell(out, guess, robot or robot_path, chosen, report, list(texts), paths[0], shown, remarks)
-
-
-def _show(shown: list[dict], out: Output) -> None:
-    """Print the first poses, if any, before anything is written."""
-    from kinacc.cli.first_poses import in_words
-
-    if shown and not out.as_json:
-        click.echo("\n".join(in_words(shown)))
-
-
-_FOLDS_UNKNOWN = 60
-
-
-def _is_robot_file(robot: str | None) -> bool:
-    """Whether a robot file was given, which is used where it stands and not written."""
-    return robot is not None and Path(robot).suffix in (".yaml", ".yml") and Path(robot).is_file()
-
-
-def _robot_file(robot: str | None, joints: int, name: str, path: Path) -> tuple[str, str | None]:
-    """What the data set calls its robot, and the text of the robot file to write, if any."""
-    from kinacc.kinematics import robot as robots
-    from kinacc.measurements.intake import write
-
     if robot is None:
-        return str(path), write.template_text(f"{name}_robot", joints)
-    if robot in robots.shipped():
-        return str(path), write.shipped_text(robot)
-    if Path(robot).suffix.lower() in (".urdf", ".xml", ".xacro"):
-        return str(path), write.urdf_text(robots.load(robot).name, Path(robot), path.parent)
-    return robot, None
+        poses = poses_without_robot(guess)
+    else:
+        arm = robots.load(robot)
+        with reporting(f"init {name}", bar=True) as progress:
+            guess, report, reading = corrected(guess, arm, name, progress)
+            if texts and (coupling := coupling_of(report)) is not None:
+                matrix = coupling.values["joint_map"]
+                why = f"found by trying it on the readings: {coupling.what}"
+                texts = {
+                    robot_file: write.coupled_text(text, matrix, f"Joints are coupled, {why}.")
+                }
+                note = f"joint_map of the robot file that is written couples joints, {why}"
+                arm = replace(arm, joint_map=np.array(matrix, dtype=float))
+                guess = replace(guess, notes=(*guess.notes, note))
+                guess, report, reading = corrected(guess, arm, name, progress)
+        poses = first_poses(reading, arm.dh.prismatic)
+        remarks = list(remarks_on(guess, report, reading, arm))
+    if not out.as_json:
+        click.echo("\n".join(in_words(poses)))
+    texts[dataset] = _dataset(
+        dataset, name, str(robot_file) if text else robot, guess, report, chosen
+    )
+    with replacing(list(texts)) as parts:
+        for part, content in zip(parts, texts.values(), strict=True):
+            part.write_text(content, encoding="utf-8")
+    result = Description(
+        [str(path) for path in texts],
+        robot,
+        chosen,
+        guess.joints,
+        list(guess.columns.targets),
+        guess.section,
+        guess.assumed,
+        guess.notes,
+        guess.unused(),
+        [finding.kind for finding in report.suspicions] if report else [],
+        remarks,
+        poses,
+        [shlex.join(["kinacc", command, str(dataset)]) for command in ("check-data", "calibrate")],
+    )
+    out.say(result, "\n".join(_lines(result, guess, report)))
 
 
-def _refuse(paths, name: str, force: bool) -> None:
-    """Raise where the name is no name, or a file is there that must not be replaced."""
-    from kinacc.config.names import LONGEST
-    from kinacc.errors import Problem, refuse
-    from kinacc.measurements.intake.write import plain_name
-
-    problems = []
-    if name != plain_name(f"{name}.csv"):
-        problems.append(
-            Problem("--name", repr(name), f"at most {LONGEST} letters, digits, _ and -")
-        )
-    if not force:
-        problems += [
-            Problem(str(path), "is there already", fix="give --force to replace it, or --name")
-            for path in paths
-            if path.exists()
-        ]
-    refuse(problems)
-
-
-def _robot(guess: Guess, given: str | None, ask: bool) -> tuple[str | None, str]:
-    """The robot as given, found by fitting, or as answered; None for a template. And why."""
-    from kinacc.checks.which_robot import fitting
-    from kinacc.cli.init_questions import refuse_unanswered
-    from kinacc.progress import reporting
-
-    if given is not None:
-        return given, "as given"
+def _robot(guess: Guess, stated: str | None, ask: bool) -> tuple[str | None, str]:
+    """The robot as stated, found by fitting, or as answered; None for a template. And why."""
+    if stated is not None:
+        return stated, "as given"
     with reporting("init", bar=True) as progress:
-        found = fitting(guess, progress)
+        fit = fitting(guess, progress)
     if ask:
         question = "Robot (name in docs/robots.md, robot or URDF file, or 'new' for a form)"
         try:
-            answer = click.prompt(question, default=found[0] if found else "new")
+            answer = click.prompt(question, default=fit[0] if fit else "new")
         except click.Abort:
-            refuse_unanswered(guess, {}, None)
+            raise unanswered(guess, [], None) from None
         return (None, "a template to fill in") if answer == "new" else (answer, "as answered")
-    if not found:
+    if not fit:
         return None, "none of the shipped robots fits; a template to fill in"
-    if len(found) > 1:
-        return found[0], f"fits the readings, as does {', '.join(found[1:])} (--robot)"
-    return found[0], "the only shipped robot that fits the readings"
+    if len(fit) > 1:
+        return fit[0], f"fits the readings, as does {', '.join(fit[1:])} (--robot)"
+    return fit[0], "the only shipped robot that fits the readings"
 
 
-def _tried(guess: Guess, arm: Robot, name: str) -> tuple[Guess, Report, MeasuredFile]:
-    """The guess corrected by the readings, the check of them, and what was read."""
-    from kinacc.checks.described import corrected
-    from kinacc.progress import reporting
+def _robot_text(robot: str | None, joints: int, name: str, folder: Path) -> str | None:
+    """The text of the robot file to write; None where a robot file is used where it stands."""
+    if robot is None:
+        return write.template_text(f"{name}_robot", joints)
+    if robot in robots.shipped():
+        return write.shipped_text(robot)
+    if Path(robot).suffix.lower() in (".urdf", ".xml", ".xacro"):
+        return write.urdf_text(robots.load(robot).name, Path(robot), folder)
+    return None
 
-    with reporting(f"init {name}", bar=True) as progress:
-        return corrected(guess, arm, name, progress)
 
-
-def _coupled(text: str, arm: Robot, guess: Guess, coupling: Finding) -> tuple:
-    """The robot file's text, the arm and the guess, with the joint_map that the readings show."""
-    import numpy as np
-
-    from kinacc.measurements.intake.write import coupled_text
-
-    matrix = coupling.values["joint_map"]
-    why = f"found by trying it on the readings: {coupling.what}"
-    note = f"joint_map of the robot file that is written couples joints, {why}"
-    text = coupled_text(text, matrix, f"Joints are coupled, {why}.")
-    arm = replace(arm, joint_map=np.array(matrix, dtype=float))
-    return text, arm, replace(guess, notes=(*guess.notes, note))
+def _dataset(
+    path: Path, name: str, robot: str, guess: Guess, report: Report | None, chosen: str
+) -> str:
+    """Text of the data set, which names files from where it stands."""
+    how = _how(report).capitalize()
+    note = [f"Written by kinacc init. Robot: {chosen}."]
+    note += [f"{how}: {text}." for text in guess.assumed.values()]
+    note += [f"Not read: {names} ({why})." for why, names in _unread(guess.unused()) if why]
+    check = shlex.join(["kinacc", "check-data", str(path)])
+    note.append(f"Everything not given here is as in config.yaml.\n    {check}")
+    poses = int(report.facts["poses"]) if report else _FOLDS_UNKNOWN
+    files = {"path": write.seen_from(path.parent, guess.section["path"])}
+    if joints := guess.section.get("joints"):
+        files["joints"] = joints | {"path": write.seen_from(path.parent, joints["path"])}
+    robot = write.seen_from(path.parent, robot)
+    return write.dataset_text(name, robot, guess.but(files), poses, "\n".join(note))
 
 
 def _how(report: Report | None) -> str:
@@ -233,81 +253,37 @@ def _how(report: Report | None) -> str:
     return "assumed" if report is None or report.stopping else "assumed, and the readings agree"
 
 
-def _dataset(
-    path: Path, name: str, robot: str, guess: Guess, report: Report | None, chosen: str
-) -> str:
-    """Text of the data set, which names files from where it stands."""
-    from kinacc.kinematics.robot import shipped
-    from kinacc.measurements.intake.write import dataset_text, seen_from
-
-    note = [f"Written by kinacc init. Robot: {chosen}."]
-    note += [f"{_how(report).capitalize()}: {text}." for text in guess.assumed.values()]
-    note += [f"Not read: {names} ({why})." for why, names in _unread(guess).items() if why]
-    check = shlex.join(["kinacc", "check-data", str(path)])
-    note.append(f"Everything not given here is as in config.yaml.\n    {check}")
-    configurations = _FOLDS_UNKNOWN if report is None else int(report.facts["poses"])
-    robot = robot if robot in shipped() else seen_from(path.parent, robot)
-    files = {"path": seen_from(path.parent, guess.section["path"])}
-    if joints := guess.section.get("joints"):
-        files["joints"] = joints | {"path": seen_from(path.parent, joints["path"])}
-    return dataset_text(name, robot, guess.but(files), configurations, "\n".join(note))
+def _unread(unused: dict[str, str]) -> Iterator[tuple[str, str]]:
+    """Reasons, each with the columns that are not read for it."""
+    for why in dict.fromkeys(unused.values()):
+        yield why, ", ".join(name for name in unused if unused[name] == why)
 
 
-def _unread(guess: Guess) -> dict[str, str]:
-    """Columns that are not read, by the reason."""
-    unused = guess.unused()
-    reasons = dict.fromkeys(unused.values())
-    return {why: ", ".join(n for n in unused if unused[n] == why) for why in reasons}
-
-
-def _tell(
-    out: Output, guess, robot, chosen, report, written, dataset: Path, shown=(), remarks=()
-) -> None:
-    """Print the answer."""
-    from kinacc.measurements.intake.groups import listed
-
-    commands = [shlex.join(["kinacc", name, str(dataset)]) for name in ("check-data", "calibrate")]
-    columns, section, unused = guess.columns, guess.section, guess.unused()
-    kinds = [] if report is None else [finding.kind for finding in report.suspicions]
-    answer = {
-        "written": [str(path) for path in written],
-        "robot": robot,
-        "robot_because": chosen,
-        "joints": guess.joints,
-        "targets": list(columns.targets),
-        "file": section,
-        "assumed": guess.assumed,
-        "told": list(guess.notes),
-        "unused_columns": unused,
-        "suspicions": kinds,
-        "remarks": list(remarks),
-        "first_poses": list(shown),
-        "next": commands,
-    }
-    turn = section["orientation"]
-    kind = f"Euler angles {turn['convention']}" if turn["kind"] == "euler" else turn["kind"]
-    unit = f", in {turn['unit']}" if turn["kind"] in ("euler", "rotation_vector") else ""
+def _lines(result: Description, guess: Guess, report: Report | None) -> Iterator[str]:
+    """The description as it is printed."""
+    columns, section, turn = guess.columns, guess.section, guess.section["orientation"]
+    yield from (f"file: {text}" for text in result.told)
+    yield f"robot: {result.robot or result.written[0]} ({result.robot_because})"
+    names = listed([name.column for name in columns.joints])
+    yield f"joints: {result.joints}, in {section['joint_unit']}: {names}"
     targets = [f"{name} ({listed([target[axis].column for axis in 'xyz'])})"
                for name, target in columns.targets.items()]  # fmt: skip
-    joints = listed([name.column for name in columns.joints])
-    lines = [
-        *(f"file: {text}" for text in guess.notes),
-        f"robot: {robot} ({chosen})",
-        f"joints: {guess.joints}, in {section['joint_unit']}: {joints}",
-        f"targets, in {section['length_unit']}: {', '.join(targets)}",
-        f"orientation: {kind}{unit}",
-    ]
+    yield f"targets, in {section['length_unit']}: {', '.join(targets)}"
+    kind = f"Euler angles {turn['convention']}" if turn["kind"] == "euler" else turn["kind"]
+    unit = f", in {turn['unit']}" if turn["kind"] in ("euler", "rotation_vector") else ""
+    yield f"orientation: {kind}{unit}"
     also = [f"{quantity} ({name.column})" for quantity, name in columns.single.items()]
-    also += [f"commanded joints ({listed([n.column for n in columns.commanded])})"] * bool(
-        columns.commanded
-    )
-    lines += [f"also read: {', '.join(also)}"] if also else []
-    lines += [f"{_how(report)}: {text}" for text in guess.assumed.values()]
-    lines += [f"columns not used: {names}" + (f" ({why})" if why else "")
-              for why, names in _unread(guess).items()]  # fmt: skip
-    if kinds:
-        lines.append(f"suspicions: {', '.join(dict.fromkeys(kinds))} (details: check-data)")
-    lines += [f"note: {text}" for text in remarks]
-    lines += [f"written: {path}" for path in written]
-    lines += ["fill in the robot file first"] if report is None else []
-    out.say(answer, "\n".join([*lines, "next:", *(f"  {command}" for command in commands)]))
+    if columns.commanded:
+        also.append(f"commanded joints ({listed([name.column for name in columns.commanded])})")
+    if also:
+        yield f"also read: {', '.join(also)}"
+    yield from (f"{_how(report)}: {text}" for text in result.assumed.values())
+    for why, unread in _unread(result.unused_columns):
+        yield f"columns not used: {unread}" + (f" ({why})" if why else "")
+    if result.suspicions:
+        yield f"suspicions: {', '.join(dict.fromkeys(result.suspicions))} (details: check-data)"
+    yield from (f"note: {text}" for text in result.remarks)
+    yield from (f"written: {path}" for path in result.written)
+    if report is None:
+        yield "fill in the robot file first"
+    yield from ("next:", *(f"  {command}" for command in result.next))

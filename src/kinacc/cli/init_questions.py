@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any, NoReturn
+import re
+from collections.abc import Sequence
+from typing import Any
 
 import click
 
@@ -16,10 +17,7 @@ _FREE = ("join", "clock_offset", "pulses_per_deg", "no_reading")  # answers that
 
 
 def guessed(paths: Sequence[str], answers: dict[str, Any], ask: bool) -> Guess:
-    """The guess without open questions: answered by options, or by a person into ``answers``.
-
-    Two files are joints and points of the same poses.
-    """
+    """The guess without open questions: answered by options, or by a person into ``answers``."""
     if len(paths) > 2:
         message, allowed = f"{len(paths)} files", "one file, or one of joints and one of points"
         raise InputError(Problem(" ".join(paths), message, allowed))
@@ -29,50 +27,46 @@ def guessed(paths: Sequence[str], answers: dict[str, Any], ask: bool) -> Guess:
         except Undecided as error:
             if not ask:
                 raise
-            _answer(error.choices[0], answers, error)
+            try:
+                answers |= _answer(error.choices[0], answers.get("take", ()))
+            except click.Abort:
+                raise error from None
 
 
-def _answer(choice: Choice, answers: dict[str, Any], error: Undecided) -> None:
-    """Ask one question. Raises ``error`` where nobody is there to answer."""
+def _answer(choice: Choice, taken: Sequence[str]) -> dict[str, Any]:
+    """Ask one question. Raises Abort where nobody is there to answer, or takes none."""
+    values, by_number = [*choice.answers], choice.option == TAKE
     click.echo(f"{choice.about[0].upper()}{choice.about[1:]}.")
-    is_take, values = choice.option == TAKE, [*choice.answers]
     for number, (value, text) in enumerate(choice.answers.items(), 1):
-        click.echo(f"  {number if is_take else value}: {text}")
-    while True:
-        hint = "Number, 0 for none" + (", as 1,2 for several" if choice.several else "")
-        is_free = is_take or choice.key in _FREE
-        try:
-            answer = click.prompt(
-                hint if is_take else "Answer", type=str if is_free else click.Choice(values),
-                show_choices=False,
-            )  # fmt: skip
-        except click.Abort:
-            raise error from None
-        if not is_take:
-            answers[choice.key] = answer
-            return
-        numbers = [int(word) for word in answer.replace(",", " ").split() if word.isdecimal()]
-        if numbers == [0] and choice.without:
-            answers["orientation"] = "none"
-            return
+        click.echo(f"  {number if by_number else value}: {text}")
+
+    def read(text: str) -> dict[str, Any]:
+        if not by_number:
+            if choice.key not in _FREE and text not in values:
+                raise click.BadParameter(", ".join(values))
+            return {choice.key: text}
+        numbers = [int(number) for number in re.findall(r"\d+", text)]
         if numbers == [0]:
-            raise error
-        if (
-            numbers
-            and all(1 <= n <= len(values) for n in numbers)
-            and (choice.several or len(numbers) == 1)
-        ):
-            answers["take"] = [*answers.get("take", ()), *(values[n - 1] for n in numbers)]
-            return
+            if not choice.without:
+                raise click.Abort
+            return {"orientation": "none"}
+        if not numbers or not 1 <= min(numbers) <= max(numbers) <= len(values):
+            raise click.BadParameter(f"1 to {len(values)}, or 0 for none")
+        if len(numbers) > 1 and not choice.several:
+            raise click.BadParameter("one number")
+        return {"take": [*taken, *(values[number - 1] for number in numbers)]}
+
+    hint = "Number, 0 for none" + (", as 1,2 for several" if choice.several else "")
+    return click.prompt(hint if by_number else "Answer", value_proc=read)
 
 
-def asked(guess: Guess, robot: str | None) -> dict[str, str]:
+def confirmed(guess: Guess, robot: str | None) -> dict[str, str]:
     """A person's answers to what was assumed, where they differ from the guess.
 
-    ``robot``: the one given, which needs no question. Raises InputError where nobody answers.
+    Raises InputError where nobody answers.
     """
     section, turn = guess.section, guess.section["orientation"]
-    guessed_ = section | {
+    defaults = section | {
         "angle_unit": turn["unit"],
         "orientation": turn["convention"],
         "order": "quaternion",
@@ -82,27 +76,24 @@ def asked(guess: Guess, robot: str | None) -> dict[str, str]:
     for setting, text in guess.assumed.items():
         option, allowed = OPTIONS[setting]
         click.echo(f"Not stated in the file: {text}.")
+        key = option[2:].replace("-", "_")
         try:
             answer = click.prompt(
-                f"{option[2:].replace('-', ' ').capitalize()}", type=click.Choice(allowed),
-                default=guessed_[setting], show_choices=len(allowed) < 5,
+                key.replace("_", " ").capitalize(), type=click.Choice(allowed),
+                default=defaults[setting], show_choices=len(allowed) < 5,
             )  # fmt: skip
         except click.Abort:
-            refuse_unanswered(guess, guess.assumed, robot)
-        if answer != guessed_[setting]:
-            answers[option[2:].replace("-", "_")] = answer
+            raise unanswered(guess, [OPTIONS[name][0] for name in guess.assumed], robot) from None
+        if answer != defaults[setting]:
+            answers[key] = answer
     return answers
 
 
-def refuse_unanswered(guess: Guess, assumed: Mapping[str, str], robot: str | None) -> NoReturn:
-    """Raise InputError naming the options that answer what nobody answered."""
+def unanswered(guess: Guess, options: Sequence[str], robot: str | None) -> InputError:
+    """The error naming the options that answer what nobody answered."""
     path = str(guess.section["path"])
-    problems = [
-        Problem(path, f"not stated; the guess: {text}",
-                fix=f"give {OPTIONS[setting][0]}, or --yes to take the guess")
-        for setting, text in assumed.items()
-    ]  # fmt: skip
-    if robot is None:
-        fix = "give --robot, or --yes to take the one that fits"
-        problems.append(Problem(path, "does not state which robot was measured", fix=fix))
-    raise InputError(problems, "The questions were not answered, and nothing was written")
+    options = [*options, *([] if robot else ["--robot"])]
+    return InputError(
+        [Problem(path, "not stated", fix=f"give {option}, or --yes") for option in options],
+        "The questions were not answered, and nothing was written",
+    )
