@@ -19,6 +19,7 @@ from kinacc.errors import InputError
 from kinacc.kinematics import robot
 from kinacc.measurements.intake import guess
 from kinacc.measurements.reader import read
+from kinacc.measurements.rows import read_rows
 
 ARM = robot.load("ur10")
 GIGABYTE = 1 << 30
@@ -94,8 +95,8 @@ def look(*paths: Path) -> None:
         lambda: read(guess.look(paths if len(paths) > 1 else paths[0]).section, ARM, strict=False),
         lambda: read({"path": str(paths[0])}, ARM),
         *(
-            lambda need=need: guess.under_our_names(guess.look(paths[0], {}, need))
-            for need in ("joints", "poses")
+            lambda need=need: read_rows(paths[0], ARM.dh.prismatic, need)
+            for need in ("joints", "points", "poses")
         ),
     ):
         with suppress(InputError):

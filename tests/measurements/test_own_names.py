@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from kinacc.cli import rows
 from kinacc.errors import InputError
 from kinacc.kinematics import robot
 from kinacc.measurements.intake.choices import Undecided
+from kinacc.measurements.rows import read_rows
 
 ARM = robot.load("ur10")
+SLIDES = ARM.dh.prismatic
 Q_DEG = np.random.default_rng(2).uniform(-120, 120, (6, 6)).round(3)
 POSE = robot.forward(ARM, np.deg2rad(Q_DEG))
 TURNED = Rotation.from_matrix(POSE.rotation)
@@ -44,7 +45,7 @@ PROGRAMS = {
 
 @pytest.mark.parametrize("case", PROGRAMS)
 def test_joints_of_a_program_in_any_form(case, tmp_path):
-    found = rows.read(PROGRAMS[case](tmp_path), ARM)
+    found = read_rows(PROGRAMS[case](tmp_path), SLIDES)
     np.testing.assert_allclose(np.rad2deg(found.joints), Q_DEG, atol=1e-6)
 
 
@@ -65,7 +66,7 @@ def test_wanted_poses_in_every_convention(case, unit, tmp_path):
     factor = 25.4 if axes[0] == "X [inch]" else 1.0
     angles = TURNED.as_euler(convention, degrees=True)
     path = table(tmp_path, [*axes, *names], POSE.position_mm / factor, angles)
-    found = rows.read(path, ARM, joints=False, pose=True).pose
+    found = read_rows(path, SLIDES, "poses").pose
     np.testing.assert_allclose(found.position_mm, POSE.position_mm, atol=1e-5)
     np.testing.assert_allclose(found.rotation, POSE.rotation, atol=1e-6)
 
@@ -74,7 +75,7 @@ def test_nominal_poses_are_those_wanted_and_a_quaternion_may_have_its_scalar_fir
     names = [*(f"Soll {a} (m)" for a in "XYZ"), *(f"Soll q{n}" for n in range(1, 5))]
     turned = TURNED.as_quat(scalar_first=True)
     path = table(tmp_path, names, POSE.position_mm / 1000.0, turned)
-    found = rows.read(path, ARM, joints=False, pose=True).pose
+    found = read_rows(path, SLIDES, "poses").pose
     np.testing.assert_allclose(found.position_mm, POSE.position_mm, atol=1e-3)
     np.testing.assert_allclose(found.rotation, POSE.rotation, atol=1e-6)
 
@@ -82,32 +83,32 @@ def test_nominal_poses_are_those_wanted_and_a_quaternion_may_have_its_scalar_fir
 def test_readings_of_points_are_those_measured(tmp_path):
     names = [*(f"Nominal {a} [mm]" for a in "XYZ"), *(f"Measured {a} [mm]" for a in "XYZ")]
     path = table(tmp_path, names, POSE.position_mm + 1.0, POSE.position_mm)
-    found = rows.Quantities(rows.open_table(path)).group(["x", "y", "z"], [rows.LENGTH] * 3, True)
+    found = read_rows(path, SLIDES, "points").position_mm
     np.testing.assert_allclose(found, POSE.position_mm, atol=1e-6)
 
 
 def test_what_is_open_is_asked_about(tmp_path):
     small = table(tmp_path, [f"J{n}" for n in range(1, 7)], Q_DEG / 100.0)
     with pytest.raises(Undecided, match="--joint-unit"):
-        rows.read(small, ARM)
+        read_rows(small, SLIDES)
     two = table(tmp_path, [f"{side}_j{n}_deg" for side in ("left", "right") for n in range(1, 7)],
                 Q_DEG, Q_DEG + 1.0)  # fmt: skip
     with pytest.raises(InputError, match="--take left_j1_deg or --take right_j1_deg"):
-        rows.read(two, ARM)
+        read_rows(two, SLIDES)
     names = [f"{ball}_{a} [mm]" for ball in ("m1", "m2") for a in "XYZ"]
     several = table(tmp_path, names, POSE.position_mm, POSE.position_mm + 5.0 * POSE.rotation[:, 0])
     with pytest.raises(InputError, match="--take 'm1_X \\[mm\\]' or --take"):
-        rows.open_table(several)
+        read_rows(several, SLIDES, "points")
     two = table(tmp_path, [f"{side}_j{n}_deg" for side in ("left", "right") for n in range(1, 7)],
                 Q_DEG, Q_DEG + 1.0)  # fmt: skip
-    found = rows.read(two, ARM, answers={"take": ["right_j1_deg"]}).joints
+    found = read_rows(two, SLIDES, answers={"take": ["right_j1_deg"]}).joints
     np.testing.assert_allclose(np.rad2deg(found), Q_DEG + 1.0, atol=1e-6)
 
 
 def test_units_that_contradict_each_other_are_refused(tmp_path):
     names = [*(f"J{n} [deg]" for n in range(1, 6)), "J6 [rad]"]
     with pytest.raises(InputError, match="one unit for all"):
-        rows.read(table(tmp_path, names, Q_DEG), ARM)
+        read_rows(table(tmp_path, names, Q_DEG), SLIDES)
     degrees = table(tmp_path, [f"J{n} [deg]" for n in range(1, 7)], Q_DEG)
     with pytest.raises(InputError, match="one unit for all"):
-        rows.read(degrees, ARM, answers={"joint_unit": "rad"})
+        read_rows(degrees, SLIDES, answers={"joint_unit": "rad"})

@@ -120,8 +120,8 @@ def errors_of(name: str, point: str | None = None) -> ErrorField:
 
     ``point``: target of a results folder, by default the one that a campaign is about.
     """
-    from kinacc.cli import rows
     from kinacc.errors import InputError, Problem, refuse
+    from kinacc.measurements.rows import open_table
     from kinacc.measurements.table import numbers
     from kinacc.study import fields
 
@@ -133,7 +133,8 @@ def errors_of(name: str, point: str | None = None) -> ErrorField:
     if not path.is_file():
         allowed = f"a results folder, a file, {', '.join(fields.FAMILIES)}"
         raise InputError(Problem("--errors", f"{name!r} does not exist", allowed))
-    table, problems = rows.open_table(path), []
+    problems: list[Problem] = []
+    table = open_table(path)[0]
     missing = [each for each in names if each not in table.columns]
     if missing:
         raise InputError(Problem(name, f"has no column {', '.join(missing)}", ", ".join(names)))

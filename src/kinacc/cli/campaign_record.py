@@ -106,16 +106,17 @@ def _of_file(path: str, given: Mapping, campaign):
     """The rows of a file as readings, or what is wrong with them."""
     from kinacc.campaign.campaign import RowsOfFile
     from kinacc.campaign.reading import Reading, point_at
-    from kinacc.cli.rows import ANGLE, LENGTH, Quantities, open_table
     from kinacc.errors import Problem, refuse
+    from kinacc.measurements.rows import POINTS, read_rows
 
-    table, plan = open_table(path), campaign.plan
-    if "pose" in table.columns:
-        table = table.with_pose_names("pose")
+    plan = campaign.plan
     # A cell that is no number spoils its row, not the file: it is named row by row.
-    reader = Quantities(table, cells=[])
-    problems = reader.problems
-    problems += [
+    rows_of_file = read_rows(path, plan.slides, POINTS, spoilt=[])
+    table, joints, std = rows_of_file.table, rows_of_file.joints, rows_of_file.std_mm
+    names = rows_of_file.columns.single.get("pose")
+    if names:
+        table = table.with_pose_names(names.column)
+    problems = [
         Problem(f"--{name.replace('_', '-')}", "is given with a file", "a column of the file")
         for name in _OF_ONE
         if given[name] is not None
@@ -125,13 +126,9 @@ def _of_file(path: str, given: Mapping, campaign):
         for command, column in _COMPUTED.items()
         if column in table.columns
     ]
-    position = reader.group(["x", "y", "z"], [LENGTH] * 3, True)
-    names = [f"q{joint + 1}" for joint in range(len(plan.slides))]
-    joints = reader.group(names, [LENGTH if each else ANGLE for each in plan.slides], False)
-    std = reader.group(["std_x", "std_y", "std_z"], [LENGTH] * 3, False)
-    known = {each.name for each in plan.instruments}
-    if "pose" not in table.columns and joints is None and not problems:
-        problems.append(Problem(path, "has no column pose and no joints", f"pose, {names[0]}_deg"))
+    known = {instrument.name for instrument in plan.instruments}
+    if not names and joints is None and not problems:
+        problems.append(Problem(path, "has no column pose and no joints", "pose, q1_deg"))
     if given["instrument"] not in (None, *known):
         problems.append(Problem("--instrument", f"{given['instrument']!r}", ", ".join(known)))
     refuse(problems, "Nothing was recorded")
@@ -139,7 +136,7 @@ def _of_file(path: str, given: Mapping, campaign):
     places = [f"{path}, {table.row_names.one(line)}" for line in table.line]
     for i, place in enumerate(places):
         at = None if joints is None or not np.isfinite(joints[i]).all() else joints[i]
-        name = str(table.columns["pose"][i]).strip() if "pose" in table.columns else None
+        name = str(table.columns[names.column][i]).strip() if names else None
         if name is not None:
             point = plan.points.number(name)
         else:
@@ -153,8 +150,8 @@ def _of_file(path: str, given: Mapping, campaign):
         elif instrument not in known:
             rows.append(Problem(place, f"instrument {instrument!r} is unknown", ", ".join(known)))
         else:
-            noise = None if std is None else ",".join(repr(float(each)) for each in std[i])
-            rows.append(Reading(point, position[i], instrument, at, noise))
+            noise = None if std is None else ",".join(repr(float(value)) for value in std[i])
+            rows.append(Reading(point, rows_of_file.position_mm[i], instrument, at, noise))
     return RowsOfFile(
         rows,
         places,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
 from scipy.spatial.transform import Rotation
 
 if TYPE_CHECKING:
@@ -20,25 +21,16 @@ def first_poses(reading: MeasuredFile, prismatic: np.ndarray) -> list[dict[str, 
     ``again`` counts the readings after that. Orientations are a turn in deg about an axis of the
     instrument's frame.
     """
-    columns = reading.columns
-    shown = []
-    for pose in list(dict.fromkeys(columns["pose"].tolist()))[:_POSES]:
-        rows = np.flatnonzero(columns["pose"] == pose)
-        _, first, times = np.unique(
-            columns["target"][rows].astype(str), return_index=True, return_counts=True
-        )
-        q = np.array([columns[f"q{i + 1}"][rows[0]] for i in range(len(prismatic))])
-        line = int(columns["row"][rows[0]])
-        shown.append(
-            {
-                "line": line,
-                "where": reading.row_names.one(line),
-                "joints": np.round(np.where(prismatic, q, np.rad2deg(q)), 4).tolist(),
-                "targets": [_target(columns, row) for row in rows[np.sort(first)]],
-                "again": int(times.max()) - 1,
-            }
-        )
-    return shown
+    poses = []
+    table = pd.DataFrame(reading.columns)
+    for _, rows in list(table.groupby("pose", sort=False))[:_POSES]:
+        joints = rows.iloc[0][[f"q{i + 1}" for i in range(len(prismatic))]].to_numpy(float)
+        line, targets = int(rows["row"].iloc[0]), rows.drop_duplicates("target")
+        pose = {"line": line, "where": reading.row_names.one(line)}
+        pose["joints"] = np.round(np.where(prismatic, joints, np.rad2deg(joints)), 4).tolist()
+        pose["targets"] = [_target(row) for _, row in targets.iterrows()]
+        poses.append(pose | {"again": int(rows["target"].value_counts().max()) - 1})
+    return poses
 
 
 def poses_without_robot(guess: Guess) -> list[dict[str, object]]:
@@ -51,10 +43,9 @@ def poses_without_robot(guess: Guess) -> list[dict[str, object]]:
     return first_poses(read(guess.section, arm, strict=False), arm.dh.prismatic)
 
 
-def _target(columns, row: int) -> dict[str, object]:
-    target: dict[str, object] = {"target": str(columns["target"][row])}
-    target |= {f"{a}_mm": round(float(columns[f"{a}_mm"][row]), 4) for a in "xyz"}
-    quaternion = [float(columns[f"q{part}"][row]) for part in "xyzw"]
+def _target(row: pd.Series) -> dict[str, object]:
+    target = {"target": str(row["target"])} | {f"{a}_mm": round(row[f"{a}_mm"], 4) for a in "xyz"}
+    quaternion = row[["qx", "qy", "qz", "qw"]].to_numpy(float)
     if np.isfinite(quaternion).all():
         vector = Rotation.from_quat(quaternion).as_rotvec(degrees=True)
         angle = float(np.linalg.norm(vector))
@@ -63,18 +54,21 @@ def _target(columns, row: int) -> dict[str, object]:
     return target
 
 
-def in_words(shown: list[dict]) -> list[str]:
+def in_words(poses: list[dict]) -> list[str]:
     """The poses as lines of text."""
     lines = ["the first poses, as they are understood (joints in deg, positions in mm):"]
-    for pose in shown:
-        lines.append(f"  {pose['where']}: joints {', '.join(f'{q:.3f}' for q in pose['joints'])}")
+    for pose in poses:
+        lines.append(f"  {pose['where']}: joints {_numbers(pose['joints'])}")
         for target in pose["targets"]:
-            point = ", ".join(f"{target[f'{axis}_mm']:.3f}" for axis in "xyz")
-            turn = ""
+            line = f"    {target['target']} at {_numbers(target[f'{axis}_mm'] for axis in 'xyz')}"
             if "about" in target:
-                about = ", ".join(f"{part:.3f}" for part in target["about"])
-                turn = f", turned by {target['turned_deg']:.3f} deg about ({about})"
-            lines.append(f"    {target['target']} at {point}{turn}")
+                line += f", turned by {target['turned_deg']:.3f} deg about "
+                line += f"({_numbers(target['about'])})"
+            lines.append(line)
         if pose["again"]:
             lines.append(f"    more readings of it: {pose['again']}")
     return lines
+
+
+def _numbers(values) -> str:
+    return ", ".join(f"{value:.3f}" for value in values)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import click
 import numpy as np
@@ -18,9 +18,10 @@ from kinacc.checks.digits import smallest_step, step_between
 from kinacc.checks.repeatability import Noise, Repeated
 from kinacc.cli.choice import option
 from kinacc.cli.output import answers
-from kinacc.cli.rows import LENGTH, Quantities, open_table
 from kinacc.errors import InputError, Problem, first_few, refuse
-from kinacc.measurements.layout import columns_of_quantity, listed
+from kinacc.measurements.layout import POSITION, Place, find, listed
+from kinacc.measurements.reader import stacked
+from kinacc.measurements.rows import open_table
 from kinacc.measurements.table import RawTable, numbers
 from kinacc.report.terminal import size
 
@@ -108,16 +109,24 @@ def repeatability(file, rows_are, out) -> None:
     out.show(result, result.rows, [*_lines(result), *result.remarks])
 
 
-def read_repeats(path: str, rows_are: str | None) -> tuple[RawTable, np.ndarray, pd.DataFrame]:
-    """The file, positions (n, 3) in mm, and pose, side, visit and hours of every row.
+def read_repeats(
+    path: str, rows_are: str | None
+) -> tuple[RawTable, np.ndarray, pd.DataFrame, np.ndarray]:
+    """The file, positions (n, 3) in mm, pose, side, visit and hours of every row, and steps (3,).
 
     ``rows_are``: whether rows of a pose without a visit are ``visits`` or ``stays``. InputError
     with all problems.
     """
-    table = open_table(path)
-    reader = Quantities(table)
-    problems = reader.problems
-    position = reader.group(["x", "y", "z"], [LENGTH] * 3, True)
+    problems: list[Problem] = []
+    table, layout, notes = open_table(path)
+    for note in notes:
+        click.echo(f"{path}: {note}", err=True)
+    found = find(table, layout, np.zeros(0), problems, POSITION)
+    refuse(problems, f"{path} cannot be used")
+    axes = found.targets[0].position
+    position = stacked(table, axes, problems, gaps=False)
+    singles = {place.column: name for name, place in found.single.items()}
+    table = replace(table, columns=table.columns.rename(columns=singles))
     rows = pd.DataFrame({"side": "", "visit": "", "hours": math.nan}, index=range(len(table)))
     if "pose" not in table.columns:
         problems.append(Problem(f"{path}: column pose", "is missing", fix=listed(table)))
@@ -144,16 +153,16 @@ def read_repeats(path: str, rows_are: str | None) -> tuple[RawTable, np.ndarray,
             problems.append(Problem(where, what, "whether the arm left the pose", fix))
         if rows_are != "stays":
             rows["visit"] = rows.index
-    if position is not None and (far := np.flatnonzero(abs(position).max(1) > _FARTHEST_MM)).size:
+    if (far := np.flatnonzero(abs(position).max(1) > _FARTHEST_MM)).size:
         where = f"{path}: {table.rows_in_words(far)}"
         problems.append(Problem(where, "a position beyond a kilometre", "x, y, z in mm or m"))
     if not problems and rows["pose"].is_unique:
         problems.append(Problem(path, "no pose has more than one reading"))
     refuse(problems, f"{path} cannot be used")
-    used = reader.used.union(*_NAMES.values(), _SINGLE, _HOURS, ["time"])
+    used = {axis.column for axis in axes}.union(*_NAMES.values(), _SINGLE, _HOURS, ["time"])
     if unused := [name for name in table.columns if name not in used]:
         click.echo(f"not used: {', '.join(unused)}", err=True)
-    return table, position, rows
+    return table, position, rows, _steps_mm(table, axes)
 
 
 def _hours(table: RawTable, name: str, problems: list[Problem]) -> np.ndarray:
@@ -169,26 +178,24 @@ def _hours(table: RawTable, name: str, problems: list[Problem]) -> np.ndarray:
     return ((times - times.min()) / pd.Timedelta(hours=1)).to_numpy()
 
 
-def _steps_mm(table: RawTable) -> np.ndarray:
+def _steps_mm(table: RawTable, axes: Sequence[Place]) -> np.ndarray:
     """Steps (3,) of the values of the axes; of equal values, that of the other axes or digits."""
-    steps, digits = np.zeros(3), 0.0
-    for axis, name in enumerate("xyz"):
-        for place in columns_of_quantity(table, name, LENGTH):
-            cells = table.columns[place.column]
-            step = step_between(cells, place.factor, table.decimal)
-            steps[axis] = max(steps[axis], step)
-            digits = max(digits, smallest_step([cells], place.factor, table.decimal))
+    cells = [(table.columns[axis.column], axis.factor) for axis in axes]
+    steps = np.array([step_between(values, unit, table.decimal) for values, unit in cells])
+    digits = max(smallest_step([values], unit, table.decimal) for values, unit in cells)
     return np.where(steps > 0.0, steps, steps.max() or digits)
 
 
-def estimate(table: RawTable, position_mm: np.ndarray, rows: pd.DataFrame) -> Repeatability:
+def estimate(
+    table: RawTable, position_mm: np.ndarray, rows: pd.DataFrame, resolution_mm: np.ndarray
+) -> Repeatability:
     """Noise and repeatability of readings, see :func:`read_repeats`.
 
     InputError where readings of a pose are equal to the last digit.
     """
     keys = ["pose", "side", "visit"]
     groups = [rows.groupby(keys[:n], sort=False).ngroup().to_numpy() for n in (1, 2, 3)]
-    read, resolution_mm = Repeated(position_mm, *groups), _steps_mm(table)
+    read = Repeated(position_mm, *groups)
     poses = rows["pose"].unique()
     parts = checks.parts(read)
     noise = checks.noise_of(parts, resolution_mm)

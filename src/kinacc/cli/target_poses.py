@@ -23,7 +23,7 @@ _TEXTS = {
     PoseStatus.OTHER_POSTURE: "converged in another posture than the nearest",
     PoseStatus.OUTSIDE_LIMITS: "no joints: {joints} would be outside the limits",
     PoseStatus.OUTSIDE_RANGE: "no joints: {joints} would be outside the data's range",
-    PoseStatus.NOT_REACHED: "no joints: not reached, {left:.3g} mm left",
+    PoseStatus.NOT_REACHED: "no joints: not reached, {error_mm:.3g} mm left",
 }
 
 
@@ -37,69 +37,59 @@ def poses(
 
     Raises InputError listing all problems.
     """
-    sources = [path is not None, bool(texts)]
-    if sum(sources) != 1:
-        message = "is not given" if not any(sources) else "is given more than once"
-        raise InputError(
-            Problem("what is wanted", message, "a file of poses, --pose, or --program")
-        )
-    near = None
-    if near_deg is not None:
-        near = rows.of_arguments((near_deg,), "deg", calibration.robot, "--near-deg")
+    if (path is None) != bool(texts):
+        message = "is given more than once" if path else "is not given"
+        allowed = "a file of poses, --pose, or --program"
+        raise InputError(Problem("the wanted pose", message, allowed))
+    robot = calibration.robot
+    near = rows.of_arguments((near_deg,), "deg", robot, "--near-deg") if near_deg else None
     if path is not None:
-        inputs = rows.read(path, calibration.robot, joints=False, pose=True)
+        inputs = rows.read(path, robot, "poses")
     else:
-        pose = _of_arguments(texts)
-        inputs = Rows(len(texts), np.arange(1, len(texts) + 1), None, None, pose, ())
+        inputs = Rows(np.arange(1, len(texts) + 1), pose=_of_arguments(texts))
     if inputs.joints is None and near is not None:
-        inputs = replace(inputs, joints=np.broadcast_to(near, (inputs.count, near.shape[1])))
+        inputs = replace(inputs, joints=np.repeat(near, len(inputs.label), axis=0))
     if inputs.joints is not None:
-        rows.require_within_limits(calibration.robot, inputs, path or "--near-deg")
+        rows.require_within_limits(robot, inputs, path or "--near-deg")
     return inputs
 
 
 def answer_table(
-    calibration: Calibration, given: Rows, found: Compensation, unlike: np.ndarray
+    calibration: Calibration, inputs: Rows, answer: Compensation, unlike: np.ndarray
 ) -> pd.DataFrame:
-    """A row for each wanted pose: joints, status, what is left, and the pose.
+    """A row for each wanted pose: joints, status, remaining error, and the pose.
 
     ``unlike`` (n,): joints that are unlike those measured.
     """
     prismatic = calibration.robot.dh.prismatic
-    texts = []
-    for row, status in enumerate(found.status):
-        numbers = ", ".join(map(str, np.flatnonzero(found.offending[row]) + 1))
-        left_mm, turned_mrad = found.position_error_mm[row], 1e3 * found.rotation_error_rad[row]
-        text = _TEXTS[PoseStatus(status)].format(joints=f"joint {numbers}", left=left_mm)
-        if status <= PoseStatus.OTHER_POSTURE:
-            if unlike[row]:
-                text += ", extrapolated: the joints together are unlike those measured"
-            if turned_mrad > 1e3 * ROTATION_TOLERANCE_RAD:
-                text += (
-                    f", turned {turned_mrad:.3g} mrad away: {len(prismatic)} axes reach no nearer"
-                )
+    rotation_mrad, texts = 1e3 * answer.rotation_error_rad, []
+    for row, status in enumerate(answer.status):
+        joints = f"joint {', '.join(map(str, np.flatnonzero(answer.offending[row]) + 1))}"
+        text = _TEXTS[PoseStatus(status)].format(
+            joints=joints, error_mm=answer.position_error_mm[row]
+        )
+        if status <= PoseStatus.OTHER_POSTURE and unlike[row]:
+            text += ", extrapolated: the joints together are unlike those measured"
+        if status <= PoseStatus.OTHER_POSTURE and rotation_mrad[row] > 1e3 * ROTATION_TOLERANCE_RAD:
+            text += f", turned {rotation_mrad[row]:.3g} mrad away: "
+            text += f"{len(prismatic)} axes reach no nearer"
         texts.append(text)
-    change_deg = np.where(prismatic, -1.0, np.rad2deg(np.abs(found.change)))
+    change_deg = np.where(prismatic, -1.0, np.rad2deg(np.abs(answer.change)))
     table = {
-        "row": given.label,
-        **rows.joint_columns(prismatic, found.q_rad),
+        "row": inputs.label,
+        **rows.joint_columns(prismatic, answer.q_rad),
         "status": texts,
-        "solver_residual_mm": found.position_error_mm,
-        "orientation_error_mrad": 1e3 * found.rotation_error_rad,
+        "solver_residual_mm": answer.position_error_mm,
+        "orientation_error_mrad": rotation_mrad,
         "largest_change_deg": change_deg.max(axis=1),
     }
-    return pd.DataFrame(table | pose_columns(given.pose))
+    return pd.DataFrame(table | pose_columns(inputs.pose))
 
 
 def _of_arguments(texts: tuple[str, ...]) -> Pose:
-    values, problems = [], []
-    for text in texts:
-        row = numbers_of(text)
-        length = np.linalg.norm(row[3:]) if len(row) == 7 else 0.0
-        if abs(length - 1.0) > 1e-3:
-            problems.append(Problem("--pose", repr(text), _NUMBERS))
-            continue
-        values.append([*row[:3], *(row[3:] / length)])
-    refuse(problems)
-    table = np.array(values)
-    return Pose(rotation_from_quaternion(table[:, 3:]), table[:, :3])
+    rows = [numbers_of(text) for text in texts]
+    refuse(Problem("--pose", repr(text), _NUMBERS) for text, row in zip(texts, rows, strict=True)
+           if len(row) != 7 or abs(np.linalg.norm(row[3:]) - 1.0) > 1e-3)  # fmt: skip
+    table = np.array(rows)
+    unit = table[:, 3:] / np.linalg.norm(table[:, 3:], axis=1, keepdims=True)
+    return Pose(rotation_from_quaternion(unit), table[:, :3])

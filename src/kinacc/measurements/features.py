@@ -114,6 +114,5 @@ def by_feature(table: RawTable) -> RawTable:
     if other := [str(table.columns[found.axis][n]) for n, axis in enumerate(axes) if not axis]:
         told = ", ".join([*dict.fromkeys(other)][:5])
         notes.append(f"{len(other)} rows of other quantities than X, Y, Z, not read ({told})")
-    letters = table.letters and dict.fromkeys(columns, "") | dict(table.letters)
     made = replace(table, columns=frame(columns), line=table.line[first], units=units)
-    return replace(made, notes=tuple(notes), letters=letters)
+    return replace(made, notes=tuple(notes))

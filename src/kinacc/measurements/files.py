@@ -248,7 +248,10 @@ def _of_parquet(path: Path) -> RawTable:
         else [f"<{field.type}>"] * rows  # one cell of a list may hold a million values
         for field in schema
     }
-    return RawTable(where, frame(columns), np.arange(1, rows + 1))
+    units = {field.name: unit for field in schema
+             if (unit := (field.metadata or {}).get(b"unit", b"").decode(errors="replace"))
+             in ("deg", "rad", "mm", "m")}  # fmt: skip
+    return RawTable(where, frame(columns), np.arange(1, rows + 1), units=units)
 
 
 def _cells(column, where: str) -> list:

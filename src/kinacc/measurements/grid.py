@@ -113,7 +113,7 @@ def tabled(path: str, rows: Iterable[Row], layout: Layout, sheet: bool = False) 
     def used(cells: Sequence) -> list:
         return [cell for place, cell in enumerate(cells) if place not in spare]
 
-    names, letters = used(names), used([_letter(place) for place in range(width)])
+    names = used(names)
     readings = [(number, used(row)) for number, row in readings] if spare else readings
     refuse(_problems(path, names, readings, line, "row" if sheet else "line"),
            f"{path} cannot be read")  # fmt: skip
@@ -127,18 +127,13 @@ def tabled(path: str, rows: Iterable[Row], layout: Layout, sheet: bool = False) 
         layout.thousands,
         units | _units_behind(cells, units),
         not_rows=tuple(not_rows),
-        letters=dict(zip(names, letters, strict=True)) if sheet else {},
+        row_kind="row" if sheet else "line",
     )
     if not aside:
         return table
     labels = dict.fromkeys(str(filled(row)[0]).strip()[:30] for _, row in aside)
     note = f"{table.row_names.few(not_rows)}: not read ({', '.join([*labels][:3])})"
     return replace(table, notes=(note,))
-
-
-def _letter(place: int) -> str:
-    """The letter of a sheet's column, counted from 0."""
-    return (_letter(place // 26 - 1) if place > 25 else "") + chr(ord("A") + place % 26)
 
 
 def _is_text(cells: list, width: int) -> bool:

@@ -29,12 +29,12 @@ TABLE, FEATURES, SPHERICAL = "table", "features", "spherical"
 ANGLE = {"deg": np.pi / 180.0, "rad": 1.0}
 LENGTH = {"mm": 1.0, "m": 1000.0, "cm": 10.0, "inch": 25.4}
 # By so much may a quantity given in two units differ: rounding to the digits commands show.
-ROUNDED_RAD, ROUNDED_MM = 1e-6, 1e-3
-AREA = {f"{unit}2": factor**2 for unit, factor in LENGTH.items()}
-PURE, MASS = {"": 1.0}, {"kg": 1.0}
+_ROUNDED_RAD, _ROUNDED_MM = 1e-6, 1e-3
+_AREA = {f"{unit}2": factor**2 for unit, factor in LENGTH.items()}
 _CELSIUS = ({"c": 1.0, "C": 1.0}, "C", "")
-_SINGLE = {"temperature": _CELSIUS, "temp": _CELSIUS, "payload": (MASS, "kg", "")}
+_SINGLE = {"temperature": _CELSIUS, "temp": _CELSIUS, "payload": ({"kg": 1.0}, "kg", "")}
 
+JOINTS = "joints"
 POSITION = ("x", "y", "z")
 PAYLOAD = ("payload", "payload_x", "payload_y", "payload_z")
 STD = ("std_x", "std_y", "std_z")
@@ -46,9 +46,11 @@ ANGLES = ("rx", "ry", "rz")
 ANGLES_IN_ORDER = ("e1", "e2", "e3")
 _TURNS = (*ANGLES, *ANGLES_IN_ORDER, *STD_TURN)
 _OF_TARGETS = (*POSITION, *STD, *COVARIANCE, *QUATERNION, *QUATERNION_IN_ORDER, *_TURNS)
+# The longest quantity counts: mA_std_x is no x of a target named mA_std.
+_OF_TARGET = re.compile(rf"(?:(.*?)_)??({'|'.join(_OF_TARGETS)})", re.DOTALL)
+_NAMES = ("pose", "repeat", "target", "session")
 _JOINT = re.compile(r"q(\d)(?:_cmd)?")
 _READ = (column_names.MEASURED, column_names.REPORTED, column_names.PLAIN)
-_DEFAULT = {"joint_unit": "deg", "length_unit": "mm", "orientation.unit": "deg"}
 
 
 @dataclass(frozen=True)
@@ -105,25 +107,18 @@ class Layout:
     @classmethod
     def of(cls, section: Mapping) -> Layout:
         """From the section; a key that is not there is at its default."""
-        turn = section.get("orientation", {})
-        given = {each.name: section[each.name] for each in fields(cls) if each.name in section}
-        given = {k: tuple(v) if isinstance(v, list) else v for k, v in given.items()}
-        given |= {"orientation": turn.get("kind", "none"), "order": turn.get("order")}
-        given |= {
-            "convention": turn.get("convention", "XYZ"),
-            "angle_unit": turn.get("unit", "deg"),
-        }
-        given["directions"] = Directions(**section.get("directions", {}))
-        return cls(**given)
+        names = {field.name for field in fields(cls)}
+        keys = {k: tuple(v) if isinstance(v, list) else v for k, v in section.items() if k in names}
+        turn = {"kind": "none", "unit": "deg"} | section.get("orientation", {})
+        keys |= {"angle_unit" if k == "unit" else k: v for k, v in turn.items()}
+        keys |= {"orientation": keys.pop("kind")}
+        return cls(**keys | {"directions": Directions(**section.get("directions", {}))})
 
     def written(self) -> dict[str, object]:
         """The keys of the section that say how the file is written, defaults included."""
-        names = [each.name for each in fields(self)]
-        keys = {name: getattr(self, name) for name in names[: names.index("columns")]}
-        return keys | {
-            "names": self.names and list(self.names),
-            "directions": vars(self.directions),
-        }
+        keys = dict(list(vars(self).items())[: list(vars(self)).index("columns")])
+        keys["names"] = self.names and list(self.names)
+        return keys | {"directions": vars(self.directions)}
 
 
 @dataclass(frozen=True)
@@ -144,7 +139,7 @@ class Join:
     @classmethod
     def of(cls, section: Mapping) -> Join:
         """From the configuration section ``measurements.file.joints``."""
-        return cls(*(section[each.name] for each in fields(cls)))
+        return cls(*(section[field.name] for field in fields(cls)))
 
 
 @dataclass(frozen=True)
@@ -157,7 +152,7 @@ class Place:
 
 @dataclass(frozen=True)
 class Target:
-    """Columns of one target: position always, the rest where the file has it (else empty).
+    """Columns of a target: position always, the rest where the file has it (else empty).
 
     ``turn`` are the orientation's columns in the order its kind is read in; ``std``, ``std_turn``
     and ``covariance`` as ``STD``, ``STD_TURN`` and ``COVARIANCE``.
@@ -170,13 +165,9 @@ class Target:
     std_turn: tuple[Place, ...] = ()
     covariance: tuple[Place, ...] = ()
 
-    def places(self) -> tuple[Place, ...]:
-        """Every column of the target."""
-        return (*self.position, *self.turn, *self.std, *self.std_turn, *self.covariance)
-
 
 @dataclass(frozen=True)
-class FoundColumns:
+class FileColumns:
     """Every column that is used. ``single`` holds pose, repeat, target, session, temperature.
 
     ``payload``: mass and, where the file has it, the three coordinates of its centre.
@@ -187,12 +178,13 @@ class FoundColumns:
     directions: Mapping[int, Place]
     targets: tuple[Target, ...]
     single: Mapping[str, Place]
-    payload: tuple[Place, ...] = ()
+    payload: tuple[Place, ...]
 
     def measured(self) -> list[Place]:
         """Columns of all but the names of rows."""
-        every = [*self.joints, *self.commanded, *self.directions.values(), *self.payload]
-        return every + [place for target in self.targets for place in target.places()]
+        of_targets = [group for t in self.targets for group in list(vars(t).values())[1:]]
+        groups = (self.joints, self.commanded, self.directions.values(), self.payload, *of_targets)
+        return [place for group in groups for place in group]
 
     def unused(self, table: RawTable) -> tuple[str, ...]:
         """Columns of the file that hold nothing that was recognised."""
@@ -201,45 +193,51 @@ class FoundColumns:
 
 
 def find(
-    table: RawTable, layout: Layout, prismatic: np.ndarray, problems: list[Problem]
-) -> FoundColumns | None:
-    """Columns of every quantity; None where one is missing, which is added to ``problems``.
+    table: RawTable,
+    layout: Layout,
+    prismatic: np.ndarray,
+    problems: list[Problem],
+    need: Sequence[str] = (JOINTS, POSITION),
+) -> FileColumns:
+    """Columns of every quantity; columns that are missing are added to ``problems``.
 
-    ``prismatic`` (k,) marks joints whose position is a length.
+    ``prismatic`` (k,) is True for joints whose position is a length. ``need`` are the quantities
+    that must be there, of ``JOINTS`` and ``POSITION``.
     """
     finder = _Finder(table, layout, prismatic, problems)
     before, numbers = len(problems), range(1, len(prismatic) + 1)
-    joints = finder.group([f"q{n}" for n in numbers], required=True)
+    joints = finder.group([f"q{n}" for n in numbers], JOINTS in need)
     commanded = finder.group([f"q{n}_cmd" for n in numbers])
-    if finder.any(spare := f"q{len(prismatic) + 1}"):
-        what = f"{spare} is there, the robot has {len(prismatic)} joints"
-        problems.append(Problem(f"{table.path}: columns", what))
-    directions = {n - 1: finder.any(f"s{n}") for n in numbers}
-    single = {name: finder.any(name) for name in ("pose", "repeat", "target", "session")}
-    single["temperature"] = finder.any("temperature") or finder.any("temp")
+    if len(prismatic) and finder.place(spare := f"q{len(prismatic) + 1}"):
+        message = f"{spare} is there, the robot has {len(prismatic)} joints"
+        problems.append(Problem(f"{table.path}: columns", message))
+    directions = {n - 1: place for n in numbers if (place := finder.place(f"s{n}"))}
+    single = {name: place for name in _NAMES if (place := finder.place(name))}
+    if place := finder.place("temperature") or finder.place("temp"):
+        single["temperature"] = place
     mass, centre = finder.group(PAYLOAD[:1]), finder.group(PAYLOAD[1:])
     if centre and not mass:
         finder.problem("payload_kg", "is missing beside the centre of the payload")
     names = finder.targets()
-    targets = tuple(finder.target(name, alone=len(names) == 1) for name in names)
-    for name, foreign in layout.columns.items():
-        if foreign not in table.columns:
-            what = f"is not there, but measurements.file.columns maps {name} to it"
-            finder.problem(foreign, what, listed(table))
-    found = FoundColumns(
+    targets = [finder.target(name, len(names) == 1, POSITION in need) for name in names]
+    for name, column in layout.columns.items():
+        if column not in table.columns:
+            message = f"is not there, but measurements.file.columns maps {name} to it"
+            finder.problem(column, message, listed(table))
+    columns = FileColumns(
         finder.in_pulses(joints),
         finder.in_pulses(commanded),
-        {joint: place for joint, place in directions.items() if place},
-        targets,
-        {name: place for name, place in single.items() if place},
+        directions,
+        tuple(target for target in targets if target.position),
+        single,
         (*mass, *centre) if mass else (),
     )
-    twice = Counter(place.column for place in found.measured())
-    for column in (each for each in twice if twice[each] > 1 and len(problems) == before):
-        mapped = ", ".join(name for name, own in layout.columns.items() if own == column)
-        what = f"is taken for {twice[column]} quantities, {mapped} among them"
-        finder.problem(column, what, "one", "correct measurements.file.columns")
-    return found if len(problems) == before else None
+    uses = Counter(place.column for place in columns.measured())
+    for column in (column for column in uses if uses[column] > 1 and len(problems) == before):
+        mapped = ", ".join(name for name, source in layout.columns.items() if source == column)
+        message = f"is taken for {uses[column]} quantities, {mapped} among them"
+        finder.problem(column, message, "one", "correct measurements.file.columns")
+    return columns
 
 
 @dataclass(frozen=True)
@@ -251,54 +249,43 @@ class _Finder:
     prismatic: np.ndarray
     problems: list[Problem]
 
-    def any(self, name: str) -> Place | None:
-        """The column of ``name``, if there is one; in two units it has to say the same twice."""
+    def place(self, name: str) -> Place | None:
+        """The column of ``name``, if there is one; in two units it has to hold the same twice."""
         units, unit, key = _kind(name, self.layout, self.prismatic)
-        foreign = self.layout.columns.get(name)
-        if foreign is not None:
-            if foreign not in self.table.columns:
+        if name in self.layout.columns:
+            column = self.layout.columns[name]
+            if column not in self.table.columns:
                 return None
-            self._refuse_unit(foreign, _stated_unit(self.table, foreign), unit, key)
-            return Place(foreign, units[unit])
+            if key and (stated := _stated_unit(self.table, column)) not in (None, unit):
+                message = f"says {stated}, but measurements.file.{key} says {unit}"
+                self.problem(column, message, "the same in both places")
+            return Place(column, units[unit])
         present = columns_of_quantity(self.table, name, units)
         if len(present) > 1:
             first, *others = (self.table.values(p.column) * p.factor for p in present)
-            off = ROUNDED_RAD if units is ANGLE else ROUNDED_MM
-            if not all(np.allclose(first, each, 0.0, off, equal_nan=True) for each in others):
-                names = " or ".join(each.column for each in present)
+            rounding = _ROUNDED_RAD if units is ANGLE else _ROUNDED_MM
+            if not all(np.allclose(first, x, 0.0, rounding, equal_nan=True) for x in others):
+                names = " or ".join(place.column for place in present)
                 self.problem(names, "is given in two units that do not say the same")
-        # A key that is the default may not be meant, and one may be about a mapped column.
-        about = unit == _DEFAULT.get(key, unit) or any(
-            _kind(each, self.layout, self.prismatic)[2] == key for each in self.layout.columns
-        )
-        for place in () if about else present[:1]:
-            self._refuse_unit(place.column, place.column.rpartition("_")[2], unit, key)
         return present[0] if present else None
-
-    def _refuse_unit(self, column: str, stated: str | None, unit: str, key: str) -> None:
-        """Note a column that states another unit than the key that is about it."""
-        what = f"says {stated}, but measurements.file.{key} says {unit}"
-        problem = Problem(f"{self.table.path}: column {column}", what, "the same in both places")
-        if key and stated not in (None, unit) and problem not in self.problems:
-            self.problems.append(problem)
 
     def group(self, names: Sequence[str], required: bool = False) -> tuple[Place, ...]:
         """Columns of quantities that come together, or none of them where not ``required``."""
-        places = {name: self.any(name) for name in names}
+        places = {name: self.place(name) for name in names}
         missing = [name for name, place in places.items() if place is None]
         if missing and required:
-            for name in (each for each in missing if each not in self.layout.columns):
+            for name in (name for name in missing if name not in self.layout.columns):
                 units = _kind(name, self.layout, self.prismatic)[0]
                 fix = f"or map {name} in measurements.file.columns"
-                told = " or ".join(list(names_of(name, units))[:2])
-                self.problem(told, "is missing", listed(self.table), fix)
+                column = " or ".join([f"{name}_{unit}" if unit else name for unit in units][:2])
+                self.problem(column, "is missing", listed(self.table), fix)
         elif missing and len(missing) < len(names):
             there = ", ".join(name for name in names if name not in missing)
             self.problem(", ".join(missing), f"is missing beside {there}")
         return () if missing else tuple(places.values())
 
     def in_pulses(self, places: tuple[Place, ...]) -> tuple[Place, ...]:
-        """The joints; pulses of their motors have a number per degree each."""
+        """The joints; pulses of their motors have a number per degree for each joint."""
         count = self.layout.pulses_per_deg
         if not places or not count:
             return places
@@ -319,34 +306,35 @@ class _Finder:
         mapped = [split(name) for name in self.layout.columns]
         named = [target or TOOL for target, quantity in mapped if quantity == "x"]
         parts = {c: c.rpartition("_") for c in map(str, self.table.columns)}
-        own = {split(ours)[0] or TOOL: column for column, (ours, _, unit) in parts.items()
-               if unit in LENGTH and split(ours)[1] == "x"}  # fmt: skip
-        says = {name: column_names.role(name_of(f"{name} x").terms) for name in own}
-        read = [n for n in own if says[n] in _READ or n in named]
-        frames = [n for n in own if n not in read and column_names.is_frame(name_of(n).terms)]
+        points = {split(ours)[0] or TOOL: column for column, (ours, _, unit) in parts.items()
+                  if unit in LENGTH and split(ours)[1] == "x"}  # fmt: skip
+        roles = {name: column_names.role(name_of(f"{name} x").terms) for name in points}
+        read = [n for n in points if roles[n] in _READ or n in named]
+        frames = [n for n in points if n not in read and column_names.is_frame(name_of(n).terms)]
         if not read and not named and len(frames) == 1:
             read = frames  # the tool centre point, under its usual name
-        unclear = [n for n in own if n not in read and says[n] == column_names.OPEN]
-        unclear = unclear if read or named else unclear or [n for n in own if n not in read]
+        unclear = [n for n in points if n not in read and roles[n] == column_names.OPEN]
+        unclear = unclear if read or named else unclear or [n for n in points if n not in read]
         if unclear:
             fix = "name those that were measured in measurements.file.targets (of: "
-            fix += f"{', '.join(own)})"
-            what = "the name does not say that this was measured"
-            self.problem(", ".join(own[n] for n in unclear), what, "measured points", fix)
+            fix += f"{', '.join(points)})"
+            message = "the name does not say that this was measured"
+            self.problem(", ".join(points[n] for n in unclear), message, "measured points", fix)
         return list(dict.fromkeys([*read, *named])) or [TOOL]
 
-    def target(self, name: str, alone: bool) -> Target:
+    def target(self, name: str, alone: bool, required: bool) -> Target:
         """Columns of a target; ``alone`` it must have an orientation, where there is a kind."""
-        own = self.any(f"{TOOL}_x")
-        prefix = "" if name == TOOL and ("x" in self.layout.columns or not own) else f"{name}_"
+        is_plain = "x" in self.layout.columns or not self.place(f"{TOOL}_x")
+        prefix = "" if name == TOOL and is_plain else f"{name}_"
         position, std, std_turn, covariance = (
-            self.group([f"{prefix}{each}" for each in group], required=group is POSITION)
+            self.group([f"{prefix}{part}" for part in group], group is POSITION and required)
             for group in (POSITION, STD, STD_TURN, COVARIANCE)
         )
         if std and covariance:
-            where = ", ".join(place.column for place in (*std, *covariance))
-            self.problem(where, "standard deviations and a covariance", "one of them")
-        return Target(name, position, self._turn(prefix, alone), std, std_turn, covariance)
+            names = ", ".join(place.column for place in (*std, *covariance))
+            self.problem(names, "standard deviations and a covariance", "one of them")
+        turn = self._turn(prefix, alone and required)
+        return Target(name, position, turn, std, std_turn, covariance)
 
     def _turn(self, prefix: str, alone: bool) -> tuple[Place, ...]:
         kind = self.layout.orientation
@@ -355,22 +343,24 @@ class _Finder:
         usual = in_order_of(self.layout.convention) if kind == "euler" else ANGLES
         usual = QUATERNION if kind == "quaternion" else usual
         in_order = {"quaternion": QUATERNION_IN_ORDER, "euler": ANGLES_IN_ORDER}.get(kind, ())
-        ordered = self.group([f"{prefix}{each}" for each in in_order])
+        ordered = self.group([f"{prefix}{part}" for part in in_order])
         if ordered and kind == "quaternion":
             return tuple(ordered[(self.layout.order or "wxyz").index(part)] for part in "wxyz")
-        names = [f"{prefix}{each}" for each in usual]
-        there = any(self.any(name) or name in self.layout.columns for name in names)
-        if ordered or there or not alone:  # one of several targets may be a bare point
+        names = [f"{prefix}{part}" for part in usual]
+        there = any(self.place(name) or name in self.layout.columns for name in names)
+        if ordered or there or not alone:  # of several targets some may be bare points
             return ordered or self.group(names, required=alone)
         fix = "set measurements.file.orientation.kind (none for positions alone), or map them in "
         fix += "measurements.file.columns"
-        what = "are missing: the file states no orientation"
-        self.problem(", ".join(names), what, listed(self.table), fix)
+        message = "are missing: the file states no orientation"
+        self.problem(", ".join(names), message, listed(self.table), fix)
         return ()
 
-    def problem(self, column: str, what: str, allowed: str = "", fix: str = "") -> None:
-        """Add a problem with a column."""
-        self.problems.append(Problem(f"{self.table.path}: column {column}", what, allowed, fix))
+    def problem(self, column: str, message: str, allowed: str = "", fix: str = "") -> None:
+        """Add a problem with a column, once."""
+        problem = Problem(f"{self.table.path}: column {column}", message, allowed, fix)
+        if problem not in self.problems:
+            self.problems.append(problem)
 
 
 def _kind(quantity: str, layout: Layout, prismatic: Sequence) -> tuple[dict, str, str]:
@@ -384,15 +374,15 @@ def _kind(quantity: str, layout: Layout, prismatic: Sequence) -> tuple[dict, str
     if part in _TURNS:
         return ANGLE, layout.angle_unit, "orientation.unit"
     if part in COVARIANCE:
-        return AREA, f"{layout.length_unit}2", ""
-    return _SINGLE.get(quantity, (PURE, "", ""))
+        return _AREA, f"{layout.length_unit}2", ""
+    return _SINGLE.get(quantity, ({"": 1.0}, "", ""))
 
 
 def _stated_unit(table: RawTable, column: str) -> str | None:
     """The unit a column states in its name or under it, None for none that is known."""
     under = table.units.get(column, "")
-    said = name_of(column, under if name_of("x", under).unit in KNOWN else "").unit
-    return said if said in KNOWN or " or " in said else None
+    unit = name_of(column, under if name_of("x", under).unit in KNOWN else "").unit
+    return unit if unit in KNOWN or " or " in unit else None
 
 
 def in_order_of(convention: str) -> tuple[str, ...]:
@@ -406,23 +396,14 @@ def in_order_of(convention: str) -> tuple[str, ...]:
 
 def split(name: str) -> tuple[str, str]:
     """Target (may be empty) and quantity of a name such as std_x or mA_std_x; empty if neither."""
-    if name in PAYLOAD:
-        return "", ""
-    # The longest quantity counts: mA_std_x is no x of a target named mA_std.
-    ends = [each for each in _OF_TARGETS if name == each or name.endswith(f"_{each}")]
-    quantity = max(ends, key=len, default="")
-    return name.removesuffix(quantity).removesuffix("_") if quantity else "", quantity
-
-
-def names_of(name: str, units: Mapping[str, float]) -> dict[str, float]:
-    """Names of the columns a quantity may stand in, each with the factor of its unit."""
-    return {f"{name}_{unit}" if unit else name: factor for unit, factor in units.items()}
+    match = _OF_TARGET.fullmatch(name) if name not in PAYLOAD else None
+    return (match[1] or "", match[2]) if match else ("", "")
 
 
 def columns_of_quantity(table: RawTable, name: str, units: Mapping[str, float]) -> list[Place]:
     """The columns of a table that hold a quantity: one for every unit it is given in."""
-    found = (Place(*each) for each in names_of(name, units).items())
-    return [place for place in found if place.column in table.columns]
+    places = [Place(f"{name}_{unit}" if unit else name, factor) for unit, factor in units.items()]
+    return [place for place in places if place.column in table.columns]
 
 
 def listed(table: RawTable) -> str:

@@ -13,12 +13,11 @@ from kinacc.errors import InputError, Problem, gathered, refuse
 from kinacc.kinematics.model import PAYLOAD_COLUMNS
 from kinacc.kinematics.robot import Robot
 from kinacc.measurements import faults
-from kinacc.measurements.faults import at
 from kinacc.measurements.files import load
 from kinacc.measurements.layout import (
     STD,
     TABLE,
-    FoundColumns,
+    FileColumns,
     Join,
     Layout,
     Place,
@@ -80,7 +79,7 @@ def read(section: Mapping, robot: Robot, strict: bool = True) -> MeasuredFile:
 
 
 def read_excluded(section: Mapping, robot: Robot) -> tuple[MeasuredFile | None, list[Problem]]:
-    """The rows that ``section`` excludes, as far as they can be read, and what of them cannot.
+    """The rows that ``section`` excludes, as far as they can be read, and the problems of others.
 
     None where no row can be. Raises InputError where the file itself cannot be read.
     """
@@ -106,9 +105,9 @@ def _loaded(section: Mapping) -> RawTable:
     excluded, where = excluded_lines(section), "measurements.file.exclude"
     absent = sorted(set(excluded) - set(table.line.tolist()) - set(table.not_rows))
     if absent:
-        what = f"line{'s' if len(absent) > 1 else ''} {', '.join(map(str, absent))} hold no reading"
+        message = f"line{'s' * (len(absent) > 1)} {', '.join(map(str, absent))} hold no reading"
         allowed = f"lines {table.line[0]} to {table.line[-1]} of {table.path}"
-        raise InputError(Problem(where, what, allowed))
+        raise InputError(Problem(where, message, allowed))
     if len(excluded) == len(table):
         raise InputError(Problem(where, f"every row of {table.path} is excluded", "some of them"))
     joints = section.get("joints") or {}
@@ -116,123 +115,108 @@ def _loaded(section: Mapping) -> RawTable:
         return table
     from kinacc.measurements.joining import joined
 
-    own = {**section, "exclude": (), "source": None, "layout": TABLE, **joints, "joints": None}
-    return joined(table, _loaded(own), Join.of(joints))
+    other = {**section, "exclude": (), "source": None, "layout": TABLE, **joints, "joints": None}
+    return joined(table, _loaded(other), Join.of(joints))
 
 
 def convert(table: RawTable, layout: Layout, robot: Robot, strict: bool = True) -> MeasuredFile:
     """Measurements of a table as read; see ``read``. Raises InputError listing every problem."""
     problems: list[Problem] = []
     title = f"{table.path} cannot be used"
-    found = find(table, layout, robot.dh.prismatic, problems)
+    columns = find(table, layout, robot.dh.prismatic, problems)
     refuse(problems, title)
-    if not found.targets:
+    if not columns.targets:
         problems.append(Problem(table.path, "no target is asked for", "measurements.file.targets"))
         raise InputError(problems, title)
-    if "pose" in found.single and not table.pose_name:
-        table = table.with_pose_names(found.single["pose"].column)
-    q_rad = _stacked(table, found.joints, problems)
-    commanded = _stacked(table, found.commanded, problems) if found.commanded else None
-    shared = _shared(table, found, layout, problems)
+    if "pose" in columns.single and not table.pose_name:
+        table = table.with_pose_names(columns.single["pose"].column)
+    q_rad = stacked(table, columns.joints, problems)
+    commanded = stacked(table, columns.commanded, problems) if columns.commanded else None
+    shared = _shared(table, columns, layout, problems)
     shared |= {f"q{i + 1}": values for i, values in enumerate(q_rad.T)}
-    parts = [_target(table, target, layout, problems) for target in found.targets]
+    parts = [_target(table, target, layout, problems) for target in columns.targets]
     posed = np.isfinite(q_rad).all(axis=1)
-    problems += [] if problems else _without_joints(table, found, posed, parts)
-    notes = (*table.notes, *_not_read(table, parts, posed))
+    nothing = ~np.any([part["there"] for part in parts], axis=0)
+    missing = ~nothing & ~posed
+    if missing.sum() > _MOST_WITHOUT_JOINTS * (~nothing).sum() and not problems:
+        message = f"empty beside {missing.sum()} of {(~nothing).sum()} points"
+        joints_of_all = "joints in every row"
+        problems += faults.of_rows(table, columns.joints, missing, message, joints_of_all)
+    without = [(posed & nothing, "no reading")]
+    for target, part in zip(columns.targets, parts, strict=True):
+        without.append((part.pop("void") & posed & ~nothing, f"no reading of {target.name}"))
+    without.append((~posed, "no joints" if nothing[~posed].all() else "not all joints"))
+    notes = (*table.notes, *(
+        f"{rows.sum()} {'rows hold' if rows.sum() > 1 else 'row holds'} {quantity}: "
+        f"{table.rows_in_words(np.flatnonzero(rows))}" for rows, quantity in without if rows.any()
+    ))  # fmt: skip
     there = [part.pop("there") & posed for part in parts]
     if not np.any(there) and not problems:
         problems.append(Problem(table.path, "no target was measured in any row", "positions"))
     if strict:
-        problems += faults.limit_problems(table, q_rad, robot, found.joints)
-    rows = [pd.DataFrame(shared | part)[own] for part, own in zip(parts, there, strict=True)]
+        problems += faults.limit_problems(table, q_rad, robot, columns.joints)
     # One after the other: all targets of a row of the file.
-    rows = pd.concat(rows).sort_index(kind="stable")
+    rows = pd.concat([pd.DataFrame(shared | part)[read] for part, read in
+                      zip(parts, there, strict=True)]).sort_index(kind="stable")  # fmt: skip
     order = rows.index.to_numpy()
     if "label" in rows:
         rows["target"] = rows.pop("label")
     keys = ["pose", "target"]
-    if "repeat" not in found.single:
+    if "repeat" not in columns.single:
         rows["repeat"] = rows.groupby(keys, sort=False).cumcount()
-    elif "pose" in found.single and strict:
+    elif "pose" in columns.single and strict:
         again = rows.duplicated([*keys, "repeat"])
         if again.any():
-            one = rows[again].iloc[0]
+            first = rows[again].iloc[0]
             where = f"{table.path}: {table.rows_in_words(np.unique(order[again]))}"
-            what = f"pose {one['pose']}, repeat {one['repeat']} is given again"
-            problems.append(Problem(where, what, "one row per pose, repeat and target"))
-    turns = rows.filter(like="turn ").to_numpy()
-    rows = rows.drop(columns=rows.filter(like="turn ").columns)
-    columns = {name: rows[name].to_numpy() for name in rows}
-    columns["row"] = table.line[order]
-    columns |= table.row_names.columns(columns["row"])
+            message = f"pose {first['pose']}, repeat {first['repeat']} is given again"
+            problems.append(Problem(where, message, "one row per pose, repeat and target"))
+    turns = rows[[name for name in rows if name.startswith("turn ")]]
+    measured = {name: rows[name].to_numpy() for name in rows if name not in turns}
+    measured["row"] = table.line[order]
+    measured |= table.row_names.columns(measured["row"])
     if strict and not problems:
-        problems += faults.scale_problems(table, columns, robot)
+        problems += faults.scale_problems(table, measured, robot)
     refuse(problems, title)
-    unused = tuple(name for name in found.unused(table) if name != table.key)
+    unused = tuple(name for name in columns.unused(table) if name != table.key)
     commanded = commanded if commanded is None else commanded[order]
-    return MeasuredFile(columns, unused, notes, commanded, turns, table.row_names)
+    return MeasuredFile(measured, unused, notes, commanded, turns.to_numpy(), table.row_names)
 
 
-def _not_read(table: RawTable, parts: list[dict], posed: np.ndarray) -> list[str]:
-    """What is left out of the rows, in words: those without joints, and points that are none."""
-
-    def told(rows: np.ndarray, what: str) -> list[str]:
-        count = int(rows.sum())
-        hold = "rows hold" if count > 1 else "row holds"
-        words = table.rows_in_words(np.flatnonzero(rows))
-        return [f"{count} {hold} {what}: {words}"] if count else []
-
-    nothing = ~np.any([part["there"] for part in parts], axis=0)
-    notes = told(posed & nothing, "no reading")
-    for part in parts:
-        notes += told(part.pop("void") & posed & ~nothing, f"no reading of {part['target'][0]}")
-    return notes + told(~posed, "no joints" if nothing[~posed].all() else "not all joints")
-
-
-def _without_joints(
-    table: RawTable, found: FoundColumns, posed: np.ndarray, parts: list[dict]
-) -> list[Problem]:
-    """Joints that are missing beside so many points that it can be no gap."""
-    points = np.any([part["there"] for part in parts], axis=0)
-    missing = np.flatnonzero(points & ~posed)
-    if len(missing) <= _MOST_WITHOUT_JOINTS * points.sum():
-        return []
-    what = f"empty beside {len(missing)} of {points.sum()} points"
-    return [at(table, found.joints, missing, what, "joints in every row")]
-
-
-def _stacked(table: RawTable, places: Sequence[Place], problems: list[Problem]) -> np.ndarray:
-    """Columns (n, len(places)) in our units, NaN where a cell is empty."""
-    columns = [numbers(table, p.column, problems, gaps=True) * p.factor for p in places]
+def stacked(
+    table: RawTable, places: Sequence[Place], problems: list[Problem], gaps: bool = True
+) -> np.ndarray:
+    """Columns (n, len(places)) in our units, NaN where a cell is empty, if ``gaps`` are allowed."""
+    columns = [numbers(table, p.column, problems, gaps=gaps) * p.factor for p in places]
     return np.stack(columns, axis=1)
 
 
-def _refuse_parts(table: RawTable, places: tuple[Place, ...], problems: list[Problem]) -> None:
-    """Note rows in which some of the columns are empty and others are not."""
+def _whole_rows(table: RawTable, places: Sequence[Place], problems: list[Problem]) -> np.ndarray:
+    """Columns as ``stacked``; rows of which some cells alone are empty are a problem."""
     cells = np.stack([table.gaps(place.column) for place in places], axis=1)
     partly = cells.any(axis=1) & ~cells.all(axis=1)
-    if partly.any():
-        problems.append(at(table, places, partly, "some of them are empty", "all of them, or none"))
+    message = "some of them are empty"
+    problems += faults.of_rows(table, places, partly, message, "all of them, or none")
+    return stacked(table, places, problems)
 
 
 def _target(table: RawTable, target: Target, layout: Layout, problems: list[Problem]) -> dict:
-    """Columns (n,) of one target; ``there``: it was measured, ``void``: half of it was."""
-    position = _stacked(table, target.position, problems)
+    """Columns (n,) of a target; ``there``: it was measured, ``void``: half of it was."""
+    position = stacked(table, target.position, problems)
     gaps = np.isnan(position)
     void = gaps.any(axis=1) & ~gaps.all(axis=1)
     factors = np.array([place.factor for place in target.position])
     for number in layout.no_reading:
         void |= faults.none_read(np.where(position == number * factors, number, np.nan), number)
-    part = {"there": ~gaps.all(axis=1) & ~void, "void": void, "target": [target.name] * len(table)}
-    quaternion = layout.orientation == "quaternion"
-    turn = np.full((len(table), 4 if quaternion else 3), np.nan)
+    part = {"there": ~gaps.all(axis=1) & ~void, "void": void, "target": target.name}
+    turn = np.full((len(table), 4 if layout.orientation == "quaternion" else 3), np.nan)
+    turned = np.full((len(table), 4), np.nan)
     if target.turn:
-        _refuse_parts(table, target.turn, problems)
-        turn = _stacked(table, target.turn, problems)
-        if quaternion:
+        turn = _whole_rows(table, target.turn, problems)
+        if layout.orientation == "quaternion":
             problems += faults.quaternion_problems(table, turn, target.turn)
+        turned = quaternions(turn, layout)
     part |= dict(zip(POSITION, position.T, strict=True))
-    turned = quaternions(turn, layout) if target.turn else np.full((len(table), 4), np.nan)
     part |= dict(zip(QUATERNION, turned.T, strict=True))
     part |= _uncertainty(table, target, turn, layout, problems)
     return part | {f"turn {number}": values for number, values in enumerate(turn.T)}
@@ -242,19 +226,17 @@ def _uncertainty(table, target: Target, turn: np.ndarray, layout: Layout, proble
     """Standard deviations and correlations (n,) of a target, NaN where the file has none."""
 
     def spread(places: Sequence[Place]) -> np.ndarray:
-        std = _stacked(table, places, problems) / layout.sigma
+        std = stacked(table, places, problems) / layout.sigma
         for place, values in zip(places, std.T, strict=True):
-            bad = np.flatnonzero(values < 0.0)
-            if bad.size:
-                what = f"standard deviation {values[bad[0]] / place.factor:g}"
-                problems.append(at(table, [place], bad, what, "0 or above"))
-        return np.where(std > 0.0, std, np.nan)  # a zero says nothing
+            message = f"standard deviation {np.nanmin(values, initial=0.0) / place.factor:g}"
+            problems.extend(faults.of_rows(table, [place], values < 0.0, message, "0 or above"))
+        return np.where(std > 0.0, std, np.nan)  # a zero states nothing
 
     values = np.full((9, len(table)), np.nan)
     if target.std:
         values[:3] = spread(target.std).T
     if target.covariance:
-        elements = _stacked(table, target.covariance, problems)
+        elements = stacked(table, target.covariance, problems)
         matrix = elements[:, [0, 1, 2, 1, 3, 4, 2, 4, 5]].reshape(-1, 3, 3)
         problems += faults.covariance_problems(table, matrix, target.covariance)
         with np.errstate(invalid="ignore"):
@@ -270,9 +252,9 @@ def _uncertainty(table, target: Target, turn: np.ndarray, layout: Layout, proble
     return dict(zip(UNCERTAINTY, values, strict=True))
 
 
-def _shared(table: RawTable, found: FoundColumns, layout: Layout, problems: list[Problem]) -> dict:
+def _shared(table: RawTable, columns: FileColumns, layout: Layout, problems: list) -> dict:
     """Columns (n,) that the targets of a row have in common; without poses every row is one."""
-    count, single = len(table), found.single
+    count, single = len(table), columns.single
     shared: dict = {
         "pose": np.arange(count),
         "repeat": np.zeros(count, dtype=np.int64),
@@ -281,58 +263,59 @@ def _shared(table: RawTable, found: FoundColumns, layout: Layout, problems: list
     }
     if "temperature" in single:
         shared["temperature_c"] = numbers(table, single["temperature"].column, problems, gaps=True)
-    if "session" in single:
-        shared["session"] = _labels(table, single["session"], problems)
-    for name in ("pose", "repeat"):
+    for name, label in (("session", "session"), ("target", "label")):
         if name in single:
-            again = layout.repeats_in_names and name == "pose"
-            shared[name] = _whole(table, single[name], problems, name == "pose", again)
+            shared[label] = _labels(table, single[name], problems)
+    for name in ("pose", "repeat"):
+        if name in single and (name == "repeat" or table.is_numbered(single[name].column)):
+            shared[name] = _whole(table, single[name], problems)
+        elif name in single:
+            labels = _labels(table, single[name], problems)
+            again = AGAIN if layout.repeats_in_names else re.compile(r"(?!)")
+            shared[name] = pd.factorize(np.array([again.sub("", label) for label in labels]))[0]
     if "session" in single and "pose" in single:  # every session may count its poses from 0
         shared["pose"] = pd.factorize(pd.MultiIndex.from_arrays(
             [shared["session"], shared["pose"]]))[0]  # fmt: skip
-    for joint in range(len(found.joints)):
-        s = np.zeros(count, dtype=np.int8)
-        if place := found.directions.get(joint):
-            values = numbers(table, place.column, problems, gaps=True)
-            bad = np.flatnonzero(np.isfinite(values) & ~np.isin(values, (-1, 0, 1)))
-            if bad.size:
-                problems.append(at(table, [place], bad, f"{values[bad[0]]:g}", "-1, 0 or 1"))
-            s = np.where(np.isin(values, (-1, 0, 1)), values, 0).astype(np.int8)
-        shared[f"s{joint + 1}"] = s
-    if found.payload:
-        _refuse_parts(table, found.payload, problems)
-        load = _stacked(table, found.payload, problems)
-        if (load[:, 0] < 0.0).any():
-            what = f"a mass of {load[:, 0].min():g} kg"
-            problems.append(at(table, found.payload[:1], load[:, 0] < 0.0, what, "0 or above"))
-        # A mass alone hangs at the last DH frame.
-        load = load if len(found.payload) > 1 else load * np.array([1.0, 0.0, 0.0, 0.0])
+    shared |= {f"s{n + 1}": values.astype(np.int8) for n, values in
+               enumerate(travel(table, columns, problems).T)}  # fmt: skip
+    if columns.payload:
+        load = payload(table, columns, problems, _whole_rows)
         shared |= dict(zip(PAYLOAD_COLUMNS, load.T, strict=True))
-    if "target" in single:
-        shared["label"] = _labels(table, single["target"], problems)
     return shared
+
+
+def travel(table: RawTable, columns: FileColumns, problems: list[Problem]) -> np.ndarray:
+    """Directions of travel (n, k) of the joints: -1, 1, or 0 where the file states none."""
+    directions = np.zeros((len(table), len(columns.joints)))
+    for joint, place in columns.directions.items():
+        values = np.nan_to_num(numbers(table, place.column, problems, gaps=True))
+        bad = ~np.isin(values, (-1, 0, 1))
+        message = f"{next(iter(values[bad]), 0.0):g}"
+        problems += faults.of_rows(table, [place], bad, message, "-1, 0 or 1")
+        directions[:, joint] = np.where(bad, 0, values)
+    return directions
+
+
+def payload(table: RawTable, columns: FileColumns, problems: list[Problem], rows=stacked):
+    """Mass and centre (n, 4) of the payload in kg and mm; a mass alone hangs at the last frame."""
+    load = rows(table, columns.payload, problems)
+    mass = load[:, 0]
+    message = f"a mass of {np.nanmin(mass, initial=0.0):g} kg"
+    problems += faults.of_rows(table, columns.payload[:1], mass < 0.0, message, "0 or above")
+    return load if load.shape[1] > 1 else load * np.array([1.0, 0.0, 0.0, 0.0])
 
 
 def _labels(table: RawTable, place: Place, problems: list[Problem]) -> np.ndarray:
     empty = table.gaps(place.column)
-    if empty.any():
-        problems.append(at(table, [place], empty, "is empty", "a name in every row"))
+    problems += faults.of_rows(table, [place], empty, "is empty", "a name in every row")
     return np.array([*table.texts(place.column), None], dtype=object)[:-1]
 
 
-def _whole(table: RawTable, place: Place, problems: list, words: bool, again: bool) -> np.ndarray:
-    """Whole numbers (n,); with ``words``, names are numbered as they first appear.
-
-    ``again``: a number behind a name counts the readings of one pose.
-    """
-    if words and not np.isfinite(table.values(place.column)).any():
-        labels = [AGAIN.sub("", each) if again else each for each in
-                  _labels(table, place, problems)]  # fmt: skip
-        return pd.factorize(np.array(labels, dtype=object))[0]
+def _whole(table: RawTable, place: Place, problems: list[Problem]) -> np.ndarray:
+    """Whole numbers (n,)."""
     values = numbers(table, place.column, problems)
-    wrong = (values < 0) | (values > _LARGEST_WHOLE) | (values % 1 != 0)
-    bad = np.flatnonzero(np.isfinite(values) & wrong)
-    if bad.size:
-        what = f"{values[bad[0]]:g}"
-        problems.append(at(table, [place], bad, what, "whole numbers from 0"))
-    return np.where(np.isfinite(values) & ~wrong, values, 0).astype(np.int64)
+    bad = (values < 0) | (values > _LARGEST_WHOLE) | (values % 1 != 0)
+    bad &= np.isfinite(values)
+    message = f"{next(iter(values[bad]), 0.0):g}"
+    problems += faults.of_rows(table, [place], bad, message, "whole numbers from 0")
+    return np.where(np.isfinite(values) & ~bad, values, 0).astype(np.int64)

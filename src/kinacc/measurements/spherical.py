@@ -99,8 +99,7 @@ def cartesian(table: RawTable, directions: Directions) -> RawTable:
             columns |= {f"{stem}_{end}" if stem else end: [None if v != v else v for v in axis]
                         for end, axis in zip(ends, points.tolist(), strict=True)}  # fmt: skip
     refuse(problems, f"{table.path} cannot be read")
-    letters = table.letters and dict.fromkeys(columns, "") | dict(table.letters)
-    return replace(table, columns=frame(columns), letters=letters)
+    return replace(table, columns=frame(columns))
 
 
 def _points(

@@ -30,7 +30,7 @@ class RawTable:
     ``path`` names the file, with the sheet where it has several. ``line`` (n,) is the line of the
     file a row stands on, its row in a sheet or its number from 1 in a Parquet file. ``units`` are
     those stated under the names or behind the numbers, by column. ``notes`` name what of the file
-    is no row, ``not_rows`` are its lines. ``letters`` of the columns of a sheet. ``pose_name`` are
+    is no row, ``not_rows`` are its lines. ``row_kind``: line, or row in a sheet. ``pose_name`` are
     names of poses by line. Where joints stand in another file, ``points_file`` is that of the
     lines, and ``key`` its column by which joints belong to a point.
     """
@@ -43,7 +43,7 @@ class RawTable:
     units: Mapping[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     not_rows: tuple[int, ...] = ()
-    letters: Mapping[str, str] = field(default_factory=dict)
+    row_kind: str = "line"
     pose_name: Mapping[int, str] = field(default_factory=dict)
     points_file: str = ""
     key: str | None = None
@@ -72,6 +72,10 @@ class RawTable:
         """Numbers (n,) of a column, NaN where a cell is none."""
         return _converted(self.columns[name].tolist(), self.decimal, self.thousands)
 
+    def is_numbered(self, name: str) -> bool:
+        """Whether a column holds a number."""
+        return bool(np.isfinite(self.values(name)).any())
+
     def select(self, rows: np.ndarray) -> RawTable:
         """The table of the rows at indices ``rows``."""
         columns = self.columns.iloc[rows].reset_index(drop=True)
@@ -80,7 +84,7 @@ class RawTable:
     @property
     def row_names(self) -> RowNames:
         """Names of its rows; a sheet has rows and no lines."""
-        return RowNames(self.pose_name, self.points_file, "row" if self.letters else "line")
+        return RowNames(self.pose_name, self.points_file, self.row_kind)
 
     def rows_in_words(self, rows: np.ndarray) -> str:
         """Lines of the rows at indices ``rows``, the first few by number."""
@@ -93,15 +97,10 @@ class RawTable:
         named = {n: str(c).strip() for n, c, v in parts if v != v and not self.is_gap(c)}
         return replace(self, pose_name=named)
 
-    def column_in_words(self, name: str) -> str:
-        """A column as the person sees it: its name, and its letter in a sheet."""
-        letter = self.letters.get(name)
-        return f"{name} ({letter})" if letter else name
-
     def where(self, column: str, rows: np.ndarray | None = None) -> str:
-        """The place of a column, at the rows of these indices, for a problem."""
+        """The place of a column, or of several, at the rows of these indices, for a problem."""
         lines = "" if rows is None else f", {self.rows_in_words(rows)}"
-        return f"{self.path}: column {self.column_in_words(column)}{lines}"
+        return f"{self.path}: column{'s' * (', ' in column)} {column}{lines}"
 
 
 def frame(columns: Mapping[str, Sequence]) -> pd.DataFrame:

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from kinacc.errors import InputError, Problem, refuse
 from kinacc.measurements.column_names import NOMINAL, Name
@@ -18,9 +17,9 @@ from kinacc.measurements.intake import pairs, targets_in_rows
 from kinacc.measurements.intake.choices import TAKE, Choice, Undecided
 from kinacc.measurements.intake.columns import ABOUT_JOINTS, NamedColumns
 from kinacc.measurements.intake.groups import JOINTS, POINT, POSE, PULSES, listed
-from kinacc.measurements.layout import ANGLE, LENGTH, TOOL, Layout, find, in_order_of
-from kinacc.measurements.orientation import CONVENTIONS, rotations
-from kinacc.measurements.table import RawTable, frame
+from kinacc.measurements.layout import ANGLE, LENGTH, TOOL, Layout, find
+from kinacc.measurements.orientation import CONVENTIONS
+from kinacc.measurements.table import RawTable
 
 MEASUREMENTS, POINTS, POSES = "measurements", "points", "poses"
 FULL_TURN_RAD = 2.0 * np.pi * 1.05
@@ -352,45 +351,6 @@ def _mapping(
     for quantity, name in columns.single.items():
         put(quantity, name, length_unit if quantity.startswith("payload_") else "")
     return mapping
-
-
-def under_our_names(guess: Guess) -> RawTable:
-    """The table with its columns under our names, with units: q1_deg, x_mm, rvx_rad, pose."""
-    section, table, columns = guess.section, guess.table, guess.columns
-    named: dict[str, Sequence] = {}
-    per_deg = section.get("pulses_per_deg") or [None] * guess.joints
-    for number, (name, count) in enumerate(zip(columns.joints, per_deg, strict=True), 1):
-        unit = name.unit if name.unit in LENGTH else section["joint_unit"]
-        cells = table.columns[name.column]
-        named[f"q{number}_{unit}"] = cells if count is None else table.values(name.column) / count
-    target = next(iter(columns.targets.values()), {})
-    for axis in "xyz" if target else "":
-        named[f"{axis}_{section['length_unit']}"] = table.columns[target[axis].column]
-    turn = [quantity for quantity in target if quantity[0] in "qr"]
-    kind, convention = columns.turn
-    if turn and kind == "quaternion":
-        for ours, quantity in zip(("qw", "qx", "qy", "qz"), turn, strict=True):
-            named[ours] = table.columns[target[quantity].column]
-    elif turn:
-        order = in_order_of(convention) if kind == "euler" else turn
-        angles = np.stack([table.values(target[quantity].column) for quantity in order], axis=1)
-        angles = angles * ANGLE[section["orientation"]["unit"]]
-        turned = rotations(angles, Layout(orientation=kind, convention=convention))
-        vectors = Rotation.from_matrix(turned).as_rotvec().T
-        named |= {f"rv{axis}_rad": vector for axis, vector in zip("xyz", vectors, strict=True)}
-    named |= {quantity: table.columns[name.column] for quantity, name in columns.single.items()}
-    used = columns.read()
-    spare = [name for name in table.columns if name not in used and name not in named]
-    for name in spare if "pose" not in named else ():
-        texts = table.texts(name)
-        if (
-            np.isnan(table.values(name)).all()
-            and ":" not in "".join(texts)
-            and (len({*texts}) == len(texts) and not table.gaps(name).any())
-        ):
-            named["pose"] = table.columns[name]
-            break
-    return replace(table, columns=frame(named | {n: table.columns[n] for n in spare}))
 
 
 def summary(guess: Guess) -> list[str]:
