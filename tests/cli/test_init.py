@@ -92,21 +92,6 @@ def test_without_a_terminal_every_question_names_the_option_that_answers_it(fore
     assert "--orientation" not in done.output
 
 
-def test_what_stands_above_the_names_is_counted_as_it_is_written_down(foreign, tmp_path):
-    from openpyxl import Workbook
-
-    book, text = Workbook(), foreign.read_text(encoding="utf-8").replace(",", ".")
-    names, *rows = (line.split(";") for line in text.splitlines())
-    numbers = [[*map(float, row), 20.5] for row in rows]
-    for row in (["Cell 4"], ["UR"], [], [*names, "Temp [C]"], *numbers):
-        book.active.append(row)
-    book.save(tmp_path / "m.xlsx")
-    done = call("init", tmp_path / "m.xlsx", "--robot", "irb120", "--out", tmp_path, "--yes")
-    assert done.exit_code == 0, done.output
-    assert "3 rows above the names, not read" in done.output
-    assert load((tmp_path / "m.yaml",))["m"]["measurements"]["file"]["skip_lines"] == 3
-
-
 def test_an_unknown_robot_gets_a_template_to_fill_in(foreign, tmp_path):
     lines = foreign.read_text(encoding="utf-8").splitlines()
     without = [";".join(line.split(";")[1:]) for line in lines]
@@ -119,14 +104,6 @@ def test_an_unknown_robot_gets_a_template_to_fill_in(foreign, tmp_path):
     template = tmp_path / "five.robot.yaml"
     assert "FILL IN" in template.read_text()
     assert robot.load(template).dh.joints == 5
-
-
-def test_the_answer_for_a_program(foreign, tmp_path):
-    done = call("init", foreign, "--out", tmp_path, "--robot", "irb120", "--json")
-    told = json.loads(done.stdout)
-    assert told["joints"] == 6
-    assert told["suspicions"] == []
-    assert told["next"][0].startswith("kinacc check-data")
 
 
 def test_wrong_options_are_named(foreign, tmp_path):

@@ -1,31 +1,20 @@
 """Files whose names hold more than one reading: the measured one is taken, or it is asked."""
 
-import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
-import yaml
-from click.testing import CliRunner
-from scipy.spatial.transform import Rotation
+from tracked_arm import assert_read, call, described, refused, table, tracked
 
 from kinacc.checks.contradictions import load
-from kinacc.cli.group import main
+from kinacc.config.schema import defaults
 from kinacc.errors import InputError
 from kinacc.kinematics import robot
 from kinacc.measurements.reader import read
 
 ROWS = 14
 ARM = robot.load("ur10")
-AXES = "xyz"
-
-
-def call(*words, **more):
-    return CliRunner().invoke(main, [str(word) for word in words], **more)
-
-
-def file_section(folder):
-    """What a run would read, from the data set that init has written."""
-    return load((folder / "readings.yaml",))["readings"]["measurements"]["file"]
+TRACKED = tracked(poses=ROWS)
 
 
 def numbered(pattern, count=6, first=1):
@@ -34,29 +23,21 @@ def numbered(pattern, count=6, first=1):
 
 def by_axis(pattern):
     """Names of x, y, z; capitals where the pattern asks for {A}."""
-    return [pattern.format(a=axis, A=axis.upper()) for axis in AXES]
+    return [pattern.format(a=axis, A=axis.upper()) for axis in "xyz"]
 
 
-class Rows:
-    """What an arm that is a little off did, as a tracker and its controller have it."""
-
-    def __init__(self):
-        rng = np.random.default_rng(4)
-        self.q = np.round(rng.uniform(-100, 100, (ROWS, 6)), 4)
-        pose = robot.forward(ARM, np.deg2rad(self.q))
-        self.controller = pose.position_mm
-        turn = Rotation.from_euler("XYZ", [20, -30, 100], degrees=True)
-        self.measured = turn.apply(self.controller) + np.array([2000, -900, 300])
-        self.measured = np.round(self.measured + rng.normal(0, 0.05, (ROWS, 3)), 4)
-        self.nominal = np.round(self.measured + rng.normal(0, 0.7, (ROWS, 3)), 4)
-        self.deviation = self.measured - self.nominal
-        self.spread = rng.uniform(0.01, 0.05, (ROWS, 3))
-        self.turn = turn * Rotation.from_matrix(pose.rotation)
-        self.quaternion = self.turn.as_quat(scalar_first=True)
-        self.rounded = np.round(self.q)
+def _it():
+    """What else stands in the files of a tracked arm."""
+    rng, measured = np.random.default_rng(4), TRACKED.point
+    nominal = np.round(measured + rng.normal(0, 0.7, (ROWS, 3)), 4)
+    return SimpleNamespace(
+        q=TRACKED.q, measured=measured, nominal=nominal, deviation=measured - nominal,
+        spread=rng.uniform(0.01, 0.05, (ROWS, 3)), turn=TRACKED.turn, rounded=np.round(TRACKED.q),
+        quaternion=TRACKED.turn.as_quat(scalar_first=True), controller=TRACKED.controller,
+    )  # fmt: skip
 
 
-IT = Rows()
+IT = _it()
 Q = (numbered("q{}_deg"), IT.q)
 X = (by_axis("{a}_mm"), IT.measured)
 
@@ -65,53 +46,33 @@ X = (by_axis("{a}_mm"), IT.measured)
 def file(tmp_path):
     def write(*groups):
         names = [name for group, _ in groups for name in group]
-        rows = np.hstack([np.reshape(values, (ROWS, -1)) for _, values in groups])
         path = tmp_path / "readings.csv"
-        lines = [",".join(names), *(",".join(f"{v:.9g}" for v in row) for row in rows)]
-        path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+        path.write_text(table(names, *(values for _, values in groups)), encoding="utf-8")
         return path
 
     return write
 
 
-def described(path, *options):
+def section_of(path, *options):
     """What a run would read, where init finds it without a question."""
-    folder = path.parent / "cell"
-    done = call("init", path, "--robot", "ur10", "--out", folder, "--yes", *options)
-    assert done.exit_code == 0, done.output
-    return file_section(folder)
+    return described([path], *options)[0]
 
 
 def assert_measured(section, others=()):
-    """The run takes the measured points and the joints as they were; returns their columns.
-
-    ``others`` are the targets it takes beside that of the measured points, none unless named.
-    """
-    columns = read(section, ARM, strict=False).columns
-    assert set(columns["target"]) == {"tool", *others}
-    columns = {name: values[columns["target"] == "tool"] for name, values in columns.items()}
-    point = np.stack([columns[f"{axis}_mm"] for axis in AXES], axis=1)
-    q_deg = np.rad2deg(np.stack([columns[f"q{i}"] for i in range(1, 7)], axis=1))
-    np.testing.assert_allclose(point, IT.measured, atol=1e-3)
-    np.testing.assert_allclose(q_deg, IT.q, atol=1e-4)
-    return columns
+    """The run takes the measured points, the joints as they were and the ``others``' targets."""
+    targets = read(section, ARM, strict=False).columns["target"]
+    assert set(targets) == {"tool", *others}
+    return assert_read(section, TRACKED)
 
 
 RIGHT = {
     "nominal beside ours": [Q, X, (by_axis("nom_{a}_mm"), IT.nominal)],
-    "nominal before ours": [(by_axis("nom_{a}_mm"), IT.nominal), Q, X],
     "commanded behind the axis": [Q, X, (by_axis("{a}_cmd_mm"), IT.nominal)],
     "nominal, actual, d": [
         Q,
         (by_axis("Nominal {A} [mm]"), IT.nominal),
         (by_axis("Actual {A} [mm]"), IT.measured),
         (by_axis("d{A} [mm]"), IT.deviation),
-    ],
-    "d first": [
-        Q,
-        (by_axis("d{A} [mm]"), IT.deviation),
-        (by_axis("Actual {A} [mm]"), IT.measured),
-        (by_axis("Nominal {A} [mm]"), IT.nominal),
     ],
     "uncertainties": [Q, (by_axis("{A}"), IT.measured), (by_axis("U{a}"), IT.spread / 1000)],
     "Greek letters": [
@@ -121,13 +82,6 @@ RIGHT = {
         (by_axis("σ{a}"), IT.spread),
         (by_axis("{a}_nom"), IT.nominal),
     ],
-    "written together": [
-        (numbered("qcmd{}"), IT.rounded),
-        (numbered("qact{}"), IT.q),
-        (by_axis("{a}nom"), IT.nominal),
-        (by_axis("{a}meas"), IT.measured),
-        (by_axis("{a}err"), IT.deviation),
-    ],
     "a controller's log beside a tracker": [
         (numbered("target_q_{}", first=0), np.deg2rad(IT.rounded)),
         (numbered("actual_q_{}", first=0), np.deg2rad(IT.q)),
@@ -136,8 +90,6 @@ RIGHT = {
         (numbered("actual_TCP_pose_{}", first=0), np.hstack([IT.controller / 1000.0] * 2)),
         (by_axis("tracker_{a}_mm"), IT.measured),
     ],
-    "a pose of the robot beside ours": [Q, X, (by_axis("robot_{a}_mm"), IT.controller)],
-    "the same point twice": [Q, (by_axis("{A}"), IT.measured), X],
     "joints in both units": [(numbered("q{}_rad"), np.deg2rad(IT.q)), Q, X],
     "velocities and forces": [
         Q,
@@ -153,8 +105,6 @@ RIGHT = {
         (by_axis("B1_{a}_mm"), IT.measured + IT.turn.apply([90, 0, 0])),
         (by_axis("B2_{a}_mm"), IT.measured + IT.turn.apply([0, 90, 0])),
     ],
-    "axes by letters": [(list("SLURBT"), IT.q), X],
-    "centimetres": [Q, (by_axis("{A} [cm]"), IT.measured / 10)],
     "inches": [Q, (by_axis("{a}_in"), IT.measured / 25.4)],
 }
 
@@ -163,26 +113,19 @@ RIGHT = {
 def test_what_was_measured_is_read_whatever_stands_beside_it(case, file):
     others = ("B1", "B2") if case == "three reflectors" else ()
     options = ("--sigma", "none") if case == "uncertainties" else ()
-    assert_measured(described(file(*RIGHT[case]), *options), others)
+    assert_measured(section_of(file(*RIGHT[case]), *options), others)
 
 
-def test_a_column_that_init_calls_not_used_is_not_used(file, tmp_path):
-    path = file(*RIGHT["nominal beside ours"])
-    done = call("init", path, "--robot", "ur10", "--out", tmp_path / "cell", "--json")
-    told = json.loads(done.stdout)
+def test_a_column_that_init_calls_not_used_is_not_used(file):
+    section, told = described([file(*RIGHT["nominal beside ours"])])
     assert told["unused_columns"] == dict.fromkeys(by_axis("nom_{a}_mm"), "nominal")
-    settings = file_section(tmp_path / "cell")
-    assert settings["targets"] == ["tool"]
-    assert settings["columns"]["x"] == "x_mm"
-    columns = read(settings, ARM).columns
-    assert len(columns["x_mm"]) == ROWS
-    assert set(columns["target"]) == {"tool"}
+    assert (section["targets"], section["columns"]["x"]) == (["tool"], "x_mm")
 
 
 def test_what_was_reported_is_read_and_what_was_commanded_goes_beside_it(file):
     joints = (numbered("actual_q_{}", first=0), np.deg2rad(IT.q))
     wanted = (numbered("target_q_{}", first=0), np.deg2rad(IT.rounded))
-    section = described(file(wanted, joints, X))
+    section = section_of(file(wanted, joints, X))
     assert_measured(section)
     reading = read(section, ARM)
     np.testing.assert_allclose(reading.commanded, np.deg2rad(IT.rounded), atol=1e-6)
@@ -192,7 +135,7 @@ def test_what_was_reported_is_read_and_what_was_commanded_goes_beside_it(file):
 def test_q1_to_q4_beside_joints_are_a_quaternion(file, tmp_path, order):
     four = IT.quaternion if order == "wxyz" else IT.quaternion[:, [1, 2, 3, 0]]
     path = file((numbered("rax_{}"), IT.q), X, (numbered("q{}", 4), four))
-    section = described(path)
+    section = section_of(path)
     assert section["orientation"]["kind"] == "quaternion"
     assert section["orientation"]["order"] == order
     columns = assert_measured(section)
@@ -206,26 +149,19 @@ def test_standard_deviations_are_those_of_the_measured_point(file):
     spread = (by_axis("Measured std {A} [mm]"), IT.spread)
     wide = (by_axis("U95 {A} [mm]"), 2 * IT.spread)
     deviation = (by_axis("Dev {A} [mm]"), IT.deviation)
-    columns = assert_measured(described(file(Q, wide, measured, spread, deviation)))
-    given = np.stack([columns[f"std_{axis}_mm"] for axis in AXES], axis=1)
-    np.testing.assert_allclose(given, IT.spread, rtol=1e-6)
+    columns = assert_measured(section_of(file(Q, wide, measured, spread, deviation)))
+    std_mm = np.stack([columns[f"std_{axis}_mm"] for axis in "xyz"], axis=1)
+    np.testing.assert_allclose(std_mm, IT.spread, rtol=1e-6)
 
 
 ASKED = {
     "a tool centre point": [Q, (by_axis("tcp_{a}"), IT.controller)],
-    "a tool centre point beside another point": [Q, X, (by_axis("tcp_{a}_mm"), IT.controller)],
     "actual beside actual joints": [
         (numbered("actual_q_{}", first=0), np.deg2rad(IT.q)),
         (by_axis("actual_{a}"), IT.controller),
     ],
-    "set point and actual point": [
-        Q,
-        (by_axis("{A} Soll"), IT.nominal),
-        (by_axis("{A} Ist"), IT.controller),
-    ],
     "a point and the length of its deviation": [Q, X, (["3D error [mm]"], IT.spread[:, :1])],
     "a target beside a point": [Q, X, (by_axis("target_{a}_mm"), IT.nominal)],
-    "a reference beside a point": [Q, X, (by_axis("ref_{a}_mm"), IT.nominal)],
     "a point and how far it is off": [
         Q,
         (by_axis("{A}"), IT.nominal),
@@ -241,26 +177,14 @@ ASKED = {
         (by_axis("zadana_{a}"), IT.nominal),
         (by_axis("zmierzona_{a}"), IT.measured),
     ],
-    "two points in frames of their own": [
-        Q,
-        (by_axis("A_{a}"), IT.controller),
-        (by_axis("B_{a}"), IT.measured),
-    ],
     "the same name with other numbers": [Q, X, (by_axis("{A}"), IT.nominal)],
     "commanded joints alone": [(numbered("joint_{}_cmd"), IT.rounded), X],
-    "joints of two arms": [(numbered("left_j{}"), IT.q), (numbered("right_j{}"), IT.rounded), X],
     "numbers without a word for joints": [(numbered("position[{}]", first=0), IT.q), X],
     "the controller's orientation beside a tracker's point": [
         (numbered("robax_{}"), IT.q),
         (by_axis("trans_{a}"), IT.controller),
         (numbered("rot_q{}", 4), IT.quaternion),
         (by_axis("tracker_{a}"), IT.measured),
-    ],
-    "two orientations": [
-        Q,
-        X,
-        (by_axis("r{a}_deg"), IT.turn.as_euler("XYZ", degrees=True)),
-        (["qw", "qx", "qy", "qz"], IT.quaternion),
     ],
     "an orientation beside nominal and measured": [
         Q,
@@ -272,30 +196,19 @@ ASKED = {
 
 
 @pytest.mark.parametrize("case", ASKED)
-def test_two_readings_are_asked_about_and_never_taken_in_silence(case, file, tmp_path):
-    path, out = file(*ASKED[case]), tmp_path / "cell"
-    for flag in ("--yes", "--json"):
-        done = call("init", path, "--robot", "ur10", "--out", out, flag)
-        assert done.exit_code == 2, done.output
-        assert "--take" in done.output
-    unanswered = call("init", path, "--robot", "ur10", "--out", out)
-    assert unanswered.exit_code == 2
-    assert "--take" in unanswered.output
-    assert not out.exists()
+def test_two_readings_are_asked_about_and_never_taken_in_silence(case, file):
+    assert "--take" in refused([file(*ASKED[case])])
 
 
 def test_an_answer_and_an_option_decide_alike(file, tmp_path):
     path = file(*ASKED["a target beside a point"])
     words = ("init", path, "--robot", "ur10", "--force")
     asked = call(*words, "--out", tmp_path / "a", input="1\n")
-    given = call(*words, "--out", tmp_path / "b", "--yes", "--take", "x_mm")
-    for done, folder in ((asked, "a"), (given, "b")):
+    stated = call(*words, "--out", tmp_path / "b", "--yes", "--take", "x_mm")
+    for done, folder in ((asked, "a"), (stated, "b")):
         assert done.exit_code == 0, done.output
-        file_section = load((tmp_path / folder / "readings.yaml",))["readings"]["measurements"][
-            "file"
-        ]
-        assert file_section["columns"]["x"] == "x_mm"
-        assert file_section["targets"] == ["tool"]
+        section = load((tmp_path / folder / "readings.yaml",))["readings"]["measurements"]["file"]
+        assert (section["columns"]["x"], section["targets"]) == ("x_mm", ["tool"])
 
 
 REFUSED = {
@@ -323,12 +236,9 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("case", REFUSED)
-def test_what_cannot_be_read_is_refused_with_its_reason(case, file, tmp_path):
+def test_what_cannot_be_read_is_refused_with_its_reason(case, file):
     groups, reason = REFUSED[case]
-    done = call("init", file(*groups), "--robot", "ur10", "--out", tmp_path / "cell", "--yes")
-    assert done.exit_code == 2
-    assert reason in done.output
-    assert not (tmp_path / "cell").exists()
+    assert reason in refused([file(*groups)])
 
 
 @pytest.mark.parametrize("mapped", [True, False])
@@ -336,35 +246,11 @@ def test_what_cannot_be_read_is_refused_with_its_reason(case, file, tmp_path):
     ("key", "unit", "ours", "column"),
     [("joint_unit", "rad", "q1", "q1_deg"), ("length_unit", "m", "x", "x_mm")],
 )
-def test_a_key_against_the_names_is_refused(file, tmp_path, mapped, key, unit, ours, column):
-    path, config = file(Q, X), tmp_path / "cell.yaml"
-    section = {"path": str(path), "orientation": {"kind": "none"}, key: unit}
+def test_a_key_against_the_names_is_refused(file, mapped, key, unit, ours, column):
+    section = load_defaults() | {"path": str(file(Q, X)), key: unit}
     section |= {"columns": {ours: column}} if mapped else {}
-    dataset = {"robot": "ur10", "measurements": {"source": "file", "file": section}}
-    dataset |= {
-        "calibration": {"base_and_tool": "estimated"},
-        "evaluation": {"space": "measured"},
-    }
-    config.write_text(yaml.safe_dump({"datasets": {"cell": dataset}}))
-    done = call("check-data", config)
-    assert done.exit_code == 2
-    for words in (column, f"measurements.file.{key}", unit):
-        assert words in done.output
-    with pytest.raises(InputError, match=f"measurements.file.{key} says {unit}"):
-        read(load((config,))["cell"]["measurements"]["file"], ARM)
-
-
-def test_degrees_under_the_names_contradict_a_key_in_radians(tmp_path):
-    names = [*numbered("J{}"), *by_axis("{A}")]
-    rows = np.hstack([IT.q, IT.measured])
-    lines = [",".join(names), ",".join(["[deg]"] * 6 + ["[mm]"] * 3)]
-    path = tmp_path / "readings.csv"
-    path.write_text("\n".join([*lines, *(",".join(map(str, row)) for row in rows)]) + "\n")
-    columns = dict(zip([*numbered("q{}"), *AXES], names, strict=True))
-    section = described(path)
-    assert_measured(section)
-    with pytest.raises(InputError, match=r"J1.*says deg.*joint_unit says rad"):
-        read(section | {"joint_unit": "rad", "columns": columns}, ARM)
+    with pytest.raises(InputError, match=f"{column}.*measurements.file.{key} says {unit}"):
+        read(section, ARM)
 
 
 def test_the_reader_takes_no_nominal_point_for_a_target(file):
@@ -385,7 +271,5 @@ def test_the_reader_takes_no_point_alone_that_says_it_was_not_measured(file, wor
 
 
 def load_defaults():
-    from kinacc.config.schema import defaults
-
     section = defaults()["measurements"]["file"]
     return section | {"orientation": section["orientation"] | {"kind": "none"}}

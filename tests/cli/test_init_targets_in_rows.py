@@ -1,7 +1,7 @@
 """Files with a row for every target of a pose, where no column calls the targets so."""
 
 import numpy as np
-from tracked_arm import call, described, refused, table, tracked, written
+from tracked_arm import described, refused, table, tracked, written
 
 from kinacc.kinematics import robot
 from kinacc.measurements.reader import read
@@ -33,12 +33,6 @@ def test_groups_of_points_are_the_targets_where_they_keep_their_distances(tmp_pa
     assert targets(section) == {"SMR_A": COUNT, "SMR_B": COUNT, "SMR_C": COUNT}
 
 
-def test_groups_of_the_same_points_are_readings_of_one_target(tmp_path):
-    points = grouped(IT.point, IT.point + 0.01)
-    section, _ = described(written(tmp_path, joints_csv=JOINTS, tracker_csv=points))
-    assert targets(section) == {"tool": 2 * COUNT}
-
-
 def test_groups_from_two_places_of_the_tracker_are_no_targets(tmp_path):
     x, y, z = IT.point.T
     points = grouped(IT.point, np.stack([-y + 900.0, x, z], axis=1))
@@ -68,17 +62,3 @@ def test_radii_that_were_measured_scatter_and_are_one_reflector(tmp_path):
     radius = np.linspace(19.04, 19.06, COUNT)
     section, _ = described(written(tmp_path, cell_csv=in_one_nest(radius)))
     assert targets(section) == {"tool": COUNT}
-
-
-def test_a_radius_that_changes_within_a_target_is_refused(tmp_path):
-    text = in_one_nest([19.05] * 12 + [6.35] * (COUNT - 12), Target=["A"] * COUNT)
-    said = refused(written(tmp_path, cell_csv=text))
-    assert "column Reflector radius [mm]" in said
-    assert "their centres lie elsewhere" in said
-
-
-def test_targets_called_by_their_radius_pass_the_check(tmp_path):
-    described(written(tmp_path, cell_csv=in_one_nest([19.05] * 12 + [6.35] * (COUNT - 12))))
-    done = call("check-data", tmp_path / "cell" / "m.yaml", "--json")
-    assert "does_not_fit" not in done.output
-    assert "target_moved" not in done.output

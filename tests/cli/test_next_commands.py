@@ -3,20 +3,14 @@
 from __future__ import annotations
 
 import json
-import os
 import re
 import shlex
-import subprocess
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 from command_line import call, small_study
 
 from kinacc.kinematics import robot
-
-ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture(scope="module")
@@ -49,18 +43,6 @@ def run(line):
     words = shlex.split(line)
     assert words[0] == "kinacc"
     return call(*words[1:])
-
-
-def test_what_init_names_next_runs_as_printed(described):
-    said = described().output.split("next:\n")[1]
-    check, study = (line.strip() for line in said.strip().splitlines())
-    assert run(check).exit_code == 0, check
-    made = subprocess.run(
-        [sys.executable, "-m", *shlex.split(study), "--", "--dry-run"],
-        cwd=ROOT, env={**os.environ, "PYTHONPATH": str(ROOT / "src")}, capture_output=True,
-        text=True, timeout=300, check=False,
-    )  # fmt: skip
-    assert made.returncode == 0, made.stdout + made.stderr
 
 
 def test_what_init_writes_into_its_file_and_its_json_runs_as_printed(described, tmp_path):
