@@ -185,7 +185,7 @@ def test_what_a_script_imports_says_what_it_is_for_its_shapes_and_its_units(name
     assert told.splitlines()[0][0].isupper() or told.startswith("``")
     signature = str(inspect.signature(found))
     if "np.ndarray" in signature and not getattr(found, "_is_protocol", False):
-        assert re.search(r"\((\w+|\.\.\.)(, [\w +]+)*,?\)", told), "the shape of an array is missing"
+        assert re.search(r"\((\w+|\.\.\.)(, [\w +]+)*,?\)", told), "no shape"
         without = ("choose", "order", "distances")  # of any unit: what is given is given back
         assert attribute in without or re.search(r"\b(mm|rad|mrad)\b|_mm|_rad", told + signature)
     if inspect.isfunction(found) and "InputError" in inspect.getsource(found):
