@@ -41,19 +41,19 @@ def observed(order, seed=0, prior=WAVY):
 def choose(seen, orders=(1, 2, 3, 4, 6), stated=None):
     empty = vec.without_errors(ARM.dh, LOW, HIGH, 1)
     fixed = FrameParameters.none(known())
-    return evidence.choose(seen, empty, fixed, WEIGHT, orders, 1e-3, stated)
+    return evidence.choose(seen, empty, fixed, WEIGHT, orders, stated).query("chosen").iloc[0]
 
 
 @pytest.mark.parametrize("order", [2, 4])
 @pytest.mark.parametrize("stated", [None, WAVY])
 def test_the_order_of_the_errors_is_found(order, stated):
-    assert choose(observed(order), stated=stated).chosen.order == order
+    assert choose(observed(order), stated=stated)["order"] == order
 
 
 def test_width_and_fall_of_the_errors_are_found():
-    prior = choose(observed(6, prior=Prior(0.3, 0.3e-3, 0.6, 1e-4)), (6,)).chosen.prior
-    assert prior.delta_mm == pytest.approx(0.3, rel=0.15)
-    assert prior.decay == pytest.approx(0.6, rel=0.1)
+    best = choose(observed(6, prior=Prior(0.3, 0.3e-3, 0.6, 1e-4)), (6,))
+    assert best["prior_std_mm"] == pytest.approx(0.3, rel=0.15)
+    assert best["prior_decay"] == pytest.approx(0.6, rel=0.1)
 
 
 def test_differences_of_evidence_are_those_of_the_marginal_likelihood():
@@ -79,7 +79,7 @@ def test_differences_of_evidence_are_those_of_the_marginal_likelihood():
         wanted = multivariate_normal(cov=variance * shape).logpdf(noise)
         linear = evidence._Linear(seen, empty, FrameParameters.none(known()), WEIGHT)
         linear.root[:] = 1.0
-        normal, count = linear.bent(2, 2)
+        normal, count = linear.above_constants(2, 2)
         at = np.array([0.5 * np.log(ratio), prior.decay])
         got[prior.decay] = -evidence._negative(at, normal, noise.size, np.repeat([1, 2], 36))[0]
         got[prior.decay] -= wanted
@@ -90,7 +90,7 @@ def test_differences_of_evidence_are_those_of_the_marginal_likelihood():
 def test_slopes_of_the_evidence_are_its_finite_differences():
     fixed = FrameParameters.none(known())
     empty = vec.without_errors(ARM.dh, LOW, HIGH, 1)
-    normal, count = evidence._Linear(observed(3), empty, fixed, WEIGHT).bent(3, 3)
+    normal, count = evidence._Linear(observed(3), empty, fixed, WEIGHT).above_constants(3, 3)
     at, degree = np.array([1.5, 0.8]), np.repeat([1, 2, 3], 36)
     slopes = evidence._negative(at, normal, count, degree)[1]
     for i, step in enumerate(1e-5 * np.eye(2)):

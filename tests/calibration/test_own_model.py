@@ -11,8 +11,8 @@ from test_few_poses import settings
 
 import kinacc
 from kinacc.calibration import models
-from kinacc.calibration.model_comparison_columns import selection_columns
 from kinacc.calibration.own_model import register_error_model
+from kinacc.calibration.residual_tables import selection
 from kinacc.calibration.residuals import cross_validated
 from kinacc.config import error_models
 from kinacc.geometry import compose
@@ -92,7 +92,7 @@ def test_a_registered_model_is_fitted_held_out_and_selected(registered):
     held_out, _ = cross_validated(
         seen, lambda train, fold: models.fit_all(train, pair), range(5), ("ripple", "dh", "nominal")
     )
-    table = selection_columns(seen, held_out)
+    table = selection(seen, held_out)
     assert table["model"][table["selected"] == 1].tolist() == ["ripple"]
     rms = dict(zip(table["model"], table["held_out_rms_mm"], strict=True))
     assert rms["ripple"] < 0.1 < rms["dh"]

@@ -9,13 +9,17 @@ from kinacc.calibration import model_comparison
 from kinacc.calibration.residuals import Errors
 
 
-def errors(vectors):
-    return Errors(np.asarray(vectors, dtype=float), np.full(np.shape(vectors), np.nan))
+def selection(others, configuration, fold):
+    """``model_selection`` by model, from position errors (n, 3) of each."""
+    held_out = {
+        name: Errors(np.asarray(vectors, dtype=float), np.full(np.shape(vectors), np.nan))
+        for name, vectors in others.items()
+    }
+    return model_comparison.select(held_out, configuration, fold).set_index("model")
 
 
-def selection(by_dh, by_vec, configuration, fold):
-    held_out = {"dh": errors(by_dh), "vec": errors(by_vec)}
-    return model_comparison.select(held_out, configuration, fold)
+def best(table):
+    return table.index[table["selected"] == 1].item()
 
 
 def scattered(count, size, seed):
@@ -25,29 +29,25 @@ def scattered(count, size, seed):
 def test_a_gain_that_may_be_chance_is_none():
     configuration, fold = np.arange(24), np.arange(24) % 6
     by_dh, by_vec = scattered(24, 0.2, 1), scattered(24, 0.198, 2)
-    assert selection(by_dh, by_vec, configuration, fold).selected == "dh"
-    found = selection(by_dh, 0.5 * by_dh, configuration, fold)
-    assert found.selected == "vec"
-    assert found.standings["vec"].gain_mm2 == pytest.approx(
-        0.75 * np.mean(np.sum(by_dh**2, axis=1))
-    )
-    dh, vec = found.standings["dh"], found.standings["vec"]
-    assert vec.rms_mm == pytest.approx(0.5 * dh.rms_mm)
+    assert best(selection({"dh": by_dh, "vec": by_vec}, configuration, fold)) == "dh"
+    table = selection({"dh": by_dh, "vec": 0.5 * by_dh}, configuration, fold)
+    assert best(table) == "vec"
+    gain = 0.75 * np.mean(np.sum(by_dh**2, axis=1))
+    assert table["gain_mm2"]["vec"] == pytest.approx(gain)
+    assert table["held_out_rms_mm"]["vec"] == pytest.approx(0.5 * table["held_out_rms_mm"]["dh"])
 
 
 def test_repeats_of_a_configuration_are_one_witness():
-    by_dh, by_vec = scattered(12, 0.2, 4), scattered(12, 0.15, 5)
-    once = selection(by_dh, by_vec, np.arange(12), np.arange(12) % 3)
+    models = {"dh": scattered(12, 0.2, 4), "vec": scattered(12, 0.15, 5)}
+    once = selection(models, np.arange(12), np.arange(12) % 3)
     again = np.repeat(np.arange(12), 50)
-    often = selection(by_dh[again], by_vec[again], again, again % 3)
-    assert often.configurations == 12
-    errors_mm2 = [each.standings["vec"].std_error_mm2 for each in (often, once)]
-    assert errors_mm2[0] == pytest.approx(errors_mm2[1])
+    often = selection({k: v[again] for k, v in models.items()}, again, again % 3)
+    assert set(often["configurations"]) == {12}
+    std_error = once["gain_std_error_mm2"]["vec"]
+    assert often["gain_std_error_mm2"]["vec"] == pytest.approx(std_error)
 
 
 def test_of_two_models_worth_it_the_better_is_selected_wherever_it_stands():
     plain, configuration, fold = scattered(60, 0.2, 8), np.arange(60), np.arange(60) % 5
-    better, best = errors(0.6 * plain), errors(0.5 * plain)
-    for others in ({"a": better, "b": best}, {"b": best, "a": better}):
-        held_out = {"dh": errors(plain), **others}
-        assert model_comparison.select(held_out, configuration, fold).selected == "b"
+    for others in ({"a": 0.6 * plain, "b": 0.5 * plain}, {"b": 0.5 * plain, "a": 0.6 * plain}):
+        assert best(selection({"dh": plain, **others}, configuration, fold)) == "b"

@@ -10,10 +10,11 @@ near the best.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
+import pandas as pd
 import scipy
+from scipy.linalg import lapack
 
 from kinacc.calibration.fitting import distinct, once, scales
 from kinacc.calibration.frames import FrameParameters
@@ -38,28 +39,6 @@ _GAUGE_RIDGE = 1e-9  # holds constants no pose shows, as a share of those it doe
 _FIRST = 12  # normal equations reach up to this order at first
 
 
-@dataclass(frozen=True)
-class Trial:
-    """Log evidence of an ``order`` under the ``prior`` that suits it best.
-
-    ``log_ratio``: log of the width of the prior over the noise.
-    """
-
-    order: int
-    prior: Prior
-    log_evidence: float
-    log_ratio: float
-
-
-@dataclass(frozen=True)
-class Choice:
-    """Trials by rising order and the one ``chosen``, with nothing seen of fold ``held_out``."""
-
-    held_out: int | None
-    trials: tuple[Trial, ...]
-    chosen: Trial
-
-
 def highest_order(observations: Observations, joints: int, frames: int) -> int:
     """The highest order with no more parameters than residuals, below 0 where there is none."""
     return (distinct(observations).components - frames) // (6 * joints) - 1
@@ -71,12 +50,6 @@ def prior_of(std_mm: float, decay: float, offset_rad: float) -> Prior:
     return Prior(std_mm, 1e-3 * std_mm, decay, offset_rad, *constant)
 
 
-def without_evidence(order: int, offset_rad: float, held_out: int | None) -> Choice:
-    """The choice of too few residuals to judge by: a prior of usual width."""
-    only = Trial(order, prior_of(USUAL_STD, 1.0, offset_rad), np.nan, 0.0)
-    return Choice(held_out, (only,), only)
-
-
 @one_thread
 def choose(
     observations: Observations,
@@ -84,41 +57,60 @@ def choose(
     parameters: FrameParameters,
     rotation_weight_mm_per_rad: float,
     orders: Sequence[int],
-    offset_rad: float,
     stated: Prior | None = None,
-    held_out: int | None = None,
-    near: Choice | None = None,
-) -> Choice:
-    """The order, of ``orders``, and the prior of a VEC model of ``observations``.
+    near: pd.DataFrame | None = None,
+) -> pd.DataFrame:
+    """Choose order and prior of a VEC model of some observations.
 
-    ``empty``: the model at any order. ``parameters`` of base and targets as a fit has them.
-    ``stated``: a prior that is not chosen, for which only the order is. ``near``: a choice of
-    nearly the same rows, from whose priors the search starts.
+    Parameters
+    ----------
+    observations : Observations
+        Measured points and poses.
+    empty : VECModel
+        The model at any order.
+    parameters : FrameParameters
+        Base and targets as a fit has them.
+    rotation_weight_mm_per_rad : float
+        Position error that weighs as much as one radian.
+    orders : sequence of int
+        Orders to try, rising.
+    stated : Prior, optional
+        A prior that is not chosen, for which only the order is.
+    near : pandas.DataFrame, optional
+        The result for nearly the same rows, from whose priors the search starts.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Orders tried: ``order``, ``prior_std_mm``, ``prior_std_mrad`` and ``prior_decay`` that suit
+        it best, ``log_evidence``, ``log_evidence_less`` (than the best), ``chosen``, and
+        ``start`` (2,), the log of the width of the prior over the noise, and the decay.
     """
-    begin = {each.order: each for each in near.trials} if near else {}
-    system = _Linear(observations, empty, parameters, rotation_weight_mm_per_rad)
-    trials: list[Trial] = []
+    near = pd.DataFrame(columns=["order", "start"]) if near is None else near
+    starts = dict(zip(near["order"], near["start"], strict=True))
+    linear = _Linear(observations, empty, parameters, rotation_weight_mm_per_rad)
+    rows: list[tuple] = []
     at = np.array([0.0, 0.8])
     for order in orders:
-        normal, count = system.bent(order, max(orders))
-        degree = np.repeat(np.arange(1, order + 1), system.motions)
+        normal, count = linear.above_constants(order, max(orders))
+        degree = np.repeat(np.arange(1, order + 1), linear.motions)
         if stated is None:
-            if order in begin:
-                at = np.array([begin[order].log_ratio, begin[order].prior.decay])
+            at = starts.get(order, at)
             least, at, noise = _best(normal, count, degree, at)
-            prior = prior_of(float(np.exp(at[0])) * noise, float(at[1]), offset_rad)
+            prior = prior_of(float(np.exp(at[0])) * noise, float(at[1]), 0.0)
         else:
             prior, noise = stated, 0.1
             for _ in range(_STATED_STEPS):
                 at = np.array([np.log(stated.delta_mm / noise), stated.decay])
                 least, _, noise = _negative(at, normal, count, degree)
-        trials.append(Trial(order, prior, -least, float(at[0])))
-        best = max(range(len(trials)), key=lambda i: trials[i].log_evidence)
-        if len(trials) - 1 - best >= PATIENCE and len(orders) > 1:
+        rows.append((order, prior.delta_mm, 1e3 * prior.eps_rad, prior.decay, -least, at))
+        if len(rows) > PATIENCE + int(np.argmax([row[4] for row in rows])):
             break
-    top = trials[best].log_evidence
-    chosen = next(each for each in trials if each.log_evidence >= top - ENOUGH)
-    return Choice(held_out, tuple(trials), chosen)
+    names = ("order", "prior_std_mm", "prior_std_mrad", "prior_decay", "log_evidence", "start")
+    table = pd.DataFrame(rows, columns=names)
+    table["log_evidence_less"] = table["log_evidence"] - table["log_evidence"].max()
+    table["chosen"] = table.index == int(np.argmax(table["log_evidence_less"] >= -ENOUGH))
+    return table
 
 
 class _Linear:
@@ -132,62 +124,49 @@ class _Linear:
         self.built, self.gram = -1, np.zeros((0, 0))
         # A reading that no arm with constant errors comes near bends high orders most.
         for _ in range(_SCREENINGS):
-            system, scale, flat = self._system(0)
-            normal = system.normal(self._start(system))[0] * np.outer(scale, scale)
-            own = normal[:flat, :flat]
-            ridge = _GAUGE_RIDGE * np.maximum(np.diag(own), own.trace() / flat)
-            step = -np.linalg.solve(own + np.diag(ridge), normal[:flat, -1])
-            squared = self._misfit(system, scale[:-1] * step)
+            system, start, scale = self._system(0)
+            normal = system.normal(start)[0] * np.outer(scale, scale)
+            step = -np.linalg.solve(_steady(normal[:-1, :-1]), normal[:-1, -1])
+            to = scale * np.append(step, 1.0)
+            parts = [np.tensordot(to, part[:, :3], 1) for part, _ in system.columns(start)]
+            squared = np.sum(np.concatenate(parts, axis=1) ** 2, axis=0) / self.root**2
             far = max(FAR**2 * float(np.median(squared)), np.finfo(float).tiny)
             self.root = once(observations) * np.sqrt(far / np.maximum(squared, far))
 
-    def _system(self, order: int) -> tuple[PoseSystem, np.ndarray, int]:
+    def _system(self, order: int) -> tuple[PoseSystem, np.ndarray, np.ndarray]:
+        """The system, where it is linearised, and the scale of ``[J | r]``."""
         empty = vec.without_errors(self.empty.dh, self.empty.q_min_rad, self.empty.q_max_rad, order)
-        free = informed(self.observations, empty)
-        system = PoseSystem(self.observations, empty, free, self.parameters, self.weight, self.root)
-        scale = np.concatenate([self.parameters.scale, scales(empty)[free], [1.0]])
-        scale[: self.parameters.size] *= self.parameters.free
-        return system, scale, len(scale) - 1 - self.motions * order
+        free, frames = informed(self.observations, empty), self.parameters
+        system = PoseSystem(self.observations, empty, free, frames, self.weight, self.root)
+        start = np.concatenate([frames.begin, np.zeros(free.sum())])
+        return system, start, np.concatenate([frames.scale * frames.free, scales(empty)[free], [1]])
 
-    def _start(self, system: PoseSystem) -> np.ndarray:
-        return np.concatenate([self.parameters.begin, np.zeros(system.free.sum())])
-
-    def _misfit(self, system: PoseSystem, step: np.ndarray) -> np.ndarray:
-        """Squared position errors (n,) of a step, by the linear model, rows unweighted."""
-        plain = system.weighted(np.ones(len(self.observations)))
-        found = [
-            np.concatenate([residual, np.zeros(0)]) + jacobian @ step
-            for residual, jacobian in plain.blocks(self._start(plain))
-        ]
-        row = np.repeat(np.arange(len(self.observations)), 3 + 3 * self.observations.has_rotation)
-        position = ~self.observations.is_rotation
-        squared = np.concatenate(found) ** 2
-        return np.bincount(row[position], squared[position], minlength=len(self.observations))
-
-    def bent(self, order: int, highest: int) -> tuple[np.ndarray, float]:
+    def above_constants(self, order: int, highest: int) -> tuple[np.ndarray, float]:
         """Gram matrix of ``[r | J]`` above order 0 up to ``order``, and the count of residuals.
 
         Base, targets, constants and offsets are projected out, and taken off the count.
         """
         if order > self.built:
             self.built = min(max(order, _FIRST), highest) if order <= _FIRST else highest
-            system, scale, flat = self._system(self.built)
-            normal = system.normal(self._start(system))[0] * np.outer(scale, scale)
-            frames, terms = self.parameters.size, self.built + 1
+            system, start, scale = self._system(self.built)
             degree = np.zeros(len(scale))
-            bent = slice(frames, frames + self.motions * terms)
-            degree[bent] = np.tile(np.arange(terms), self.motions)
+            series = self.parameters.size + np.arange(self.motions * (self.built + 1))
+            degree[series] = np.tile(np.arange(self.built + 1), self.motions)
             degree[-1] = 0.5  # the residual follows what every order has
-            place = np.argsort(degree, kind="stable")
-            normal = normal[np.ix_(place, place)]
-            own = normal[:flat, :flat]
-            ridge = _GAUGE_RIDGE * np.maximum(np.diag(own), own.trace() / flat)
-            factor = np.linalg.cholesky(own + np.diag(ridge))
+            place, flat = np.argsort(degree, kind="stable"), int(np.sum(degree == 0.0))
+            normal = (system.normal(start)[0] * np.outer(scale, scale))[np.ix_(place, place)]
+            factor = np.linalg.cholesky(_steady(normal[:flat, :flat]))
             sides = scipy.linalg.solve_triangular(factor, normal[:flat, flat:], lower=True)
             self.gram = normal[flat:, flat:] - sides.T @ sides
-            self.flat = flat
+            self.count = system.weight - flat
         size = 1 + self.motions * order
-        return self.gram[:size, :size], self._system(0)[0].weight - self.flat
+        return self.gram[:size, :size], self.count
+
+
+def _steady(normal: np.ndarray) -> np.ndarray:
+    """A normal matrix that is definite where no pose shows a constant."""
+    diagonal = np.diag(normal)
+    return normal + np.diag(_GAUGE_RIDGE * np.maximum(diagonal, diagonal.mean()))
 
 
 def _best(
@@ -220,14 +199,15 @@ def _negative(
     """
     std = np.exp(at[0]) * at[1] ** (degree - 1.0)
     gradient = std * normal[0, 1:]
-    matrix = normal[1:, 1:] * np.outer(std, std)
+    matrix = normal[1:, 1:] * std
+    matrix *= std[:, None]
     matrix[np.diag_indices_from(matrix)] += 1.0
-    factor = scipy.linalg.cholesky(matrix, lower=True, overwrite_a=True, check_finite=False)
-    step = scipy.linalg.cho_solve((factor, True), gradient, check_finite=False)
+    factor, _ = lapack.dpotrf(matrix.T, overwrite_a=1)  # transposed: in place
+    step = lapack.dpotrs(factor, gradient)[0]
     misfit = max(normal[0, 0] - gradient @ step, np.finfo(float).tiny)
     value = 0.5 * count * np.log(misfit) + np.sum(np.log(np.diag(factor)))
-    root, _ = scipy.linalg.lapack.dtrtri(factor, lower=1, overwrite_c=1)
+    root, _ = lapack.dtrtri(factor, overwrite_c=1)
     # What data decide of each coefficient, less its square beside its prior.
-    share = 1.0 - np.einsum("ij,ij->j", root, root) - count / misfit * step**2
+    share = 1.0 - np.einsum("ij,ij->i", root, root) - count / misfit * step**2
     slopes = np.array([np.sum(share), np.sum(share * (degree - 1.0)) / at[1]])
     return value, slopes, float(np.sqrt(misfit / count))

@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import astuple
 
 import numpy as np
+import pandas as pd
 
-from kinacc.calibration import model_comparison_columns
+from kinacc.calibration import model_comparison
 from kinacc.calibration.delivered import delivered_fits, observed
 from kinacc.calibration.models import Fit, estimators, fit_all
 from kinacc.calibration.observations import Observations
 from kinacc.calibration.residuals import Errors, cross_validated, errors, statistics
+from kinacc.config.error_models import ERROR_MODELS, MEASURED, Comparison
 from kinacc.kinematics import robot
+from kinacc.measurements import folds
 from kinacc.tables.columns import Columns
 from kinacc.tables.contract import columns_of
-
-_QUANTITIES = (("position", "mm", 1.0), ("orientation", "mrad", 1e3))
 
 
 def run(inputs: Mapping, settings: Mapping, progress=None) -> dict[str, Columns]:
@@ -24,89 +26,73 @@ def run(inputs: Mapping, settings: Mapping, progress=None) -> dict[str, Columns]
     Train rows are of the delivered models at the rows they were fitted to. Validation rows are of
     rows held out: pooled over all folds, each fold refitted without its rows, and fold by fold.
     """
-    arm = robot.load(settings["robot"])
+    arm, measurements = robot.load(settings["robot"]), inputs["measurements"]
     every, train = observed(inputs, arm)
     delivered = delivered_fits(inputs, arm, every)
-    fitted_by = {
-        kind: each
-        for kind, each in estimators(settings["calibration"], arm, every).items()
-        if kind in delivered
-    }
+    kinds = estimators(settings["calibration"], arm, every)
 
     def refit(observations: Observations, fold: int) -> dict[str, Fit]:
         if np.array_equal(every.fold != fold, train):
             return delivered
-        own = [each.chosen(inputs, fold) for each in fitted_by.values()]
-        return fit_all(observations, own)
+        chosen = [e.chosen(inputs, fold) for kind, e in kinds.items() if kind in delivered]
+        return fit_all(observations, chosen)
 
-    folds = [int(fold) for fold in np.unique(every.fold) if fold >= 0]
-    counted = progress(folds, "shares of the poses held out") if progress else folds
+    numbers = [int(fold) for fold in np.unique(every.fold) if fold >= 0]
+    counted = progress(numbers, "shares of the poses held out") if progress else numbers
     held_out, trained = cross_validated(every, refit, counted, delivered)
-    seen = errors(delivered, every.select(train))
+    fitted = errors(delivered, every.select(train))
+    rows, parts = [], []
+    for name in fitted:
+        rows += _statistics(name, "train", np.nan, fitted[name])
+        for fold in numbers:
+            rows += _statistics(name, "train", fold, trained[fold][name])
+        rows += _statistics(name, "validation", np.nan, held_out[name])
+        for fold in numbers:
+            out = held_out[name].select(every.fold == fold)
+            rows += _statistics(name, "validation", fold, out)
+        parts.append(error_rows(measurements, name, "train", np.flatnonzero(train), fitted[name]))
+        there = np.flatnonzero(np.isfinite(held_out[name].position_mm[:, 0]))
+        out = held_out[name].select(there)
+        parts.append(error_rows(measurements, name, "cross_validated", there, out))
+    pose_errors = pd.concat(parts, ignore_index=True)
+    tables = {
+        "pose_errors": pose_errors,
+        "model_selection": selection(every, held_out),
+        "worst_rows": model_comparison.worst(pose_errors, np.asarray(measurements["row"], float)),
+    }
     return {
-        "residuals": _residuals(every.fold, folds, seen, held_out, trained),
-        "pose_errors": _pose_errors(inputs["measurements"], train, seen, held_out, bool(folds)),
-        **model_comparison_columns.columns(inputs["measurements"], every, train, seen, held_out),
+        "residuals": columns_of("residuals", rows),
+        "joint_bias": columns_of("joint_bias", model_comparison.bias(pose_errors, every.q_rad)),
+        **{name: {c: table[c].to_numpy() for c in table} for name, table in tables.items()},
     }
 
 
-def _residuals(
-    fold: np.ndarray,
-    folds: list[int],
-    seen: dict[str, Errors],
-    held_out: dict[str, Errors],
-    trained: dict[int, dict[str, Errors]],
-) -> Columns:
-    rows: list[tuple] = []
-    for name in seen:
-        rows += _statistics_rows(name, "train", np.nan, seen[name])
-        for number in folds:
-            rows += _statistics_rows(name, "train", number, trained[number][name])
-        rows += _statistics_rows(name, "validation", np.nan, held_out[name])
-        for number in folds:
-            part = held_out[name].select(fold == number)
-            rows += _statistics_rows(name, "validation", number, part)
-    return columns_of("residuals", rows)
+def selection(every: Observations, held_out: Mapping[str, Errors]) -> pd.DataFrame:
+    """``model_selection`` from errors ``held_out`` of every row, by name of the comparison."""
+    names = {kind: Comparison(MEASURED, kind).name for kind in ERROR_MODELS}
+    of_kinds = {kind: held_out[name] for kind, name in names.items() if name in held_out}
+    configuration = folds.configurations(every.pose, every.q_rad)
+    return model_comparison.select(of_kinds, configuration, every.fold)
 
 
-def _statistics_rows(name: str, subset: str, fold: float, found: Errors) -> Iterator[tuple]:
-    vectors = {"position": found.position_mm, "orientation": found.rotation_rad}
-    for quantity, unit, factor in _QUANTITIES:
-        figures = statistics(factor * vectors[quantity])
+def _statistics(name: str, subset: str, fold: float, found: Errors) -> Iterator[tuple]:
+    """Rows of ``residuals``."""
+    for quantity, unit, vectors in (
+        ("position", "mm", found.position_mm),
+        ("orientation", "mrad", 1e3 * found.rotation_rad),
+    ):
+        figures = statistics(vectors)
         if figures is not None:
-            values = figures.n, figures.mean, figures.max, figures.rms, figures.gamma99
-            yield (name, subset, fold, quantity, unit, *values)
+            yield (name, subset, fold, quantity, unit, *astuple(figures))
 
 
-def _pose_errors(
-    measurements: Mapping,
-    train: np.ndarray,
-    seen: dict[str, Errors],
-    held_out: dict[str, Errors],
-    any_folds: bool,
-) -> Columns:
-    parts = []
-    for name in seen:
-        parts.append(_error_rows(measurements, name, "train", np.flatnonzero(train), seen[name]))
-        if any_folds:
-            rows = np.flatnonzero(np.isfinite(held_out[name].position_mm[:, 0]))
-            found = held_out[name].select(rows)
-            parts.append(_error_rows(measurements, name, "cross_validated", rows, found))
-    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-
-
-def _error_rows(
+def error_rows(
     measurements: Mapping, comparison: str, estimate: str, rows: np.ndarray, found: Errors
-) -> Columns:
-    copied = {
-        name: np.asarray(measurements[name])[rows]
-        for name in ("pose", "target", "repeat", "subset", "fold")
-    }
-    return {
-        "comparison": np.full(len(rows), comparison, dtype=object),
-        "estimate": np.full(len(rows), estimate, dtype=object),
-        "row": rows,
-        **copied,
-        **{f"e{axis}_mm": found.position_mm[:, i] for i, axis in enumerate("xyz")},
-        **{f"r{axis}_mrad": 1e3 * found.rotation_rad[:, i] for i, axis in enumerate("xyz")},
-    }
+) -> pd.DataFrame:
+    """``pose_errors`` of the ``rows`` of measurements that the errors are of."""
+    table = pd.DataFrame({"comparison": comparison, "estimate": estimate, "row": rows})
+    for name in ("pose", "target", "repeat", "subset", "fold"):
+        table[name] = np.asarray(measurements[name])[rows]
+    table[["ex_mm", "ey_mm", "ez_mm"]] = found.position_mm
+    table[["rx_mrad", "ry_mrad", "rz_mrad"]] = 1e3 * found.rotation_rad
+    return table

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
-from kinacc.calibration.evidence import Choice
 from kinacc.calibration.fitting import ModelFit
 from kinacc.calibration.frames import Frames, stacked
 from kinacc.calibration.solve import Solution, Spectrum
 from kinacc.calibration.uncertainty import Uncertainty, scaled_unit
-from kinacc.calibration.vec_fit import Prior
 from kinacc.geometry import quaternion_from_rotation
 from kinacc.kinematics.tables import frame
 from kinacc.tables.columns import Columns
@@ -64,42 +62,6 @@ def vec_fit_columns(fit: ModelFit, gauge: Spectrum, uncertainty: Uncertainty) ->
         )
     ]
     return columns_of("vec_fit", [*rows, *_undetermined_rows(uncertainty)])
-
-
-def vec_orders_columns(choices: Sequence[Choice], stated: tuple[int, Prior]) -> Columns:
-    """``vec_orders``: orders tried with nothing seen of a fold, and the one chosen.
-
-    Without ``choices`` the ``stated`` order and prior are the one row there is.
-    """
-    rows = [(None, stated[0], *_stated(stated[1]), None, None, True)] if not choices else []
-    for choice in choices:
-        best = max(trial.log_evidence for trial in choice.trials)
-        rows += [
-            (
-                choice.held_out,
-                trial.order,
-                *_stated(trial.prior),
-                trial.log_evidence,
-                trial.log_evidence - best,
-                trial is choice.chosen,
-            )
-            for trial in choice.trials
-        ]
-    return columns_of("vec_orders", rows)
-
-
-def _stated(prior: Prior) -> tuple[float, float, float]:
-    return prior.delta_mm, 1e3 * prior.eps_rad, prior.decay
-
-
-def chosen_order(columns: Mapping, fold: int | None) -> tuple[int, float, float]:
-    """Order, prior std in mm and decay that ``vec_orders`` chose without seeing ``fold``."""
-    folds = np.asarray(columns["fold"], dtype=float)
-    own = np.isnan(folds) if fold is None else folds == fold
-    row = np.flatnonzero(own & (np.asarray(columns["chosen"]) == 1))[0]
-    return int(columns["order"][row]), *(
-        float(columns[name][row]) for name in ("prior_std_mm", "prior_decay")
-    )
 
 
 def fit_columns(name: str, fit: ModelFit, uncertainty: Uncertainty) -> Columns:

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 from typing import ClassVar, Self
 
 import numpy as np
+import pandas as pd
 
 from kinacc.calibration import evidence, tables, vec_fit
-from kinacc.calibration.evidence import Choice
 from kinacc.calibration.fitting import ModelFit, placed
 from kinacc.calibration.frames import FrameParameters, Frames, FrameTerms
 from kinacc.calibration.models import Common, Estimator, Fit, nominal_frames
@@ -21,6 +21,7 @@ from kinacc.kinematics import vec
 from kinacc.kinematics.robot import Robot
 from kinacc.kinematics.vec import VECModel
 from kinacc.tables.columns import Columns
+from kinacc.tables.contract import ARTEFACTS
 
 _AUTO = "auto"
 
@@ -52,7 +53,7 @@ class VECEstimator(Estimator):
         stated = Prior(
             float(section["prior_std_mm"]), angle_rad, float(section["prior_decay"]), angle_rad
         )
-        orders = [each for each in evidence.ORDERS if each <= int(section["order_highest"])]
+        orders = [order for order in evidence.ORDERS if order <= int(section["order_highest"])]
         return cls(
             Common.of(calibration, arm),
             _joint_range_rad(section, arm, every.q_rad),
@@ -79,24 +80,31 @@ class VECEstimator(Estimator):
         return len(self.orders) > 1 or not self.prior_stated
 
     def choices(self, every: Observations, progress: Callable | None = None) -> dict[str, Columns]:
-        """``vec_orders``: the order and prior with each fold unseen and with all seen."""
-        found: list[Choice] = []
+        """``vec_orders``: orders and priors tried with each fold unseen and with all seen."""
+        parts: list[pd.DataFrame] = []
         folds = [None, *(int(fold) for fold in np.unique(every.fold) if fold >= 0)]
-        if self.open:
-            for fold in progress(folds, "shares of the poses held out") if progress else folds:
-                seen = every if fold is None else every.select(every.fold != fold)
-                found.append(self._choice(seen, fold, found[0] if found else None))
-        return {"vec_orders": tables.vec_orders_columns(found, (self.order, self.prior))}
+        if not self.open:
+            parts.append(self._without_evidence(self.order, self.prior))
+        elif progress:
+            folds = progress(folds, "shares of the poses held out")
+        for fold in folds if self.open else ():
+            seen = every if fold is None else every.select(every.fold != fold)
+            parts.append(self._choice(seen, parts[0] if parts else None).assign(fold=fold))
+        table = pd.concat([part.astype({"fold": float, "chosen": int}) for part in parts])
+        names = [column.name for column in ARTEFACTS["vec_orders"].columns]
+        return {"vec_orders": {name: table[name].to_numpy() for name in names}}
 
-    def chosen(self, tables_of: Mapping[str, Columns], fold: int | None) -> Self:
+    def chosen(self, tables: Mapping[str, Columns], fold: int | None) -> Self:
         """The estimator with the order and prior that ``vec_orders`` states for one fold."""
         if not self.open:
             return self
-        order, std_mm, decay = tables.chosen_order(tables_of["vec_orders"], fold)
+        table = pd.DataFrame(tables["vec_orders"]).query("chosen == 1")
+        row = table[table["fold"].isna() if fold is None else table["fold"] == fold].iloc[0]
         prior = self.prior
         if not self.prior_stated:
+            std_mm, decay = float(row["prior_std_mm"]), float(row["prior_decay"])
             prior = evidence.prior_of(std_mm, decay, self.prior.offset_rad)
-        return replace(self, order=order, prior=prior)
+        return replace(self, order=int(row["order"]), prior=prior)
 
     def fit(self, observations: Observations, others: Mapping[str, Fit]) -> ModelFit:
         """The VEC model on the nominal arm, base and targets starting where that has them."""
@@ -124,21 +132,37 @@ class VECEstimator(Estimator):
         )
         return {"vec_fit": tables.vec_fit_columns(fitted, gauge, known)}
 
-    def _choice(self, seen: Observations, fold: int | None, near: Choice | None) -> Choice:
+    def _choice(self, seen: Observations, near: pd.DataFrame | None) -> pd.DataFrame:
         frames, terms = self._begin(seen, {})
         weight, arm = self.common.rotation_weight_mm_per_rad, self.common.nominal
         parameters = FrameParameters.none(frames)
         if terms is not None:
             parameters = placed(seen, arm, terms, weight, start=frames)
         most = evidence.highest_order(seen, arm.joints, parameters.size)
-        orders = [each for each in self.orders if each <= most]
-        if not orders:
-            return evidence.without_evidence(self.orders[0], self.prior.offset_rad, fold)
+        orders = [order for order in self.orders if order <= most]
+        if not orders:  # too few residuals to judge by
+            usual = evidence.prior_of(evidence.USUAL_STD, 1.0, self.prior.offset_rad)
+            return self._without_evidence(self.orders[0], usual)
         stated = self.prior if self.prior_stated else None
+        observations = self._wanted(seen)
         return evidence.choose(
-            self._wanted(seen), self._empty(1), parameters, weight, orders,
-            self.prior.offset_rad, stated, fold, near,
-        )  # fmt: skip
+            observations, self._empty(1), parameters, weight, orders, stated, near
+        )
+
+    def _without_evidence(self, order: int, prior: Prior) -> pd.DataFrame:
+        """``vec_orders`` of one order and prior that nothing was compared with."""
+        return pd.DataFrame(
+            {
+                "fold": np.nan,
+                "order": [order],
+                "prior_std_mm": prior.delta_mm,
+                "prior_std_mrad": 1e3 * prior.eps_rad,
+                "prior_decay": prior.decay,
+                "log_evidence": np.nan,
+                "log_evidence_less": np.nan,
+                "chosen": True,
+            }
+        )
 
     def _begin(
         self, observations: Observations, others: Mapping[str, Fit]
