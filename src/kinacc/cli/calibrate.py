@@ -7,32 +7,35 @@ import os
 import shlex
 from contextlib import nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
-from kinacc.cli.choice import CONFIG
-
-if TYPE_CHECKING:
-    from kinacc.workflow.data_sets import DataSets
+from kinacc.cli.choice import CONFIG, together
+from kinacc.cli.report import written
+from kinacc.cli.summary import as_plain
+from kinacc.errors import InputError, Problem
+from kinacc.report.summarise import summarise_all
+from kinacc.report.terminal import FEW, print_summaries
+from kinacc.workflow.data_sets import RESULTS, read_data_sets
+from kinacc.workflow.running import held
+from kinacc.workflow.start import run_workflow
 
 # Made by a study, perhaps of an earlier calibration.
 STUDIED = (
     *("accuracy_map", "assessment_points", "study", "study_summary", "readings", "histories"),
     "claims",
 )
-WORDS = {"ignore_unknown_options": True}
-CORES = click.option(
-    "--cores", "-c", type=click.IntRange(1), help="Processor cores to use. [all there are]"
+workflow_options = together(
+    click.option(
+        "--cores", "-c", type=click.IntRange(1), help="Processor cores to use. [all there are]"
+    ),
+    click.option("--json", "as_json", is_flag=True, help="Print the answer as JSON."),
+    click.argument("words", nargs=-1, type=click.UNPROCESSED, metavar="[FILE.yaml|FOLDER]..."),
 )
-JSON = click.option("--json", "as_json", is_flag=True, help="Print the answer as JSON.")
-TARGETS = click.argument("words", nargs=-1, type=click.UNPROCESSED, metavar="[FILE.yaml|FOLDER]...")
 
 
-@click.command("calibrate", context_settings=WORDS)
-@CORES
-@JSON
-@TARGETS
+@click.command("calibrate", context_settings={"ignore_unknown_options": True})
+@workflow_options
 def calibrate(words: tuple[str, ...], cores: int | None, as_json: bool) -> None:
     """Fit the models of the data sets of FILE.yaml, and say what they are worth.
 
@@ -47,21 +50,13 @@ def calibrate(words: tuple[str, ...], cores: int | None, as_json: bool) -> None:
       kinacc calibrate robots
       kinacc calibrate tracker.yaml -- --dry-run
     """
-    from kinacc.cli.report import written
-    from kinacc.cli.summary import as_plain
-    from kinacc.report.summarise import summarise_all
-    from kinacc.report.terminal import FEW, print_summaries
-    from kinacc.workflow.data_sets import RESULTS
-
-    configs, data = carried_out("calibration", words, cores, default=None)
-    if data is None:
+    configs, folders = carried_out("calibration", words, cores, None)
+    if not folders:
         return
-    folders = [Path(RESULTS, name) for name in data.told]
     if as_json:
-        found = summarise_all(folders)
-        click.echo(json.dumps(as_plain(found), indent=2))
+        click.echo(json.dumps(as_plain(summarise_all(folders)), indent=2))
         return
-    pages = [written(str(each), without=STUDIED) for each in folders if len(folders) <= FEW]
+    pages = [written(str(folder), without=STUDIED) for folder in folders if len(folders) <= FEW]
     print_summaries(folders, without=STUDIED)
     if pages:
         click.echo(f"Page: {', '.join(map(str, pages))}")
@@ -70,50 +65,38 @@ def calibrate(words: tuple[str, ...], cores: int | None, as_json: bool) -> None:
 
 def carried_out(
     target: str, words: tuple[str, ...], cores: int | None, default: Path | None
-) -> tuple[tuple[str, ...], DataSets | None]:
-    """Run the workflow up to a target: the configuration files and, after a real run, the data.
+) -> tuple[list[str], list[Path]]:
+    """Run the workflow up to a target: the configuration files and, after a real run, folders.
 
-    ``words`` are configuration files and, from the first that begins with ``-``, Snakemake's;
-    without files config.yaml is meant, or the ``default`` where there is none. Leaves with
-    Snakemake's exit code where that is not 0. Raises InputError for bad configuration.
+    ``words`` are configuration files, folders of these and, from the first that begins with ``-``,
+    Snakemake's; without files config.yaml is meant, or the ``default`` where there is none. Leaves
+    with Snakemake's exit code where that is not 0. Raises InputError for bad configuration.
     """
-    from kinacc.errors import InputError, Problem
-    from kinacc.workflow.data_sets import RESULTS, read_data_sets
-    from kinacc.workflow.running import held
-    from kinacc.workflow.start import run_workflow
-
     first = next((i for i, word in enumerate(words) if word.startswith("-")), len(words))
-    configs, more = words[:first], list(words[first:])
-    if not configs and Path(CONFIG).is_file():
-        configs = (CONFIG,)
-    elif not configs and default is not None:
-        configs = (str(default),)
-    elif not configs:
+    names, options = words[:first], list(words[first:])
+    if not names and Path(CONFIG).is_file():
+        names = (CONFIG,)
+    elif not names and default is not None:
+        names = (str(default),)
+    elif not names:
         what = f"no configuration file is given, and there is no {CONFIG} here"
         fix = "kinacc init MEASUREMENTS writes one; then: kinacc calibrate NAME.yaml"
         raise InputError(Problem("FILE.yaml", what, fix=fix))
-    configs = tuple(each for word in configs for each in _files(word))
+    configs: list[str] = []
+    for name in names:
+        files = [name]
+        if Path(name).is_dir():
+            files = sorted(map(str, Path(name).glob("*.yaml")))
+            files = [file for file in files if not file.endswith(".robot.yaml")]
+        if not files:
+            fix = "kinacc init MEASUREMENTS --out FOLDER writes one"
+            what = "is a folder without configuration files"
+            raise InputError(Problem(name, what, "*.yaml", fix))
+        configs += files
     data = read_data_sets(configs)
-    ran = not {"-n", "--dry-run", "--dryrun", "--lint"} & set(more)
-    with held(RESULTS) if ran else nullcontext():  # --no-hooks leaves out what holds them
-        code = run_workflow(target, configs, cores or os.cpu_count() or 1, more)
+    is_run = {"-n", "--dry-run", "--dryrun", "--lint"}.isdisjoint(options)
+    with held(RESULTS) if is_run else nullcontext():  # --no-hooks leaves out what holds them
+        code = run_workflow(target, configs, cores or os.cpu_count() or 1, options)
     if code:
         raise SystemExit(code)
-    return configs, data if ran else None
-
-
-def _files(word: str) -> list[str]:
-    """The configuration files of a word: itself, or those in a folder, without robot files.
-
-    Raises InputError for a folder without any.
-    """
-    from kinacc.errors import InputError, Problem
-
-    if not Path(word).is_dir():
-        return [word]
-    found = sorted(str(each) for each in Path(word).glob("*.yaml"))
-    found = [each for each in found if not each.endswith(".robot.yaml")]
-    if not found:
-        fix = "kinacc init MEASUREMENTS --out FOLDER writes one"
-        raise InputError(Problem(word, "is a folder without configuration files", "*.yaml", fix))
-    return found
+    return configs, [Path(RESULTS, name) for name in data.told] if is_run else []

@@ -9,27 +9,27 @@ from pathlib import Path
 
 import click
 
+from kinacc.checks.check import examined
+from kinacc.checks.contradictions import load
+from kinacc.checks.report import UNUSABLE, VERDICTS, to_json
 from kinacc.cli.choice import CONFIG
+from kinacc.cli.exclude import measured_data_set
+from kinacc.cli.output import Output, answers
+from kinacc.config.edit import with_added
+from kinacc.errors import InputError, Problem, refuse
+from kinacc.figures.checked_data import draw
+from kinacc.progress import reporting
+from kinacc.tables.atomic import write_whole
 
 
 @click.command("check-data")
 @click.argument("files", nargs=-1, type=click.Path())
 @click.option("--dataset", multiple=True, help="Data set of the configuration. [all that are read]")
-@click.option(
-    "--picture", type=click.Path(), help="Draw one data set to a .svg, .png or .pdf file."
-)
-@click.option("--force", is_flag=True, help="Replace a picture that is there.")
-@click.option("--json", "as_json", is_flag=True, help="Print the report as JSON.")
 @click.option("--accept", metavar="FINDING", help="Finding to go on with, kept in FILE.yaml.")
 @click.option("--reason", default="", help="Reason for --accept.")
+@answers("Print the report as JSON.", picture="Draw one data set to a .svg, .png or .pdf file.")
 def check_data(
-    files: tuple[str, ...],
-    dataset: tuple[str, ...],
-    picture: str | None,
-    force: bool,
-    as_json: bool,
-    accept: str | None,
-    reason: str,
+    files: tuple[str, ...], dataset: tuple[str, ...], accept: str | None, reason: str, out: Output
 ) -> None:
     """Check measured files before anything is fitted: what is there, and what looks wrong.
 
@@ -42,65 +42,44 @@ def check_data(
       kinacc check-data examples/ur10_published.yaml --picture checked.svg
       kinacc check-data config.yaml examples/ur10.yaml --dataset ur10_b --json
     """
-    from kinacc.checks.check import examined
-    from kinacc.checks.report import UNUSABLE, VERDICTS, to_json
-    from kinacc.cli.output import PICTURES, require_writable
-    from kinacc.errors import InputError, Problem
-    from kinacc.progress import reporting
-
     files = files or (CONFIG,)
-    code, texts, following, sections = 0, [], [], {}
-
-    def unusable(name: str, path: str, error: InputError) -> None:
-        problems = [asdict(item) for item in error.problems]
-        verdict = VERDICTS[UNUSABLE]
-        texts.append({"dataset": name, "path": path, "verdict": verdict, "problems": problems})
-
-    try:
-        if accept is not None:
-            _accept(files, dataset, accept, reason)
-        sections = _sections(files, dataset)
-        if picture is not None and len(sections) > 1:
-            message = "draws one data set, and there are several"
-            raise InputError(Problem("--picture", message, ", ".join(sections), "give --dataset"))
-        require_writable([picture], force, PICTURES)
-    except InputError as error:
-        if not as_json:
-            raise
-        code = UNUSABLE
-        unusable(", ".join(files), "", error)
+    if accept is not None:
+        _accept(files, dataset, accept, reason)
+    sections = _sections(files, dataset)
+    if out.picture is not None and len(sections) > 1:
+        message = "draws one data set, and there are several"
+        raise InputError(Problem("--picture", message, ", ".join(sections), "give --dataset"))
+    code, reports, following = 0, [], []
     for name, settings in sections.items():
         try:
             with reporting(f"check-data {name}", bar=True) as progress:
                 report = examined(settings, name, progress)
         except InputError as error:
             code = UNUSABLE
-            unusable(name, settings["measurements"]["file"]["path"], error)
-            if not as_json:
-                click.echo(f"{error}\n", err=True)
-            continue
-        code = max(code, report.code)
-        texts.append(report.as_dict())
-        following += [text for item in report.stopping for text in item.commands(files[0])]
-        if picture is not None:
-            _draw(report, picture)
-        if not as_json:
-            click.echo(report.as_text() + "\n")
-    if as_json:
-        click.echo(to_json(texts))
+            path = settings["measurements"]["file"]["path"]
+            problems = [asdict(problem) for problem in error.problems]
+            facts = {"dataset": name, "path": path, "verdict": VERDICTS[code]}
+            reports.append({**facts, "problems": problems})
+            text = f"{error}\n"
+        else:
+            code = max(code, report.code)
+            reports.append(report.as_dict())
+            following += [line for item in report.stopping for line in item.commands(files[0])]
+            text = report.as_text() + "\n"
+            if out.picture is not None:
+                out.draw(_drawn(report))
+        if not out.as_json:
+            click.echo(text, err="problems" in reports[-1])
+    if out.as_json:
+        click.echo(to_json(reports))
     elif code < UNUSABLE:
-        next_ = following or [shlex.join(["kinacc", "calibrate", *files])]
-        click.echo("\n  ".join(["next:", *next_]))
+        lines = following or [shlex.join(["kinacc", "calibrate", *files])]
+        click.echo("\n  ".join(["next:", *lines]))
     sys.exit(code)
 
 
 def _accept(files: tuple[str, ...], dataset: tuple[str, ...], kind: str, reason: str) -> None:
     """Write to the configuration that the workflow goes on with a finding."""
-    from kinacc.cli.exclude import measured_data_set
-    from kinacc.config.edit import with_added
-    from kinacc.errors import Problem, refuse
-    from kinacc.tables.atomic import write_whole
-
     problems = [] if reason.strip() else [Problem("--reason", "is empty", "why, in words")]
     problems += [] if len(files) == 1 else [Problem("--accept", "needs one FILE.yaml")]
     refuse(problems)
@@ -112,12 +91,9 @@ def _accept(files: tuple[str, ...], dataset: tuple[str, ...], kind: str, reason:
 
 def _sections(files: tuple[str, ...], wanted: tuple[str, ...]) -> dict[str, dict]:
     """The data sets to check: those asked for, or all that are read from a file."""
-    from kinacc.checks.contradictions import load
-    from kinacc.errors import Problem, refuse
-
     full = load(files)
+    measured = [name for name, c in full.items() if c["measurements"]["source"] == "file"]
     # The newest line of a series is the arm's own file.
-    measured = [n for n, c in full.items() if c["measurements"]["source"] == "file"]
     chosen = wanted or [name for name in measured if "series" not in full[name]]
     refuse(
         Problem("--dataset", f"{name!r} is not read from a file", ", ".join(measured))
@@ -125,15 +101,11 @@ def _sections(files: tuple[str, ...], wanted: tuple[str, ...]) -> dict[str, dict
         if name not in measured
     )
     if not chosen:
-        refuse([Problem(", ".join(files), "no data set is read from a file")])
+        raise InputError(Problem(", ".join(files), "no data set is read from a file"))
     return {name: full[name] for name in chosen}
 
 
-def _draw(report, picture: str) -> None:
-    from kinacc.cli.output import Output
-    from kinacc.figures.checked_data import draw
-
+def _drawn(report):
     suspects = {item.kind: item.lines for item in report.suspicions}
     limit_mm = report.facts.get("quick_fit", {}).get("most_expected_mm", float("nan"))
-    drawn = draw(report.facts["joint_coverage"], report.line, report.left_mm, limit_mm, suspects)
-    Output(picture=picture).draw(drawn)
+    return draw(report.facts["joint_coverage"], report.line, report.left_mm, limit_mm, suspects)

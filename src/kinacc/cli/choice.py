@@ -6,49 +6,36 @@ from collections.abc import Callable, Mapping
 from dataclasses import fields, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import click
 
 from kinacc.assess.statement import CONFIDENCE
 from kinacc.config import schema
+from kinacc.deployment import folder as results
+from kinacc.deployment.record import Calibration
 from kinacc.errors import InputError, Problem
+from kinacc.kinematics import robot as robots
+from kinacc.kinematics.robot import Robot
 from kinacc.tables.allowed import SELECTABLE
-
-if TYPE_CHECKING:
-    from kinacc.deployment.record import Calibration
-    from kinacc.kinematics.robot import Robot
+from kinacc.workflow.data_sets import read_data_sets
+from kinacc.workflow.outdated import outdated_reason
 
 Record = TypeVar("Record")
 CONFIG = "config.yaml"
 
 
-class _Option(click.Option):
-    """An option whose numbers are written in plain digits: Python would take 1_000 and １ too."""
-
-    def type_cast_value(self, ctx: click.Context, value: object) -> object:
-        if isinstance(self.type, (click.types.FloatParamType, click.types.IntParamType)):
-            for each in value if isinstance(value, (list, tuple)) else [value]:
-                if isinstance(each, str) and not (each.isascii() and "_" not in each):
-                    self.type.fail(f"{each!r} is not a valid number.", self, ctx)
-        return super().type_cast_value(ctx, value)
-
-
-option = partial(click.option, show_default=True, cls=_Option)
+option = partial(click.option, show_default=True)
 MODEL = click.Choice([*SELECTABLE, "nominal"])
 
 
 def values_of(path: str) -> click.ParamType:
-    """What an option takes that stands for a key of the configuration, such as study.alpha."""
+    """Values of an option for a key of the configuration, such as measurements.file.decimal."""
     key = schema.key(path)
     if "enum" in key:
         return click.Choice(key["enum"])
-    if key["type"] == "integer":
-        return click.IntRange(key["minimum"], key["maximum"])
-    if "exclusiveMinimum" in key:
-        ends = key["exclusiveMinimum"], key["exclusiveMaximum"]
-        return click.FloatRange(*ends, min_open=True, max_open=True)
-    return click.FloatRange(key["minimum"], key["maximum"])
+    ends = key["exclusiveMinimum"], key["exclusiveMaximum"]
+    return click.FloatRange(*ends, min_open=True, max_open=True)
 
 
 ROBOT = option("--robot", help="Robot of the results: a shipped name or file. [as the results say]")
@@ -151,32 +138,23 @@ def robot_of(folder: str | Path, robot: str | None, config: tuple[str, ...]) -> 
 
     Raises InputError for a robot given that is not the one the results were made with.
     """
-    from kinacc.deployment import folder as results
-    from kinacc.kinematics import robot as robots
-
     recorded = results.recorded_robot(folder)
     if robot is None and not config and recorded is not None:
         return recorded
-    given = robots.load(robot if robot is not None else _configured(folder, config))
+    if robot is None:
+        if not config and not Path(CONFIG).is_file():
+            what = f"is not given, and there is no {CONFIG} here"
+            raise InputError(Problem("--robot", what, "a shipped name, a robot file"))
+        datasets = read_data_sets(config or (CONFIG,)).settings
+        name = Path(folder).resolve().name
+        if name not in datasets:
+            what = f"data set {name} is not in the configuration"
+            raise InputError(Problem(str(folder), what, ", ".join(datasets), "give --robot"))
+        robot = datasets[name]["robot"]
+    arm = robots.load(robot)
     if recorded is not None:
-        results.require_same_robot(recorded, given, str(folder))
-    return given
-
-
-def _configured(folder: str | Path, config: tuple[str, ...]) -> str:
-    """What the configuration calls the robot of a results folder."""
-    from kinacc.workflow.data_sets import read_data_sets
-
-    if not config and not Path(CONFIG).is_file():
-        what = f"is not given, and there is no {CONFIG} here"
-        raise InputError(Problem("--robot", what, "a shipped name, a robot file"))
-    datasets = read_data_sets(config or (CONFIG,)).settings
-    name = Path(folder).resolve().name
-    if name not in datasets:
-        what = f"data set {name} is not in the configuration"
-        allowed = ", ".join(datasets)
-        raise InputError(Problem(str(folder), what, allowed, "give --config or --robot"))
-    return datasets[name]["robot"]
+        results.require_same_robot(recorded, arm, str(folder))
+    return arm
 
 
 def calibration_of(
@@ -187,19 +165,14 @@ def calibration_of(
     session: str | None = None,
 ) -> Calibration:
     """The calibration of a results folder."""
-    from kinacc.deployment import folder as results
-
     tables = results.read_tables(folder)
-    name = Path(folder).resolve().name
     arm = robot_of(folder, robot, config)
-    found = results.calibration(tables, arm, model, name, session)
-    return replace(found, outdated=say_outdated(folder))
+    calibration = results.calibration(tables, arm, model, Path(folder).resolve().name, session)
+    return replace(calibration, outdated=say_outdated(folder))
 
 
 def say_outdated(folder: str | Path) -> str:
     """Print why results are outdated, if they are; returns the reason, empty where they are not."""
-    from kinacc.workflow.outdated import outdated_reason
-
     reason = outdated_reason(folder)
     if reason:
         click.echo(f"{folder} is outdated: {reason}; run kinacc calibrate again", err=True)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import signal
-import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict
@@ -93,78 +92,74 @@ class Commands(InOrder):
 
     def parse_args(self, context: click.Context, args: list[str]) -> list[str]:
         """Note whether problems are asked for as JSON; more threads of BLAS are not."""
-        own = args[: args.index("--")] if "--" in args else args
-        context.meta[_AS_JSON] = "--json" in own
-        if {*own}.isdisjoint(_HELP):
+        context.meta[_AS_JSON] = "--json" in args
+        if {*args}.isdisjoint(_HELP):
             os.environ.update(ONE_THREAD)
         return super().parse_args(context, args)
 
     def invoke(self, context: click.Context) -> object:
         """Run the command; docs/commands.md has the exit codes of errors and signals."""
-        came: list[int] = []
+        signals: list[int] = []
         try:
-            with _listening(came):
-                return super().invoke(context)
+            with _listening(signals):
+                result = super().invoke(context)
+                print(end="", flush=True)  # a full disk is noticed here
+                return result
         except (Exception, KeyboardInterrupt) as error:
             usage = isinstance(error, click.UsageError) and not context.meta[_AS_JSON]
             if usage or isinstance(error, (click.exceptions.Exit, click.Abort)):
                 raise
-            code, text, problems = _ending(error, came)
+            code, text, problems = _ending(error, signals)
         if problems and context.meta[_AS_JSON]:
-            click.echo(json.dumps({"problems": [asdict(each) for each in problems]}, indent=1))
+            click.echo(json.dumps({"problems": [asdict(item) for item in problems]}, indent=1))
         if text:
             click.echo(text, err=True)
         context.exit(code)
 
 
-def _ending(error: BaseException, came: Sequence[int]) -> tuple[int, str, Sequence[Problem]]:
+def _ending(error: BaseException, signals: Sequence[int]) -> tuple[int, str, Sequence[Problem]]:
     """Exit code, text and problems of an error; a fault of kinacc itself is raised again.
 
-    ``came``: signals to stop. A library that a signal meets may raise an error of its own.
+    ``signals`` to stop that came. A library that a signal meets may raise an error of its own.
     """
-    if signal.SIGTERM in came:
+    if signal.SIGTERM in signals:
         return TERMINATED, "stopped by the system; what was finished is kept", ()
-    if came or isinstance(error, KeyboardInterrupt):
+    if signals or isinstance(error, KeyboardInterrupt):
         return STOPPED, "stopped", ()
+    if isinstance(error, BrokenPipeError):
+        return NOBODY_READS, "", ()
     if isinstance(error, MemoryError):
         return AGAINST, f"not enough memory: {error or 'ask for less'}", ()
     if isinstance(error, RecursionError):
         return AGAINST, "the input is nested too deeply to be read", ()
-    if isinstance(error, BrokenPipeError):
-        return NOBODY_READS, "", ()
-    if isinstance(error, OSError):
-        error = refused(error)
     if isinstance(error, click.UsageError):
         place = error.ctx.command_path if error.ctx else ""
         return UNUSABLE, "", (Problem(place, error.format_message()),)
-    if isinstance(error, InputError):
-        code = AGAINST if isinstance(error, MachineError) else UNUSABLE
-        return code, str(error), error.problems
-    if isinstance(error, KinaccError):
-        return AGAINST, str(error), ()
-    raise error
+    if isinstance(error, OSError):
+        error = refused(error)
+    if not isinstance(error, KinaccError):
+        raise error
+    unusable = isinstance(error, InputError) and not isinstance(error, MachineError)
+    return UNUSABLE if unusable else AGAINST, str(error), getattr(error, "problems", ())
 
 
 @contextmanager
-def _listening(came: list[int]) -> Iterator[None]:
+def _listening(signals: list[int]) -> Iterator[None]:
     """Ctrl-C and SIGTERM end the block as an exception, so that files in the making are removed."""
 
-    def end(signum: int, _: object) -> NoReturn:
-        came.append(signum)
+    def end(number: int, _: object) -> NoReturn:
+        signals.append(number)
         raise KeyboardInterrupt
 
-    if threading.current_thread() is not threading.main_thread():
-        yield  # Python sets handlers in the main thread only
-        return
-    before = {each: signal.getsignal(each) for each in (signal.SIGINT, signal.SIGTERM)}
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
-        for each, handler in before.items():
+        for number, handler in before.items():
             if handler != signal.SIG_IGN:  # as of SIGINT for a command in the background
-                signal.signal(each, end)
+                signal.signal(number, end)
         yield
     finally:
-        for each, handler in before.items():
-            signal.signal(each, handler)
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 @click.group(cls=Commands, context_settings={"help_option_names": list(_HELP)})

@@ -16,7 +16,7 @@ import numpy as np
 import pandas as pd
 
 from kinacc.config.names import in_csv
-from kinacc.errors import InputError, Problem, as_seen
+from kinacc.errors import Problem, as_seen, refuse
 from kinacc.tables.atomic import write_whole
 
 if TYPE_CHECKING:
@@ -98,37 +98,37 @@ def answers(
 
     ``as_json``, ``picture``, ``page`` and ``force`` are helps of options, ``table`` is for --out.
     """
-    options = [click.option("--json", "as_json", is_flag=True, help=as_json)]
-    if table:
-        texts = "Write to a .csv, .xlsx, .json or .parquet file."
-        options.insert(0, click.option("--out", "-o", "table", type=click.Path(), help=texts))
-    if verbose:
-        options.append(click.option("--verbose", is_flag=True, help="Every row and detail."))
-    if page:
-        options.insert(0, click.option("--page", type=click.Path(), help=page))
-    if picture:
-        options.insert(0, click.option("--picture", type=click.Path(), help=picture))
-    if table or picture or page or force:
-        texts = force or "Replace a file that is there."
-        options.append(click.option("--force", is_flag=True, help=texts))
+    file = {"type": click.Path()}
+    options = {
+        "out": table and click.option(
+            "--out", "-o", "table", **file, help="Write to a .csv, .xlsx, .json or .parquet file."
+        ),
+        "picture": picture and click.option("--picture", **file, help=picture),
+        "page": page and click.option("--page", **file, help=page),
+        "json": click.option("--json", "as_json", is_flag=True, help=as_json),
+        "verbose": verbose
+        and click.option("--verbose", is_flag=True, help="Every row and detail."),
+        "force": (table or picture or page or force)
+        and click.option("--force", is_flag=True, help=force or "Replace a file that is there."),
+    }  # fmt: skip
 
     def decorate(command: Callable) -> Callable:
         @wraps(command)
-        def called(**given: object) -> None:
-            out = Output(**{name: given.pop(name) for name in _NAMES if name in given})
+        def run(**options: object) -> None:
+            out = Output(**{name: options.pop(name) for name in _NAMES if name in options})
             require_writable([out.table], out.force, TABLES)
             require_writable([out.picture], out.force, PICTURES)
             require_writable([out.page], out.force, PAGES)
-            command(out=out, **given)
+            command(out=out, **options)
 
-        for option in reversed(options):
-            called = option(called)
-        return called
+        for option in filter(None, reversed(options.values())):
+            run = option(run)
+        return run
 
     return decorate
 
 
-_NAMES = tuple(each.name for each in fields(Output))
+_NAMES = tuple(item.name for item in fields(Output))
 
 
 def write_table(table: pd.DataFrame, path: Path | str, answer: object = None) -> None:
@@ -200,12 +200,8 @@ def require_writable(
     for path in [Path(item) for item in paths if item is not None]:
         if path.is_dir():
             problems.append(Problem(str(path), "is a folder", "a file"))
-            continue
-        if kinds and path.suffix not in kinds:
+        elif kinds and path.suffix not in kinds:
             problems.append(Problem(str(path), f"ends in {path.suffix!r}", ", ".join(kinds)))
-        if path.exists() and not force:
-            problems.append(
-                Problem(str(path), "is there already", fix="give --force to replace it")
-            )
-    if problems:
-        raise InputError(problems, "Nothing was written")
+        elif path.exists() and not force:
+            problems.append(Problem(str(path), "is there already", fix="give --force"))
+    refuse(problems, "Nothing was written")

@@ -29,30 +29,36 @@ def show(path, name, describe, out) -> None:
       kinacc show results/ur10_b
       kinacc show results/ur10_b residuals -o residuals.xlsx
     """
-    place = find(path, name)
+    place = find(path / (name or ""))
     if place.is_dir():
         table = listing(place)
         first = shlex.join(["kinacc", "show", str(place / str(table.iloc[0, 0]))])
         out.show({"rows": table}, table, [f"The first of these: {first}"], most=len(table))
         return
-    table = described(place) if describe else frame(store.read_arrow(place, any_type=True), place)
-    meaning = ARTEFACTS[place.stem].meaning if place.stem in ARTEFACTS else ""
-    lines = [f"{place}: {len(table)} {'columns' if describe else 'rows'}. {meaning}".rstrip()]
-    out.show({"rows": table}, table, lines, most=len(table) if describe else 24)
+    content = store.read_arrow(place, any_type=True)
+    try:
+        content.validate(full=True)
+        table = content.to_pandas()
+    except (ValueError, pa.ArrowException) as error:
+        message = f"cannot be shown: {error}"
+        raise InputError(Problem(str(place), message, fix=store.remake(place))) from None
+    lines = [f"{place}: {table.shape[describe]} {'columns' if describe else 'rows'}. "]
+    lines[0] += ARTEFACTS[place.stem].meaning if place.stem in ARTEFACTS else ""
+    table = described(content.schema, table) if describe else table
+    out.show({"rows": table}, table, [lines[0].rstrip()], most=len(table) if describe else 24)
 
 
-def find(path: Path, name: str | None) -> Path:
+def find(path: Path) -> Path:
     """The file or folder meant. Raises InputError with what is there instead."""
-    asked = path / (name or "")
-    named = asked.with_name(f"{asked.name}.parquet") if asked.name else asked
-    if place := next((item for item in (asked, named) if item.is_file()), None):
-        return place
-    if asked.is_dir():
-        return asked
-    there = sorted(item.stem for item in asked.parent.glob("*") if item.name[0] != ".")
-    close = nearest(asked.stem, tuple(there))
-    fix = f"did you mean {asked.with_name(close)}?" if close else ""
-    raise InputError(Problem(str(asked), "no such table or folder", first_few(there, 30), fix))
+    for place in (path, path.with_name(f"{path.name}.parquet") if path.name else path):
+        if place.is_file():
+            return place
+    if path.is_dir():
+        return path
+    there = sorted(item.stem for item in path.parent.glob("[!.]*"))
+    close = nearest(path.stem, tuple(there))
+    fix = f"did you mean {path.with_name(close)}?" if close else ""
+    raise InputError(Problem(str(path), "no such table or folder", first_few(there, 30), fix))
 
 
 def listing(folder: Path) -> pd.DataFrame:
@@ -66,32 +72,21 @@ def listing(folder: Path) -> pd.DataFrame:
             rows.append((path.stem, "", error.problems[0].what))
     if rows:
         return pd.DataFrame(rows, columns=["table", "rows", "meaning"])
-    within = [(item.name, len([*item.glob("*.parquet")])) for item in sorted(folder.iterdir())]
-    if not any(count for _, count in within):
+    tables = pd.Series([path.parent.name for path in folder.glob("*/*.parquet")], dtype=object)
+    if tables.empty:
         raise InputError(Problem(str(folder), "holds no table", "the folder of a data set"))
-    return pd.DataFrame([item for item in within if item[1]], columns=["folder", "tables"])
+    return tables.value_counts().sort_index().rename_axis("folder").reset_index(name="tables")
 
 
-def frame(table: pa.Table, path: Path) -> pd.DataFrame:
-    """A table read from a file. InputError where it is damaged."""
-    try:
-        table.validate(full=True)
-        return table.to_pandas()
-    except (ValueError, pa.ArrowException) as error:
-        message = f"cannot be shown: {error}"
-        raise InputError(Problem(str(path), message, fix=store.remake(path))) from None
-
-
-def described(path: Path) -> pd.DataFrame:
-    """Unit, meaning and range of every column of a file."""
-    table = store.read_arrow(path, any_type=True)
-    values, rows = frame(table, path), []
-    for field in table.schema:
+def described(schema: pa.Schema, table: pd.DataFrame) -> pd.DataFrame:
+    """Unit, meaning and range of every column."""
+    rows = []
+    for field in schema:
         known = {key.decode(): text.decode() for key, text in (field.metadata or {}).items()}
-        there = values[field.name].dropna()
-        if pd.api.types.is_numeric_dtype(there) and len(there):
-            holds = f"{float(there.min()):.6g} to {float(there.max()):.6g}"
+        values = table[field.name].dropna()
+        if pd.api.types.is_numeric_dtype(values) and len(values):
+            holds = f"{float(values.min()):.6g} to {float(values.max()):.6g}"
         else:
-            holds = f"{there.astype(str).nunique()} different texts"
+            holds = f"{values.astype(str).nunique()} different texts"
         rows.append((field.name, known.get("unit"), known.get("meaning"), holds))
     return pd.DataFrame(rows, columns=["column", "unit", "meaning", "holds"])

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import json
 import shlex
-from pathlib import Path
 
 import click
 
-from kinacc.cli.calibrate import CORES, JSON, TARGETS, WORDS, carried_out
+from kinacc.cli.calibrate import carried_out, workflow_options
+from kinacc.report.terminal import print_summaries
+from kinacc.workflow.data_sets import RESULTS
+from kinacc.workflow.start import SNAKEFILE
 
 
-@click.command("study", context_settings=WORDS)
-@CORES
-@JSON
-@TARGETS
+@click.command("study", context_settings={"ignore_unknown_options": True})
+@workflow_options
 def study(words: tuple[str, ...], cores: int | None, as_json: bool) -> None:
     """Carry out the whole study of the data sets of FILE.yaml.
 
@@ -27,17 +27,11 @@ def study(words: tuple[str, ...], cores: int | None, as_json: bool) -> None:
       kinacc study tracker.yaml
       kinacc study config.yaml tracker.yaml -- --dry-run
     """
-    from kinacc.report.terminal import print_summaries
-    from kinacc.workflow.data_sets import RESULTS
-    from kinacc.workflow.start import SNAKEFILE
-
-    paper = SNAKEFILE.parent / "config.yaml"
-    configs, data = carried_out("all", words, cores, default=paper)
-    if data is None:
+    configs, folders = carried_out("all", words, cores, SNAKEFILE.with_name("config.yaml"))
+    if not folders:
         return
-    folders = [Path(RESULTS, name) for name in data.told]
     if as_json:
-        click.echo(json.dumps({"results": [str(each) for each in folders]}))
+        click.echo(json.dumps({"results": [str(folder) for folder in folders]}))
         return
     print_summaries(folders)
     options = [word for name in configs for word in ("--config", name)]
