@@ -125,7 +125,7 @@ class _Linear:
         # A reading that no arm with constant errors comes near bends high orders most.
         for _ in range(_SCREENINGS):
             system, start, scale = self._system(0)
-            normal = system.normal(start)[0] * np.outer(scale, scale)
+            normal = system.normal(start) * np.outer(scale, scale)
             step = -np.linalg.solve(_steady(normal[:-1, :-1]), normal[:-1, -1])
             to = scale * np.append(step, 1.0)
             parts = [np.tensordot(to, part[:, :3], 1) for part, _ in system.columns(start)]
@@ -154,7 +154,7 @@ class _Linear:
             degree[series] = np.tile(np.arange(self.built + 1), self.motions)
             degree[-1] = 0.5  # the residual follows what every order has
             place, flat = np.argsort(degree, kind="stable"), int(np.sum(degree == 0.0))
-            normal = (system.normal(start)[0] * np.outer(scale, scale))[np.ix_(place, place)]
+            normal = (system.normal(start) * np.outer(scale, scale))[np.ix_(place, place)]
             factor = np.linalg.cholesky(_steady(normal[:flat, :flat]))
             sides = scipy.linalg.solve_triangular(factor, normal[:flat, flat:], lower=True)
             self.gram = normal[flat:, flat:] - sides.T @ sides

@@ -18,7 +18,8 @@ from kinacc.calibration.hand_eye import closed_form_start
 from kinacc.calibration.observations import Observations
 from kinacc.calibration.one_thread import one_thread
 from kinacc.calibration.robust import Weights
-from kinacc.calibration.solve import TOUCH_SQUARED, Solution, Task, minimise_robust
+from kinacc.calibration.solve import Solution, Task, minimise_robust
+from kinacc.calibration.split import TOUCH_SQUARED
 from kinacc.calibration.system import PoseSystem, require_enough
 from kinacc.calibration.uncertainty import scale_of
 from kinacc.geometry import Pose
@@ -226,7 +227,7 @@ def placed(
     still = np.zeros(len(arm.start), dtype=bool)
     system = PoseSystem(observations, arm, still, found, rotation_weight_mm_per_rad)
     keep = np.flatnonzero(found.free)
-    gram = system.normal(found.begin)[0, :-1, :-1] * np.outer(found.scale, found.scale)
+    gram = system.normal(found.begin)[:-1, :-1] * np.outer(found.scale, found.scale)
     values, vectors = np.linalg.eigh(gram[np.ix_(keep, keep)])
     hidden = vectors[:, values <= SHOWN**2 * max(values[-1:], default=0.0)].T
     hidden = _without_known(hidden, np.isfinite(found.std[keep]))

@@ -18,7 +18,7 @@ from kinacc.calibration.identifiability import (
 )
 from kinacc.calibration.observations import Observations, full_poses
 from kinacc.calibration.one_thread import one_thread
-from kinacc.calibration.solve import MOVES_SQUARED, TOUCH_SQUARED, undetermined
+from kinacc.calibration.split import MOVES_SQUARED, TOUCH_SQUARED, undetermined
 from kinacc.calibration.system import PoseSystem
 from kinacc.calibration.uncertainty import Uncertainty, is_angle, named_directions, unit_of
 from kinacc.geometry import Pose, compose
@@ -37,8 +37,8 @@ def table(fit: ModelFit, known: Uncertainty, observations: Observations) -> Colu
     """``dh_identified``: status of every parameter of a DH fit, frames first, and why.
 
     Undetermined are those of which directions below the truncation's share of the largest singular
-    value (base and targets projected out) hold more than 1 % (``solve.TOUCH_SQUARED``), or a
-    quarter where a prior determines it (``solve.MOVES_SQUARED``).
+    value (base and targets projected out) hold more than 1 % (``split.TOUCH_SQUARED``), or a
+    quarter where a prior determines it (``split.MOVES_SQUARED``).
 
     Parameters
     ----------

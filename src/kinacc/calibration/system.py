@@ -65,11 +65,6 @@ class PoseSystem:
         return self.frames.size + int(self.free.sum())
 
     @property
-    def counts(self) -> np.ndarray:
-        """Numbers (2,) of residuals of positions and of rotations."""
-        return 3 * np.array([len(self.observations), int(self.observations.has_rotation.sum())])
-
-    @property
     def weight(self) -> float:
         """Number of residuals, each times its squared factor."""
         squared = 1.0 if self.root is None else self.root**2
@@ -93,17 +88,12 @@ class PoseSystem:
             rows = columns.transpose(2, 1, 0)[measured.T]
             yield rows[:, -1], rows[:, :-1]
 
-    def normal(self, x: np.ndarray, by_kind: bool = False) -> np.ndarray:
-        """Gram matrices (K, P+1, P+1) of ``[J | r]``: normal equations and, last, the cost.
-
-        K = 1 for all residuals, or 2 ``by_kind``: of positions and of rotations.
-        """
-        total = np.zeros((1 + by_kind, self.size + 1, self.size + 1))
+    def normal(self, x: np.ndarray) -> np.ndarray:
+        """Gram matrix (P+1, P+1) of ``[J | r]``: normal equations and, last, the cost."""
+        total = np.zeros((self.size + 1, self.size + 1))
         for columns, _ in self.columns(x):
-            kinds = (columns[:, :3], columns[:, 3:]) if by_kind else (columns,)
-            for number, kind in enumerate(kinds):
-                flat = kind.reshape(self.size + 1, kind[0].size)
-                total[number] += flat @ flat.T
+            flat = columns.reshape(self.size + 1, -1)
+            total += flat @ flat.T
         return total
 
     def columns(self, x: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:

@@ -8,7 +8,8 @@ import numpy as np
 
 from kinacc.calibration.fitting import ModelFit
 from kinacc.calibration.frames import Frames, stacked
-from kinacc.calibration.solve import Solution, Spectrum
+from kinacc.calibration.solve import Solution
+from kinacc.calibration.split import Spectrum
 from kinacc.calibration.uncertainty import Uncertainty, scaled_unit
 from kinacc.geometry import quaternion_from_rotation
 from kinacc.kinematics.tables import frame

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kinacc.calibration.frames import ANGLE_UNIT_RAD
+from kinacc.calibration.split import TOUCH_SQUARED
 
 if TYPE_CHECKING:
     from kinacc.calibration.fitting import ModelFit
@@ -37,8 +38,6 @@ class Uncertainty:
     @property
     def determined(self) -> np.ndarray:
         """True (P,) where no undetermined direction reaches a parameter."""
-        from kinacc.calibration.solve import TOUCH_SQUARED
-
         return np.sum(self.undetermined**2, axis=0) <= TOUCH_SQUARED
 
 

@@ -12,7 +12,7 @@ from kinacc.calibration.fitting import ModelFit
 from kinacc.calibration.frames import FrameParameters, Frames, FrameTerms
 from kinacc.calibration.observations import Observations
 from kinacc.calibration.one_thread import one_thread
-from kinacc.calibration.solve import Spectrum, singular_values
+from kinacc.calibration.split import Spectrum, singular_values
 from kinacc.calibration.system import PoseSystem
 from kinacc.kinematics.vec import ERRORS, VECModel
 
@@ -119,7 +119,8 @@ def gauge(
     free, known = informed(observations, empty), FrameParameters.none(frames)
     zero = empty.with_parameters(np.zeros(free.size))
     system = PoseSystem(observations, zero, free, known, rotation_weight_mm_per_rad)
-    values = singular_values(system, np.zeros(system.size), fitting.scales(empty)[free])
+    blocks, scale = system.blocks(np.zeros(system.size)), fitting.scales(empty)[free]
+    values = singular_values(jacobian * scale for _, jacobian in blocks)
     return Spectrum.of(values, RANK_THRESHOLD)
 
 
