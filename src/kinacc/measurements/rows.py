@@ -195,7 +195,7 @@ def open_table(
 
     answers = {key: value for key, value in (answers or {}).items() if value}
     guess = guesses.look(path, answers, need)
-    notes = (*guess.notes, *guess.assumed.values(), *guesses.summary(guess))
+    notes = (*guess.notes, *guess.assumed.values(), *guess.columns.lines())
     return guess.table, Layout.of(guess.section), notes
 
 

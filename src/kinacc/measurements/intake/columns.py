@@ -8,6 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from itertools import combinations
+
+import numpy as np
 
 from kinacc.measurements.column_names import (
     CALCULATED,
@@ -35,7 +38,8 @@ from kinacc.measurements.intake.groups import (
     Group,
     Values,
     all_groups,
-    rigid,
+    keeps_distance,
+    listed,
     same,
 )
 from kinacc.measurements.layout import ANGLE, LENGTH, TOOL
@@ -56,7 +60,7 @@ class NamedColumns:
     payload, payload_x and so on. ``aside``: groups that are not read; ``questions``: open choices.
     """
 
-    joints: tuple[Name, ...]
+    joints: tuple[Name, ...] = ()
     commanded: tuple[Name, ...] = ()
     targets: dict[str, dict[str, Name]] = field(default_factory=dict)
     turn: tuple[str, str] = ("none", "XYZ")
@@ -66,9 +70,21 @@ class NamedColumns:
 
     def read(self) -> set[str]:
         """Names of the columns that are read."""
-        names = [*self.joints, *self.commanded, *self.single.values()]
-        names += [name for target in self.targets.values() for name in target.values()]
-        return {name.column for name in names}
+        groups = (self.joints, self.commanded, *(t.values() for t in self.targets.values()))
+        return {name.column for group in (*groups, self.single.values()) for name in group}
+
+    def lines(self) -> list[str]:
+        """What the joints, the first point and its orientation were read as, a line each."""
+        kind, convention = self.turn
+        target = next(iter(self.targets.values()), {})
+        turned = f"w, x, y, z of a {kind}" if kind == "quaternion" else f"{kind} {convention}"
+        parts = {
+            "joints": self.joints,
+            "point": [target[axis] for axis in "xyz" if target],
+            turned: [name for quantity, name in target.items() if quantity[0] in "qr"],
+        }
+        return [f"{listed([name.column for name in names])}: read as {text}"
+                for text, names in parts.items() if names]  # fmt: skip
 
 
 def names_in(table: RawTable) -> list[Name]:
@@ -106,11 +122,13 @@ def recognise(
     joints = choice.joints()
     points = choice.points(joints)
     turns = choice.turns(points) if turned else {}
-    targets = {point.target: dict(point.columns) for point in points}
-    for target, turn in turns.items():
-        targets[target] |= turn.columns
-    for target, spread in choice.spreads(points, turns).items():
-        targets[target] |= spread
+    spreads = choice.spreads(points, turns)
+    targets = {
+        point.target: point.columns
+        | (turns[point.target].columns if point.target in turns else {})
+        | spreads.get(point.target, {})
+        for point in points
+    }
     commanded = choice.commanded(joints)
     result = NamedColumns(
         tuple(joints.columns.values()) if joints else (),
@@ -120,8 +138,11 @@ def recognise(
         questions=tuple(choice.questions),
     )
     used = result.read()
+    single: dict[str, Name] = {}
+    for name in names:
+        if name.column not in used and (quantity := _payload_of(name) or _single_of(name)):
+            single.setdefault(quantity, name)
     aside = tuple(group for group in choice.every if not used & {*group.names})
-    single = _singles([name for name in names if name.column not in used])
     return replace(result, single=single, aside=aside)
 
 
@@ -133,18 +154,13 @@ class _Choice:
         self.every = all_groups(names, values)
         self.groups = [g for g in self.every if g.kind != POSE and not g.wrong_units]
         if wanted:
-            nominal = [
-                g for g in self.groups if g.kind in (POINT, TURN) and g.role in (NOMINAL, OPEN)
-            ]
+            nominal = [*self._of(POINT, NOMINAL, OPEN), *self._of(TURN, NOMINAL, OPEN)]
             self.take = take | {group.names[0] for group in nominal}
         # Whether a column by itself is a deviation: error, 3D deviation.
-        self.off = any(
-            role(n.terms) == DEVIATION
-            and n.unit not in ANGLE
-            and not WORDS["external"] & {*n.terms}
-            for n in names
-            if not any(n.column in g.names for g in self.every)
-        )
+        grouped = {column for group in self.every for column in group.names}
+        self.off = any(role(n.terms) == DEVIATION and n.unit not in ANGLE
+                       and not WORDS["external"] & {*n.terms}
+                       for n in names if n.column not in grouped)  # fmt: skip
         self.questions: list[Choice] = []
 
     def _of(self, kind: str, *roles: str) -> list[Group]:
@@ -152,8 +168,8 @@ class _Choice:
 
     def _taken(self, kind: str) -> list[Group]:
         """Groups that ``take`` names."""
-        fit = [g for g in self._of(kind) if g.role not in (*_WRONG, CALCULATED)]
-        return [g for g in fit if self.take & {*g.names}]
+        fit = self._of(kind, PLAIN, OPEN, MEASURED, REPORTED, NOMINAL)
+        return [group for group in fit if self.take & {*group.names}]
 
     def _distinct(self, candidates: list[Group]) -> list[Group]:
         """Without groups of the same numbers; those that state a unit stay."""
@@ -172,15 +188,17 @@ class _Choice:
         """The joints as reported, else those without a term."""
         if taken := self._taken(JOINTS):
             return taken[0]
-        strong = {role_: [g for g in self._of(JOINTS, role_) if not g.weak]
-                  for role_ in (REPORTED, PLAIN, OPEN, NOMINAL)}  # fmt: skip
-        weak = [g for g in self._of(JOINTS, *strong) if g.weak]
-        reported, plain = self._distinct(strong[REPORTED]), self._distinct(strong[PLAIN])
-        best = reported or (plain and [*plain, *strong[OPEN]]) or [*strong[OPEN], *weak]
-        best = best or strong[NOMINAL]
-        if not best or (len(best) == 1 and (reported or plain)):
-            return best[0] if best else None
-        return self._ask(f"{ABOUT_JOINTS} as they were read back", best)
+        every = self._of(JOINTS, REPORTED, PLAIN, OPEN, NOMINAL)
+        strong = {name: [g for g in every if g.role == name and not g.weak]
+                  for name in (REPORTED, PLAIN, OPEN, NOMINAL)}  # fmt: skip
+        if len(certain := self._distinct(strong[REPORTED])) == 1:
+            return certain[0]
+        plain = self._distinct(strong[PLAIN])
+        if not certain and len(plain) == 1 and not strong[OPEN]:
+            return plain[0]
+        best = certain or (plain and [*plain, *strong[OPEN]])
+        best = best or [*strong[OPEN], *(g for g in every if g.weak)] or strong[NOMINAL]
+        return self._ask(f"{ABOUT_JOINTS} as they were read back", best) if best else None
 
     def commanded(self, joints: Group | None) -> Group | None:
         """The joints as commanded beside ``joints``, where there is one such group."""
@@ -190,53 +208,52 @@ class _Choice:
         return fit[0] if len(fit) == 1 else None
 
     def points(self, joints: Group | None) -> list[Group]:
-        """The points that were measured, one of each target."""
+        """The points that were measured, one of each target; the first of these rules that fits."""
         if taken := self._taken(POINT):
             return _named_apart(taken)
-        measured, reported, plain, unclear = (
-            self._of(POINT, role_) for role_ in (MEASURED, REPORTED, PLAIN, OPEN)
+        measured, reported, plain, unclear, nominal, deviations = (
+            self._of(POINT, name)
+            for name in (MEASURED, REPORTED, PLAIN, OPEN, NOMINAL, DEVIATION)
         )
-        every = [*measured, *reported, *plain, *unclear]
-        radii = [g for g in self.every if g.kind == RADIUS and g.role == OPEN]
-        if radii and every:
-            why = f"{radii[0].text}: points may not be corrected for the radius"
-            return self._ask_points(every, why)
-        if measured:
-            return self._separate(measured)
-        nominal, deviations = self._of(POINT, NOMINAL), self._of(POINT, DEVIATION)
-        if reported:
-            targets = [g for g in unclear if "target" in g.columns["x"].terms]
-            if plain or len(targets) < len(unclear):
-                return self._ask_points([*reported, *plain, *unclear])
-            # A record of measurement: nominal, actual, deviation.
-            record = any({*g.columns["x"].terms} & WORDS["records"] for g in nominal)
-            record = record or bool(nominal and deviations)
-            if not record or (joints is not None and joints.role == REPORTED):
-                why = "cannot tell whether an instrument measured it or the controller computed it"
-                return self._ask_points(reported, why)
-            return self._separate(reported)
-        if unclear:
-            return self._ask_points([*plain, *unclear])
-        if plain and (self.off or deviations) and not nominal:
-            return self._ask_points(plain, "beside a deviation it may be the nominal point")
-        return self._separate(plain) if plain else []
-
-    def _separate(self, candidates: list[Group]) -> list[Group]:
-        """The candidates, unless two of them may be the same point."""
-        distinct = self._distinct(candidates)
-        if len({group.target for group in distinct}) < len(distinct):
-            return self._ask_points(distinct, "several columns may hold it")
-        if not rigid(distinct, self.values):
-            return self._ask_points(
-                distinct, "they do not keep the distance of targets on a flange"
-            )
-        return distinct
-
-    def _ask_points(
-        self, candidates: list[Group], why: str = "no name states that an instrument measured it"
-    ) -> list[Group]:
+        not_corrected = [g for g in self._of(RADIUS, OPEN)]
+        goals = [g for g in unclear if "target" in g.columns["x"].terms]
+        # A record of measurement: nominal, actual, deviation.
+        record = any({*g.columns["x"].terms} & WORDS["records"] for g in nominal)
+        record = record or bool(nominal and deviations)
+        by_arm = not record or (joints is not None and joints.role == REPORTED)
+        rules: list[tuple[object, list[Group], str]] = [
+            (not_corrected, [*measured, *reported, *plain, *unclear],
+             "points may not be corrected for the radius"),
+            (measured, measured, ""),
+            (reported and (plain or len(goals) < len(unclear)), [*reported, *plain, *unclear],
+             "no name states that an instrument measured it"),
+            (reported and by_arm, reported,
+             "cannot tell whether an instrument measured it or the controller computed it"),
+            (reported, reported, ""),
+            (unclear, [*plain, *unclear], "no name states that an instrument measured it"),
+            (plain and (self.off or deviations) and not nominal, plain,
+             "beside a deviation it may be the nominal point"),
+            (plain, plain, ""),
+        ]  # fmt: skip
+        candidates, why = next(((g, why) for fits, g, why in rules if fits and g), ([], ""))
+        if candidates and not why:
+            candidates = self._distinct(candidates)
+            if len({group.target for group in candidates}) < len(candidates):
+                why = "several columns may hold it"
+            elif not self._is_rigid(candidates):
+                why = "they do not keep the distance of targets on a flange"
+        if not why:
+            return candidates
         self._ask(f"the names do not tell the measured point ({why})", candidates, several=True)
         return _named_apart(candidates)
+
+    def _is_rigid(self, groups: Sequence[Group]) -> bool:
+        """Whether points can be targets of one rigid body."""
+        if self.values is None:
+            return True
+        points = [np.stack([self.values(g.columns[axis]) for axis in "xyz"], axis=1)
+                  for g in groups]  # fmt: skip
+        return all(keeps_distance(a, b) for a, b in combinations(points, 2))
 
     def turns(self, points: Sequence[Group]) -> dict[str, Group]:
         """Orientations by target, all of the kind of the first."""
@@ -277,19 +294,19 @@ class _Choice:
             point = point or (points[0] if len(points) == 1 and group.target == TOOL else None)
             values = turns.get(point.target) if point and "std_rx" in group.columns else point
             terms = {term for name in group.columns.values() for term in name.terms}
-            if group.weak and (self.sigma == "none" or not terms & WORDS["uncertainties"]):
-                continue
-            if point is None or values is None or values.turn[0] == "quaternion":
-                continue
-            if values.role in _NOT_MEASURED or group.units != values.units:
-                continue
-            if {*group.columns} & {*spreads.get(point.target, {})}:
-                continue
+            not_meant = self.sigma == "none" or not terms & WORDS["uncertainties"]
             if (
-                group.weak
-                and not self.sigma
-                and not all(n.coverage for n in group.columns.values())
+                point is None
+                or values is None
+                or (group.weak and not_meant)
+                or values.turn[0] == "quaternion"
+                or values.role in _NOT_MEASURED
+                or group.units != values.units
+                or {*group.columns} & {*spreads.get(point.target, {})}
             ):
+                continue
+            covered = self.sigma or all(n.coverage for n in group.columns.values())
+            if group.weak and not covered:
                 unclear.append(group)
             else:
                 spreads.setdefault(point.target, {}).update(group.columns)
@@ -301,29 +318,22 @@ class _Choice:
         return spreads
 
 
-def _named_apart(taken: list[Group]) -> list[Group]:
+def _named_apart(groups: list[Group]) -> list[Group]:
     """The groups under names of which no two are equal."""
     named: dict[str, Group] = {}
-    for group in taken:
-        name, number = group.target, 1
-        while name in named:
-            number += 1
-            name = f"{group.target}{number}"
+    for group in groups:
+        names = [group.target, *(f"{group.target}{n}" for n in range(2, len(groups) + 1))]
+        name = next(name for name in names if name not in named)
         named[name] = replace(group, target=name)
     return list(named.values())
 
 
-def _singles(names: Sequence[Name]) -> dict[str, Name]:
-    single: dict[str, Name] = {}
-    for name in names:
-        terms = [t for t in name.terms if t not in ("measurement", "c", "id", "number")]
-        for quantity, known in WORDS["single"].items():
-            fits = quantity != "temperature" or name.unit in ("", "C")
-            if fits and len(terms) == 1 and terms[0] in known:
-                single.setdefault(quantity, name)
-        if quantity := _payload_of(name):
-            single.setdefault(quantity, name)
-    return single
+def _single_of(name: Name) -> str:
+    """pose, repeat, session, target or temperature where the name is one, else nothing."""
+    terms = [t for t in name.terms if t not in ("measurement", "c", "id", "number")]
+    quantities = [q for q, known in WORDS["single"].items() if len(terms) == 1 and terms[0] in known
+                  and (q != "temperature" or name.unit in ("", "C"))]  # fmt: skip
+    return next(iter(quantities), "")
 
 
 def _payload_of(name: Name) -> str:

@@ -9,7 +9,6 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import combinations
 
 import numpy as np
 
@@ -36,6 +35,7 @@ UNCERTAINTY = "an uncertainty"
 PULSES = ("pulse", "pulses", "count", "counts", "tick", "ticks")
 Values = Callable[[Name], np.ndarray]
 
+_READ = (PLAIN, OPEN, REPORTED, MEASURED)
 _UNITS = {JOINTS: {**ANGLE, **LENGTH}, POINT: LENGTH, TURN: ANGLE}
 _UNIT_LENGTH = 2e-3  # how far from 1 the length of a quaternion may be, as written
 _TURNED = WORDS["turn"] | WORDS["quaternion"] | WORDS["vector"]
@@ -90,10 +90,10 @@ class Group:
         """Why it is not read."""
         if self.kind == POSE or (self.kind == POINT and is_controller_pose(self.terms)):
             return "the controller's own forward kinematics, never a measurement"
-        if self.wrong_units and self.role in (PLAIN, OPEN, REPORTED, MEASURED):
-            return f"{self.kind} in {' and '.join(sorted(self.wrong_units))}"
-        chosen = self.role in (PLAIN, OPEN, REPORTED, MEASURED)
-        return "other columns are read" if chosen else self.role
+        if self.role not in _READ:
+            return self.role
+        wrong = " and ".join(sorted(self.wrong_units))
+        return f"{self.kind} in {wrong}" if wrong else "other columns are read"
 
 
 def listed(names: Sequence[str]) -> str:
@@ -109,12 +109,12 @@ def all_groups(names: Sequence[Name], values: Values | None = None) -> list[Grou
         for terms, _, columns in _alike(names, "|".join(letters)):
             # Single letters are angles beside x, y, z alone.
             if len(columns) == 3 and (len(letters[0]) > 1 or terms in points):
-                known = role(terms)
-                before, kind = ("std_", UNCERTAINTY) if known == SPREAD else ("", TURN)
-                turned = {f"{before}r{axis}": columns[letter]
+                spread = role(terms) == SPREAD
+                turned = {f"{'std_' * spread}r{axis}": columns[letter]
                           for axis, letter in zip("xyz", letters, strict=True)}  # fmt: skip
-                target = _target(columns[letters[0]], terms=terms)
-                groups.append(Group(kind, known, target, turned, ("euler", convention), True))
+                target, kind = _target(columns[letters[0]], terms), UNCERTAINTY if spread else TURN
+                turn = ("euler", convention)
+                groups.append(Group(kind, role(terms), target, turned, turn, True))
     for name in names:
         if WORDS["radius"] & {*name.terms}:  # open where the points may be no centres
             known = OPEN if WORDS["not_corrected"] & {*name.terms} else OTHER
@@ -131,22 +131,20 @@ def _alike(
     label is there twice (X and x_mm), columns of one unit and spelling belong together.
     """
     pattern = re.compile(rf"(?<![^_])({stem})({label})(?![^_])")
-    groups: dict[tuple, dict[str, list[Name]]] = {}
+    groups: dict[tuple, list[tuple[str, Name]]] = {}
     for name in names:
         joined = "_".join(name.terms)
         for match in pattern.finditer(joined):
-            key = (joined[: match.start()], joined[match.end() :], match[1])
-            groups.setdefault(key, {}).setdefault(match[2], []).append(name)
-    for (before, behind, stem_), columns in groups.items():
-        terms = tuple(filter(None, (*before.split("_"), *behind.split("_"))))
-        twice = any(len(columns_) > 1 for columns_ in columns.values())
+            key = (f"{joined[: match.start()]}_{joined[match.end() :]}", match.start(), match[1])
+            groups.setdefault(key, []).append((match[2], name))
+    for (around, _, stem_), columns in groups.items():
+        terms = tuple(filter(None, around.split("_")))
+        twice = len({text for text, _ in columns}) < len(columns)
         rows: dict[tuple, dict[str, Name]] = {}
-        for text, columns_ in columns.items():
-            for name in columns_:
-                spelled = [s for t, s in zip(name.terms, name.spelled, strict=True) if t in terms]
-                small = any(s.islower() for s in name.spelled)
-                kind = (name.unit, *spelled, small) if twice else ()
-                rows.setdefault(kind, {})[text] = name
+        for text, name in columns:
+            spelled = [s for t, s in zip(name.terms, name.spelled, strict=True) if t in terms]
+            small = any(s.islower() for s in name.spelled)
+            rows.setdefault((name.unit, *spelled, small) if twice else (), {})[text] = name
         for row in rows.values():
             yield terms, stem_, row
 
@@ -159,10 +157,11 @@ def _numbered(names: Sequence[Name], values: Values | None) -> Iterator[Group]:
         if first > 1 or {*by_number} != {*range(first, first + len(by_number))}:
             continue
         row = [by_number[number] for number in sorted(by_number)]
+        is_joint = bool(about & WORDS["joint"]) and not about & WORDS["external"]
         if len(row) == 4 and _is_quaternion(row, about, values):
-            known = role([t for t in row[0].terms if t not in WORDS["quaternion"]])
             turned = {f"quat{number}": name for number, name in enumerate(row, 1)}
-            yield Group(TURN, known, _target(row[0], True), turned, ("quaternion", "XYZ"))
+            known, target = role(about - WORDS["quaternion"]), _target(row[0], None, True)
+            yield Group(TURN, known, target, turned, ("quaternion", "XYZ"))
         elif (
             len(row) == 6
             and about & WORDS["pose_of_controller"]
@@ -170,20 +169,18 @@ def _numbered(names: Sequence[Name], values: Values | None) -> Iterator[Group]:
         ):
             yield Group(POSE, role(terms), "", dict(zip("123456", row, strict=True)))
         elif len(row) == 3 and about & (WORDS["turn"] - WORDS["joint"]):
-            turned = dict(zip(("rx", "ry", "rz"), row, strict=True))
             if {name.unit for name in row} in ({"deg"}, {"rad"}):
-                yield Group(TURN, role(terms), _target(row[0], True), turned, ("euler", "XYZ"))
-        elif 4 <= len(row) <= 7:
-            known = bool(about & WORDS["joint"]) and not about & WORDS["external"]
-            if known or len(row) >= 6:
-                yield _joints(row, terms, weak=not known)
+                turned = dict(zip(("rx", "ry", "rz"), row, strict=True))
+                target = _target(row[0], None, True)
+                yield Group(TURN, role(terms), target, turned, ("euler", "XYZ"))
+        elif 6 - 2 * is_joint <= len(row) <= 7:
+            yield _joints(row, terms, weak=not is_joint)
 
 
 def _is_quaternion(row: list[Name], about: set[str], values: Values | None) -> bool:
     """Whether four numbered columns are a quaternion, by their terms and their length."""
-    stated = bool(about & (WORDS["quaternion"] - {"q"}))
     if values is None or not about & (WORDS["quaternion_or_joint"] | WORDS["quaternion"]):
-        return stated
+        return bool(about & (WORDS["quaternion"] - {"q"}))
     length = np.sqrt(sum(values(name) ** 2 for name in row))
     length = length[np.isfinite(length)]
     return length.size > 0 and bool(np.mean(np.abs(length - 1.0) < _UNIT_LENGTH) > 0.9)
@@ -192,13 +189,10 @@ def _is_quaternion(row: list[Name], about: set[str], values: Values | None) -> b
 def _joints(row: Sequence[Name], terms: Sequence[str], weak: bool = False) -> Group:
     rest = [t for t in terms if t not in WORDS["joint"] | WORDS["filling"] and not t.isdigit()]
     rest = [t for t in rest if role([t]) != CALCULATED]
-    known = role(rest)
+    known = NOMINAL if commands(rest) else role(rest)
+    known = REPORTED if known == MEASURED else known
     if weak and WORDS["external"] & {*terms}:
         known = OTHER
-    elif commands(rest):
-        known = NOMINAL
-    elif known == MEASURED:
-        known = REPORTED
     columns = {f"q{number}": name for number, name in enumerate(row, 1)}
     return Group(JOINTS, known, "", columns, weak=weak)
 
@@ -209,9 +203,8 @@ def _named_joints(names: Sequence[Name]) -> Iterator[Group]:
     for series in WORDS["named_joints"]:
         free = [name for name in names if name.column not in taken]
         for terms, _, columns in _alike(free, "|".join(series)):
-            letters = len(series[0]) == 1
             known = all(t in WORDS["joint"] or role([t]) != PLAIN for t in terms)
-            if {*columns} == {*series} and (known or not letters):
+            if {*columns} == {*series} and (known or len(series[0]) > 1):
                 taken |= {name.column for name in columns.values()}
                 yield _joints([columns[joint] for joint in series], terms)
 
@@ -222,6 +215,7 @@ def _by_axis(names: Sequence[Name]) -> Iterator[Group]:
         if not {*"xyz"} <= {*axes}:
             continue
         about, first = {*terms}, axes["x"]
+        units = {axes[axis].unit for axis in "xyz"} - {""}
         is_turn = stem in ("r", "rv") or bool(about & WORDS["turn"])
         vector = stem == "rv" or (bool(about & WORDS["vector"]) and is_turn)
         known = role([t for t in terms if not (vector and t == "vector")])
@@ -231,25 +225,24 @@ def _by_axis(names: Sequence[Name]) -> Iterator[Group]:
         if stem == "q" or about & WORDS["quaternion"] or (is_turn and "w" in axes and not stem):
             if "w" in axes:
                 columns = {f"q{axis}": axes[axis] for axis in "wxyz"}
-                yield Group(TURN, known, _target(first, True), columns, ("quaternion", "XYZ"))
+                target = _target(first, None, True)
+                yield Group(TURN, known, target, columns, ("quaternion", "XYZ"))
             continue
-        units = {axes[axis].unit for axis in "xyz"} - {""}
         is_turn = is_turn or (bool(units) and units <= {*ANGLE})
-        before = ("std_" if known == SPREAD else "") + ("r" if is_turn else "")
+        before = "std_" * (known == SPREAD) + "r" * is_turn
         columns = {f"{before}{axis}": axes[axis] for axis in "xyz"}
         kind = UNCERTAINTY if known == SPREAD else TURN if is_turn else POINT
-        turn = ("rotation_vector" if vector else "euler" if kind == TURN else "none", "XYZ")
+        turn = "rotation_vector" if vector else "euler" if kind == TURN else "none"
         # One standard deviation is no interval, and no multiple of it.
         sigma = about & WORDS["one_sigma"] or {"standard", "deviation"} <= about
         weak = not sigma or any(term.isdigit() for term in terms)
-        yield Group(kind, known, _target(first, is_turn), columns, turn, weak)
+        yield Group(kind, known, _target(first, None, is_turn), columns, (turn, "XYZ"), weak)
 
 
-def _target(name: Name, is_turn: bool = False, terms: Sequence[str] | None = None) -> str:
-    """Name of a target from ``terms`` of a column, those of all its columns where not given."""
+def _target(name: Name, terms: Sequence[str] | None = None, is_turn: bool = False) -> str:
+    """Name of a target by ``terms`` of a column; None for those that all its columns have."""
     if terms is None:
-        gone = _TURNED if is_turn else frozenset()
-        gone |= {name.terms[-1]} if is_turn and name.terms[-1].isdigit() else frozenset()
+        gone = {*_TURNED, name.terms[-1] if name.terms[-1].isdigit() else ""} if is_turn else {""}
         terms = [t for t in name.terms if (t[-1] not in "xyzw" or len(t) > 2) and t not in gone]
     spelling = dict(zip(name.terms, name.spelled, strict=True))
     target = ""
@@ -270,21 +263,11 @@ def same(a: Group, b: Group, values: Values | None) -> bool:
     return any(np.allclose(here * factor, there, 0.0, off, equal_nan=True) for factor in factors)
 
 
-def rigid(groups: Sequence[Group], values: Values | None) -> bool:
-    """Whether points can be targets of one rigid body: they keep their distances while they turn.
-
-    A nominal point beside its measured one is a millimetre off, or in a frame of its own.
-    """
-    if values is None:
-        return True
-    points = [np.stack([values(g.columns[axis]) for axis in "xyz"], axis=1) for g in groups]
-    return all(keeps_distance(a, b) for a, b in combinations(points, 2))
-
-
 def keeps_distance(a: np.ndarray, b: np.ndarray) -> bool:
     """Whether two points (n, 3), NaN where unread, keep their distance and turn about each other.
 
-    Fewer than three readings of both are too few.
+    A nominal point beside its measured one is a millimetre off, or in a frame of its own. Fewer
+    than three readings of both are too few.
     """
     apart = (a - b)[np.isfinite(a - b).all(axis=1)]
     if len(apart) < 3:
