@@ -5,11 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from measurements.scoring import CRASHED, FILES, WRONG, measured, score
+from measurements.scoring import FILES, fault, measured
 
 
 @pytest.mark.parametrize("name", FILES)
 def test_a_file_is_read_right_or_asked_about_what_it_leaves_open(name: str, tmp_path: Path) -> None:
-    one = score(measured(name), tmp_path)
-    assert one.outcome not in (WRONG, CRASHED), one.reason
-    assert one.holds, f"{one.outcome}: {one.reason}"
+    assert fault(measured(name), tmp_path) == ""

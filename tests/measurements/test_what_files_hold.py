@@ -14,6 +14,8 @@ from kinacc.config.schema import defaults
 from kinacc.errors import InputError
 from kinacc.geometry import exp_so3, log_so3, rotation_from_quaternion
 from kinacc.kinematics import robot
+from kinacc.measurements.column_names import name_of
+from kinacc.measurements.intake.columns import recognise
 from kinacc.measurements.reader import UNCERTAINTY, read
 
 ROOT = Path(__file__).parents[2]
@@ -68,7 +70,7 @@ def test_targets_are_found_by_their_names_and_may_be_missing(tmp_path, joints):
     assert np.isnan(columns["qw"]).all()
 
 
-def test_half_a_point_is_no_reading_of_its_target_and_is_told(tmp_path, joints):
+def test_half_a_point_is_no_reading_of_its_target(tmp_path, joints):
     one = {n: v.astype(object) for n, v in points("mA_").items()}
     one["mA_y_mm"][2] = ""
     found = reading(tmp_path, joints | one | points("mB_"))
@@ -85,14 +87,6 @@ def test_only_the_targets_asked_for(tmp_path, joints):
     assert found.unused == ("goal_x_mm", "goal_y_mm", "goal_z_mm")
     text = refused(tmp_path, table, targets=["mB"])
     assert "column mB_x_mm or mB_x_m: is missing" in text
-
-
-def test_one_row_per_target_with_the_target_in_a_column(tmp_path, joints):
-    table = joints | points() | {"pose": np.repeat(np.arange(4), 2)}
-    table["target"] = words(*["left", "right"] * 4)
-    columns = reading(tmp_path, table).columns
-    assert list(columns["target"][:2]) == ["left", "right"]
-    assert (columns["repeat"] == 0).all()
 
 
 def test_mapped_names_of_several_targets(tmp_path, joints):
@@ -184,19 +178,13 @@ def test_a_full_covariance(tmp_path, joints):
 
 
 def test_sessions_count_their_poses_anew(tmp_path, joints):
-    table = joints | points() | {"pose": np.tile(np.arange(4), 2), "temp_C": np.full(COUNT, 21.5)}
+    table = joints | points() | {"pose": words(*"badabada"), "temp_C": np.full(COUNT, 21.5)}
     table["session"] = words(*["monday"] * 4 + ["tuesday"] * 4)
     columns = reading(tmp_path, table).columns
-    np.testing.assert_array_equal(columns["pose"], np.arange(COUNT))
+    np.testing.assert_array_equal(columns["pose"], [0, 1, 2, 1, 3, 4, 5, 4])
+    np.testing.assert_array_equal(columns["repeat"], [0, 0, 0, 1, 0, 0, 0, 1])
     assert list(columns["session"][[0, 7]]) == ["monday", "tuesday"]
     assert (columns["temperature_c"] == 21.5).all()
-
-
-def test_poses_may_have_names(tmp_path, joints):
-    table = joints | points() | {"pose": words("P9", "P9", "P2", "P2", "P9", "P1", "P1", "P1")}
-    columns = reading(tmp_path, table).columns
-    np.testing.assert_array_equal(columns["pose"], [0, 0, 1, 1, 0, 2, 2, 2])
-    np.testing.assert_array_equal(columns["repeat"], [0, 1, 0, 1, 2, 0, 1, 2])
 
 
 def test_commanded_joints_beside_those_read_back(tmp_path, joints):
@@ -236,3 +224,39 @@ def test_a_published_file_is_used_as_its_publisher_wrote_it():
             published.columns[name], plain.columns[name], atol=1e-7, err_msg=name
         )
     assert np.isfinite(np.stack([published.columns[name] for name in UNCERTAINTY[:3]])).all()
+
+
+def test_mass_and_centre_of_the_payload_of_every_row(tmp_path, joints):
+    mass = {"payload_kg": np.arange(COUNT) % 3}
+    centre = {"payload_x_mm": np.full(COUNT, 10.0), "payload_y_m": np.full(COUNT, 0.02)}
+    centre |= {"payload_z_mm": np.full(COUNT, -30.0)}
+    columns = reading(tmp_path, joints | points() | mass | centre).columns
+    np.testing.assert_array_equal(columns["payload_kg"], mass["payload_kg"])
+    assert [columns[f"payload_{axis}_mm"][1] for axis in "xyz"] == [10.0, 20.0, -30.0]
+    table = joints | points()
+    assert "payload_kg: is missing beside the centre" in refused(tmp_path, table | centre)
+    del centre["payload_z_mm"]
+    assert "payload_z: is missing beside" in refused(tmp_path, table | mass | centre)
+    negative = {"payload_kg": np.full(COUNT, -2.5)}
+    assert "a mass of -2.5 kg" in refused(tmp_path, table | negative)
+
+
+def test_a_mass_alone_hangs_at_the_last_frame_and_an_empty_cell_says_nothing(tmp_path, joints):
+    table = joints | points() | {"Last": words(5, 5, "", 5, 5, 5, 5, 5)}
+    columns = reading(tmp_path, table, columns={"payload": "Last"}).columns
+    assert columns["payload_z_mm"][0] == 0.0
+    assert np.isnan([columns["payload_kg"][2], columns["payload_x_mm"][2]]).all()
+
+
+@pytest.mark.parametrize(
+    ("names", "expected"),
+    [
+        (["Payload [kg]"], {"payload"}),
+        (["charge utile (kg)"], {"payload"}),
+        (["charge"], set()),  # of a battery
+        (["Nutzlast [kg]", *(f"Schwerpunkt Nutzlast {axis} [mm]" for axis in "XYZ")],
+         {"payload", "payload_x", "payload_y", "payload_z"}),
+    ],
+)  # fmt: skip
+def test_a_load_is_known_under_names_people_use_with_their_unit(names, expected):
+    assert {*recognise([*map(name_of, names)]).single} == expected

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from written_tables import (
     JOINTS,
+    NO_UNITS,
     POINT_MM,
     ROWS,
     XYZ,
@@ -17,32 +18,19 @@ from written_tables import (
     lines,
     looked,
     reading,
+    undecided,
 )
 
 from kinacc.errors import InputError
-from kinacc.measurements.intake.choices import Undecided
-from kinacc.measurements.intake.text import look
 
 GERMAN = [*(f"Achse {i} [°]" for i in range(1, 7)), *(f"{axis} gemessen [mm]" for axis in "XYZ")]
-
-
-def undecided(path, **answers):
-    with pytest.raises(Undecided) as caught:
-        looked(path, **answers)
-    return caught.value
 
 
 ENCODED = {
     "latin-1": (GERMAN, "latin-1", "latin-1"),
     "Windows": ([*GERMAN[:6], "X – gemessen", "Y – gemessen", "Z – gemessen"], "cp1252", "latin-1"),
-    "French": (
-        [*(f"axe {i} (degrés)" for i in range(1, 7)), *(f"{a} mesuré (mm)" for a in "XYZ")],
-        "latin-1",
-        "latin-1",
-    ),
     "UTF-16 with its mark": (GERMAN, "utf-16", "utf-16-le"),
     "UTF-16 without a mark": (GERMAN, "utf-16-le", "utf-16-le"),
-    "UTF-16, the other order": (GERMAN, "utf-16-be", "utf-16-be"),
     "Japanese": ([*JOINTS[:6], *(f"測定 {a} [mm]" for a in "XYZ")], "cp932", "cp932"),
     "UTF-8 with a mark": (GERMAN, "utf-8-sig", "utf-8"),
 }
@@ -52,11 +40,6 @@ ENCODED = {
 def test_characters_are_found_and_named_where_they_are_not_utf_8(case, tmp_path):
     names, encoding, said = ENCODED[case]
     path = file(tmp_path, lines(cells(), names, ";"), encoding=encoding)
-    if case == "Japanese":  # what the names mean is another's business
-        found = look(path)
-        assert list(found.table.columns) == names
-        assert found.written.encoding == "cp932"
-        return
     found = looked(path)
     assert found.section["encoding"] == said
     assert list(found.table.columns) == names
@@ -65,17 +48,15 @@ def test_characters_are_found_and_named_where_they_are_not_utf_8(case, tmp_path)
 
 
 WRITTEN = {
-    "several blanks": lines(cells(), (*(f"J{i}" for i in range(1, 7)), *"XYZ"), "   "),
+    "several blanks": lines(cells(), NO_UNITS, "   "),
     "blanks and names with units": lines(cells(), mark="   "),
     "aligned to the right": "\n".join(
         "".join(f"{cell:>12}" for cell in row)
-        for row in [[*(f"J{i}" for i in range(1, 7)), *"XYZ"], *cells()]
+        for row in [NO_UNITS, *cells()]
     ),
-    "tabs": lines(cells(), mark="\t"),
-    "decimal commas": lines(cells(decimal=","), mark=";"),
     "decimal commas between tabs": lines(cells(decimal=","), mark="\t"),
     "decimal commas between blanks": lines(
-        cells(decimal=","), (*(f"J{i}" for i in range(1, 7)), *"XYZ"), "  "
+        cells(decimal=","), NO_UNITS, "  "
     ),
     "quoted decimal commas between commas": lines(
         [[f'"{cell}"' for cell in row] for row in cells(decimal=",")]
@@ -89,19 +70,19 @@ WRITTEN = {
     "Swiss thousands": lines(cells(thousands="'"), mark=";"),
     "French thousands": lines(cells(decimal=",", thousands="\u202f"), mark=";"),
     "blanks between thousands": lines(cells(thousands=" "), mark=";"),
-    "a real minus": lines(cells(), mark=";").replace("-", "\u2212"),
+    "a real minus": lines(cells(), mark="	").replace("-", "\u2212"),
     "title and blank lines above": "Tracker survey, cell 3\nDate: 2024-03-01; operator 7\n\n"
     + lines(cells(), mark=";"),
     "units under the names": lines(
-        [["deg"] * 6 + ["mm"] * 3, *cells()], (*(f"J{i}" for i in range(1, 7)), *"XYZ")
+        [["deg"] * 6 + ["mm"] * 3, *cells()], NO_UNITS
     ),
     "a rule under the names": lines(
-        [["---"] * 9, *cells()], (*(f"J{i}" for i in range(1, 7)), *"XYZ"), "\t"
+        [["---"] * 9, *cells()], NO_UNITS, "\t"
     ),
     "a mark at the end of every row": lines(cells(), mark=";").replace("\n", ";\n"),
     "a mark at the end of the rows alone": lines([[*row, ""] for row in cells()], mark=";"),
     "names in two lines": lines(
-        [[*(f"J{i}" for i in range(1, 7)), *"XYZ"], *cells()],
+        [NO_UNITS, *cells()],
         ["Joints", *[""] * 5, "Measured", "", ""],
         ";",
     ),
@@ -113,7 +94,7 @@ WRITTEN = {
             [*(f"{c} °" for c in row[:6]), *(f"{c} mm" for c in row[6:])]
             for row in cells(decimal=",")
         ],
-        (*(f"J{i}" for i in range(1, 7)), *"XYZ"),
+        NO_UNITS,
         ";",
     ),
     "a column of row numbers without a name": lines(
@@ -142,11 +123,8 @@ def test_a_mark_that_may_be_one_of_thousands_is_asked_about(case, tmp_path):
     points = [[f"{v // 10:.0f}" for v in row] for row in np.abs(POINT_MM)]
     rows = [[*q, *map(AMBIGUOUS[case], p)] for q, p in zip(rows, points, strict=True)]
     path = file(tmp_path, lines(rows, mark=";"))
-    error = undecided(path)
-    assert "--decimal" in str(error)
-    values = {
-        mark: reading(path, decimal=mark).columns["x_mm"] for mark in error.choices[0].answers
-    }
+    assert "--decimal" in undecided(path)
+    values = {mark: reading(path, decimal=mark).columns["x_mm"] for mark in ",."}
     ratio = values[","] / values["."]
     assert np.isclose(np.abs(np.log10(np.median(ratio))), 3.0, atol=0.01) or (ratio != 1).any()
 
@@ -155,7 +133,7 @@ def test_a_thousand_where_all_others_have_none_is_asked_about(tmp_path):
     rows = cells(decimal=",")
     rows[3][6] = "2.500"
     path = file(tmp_path, lines(rows, mark=";"))
-    assert "--thousands" in str(undecided(path))
+    assert "--thousands" in undecided(path)
     assert reading(path, thousands=".").columns["x_mm"][3] == 2500.0
     with pytest.raises(InputError, match=r"line 5: not a finite number: '2\.500'"):
         reading(path, thousands="none")
@@ -241,9 +219,7 @@ def test_one_zero_among_points_around_it_is_asked_about(tmp_path):
     rows = [[*row[:6], *map(str, np.round(p, 3))] for row, p in zip(cells(), near, strict=True)]
     rows[4][6:] = ["0", "0", "0"]
     path = file(tmp_path, lines(rows, mark=";"))
-    error = undecided(path)
-    assert "--no-reading" in str(error)
-    assert "line 6" in str(error)
+    assert re.search("line 6.*--no-reading", undecided(path))
     assert len(reading(path, no_reading="0").columns["row"]) == ROWS - 1
     assert len(reading(path, no_reading="none").columns["row"]) == ROWS
 
@@ -252,7 +228,7 @@ def test_a_nine_in_one_coordinate_is_asked_about(tmp_path):
     rows = cells()
     rows[4][8] = "9999"
     path = file(tmp_path, lines(rows, mark=";"))
-    assert "--no-reading" in str(undecided(path))
+    assert "--no-reading" in undecided(path)
     found = reading(path, no_reading="9999")
     assert_is_truth(found, np.arange(ROWS) != 4)
 

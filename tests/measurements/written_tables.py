@@ -5,10 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
 from scipy.spatial.transform import Rotation
 
 from kinacc.kinematics import robot
 from kinacc.measurements.intake import guess
+from kinacc.measurements.intake.choices import Undecided
 from kinacc.measurements.reader import read
 
 ARM = robot.load("ur10")
@@ -21,6 +23,7 @@ POINT_MM = np.add(TURN.apply(robot.forward(ARM, np.deg2rad(Q_DEG)).position_mm),
 POINT_MM = np.round(POINT_MM + _RNG.normal(0, 0.04, (ROWS, 3)), 3)
 JOINTS = [f"J{number} [deg]" for number in range(1, 7)]
 XYZ = ["X [mm]", "Y [mm]", "Z [mm]"]
+NO_UNITS = [*(f"J{number}" for number in range(1, 7)), *"XYZ"]
 
 
 def cells(decimals=3, decimal=".", thousands="", q=Q_DEG, point=POINT_MM):
@@ -80,3 +83,10 @@ def assert_is_truth(found, rows=slice(None), atol=2e-3):
     point = np.stack([found.columns[f"{axis}_mm"] for axis in AXES], axis=1)
     np.testing.assert_allclose(q, Q_DEG[rows], atol=atol)
     np.testing.assert_allclose(point, POINT_MM[rows], atol=atol)
+
+
+def undecided(path, **answers) -> str:
+    """The questions that a file leaves open."""
+    with pytest.raises(Undecided) as caught:
+        looked(path, **answers)
+    return str(caught.value)

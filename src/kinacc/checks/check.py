@@ -161,8 +161,9 @@ def _meant(
     observed, there = fitted.readings, fitted.readings.has_rotation
     if not there.any():
         return fitted, meaning, findings
+    flange = fitted.residuals.flange[there]
     way, least, before = orientations.find(
-        single.turns[there], layout, fitted.residuals.flange[there], observed.target[there]
+        single.turns[there], layout.orientation, flange, observed.target[there]
     )
     if before > meanings.BAD_RAD and (
         turned := meanings.find_by_turns(single, robot, meaning, least)

@@ -14,7 +14,8 @@ from numpy import ndarray
 
 from kinacc.checks.findings import Finding, finding
 from kinacc.checks.readings import Readings, nearest_rotation
-from kinacc.measurements.layout import ANGLES, Layout, in_order_of
+from kinacc.config.measured import Orientation
+from kinacc.measurements.layout import ANGLES, in_order_of
 from kinacc.measurements.orientation import CONVENTIONS, rotations
 
 BETTER = 0.5  # of the scatter as written
@@ -42,17 +43,17 @@ def scatter(flange: ndarray, rotation: ndarray, target: ndarray) -> float:
 
 
 def find(
-    raw: ndarray, layout: Layout, flange: ndarray, target: ndarray
+    raw: ndarray, stated: Orientation, flange: ndarray, target: ndarray
 ) -> tuple[Turn, float, float]:
     """The best way to read the raw orientations (n, 3 or 4), and its scatter and that as written.
 
     As written unless another way scatters less than half, and little.
     """
-    written = Turn(None, lambda raw: rotations(raw, layout))
+    written = Turn(None, lambda raw: rotations(raw, stated))
     step = max(len(raw) // _ROWS, 1)
     raw, flange, target = raw[::step], flange[::step], target[::step]
     here = scatter(flange, written.read(raw), target)
-    for ways in (simple(layout, raw), combined(layout)):
+    for ways in (simple(stated, raw), combined(stated)):
         tried = [(scatter(flange, way.read(raw), target), way) for way in ways]
         least = min(value for value, _ in tried)
         if least < BETTER * here and least < _LARGEST_RAD:
@@ -70,24 +71,24 @@ def change_finding(
     return change.of_lines(read.lines(there), detail, **degrees)
 
 
-def simple(layout: Layout, raw: ndarray) -> Iterator[Turn]:
+def simple(stated: Orientation, raw: ndarray) -> Iterator[Turn]:
     """Ways one change away from what is stated, likely ones first."""
-    yield from _backwards(Turn(None, lambda raw: rotations(raw, layout)))
+    yield from _backwards(Turn(None, lambda raw: rotations(raw, stated)))
     largest = np.nanmax(np.abs(raw), initial=0.0)
-    for unit, stated, short, factor, may_be in (
+    for unit, before, short, factor, may_be in (
         ("radians", "degrees", "rad", 180.0 / np.pi, np.rad2deg(largest) <= 4.0 * np.pi),
         ("degrees", "radians", "deg", np.pi / 180.0, largest > 2.0 * np.pi),
     ):
-        if may_be and layout.orientation != "quaternion":
+        if may_be and stated.kind != "quaternion":
             setting = {"orientation": {"unit": short}}
-            change = finding("angle_units", unit=unit, stated=stated, short=short, setting=setting)
-            yield Turn(change, lambda raw, factor=factor: rotations(raw * factor, layout))
-    yield from _readings(layout)
+            change = finding("angle_units", unit=unit, stated=before, short=short, setting=setting)
+            yield Turn(change, lambda raw, factor=factor: rotations(raw * factor, stated))
+    yield from _readings(stated)
 
 
-def combined(layout: Layout) -> Iterator[Turn]:
+def combined(stated: Orientation) -> Iterator[Turn]:
     """Other conventions, read the wrong way round or in left-handed coordinates."""
-    for turn in _readings(layout):
+    for turn in _readings(stated):
         yield from _backwards(turn)
 
 
@@ -108,44 +109,44 @@ def _backwards(turn: Turn) -> Iterator[Turn]:
         yield Turn(joined(change), lambda raw, both=both: turn.read(raw) * both)
 
 
-def _readings(layout: Layout) -> Iterator[Turn]:
-    if layout.orientation == "quaternion":
+def _readings(stated: Orientation) -> Iterator[Turn]:
+    if stated.kind == "quaternion":
         for columns, order in (([3, 0, 1, 2], "xyzw"), ([1, 2, 3, 0], "wxyz")):
             setting = {"orientation": {"order": order}}
             change = finding("euler_convention/quaternion", order=order, setting=setting)
-            yield Turn(change, lambda raw, columns=columns: rotations(raw[:, columns], layout))
+            yield Turn(change, lambda raw, columns=columns: rotations(raw[:, columns], stated))
         return
-    euler = layout.orientation == "euler"
-    names = in_order_of(layout.convention) if euler else ANGLES
-    if euler and len(set(layout.convention.lower())) == 3:
+    euler = stated.kind == "euler"
+    names = in_order_of(stated.convention) if euler else ANGLES
+    if euler and len(set(stated.convention.lower())) == 3:
         # Angles about x, y, z as named, taken in another sequence.
         for convention in CONVENTIONS[:6]:
-            if convention not in (layout.convention, layout.convention[::-1].upper()):
+            if convention not in (stated.convention, stated.convention[::-1].upper()):
                 order = [names.index(name) for name in in_order_of(convention)]
-                yield _euler(layout, convention, order, f" (or {convention[::-1].lower()})")
+                yield _euler(stated, convention, order, f" (or {convention[::-1].lower()})")
     for convention in CONVENTIONS:
-        if not (euler and convention == layout.convention):
-            yield _euler(layout, convention, [0, 1, 2], " in the columns' order")
+        if not (euler and convention == stated.convention):
+            yield _euler(stated, convention, [0, 1, 2], " in the columns' order")
     if euler:
         order = [names.index(name) for name in ANGLES]
-        vector = replace(layout, orientation="rotation_vector")
+        vector = stated.model_copy(update={"kind": "rotation_vector"})
         setting = {"orientation": {"kind": "rotation_vector"}}
         change = finding("euler_convention/vector", setting=setting)
         yield Turn(change, lambda raw: rotations(raw[:, order], vector))
 
 
-def _euler(layout: Layout, convention: str, order: list[int], text: str) -> Turn:
+def _euler(stated: Orientation, convention: str, order: list[int], text: str) -> Turn:
     """Euler angles of a convention, of which ``order`` are the raw columns."""
-    euler = layout.orientation == "euler"
-    here = in_order_of(layout.convention) if euler else ANGLES
+    euler = stated.kind == "euler"
+    here = in_order_of(stated.convention) if euler else ANGLES
     columns = [here[number] for number in order]
     setting: dict[str, object] = {"orientation": {"kind": "euler", "convention": convention}}
     setting |= {} if columns == list(in_order_of(convention)) else {"e": columns}
-    stated = f"of convention {layout.convention}" if euler else "rotation vectors"
+    before = f"of convention {stated.convention}" if euler else "rotation vectors"
     change = finding(
-        "euler_convention", convention=convention, order=text, stated=stated, setting=setting
+        "euler_convention", convention=convention, order=text, stated=before, setting=setting
     )
-    second = replace(layout, orientation="euler", convention=convention)
+    second = stated.model_copy(update={"kind": "euler", "convention": convention})
     return Turn(change, lambda raw: rotations(raw[:, order], second))
 
 

@@ -62,7 +62,8 @@ def _explanations(
         replace(observed, q_rad=meaning.joints(observed.commanded)),
     )
     there = observed.has_rotation
-    for way in orientations.simple(layout, observed.turns[there]) if there.any() else ():
+    turns, stated = observed.turns[there], layout.orientation
+    for way in orientations.simple(stated, turns) if there.any() else ():
         rotation = observed.rotation.copy()
         rotation[there] = way.read(observed.turns[there])
         yield way.change, moved(observed.position_mm, rotation)

@@ -204,6 +204,10 @@ class Directions(Section):
 class Written(Section):
     """How numbers and columns are written in a file."""
 
+    delimiter: Literal[",", ";", "\t", " ", "blanks"] = setting(
+        ",",
+        "character between two columns, or blanks for one or more of them",
+    )
     decimal: Literal[".", ","] = setting(".", "decimal mark")
     skip_lines: int = setting(0, "lines left out above the line of column names", ge=0, le=10000)
     skip_under_names: int = setting(0, "lines left out under the column names", ge=0, le=100)
@@ -222,7 +226,6 @@ class Written(Section):
 class JointsFile(Written):
     """Joints that stand in a file of their own, beside the points of path."""
 
-    delimiter: Literal[",", ";", "\t", " "] = setting(",", "character between two columns")
     path: Text | None = setting(
         None,
         "file of the joints, relative to the folder of the file this stands in; null where path"
@@ -283,10 +286,6 @@ class MeasuredFile(Written):
         {},
         "the file's own names of columns, where they are not q1_deg, x_mm, rx_deg and the like",
         allowed=f"a mapping of {_NAMES} to text",
-    )
-    delimiter: Literal[",", ";", "\t", " ", "blanks"] = setting(
-        ",",
-        "character between two columns, or blanks for one or more of them",
     )
     layout: Literal["table", "features", "spherical"] = setting(
         "table",

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from kinacc.config.measured import JointsFile
 from kinacc.errors import InputError, Problem, first_few, refuse
-from kinacc.measurements.layout import Join
 from kinacc.measurements.reader import AGAIN
 from kinacc.measurements.table import RawTable
 from kinacc.measurements.times import seconds
@@ -23,7 +23,7 @@ _BESIDE = re.compile(r"[\s\[\](){}\"']+")
 _PREFIX = "joints file "  # before columns of the joints' file whose name the points' file has too
 
 
-def joined(points: RawTable, joints: RawTable, how: Join) -> RawTable:
+def joined(points: RawTable, joints: RawTable, how: JointsFile) -> RawTable:
     """Rows of the points with the joints beside them, under the lines of the points.
 
     ``notes`` of the table name the rows without a partner. Raises InputError where keys are
@@ -61,7 +61,9 @@ def beside_name(column: str, points: RawTable) -> str:
     return f"{_PREFIX}{column}" if column in points.columns else column
 
 
-def _pairs(points: RawTable, joints: RawTable, how: Join) -> tuple[np.ndarray, tuple[str, ...]]:
+def _pairs(
+    points: RawTable, joints: RawTable, how: JointsFile
+) -> tuple[np.ndarray, tuple[str, ...]]:
     """Row of the joints (n,) of every point, -1 for none, and notes on rows without a partner."""
     keys = (("key", how.key, joints), ("key_of_points", how.key_of_points, points))
     refuse(
@@ -99,7 +101,7 @@ def _unmatched(
     return (f"{table.path}: left out, without a partner in {other.path}: {lines}{named}",)
 
 
-def rows_by_name(points: RawTable, joints: RawTable, how: Join) -> np.ndarray:
+def rows_by_name(points: RawTable, joints: RawTable, how: JointsFile) -> np.ndarray:
     """Row of the joints (n,) of the same name as every point, -1 for none.
 
     Raises InputError where one name has joints that are not the same.
@@ -146,7 +148,9 @@ def joint_values(joints: RawTable) -> np.ndarray:
     return q if names[0].unit == "rad" or (not names[0].unit and small) else np.deg2rad(q)
 
 
-def _rows_by_time(points: RawTable, joints: RawTable, how: Join) -> tuple[np.ndarray, np.ndarray]:
+def _rows_by_time(
+    points: RawTable, joints: RawTable, how: JointsFile
+) -> tuple[np.ndarray, np.ndarray]:
     """Row of the joints (n,) next in time to every point, -1 for none; and where the arm moved."""
     problems: list[Problem] = []
     here = seconds(points, how.key_of_points or "", problems) + how.clock_offset_s

@@ -14,10 +14,12 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass
 
 import numpy as np
 
+from kinacc.config.fields import Section
+from kinacc.config.measured import Directions, JointsFile, MeasuredFile, Orientation, Written
 from kinacc.errors import Problem
 from kinacc.measurements import column_names
 from kinacc.measurements.column_names import KNOWN, name_of
@@ -53,93 +55,26 @@ _JOINT = re.compile(r"q(\d)(?:_cmd)?")
 _READ = (column_names.MEASURED, column_names.REPORTED, column_names.PLAIN)
 
 
-@dataclass(frozen=True)
-class Directions:
-    """How a spherical reading states its angles; ``unit`` deg, gon or rad.
-
-    ``vertical`` is counted from the zenith or from the horizon; ``horizontal`` is clockwise or
-    counterclockwise, seen from above.
-    """
-
-    unit: str = "deg"
-    vertical: str = "zenith"
-    horizontal: str = "clockwise"
-
-
-@dataclass(frozen=True)
-class Layout:
-    """The ``measurements.file`` section of the configuration: all there is to know of a file.
-
-    ``delimiter`` may be ``blanks``, one or more of them; ``thousands`` the mark between thousands;
-    ``names`` the columns of a file that has no line of names; ``layout`` table, features (a row per
-    feature and axis) or spherical. ``columns`` maps our names (``q1``, ``x``, ``mA_x``, ``pose``)
-    to the file's own, which then carry ``joint_unit``, ``length_unit`` and ``angle_unit``.
-    ``orientation`` is none, quaternion (``order`` of quat1..quat4), rotation_vector or euler (of
-    ``convention``). ``targets`` names those to read; None for all that are there. ``no_reading``
-    are numbers that say that nothing was read; uncertainties are ``sigma`` standard deviations.
-    ``pulses_per_deg``: joints are motor pulses. ``repeats_in_names``: P12_1 and P12-2 are readings
-    of one pose.
-    """
-
-    delimiter: str = ","
-    decimal: str = "."
-    thousands: str | None = None
-    skip_lines: int = 0
-    skip_under_names: int = 0
-    encoding: str = "utf-8"
-    sheet: str | None = None
-    names: tuple[str, ...] | None = None
-    layout: str = TABLE
-    directions: Directions = Directions()
-    columns: Mapping[str, str] = field(default_factory=dict)
-    joint_unit: str = "deg"
-    length_unit: str = "mm"
-    orientation: str = "none"
-    convention: str = "XYZ"
-    angle_unit: str = "deg"
-    order: str | None = None
-    targets: tuple[str, ...] | None = None
-    no_reading: tuple[float, ...] = ()
-    sigma: int = 1
-    pulses_per_deg: tuple[float, ...] | None = None
-    repeats_in_names: bool = False
+class Layout(MeasuredFile):
+    """The ``measurements.file`` section of the settings: all there is to know of a file."""
 
     @classmethod
     def of(cls, section: Mapping) -> Layout:
-        """From the section; a key that is not there is at its default."""
-        names = {field.name for field in fields(cls)}
-        keys = {k: tuple(v) if isinstance(v, list) else v for k, v in section.items() if k in names}
-        turn = {"kind": "none", "unit": "deg"} | section.get("orientation", {})
-        keys |= {"angle_unit" if k == "unit" else k: v for k, v in turn.items()}
-        keys |= {"orientation": keys.pop("kind")}
-        return cls(**keys | {"directions": Directions(**section.get("directions", {}))})
+        """From a section that was validated; a key that is not there is at its default."""
+        parts: dict[str, type[Section]] = {
+            "orientation": Orientation, "directions": Directions, "joints": JointsFile
+        }  # fmt: skip
+        keys = {key: value for key, value in section.items() if key in cls.model_fields}
+        keys |= {k: model.model_construct(**section.get(k) or {}) for k, model in parts.items()}
+        return cls.model_construct(**keys)
+
+    def but(self, **keys: object) -> Layout:
+        """The layout with other values of some keys."""
+        return self.model_copy(update=keys)
 
     def written(self) -> dict[str, object]:
-        """The keys of the section that say how the file is written, defaults included."""
-        keys = dict(list(vars(self).items())[: list(vars(self)).index("columns")])
-        keys["names"] = self.names and list(self.names)
-        return keys | {"directions": vars(self.directions)}
-
-
-@dataclass(frozen=True)
-class Join:
-    """How rows of points and of joints in a file of their own belong together.
-
-    ``by`` a name (of columns ``key`` of the joints and ``key_of_points``), by time (of these
-    columns: a point's clock shows ``clock_offset_s`` less than the joints') or by order. Joints
-    within ``within_s`` of a point are those of the point, if the arm stood still.
-    """
-
-    by: str
-    key: str | None = None
-    key_of_points: str | None = None
-    clock_offset_s: float = 0.0
-    within_s: float = 0.5
-
-    @classmethod
-    def of(cls, section: Mapping) -> Join:
-        """From the configuration section ``measurements.file.joints``."""
-        return cls(*(section[field.name] for field in fields(cls)))
+        """The keys of the section that state how the file is written, defaults included."""
+        return self.model_dump(include={*Written.model_fields, "layout", "directions"})
 
 
 @dataclass(frozen=True)
@@ -256,9 +191,7 @@ class _Finder:
             column = self.layout.columns[name]
             if column not in self.table.columns:
                 return None
-            if key and (stated := _stated_unit(self.table, column)) not in (None, unit):
-                message = f"says {stated}, but measurements.file.{key} says {unit}"
-                self.problem(column, message, "the same in both places")
+            self._hold_to(column, _stated_unit(self.table, column), unit, key)
             return Place(column, units[unit])
         present = columns_of_quantity(self.table, name, units)
         if len(present) > 1:
@@ -267,7 +200,18 @@ class _Finder:
             if not all(np.allclose(first, x, 0.0, rounding, equal_nan=True) for x in others):
                 names = " or ".join(place.column for place in present)
                 self.problem(names, "is given in two units that do not say the same")
+        # A key that is the default may not be meant, and one may be about a mapped column.
+        mapped = any(_kind(ours, self.layout, self.prismatic)[2] == key
+                     for ours in self.layout.columns)  # fmt: skip
+        if present and unit not in ("deg", "mm") and not mapped:
+            self._hold_to(present[0].column, present[0].column.rpartition("_")[2], unit, key)
         return present[0] if present else None
+
+    def _hold_to(self, column: str, stated: str | None, unit: str, key: str) -> None:
+        """Note a column that states another unit than the key that is about it."""
+        if key and stated not in (None, unit):
+            message = f"says {stated}, but measurements.file.{key} says {unit}"
+            self.problem(column, message, "the same in both places")
 
     def group(self, names: Sequence[str], required: bool = False) -> tuple[Place, ...]:
         """Columns of quantities that come together, or none of them where not ``required``."""
@@ -337,15 +281,15 @@ class _Finder:
         return Target(name, position, turn, std, std_turn, covariance)
 
     def _turn(self, prefix: str, alone: bool) -> tuple[Place, ...]:
-        kind = self.layout.orientation
+        kind = self.layout.orientation.kind
         if kind == "none":
             return ()
-        usual = in_order_of(self.layout.convention) if kind == "euler" else ANGLES
+        usual = in_order_of(self.layout.orientation.convention) if kind == "euler" else ANGLES
         usual = QUATERNION if kind == "quaternion" else usual
         in_order = {"quaternion": QUATERNION_IN_ORDER, "euler": ANGLES_IN_ORDER}.get(kind, ())
         ordered = self.group([f"{prefix}{part}" for part in in_order])
         if ordered and kind == "quaternion":
-            return tuple(ordered[(self.layout.order or "wxyz").index(part)] for part in "wxyz")
+            return tuple(ordered[self.layout.orientation.order.index(part)] for part in "wxyz")
         names = [f"{prefix}{part}" for part in usual]
         there = any(self.place(name) or name in self.layout.columns for name in names)
         if ordered or there or not alone:  # of several targets some may be bare points
@@ -372,7 +316,7 @@ def _kind(quantity: str, layout: Layout, prismatic: Sequence) -> tuple[dict, str
     if joint:
         return ANGLE, layout.joint_unit, "" if layout.pulses_per_deg else "joint_unit"
     if part in _TURNS:
-        return ANGLE, layout.angle_unit, "orientation.unit"
+        return ANGLE, layout.orientation.unit, "orientation.unit"
     if part in COVARIANCE:
         return _AREA, f"{layout.length_unit}2", ""
     return _SINGLE.get(quantity, ({"": 1.0}, "", ""))

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from kinacc.config.measured import Orientation
 from kinacc.geometry import exp_so3, rotation_from_quaternion, skew
-from kinacc.measurements.layout import Layout
 
 CONVENTIONS = tuple(
     order if intrinsic else order.lower()
@@ -19,30 +19,30 @@ CONVENTIONS = tuple(
 _SMALL_ANGLE_RAD = 1e-6
 
 
-def quaternions(turns: np.ndarray, layout: Layout) -> np.ndarray:
+def quaternions(turns: np.ndarray, orientation: Orientation) -> np.ndarray:
     """Unit quaternions (n, 4) w, x, y, z, w >= 0, of ``turns`` (n, 4 or 3); NaN stays NaN.
 
     ``turns``: w, x, y, z of about unit length, rotation vectors, or Euler angles in the order of
-    the layout's convention, in rad.
+    its convention, in rad.
     """
     result = np.full((len(turns), 4), np.nan)
     there = np.isfinite(turns).all(axis=1)
-    if layout.orientation == "quaternion":
+    if orientation.kind == "quaternion":
         unit = turns[there] / np.linalg.norm(turns[there], axis=1, keepdims=True)
         result[there] = np.where(unit[:, :1] < 0.0, -unit, unit)
     elif there.any():
-        turned = Rotation.from_matrix(rotations(turns[there], layout))
+        turned = Rotation.from_matrix(rotations(turns[there], orientation))
         result[there] = turned.as_quat(canonical=True, scalar_first=True)
     return result
 
 
-def rotations(turns: np.ndarray, layout: Layout) -> np.ndarray:
+def rotations(turns: np.ndarray, orientation: Orientation) -> np.ndarray:
     """Rotations (n, 3, 3) of ``turns`` as in ``quaternions``."""
-    if layout.orientation == "quaternion":
+    if orientation.kind == "quaternion":
         return rotation_from_quaternion(turns / np.linalg.norm(turns, axis=1, keepdims=True))
-    if layout.orientation == "rotation_vector":
+    if orientation.kind == "rotation_vector":
         return exp_so3(turns)
-    return euler(turns, layout.convention)
+    return euler(turns, orientation.convention)
 
 
 def euler(angles_rad: np.ndarray, convention: str) -> np.ndarray:
@@ -50,17 +50,17 @@ def euler(angles_rad: np.ndarray, convention: str) -> np.ndarray:
     return Rotation.from_euler(convention, angles_rad).as_matrix().reshape(-1, 3, 3)
 
 
-def rotation_std(turns: np.ndarray, std: np.ndarray, layout: Layout) -> np.ndarray:
+def rotation_std(turns: np.ndarray, std: np.ndarray, orientation: Orientation) -> np.ndarray:
     """Standard deviations (n, 3) of the rotation vector w of ``exp(w) R``, instrument's frame.
 
-    ``std`` (n, 3): of the layout's angles or rotation vector components, taken as independent.
+    ``std`` (n, 3): of its angles or rotation vector components, taken as independent.
     """
-    if layout.orientation == "rotation_vector":
+    if orientation.kind == "rotation_vector":
         jacobian = _left_jacobians(turns)
     else:
         # The axis of an angle is turned by the factors left of it in the product.
-        letters = layout.convention.upper()
-        order = range(3) if layout.convention.isupper() else range(2, -1, -1)
+        letters = orientation.convention.upper()
+        order = range(3) if orientation.convention.isupper() else range(2, -1, -1)
         jacobian = np.empty((len(turns), 3, 3))
         product = Rotation.identity(len(turns))
         for number in order:

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import pandas as pd
 
+from kinacc.config.measured import JointsFile
 from kinacc.errors import InputError, Problem, gathered, refuse
 from kinacc.kinematics.model import PAYLOAD_COLUMNS
 from kinacc.kinematics.robot import Robot
@@ -18,7 +19,6 @@ from kinacc.measurements.layout import (
     STD,
     TABLE,
     FileColumns,
-    Join,
     Layout,
     Place,
     Target,
@@ -116,7 +116,7 @@ def _loaded(section: Mapping) -> RawTable:
     from kinacc.measurements.joining import joined
 
     other = {**section, "exclude": (), "source": None, "layout": TABLE, **joints, "joints": None}
-    return joined(table, _loaded(other), Join.of(joints))
+    return joined(table, _loaded(other), JointsFile.model_construct(**joints))
 
 
 def convert(table: RawTable, layout: Layout, robot: Robot, strict: bool = True) -> MeasuredFile:
@@ -209,13 +209,13 @@ def _target(table: RawTable, target: Target, layout: Layout, problems: list[Prob
     for number in layout.no_reading:
         void |= faults.none_read(np.where(position == number * factors, number, np.nan), number)
     part = {"there": ~gaps.all(axis=1) & ~void, "void": void, "target": target.name}
-    turn = np.full((len(table), 4 if layout.orientation == "quaternion" else 3), np.nan)
+    turn = np.full((len(table), 4 if layout.orientation.kind == "quaternion" else 3), np.nan)
     turned = np.full((len(table), 4), np.nan)
     if target.turn:
         turn = _whole_rows(table, target.turn, problems)
-        if layout.orientation == "quaternion":
+        if layout.orientation.kind == "quaternion":
             problems += faults.quaternion_problems(table, turn, target.turn)
-        turned = quaternions(turn, layout)
+        turned = quaternions(turn, layout.orientation)
     part |= dict(zip(POSITION, position.T, strict=True))
     part |= dict(zip(QUATERNION, turned.T, strict=True))
     part |= _uncertainty(table, target, turn, layout, problems)
@@ -242,13 +242,13 @@ def _uncertainty(table, target: Target, turn: np.ndarray, layout: Layout, proble
         with np.errstate(invalid="ignore"):
             values[:3] = np.sqrt(elements[:, [0, 3, 5]]).T
             values[3:6] = elements[:, [1, 2, 4]].T / values[[0, 0, 1]] / values[[1, 2, 2]]
-    if target.std_turn and target.turn and layout.orientation != "quaternion":
+    if target.std_turn and target.turn and layout.orientation.kind != "quaternion":
         std = spread(target.std_turn)
-        axes = layout.convention.lower()
-        if layout.orientation == "euler" and len({*axes}) == 3:
+        axes = layout.orientation.convention.lower()
+        if layout.orientation.kind == "euler" and len({*axes}) == 3:
             std = std[:, ["xyz".index(axis) for axis in axes]]
         there = np.isfinite(turn).all(axis=1) & np.isfinite(std).all(axis=1)
-        values[6:, there] = rotation_std(turn[there], std[there], layout).T
+        values[6:, there] = rotation_std(turn[there], std[there], layout.orientation).T
     return dict(zip(UNCERTAINTY, values, strict=True))
 
 

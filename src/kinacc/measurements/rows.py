@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from kinacc.config import json_files
+from kinacc.config.measured import Orientation
 from kinacc.config.names import of_csv
 from kinacc.errors import InputError, Problem, refuse
 from kinacc.geometry import Pose
@@ -133,10 +134,10 @@ def read_rows(
     pose = None
     if need == POSES and target:
         turn = stacked(table, target.turn, cells, gaps=False)
-        if layout.orientation == "quaternion":
+        if layout.orientation.kind == "quaternion":
             problems += faults.quaternion_problems(table, turn, target.turn)
         with np.errstate(invalid="ignore"):
-            pose = Pose(rotations(np.nan_to_num(turn, nan=0.5), layout), position)
+            pose = Pose(rotations(np.nan_to_num(turn, nan=0.5), layout.orientation), position)
     refuse(problems, f"{table.path} cannot be used")
     label, name = table.line, _label(table, columns)
     if name is not None:
@@ -188,7 +189,7 @@ def open_table(
         if re.search(rf"(?<![^\s,;\"']){_FIRST_NAMES[need]}(?![^\s,;\"'])", head):
             delimiter = next((mark for mark in ";\t" if mark in head), ",")
             comma = delimiter == ";" and "," in first and "." not in first
-            table = load(path, Layout(delimiter, "," if comma else "."))
+            table = load(path, Layout(delimiter=delimiter, decimal="," if comma else "."))
             table = replace(table, columns=table.columns.map(of_csv))
             return table, _plain_layout(table, need), ()
     from kinacc.measurements.intake import guess as guesses
@@ -211,13 +212,8 @@ def _plain_layout(table: RawTable, need: str) -> Layout:
     unit = next((unit for unit in ANGLE if f"rvx_{unit}" in names), "deg")
     vector = {f"r{axis}": f"rv{axis}_{unit}" for axis in "xyz"}
     columns = vector if kind == "rotation_vector" else {}
-    return Layout(
-        decimal=table.decimal,
-        columns=columns,
-        orientation=kind,
-        angle_unit=unit,
-        targets=(TOOL,),
-    )
+    turn = Orientation(kind=kind, unit=unit)
+    return Layout().but(columns=columns, orientation=turn, targets=[TOOL])
 
 
 def _of_json(path: Path) -> RawTable:

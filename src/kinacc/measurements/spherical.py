@@ -11,9 +11,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from kinacc.config.measured import Directions
 from kinacc.errors import Problem, refuse
 from kinacc.measurements.column_names import MEASURED, PLAIN, REPORTED, WORDS, Name, name_of, role
-from kinacc.measurements.layout import LENGTH, Directions
+from kinacc.measurements.layout import LENGTH
 from kinacc.measurements.table import RawTable, frame, numbers
 
 PER_UNIT = {"deg": np.pi / 180.0, "gon": np.pi / 200.0, "rad": 1.0}

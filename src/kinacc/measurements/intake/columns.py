@@ -212,10 +212,9 @@ class _Choice:
         if taken := self._taken(POINT):
             return _named_apart(taken)
         measured, reported, plain, unclear, nominal, deviations = (
-            self._of(POINT, name)
-            for name in (MEASURED, REPORTED, PLAIN, OPEN, NOMINAL, DEVIATION)
+            self._of(POINT, name) for name in (MEASURED, REPORTED, PLAIN, OPEN, NOMINAL, DEVIATION)
         )
-        not_corrected = [g for g in self._of(RADIUS, OPEN)]
+        not_corrected = self._of(RADIUS, OPEN)
         goals = [g for g in unclear if "target" in g.columns["x"].terms]
         # A record of measurement: nominal, actual, deviation.
         record = any({*g.columns["x"].terms} & WORDS["records"] for g in nominal)

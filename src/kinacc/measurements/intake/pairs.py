@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from kinacc.config.measured import JointsFile, Written
 from kinacc.errors import InputError, Problem, refuse
 from kinacc.measurements.column_names import OTHER, WORDS, name_of
 from kinacc.measurements.files import EXCEL
@@ -27,13 +28,11 @@ from kinacc.measurements.joining import (
     labels,
     rows_by_name,
 )
-from kinacc.measurements.layout import ANGLE, LENGTH, Join
+from kinacc.measurements.layout import ANGLE, LENGTH
 from kinacc.measurements.times import seconds
 
 _FEWEST_NAMES = 0.05  # of the rows: targets of a pose stand in rows of their own
 _SHARE = 0.5  # of the points: fewer in common are no key
-_WRITTEN = ("delimiter", "decimal", "thousands", "skip_lines", "skip_under_names", "encoding",
-            "sheet", "names")  # fmt: skip
 
 
 def look(
@@ -101,21 +100,21 @@ def _together(files: Sequence[Looked], answers: Mapping[str, Any]) -> Looked:
             *(q for q in points.columns.questions if not q.about.startswith(about)),
         ),
     )
-    written = joints.written.written()
-    section = {"path": joints.path, **vars(how), **{name: written[name] for name in _WRITTEN}}
+    written = joints.written.model_dump(include={*Written.model_fields})
+    section = {**how.model_dump(), **written, "path": joints.path}
     notes = (*points.notes, *joints.notes, *note)
     table = joined(points.table, joints.table, how)
     return replace(points, table=table, columns=meaning, joints=section, notes=notes)
 
 
-def _join(joints: Looked, points: Looked, answers: Mapping) -> tuple[Join, tuple[str, ...]]:
+def _join(joints: Looked, points: Looked, answers: Mapping) -> tuple[JointsFile, tuple[str, ...]]:
     """How the rows belong together, as answered or as the files leave no doubt."""
     given = answers.get("join")
     if given == ORDER:
-        return Join(ORDER), ()
+        return JointsFile(by="order"), ()
     if given and given != TIME:
         key, _, other = given.partition("=")
-        return Join(NAME, key, other or key), ()
+        return _by_name(key, other or key), ()
     if given != TIME and (how := _by_names(joints, points)):
         count = int(np.sum(rows_by_name(points.table, joints.table, how) >= 0))
         note = f"joined where {how.key} of {joints.table.path} is {how.key_of_points} of "
@@ -132,13 +131,13 @@ def _join(joints: Looked, points: Looked, answers: Mapping) -> tuple[Join, tuple
     raise InputError(Problem(points.table.path, message, fix=fix))
 
 
-def _by_names(joints: Looked, points: Looked) -> Join | None:
+def _by_names(joints: Looked, points: Looked) -> JointsFile | None:
     """The columns whose names of poses are those of the other file. Asks where several differ."""
-    certain: list[tuple[int, Join, bytes]] = []
-    counting: list[tuple[int, Join, bytes]] = []
+    certain: list[tuple[int, JointsFile, bytes]] = []
+    counting: list[tuple[int, JointsFile, bytes]] = []
     for key in _keys(joints):
         for other in _keys(points):
-            how = Join(NAME, key, other)
+            how = _by_name(key, other)
             try:
                 row = rows_by_name(points.table, joints.table, how)
             except InputError:
@@ -174,7 +173,7 @@ def _keys(file: Looked) -> list[str]:
     return keys
 
 
-def _counts_rows(how: Join, joints: Looked, points: Looked) -> bool:
+def _counts_rows(how: JointsFile, joints: Looked, points: Looked) -> bool:
     """Whether both keys only count rows: as many of both are poses where a term states it."""
     as_many = len(joints.table) == len(points.table)
     for file, key in ((joints, how.key), (points, how.key_of_points)):
@@ -194,7 +193,7 @@ def _times(file: Looked) -> str:
 
 def _by_clock(
     joints: Looked, points: Looked, key: str, other: str, answers: Mapping
-) -> tuple[Join, tuple[str, ...]]:
+) -> tuple[JointsFile, tuple[str, ...]]:
     problems: list[Problem] = []
     there, here = seconds(joints.table, key, problems), seconds(points.table, other, problems)
     refuse(problems, "the times are no key")
@@ -202,7 +201,7 @@ def _by_clock(
     stands, within = clocks.standstills(there[good], joint_values(joints.table)[good])
     if (given := answers.get("clock_offset")) is not None:
         try:
-            return Join(TIME, key, other, float(given), within), ()
+            return _by_time(key, other, float(given), within), ()
         except ValueError:
             raise InputError(Problem("--clock-offset", repr(given), "seconds")) from None
     ways = clocks.offsets(here, stands, within)
@@ -213,7 +212,7 @@ def _by_clock(
         meant = meant or {"0": "both clocks showed the same"}
         raise Undecided(points.table.path, [Choice("--clock-offset", about, meant)])
     note = f"joined by time: {ways[0]:g} s are added to {other} of {points.table.path}"
-    return Join(TIME, key, other, ways[0], within), (note,)
+    return _by_time(key, other, ways[0], within), (note,)
 
 
 def _undecided(joints: Looked, points: Looked, ways: dict[str, str]) -> Undecided:
@@ -223,3 +222,12 @@ def _undecided(joints: Looked, points: Looked, ways: dict[str, str]) -> Undecide
     about = f"nothing decides which joints of {joints.table.path} ({others} rows) belong to which "
     about += f"points ({count} rows)"
     return Undecided(points.table.path, [Choice("--join", about, ways)])
+
+
+def _by_name(key: str, key_of_points: str) -> JointsFile:
+    return JointsFile.model_construct(by="name", key=key, key_of_points=key_of_points)
+
+
+def _by_time(key: str, key_of_points: str, offset_s: float, within_s: float) -> JointsFile:
+    times = {"clock_offset_s": offset_s, "within_s": within_s}
+    return JointsFile.model_construct(by="time", key=key, key_of_points=key_of_points, **times)

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from kinacc.config.measured import Directions
 from kinacc.errors import InputError, Problem, first_few
 from kinacc.measurements import robot_programs
 from kinacc.measurements.column_names import name_of
@@ -34,7 +35,7 @@ from kinacc.measurements.intake import decimals, heads
 from kinacc.measurements.intake.choices import Choice, Undecided
 from kinacc.measurements.intake.columns import NamedColumns, names_in
 from kinacc.measurements.intake.heads import Head
-from kinacc.measurements.layout import FEATURES, LENGTH, SPHERICAL, Directions, Layout
+from kinacc.measurements.layout import FEATURES, LENGTH, SPHERICAL, Layout
 from kinacc.measurements.spherical import PER_UNIT, Reading, readings_of
 from kinacc.measurements.table import RawTable
 
@@ -91,7 +92,7 @@ def look(path: str | Path, answers: Mapping[str, Any] | None = None) -> Looked:
     decimal, thousands, choice = decimals.marks_of(table.columns, answers, blanks)
     if choice:
         raise Undecided(str(path), [choice])
-    written = replace(written, decimal=decimal, thousands=thousands)
+    written = written.but(decimal=decimal, thousands=thousands)
     table = replace(table, decimal=decimal, thousands=thousands)
     if head.line > 1 and head.names is None:
         notes.append(f"{written.skip_lines} rows above the names, not read")
@@ -100,16 +101,16 @@ def look(path: str | Path, answers: Mapping[str, Any] | None = None) -> Looked:
     notes += [f"{thousands!r} between thousands"] if thousands else []
     assumed: dict[str, str] = {}
     if report_of(table):
-        written = replace(written, layout=FEATURES)
+        written = written.but(layout=FEATURES)
         notes.append(f"a row per feature and axis: {len(table)} rows")
     elif readings := readings_of(names_in(table)):
         way = _directions(table, readings, stated.get("angle", ""), answers)
-        written = replace(written, layout=SPHERICAL, directions=way)
+        written = written.but(layout=SPHERICAL, directions=way)
         notes.append(f"{readings[0].vertical.column} is counted from the {way.vertical}")
         if "horizontal" not in answers:
             name = readings[0].horizontal.column
             assumed["horizontal"] = f"{name} counts {way.horizontal}, seen from above"
-    if written.layout != Layout.layout:
+    if written.layout != "table":
         table = load(path, written)
     return Looked(str(path), written, table, tuple(notes), assumed, stated)
 
@@ -137,7 +138,7 @@ def _text(path: Path, answers: Mapping) -> tuple[Layout, Head, list[Row], list[s
         message = "no line of column names above rows of numbers was found"
         raise InputError(Problem(str(path), message, "columns parted by ; , tab or blanks"))
     notes = [f"read as {encoding}"] if encoding != "utf-8" else []
-    return Layout(best, encoding=encoding), head, split[best], notes
+    return Layout().but(delimiter=best, encoding=encoding), head, split[best], notes
 
 
 def _best(split: Mapping[str, Sequence[Row]]) -> str:
@@ -219,7 +220,7 @@ def _workbook(path: Path, answers: Mapping) -> tuple[Layout, Head, list[Row], li
     sheet = likely[0]
     others = [name for name in sheets if name != sheet and "sheet" not in answers]
     notes = [f"sheet {sheet!r}" + (f"; not read: {first_few(others)}" if others else "")]
-    return Layout(sheet=sheet if len(sheets) > 1 else None), *tables[sheet], notes
+    return Layout().but(sheet=sheet if len(sheets) > 1 else None), *tables[sheet], notes
 
 
 def _names(head: Head, rows: Sequence[Row]) -> list[str]:
@@ -263,14 +264,16 @@ def _named(
         if len(names) != head.width:
             message = f"{len(names)} names for {head.width} columns"
             raise InputError(Problem(f"--names {given}", message, f"{head.width} names"))
-        return replace(written, names=names, skip_lines=above)
+        return written.but(names=[*names], skip_lines=above)
     if head.line:
         skipped = head.line if head.names else head.line - 1
-        return replace(written, names=head.names, skip_lines=skipped, skip_under_names=head.under)
+        return written.but(
+            names=head.names and [*head.names], skip_lines=skipped, skip_under_names=head.under
+        )
     cells = [cells for _, cells in rows[head.first :] if len(cells) == head.width]
     names = head.names or _point_names(cells, stated) or robot_programs.names_of_rows(cells)
     if names:
-        return replace(written, names=names, skip_lines=above)
+        return written.but(names=[*names], skip_lines=above)
     for line, row in rows[: head.first]:
         if len(row) > 3 and len(filled(row)) == len(row) and not heads.numbers_in(row):
             message = f"{len(row)} names above rows of {head.width} cells"
@@ -333,4 +336,5 @@ def _directions(
     if choices:
         raise Undecided(table.path, choices)
     turning = "clockwise" if first.is_geodetic else "counterclockwise"
-    return Directions(unit, counted, answers.get("horizontal") or turning)
+    turning = answers.get("horizontal") or turning
+    return Directions.model_construct(unit=unit, vertical=counted, horizontal=turning)

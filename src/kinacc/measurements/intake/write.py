@@ -10,32 +10,28 @@ from typing import Any
 
 import yaml
 
+from kinacc.config.measured import JointsFile, MeasuredFile
 from kinacc.config.names import LONGEST
 from kinacc.config.schema import defaults
 from kinacc.kinematics import robot as robots
 from kinacc.measurements.intake.guess import Guess
-from kinacc.measurements.layout import Layout
 
-_AS_USUAL = {**Layout().written(), "no_reading": [], "sigma": 1}
 _FEW_POSES = 60  # below, every configuration is held out once
 
 
 def dataset_content(robot: str, guess: Guess, poses: int) -> dict[str, Any]:
     """The settings of a data set as in the configuration; ``poses``: how many were measured."""
-    section = guess.section
-    file = {k: v for k, v in section.items() if k not in _AS_USUAL or v != _AS_USUAL[k]}
+    section, usual = guess.section, MeasuredFile().model_dump()
+    units = ("joint_unit", "length_unit")
+    file = {k: v for k, v in section.items() if k in units or v != usual[k]}
     turn = section["orientation"]
-    keys = {"euler": ("convention", "unit"), "rotation_vector": ("unit",)}
-    wanted = keys.get(turn["kind"], ())
-    if any(ours.endswith("quat1") for ours in section["columns"]):
-        wanted = ("order",)
-    file["orientation"] = {key: turn[key] for key in ("kind", *wanted)}
-    if "joints" in section:
-        spare = () if section["joints"]["by"] == "time" else ("clock_offset_s", "within_s")
-        joints = {k: v for k, v in section["joints"].items() if v not in (None, _AS_USUAL.get(k))}
-        file["joints"] = {k: v for k, v in joints.items() if k not in spare}
-    if not file["columns"]:
-        del file["columns"]
+    keys = {"euler": ("kind", "convention", "unit"), "rotation_vector": ("kind", "unit")}
+    in_order = any(ours.endswith("quat1") for ours in section["columns"])
+    shown = ("kind", "order") if in_order else keys.get(turn["kind"], ("kind",))
+    file["orientation"] = {key: turn[key] for key in shown}
+    if joints := section.get("joints"):
+        usual = JointsFile().model_dump()
+        file["joints"] = {k: v for k, v in joints.items() if k == "by" or v != usual[k]}
     few = poses < _FEW_POSES  # one configuration held out at a time
     return {
         "robot": robot,
