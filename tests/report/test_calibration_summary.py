@@ -16,7 +16,7 @@ from kinacc.campaign import of_calibration
 from kinacc.campaign.journal import JOURNAL
 from kinacc.deployment import folder
 from kinacc.report import summarise
-from kinacc.report.terminal import size
+from kinacc.report.rendering import size
 from kinacc.tables import store
 
 
@@ -70,12 +70,9 @@ def test_errors_are_those_of_the_pose_errors_of_the_selected_model(fleet):
         & (table["estimate"] == "cross_validated")
     ]
     sizes = np.linalg.norm(mine[["ex_mm", "ey_mm", "ez_mm"]], axis=1)
-    (errors,) = [
-        each
-        for each in known["errors"]
-        if (each["model"], each["reference"]) == (known["selected"], "measured")
-        and (each["estimate"], each["quantity"]) == ("held_out", "position")
-    ]
+    names = ["model", "reference", "estimate", "quantity"]
+    errors = pd.DataFrame(known["errors"]).set_index(names)
+    errors = errors.loc[known["selected"], "measured", "held_out", "position"]
     assert errors["n"] == len(sizes)
     assert errors["mean"] == pytest.approx(sizes.mean(), rel=1e-12)
     assert errors["largest"] == pytest.approx(sizes.max(), rel=1e-12)
@@ -170,8 +167,8 @@ def test_the_order_of_findings_and_what_is_open(study):
     ]
     tables["data_check"] = dict(zip(names, map(list, zip(*rows, strict=True)), strict=True))
     found = summarise.summarise(study, tables, ())
-    assert [each.finding for each in found.findings] == ["jump", "outlier", "sparse"]
-    assert [each.is_open for each in found.findings] == [True, False, False]
+    assert found.findings["finding"].tolist() == ["jump", "outlier", "sparse"]
+    assert found.findings["is_open"].tolist() == [True, False, False]
     assert found.left_out == ("column 3 is not used",)
 
 
@@ -184,11 +181,11 @@ def test_a_joint_bends_where_either_of_its_coefficients_was_fitted():
         "lever_coefficient_rad_per_mm": np.array([nan, nan, 2e-6]),
         "std_lever_coefficient_rad_per_mm": np.array([nan, nan, 1e-7]),
     }
-    two, three = summarise.compliance(table)
+    two, three = summarise.compliance(table).itertuples()
     assert (two.joint, two.compliance_rad_per_nm) == (2, 1e-6)
     assert np.isnan(two.lever_coefficient_rad_per_mm)
     assert (three.joint, three.lever_coefficient_rad_per_mm) == (3, 2e-6)
-    assert list(summarise.compliance(None)) == []
+    assert summarise.compliance(None).empty
 
 
 def test_the_stage_writes_the_figures_of_the_record(study):
@@ -196,7 +193,7 @@ def test_the_stage_writes_the_figures_of_the_record(study):
     table = pd.DataFrame(dict(store.read(study / "summary.parquet")))
     found = table.set_index(["topic", "item", "statistic"])["value"]
     assert found["held_out_error", known.selected, "mean"] == known.best.mean
-    assert found["range", "joint 2", "low"] == known.joint_ranges[1].low
+    assert found["range", "joint 2", "low"] == known.joint_ranges["low"][1]
     assert found["like_measured", "ranges of all joints", "share"] == known.share_measured
     assert 0.0 <= known.share_measured <= 1.0
 

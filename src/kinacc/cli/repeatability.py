@@ -23,7 +23,7 @@ from kinacc.measurements.layout import POSITION, Place, find, listed
 from kinacc.measurements.reader import stacked
 from kinacc.measurements.rows import open_table
 from kinacc.measurements.table import RawTable, numbers
-from kinacc.report.terminal import size
+from kinacc.report.rendering import size
 
 _A_DAY_H = 1.0  # readings of a pose within less time do not show the changes of a day
 _USUAL_VISITS = 30  # of each pose, by ISO 9283

@@ -89,7 +89,7 @@ def _lines(result: Verification, units: list[str]) -> Iterator[str]:
 
     from kinacc.config.error_models import model_name
     from kinacc.deployment.permutation import LEVEL
-    from kinacc.report.terminal import size
+    from kinacc.report.rendering import size
 
     test, offsets = result.test, result.smallest_offsets
     detected, p = "", ""

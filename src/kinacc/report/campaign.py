@@ -15,7 +15,8 @@ from kinacc.campaign.state import State
 from kinacc.campaign.status import Bound, CampaignStatus, assumptions, percent, status
 from kinacc.config.error_models import model_name
 from kinacc.figures import campaign as drawing
-from kinacc.report.page import FirstScreen, Page, Part, Table, environment
+from kinacc.report.page import FirstScreen, Page, Part, Table
+from kinacc.report.rendering import environment
 from kinacc.tables.columns import Columns
 
 _VERDICTS = {ACCEPT: "MODEL WITHIN", REJECT: "MODEL BEYOND"}
@@ -59,7 +60,11 @@ def section(opened: Opened, state: State, tables: Mapping[str, Columns]) -> Part
 def markdown(opened: Opened, state: State, tables: Mapping[str, Columns], picture: str) -> str:
     """Return the report as text, with the values of the page."""
     values = section(opened, state, tables).values
-    return environment().get_template("campaign.md").render({**values, "picture": picture})
+    return (
+        environment(is_page=False)
+        .get_template("campaign.md")
+        .render({**values, "picture": picture})
+    )
 
 
 def campaign_page(opened: Opened, state: State, tables: Mapping[str, Columns]) -> Page:

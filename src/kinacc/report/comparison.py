@@ -10,7 +10,7 @@ from kinacc.deployment.compare import Difference
 from kinacc.deployment.record import Calibration
 from kinacc.figures import comparison
 from kinacc.report.page import FirstScreen, Page, Part, Table
-from kinacc.report.terminal import size
+from kinacc.report.rendering import size
 
 _FAR = 3.0  # standard deviations
 _WORST = 10

@@ -10,6 +10,7 @@ from kinacc.campaign import of_calibration, report
 from kinacc.kinematics import robot
 from kinacc.report import campaign, fit_sections, study_sections, terminal
 from kinacc.report.page import FirstScreen, Page, Table
+from kinacc.report.rendering import counted
 from kinacc.report.summarise import summarise
 from kinacc.report.summary import CalibrationSummary
 
@@ -64,17 +65,18 @@ def first_screen(summary: CalibrationSummary, left_out: Sequence[str] = ()) -> F
     for model, row in zip(errors.index, rows, strict=True):
         row |= {"remark": "selected"} if model == summary.selected else {}
     where = "held-out" if summary.is_held_out else "fitted"
-    count = terminal.counted(summary.best.n, "reading")
-    steps = [text for step in summary.next_steps for text in (f"{step.purpose}:", step.command)]
+    count = counted(summary.best.n, "reading")
+    about, *answers = terminal.headline(summary)
+    steps = [text for item in summary.next_steps.items() for text in (f"{item[0]}:", item[1])]
     notes = {"Next": steps, **terminal.notes(summary, None)}
     if left_out:
         made = f"{', '.join(left_out)}: made from other tables than those here, so not shown"
         notes["Left out"] = [made, "kinacc check-results"]
     return FirstScreen(
         summary.name,
-        terminal.about(summary),
+        about,
         _badge(summary),
-        terminal.headline(summary),
+        answers,
         [Table(f"Errors at the same {count} ({where}) for every model", rows, columns)],
         notes,
     )
@@ -86,5 +88,5 @@ def _badge(summary: CalibrationSummary) -> tuple[str, bool]:
         return "SYNTHETIC ARM", False
     if not summary.checked:
         return "DATA: not checked", True
-    count = sum(each.is_open for each in summary.findings)
-    return (f"DATA: {terminal.counted(count, 'problem')}", True) if count else ("DATA: OK", False)
+    count = len(summary.open_findings)
+    return (f"DATA: {counted(count, 'problem')}", True) if count else ("DATA: OK", False)

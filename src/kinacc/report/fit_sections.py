@@ -28,10 +28,9 @@ from kinacc.kinematics.dh import PARAMETERS, DHModel
 from kinacc.kinematics.robot import Robot
 from kinacc.kinematics.vec import VECModel
 from kinacc.measurements.row_names import RowNames
-from kinacc.report import charts
-from kinacc.report.page import Part, records
-from kinacc.report.summarise import compliance
-from kinacc.tables.allowed import ERRORS, FINDING_LEVELS, LEFT_OUT, SUBSETS
+from kinacc.report import charts, summarise
+from kinacc.report.page import Part
+from kinacc.tables.allowed import ERRORS, SUBSETS
 from kinacc.tables.columns import Columns
 
 _WORST = 10
@@ -49,53 +48,47 @@ Tables = Mapping[str, Columns]
 def residuals(tables: Tables, robot: Robot) -> Part:
     """Position errors of every row before and after calibration."""
     measurements, best = tables["measurements"], summary.selected(tables["model_selection"])
-    errors = _position_errors(tables)
-    held_out = bool((np.asarray(tables["pose_errors"]["estimate"]) == "cross_validated").any())
-    large = float(errors[best].quantile(summary.LARGE_SHARE))
-    worst = errors.sort_values(best, ascending=False, kind="stable")[:_WORST]
-    step = -(-len(errors) // _MOST_POINTS)
-    drawn = errors.loc[np.union1d(errors.index[::step], worst.index)].copy()
-    names = _row_names(measurements)
-    drawn.insert(0, "name", [names[row] for row in drawn.index])
-    drawn.insert(0, "order", drawn.index)
+    is_held_out = bool((np.asarray(tables["pose_errors"]["estimate"]) == "cross_validated").any())
+    errors = _position_errors(tables, "cross_validated" if is_held_out else "train")
+    large_mm = float(errors[best].quantile(summary.LARGE_SHARE))
+    labels = {model: model_name(model) for model in errors}
+    labels[best] += ", selected"
+    rows = errors.assign(order=errors.index, name=np.array(_row_names(measurements))[errors.index])
     joints = []
     for n, slides in enumerate(robot.dh.prismatic, start=1):
         joints.append(f"J{n}, {'mm' if slides else 'deg'}")
-        joint = np.asarray(measurements[f"q{n}"], dtype=float)[drawn.index]
-        drawn[joints[-1]] = joint if slides else np.rad2deg(joint)
+        joint = np.asarray(measurements[f"q{n}"], dtype=float)[errors.index]
+        rows[joints[-1]] = joint if slides else np.rad2deg(joint)
     for axis in "xyz":
-        drawn[axis] = np.asarray(measurements[f"{axis}_mm"], dtype=float)[drawn.index]
-    labels = {model: model_name(model) for model in errors}
-    labels[best] += ", selected"
+        rows[axis] = np.asarray(measurements[f"{axis}_mm"], dtype=float)[errors.index]
+    worst = rows.sort_values(best, ascending=False, kind="stable")[:_WORST]
+    step = -(-len(rows) // _MOST_POINTS)
+    drawn = rows.loc[np.union1d(rows.index[::step], worst.index)]
     values = {
         "count": len(errors),
-        "held_out": held_out,
+        "held_out": is_held_out,
         "selected": model_name(best),
         "share": summary.LARGE_SHARE,
-        "large_mm": large,
+        "large_mm": large_mm,
         "labels": labels,
-        "sizes": [
-            {"model": labels[model], "mean": size.mean(), "largest": size.max()}
-            for model, size in errors.items()
-        ],
-        "worst": [{"name": names[row], **errors.loc[row].to_dict()} for row in worst.index],
+        "sizes": errors.agg(["mean", "max"]).T.assign(model=labels),
+        "worst": worst,
     }
     shown = {model: labels[model] for model in (NOMINAL, best)}
-    chart = charts.residuals(drawn, shown, joints, large)
-    return Part("residuals", values, charts={"rows": chart})
+    return Part(
+        "residuals", values, charts={"rows": charts.residuals(drawn, shown, joints, large_mm)}
+    )
 
 
-def _position_errors(tables: Tables) -> pd.DataFrame:
+def _position_errors(tables: Tables, estimate: str) -> pd.DataFrame:
     """Position errors in mm by row and model, at rows that every model was tried on."""
-    table = tables["pose_errors"]
-    estimate = np.asarray(table["estimate"])
-    held_out = "cross_validated" if (estimate == "cross_validated").any() else "train"
-    size = np.linalg.norm([table[f"e{axis}_mm"] for axis in "xyz"], axis=0)
-    known = pd.DataFrame({"row": table["row"], "comparison": table["comparison"], "mm": size})
-    known = known[estimate == held_out].pivot(index="row", columns="comparison", values="mm")
+    table = pd.DataFrame(dict(tables["pose_errors"]))
+    table["mm"] = np.linalg.norm(table[["ex_mm", "ey_mm", "ez_mm"]], axis=1)
+    table = table[table["estimate"] == estimate]
+    table = table.pivot(index="row", columns="comparison", values="mm")
     models = (NOMINAL, *map(str, tables["model_selection"]["model"]))
-    wanted = {Comparison(MEASURED, model).name: model for model in models}
-    return known[list(wanted)].rename(columns=wanted).dropna()
+    names = {Comparison(MEASURED, model).name: model for model in models}
+    return table[list(names)].rename(columns=names).dropna()
 
 
 def _row_names(measurements: Columns) -> list[str]:
@@ -113,87 +106,58 @@ def _row_names(measurements: Columns) -> list[str]:
 
 def data(tables: Tables, robot: Robot) -> Part:
     """The measured file and the findings of its check."""
-    measurements, check = tables["measurements"], tables.get("data_check")
-    low, high = summary.covered(measurements, robot)
-    joints = []
-    for n, slides in enumerate(robot.dh.prismatic):
-        scale = 1.0 if slides else 180.0 / np.pi
-        ends = {"low": low[n], "high": high[n], "least": robot.q_min_rad[n],
-                "most": robot.q_max_rad[n]}  # fmt: skip
-        joint = {name: scale * float(value) for name, value in ends.items()}
-        share = (joint["high"] - joint["low"]) / (joint["most"] - joint["least"])
-        joints.append({"joint": n + 1, "unit": "mm" if slides else "deg", "share": share, **joint})
-    findings = [each for each in records(check or {}) if each["finding"] != LEFT_OUT]
-    std = np.array([measurements[f"std_{axis}_mm"] for axis in "xyz"], dtype=float)
-    stated = std[:, np.isfinite(std).all(axis=0)]
+    measurements, check = pd.DataFrame(dict(tables["measurements"])), tables.get("data_check")
+    std = measurements[[f"std_{axis}_mm" for axis in "xyz"]].astype(float).dropna()
+    joints = summarise.joint_ranges(tables["measurements"], robot)
     values = {
         "arm": robot,
-        "measured": bool(np.isfinite(np.asarray(measurements["row"], dtype=float)).any()),
+        "measured": bool(measurements["row"].notna().any()),
         "checked": check is not None,
-        "findings": sorted(findings, key=lambda each: FINDING_LEVELS.index(each["level"])),
-        "excluded": _excluded(tables),
+        "findings": summarise.findings(check),
+        "excluded": summarise.excluded(tables),
         "selected": model_name(summary.selected(tables["model_selection"])),
         "left_out": summary.left_out(check),
-        "readings": len(measurements["pose"]),
-        "poses": len(np.unique(measurements["pose"])),
-        "fitted": int(np.sum(np.asarray(measurements["subset"]) == SUBSETS[0])),
-        "turned": int(np.isfinite(np.asarray(measurements["qw"], dtype=float)).sum()),
-        "targets": pd.Series(measurements["target"]).astype(str).value_counts().to_dict(),
-        "sessions": pd.Series(measurements["session"]).fillna("").value_counts().to_dict(),
-        "noise": noise.of_measurements(measurements, robot),
-        "stated": (stated.shape[1], np.median(stated, axis=1)) if stated.size else None,
+        "readings": len(measurements),
+        "poses": measurements["pose"].nunique(),
+        "fitted": int((measurements["subset"] == SUBSETS[0]).sum()),
+        "turned": int(measurements["qw"].notna().sum()),
+        "targets": measurements["target"].astype(str).value_counts().to_dict(),
+        "sessions": measurements["session"].fillna("").value_counts().to_dict(),
+        "noise": noise.of_measurements(tables["measurements"], robot),
+        "stated": (len(std), std.median().tolist()) if len(std) else None,
         "joints": joints,
     }
-    return Part("data", values, figures={"coverage": checked_data.coverage(joints)})
-
-
-def _excluded(tables: Tables) -> list[dict]:
-    """Rows that the configuration excludes, with the errors of a model not fitted to them."""
-    table = tables.get("excluded_rows")
-    if table is None:
-        return []
-    names = RowNames.of_columns({**table, "row": table["line"]})
-    found = summary.excluded_errors(table, summary.selected(tables["model_selection"]))
-    return [
-        {"row": names.one(line), "reason": reason, "size": error_mm}
-        for line, reason, error_mm in found
-    ]
+    figure = checked_data.coverage(joints.to_dict("records"))
+    return Part("data", values, figures={"coverage": figure})
 
 
 def identifiability(tables: Tables, robot: Robot) -> Part:
     """Parameters that the poses do not determine, and those known only together."""
-    told = tables["dh_identified"]
-    open_directions = listed(told)
-    weak_directions = weak(open_directions)
-    status = list(told["status"])
+    table = pd.DataFrame(dict(tables["dh_identified"]))
+    sentences = listed(tables["dh_identified"])
+    poorly_determined = weak(sentences)
     pairs = pd.DataFrame(dict(tables["dh_covariance"]))
     pairs = pairs[pairs["parameter"] != pairs["other"]].dropna(subset="correlation")
     pairs = pairs.sort_values("correlation", key=abs, ascending=False, kind="stable")
-    every = []
-    for row in records(told):
-        scale, unit = (1e3, "mrad") if is_angle(str(row["parameter"])) else (1.0, "mm")
-        std = f"{scale * row['std']:.3g} {unit}" if np.isfinite(row["std"]) else None
-        every.append(row | {"called": parameter_name(str(row["parameter"])), "known": std})
+    table["unit"] = np.where(table["parameter"].map(is_angle), "mrad", "mm")
+    table["std"] *= np.where(table["unit"] == "mrad", 1e3, 1.0)
+    table["called"] = table["parameter"].map(parameter_name)
+    for column in ("parameter", "other"):
+        pairs[column] = pairs[column].map(parameter_name)
     values = {
-        "parameters": len(status),
-        "counts": {words: status.count(each) for each, words in _STATUSES.items()},
-        "weak": weak_directions,
-        "always": [text for text in open_directions if not text.endswith(POORLY_DETERMINED)],
+        "counts": {
+            text: int((table["status"] == status).sum()) for status, text in _STATUSES.items()
+        },
+        "weak": poorly_determined,
+        "always": [text for text in sentences if not text.endswith(POORLY_DETERMINED)],
         "spread_deg": summary.flange_spread_deg(tables["measurements"], robot)
-        if weak_directions
+        if poorly_determined
         else None,
         "rank": _rank(tables.get("dh_fit")),
         "close": int((pairs["correlation"].abs() >= _CLOSE).sum()),
         "limit": _CLOSE,
-        "pairs": [
-            {
-                "first": parameter_name(str(each["parameter"])),
-                "second": parameter_name(str(each["other"])),
-                "correlation": each["correlation"],
-            }
-            for each in pairs[:_WORST].to_dict("records")
-        ],
-        "every": every,
+        "pairs": pairs[:_WORST],
+        "every": table,
         "deviations": in_words([misfit(tables, robot, "dh")]),
     }
     return Part("identifiability", values)
@@ -203,76 +167,66 @@ def _rank(fit: Columns | None) -> dict | None:
     """Number of fitted directions, the limit, and singular values over the largest."""
     if fit is None:
         return None
-    quantity, value = np.asarray(fit["quantity"]), np.asarray(fit["value"], dtype=float)
-    share = value[quantity == "singular_value"]
-    if not len(share):
+    values = pd.Series(np.asarray(fit["value"], dtype=float), index=fit["quantity"])
+    if "singular_value" not in values or not values["rank"]:
         return None
-    rank, threshold = (value[quantity == name][0] for name in ("rank", "rank_threshold"))
-    if not rank:
-        return None
-    return {"rank": int(rank), "threshold": threshold, "share": share / share[0]}
+    share = values.loc[["singular_value"]].to_numpy()
+    return {
+        "rank": int(values["rank"]),
+        "threshold": values["rank_threshold"],
+        "share": share / share[0],
+    }
 
 
 def parameters(tables: Tables, robot: Robot) -> Part:
     """DH parameters against nominal, and what the VEC model adds to them."""
     model = VECModel.from_columns(tables["vec_model"], robot.dh.prismatic)
-    joints, values, std = vec_errors(tables, model, robot)
+    joints, errors, std = vec_errors(tables, model, robot)
     largest: list[dict] = [{"joint": f"joint {n + 1}"} for n in range(model.joints)]
-    for joint, error in np.ndindex(values.shape[:2]):
-        at = int(np.argmax(np.abs(values[joint, error])))
-        spread = std[joint, error, at]
-        sure = f" ± {spread:.3f}" if np.isfinite(spread) else ""
-        largest[joint][ERRORS[error]] = f"{values[joint, error, at]:+.3f}{sure}"
-    shown = {
+    for joint, error in np.ndindex(errors.shape[:2]):
+        place = (joint, error, int(np.argmax(np.abs(errors[joint, error]))))
+        spread = f" ± {std[place]:.3f}" if np.isfinite(std[place]) else ""
+        largest[joint][ERRORS[error]] = f"{errors[place]:+.3f}{spread}"
+    offsets = pd.DataFrame(dict(tables["vec_model"]))
+    values = {
         "fitted": int(np.sum(np.asarray(tables["measurements"]["subset"]) == SUBSETS[0])),
         "selected": model_name(summary.selected(tables["model_selection"])),
         "deviations": in_words(misfits(tables, robot)),
         "parameters": dh_parameters(tables["dh_model"], tables["dh_identified"], robot),
-        "bending": list(compliance(tables.get("compliance_model"))),
+        "bending": summarise.compliance(tables.get("compliance_model")),
         "order": model.order,
         "banded": bool(np.isfinite(std).any()),
         "errors": {name: "mm" if name.startswith("delta") else "mrad" for name in ERRORS},
         "largest": largest,
-        "offsets": [each for each in records(tables["vec_model"]) if each["direction"]],
+        "offsets": offsets[offsets["direction"] != 0],
     }
     units = ["mm" if slides else "deg" for slides in robot.dh.prismatic]
-    return Part(
-        "parameters", shown, figures={"errors": joint_errors.draw(joints, values, std, units)}
-    )
+    figure = joint_errors.draw(joints, errors, std, units)
+    return Part("parameters", values, figures={"errors": figure})
 
 
-def dh_parameters(model: Columns, told: Columns, robot: Robot) -> list[dict]:
+def dh_parameters(model: Columns, identified: Columns, robot: Robot) -> pd.DataFrame:
     """Every DH parameter: ``nominal`` and ``calibrated`` in deg or mm, changes in mrad or mm.
 
     The angle beta is left out of joints that have none.
     """
-    status = dict(zip(told["parameter"], told["status"], strict=True))
     fitted = DHModel.from_columns(model, robot.dh.prismatic)
     order = np.argsort(model["joint"], kind="stable")
-    found = []
-    for joint, column in np.ndindex(fitted.joints, len(PARAMETERS)):
-        parameter = PARAMETERS[column]
-        name = f"j{joint + 1}.{parameter}"
-        known = str(status.get(name, FIXED))
-        values = [float(getattr(of, parameter)[joint]) for of in (robot.dh, fitted)]
-        if parameter == "beta_rad" and known == FIXED and not any(values):
-            continue
-        angle = is_angle(name)
-        scale = 1e3 if angle else 1.0
-        nominal, calibrated = np.rad2deg(values) if angle else values
-        found.append(
-            {
-                "called": parameter_name(name),
-                "status": known,
-                "nominal": nominal,
-                "calibrated": calibrated,
-                "of": "deg" if angle else "mm",
-                "difference": scale * (values[1] - values[0]),
-                "std": scale * float(np.asarray(model[f"std_{parameter}"])[order][joint]),
-                "unit": "mrad" if angle else "mm",
-            }
-        )
-    return found
+    std = np.stack([np.asarray(model[f"std_{name}"])[order] for name in PARAMETERS], axis=1)
+    table = pd.DataFrame({"name": fitted.names, "std": std.ravel()})
+    status = dict(zip(identified["parameter"], identified["status"], strict=True))
+    table["status"] = table["name"].map(status).fillna(FIXED)
+    table["called"] = table["name"].map(parameter_name)
+    angle = table["name"].map(is_angle)
+    for column, of in (("nominal", robot.dh), ("calibrated", fitted)):
+        table[column] = of.start
+    table["difference"] = (table["calibrated"] - table["nominal"]) * np.where(angle, 1e3, 1.0)
+    table["std"] *= np.where(angle, 1e3, 1.0)
+    unused = table["name"].str.endswith("beta_rad") & (table["status"] == FIXED)
+    unused &= (table[["nominal", "calibrated"]] == 0.0).all(axis=1)
+    table.loc[angle, ["nominal", "calibrated"]] *= 180.0 / np.pi
+    table["of"], table["unit"] = np.where(angle, "deg", "mm"), np.where(angle, "mrad", "mm")
+    return table[~unused]
 
 
 def vec_errors(
@@ -285,24 +239,25 @@ def vec_errors(
     Positions (k, count) in deg or mm, errors (k, 6, count) in mm and mrad, and their standard
     deviations, NaN where the covariance is unknown.
     """
-    at = np.linspace(-1.0, 1.0, count)
+    places = np.linspace(-1.0, 1.0, count)
     low, high = model.domain
-    joints = 0.5 * (low + high)[:, None] + 0.5 * (high - low)[:, None] * at
+    joints = 0.5 * (low + high)[:, None] + 0.5 * (high - low)[:, None] * places
     prismatic = np.asarray(robot.dh.prismatic)
-    basis = np.polynomial.chebyshev.chebvander(at, model.order)
+    basis = np.polynomial.chebyshev.chebvander(places, model.order)
     known = uncertainty(tables, "vec")
-    place = {} if known is None else {name: i for i, name in enumerate(known.names)}
+    covariance = pd.DataFrame()
+    if known is not None:
+        covariance = pd.DataFrame(known.covariance, index=known.names, columns=known.names)
     values = np.empty((model.joints, len(ERRORS), count))
     std = np.full(values.shape, np.nan)
     for joint, error in np.ndindex(values.shape[:2]):
         scale = 1.0 if ERRORS[error].startswith("delta") else 1e3
         shared = _shared(ERRORS[error], joints[joint], bool(prismatic[joint]))
-        own = scale * (basis - shared @ np.linalg.lstsq(shared, basis, rcond=None)[0])
-        values[joint, error] = own @ model.coefficients[joint, error]
+        rest = scale * (basis - shared @ np.linalg.lstsq(shared, basis, rcond=None)[0])
+        values[joint, error] = rest @ model.coefficients[joint, error]
         names = [f"j{joint + 1}.{ERRORS[error]}.{n}" for n in range(basis.shape[1])]
-        if known is not None and all(name in place for name in names):
-            mine = [place[name] for name in names]
-            variance = np.einsum("mi,ij,mj->m", own, known.covariance[np.ix_(mine, mine)], own)
+        if covariance.index.isin(names).sum() == len(names):
+            variance = np.einsum("mi,ij,mj->m", rest, covariance.loc[names, names], rest)
             std[joint, error] = np.sqrt(np.maximum(variance, 0.0))
     return np.where(prismatic[:, None], joints, np.rad2deg(joints)), values, std
 
@@ -322,38 +277,28 @@ def _shared(error: str, joint: np.ndarray, slides: bool) -> np.ndarray:
 
 def selection(tables: Tables, why: str) -> Part:
     """``model_selection`` and ``vec_orders``; ``why`` one model is selected."""
-    choice = tables["model_selection"]
-    orders = pd.DataFrame(dict(tables.get("vec_orders", {})))
-    chosen, tried = orders, orders
-    if len(orders):
-        chosen = orders[orders["chosen"] == 1]
-        tried = orders[orders["fold"].isna() & orders["log_evidence"].notna()]
-        tried = tried.sort_values("order", kind="stable")
-    models = []
-    for each in records(choice):
-        order = tables.get(f"{each['model']}_model", {}).get("order")
-        plain = each["model"] == PLAINEST or not np.isfinite(each["gain_mm2"])
-        gain = np.nan if plain else each["gain_mm2"]
-        error = np.nan if plain else each["gain_std_error_mm2"]
-        row = {
-            "name": model_name(str(each["model"])),
-            "order": None if order is None else int(np.max(order)),
-            "gain": gain,
-            "error": error,
-            "times": gain / error if error > 0.0 else np.nan,
-        }
-        models.append(each | row | ({"remark": "selected"} if each["selected"] else {}))
+    models = pd.DataFrame(dict(tables["model_selection"]))
+    gains = models[["gain_mm2", "gain_std_error_mm2"]].where(models["model"] != PLAINEST)
+    models[["gain", "error"]] = gains.where(gains["gain_mm2"].notna())
+    models["times"] = models["gain"] / models["error"].where(models["error"] > 0.0)
+    orders = [tables.get(f"{model}_model", {}).get("order") for model in models["model"]]
+    models["order"] = [np.nan if order is None else np.max(order) for order in orders]
+    models["name"] = models["model"].map(model_name)
+    models["remark"] = np.where(models["selected"] == 1, "selected", "")
+    columns = ("fold", "order", "log_evidence", "chosen", "prior_std_mm")
+    tried = pd.DataFrame(dict(tables.get("vec_orders", dict.fromkeys(columns, ()))))
+    chosen = tried[tried["chosen"] == 1]
+    tried = tried[tried["fold"].isna() & tried["log_evidence"].notna()]
     values = {
-        "configurations": np.nanmax(np.asarray(choice["configurations"], float), initial=0.0),
+        "configurations": models["configurations"].fillna(0.0).max(),
         "why": why,
         "standard_errors": STANDARD_ERRORS,
         "plainest": model_name(PLAINEST),
         "models": models,
-        "stated": not len(orders) or not chosen["log_evidence"].notna().any(),
-        "tried": [
-            each | ({"remark": "← chosen"} if each["chosen"] else {})
-            for each in tried.to_dict("records")
-        ],
-        "chosen": chosen.to_dict("records"),
+        "stated": not chosen["log_evidence"].notna().any(),
+        "tried": tried.assign(remark=np.where(tried["chosen"] == 1, "← chosen", "")).sort_values(
+            "order", kind="stable"
+        ),
+        "chosen": chosen,
     }
     return Part("selection", values)

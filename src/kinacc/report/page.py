@@ -6,16 +6,13 @@ import base64
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cache
-from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
+import pandas as pd
 
 from kinacc import __version__
-from kinacc.config.names import in_markdown
-from kinacc.tables.columns import Columns
+from kinacc.report.rendering import environment, text_of
 
 if TYPE_CHECKING:
     from bokeh.models import LayoutDOM
@@ -42,7 +39,8 @@ class Part:
     """A section: the template of its ``key``, the values it shows, figures and charts by name.
 
     The template sets title, population, shows, judged and to_do, and prints tables and pictures.
-    ``figures`` are drawn by matplotlib, ``charts`` by Bokeh in the reader's browser.
+    DataFrames among the ``values`` become lists of rows. ``figures`` are drawn by matplotlib,
+    ``charts`` by Bokeh in the reader's browser.
     """
 
     key: str
@@ -93,32 +91,23 @@ def html(
     for part in page.sections:
         drawn = {name: _image(figure) for name, figure in part.figures.items()}
         drawn |= {name: f"chart-{part.key}-{name}" for name in part.charts}
+        values = {
+            name: value.to_dict("records") if isinstance(value, pd.DataFrame) else value
+            for name, value in part.values.items()
+        }
         template = templates.get_template(f"{part.key}.html")
-        body = template.make_module({**part.values, "pictures": drawn})
+        body = template.make_module({**values, "pictures": drawn})
         sections.append({"key": part.key, "body": body})
     return templates.get_template("page.html").render(
         page=page,
         sections=sections,
         marks={"kinacc_version": __version__, **page.marks, **(marks or {})},
         read=read or {},
-        style=_text("page.css"),
-        script=_text("page.js"),
+        style=text_of("page.css"),
+        script=text_of("page.js"),
         library=_library() if charts else "",
         charts=_items(charts),
     )
-
-
-def records(table: Columns, rows: Sequence[int] | np.ndarray | None = None) -> list[dict]:
-    """Rows of a table, all of them or those numbered, each as a dict by column."""
-    order = range(max(map(len, table.values()), default=0)) if rows is None else rows
-    return [{name: column[row] for name, column in table.items()} for row in order]
-
-
-def cell(value: object, form: str = "") -> str:
-    """A value as a table shows it: a number in the format given, a dash where there is none."""
-    if value is None or value == "" or value != value:
-        return "–"
-    return value if isinstance(value, str) else format(value, form)
 
 
 def _items(charts: Mapping[str, LayoutDOM]) -> str:
@@ -144,25 +133,3 @@ def _image(figure: Figure) -> str:
 
     content = render(figure, ("svg",))["svg"]
     return "data:image/svg+xml;base64," + base64.b64encode(content).decode()
-
-
-def _text(name: str) -> str:
-    return (files("kinacc.report") / "templates" / name).read_text("utf-8")
-
-
-@cache
-def environment():
-    """Templates of pages and texts; those of pages escape what they show."""
-    from jinja2 import Environment, FunctionLoader, StrictUndefined
-
-    from kinacc.report.terminal import counted
-
-    made = Environment(
-        loader=FunctionLoader(_text),
-        autoescape=lambda name: not str(name).endswith(".md"),
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    made.filters |= {"cell": cell, "counted": counted, "md": in_markdown}
-    return made

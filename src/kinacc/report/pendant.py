@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from kinacc import __version__
-from kinacc.report.page import environment
+from kinacc.report.rendering import environment
 
 if TYPE_CHECKING:
     from kinacc.deployment.export.pendant import Pendant

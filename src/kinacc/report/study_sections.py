@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,14 +14,14 @@ from kinacc.figures.truth import FOOTNOTE, OF_MODELS
 from kinacc.kinematics.robot import Robot
 from kinacc.report import charts
 from kinacc.report.history_lines import sentence
-from kinacc.report.page import Part, records
+from kinacc.report.page import Part
 from kinacc.tables.allowed import VERDICTS
 from kinacc.tables.columns import Columns
 
 _LARGEST = 10
 _DIFFERS = VERDICTS[1]
 _STATISTICS = {"mean": "mean", "max": "largest", "gamma99": "99 % gamma"}
-_PARAMETERS = ("theta_offset", "d", "a", "alpha")
+_PARAMETERS = {"theta_offset": "theta", "d": "d", "a": "a", "alpha": "alpha"}
 _EXAMPLES = {
     "rejected": "Fig. 5: the bound is rejected",
     "rejected_larger_eta": "the same readings, a slightly larger bound",
@@ -32,51 +32,44 @@ Tables = Mapping[str, Columns]
 
 def history(tables: Tables, robot: Robot) -> Part:
     """The history of the robot, one row a data set of its series."""
-    table = tables["history"]
-    rows = [
-        each | {"called": model_name(str(each["model"]))}
-        | ({"remark": each["reason"]} if each["reason"] else {})
-        for each in records(table)
-    ]  # fmt: skip
-    values = {"rows": rows, "sentence": sentence(table)}
-    return Part("history", values, figures={"history": history_over_time.draw(table)})
+    rows = pd.DataFrame(dict(tables["history"]))
+    rows["called"], rows["remark"] = rows["model"].map(model_name), rows["reason"].fillna("")
+    values = {"rows": rows, "sentence": sentence(tables["history"])}
+    figure = history_over_time.draw(tables["history"])
+    return Part("history", values, figures={"history": figure})
 
 
 def accuracy_map(tables: Tables, robot: Robot) -> Part:
     """The cells of ``accuracy_map``."""
     table = pd.DataFrame(dict(tables["accuracy_map"]))
-    joints = [name for name in table if name[:1] == "q" and name[1:].isdigit()]
     slides = robot.dh.prismatic
-    degrees = table[joints].to_numpy() * np.where(slides, 1.0, 180.0 / np.pi)[: len(joints)]
+    names = [f"q{joint}" for joint in range(1, len(slides) + 1)]
+    degrees = table[names].to_numpy() * np.where(slides, 1.0, 180.0 / np.pi)
     reached = (table["solutions"] > 0).to_numpy()
+    texts = [", ".join(f"{angle:.1f}" for angle in row) for row in degrees]
     cells = pd.DataFrame(
         {
-            "slice": [f"{each:g} deg" for each in table["slice_deg"]],
+            "slice": table["slice_deg"].map("{:g} deg".format),
             "radius": table["radius_mm"],
             "height": table["height_mm"],
             "position": table["position_max_mm"],
             "orientation": table["orientation_max_mrad"],
             "reached": 100.0 * table["solutions"] / table["wanted"],
-            "pose": [each or "" for each in table["worst_branch"]],
-            "joints": [
-                ", ".join(f"{each:.1f}" for each in row) if known else ""
-                for row, known in zip(degrees, reached, strict=True)
-            ],
+            "pose": table["worst_branch"].fillna(""),
+            "joints": np.where(reached, texts, ""),
         }
     )
-    largest = cells.dropna(subset="position").sort_values(
-        "position", ascending=False, kind="stable"
-    )
-    beyond = ~reached & (table["extrapolating"] > 0).to_numpy()
+    largest = cells.dropna(subset="position")
+    largest = largest.sort_values("position", ascending=False, kind="stable")
     values = {
         "cells": len(cells),
-        "slices": list(dict.fromkeys(cells["slice"])),
+        "slices": list(cells["slice"].unique()),
         "spans": {name: (cells[name].min(), cells[name].max()) for name in ("radius", "height")},
         "wanted": int(table["wanted"].max()),
         "unreached": int((~reached).sum()),
-        "beyond": int(beyond.sum()),
+        "beyond": int((~reached & (table["extrapolating"] > 0)).sum()),
         "slides": any(slides),
-        "largest": largest[:_LARGEST].to_dict("records"),
+        "largest": largest[:_LARGEST],
     }
     size = (_step(cells["radius"]), _step(cells["height"]))
     return Part("map", values, charts={"map": charts.accuracy_map(cells, *size)})
@@ -104,32 +97,34 @@ class Truth:
 
 def truth(tables: Tables) -> Truth:
     """The error that the study holds assessors to, of ``assessment_points``."""
-    points, measurements = tables["assessment_points"], tables["measurements"]
-    largest = float(np.max(points["true_error_mm"]))
-    names = [name for name in points if name[:1] == "q" and name[1:].isdigit()]
-    measured = set(zip(*(np.asarray(measurements[name]).tolist() for name in names), strict=True))
-    wanted = zip(*(np.asarray(points[name]).tolist() for name in names), strict=True)
-    if all(each in measured for each in wanted):
-        what = "held-out errors of DH at measured poses, which contain the instrument's noise"
-        return Truth(largest, what, FOOTNOTE)
-    if np.isfinite(np.asarray(measurements["row"], dtype=float)).any():
+    points = pd.DataFrame(dict(tables["assessment_points"]))
+    measurements = pd.DataFrame(dict(tables["measurements"]))
+    largest = float(points["true_error_mm"].max())
+    joints = [name for name in points if name[:1] == "q" and name[1:].isdigit()]
+    measured = pd.MultiIndex.from_frame(measurements[joints])
+    if pd.MultiIndex.from_frame(points[joints]).isin(measured).all():
+        origin = "held-out errors of DH at measured poses, which contain the instrument's noise"
+        return Truth(largest, origin, FOOTNOTE)
+    if measurements["row"].notna().any():
         return Truth(largest, "VEC minus DH of this arm: of models, not measured", OF_MODELS)
     return Truth(largest, "VEC minus DH of the synthetic arm: known exactly", None)
 
 
 def study(tables: Tables, robot: Robot) -> Part:
     """``study_summary`` and ``study``, held to ``truth``."""
-    summary, runs, held_to = tables["study_summary"], tables.get("study"), truth(tables)
-    rows = [each | {"label": str(each["assessor"]).replace("_", " ")} for each in records(summary)]
-    for row in rows if runs else ():
-        mine = (runs["assessor"] == row["assessor"]) & (runs["noise_mm"] == row["noise_mm"])
-        stated = runs["assessed_mm"][mine]
-        row["too_small"] = f"{np.sum(stated < held_to.largest_mm)} of {len(stated)}"
+    summary, held_to = tables["study_summary"], truth(tables)
+    rows = pd.DataFrame(dict(summary))
+    if "study" in tables:
+        runs = pd.DataFrame(dict(tables["study"]))
+        runs["small"] = runs["assessed_mm"] < held_to.largest_mm
+        small = runs.groupby(["assessor", "noise_mm"])["small"].agg(["sum", "count"])
+        texts = small["sum"].astype(str) + " of " + small["count"].astype(str)
+        rows = rows.join(texts.rename("too_small"), on=["assessor", "noise_mm"])
     values = {
         "points": len(tables["assessment_points"]["point"]),
-        "levels": len(np.unique(summary["noise_mm"])),
+        "levels": rows["noise_mm"].nunique(),
         "truth": held_to,
-        "rows": rows,
+        "rows": rows.assign(label=rows["assessor"].str.replace("_", " ")),
     }
     figure = fig4.draw(summary, true_accuracy_mm=held_to.largest_mm, taken_as_true=held_to.footnote)
     return Part("study", values, figures={"noise": figure})
@@ -138,76 +133,67 @@ def study(tables: Tables, robot: Robot) -> Part:
 def histories(tables: Tables, robot: Robot) -> Part:
     """``histories`` reading by reading: the simulations of Figs. 5 and 6."""
     table, held_to = tables["histories"], truth(tables)
-    every = pd.DataFrame(dict(table)).sort_values("iteration", kind="stable")
-    outcomes, figures = [], {}
-    names = list(dict.fromkeys([*_EXAMPLES, *every["example"]]))
-    for name in names:
-        rows = every[every["example"] == name]
-        if rows.empty:
-            continue
-        called = _EXAMPLES.get(name, name.replace("_", " "))
-        final = rows.iloc[-1].to_dict()
-        beyond = final["rejection_probability"] > final["alpha"]
-        found = {
-            "called": called,
-            "outcome": "rejected" if beyond else "not rejected",
-            "points": rows["point"].nunique(),
-            "repeats": int((rows["repeat"] > 1).sum()),
-        }
-        if not final["rule_met"]:
-            found["remark"] = f"the nearest there is: {final['rule']}"
-        outcomes.append(final | found)
-        figures[called] = iterations.draw(
+    steps = pd.DataFrame(dict(table)).sort_values("iteration", kind="stable")
+    final = steps.groupby("example").tail(1).set_index("example")
+    final = final.loc[sorted(final.index, key=lambda name: [*_EXAMPLES, name].index(name))]
+    beyond = final["rejection_probability"] > final["alpha"]
+    names = final.index.to_series()
+    called = names.map(_EXAMPLES).fillna(names.str.replace("_", " "))
+    outcomes = final.assign(
+        called=called,
+        outcome=np.where(beyond, "rejected", "not rejected"),
+        points=steps.groupby("example")["point"].nunique(),
+        repeats=(steps["repeat"] > 1).groupby(steps["example"]).sum(),
+        remark=("the nearest there is: " + final["rule"]).where(final["rule_met"] == 0, ""),
+    )
+    figures = {
+        called[name]: iterations.draw(
             table, example=name, true_accuracy_mm=held_to.largest_mm,
             taken_as_true=held_to.footnote,
-        )  # fmt: skip
+        )
+        for name in final.index
+    }  # fmt: skip
     values = {
         "truth": held_to,
         "outcomes": outcomes,
-        "readings": int((every["example"] == every["example"].iloc[0]).sum()),
-        "noise_mm": every["noise_mm"].iloc[0],
+        "readings": int((steps["example"] == steps["example"].iloc[0]).sum()),
+        "noise_mm": steps["noise_mm"].iloc[0],
     }
     return Part("histories", values, figures=figures)
 
 
 def paper_tables(tables: Tables, robot: Robot) -> Part:
     """Tables I to III, as ``claims`` holds them beside the paper's."""
-    known = {each["claim"]: each for each in records(tables["claims"])}
+    known = pd.DataFrame(dict(tables["claims"])).set_index("claim")
     values: dict[str, object] = {
         table: [
-            _row(f"{what}, {unit}", known, f"{table}_{what}_{{}}", _STATISTICS)
-            for what, unit in (("position", "mm"), ("orientation", "mrad"))
+            _row(f"{quantity}, {unit}", known, f"{table}_{quantity}_{{}}", _STATISTICS)
+            for quantity, unit in (("position", "mm"), ("orientation", "mrad"))
         ]
         for table in ("table1", "table3")
     }
+    joints = known.index.str.startswith("table2_alpha_").sum()
     values["table2"] = [
-        _row(joint, known, f"table2_{{}}_{joint}", _PARAMETERS)
-        for joint in range(1, 1 + sum(name.startswith("table2_alpha_") for name in known))
+        _row(joint, known, f"table2_{{}}_{joint}", _PARAMETERS) for joint in range(1, 1 + joints)
     ]
-    values |= {"statistics": _STATISTICS, "apart": known["table2_d_2_minus_d_3"]}
+    values |= {"statistics": _STATISTICS, "apart": known.loc["table2_d_2_minus_d_3"]}
     return Part("paper-tables", values)
 
 
-def _row(first: object, known: Mapping[str, dict], pattern: str, names: Iterable[str]) -> dict:
+def _row(first: object, known: pd.DataFrame, pattern: str, names: Mapping[str, str]) -> dict:
     """Pairs of the paper's number and the one here; the remark names those that differ."""
-    found = {name: known[pattern.format(name)] for name in names}
     row: dict[str, object] = {"of": first}
-    for name, claim in found.items():
+    differing = []
+    for name, text in names.items():
+        claim = known.loc[pattern.format(name)]
         row |= {f"{name}_paper": claim["paper"], f"{name}_here": claim["reproduced"]}
-    differs = [name for name, claim in found.items() if claim["verdict"] == _DIFFERS]
-    if differs:
-        words = ", ".join(_STATISTICS.get(name, name.partition("_")[0]) for name in differs)
-        row["remark"] = f"{words} differs"
-    return row
+        differing += [text] * (claim["verdict"] == _DIFFERS)
+    return row | {"remark": f"{', '.join(differing)} differs" if differing else ""}
 
 
 def claims(tables: Tables, robot: Robot) -> Part:
     """Every row of ``claims``, those that differ first."""
-    table = tables["claims"]
-    chose = np.asarray(table["used_to_choose"], dtype=bool)
-    verdicts = list(table["verdict"][~chose])
-    counts = ", ".join(f"{verdicts.count(name)} {name}" for name in VERDICTS)
-    counted = f"{len(verdicts)} claims: {counts}"
-    if chose.any():
-        counted += f" ({chose.sum()} that chose a reading are not counted)"
-    return Part("claims", {"claims": records(table), "counted": counted})
+    table = pd.DataFrame(dict(tables["claims"]))
+    chose = table["used_to_choose"].astype(bool)
+    counts = table["verdict"][~chose].value_counts().reindex(VERDICTS, fill_value=0).to_dict()
+    return Part("claims", {"claims": table, "counts": counts, "chose": int(chose.sum())})

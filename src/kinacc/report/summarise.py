@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -14,7 +15,6 @@ from kinacc.calibration import identifiability, misfit
 from kinacc.calibration import summary as figures
 from kinacc.calibration.summary import Tolerance
 from kinacc.campaign import journal, of_calibration
-from kinacc.campaign.of_calibration import Sought
 from kinacc.config.error_models import ERROR_MODELS, MEASURED, PLAINEST
 from kinacc.deployment import applicability
 from kinacc.deployment import folder as results
@@ -23,23 +23,12 @@ from kinacc.kinematics import robot
 from kinacc.kinematics.robot import Robot
 from kinacc.measurements.row_names import RowNames
 from kinacc.report.history_lines import sentence
-from kinacc.report.summary import (
-    CalibrationSummary,
-    Claims,
-    ExcludedRow,
-    Finding,
-    JointCompliance,
-    JointRange,
-    ModelErrors,
-    NextStep,
-    Selection,
-)
+from kinacc.report.summary import CalibrationSummary
 from kinacc.tables import store, sums
 from kinacc.tables.allowed import FINDING_LEVELS, LEFT_OUT, SUBSETS, VERDICTS
 from kinacc.tables.columns import Columns
 from kinacc.tables.contract import columns_of
 
-HELD_OUT_TOPICS = {"cross_validated": "held_out", "train": "training"}
 OPTIONAL = (
     *(f"{kind}_model" for kind in ERROR_MODELS),
     *("summary", "data_check", "excluded_rows", "vec_orders", "accuracy_map"),
@@ -49,10 +38,11 @@ OPTIONAL = (
 PAGE_TABLES = (*figures.TABLES, "dh_model", "vec_model", "residuals", "worst_rows", "summary")
 ON_PAGE = (
     *OPTIONAL,
-    *(f"{kind}_{what}" for kind in ERROR_MODELS for what in ("fit", "covariance")),
+    *(f"{kind}_{part}" for kind in ERROR_MODELS for part in ("fit", "covariance")),
     *("study", "study_summary", "readings", "histories"),
 )
-_NOTE = FINDING_LEVELS[-1]
+_ESTIMATES = {"cross_validated": "held_out", "train": "training"}
+_STATISTICS = ("n", "mean", "quantile_99", "largest")
 Tables = Mapping[str, Columns]
 
 
@@ -87,17 +77,19 @@ def summarise(
     name = folder.resolve().name
     places = journal.of_results(folder) if campaigns is None else campaigns
     sought = of_calibration.sought(name, tables, places)
-    measurements, best = tables["measurements"], figures.selected(tables["model_selection"])
+    measurements, check = tables["measurements"], tables.get("data_check")
     fits = misfit.misfits(tables, arm)
     listed = identifiability.listed(tables["dh_identified"])
-    weak = identifiability.weak(listed)
+    always = (text for text in listed if not text.endswith(identifiability.POORLY_DETERMINED))
+    errors = figures.error_statistics(tables["pose_errors"]).drop(columns="comparison")
+    errors["estimate"] = errors["estimate"].map(_ESTIMATES)
+    turned = (errors["quantity"] == "orientation") & (errors["reference"] == MEASURED)
     rows = np.asarray(measurements.get("row", [np.nan]), dtype=float)
     synthetic = not np.isfinite(rows).any()
-    errors = tuple(_errors(tables["pose_errors"]))
     return CalibrationSummary(
         name=name,
         folder=str(folder),
-        written=_written(folder),
+        written=_written(folder / "model_selection.parquet"),
         robot=arm.name,
         synthetic=synthetic,
         readings=len(measurements["pose"]),
@@ -105,34 +97,30 @@ def summarise(
         targets=len(np.unique(np.asarray(measurements["target"]).astype(str))),
         fitted=int(np.sum(np.asarray(measurements["subset"]) == SUBSETS[0])),
         frames_fitted=figures.frames_are_fitted(tables["frames"]),
-        full_pose=any(
-            (each.quantity, each.reference) == ("orientation", MEASURED) for each in errors
-        ),
-        selected=best,
+        full_pose=bool(turned.any()),
+        selected=figures.selected(tables["model_selection"]),
         errors=errors,
-        selection=tuple(_selection(tables)),
-        joint_ranges=tuple(_ranges(measurements, arm)),
+        selection=_selection(tables),
+        joint_ranges=joint_ranges(measurements, arm),
         share_measured=_fact(tables, "like_measured"),
         flange_spread_deg=figures.flange_spread_deg(measurements, arm),
-        unidentifiable=tuple(
-            text for text in listed if not text.endswith(identifiability.POORLY_DETERMINED)
-        ),
-        poorly_determined=tuple(weak),
-        checked="data_check" in tables,
-        findings=tuple(_findings(tables.get("data_check"))),
-        left_out=tuple(figures.left_out(tables.get("data_check"))),
-        excluded=tuple(_excluded(tables.get("excluded_rows"), best)),
-        compliance=tuple(compliance(tables.get("compliance_model"))),
+        unidentifiable=tuple(always),
+        poorly_determined=tuple(identifiability.weak(listed)),
+        checked=check is not None,
+        findings=findings(check),
+        left_out=tuple(figures.left_out(check)),
+        excluded=excluded(tables),
+        compliance=compliance(tables.get("compliance_model")),
         noise_mm=fits[0].noise.per_axis_mm,
-        held_out_over_noise={each.model: each.ratio for each in fits},
+        held_out_over_noise={fit.model: fit.ratio for fit in fits},
         campaign=sought.status,
         remarks=sought.remarks,
         tolerance=tolerance_of(tables),
-        claims=_claims(tables) if synthetic else None,
+        claims=_claims(tables["claims"]) if synthetic and "claims" in tables else None,
         other_errors=_other_errors(tables),
         history=sentence(tables["history"]) if "history" in tables else "",
         outdated=outdated,
-        next_steps=tuple(_next_steps(folder, tables, arm, sought)),
+        next_steps=_next_steps(str(folder), results.calibration(tables, arm).choice, sought.status),
     )
 
 
@@ -203,19 +191,19 @@ def run(inputs: Tables, settings: Mapping) -> dict[str, Columns]:
             for number, text in enumerate(getattr(known, topic), 1)
         ),
         *(
-            ("check", each.finding, each.level, float(each.rows), "1", each.text)
-            for each in known.findings
+            ("check", row.finding, row.level, float(row.rows), "1", row.text)
+            for row in known.findings.itertuples()
         ),
         *(
-            ("excluded_rows", each.where, "error", each.error_mm, "mm", each.reason)
-            for each in known.excluded
+            ("excluded_rows", row.where, "error", row.error_mm, "mm", row.reason)
+            for row in known.excluded.itertuples()
         ),
-        *(row for each in known.errors for row in _error_rows(each)),
-        *(row for each in known.selection for row in _selection_rows(each)),
+        *_error_rows(known.errors),
+        *_selection_rows(known.selection),
         *(
-            ("range", f"joint {each.joint}", name, float(getattr(each, name)), unit, None)
-            for each in known.joint_ranges
-            for name, unit in (("low", each.unit), ("high", each.unit), ("share", "1"))
+            ("range", f"joint {row['joint']}", name, float(row[name]), unit, None)
+            for row in known.joint_ranges.to_dict("records")
+            for name, unit in (("low", row["unit"]), ("high", row["unit"]), ("share", "1"))
         ),
         ("like_measured", "ranges of all joints", "share", share, "1", None),
     ]
@@ -227,129 +215,123 @@ def run(inputs: Tables, settings: Mapping) -> dict[str, Columns]:
     return {"summary": columns_of("summary", rows)}
 
 
-def _error_rows(each: ModelErrors) -> list[tuple]:
-    quantity = "" if each.quantity == "position" else "orientation_"
-    topic = f"{each.estimate}_{quantity}error"
-    item = each.model
-    if each.reference != MEASURED:
-        topic = "held_out_model_difference" if each.estimate == "held_out" else "model_difference"
-        item = f"{each.model}_vs_{each.reference}"
-    if quantity and (each.reference != MEASURED or each.estimate != "held_out"):
-        return []
-    return [
-        (topic, item, name, float(getattr(each, name)), "1" if name == "n" else each.unit, None)
-        for name in ("n", "mean", "quantile_99", "largest")
-    ]
+def _error_rows(errors: pd.DataFrame) -> Iterable[tuple]:
+    """Errors by model, and differences of models; orientations where they are held out."""
+    for row in errors.to_dict("records"):
+        topic, item = f"{row['estimate']}_error", row["model"]
+        if row["reference"] != MEASURED:
+            topic = f"{'held_out_' * (row['estimate'] == 'held_out')}model_difference"
+            item += f"_vs_{row['reference']}"
+        if row["quantity"] == "orientation":
+            if topic != "held_out_error":
+                continue
+            topic = "held_out_orientation_error"
+        for name in _STATISTICS:
+            yield topic, item, name, float(row[name]), "1" if name == "n" else row["unit"], None
 
 
-def _selection_rows(each: Selection) -> list[tuple]:
-    numbers = [
-        ("selected", float(each.selected), "1"),
-        ("held_out_rms", each.held_out_rms_mm, "mm"),
-        ("gain", each.gain_mm2, "mm^2"),
-        ("gain_std_error", each.gain_std_error_mm2, "mm^2"),
-    ]
-    low, high = each.held_out_orders or (None, None)
-    orders = {
-        "order": each.order,
+def _selection_rows(selection: pd.DataFrame) -> Iterable[tuple]:
+    units = {"selected": "1", "held_out_rms_mm": "mm", "gain_mm2": "mm^2",
+             "gain_std_error_mm2": "mm^2"}  # fmt: skip
+    for row in selection.to_dict("records"):
+        model = row.pop("model")
+        for name, value in row.items():
+            if value is not None:
+                unit = units.get(name, "1")
+                suffix = f"_{unit.replace('^', '')}"
+                yield "selection", model, name.removesuffix(suffix), float(value), unit, None
+
+
+def _selection(tables: Tables) -> pd.DataFrame:
+    names = ["model", "selected", "held_out_rms_mm", "gain_mm2", "gain_std_error_mm2"]
+    choice = pd.DataFrame(dict(tables["model_selection"]))[names].astype({"selected": bool})
+    rows = [row | _orders(tables, row["model"]) for row in choice.to_dict("records")]
+    return pd.DataFrame(rows, dtype=object)
+
+
+def _orders(tables: Tables, model: str) -> dict[str, int | None]:
+    """The order of a model, those chosen in folds, and the highest where several were tried."""
+    order = tables.get(f"{model}_model", {}).get("order")
+    low = high = tried = None
+    if order is not None and (orders := tables.get(f"{model}_orders")) is not None:
+        table = pd.DataFrame(dict(orders))
+        chosen = table["order"][table["fold"].notna() & (table["chosen"] == 1)]
+        if len(chosen):
+            low, high = int(chosen.min()), int(chosen.max())
+        if table["order"].nunique() > 1:
+            tried = int(table["order"].max())
+    return {
+        "order": None if order is None else int(np.max(order)),
         "low_order_held_out": low,
         "high_order_held_out": high,
-        "highest_order_tried": each.highest_order_tried,
+        "highest_order_tried": tried,
     }
-    numbers += [(name, float(value), "1") for name, value in orders.items() if value is not None]
-    return [("selection", each.model, name, value, unit, None) for name, value, unit in numbers]
 
 
-def _errors(pose_errors: Mapping) -> Iterable[ModelErrors]:
-    for row in figures.error_statistics(pose_errors).itertuples(index=False):
-        estimate = HELD_OUT_TOPICS[row.estimate]
-        yield ModelErrors(
-            *(row.model, row.reference, estimate, row.quantity, row.unit, int(row.n)),
-            *(float(row.mean), float(row.quantile_99), float(row.largest)),
-        )
+def joint_ranges(measurements: Columns, arm: Robot) -> pd.DataFrame:
+    """Measured range and limits of every joint, deg or mm, and the share of its travel."""
+    slides = np.asarray(arm.dh.prismatic)
+    scale = np.where(slides, 1.0, 180.0 / np.pi)
+    low, high = figures.covered(measurements, arm)
+    ends = {"low": low, "high": high, "least": arm.q_min_rad, "most": arm.q_max_rad}
+    table = pd.DataFrame({"joint": np.arange(1, len(low) + 1)} | ends)
+    table[[*ends]] *= scale[:, None]
+    table["unit"] = np.where(slides, "mm", "deg")
+    table["share"] = (high - low) / (arm.q_max_rad - arm.q_min_rad)
+    return table
 
 
-def _selection(tables: Tables) -> Iterable[Selection]:
-    choice = pd.DataFrame(dict(tables["model_selection"]))
-    for row in choice.itertuples(index=False):
-        model = str(row.model)
-        order = tables.get(f"{model}_model", {}).get("order")
-        known = (bool(row.selected), float(row.held_out_rms_mm), float(row.gain_mm2))
-        found = Selection(model, *known, float(row.gain_std_error_mm2))
-        if order is None:
-            yield found
-            continue
-        held_out = tried = None
-        if (orders := tables.get(f"{model}_orders")) is not None:
-            number = np.asarray(orders["order"], dtype=int)
-            folds = np.isfinite(np.asarray(orders["fold"], dtype=float))
-            chosen = number[folds & (np.asarray(orders["chosen"], dtype=float) == 1)]
-            held_out = (int(chosen.min()), int(chosen.max())) if len(chosen) else None
-            tried = int(number.max()) if len(np.unique(number)) > 1 else None
-        yield Selection(
-            model, *known, found.gain_std_error_mm2, int(np.max(order)), held_out, tried
-        )
+def findings(check: Columns | None) -> pd.DataFrame:
+    """Findings of the data check, the gravest first."""
+    names = {"finding": "finding", "level": "level", "rows": "rows", "what": "text",
+             "lines": "lines", "fix": "fix", "accepted": "accepted"}  # fmt: skip
+    table = pd.DataFrame({names[name]: (check or {}).get(name, ()) for name in names}).fillna("")
+    table = table[table["finding"] != LEFT_OUT]
+    table["is_open"] = (table["level"] != FINDING_LEVELS[-1]) & (table["accepted"] == "")
+    return table.sort_values(
+        "level", key=lambda levels: levels.map(FINDING_LEVELS.index), kind="stable"
+    )
 
 
-def _ranges(measurements: Mapping, arm: Robot) -> Iterable[JointRange]:
-    travel = arm.q_max_rad - arm.q_min_rad
-    for joint, (low, high) in enumerate(zip(*figures.covered(measurements, arm), strict=True)):
-        slides = bool(arm.dh.prismatic[joint])
-        scale, unit = (1.0, "mm") if slides else (180.0 / np.pi, "deg")
-        share = float((high - low) / travel[joint])
-        yield JointRange(joint + 1, float(scale * low), float(scale * high), unit, share)
+def excluded(tables: Tables) -> pd.DataFrame:
+    """Rows that the configuration excludes, with errors of a model that was not fitted to them."""
+    names = ["line", "where", "reason", "error_mm"]
+    if (table := tables.get("excluded_rows")) is None:
+        return pd.DataFrame(columns=names)
+    rows = RowNames.of_columns({**table, "row": table["line"]})
+    errors = figures.excluded_errors(table, figures.selected(tables["model_selection"]))
+    found = [(line, rows.one(line), reason, error_mm) for line, reason, error_mm in errors]
+    return pd.DataFrame(found, columns=names)
 
 
-def _findings(table: Mapping | None) -> Iterable[Finding]:
-    """Findings of the data check, suspicions before notes."""
-    rows = range(len(table["finding"])) if table is not None else ()
-    order = [i for i in rows if table["finding"][i] != LEFT_OUT]
-    for i in sorted(order, key=lambda i: table["level"][i] == _NOTE):
-        texts = (str(table[name][i] or "") for name in ("what", "lines", "fix", "accepted"))
-        level = str(table["level"][i])
-        yield Finding(str(table["finding"][i]), level, int(table["rows"][i]), *texts)
+def compliance(model: Columns | None) -> pd.DataFrame:
+    """Joints that bend, of a table ``compliance_model``: coefficients and standard deviations."""
+    values = ["compliance_rad_per_nm", "lever_coefficient_rad_per_mm"]
+    columns = ["joint", *values, *(f"std_{name}" for name in values)]
+    table = pd.DataFrame({name: (model or {}).get(name, ()) for name in columns})
+    return table.dropna(how="all", subset=columns[1:])
 
 
-def _excluded(table: Mapping | None, model: str) -> Iterable[ExcludedRow]:
-    if table is not None:
-        names = RowNames.of_columns({**table, "row": table["line"]})
-        for line, reason, error_mm in figures.excluded_errors(table, model):
-            yield ExcludedRow(line, names.one(line), reason, error_mm)
-
-
-def compliance(table: Mapping | None) -> Iterator[JointCompliance]:
-    """Joints that bend by a table ``compliance_model``."""
-    names = [each for each in JointCompliance.__dataclass_fields__ if each != "joint"]
-    for i in range(len(table["joint"])) if table is not None else ():
-        values = [float(table[name][i]) for name in names]
-        if np.isfinite(values).any():
-            yield JointCompliance(int(table["joint"][i]), *values)
-
-
-def _fact(tables: Tables, topic: str) -> float | None:
-    """The number that the table ``summary`` states on a topic."""
-    known = tables.get("summary")
-    values = [] if known is None else known["value"][np.asarray(known["topic"]) == topic]
-    return float(values[0]) if len(values) else None
+def _fact(tables: Tables, topic: str, column: str = "value") -> Any:
+    """What the table ``summary`` states on a topic, None where nothing."""
+    known = pd.DataFrame(dict(tables.get("summary", {"topic": ()})))
+    rows = known[known["topic"] == topic]
+    return rows[column].iloc[0] if len(rows) else None
 
 
 def tolerance_of(tables: Tables) -> Tolerance | None:
     """The tolerance that the table ``summary`` states."""
     mm = _fact(tables, "tolerance")
-    if mm is None:
-        return None
-    known = tables["summary"]
-    return Tolerance(mm, str(known["item"][np.asarray(known["topic"]) == "tolerance"][0]))
+    return None if mm is None else Tolerance(float(mm), str(_fact(tables, "tolerance", "item")))
 
 
-def _claims(tables: Tables) -> Claims | None:
-    if "claims" not in tables:
-        return None
-    table = pd.DataFrame(dict(tables["claims"]))
+def _claims(claims: Columns) -> dict[str, Any]:
+    table = pd.DataFrame(dict(claims))
     table = table[~table["used_to_choose"].astype(bool)]  # these chose a reading: no evidence
-    counts = [int((table["verdict"] == each).sum()) for each in VERDICTS]
-    agree, differ, open_ = counts
-    return Claims(agree, differ, open_, tuple(table.loc[table["verdict"] == VERDICTS[1], "claim"]))
+    counts = {name: int((table["verdict"] == name).sum()) for name in VERDICTS}
+    agree, differ, open_ = counts.values()
+    differing = tuple(table["claim"][table["verdict"] == VERDICTS[1]])
+    return {"agree": agree, "differ": differ, "not_comparable": open_, "differing": differing}
 
 
 def _other_errors(tables: Tables) -> dict[str, float]:
@@ -357,41 +339,28 @@ def _other_errors(tables: Tables) -> dict[str, float]:
     found = {}
     if (points := tables.get("assessment_points")) is not None:
         found[f"{len(points['point'])} operating points"] = float(np.max(points["true_error_mm"]))
-    if (cells := tables.get("accuracy_map")) is not None:
-        largest = np.asarray(cells["position_max_mm"], dtype=float)
-        if np.isfinite(largest).any():
-            reached = int(np.isfinite(largest).sum())
-            found[f"accuracy map of {reached} cells"] = float(np.nanmax(largest))
+    cells = pd.Series(tables.get("accuracy_map", {}).get("position_max_mm", ()), dtype=float)
+    if cells.notna().any():
+        found[f"accuracy map of {cells.count()} cells"] = float(cells.max())
     return found
 
 
-def _written(folder: Path) -> str:
-    path = folder / "model_selection.parquet"
+def _written(path: Path) -> str:
     if not path.is_file():
         return ""
     return datetime.fromtimestamp(path.stat().st_mtime, UTC).date().isoformat()
 
 
-def _next_steps(folder: Path, tables: Tables, arm: Robot, sought: Sought) -> Iterable[NextStep]:
-    place = shlex.quote(str(folder))
-    if sought.status is not None:
-        yield NextStep("continue the campaign", sought.status.next_command)
-    else:
-        yield NextStep(
-            "bound the largest error; NOISE is the standard deviation of a reading in mm",
-            f"kinacc campaign start check --calibration {place} --noise-mm NOISE --budget 300",
-        )
-    yield NextStep(
-        "a robot program, corrected",
-        f"kinacc compensate {place} --program PROGRAM -o CORRECTED",
-    )
-    chosen = results.calibration(tables, arm).choice
-    model = "" if chosen == PLAINEST else f" --model {chosen}"
-    yield NextStep(
-        "files of the model for simulators",
-        f"kinacc export {place}{model} --out exported",
-    )
-    yield NextStep(
-        "values to enter into the controller: kuka, abb, fanuc, ur, yaskawa, staubli or ros",
-        f"kinacc export {place} --for CONTROLLER --out pendant",
-    )
+def _next_steps(folder: str, model: str, campaign: Any) -> dict[str, str]:
+    place = shlex.quote(folder)
+    option = "" if model == PLAINEST else f" --model {model}"
+    start = f"kinacc campaign start check --calibration {place} --noise-mm NOISE --budget 300"
+    bound = "bound the largest error; NOISE is the standard deviation of a reading in mm"
+    first = {bound: start} if campaign is None else {"continue the campaign": campaign.next_command}
+    return first | {
+        "a robot program, corrected": f"kinacc compensate {place} --program PROGRAM -o CORRECTED",
+        "files of the model for simulators": f"kinacc export {place}{option} --out exported",
+        "values to enter into the controller: kuka, abb, fanuc, ur, yaskawa, staubli or ros": (
+            f"kinacc export {place} --for CONTROLLER --out pendant"
+        ),
+    }

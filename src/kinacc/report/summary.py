@@ -2,118 +2,23 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import pandas as pd
 
 from kinacc.assess.conformity import UNDECIDED
 from kinacc.assess.statement import CANDIDATES, Statement
-from kinacc.calibration import summary as figures
-from kinacc.calibration.summary import Tolerance
+from kinacc.calibration.summary import LARGE_SHARE, Tolerance
 from kinacc.campaign import tolerance
 from kinacc.campaign.status import CampaignStatus
 from kinacc.config.error_models import MEASURED, NOMINAL, model_name
-from kinacc.tables.allowed import FINDING_LEVELS
+from kinacc.report.rendering import size
 
 BOUND, HELD_OUT = "bound", "held-out"  # statistics that a verdict is by
-STATISTICS = {"mean": "mean", f"{figures.LARGE_SHARE:.0%}": "quantile_99", "largest": "largest"}
+STATISTICS = {"mean": "mean", f"{LARGE_SHARE:.0%}": "quantile_99", "largest": "largest"}
 _TOLERANCE_OF = {BOUND: "bound", HELD_OUT: "quantile_99"}
-_NOTE = FINDING_LEVELS[-1]
-
-
-@dataclass(frozen=True)
-class ModelErrors:
-    """Errors of a model over ``n`` rows that every model was tried on.
-
-    ``reference`` is ``measured`` or the model it is compared with; ``estimate`` is ``held_out`` or
-    ``training``; ``quantity`` is position (mm) or orientation (mrad).
-    """
-
-    model: str
-    reference: str
-    estimate: str
-    quantity: str
-    unit: str
-    n: int
-    mean: float
-    quantile_99: float
-    largest: float
-
-
-@dataclass(frozen=True)
-class Selection:
-    """How a model did in the selection: see ``model_selection``; ``order`` of a VEC model."""
-
-    model: str
-    selected: bool
-    held_out_rms_mm: float
-    gain_mm2: float
-    gain_std_error_mm2: float
-    order: int | None = None
-    held_out_orders: tuple[int, int] | None = None
-    highest_order_tried: int | None = None
-
-    @property
-    def label(self) -> str:
-        """The model's name with its order."""
-        if self.order is None:
-            return model_name(self.model)
-        low, high = self.held_out_orders or (self.order, self.order)
-        folds = f" (held out: {low} to {high})" if low < high else ""
-        most = ", the highest tried" if self.order == self.highest_order_tried else ""
-        return f"{model_name(self.model)}, order {self.order}{folds}{most}"
-
-
-@dataclass(frozen=True)
-class JointRange:
-    """Measured range of a joint (deg or mm) and its share of the joint's travel."""
-
-    joint: int
-    low: float
-    high: float
-    unit: str
-    share: float
-
-
-@dataclass(frozen=True)
-class Finding:
-    """A finding of the data check; ``accepted`` is the reason given in the configuration."""
-
-    finding: str
-    level: str
-    rows: int
-    text: str
-    lines: str
-    fix: str
-    accepted: str
-
-    @property
-    def is_open(self) -> bool:
-        """Whether it is a suspicion that nobody accepted."""
-        return self.level != _NOTE and not self.accepted
-
-
-@dataclass(frozen=True)
-class ExcludedRow:
-    """A row that the configuration excludes, and its error by the selected model."""
-
-    line: int
-    where: str
-    reason: str
-    error_mm: float
-
-
-@dataclass(frozen=True)
-class JointCompliance:
-    """How a joint bends; a value that was not fitted is NaN."""
-
-    joint: int
-    compliance_rad_per_nm: float
-    std_compliance_rad_per_nm: float
-    lever_coefficient_rad_per_mm: float
-    std_lever_coefficient_rad_per_mm: float
 
 
 @dataclass(frozen=True)
@@ -129,32 +34,40 @@ class Verdict:
     source: str = ""
 
 
-@dataclass(frozen=True)
-class NextStep:
-    """A command to go on with, and its purpose."""
-
-    purpose: str
-    command: str
-
-
-@dataclass(frozen=True)
-class Claims:
-    """Number of the paper's claims by verdict, without those that chose a reading of the paper."""
-
-    agree: int
-    differ: int
-    not_comparable: int
-    differing: tuple[str, ...]
-
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class CalibrationSummary:
-    """What the calibration of one data set is worth.
+    """What the calibration of one data set is worth. Positions in mm, orientations in mrad.
 
-    Positions in mm, orientations in mrad. ``errors`` holds every population; ``share_measured`` is
-    the share of the box of the joint ranges that lies near measured poses (None where the table
-    ``summary`` does not state it); ``flange_spread_deg`` is None unless the flange points in one
-    direction; ``held_out_over_noise`` is NaN where the noise is unknown.
+    Attributes
+    ----------
+    errors
+        A row for each model, reference (``measured`` or another model), estimate (``held_out`` or
+        ``training``) and quantity (position, orientation): ``unit``, ``n`` rows that every model
+        was tried on, ``mean``, ``quantile_99`` and ``largest``.
+    selection
+        ``model_selection`` with the ``order`` of a VEC model, the lowest and highest order chosen
+        in folds, and the highest that was tried; None where there is none.
+    joint_ranges
+        Measured ``low`` and ``high`` of each joint and its limits ``least`` and ``most``, in deg or
+        mm, and the ``share`` of the travel that is measured.
+    share_measured
+        Share of the box of the joint ranges that lies near measured poses, None where unknown.
+    flange_spread_deg
+        Largest angle of the flange axis to its mean, None unless it points in one direction.
+    findings
+        Findings of the data check, the gravest first; ``is_open`` where nobody accepted a
+        suspicion, ``accepted`` is the reason stated.
+    excluded
+        Rows that the configuration excludes, each with its error by the selected model.
+    compliance
+        Joints that bend; NaN where a coefficient was not fitted.
+    held_out_over_noise
+        By model, NaN where the noise is unknown.
+    claims
+        Number of the paper's claims by verdict, without those that chose a reading of the paper,
+        and the names of the differing ones.
+    next_steps
+        Commands by purpose.
     """
 
     name: str
@@ -169,56 +82,53 @@ class CalibrationSummary:
     frames_fitted: bool
     full_pose: bool
     selected: str
-    errors: tuple[ModelErrors, ...]
-    selection: tuple[Selection, ...]
-    joint_ranges: tuple[JointRange, ...]
+    errors: pd.DataFrame
+    selection: pd.DataFrame
+    joint_ranges: pd.DataFrame
     share_measured: float | None
     flange_spread_deg: float | None
     unidentifiable: tuple[str, ...]
     poorly_determined: tuple[str, ...]
     checked: bool
-    findings: tuple[Finding, ...]
+    findings: pd.DataFrame
     left_out: tuple[str, ...]
-    excluded: tuple[ExcludedRow, ...]
-    compliance: tuple[JointCompliance, ...]
+    excluded: pd.DataFrame
+    compliance: pd.DataFrame
     noise_mm: float
     held_out_over_noise: Mapping[str, float]
     campaign: CampaignStatus | None
     remarks: tuple[str, ...]
     tolerance: Tolerance | None
-    claims: Claims | None
+    claims: Mapping[str, Any] | None
     other_errors: Mapping[str, float]
     history: str
     outdated: str
-    next_steps: tuple[NextStep, ...]
+    next_steps: Mapping[str, str]
 
     @property
     def is_held_out(self) -> bool:
         """Whether poses were held out."""
-        return any(each.estimate == "held_out" for each in self.errors)
-
-    def position_errors(self) -> dict[str, ModelErrors]:
-        """Position errors against measurements by model, held out where poses were."""
-        estimate = "held_out" if self.is_held_out else "training"
-        return {
-            each.model: each
-            for each in self.errors
-            if (each.reference, each.estimate, each.quantity) == (MEASURED, estimate, "position")
-        }
-
-    def orientation_errors(self) -> dict[str, ModelErrors]:
-        """Held-out orientation errors by model, empty for positions only."""
-        return {
-            each.model: each
-            for each in self.errors
-            if (each.reference, each.estimate, each.quantity)
-            == (MEASURED, "held_out", "orientation")
-        }
+        return bool((self.errors["estimate"] == "held_out").any())
 
     @property
-    def best(self) -> ModelErrors:
-        """Position errors of the selected model."""
-        return self.position_errors()[self.selected]
+    def position_errors(self) -> pd.DataFrame:
+        """Position errors against measurements by model, held out where poses were."""
+        return self._against_measured("position")
+
+    def _against_measured(self, quantity: str) -> pd.DataFrame:
+        table = self.errors[self.errors["quantity"] == quantity].set_index("model")
+        estimate = "held_out" if self.is_held_out else "training"
+        return table[(table["reference"] == MEASURED) & (table["estimate"] == estimate)]
+
+    @property
+    def best(self) -> Any:
+        """Position errors of the selected model: ``n``, ``mean``, ``quantile_99``, ``largest``."""
+        return next(self.position_errors.loc[[self.selected]].itertuples())
+
+    @property
+    def open_findings(self) -> pd.DataFrame:
+        """Suspicions of the data check that nobody accepted."""
+        return self.findings[self.findings["is_open"].astype(bool)]
 
     @property
     def doubts(self) -> tuple[str, ...]:
@@ -230,20 +140,24 @@ class CalibrationSummary:
 
         The index holds the models; numbers are texts of three significant digits.
         """
-        turned, rows = self.orientation_errors(), {}
-        for model, errors in self.position_errors().items():
-            row = {"model": self.label(model)}
-            for part in filter(None, (errors, turned.get(model))):
-                for name, key in STATISTICS.items():
-                    row[f"{name}, {part.unit}"] = size(getattr(part, key))
-            rows[model] = row
-        return pd.DataFrame.from_dict(rows, orient="index").fillna("")
+        table = pd.DataFrame(index=self.position_errors.index)
+        table["model"] = [self.label(model) for model in table.index]
+        for errors in (self.position_errors, self._against_measured("orientation")):
+            for name, column in STATISTICS.items() if len(errors) else ():
+                table[f"{name}, {errors['unit'].iloc[0]}"] = errors[column].map(size)
+        return table.fillna("")
 
     def label(self, model: str) -> str:
         """A model's name with its order, or with the frames that were fitted."""
         if model == NOMINAL:
             return "nominal, base and tool fitted" if self.frames_fitted else NOMINAL
-        return next(each.label for each in self.selection if each.model == model)
+        row = self.selection.set_index("model").loc[model]
+        if row["order"] is None:
+            return model_name(model)
+        low, high = row["low_order_held_out"], row["high_order_held_out"]
+        folds = f" (held out: {low} to {high})" if low != high else ""
+        most = ", the highest tried" if row["order"] == row["highest_order_tried"] else ""
+        return f"{model_name(model)}, order {row['order']}{folds}{most}"
 
     def verdict(self, by: str, tolerance_mm: float | None = None) -> Verdict | None:
         """The verdict ``by`` the bound of the campaign or by held-out errors.
@@ -260,15 +174,13 @@ class CalibrationSummary:
         if tolerance_mm is None:
             return None
         if by == HELD_OUT:
-            judged = tolerance.by_held_out(
-                Tolerance(tolerance_mm, _TOLERANCE_OF[by]), self._held_out()
-            )
-        elif bound is None:
-            judged = UNDECIDED, "no campaign bounds the largest error"
-        else:
-            limits = (bound.value_mm, bound.lower_mm, bound.upper_mm, bound.confidence)
-            statement = Statement(CANDIDATES, *limits, excepted=bound.excepted)
-            judged = tolerance.by_bound(tolerance_mm, statement, bool(self.doubts))
+            return self._by_held_out(Tolerance(tolerance_mm, _TOLERANCE_OF[by]), source)
+        if bound is None:
+            reason = "no campaign bounds the largest error"
+            return Verdict(UNDECIDED, reason, tolerance_mm, source)
+        limits = (bound.value_mm, bound.lower_mm, bound.upper_mm, bound.confidence)
+        statement = Statement(CANDIDATES, *limits, excepted=bound.excepted)
+        judged = tolerance.by_bound(tolerance_mm, statement, bool(self.doubts))
         return Verdict(*judged, tolerance_mm, source)
 
     def of_configuration(self) -> Verdict | None:
@@ -277,18 +189,8 @@ class CalibrationSummary:
             return None
         if self.tolerance.of == "bound":
             return self.verdict(BOUND, self.tolerance.mm)
-        judged = tolerance.by_held_out(self.tolerance, self._held_out())
-        return Verdict(*judged, self.tolerance.mm, tolerance.OF_CONFIGURATION)
+        return self._by_held_out(self.tolerance, tolerance.OF_CONFIGURATION)
 
-    def _held_out(self) -> dict[str, float]:
-        best = self.best
-        if not self.is_held_out:
-            return {}
-        return {"n": best.n, "mean": best.mean, "quantile_99": best.quantile_99}
-
-
-def size(value: float) -> str:
-    """A number with three significant digits, without an exponent."""
-    if not math.isfinite(value) or value == 0.0:
-        return f"{value:.3g}"
-    return f"{value:.{max(0, 2 - math.floor(math.log10(abs(value))))}f}"
+    def _by_held_out(self, allowed: Tolerance, source: str) -> Verdict:
+        held_out = self.best._asdict() if self.is_held_out else {}
+        return Verdict(*tolerance.by_held_out(allowed, held_out), allowed.mm, source)
