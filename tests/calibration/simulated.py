@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from kinacc.calibration import fitting
 from kinacc.calibration.observations import Observations
 from kinacc.geometry import Pose, compose, exp_so3
 from kinacc.kinematics import dh
@@ -26,12 +27,12 @@ def disturbed(model, free, rng, angle_rad=1e-3, length_mm=0.5):
     return model.with_parameters((table + free * size * rng.normal(size=table.shape)).ravel())
 
 
-def far_off(model, rng, angle_deg=5.0, length_mm=20.0):
-    """The model with joint offsets and lengths anywhere within these distances."""
-    table = model.start.reshape(-1, 5).copy()
-    table[:, 0] += np.deg2rad(angle_deg) * rng.uniform(-1, 1, len(table))
-    table[:, 1:3] += length_mm * rng.uniform(-1, 1, (len(table), 2))
-    return model.with_parameters(table.ravel())
+def far_off(model, free, rng):
+    """Free (k, 5) parameters up to 5 degrees and 20 mm off; parallel axes (Hayati) a degree."""
+    size = np.array([np.deg2rad(5.0), 20.0, 20.0, np.deg2rad(5.0), np.deg2rad(5.0)])
+    shift = size * rng.uniform(-1, 1, free.shape) * free
+    shift[free[:, 4], 3:] *= 0.2
+    return model.with_parameters(model.start + shift.ravel())
 
 
 def anywhere(rng, distance_mm, count=None):
@@ -39,10 +40,15 @@ def anywhere(rng, distance_mm, count=None):
     return Pose(exp_so3(rng.normal(size=shape)), distance_mm * rng.normal(size=shape))
 
 
-def measure(model, q_rad, kind, rng, noise_mm=0.05, sessions=1):
-    """Observations of ``kind`` of an arm ``model`` at DH joints (n, k), dealt over sessions."""
+def measure(
+    model, q_rad, kind, rng, noise_mm=0.05, sessions=1, frames=None, noise_rad=ORIENTATION_NOISE_RAD
+):
+    """Observations of ``kind`` of an arm ``model`` at DH joints (n, k), dealt over sessions.
+
+    ``frames``: poses of bases and targets, anywhere if not stated.
+    """
     poses, targets = len(q_rad), 3 if kind == THREE else 1
-    bases, tools = anywhere(rng, 1500.0, sessions), anywhere(rng, 80.0, targets)
+    bases, tools = frames or (anywhere(rng, 1500.0, sessions), anywhere(rng, 80.0, targets))
     pose, target = np.repeat(np.arange(poses), targets), np.tile(np.arange(targets), poses)
     session = pose % sessions
     flange = dh.forward(model, q_rad[pose])
@@ -50,9 +56,7 @@ def measure(model, q_rad, kind, rng, noise_mm=0.05, sessions=1):
     seen = compose(Pose(bases.rotation[session], bases.position_mm[session]), carried)
     rotation = np.full((len(pose), 3, 3), np.nan)
     if kind == POSE:
-        turn = exp_so3(ORIENTATION_NOISE_RAD * rng.normal(size=(len(pose), 3)))
-        rotation = turn @ seen.rotation
-    zeros = np.zeros(len(pose), dtype=int)
+        rotation = exp_so3(noise_rad * rng.normal(size=(len(pose), 3))) @ seen.rotation
     return Observations(
         q_rad=q_rad[pose],
         s=np.zeros((len(pose), q_rad.shape[1]), np.int8),
@@ -60,9 +64,20 @@ def measure(model, q_rad, kind, rng, noise_mm=0.05, sessions=1):
         rotation=rotation,
         pose=pose,
         target=target,
-        repeat=zeros,
+        repeat=np.zeros(len(pose), dtype=int),
         fold=pose % 5,
         target_names=tuple(f"t{number}" for number in range(targets)),
         session=session,
         session_names=(None,) if sessions == 1 else tuple(f"s{i}" for i in range(sessions)),
     )
+
+
+def fit(observations, nominal, free, **settings):
+    """A DH fit of full weight of rotations, truncated at 1e-3 unless ``settings`` say otherwise."""
+    settings = {"rotation_weight_mm_per_rad": 500.0, "threshold": 1e-3} | settings
+    return fitting.fit(observations, nominal, free=free, **settings)
+
+
+def predicted(fit, q_rad):
+    """Poses (n, ...) of the first target by a fit."""
+    return compose(fit.frames.base, compose(dh.forward(fit.model, q_rad), fit.frames.tool))

@@ -2,26 +2,29 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
+import pandas as pd
 import pytest
 import shared_data
+import simulated
+from measured_arms import measured_arm
 from scipy.stats import multivariate_normal
+from test_few_poses import settings
 
-from kinacc.calibration import delivered, evidence, models, vec_fit
-from kinacc.calibration.evidence import ORDERS
+from kinacc.calibration import evidence, models, vec_fit
 from kinacc.calibration.frames import FrameParameters, known
 from kinacc.calibration.observations import full_poses
+from kinacc.calibration.system import PoseSystem
 from kinacc.calibration.vec_fit import Prior
-from kinacc.checks.contradictions import load
 from kinacc.geometry import Pose, exp_so3
 from kinacc.kinematics import robot, vec
-from kinacc.synthetic import source
 
-SERIES = "ur10_tmac/series_D.csv"
-AXES = ("x_mm", "y_mm", "z_mm")
 ARM = robot.load("mh180")
 LOW, HIGH = np.deg2rad([(-10, 70), (-30, 54), (-74, 18), (-170, 170), (-120, 120), (-170, 170)]).T
 WEIGHT, POSES, NOISE_MM = 500.0, 200, 0.03
+FIXED = FrameParameters.none(known())
 WAVY = Prior(0.3, 0.3e-3, 1.0, 1e-4)
 
 
@@ -40,8 +43,7 @@ def observed(order, seed=0, prior=WAVY):
 
 def choose(seen, orders=(1, 2, 3, 4, 6), stated=None):
     empty = vec.without_errors(ARM.dh, LOW, HIGH, 1)
-    fixed = FrameParameters.none(known())
-    return evidence.choose(seen, empty, fixed, WEIGHT, orders, stated).query("chosen").iloc[0]
+    return evidence.choose(seen, empty, FIXED, WEIGHT, orders, stated).query("chosen").iloc[0]
 
 
 @pytest.mark.parametrize("order", [2, 4])
@@ -58,39 +60,32 @@ def test_width_and_fall_of_the_errors_are_found():
 
 def test_differences_of_evidence_are_those_of_the_marginal_likelihood():
     """Of residuals with what is integrated out projected away, by the dense covariance matrix."""
-    seen = observed(2).select(slice(0, 40))
-    got = {}
+    seen, empty = observed(2).select(slice(0, 40)), vec.without_errors(ARM.dh, LOW, HIGH, 2)
+    free = vec_fit.informed(seen, empty)
+    system = PoseSystem(seen, empty, free, FIXED, WEIGHT)
+    parts = zip(*system.blocks(np.zeros(free.sum())), strict=True)
+    residual, jacobian = (np.concatenate(part) for part in parts)
+    order, got = np.tile(np.arange(3), 36), []
+    left, values, _ = np.linalg.svd(jacobian[:, order == 0])
+    rest = left[:, int(np.sum(values > 1e-9 * values[0])) :]
+    linear = evidence._Linear(seen, empty, FIXED, WEIGHT)
+    linear.root[:] = 1.0
+    normal, _ = linear.above_constants(2, 2)
     for prior in (Prior(0.2, 0.2e-3, 0.7, 1e-4), Prior(0.5, 0.5e-3, 1.0, 1e-4)):
-        empty = vec.without_errors(ARM.dh, LOW, HIGH, 2)
-        free = vec_fit.informed(seen, empty)
-        system = vec_fit.PoseSystem(seen, empty, free, FrameParameters.none(known()), WEIGHT)
-        rows = [*system.blocks(np.zeros(free.sum()))]
-        residual, jacobian = (np.concatenate(each) for each in zip(*rows, strict=True))
-        order = np.tile(np.arange(3), 36)
-        flat = jacobian[:, order == 0]
-        left, values, _ = np.linalg.svd(flat)
-        rest = left[:, int(np.sum(values > 1e-9 * values[0])) :]
-        spread = jacobian[:, order > 0] * prior.std(empty)[: 36 * 3][order > 0]
-        told = rest.T @ spread
-        ratio = (prior.delta_mm / NOISE_MM) ** 2
-        shape = np.eye(rest.shape[1]) + told @ told.T / NOISE_MM**2
-        noise = rest.T @ residual
+        std = prior.std(empty)[: 36 * 3][order > 0]
+        spread, noise = rest.T @ (jacobian[:, order > 0] * std), rest.T @ residual
+        shape = np.eye(rest.shape[1]) + spread @ spread.T / NOISE_MM**2
         variance = noise @ np.linalg.solve(shape, noise) / noise.size
         wanted = multivariate_normal(cov=variance * shape).logpdf(noise)
-        linear = evidence._Linear(seen, empty, FrameParameters.none(known()), WEIGHT)
-        linear.root[:] = 1.0
-        normal, count = linear.above_constants(2, 2)
-        at = np.array([0.5 * np.log(ratio), prior.decay])
-        got[prior.decay] = -evidence._negative(at, normal, noise.size, np.repeat([1, 2], 36))[0]
-        got[prior.decay] -= wanted
-        assert count <= noise.size
-    assert got[0.7] == pytest.approx(got[1.0], abs=1e-3)
+        at = np.array([np.log(prior.delta_mm / NOISE_MM), prior.decay])
+        value = evidence._negative(at, normal, noise.size, np.repeat([1, 2], 36))[0]
+        got.append(-value - wanted)
+    assert got[0] == pytest.approx(got[1], abs=1e-3)
 
 
 def test_slopes_of_the_evidence_are_its_finite_differences():
-    fixed = FrameParameters.none(known())
     empty = vec.without_errors(ARM.dh, LOW, HIGH, 1)
-    normal, count = evidence._Linear(observed(3), empty, fixed, WEIGHT).above_constants(3, 3)
+    normal, count = evidence._Linear(observed(3), empty, FIXED, WEIGHT).above_constants(3, 3)
     at, degree = np.array([1.5, 0.8]), np.repeat([1, 2, 3], 36)
     slopes = evidence._negative(at, normal, count, degree)[1]
     for i, step in enumerate(1e-5 * np.eye(2)):
@@ -100,69 +95,46 @@ def test_slopes_of_the_evidence_are_its_finite_differences():
         assert slopes[i] == pytest.approx((ahead - behind) / 2e-5, rel=1e-4)
 
 
-def read(path, arm, highest, orientation, folder):
-    """Settings and measured rows of a file, as ``kinacc init`` sets them."""
-    (folder / "own.yaml").write_text(
-        f"datasets:\n  own:\n    robot: {arm}\n    evaluation: {{space: measured}}\n"
-        f"    measurements:\n      source: file\n"
-        f"      file: {{path: {path}, orientation: {orientation}}}\n"
-        "    calibration:\n      base_and_tool: estimated\n      dh: {fit_to: measurements}\n"
-        f"      vec: {{order: auto, prior: chosen, order_highest: {highest}}}\n"
-    )
-    settings = load([folder / "own.yaml"])["own"]
-    return settings, source.run({}, settings)["measurements"]
-
-
-def orders(settings, rows):
+def orders(arm, calibration, seen):
     """``vec_orders`` of these rows."""
-    arm = robot.load(settings["robot"])
-    every, _ = delivered.observed({"measurements": rows}, arm)
-    estimator = models.estimators(settings["calibration"], arm, every)["vec"]
-    return estimator.choices(every)["vec_orders"]
+    estimator = models.estimators(calibration, arm, seen)["vec"]
+    return pd.DataFrame(estimator.choices(seen)["vec_orders"])
 
 
-def chosen(table):
-    return np.asarray(table["order"])[np.asarray(table["chosen"]) == 1].tolist()
+def positions(poses, repeats=1):
+    """Positions of an arm as described, each configuration read several times."""
+    arm, rng = robot.load("irb120"), np.random.default_rng(3)
+    q = np.repeat(rng.uniform(-1.2, 1.2, (poses, 6)), repeats, axis=0)
+    return arm, settings(), simulated.measure(arm.dh, q, simulated.POINT, rng)
 
 
-def test_a_choice_has_seen_nothing_of_what_is_held_out(tmp_path):
-    settings, rows = made_up(tmp_path, poses=60)
-    before = orders(settings, rows)
-    spoilt = rows | {"x_mm": rows["x_mm"] + 5.0 * (rows["fold"] == 2)}
-    after = orders(settings, spoilt)
-    assert np.isnan(before["fold"]).any()
+def test_a_choice_has_seen_nothing_of_what_is_held_out():
+    arm, calibration, seen = positions(60)
+    shift = np.where(seen.fold == 2, 5.0, 0.0)[:, None] * [1.0, 0.0, 0.0]
+    spoilt = replace(seen, position_mm=seen.position_mm + shift)
+    before, after = (orders(arm, calibration, rows) for rows in (seen, spoilt))
+    assert before["fold"].isna().any()
     for fold in range(5):
-        one, other = (
-            np.asarray(each["log_evidence"])[np.asarray(each["fold"]) == fold]
-            for each in (before, after)
-        )
+        one, other = (t.loc[t["fold"] == fold, "log_evidence"] for t in (before, after))
         assert (len(one) == len(other) and np.allclose(one, other, atol=0.1)) == (fold == 2)
 
 
+@shared_data.needed("ur10_tmac/series_D.csv")
 @pytest.mark.parametrize(("row", "axis"), [(613, 2), (402, 0)])
-def test_one_reading_off_by_5_mm_does_not_change_the_order(row, axis, tmp_path):
-    turn = "{kind: euler, convention: XYZ, unit: deg}"
-    settings, rows = read(shared_data.path_of(SERIES), "ur10", 12, turn, tmp_path)
-    rows = rows | {"fold": np.full(len(rows["pose"]), np.nan)}
-    before = chosen(orders(settings, rows))[0]
-    spoilt = rows | {AXES[axis]: rows[AXES[axis]].copy()}
-    spoilt[AXES[axis]][row] += 5.0
-    after = chosen(orders(settings, spoilt))[0]
-    assert abs(ORDERS.index(after) - ORDERS.index(before)) <= 1
+def test_one_reading_off_by_5_mm_does_not_change_the_order(row, axis):
+    arm, calibration, seen = measured_arm("ur10_d")
+    calibration = calibration | {"vec": calibration["vec"] | {"order_highest": 12}}
+    seen = replace(seen, fold=np.full(len(seen), -1))
+    place = seen.position_mm.copy()
+    place[row, axis] += 5.0
+    before, after = (
+        orders(arm, calibration, rows).query("chosen == 1")["order"].item()
+        for rows in (seen, replace(seen, position_mm=place))
+    )
+    assert abs(evidence.ORDERS.index(after) - evidence.ORDERS.index(before)) <= 1
 
 
-def made_up(folder, poses, repeats=1, noise_mm=0.05):
-    """A file of positions of an arm whose links are off, each configuration read several times."""
-    arm, draw = robot.load("irb120"), np.random.default_rng(3)
-    q = np.repeat(draw.uniform(-1.2, 1.2, (poses, 6)), repeats, axis=0)
-    place = robot.forward(arm, q).position_mm + draw.normal(0.0, noise_mm, (len(q), 3))
-    lines = [",".join([*(f"q{i}_rad" for i in range(1, 7)), "x_mm", "y_mm", "z_mm"])]
-    lines += [",".join(f"{value:.9f}" for value in row) for row in np.hstack([q, place])]
-    (folder / "own.csv").write_text("\n".join(lines) + "\n")
-    return read(folder / "own.csv", "irb120", 40, "{kind: none}", folder)
-
-
-def test_the_search_ends_where_high_orders_gain_nothing(tmp_path):
-    table = orders(*made_up(tmp_path, poses=600))
-    assert set(chosen(table)) <= {1, 2}
-    assert max(table["order"]) <= 6  # 600 poses can carry 40
+def test_the_search_ends_where_high_orders_gain_nothing():
+    table = orders(*positions(600))
+    assert set(table.query("chosen == 1")["order"]) <= {1, 2}
+    assert table["order"].max() <= 6  # 600 poses can carry 40

@@ -22,22 +22,14 @@ def joints(count: int, seed: int) -> np.ndarray:
     return np.random.default_rng(seed).uniform(LOW, HIGH, (count, 6))
 
 
-def stack(matrices) -> geometry.Pose:
-    matrices = np.array(matrices)
-    return geometry.Pose(matrices[:, :3, :3], matrices[:, :3, 3])
-
-
-def noisy_poses(table, q, seed):
-    """Poses of a DH arm with 0.05 mm and 0.1 mrad of noise."""
-    rng = np.random.default_rng(seed)
-    result = []
-    for row in q:
-        frame = oracle.dh_forward(table, row)
-        spin = geometry.exp_so3(rng.normal(size=3) * 1e-4)
-        frame[:3, :3] = spin @ frame[:3, :3]
-        frame[:3, 3] += rng.normal(size=3) * 0.05
-        result.append(frame)
-    return result
+def measured(forward, count, rng, noise_mm, noise_rad):
+    """Matrices of what ``forward`` has for each number, with noise, and the same as poses."""
+    matrices = np.array([forward(i) for i in range(count)])
+    matrices[:, :3, :3] = (
+        geometry.exp_so3(noise_rad * rng.normal(size=(count, 3))) @ matrices[:, :3, :3]
+    )
+    matrices[:, :3, 3] += noise_mm * rng.normal(size=(count, 3))
+    return matrices, geometry.Pose(matrices[:, :3, :3], matrices[:, :3, 3])
 
 
 @pytest.mark.parametrize(
@@ -46,24 +38,21 @@ def noisy_poses(table, q, seed):
     ids=["plain", "hayati", "coarse"],
 )
 def test_dh_fit_is_the_smallest_displacement_that_minimises_the_residual(hayati, threshold):
-    nominal = np.array(oracle.MH180)
-    truth = nominal + np.random.default_rng(1).normal(size=(6, 5)) * [1e-3, 0.8, 0.8, 1e-3, 0]
-    q = joints(22, 2)
-    measured = noisy_poses(truth, q, 3)
-    free = free_parameters(6, hayati)
-    assert free[:, :4].all()
-    assert [i + 1 for i in range(6) if free[i, 4]] == list(hayati)
+    nominal, rng = np.array(oracle.MH180), np.random.default_rng(1)
+    truth = nominal + rng.normal(size=(6, 5)) * [1e-3, 0.8, 0.8, 1e-3, 0]
+    q, free = joints(22, 2), free_parameters(6, hayati)
     mask = free.ravel()
+    seen, poses = measured(lambda i: oracle.dh_forward(truth, q[i]), 22, rng, 0.05, 1e-4)
 
     def function(x):
         table = nominal.ravel().copy()
         table[mask] = x
         table = table.reshape(6, 5)
-        return fits.residual(lambda i: oracle.dh_forward(table, q[i]), measured, WEIGHT)
+        return fits.residual(lambda i: oracle.dh_forward(table, q[i]), seen, WEIGHT)
 
     expected = fits.truncated_fit(function, nominal.ravel()[mask], DH_UNIT[mask], threshold)
     fit = fitting.fit(
-        full_poses(q, stack(measured)),
+        full_poses(q, poses),
         dh.DHModel(*nominal.T),
         free=free,
         rotation_weight_mm_per_rad=WEIGHT,
@@ -73,9 +62,10 @@ def test_dh_fit_is_the_smallest_displacement_that_minimises_the_residual(hayati,
     assert fit.solution.spectrum.rank == expected["rank"]
     assert fit.solution.cost == pytest.approx(expected["cost"], rel=1e-7)
     found = fit.model.start
-    np.testing.assert_allclose(found[~mask], nominal.ravel()[~mask], rtol=0, atol=0)
-    off = (found[mask] - expected["x"]) / DH_UNIT[mask]
-    assert np.abs(off).max() < 1e-5
+    np.testing.assert_array_equal(found[~mask], nominal.ravel()[~mask])
+    np.testing.assert_allclose(
+        found[mask] / DH_UNIT[mask], expected["x"] / DH_UNIT[mask], rtol=0, atol=1e-5
+    )
     std, lost = fit.std.ravel()[mask], expected["lost"]
     assert np.isnan(std[lost > 1e-2]).all()
     known = lost < 1e-6
@@ -84,11 +74,9 @@ def test_dh_fit_is_the_smallest_displacement_that_minimises_the_residual(hayati,
         assert expected["rank"] < mask.sum() - 1  # more is left out than what nobody can see
         return
     assert known.sum() >= 20
-    # The direction nobody can see is d2 and d3 together; what is seen is d2 - d3.
-    if not hayati:
+    if not hayati:  # nobody can see d2 and d3 together; what is seen is d2 - d3
         assert expected["rank"] == mask.sum() - 1
-        table = fit.model
-        assert table.d_mm[1] - table.d_mm[2] == pytest.approx((truth[1, 1] - truth[2, 1]), abs=0.2)
+        assert np.diff(fit.model.d_mm[1:3]) == pytest.approx(np.diff(truth[1:3, 1]), abs=0.2)
         assert np.isnan(fit.std[[1, 2], 1]).all()
 
 
@@ -97,47 +85,37 @@ def test_vec_fit_is_where_the_gradient_with_its_prior_vanishes():
     arm, low, high, order, count = np.array(oracle.MH180)[:4], LOW[:4], HIGH[:4], 2, 16
     shape = (4, 6, order + 1)
     unit = np.broadcast_to(np.array([[1.0]] * 3 + [[1e-3]] * 3), shape)
-    series = rng.normal(size=shape) * unit * 0.4
-    offsets = rng.normal(size=(4, 2)) * 2e-4
+    true = np.concatenate(
+        [(0.4 * unit * rng.normal(size=shape)).ravel(), 2e-4 * rng.normal(size=8)]
+    )
     # Some at rest: where every pose travels, a constant shared with eps_z is moved after the fit.
     q, s = joints(count, 6)[:, :4], rng.choice([-1, 0, 1], (count, 4))
-    measured = []
-    for row, way in zip(q, s, strict=True):
-        frame = oracle.projected(oracle.vec_forward(arm, series, low, high, offsets, row, way))
-        frame[:3, :3] = geometry.exp_so3(rng.normal(size=3) * 5e-5) @ frame[:3, :3]
-        frame[:3, 3] += rng.normal(size=3) * 0.03
-        measured.append(frame)
-    prior = vec_fit.Prior(delta_mm=0.7, eps_rad=0.9e-3, decay=0.6, offset_rad=3e-4)
-    empty = vec.without_errors(dh.DHModel(*arm.T), low, high, order)
+
+    def forward(x, i):
+        series, offsets = x[:-8].reshape(shape), x[-8:].reshape(4, 2)
+        return oracle.projected(oracle.vec_forward(arm, series, low, high, offsets, q[i], s[i]))
+
+    seen, poses = measured(lambda i: forward(true, i), count, rng, 0.03, 5e-5)
     fit = vec_fit.fit(
-        full_poses(q, stack(measured), s),
-        empty,
-        prior=prior,
+        full_poses(q, poses, s),
+        vec.without_errors(dh.DHModel(*arm.T), low, high, order),
+        prior=vec_fit.Prior(delta_mm=0.7, eps_rad=0.9e-3, decay=0.6, offset_rad=3e-4),
         rotation_weight_mm_per_rad=WEIGHT,
         frames=frames.known(),
         frames_free=False,
     )
-    x = fit.model.start
-    size = series.size
-    sigma = np.sqrt(fit.solution.variance)
+    x, sigma = fit.model.start, np.sqrt(fit.solution.variance)
 
     def function(x):
-        new, away = x[:size].reshape(shape), x[size:].reshape(4, 2)
-
-        def forward(i):
-            return oracle.projected(oracle.vec_forward(arm, new, low, high, away, q[i], s[i]))
-
-        return fits.residual(forward, measured, WEIGHT) / sigma
+        return fits.residual(lambda i: forward(x, i), seen, WEIGHT) / sigma
 
     spread = np.array([0.7] * 3 + [0.9e-3] * 3)[:, None] * np.array([1.0, 1.0, 0.6])
     prior_std = np.concatenate([np.broadcast_to(spread, shape).ravel(), np.full(8, 3e-4)])
     np.testing.assert_allclose(fit.prior_std, prior_std, rtol=1e-12)
     jacobian = fits.slopes(function, x, prior_std * 0.05)
-    information = jacobian.T @ jacobian + np.diag(prior_std**-2)
-    gradient = jacobian.T @ function(x) + x / prior_std**2
+    covariance = np.linalg.inv(jacobian.T @ jacobian + np.diag(prior_std**-2))
     # The Newton step left to the minimum, in standard deviations of each coefficient.
-    covariance = np.linalg.inv(information)
-    step = -covariance @ gradient
+    step = -covariance @ (jacobian.T @ function(x) + x / prior_std**2)
     assert np.abs(step / np.sqrt(np.diag(covariance))).max() < 1e-3
     np.testing.assert_allclose(fit.std, np.sqrt(np.diag(covariance)), rtol=1e-4)
     misfit = function(x) @ function(x)

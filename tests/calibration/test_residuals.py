@@ -20,16 +20,17 @@ COUNT = 12
 Q = np.random.default_rng(0).uniform(-0.5, 0.5, (COUNT, 6))
 
 
-def frames(base=BASE):
-    return Frames(base, Pose(TOOL.rotation[None], TOOL.position_mm[None]))
+def fit_of(model, shift_mm=(0.0, 0.0, 0.0)):
+    """A model whose base is moved in the instrument's frame."""
+    tool = Pose(TOOL.rotation[None], TOOL.position_mm[None])
+    return Fit(model, Frames(Pose(BASE.rotation, BASE.position_mm + shift_mm), tool))
 
 
-def fitted(base_shift_mm=(0.0, 0.0, 0.0)) -> dict[str, Fit]:
-    """All three models the nominal arm; the VEC's base moved (instrument's frame)."""
-    moved = Pose(BASE.rotation, BASE.position_mm + base_shift_mm)
+def fitted(shift_mm=(0.0, 0.0, 0.0)):
+    """All three models the nominal arm, the base of DH moved."""
     empty = vec.without_errors(ARM.dh, np.full(6, -1.0), np.full(6, 1.0), 1)
-    plain = Fit(ARM.dh, frames())
-    return {"vec": Fit(empty, frames(moved)), "dh": plain, "nominal": plain}
+    plain = fit_of(ARM.dh)
+    return {"vec": fit_of(empty), "dh": fit_of(ARM.dh, shift_mm), "nominal": plain}
 
 
 def measured(shift_mm, turn_rad):
@@ -55,9 +56,7 @@ def test_every_row_is_judged_by_a_model_that_has_not_seen_its_fold():
 
     def refit(train, number):
         shown[number] = set(train.pose.tolist())
-        # Each fold's model is told apart by where its base is.
-        moved = Pose(BASE.rotation, BASE.position_mm + np.array([10.0 * (number + 1), 0, 0]))
-        return {**fitted(), "dh": Fit(ARM.dh, frames(moved))}
+        return fitted((10.0 * (number + 1), 0.0, 0.0))  # tells the models of the folds apart
 
     held_out, trained = residuals.cross_validated(seen, refit, [0, 1, 2], ["vec", "dh", "nominal"])
     size = np.linalg.norm(held_out["dh_vs_measured"].position_mm, axis=1)

@@ -6,51 +6,35 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from simulated import POINT, POSE, THREE, disturbed, joints, measure
+from simulated import POINT, POSE, THREE, disturbed, fit, joints, measure, predicted
 
-from kinacc.calibration import constraints, fitting, frames, robust
-from kinacc.calibration.constraints import free_parameters
-from kinacc.config import parameter_rules
-from kinacc.geometry import compose
-from kinacc.kinematics import dh, robot
+from kinacc.calibration import constraints, frames, robust
+from kinacc.config.parameter_rules import rules
+from kinacc.kinematics import robot
 
 ARM = robot.load("mh180")
-FREE = free_parameters(6)
-WEIGHT = 500.0
+FREE = constraints.free_parameters(6)
 
 
-def seen(kind=POSE, count=60, seed=0, noise_mm=0.05, sessions=1):
+def observed(kind=POSE, count=60, seed=0, sessions=1):
     rng = np.random.default_rng(seed)
     true = disturbed(ARM.dh, FREE, rng)
-    return true, measure(true, joints(ARM, count, rng), kind, rng, noise_mm, sessions)
+    return measure(true, joints(ARM, count, rng), kind, rng, 0.05, sessions)
 
 
-def fitted(observations, arm_rules=None, frame_rules=None, **given):
-    arm = constraints.arm_terms(ARM.dh, FREE, parameter_rules.rules(arm_rules or {}))
-    stated = frames.known(
-        ARM.base,
-        robot.carried(ARM),
-        sessions=len(observations.session_names),
-        targets=len(observations.target_names),
-    )
-    of_frames = frames.frame_terms(observations, stated, parameter_rules.rules(frame_rules or {}))
-    return fitting.fit(
-        observations,
-        arm.nominal,
-        free=arm.free,
-        std=arm.std,
-        rotation_weight_mm_per_rad=WEIGHT,
-        threshold=1e-3,
-        frame_terms=of_frames,
-        **given,
-    )
+def fitted(observations, arm_rules=None, frame_rules=None, **settings):
+    arm = constraints.arm_terms(ARM.dh, FREE, rules(arm_rules or {}))
+    count = len(observations.session_names), len(observations.target_names)
+    stated = frames.known(ARM.base, robot.carried(ARM), *count)
+    terms = frames.frame_terms(observations, stated, rules(frame_rules or {}))
+    return fit(observations, arm.nominal, arm.free, std=arm.std, frame_terms=terms, **settings)
 
 
 @pytest.mark.parametrize("kind", [POINT, THREE, POSE])
 @pytest.mark.parametrize("sessions", [1, 2])
 def test_fixed_frames_stay_and_the_rest_fits_as_well(kind, sessions):
     """With every component fixed where the plain fit found it, the same optimum is reached."""
-    _, data = seen(kind, sessions=sessions)
+    data = observed(kind, sessions=sessions)
     plain = fitted(data)
     first = data.target_names[0]
     names = [f"base {axis}" for axis in "xyz"] + [f"{first} {axis}" for axis in "xyz"]
@@ -69,7 +53,7 @@ def test_fixed_frames_stay_and_the_rest_fits_as_well(kind, sessions):
 
 def test_a_prior_weighs_as_its_standard_deviation_says():
     """Posterior of one parameter by the formula for independent Gaussian knowledge."""
-    _, data = seen()
+    data = observed()
     plain = fitted(data)
     std, at = plain.std[3, 0], plain.model.theta_offset_rad[3]
     value = at + 4 * std
@@ -81,7 +65,7 @@ def test_a_prior_weighs_as_its_standard_deviation_says():
 
 def test_a_prior_determines_what_the_data_leave_open():
     """Axes 2 and 3 are antiparallel: d2 and d3 only show as their difference."""
-    _, data = seen()
+    data = observed()
     plain = fitted(data)
     assert np.isnan(plain.std[1, 1])
     rules = {"joint 2 d": {"value_mm": 5.0, "prior_std_mm": 0.2}}
@@ -95,18 +79,16 @@ def test_a_prior_determines_what_the_data_leave_open():
 
 @pytest.mark.parametrize("loss", [robust.HUBER, robust.TUKEY])
 def test_a_robust_loss_forgives_rows_far_off(loss):
-    _, clean = seen(count=150, seed=4)
+    clean = observed(count=150, seed=4)
     position = clean.position_mm.copy()
     position[:12] += np.random.default_rng(1).normal(size=(12, 3)) * 8.0
     spoiled = replace(clean, position_mm=position)
-    reference, new = fitted(clean), joints(ARM, 200, np.random.default_rng(9))
+    new = joints(ARM, 200, np.random.default_rng(9))
+    wanted = predicted(fitted(clean), new).position_mm
 
     def off(fit):
-        got, wanted = (
-            compose(each.frames.base, compose(dh.forward(each.model, new), each.frames.tool))
-            for each in (fit, reference)
-        )
-        return np.sqrt(np.mean(np.sum((got.position_mm - wanted.position_mm) ** 2, axis=1)))
+        error = predicted(fit, new).position_mm - wanted
+        return np.sqrt(np.mean(np.sum(error**2, axis=1)))
 
     squares, found = fitted(spoiled), fitted(spoiled, loss=loss)
     assert off(squares) > 0.3

@@ -1,0 +1,22 @@
+"""The measured arms of ``benchmarks/reach.yaml``, as a calibration reads them."""
+
+from __future__ import annotations
+
+from contextlib import chdir
+from pathlib import Path
+
+from kinacc.calibration.observations import from_columns
+from kinacc.kinematics import robot
+from kinacc.synthetic import source
+from kinacc.workflow.data_sets import read_data_sets
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def measured_arm(name):
+    """Arm, calibration settings and observations of a data set."""
+    with chdir(ROOT):
+        settings = read_data_sets(["benchmarks/reach.yaml"]).settings[name]
+        columns = source.run({}, settings)["measurements"]
+    arm = robot.load(settings["robot"])
+    return arm, settings["calibration"], from_columns(columns, arm)
