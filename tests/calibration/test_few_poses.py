@@ -25,15 +25,14 @@ def settings():
     return made
 
 
-def positions(name, offset_deg=(0.2, 0.45), count=300, seed=1):
+def positions(name, offset_deg=(0.2, 0.45), count=300):
     """Positions of an arm whose joints are off by ``offset_deg`` either way."""
-    arm, rng = robot.load(name), np.random.default_rng(seed)
-    free = free_parameters(arm.dh.joints, parallel_joints(arm.dh), True)
+    arm, rng = robot.load(name), np.random.default_rng(1)
+    free = free_parameters(6, parallel_joints(arm.dh), True)
     true = simulated.disturbed(arm.dh, free, rng, 0.5e-3, 0.3)
-    turned = true.start.reshape(free.shape).copy()
-    size = np.deg2rad(rng.uniform(*offset_deg, len(free)))
-    turned[:, 0] += size * rng.choice([-1.0, 1.0], len(free))
-    true = true.with_parameters(turned.ravel())
+    turned = np.zeros((6, 5))
+    turned[:, 0] = np.deg2rad(rng.uniform(*offset_deg, 6)) * rng.choice([-1.0, 1.0], 6)
+    true = true.with_parameters(true.start + turned.ravel())
     return arm, simulated.measure(true, simulated.joints(arm, count, rng), simulated.POINT, rng)
 
 

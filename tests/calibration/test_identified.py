@@ -5,45 +5,27 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 import pytest
-from simulated import POINT, POSE, THREE, disturbed, joints, measure
+from simulated import POINT, POSE, THREE, disturbed, fit, joints, measure
 
-from kinacc.calibration import constraints, fitting, identified, uncertainty
+from kinacc.calibration import constraints, identified, uncertainty
 from kinacc.calibration.frames import known
 from kinacc.calibration.identifiability import LeftOpen
-from kinacc.config import parameter_rules
 from kinacc.kinematics import robot
 
 
-def asked(name, kind=POSE, sessions=1, instead=False, rules=None, moving=None, poses=80):
-    """Parameters of a fit to simulated poses by name; joints not in ``moving`` stand still."""
+def asked(name, kind=POSE, sessions=1):
+    """Table ``dh_identified`` by parameter, of a fit to simulated poses."""
     arm, rng = robot.load(name), np.random.default_rng(0)
-    hayati = constraints.parallel_joints(arm.dh)
-    free = constraints.free_parameters(arm.dh.joints, hayati, instead)
-    q = joints(arm, poses, rng)
-    for joint in range(arm.dh.joints) if moving else ():
-        if joint + 1 not in moving:
-            q[:, joint] = 0.3
-    data = measure(disturbed(arm.dh, free, rng), q, kind, rng, sessions=sessions)
-    terms = constraints.arm_terms(arm.dh, free, parameter_rules.rules(rules or {}))
-    fit = fitting.fit(
-        data,
-        terms.nominal,
-        free=terms.free,
-        std=terms.std,
-        rotation_weight_mm_per_rad=500.0,
-        threshold=1e-3,
-    )
-    known = uncertainty.of_fit(fit, data.target_names)
-    return by_name(identified.table(fit, known, data)), fit
-
-
-def by_name(table):
-    """Rows of ``dh_identified`` by parameter."""
-    return pd.DataFrame(dict(table)).set_index("parameter")
+    free = constraints.free_parameters(6, constraints.parallel_joints(arm.dh))
+    true, q = disturbed(arm.dh, free, rng), joints(arm, 80, rng)
+    data = measure(true, q, kind, rng, sessions=sessions)
+    found = fit(data, arm.dh, free)
+    known_of = uncertainty.of_fit(found, data.target_names)
+    return pd.DataFrame(identified.table(found, known_of, data)).set_index("parameter")
 
 
 def test_what_every_serial_arm_hides():
-    found, _ = asked("mh180")
+    found = asked("mh180")
     expected = {
         "j1.theta_offset_rad": "theta of joint 1 +1 mrad, base rz -1 mrad",
         "j1.d_mm": "d of joint 1 +1 mm, base z -1 mm",
@@ -59,7 +41,7 @@ def test_what_every_serial_arm_hides():
 
 @pytest.mark.parametrize(("kind", "sessions"), [(POINT, 1), (THREE, 2), (POSE, 2)])
 def test_three_parallel_axes_show_one_sum(kind, sessions):
-    found, _ = asked("ur10", kind, sessions)
+    found = asked("ur10", kind, sessions)
     for joint in (2, 3, 4):
         assert "d of joint" in found.statement[f"j{joint}.d_mm"]
     assert ("base2 z" in found.statement["j1.d_mm"]) == (sessions == 2)

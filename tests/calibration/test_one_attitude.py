@@ -2,65 +2,46 @@
 
 from __future__ import annotations
 
-from copy import deepcopy
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
 from simulated import POSE, disturbed, measure
+from test_few_poses import settings
 
-from kinacc.calibration import constraints, identified, uncertainty
+from kinacc.calibration import identified, uncertainty
+from kinacc.calibration.constraints import free_parameters
 from kinacc.calibration.models import estimators
 from kinacc.geometry import Pose
 from kinacc.kinematics import robot
-from kinacc.workflow.data_sets import read_data_sets
 
-ROOT = Path(__file__).resolve().parents[2]
 STATED_MM = 140.0
+ARM = replace(robot.load("ur10"), tool=Pose(np.eye(3), np.array([0.0, 0.0, STATED_MM])))
 
 
 @cache
-def settings():
-    paths = [str(ROOT / "config.yaml"), str(ROOT / "examples/ur10.yaml")]
-    return read_data_sets(paths).settings["ur10_d"]
-
-
-def stated_arm():
-    return replace(robot.load("ur10"), tool=Pose(np.eye(3), np.array([0.0, 0.0, STATED_MM])))
-
-
-@cache
-def pointing_one_way(kind=POSE, sessions=1):
+def pointing_one_way():
     """Poses of an arm with axes off by a mrad; the last one as described never tilts."""
-    arm, rng = stated_arm(), np.random.default_rng(1)
-    q = np.zeros((120, 6))
+    rng, q = np.random.default_rng(1), np.zeros((120, 6))
     q[:, 1:3] = rng.uniform([-1.5, 0.5], [-0.5, 1.5], (120, 2))
     q[:, 0] = rng.uniform(-1.0, 1.0, 120)
     q[:, 4] = q[:, 0] + rng.normal(0.0, 2e-4, 120)  # to what a controller reports
     q[:, 3] = -q[:, 1] - q[:, 2]
     q[:, 5] = rng.uniform(-1.0, 1.0, 120)
-    free = constraints.free_parameters(6, (2, 3))
-    return measure(disturbed(arm.dh, free, rng), q, kind, rng, sessions=sessions)
+    return measure(disturbed(ARM.dh, free_parameters(6, (2, 3)), rng), q, POSE, rng)
 
 
 @cache
-def fitted(kind=POSE, sessions=1, **tool_z):
+def fitted(**tool_z):
     """Every model of the same poses by kind, with ``tool_z`` for the rule of that name."""
-    seen = pointing_one_way(kind, sessions)
-    calibration = deepcopy(settings()["calibration"])
-    calibration["vec"] |= {"order": 2}
-    calibration["compliance"] = {
-        "joints": [2, 3],
-        "gravity": [0.0, 0.0, -1.0],
-        "payload": {"mass_kg": 0.0, "centre_mm": [0.0, 0.0, 0.0]},
-        "links": [],
-    }
+    calibration = settings()
+    calibration["vec"] |= {"order": 2, "prior": "stated"}
+    calibration["compliance"] |= {"joints": [2, 3]}
     calibration["frames"] = {"t0 z": tool_z} if tool_z else {}
     found = {}
-    for each in estimators(calibration, stated_arm(), seen).values():
-        found[each.kind] = each.fit(seen, found)
+    for kind, estimator in estimators(calibration, ARM, pointing_one_way()).items():
+        found[kind] = estimator.fit(pointing_one_way(), found)
     return found
 
 
