@@ -171,6 +171,6 @@ def test_a_plan_simulates_with_the_errors_of_the_model_a_campaign_would_be_about
         path = folder / "model_selection.parquet"
         columns = store.read(path)
         columns["selected"] = (columns["model"] == model).astype(int)
-        store.write(path, "model_selection", columns, store.read_metadata(path))
+        store.write_table(path, "model_selection", columns, store.read_metadata(path))
         largest = sizes[held_out & (errors["comparison"] == f"{model}_vs_measured")].max()
         assert errors_of(str(folder)).size_mm.max() == pytest.approx(largest, rel=0.02)

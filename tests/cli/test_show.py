@@ -35,7 +35,7 @@ def folder(tmp_path):
         "row": np.arange(POSES) + 2,
     }
     provenance = dict.fromkeys(PROVENANCE_KEYS, "1")
-    store.write(here / "measurements.parquet", "measurements", columns, provenance)
+    store.write_table(here / "measurements.parquet", "measurements", columns, provenance)
     (here / "vec_model.parquet").write_bytes(b"PAR1 and no more")
     pq.write_table(pa.table({"a": [1, 2], "b": ["x", None]}), here / "own.parquet")
     return here

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from oracles import assessors, kinematics, small_study, tables
+from oracles import assessors, small_study, tables
 
 PAPER = {
     ("table1", "vec_vs_measured", "position"): (0.705, 1.635, 1.731),
@@ -21,11 +21,6 @@ def measurements(finished):
     return tables.rows(finished, "measurements")
 
 
-@pytest.fixture(scope="module")
-def models(finished):
-    return tables.models(finished)
-
-
 # --- measurements and fits ------------------------------------------------------------------------
 
 
@@ -38,31 +33,6 @@ def test_folds_keep_a_configuration_together_and_name_the_validation_rows(measur
         assert row["subset"] == ("validation" if row["fold"] == 1 else "train")
     sizes = [list(fold_of.values()).count(fold) for fold in range(4)]
     assert max(sizes) - min(sizes) <= 1
-
-
-def test_frames_of_the_synthetic_arm_are_its_own(models):
-    assert {model for model, _ in models.frames} == {"vec", "dh", "nominal"}
-    for frame in models.frames.values():
-        np.testing.assert_allclose(frame, np.eye(4), rtol=0, atol=1e-12)
-
-
-def test_the_vec_acts_on_the_nominal_arm_and_covers_the_measured_joints(models, measurements):
-    np.testing.assert_allclose(
-        np.array(models.nominal), np.array(kinematics.MH180), rtol=0, atol=1e-12
-    )
-    for row in models.vec:
-        q = [tables.joints(m)[row["joint"] - 1] for m in measurements]
-        assert row["q_min_rad"] <= min(q)
-        assert row["q_max_rad"] >= max(q)
-
-
-# --- residuals ------------------------------------------------------------------------------------
-
-
-# --- accuracy map and assessment points -----------------------------------------------------------
-
-
-# --- study ----------------------------------------------------------------------------------------
 
 
 def true_errors(finished) -> np.ndarray:

@@ -118,31 +118,3 @@ def test_points_fit_their_contract_and_state_the_error_of_their_joints(changed):
     assert np.allclose(stated, error, atol=1e-9)
     assert np.allclose(columns["true_error_mm"], np.linalg.norm(error, axis=1))
     assert limits.within(q, model.q_min_rad, model.q_max_rad).all()
-
-
-def test_measured_points_are_cross_validated_errors_averaged_over_readings():
-    count = 12
-    rows = np.repeat(np.arange(count), 2)
-    rng = np.random.default_rng(1)
-    measurements = {f"q{i}": rng.normal(size=2 * count) for i in range(1, 7)}
-    measurements |= {f"s{i}": np.ones(2 * count, dtype=np.int8) for i in range(1, 7)}
-    comparison = np.repeat(["dh_vs_measured", "vec_vs_measured"], 4 * count).astype(object)
-    estimate = np.tile(np.repeat(["train", "cross_validated"], 2 * count), 2).astype(object)
-    errors = {
-        "comparison": comparison,
-        "estimate": estimate,
-        "row": np.tile(np.arange(2 * count), 4),
-        "pose": np.tile(rows, 4),
-        "target": np.full(8 * count, "tool", dtype=object),
-    }
-    errors |= {f"e{axis}_mm": rng.normal(size=8 * count) for axis in "xyz"}
-    given = {"pose_errors": errors, "measurements": measurements}
-    columns = evaluation.points(given, settings(space="measured", points=5))["assessment_points"]
-    to_table("assessment_points", columns, PROVENANCE)
-    assert len(columns["point"]) == 5
-    held_out = (comparison == "dh_vs_measured") & (estimate == "cross_validated")
-    for i in range(5):
-        row = np.flatnonzero(measurements["q1"] == columns["q1"][i])[0]
-        same = held_out & (errors["pose"] == rows[row])
-        assert same.sum() == 2
-        assert np.isclose(columns["ey_mm"][i], errors["ey_mm"][same].mean())

@@ -6,9 +6,10 @@ Counts, codes, verdicts and words are compared exactly, numbers within the toler
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -36,8 +37,8 @@ _ROUNDING = ("last_step", "gap", "undetermined_direction")
 class Difference:
     """One column that differs, or (``column`` empty) rows or a file that only one side has.
 
-    ``row`` is the first row by its key, ``before`` and ``now`` its values; ``largest`` is the
-    largest difference of numbers in ``unit``.
+    ``rows`` is their number and ``row`` the first by its key; ``largest`` is the largest
+    difference of numbers in ``unit``.
     """
 
     table: str
@@ -45,19 +46,12 @@ class Difference:
     what: str
     rows: int = 0
     row: str = ""
-    before: object = None
-    now: object = None
     largest: float | None = None
     unit: str = ""
 
     def __str__(self) -> str:
         place = f"{self.table}, column {self.column}" if self.column else self.table
-        if not self.row:
-            return f"{place}: {self.what}"
-        text = (
-            f"{place}: {self.rows} rows differ, first {self.row}: {self.before!r} -> {self.now!r}"
-        )
-        return text if self.largest is None else f"{text}, at most {self.largest:.3g} {self.unit}"
+        return f"{place}: {self.what}"
 
 
 def compare_folders(before: Path, now: Path) -> Iterator[Difference]:
@@ -69,11 +63,11 @@ def compare_folders(before: Path, now: Path) -> Iterator[Difference]:
     if not paths:
         raise InputError(Problem(str(before), "holds no table", "a folder of results"))
     for path in paths:
-        second = now / path.relative_to(before)
-        if not second.is_file():
-            yield Difference(str(path.relative_to(before)), "", "missing")
-            continue
-        yield from compare_tables(path, second)
+        name = path.relative_to(before)
+        if (now / name).is_file():
+            yield from compare_tables(path, now / name)
+        else:
+            yield Difference(str(name), "", "missing")
 
 
 def compare_tables(before: Path, now: Path) -> Iterator[Difference]:
@@ -83,38 +77,37 @@ def compare_tables(before: Path, now: Path) -> Iterator[Difference]:
     old, new = map(store.read_table, (before, now))
     for column in old.columns.symmetric_difference(new.columns):
         yield Difference(name, str(column), "missing" if column in old else "new")
-    joints = joint_count(artefact, old.columns) if artefact else 0
-    known = {item.name: item for item in artefact.for_joints(joints)} if artefact else {}
+    columns = artefact.for_joints(joint_count(artefact, old.columns)) if artefact else ()
+    known = {item.name: item for item in columns}
     key = [item for item in (artefact.key if artefact else ()) if item in old and item in new]
-    old, new = _keyed(old, key, name), _keyed(new, key, name)
-    for which, single, second in (("missing", old, new), ("new", new, old)):
+    old, new = (_by_key(table, key, name) for table in (old, new))
+    for word, single, second in (("missing", old, new), ("new", new, old)):
         only = single.index.difference(second.index)
         if len(only):
-            yield Difference(name, "", f"{len(only)} rows {which}, first {_row(key, only[0])}")
+            yield Difference(name, "", f"{len(only)} rows {word}, first {_row(key, only[0])}")
     common = old.index.intersection(new.index)
     old, new = old.loc[common], new.loc[common]
     for column in old.columns.intersection(new.columns).difference(key, sort=False):
-        contract = known.get(column)
-        allowed = _tolerance(contract, old, column)
-        single, second = old[column], new[column]
+        single, second, largest, text = old[column], new[column], None, ""
         differs = (single.isna() != second.isna()).to_numpy()
         both = (single.notna() & second.notna()).to_numpy()
-        largest = None
+        unit = known[column].unit if column in known else ""
         if single.dtype.kind in "fiu" and second.dtype.kind in "fiu":
             apart = np.abs(second.to_numpy(float) - single.to_numpy(float))
-            beyond = both & ~(apart <= allowed)
+            beyond = both & ~(apart <= _tolerance(known.get(column), old))
             largest = float(np.max(apart[beyond], initial=0.0))
+            text = f", at most {largest:.3g} {unit}"
         else:
             beyond = both & (single.to_numpy(object) != second.to_numpy(object))
-        differs = differs | beyond
-        if differs.any():
-            first = int(np.argmax(differs))
-            unit = contract.unit if contract and contract.unit != "1" else ""
-            values = (int(differs.sum()), _row(key, old.index[first]), single.iloc[first])
-            yield Difference(name, str(column), "", *values, second.iloc[first], largest, unit)
+        rows = np.flatnonzero(differs | beyond)
+        if rows.size:
+            row = _row(key, common[rows[0]])
+            pair = f"{single.iloc[rows[0]]!r} -> {second.iloc[rows[0]]!r}"
+            text = f"{rows.size} rows differ, first {row}: {pair}{text}"
+            yield Difference(name, str(column), text, rows.size, row, largest, unit)
 
 
-def _keyed(table: pd.DataFrame, key: list[str], name: str) -> pd.DataFrame:
+def _by_key(table: pd.DataFrame, key: list[str], name: str) -> pd.DataFrame:
     """Rows by their key and, where several share one, a running number."""
     if name.endswith("_fit"):
         table = table[~table["quantity"].isin(_ROUNDING)]
@@ -126,25 +119,26 @@ def _keyed(table: pd.DataFrame, key: list[str], name: str) -> pd.DataFrame:
     return table.set_index(pd.MultiIndex.from_frame(keys))
 
 
-def _row(key: list[str], values: object) -> str:
-    values = values if isinstance(values, tuple) else (values,)
-    texts = [f"{name}={value}" for name, value in zip(key, values, strict=False) if value != ""]
-    return ", ".join(texts) or str(values[0])
+def _row(key: Sequence[str], values: Any) -> str:
+    if not key:
+        return str(values)
+    return ", ".join(
+        f"{name}={value}" for name, value in zip(key, values, strict=False) if value != ""
+    )
 
 
-def _tolerance(column: Column | None, rows: pd.DataFrame, name: str) -> np.ndarray | float:
+def _tolerance(column: Column | None, rows: pd.DataFrame) -> np.ndarray | float:
     """What numbers of a column may differ by: one for all, or one for each row."""
-    if column is None or column.kind == "text":
+    if column is None:
         return 0.0
-    within = column.same_within
-    if not isinstance(within, str):
+    if not isinstance(within := column.same_within, str):
         return within
     if within == BY_STD:
-        return _RELATIVE * float(np.nanmax(np.abs(rows[name].to_numpy(float)), initial=0.0))
-    if within in (BY_ROW, BY_POSES) and column.unit not in SAME_WITHIN:
-        if "error" in rows:
-            lengths = rows["error"].str.startswith("delta").to_numpy(bool)
-            return np.where(lengths, SAME_WITHIN["mm"], SAME_WITHIN["rad"])
-        units = rows["unit"] if "unit" in rows else pd.Series("", index=rows.index)
-        return units.map(SAME_AMONG).fillna(_RELATIVE).to_numpy(float)
-    return SAME_WITHIN.get(column.unit, _RELATIVE)
+        return _RELATIVE * float(np.nanmax(np.abs(rows[column.name].to_numpy(float)), initial=0.0))
+    if within not in (BY_ROW, BY_POSES) or column.unit in SAME_WITHIN:
+        return SAME_WITHIN.get(column.unit, _RELATIVE)
+    if "error" in rows:
+        lengths = rows["error"].str.startswith("delta").to_numpy(bool)
+        return np.where(lengths, SAME_WITHIN["mm"], SAME_WITHIN["rad"])
+    units = rows["unit"] if "unit" in rows else pd.Series("", index=rows.index)
+    return units.map(SAME_AMONG).fillna(_RELATIVE).to_numpy(float)

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import os
 import shlex
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -20,7 +21,6 @@ from kinacc.tables.atomic import write_whole
 from kinacc.tables.columns import (
     JOINTS_MAX,
     JOINTS_MIN,
-    Artefact,
     Column,
     Columns,
     joint_count,
@@ -36,7 +36,6 @@ _ARROW_TYPES = {
     "text": pa.string(),
 }
 _MOST_BYTES = 400_000_000  # of a table in memory: a file of few bytes may unpack to many
-Read = TypeVar("Read")
 
 
 def read_table(path: Path | str) -> pd.DataFrame:
@@ -75,16 +74,6 @@ def write_table(
     write_whole(path, content_of(to_table(artefact, table, provenance)))
 
 
-write = write_table
-
-
-def artefact_named(name: str) -> Artefact:
-    """The contract of an artefact; InputError if there is none of that name."""
-    if name not in ARTEFACTS:
-        raise InputError(Problem(f"artefact {name!r}", "not in the contract", ", ".join(ARTEFACTS)))
-    return ARTEFACTS[name]
-
-
 def arrow_schema(
     artefact: str,
     joints: int = 0,
@@ -95,7 +84,7 @@ def arrow_schema(
 
     ``names``: of columns there are, where some may be absent.
     """
-    contract = artefact_named(artefact)
+    contract = ARTEFACTS[artefact]
     columns = contract.for_joints(joints) if names is None else contract.in_file(joints, names)
     fields = [
         pa.field(
@@ -118,17 +107,17 @@ def to_table(
     InputError naming every column that is missing, unknown or of another length, null where none
     may be, number that is not finite, and value of a wrong type.
     """
-    contract = artefact_named(artefact)
-    where = f"table {artefact}"
-    problems = [
-        Problem(where, f"provenance lacks {key} or has one too many", ", ".join(PROVENANCE_KEYS))
-        for key in sorted({*provenance} ^ {*PROVENANCE_KEYS})
-    ]
+    contract, where = ARTEFACTS[artefact], f"table {artefact}"
+    problems = []
+    if {*provenance} != {*PROVENANCE_KEYS}:
+        message = f"has provenance {', '.join(provenance)}"
+        problems.append(Problem(where, message, ", ".join(PROVENANCE_KEYS)))
     joints = joint_count(contract, columns)
     if contract.has_joints and not JOINTS_MIN <= joints <= JOINTS_MAX:
         allowed = f"q1.. of {JOINTS_MIN} to {JOINTS_MAX}"
         problems.append(Problem(where, f"has columns of {joints} joints", allowed))
-    names = [column.name for column in contract.for_joints(joints)]
+    known = contract.in_file(joints, columns)
+    names = [column.name for column in known]
     problems += [
         Problem(f"{where}, column {name}", "not in the contract", ", ".join(names))
         for name in columns
@@ -136,25 +125,22 @@ def to_table(
     ]
     rows = max((len(columns[name]) for name in columns), default=0)
     arrays = []
-    for column in contract.in_file(joints, columns):
-        place = f"{where}, column {column.name}"
-        if column.name not in columns and not column.optional:
-            problems.append(Problem(place, "missing"))
-            continue
-        values = columns[column.name] if column.name in columns else [None] * rows
-        array, wrong = _to_arrow(column, values)
-        if not wrong and len(array) != rows:
-            wrong = ("columns of different lengths", f"{rows} rows")
-        problems += [Problem(place, *wrong)] if wrong else []
-        arrays.append(array)
+    for column in known:
+        values, wrong = columns.get(column.name), ("missing", "")
+        if values is not None or column.optional:
+            array, wrong = _to_arrow(column, [None] * rows if values is None else values)
+            arrays.append(array)
+            if not any(wrong) and len(array) != rows:
+                wrong = "columns of different lengths", f"{rows} rows"
+        if any(wrong):
+            problems.append(Problem(f"{where}, column {column.name}", *wrong))
     refuse(problems, f"{artefact} does not fit its contract")
     return pa.Table.from_arrays(arrays, schema=arrow_schema(artefact, joints, provenance, columns))
 
 
-def _to_arrow(column: Column, values: Any) -> tuple[pa.Array, tuple[str, str] | None]:
+def _to_arrow(column: Column, values: Any) -> tuple[pa.Array, tuple[str, str]]:
     """Values in the type of a column; and what is wrong with them, beside what is allowed."""
-    kind = _ARROW_TYPES[column.kind]
-    is_text = column.kind == "text"
+    kind, is_text = _ARROW_TYPES[column.kind], column.kind == "text"
     if isinstance(values, pd.Series):
         values = values.to_numpy(object if is_text else None)
     try:
@@ -164,17 +150,14 @@ def _to_arrow(column: Column, values: Any) -> tuple[pa.Array, tuple[str, str] | 
         array = array.cast(kind)
     except (pa.ArrowException, TypeError, ValueError, OverflowError) as error:
         return None, (str(error).split("\n")[0], column.kind)
-    if array.null_count and not column.nullable:
-        where = rows(array.is_null().to_numpy(zero_copy_only=False))
-        return None, (f"null or NaN in {where}", "a value in every row")
-    if column.kind == "float":
-        numbers = array.to_numpy(zero_copy_only=False)
-        if np.isinf(numbers).any():
-            return None, (f"infinite in {rows(np.isinf(numbers))}", "finite numbers")
-    if array.null_count and not is_text:  # the same bytes below every null: digests depend on them
-        null = array.is_null().to_numpy(zero_copy_only=False)
-        array = pa.array(array.fill_null(0).to_numpy(zero_copy_only=False), kind, mask=null)
-    return array, None
+    null = np.asarray(array.is_null())
+    if null.any() and not column.nullable:
+        return None, (f"null or NaN in {rows(null)}", "a value in every row")
+    if column.kind == "float" and (infinite := np.isinf(np.asarray(array))).any():
+        return None, (f"infinite in {rows(infinite)}", "finite numbers")
+    if null.any() and not is_text:  # the same bytes below every null: digests depend on them
+        array = pa.array(np.asarray(array.fill_null(0)), kind, mask=null)
+    return array, ("", "")
 
 
 def digest_of(artefact: str, columns: pd.DataFrame | Mapping[str, Any]) -> str:
@@ -207,18 +190,20 @@ def read(path: Path | str, any_type: bool = False) -> Columns:
 
 def columns_in(table: pa.Table) -> Columns:
     """Columns as arrays: a null number is NaN (a nullable column is float64), a null text None."""
-    names = zip(table.schema, table.columns, strict=True)
-    return {field.name: _to_numpy(field, column) for field, column in names}
+    return {field.name: _to_numpy(field, table[place]) for place, field in enumerate(table.schema)}
 
 
 def _to_numpy(field: pa.Field, column: pa.ChunkedArray) -> np.ndarray:
     if pa.types.is_boolean(field.type):
-        return np.array(column.to_numpy(zero_copy_only=False))
-    if not (pa.types.is_integer(field.type) or pa.types.is_floating(field.type)):
+        return np.array(column)
+    if not _is_number(field.type):
         return texts(column.to_pylist())
-    if field.nullable or column.null_count:
-        return column.cast(pa.float64()).to_numpy().astype(np.float64)
-    return np.array(column.to_numpy())
+    is_real = field.nullable or column.null_count
+    return np.array(column, np.float64 if is_real else None)
+
+
+def _is_number(kind: pa.DataType) -> bool:
+    return pa.types.is_integer(kind) or pa.types.is_floating(kind)
 
 
 def read_arrow(path: Path | str, content: bytes | None = None, any_type: bool = False) -> pa.Table:
@@ -226,18 +211,16 @@ def read_arrow(path: Path | str, content: bytes | None = None, any_type: bool = 
 
     Checksums of pages are held to the pages. ``any_type`` and errors as of :func:`read`.
     """
-
-    def unpacked(file: pq.ParquetFile) -> pa.Table:
+    with _opened(path, content) as file:
         schema, footer = file.schema_arrow, file.metadata
         known = {pa.string(), pa.large_string(), pa.bool_(), pa.null()}
         refuse(
             Problem(f"{path}, column {field.name}", f"is of type {field.type}", "numbers, text")
             for field in (() if any_type else schema)
-            if not (pa.types.is_integer(field.type) or pa.types.is_floating(field.type))
-            and field.type not in known
+            if not _is_number(field.type) and field.type not in known
         )
-        groups = [footer.row_group(item) for item in range(footer.num_row_groups)]
         # No text is longer than all of a group; one that is held once may stand in every row.
+        groups = map(footer.row_group, range(footer.num_row_groups))
         longest = max((item.total_byte_size for item in groups), default=0)
         at_once = _MOST_BYTES // (10 * (longest + 16 * max(len(schema), 1)))
         batches, held = [], 0
@@ -246,10 +229,8 @@ def read_arrow(path: Path | str, content: bytes | None = None, any_type: bool = 
             held += max(batch.nbytes, 8 * batch.num_rows * len(schema))
             if held > _MOST_BYTES:
                 message = f"holds more than {_MOST_BYTES // 1_000_000} MB"
-                raise InputError(Problem(str(path), message, "a smaller table", remake(path)))
+                raise InputError(Problem(str(path), message, "a smaller table"))
         return pa.Table.from_batches(batches, schema)
-
-    return _open(path, unpacked, content)
 
 
 def remake(path: Path | str) -> str:
@@ -257,14 +238,10 @@ def remake(path: Path | str) -> str:
     return f"rm {shlex.quote(str(path))}, then run the workflow again"
 
 
-def read_schema(path: Path | str) -> pa.Schema:
-    """Arrow schema of a table's file; InputError if absent or not Parquet."""
-    return _open(path, lambda file: file.schema_arrow)
-
-
 def row_count(path: Path | str) -> int:
     """Number of rows of a table's file; InputError if absent or not Parquet."""
-    return _open(path, lambda file: file.metadata.num_rows)
+    with _opened(path) as file:
+        return file.metadata.num_rows
 
 
 def read_metadata(path: Path | str) -> dict[str, str]:
@@ -272,25 +249,28 @@ def read_metadata(path: Path | str) -> dict[str, str]:
 
     Raises InputError if the file is absent or not Parquet.
     """
-    raw = read_schema(path).metadata or {}
+    with _opened(path) as file:
+        raw = file.schema_arrow.metadata or {}
     return {key.decode(errors="replace"): raw[key].decode(errors="replace") for key in raw}
 
 
-def _open(
-    path: Path | str, opening: Callable[[pq.ParquetFile], Read], content: bytes | None = None
-) -> Read:
-    if content is None and os.path.exists(path) and not os.path.isfile(path):
-        raise InputError(Problem(str(path), "is no file", "a Parquet file"))  # a pipe has no end
+@contextmanager
+def _opened(path: Path | str, content: bytes | None = None) -> Iterator[pq.ParquetFile]:
+    """A Parquet file; what is wrong with it, within the block too, becomes an InputError."""
     try:
+        if content is None and os.path.exists(path) and not os.path.isfile(path):
+            raise InputError(
+                Problem(str(path), "is no file", "a Parquet file")
+            )  # a pipe has no end
         source = path if content is None else pa.BufferReader(content)
         with pq.ParquetFile(source, page_checksum_verification=True) as file:
-            return opening(file)
+            yield file
     except InputError as error:
         raise InputError([replace(item, fix=remake(path)) for item in error.problems]) from None
     except FileNotFoundError:
         raise InputError(Problem(str(path), "no such file", fix=remake(path))) from None
     except (pa.ArrowException, OSError, ValueError, OverflowError) as error:
-        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+        reason = (str(error) or type(error).__name__).splitlines()[0]
         message = f"not a readable Parquet file: {reason}"
         raise InputError(Problem(str(path), message, fix=remake(path))) from None
 

@@ -8,13 +8,22 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import NamedTuple
 
 from kinacc.errors import InputError, Problem
 
 FOLDER = "sums"
 _READ = "# read "
+_AGAIN = "run the workflow again"
+
+
+class _Line(NamedTuple):
+    stage: str
+    name: str
+    digest: str
+    is_read: bool
 
 
 def digest(content: bytes) -> str:
@@ -24,84 +33,73 @@ def digest(content: bytes) -> str:
 
 def text_of(written: Mapping[str, bytes], read: Mapping[str, str]) -> bytes:
     """Content of a sums file: contents ``written`` and digests ``read``, both by file name."""
-    lines = [f"{digest(content)}  {name}" for name, content in sorted(written.items())]
-    lines += [f"{_READ}{value}  {name}" for name, value in sorted(read.items())]
-    return "".join(f"{line}\n" for line in lines).encode()
-
-
-def folder_of(path: Path | str) -> Path:
-    """Folder of the data set that a file belongs to: the nearest one above with sums."""
-    path = Path(path)
-    return next((item for item in path.parents if (item / FOLDER).is_dir()), path.parent)
+    lines = [f"{digest(content)}  {name}\n" for name, content in sorted(written.items())]
+    lines += [f"{_READ}{value}  {name}\n" for name, value in sorted(read.items())]
+    return "".join(lines).encode()
 
 
 def stated(folder: Path | str) -> dict[str, str]:
     """Digests of all files that the stages of a data set left, by name in its folder."""
-    paths = sorted((Path(folder) / FOLDER).glob("*.sha256"))
-    lines = [line for path in paths for line in _parsed(path)]
-    return {name: value for name, value in lines if not value.startswith(_READ)}
+    return {line.name: line.digest for line in _lines(folder) if not line.is_read}
 
 
 def outdated(folder: Path | str) -> list[str]:
     """Names of files that were made from files which have changed since, or are gone."""
-    return sorted({created for _, whole in _changed_reads(Path(folder)) for created in whole})
+    stages = {line.stage for line in _changed_reads(folder)}
+    return sorted(e.name for e in _lines(folder) if e.stage in stages and not e.is_read)
 
 
 def changed_since(folder: Path | str) -> list[str]:
     """Names of files that changed since stages read them, as seen from the current folder."""
-    folder = Path(folder)
-    names = {name for name, _ in _changed_reads(folder)}
-    return sorted(os.path.relpath(folder / name) for name in names)
-
-
-def _changed_reads(folder: Path) -> Iterator[tuple[str, list[str]]]:
-    """Each file that changed since a stage read it, with what that stage left."""
-    now = stated(folder)
-    for path in sorted((folder / FOLDER).glob("*.sha256")):
-        lines = list(_parsed(path))
-        remaining = [name for name, value in lines if not value.startswith(_READ)]
-        for name, value in lines:
-            if value.startswith(_READ) and value != f"{_READ}{_digest_now(folder, name, now)}":
-                yield name, remaining
-
-
-def _digest_now(folder: Path, name: str, stated_now: Mapping[str, str]) -> str:
-    """Digest of a file as its stage left it or, of one from outside, as it is now."""
-    if name in stated_now or not name.startswith(".."):
-        return stated_now.get(name, "")
-    path = folder / name
-    return digest(path.read_bytes()) if path.is_file() else ""
+    names = {line.name for line in _changed_reads(folder)}
+    return sorted(os.path.relpath(Path(folder) / name) for name in names)
 
 
 def hold(path: Path | str, content: bytes) -> None:
     """Raise InputError where a file is not as its stage left it."""
-    folder = folder_of(path)
-    name = Path(path).relative_to(folder).as_posix()
-    remaining = stated(folder).get(name)
-    fix = f"rm {path}, then run the workflow again"
-    if remaining is None and (folder / FOLDER).is_dir():
-        message = f"has no digest in {folder / FOLDER}"
-        raise InputError(Problem(str(path), message, fix=fix))
-    if remaining is not None and remaining != digest(content):
-        raise InputError(Problem(str(path), "changed since its stage wrote it", fix=fix))
+    path = Path(path)
+    folder = next((item for item in path.parents if (item / FOLDER).is_dir()), None)
+    if folder is None:
+        return
+    expected = stated(folder).get(path.relative_to(folder).as_posix())
+    if expected != digest(content):
+        missing, changed_ = (
+            f"has no digest in {folder / FOLDER}",
+            "changed since its stage wrote it",
+        )
+        raise InputError(_problem(path, changed_ if expected else missing))
 
 
-def changed(folder: Path | str) -> Iterable[Problem]:
+def changed(folder: Path | str) -> Iterator[Problem]:
     """Every file of a data set that is missing or not as its stage left it."""
-    folder = Path(folder)
-    for name, remaining in stated(folder).items():
-        path = folder / name
-        fix = f"rm {path}, then run the workflow again"
+    for name, expected in stated(folder).items():
+        path = Path(folder) / name
         if not path.is_file():
-            yield Problem(str(path), "missing", fix="run the workflow again")
-        elif digest(path.read_bytes()) != remaining:
-            yield Problem(str(path), "changed since its stage wrote it", fix=fix)
+            yield Problem(str(path), "missing", fix=_AGAIN)
+        elif digest(path.read_bytes()) != expected:
+            yield _problem(path, "changed since its stage wrote it")
 
 
-def _parsed(path: Path) -> Iterable[tuple[str, str]]:
-    for line in path.read_text("utf-8", errors="replace").splitlines():
-        value, separator, name = line.partition("  ")
-        if not separator:
-            raise InputError(Problem(str(path), f"is not a list of digests: {line[:60]!r}",
-                                     fix=f"rm {path}, then run the workflow again"))  # fmt: skip
-        yield name, value
+def _problem(path: Path, message: str) -> Problem:
+    return Problem(str(path), message, fix=f"rm {path}, then {_AGAIN}")
+
+
+def _changed_reads(folder: Path | str) -> list[_Line]:
+    """Lines about files that changed since a stage read them: by digest, or outside as they are."""
+    lines, now = _lines(folder), stated(folder)
+    for name in {line.name for line in lines if line.name.startswith("..")} - {*now}:
+        path = Path(folder) / name
+        now[name] = digest(path.read_bytes()) if path.is_file() else ""
+    return [line for line in lines if line.is_read and line.digest != now.get(line.name)]
+
+
+def _lines(folder: Path | str) -> list[_Line]:
+    lines = []
+    for path in sorted((Path(folder) / FOLDER).glob("*.sha256")):
+        for line in path.read_text("utf-8", errors="replace").splitlines():
+            value, separator, name = line.partition("  ")
+            if not separator:
+                raise InputError(_problem(path, f"is not a list of digests: {line[:60]!r}"))
+            is_read = value.startswith(_READ)
+            lines.append(_Line(path.name, name, value.removeprefix(_READ), is_read))
+    return lines
