@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import cycle
 from typing import NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from kinacc.figures import style
-
-_POWER_TOP = 1.04
 
 
 class Curve(NamedTuple):
@@ -35,36 +34,29 @@ def draw(
     """
     widths = np.concatenate([curve.width_mm.ravel() for curve in curves])
     top = 1.08 * max(widths[np.isfinite(widths)].max(initial=0.0), wanted_mm or 0.0) or 1.0
+    share = "Share with a bound" if power is None else "Share that reach the aim"
     with style.house():
         figure = style.new_figure(style.DOUBLE_COLUMN_IN, 3.0)
         left, right = figure.subplots(1, 2, sharex=True)
-        for number, curve in enumerate(curves):
-            colour, marker = style.SERIES[number % len(style.SERIES)]
-            look = {"color": colour, "marker": marker, "ms": 3}
+        for curve, (colour, marker) in zip(curves, cycle(style.SERIES), strict=False):
             low, middle, high = curve.width_mm.T
-            stated = np.isfinite(low)
             high = np.where(np.isfinite(high), high, top)
-            left.fill_between(curve.budget, low, high, where=stated, color=colour, alpha=0.15, lw=0)
-            for edge in (low, high):
-                left.plot(curve.budget[stated], edge[stated], color=colour, lw=0.5, alpha=0.6)
+            left.fill_between(curve.budget, low, high, where=np.isfinite(low), color=colour,
+                              alpha=0.15, lw=0.5)  # fmt: skip
             middle = np.where(np.isfinite(middle), middle, np.nan)
+            look = {"color": colour, "marker": marker, "ms": 3}
             left.plot(curve.budget, middle, label=style.literal(curve.name), **look)
             right.plot(curve.budget, curve.power, **look)
-        left.set(ylim=(0.0, top), xlabel="Readings allowed", ylabel="Upper minus lower bound, mm")
         if wanted_mm is not None:
-            left.axhline(wanted_mm, **style.LIMIT)
-            style.outside_label(left, wanted_mm / top, "wanted", style.VERMILION)
-        share = "Share with a bound" if power is None else "Share that reach the aim"
-        right.set(ylim=(0.0, _POWER_TOP), xlabel="Readings allowed", ylabel=share)
+            left.axhline(wanted_mm, **style.LIMIT, label=f"wanted ({wanted_mm:g} mm)")
         if power is not None:
-            right.axhline(power, **style.LIMIT)
-            style.outside_label(right, power / _POWER_TOP, f"{power:.0%}\nwanted", style.VERMILION)
+            right.axhline(power, **style.LIMIT, label=f"wanted ({power:.0%})")
         if enough is not None:
-            for ax in (left, right):
-                ax.axvline(enough, color=style.MUTED, lw=0.8, ls=(0, (1, 1)))
-            right.annotate(f"{enough} readings", (enough, 0.02), xytext=(3, 0),
-                           textcoords="offset points", fontsize=style.SMALL_PT)  # fmt: skip
+            left.axvline(enough, color=style.MUTED, lw=0.8, ls=":")
+            right.axvline(enough, color=style.MUTED, lw=0.8, ls=":", label=f"{enough} readings")
+        left.set(ylim=(0.0, top), xlabel="Readings allowed", ylabel="Upper minus lower bound, mm")
+        right.set(ylim=(0.0, 1.04), xlabel="Readings allowed", ylabel=share)
         title = "median, 5 to 95 % of campaigns; to the top where some state no bound"
-        figure.legend(loc="outside lower center", ncols=min(len(curves), 4), title=title,
+        figure.legend(loc="outside lower center", ncols=4, title=title,
                       title_fontsize=style.SMALL_PT)  # fmt: skip
     return figure

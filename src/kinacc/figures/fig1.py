@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from scipy.stats import norm
 
 from kinacc.figures import style
 
@@ -18,6 +19,7 @@ MEASURED_MM = {
     "Less likely: far from its true value": 1.17,
     "More likely: near its true value": 1.4,
 }
+_RANGE_MM = (ETA_MM - 3.3 * SIGMA_MM, TRUE_MM + 3.3 * SIGMA_MM)
 
 
 class Case(NamedTuple):
@@ -44,7 +46,7 @@ def run(inputs: Mapping, settings: Mapping) -> Figure:
     return draw()
 
 
-def draw(dataset: str | None = None) -> Figure:
+def draw() -> Figure:
     """Draw the less likely case above the more likely one.
 
     Shaded: the part of the candidate's distribution farther from it than the measurement, whose
@@ -59,52 +61,29 @@ def draw(dataset: str | None = None) -> Figure:
         axes[1].set_xlabel("Error (mm)")
         handles = axes[0].get_legend_handles_labels()
         figure.legend(*handles, loc="outside lower center", ncols=1, alignment="left")
-        style.name_dataset(figure, dataset)
     return figure
 
 
 def _case(ax: Axes, measured_mm: float) -> None:
-    candidate, _, probability = judge(measured_mm, ETA_MM, SIGMA_MM)
-    peak = 1 / (SIGMA_MM * np.sqrt(2 * np.pi))
-    ends = min(candidate, TRUE_MM) - 3.3 * SIGMA_MM, max(candidate, TRUE_MM) + 3.3 * SIGMA_MM
-    x = np.linspace(*ends, 401)
-
-    def density(at, mean: float) -> np.ndarray:
-        return peak * np.exp(-0.5 * ((at - mean) / SIGMA_MM) ** 2)
-
-    ax.plot(
-        x, density(x, TRUE_MM), color=style.BLUE, ls=(0, (4, 2)),
-        label="distribution of ẽ about its true value e (H₀ does not hold)",
+    candidate, distance, probability = judge(measured_mm, ETA_MM, SIGMA_MM)
+    x = np.linspace(*_RANGE_MM, 801)
+    true, assumed = (norm(mean, SIGMA_MM).pdf(x) for mean in (TRUE_MM, candidate))
+    peak = assumed.max()
+    ax.plot(x, true, color=style.BLUE, ls=(0, (4, 2)),
+            label="distribution of ẽ about its true value e (H₀ does not hold)")  # fmt: skip
+    ax.plot(x, assumed, color=style.VERMILION, label="assumed under H₀, about the candidate ê")
+    ax.fill_between(
+        x, assumed, where=abs(x - candidate) >= distance * SIGMA_MM, color=style.ORANGE,
+        alpha=0.55, lw=0, label="Pₖ, the chance of a measurement farther from ê than ẽ",
     )  # fmt: skip
-    ax.plot(
-        x, density(x, candidate), color=style.VERMILION,
-        label="assumed under H₀, about the candidate ê",
-    )  # fmt: skip
-    reach = abs(measured_mm - candidate)
-    low, high = candidate - reach, candidate + reach
-    label = "Pₖ, the chance of a measurement farther from ê than ẽ"
-    for tail in (np.append(x[x <= low], low), np.append(high, x[x >= high])):
-        shade = density(tail, candidate)
-        ax.fill_between(tail, shade, color=style.ORANGE, alpha=0.55, lw=0, label=label)
-        label = ""
-    ax.vlines(TRUE_MM, 0, peak, color=style.BLUE, lw=0.8, ls=(0, (4, 2)))
-    ax.vlines(candidate, 0, peak, color=style.VERMILION, lw=0.8)
-    ax.plot(
-        [measured_mm] * 2, [0, peak], color=style.INK, lw=1, marker="o", ms=3.5,
-        markevery=[0], clip_on=False, zorder=4,
-    )  # fmt: skip
-    for place, mark, colour in (
+    for place, text, colour in (
         (candidate, "ê = η", style.VERMILION),
         (TRUE_MM, "e", style.BLUE),
         (measured_mm, "ẽ", style.INK),
     ):
-        ax.text(
-            place, 1.03 * peak, mark, ha="center", va="bottom", color=style.darker(colour),
-            bbox={"fc": "white", "ec": "none", "pad": 0.6}, zorder=5,
-        )  # fmt: skip
-    ax.text(
-        0.985, 0.93, f"Pₖ = {probability:.2f}", transform=ax.transAxes, ha="right", va="top",
-        fontsize=style.TEXT_PT + 1,
-    )  # fmt: skip
-    ax.set(ylim=(0, peak * 1.28), xlim=ends, ylabel="Density (1/mm)")
+        ax.vlines(place, 0, peak, color=colour, lw=0.8)
+        ax.text(place, 1.03 * peak, text, ha="center", color=style.darker(colour))
+    ax.plot(measured_mm, 0.0, "o", color=style.INK, ms=3.5, clip_on=False)
+    ax.text(0.985, 0.85, f"Pₖ = {probability:.2f}", transform=ax.transAxes, ha="right")
+    ax.set(ylim=(0, peak * 1.28), xlim=_RANGE_MM, ylabel="Density (1/mm)")
     ax.grid(False)

@@ -18,7 +18,7 @@ from kinacc.tables.atomic import write_together
 
 # Dots per inch (of the dense meshes inside the vector formats), and marks that are left out.
 _SAVED = {
-    "svg": (300, ("Date", "Creator")),
+    "svg": (250, ("Date", "Creator")),
     "png": (200, ("Software",)),
     "pdf": (300, ("CreationDate", "ModDate", "Creator", "Producer")),
 }

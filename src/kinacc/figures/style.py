@@ -6,17 +6,15 @@ which stay apart for colour-blind readers; a marker or line style carries every 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from contextlib import AbstractContextManager
+from itertools import cycle
 from pathlib import Path
 from typing import Any
 
 import matplotlib.style
-import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-
-from kinacc.errors import Problem, refuse
 
 SINGLE_COLUMN_IN = 3.5
 DOUBLE_COLUMN_IN = 7.16
@@ -59,19 +57,13 @@ def new_figure(width_in: float, height_in: float, *, arranged: bool = True) -> F
     return Figure(figsize=(width_in, height_in), layout="constrained" if arranged else None)
 
 
-def require(table: Mapping, columns: Iterable[str], name: str) -> None:
-    """Raise InputError naming every one of the ``columns`` that a table lacks."""
-    lacking = [each for each in columns if each not in table]
-    refuse([Problem(name, f"column {each!r} is missing") for each in lacking])
-
-
 def assessor_style(names: Iterable[str]) -> dict[str, tuple[str, str, str]]:
     """Return label, colour and marker for each assessor, known ones first and fixed."""
     names = set(names)
-    found = {name: look for name, look in ASSESSORS.items() if name in names}
-    for index, name in enumerate(sorted(names - set(found))):
-        found[name] = (name.replace("_", " ").capitalize(), *SPARE[index % len(SPARE)])
-    return found
+    looks = {name: look for name, look in ASSESSORS.items() if name in names}
+    for name, look in zip(sorted(names - set(looks)), cycle(SPARE), strict=False):
+        looks[name] = (name.replace("_", " ").capitalize(), *look)
+    return looks
 
 
 def darker(colour: str, factor: float = 0.75) -> str:
@@ -105,31 +97,4 @@ def legend_above(axes: Axes, columns: int = 2, title: str | None = None, **look:
     axes.legend(
         loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=columns, title=title,
         title_fontsize=SMALL_PT, alignment="left", **look,
-    )  # fmt: skip
-
-
-def spread(values: list[float], gap: float, low: float, high: float) -> np.ndarray:
-    """Return positions near ``values`` at least ``gap`` apart and inside [low, high].
-
-    Neighbours that would overlap are centred on their mean (isotonic regression). If everything
-    cannot fit, the gap shrinks to what fits.
-    """
-    count = len(values)
-    steps = min(gap, (high - low) / max(count - 1, 1)) * np.arange(count)
-    order = np.argsort(values, kind="stable")
-    free = np.asarray(values, dtype=float)[order] - steps
-    flat = [
-        max(min(free[i:j].mean() for j in range(k + 1, count + 1)) for i in range(k + 1))
-        for k in range(count)
-    ]
-    placed = np.empty(count)
-    placed[order] = np.clip(flat, low, high - steps[-1:].sum()) + steps
-    return placed
-
-
-def outside_label(axes: Axes, y: float, text: str, colour: str) -> None:
-    """Write a label just right of the axes, at height ``y`` in axes fractions."""
-    axes.text(
-        1.02, y, text, transform=axes.transAxes, color=darker(colour), fontsize=SMALL_PT,
-        va="center", ha="left", linespacing=1.0,
     )  # fmt: skip
