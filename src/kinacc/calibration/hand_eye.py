@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from kinacc.calibration.frames import Frames, known
 from kinacc.calibration.observations import Observations
@@ -13,70 +14,89 @@ _LEVER_MM = 100.0  # one radian of orientation counts as much as a point this fa
 
 
 def closed_form_start(observations: Observations, flange: Pose) -> Frames:
-    """Bases and targets from flange poses (n, ...) of a nominal model, without a starting value.
+    """Bases and targets from flange poses of a nominal model, without a starting value.
 
     The session with most rows first, base and targets together; the bases of the others then from
     the targets known by then. What was never measured starts at the identity.
+
+    Parameters
+    ----------
+    observations : Observations
+        n measured points and poses.
+    flange : Pose
+        Flange poses in the robot base, shape (n, ...), mm.
+
+    Returns
+    -------
+    Frames
+        Bases in the instrument's frame, targets in the flange frame.
     """
     sessions, names = len(observations.session_names), len(observations.target_names)
-    found = known(sessions=sessions, targets=names)
+    start = known(sessions=sessions, targets=names)
     placed = np.zeros(names, dtype=bool)
     sizes = np.bincount(observations.session, minlength=sessions)
     for session in np.argsort(-sizes, kind="stable")[: np.count_nonzero(sizes)]:
         rows = np.flatnonzero(observations.session == session)
-        part, at = observations.select(rows), Pose(*(each[rows] for each in flange))
-        seen = np.unique(part.target)
-        if not placed[seen].any():
-            alone = _one_session(part, at)
-            base, new = alone.base, alone.targets
+        part, at = observations.select(rows), Pose(*(values[rows] for values in flange))
+        measured = np.isin(np.arange(names), part.target)
+        new = measured & ~placed
+        if not placed[measured].any():
+            base, points = _one_session(part, at)
+            start.targets.position_mm[new] = points[new]
         else:
-            base = base_from_targets(part, at, found.targets, placed)
-            new = _targets_from_base(part, at, base)
-        found.bases.rotation[session], found.bases.position_mm[session] = base
-        for target in seen[~placed[seen]]:
-            found.targets.rotation[target] = new.rotation[target]
-            found.targets.position_mm[target] = new.position_mm[target]
-        placed[seen] = True
-    return found
+            base = base_from_targets(part, at, start.targets, placed)
+            in_base = (part.position_mm - base.position_mm) @ base.rotation - at.position_mm
+            points = np.einsum("nji,nj->ni", at.rotation, in_base)
+            for target in np.flatnonzero(new):
+                start.targets.position_mm[target] = points[part.target == target].mean(axis=0)
+        for target in np.flatnonzero(new):
+            turned = part.has_rotation & (part.target == target)
+            if turned.any():
+                turns = np.swapaxes(at.rotation[turned], 1, 2) @ base.rotation.T
+                mean = Rotation.from_matrix(turns @ part.rotation[turned]).mean()
+                start.targets.rotation[target] = mean.as_matrix()
+        start.bases.rotation[session], start.bases.position_mm[session] = base
+        placed |= measured
+    return start
 
 
-def _one_session(observations: Observations, flange: Pose) -> Frames:
-    """Base and targets from the rows of one session.
+def _one_session(observations: Observations, flange: Pose) -> tuple[Pose, np.ndarray]:
+    """Base and target positions (T, 3) from the rows of one session.
 
-    Two linear solutions for the base rotation, the one that leaves the smaller position error:
-    from orientations, robot-world/hand-eye by the leading singular vectors of a sum of Kronecker
-    products (Shah, J. Mechanisms Robotics 5, 2013), which fails where the tool turns about one
-    axis only; and from positions with a free 3x3 matrix, which fails where they lie in a plane.
+    Linear solutions for the base rotation, the one that leaves the smallest position error: from
+    positions with a free 3x3 matrix, C m - R_flange t + c = p_flange, which fails where they lie in
+    a plane; and from orientations of each target, robot-world/hand-eye by the leading singular
+    vectors of a sum of Kronecker products (Shah, J. Mechanisms Robotics 5, 2013), which fails where
+    the tool turns about one axis only.
     """
-    bases = [_base_rotation_from_points(observations, flange)]
-    turned = observations.has_rotation
-    for target in np.unique(observations.target[turned]):
-        rows = turned & (observations.target == target)
-        bases.append(_hand_eye_base(observations.rotation[rows], flange.rotation[rows]))
-    starts = [_translations(observations, flange, base) for base in bases]
-    best = int(np.argmin([misfit for _, _, misfit in starts]))
-    position, points, _ = starts[best]
-    rotations = _target_rotations(observations, flange, bases[best])
-    return Frames(Pose(bases[best], position), Pose(rotations, points))
-
-
-def _hand_eye_base(measured: np.ndarray, flange: np.ndarray) -> np.ndarray:
-    """Base rotation of ``measured = base flange tool``, each (n, 3, 3)."""
-    # vec(base) is proportional to sum(flange (x) measured) vec(tool'), vec by columns.
-    kron = np.einsum("nij,nkl->ikjl", flange, measured).reshape(9, 9)
-    base = np.linalg.svd(kron)[0][:, 0].reshape(3, 3).T
-    return _nearest_rotation(base if np.linalg.det(base) > 0 else -base)
-
-
-def _target_rotations(observations: Observations, flange: Pose, base: np.ndarray) -> np.ndarray:
-    """Mean target rotations (T, 3, 3) in the flange; identity where none was measured."""
-    rotations = np.broadcast_to(np.eye(3), (len(observations.target_names), 3, 3)).copy()
-    turned = observations.has_rotation
-    for target in np.unique(observations.target[turned]):
-        rows = turned & (observations.target == target)
-        seen = np.swapaxes(flange.rotation[rows], 1, 2) @ base.T @ observations.rotation[rows]
-        rotations[target] = _nearest_rotation(seen.sum(axis=0))
-    return rotations
+    count, targets = len(observations), len(observations.target_names)
+    carried = np.eye(targets)[observations.target]
+    levers = np.einsum("nij,nt->nitj", flange.rotation, carried).reshape(count, 3, -1)
+    centred = observations.position_mm - observations.position_mm.mean(axis=0)
+    centred = centred / (np.abs(centred).max() or 1.0)
+    free = np.einsum("ab,nj->nabj", np.eye(3), centred).reshape(3 * count, 9)
+    constant, system = np.tile(np.eye(3), (count, 1)), -levers.reshape(3 * count, -1)
+    system = np.hstack([free, constant, system])
+    solution = np.linalg.lstsq(system, flange.position_mm.ravel(), rcond=_START_RCOND)[0]
+    rotations = [_nearest_rotation(solution[:9].reshape(3, 3)).T]
+    for target in np.unique(observations.target[observations.has_rotation]):
+        rows = observations.has_rotation & (observations.target == target)
+        # vec(base) is proportional to sum(flange (x) measured) vec(tool'), vec by columns.
+        kron = np.einsum("nij,nkl->ikjl", flange.rotation[rows], observations.rotation[rows])
+        base = np.linalg.svd(kron.reshape(9, 9))[0][:, 0].reshape(3, 3).T
+        rotations.append(_nearest_rotation(base if np.linalg.det(base) > 0 else -base))
+    starts = []
+    for rotation in rotations:  # once the base is turned, positions are linear
+        design = rotation @ levers
+        goal = observations.position_mm - flange.position_mm @ rotation.T
+        # Centred, so that what the turns cannot show of a target is left at zero.
+        system = (design - design.mean(axis=0)).reshape(3 * count, -1)
+        points = np.linalg.lstsq(system, (goal - goal.mean(axis=0)).ravel(), rcond=_START_RCOND)[0]
+        rest = goal - design @ points
+        position = rest.mean(axis=0)
+        misfit = float(np.sum((rest - position) ** 2))
+        starts.append((misfit, Pose(rotation, position), points.reshape(targets, 3)))
+    return min(starts, key=lambda start: start[0])[1:]
 
 
 def base_from_targets(
@@ -97,55 +117,7 @@ def base_from_targets(
     return Pose(rotation, centre - rotation @ arm_centre)
 
 
-def _targets_from_base(observations: Observations, flange: Pose, base: Pose) -> Pose:
-    """Every target where the base puts it in the flange, averaged over its rows."""
-    names = len(observations.target_names)
-    position = np.zeros((names, 3))
-    in_base = (observations.position_mm - base.position_mm) @ base.rotation
-    reach = (np.swapaxes(flange.rotation, 1, 2) @ (in_base - flange.position_mm)[..., None])[..., 0]
-    for target in np.unique(observations.target):
-        position[target] = reach[observations.target == target].mean(axis=0)
-    return Pose(_target_rotations(observations, flange, base.rotation), position)
-
-
 def _nearest_rotation(matrix: np.ndarray) -> np.ndarray:
     left, _, right = np.linalg.svd(matrix)
     left[:, 2] *= np.sign(np.linalg.det(left @ right))
     return project_so3(left @ right)
-
-
-def _base_rotation_from_points(observations: Observations, flange: Pose) -> np.ndarray:
-    """Base rotation of positions alone: C m - R_flange t + c = p_flange, linear in C, t and c."""
-    count, targets = len(observations), len(observations.target_names)
-    mean = observations.position_mm.mean(axis=0)
-    spread = np.abs(observations.position_mm - mean).max() or 1.0
-    design = np.zeros((count, 3, 12 + 3 * targets))
-    for axis in range(3):
-        design[:, axis, 3 * axis : 3 * axis + 3] = (observations.position_mm - mean) / spread
-        design[:, axis, 9 + axis] = 1.0
-    for target in range(targets):
-        rows = observations.target == target
-        columns = slice(12 + 3 * target, 15 + 3 * target)
-        design[rows, :, columns] = -flange.rotation[rows]
-    system = design.reshape(3 * count, -1)
-    solution = np.linalg.lstsq(system, flange.position_mm.ravel(), rcond=_START_RCOND)[0]
-    return _nearest_rotation(solution[:9].reshape(3, 3)).T
-
-
-def _translations(
-    observations: Observations, flange: Pose, base_rotation: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, float]:
-    """Base position, target points (linear once the base is turned) and the squared misfit."""
-    count, targets = len(observations), len(observations.target_names)
-    design = np.zeros((count, 3, 3 * targets))
-    for target in range(targets):
-        rows = observations.target == target
-        design[rows, :, 3 * target : 3 * target + 3] = base_rotation @ flange.rotation[rows]
-    goal = observations.position_mm - flange.position_mm @ base_rotation.T
-    # Centred, so that what the turns cannot show of a target is left at zero, not shared with base.
-    centred = (design - design.mean(axis=0)).reshape(3 * count, -1)
-    solution = np.linalg.lstsq(centred, (goal - goal.mean(axis=0)).ravel(), rcond=_START_RCOND)[0]
-    rest = goal - design @ solution
-    base_position = rest.mean(axis=0)
-    misfit = float(np.sum((rest - base_position) ** 2))
-    return base_position, solution.reshape(targets, 3), misfit

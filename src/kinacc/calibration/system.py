@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kinacc.calibration.frames import FrameParameters, inverse_left_jacobians, left_jacobian
+from kinacc.calibration.frames import FrameParameters, Frames, left_jacobians
 from kinacc.calibration.observations import Observations
 from kinacc.errors import InputError, Problem
 from kinacc.geometry import Pose, log_so3, skew
@@ -76,11 +76,10 @@ class PoseSystem:
 
     def residual(self, x: np.ndarray) -> np.ndarray:
         """All residuals (m,), observation by observation."""
-        model, found = self._model(x), []
-        for part, root in self._parts():
-            view = self._view(x, part, model.pose(part.at))
-            found.append((root * view.residual).T[view.measured.T])
-        return np.concatenate(found)
+        known = FrameParameters.none(self.frames.frames(x[: self.frames.size]))
+        still = np.zeros_like(self.free)
+        system = replace(self, model=self._model(x), free=still, frames=known)
+        return np.concatenate([residual for residual, _ in system.blocks(x[:0])])
 
     def blocks(self, x: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Residual (m,) and Jacobian (m, P) per block of observations, ordered as ``residual``."""
@@ -101,73 +100,45 @@ class PoseSystem:
 
         c = 3, or 6 in a block with orientations.
         """
-        model, frames = self._model(x), self.frames.size
-        for part, root in self._parts():
-            if self.free.any():
-                pose, motions, of, factors = model.motions(part.at)
-            else:
-                pose, motions = model.pose(part.at), np.zeros((0, 6, len(part)))
-            view = self._view(x, part, pose)
-            if self.free.any():
-                motions = view.lifted(motions)
-            columns = np.empty((self.size + 1, *view.residual.shape))
-            columns[:frames], columns[-1] = 0.0, view.residual
-            for place, number in enumerate(np.flatnonzero(self.free), frames):
-                if factors is None:
-                    columns[place] = motions[of[number]]
-                else:
-                    np.multiply(motions[of[number]], factors[number], out=columns[place])
-            for kind, number, at in self.frames.slots:
-                seen = np.flatnonzero((part.session if kind == "bases" else part.target) == number)
-                ahead = (view.back if kind == "bases" else pose.rotation)[seen]
-                slopes = np.zeros((len(seen), len(view.residual), len(at)))
-                slopes[:, :3, :3] = ahead
-                if len(at) == 6:
-                    turn = left_jacobian(x[at[3:]])
-                    if kind == "bases":
-                        slopes[:, :3, 3:] = -ahead @ skew(view.reach[seen]) @ turn
-                    if view.turning is not None:
-                        # The measured side stands behind exp(r): L^-1 exp(r) is L^-1 transposed.
-                        spin = view.turning[seen]
-                        spin = np.swapaxes(spin, 1, 2) if kind == "bases" else spin
-                        slopes[:, 3:, 3:] = spin @ (ahead @ turn)
-                columns[at[0] : at[-1] + 1, :, seen] = slopes.transpose(2, 1, 0)
-            if self.root is not None:
-                columns *= root
-            if not view.measured.all():
-                columns[:, ~view.measured] = 0.0
-            yield columns, view.measured
-
-    def _model(self, x: np.ndarray) -> ErrorModel:
-        if not self.free.any():
-            return self.model
-        vector = self.model.start.copy()
-        vector[self.free] = x[self.frames.size :]
-        return self.model.with_parameters(vector)
-
-    def _parts(self) -> Iterator[tuple[Observations, np.ndarray]]:
-        """Blocks of observations and factors (n,) of their residuals."""
+        size, model = self.frames.size, self._model(x)
+        frames = self.frames.frames(x[:size])
         root = np.ones(len(self.observations)) if self.root is None else self.root
         for begin in range(0, len(root), BLOCK_ROWS):
             rows = slice(begin, begin + BLOCK_ROWS)
-            yield self.observations.select(rows), root[rows]
+            part = self.observations.select(rows)
+            if self.free.any():
+                flange, motions, of, factors = model.motions(part.at)
+            else:
+                flange, motions = model.pose(part.at), np.zeros((0, 6, len(part)))
+            view = _View.of(part, flange, frames, self.rotation_weight_mm_per_rad)
+            lifted = view.lifted(motions)
+            columns = np.zeros((self.size + 1, *view.residual.shape))
+            columns[-1] = view.residual
+            for place, number in enumerate(np.flatnonzero(self.free), size):
+                factor = 1.0 if factors is None else factors[number]
+                np.multiply(lifted[of[number]], factor, out=columns[place])
+            for kind, number, at in self.frames.slots:
+                of_base = kind == "bases"
+                here = np.flatnonzero((part.session if of_base else part.target) == number)
+                ahead = (view.back if of_base else flange.rotation)[here]
+                slopes = np.zeros((len(here), len(view.residual), len(at)))
+                slopes[:, :3, :3] = ahead
+                turn = left_jacobians(x[at[3:]]) if len(at) == 6 else None
+                if turn is not None and of_base:
+                    slopes[:, :3, 3:] = -ahead @ skew(view.reach[here]) @ turn
+                if turn is not None and view.turning is not None:
+                    # The measured side stands behind exp(r): L^-1 exp(r) is L^-1 transposed.
+                    spin = view.turning[here]
+                    spin = np.swapaxes(spin, 1, 2) if of_base else spin
+                    slopes[:, 3:, 3:] = spin @ (ahead @ turn)
+                columns[at[0] : at[-1] + 1, :, here] = slopes.transpose(2, 1, 0)
+            columns *= root[rows] * view.measured
+            yield columns, view.measured
 
-    def _view(self, x: np.ndarray, part: Observations, flange: Pose) -> _View:
-        frames = self.frames.frames(x[: self.frames.size])
-        back = np.swapaxes(frames.bases.rotation, 1, 2)[part.session]
-        reach = part.position_mm - frames.bases.position_mm[part.session]
-        arm = (flange.rotation @ frames.targets.position_mm[part.target][..., None])[..., 0]
-        residual = (flange.position_mm + arm - (back @ reach[..., None])[..., 0]).T
-        turned, turning = part.has_rotation, None
-        if turned.any():
-            model = flange.rotation @ frames.targets.rotation[part.target]
-            measured = back @ np.where(turned[:, None, None], part.rotation, np.eye(3))
-            angles = log_so3(model @ np.swapaxes(measured, 1, 2)) * turned[:, None]
-            weight = self.rotation_weight_mm_per_rad
-            residual = np.concatenate([residual, weight * angles.T])
-            turning = weight * inverse_left_jacobians(angles)
-        there = np.repeat(np.stack([np.ones_like(turned), turned]), 3, axis=0)
-        return _View(residual, there[: len(residual)], arm.T, turning, back, reach)
+    def _model(self, x: np.ndarray) -> ErrorModel:
+        vector = self.model.start.copy()
+        vector[self.free] = x[self.frames.size :]
+        return self.model.with_parameters(vector)
 
 
 class _View(NamedTuple):
@@ -184,6 +155,23 @@ class _View(NamedTuple):
     turning: np.ndarray | None
     back: np.ndarray
     reach: np.ndarray
+
+    @classmethod
+    def of(cls, part: Observations, flange: Pose, frames: Frames, weight: float) -> _View:
+        """Observations beside what an arm and its frames predict."""
+        back = np.swapaxes(frames.bases.rotation, 1, 2)[part.session]
+        reach = part.position_mm - frames.bases.position_mm[part.session]
+        arm = (flange.rotation @ frames.targets.position_mm[part.target][..., None])[..., 0]
+        residual = (flange.position_mm + arm - (back @ reach[..., None])[..., 0]).T
+        turned, turning = part.has_rotation, None
+        if turned.any():
+            model = flange.rotation @ frames.targets.rotation[part.target]
+            measured = back @ np.where(turned[:, None, None], part.rotation, np.eye(3))
+            angles = log_so3(model @ np.swapaxes(measured, 1, 2)) * turned[:, None]
+            residual = np.concatenate([residual, weight * angles.T])
+            turning = weight * np.linalg.inv(left_jacobians(angles))
+        there = np.repeat(np.stack([np.ones_like(turned), turned]), 3, axis=0)
+        return cls(residual, there[: len(residual)], arm.T, turning, back, reach)
 
     def lifted(self, motions: np.ndarray) -> np.ndarray:
         """Derivatives (E, c, n) of the residuals by motions (E, 6, n) of the flange."""
