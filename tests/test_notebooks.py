@@ -19,7 +19,7 @@ def run(name, monkeypatch):
     for cell in cells:
         if cell["cell_type"] == "code":
             assert cell["outputs"] == []
-            exec(compile("".join(cell["source"]), f"{name}:{cell['id']}", "exec"), variables)
+            exec(compile("".join(cell["source"]), f"{name}:{cell['id']}", "exec"), variables)  # noqa: S102
     return variables
 
 

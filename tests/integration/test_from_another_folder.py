@@ -88,12 +88,6 @@ def test_init_prints_commands_that_run_from_where_it_was_called(project, cell):
     assert "data_check" in started(project, cell, ["sh", "-c", f"{run} -- -n"])
 
 
-def test_calibrate_goes_by_the_profile_of_the_workflow(project, cell):
-    text = started(project, cell, ["kinacc", "calibrate", "own.yaml", "--", "--dry-run"])
-    assert "fit_dh" in text
-    assert "host:" not in text  # as the profile of the workflow says
-
-
 MODULE = """\
 configfile: "cell.yaml"
 

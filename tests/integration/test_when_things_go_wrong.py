@@ -5,11 +5,6 @@ import pytest
 CSV = "own data/poses.csv"
 
 
-def no_half_written(project):
-    results = project.folder / "results"
-    return not [*results.rglob("*.partial")]
-
-
 def test_a_stage_that_fails(project):
     before = project.digests()
     project.configure("histories: {noise_mm: 0.2}")
@@ -24,7 +19,7 @@ def test_a_stage_that_fails(project):
     after = project.digests()
     assert "mh180/histories.parquet" not in after
     assert {name: before[name] for name in after} == after
-    assert no_half_written(project)
+    assert not [*(project.folder / "results").rglob("*.partial")]
 
 
 def test_a_configuration_with_several_mistakes(project):
@@ -70,20 +65,3 @@ def test_a_row_that_cannot_be_right(project, row, column, value, said):
     path.write_text(good)
     project.snakemake()
     assert project.digests() == before
-
-
-def test_a_mapping_that_no_longer_fits_the_file(project):
-    wrong = project.folder / "wrong.yaml"
-    wrong.write_text("datasets: {own: {measurements: {file: {columns: {q1: shoulder}}}}}\n")
-    text = project.snakemake(ok=False, configs=("config.yaml", "small.yaml", "wrong.yaml"))
-    assert "shoulder" in text
-    assert "Traceback" not in text
-
-
-def test_fewer_readings_than_the_fits_have_parameters(project):
-    path = project.folder / CSV
-    good = path.read_text()
-    path.write_text("\n".join(good.splitlines()[:12]) + "\n")
-    text = project.snakemake(ok=False)
-    assert "Traceback" not in text
-    path.write_text(good)

@@ -23,7 +23,7 @@ def _sets(value: Any) -> Any:
 
 _PLAIN = yaml.load(
     files(__package__).joinpath("words.yaml").read_text(encoding="utf-8"),
-    Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader),
+    Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader),  # noqa: S506
 )
 # A folded text is a set of words, a list and a mapping stay as they are.
 WORDS: dict[str, Any] = {

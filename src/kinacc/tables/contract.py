@@ -38,7 +38,7 @@ def _column(name: str, details: dict[str, Any]) -> Column:
 
 def _artefacts(topic: str) -> Iterable[Artefact]:
     path = Path(__file__).parent / "schemas" / f"{topic}.yaml"
-    for name, details in yaml.load(path.read_text(encoding="utf-8"), Loader=_LOADER).items():
+    for name, details in yaml.load(path.read_text(encoding="utf-8"), Loader=_LOADER).items():  # noqa: S506
         columns = tuple(_column(*item) for item in details.pop("columns").items())
         yield Artefact(name, topic, columns=columns, key=tuple(details.pop("key")), **details)
 
