@@ -121,7 +121,7 @@ def test_a_robot_by_name_gives_its_flange():
 def test_values_for_a_controller_state_the_error_of_what_it_takes(calibration):
     pendant = calibration.values_for("staubli")
     assert len(pendant.values) == 6 * 6 + 2 * 6
-    mine, _, nominal = pendant.errors
+    mine, _, nominal = pendant.errors.itertuples()
     assert mine.position_mm < nominal.position_mm
 
 

@@ -78,10 +78,10 @@ def written(base, name, rows, more=(), kind="none", target=""):
     return base / f"{name}.yaml"
 
 
-def answered(found, described, *more, code=None):
+def answered(found, described, *more):
     done = call("verify", described, "--calibration", found, *(more or SAME), "--json")
     answer = json.loads(done.stdout)
-    assert done.exit_code == (0 if answer["verdict"] == "pass" else 1), done.output
+    assert done.exit_code == {"pass": 0, "fail": 1, "undecided": 3}[answer["verdict"]], done.output
     return answer
 
 
@@ -186,3 +186,8 @@ def test_a_file_of_readings_is_read_as_those_of_the_calibration_were(folder, lat
     described = answered(found, file.with_suffix(".yaml"))
     assert answer["test"] == described["test"]
     assert answer["errors"] == described["errors"]
+    own.write_text(text.replace("moved.csv", str(base / "moved.csv")))
+    file.write_text(file.read_text().replace("q1_rad", "axis one"))
+    done = call("verify", file, "--calibration", found, *SAME)
+    assert done.exit_code == 2
+    assert f"run kinacc init {file} first" in done.output

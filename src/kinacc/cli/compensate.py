@@ -52,27 +52,12 @@ def compensate(folder, model, config, robot, poses, pose, near_deg, program, **o
         if poses is not None or pose:
             raise click.UsageError("--program stands alone: give no poses beside it")
         calibration = choice.calibration_of(folder, model, robot, config, session)
-        programs.correct(calibration, program, near_deg, **options)
+        programs.correct(calibration, program, near_deg, options)
         return
-    _find_joints(folder, model, config, robot, poses, pose, near_deg, session, **options)
+    _find_joints(folder, model, config, robot, poses, pose, near_deg, session, options)
 
 
-def _find_joints(
-    folder,
-    model,
-    config,
-    robot,
-    poses,
-    pose,
-    near_deg,
-    session,
-    frame,
-    point,
-    out,
-    as_json,
-    force,
-    **_,
-) -> None:
+def _find_joints(folder, model, config, robot, poses, pose, near_deg, session, options) -> None:
     import numpy as np
 
     from kinacc.cli import rows, target_poses
@@ -83,8 +68,9 @@ def _find_joints(
     from kinacc.kinematics.model import JointState
     from kinacc.progress import reporting
 
-    answer = Output(as_json=as_json, table=out, force=force)
-    require_writable([out], force, TABLES)
+    frame, point, out = options["frame"], options["point"], options["out"]
+    answer = Output(as_json=options["as_json"], table=out)
+    require_writable([out], options["force"], TABLES)
     calibration = choice.calibration_of(folder, model, robot, config, session)
     inputs = target_poses.poses(calibration, poses, pose, near_deg)
     with reporting("compensate", bar=True):

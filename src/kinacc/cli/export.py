@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
-
 import click
 
 from kinacc.cli import choice
@@ -19,7 +17,12 @@ _MAKERS = ("kuka", "abb", "fanuc", "ur", "yaskawa", "staubli", "ros")
 @click.argument("folder", type=click.Path())
 @option("--out", "target", type=click.Path(), default=".", help="Folder.")
 @option("--format", "formats", multiple=True, type=click.Choice(FORMATS), help="Formats. [all]")
-@option("--for", "maker", type=click.Choice(_MAKERS), help="Controller to enter values into.")
+@option(
+    "--for",
+    "maker",
+    type=click.Choice(_MAKERS, case_sensitive=False),
+    help="Controller to enter values into.",
+)
 @option(
     "--model",
     type=click.Choice(list(ERROR_MODELS)),
@@ -115,6 +118,7 @@ def _to_controller(folder, target, maker, name, robot, config, out) -> None:
         files[f"{stem}{result.ending}"] = result.text + "\n"
     paths = write(files, target, out.force)
     choice.say_outdated(folder)
-    lines = [f"Mean position error at {result.errors[0].points} {result.errors[0].poses}:"]
-    lines += [f"  {item.model}: {item.position_mm:.3f} mm" for item in result.errors]
-    out.say({**asdict(result), "files": paths}, "\n".join([*lines, *paths]))
+    first, *_ = errors = [*result.errors.itertuples()]
+    lines = [f"Mean position error at {first.points} {first.poses}:"]
+    lines += [f"  {item.model}: {item.position_mm:.3f} mm" for item in errors]
+    out.say({**vars(result), "files": paths}, "\n".join([*lines, *paths]))

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from typing import Any
 
 import click
 import numpy as np
-import pandas as pd
 
 from kinacc.cli import rows
+from kinacc.cli.exit_codes import AGAINST
 from kinacc.cli.output import PICTURES, TABLES, Output, require_writable
 from kinacc.deployment import programs
 from kinacc.deployment.record import Calibration
@@ -18,73 +19,60 @@ from kinacc.measurements.table import numbers_of
 
 
 def correct(
-    calibration: Calibration,
-    program: str,
-    near_deg: str | None,
-    tools: tuple[str, ...],
-    bases: tuple[str, ...],
-    frames: tuple[str, ...],
-    pulses_per_degree: str | None,
-    base_is_fixed: bool,
-    at_most_mm: float,
-    dry_run: bool,
-    table: str | None,
-    picture: str | None,
-    frame: str,
-    point: str | None,
-    out: str | None,
-    as_json: bool,
-    force: bool,
+    calibration: Calibration, program: str, near_deg: str | None, options: Mapping[str, Any]
 ) -> None:
-    """Correct a program, write it, and print its corrections; exit code 1 where one is refused."""
-    if frame != "base":
+    """Correct a program, write it, and print its corrections; exit code 1 where one is refused.
+
+    ``options``: those of ``kinacc compensate``, by their names.
+    """
+    if options["frame"] != "base":
         raise InputError(Problem("--frame", "programs are in the robot's own base", "base"))
-    require_writable([table], force, TABLES)
-    require_writable([picture], force, PICTURES)
-    near = near_deg and rows.of_arguments((near_deg,), "deg", calibration.robot, "--near-deg")[0]
+    require_writable([options["table"]], options["force"], TABLES)
+    require_writable([options["picture"]], options["force"], PICTURES)
+    near, pulses = near_deg, options["pulses_per_degree"]
     answer = programs.compensate_program(
         calibration,
         program,
-        _frames(tools),
-        _frames(bases),
-        frames,
-        near,
-        pulses_per_degree and np.array(numbers_of(pulses_per_degree)),
-        point,
-        at_most_mm,
-        base_is_fixed,
+        _frames(options["tools"]),
+        _frames(options["bases"]),
+        options["frames"],
+        near and rows.of_arguments((near,), "deg", calibration.robot, "--near-deg")[0],
+        pulses and np.array(numbers_of(pulses)),
+        options["point"],
+        options["at_most_mm"],
+        options["base_is_fixed"],
         _asked if sys.stdin.isatty() else None,
     )
-    if picture:
+    out = Output(options["as_json"], options["table"], options["picture"])
+    if out.picture:
         from kinacc.figures.program import draw
 
-        Output(picture=picture).draw(draw(answer.table))
-    changes = answer.table.query("status == 'corrected'").get("change_mm", pd.Series([0.0]))
+        out.draw(draw(answer.table))
+    change = answer.table.get("change_mm", answer.table["status"] == "")
+    change = change[answer.table["status"] == "corrected"]
     missed = f", {len(answer.not_corrected)} statements not" if answer.not_corrected else ""
-    lines = [
-        f"{answer.language}: {len(answer.table) - len(answer.refused)} of {len(answer.table)} "
-        f"positions corrected{missed}; change: mean {changes.mean():.3g} mm, "
-        f"largest {changes.max():.3g} mm"
-    ]
+    line = f"{answer.language}: {len(change)} of {len(answer.table)} positions corrected{missed}"
+    if len(change):
+        line += f"; change: mean {change.mean():.3g} mm, largest {change.max():.3g} mm"
     facts = {name: value for name, value in vars(answer).items() if name != "files"}
-    Output(as_json, table).show(facts, answer.table, lines)
-    for line in () if as_json else _warnings(answer):
-        click.echo(as_seen(line), err=True)
+    out.show(facts, answer.table, [line])
+    for text in () if out.as_json else _warnings(answer):
+        click.echo(as_seen(text), err=True)
     if answer.refused:
-        raise SystemExit(1)
-    if not dry_run and out is not None:
-        answer.write(out, force)
-        click.echo(f"Written: {out}", err=as_json)
+        raise SystemExit(AGAINST)
+    if not options["dry_run"] and options["out"] is not None:
+        answer.write(options["out"], options["force"])
+        click.echo(f"Written: {options['out']}", err=out.as_json)
 
 
 def _warnings(answer: programs.CorrectedProgram) -> Iterator[str]:
     table = answer.table.reindex(columns=["position", "is_measured_there", "is_near_singular"])
-    for named, text in (
-        (table[table["is_measured_there"].eq(False)], "outside the measured region"),
-        (table[table["is_near_singular"].eq(True)], "near a singular posture"),
+    for warned, text in (
+        (table["is_measured_there"].eq(False), "outside the measured region"),
+        (table["is_near_singular"].eq(True), "near a singular posture"),
     ):
-        if len(named):
-            yield f"{len(named)} positions {text}: {first_few(list(named['position']))}"
+        if warned.any():
+            yield f"{warned.sum()} positions {text}: {first_few(list(table['position'][warned]))}"
     yield from answer.remarks
     reason = "computed by the program, incomplete or defined elsewhere"
     yield from (f"Not corrected, {reason}: {line}" for line in answer.not_corrected)

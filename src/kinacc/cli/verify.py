@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING
 import click
 
 from kinacc.cli import choice
-from kinacc.cli.exit_codes import AGAINST
+from kinacc.cli.exit_codes import AGAINST, UNDECIDED
 from kinacc.cli.output import answers
 
 if TYPE_CHECKING:
     from kinacc.deployment.verify import Verification
 
+_YAML = (".yaml", ".yml")
 _SETUP = click.Choice(["same", "moved"])
 _DETAILS = ("mean_mrad", "quantile_99_mrad", "largest_mrad", "rms_mrad", "rms_mm")
 
@@ -32,7 +33,8 @@ def verify(readings: Path, folder: str, base: str, tool: str, dataset: str | Non
 
     NEW is a file of readings like those of the calibration, or a .yaml by `kinacc init`. A frame
     that was moved is fitted to the new readings. A permutation test compares position errors near
-    measured poses with held-out errors, at the 1 % level. The exit code is 1 unless it passes.
+    measured poses with held-out errors, at the 1 % level. The exit code is 0 where it passes, 1
+    where it fails and 3 where it is undecided.
 
     \b
     Example:
@@ -43,6 +45,7 @@ def verify(readings: Path, folder: str, base: str, tool: str, dataset: str | Non
 
     from kinacc.deployment import folder as results
     from kinacc.deployment import verify as verification
+    from kinacc.errors import InputError, Problem
     from kinacc.progress import reporting
     from kinacc.synthetic import source
 
@@ -53,7 +56,14 @@ def verify(readings: Path, folder: str, base: str, tool: str, dataset: str | Non
     weight = float(config["calibration"]["rotation_weight_mm_per_rad"])
     with reporting("verify", bar=True), warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        columns = source.run({}, config)["measurements"]
+        try:
+            columns = source.run({}, config)["measurements"]
+        except InputError as error:
+            if readings.suffix.lower() in _YAML:
+                raise
+            message = "cannot be read as the readings of the calibration were"
+            fix = f"if it has another form: run kinacc init {readings} first, and give the .yaml"
+            raise InputError([Problem(str(readings), message, fix=fix), *error.problems]) from None
         result = verification.verify(tables, arm, columns, moved, weight)
     for text in dict.fromkeys(str(warning.message) for warning in caught):
         click.echo(f"{name}: {text}", err=True)
@@ -65,7 +75,7 @@ def verify(readings: Path, folder: str, base: str, tool: str, dataset: str | Non
     lines = [*_lines(result, units), *_next(result, folder, "" if moved else shlex.join(again))]
     out.show(result, result.errors, lines, shown)
     if result.verdict != verification.PASS:
-        raise SystemExit(AGAINST)
+        raise SystemExit(AGAINST if result.verdict == verification.FAIL else UNDECIDED)
 
 
 def _settings(readings: Path, folder: str, dataset: str | None) -> tuple[str, Mapping]:
@@ -74,7 +84,7 @@ def _settings(readings: Path, folder: str, dataset: str | None) -> tuple[str, Ma
     from kinacc.errors import InputError, Problem
     from kinacc.workflow.described import like_those_of
 
-    if readings.suffix.lower() not in (".yaml", ".yml"):
+    if readings.suffix.lower() not in _YAML:
         return readings.stem, like_those_of(Path(folder), readings)
     settings = load([str(readings)])
     name = next(iter(settings)) if dataset is None and len(settings) == 1 else dataset

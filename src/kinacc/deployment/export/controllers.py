@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import pandas as pd
 import yaml
 
 from kinacc.deployment.programs.orientation import (
@@ -18,7 +17,7 @@ from kinacc.deployment.programs.orientation import (
     Convention,
 )
 from kinacc.errors import InputError, Problem
-from kinacc.geometry import Pose, compose, rotation_x, rotation_y, rotation_z
+from kinacc.geometry import IDENTITY, Pose, compose, rotation_x, rotation_y, rotation_z
 from kinacc.kinematics import dh
 from kinacc.kinematics.dh import PARAMETERS, DHModel
 from kinacc.kinematics.inverse.limits import reported_joints
@@ -72,74 +71,61 @@ def _frame(names: str, convention: Convention) -> Callable[[Pose], Numbers]:
     units = [length] * 3 + ["" if convention.orientation == QUATERNION else turn] * 4
 
     def numbers(pose: Pose) -> Numbers:
-        values = convention.numbers(pose, np.zeros(len(names.split())))
-        pairs = zip(map(float, values), units, strict=False)
-        return dict(zip(names.split(), pairs, strict=True))
+        values = convention.numbers(pose, np.zeros(len(names.split()))).tolist()
+        return dict(zip(names.split(), zip(values, units, strict=False), strict=True))
 
     return numbers
 
 
-def require_plain_joints(robot: Robot, name: str) -> None:
-    """InputError where reported joints are not those of the DH table."""
-    if not np.array_equal(robot.joint_map, np.eye(robot.dh.joints)):
-        message = (
-            f"reports joints with signs or couplings; {name} counts joints as its DH table does"
-        )
-        raise InputError(Problem(f"robot {robot.name}", message, fix="use --format urdf"))
+def _by_joint(columns: Mapping[str, tuple[np.ndarray, str]]) -> Numbers:
+    """Numbers named name[joint] of columns with a value (k,) a joint, and their unit."""
+    return {
+        f"{name}[{joint}]": (float(value), unit)
+        for name, (values, unit) in columns.items()
+        for joint, value in enumerate(values, 1)
+    }
 
 
 def _staubli(robot: Robot, model: DHModel) -> Numbers:
-    """Offsets of theta, d, a, b, alpha, beta, joint by joint."""
-    require_plain_joints(robot, "Staubli")
-    numbers: Numbers = {}
-    for joint in range(model.joints):
-        for name in PARAMETERS:
-            shift = getattr(model, name)[joint] - getattr(robot.dh, name)[joint]
-            stem, unit = name.replace("_offset", "").split("_")
-            if stem == "alpha":
-                numbers[f"b[{joint + 1}]"] = (0.0, "mm")
-            value = np.rad2deg(shift) if unit == "rad" else shift
-            numbers[f"{stem}[{joint + 1}]"] = (float(value), "deg" if unit == "rad" else "mm")
-    return numbers
+    """Offsets of theta, d, a, b, alpha, beta."""
+    theta, d_mm, a_mm, alpha, beta = (
+        getattr(model, name) - getattr(robot.dh, name) for name in PARAMETERS
+    )
+    lengths = {"d": d_mm, "a": a_mm, "b": 0.0 * a_mm}
+    angles = {"theta": theta, "alpha": alpha, "beta": beta}
+    columns = {name: (values, "mm") for name, values in lengths.items()}
+    return _by_joint(columns | {name: (np.rad2deg(x), "deg") for name, x in angles.items()})
 
 
 def _ur(robot: Robot, model: DHModel) -> Numbers:
     """Deltas of a, d, alpha and theta: common normals of the fitted axes, however far they lie."""
-    require_plain_joints(robot, "UR")
     nominal = robot.dh
     if model.joints != len(_UR_ALPHA) or np.abs(nominal.alpha_rad - _UR_ALPHA).max() > 1e-3:
         message = "has no DH table of UR arms (alpha 90, 0, 0, 90, -90, 0 deg)"
-        raise InputError(
-            Problem(f"robot {robot.name}", message, fix="use the table that UR publishes")
-        )
+        fix = "use the table that UR publishes"
+        raise InputError(Problem(f"robot {robot.name}", message, fix=fix))
     frames = dh.chain(model, np.zeros((1, model.joints)))
     axes = Axes(frames.position_mm[0, :-1], frames.rotation[0, :-1, :, 2])
     end = Pose(frames.rotation[0, -1], frames.position_mm[0, -1])
     _, standard, _ = chain_of(axes, end, nominal.prismatic, _PARALLEL)
     turns = standard.theta_offset_rad - nominal.theta_offset_rad
-    columns = {
+    return _by_joint({
         "delta_theta": ((turns + np.pi) % (2.0 * np.pi) - np.pi, "rad"),
         "delta_a": (1e-3 * (standard.a_mm - nominal.a_mm), "m"),
         "delta_d": (1e-3 * (standard.d_mm - nominal.d_mm), "m"),
         "delta_alpha": (standard.alpha_rad - nominal.alpha_rad, "rad"),
-    }
-    return {
-        f"{name}[{joint + 1}]": (float(values[joint]), unit)
-        for name, (values, unit) in columns.items()
-        for joint in range(model.joints)
-    }
+    })  # fmt: skip
 
 
 def _ros(robot: Robot, model: DHModel) -> Numbers:
     """Origins of the joints, each in the link before it, d in front of the joint as UR has it."""
-    require_plain_joints(robot, "ROS")
     names = _UR_LINKS if model.joints == len(_UR_LINKS) else robot.joint_names
-    numbers, before = {}, Pose(np.eye(3), np.zeros(3))
+    numbers, before = {}, IDENTITY
     for joint, name in enumerate(names):
         along = np.array([0.0, 0.0, model.d_mm[joint]])
         origin = compose(before, Pose(rotation_z(model.theta_offset_rad[joint]), along))
-        for key, value in _ros_frame(origin).items():
-            numbers[f"{name.replace(' ', '_')} {key}"] = value
+        parts = _ros_frame(origin).items()
+        numbers |= {f"{name.replace(' ', '_')} {key}": value for key, value in parts}
         tilt = rotation_x(model.alpha_rad[joint]) @ rotation_y(model.beta_rad[joint])
         before = Pose(tilt, np.array([model.a_mm[joint], 0.0, 0.0]))
     return numbers
@@ -148,33 +134,36 @@ def _ros(robot: Robot, model: DHModel) -> Numbers:
 _ros_frame = _frame("x y z roll pitch yaw", Convention(FIXED, 1e3, _RAD))
 
 
-def _by_joint(numbers: Numbers) -> pd.DataFrame:
-    """Numbers named name[joint], a row a joint."""
-    index = pd.MultiIndex.from_tuples([tuple(key.rstrip("]").split("[")) for key in numbers])
-    table = pd.Series([value for value, _ in numbers.values()], index).unstack(0)
-    return table[list(index.get_level_values(0).unique())]
+def _nested(numbers: Numbers, outer: int) -> dict[str, dict[str, float]]:
+    """Numbers by the first or second (``outer`` 0 or 1) part of their name, and by the other."""
+    result: dict[str, dict[str, float]] = {}
+    for name, (value, _) in numbers.items():
+        parts = name.rstrip("]").replace("[", " ").split()
+        result.setdefault(parts[outer], {})[parts[1 - outer]] = value
+    return result
 
 
 def _ur_text(numbers: Numbers) -> str:
-    columns = _by_joint(numbers).items()
-    rows = [f"{name} = [ {', '.join(f'{x:.17g}' for x in values)}]" for name, values in columns]
+    rows = [
+        f"{name} = [ {', '.join(f'{x:.17g}' for x in row.values())}]"
+        for name, row in _nested(numbers, 0).items()
+    ]
     return "\n".join(["[mounting]", *rows])
 
 
 def _staubli_text(numbers: Numbers) -> str:
     rows = [
-        f'  <DH index="{joint}" ' + " ".join(f'{key}="{x:.9f}"' for key, x in row.items()) + " />"
-        for joint, (_, row) in enumerate(_by_joint(numbers).iterrows())
+        f'  <DH index="{int(joint) - 1}" '
+        + " ".join(f'{key}="{x:.9f}"' for key, x in row.items())
+        + " />"
+        for joint, row in _nested(numbers, 1).items()
     ]
     return "\n".join(['<DhArray name="dhOffset">', *rows, "</DhArray>"])
 
 
 def _ros_text(numbers: Numbers) -> str:
-    links: dict[str, dict[str, float]] = {}
-    for key, (value, _) in numbers.items():
-        link, name = key.split()
-        links.setdefault(link, {})[name] = value
-    return yaml.safe_dump({"kinematics": {**links, "hash": "calib_kinacc"}}, sort_keys=False)
+    content = {"kinematics": {**_nested(numbers, 0), "hash": "calib_kinacc"}}
+    return yaml.safe_dump(content, sort_keys=False)
 
 
 CONTROLLERS = {

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -180,31 +180,48 @@ def compensate_program(
     flange = {
         n: compose(compose(base[n], convention.pose(item.numbers, item.where)), invert(tool[n]))
         for n, item in enumerate(positions)
-        if item.scale is None
+        if item.scale is None and not item.refused
     }
-    q_rad, reasons = _starts(robot, language, positions, flange, near_rad, base_is_fixed)
-    remarks, parts = [], []
-    for name in dict.fromkeys(item.tool for item in positions):
-        group = [n for n, item in enumerate(positions) if item.tool == name and n not in reasons]
-        if group:
-            mounted = frames.get((TOOL, name or ""), IDENTITY)
-            carried, remark = _carried(calibration, mounted, point)
-            remarks += [f"Tool {name or ''}: {remark}"] if remark else []
-            parts.append(_corrected(calibration, q_rad[group], carried, mounted).set_axis(group))
-    facts = pd.concat(parts).reindex(range(len(positions))) if parts else pd.DataFrame()
+    ways = dict(zip(flange, posture.postures_of(robot, [*flange.values()]), strict=True))
+    unit = np.where(robot.dh.prismatic, 1.0, np.pi / 180.0)
+    reasons: dict[int, str] = {}
+    starts: dict[int, np.ndarray] = {}
+    for number, item in enumerate(positions):
+        if item.moves_outside and item.scale is None and not item.refused and not base_is_fixed:
+            start: np.ndarray | str = _TRACK
+        elif number in ways:
+            near = near_rad if item.near_rad is None else item.near_rad
+            start = posture.choose(robot, ways[number], language.posture, item.posture, near)
+        else:
+            start = item.refused or _joints(robot, item, unit)
+        if isinstance(start, str):
+            reasons[number] = start
+        else:
+            near_rad = starts[number] = start
+    makers = {item.name for item in LANGUAGES if robot.name.lower().startswith(item.robots)}
+    remarks = []
+    if makers - {language.name}:
+        remarks = [f"{language.name}: robot {robot.name} has a controller of another maker."]
+    parts = [pd.DataFrame(columns=["change_mm"])]
+    for name in dict.fromkeys(positions[number].tool for number in starts):
+        group = [number for number in starts if positions[number].tool == name]
+        place, remark = _carried(calibration, tool[group[0]], point)
+        remarks += [f"Tool {name or ''}: {remark}"] if remark else []
+        q_rad = np.stack([starts[number] for number in group])
+        parts.append(_corrected(calibration, q_rad, place, tool[group[0]]).set_axis(group))
+    facts = pd.concat([part for part in parts if len(part)] or parts)
     new: dict[Position, np.ndarray] = {}
-    for number in sorted(set(range(len(positions))) - set(reasons)):
-        item, row = positions[number], facts.loc[number]
-        posture_now = item.posture and language.posture
+    for number, row in facts.iterrows():
+        item, stated = positions[number], positions[number].posture and language.posture
         if row["outcome"] > PoseStatus.EXTRAPOLATED:
             name = PoseStatus(row["outcome"]).name
             reasons[number] = f"the calibrated arm: {name.lower().replace('_', ' ')}"
         elif row["change_mm"] > at_most_mm:
             reasons[number] = f"would move by {row['change_mm']:.3g} mm (--at-most-mm)"
         elif item.scale is not None:
-            new[item] = row["q_rad"] / _unit(robot) * item.scale
-        elif posture_now and (
-            apart := posture.unmatched(robot, posture_now, item.posture, row["q_rad"])
+            new[item] = row["q_rad"] / unit * item.scale
+        elif stated and (
+            apart := posture.unmatched(robot, stated, item.posture or (), row["q_rad"])
         ):
             reasons[number] = f"the posture would change: {apart}"
         elif max(row["change_mm"], row["change_mrad"]) > _SAME:
@@ -213,9 +230,8 @@ def compensate_program(
         "position": [item.name for item in positions],
         "file": [item.where for item in positions],
         "kind": ["pose" if item.scale is None else "joints" for item in positions],
-        **{key: facts[key] for key in facts.columns if key not in ("q_rad", "pose", "outcome")},
-        "status": [reasons.get(number, "corrected") for number in range(len(positions))],
-    })  # fmt: skip
+    }).join(facts.drop(columns=["q_rad", "pose", "outcome"], errors="ignore"))  # fmt: skip
+    rows["status"] = [reasons.get(number, "corrected") for number in range(len(positions))]
     return CorrectedProgram(
         language.name,
         f"{calibration.name}, {calibration.choice}",
@@ -230,29 +246,13 @@ def compensate_program(
     )
 
 
-def _starts(
-    robot: Robot,
-    language: Language,
-    positions: Sequence[Position],
-    flange: Mapping[int, Pose],
-    near_rad: np.ndarray | None,
-    base_is_fixed: bool,
-) -> tuple[np.ndarray, dict[int, str]]:
-    """Joints (n, k) of the nominal arm at all positions, and why some have none.
-
-    ``flange``: wanted poses of the flange by number, of positions that are no joints.
-    """
-    ways = dict(zip(flange, posture.postures_of(robot, list(flange.values())), strict=True))
-    reasons: dict[int, str] = {}
-    q_rad, near = np.full((len(positions), robot.dh.joints), np.nan), near_rad
-    for number, item in enumerate(positions):
-        try:
-            if item.moves_outside and number in ways and not base_is_fixed:
-                raise InputError(Problem("", _TRACK))
-            near = q_rad[number] = _start(robot, language, item, ways.get(number), near)
-        except InputError as error:
-            reasons[number] = error.problems[0].what
-    return q_rad, reasons
+def _joints(robot: Robot, position: Position, unit: np.ndarray) -> np.ndarray | str:
+    """Reported joints (k,) of a position that is joints, or why it is refused."""
+    if len(position.places) != robot.dh.joints:
+        return f"has {len(position.places)} joints, not {robot.dh.joints}"
+    q_rad = position.numbers / position.scale * unit
+    within = limits.within(q_rad, robot.q_min_rad, robot.q_max_rad)
+    return q_rad if within else "its joints are beyond the limits"
 
 
 def _digest(contents: Iterable[bytes]) -> str:
@@ -288,30 +288,6 @@ def _all_frames(
             frames[kind, name] = convention.typed(numbers)
     refuse(problems, "Frames are missing")
     return frames
-
-
-def _start(
-    robot: Robot, language: Language, position: Position, ways: np.ndarray | None,
-    near: np.ndarray | None,
-) -> np.ndarray:  # fmt: skip
-    """Reported joints (k,) of the nominal arm at a position; InputError where it is refused."""
-    if position.refused:
-        raise InputError(Problem("", position.refused))
-    if ways is not None:
-        near = near if position.near_rad is None else position.near_rad
-        return posture.choose(robot, ways, language.posture, position.posture, near)
-    if len(position.places) != robot.dh.joints:
-        message = f"has {len(position.places)} joints, not {robot.dh.joints}"
-        raise InputError(Problem("", message))
-    q_rad = position.numbers / position.scale * _unit(robot)
-    if not limits.within(q_rad, robot.q_min_rad, robot.q_max_rad):
-        raise InputError(Problem("", "its joints are beyond the limits"))
-    return q_rad
-
-
-def _unit(robot: Robot) -> np.ndarray:
-    """Radians (mm where a joint slides) of a unit in which joints are written, (k,)."""
-    return np.where(robot.dh.prismatic, 1.0, np.pi / 180.0)
 
 
 def _carried(calibration: Calibration, tool: Pose, point: str | None) -> tuple[Pose, str]:

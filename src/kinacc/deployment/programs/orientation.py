@@ -43,26 +43,27 @@ class Convention(NamedTuple):
 
     def numbers(self, pose: Pose, near: np.ndarray) -> np.ndarray:
         """The numbers of a frame, of equal ones those nearest to ``near``."""
-        near, rotation = np.asarray(near[3:]), Rotation.from_matrix(pose.rotation)
-        unit, turns = 1.0, 360.0
+        rotation, near = Rotation.from_matrix(pose.rotation), np.asarray(near[3:])
+        unit = self.angle_deg
         if self.orientation == QUATERNION:
-            quaternion = rotation.as_quat(scalar_first=True)
+            quaternion, unit = rotation.as_quat(scalar_first=True), 1.0
             ways = [quaternion, -quaternion]
         elif self.orientation == VECTOR:
-            unit, vector = self.angle_deg, rotation.as_rotvec(degrees=True)
-            axis = vector / max(np.linalg.norm(vector), 1e-12)
-            ways = [vector + turn * axis for turn in (0.0, -turns, turns)]
+            vector = rotation.as_rotvec(degrees=True)
+            turn = 360.0 * vector / max(np.linalg.norm(vector), 1e-12)
+            ways = [vector, vector - turn, vector + turn]
         else:
-            unit = self.angle_deg
-            a, b, c = rotation.as_euler(self.orientation, degrees=True, suppress_warnings=True)
-            ways = [np.array([a, b, c]), np.array([a + 180.0, 180.0 - b, c + 180.0])]
-            ways = [way + turns * np.rint((unit * near - way) / turns) for way in ways]
+            first = rotation.as_euler(self.orientation, degrees=True, suppress_warnings=True)
+            second = first * [1.0, -1.0, 1.0] + 180.0
+            ways = [way + 360.0 * np.rint((unit * near - way) / 360.0) for way in (first, second)]
         best = min(ways, key=lambda way: np.linalg.norm(way - unit * near))
         return np.concatenate([pose.position_mm / self.length_mm, best / unit])
 
     def typed(self, numbers: np.ndarray) -> Pose:
         """A frame as a person gives it, in mm and degrees; fixed angles for a quaternion."""
-        is_short = self.orientation == QUATERNION and len(numbers) == 6
-        if len(numbers) != (7 if self.orientation == QUATERNION and not is_short else 6):
+        convention = Convention(self.orientation)
+        if self.orientation == QUATERNION and len(numbers) == 6:
+            convention = Convention(FIXED)
+        if len(numbers) != (7 if convention.orientation == QUATERNION else 6):
             raise InputError(Problem("frame", f"has {len(numbers)} numbers", "6, mm and deg"))
-        return Convention(FIXED if is_short else self.orientation).pose(numbers)
+        return convention.pose(numbers)

@@ -7,7 +7,6 @@ from itertools import product
 
 import numpy as np
 
-from kinacc.errors import InputError, Problem
 from kinacc.geometry import Pose, compose, invert
 from kinacc.kinematics import dh
 from kinacc.kinematics.inverse import limits, solve
@@ -30,15 +29,11 @@ def unmatched(
     poses = np.stack([q_rad, 0.0 * q_rad])
     frames = compose(robot.base, dh.chain(robot.dh, robot.dh_joints(poses)))
     place = frames.position_mm[0]
-    front, computed, _ = (
-        frames.rotation[0, 1] @ frames.rotation[1, 1].T
-    ).T  # turned by joint 1 alone
+    turned = frames.rotation[0, 1] @ frames.rotation[1, 1].T  # by joint 1 alone
     arm = np.cross(place[2] - place[1], place[4] - place[2])
-    names = []
-    for slack in (0.0, slack_deg, -slack_deg):
-        q_deg = np.rad2deg(q_rad) + slack
-        sides = front @ (place[4] - place[0]) >= 0.0, arm @ computed > 0.0, q_deg[4] > 0.0
-        names.append(posture(sides, q_deg))
+    ahead, above = turned[:, 0] @ (place[4] - place[0]) >= 0.0, arm @ turned[:, 1] > 0.0
+    slacks = np.array([0.0, slack_deg, -slack_deg])
+    names = [posture((ahead, above, q[4] > 0.0), q) for q in np.rad2deg(q_rad) + slacks[:, None]]
     parts = zip(stated, *names, strict=False)  # some programs state the first parts alone
     return ", ".join(now for wanted, now, *near in parts if wanted not in (None, now, *near))
 
@@ -58,13 +53,12 @@ def choose(
     posture: Posture | None,
     stated: Stated | None,
     near_rad: np.ndarray | None,
-) -> np.ndarray:
+) -> np.ndarray | str:
     """Of postures (m, k) on all turns within the limits the one stated, nearest to ``near_rad``.
 
-    Raises InputError where there are none, or several and nothing to choose by.
+    A reason where there are none, or several and nothing to choose by.
     """
     turns = [(0.0,) if slides else 2.0 * np.pi * np.arange(-2, 3) for slides in robot.dh.prismatic]
-    ways = ways[np.isfinite(ways).all(axis=1)]
     ways = (ways[:, None] + np.array([*product(*turns)])).reshape(-1, robot.dh.joints)
     inside = (ways >= robot.q_min_rad - 1e-9) & (ways <= robot.q_max_rad + 1e-9)
     ways = ways[inside.all(axis=1)]
@@ -73,8 +67,8 @@ def choose(
         fits = [not unmatched(robot, posture, stated, way, _ROUNDING_DEG) for way in ways]
         ways, texts = ways[fits], f"in the posture {', '.join(filter(None, stated))}"
     elif near_rad is None and len(ways) > 1:
-        raise InputError(Problem("", "no posture is stated; give joints to start from: --near-deg"))
-    if len(ways) == 0:
-        raise InputError(Problem("", f"the nominal arm cannot reach it {texts}"))
-    near_rad = np.zeros(ways.shape[1]) if near_rad is None else near_rad
-    return ways[np.argmin(np.max(np.abs(ways - near_rad), axis=1).round(9))]
+        return "no posture is stated; give joints to start from: --near-deg"
+    if not len(ways):
+        return f"the nominal arm cannot reach it {texts}"
+    distance = np.abs(ways - (0.0 if near_rad is None else near_rad)).max(axis=1)
+    return ways[np.argmin(distance.round(9))]

@@ -7,10 +7,8 @@ comes back unchanged, whatever the encoding and the line ends.
 from __future__ import annotations
 
 import re
-from bisect import bisect
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from functools import cached_property
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -20,11 +18,11 @@ from kinacc.errors import InputError, Problem
 from kinacc.geometry import IDENTITY, Pose
 
 NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
-_NUMBER = re.compile(NUMBER)
 TOOL, BASE = "tool", "base"
 CHANGED = "the program changes its tool or base"
 SEVERAL = "is used with different tools or bases"
 STILL = "the tool stands still"
+FIXED_BASE = {("base", ""): IDENTITY}  # of languages whose positions are in the robot's base
 Place = tuple[int, int]
 Frames = dict[tuple[str, str], Pose]
 NO_FRAMES: Frames = {(kind, "0"): IDENTITY for kind in (TOOL, BASE)}
@@ -45,17 +43,18 @@ class Source:
             raise InputError(Problem(str(path), "is no text of one byte a character"))
         return cls(path, content.decode("latin-1"))
 
-    def where(self, at: int) -> str:
+    def where(self, offset: int) -> str:
         """File and line of an offset."""
-        return f"{self.path.name}:{bisect(self._ends, at) + 1}"
+        newlines = self.text.count("\n", 0, offset)
+        return f"{self.path.name}:{newlines + 1}"
 
-    @cached_property
-    def _ends(self) -> list[int]:
-        return [result.end() for result in re.finditer("\n", self.text)]
+    def statement(self, offset: int, text: str) -> str:
+        """File, line and words of a statement."""
+        return f"{self.where(offset)}: {' '.join(text.split())}"
 
     def numbers(self, start: int, end: int) -> list[Place]:
         """Places of the numbers between two offsets."""
-        return [result.span() for result in _NUMBER.finditer(self.text, start, end)]
+        return [number.span() for number in re.compile(NUMBER).finditer(self.text, start, end)]
 
     def values(self, places: Iterable[Place]) -> np.ndarray:
         """The numbers at places."""
@@ -97,6 +96,16 @@ class Position:
         return self.source.where(self.places[0][0])
 
 
+Use = tuple[str | None, str | None, str]  # tool, base, and why these cannot be corrected
+
+
+def in_use(position: Position, name: str, uses: Collection[Use]) -> Position:
+    """The position with its name and the frames of its uses; refused where these differ."""
+    tool, base, reason = next(iter(uses))
+    reason = SEVERAL if len(uses) > 1 else reason
+    return replace(position, name=name, tool=tool, base=base, refused=reason)
+
+
 @dataclass(frozen=True)
 class Program:
     """A program as read.
@@ -121,7 +130,7 @@ class Language:
     bases that a file holds. ``partners``: endings of files written together with the program;
     ``frame_files``: names, in lower case, of files with frames beside it. ``posture``: what the
     controller calls the posture, from the sides (front, elbow up, wrist of joint 5 positive) and
-    the joints in degrees.
+    the joints in degrees. ``robots``: how names of shipped robots begin that have this controller.
     """
 
     name: str
@@ -132,30 +141,30 @@ class Language:
     posture: Callable[[Sequence[bool], np.ndarray], tuple[str, ...]] | None = None
     partners: tuple[str, ...] = ()
     frame_files: tuple[str, ...] = ()
+    robots: tuple[str, ...] = ()
 
 
 def blanked(text: str, *patterns: str) -> str:
-    """The text with what matches replaced by spaces: comments and strings, offsets as before."""
-    for pattern in patterns:
-        text = re.sub(pattern, lambda found: re.sub(r"[^\r\n]", " ", found[0]), text)
-    return text
+    """The text with comments and strings, which match, replaced by spaces: offsets as before."""
+    return re.sub(
+        "|".join(patterns), lambda match: re.sub(r"[^\r\n]", " ", match[0]), text, flags=re.M
+    )
 
 
 def replaced(source: Source, new: Mapping[Position, np.ndarray]) -> bytes:
     """The file with new numbers of its positions."""
+    text = source.text
     changes = [
-        (place, _written(source.text[slice(*place)], value, least))
+        (place, value, least)
         for position, values in new.items()
         if position.source is source
         for place, value, least in zip(
             position.places, values, np.broadcast_to(position.decimals, len(values)), strict=True
         )
     ]
-    parts, done = [], 0
-    for (start, end), number in sorted(changes):
-        parts += [source.text[done:start], number]
-        done = end
-    return "".join([*parts, source.text[done:]]).encode("latin-1")
+    for (start, end), value, least in sorted(changes, reverse=True):
+        text = text[:start] + _written(text[start:end], value, least) + text[end:]
+    return text.encode("latin-1")
 
 
 def _written(old: str, value: float, least: int) -> str:

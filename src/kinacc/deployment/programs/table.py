@@ -16,7 +16,7 @@ from kinacc.deployment.programs.orientation import (
     Convention,
 )
 from kinacc.deployment.programs.record import (
-    BASE,
+    FIXED_BASE,
     Frames,
     Language,
     Position,
@@ -24,9 +24,8 @@ from kinacc.deployment.programs.record import (
     Source,
 )
 from kinacc.errors import InputError, Problem
-from kinacc.geometry import IDENTITY
 
-_UNITS = {"deg": 1.0, "rad": 180.0 / np.pi, "mm": 1.0, "m": 1e3, "": 1.0}
+_UNITS = {"rad": 180.0 / np.pi, "m": 1e3}  # deg and mm where not stated
 _TURNS = {
     QUATERNION: ["qw", "qx", "qy", "qz"],
     VECTOR: ["rvx", "rvy", "rvz"],
@@ -34,50 +33,46 @@ _TURNS = {
     KUKA: ["a", "b", "c"],
     FIXED: ["w", "p", "r"],
 }
-_COLUMN = re.compile(r"(\w+?)(?:_|\s*[\[(])(mm|m|deg|rad)[\])]?")
+_COLUMN = re.compile(r"(\w+?)(?:(?:_|\s*[\[(])(mm|m|deg|rad)[\])]?)?")
 
 
 def read(sources: Sequence[Source], frames: Frames, _: np.ndarray | None) -> Program:
     """Positions of a CSV file: joints where it has them, else poses in the robot's base."""
     (source,) = sources
-    head, *lines = source.text.splitlines(keepends=True) or [""]
-    mark = next((mark for mark in ";\t" if mark in head), ",")
-    cells = [cell.strip('\xef\xbb\xbf" \r\n').lower() for cell in head.split(mark)]
-    columns = [_COLUMN.fullmatch(cell) for cell in cells]
-    names = [result[1] if result else cell for result, cell in zip(columns, cells, strict=True)]
-    unit = {result[1]: _UNITS[result[2]] for result in columns if result}
-    keys = sorted(name for name in names if re.fullmatch(r"q[1-9]", name))
+    lines = [line for line in re.finditer(r"[^\r\n]+", source.text) if line[0].strip()]
+    head = lines[0][0] if lines else ""
+    separator = next((mark for mark in ";\t" if mark in head), ",")
+    units = {}
+    for cell in head.split(separator):
+        column = _COLUMN.fullmatch(cell.strip('\xef\xbb\xbf" ').lower())
+        units[column[1] if column else cell] = _UNITS.get(column[2] if column else "", 1.0)
     convention = scale = None
-    if keys:
-        scale = np.array([1.0 / unit.get(key, 1.0) for key in keys])
+    if keys := sorted(name for name in units if re.fullmatch(r"q[1-9]", name)):
+        scale = np.array([1.0 / units[key] for key in keys])
     else:
-        kinds = [kind for kind, turn in _TURNS.items() if {*"xyz", *turn} <= set(names)]
-        if not kinds:
+        kind = next((kind for kind, turn in _TURNS.items() if {*"xyz", *turn} <= {*units}), None)
+        if kind is None:
             allowed = "q1_deg .., or x_mm .. with qw .., rvx_deg .., rx_deg .., a .. c or w, p, r"
             raise InputError(Problem(f"{source.path}:1", "names no columns of positions", allowed))
-        keys = [*"xyz", *_TURNS[kinds[0]]]
-        convention = Convention(kinds[0], unit.get("x", 1.0), unit.get(keys[-1], 1.0))
-    positions, state = [], len(head)
-    for number, line in enumerate(lines, 2):
-        row = dict(zip(names, _places(line, mark, state), strict=False))
-        state += len(line)
-        if not line.strip():
-            continue
+        keys = [*"xyz", *_TURNS[kind]]
+        convention = Convention(kind, units["x"], units[keys[-1]])
+    positions = []
+    cells = re.compile(rf'[ \t]*"?([^{separator}"\r\n]*?)"?[ \t]*(?:{separator}|$)', re.M)
+    for line in lines[1:]:
+        spans = [cell.span(1) for cell in cells.finditer(source.text, *line.span())]
+        row = dict(zip(units, spans, strict=False))
+        where = source.where(line.start())
         try:
-            label = source.text[slice(*row["pose"])] if "pose" in names else f"line {number}"
             places = [row[key] for key in keys]
             source.values(places)
         except (KeyError, ValueError):
             message = f"has no number in a column of {', '.join(keys)}"
-            raise InputError(Problem(f"{source.path}:{number}", message)) from None
+            raise InputError(Problem(f"{source.path.parent / where}", message)) from None
+        label = f"line {where.split(':')[1]}"
+        if "pose" in row:
+            label = source.text[slice(*row["pose"])]
         positions.append(Position(label, source, places, 6, scale, tool="", base=""))
-    return Program(sources, positions, {**frames, (BASE, ""): IDENTITY}, convention=convention)
-
-
-def _places(line: str, mark: str, at: int) -> list[tuple[int, int]]:
-    """Where the cells of a line are, without spaces and quotes around them."""
-    result = re.finditer(rf'[ \t]*"?([^{mark}"\r\n]*?)"?\s*(?:{mark}|$)', line.rstrip("\r\n"))
-    return [(at + cell.start(1), at + cell.end(1)) for cell in result][: line.count(mark) + 1]
+    return Program(sources, positions, {**frames, **FIXED_BASE}, convention=convention)
 
 
 LANGUAGE = Language("CSV", (".csv",), Convention(FIXED), read)

@@ -25,10 +25,8 @@ CONVENTION = Convention(FIXED)
 _POSITION = re.compile(r"^(B?C|B?P|E[CX])(\d+)\s*=(.*)|^///(\w+)(.*)", re.M)
 _BLOCK = re.compile(r"^//(TOOL|UFRAME)\s+(\d+)(.*?)(?=^//(?!/)|\Z)", re.M | re.S)
 _ROW = re.compile(r"^(?:/{3,4}BUSER\s+)?[-+.\d][^\r\n/]*", re.M)
-_MOVE = re.compile(r"^\s*S?MOV[JLCS]\b.*?\bP(\d+)\b", re.M)
-_OTHER = re.compile(r"^(?!\s*S?MOV[JLCS]\b).*", re.M)
-_COMPUTED = re.compile(r"^\s*(?:IMOV|SFTON|CNVRT|MULMAT|SETE)\b.*", re.M)
-_WORDS = (
+_INSTRUCTION = re.compile(r"^\s*(S?MOV[JLCS]\b)?(IMOV\b|SFTON\b|CNVRT\b|MULMAT\b|SETE\b)?.*", re.M)
+_SIDES = (
     ("flip", "no flip"),
     ("upper arm", "lower arm"),
     ("front", "rear"),
@@ -56,33 +54,32 @@ def read(
     """Positions of a job; those of base and station axes, and shifts, stay as they are."""
     (source,) = sources
     end = source.text.find("//INST") % (len(source.text) + 1)
-    instructions = source.text[end:]
-    targets = set(map(int, _MOVE.findall(instructions)))
-    targets -= set(map(int, re.findall(r"\bP(\d+)\b", "\n".join(_OTHER.findall(instructions)))))
-    computed = [
-        f"{source.where(result.end())}: {result[0].strip()}"
-        for result in _COMPUTED.finditer(source.text, end)
-    ]
+    reached: set[int] = set()
+    computed, shifts, moving, positions = [], set(), set(), []
+    for line in _INSTRUCTION.finditer(source.text, end):
+        numbers = map(int, re.findall(r"\bP(\d+)\b", line[0]))
+        (reached if line[1] else shifts).update(numbers)
+        if line[2]:
+            computed.append(source.statement(line.end(), line[0]))
     state: dict[str, str] = {}
-    positions, moving = [], set()
-    for result in _POSITION.finditer(source.text, 0, end):
-        kind, name, word = result[1], result[2], result[4]
-        if word:
-            state[word] = result[5].strip()
-            state["unit"] = word if word in ("PULSE", "RECTAN") else state.get("unit", "PULSE")
-            continue
-        places = source.numbers(*result.span(3))
-        if kind[0] in "BE":
+    for line in _POSITION.finditer(source.text, 0, end):
+        kind, name, places = line[1], line[2], source.numbers(*line.span(3))
+        if line[4]:
+            state[line[4]] = line[5].strip()
+            if line[4] in ("PULSE", "RECTAN"):
+                state["unit"] = line[4]
+        elif kind[0] in "BE":
             moving |= {name} if source.values(places).any() else set()
-        elif kind == "C" or int(name) in targets:
-            positions.append((kind + name, places, dict(state)))
+        elif kind == "C" or int(name) in reached - shifts:
+            positions.append((kind, name, places, dict(state)))
+    frames = {**NO_FRAMES, (BASE, "ROBOT"): IDENTITY, (BASE, "BASE"): IDENTITY, **frames}
     return Program(
         sources,
         [
-            _position(source, *item, pulses_per_degree, item[0].lstrip("CP") in moving)
-            for item in positions
+            _position(source, kind + name, places, state, pulses_per_degree, name in moving)
+            for kind, name, places, state in positions
         ],
-        {**NO_FRAMES, (BASE, "ROBOT"): IDENTITY, (BASE, "BASE"): IDENTITY, **frames},
+        frames,
         computed,
     )
 
@@ -94,10 +91,8 @@ def _position(
         if pulses is None:
             fix = "give --pulses-per-degree, one number an axis (S, L, U, R, B, T)"
             raise InputError(Problem(str(source.path), "positions are in pulses", fix=fix))
-        scale = np.asarray(pulses)
-        return Position(name, source, places[: len(scale)], 0, scale)
+        return Position(name, source, places[: len(pulses)], 0, pulses)
     reference, rconf = state.get("POSTYPE", "").upper(), state.get("RCONF")
-    base = str(int(state.get("USER") or 0)) if reference == "USER" else reference
     known = reference in ("USER", "ROBOT", "BASE")
     return Position(
         name,
@@ -105,7 +100,7 @@ def _position(
         places[:6],
         (3, 3, 3, 4, 4, 4),
         tool=str(int(state.get("TOOL", "0").split(",")[0])),
-        base=base,
+        base=str(int(state.get("USER") or 0)) if reference == "USER" else reference,
         posture=_named(map(int, rconf.split(","))) if rconf else None,
         moves_outside=moves or bool(source.values(places[6:]).any()),
         refused="" if known else f"is in the frame {reference or 'of its axes'}",
@@ -113,7 +108,7 @@ def _position(
 
 
 def _named(bits: Iterable[int]) -> tuple[str, ...]:
-    return tuple(pair[int(bit)] for pair, bit in zip(_WORDS, bits, strict=False))
+    return tuple(pair[bit] for pair, bit in zip(_SIDES, bits, strict=False))
 
 
 def posture(sides: Sequence[bool], q_deg: np.ndarray) -> tuple[str, ...]:
@@ -125,5 +120,13 @@ def posture(sides: Sequence[bool], q_deg: np.ndarray) -> tuple[str, ...]:
 
 
 LANGUAGE = Language(
-    "Yaskawa JBI", (".jbi",), CONVENTION, read, frames_of, posture, (), ("tool.cnd", "uframe.cnd")
+    "Yaskawa JBI",
+    (".jbi",),
+    CONVENTION,
+    read,
+    frames_of,
+    posture,
+    (),
+    ("tool.cnd", "uframe.cnd"),
+    robots=("gp", "mh"),
 )
