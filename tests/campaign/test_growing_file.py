@@ -124,12 +124,3 @@ def test_a_row_whose_reading_was_struck_does_not_come_back(day):
     day.strike(2)
     day.takes(rows, 1)
     assert day.taken() == 2
-
-
-def test_a_reading_given_alone_and_written_down_as_well_is_taken_once(day):
-    rows = [day.row(place) for place in range(3)]
-    point, _, position = rows[0].partition(",")
-    done = call("campaign", "record", day.folder, "--point", point, "--position-mm", position)
-    assert done.exit_code == 0, done.output
-    day.takes(rows, 2)
-    assert len(set(day.positions())) == 3

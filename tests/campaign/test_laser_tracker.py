@@ -113,21 +113,7 @@ def test_a_laser_tracker_stated_wrongly_is_refused(text, key):
     assert camera.where == "noise of camera"
 
 
-def test_a_laser_tracker_is_no_instrument_of_the_robots_own_base(calibration, tmp_path):
-    done = call("campaign", "start", tmp_path / "check", "--calibration", calibration,
-                "--instrument", f"tracker={LASER}", "--frame", "base")  # fmt: skip
-    assert done.exit_code == 2
-    assert "hangs on where it stands; allowed: --frame instrument" in done.output
-
-
 def test_a_noise_below_the_rounding_of_the_readings_is_taken_as_the_rounding(begun):
     plan = campaigns.open_(begun("--noise-mm", "0.001,0.001,0.2", "--resolution-mm", 0.1)).plan
     std = np.sqrt(np.diag(plan.instruments[0].covariance_mm2))
     np.testing.assert_allclose(std, [0.1 / np.sqrt(12), 0.1 / np.sqrt(12), 0.2])
-
-
-def test_a_resolution_that_is_no_length_is_refused(calibration, tmp_path):
-    done = call("campaign", "start", tmp_path / "check", "--calibration", calibration,
-                "--noise-mm", 0.1, "--resolution-mm", -1)  # fmt: skip
-    assert done.exit_code == 2
-    assert "--resolution-mm: -1" in done.output

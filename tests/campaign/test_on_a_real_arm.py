@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shutil
 
 import numpy as np
 import pytest
@@ -12,15 +11,9 @@ from command_line import call
 from measured_worlds import measured_world
 from stages_by_hand import run_stage
 
-from kinacc.assess.random_numbers import key_of
-from kinacc.assess.search_and_confirm import SearchAndConfirm
 from kinacc.assess.simulate import conduct
 from kinacc.assess.single_shot import SingleShot
-from kinacc.assess.world import drawn_world
 from kinacc.campaign import folder as campaigns
-from kinacc.campaign.reading import Reading
-from kinacc.cli.campaign_plan import errors_of
-from kinacc.geometry import invert
 from kinacc.tables import store
 
 SERIES = "ur10_tmac/series_D.csv"
@@ -131,46 +124,3 @@ def test_the_series_itself_imported_whole_says_what_it_says_in_memory(ur10_d, tm
     wanted = conduct(SingleShot(measurements=len(errors)), measured_world(
         errors, np.zeros((len(errors), 0, 3)), SIGMA_MM))  # fmt: skip
     same(folder, wanted.statements())
-
-
-def test_a_simulated_campaign_on_its_residuals_ends_as_in_memory(ur10_d, tmp_path):
-    whole, folder = tmp_path / "whole", tmp_path / "campaign"
-    plan = begun(ur10_d, whole, "--assessor", "single_shot")
-    call("campaign", "record", whole, ur10_d[1])
-    errors = np.zeros((len(plan.points), 3))
-    for each in campaigns.open_(whole).state().told:
-        errors[each.reading.point] = each.error_mm
-    plan = begun(ur10_d, folder)
-    rows = plan.visiting(frozenset())
-    row = {int(point): number for number, point in enumerate(rows)}
-    world = drawn_world(errors[rows], SIGMA_MM, key_of(8), 200)
-    back = invert(plan.to_base)
-    while True:
-        with campaigns.writing(folder) as opened:
-            state = opened.state()
-            if state.asked is None:
-                break
-            visit = sum(each.reading.point == state.asked for each in state.told)
-            seen = plan.points.modelled_mm[state.asked] + world.reading_mm(row[state.asked], visit)
-            seen = back.rotation @ seen + back.position_mm
-            opened.write(campaigns.readings_entry([Reading(state.asked, seen, "instrument")]))
-    wanted = conduct(SearchAndConfirm(measurements=len(rows)), world)
-    bound = same(folder, wanted.statements())
-    measured = np.linalg.norm(errors[rows[wanted.ledger.visited]], axis=1).max()
-    assert bound["lower_mm"] <= measured <= bound["upper_mm"]
-
-
-def test_a_plan_simulates_with_the_errors_of_the_model_a_campaign_would_be_about(ur10_d, tmp_path):
-    results, *_ = ur10_d
-    errors = store.read(results / "pose_errors.parquet")
-    sizes = np.linalg.norm([errors[f"e{axis}_mm"] for axis in "xyz"], axis=0)
-    held_out = errors["estimate"] == "cross_validated"
-    for model in ("dh", "vec"):
-        folder = tmp_path / model
-        shutil.copytree(results, folder)
-        path = folder / "model_selection.parquet"
-        columns = store.read(path)
-        columns["selected"] = (columns["model"] == model).astype(int)
-        store.write_table(path, "model_selection", columns, store.read_metadata(path))
-        largest = sizes[held_out & (errors["comparison"] == f"{model}_vs_measured")].max()
-        assert errors_of(str(folder)).size_mm.max() == pytest.approx(largest, rel=0.02)

@@ -9,7 +9,6 @@ import numpy as np
 import pandas as pd
 import pytest
 from command_line import call
-from scipy.stats import ncx2
 
 from kinacc.assess.attainable import width_limits
 from kinacc.assess.random_numbers import key_of
@@ -48,21 +47,6 @@ def test_a_simulated_campaign_is_one_run_in_memory(target):
             assert each.true_mm == sizes[campaign.ledger.visited].max()
         else:
             assert each.true_mm == np.sort(sizes)[-1 - each.excepted]
-
-
-def test_a_plan_for_single_visits_is_held_to_what_95_percent_of_visits_keep():
-    errors, sigma = field(), 0.2
-    assessors = [
-        SearchAndConfirm(measurements=60, error_of="visit", **own) for own in ({}, {"arm_mm": 0.1})
-    ]
-    found = simulate([errors], 40, sigma**2 * np.eye(3), assessors, 2, 9, Aim())
-    rows = [np.random.default_rng([9, 0, each]).permutation(100)[:40] for each in (0, 1)]
-    wanted = [
-        scale * math.sqrt(ncx2.ppf(0.95, 3, (errors.size_mm[chosen].max() / scale) ** 2))
-        for chosen in rows
-        for scale in (sigma, 0.1)
-    ]
-    assert found["true_mm"].tolist() == pytest.approx(wanted, rel=1e-6)
 
 
 def test_a_plan_has_the_excess_of_bounds_that_know_the_errors():
@@ -113,12 +97,6 @@ def test_rows_count_what_is_stated_wanted_held_and_decided():
     assert row.width_q95_mm == math.inf
 
 
-def test_bounds_that_contradict_each_other_are_no_width_below_zero():
-    table = runs((1.1, 0.9, 1.0, "undecided"), (0.9, 1.2, 1.0, "undecided"))
-    row = pd.Series(planning._row("x", 10, table, Aim()))
-    assert (row.width_q05_mm, row.width_q95_mm) == pytest.approx((0.0, 0.3))
-
-
 def test_the_budget_named_is_enough_on_all_errors_and_beyond():
     aim = Aim(width_mm=0.5, power=0.8)
 
@@ -161,13 +139,6 @@ def test_the_command_answers_with_table_picture_and_budget(errors_file, tmp_path
     assert [row["budget"] for row in content["rows"]] == [15, 60]
     assert pd.read_csv(table)["true_mm"].iloc[1] == pytest.approx(content["rows"][1]["true_mm"])
     assert call(*words, "--json").stdout == call(*words, "--json").stdout
-
-
-def test_errors_can_be_scaled(errors_file):
-    words = ("campaign", "plan", "--noise-mm", "0.01", "--candidates", 60, "--errors", errors_file,
-             "--largest-mm", "3", "--repetitions", 2, "--budget", 60, "--json")  # fmt: skip
-    content = json.loads(call(*words).stdout)
-    assert content["rows"][0]["true_mm"] == pytest.approx(3.0)
 
 
 @pytest.mark.parametrize(

@@ -4,18 +4,23 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
 from kinacc import __version__
 from kinacc.assess.adaptive import AdaptiveAssessor, Candidates
+from kinacc.calibration.noise import Noise
+from kinacc.campaign import folder as folders
+from kinacc.campaign.doubts import of_candidates, of_little_noise, of_noise
 from kinacc.campaign.instrument import Instrument
 from kinacc.campaign.plan import Limits, Plan, Points
 from kinacc.config.names import not_in_a_line
 from kinacc.deployment.planning import distances, shortest_path
 from kinacc.deployment.record import Calibration
 from kinacc.errors import InputError, Problem, first_few, refuse
-from kinacc.geometry import Pose, compose, invert
+from kinacc.geometry import compose, invert
 from kinacc.kinematics.inverse.limits import travel_unit
 from kinacc.kinematics.model import JointState
 from kinacc.kinematics.robot import outside_limits
@@ -44,7 +49,7 @@ def points_of(
     directions = None if directions is None else directions[kept]
     problems = _outside(arm, joints, label)
     problems += [fault for each in label for fault in not_in_a_line("candidates, pose", each)]
-    if doubled := sorted(each for each, count in Counter(label).items() if count > 1):
+    if doubled := sorted(name for name, count in Counter(label).items() if count > 1):
         what = f"names given to different joints: {', '.join(doubled[:5])}"
         problems.append(Problem("candidates", what, "one name per point"))
     refuse(problems, "These candidates cannot be measured against the model")
@@ -71,18 +76,50 @@ def plan_of(
     the random order.
     """
     order = np.random.default_rng(seed).permutation(len(points))
-    to_base = _to_base(arm)
-    instruments = [each.placed(to_base, points.modelled_mm) for each in instruments]
+    to_base = compose(arm.origin("base"), invert(arm.origin("instrument")))
+    instruments = [device.placed(to_base, points.modelled_mm) for device in instruments]
+    if not np.isfinite(limits.implausible_mm):
+        limits = replace(limits, implausible_mm=_plausible_mm(arm, instruments))
     noise = instruments[0].in_base(to_base, points.modelled_mm)
     begun = assessor.begin(Candidates(noise[order]))
     route = order[: begun.first]
     if by_travel:
-        unit = travel_unit(arm.robot)
-        route = route[_visit_path(points.joints[route] / unit, start / unit, begun.reference_poses)]
+        unit, count = travel_unit(arm.robot), begun.reference_poses
+        places = points.joints[route] / unit
+        path = _short_path(places[:count], start / unit) if count else np.array([], dtype=int)
+        here = places[path[-1]] if count else start / unit
+        route = route[np.concatenate([path, count + _short_path(places[count:], here)])]
     return Plan(
         points, order, route, assessor, tuple(instruments), to_base,
         arm.robot.dh.prismatic, limits, seed, about,
     )  # fmt: skip
+
+
+def start(
+    folder: Path | str,
+    arm: Calibration,
+    plan: Plan,
+    known: Noise | None = None,
+    doubts: Sequence[Problem] = (),
+    sure: bool = True,
+) -> Plan:
+    """Put a plan on disk with what speaks against it; returns the plan.
+
+    ``known``: noise of readings of the calibration; ``doubts``: further ones. Raises InputError
+    where there is one, unless ``sure``, and where the folder holds a campaign.
+    """
+    point = plan.about["point"]
+    problems = [
+        *of_noise(plan.instruments, unexplained_mm(arm)),
+        *doubts,
+        *of_little_noise(plan.instruments, known),
+        *of_candidates(arm, plan.points, point),
+    ]
+    if not sure:
+        refuse(problems, "The campaign was not begun")
+    plan = replace(plan, overruled=tuple(f"{item.where}: {item.what}" for item in problems))
+    folders.start(folder, plan)
+    return plan
 
 
 def about(arm: Calibration, point: str | None, source: str) -> dict[str, str]:
@@ -102,31 +139,16 @@ def unexplained_mm(arm: Calibration) -> float:
     return arm.residual.position_mm if arm.residual else np.nan
 
 
-def plausible_mm(arm: Calibration, instruments: Sequence[Instrument], points: Points) -> float:
+def _plausible_mm(arm: Calibration, instruments: Sequence[Instrument]) -> float:
     """Size of an error beyond which a reading is more likely to be of another pose, mm.
 
     Twenty times what the calibration left unexplained, and ten standard deviations of the
     noisiest instrument; at least 5 mm, and 50 mm for a model that was never fitted.
     """
-    used = [each.placed(_to_base(arm), points.modelled_mm) for each in instruments]
-    noise = max(np.sqrt(np.linalg.eigvalsh(each.covariance_mm2)[-1]) for each in used)
-    left = unexplained_mm(arm)
-    usual = 50.0 if not np.isfinite(left) else max(5.0, 20.0 * left)
-    return float(f"{usual + 10.0 * noise:.3g}")
-
-
-def _to_base(arm: Calibration) -> Pose:
-    """The instrument's frame in the robot's base."""
-    return compose(arm.origin("base"), invert(arm.origin("instrument")))
-
-
-def _visit_path(places: np.ndarray, start: np.ndarray, references: int) -> np.ndarray:
-    """Rows (n,) of places (n, k): the reference poses, then the others, each with little travel."""
-    if not references:
-        return _short_path(places, start)
-    early = _short_path(places[:references], start)
-    later = _short_path(places[references:], places[early[-1]])
-    return np.concatenate([early, references + later])
+    noise = max(np.sqrt(np.linalg.eigvalsh(item.covariance_mm2)[-1]) for item in instruments)
+    left_mm = unexplained_mm(arm)
+    usual_mm = 50.0 if not np.isfinite(left_mm) else max(5.0, 20.0 * left_mm)
+    return float(f"{usual_mm + 10.0 * noise:.3g}")
 
 
 def _short_path(places: np.ndarray, start: np.ndarray) -> np.ndarray:
@@ -145,17 +167,18 @@ def _short_path(places: np.ndarray, start: np.ndarray) -> np.ndarray:
 
 def _outside(arm: Calibration, joints: np.ndarray, label: list[str]) -> list[Problem]:
     robot = arm.robot
-    problems = [
-        _said(each.rows, label, f"joint {each.joint} outside the limits of {robot.name}")
-        for each in outside_limits(robot, joints, 1e-9)
+    beyond = [
+        (fault.rows, f"joint {fault.joint} outside the limits of {robot.name}")
+        for fault in outside_limits(robot, joints, 1e-9)
     ]
     if arm.model.domain is not None:
         outside = arm.outside_range(robot.dh_joints(joints))
-        for joint in np.flatnonzero(outside.any(axis=0)):
-            words = f"joint {joint + 1} outside the range the data cover: no prediction"
-            problems.append(_said(np.flatnonzero(outside[:, joint]), label, words))
-    return problems
-
-
-def _said(rows: np.ndarray, label: list[str], words: str) -> Problem:
-    return Problem(f"candidates {first_few([label[i] for i in rows])}", words)
+        beyond += [
+            (rows, f"joint {joint} outside the range the data cover: no prediction")
+            for joint, column in enumerate(outside.T, 1)
+            if len(rows := np.flatnonzero(column))
+        ]
+    return [
+        Problem(f"candidates {first_few([label[row] for row in rows])}", text)
+        for rows, text in beyond
+    ]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
@@ -12,7 +12,7 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from kinacc.assess.registry import RECOMMENDED
-from kinacc.campaign import begin, slips
+from kinacc.campaign import begin
 from kinacc.campaign import folder as folders
 from kinacc.campaign import reading as checks
 from kinacc.campaign.instrument import INSTRUMENT, Instrument, covariance_of
@@ -150,24 +150,21 @@ class Campaign:
             For candidates the model does not cover, a wrong noise, or a folder in use.
         """
         arm, problems = calibration.model, list[Problem]()
-        noise = np.asarray(noise_mm, dtype=float)
-        text = ",".join(map(repr, noise.ravel().tolist()))
+        text = ",".join(map(repr, np.asarray(noise_mm, dtype=float).ravel().tolist()))
         covariance = covariance_of(text, "noise_mm", problems)
         refuse(problems)
-        used = [Instrument(INSTRUMENT, covariance, frame)]
         joints = np.asarray(candidates, dtype=float)
         labels = [str(number) for number in range(1, len(joints) + 1)]
         points = begin.points_of(arm, joints, labels, None, point)
         settings = {"measurements": budget, **(settings or {})}
-        made = assessor_of(assessor, settings)
-        made = with_references(made, len(points), settings.get("references"))
-        limits = Limits(np.deg2rad(0.02), begin.plausible_mm(arm, used, points), tolerance_mm)
-        at, about = np.zeros(joints.shape[1]), begin.about(arm, point, "given as an array")
-        plan = begin.plan_of(arm, points, made, used, limits, seed, at, about)
-        doubts = slips.of_noise(used, begin.unexplained_mm(arm))
-        doubts += slips.of_candidates(arm, points, point)
-        overruled = tuple(f"{each.where}: {each.what}" for each in doubts)
-        folders.start(folder, replace(plan, overruled=overruled))
+        references = settings.get("references")
+        chosen = with_references(assessor_of(assessor, settings), len(points), references)
+        plan = begin.plan_of(
+            arm, points, chosen, [Instrument(INSTRUMENT, covariance, frame)],
+            Limits(np.deg2rad(0.02), np.inf, tolerance_mm), seed, np.zeros(joints.shape[1]),
+            begin.about(arm, point, "given as an array"),
+        )  # fmt: skip
+        begin.start(folder, arm, plan)
         return cls(folder)
 
     def _load(self) -> None:

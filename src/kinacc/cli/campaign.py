@@ -8,10 +8,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
+import numpy as np
 import pandas as pd
 
 from kinacc.cli import campaign_plan, campaign_record, campaign_start
-from kinacc.cli.choice import option
+from kinacc.cli.choice import option, positive
 from kinacc.cli.exit_codes import AGAINST
 from kinacc.cli.group import InOrder
 from kinacc.cli.output import Output, answers, require_writable, write_table
@@ -55,16 +56,12 @@ def next_(folder, every, out) -> None:
       kinacc campaign next check
       kinacc campaign next check --all -o visit.csv
     """
-    from kinacc.campaign.campaign import Campaign
-
-    found = Campaign(folder)
-    _say_doubts(found)
-    table, pose, done = found.visit(every), found.next_pose(), found.status().progress
-    result = {"rows": table, "progress": done}
-    shown = table[[each for each in table.columns if not each.endswith("_rad")]]
-    one = not every and out.table is None and pose is not None
-    lines = _pose_lines(found, pose) if one and pose else [done]
-    out.show(result, table, lines, shown.head(0) if one else shown)
+    found = _open(folder)
+    table, pose, progress = found.visit(every), found.next_pose(), found.status().progress
+    shown, lines = table[[name for name in table if not name.endswith("_rad")]], [progress]
+    if pose is not None and not every and out.table is None:
+        shown, lines = shown.head(0), _pose_lines(found, pose)
+    out.show({"rows": table, "progress": progress}, table, lines, shown)
 
 
 @campaign.command("leave-out")
@@ -79,9 +76,7 @@ def leave_out(folder, point, reason, out) -> None:
     Example:
       kinacc campaign leave-out check 17 --reason "hidden behind the column"
     """
-    from kinacc.campaign.campaign import Campaign
-
-    found = Campaign(folder)
+    found = _open(folder)
     found.leave_out(point, reason)
     _show(found.status(), out)
 
@@ -100,17 +95,14 @@ def strike(folder, number, reason, out) -> None:
     Example:
       kinacc campaign strike check 31 --reason "reflector was not seated"
     """
-    from kinacc.campaign.campaign import Campaign
-
-    found = Campaign(folder)
+    found = _open(folder)
     found.strike(number, reason)
     _show(found.status(), out)
 
 
 @campaign.command("status")
 @click.argument("folder", type=click.Path())
-@option("--tolerance-mm", type=click.FloatRange(0.0, 1e6, min_open=True),
-        help="Largest error allowed. [as started]")  # fmt: skip
+@option("--tolerance-mm", type=positive, help="Largest error allowed. [as started]")
 @answers("JSON of the status.", verbose=True)
 def status(folder, tolerance_mm, out) -> None:
     """Show the current bounds, the verdict, and the next point.
@@ -119,12 +111,7 @@ def status(folder, tolerance_mm, out) -> None:
     Example:
       kinacc campaign status check --tolerance-mm 0.5
     """
-    from kinacc.campaign.campaign import Campaign
-
-    found = Campaign(folder)
-    if not out.as_json:
-        _say_doubts(found)
-    _show(found.status(tolerance_mm), out)
+    _show(_open(folder).status(tolerance_mm), out)
 
 
 @campaign.command("report")
@@ -144,15 +131,12 @@ def report(folder, to, formats, out) -> None:
     Example:
       kinacc campaign report check --page check.html --table xlsx
     """
-    from kinacc.campaign.campaign import Campaign
-
-    found = Campaign(folder)
-    _say_doubts(found)
+    found = _open(folder)
     into = Path(to or found.folder / "report")
-    written = _write_report(found, into, formats, out, out.force or to is None)
+    files = _write_report(found, into, formats, out, out.force or to is None)
     result = found.status()
-    lines = [result.headline, f"{into}: {', '.join(written)}", out.page or ""]
-    answer = {**vars(result), "report": str(into), "files": written, "page": out.page}
+    lines = [result.headline, f"{into}: {', '.join(files)}", out.page or ""]
+    answer = {**vars(result), "report": str(into), "files": files, "page": out.page}
     out.show(answer, pd.DataFrame(), filter(None, lines))
 
 
@@ -195,19 +179,9 @@ def _write_report(
     from kinacc.tables.store import content_of, to_table
 
     if not found.state.told:
-        what = "no reading was requested and taken yet"
-        raise InputError(Problem(str(found.folder), what))
-    names = ("campaign_points", "campaign_readings", "campaign_bounds")
-    pictures = {kind: into / f"campaign.{kind}" for kind in ("svg", "png")}
-    text = into / "report.md"
-    sheets = {into / f"{name}.{kind}": name for kind in dict.fromkeys(formats) for name in names}
-    paths = [*(into / f"{name}.parquet" for name in names), *sheets, *pictures.values(), text]
-    require_writable(paths, force)
+        raise InputError(Problem(str(found.folder), "no reading was requested and taken yet"))
     state, tables = reports.tables(found.opened)
-    marks = marks_of(found.opened)
-    contents = {
-        into / f"{name}.parquet": content_of(to_table(name, tables[name], marks)) for name in names
-    }
+    metadata = marks_of(found.opened)
     figure = drawing.draw(
         tables["campaign_points"],
         tables["campaign_bounds"],
@@ -215,14 +189,21 @@ def _write_report(
         state.plan.limits.tolerance_mm,
         state.plan.about["calibration"],
     )
-    contents |= {pictures[kind]: drawn for kind, drawn in render(figure, pictures).items()}
-    contents[text] = markdown(found.opened, state, tables, "campaign.svg").encode()
-    write_together(contents)
+    contents = {
+        f"{name}.parquet": content_of(to_table(name, table, metadata))
+        for name, table in tables.items()
+    }
+    pictures = render(figure, ("svg", "png"))
+    contents |= {f"campaign.{kind}": content for kind, content in pictures.items()}
+    contents["report.md"] = markdown(found.opened, state, tables, "campaign.svg").encode()
+    sheets = {f"{name}.{kind}": name for kind in dict.fromkeys(formats) for name in tables}
+    require_writable([into / name for name in (*contents, *sheets)], force)
+    write_together({into / name: content for name, content in contents.items()})
     for path, name in sheets.items():
-        write_table(pd.DataFrame(tables[name]), path)
+        write_table(pd.DataFrame(tables[name]), into / path)
     if out.page is not None:
         out.write_page(campaign_page(found.opened, state, tables))
-    return [each.name for each in paths]
+    return [*contents, *sheets]
 
 
 def _show(found: CampaignStatus, out: Output) -> None:
@@ -231,46 +212,53 @@ def _show(found: CampaignStatus, out: Output) -> None:
 
 def status_lines(found: CampaignStatus, verbose: bool = False) -> list[str]:
     """Return the verdict, the bounds, their conditions, and the progress."""
-    texts = [found.headline]
-    if not found.against:
-        texts += [each.text for each in found.bounds if math.isfinite(each.upper_mm)]
-    texts += [found.assumes, *(f"{text}." for text in found.against[1:]), *found.advice]
-    texts.append(found.progress)
-    texts += [f"Note: {text}." for text in found.notes]
-    texts += [f"Overruled at the start: {text}." for text in found.overruled]
+    bounds = [bound for bound in found.bounds if math.isfinite(bound.upper_mm)]
+    texts = [
+        found.headline,
+        *(bound.text for bound in bounds if not found.against),
+        found.assumes,
+        *(f"{text}." for text in found.against[1:]),
+        *found.advice,
+        found.progress,
+        *(f"Note: {text}." for text in found.notes),
+        *(f"Overruled at the start: {text}." for text in found.overruled),
+    ]
     if verbose:
         texts += [f"Instrument {name}: {noise}." for name, noise in found.noise.items()]
         texts += [
-            f"Mean excess of the upper bound ({each.about}): {each.attainable_mm:.3f} mm with all "
-            f"errors known, no reliable bound below {each.proven_mm:.3f} mm; now "
-            f"{each.upper_mm - each.value_mm:.3f} mm above the estimate."
-            for each in found.bounds
-            if math.isfinite(each.attainable_mm)
+            f"Mean excess of the upper bound ({bound.about}): {bound.attainable_mm:.3f} mm with "
+            f"all errors known, no reliable bound below {bound.proven_mm:.3f} mm; now "
+            f"{bound.upper_mm - bound.value_mm:.3f} mm above the estimate."
+            for bound in bounds
+            if math.isfinite(bound.attainable_mm)
         ]
-    return [each for each in dict.fromkeys(texts) if each]
+    return list(filter(None, dict.fromkeys(texts)))
 
 
 def _pose_lines(found: Campaign, pose: NextPose) -> list[str]:
     """The joints of a pose, and where the model expects the reading."""
-    budget = found.plan.assessor.measurements
-    lines = [f"Point {pose.point}, reading {len(found.state.told) + 1} of {budget}"]
+    lines = [f"Point {pose.point}, reading {len(found.state.told) + 1} of {found.status().budget}"]
+    travel = np.zeros(len(pose.joints), int) if pose.directions is None else pose.directions
     for joint, (value, slides) in enumerate(zip(pose.joints, found.plan.slides, strict=True)):
-        shown = f"{value:12.4f} mm"
-        if not slides:
-            shown = f"{math.degrees(value):12.4f} deg  {value:12.7f} rad"
-        travel = 0 if pose.directions is None else pose.directions[joint]
-        lines.append(f"  q{joint + 1} {shown}{('', '  arriving up', '  arriving down')[travel]}")
+        turn = f"{math.degrees(value):12.4f} deg  {value:12.7f} rad"
+        arrival = ("", "  arriving up", "  arriving down")[travel[joint]]
+        lines.append(f"  q{joint + 1} {f'{value:12.4f} mm' if slides else turn}{arrival}")
     x, y, z = pose.expected_mm
     lines.append(f"Expected at {x:.3f}, {y:.3f}, {z:.3f} mm in the {pose.frame} frame.")
-    again = f"Read {pose.times_read} times before: leave the pose and come back to it."
-    return [*lines, again] if pose.times_read else lines
+    if pose.times_read:
+        lines.append(f"Read {pose.times_read} times before: leave the pose and come back to it.")
+    return lines
 
 
-def _say_doubts(found: Campaign) -> None:
+def _open(folder: str) -> Campaign:
+    """The campaign; what is unusual about its files goes to the error stream."""
+    from kinacc.campaign.campaign import Campaign
     from kinacc.campaign.folder import doubts
 
+    found = Campaign(folder)
     for line in doubts(found.opened):
         click.echo(line, err=True)
+    return found
 
 
 campaign.add_command(campaign_plan.plan)

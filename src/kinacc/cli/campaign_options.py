@@ -4,20 +4,18 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import fields
 from pathlib import Path
 
 from kinacc.assess.adaptive import AdaptiveAssessor
-from kinacc.assess.registry import ADAPTIVE, RECOMMENDED
-from kinacc.assess.statement import CONFIDENCE
-from kinacc.campaign import instrument, known_noise, plan, slips
+from kinacc.assess.noise import ESTIMATED
+from kinacc.assess.registry import RECOMMENDED
+from kinacc.campaign import doubts, instrument, known_noise
 from kinacc.campaign.known_noise import KnownNoise
-from kinacc.errors import InputError, Problem, refuse
+from kinacc.campaign.plan import assessor_of, with_references
+from kinacc.errors import InputError, Problem
 
-_LARGEST_MM = 1e6
 # Settings of assessors by the options that set them.
 _SETTINGS = {
-    "noise": "noise",
     "wrong_readings": "wrong_rate",
     "references": "references",
     "error": "error_of",
@@ -25,88 +23,55 @@ _SETTINGS = {
     "allowance_mm": "allowance_mm",
     "confidence": "confidence",
 }
-_DEFAULTS = {"noise": "known", "error": "mean"}
 
 
 def instruments(
-    given: Mapping, tested: KnownNoise | None, results: Sequence[Path] = ()
-) -> tuple[instrument.Instrument, ...]:
-    """Return the instruments of the options; ``tested``: the noise of ``--repeatability``.
+    options: Mapping, results: Sequence[Path] = ()
+) -> tuple[tuple[instrument.Instrument, ...], KnownNoise | None]:
+    """Return the instruments of the options, and the noise of ``--repeatability``.
 
     Raises InputError without any, with the scatter of the readings in the folders ``results``.
     """
-    frame, resolution_mm = given.get("frame", "base"), given["resolution_mm"]
-    unnamed = (given["covariance_mm2"], given["noise_mm"])
-    texts = [f"instrument={each}" for each in unnamed if each is not None]
-    texts += given.get("instrument", ())
-    refuse(not_positive(resolution_mm=resolution_mm))
-    resolution_mm = resolution_mm or 0.0
-    if tested is None and texts:
-        return instrument.instruments(texts, frame, resolution_mm)
-    if tested is not None and texts:
-        raise InputError(Problem("--repeatability", f"is given beside {', '.join(texts)}"))
-    if tested is None:
-        known = [slips.noise_by_repeats(slips.noise_of(each)) for each in results]
-        fix = "\n    ".join(filter(None, [slips.WAYS_TO_NOISE, *known]))
+    frame, resolution_mm = options.get("frame", "base"), options["resolution_mm"] or 0.0
+    unnamed = (options["covariance_mm2"], options["noise_mm"])
+    texts = [f"instrument={text}" for text in unnamed if text is not None]
+    texts += options.get("instrument", ())
+    if options["repeatability"] is not None:
+        if texts:
+            raise InputError(Problem("--repeatability", f"is given beside {', '.join(texts)}"))
+        tested = known_noise.read(options["repeatability"])
+        covariance = instrument.floored(tested.covariance_mm2, resolution_mm)
+        used = instrument.Instrument("instrument", covariance, frame, None, resolution_mm)
+        return (used,), tested
+    if not texts:
+        scatter = [doubts.noise_by_repeats(doubts.noise_of(folder)) for folder in results]
+        fix = "\n    ".join(filter(None, [doubts.WAYS_TO_NOISE, *scatter]))
         raise InputError(Problem("noise", "is not given", fix=fix))
-    floored = instrument.floored(tested.covariance_mm2, resolution_mm)
-    return (instrument.Instrument("instrument", floored, frame, None, resolution_mm),)
+    return instrument.instruments(texts, frame, resolution_mm), None
 
 
-def tested_noise(path: str | None) -> KnownNoise | None:
-    """Return the noise of ``--repeatability``; None where it is not given."""
-    return None if path is None else known_noise.read(path)
+def assessor(
+    options: Mapping, budget: int, points: int, tested: KnownNoise | None
+) -> AdaptiveAssessor:
+    """Return the assessor of the options for so many candidates.
 
-
-def assessor(given: Mapping, budget: int, tested: KnownNoise | None) -> AdaptiveAssessor:
-    """Return the assessor of the options. Raises InputError for settings that it has not."""
-    name = given["assessor"] or RECOMMENDED
-    known = {each.name for each in fields(ADAPTIVE[name])} if name in ADAPTIVE else {"confidence"}
-    asked = {
-        option: given[option]
-        for option in _SETTINGS
-        if given[option] is not None and given[option] != _DEFAULTS.get(option)
+    Raises InputError for settings that it does not have.
+    """
+    settings: dict[str, object] = {
+        name: options[option] for option, name in _SETTINGS.items() if options[option] is not None
     }
-    problems = [
-        Problem(f"--{option.replace('_', '-')}", f"{name} has no such setting")
-        for option in asked
-        if name in ADAPTIVE and _SETTINGS[option] not in known
-    ]
-    if tested is not None and name in ADAPTIVE and "noise_freedom" not in known:
-        problems.append(Problem("--repeatability", f"{name} takes the noise as known"))
-    if tested is not None and "noise" in asked:
-        problems.append(Problem("--noise", "is given beside --repeatability"))
-    settings: dict[str, object] = {"measurements": budget}
-    if "confidence" in known:
-        settings["confidence"] = CONFIDENCE
-    settings |= {_SETTINGS[option]: value for option, value in asked.items()}
-    if "noise" in asked or tested is not None:
-        settings["noise"] = "estimated"
+    settings["measurements"] = budget
+    if options["noise"] == "estimate" or tested is not None:
+        settings["noise"] = ESTIMATED
     if tested is not None:
         settings["noise_freedom"] = tested.freedom
-    if "wrong_readings" in asked:
-        text = str(asked["wrong_readings"]).strip()
-        try:
-            rate = float(text.removesuffix("%")) * (0.01 if text.endswith("%") else 1.0)
-            settings["wrong_rate"] = rate
-        except ValueError:
-            problems.append(Problem("--wrong-readings", repr(text), "a share as 1% or 0.01"))
-    refuse(problems)
-    for text in given["settings"]:
-        key, mark, value = text.partition("=")
-        if not mark:
+    for text in options["settings"]:
+        key, equals, value = text.partition("=")
+        if not equals:
             raise InputError(Problem("--set", repr(text), "NAME=VALUE"))
         try:
             settings[key.strip()] = json.loads(value)
         except (ValueError, RecursionError):
             settings[key.strip()] = value.strip()
-    return plan.assessor_of(name, settings)
-
-
-def not_positive(**given: float | None) -> list[Problem]:
-    """Return a problem for each option that is given and not above 0, or beyond all arms."""
-    return [
-        Problem(f"--{name.replace('_', '-')}", f"{value:g}", f"above 0, to {_LARGEST_MM:g}")
-        for name, value in given.items()
-        if value is not None and not 0.0 < value <= _LARGEST_MM
-    ]
+    found = assessor_of(options["assessor"] or RECOMMENDED, settings)
+    return with_references(found, points, options["references"])

@@ -31,7 +31,7 @@ _OF_ONE = ("point", "joints_deg", "joints_rad", "std_mm")
 @option("--skip-bad", is_flag=True, help="Good rows of a file without the bad ones.")
 @option("--again", is_flag=True, help="Acceptance of readings that repeat or replace others.")
 @answers("JSON of the readings taken and the status.")
-def record(out, folder, file, **given) -> None:
+def record(out, folder, file, **options) -> None:
     """Record a reading, or all new readings of a CSV, Excel, Parquet or JSON FILE.
 
     FILE has x_mm, y_mm, z_mm (or _m) and a column pose or joints q1_deg ..; optional: instrument,
@@ -46,63 +46,58 @@ def record(out, folder, file, **given) -> None:
     from kinacc.cli.campaign import status_lines
     from kinacc.errors import InputError, Problem
 
-    if (given["position_mm"] is None) == (file is None):
+    if (options["position_mm"] is None) == (file is None):
         what = "is given twice" if file else "is not given"
         raise InputError(Problem("the reading", what, "--position-mm, or a FILE"))
     campaign = Campaign(folder)
-    flags = {name: given[name] for name in ("accept_implausible", "again")}
-    asked = campaign.state.asked
+    flags = {name: options[name] for name in ("accept_implausible", "again")}
+    requested, plan = campaign.state.asked, campaign.plan
     if file is None:
-        taken = campaign.add_reading(**_single(given, campaign.plan.slides), **flags)
-    else:
-        rows = _of_file(file, given, campaign)
-        taken = campaign.add_readings(rows, **flags, skip_bad=given["skip_bad"])
-    found = campaign.status()
-    for each in taken.skipped:
-        click.echo(f"not taken: {each}", err=True)
-    if file is not None:
-        known = f"; {len(taken.known)} rows were recorded before" if taken.known else ""
-        first = f"Recorded {len(taken.numbers)} readings of {file}{known}."
-    else:
-        point, label = taken.points[0], campaign.plan.points.label
+        taken = campaign.add_reading(**_single(options, plan.slides), **flags)
+        point = taken.points[0]
         first = f"Recorded reading {taken.numbers[0]} at point {point}: {taken.error_mm[0]:.3f} mm"
         first += " from the model."
-        if asked is not None and point != label[asked]:
-            first += f" It is used when its point is requested; {label[asked]} is next."
+        if requested is not None and point != (following := plan.points.label[requested]):
+            first += f" It is used when its point is requested; {following} is next."
+    else:
+        rows = _of_file(file, options, campaign)
+        taken = campaign.add_readings(rows, **flags, skip_bad=options["skip_bad"])
+        known = f"; {len(taken.known)} rows were recorded before" if taken.known else ""
+        first = f"Recorded {len(taken.numbers)} readings of {file}{known}."
+    for problem in taken.skipped:
+        click.echo(f"not taken: {problem}", err=True)
+    found = campaign.status()
     answer = {**vars(taken), "status": found}
     out.show(answer, pd.DataFrame(), [first, *status_lines(found)])
 
 
-def _single(given: Mapping, slides: np.ndarray) -> dict[str, object]:
+def _single(options: Mapping, slides: np.ndarray) -> dict[str, object]:
     """Arguments of ``Campaign.add_reading``."""
     from kinacc.errors import Problem, refuse
     from kinacc.measurements.table import numbers_of
 
-    problems: list[Problem] = []
-    values: dict[str, np.ndarray] = {}
-    for name, count in (
-        ("position_mm", 3),
-        ("joints_deg", len(slides)),
-        ("joints_rad", len(slides)),
-    ):
-        if (text := given[name]) is None:
-            continue
-        values[name] = numbers_of(text)
-        if values[name].shape != (count,):
-            place = f"--{name.replace('_', '-')}"
-            problems.append(Problem(place, repr(text), f"{count} numbers"))
-    refuse(problems, "Nothing was recorded")
+    sizes = {"position_mm": 3, "joints_deg": len(slides), "joints_rad": len(slides)}
+    values = {name: numbers_of(options[name]) for name in sizes if options[name] is not None}
+    refuse(
+        (
+            Problem(_flag(name), repr(options[name]), f"{sizes[name]} numbers")
+            for name, value in values.items()
+            if value.shape != (sizes[name],)
+        ),
+        "Nothing was recorded",
+    )
     joints = values.get("joints_rad")
     if joints is None and "joints_deg" in values:
         joints = values["joints_deg"] * np.where(slides, 1.0, np.pi / 180.0)
-    return {
-        "position_mm": values["position_mm"],
-        "joints": joints,
-        **{name: given[name] for name in ("point", "instrument", "std_mm")},
-    }
+    others = {name: options[name] for name in ("point", "instrument", "std_mm")}
+    return {"position_mm": values["position_mm"], "joints": joints, **others}
 
 
-def _of_file(path: str, given: Mapping, campaign):
+def _flag(name: str) -> str:
+    return f"--{name.replace('_', '-')}"
+
+
+def _of_file(path: str, options: Mapping, campaign):
     """The rows of a file as readings, or what is wrong with them."""
     from kinacc.campaign.campaign import RowsOfFile
     from kinacc.campaign.reading import Reading, point_at
@@ -111,50 +106,50 @@ def _of_file(path: str, given: Mapping, campaign):
 
     plan = campaign.plan
     # A cell that is no number spoils its row, not the file: it is named row by row.
-    rows_of_file = read_rows(path, plan.slides, POINTS, spoilt=[])
-    table, joints, std = rows_of_file.table, rows_of_file.joints, rows_of_file.std_mm
-    names = rows_of_file.columns.single.get("pose")
-    if names:
-        table = table.with_pose_names(names.column)
+    read = read_rows(path, plan.slides, POINTS, spoilt=[])
+    table, joints, pose = read.table, read.joints, read.columns.single.get("pose")
+    if pose:
+        table = table.with_pose_names(pose.column)
+    known = [instrument.name for instrument in plan.instruments]
     problems = [
-        Problem(f"--{name.replace('_', '-')}", "is given with a file", "a column of the file")
+        Problem(_flag(name), "is given with a file", "a column of the file")
         for name in _OF_ONE
-        if given[name] is not None
+        if options[name] is not None
     ]
     problems += [
         Problem(path, f"holds positions that kinacc {command} computed", "measured positions")
         for command, column in _COMPUTED.items()
         if column in table.columns
     ]
-    known = {instrument.name for instrument in plan.instruments}
-    if not names and joints is None and not problems:
+    if not pose and joints is None and not problems:
         problems.append(Problem(path, "has no column pose and no joints", "pose, q1_deg"))
-    if given["instrument"] not in (None, *known):
-        problems.append(Problem("--instrument", f"{given['instrument']!r}", ", ".join(known)))
+    if options["instrument"] not in (None, *known):
+        problems.append(Problem("--instrument", repr(options["instrument"]), ", ".join(known)))
     refuse(problems, "Nothing was recorded")
-    rows: list[Reading | Problem] = []
+    usual = options["instrument"] or known[0]
+    count = len(table.line)
+    names = [name.strip() for name in map(str, table.columns[pose.column])] if pose else []
+    devices = [usual] * count
+    if "instrument" in table.columns:
+        gap, column = table.gaps("instrument"), table.columns["instrument"]
+        devices = [usual if gap[i] else str(column[i]).strip() for i in range(count)]
     places = [f"{path}, {table.row_names.one(line)}" for line in table.line]
-    for i, place in enumerate(places):
-        at = None if joints is None or not np.isfinite(joints[i]).all() else joints[i]
-        name = str(table.columns[names.column][i]).strip() if names else None
-        if name is not None:
-            point = plan.points.number(name)
+    rows: list[Reading | Problem] = []
+    for i, (place, device) in enumerate(zip(places, devices, strict=True)):
+        at_rad = joints[i] if joints is not None and np.isfinite(joints[i]).all() else None
+        if pose:
+            point, subject = plan.points.number(names[i]), f"{names[i]!r} is"
         else:
-            point = None if at is None else point_at(plan, at)
-        instrument = given["instrument"] or plan.instruments[0].name
-        if "instrument" in table.columns and not table.is_gap(table.columns["instrument"][i]):
-            instrument = str(table.columns["instrument"][i]).strip()
+            point = None if at_rad is None else point_at(plan, at_rad)
+            subject = "its joints are"
         if point is None:
-            what = "its joints are" if name is None else f"{name!r} is"
-            rows.append(Problem(place, f"{what} no candidate"))
-        elif instrument not in known:
-            rows.append(Problem(place, f"instrument {instrument!r} is unknown", ", ".join(known)))
+            rows.append(Problem(place, f"{subject} no candidate"))
+        elif device not in known:
+            rows.append(Problem(place, f"instrument {device!r} is unknown", ", ".join(known)))
         else:
-            noise = None if std is None else ",".join(repr(float(value)) for value in std[i])
-            rows.append(Reading(point, rows_of_file.position_mm[i], instrument, at, noise))
-    return RowsOfFile(
-        rows,
-        places,
-        hashlib.sha256(Path(path).read_bytes()).hexdigest()[:16],
-        Path(os.path.relpath(Path(path).resolve(), campaign.folder.resolve())).as_posix(),
-    )
+            std = read.std_mm
+            noise = None if std is None else ",".join(map(repr, map(float, std[i])))
+            rows.append(Reading(point, read.position_mm[i], device, at_rad, noise))
+    digest = hashlib.sha256(Path(path).read_bytes()).hexdigest()[:16]
+    relative = os.path.relpath(Path(path).resolve(), campaign.folder.resolve())
+    return RowsOfFile(rows, places, digest, Path(relative).as_posix())

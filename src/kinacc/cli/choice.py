@@ -38,6 +38,18 @@ def values_of(path: str) -> click.ParamType:
     return click.FloatRange(*ends, min_open=True, max_open=True)
 
 
+def positive(text: str) -> float:
+    """A length or an angle of an option."""
+    if not 0.0 < float(text) <= 1e6:
+        raise click.BadParameter(f"{text}; allowed: above 0, to 1e+06")
+    return float(text)
+
+
+def share(text: str) -> float:
+    """A share of an option, as 1% or 0.01."""
+    return float(text.strip().removesuffix("%")) * (0.01 if "%" in text else 1.0)
+
+
 ROBOT = option("--robot", help="Robot of the results: a shipped name or file. [as the results say]")
 NAMING = option("--config", multiple=True, help="Configuration naming the robot.")
 SELECTED = option(
@@ -90,17 +102,20 @@ campaign_options = together(
     ),
     option(
         "--resolution-mm",
-        type=float,
+        type=positive,
         help="Step in which positions are read off: no axis has less noise than its rounding.",
     ),
     option(
         "--noise",
         type=click.Choice(["known", "estimate"]),
-        default="known",
         help="Whether --noise-mm is known, or what readings are planned with: it is then estimated "
-        "from repeats within the campaign.",
+        "from repeats within the campaign. [known]",
     ),
-    option("--wrong-readings", help="Largest share of readings that go wrong, e.g. 1%.  [none]"),
+    option(
+        "--wrong-readings",
+        type=share,
+        help="Largest share of readings that go wrong, e.g. 1%.  [none]",
+    ),
     option(
         "--references",
         default=None,
@@ -111,17 +126,16 @@ campaign_options = together(
     option(
         "--error",
         type=click.Choice(["mean", "visit"]),
-        default="mean",
         help="The error that stays when a pose is measured again, or what 95 % of future visits to "
-        "the worst pose keep.",
+        "the worst pose keep. [mean]",
     ),
     option("--arm-mm", type=float, help="The arm's own repeatability, for --error visit. [noise]"),
     option("--allowance-mm", type=float, help="What no repeat sees, added to the bounds. [0]"),
     option("--assessor", help="How points are chosen and bounds made. [search_and_confirm]"),
     option("--set", "settings", multiple=True, help="Setting of the assessor: NAME=VALUE."),
     option("--confidence", type=float, help=f"How surely each bound is to hold. [{CONFIDENCE}]"),
-    option("--tolerance-mm", type=float, help="Largest error the arm is allowed to have."),
-    option("--width-mm", type=float, help="Wanted distance of upper from lower bound."),
+    option("--tolerance-mm", type=positive, help="Largest error the arm is allowed to have."),
+    option("--width-mm", type=positive, help="Wanted distance of upper from lower bound."),
     option(
         "--target",
         type=click.Choice(["candidates", "measured"]),
