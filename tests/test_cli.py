@@ -1,16 +1,12 @@
 """The command line as a person uses it: help, one stage by hand, mistakes."""
 
 import json
-from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
 
 from kinacc import __version__
 from kinacc.cli.group import main
-
-ROOT = Path(__file__).resolve().parents[1]
-CONFIG = str(ROOT / "config.yaml")
 
 
 def call(*words: str):
@@ -49,29 +45,18 @@ def test_every_command_is_listed_once_with_all_its_words():
         assert not line.endswith("...")
 
 
-def test_checking_a_folder_that_is_not_there_fails(tmp_path):
-    done = call("check-results", tmp_path / "nowhere")
-    assert done.exit_code == 2
-
-
 @pytest.mark.parametrize(
-    ("tried", "meant"),
+    ("words", "near"),
     [
         (["chek-data"], "check-data"),
         (["campaign", "recrod"], "record"),
+        (["init", "x.csv", "--robto", "ur10"], "--robot"),
     ],
-    ids=lambda value: value if isinstance(value, str) else " ".join(value),
 )
-def test_a_word_that_is_no_command_is_told_the_one_that_is_meant(tried, meant):
-    done = call(*tried)
+def test_a_slip_of_the_hand_is_told_what_is_meant(words, near):
+    done = call(*words)
     assert done.exit_code == 2
-    assert f"Did you mean {meant}?" in done.stderr
-
-
-def test_an_option_that_is_none_is_told_the_nearest():
-    done = call("init", "x.csv", "--robto", "ur10")
-    assert done.exit_code == 2
-    assert "--robot" in done.stderr
+    assert near in done.stderr
 
 
 @pytest.mark.parametrize(

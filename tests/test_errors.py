@@ -18,12 +18,3 @@ def test_what_two_steps_find_wrong_is_told_together():
         refuse(problems, "Nothing was done")
     assert told.value.problems == (ONE, OTHER)
     assert str(told.value).startswith("Nothing was done\n")
-
-
-def test_nothing_wrong_is_no_error():
-    refuse(iter(()), "Nothing was done")
-
-
-def test_other_faults_are_not_taken_for_bad_input():
-    with pytest.raises(ZeroDivisionError), gathered([]):
-        raise ZeroDivisionError

@@ -20,8 +20,6 @@ from kinacc.kinematics import robot
 EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
 DATA = "data/ur10_tmac/series_B.csv"
 SERIES = "".join((EXAMPLES / DATA).read_text().splitlines(keepends=True)[:11])
-LONG_NAMES = "pose," + SERIES.strip().replace("\n", f"\n{'9' * 5000},")
-NO_WORDS = SERIES.replace("q4_deg", "ﾟ")
 CONFIG = (EXAMPLES / "ur10.yaml").read_text().partition("  ur10_d:")[0]
 ROBOT = (EXAMPLES / "ur5.robot.yaml").read_text()
 OF_URDF = "name: own\nurdf: arm.urdf\nbase_link: l0\ntip_link: l4\njoint_map: {couplings: []}\n"
@@ -105,33 +103,12 @@ def results(tmp_path_factory) -> Path:
     return small_study(tmp_path_factory.mktemp("results"))
 
 
-@settings(max_examples=8)
-@given(edited(SERIES), ENCODINGS)
-@example(LONG_NAMES, "utf-8")
-@example(NO_WORDS, "cp932")
-def test_a_measured_file_without_a_description(folder, text, encoding):
-    (folder / "odd.csv").write_bytes(text.encode(encoding, "replace"))
-    words = ("--robot", "ur10", "--yes", "--force", "--name", "odd", "--out", folder / "out")
-    taken_or_refused("init", folder / "odd.csv", *words)
-
-
 @settings(max_examples=10)
 @given(edited(SERIES), ENCODINGS)
 @example(SERIES.replace("383.76294", "1e300"), "utf-8")
 def test_a_measured_file_with_a_description(folder, text, encoding):
     (folder / DATA).write_bytes(text.encode(encoding, "replace"))
     taken_or_refused("check-data", folder / "own.yaml")
-
-
-@settings(max_examples=12)
-@given(st.integers(0, 18), CHANGES)
-def test_a_measured_parquet_file(folder, column, how):
-    names, *rows = (line.split(",") for line in SERIES.split())
-    values = [[float(cell) for cell in cells] for cells in zip(*rows, strict=True)]
-    table = pa.table(dict(zip(names, values, strict=True)))
-    pq.write_table(changed(table, column, how), folder / "poses.parquet")
-    (folder / "parquet.yaml").write_text(CONFIG.replace(DATA, "poses.parquet"))
-    taken_or_refused("check-data", folder / "parquet.yaml")
 
 
 @settings(max_examples=100)

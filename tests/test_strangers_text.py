@@ -43,12 +43,6 @@ def test_a_thousand_data_sets_stand_in_one_file(tmp_path):
     assert len(document.data["datasets"]) == 1000
 
 
-def test_two_aliases_of_themselves_are_one_problem(tmp_path):
-    said = problems_of(tmp_path, "datasets: {own: {robot: mh180}}\nseed: &a [*a, *a]\n")
-    assert len([each for each in said if "aliases" in each]) == 1
-    assert len(said) < 3
-
-
 @pytest.mark.parametrize(
     "text",
     [
@@ -65,12 +59,6 @@ def test_two_aliases_of_themselves_are_one_problem(tmp_path):
 )
 def test_thousands_of_faults_are_not_all_looked_into(tmp_path, text):
     assert len(problems_of(tmp_path, text)) <= 101
-
-
-@pytest.mark.parametrize("length", [101, 300])
-def test_a_data_set_of_a_long_name_is_refused_where_it_is_named(tmp_path, length):
-    (said,) = problems_of(tmp_path, f"datasets: {{{'a' * length}: {{robot: mh180}}}}\n")
-    assert "cannot be the name of a data set; give a text of at most 100 letters" in said
 
 
 def test_a_file_of_a_long_name_is_described_under_a_shorter_one():

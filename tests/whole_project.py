@@ -89,13 +89,6 @@ class Project:
         path = self.folder / "small.yaml"
         path.write_text(yaml.safe_dump(_merged(yaml.safe_load(path.read_text()), text)))
 
-    def edit(self, name: str, old: str, new: str) -> None:
-        """Replace a text that must be there once in a file."""
-        path = self.folder / name
-        text = path.read_text()
-        assert text.count(old) == 1, f"{name} has {text.count(old)} times {old!r}"
-        path.write_text(text.replace(old, new))
-
     def append(self, name: str, line: str) -> None:
         """Add a line to a file."""
         with (self.folder / name).open("a") as file:

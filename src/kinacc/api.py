@@ -529,7 +529,7 @@ def _require(name: str, value: object, kinds: type | tuple[type, ...]) -> None:
         raise InputError(Problem(name, f"is of type {type(value).__name__}", expected))
 
 
-def _array(name: str, value: object, shape: tuple[int, ...]) -> np.ndarray:
+def _array(name: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
     """Numbers of a shape, or InputError."""
     try:
         return np.broadcast_to(np.asarray(value, dtype=float), shape)
