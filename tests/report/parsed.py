@@ -69,3 +69,14 @@ def _table(table) -> Shown:
         marked,
         table.getparent().getparent().tag == "details",
     )
+
+
+def table(section, caption: str) -> Shown:
+    """The one table of a section whose caption begins so."""
+    (found,) = (each for each in read(section).tables if each.caption.startswith(caption))
+    return found
+
+
+def words(section) -> str:
+    """All paragraphs of a section."""
+    return "\n".join(read(section).paragraphs)

@@ -48,27 +48,38 @@ def paged(first, second, shared=NONE_SHARED, poses=40):
     return comparison_page(found, first, spread(first.robot, poses))
 
 
-@pytest.fixture(scope="module")
-def bent():
-    return paged(arm(), arm("November", j3_alpha_rad=1e-3, j2_a_mm=0.1))
+def far(calibration):
+    """The calibration, as if it was fitted elsewhere."""
+    return replace(calibration, fitted_range_rad=(np.full(6, 3.0), np.full(6, 3.1)))
 
 
-def test_an_arm_that_changed_is_said_to_against_chance(bent):
-    assert bent.first.badge == ("CHANGED", True)
-    plain, apart = bent.first.tables[0].rows
-    assert plain["rms_mm"] > apart["rms_mm"] > 2 * apart["chance_mm"] > 0.0
+class Curves(dh.DHModel):
+    """A model whose parameters say nothing by themselves, as those of VEC."""
+
+    comparable = None
 
 
-def test_an_arm_that_did_not_change_needs_nothing():
-    built = paged(arm(), arm("November", j2_a_mm=0.01))
-    assert built.first.badge == ("NO CHANGE PROVEN", False)
+def curved():
+    fields_ = {each.name: getattr(arm().model, each.name) for each in fields(arm().model)}
+    return replace(arm(), model=Curves(**fields_), choice="vec")
 
 
-def test_a_base_that_moved_is_not_taken_for_the_arm():
-    built = paged(arm(), arm("November", j1_theta_offset_rad=2e-3))
-    stands, stays = built.first.tables[0].rows
-    assert stands["rms_mm"] > 0.5
-    assert stays["rms_mm"] < 1e-6
+@pytest.mark.parametrize(
+    ("first", "second", "shared", "badge"),
+    [
+        (arm(), arm("B", j3_alpha_rad=1e-3, j2_a_mm=0.1), NONE_SHARED, ("CHANGED", True)),
+        (arm(), arm("B", j2_a_mm=0.01), NONE_SHARED, ("NO CHANGE PROVEN", False)),
+        (arm(j2_a_mm=0.5), arm("B", fitted=False), NONE_SHARED, ("UNKNOWN", True)),
+        (arm(), arm("B", robot="mh180"), NONE_SHARED, ("DIFFERENT ROBOTS", True)),
+        (curved(), far(curved()), NONE_SHARED, ("NOT COMPARABLE HERE", True)),
+        (arm(), arm("B", j2_a_mm=0.5), SharedReadings(80, 80, 80), ("SAME READINGS", False)),
+    ],
+    ids=lambda value: value[0] if isinstance(value, tuple) else "",
+)
+def test_the_badge_is_the_verdict(first, second, shared, badge):
+    built = paged(first, second, shared)
+    assert built.first.badge == badge
+    assert bool(built.first.tables) == (badge[0] != "NOT COMPARABLE HERE")
 
 
 @pytest.mark.parametrize(("row", "verdict"), [(0, "changed"), (22, "change in doubt")])
@@ -81,54 +92,16 @@ def test_no_arm_is_called_changed_that_was_measured_elsewhere(row, verdict):
     assert found.poses["measured_by_both"].sum() == 40 - row
 
 
-class Curves(dh.DHModel):
-    """A model whose parameters say nothing by themselves, as those of VEC."""
-
-    comparable = None
-
-
-def test_models_without_parameters_are_not_compared_where_one_was_never_measured():
-    first, far = arm(), (np.full(6, 3.0), np.full(6, 3.1))
-    fields_ = {each.name: getattr(first.model, each.name) for each in fields(first.model)}
-    first = replace(first, model=Curves(**fields_), choice="vec")
-    second = replace(first, name="November", fitted_range_rad=far)
-    built = paged(first, second)
-    assert built.first.badge == ("NOT COMPARABLE HERE", True)
-    assert not built.first.tables
-
-
-def test_a_robot_that_was_never_fitted_gives_distances_and_no_verdict():
-    built = paged(arm(j2_a_mm=0.5), arm("ur10.yaml", fitted=False))
-    assert built.first.badge == ("UNKNOWN", True)
-
-
-def test_the_same_readings_and_other_robots_are_no_change():
-    same = paged(arm(), arm("other settings", j2_a_mm=0.5), SharedReadings(80, 80, 80))
-    assert same.first.badge == ("SAME READINGS", False)
-    other = paged(arm(), arm("B", robot="mh180"))
-    assert other.first.badge == ("DIFFERENT ROBOTS", True)
-
-
-def test_what_the_poses_leave_open_is_not_counted(bent):
-    table = read(bent.sections[-1]).tables[0]
-    row = next(each for each in table.rows if each[0] == "j1.d")
-    assert row[6:] == ("–", "both")
-
-
-def test_the_poses_that_moved_the_most_are_listed(bent):
+def test_shifts_worst_poses_and_open_parameters_are_listed():
+    bent = paged(arm(), arm("<b>two", j3_alpha_rad=1e-3, j2_a_mm=0.1))
+    plain, apart = bent.first.tables[0].rows
+    assert plain["rms_mm"] > apart["rms_mm"] > 2 * apart["chance_mm"] > 0.0
     where = next(each for each in bent.sections if each.key == "where")
     sizes = [float(row[2]) for row in read(where).tables[0].rows]
     assert sizes == sorted(sizes, reverse=True)
-    assert sizes[0] == pytest.approx(bent.first.tables[0].rows[1]["largest_mm"], abs=5e-4)
-
-
-def test_names_a_user_gave_are_text():
-    text = page.html(paged(arm('<script>"1'), arm("<b>two", j2_a_mm=0.5)))
-    assert '<script>"1' not in text
+    assert sizes[0] == pytest.approx(apart["largest_mm"], abs=5e-4)
+    rows = {row[0]: row for row in read(bent.sections[-1]).tables[0].rows}
+    assert rows["j1.d"][6:] == ("–", "both")
+    text = page.html(bent)
     assert "&lt;b&gt;two" in text
-
-
-def test_one_pose_is_enough_for_a_page():
-    built = paged(arm(), arm("November", j2_a_mm=0.5), poses=1)
-    assert "1 poses" in built.first.subtitle
-    assert page.html(built)
+    assert "<b>two" not in text

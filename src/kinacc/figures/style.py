@@ -93,8 +93,10 @@ def name_dataset(figure: Figure, dataset: str | None) -> None:
 
 
 def legend_above(axes: Axes, columns: int = 2, title: str | None = None, **look: Any) -> None:
-    """Place a legend above the axes, where it covers nothing."""
+    """Place a legend above the axes, where it covers nothing; none where nothing is labelled."""
+    handles, labels = axes.get_legend_handles_labels()
     axes.legend(
+        handles, labels,
         loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=columns, title=title,
         title_fontsize=SMALL_PT, alignment="left", **look,
     )  # fmt: skip

@@ -1,0 +1,218 @@
+"""Sections on a calibration: golden tables of a measured UR10 with planted facts."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pandas as pd
+import pytest
+from parsed import as_page, read, table, words
+
+from kinacc.calibration.identifiability import POORLY_DETERMINED
+from kinacc.kinematics import robot as robots
+from kinacc.report import fit_sections
+from kinacc.report.summarise import joint_ranges
+from kinacc.tables import store
+
+RESULTS = Path(__file__).parents[1] / "golden" / "results" / "ur10_d"
+FINDING = ("finding", "level", "what", "lines", "fix", "accepted", "rows")
+ALWAYS = "theta of joint 1 +1 mrad, base rz -1 mrad: no pose separates these"
+EVIL = '</script><script>alert("1")</script>'
+ROBOT = robots.load("ur10")
+
+
+@pytest.fixture
+def tables():
+    return {path.stem: dict(store.read(path)) for path in RESULTS.glob("*.parquet")}
+
+
+def check(*findings: tuple) -> dict:
+    """A ``data_check``."""
+    frame = pd.DataFrame(findings, columns=FINDING)
+    return {name: column.to_numpy(object) for name, column in frame.items()}
+
+
+def identified(tables, **parameters: tuple) -> dict:
+    """``dh_identified`` with status, std and statement of some parameters: j1__d_mm."""
+    frame = pd.DataFrame(tables["dh_identified"]).set_index("parameter")
+    frame[["status", "statement"]] = "identified", ""
+    for name, (status, std, statement) in parameters.items():
+        row = {"status": status, "std": std, "statement": statement}
+        frame.loc[name.replace("__", "."), [*row]] = [*row.values()]
+    return dict(frame.reset_index())
+
+
+def readings(tables, joints_rad, x_mm) -> dict:
+    """Golden measurements of one target with all joints of a reading the same, and its x."""
+    frame = pd.DataFrame(tables["measurements"]).head(len(x_mm)).copy()
+    for n in range(1, 7):
+        frame[f"q{n}"] = np.asarray(joints_rad, dtype=float)
+    return dict(frame.assign(x_mm=x_mm, y_mm=0.0, z_mm=0.0, pose=range(len(x_mm)), target="tool"))
+
+
+def test_findings_stand_the_gravest_first_with_the_reason_they_were_accepted(tables):
+    tables["data_check"] = check(
+        ("thin_coverage", "note", "joint 4 hardly moves", None, "move it", None, 0),
+        ("base_jump", "stops", "the base moved", "lines 9-12", "say so", "moved on purpose", 4),
+        ("outliers", "warning", "1 row is off", "line 3", None, None, 1),
+        ("left_out", "note", "column temp is not read", None, None, None, 0),
+    )
+    found = fit_sections.data(tables, ROBOT)
+    rows = table(found, "Findings of the check: 3 findings").rows
+    assert [row[0] for row in rows] == ["stops", "warning", "note"]
+    assert rows[0][1:] == (
+        *("base_jump", "the base moved", "lines 9-12", "say so", "moved on purpose"),
+    )
+    assert table(found, "Not used of the measured").rows == (("column temp is not read",),)
+
+
+def test_excluded_rows_have_the_error_of_the_selected_model(tables):
+    tables["excluded_rows"] = {
+        "comparison": np.array(["vec_vs_measured", "dh_vs_measured", "vec_vs_measured"], object),
+        "line": np.array([9, 9, 4]),
+        "reason": np.array(["slip", "slip", "no number"], object),
+        "ex_mm": np.array([3.0, 9.0, np.nan]),
+        "ey_mm": np.array([4.0, 9.0, np.nan]),
+        "ez_mm": np.array([0.0, 9.0, np.nan]),
+    }
+    is_vec = np.asarray(tables["model_selection"]["model"]) == "vec"
+    tables["model_selection"]["selected"] = is_vec.astype(int)
+    found = table(fit_sections.data(tables, ROBOT), "Rows left out")
+    assert found.rows == (("line 4", "could not be read", "no number"), ("line 9", "5.000", "slip"))
+
+
+@pytest.mark.parametrize(
+    ("joints", "x_mm", "std", "counts"),
+    [
+        # Each of three pairs leaves 2 (0.01 mm)^2 to one degree of freedom.
+        ([0, 0, 1, 1, 2, 2], [-0.01, 0.01, 5.01, 4.99, 7.01, 6.99], "0.014", (3, 6, 3)),
+        # A configuration that the arm came back to: 2 (0.01 mm)^2 on two degrees of freedom.
+        ([0.0, 0.5, 0.0, 0.0], [0.31, 9.0, 0.29, 0.30], "0.01", (1, 3, 2)),
+    ],
+)
+def test_repeats_show_the_noise_with_its_degrees_of_freedom(tables, joints, x_mm, std, counts):
+    tables["measurements"] = readings(tables, joints, x_mm)
+    rows = dict(table(fit_sections.data(tables, ROBOT), "What was measured").rows)
+    text = rows["noise of a reading"]
+    assert f"x {std}, y 0, z 0 mm" in text
+    assert tuple(map(int, re.findall(r"(\d+) (?:config|read|degree)", text))) == counts
+
+
+def test_ranges_of_joints_stand_beside_their_limits_deg_and_mm():
+    arm = SimpleNamespace(dh=SimpleNamespace(prismatic=[False, True]),
+                          q_min_rad=np.array([-np.pi / 2, -100.0]),
+                          q_max_rad=np.array([np.pi / 2, 100.0]))  # fmt: skip
+    found = joint_ranges({"q1": [-np.pi / 4, np.pi / 4], "q2": [-20.0, 30.0]}, arm)
+    columns = ["low", "high", "least", "most", "share"]
+    assert found[columns].to_numpy() == pytest.approx(
+        np.array([[-45, 45, -90, 90, 0.5], [-20, 30, -100, 100, 0.25]])
+    )
+    assert found["unit"].tolist() == ["deg", "mm"]
+
+
+def test_what_other_poses_would_show_stands_first(tables):
+    tables["dh_identified"] = identified(
+        tables,
+        j1__theta_offset_rad=("undetermined", np.nan, ALWAYS),
+        j2__a_mm=("prior", 0.5, "known beforehand to 0.5 mm"),
+        j3__alpha_rad=("identified", 0.0002, None),
+        tool__z_mm=("undetermined", np.nan, f"tool z +1 mm{POORLY_DETERMINED}"),
+    )
+    found = fit_sections.identifiability(tables, ROBOT)
+    first, second = table(found, "What cannot be told apart").rows
+    assert first[0] == "tool z +1 mm"
+    assert second == (ALWAYS, "no pose of such an arm does: no fault")
+    assert "2 undetermined" in read(found).population
+    rows = {row[0]: row[1:] for row in table(found, "Status of").rows}
+    assert rows["a of joint 2"] == ("prior", "0.5 mm", "known beforehand to 0.5 mm")
+    assert rows["alpha of joint 3"] == ("identified", "0.2 mrad", "–")
+    assert rows["tool z"][:2] == ("undetermined", "–")
+
+
+def test_the_closest_pair_comes_first_and_the_rank_has_its_limit(tables):
+    tables["dh_covariance"] = {
+        "parameter": np.array(["j1.a_mm", "j2.a_mm", "j2.a_mm", "j1.d_mm"], object),
+        "other": np.array(["base.x_mm", "j1.a_mm", "j2.a_mm", "base.x_mm"], object),
+        "correlation": np.array([0.25, -0.97, 1.0, np.nan]),
+    }
+    tables["dh_fit"] = {
+        "quantity": np.array(["rank", "rank_threshold", *["singular_value"] * 3], object),
+        "value": np.array([2.0, 0.01, 40.0, 10.0, 0.02]),
+    }
+    found = fit_sections.identifiability(tables, ROBOT)
+    rows = table(found, "The 2 pairs of the largest |correlation|; 1 reach 0.95").rows
+    assert rows == (
+        ("a of joint 2", "a of joint 1", "-0.970"),
+        ("a of joint 1", "base x", "+0.250"),
+    )
+    for text in ("2 of 3 are fitted", "0.25 times", "0.0005 times", "the limit is 0.01"):
+        assert text in words(found)
+
+
+def test_the_selected_model_has_its_gain_in_standard_errors_and_the_orders_tried(tables):
+    tables["model_selection"] = {
+        "model": np.array(["dh", "vec"], object),
+        "selected": np.array([0, 1]),
+        "held_out_rms_mm": np.array([0.4, 0.3]),
+        "mean_of_folds_mm": np.array([0.41, 0.31]),
+        "gain_mm2": np.array([0.0, 0.05]),
+        "gain_std_error_mm2": np.array([0.0, 0.01]),
+        "configurations": np.full(2, 40.0),
+    }
+    tables["vec_model"]["order"] = np.minimum(tables["vec_model"]["order"], 2)
+    nan = np.nan
+    tables["vec_orders"] = {
+        "fold": np.array([nan, nan, nan, 0, 0]),
+        "order": np.array([0, 2, 4, 0, 4]),
+        "log_evidence": np.array([-900.0, -861, -860, -700, -670]),
+        "log_evidence_less": np.array([-40.0, -1, 0, -30, 0]),
+        "chosen": np.array([0, 1, 0, 0, 1]),
+        **{name: np.full(5, 0.3) for name in ("prior_std_mm", "prior_std_mrad", "prior_decay")},
+    }
+    found = fit_sections.selection(tables, "VEC selected.")
+    models = table(found, "Models at held-out poses")
+    assert models.rows == (
+        ("DH", "–", "0.400", "0.410", "–", "–", "–"),
+        ("VEC", "2", "0.300", "0.310", "+0.0500", "0.0100", "+5.0"),
+    )
+    assert models.marked == {1: "selected"}
+    tried, chosen = table(found, "Orders tried"), table(found, "Orders chosen")
+    assert (tried.rows[1], tried.marked) == (("2", "0.3", "0.3", "0.3", "-1.0"), {1: "← chosen"})
+    assert [row[:2] for row in chosen.rows] == [("all, delivered", "2"), ("without fold 0", "4")]
+    for name in ("held_out_rms_mm", "mean_of_folds_mm", "gain_mm2", "configurations"):
+        tables["model_selection"][name] = np.full(2, nan)
+    found = fit_sections.selection(tables, "no pose was held out")
+    assert table(found, "Models at held-out poses").rows[1][2:] == ("–",) * 5
+
+
+def test_names_in_a_users_file_are_text_on_the_page(tables):
+    tables["measurements"]["target"] = np.full(len(tables["measurements"]["pose"]), EVIL, object)
+    tables["data_check"] = check(
+        ("outliers", "warning", EVIL, f"lines of {EVIL}", EVIL, f"{EVIL} it's so", 1),
+        ("left_out", "note", EVIL, None, None, None, 0),
+    )
+    tables["dh_identified"] = identified(tables, j1__d_mm=("undetermined", np.nan, EVIL))
+    tables["dh_covariance"]["other"] = np.full(len(tables["dh_covariance"]["other"]), EVIL, object)
+    page = as_page(fit_sections.data(tables, ROBOT), fit_sections.identifiability(tables, ROBOT))
+    assert "<script>alert" not in page
+    assert "&lt;script&gt;alert" in page
+
+
+def test_a_page_on_thirty_thousand_rows_can_still_be_mailed(tables):
+    rows = 30_000
+    rng = np.random.default_rng(0)
+    frame = pd.DataFrame(tables["measurements"]).iloc[np.zeros(rows, int)]
+    frame = frame.assign(**{f"q{n}": rng.uniform(-1.0, 1.0, rows) for n in range(1, 7)})
+    tables["measurements"] = dict(frame)
+    errors = rng.normal(size=(3 * rows, 3))
+    models = [f"{model}_vs_measured" for model in ("nominal", "dh", "vec")]
+    tables["pose_errors"] = {
+        "comparison": np.repeat(models, rows).astype(object),
+        "estimate": np.full(3 * rows, "cross_validated", object),
+        "row": np.tile(np.arange(rows), 3),
+        **{f"e{axis}_mm": errors[:, i] for i, axis in enumerate("xyz")},
+    }
+    assert len(as_page(fit_sections.residuals(tables, ROBOT)).encode()) < 4_000_000
