@@ -27,6 +27,10 @@ class Pose(NamedTuple):
     rotation: np.ndarray
     position_mm: np.ndarray
 
+    def select(self, rows: np.ndarray | slice) -> Pose:
+        """The frames of ``rows`` (mask, indices or slice) of the first axis."""
+        return Pose(self.rotation[rows], self.position_mm[rows])
+
 
 IDENTITY = Pose(np.eye(3), np.zeros(3))
 

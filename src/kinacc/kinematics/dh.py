@@ -52,6 +52,10 @@ class DHModel(ErrorModel):
             value.setflags(write=False)
             object.__setattr__(self, field.name, value)
 
+    def part(self, joints: slice) -> DHModel:
+        """Some joints in a row, as an arm by themselves."""
+        return DHModel(*(getattr(self, field.name)[joints] for field in fields(self)))
+
     @property
     def joints(self) -> int:
         """Number of joints k."""

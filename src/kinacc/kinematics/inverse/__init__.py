@@ -10,7 +10,6 @@ import numpy as np
 from kinacc.errors import InputError, Problem
 from kinacc.geometry import Pose, compose, invert
 from kinacc.kinematics import dh as _dh
-from kinacc.kinematics.dh import PARAMETERS, DHModel
 from kinacc.kinematics.inverse import closed_form, limits, newton, postures
 from kinacc.kinematics.inverse.closed_form import BRANCHES
 from kinacc.kinematics.model import ErrorModel, JointState
@@ -27,12 +26,10 @@ __all__ = [
 ]
 
 # An arm a little different from the nominal one may have postures the nominal one just misses.
-_NEAR_MISS_MM = 30.0
-_BENDS_RAD = (0.02, 0.1)
+_NEAR_MISS_MM, _BEND_RAD = 30.0, 0.05
 _GRID_RAD = np.deg2rad(30.0)
 _GRID_POINTS = 9  # of a first joint that slides
 _AT_LIMIT_RAD = 1e-9
-_SAME_RAD = 1e-6
 _WEAK_MM, _ASIDE_RAD = 60.0, (-0.25, -0.08, 0.08, 0.25)  # beside nearly singular postures
 # Postures of one name: of sixteen in all five were the most seen; two with spherical joints.
 _PER_NAME, _PER_NAME_SPHERICAL = 8, 2
@@ -86,8 +83,8 @@ def branches_of(robot: Robot, grid_rad: np.ndarray | None = None) -> tuple[str, 
     if closed_form.recognise(robot.dh) is not None:
         return BRANCHES
     numbered = tuple(
-        name if number == 1 else f"{name} ({number})"
-        for number in range(1, _per_name(robot.dh) + 1)
+        name if number == 0 else f"{name} ({number + 1})"
+        for number in range(_per_name(robot.dh))
         for name in postures.names_of(robot.dh)
     )
     if robot.dh.joints < 7:
@@ -118,29 +115,54 @@ def solve(
     fitted_range_rad: tuple[np.ndarray, np.ndarray] | None = None,
     grid_rad: np.ndarray | None = None,
 ) -> Solutions:
-    """Joints at which ``model`` puts the last DH frame at ``pose`` (n, ...), per branch.
+    """Joints at which a model puts the last DH frame at wanted poses, per branch.
 
     The nominal arm's closed form, or where it has none a search over all its postures, starts a
-    Newton refinement onto ``model`` (the pose of a VEC model is its projected one, at travel
-    directions ``travel`` (k,)). A solution counts when forward kinematics returns to the pose
-    within ``newton.POSITION_TOLERANCE_MM`` and ``newton.ROTATION_TOLERANCE_RAD``; otherwise it is
-    dropped. Turns are those of ``limits.take_turns``. Solutions outside the joint limits are
-    OUTSIDE_LIMITS, those within them but outside ``fitted_range_rad`` (k,), (k,) OUTSIDE_RANGE.
-    ``branches`` are some of ``branches_of``, others raise InputError; None for all. ``grid_rad``
-    are the values of DH joint 1 at which the freedom of a seven-axis arm is sampled
-    (``grid_of`` when not given).
+    Newton refinement onto ``model``. A solution counts when forward kinematics returns to the pose
+    within ``newton.POSITION_TOLERANCE_MM`` and ``newton.ROTATION_TOLERANCE_RAD``. Of the turns of a
+    joint ``limits.take_turns`` chooses one.
 
     With a closed form, a branch that converged to the joints of an earlier one is a DUPLICATE and
     branches keep the name they started from; on a calibrated arm one may be missed within 5 mm of
     axis 1 and where two singularities meet. The search looks for postures within the limits and
     slightly beyond, and names what it finds by ``postures.classes_of``.
+
+    Parameters
+    ----------
+    robot : Robot
+        Nominal arm of k joints.
+    model : ErrorModel
+        Model of that arm. The pose of a VEC model is its projected one.
+    pose : Pose
+        Poses (n, ...) of the last DH frame in the first one, mm.
+    branches : tuple of str, optional
+        Some of ``branches_of``; all when not given.
+    travel : numpy.ndarray, optional
+        Travel directions (-1, 0, +1) of the joints, shape (k,).
+    fitted_range_rad : tuple of numpy.ndarray, optional
+        Ends (k,), (k,) of the DH joints of the fit. Solutions within the limits but outside this
+        range are OUTSIDE_RANGE.
+    grid_rad : numpy.ndarray, optional
+        Values of DH joint 1 at which the freedom of a seven-axis arm is sampled; ``grid_of`` when
+        not given.
+
+    Returns
+    -------
+    Solutions
+        Joints and their status.
+
+    Raises
+    ------
+    InputError
+        For a branch that the arm does not have.
     """
-    known = branches_of(robot, grid_rad)
+    grid = grid_of(robot) if grid_rad is None and robot.dh.joints == 7 else grid_rad
+    known = branches_of(robot, grid)
     names = known if branches is None else tuple(branches)
-    unknown = [name for name in names if name not in known]
-    if unknown:
-        problem = Problem(f"robot {robot.name}", f"has no branch {unknown[0]}", ", ".join(known))
-        raise InputError(problem)
+    for name in names:
+        if name not in known:
+            problem = Problem(f"robot {robot.name}", f"has no branch {name}", ", ".join(known))
+            raise InputError(problem)
     columns = [known.index(name) for name in names]
     like = None if travel is None else JointState(np.zeros((1, model.joints)), travel[None])
     onto = _Onto(robot, model, like, fitted_range_rad)
@@ -148,13 +170,11 @@ def solve(
     if form is not None:
         q_rad, status = _by_closed_form(onto, form, pose, columns)
     else:
-        if robot.dh.joints < 7:
-            q_rad, expected = _searched(onto, pose, None)
-        else:
-            grid = grid_of(robot) if grid_rad is None else grid_rad
-            parts = [_searched(onto, pose, value) for value in grid]
-            q_rad, expected = (np.concatenate(each, axis=1) for each in zip(*parts, strict=True))
-        q_rad, expected = q_rad[:, columns], expected[:, columns]
+        starts: list[float | None] = [None] if robot.dh.joints < 7 else list(grid)
+        parts = [_searched(onto, pose, value) for value in starts]
+        q_rad, expected = (
+            np.concatenate(part, axis=1)[:, columns] for part in zip(*parts, strict=True)
+        )
         status = np.where(expected, Status.NOT_CONVERGED, Status.OUT_OF_REACH).astype(np.int8)
         status[np.isfinite(q_rad[..., 0])] = Status.FOUND
     good = status == Status.FOUND
@@ -172,56 +192,36 @@ class _Onto(NamedTuple):
     like: JointState | None
     preferred_rad: tuple[np.ndarray, np.ndarray] | None
 
-    def turns(self, q_rad: np.ndarray) -> np.ndarray:
-        """Joints (..., k) on the turns ``limits.take_turns`` prefers."""
-        box, slides = limits.dh_limits(self.robot), self.robot.dh.prismatic
-        turned = limits.take_turns(q_rad, box, self.preferred_rad, slides)
-        return limits.take_coupled_turns(self.robot, turned)
-
     def converge(self, goal: Pose, start: np.ndarray, first: int) -> tuple[np.ndarray, np.ndarray]:
         """Joints (m, k) on their final turns and convergence (m,), from starts (m, k).
 
         Turns are taken before the refinement, as a model need not repeat after one, and once more
         after it, as a step may cross one. Joints before ``first`` stay.
         """
-        found = newton.refine(self.model, goal, self.turns(start), self.like, first)
-        q_rad, converged = found.q_rad, found.converged
-        turned = self.turns(q_rad)
-        changed = np.flatnonzero(converged & (np.abs(turned - q_rad) > 1.0).any(axis=1))
-        if len(changed):
-            part = Pose(goal.rotation[changed], goal.position_mm[changed])
-            again = newton.refine(self.model, part, turned[changed], self.like, first)
-            q_rad[changed], converged[changed] = again.q_rad, again.converged
+        start = limits.take_turns(self.robot, start, self.preferred_rad)
+        q_rad, _, converged = newton.refine(self.model, goal, start, self.like, first)
+        turned = limits.take_turns(self.robot, q_rad, self.preferred_rad)
+        rows = np.flatnonzero(converged & (np.abs(turned - q_rad) > 1.0).any(axis=1))
+        again = newton.refine(self.model, goal.select(rows), turned[rows], self.like, first)
+        q_rad[rows], converged[rows] = again.q_rad, again.converged
         return q_rad, converged
 
 
 def _by_closed_form(
     onto: _Onto, form: closed_form.SixAxes, pose: Pose, columns: list[int]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Joints (n, b, 6) and status (n, b): from bent starts and, where these missed, exact ones."""
-    q_rad = np.full((len(pose.position_mm), len(columns), 6), np.nan)
-    status = np.full(q_rad.shape[:2], Status.OUT_OF_REACH, dtype=np.int8)
-    for start in (closed_form.Start(), closed_form.EXACT):
-        starts, reached = (part[:, columns] for part in form.solve(pose, start))
-        if start is closed_form.EXACT:
-            status[reached & (status == Status.OUT_OF_REACH)] = Status.NOT_CONVERGED
-        rows, places = np.nonzero(reached & (status != Status.FOUND))
-        goal = Pose(pose.rotation[rows], pose.position_mm[rows])
-        found, converged = onto.converge(goal, starts[rows, places], 0)
-        rows, places = rows[converged], places[converged]
-        q_rad[rows, places], status[rows, places] = found[converged], Status.FOUND
-        rows, places = np.nonzero(status == Status.FOUND)
-        again = postures.repeats(rows, q_rad[rows, places], onto.robot.dh.prismatic, _SAME_RAD)
-        q_rad[rows[again], places[again]] = np.nan
-        status[rows[again], places[again]] = Status.DUPLICATE
+    """Joints (n, b, 6) and status (n, b)."""
+    starts, near = (part[:, columns] for part in form.solve(pose, closed_form.Start()))
+    reached = form.solve(pose)[1][:, columns]
+    status = np.where(reached, Status.NOT_CONVERGED, Status.OUT_OF_REACH).astype(np.int8)
+    rows, places = np.nonzero(near)
+    found, converged = onto.converge(pose.select(rows), starts[rows, places], 0)
+    rows, places, found = rows[converged], places[converged], found[converged]
+    again = postures.repeats(rows, found, onto.robot.dh.prismatic)
+    status[rows, places] = np.where(again, Status.DUPLICATE, Status.FOUND)
+    q_rad = np.full((*status.shape, 6), np.nan)
+    q_rad[rows[~again], places[~again]] = found[~again]
     return q_rad, status
-
-
-def _apart(q_rad: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """Largest difference (...) of joints (..., k) but for whole turns; infinite for NaN."""
-    gap = q_rad - other
-    gap = np.abs(gap - 2.0 * np.pi * np.rint(gap / (2.0 * np.pi))).max(axis=-1, initial=0.0)
-    return np.where(np.isnan(gap), np.inf, gap)
 
 
 def _searched(onto: _Onto, pose: Pose, first: float | None) -> tuple[np.ndarray, np.ndarray]:
@@ -229,47 +229,38 @@ def _searched(onto: _Onto, pose: Pose, first: float | None) -> tuple[np.ndarray,
 
     Joint 1 stands at ``first`` where that is given.
     """
-    dh, count = onto.robot.dh, len(pose.position_mm)
-    low, high = limits.dh_limits(onto.robot)  # coupled joints, without limits, make a turn
-    low, high = np.where(np.isfinite(low), low, -np.pi), np.where(np.isfinite(high), high, np.pi)
+    dh, fixed = onto.robot.dh, int(first is not None)
     seven = closed_form.recognise_seven(dh)
-    if first is None:
-        rows, start, error = postures.search(postures.table_of(dh, low, high), pose, _NEAR_MISS_MM)
-    elif seven is None:
-        columns = (getattr(dh, name) for name in (*PARAMETERS, "prismatic"))
-        head, tail = zip(*((column[:1], column[1:]) for column in columns), strict=True)
-        before = _dh.forward(DHModel(*head), np.array([[first]]))
-        table = postures.table_of(DHModel(*tail), low[1:], high[1:])
-        rows, start, error = postures.search(table, compose(invert(before), pose), _NEAR_MISS_MM)
+    if seven is not None:
+        starts, error = seven.solve(pose, first, _NEAR_MISS_MM, _BEND_RAD)
+        rows, slots = np.nonzero(np.isfinite(error))
+        start, error = starts[rows, slots], error[rows, slots]
     else:
-        q_rad, missed_mm = seven.solve(pose, first)
-        for bend in _BENDS_RAD:
-            bent, short_mm = seven.solve(pose, first, _NEAR_MISS_MM, bend)
-            short_mm[_apart(bent, q_rad[:, :8]) < _SAME_RAD] = np.inf
-            q_rad = np.concatenate([q_rad, bent], axis=1)
-            missed_mm = np.concatenate([missed_mm, np.maximum(short_mm, 1.0)], axis=1)
-        rows, slots = np.nonzero(np.isfinite(missed_mm))
-        start, error = q_rad[rows, slots], missed_mm[rows, slots]
-    if first is not None:
+        low, high = limits.dh_limits(onto.robot)  # coupled joints, without limits, make a turn
+        low, high = (
+            np.where(np.isfinite(low), low, -np.pi),
+            np.where(np.isfinite(high), high, np.pi),
+        )
+        before = _dh.forward(dh.part(slice(fixed)), np.full((1, fixed), first, dtype=float))
+        tail = slice(fixed, None)
+        table = postures.table_of(dh.part(tail), low[tail], high[tail])
+        rows, start, error = postures.search(table, compose(invert(before), pose), _NEAR_MISS_MM)
+    if fixed:
         start = np.insert(start, 0, first, axis=1)
-    goal = Pose(pose.rotation[rows], pose.position_mm[rows])
-    fixed = 0 if first is None else 1
-    q_rad, converged = onto.converge(goal, start, fixed)
-    exact = error < 1e-6
+    q_rad, converged = onto.converge(pose.select(rows), start, fixed)
+    exact, count = error < 1e-6, len(pose.position_mm)
     expected = np.isfinite(_placed(dh, count, rows[exact], start[exact])[..., 0])
     rows, q_rad = rows[converged], q_rad[converged]
-    of, start = _siblings(dh, q_rad, fixed)
-    goal = Pose(pose.rotation[rows[of]], pose.position_mm[rows[of]])
-    again, converged = onto.converge(goal, start, fixed)
-    rows = np.concatenate([rows, rows[of[converged]]])
-    order = np.argsort(rows, kind="stable")
-    rows, q_rad = rows[order], np.concatenate([q_rad, again[converged]])[order]
-    new = ~postures.repeats(rows, q_rad, dh.prismatic, _SAME_RAD)
+    number, start = _beside(dh, q_rad, fixed)
+    again, converged = onto.converge(pose.select(rows[number]), start, fixed)
+    rows = np.concatenate([rows, rows[number[converged]]])
+    q_rad = np.concatenate([q_rad, again[converged]])
+    new = ~postures.repeats(rows, q_rad, dh.prismatic)
     return _placed(dh, count, rows[new], q_rad[new]), expected
 
 
-def _siblings(dh: DHModel, q_rad: np.ndarray, first: int) -> tuple[np.ndarray, np.ndarray]:
-    """Which joints (m, k) are nearly singular, and starts beside them: a second posture is close.
+def _beside(dh: _dh.DHModel, q_rad: np.ndarray, first: int) -> tuple[np.ndarray, np.ndarray]:
+    """Which of joints (m, k) are nearly singular, and starts beside them for a second posture.
 
     The nominal arm may have one posture, or none, where the model has two. Starts lie along the
     direction of joints, from ``first`` on, that moves the flange least.
@@ -278,18 +269,15 @@ def _siblings(dh: DHModel, q_rad: np.ndarray, first: int) -> tuple[np.ndarray, n
     slopes = _dh.joint_jacobian(dh, q_rad) * np.repeat([1.0, 1e3], 3)[:, None] * unit
     _, sizes, directions = np.linalg.svd(slopes[..., first:], full_matrices=False)
     weak = np.flatnonzero(sizes[:, -1] < _WEAK_MM)
-    step = np.zeros((len(weak), q_rad.shape[1]))
-    step[:, first:] = directions[weak, -1]
-    starts = [q_rad[weak] + size * unit * step for size in _ASIDE_RAD]
+    step = np.pad(directions[weak, -1], ((0, 0), (first, 0))) * unit
+    starts = [q_rad[weak] + size * step for size in _ASIDE_RAD]
     return np.tile(weak, len(_ASIDE_RAD)), np.concatenate(starts)
 
 
-def _placed(dh: DHModel, count: int, rows: np.ndarray, q_rad: np.ndarray) -> np.ndarray:
+def _placed(dh: _dh.DHModel, count: int, rows: np.ndarray, q_rad: np.ndarray) -> np.ndarray:
     """Joints (m, k) of poses ``rows`` (m,) put into their branches: (count, b, k), NaN if empty."""
     names, most = len(postures.names_of(dh)), _per_name(dh)
     placed = np.full((count, most * names, dh.joints), np.nan)
-    if len(rows) == 0:
-        return placed
     classes = postures.classes_of(dh, q_rad)
     order = np.lexsort([*q_rad.T[::-1], q_rad[:, 2], classes, rows])
     rows, classes, q_rad = rows[order], classes[order], q_rad[order]
@@ -300,5 +288,5 @@ def _placed(dh: DHModel, count: int, rows: np.ndarray, q_rad: np.ndarray) -> np.
     return placed
 
 
-def _per_name(dh: DHModel) -> int:
+def _per_name(dh: _dh.DHModel) -> int:
     return _PER_NAME if closed_form.recognise_seven(dh) is None else _PER_NAME_SPHERICAL

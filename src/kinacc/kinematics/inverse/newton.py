@@ -19,25 +19,36 @@ ROTATION_TOLERANCE_RAD = 1e-9  # 1e-6 mm at a lever of one metre
 
 _LEVER_MM = 1000.0  # a radian counts as this, and so does a turn as travel of a joint that slides
 _LONGEST_TURN_RAD = 0.5
-_TIGHT_MM = 1e-9  # a radian counts as a metre
+_TIGHT_MM = 1e-9
 _BLOCK = 8192
 _ROUND_OFF = 1e-15  # smallest damping, relative to the trace of J'J: keeps the solve regular
 _FIRST_DAMPING, _SMALLEST_DAMPING, _LARGEST_DAMPING = 1e-5, 1e-9, 1e3
-_CHEAP_STEPS, _STEPS, _PATIENT_STEPS = 12, 60, 600
-_CLOSE_MM, _CLOSE_RAD = 2.0, 2e-3
+_STEPS, _PATIENT_STEPS = 60, 600
+_CLOSE_MM = 2.0
 
 
 class Refined(NamedTuple):
-    """Outcome per pose: joints (n, k), remaining errors (n,), whether both met tolerance (n,)."""
+    """Joints (n, k), errors (n,) in mm (a radian as a metre), whether they meet the tolerance."""
 
     q_rad: np.ndarray
-    position_error_mm: np.ndarray
-    rotation_error_rad: np.ndarray
+    error_mm: np.ndarray
     converged: np.ndarray
 
 
 def pose_error(target: Pose, actual: Pose) -> np.ndarray:
-    """Error (n, 6): position in mm and the rotation vector in rad that turns actual to target."""
+    """Difference of poses, in the frame the poses are given in.
+
+    Parameters
+    ----------
+    target, actual : Pose
+        Poses (n, ...).
+
+    Returns
+    -------
+    numpy.ndarray
+        Position difference in mm, then the rotation vector in rad that turns ``actual`` to
+        ``target``, shape (n, 6).
+    """
     turn = log_so3(target.rotation @ np.swapaxes(actual.rotation, 1, 2))
     return np.concatenate([target.position_mm - actual.position_mm, turn], axis=1)
 
@@ -50,89 +61,75 @@ def refine(
     first: int = 0,
     most_steps: int = _PATIENT_STEPS,
 ) -> Refined:
-    """Joints (n, k) at which ``model`` has the poses ``target`` (n, ...), from ``q_rad`` (n, k).
+    """Joints at which a model has the wanted poses, near a start.
 
-    It travels and is loaded as in the one state ``like``. Joints before ``first`` stay. Angles are
-    not wrapped and limits are not looked at. A pose that has no solution near its start comes back
-    with ``converged`` False and its smallest error. After 60 steps only poses are followed that are
-    close but creeping: beside a singular posture the error falls along a narrow curved valley.
+    After 60 steps only poses are followed that are close but creeping: beside a singular posture
+    the error falls along a narrow curved valley.
+
+    Parameters
+    ----------
+    model : ErrorModel
+        Model of k joints.
+    target : Pose
+        Poses (n, ...) of the last DH frame in the first one.
+    q_rad : numpy.ndarray
+        DH joints to start from, rad, or mm where a joint slides, shape (n, k).
+    like : JointState, optional
+        One state whose travel directions and payload the arm has at every pose.
+    first : int
+        Joints before this one stay.
+    most_steps : int
+        Largest number of steps.
+
+    Returns
+    -------
+    Refined
+        Angles are not wrapped and limits are not looked at. A pose without a solution near its
+        start has ``converged`` False and the joints of its smallest error.
     """
-    count = len(q_rad)
-    result = Refined(
-        np.array(q_rad, dtype=float),
-        np.full(count, np.inf),
-        np.full(count, np.inf),
-        np.zeros(count, dtype=bool),
-    )
-    for begin in range(0, count, _BLOCK):
-        block = slice(begin, begin + _BLOCK)
-        part = Refined(*(column[block] for column in result))
-        goal = Pose(target.rotation[block], target.position_mm[block])
-        _refine_block(model, goal, part, like, first, most_steps)
-    return result
-
-
-def _refine_block(
-    model: ErrorModel,
-    target: Pose,
-    result: Refined,
-    like: JointState | None,
-    first: int,
-    most_steps: int,
-) -> None:
-    active = np.arange(len(result.q_rad))
-    # Errors of a milliradian change the slopes by a thousandth: each step with those of the DH arm
-    # still gains three digits, at a fifth of the cost.
-    cheap_until = _CHEAP_STEPS if model.table is None else 0
-    unit = np.where(model.dh.prismatic, _LEVER_MM, 1.0)[first:]
+    if len(q_rad) > _BLOCK:
+        blocks = [slice(begin, begin + _BLOCK) for begin in range(0, len(q_rad), _BLOCK)]
+        parts = [refine(model, target.select(b), q_rad[b], like, first, most_steps) for b in blocks]
+        return Refined(*map(np.concatenate, zip(*parts, strict=True)))
+    best, trial = np.array(q_rad, dtype=float), np.array(q_rad, dtype=float)
+    count, unit = len(best), np.where(model.dh.prismatic, _LEVER_MM, 1.0)[first:]
     weight = np.repeat([1.0, _LEVER_MM], 3)
-    damping, lowest = np.zeros(len(active)), np.full(len(active), np.inf)
-    normal = np.empty((len(active), unit.size, unit.size))
-    gradient, nearest = np.empty((len(active), unit.size)), np.empty((len(active), 6))
-    trial = result.q_rad.copy()
+    active, converged = np.arange(count), np.zeros(count, dtype=bool)
+    damping, lowest = np.zeros(count), np.full(count, np.inf)
+    slopes, gap = np.empty((count, 6, unit.size)), np.empty((count, 6))
+
+    def state(joints: np.ndarray) -> JointState:
+        return JointState(joints) if like is None else like.moved(joints)
+
     for step in range(most_steps + 1):
-        goal = Pose(target.rotation[active], target.position_mm[active])
-        at = JointState(trial) if like is None else like.moved(trial)
-        error = pose_error(goal, model.pose(at))
-        position = np.linalg.norm(error[:, :3], axis=1)
-        rotation = np.linalg.norm(error[:, 3:], axis=1)
-        met = (position < POSITION_TOLERANCE_MM) & (rotation < ROTATION_TOLERANCE_RAD)
-        cost = position**2 + (_LEVER_MM * rotation) ** 2
-        better = cost < lowest
-        rows, already = active[better], result.converged[active]
-        result.q_rad[rows], result.converged[rows] = trial[better], met[better]
-        result.position_error_mm[rows] = position[better]
-        result.rotation_error_rad[rows] = rotation[better]
-        nearest[better], lowest[better] = error[better], cost[better]
-        relaxed = np.where(damping > _SMALLEST_DAMPING, 0.1 * damping, 0.0)
-        damping = np.where(better, relaxed, np.maximum(8.0 * damping, _FIRST_DAMPING))
+        error = weight * pose_error(target.select(active), model.pose(state(trial)))
+        cost = np.sum(error**2, axis=1)
+        met = (np.sum(error.reshape(-1, 2, 3) ** 2, axis=2) < POSITION_TOLERANCE_MM**2).all(axis=1)
+        better, already = cost < lowest[active], converged[active]
+        rows = active[better]
+        best[rows], lowest[rows], gap[rows] = trial[better], cost[better], error[better]
+        converged[rows] = met[better]
+        before = damping[active]
+        relaxed = np.where(before > _SMALLEST_DAMPING, 0.1 * before, 0.0)
+        damping[active] = np.where(better, relaxed, np.maximum(8.0 * before, _FIRST_DAMPING))
         # One step more than the tolerance asks for: it costs little and gains what it has gained.
-        going = ~(result.converged[active] & (already | (lowest < _TIGHT_MM**2)))
-        if step >= cheap_until:
-            going &= damping <= _LARGEST_DAMPING
+        done = converged[active] & (already | (lowest[active] < _TIGHT_MM**2))
+        going = ~done & (damping[active] <= _LARGEST_DAMPING)
         if step == _STEPS:
-            going &= result.position_error_mm[active] < _CLOSE_MM
-            going &= result.rotation_error_rad[active] < _CLOSE_RAD
-        if not going.any():
+            going &= lowest[active] < _CLOSE_MM**2
+        rows, active = active[going & better], active[going]
+        if not len(active):
             break
-        exact = step == cheap_until > 0  # from here on with the slopes of the model itself
-        if exact:
-            damping[:] = 0.0
-        renewed = np.flatnonzero(going & (better | exact))
-        if len(renewed):
-            there = result.q_rad[active[renewed]]
-            at = JointState(there) if like is None else like.moved(there)
-            slopes = (model.dh if step < cheap_until else model).joint_jacobian(at)
-            slopes = slopes[..., first:] * weight[:, None] * unit
-            turned = np.swapaxes(slopes, 1, 2)
-            normal[renewed] = turned @ slopes
-            gradient[renewed] = (turned @ (nearest[renewed] * weight)[..., None])[..., 0]
-        active, damping, lowest = active[going], damping[going], lowest[going]
-        normal, gradient, nearest = normal[going], gradient[going], nearest[going]
-        diagonal = np.trace(normal, axis1=1, axis2=2) * (damping + _ROUND_OFF)
+        if len(rows):
+            jacobian = model.joint_jacobian(state(best[rows]))
+            slopes[rows] = jacobian[..., first:] * weight[:, None] * unit
+        turned = np.swapaxes(slopes[active], 1, 2)
+        normal = turned @ slopes[active]
+        diagonal = np.trace(normal, axis1=1, axis2=2) * (damping[active] + _ROUND_OFF)
         system = normal + diagonal[:, None, None] * np.eye(unit.size)
-        move = np.linalg.solve(system, gradient[..., None])[..., 0]
-        longest = np.max(np.abs(move), axis=1)
-        move *= np.minimum(1.0, _LONGEST_TURN_RAD / np.maximum(longest, 1e-300))[:, None]
-        trial = result.q_rad[active]
+        move = np.linalg.solve(system, turned @ gap[active, :, None])[..., 0]
+        longest = np.max(np.abs(move), axis=1, keepdims=True)
+        move *= np.minimum(1.0, _LONGEST_TURN_RAD / np.maximum(longest, 1e-300))
+        trial = best[active]
         trial[:, first:] += move * unit
+    return Refined(best, np.sqrt(lowest), converged)
