@@ -123,16 +123,6 @@ def test_a_line_that_is_not_the_newest_is_not_written(cell, day):
     assert Path("tracker.yaml").read_text() == text
 
 
-def test_a_file_that_cannot_be_changed_safely_is_left_and_the_line_is_told(cell):
-    text = HERE.replace("measurements:\n", "measurements: &how\n")
-    text += "  other:\n    robot: ur10\n    measurements: *how\n    evaluation: {space: measured}\n"
-    Path("tracker.yaml").write_text(text)
-    done = added("june.csv", *JUNE, "--first-date", "2026-03-01", "--dataset", "tracker")
-    assert done.exit_code == 2
-    assert "- {path: june.csv, date: 2026-06-02, base: moved, tool: same}" in done.output
-    assert Path("tracker.yaml").read_text() == text
-
-
 @pytest.mark.parametrize(
     ("before", "after"),
     [

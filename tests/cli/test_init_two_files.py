@@ -46,14 +46,6 @@ def test_what_stays_unmatched_is_printed_with_its_lines(tmp_path):
     assert "lines 2, 3, 4" in "\n".join(read(section, robot.load("ur10")).notes)
 
 
-def test_a_log_of_the_robot_with_a_pose_of_its_own_gives_the_joints_alone(tmp_path):
-    joints = table(["Name", *Q, *XYZ], named("P{}", range(COUNT)), IT.q, IT.controller)
-    points = table(["Name", *XYZ], named("P{}", range(COUNT)), IT.point)
-    section, told = described(written(tmp_path, joints_csv=joints, tracker_csv=points))
-    assert_read(section, IT)
-    assert {f"joints file {name}" for name in XYZ} <= set(told["unused_columns"])
-
-
 def test_as_many_rows_without_a_key_are_asked_about(tmp_path):
     files = written(tmp_path, joints_csv=table(Q, IT.q), tracker_csv=table(XYZ, IT.point))
     assert "--join order" in refused(files)
@@ -141,12 +133,6 @@ def test_regular_times_leave_the_offset_open(tmp_path):
     assert "--clock-offset" in refused(files)
     section, _ = described(files, "--clock-offset", "-3")
     assert_read(section, IT)
-
-
-def test_two_files_of_joints_are_refused(tmp_path):
-    joints = table([*Q, *XYZ], IT.q, IT.point)
-    files = written(tmp_path, a_csv=joints, b_csv=joints)
-    assert "3 files" in refused([*files, files[0]])
 
 
 def test_joints_that_are_gone_are_named_before_a_run(tmp_path):

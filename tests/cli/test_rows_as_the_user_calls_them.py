@@ -80,30 +80,3 @@ def test_nothing_is_left_out_without_a_word(results):
     told = [str(text) for text in table["text"][table["topic"] == "left_out"]]
     assert any(NAMES[EMPTY] in text for text in told)
     assert json.loads(call("summary", results, "--json").stdout)["m"]["left_out"] == told
-
-
-def test_the_rows_of_a_workbook_are_called_rows_in_every_answer(tmp_path):
-    from openpyxl import Workbook
-
-    book, point = Workbook(), IT.point.copy()
-    point[WRONG, 2] += 6.0
-    rows = [("Cell 4",), ("No.", *Q, "X [mm]", "Y [mm]", "Z [mm]")]
-    rows += [(i, *IT.q[i].tolist(), *point[i].tolist()) for i in range(COUNT)]
-    rows += [("Mean", *IT.q.mean(axis=0).tolist(), *point.mean(axis=0).tolist())]
-    for row in rows:
-        book.active.append(row)
-    book.save(tmp_path / "m.xlsx")
-    said = call("init", tmp_path / "m.xlsx", "--robot", "ur10", "--out", tmp_path, "--yes")
-    assert said.exit_code == 0, said.output
-    quick = tmp_path / "quick.yaml"
-    quick.write_text(
-        "measurements: {folds: 4}\ndatasets: {m: {calibration: {vec: {order: 1}, dh: {fit_to: "
-        "measurements}}, data_check: {accept: {outliers: a test, few_poses: a test}}, "
-        "measurements: {file: {exclude: [{lines: [35], reason: bumped}]}}}}\n"
-    )
-    for stage in _STAGES:
-        done = run_stage(stage, *_options((tmp_path / "m.yaml", quick)), "--results", tmp_path)
-        assert done.exit_code == 0, done.output
-    whole = call("summary", tmp_path / "m", "--verbose").output
-    for row in (COUNT + 3, WRONG + 3, 35):
-        assert f"row {row}" in whole
