@@ -8,7 +8,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kinacc.calibration.frames import FrameParameters, Frames, left_jacobians
+from kinacc.calibration.frames import (
+    FrameParameters,
+    Frames,
+    inverse_left_jacobians,
+    left_jacobians,
+)
 from kinacc.calibration.observations import Observations
 from kinacc.errors import InputError, Problem
 from kinacc.geometry import Pose, log_so3, skew
@@ -169,7 +174,7 @@ class _View(NamedTuple):
             measured = back @ np.where(turned[:, None, None], part.rotation, np.eye(3))
             angles = log_so3(model @ np.swapaxes(measured, 1, 2)) * turned[:, None]
             residual = np.concatenate([residual, weight * angles.T])
-            turning = weight * np.linalg.inv(left_jacobians(angles))
+            turning = weight * inverse_left_jacobians(angles)
         there = np.repeat(np.stack([np.ones_like(turned), turned]), 3, axis=0)
         return cls(residual, there[: len(residual)], arm.T, turning, back, reach)
 
