@@ -87,7 +87,7 @@ def test_the_badge_is_the_verdict(change, badge):
 
 def test_picture_and_conformity_have_the_number_of_excepted_candidates():
     found = measured(points=60, budget=40, tolerance_mm=2.0)
-    values = section(*parts(found)).values
+    values = section(*parts(found)).rows()
     assert len(values["every"]) == values["measured"] == 36
     assert values["largest"][0]["error_mm"] == np.nanmax(
         found.tables["campaign_points"]["error_mm"]
@@ -108,7 +108,7 @@ def test_reasons_and_names_of_strangers_are_text():
         {"kind": "leave_out", "point": unread, "reason": "behind a <b>"},
     )
     campaign = measured(readings=6, extra=entries, names=names)
-    values = section(*parts(campaign)).values
+    values = section(*parts(campaign)).rows()
     (struck,), (left_out,) = values["struck"], values["left_out"]
     assert (struck["reading"], struck["struck"]) == (2, reason)
     assert (left_out["point"], left_out["reason"]) == (names[unread], "behind a <b>")
@@ -122,7 +122,7 @@ def test_reasons_and_names_of_strangers_are_text():
 def test_noise_as_stated_is_a_scatter_of_one_and_fourfold_noise_of_four():
     def rms(noise_mm):
         campaign = measured(points=4, budget=120, noise_mm=noise_mm)
-        (row,) = section(*parts(campaign)).values["instruments"]
+        (row,) = section(*parts(campaign)).rows()["instruments"]
         return row["scatter"]
 
     assert rms(0.05) == pytest.approx(1.0, abs=0.15)

@@ -9,8 +9,8 @@ from kinacc.deployment import compare
 from kinacc.deployment.compare import Difference
 from kinacc.deployment.record import Calibration
 from kinacc.figures import comparison
+from kinacc.report import rendering
 from kinacc.report.page import FirstScreen, Page, Part, Table
-from kinacc.report.rendering import size
 
 _FAR = 3.0  # standard deviations
 _WORST = 10
@@ -19,93 +19,45 @@ _VALID = "Modelled poses of the flange in the robot's base."
 _NEXT = "Where a change matters: measure the poses of the first again, calibrate, compare."
 
 
-def lines(found: Difference) -> list[str]:
+def lines(difference: Difference) -> list[str]:
     """The verdict, its evidence, and what the figures include."""
-    poses, measured = len(found.poses), int(found.poses["measured_by_both"].sum())
-    shared, where = found.shared, f"{measured} of {poses} poses lie near measured poses of both"
-    test = (
-        f"p = {found.probability:.2g} in {found.directions} directions, assuming independent "
-        "residuals"
-    )
-    evidence = {
-        compare.OTHER_ROBOT: f"{' and '.join(found.robots)} differ by "
-        f"{size(found.robots_apart_mm)} mm rms before calibration",
-        compare.SAME_READINGS: f"both calibrations are fitted to the same {shared.count} readings",
-        compare.NOT_COMPARABLE: where,
-        compare.UNKNOWN: "no covariance of both calibrations",
-        compare.IN_DOUBT: f"{test}; {where}",
-    }
-    told = [f"{found.verdict.upper()}: {evidence.get(found.verdict, test)}."]
-    if shared.count and not shared.all_of_both:
-        told.append(
-            f"Shared readings, counted once: {shared.count} of {shared.first} in "
-            f"{found.names[0]} and {shared.second} in {found.names[1]}."
-        )
-    if poses < found.poses_given:
-        told.append(
-            f"Compared at {poses} of {found.poses_given} poses, those in the joint range of both "
-            f"{model_name(found.model)} models."
-        )
-    ratios = [
-        f"{name} {ratio:.3g}"
-        for name, ratio in zip(found.names, found.held_out_over_noise, strict=True)
-        if np.isfinite(ratio)
-    ]
-    if np.isfinite(found.probability):
-        over = f" Held-out error over noise: {', '.join(ratios)}." if ratios else ""
-        told.append(f"Standard deviations are valid given the model.{over}")
-    return told
+    return rendering.lines("comparison.txt", found=difference, compare=compare)
 
 
-def comparison_page(found: Difference, first: Calibration, q_rad: np.ndarray) -> Page:
+def comparison_page(difference: Difference, first: Calibration, q_rad: np.ndarray) -> Page:
     """The page of a comparison at reported joints ``q_rad`` (n, k), rad and mm, all given to it.
 
     ``first``: the first of the two calibrations.
     """
+    poses, names, verdict = difference.poses, difference.names, difference.verdict
     slides = np.asarray(first.robot.dh.prismatic)
-    joints = np.where(slides, q_rad, np.rad2deg(q_rad))
-    robots = ", ".join(dict.fromkeys(found.robots))
-    count = len(found.poses)
+    joints = np.where(slides, q_rad, np.rad2deg(q_rad))[poses["pose"] - 1]
+    worst = poses.assign(**{f"q{n}": joint for n, joint in enumerate(joints.T, start=1)})
+    worst = worst.sort_values("arm_moved_mm", ascending=False, kind="stable").head(_WORST)
+    columns = ["moved_mm", "turned_mrad", "arm_moved_mm", "arm_turned_mrad"]
+    quantiles = poses[columns].quantile([*_QUANTILES.values()]).assign(share=[*_QUANTILES])
+    picture = {"comparison": comparison.draw(difference)}
+    count = len(poses)
+    parts = [
+        Part("moved", {"poses": count, "quantiles": quantiles}, picture),
+        Part("where", {"poses": count, "largest": worst, "slides": slides.tolist()}),
+    ]
+    if difference.parameters is not None and len(difference.parameters):
+        values = {"rows": difference.parameters, "names": names, "far": _FAR}
+        parts.append(Part("changes", values))
+    heads = ("rms mm", "by chance mm", "largest mm", "rms mrad", "by chance mrad")
+    shifts = difference.shifts
+    shown = [[head, name, ".3f"] for head, name in zip(heads, shifts.columns[1:], strict=True)]
+    caption = "Change of flange poses from {} to {}".format(*names)
+    table = Table(caption, shifts.to_dict("records"), [["", "frames"], *shown])
+    robots = ", ".join(dict.fromkeys(difference.robots))
     screen = FirstScreen(
-        "{1} against {0}".format(*found.names),
-        f"{robots}, {model_name(found.model)} model; {count} poses of the flange",
-        (found.verdict.upper(), found.verdict not in (compare.SAME_READINGS, compare.UNPROVEN)),
-        lines(found),
-        [] if found.verdict == compare.NOT_COMPARABLE else [_table(found)],
+        "{1} against {0}".format(*names),
+        f"{robots}, {model_name(difference.model)} model; {count} poses of the flange",
+        (verdict.upper(), verdict not in (compare.SAME_READINGS, compare.UNPROVEN)),
+        lines(difference),
+        [] if verdict == compare.NOT_COMPARABLE else [table],
         {"VALID": [_VALID], "NEXT": [_NEXT]},
     )
-    parts = [_moved(found), _where(found, joints, slides)]
-    if found.parameters is not None and len(found.parameters):
-        rows = found.parameters.to_dict("records")
-        parts.append(Part("changes", {"rows": rows, "names": found.names, "far": _FAR}))
-    made = {"first": found.names[0], "second": found.names[1], "model": found.model}
+    made = {"first": names[0], "second": names[1], "model": difference.model}
     return Page(screen, parts, {**made, "poses": str(count)})
-
-
-def _moved(found: Difference) -> Part:
-    """Quantiles of the change over the poses."""
-    names = ["moved_mm", "turned_mrad", "arm_moved_mm", "arm_turned_mrad"]
-    quantiles = found.poses[names].quantile([*_QUANTILES.values()])
-    rows = quantiles.assign(share=[*_QUANTILES]).to_dict("records")
-    values = {"poses": len(found.poses), "quantiles": rows}
-    return Part("moved", values, figures={"comparison": comparison.draw(found)})
-
-
-def _where(found: Difference, joints: np.ndarray, slides: np.ndarray) -> Part:
-    """The poses that moved the most, with their joints (n, k) in deg or mm."""
-    worst = found.poses.sort_values("arm_moved_mm", ascending=False, kind="stable").head(_WORST)
-    rows = [
-        row | {f"q{n}": joint for n, joint in enumerate(joints[row["pose"] - 1], start=1)}
-        for row in worst.to_dict("records")
-    ]
-    return Part("where", {"poses": len(found.poses), "largest": rows, "slides": slides.tolist()})
-
-
-def _table(found: Difference) -> Table:
-    heads = ("rms mm", "by chance mm", "largest mm", "rms mrad", "by chance mrad")
-    columns = [["", "frames"]]
-    columns += [
-        [head, name, ".3f"] for head, name in zip(heads, found.shifts.columns[1:], strict=True)
-    ]
-    caption = "Change of flange poses from {} to {}".format(*found.names)
-    return Table(caption, found.shifts.to_dict("records"), columns)

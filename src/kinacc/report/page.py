@@ -48,6 +48,13 @@ class Part:
     figures: Mapping[str, Figure] = field(default_factory=dict)
     charts: Mapping[str, LayoutDOM] = field(default_factory=dict)
 
+    def rows(self) -> dict[str, object]:
+        """The values, with lists of rows for tables."""
+        return {
+            name: value.to_dict("records") if isinstance(value, pd.DataFrame) else value
+            for name, value in self.values.items()
+        }
+
 
 @dataclass(frozen=True)
 class FirstScreen:
@@ -91,12 +98,8 @@ def html(
     for part in page.sections:
         drawn = {name: _image(figure) for name, figure in part.figures.items()}
         drawn |= {name: f"chart-{part.key}-{name}" for name in part.charts}
-        values = {
-            name: value.to_dict("records") if isinstance(value, pd.DataFrame) else value
-            for name, value in part.values.items()
-        }
         template = templates.get_template(f"{part.key}.html")
-        body = template.make_module({**values, "pictures": drawn})
+        body = template.make_module({**part.rows(), "pictures": drawn})
         sections.append({"key": part.key, "body": body})
     return templates.get_template("page.html").render(
         page=page,

@@ -129,47 +129,37 @@ def data_set_folders(folders: Iterable[Path]) -> list[Path]:
 
     Raises InputError for each folder that holds none.
     """
-    found: dict[Path, None] = {}
+    found: list[Path] = []
     problems = []
     for folder in folders:
-        if not folder.is_dir():
-            what = "is not a folder" if folder.exists() else "no such folder"
-            fix = "name the folder of all results, or of one data set"
-            problems.append(Problem(str(folder), what, fix=fix))
-            continue
-        if (folder / journal.PLAN).is_file():
-            status = shlex.join(["kinacc", "campaign", "status", str(folder)])
-            fix = f"run {status}, or name its results folder"
-            problems.append(Problem(str(folder), "is a campaign, not a results folder", fix=fix))
-            continue
-        inside = [folder] if any(folder.glob("*.parquet")) else sorted(folder.iterdir())
-        own = [
-            each
-            for each in inside
-            if each.is_dir() and each.name[0] != "." and not (each / journal.PLAN).is_file()
-        ]
-        found |= dict.fromkeys(own)
-        if not own:
-            fix = "calibrate one: kinacc calibrate FILE.yaml"
+        inside = (
+            [folder]
+            if any(folder.glob("*.parquet"))
+            else sorted(filter(Path.is_dir, folder.glob("[!.]*")))
+        )
+        with_results = [path for path in inside if not (path / journal.PLAN).is_file()]
+        found += with_results
+        if not with_results:
+            fix = "calibrate a data set: kinacc calibrate FILE.yaml"
             problems.append(Problem(str(folder), "holds no results", "results of data sets", fix))
     refuse(problems)
-    return list(found)
+    return list(dict.fromkeys(found))
 
 
 def summarise_all(folders: Sequence[Path]) -> list[CalibrationSummary | Problem]:
     """The summary of every results folder, or why it has none."""
     campaigns = journal.of_each(folders)
-    found: list[CalibrationSummary | Problem] = []
+    summaries: list[CalibrationSummary | Problem] = []
     for folder in folders:
         try:
             path = folder / "summary.parquet"
             if path.is_file() and path.name in sums.outdated(folder):
                 what = "was made from other tables than those now beside it"
                 raise InputError(Problem(str(path), what, fix=store.remake(path)))
-            found.append(summarise(folder, campaigns=campaigns[folder]))
+            summaries.append(summarise(folder, campaigns=campaigns[folder]))
         except InputError as error:
-            found.append(error.problems[0])
-    return found
+            summaries.append(error.problems[0])
+    return summaries
 
 
 def run(inputs: Tables, settings: Mapping) -> dict[str, Columns]:
