@@ -253,7 +253,9 @@ class Calibration:
             f"{name}.parquet": store.content_of(store.to_table(name, columns, marks))
             for name, columns in self.tables.items()
         }
-        written: dict[str | Path, bytes] = {folder / name: each for name, each in contents.items()}
+        written: dict[str | Path, bytes] = {
+            folder / name: content for name, content in contents.items()
+        }
         digests = folder / sums.FOLDER / "calibration.sha256"
         write_together(written | {digests: sums.text_of(contents, {})})
         return folder
@@ -274,8 +276,8 @@ class Calibration:
             The files written to ``folder``; files of the same names are replaced.
         """
         formats = [formats] if isinstance(formats, str) else formats
-        made = exports.contents(Source(self.model, self.tables), formats)
-        return [Path(path) for path in exports.write(made, folder, force=True)]
+        files = exports.contents(Source(self.model, self.tables), formats)
+        return [Path(path) for path in exports.write(files, folder, force=True)]
 
     def to_pinocchio(self) -> Any:
         """The calibrated DH model as ``pinocchio.Model`` (m, rad; frames ``flange``, ``tool``).
@@ -512,7 +514,7 @@ def compare(
     if q_rad is None:
         names = [f"q{joint + 1}" for joint in range(first.robot.dh.joints)]
         q_rad = np.concatenate(
-            [each.table("measurements")[names].to_numpy(dtype=float) for each in (first, second)]
+            [fit.table("measurements")[names].to_numpy(dtype=float) for fit in (first, second)]
         )
     first.robot.dh_joints(q_rad)
     measured = first.tables["measurements"], second.tables["measurements"]

@@ -32,11 +32,11 @@ def fit(magnitudes: ArrayLike) -> GammaFit:
     """
     x = np.asarray(magnitudes, dtype=np.float64).ravel()
     if x.size == 0 or not np.all(np.isfinite(x)) or np.any(x <= 0.0):
-        found = "no values" if x.size == 0 else f"smallest {x.min():g}, largest {x.max():g}"
+        sample = "no values" if x.size == 0 else f"smallest {x.min():g}, largest {x.max():g}"
         raise InputError(
             Problem(
                 "gamma fit",
-                f"the likelihood has no maximum for this sample ({found})",
+                f"the likelihood has no maximum for this sample ({sample})",
                 "at least one value, all finite and above 0",
                 "leave out exact zeros or use another statistic",
             )

@@ -107,15 +107,15 @@ def refused(error: OSError, where: object = None, what: str = "") -> MachineErro
     reason = reason[:1].lower() + reason[1:]
     if isinstance(where, bytes):
         where = os.fsdecode(where)
-    told = ": ".join(filter(None, [what, reason]))
+    message = ": ".join(filter(None, [what, reason]))
     place = "this machine" if where is None else str(where)
-    return MachineError(Problem(place, told, fix=_REMEDIES.get(error.errno or 0, "")))
+    return MachineError(Problem(place, message, fix=_REMEDIES.get(error.errno or 0, "")))
 
 
 def refuse(problems: Iterable[Problem], title: str = "") -> None:
     """Raise InputError with all ``problems``, where there is one."""
-    if found := tuple(problems):
-        raise InputError(found, title)
+    if several := tuple(problems):
+        raise InputError(several, title)
 
 
 @contextmanager

@@ -120,9 +120,9 @@ def project_so3(matrix: np.ndarray) -> np.ndarray:
     Newton's iteration for the polar factor on cofactors; quadratic near a rotation, where the
     first-order products of eq. 6 live.
     """
-    given = np.asarray(matrix, dtype=float)
+    matrices = np.asarray(matrix, dtype=float)
     # Numbers first, matrices last: one operation for all of them.
-    result = np.moveaxis(given.reshape(-1, 3, 3), 0, 2).copy()
+    result = np.moveaxis(matrices.reshape(-1, 3, 3), 0, 2).copy()
     settled = np.zeros(result.shape[2], dtype=bool)
     cofactor = np.empty_like(result)
     for _ in range(60):
@@ -137,7 +137,7 @@ def project_so3(matrix: np.ndarray) -> np.ndarray:
         settled = settled | (change < 1e-14)
         if settled.all():
             break
-    return np.moveaxis(result, 2, 0).reshape(given.shape)
+    return np.moveaxis(result, 2, 0).reshape(matrices.shape)
 
 
 def rotation_from_quaternion(quaternion: np.ndarray) -> np.ndarray:

@@ -111,7 +111,7 @@ def test_time_stamps_join_with_the_offset_of_the_clocks(tmp_path):
     assert_read(section, IT)
     assert section["joints"]["by"] == "time"
     assert section["joints"]["clock_offset_s"] == pytest.approx(137.4, abs=1.0)
-    assert len(told["told"]) == 1
+    assert len(told["notes"]) == 1
 
 
 def test_a_point_taken_while_the_arm_moved_is_left_out_and_said(tmp_path):
@@ -122,7 +122,7 @@ def test_a_point_taken_while_the_arm_moved_is_left_out_and_said(tmp_path):
     points = table(["Time", *XYZ], reading, IT.point)
     section, told = described(written(tmp_path, joints_csv=joints, tracker_csv=points))
     assert_read(section, IT, np.delete(np.arange(COUNT), 6))
-    assert "the arm was moving: line 8" in " ".join(told["told"])
+    assert "the arm was moving: line 8" in " ".join(told["notes"])
 
 
 def test_regular_times_leave_the_offset_open(tmp_path):

@@ -1,4 +1,4 @@
-"""``kinacc calibrate``: from a data set to its models and what they are worth."""
+"""``kinacc calibrate``: from a data set to its models and their errors."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ workflow_options = together(
         "--cores", "-c", type=click.IntRange(1), help="Processor cores to use. [all there are]"
     ),
     click.option("--json", "as_json", is_flag=True, help="Print the answer as JSON."),
-    click.argument("words", nargs=-1, type=click.UNPROCESSED, metavar="[FILE.yaml|FOLDER]..."),
+    click.argument("arguments", nargs=-1, type=click.UNPROCESSED, metavar="[FILE.yaml|FOLDER]..."),
 )
 
 
 @click.command("calibrate", context_settings={"ignore_unknown_options": True})
 @workflow_options
-def calibrate(words: tuple[str, ...], cores: int | None, as_json: bool) -> None:
-    """Fit the models of the data sets of FILE.yaml, and say what they are worth.
+def calibrate(arguments: tuple[str, ...], cores: int | None, as_json: bool) -> None:
+    """Fit the models of the data sets of FILE.yaml, and show their held-out errors.
 
     Checks the measurements, fits the VEC and the DH model, holds poses out to judge them, and
     leaves all tables in results/, in the folder it is called in. What is up to date is not made
@@ -50,7 +50,7 @@ def calibrate(words: tuple[str, ...], cores: int | None, as_json: bool) -> None:
       kinacc calibrate robots
       kinacc calibrate tracker.yaml -- --dry-run
     """
-    configs, folders = carried_out("calibration", words, cores, None)
+    configs, folders = carried_out("calibration", arguments, cores, None)
     if not folders:
         return
     if as_json:
@@ -64,24 +64,24 @@ def calibrate(words: tuple[str, ...], cores: int | None, as_json: bool) -> None:
 
 
 def carried_out(
-    target: str, words: tuple[str, ...], cores: int | None, default: Path | None
+    target: str, arguments: tuple[str, ...], cores: int | None, default: Path | None
 ) -> tuple[list[str], list[Path]]:
     """Run the workflow up to a target: the configuration files and, after a real run, folders.
 
-    ``words`` are configuration files, folders of these and, from the first that begins with ``-``,
-    Snakemake's; without files config.yaml is meant, or the ``default`` where there is none. Leaves
-    with Snakemake's exit code where that is not 0. Raises InputError for bad configuration.
+    ``arguments`` are configuration files, folders of these and, from the first that begins with
+    ``-``, Snakemake's; without files config.yaml is meant, or the ``default`` where there is none.
+    Leaves with Snakemake's exit code where that is not 0. InputError for bad configuration.
     """
-    first = next((i for i, word in enumerate(words) if word.startswith("-")), len(words))
-    names, options = words[:first], list(words[first:])
+    first = next((i for i, word in enumerate(arguments) if word.startswith("-")), len(arguments))
+    names, options = arguments[:first], list(arguments[first:])
     if not names and Path(CONFIG).is_file():
         names = (CONFIG,)
     elif not names and default is not None:
         names = (str(default),)
     elif not names:
-        what = f"no configuration file is given, and there is no {CONFIG} here"
+        message = f"no configuration file is given, and there is no {CONFIG} here"
         fix = "kinacc init MEASUREMENTS writes one; then: kinacc calibrate NAME.yaml"
-        raise InputError(Problem("FILE.yaml", what, fix=fix))
+        raise InputError(Problem("FILE.yaml", message, fix=fix))
     configs: list[str] = []
     for name in names:
         files = [name]
@@ -90,12 +90,12 @@ def carried_out(
             files = [file for file in files if not file.endswith(".robot.yaml")]
         if not files:
             fix = "kinacc init MEASUREMENTS --out FOLDER writes one"
-            what = "is a folder without configuration files"
-            raise InputError(Problem(name, what, "*.yaml", fix))
+            message = "is a folder without configuration files"
+            raise InputError(Problem(name, message, "*.yaml", fix))
         configs += files
     data = read_data_sets(configs)
     is_run = {"-n", "--dry-run", "--dryrun", "--lint"}.isdisjoint(options)
-    with held(RESULTS) if is_run else nullcontext():  # --no-hooks leaves out what holds them
+    with held(RESULTS) if is_run else nullcontext():  # --no-hooks leaves out the lock
         code = run_workflow(target, configs, cores or os.cpu_count() or 1, options)
     if code:
         raise SystemExit(code)

@@ -63,7 +63,7 @@ POINT = option("--point", help="Target, or flange. [the tool]")
 
 def record_of(kind: type[Record], options: Mapping[str, Any]) -> Record:
     """The options of a command that are the fields of a record."""
-    return kind(**{each.name: options[each.name] for each in fields(kind)})
+    return kind(**{field.name: options[field.name] for field in fields(kind)})
 
 
 def together(*options: Callable[[Callable], Callable]) -> Callable[[Callable], Callable]:
@@ -157,13 +157,13 @@ def robot_of(folder: str | Path, robot: str | None, config: tuple[str, ...]) -> 
         return recorded
     if robot is None:
         if not config and not Path(CONFIG).is_file():
-            what = f"is not given, and there is no {CONFIG} here"
-            raise InputError(Problem("--robot", what, "a shipped name, a robot file"))
+            message = f"is not given, and there is no {CONFIG} here"
+            raise InputError(Problem("--robot", message, "a shipped name, a robot file"))
         datasets = read_data_sets(config or (CONFIG,)).settings
         name = Path(folder).resolve().name
         if name not in datasets:
-            what = f"data set {name} is not in the configuration"
-            raise InputError(Problem(str(folder), what, ", ".join(datasets), "give --robot"))
+            message = f"data set {name} is not in the configuration"
+            raise InputError(Problem(str(folder), message, ", ".join(datasets), "give --robot"))
         robot = datasets[name]["robot"]
     arm = robots.load(robot)
     if recorded is not None:

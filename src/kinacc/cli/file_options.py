@@ -71,6 +71,6 @@ JOINT_ANSWERS = (
 )
 
 
-def joint_answers(given: Mapping[str, Any]) -> dict[str, Any]:
+def joint_answers(options: Mapping[str, Any]) -> dict[str, Any]:
     """What the options of a command say of a file of joints."""
-    return {name: given[name] for name in JOINT_ANSWERS if given.get(name)}
+    return {name: options[name] for name in JOINT_ANSWERS if options.get(name)}

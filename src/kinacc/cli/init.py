@@ -50,7 +50,7 @@ class Description:
         The section ``measurements.file``.
     assumed
         What the file does not state, by setting.
-    told
+    notes
         Facts on how the file was read.
     unused_columns
         Columns that are not read, with the reason.
@@ -71,7 +71,7 @@ class Description:
     targets: list[str]
     file: dict[str, Any]
     assumed: dict[str, str]
-    told: tuple[str, ...]
+    notes: tuple[str, ...]
     unused_columns: dict[str, str]
     suspicions: list[str]
     remarks: list[str]
@@ -146,12 +146,16 @@ def init(measurement_files: tuple[str, ...], out: Output, **options) -> None:
         raise InputError(Problem("--name", name, f"at most {LONGEST} letters, digits, _ and -"))
     dataset = Path(options["folder"], f"{name}.yaml")
     robot_file = dataset.with_name(f"{name}.robot.yaml")
-    given = options["robot"]
-    stays = given is not None and Path(given).suffix in (".yaml", ".yml") and Path(given).is_file()
+    robot_option = options["robot"]
+    stays = (
+        robot_option is not None
+        and Path(robot_option).suffix in (".yaml", ".yml")
+        and Path(robot_option).is_file()
+    )
     require_writable([dataset] if stays else [dataset, robot_file], out.force)
-    if ask and (changed := confirmed(guess, given)):
+    if ask and (changed := confirmed(guess, robot_option)):
         guess = guessed(measurement_files, stated | changed, ask)
-    robot, chosen = _robot(guess, given, ask)
+    robot, chosen = _robot(guess, robot_option, ask)
     text = _robot_text(robot, guess.joints, name, robot_file.parent)
     texts = {} if text is None else {robot_file: text}
     report, remarks = None, []
@@ -262,7 +266,7 @@ def _unread(unused: dict[str, str]) -> Iterator[tuple[str, str]]:
 def _lines(result: Description, guess: Guess, report: Report | None) -> Iterator[str]:
     """The description as it is printed."""
     columns, section, turn = guess.columns, guess.section, guess.section["orientation"]
-    yield from (f"file: {text}" for text in result.told)
+    yield from (f"file: {text}" for text in result.notes)
     yield f"robot: {result.robot or result.written[0]} ({result.robot_because})"
     names = listed([name.column for name in columns.joints])
     yield f"joints: {result.joints}, in {section['joint_unit']}: {names}"

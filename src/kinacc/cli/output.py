@@ -68,9 +68,9 @@ class Output:
         if len(table):
             print_table(table, most)
 
-    def say(self, facts: object, words: str) -> None:
+    def say(self, facts: object, text: str) -> None:
         """Print the answer for a machine or for a person."""
-        click.echo(json.dumps(plain(facts), indent=1) if self.as_json else words)
+        click.echo(json.dumps(plain(facts), indent=1) if self.as_json else text)
 
     def draw(self, figure: Figure) -> None:
         """Write the picture."""

@@ -121,11 +121,11 @@ def read_repeats(
     table, layout, notes = open_table(path)
     for note in notes:
         click.echo(f"{path}: {note}", err=True)
-    found = find(table, layout, np.zeros(0), problems, POSITION)
+    layout_columns = find(table, layout, np.zeros(0), problems, POSITION)
     refuse(problems, f"{path} cannot be used")
-    axes = found.targets[0].position
+    axes = layout_columns.targets[0].position
     position = stacked(table, axes, problems, gaps=False)
-    singles = {place.column: name for name, place in found.single.items()}
+    singles = {place.column: name for name, place in layout_columns.single.items()}
     table = replace(table, columns=table.columns.rename(columns=singles))
     rows = pd.DataFrame({"side": "", "visit": "", "hours": math.nan}, index=range(len(table)))
     if "pose" not in table.columns:
@@ -138,19 +138,19 @@ def read_repeats(
             problems.append(Problem(table.where(column, gaps), "an empty cell", fix="fill it in"))
     for name in table.columns.columns.intersection(_SINGLE):
         if len(kinds := {*table.texts(name)}) > 1:
-            what, fix = f"holds several: {first_few(sorted(kinds))}", "one file for each"
-            problems.append(Problem(table.where(name), what, "one", fix))
+            message, fix = f"holds several: {first_few(sorted(kinds))}", "one file for each"
+            problems.append(Problem(table.where(name), message, "one", fix))
     if timed := [name for name in (*_HOURS, "time") if name in table.columns]:
         rows["hours"] = _hours(table, timed[0], problems)
     if "pose" in rows and not columns["visit"]:
         again = np.flatnonzero(rows["pose"] == rows["pose"].shift())
         if rows_are is None and again.size:
             where = f"{path}: {table.rows_in_words(again)}"
-            what, fix = (
+            message, fix = (
                 "the pose of the row before",
                 "--rows visits, --rows stays or a column visit",
             )
-            problems.append(Problem(where, what, "whether the arm left the pose", fix))
+            problems.append(Problem(where, message, "whether the arm left the pose", fix))
         if rows_are != "stays":
             rows["visit"] = rows.index
     if (far := np.flatnonzero(abs(position).max(1) > _FARTHEST_MM)).size:
@@ -173,8 +173,8 @@ def _hours(table: RawTable, name: str, problems: list[Problem]) -> np.ndarray:
     texts = texts.where(~texts.str.match(r"\d\d:"), "2000-01-01T" + texts)
     times = pd.to_datetime(texts, format="ISO8601", utc=True, errors="coerce")
     if (bad := np.flatnonzero(times.isna())).size:
-        what, allowed = f"no time: {texts[bad[0]]!r}", "2026-05-04T13:20:05 or 13:20:05"
-        problems.append(Problem(table.where(name, bad), what, allowed))
+        message, allowed = f"no time: {texts[bad[0]]!r}", "2026-05-04T13:20:05 or 13:20:05"
+        problems.append(Problem(table.where(name, bad), message, allowed))
     return ((times - times.min()) / pd.Timedelta(hours=1)).to_numpy()
 
 

@@ -15,7 +15,7 @@ from kinacc.workflow.start import SNAKEFILE
 
 @click.command("study", context_settings={"ignore_unknown_options": True})
 @workflow_options
-def study(words: tuple[str, ...], cores: int | None, as_json: bool) -> None:
+def study(arguments: tuple[str, ...], cores: int | None, as_json: bool) -> None:
     """Carry out the whole study of the data sets of FILE.yaml.
 
     Beside the calibration: the map of errors, the operating points, the paper's assessors under
@@ -27,7 +27,7 @@ def study(words: tuple[str, ...], cores: int | None, as_json: bool) -> None:
       kinacc study tracker.yaml
       kinacc study config.yaml tracker.yaml -- --dry-run
     """
-    configs, folders = carried_out("all", words, cores, SNAKEFILE.with_name("config.yaml"))
+    configs, folders = carried_out("all", arguments, cores, SNAKEFILE.with_name("config.yaml"))
     if not folders:
         return
     if as_json:

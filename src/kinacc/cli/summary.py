@@ -77,13 +77,13 @@ def summary(folders: tuple[Path, ...], tolerance_mm: float | None, by: str, out)
 
 
 def as_plain(
-    found: Sequence[CalibrationSummary | Problem],
+    calibrations: Sequence[CalibrationSummary | Problem],
     by: str = BOUND,
     tolerance_mm: float | None = None,
 ) -> dict[str, dict]:
     """Summaries by name of the data set as JSON has them, each with its verdict."""
     reported = {}
-    for item in found:
+    for item in calibrations:
         if isinstance(item, Problem):
             reported[Path(item.where.removesuffix("/summary.parquet")).name] = {
                 "problem": str(item)
