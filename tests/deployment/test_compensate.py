@@ -80,16 +80,6 @@ def test_a_program_and_the_base_mean_the_same_under_dh_and_vec():
     np.testing.assert_allclose(std[0], std[1], rtol=1e-9)
 
 
-def test_without_joints_to_be_near_any_posture_the_data_cover_is_good():
-    arm, q_rad = calibrated("mh180", "dh"), joints("mh180", 20, seed=5)
-    wanted = predict(arm, q_rad).pose
-    found = compensate(arm, wanted)
-    assert (found.status == PoseStatus.CONVERGED).all()
-    assert left(arm, found.q_rad, wanted)[0] < 1e-6
-    assert not arm.outside_range(found.q_rad @ arm.robot.joint_map.T).any()
-    assert np.isnan(found.change).all()
-
-
 def test_every_kind_of_row_without_joints_says_why():
     arm = calibrated("mh180", "dh")
     far = Pose(np.eye(3)[None], np.array([[9000.0, 0.0, 0.0]]))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import json
 
 import pytest
 import shared_data
@@ -35,21 +34,6 @@ def folder(tmp_path_factory):
     config.write_text(SETTINGS, encoding="utf-8")
     stages = ("measurements", "vec", "dh", "residuals")
     return small_study.run_stages(config, "arm", place / "results", stages)
-
-
-@pytest.mark.parametrize("model", ["vec", "dh"])
-@pytest.mark.parametrize("frame", ["instrument", "base"])
-def test_a_pose_unlike_the_measured_ones_is_marked(folder, model, frame):
-    shown = call("predict", folder, "--model", model, "--frame", frame, "--json",
-                 "--joints-deg", MEASURED, "--joints-deg", TURNED_AWAY)  # fmt: skip
-    assert shown.exit_code == 0, shown.output
-    near, far = json.loads(shown.stdout)["rows"]
-    assert near["status"] == "ok"
-    assert far["status"].startswith("extrapolated")
-    assert "1 of 2 poses are not near" in shown.stderr
-    # Where the base lies is a convention: its frame hangs on it, the instrument's does not.
-    assert (near["undetermined_mm"] > 0.1) == ("in the base frame" in shown.stderr)
-    assert (near["undetermined_mm"] > 0.1) == (frame == "base")
 
 
 def test_every_exported_file_says_what_is_left_open(folder, tmp_path):

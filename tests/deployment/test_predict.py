@@ -7,7 +7,6 @@ from small_arms import BASE, TOOL, calibrated, joints, truth
 from kinacc.calibration.frames import MOTIONS
 from kinacc.calibration.uncertainty import is_angle
 from kinacc.deployment.predict import predict
-from kinacc.deployment.record import nominal
 from kinacc.deployment.sensitivity import sensitivity
 from kinacc.geometry import Pose, compose, exp_so3, log_so3
 from kinacc.kinematics import dh, robot
@@ -30,24 +29,35 @@ def moved(arm, names, step):
     return replace(arm, model=model, base=frame(arm.base, "base"), targets=targets)
 
 
+def slope(pose_at, step):
+    """Central difference (n, 6) of poses ``pose_at(step)`` by ``step``, mm and rad."""
+    low, high = pose_at(-step), pose_at(step)
+    turn = log_so3(high.rotation @ np.swapaxes(low.rotation, 1, 2))
+    return np.hstack([high.position_mm - low.position_mm, turn]) / (2 * step)
+
+
 @pytest.mark.parametrize("model", ["dh", "vec"])
 @pytest.mark.parametrize("frame", ["base", "instrument"])
 @pytest.mark.parametrize("point", ["tool", "flange"])
-def test_sensitivities_are_the_finite_differences_of_the_pose(model, frame, point):
-    arm = calibrated("mh180", model)
-    q_rad = joints("mh180", 3, seed=8)
-    slopes = sensitivity(arm, JointState(q_rad), frame, point)
-    names = arm.known.names
+def test_slopes_are_the_finite_differences_of_the_pose(model, frame, point):
+    arm, q_rad = calibrated("mh180", model), joints("mh180", 3, seed=8)
+    state = JointState(q_rad, np.sign(np.random.default_rng(5).normal(size=q_rad.shape)))
+    slopes, names = sensitivity(arm, state, frame, point), arm.known.names
     for column in np.linspace(0, len(names) - 1, 30).astype(int):
-        size = 1e-6 if is_angle(names[column]) else 1e-3
-        step = size * np.eye(len(names))[column]
-        low, high = (
-            moved(arm, names, sign * step).pose(JointState(q_rad), frame, point) for sign in (-1, 1)
+        unit = np.eye(len(names))[column]
+        found = slope(
+            lambda step, unit=unit: moved(arm, names, step * unit).pose(state, frame, point),
+            1e-6 if is_angle(names[column]) else 1e-3,
         )
-        shift = (high.position_mm - low.position_mm) / (2 * size)
-        turn = log_so3(high.rotation @ np.swapaxes(low.rotation, 1, 2)) / (2 * size)
-        np.testing.assert_allclose(slopes[:, :3, column], shift, rtol=1e-5, atol=2e-4)
-        np.testing.assert_allclose(slopes[:, 3:, column], turn, rtol=1e-5, atol=1e-8)
+        np.testing.assert_allclose(slopes[:, :3, column], found[:, :3], rtol=1e-5, atol=2e-4)
+        np.testing.assert_allclose(slopes[:, 3:, column], found[:, 3:], rtol=1e-5, atol=1e-8)
+    slopes = arm.joint_jacobian(state, frame, point)
+    for joint, unit in enumerate(np.eye(6)):
+        found = slope(
+            lambda step, unit=unit: arm.pose(state.moved(q_rad + step * unit), frame, point), 1e-6
+        )
+        np.testing.assert_allclose(slopes[:, :3, joint], found[:, :3], atol=1e-5)
+        np.testing.assert_allclose(slopes[:, 3:, joint], found[:, 3:], atol=1e-8)
 
 
 def test_predictions_are_as_far_off_as_they_say():
@@ -80,29 +90,3 @@ def test_a_vec_model_says_nothing_outside_its_range_and_dh_says_so():
     extrapolated = predict(calibrated("mh180", "dh"), q_rad)
     assert np.isfinite(extrapolated.pose.position_mm).all()
     assert extrapolated.outside[1, 2]
-
-
-@pytest.mark.parametrize("model", ["dh", "vec"])
-@pytest.mark.parametrize("frame", ["base", "instrument"])
-@pytest.mark.parametrize("point", ["tool", "flange"])
-def test_joint_jacobians_are_the_finite_differences_of_the_pose(model, frame, point):
-    arm, step = calibrated("mh180", model), 1e-6
-    q_rad = joints("mh180", 4, seed=9)
-    s = np.sign(np.random.default_rng(5).normal(size=q_rad.shape))
-    slopes = arm.joint_jacobian(JointState(q_rad, s), frame, point)
-    for joint in range(q_rad.shape[1]):
-        moved = step * np.eye(q_rad.shape[1])[joint]
-        low, high = (
-            arm.pose(JointState(q_rad + sign * moved, s), frame, point) for sign in (-1, 1)
-        )
-        shift = (high.position_mm - low.position_mm) / (2 * step)
-        turn = log_so3(high.rotation @ np.swapaxes(low.rotation, 1, 2)) / (2 * step)
-        np.testing.assert_allclose(slopes[:, :3, joint], shift, atol=1e-5)
-        np.testing.assert_allclose(slopes[:, 3:, joint], turn, atol=1e-8)
-
-
-def test_reported_joints_go_through_the_joint_map():
-    arm = nominal(robot.load("fanuc_r2000ic_165f"))
-    q_rad = joints("fanuc_r2000ic_165f", 4)
-    wanted = robot.forward(arm.robot, q_rad).position_mm
-    np.testing.assert_allclose(predict(arm, q_rad).pose.position_mm, wanted, atol=1e-9)

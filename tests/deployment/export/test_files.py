@@ -1,7 +1,5 @@
 """A calibrated arm as robot file, JSON, CSV and tables: complete, exact, all or nothing."""
 
-import csv
-import io
 import json
 from dataclasses import replace
 
@@ -14,7 +12,7 @@ from kinacc.deployment.export.source import Source
 from kinacc.deployment.record import TOOL, nominal
 from kinacc.errors import InputError
 from kinacc.geometry import Pose, compose, exp_so3, rotation_from_quaternion, rotation_x, rotation_z
-from kinacc.kinematics import dh, robot
+from kinacc.kinematics import robot
 from kinacc.kinematics.model import JointState
 
 
@@ -49,38 +47,6 @@ def test_a_robot_file_is_read_back_bit_by_bit(name, tmp_path):
     np.testing.assert_allclose(carried.rotation, arm.targets[TOOL].rotation, atol=1e-14)
 
 
-def model_table(arm):
-    """``dh_model`` of an arm, with standard deviations."""
-    table = {"joint": np.arange(1, arm.model.joints + 1)}
-    for name in dh.PARAMETERS:
-        table[name] = getattr(arm.model, name).copy()
-        table[f"std_{name}"] = np.full(arm.model.joints, 1e-3)
-    return table
-
-
-def test_json_and_csv_say_the_same_of_every_joint():
-    said = (
-        "d of joint 2 and d of joint 3 appear only as their sum",
-        "a shift of the base along y cannot be told from a shift of the tool along z",
-    )
-    arm = replace(bent("ur10"), left_open=said)
-    table = model_table(arm)
-    table["std_d_mm"][0] = np.nan
-    content = json.loads(written("json", arm, dh_model=table))
-    rows = list(csv.DictReader(io.StringIO(written("csv", arm, dh_model=table))))
-    assert content["undetermined"] == list(said)
-    assert content["joints"][0]["std_d_mm"] is None
-    assert rows[0]["std_d_mm"] == ""
-    told = [row["undetermined"] for row in rows]
-    assert told[:5] == ["", said[0], said[0], "", ""]
-    assert told[5].startswith(said[1])
-    for joint, row in zip(content["joints"], rows, strict=True):
-        assert float(row["d_mm"]) == pytest.approx(joint["d_mm"], rel=1e-11)
-        alpha = np.rad2deg(joint["alpha_rad"])
-        assert float(row["alpha_deg"]) == pytest.approx(alpha, rel=1e-11)
-        assert float(row["nominal_a_mm"]) == pytest.approx(joint["nominal_a_mm"], rel=1e-11)
-
-
 @pytest.mark.parametrize(
     ("value", "std", "text"),
     [
@@ -92,38 +58,6 @@ def test_json_and_csv_say_the_same_of_every_joint():
 )
 def test_values_carry_two_digits_of_their_deviation(value, std, text):
     assert with_deviation(value, std) == text
-
-
-def residuals():
-    kinds = [
-        (comparison, subset, quantity)
-        for comparison in ("vec_vs_measured", "dh_vs_vec", "dh_vs_measured")
-        for subset in ("train", "validation")
-        for quantity in ("position", "orientation")
-    ]
-    columns = dict(
-        zip(("comparison", "subset", "quantity"), np.array(kinds, dtype=object).T, strict=True)
-    )
-    units = {"position": "mm", "orientation": "mrad"}
-    columns["unit"] = np.array([units[kind[2]] for kind in kinds], dtype=object)
-    columns |= {"fold": np.full(len(kinds), np.nan), "n": np.arange(1, len(kinds) + 1)}
-    return columns | dict.fromkeys(("mean", "max", "rms", "gamma99"), np.arange(len(kinds)) + 0.25)
-
-
-def test_tables_hold_every_residual_and_parameter_in_both_forms():
-    arm = replace(bent("mh180"), left_open=("+1 a_b -1 c",))
-    table = model_table(arm)
-    table["std_d_mm"][2] = np.nan
-    page, paper = (
-        written(form, arm, dh_model=table, residuals=residuals()) for form in ("markdown", "latex")
-    )
-    for value in ("0.250", "11.250", f"{arm.model.a_mm[1]:.4f} ± 0.0010"):
-        assert value in page
-    assert f"{arm.model.a_mm[1]:.4f} $\\pm$ 0.0010" in paper
-    assert page.count("†") == 2  # in its cell and in the note
-    assert r"a\_b" in paper
-    assert paper.count(r"\begin{table}") == paper.count(r"\end{table}") == 4
-    assert {line.count(" & ") for line in paper.splitlines() if line.endswith(r"\\")} == {5}
 
 
 def test_nothing_is_written_over_or_in_part(tmp_path):
