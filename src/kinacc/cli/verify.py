@@ -102,25 +102,25 @@ def _lines(result: Verification, units: list[str]) -> Iterator[str]:
     from kinacc.report.rendering import size
 
     test, offsets = result.test, result.smallest_offsets
-    detected, p = "", ""
-    if test is not None and offsets is not None:
+    if test is None or offsets is None:
+        yield f"UNDECIDED: {result.reason}."
+    else:
         p = "p > 0.99" if test.probability > 0.99 else f"p = {test.probability:.2g}"
         p = f"at the {100.0 * LEVEL:g} % level ({p})"
         finite = np.where(np.isfinite(offsets), offsets, -1.0)
-        worst = int(np.argmax(finite))
-        hidden = ", ".join(map(str, np.flatnonzero(np.isinf(offsets)) + 1))
-        detected = f"Would be detected in 80 % of cases: errors {size(result.smallest_factor)} "
-        detected += f"times as large; joint {worst + 1} off by {size(finite[worst])} {units[worst]}"
-        detected += f" (not joint {hidden})." if hidden else "."
-    if result.verdict == "pass":
-        yield f"PASS: no change detected {p}."
-    elif result.verdict == "fail":
-        change = f"joint {test.joint} off by {size(test.offset)} {units[test.joint - 1]}"
-        yield f"FAIL: change detected {p}. Most like {change}."
-    else:
-        yield f"UNDECIDED: {result.reason}."
-    if test is not None:
-        yield detected
+        worst, hidden = int(np.argmax(finite)), np.flatnonzero(np.isinf(offsets)) + 1
+        if result.verdict == "pass":
+            yield f"PASS: no change detected {p}."
+        elif result.verdict == "fail":
+            change = f"joint {test.joint} off by {size(test.offset)} {units[test.joint - 1]}"
+            yield f"FAIL: change detected {p}. Most like {change}."
+        else:
+            yield f"UNDECIDED: {result.reason}."
+        yield (
+            f"Would be detected in 80 % of cases: errors {size(result.smallest_factor)} times as "
+            f"large; joint {worst + 1} off by {size(finite[worst])} {units[worst]}"
+            + (f" (not joint {', '.join(map(str, hidden))})." if len(hidden) else ".")
+        )
         yield (
             f"{model_name(result.model)}, rms position error of {result.here.configurations} "
             f"configurations: {size(test.rms_mm)} mm. Limit: {size(test.limit_mm)} mm (random "
@@ -131,17 +131,11 @@ def _lines(result: Verification, units: list[str]) -> Iterator[str]:
 
 
 def _next(result: Verification, folder: str, again: str) -> Iterator[str]:
-    """The next step, and its command."""
-    from kinacc.deployment.verify import FAIL, FEW_HELD_OUT, PASS, SET_UP_MOVED
+    """The next step, and its command: ``again``, the test with base and tool fitted, or poses."""
+    from kinacc.deployment.verify import FAIL, PASS, SET_UP_MOVED
 
-    poses = shlex.join(["kinacc", "show", folder, "measurements", "-o", "poses.csv"])
-    if result.verdict == PASS:
-        return
-    if result.reason == FEW_HELD_OUT:
-        yield "Next: calibrate with folds (measurements.folds) and more poses."
-    elif again and (result.verdict == FAIL or result.reason == SET_UP_MOVED):
+    if again and (result.verdict == FAIL or result.reason == SET_UP_MOVED):
         yield f"Next: test the arm alone, base and tool fitted: {again}"
-    elif result.verdict == FAIL:
-        yield f"Next: measure the poses of the calibration again and calibrate: {poses}"
-    else:
-        yield f"Next: measure more configurations near those of the calibration: {poses}"
+    elif result.verdict != PASS:
+        poses = shlex.join(["kinacc", "show", folder, "measurements", "-o", "poses.csv"])
+        yield f"Next: measure more poses of the calibration: {poses}"

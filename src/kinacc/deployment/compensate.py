@@ -270,11 +270,17 @@ class _Goals:
         self, model: ErrorModel, q_dh: np.ndarray, rows: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """What is left, (m,) mm and (m,) rad, at DH joints (m, k) of goals ``rows``."""
-        state = compose(model.pose(self.like.select(rows).moved(q_dh)), self.carried)
-        off = np.linalg.norm(state.position_mm - self.wanted.position_mm[rows], axis=1)
-        turned = state.rotation @ np.swapaxes(self.wanted.rotation[rows], 1, 2)
-        angle = np.linalg.norm(log_so3(turned), axis=1)
+        end = compose(model.pose(self.like.select(rows).moved(q_dh)), self.carried)
+        wanted = Pose(self.wanted.rotation[rows], self.wanted.position_mm[rows])
+        off, angle = distance(end, wanted)
         return np.nan_to_num(off, nan=np.inf), np.nan_to_num(angle, nan=np.inf)
+
+
+def distance(first: Pose, second: Pose) -> tuple[np.ndarray, np.ndarray]:
+    """Distance (...,) in mm and angle (...,) in rad between poses (..., 3)."""
+    turn = log_so3(first.rotation @ np.swapaxes(second.rotation, -1, -2))
+    gap_mm = np.linalg.norm(first.position_mm - second.position_mm, axis=-1)
+    return gap_mm, np.linalg.norm(turn, axis=-1)
 
 
 def _within_each(

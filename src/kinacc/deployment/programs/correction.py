@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -42,7 +42,7 @@ from kinacc.deployment.programs.record import (
 )
 from kinacc.deployment.record import FLANGE, MEASURED, Calibration
 from kinacc.errors import InputError, Problem, refuse
-from kinacc.geometry import IDENTITY, Pose, compose, invert, log_so3
+from kinacc.geometry import IDENTITY, Pose, compose, invert
 from kinacc.kinematics import dh
 from kinacc.kinematics.inverse import limits
 from kinacc.kinematics.robot import Robot
@@ -56,6 +56,11 @@ _RECORD = ".kinacc.json"
 _SAME_TOOL_MM, _SAME_TOOL_RAD = 5.0, np.deg2rad(1.0)
 _SAME = 1e-6  # mm and mrad: a pose that is no other
 _SINGULAR = 0.02  # smallest singular value of the Jacobian in rad and units of the reach
+_HIDDEN = ["q_rad", "pose", "outcome"]
+_SHOWN = [
+    "change_mm", "change_mrad", "largest_joint_change_deg", "expected_error_mm",
+    "is_measured_there", "is_near_singular",
+]  # fmt: skip
 _POINT = "tool of the program"
 _TRACK = "an external axis is not at zero (--base-is-fixed: none moves the robot's base)"
 Ask = Callable[[str, str], np.ndarray]
@@ -182,63 +187,41 @@ def compensate_program(
         for n, item in enumerate(positions)
         if item.scale is None and not item.refused
     }
-    ways = dict(zip(flange, posture.postures_of(robot, [*flange.values()]), strict=True))
-    unit = np.where(robot.dh.prismatic, 1.0, np.pi / 180.0)
-    reasons: dict[int, str] = {}
-    starts: dict[int, np.ndarray] = {}
-    for number, item in enumerate(positions):
-        if item.moves_outside and item.scale is None and not item.refused and not base_is_fixed:
-            start: np.ndarray | str = _TRACK
-        elif number in ways:
-            near = near_rad if item.near_rad is None else item.near_rad
-            start = posture.choose(robot, ways[number], language.posture, item.posture, near)
-        else:
-            start = item.refused or _joints(robot, item, unit)
-        if isinstance(start, str):
-            reasons[number] = start
-        else:
-            near_rad = starts[number] = start
+    starts, reasons = _starts(robot, language, positions, flange, near_rad, base_is_fixed)
     makers = {item.name for item in LANGUAGES if robot.name.lower().startswith(item.robots)}
     remarks = []
-    if makers - {language.name}:
+    if language.robots and makers - {language.name}:
         remarks = [f"{language.name}: robot {robot.name} has a controller of another maker."]
-    parts = [pd.DataFrame(columns=["change_mm"])]
+    parts = [pd.DataFrame(columns=[*_HIDDEN, *_SHOWN])]
     for name in dict.fromkeys(positions[number].tool for number in starts):
         group = [number for number in starts if positions[number].tool == name]
         place, remark = _carried(calibration, tool[group[0]], point)
         remarks += [f"Tool {name or ''}: {remark}"] if remark else []
         q_rad = np.stack([starts[number] for number in group])
         parts.append(_corrected(calibration, q_rad, place, tool[group[0]]).set_axis(group))
-    facts = pd.concat([part for part in parts if len(part)] or parts)
+    rows = pd.concat(parts[1:] or parts)
     new: dict[Position, np.ndarray] = {}
-    for number, row in facts.iterrows():
-        item, stated = positions[number], positions[number].posture and language.posture
-        if row["outcome"] > PoseStatus.EXTRAPOLATED:
-            name = PoseStatus(row["outcome"]).name
-            reasons[number] = f"the calibrated arm: {name.lower().replace('_', ' ')}"
-        elif row["change_mm"] > at_most_mm:
-            reasons[number] = f"would move by {row['change_mm']:.3g} mm (--at-most-mm)"
+    for number, row in rows.iterrows():
+        item = positions[number]
+        if reason := _obstacle(robot, language, item, row, at_most_mm):
+            reasons[number] = reason
         elif item.scale is not None:
-            new[item] = row["q_rad"] / unit * item.scale
-        elif stated and (
-            apart := posture.unmatched(robot, stated, item.posture or (), row["q_rad"])
-        ):
-            reasons[number] = f"the posture would change: {apart}"
+            new[item] = row["q_rad"] / _unit(robot) * item.scale
         elif max(row["change_mm"], row["change_mrad"]) > _SAME:
             new[item] = convention.numbers(compose(invert(base[number]), row["pose"]), item.numbers)
-    rows = pd.DataFrame({
+    table = pd.DataFrame({
         "position": [item.name for item in positions],
         "file": [item.where for item in positions],
         "kind": ["pose" if item.scale is None else "joints" for item in positions],
-    }).join(facts.drop(columns=["q_rad", "pose", "outcome"], errors="ignore"))  # fmt: skip
-    rows["status"] = [reasons.get(number, "corrected") for number in range(len(positions))]
+    }).join(rows[_SHOWN])  # fmt: skip
+    table["status"] = [reasons.get(number, "corrected") for number in range(len(positions))]
     return CorrectedProgram(
         language.name,
         f"{calibration.name}, {calibration.choice}",
-        rows,
+        table,
         tuple(
-            Problem(f"{positions[number].where} {positions[number].name}", why)
-            for number, why in sorted(reasons.items())
+            Problem(f"{positions[number].where} {positions[number].name}", reason)
+            for number, reason in sorted(reasons.items())
         ),
         tuple(program.not_corrected),
         tuple(remarks),
@@ -246,13 +229,58 @@ def compensate_program(
     )
 
 
-def _joints(robot: Robot, position: Position, unit: np.ndarray) -> np.ndarray | str:
-    """Reported joints (k,) of a position that is joints, or why it is refused."""
-    if len(position.places) != robot.dh.joints:
-        return f"has {len(position.places)} joints, not {robot.dh.joints}"
-    q_rad = position.numbers / position.scale * unit
-    within = limits.within(q_rad, robot.q_min_rad, robot.q_max_rad)
-    return q_rad if within else "its joints are beyond the limits"
+def _starts(
+    robot: Robot,
+    language: Language,
+    positions: Sequence[Position],
+    flange: Mapping[int, Pose],
+    near_rad: np.ndarray | None,
+    base_is_fixed: bool,
+) -> tuple[dict[int, np.ndarray], dict[int, str]]:
+    """Reported joints (k,) of the nominal arm by number of the position, and why some have none.
+
+    ``flange``: wanted poses of the flange by number, of positions that are no joints.
+    """
+    ways = dict(zip(flange, posture.postures_of(robot, [*flange.values()]), strict=True))
+    starts: dict[int, np.ndarray] = {}
+    reasons: dict[int, str] = {}
+    for number, item in enumerate(positions):
+        start: np.ndarray | str = item.refused
+        if number in ways and item.moves_outside and not base_is_fixed:
+            start = _TRACK
+        elif number in ways:
+            near = near_rad if item.near_rad is None else item.near_rad
+            start = posture.choose(robot, ways[number], language.posture, item.posture, near)
+        elif not start and len(item.places) != robot.dh.joints:
+            start = f"has {len(item.places)} joints, not {robot.dh.joints}"
+        elif not start:
+            start = item.numbers / item.scale * _unit(robot)
+            if not limits.within(start, robot.q_min_rad, robot.q_max_rad):
+                start = "its joints are beyond the limits"
+        if isinstance(start, str):
+            reasons[number] = start
+        else:
+            near_rad = starts[number] = start
+    return starts, reasons
+
+
+def _obstacle(
+    robot: Robot, language: Language, position: Position, row: pd.Series, at_most_mm: float
+) -> str:
+    """Why a position cannot be corrected as its ``row`` has it; empty where it can."""
+    if row["outcome"] > PoseStatus.EXTRAPOLATED:
+        return f"the calibrated arm: {PoseStatus(row['outcome']).name.lower().replace('_', ' ')}"
+    if row["change_mm"] > at_most_mm:
+        return f"would move by {row['change_mm']:.3g} mm (--at-most-mm)"
+    if position.posture is None or language.posture is None:
+        return ""
+    changed = posture.unmatched(robot, language.posture, position.posture, row["q_rad"])
+    return f"the posture would change: {changed}" if changed else ""
+
+
+def _unit(robot: Robot) -> np.ndarray:
+    """Radians (mm where a joint slides) of a unit in which joints are written, (k,)."""
+    return np.where(robot.dh.prismatic, 1.0, np.pi / 180.0)
 
 
 def _digest(contents: Iterable[bytes]) -> str:
@@ -297,7 +325,7 @@ def _carried(calibration: Calibration, tool: Pose, point: str | None) -> tuple[P
         place = calibration.point(target)
         if calibration.orientation_source(target) != MEASURED:
             place = Pose(mounted.rotation, place.position_mm)
-        gap_mm, gap_rad = _apart(place, mounted)
+        gap_mm, gap_rad = inverse.distance(place, mounted)
         if target != FLANGE and (point or (gap_mm <= _SAME_TOOL_MM and gap_rad <= _SAME_TOOL_RAD)):
             gap = f"{gap_mm:.3g} mm and {1e3 * gap_rad:.3g} mrad"
             remark = f"the calibrated {target}, {gap} from the controller's tool, takes its place"
@@ -328,31 +356,21 @@ def _corrected(
     result = inverse.compensate(arm, wanted, start, point=_POINT)
     q_rad = np.where(np.isfinite(result.q_rad), result.q_rad, start)
     new = _nominal(robot, q_rad, tool)
-    shift_mm, turn_rad = _apart(new, wanted)
+    shift_mm, turn_rad = inverse.distance(new, wanted)
     known = predict(arm, q_rad, point=_POINT)
     slopes = dh.joint_jacobian(robot.dh, robot.dh_joints(q_rad))
     slopes[:, :3] /= np.sum(np.abs(robot.dh.a_mm) + np.abs(robot.dh.d_mm))
     errors_mm = np.nan_to_num([known.unexplained[:, 0], known.std_position_mm])
-    return pd.DataFrame({
-        "q_rad": list(q_rad),
-        "pose": [Pose(*parts) for parts in zip(*new, strict=True)],
-        "outcome": result.status,
-        "change_mm": shift_mm,
-        "change_mrad": 1e3 * turn_rad,
-        "largest_joint_change_deg": np.rad2deg(np.abs(q_rad - start).max(axis=1)),
-        "expected_error_mm": np.hypot(*errors_mm),
-        "is_measured_there": known.near,
-        "is_near_singular": np.linalg.svd(slopes, compute_uv=False)[:, -1] < _SINGULAR,
-    })  # fmt: skip
+    columns = [
+        list(q_rad), [Pose(*parts) for parts in zip(*new, strict=True)], result.status,
+        shift_mm, 1e3 * turn_rad, np.rad2deg(np.abs(q_rad - start).max(axis=1)),
+        np.hypot(*errors_mm), known.near,
+        np.linalg.svd(slopes, compute_uv=False)[:, -1] < _SINGULAR,
+    ]  # fmt: skip
+    return pd.DataFrame(dict(zip([*_HIDDEN, *_SHOWN], columns, strict=True)))
 
 
 def _nominal(robot: Robot, q_rad: np.ndarray, tool: Pose) -> Pose:
     """Poses (n, ...) of the tool that the nominal arm takes at reported joints (n, k)."""
     end = compose(robot.base, dh.forward(robot.dh, robot.dh_joints(q_rad)))
     return compose(compose(end, robot.flange), tool)
-
-
-def _apart(pose: Pose, other: Pose) -> tuple[np.ndarray, np.ndarray]:
-    turn = log_so3(np.swapaxes(other.rotation, -1, -2) @ pose.rotation)
-    gap = np.linalg.norm(pose.position_mm - other.position_mm, axis=-1)
-    return gap, np.linalg.norm(turn, axis=-1)
