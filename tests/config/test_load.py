@@ -123,7 +123,7 @@ BAD = [  # text, key path, and what is wrong or nearest
         "joints_deg",
         "limits of joint 2",
     ),
-    (OWN + "path: own.yaml, decimal: ','}}}}", "file.decimal", "also the delimiter"),
+    (OWN + "path: own.yaml, thousands: '.'}}}}", "file.thousands", "also the decimal"),
     ("measurements: {file: {columns: {A1: q1, X: x}}}", "file.columns", "q1: A1"),
     ("measurements: {file: {columns: {qx1: a}}}", "columns.qx1", "unknown name"),
     (

@@ -51,7 +51,7 @@ def _synthetic(full: Mapping[str, Any]) -> Found:
 
 
 def _file(file: Mapping[str, Any], folder: Path) -> Found:
-    """Files that are not there, and marks of numbers that part columns."""
+    """Files that are not there, and marks of numbers that are equal."""
     for keys in (("path",), ("joints", "path")):
         path = file["path"] if keys == ("path",) else file["joints"]["path"]
         if path is None and keys == ("path",):
@@ -62,21 +62,9 @@ def _file(file: Mapping[str, Any], folder: Path) -> Found:
             source = file["source"] and f"the data comes from: {' '.join(file['source'].split())}"
             fix = source or "write where the data comes from into measurements.file.source"
             yield (*_FILE, *keys), f"{path!r} does not exist", "an existing file", fix
-    decimal, thousands, delimiter = file["decimal"], file["thousands"], file["delimiter"]
-    if delimiter in (decimal, thousands) and _quoted(folder, file):
-        delimiter = None
-    if decimal == delimiter or thousands in {decimal, delimiter} - {None}:
-        key, label = ("decimal", decimal) if decimal == delimiter else ("thousands", thousands)
-        yield (*_FILE, key), f"{label!r} is also the delimiter or the decimal mark", "another mark"
-
-
-def _quoted(folder: Path, file: Mapping[str, Any]) -> bool:
-    """Whether the delimiter may stand within numbers: in quotes, or in cells of a workbook."""
-    from kinacc.measurements.files import quotes_numbers
-    from kinacc.measurements.layout import Layout
-
-    path = file["path"] and folder / file["path"]
-    return bool(path) and os.path.isfile(path) and quotes_numbers(path, Layout.of(file))
+    # A delimiter within numbers may be quoted; elsewhere it makes rows of too many cells.
+    if (mark := file["thousands"]) == file["decimal"]:
+        yield (*_FILE, "thousands"), f"{mark!r} is also the decimal mark", "another mark"
 
 
 def _arm(full: Mapping[str, Any], folder: Path) -> Found:

@@ -5,12 +5,12 @@ Columns Nominal, Measured, Dev under a column of axes become Nominal X, Nominal 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import pandas as pd
 
-from kinacc.errors import InputError, Problem
+from kinacc.errors import InputError, Problem, first_few
 from kinacc.measurements.column_names import (
     DEVIATION,
     MEASURED,
@@ -38,42 +38,27 @@ def axis_of(cell: object) -> str:
     """X, Y or Z, empty where a cell is none of them."""
     if not isinstance(cell, str) or len(cell) > 40:
         return ""
-    words = {*name_of(cell).terms} - WORDS["axis"] or {cell.strip().lower()}
-    return words.pop().upper() if len(words) == 1 and words <= {*"xyz"} else ""
+    terms = {*name_of(cell).terms} - WORDS["axis"] or {cell.strip().lower()}
+    return terms.pop().upper() if len(terms) == 1 and terms <= {*"xyz"} else ""
 
 
 def report_of(table: RawTable) -> Report | None:
     """The columns of a report of features and axes; None where the table is no such report."""
-
-    def has_axes(cells: Sequence) -> bool:
-        kinds = dict.fromkeys(cells)
-        return len(kinds) < 60 and {axis_of(each) for each in kinds} >= {*AXES}
-
-    axis = next((name for name in table.columns if has_axes(table.columns[name])), None)
-    if axis is None:
+    kinds = {name: dict.fromkeys(table.columns[name]) for name in table.columns}
+    axes = [name for name, cells in kinds.items()
+            if len(cells) < 60 and {*map(axis_of, cells)} >= {*AXES}]  # fmt: skip
+    if not axes:
         return None
-    filled = {n: [c for c in table.columns[n] if not table.is_gap(c)] for n in table.columns}
-    roles = {name: role(name_of(name).terms) for name in filled if name != axis}
-    values = [
-        name
-        for name, said in roles.items()
-        if said in (NOMINAL, MEASURED, REPORTED, DEVIATION) and _mostly_numbers(filled[name])
-    ]
+    cells = table.columns.drop(columns=axes[0]).mask(table.columns.map(table.is_gap))
+    roles = {name: role(name_of(name).terms) for name in cells}
+    numeric = cells.map(lambda c: not isinstance(c, str) or c.strip()[:1] in "+-.−0123456789")
+    values = [name for name in cells if roles[name] in (NOMINAL, MEASURED, REPORTED, DEVIATION)
+              and 2 * numeric[name].sum() > len(cells)]  # fmt: skip
     # A name stands for several rows: in each of them, or in the first.
-    names = [
-        name
-        for name in roles
-        if name not in values
-        and not table.is_gap(table.columns[name][0])
-        and 2 * min(len({*filled[name]}), len(filled[name])) <= len(table) + 1
-    ]
+    names = [name for name in cells if name not in values and pd.notna(cells[name][0])
+             and 2 * cells[name].nunique() <= len(table) + 1]  # fmt: skip
     measured = any(roles[name] in (MEASURED, REPORTED) for name in values)
-    return Report(names[0], axis, tuple(values)) if names and measured else None
-
-
-def _mostly_numbers(cells: Sequence) -> bool:
-    good = [not isinstance(e, str) or e.strip()[:1] in {*"+-.−0123456789"} for e in cells]
-    return bool(cells) and 2 * sum(good) > len(good)
+    return Report(names[0], axes[0], tuple(values)) if names and measured else None
 
 
 def by_feature(table: RawTable) -> RawTable:
@@ -81,38 +66,39 @@ def by_feature(table: RawTable) -> RawTable:
 
     A row stands on the first line of its feature; a feature that comes again is a row again.
     """
-    found = report_of(table)
-    if found is None:
-        what = "is no report with a row per feature and axis"
+    report = report_of(table)
+    if report is None:
+        message = "is no report with a row per feature and axis"
         allowed = "a column of names, one of X, Y, Z, and columns such as Nominal, Measured, Dev"
-        raise InputError(Problem(table.path, what, allowed, "set measurements.file.layout: table"))
-    names = table.columns[found.feature].mask(table.gaps(found.feature)).ffill().tolist()
-    axes = [axis_of(cell) for cell in table.columns[found.axis]]
-    rows: list[dict[str, int]] = []
-    last: object = None
-    for row, (name, axis) in enumerate(zip(names, axes, strict=True)):
-        if axis:
-            if not rows or name != last or axis in rows[-1]:
-                rows.append({})
-                last = name
-            rows[-1][axis] = row
-    first = np.array([min(each.values()) for each in rows])
-    columns: dict[str, Sequence] = {found.feature: [names[row] for row in first]}
+        fix = "set measurements.file.layout: table"
+        raise InputError(Problem(table.path, message, allowed, fix))
+    cells = table.columns.mask(table.columns.map(table.is_gap), None)
+    cells[report.feature] = cells[report.feature].ffill()
+    axes = np.array([axis_of(cell) for cell in table.columns[report.axis]], dtype=object)
+    group, seen, last = np.full(len(table), -1), set[str](), None
+    for row in np.flatnonzero(axes):
+        if cells[report.feature][row] != last or axes[row] in seen:
+            seen, last = set(), cells[report.feature][row]
+        group[row] = group.max() + (not seen)
+        seen.add(axes[row])
+    read = cells[group >= 0].groupby(group[group >= 0])
+    first = np.flatnonzero(group >= 0)[~pd.Series(group[group >= 0]).duplicated()]
+    columns = {report.feature: cells[report.feature][first]}
     units = dict(table.units)
-    for value in found.values:
-        cells = table.columns[value]
+    for value in report.values:
         for axis in AXES:
-            columns[f"{value} {axis}"] = [cells.get(each.get(axis, -1)) for each in rows]
+            rows = dict(zip(group[axes == axis], table.columns[value][axes == axis], strict=True))
+            columns[f"{value} {axis}"] = [rows.get(number) for number in range(len(first))]
             units[f"{value} {axis}"] = units.get(value, "")
-    for name in table.columns:
-        if name not in (found.feature, found.axis, *found.values):
-            cells, gaps = table.columns[name], table.gaps(name)
-            own = [dict.fromkeys(cells[r] for r in each.values() if not gaps[r]) for each in rows]
-            if all(len(each) < 2 for each in own):  # of the feature, and not of an axis
-                columns[name] = [next(iter(each), None) for each in own]
-    notes = list(table.notes)
-    if other := [str(table.columns[found.axis][n]) for n, axis in enumerate(axes) if not axis]:
-        told = ", ".join([*dict.fromkeys(other)][:5])
-        notes.append(f"{len(other)} rows of other quantities than X, Y, Z, not read ({told})")
-    made = replace(table, columns=frame(columns), line=table.line[first], units=units)
-    return replace(made, notes=tuple(notes))
+    for name in cells.columns.difference(
+        [report.feature, report.axis, *report.values], sort=False
+    ):
+        if (read[name].nunique() < 2).all():  # of the feature, and not of an axis
+            columns[name] = read[name].first()
+    notes = table.notes
+    if others := table.columns[report.axis][axes == ""].tolist():
+        kinds = first_few([*dict.fromkeys(map(str, others))])
+        notes += (f"{len(others)} rows of other quantities than X, Y, Z, not read ({kinds})",)
+    return replace(
+        table, columns=frame(columns), line=table.line[first], units=units, notes=notes
+    )

@@ -9,7 +9,6 @@ import csv
 import re
 import zipfile
 from collections.abc import Iterable, Iterator
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -37,6 +36,7 @@ _KINDS = "a CSV, text, Excel (.xlsx) or Parquet file"
 MOST_ROWS, MOST_COLUMNS, MOST_CELLS = 1_000_000, 10_000, 10_000_000
 MOST_BYTES, _MOST_UNPACKED = 500_000_000, 150_000_000  # a sheet of a million cells has some 40 MB
 _MOST_LINES = MOST_ROWS + 10_000  # titles and the like beside
+_MOST_GROUPS = MOST_ROWS // 100  # of rows in a Parquet file
 _WITH_BRACKETS = re.compile(r"(?:\{[^{}]*\}|\[(?:[^\[\]]|\[[^\[\]]*\])*\]|\S)+")
 
 
@@ -64,10 +64,6 @@ def load(path: str | Path, layout: Layout | None = None, source: str | None = No
         with opened(path, layout.encoding) as stream:
             rows = list(_limited(rows_of_lines(stream, layout.delimiter, str(path)), str(path)))
         table = tabled(str(path), rows, layout)
-        if layout.encoding == "utf-8" and any("\ufffd" in name for name in table.columns):
-            note = "names of columns hold characters that are not UTF-8: set "
-            note += "measurements.file.encoding, such as latin-1 or cp932"
-            table = replace(table, notes=(*table.notes, note))
     table = robot_programs.expanded(table)
     if layout.layout == FEATURES:
         from kinacc.measurements.features import by_feature
@@ -80,22 +76,12 @@ def load(path: str | Path, layout: Layout | None = None, source: str | None = No
     return table
 
 
-def quotes_numbers(path: Path, layout: Layout) -> bool:
-    """Whether numbers with the delimiter within them are one cell: in quotes, or in a workbook."""
-    if path.suffix.lower() in (*EXCEL, *PARQUET):
-        return True
-    with opened(path, layout.encoding) as stream:
-        text = stream.read(100_000)
-    return bool(re.search(rf'"\s*[+\-−]?\d[\d.\']*{re.escape(layout.delimiter)}\d', text))
-
-
 def refuse_other_files(path: Path, source: str | None = None) -> None:
     """Raise InputError where there is no file, or one that is none of those that are read."""
-    suffix = path.suffix.lower()
     if not path.is_file():
         origin = f"the data comes from: {source}" if source else "check measurements.file.path"
         raise InputError(Problem(str(path), "no such file", _KINDS, origin))
-    if kind := _OTHERS.get(suffix):
+    if kind := _OTHERS.get(path.suffix.lower()):
         fix = "save it as .xlsx or export it as CSV"
         raise InputError(Problem(str(path), f"is {kind}, which is not read", _KINDS, fix))
 
@@ -120,12 +106,12 @@ def _refuse_shape(path: str, rows: int, columns: int, cells: int) -> None:
 
 def refuse_large(path: Path) -> None:
     """Raise InputError where a text has too many bytes or lines."""
-    size, lines = path.stat().st_size, 0
-    if size <= MOST_BYTES:
-        with open(path, "rb") as file:
-            lines = sum(chunk.count(b"\n") for chunk in iter(lambda: file.read(1 << 20), b""))
-    if size > MOST_BYTES or lines > _MOST_LINES:
-        _refuse_too_much(str(path), f"{lines} lines" if lines else f"{size / 1e6:.0f} MB")
+    if (size := path.stat().st_size) > MOST_BYTES:
+        _refuse_too_much(str(path), f"{size / 1e6:.0f} MB")
+    with open(path, "rb") as file:
+        lines = sum(chunk.count(b"\n") for chunk in iter(lambda: file.read(1 << 20), b""))
+    if lines > _MOST_LINES:
+        _refuse_too_much(str(path), f"{lines} lines")
 
 
 def rows_of_lines(lines: Iterable[str], delimiter: str, path: str) -> Iterator[Row]:
@@ -194,11 +180,11 @@ class Workbook:
         except Exception as error:
             raise self._unreadable(error) from None
         _refuse_shape(self.path, len(cells) if most == MOST_ROWS else 0, cells.shape[1], cells.size)
-        rows = [[_cell(value) for value in row] for row in cells.itertuples(index=False)]
-        width = max((place + 1 for row in rows for place, cell in enumerate(row)
-                     if cell is not None), default=0)  # fmt: skip
-        return [(number, row[:width]) for number, row in enumerate(rows, 1)
-                if any(cell is not None for cell in row)]  # fmt: skip
+        cells = cells.map(_cell)
+        there = cells.notna().to_numpy()
+        width = int(np.flatnonzero(there.any(axis=0)).max(initial=-1)) + 1
+        rows = cells.iloc[:, :width].to_numpy().tolist()
+        return [(number, row) for number, row in enumerate(rows, 1) if there[number - 1].any()]
 
     def _unreadable(self, error: Exception) -> InputError:
         reason = str(error).splitlines()[0][:200] if str(error) else type(error).__name__
@@ -226,15 +212,14 @@ def _of_parquet(path: Path) -> RawTable:
             schema, footer = file.schema_arrow, file.metadata
         rows, width, groups = footer.num_rows, footer.num_columns, footer.num_row_groups
         _refuse_shape(where, rows, width, rows * width)
-        sizes = [footer.row_group(n).total_byte_size for n in range(min(groups, MOST_ROWS))]
-        if groups > MOST_ROWS // 100 or sum(sizes) > MOST_BYTES:
-            _refuse_too_much(where, f"{sum(sizes) / 1e6:.0f} MB in {groups} groups of rows")
+        size = sum(footer.row_group(n).total_byte_size for n in range(min(groups, _MOST_GROUPS)))
+        if groups > _MOST_GROUPS or size > MOST_BYTES:
+            _refuse_too_much(where, f"{size / 1e6:.0f} MB in {groups} groups of rows")
         if doubled := sorted({n for n in schema.names if schema.names.count(n) > 1}):
             raise InputError(Problem(where, f"column names given twice: {', '.join(doubled)}"))
         flat = [field.name for field in schema if not pa.types.is_nested(field.type)]
         # The same text in a million rows is held once.
-        texts = [n for n in flat if pa.types.is_string(schema.field(n).type)
-                 or pa.types.is_large_string(schema.field(n).type)]  # fmt: skip
+        texts = [n for n in flat if str(schema.field(n).type) in ("string", "large_string")]
         with pq.ParquetFile(path, read_dictionary=texts) as file:
             table = file.read(columns=flat)
     except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
@@ -260,19 +245,16 @@ def _cells(column, where: str) -> list:
     Raises InputError where a few long texts, repeated, are more than could be worked through.
     """
     import pyarrow as pa
+    import pyarrow.compute as pc
 
     try:
         if not pa.types.is_dictionary(column.type):
             return column.to_pylist()
-        cells: list = []
-        for chunk in column.chunks:
-            texts = [*chunk.dictionary.to_pylist(), None]
-            places = [len(texts) - 1 if p is None else p for p in chunk.indices.to_pylist()]
-            size = sum(len(str(texts[place])) for place in places)
-            if size > MOST_BYTES:
-                _refuse_too_much(where, f"texts of {size / 1e6:.0f} MB in one column")
-            cells += [texts[place] for place in places]
-        return cells
+        lengths = [pc.binary_length(part.dictionary).take(part.indices) for part in column.chunks]
+        size = sum(pc.sum(part).as_py() or 0 for part in lengths)
+        if size > MOST_BYTES:
+            _refuse_too_much(where, f"texts of {size / 1e6:.0f} MB in one column")
+        return column.to_pandas().astype(object).tolist()
     except (pa.ArrowException, ArithmeticError, LookupError, ValueError):
         # A date outside the calendar, text that is not UTF-8.
         return [f"<{column.type}>"] * len(column)

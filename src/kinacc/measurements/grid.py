@@ -60,17 +60,18 @@ def _is_reading(cells: Sequence, delimiter: str) -> bool:
 def header_cells(cells: list, width: int) -> list[str]:
     """The names of a line of names above rows of ``width`` cells.
 
-    Where blanks part the cells, units in brackets stand behind their name, and names of several
-    words are as far apart as their count allows.
+    Where blanks part the cells, units in brackets stand behind their name.
     """
     names = ["" if cell is None else str(cell).strip() for cell in cells]
+    if len(names) == width:
+        return names
     joined: list[str] = []
     for name in names:
-        if joined and name[:1] in "[(" and name[-1:] in "])" and name:
+        if joined and re.fullmatch(r"[\[(].*[\])]", name):
             joined[-1] += f" {name}"
         else:
             joined.append(name)
-    return joined if len(names) != width == len(joined) else names
+    return joined if len(joined) == width else names
 
 
 def tabled(path: str, rows: Iterable[Row], layout: Layout, sheet: bool = False) -> RawTable:
@@ -90,35 +91,29 @@ def tabled(path: str, rows: Iterable[Row], layout: Layout, sheet: bool = False) 
             under, skip = row[1], skip - 1
         else:
             (readings if _is_reading(row[1], layout.delimiter) else aside).append(row)
-    called = [row for row in aside if len(row[1]) == len(head)]
-    if len(called) > len(readings):  # where most rows begin so, the points are called so
-        aside = [row for row in aside if row not in called]
-        readings = sorted([*readings, *called], key=lambda row: row[0])
+    named = [row for row in aside if len(row[1]) == len(head)]
+    if len(named) > len(readings):  # where most rows begin so, the points are called so
+        aside = [row for row in aside if row not in named]
+        readings = sorted([*readings, *named], key=lambda row: row[0])
     names = header_cells(head, max((len(cells) for _, cells in readings[:4]), default=0))
     width = len(names)
     readings = [(n, c if len(c) <= width or filled(c[width:]) else c[:width]) for n, c in readings]
-    aside += [row for row in readings if row[1][0] == names[0] and [*map(str, row[1])] == names]
+    again = [row for row in readings if row[1][0] == names[0] and [*map(str, row[1])] == names]
+    readings = [row for row in readings if row not in again] if again else readings
     while len(readings) > 1 and _is_text(readings[-1][1], width):
-        aside.append(readings.pop())
-    not_rows = sorted(number for number, _ in aside)
-    readings = [row for row in readings if row[0] not in not_rows]
-    if aside:
-        aside.sort(key=lambda row: row[0])
-    spare = {
-        place
-        for place, name in enumerate(names)
-        if not name and not any(filled(row[place : place + 1]) for _, row in readings)
-    }
-
-    def used(cells: Sequence) -> list:
-        return [cell for place, cell in enumerate(cells) if place not in spare]
-
-    names = used(names)
-    readings = [(number, used(row)) for number, row in readings] if spare else readings
+        again.append(readings.pop())
+    aside = sorted([*aside, *again], key=lambda row: row[0])
+    places = [place for place, name in enumerate(names)
+              if name or any(filled(row[place : place + 1]) for _, row in readings)]  # fmt: skip
+    if len(places) < width:
+        names = [names[place] for place in places]
+        under = [cell for place, cell in enumerate(under) if place in places]
+        readings = [(n, [c for place, c in enumerate(row) if place in places or place >= width])
+                    for n, row in readings]  # fmt: skip
     refuse(_problems(path, names, readings, line, "row" if sheet else "line"),
            f"{path} cannot be read")  # fmt: skip
     cells = frame(dict(zip(names, zip(*(c for _, c in readings), strict=True), strict=True)))
-    units = {n: str(u) for n, u in zip(names, used(under), strict=False) if u is not None}
+    units = {n: str(u) for n, u in zip(names, under, strict=False) if u is not None}
     table = RawTable(
         path,
         cells,
@@ -126,14 +121,14 @@ def tabled(path: str, rows: Iterable[Row], layout: Layout, sheet: bool = False) 
         layout.decimal,
         layout.thousands,
         units | _units_behind(cells, units),
-        not_rows=tuple(not_rows),
+        not_rows=tuple(number for number, _ in aside),
         row_kind="row" if sheet else "line",
     )
     if not aside:
         return table
     labels = dict.fromkeys(str(filled(row)[0]).strip()[:30] for _, row in aside)
-    note = f"{table.row_names.few(not_rows)}: not read ({', '.join([*labels][:3])})"
-    return replace(table, notes=(note,))
+    lines = table.row_names.few(table.not_rows)
+    return replace(table, notes=(f"{lines}: not read ({', '.join([*labels][:3])})",))
 
 
 def _is_text(cells: list, width: int) -> bool:
@@ -148,15 +143,14 @@ def _units_behind(cells: pd.DataFrame, units: dict[str, str]) -> dict[str, str]:
     """Take the unit off columns whose every number carries the same; the units by column."""
     behind = {}
     for name in cells:
-        column = cells[name]
-        first = next((cell for cell in column if not RawTable.is_gap(cell)), None)
-        unit = number_of(first)[1] if isinstance(first, str) else ""
-        if not unit:
+        there = [cell for cell in cells[name] if not RawTable.is_gap(cell)]
+        if not there or not isinstance(there[0], str) or not number_of(there[0])[1]:
             continue
-        parts = [(c, unit) if RawTable.is_gap(c) else number_of(str(c)) for c in column]
-        if all(part[1] == unit for part in parts):
-            cells[name] = [part[0] for part in parts]
-            behind |= {} if units.get(name, "").strip("-/ ") else {name: unit}
+        numbers = {cell: number_of(str(cell)) for cell in there}
+        if len({unit for _, unit in numbers.values()}) == 1:
+            cells[name] = cells[name].map(lambda cell, of=numbers: of.get(cell, (cell,))[0])
+            if not units.get(name, "").strip("-/ "):
+                behind[name] = numbers[there[0]][1]
     return behind
 
 
@@ -173,10 +167,9 @@ def _problems(path: str, names: list[str], rows: list[Row], line: int, word: str
     ragged = [(number, len(cells)) for number, cells in rows if len(cells) != len(names)]
     if ragged and not problems:
         number, width = ragged[0]
-        fix = "check the delimiter and the decimal mark: decimal commas between commas cannot be "
-        fix += "told apart"
-        message = f"{width} cells under {len(names)} column names"
         more = f" and {len(ragged) - 1} more" if len(ragged) > 1 else ""
+        message = f"{width} cells under {len(names)} column names"
+        fix = "check delimiter and decimal mark: decimal commas cannot stand between commas"
         allowed = f"{len(names)} cells in every row"
         problems.append(Problem(f"{path}: {word} {number}{more}", message, allowed, fix))
     return problems

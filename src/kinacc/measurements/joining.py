@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from kinacc.config.measured import JointsFile
-from kinacc.errors import InputError, Problem, first_few, refuse
+from kinacc.errors import InputError, Problem, refuse
 from kinacc.measurements.reader import AGAIN
 from kinacc.measurements.table import RawTable
 from kinacc.measurements.times import seconds
@@ -29,76 +29,58 @@ def joined(points: RawTable, joints: RawTable, how: JointsFile) -> RawTable:
     ``notes`` of the table name the rows without a partner. Raises InputError where keys are
     missing, doubled with other joints, or match nothing.
     """
-    row, notes = _pairs(points, joints, how)
-    there = np.flatnonzero(row >= 0)
-    if not there.size:
-        message = f"no row belongs to any of {joints.path}, joined by {how.by}"
-        raise InputError(Problem(points.path, message, fix="correct measurements.file.joints"))
-    named = points.with_pose_names(how.key_of_points or "") if how.by == NAME else points
-    beside = joints.select(row[there]).columns
-    if (joints.decimal, joints.thousands) != (points.decimal, points.thousands):
-        beside = beside.map(  # cells are numbers of their own file
-            lambda cell: (
-                cell.replace(joints.thousands or "\0", "").replace(joints.decimal, points.decimal)
-                if isinstance(cell, str)
-                else cell
-            )
-        )
-    names = {name: beside_name(name, points) for name in beside}
-    table = named.select(there)
-    return replace(
-        table,
-        columns=pd.concat([table.columns, beside.rename(columns=names)], axis=1),
-        units={**{names[n]: u for n, u in joints.units.items()}, **points.units},
-        notes=(*points.notes, *joints.notes, *notes),
-        points_file=Path(points.path).name,
-        key=how.key_of_points,
-    )
-
-
-def beside_name(column: str, points: RawTable) -> str:
-    """What a column of the joints' file is called beside the points."""
-    return f"{_PREFIX}{column}" if column in points.columns else column
-
-
-def _pairs(
-    points: RawTable, joints: RawTable, how: JointsFile
-) -> tuple[np.ndarray, tuple[str, ...]]:
-    """Row of the joints (n,) of every point, -1 for none, and notes on rows without a partner."""
     keys = (("key", how.key, joints), ("key_of_points", how.key_of_points, points))
     refuse(
         Problem(f"measurements.file.joints.{key}", f"{table.path} has no column {name}")
         for key, name, table in keys
         if how.by != ORDER and name not in table.columns
     )
-    if how.by == ORDER:
-        if len(points) != len(joints):
-            message = f"{len(points)} rows, and {len(joints)} rows of joints in {joints.path}"
-            allowed = "as many of both to join them by order"
-            raise InputError(Problem(points.path, message, allowed))
-        return np.arange(len(points)), ()
+    if how.by == ORDER and len(points) != len(joints):
+        message = f"{len(points)} rows, and {len(joints)} rows of joints in {joints.path}"
+        raise InputError(Problem(points.path, message, "as many of both to join them by order"))
+    moving = np.zeros(len(points), dtype=bool)
     if how.by == NAME:
         row = rows_by_name(points, joints, how)
-        spare = np.setdiff1d(np.arange(len(joints)), row)
-        notes = _unmatched(points, np.flatnonzero(row < 0), joints, how.key_of_points)
-        return row, (*notes, *_unmatched(joints, spare, points, how.key))
-    row, moving = _rows_by_time(points, joints, how)
-    notes = _unmatched(points, np.flatnonzero((row < 0) & ~moving), joints, None)
-    if moving.any():
-        lines = points.rows_in_words(np.flatnonzero(moving))
-        notes += (f"{points.path}: left out, the arm was moving: {lines}",)
-    return row, notes
+    elif how.by == TIME:
+        row, moving = _rows_by_time(points, joints, how)
+    else:
+        row = np.arange(len(points))
+    there = np.flatnonzero(row >= 0)
+    if not there.size:
+        message = f"no row belongs to any of {joints.path}, joined by {how.by}"
+        raise InputError(Problem(points.path, message, fix="correct measurements.file.joints"))
+    notes = [_left_out(points, (row < 0) & ~moving, f"without a partner in {joints.path}")]
+    if how.by == NAME:
+        spare = ~np.isin(np.arange(len(joints)), row)
+        notes.append(_left_out(joints, spare, f"without a partner in {points.path}"))
+        points = points.with_pose_names(how.key_of_points)
+    notes.append(_left_out(points, moving, "the arm was moving"))
+    beside = joints.columns.iloc[row[there]].reset_index(drop=True)
+    if (joints.decimal, joints.thousands) != (points.decimal, points.thousands):
+        # Cells are numbers of their own file.
+        marks = str.maketrans({joints.thousands or "\0": "", joints.decimal: points.decimal})
+        beside = beside.map(lambda cell: cell.translate(marks) if isinstance(cell, str) else cell)
+    names = {name: beside_name(name, points) for name in beside}
+    table = points.select(there)
+    return replace(
+        table,
+        columns=pd.concat([table.columns, beside.rename(columns=names)], axis=1),
+        units={**{names[n]: u for n, u in joints.units.items()}, **points.units},
+        notes=(*points.notes, *joints.notes, *filter(None, notes)),
+        points_file=Path(points.path).name,
+        key=how.key_of_points,
+    )
 
 
-def _unmatched(
-    table: RawTable, rows: np.ndarray, other: RawTable, key: str | None
-) -> tuple[str, ...]:
-    if not rows.size:
-        return ()
-    texts = table.texts(key) if key else []
-    named = f", {key} {first_few([texts[row] for row in rows])}" if key else ""
-    lines = table.rows_in_words(rows)
-    return (f"{table.path}: left out, without a partner in {other.path}: {lines}{named}",)
+def beside_name(column: str, points: RawTable) -> str:
+    """The name of a column of the joints' file beside the points."""
+    return f"{_PREFIX}{column}" if column in points.columns else column
+
+
+def _left_out(table: RawTable, rows: np.ndarray, why: str) -> str:
+    """A note on the rows where ``rows`` (n,) is True; empty where it nowhere is."""
+    lines = table.rows_in_words(np.flatnonzero(rows))
+    return f"{table.path}: left out, {why}: {lines}" if rows.any() else ""
 
 
 def rows_by_name(points: RawTable, joints: RawTable, how: JointsFile) -> np.ndarray:
@@ -113,14 +95,13 @@ def rows_by_name(points: RawTable, joints: RawTable, how: JointsFile) -> np.ndar
     here, there = max(ways, key=lambda way: sum(name in {*way[1]} for name in way[0]))
     names = pd.Series(there)
     q = pd.DataFrame(joint_values(joints)).groupby(names)
-    doubled = names.duplicated(keep=False) & (names != "")
-    if doubled.any():
-        apart = (q.transform("max") - q.transform("min")).max(axis=1).fillna(np.inf) > STILL_RAD
-        if (rows := np.flatnonzero(doubled & apart)).size:
-            message = "a name stands for several rows of joints"
-            raise InputError(Problem(joints.where(how.key, rows), message, "a name for every pose"))
-    first = {name: row for row, name in reversed([*enumerate(there)]) if name}
-    return np.array([first.get(name, -1) for name in here], dtype=int)
+    apart = (q.transform("max") - q.transform("min")).max(axis=1).fillna(np.inf) > STILL_RAD
+    doubled = np.flatnonzero(names.duplicated(keep=False) & (names != "") & apart)
+    if doubled.size:
+        message = "a name stands for several rows of joints"
+        raise InputError(Problem(joints.where(how.key, doubled), message, "a name for every pose"))
+    first = names[~names.duplicated() & (names != "")]
+    return pd.Series(first.index, index=first).reindex(here).fillna(-1).to_numpy(int)
 
 
 def labels(cells: Sequence[object]) -> list[str]:
@@ -131,9 +112,8 @@ def labels(cells: Sequence[object]) -> list[str]:
 
 def _counts(names: list[str]) -> list[str]:
     """The number of every name, where they differ in one number behind one word alone."""
-    parts = [re.fullmatch(r"(\D*)(\d+)", name) for name in names]
-    alike = all(parts) and len({part[1] for part in parts if part}) == 1
-    return [part[2] for part in parts if part] if alike else []
+    parts = pd.Series(names).str.extract(r"^(\D*)(\d+)$")
+    return parts[1].tolist() if parts[1].notna().all() and parts[0].nunique() == 1 else []
 
 
 def joint_values(joints: RawTable) -> np.ndarray:
@@ -153,16 +133,15 @@ def _rows_by_time(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Row of the joints (n,) next in time to every point, -1 for none; and where the arm moved."""
     problems: list[Problem] = []
-    here = seconds(points, how.key_of_points or "", problems) + how.clock_offset_s
-    there = seconds(joints, how.key or "", problems)
+    here = seconds(points, how.key_of_points, problems) + how.clock_offset_s
+    there = seconds(joints, how.key, problems)
     refuse(problems)
     q = joint_values(joints)
     row, moving = np.full(len(here), -1), np.zeros(len(here), dtype=bool)
     for point, time in enumerate(here):
         apart = np.abs(there - time)
         near = np.flatnonzero(apart <= how.within_s)
-        if near.size and np.ptp(q[near], axis=0).max() > STILL_RAD:
-            moving[point] = True
-        elif near.size:
-            row[point] = near[np.argmin(apart[near])]
+        if near.size:
+            moving[point] = np.ptp(q[near], axis=0).max() > STILL_RAD
+            row[point] = -1 if moving[point] else near[np.argmin(apart[near])]
     return row, moving
