@@ -30,7 +30,6 @@ ENCODED = {
     "latin-1": (GERMAN, "latin-1", "latin-1"),
     "Windows": ([*GERMAN[:6], "X – gemessen", "Y – gemessen", "Z – gemessen"], "cp1252", "latin-1"),
     "UTF-16 with its mark": (GERMAN, "utf-16", "utf-16-le"),
-    "UTF-16 without a mark": (GERMAN, "utf-16-le", "utf-16-le"),
     "Japanese": ([*JOINTS[:6], *(f"測定 {a} [mm]" for a in "XYZ")], "cp932", "cp932"),
     "UTF-8 with a mark": (GERMAN, "utf-8-sig", "utf-8"),
 }
@@ -169,11 +168,6 @@ def test_statistics_and_remarks_between_the_rows_are_told_with_their_lines(tmp_p
     told = " ".join(found.left_out())
     assert "lines 6, 10, 11" in told
     assert found.columns["row"].tolist()[4] == 7
-
-
-def test_points_that_are_called_with_a_hash_are_no_remarks(tmp_path):
-    rows = [[f"#{number}", *row] for number, row in enumerate(cells())]
-    assert_is_truth(reading(file(tmp_path, lines(rows, ["Point", *JOINTS, *XYZ], ";"))))
 
 
 @pytest.mark.parametrize("nothing", ["", "---", "n/a", "NaN", "#N/A", "k.A.", "-"])

@@ -32,12 +32,12 @@ def is_no_coordinate(number: float) -> bool:
 
 
 def of_rows(
-    table: RawTable, places: Sequence[Place], bad: np.ndarray, what: str, allowed: str
+    table: RawTable, places: Sequence[Place], bad: np.ndarray, message: str, allowed: str
 ) -> list[Problem]:
     """A problem with columns in the rows where ``bad`` (n,) is True; none where it nowhere is."""
     names = ", ".join(place.column for place in places)
     rows = np.flatnonzero(bad)
-    return [Problem(table.where(names, rows), what, allowed)] if rows.size else []
+    return [Problem(table.where(names, rows), message, allowed)] if rows.size else []
 
 
 def quaternion_problems(

@@ -75,12 +75,12 @@ def by_feature(table: RawTable) -> RawTable:
     cells = table.columns.mask(table.columns.map(table.is_gap), None)
     cells[report.feature] = cells[report.feature].ffill()
     axes = np.array([axis_of(cell) for cell in table.columns[report.axis]], dtype=object)
-    group, seen, last = np.full(len(table), -1), set[str](), None
+    group, axes_so_far, last = np.full(len(table), -1), set[str](), None
     for row in np.flatnonzero(axes):
-        if cells[report.feature][row] != last or axes[row] in seen:
-            seen, last = set(), cells[report.feature][row]
-        group[row] = group.max() + (not seen)
-        seen.add(axes[row])
+        if cells[report.feature][row] != last or axes[row] in axes_so_far:
+            axes_so_far, last = set(), cells[report.feature][row]
+        group[row] = group.max() + (not axes_so_far)
+        axes_so_far.add(axes[row])
     read = cells[group >= 0].groupby(group[group >= 0])
     first = np.flatnonzero(group >= 0)[~pd.Series(group[group >= 0]).duplicated()]
     columns = {report.feature: cells[report.feature][first]}
@@ -90,15 +90,11 @@ def by_feature(table: RawTable) -> RawTable:
             rows = dict(zip(group[axes == axis], table.columns[value][axes == axis], strict=True))
             columns[f"{value} {axis}"] = [rows.get(number) for number in range(len(first))]
             units[f"{value} {axis}"] = units.get(value, "")
-    for name in cells.columns.difference(
-        [report.feature, report.axis, *report.values], sort=False
-    ):
+    for name in cells.columns.difference([report.feature, report.axis, *report.values], sort=False):
         if (read[name].nunique() < 2).all():  # of the feature, and not of an axis
             columns[name] = read[name].first()
     notes = table.notes
     if others := table.columns[report.axis][axes == ""].tolist():
         kinds = first_few([*dict.fromkeys(map(str, others))])
         notes += (f"{len(others)} rows of other quantities than X, Y, Z, not read ({kinds})",)
-    return replace(
-        table, columns=frame(columns), line=table.line[first], units=units, notes=notes
-    )
+    return replace(table, columns=frame(columns), line=table.line[first], units=units, notes=notes)

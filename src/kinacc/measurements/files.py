@@ -180,11 +180,11 @@ class Workbook:
         except Exception as error:
             raise self._unreadable(error) from None
         _refuse_shape(self.path, len(cells) if most == MOST_ROWS else 0, cells.shape[1], cells.size)
-        cells = cells.map(_cell)
-        there = cells.notna().to_numpy()
-        width = int(np.flatnonzero(there.any(axis=0)).max(initial=-1)) + 1
-        rows = cells.iloc[:, :width].to_numpy().tolist()
-        return [(number, row) for number, row in enumerate(rows, 1) if there[number - 1].any()]
+        rows = [[_cell(value) for value in row] for row in cells.itertuples(index=False)]
+        width = max((place + 1 for row in rows for place, cell in enumerate(row)
+                     if cell is not None), default=0)  # fmt: skip
+        return [(number, row[:width]) for number, row in enumerate(rows, 1)
+                if any(cell is not None for cell in row)]  # fmt: skip
 
     def _unreadable(self, error: Exception) -> InputError:
         reason = str(error).splitlines()[0][:200] if str(error) else type(error).__name__

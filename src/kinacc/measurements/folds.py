@@ -108,16 +108,16 @@ def always_trained(
     A fold that leaves fewer than ``LEAST_ROWS`` rows of a session or target leaves nothing to place
     it by: all rows of its configurations (n,) train. Where all rows have one label it is not asked.
     """
-    found = []
+    trained = []
     for kind, label in labels.items():
-        names, number = np.unique([str(each) for each in label], return_inverse=True)
+        names, number = np.unique([str(name) for name in label], return_inverse=True)
         table = pd.crosstab(number, fold)
         # Too few rows outside one of its folds.
         scarce = (table.gt(0) & table.rsub(table.sum(axis=1), axis=0).lt(LEAST_ROWS)).any(axis=1)
-        for each in table.index[scarce] if len(names) > 1 else ():
-            own = configuration[number == each]
-            found.append(Trained(kind, str(names[each]), np.isin(configuration, own)))
-    return found
+        for index in table.index[scarce] if len(names) > 1 else ():
+            rows = np.isin(configuration, configuration[number == index])
+            trained.append(Trained(kind, str(names[index]), rows))
+    return trained
 
 
 def split(columns: Mapping, settings: Mapping) -> Columns:

@@ -91,17 +91,11 @@ def tabled(path: str, rows: Iterable[Row], layout: Layout, sheet: bool = False) 
             under, skip = row[1], skip - 1
         else:
             (readings if _is_reading(row[1], layout.delimiter) else aside).append(row)
-    named = [row for row in aside if len(row[1]) == len(head)]
-    if len(named) > len(readings):  # where most rows begin so, the points are called so
-        aside = [row for row in aside if row not in named]
-        readings = sorted([*readings, *named], key=lambda row: row[0])
     names = header_cells(head, max((len(cells) for _, cells in readings[:4]), default=0))
     width = len(names)
     readings = [(n, c if len(c) <= width or filled(c[width:]) else c[:width]) for n, c in readings]
     again = [row for row in readings if row[1][0] == names[0] and [*map(str, row[1])] == names]
     readings = [row for row in readings if row not in again] if again else readings
-    while len(readings) > 1 and _is_text(readings[-1][1], width):
-        again.append(readings.pop())
     aside = sorted([*aside, *again], key=lambda row: row[0])
     places = [place for place, name in enumerate(names)
               if name or any(filled(row[place : place + 1]) for _, row in readings)]  # fmt: skip
@@ -131,26 +125,19 @@ def tabled(path: str, rows: Iterable[Row], layout: Layout, sheet: bool = False) 
     return replace(table, notes=(f"{lines}: not read ({', '.join([*labels][:3])})",))
 
 
-def _is_text(cells: list, width: int) -> bool:
-    """Whether a row under the last reading is a text of few cells."""
-    there = filled(cells)
-    texts = sum(isinstance(c, str) and c.strip()[:1] not in "+-.0123456789" for c in there)
-    short = len(cells) < width if len(cells) != width else 2 * len(there) < width
-    return short and 0 < len(there) <= 2 * texts and len(there) < 4
-
-
 def _units_behind(cells: pd.DataFrame, units: dict[str, str]) -> dict[str, str]:
     """Take the unit off columns whose every number carries the same; the units by column."""
     behind = {}
     for name in cells:
-        there = [cell for cell in cells[name] if not RawTable.is_gap(cell)]
-        if not there or not isinstance(there[0], str) or not number_of(there[0])[1]:
+        column = cells[name]
+        first = next((cell for cell in column if not RawTable.is_gap(cell)), None)
+        unit = number_of(first)[1] if isinstance(first, str) else ""
+        if not unit:
             continue
-        numbers = {cell: number_of(str(cell)) for cell in there}
-        if len({unit for _, unit in numbers.values()}) == 1:
-            cells[name] = cells[name].map(lambda cell, of=numbers: of.get(cell, (cell,))[0])
-            if not units.get(name, "").strip("-/ "):
-                behind[name] = numbers[there[0]][1]
+        parts = [(c, unit) if RawTable.is_gap(c) else number_of(str(c)) for c in column]
+        if all(part[1] == unit for part in parts):
+            cells[name] = [part[0] for part in parts]
+            behind |= {} if units.get(name, "").strip("-/ ") else {name: unit}
     return behind
 
 

@@ -115,8 +115,15 @@ def _loaded(section: Mapping) -> RawTable:
         return table
     from kinacc.measurements.joining import joined
 
-    other = {**section, "exclude": (), "source": None, "layout": TABLE, **joints, "joints": None}
-    return joined(table, _loaded(other), JointsFile.model_construct(**joints))
+    of_joints = {
+        **section,
+        "exclude": (),
+        "source": None,
+        "layout": TABLE,
+        **joints,
+        "joints": None,
+    }
+    return joined(table, _loaded(of_joints), JointsFile.model_construct(**joints))
 
 
 def convert(table: RawTable, layout: Layout, robot: Robot, strict: bool = True) -> MeasuredFile:

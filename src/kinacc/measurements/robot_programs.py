@@ -38,7 +38,6 @@ _HORIZONTAL = (
     "FANUC counts joint 3 from the horizontal: the arm's own is J3 plus J2, as joint_map of its "
     "robot file says; check-data holds that to the points"
 )
-_DEGREES = tuple(f"J{number} [deg]" for number in range(1, 8))
 Position = tuple[str, int, list[float]]  # name, place in the text, joints (none of a pose)
 
 
@@ -55,63 +54,62 @@ def read(path: Path) -> RawTable | None:
             break
     else:
         return None
-    found = [each for each in positions if each[2]]
+    rows = [position for position in positions if position[2]]
     cartesian = [name for name, _, joints in positions if not joints]
-    if not found:
-        what = f"holds {len(cartesian)} {_TARGETS}"
+    if not rows:
         allowed = "joint positions: jointtarget, E6AXIS, J1 .. J6 of P[n], pulses of a job"
         fix = "record the joints at each pose, or give the points alone with a file of joints"
-        raise InputError(Problem(str(path), what, allowed, fix))
-    names = _NAMES.get(maker, _DEGREES)
+        message = f"holds {len(cartesian)} {_TARGETS}"
+        raise InputError(Problem(str(path), message, allowed, fix))
+    names = _NAMES.get(maker, [f"J{number} [deg]" for number in range(1, 8)])
     notes = (_HORIZONTAL,) if maker is _of_fanuc else ()
     notes += (f"{path}: {first_few(cartesian)}: {_TARGETS}",) if cartesian else ()
-    lines = np.array([text.count("\n", 0, place) + 1 for _, place, _ in found])
-    widths = [len(joints) for _, _, joints in found]
-    if len({*widths}) > 1 or not 4 <= widths[0] <= 7:
-        odd = lines[np.array(widths) != min(widths)] if len({*widths}) > 1 else lines
-        what = "another number of joints than elsewhere"
-        raise InputError(Problem(f"{path}: lines {first_few([*odd])}", what, "4 to 7 joints"))
-    columns = {"name": [name for name, _, _ in found]}
-    columns |= {names[n]: [repr(joints[n]) for _, _, joints in found] for n in range(widths[0])}
+    lines = np.array([text.count("\n", 0, place) + 1 for _, place, _ in rows])
+    widths = np.array([len(joints) for _, _, joints in rows])
+    odd = (widths != widths.min()) | (widths < 4) | (widths > 7)
+    if odd.any():
+        where = f"{path}: lines {first_few([*lines[odd]])}"
+        raise InputError(Problem(where, "another number of joints", "4 to 7, the same in all"))
+    columns = {"name": [name for name, _, _ in rows]}
+    columns |= {names[n]: [repr(joints[n]) for _, _, joints in rows] for n in range(widths[0])}
     return RawTable(str(path), frame(columns), lines, notes=notes)
 
 
 def _of_abb(text: str) -> list[Position]:
-    found = []
-    for match in _ABB.finditer(text):
-        joints = [n for n in _floats(match[3]) if abs(n) < _UNUSED]
-        found.append((match[2], match.start(), joints if match[1][0] in "jJ" else []))
-    return found
+    return [
+        (m[2], m.start(),
+         [n for n in _floats(m[3]) if abs(n) < _UNUSED] if m[1][0] in "jJ" else [])
+        for m in _ABB.finditer(text)
+    ]  # fmt: skip
 
 
 def _of_kuka(text: str) -> list[Position]:
-    found: list[Position] = []
-    for match in _KUKA.finditer(text):
-        if parts := _parts(match[2]):
-            name = re.sub("^[xX]", "", match[1] or f"P{len(found) + 1}")
-            joints = [parts[f"A{n}"] for n in range(1, 8) if f"A{n}" in parts]
-            found.append((name, match.start(), joints))
-    return found
+    matches = [(m, parts) for m in _KUKA.finditer(text) if (parts := _parts(m[2]))]
+    return [
+        (re.sub("^[xX]", "", m[1] or f"P{count}"), m.start(),
+         [parts[f"A{n}"] for n in range(1, 8) if f"A{n}" in parts])
+        for count, (m, parts) in enumerate(matches, 1)
+    ]  # fmt: skip
 
 
 def _of_fanuc(text: str) -> list[Position]:
-    found = []
+    positions = []
     for match in _FANUC.finditer(text):
         first_group = re.split(r"GP[2-9]\s*:", match[2])[0]
         joints = {int(number): float(value) for number, value in _FANUC_JOINT.findall(first_group)}
         row = [joints[number] for number in sorted(joints)]
-        found.append((f"P[{match[1]}]", match.start(1), row))
-    return found
+        positions.append((f"P[{match[1]}]", match.start(1), row))
+    return positions
 
 
 def _of_yaskawa(text: str) -> list[Position]:
     if "/JOB" not in text or "///PULSE" not in text:
         return []
-    return [(each[1], each.start(1), _floats(each[2])) for each in _YASKAWA.finditer(text)]
+    return [(match[1], match.start(1), _floats(match[2])) for match in _YASKAWA.finditer(text)]
 
 
 def _floats(text: str) -> list[float]:
-    return [float(each) for each in re.findall(_NUMBER, text)]
+    return [float(number) for number in re.findall(_NUMBER, text)]
 
 
 def _parts(text: str) -> dict[str, float]:
@@ -124,7 +122,7 @@ def expanded(table: RawTable) -> RawTable:
     for name in table.columns:
         texts = table.texts(name)
         of = next((of for shape, of in _SHAPES.items() if re.match(shape, texts[0])), None)
-        rows = [of(each) for each in texts] if of and all(map(_LIST.fullmatch, texts)) else [{}]
+        rows = [of(text) for text in texts] if of and all(map(_LIST.fullmatch, texts)) else [{}]
         if rows[0] and all(row.keys() == rows[0].keys() for row in rows):
             columns |= {f"{name} {part}": [repr(row[part]) for row in rows] for part in rows[0]}
         else:
@@ -173,7 +171,7 @@ def _of_list(text: str) -> dict[str, float]:
 
 def _of_target(text: str) -> dict[str, float]:
     """Numbers of an ABB target: joints of [[6],[6]], a pose of [[3],[4],..], unused axes aside."""
-    groups = [_floats(each) for each in re.findall(r"\[([^\[\]]*)\]", text)]
+    groups = [_floats(group) for group in re.findall(r"\[([^\[\]]*)\]", text)]
     if len(groups) >= 2 and len(groups[0]) == 3 and len(groups[1]) == 4:
         names = ("trans x", "trans y", "trans z", "rot q1", "rot q2", "rot q3", "rot q4")
         return dict(zip(names, [*groups[0], *groups[1]], strict=True))

@@ -31,23 +31,23 @@ class RowNames:
         names, files = columns.get("pose_name", ()), columns.get("file", ())
         pairs = zip(columns["row"], names, strict=True) if len(names) else ()
         pose = {int(line): str(name) for line, name in pairs if line == line and name}
-        word = next((str(each) for each in columns.get("row_kind", ()) if each), cls.word)
-        return cls(pose, next((str(each) for each in files if each), ""), word)
+        word = next((str(kind) for kind in columns.get("row_kind", ()) if kind), cls.word)
+        return cls(pose, next((str(file) for file in files if file), ""), word)
 
     def columns(self, lines: np.ndarray) -> dict[str, np.ndarray]:
         """What ``of_columns`` reads beside ``lines`` (n,); no column that would say nothing."""
-        found = {}
+        columns = {}
         if self.pose:
-            found["pose_name"] = texts(self.pose.get(int(line)) for line in lines)
+            columns["pose_name"] = texts(self.pose.get(int(line)) for line in lines)
         if self.file:
-            found["file"] = texts([self.file] * len(lines))
+            columns["file"] = texts([self.file] * len(lines))
         if self.word != type(self).word:
-            found["row_kind"] = texts([self.word] * len(lines))
-        return found
+            columns["row_kind"] = texts([self.word] * len(lines))
+        return columns
 
     def one(self, line: int) -> str:
         """``line 14 (P12_1) of points.csv``."""
-        return self._told(self.number(line), 1)
+        return self._named(self.number(line), 1)
 
     def number(self, line: int) -> str:
         """``14 (P12_1)``, behind a word that says what it is."""
@@ -55,8 +55,8 @@ class RowNames:
 
     def few(self, lines: Sequence[int], shown: int = 5) -> str:
         """``lines 4 (P2), 7 (P5) and 3 more``, in the order given."""
-        words = [self.number(line) for line in lines[:shown]]
-        return self._told(", ".join(words) + and_more(len(lines) - shown), len(lines))
+        numbers = ", ".join(self.number(line) for line in lines[:shown])
+        return self._named(numbers + and_more(len(lines) - shown), len(lines))
 
     def spans(self, lines: Iterable[int]) -> str:
         """``lines 2-9 (P1 to P8), 12 (P11) and 17 more``; ``lines`` come in order."""
@@ -64,15 +64,15 @@ class RowNames:
         if not numbers.size:
             return f"no {self.word}"
         runs = np.split(numbers, np.flatnonzero(np.diff(numbers) > 1) + 1)
-        words = [self._run(int(run[0]), int(run[-1])) for run in runs[:_RANGES_SHOWN]]
+        ranges = ", ".join(self._run(int(run[0]), int(run[-1])) for run in runs[:_RANGES_SHOWN])
         rest = sum(len(run) for run in runs[_RANGES_SHOWN:])
-        return self._told(", ".join(words) + and_more(rest), len(numbers))
+        return self._named(ranges + and_more(rest), len(numbers))
 
-    def _told(self, words: str, count: int) -> str:
-        of = f" of {self.file}" if self.file else ""
-        return f"{self.word}{'s' if count > 1 else ''} {words}{of}"
+    def _named(self, numbers: str, count: int) -> str:
+        file = f" of {self.file}" if self.file else ""
+        return f"{self.word}{'s' * (count > 1)} {numbers}{file}"
 
     def _run(self, first: int, last: int) -> str:
         lines = f"{first}" if first == last else f"{first}-{last}"
-        ends = dict.fromkeys(self.pose[each] for each in (first, last) if each in self.pose)
+        ends = dict.fromkeys(self.pose[n] for n in (first, last) if n in self.pose)
         return f"{lines} ({' to '.join(ends)})" if ends else lines

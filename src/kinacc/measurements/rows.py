@@ -187,7 +187,7 @@ def open_table(
         with opened(path, "utf-8") as file:
             head, first = file.readline(_HEAD), file.readline(_HEAD)
         if re.search(rf"(?<![^\s,;\"']){_FIRST_NAMES[need]}(?![^\s,;\"'])", head):
-            delimiter = next((mark for mark in ";\t" if mark in head), ",")
+            delimiter = next((sign for sign in ";\t" if sign in head), ",")
             comma = delimiter == ";" and "," in first and "." not in first
             table = load(path, Layout(delimiter=delimiter, decimal="," if comma else "."))
             table = replace(table, columns=table.columns.map(of_csv))

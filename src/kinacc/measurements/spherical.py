@@ -43,9 +43,9 @@ class Reading:
 
     @property
     def vertical_from(self) -> str:
-        """What the name of the vertical angle says that it is counted from, empty for nothing."""
-        words = {*self.vertical.terms}
-        return next((each for each in ("horizon", "zenith") if words & _WORDS[each]), "")
+        """What the vertical angle is counted from by its name, empty for nothing."""
+        terms = {*self.vertical.terms}
+        return next((zero for zero in ("horizon", "zenith") if terms & _WORDS[zero]), "")
 
     @property
     def is_geodetic(self) -> bool:
@@ -55,21 +55,21 @@ class Reading:
 
 def readings_of(names: Sequence[Name]) -> list[Reading]:
     """Spherical readings among columns; none where one names x, y and z, or a part is missing."""
-    if {*"xyz"} <= {word for name in names for word in name.terms}:
+    if {*"xyz"} <= {term for name in names for term in name.terms}:
         return []
     parts: dict[tuple[str, ...], dict[str, Name]] = {}
     for name in names:
         whole = "".join(name.spelled).lower()  # Az is no acceleration along z here
-        words = (whole,) if whole in _PARTS else name.terms
-        own = [w for w in words if w in _PARTS and w not in _WORDS["filling"]]
-        said = {_PARTS[word] for word in own or words if word in _PARTS}
-        if len(said) == 1:
-            rest = tuple(w for w in words if w not in _PARTS and w not in _WORDS["filling"])
-            parts.setdefault(rest, {}).setdefault(said.pop(), name)
+        terms = (whole,) if whole in _PARTS else name.terms
+        rest = tuple(t for t in terms if t not in _PARTS and t not in _WORDS["filling"])
+        of_part = [t for t in terms if t in _PARTS]
+        of_part = [t for t in of_part if t not in _WORDS["filling"]] or of_part
+        if len(part := {_PARTS[term] for term in of_part}) == 1:
+            parts.setdefault(rest, {}).setdefault(part.pop(), name)
     return [
-        Reading(**found, rest=rest)
-        for rest, found in parts.items()
-        if len(found) == 3 and role(rest) in (PLAIN, MEASURED, REPORTED)
+        Reading(**columns, rest=rest)
+        for rest, columns in parts.items()
+        if len(columns) == 3 and role(rest) in (PLAIN, MEASURED, REPORTED)
     ]
 
 
@@ -78,27 +78,24 @@ def cartesian(table: RawTable, directions: Directions) -> RawTable:
 
     Raises InputError where there are none, or a cell of them is no number.
     """
-    found = readings_of([name_of(c, table.units.get(c, "")) for c in table.columns])
+    readings = readings_of([name_of(c, table.units.get(c, "")) for c in table.columns])
     problems = []
-    if not found:
-        what = "has no columns of a horizontal angle, a vertical angle and a distance"
-        problems.append(Problem(table.path, what, "such as Hz, V and D"))
-    columns: dict[str, Sequence] = {}
-    gone = {name: each for each in found for name in each.names}
-    for column in table.columns:
-        if column not in gone:
-            columns[column] = table.columns[column]
-        elif column == (each := gone[column]).horizontal.column:
-            said = each.angle_units - {directions.unit}
-            if said and "grad" not in column.lower():
-                what = f"says {' and '.join(sorted(said))}, the configuration {directions.unit}"
-                fix = "correct measurements.file.directions.unit"
-                problems.append(Problem(table.where(column), what, fix=fix))
-            stem, unit = "_".join(each.rest), each.distance.unit
-            ends = [f"{axis}_{unit}" if unit in LENGTH else axis for axis in "xyz"]
-            points = _points(table, each, directions, problems).T
-            columns |= {f"{stem}_{end}" if stem else end: [None if v != v else v for v in axis]
-                        for end, axis in zip(ends, points.tolist(), strict=True)}  # fmt: skip
+    if not readings:
+        message = "has no columns of a horizontal angle, a vertical angle and a distance"
+        problems.append(Problem(table.path, message, "such as Hz, V and D"))
+    spent = {name for reading in readings for name in reading.names}
+    columns: dict[str, Sequence] = {n: table.columns[n] for n in table.columns if n not in spent}
+    for reading in readings:
+        column, unit = reading.horizontal.column, reading.distance.unit
+        stated = reading.angle_units - {directions.unit}
+        if stated and "grad" not in column.lower():
+            message = f"says {' and '.join(sorted(stated))}, the configuration {directions.unit}"
+            fix = "correct measurements.file.directions.unit"
+            problems.append(Problem(table.where(column), message, fix=fix))
+        points = _points(table, reading, directions, problems).T
+        for axis, values in zip("xyz", points.tolist(), strict=True):
+            name = "_".join([*reading.rest, axis, *([unit] if unit in LENGTH else [])])
+            columns[name] = [None if value != value else value for value in values]
     refuse(problems, f"{table.path} cannot be read")
     return replace(table, columns=frame(columns))
 

@@ -120,10 +120,10 @@ def numbers(table: RawTable, name: str, problems: list[Problem], *, gaps: bool =
     if bad.size:
         cells = table.columns[name][bad].tolist()
         shown = ", ".join(repr(cell)[:60] for cell in cells[:_SHOWN])
-        other = "," if table.decimal == "." else "."
+        comma = "," if table.decimal == "." else "."
         fix = "correct the cells"
-        if np.isfinite(_converted(cells, other, None)).any():
-            fix += f", or set measurements.file.decimal or .thousands to {other!r}"
+        if np.isfinite(_converted(cells, comma, None)).any():
+            fix += f", or set measurements.file.decimal or .thousands to {comma!r}"
         where, allowed = table.where(name, bad), f"numbers with decimal mark {table.decimal!r}"
         problems.append(Problem(where, f"not a finite number: {shown}", allowed, fix))
     return values
@@ -163,8 +163,8 @@ def _number(cell: object, decimal: str, thousands: str | None) -> float:
         cell = cell.strip().replace("\u2212", "-")
         if thousands is not None:
             cell = _BLANKS.sub(" ", cell) if thousands == " " else cell.replace("\u2019", "'")
-            mark = re.escape(thousands)
-            whole = rf"[+-]?\d{{1,3}}(?:{mark}\d{{3}})+(?:{re.escape(decimal)}\d*)?"
+            between = re.escape(thousands)
+            whole = rf"[+-]?\d{{1,3}}(?:{between}\d{{3}})+(?:{re.escape(decimal)}\d*)?"
             if thousands in cell and not re.fullmatch(whole, cell):
                 return np.nan
             cell = cell.replace(thousands, "")

@@ -38,7 +38,7 @@ def offsets(points_s: np.ndarray, stands: np.ndarray, within_s: float) -> list[f
     for offset in middle[order[count[order] >= _RIVAL * count.max()]].tolist():
         theirs = stand(offset)
         both = (joints >= 0) & (theirs >= 0)
-        apart = min(abs(offset - other) for other in best) > 2.0 * within_s
+        apart = min(abs(offset - rival) for rival in best) > 2.0 * within_s
         if apart and np.sum((joints != theirs) & both) > 0.2 * max(both.sum(), 1):
             best.append(offset)
     return [round(offset, 3) for offset in best]

@@ -31,26 +31,28 @@ def shaped_as_number(cell: str) -> bool:
 
 
 def marks_of(
-    columns: Mapping[str, Sequence], given: Mapping[str, str], blanks_part: bool = False
+    columns: Mapping[str, Sequence], answers: Mapping[str, str], blanks_part: bool = False
 ) -> tuple[str, str | None, Choice | None]:
     """The two marks of the text cells of a table, or the question to ask first.
 
-    ``given``: decimal and thousands as answered.
+    ``answers``: decimal and thousands as answered. ``blanks_part``: blanks part the columns.
     """
     by_column = {str(name): _text(columns[name]) for name in columns}
     text = "\n".join(filter(None, by_column.values()))
 
-    def first(shape: str, mark: str, other: str = ".", among: str = text) -> str:
-        shape = shape.replace("m", _BETWEEN[mark]).replace("o", _BETWEEN[other])
+    def first(shape: str, sign: str, after: str = ".", among: str = text) -> str:
+        if not re.search(_BETWEEN[sign], among):
+            return ""
+        shape = shape.replace("m", _BETWEEN[sign]).replace("o", _BETWEEN[after])
         match = re.search(rf"^[+\-−]?(?:{shape})$", among, re.MULTILINE)
         return match[0].strip() if match else ""
 
     decisive = {}
-    for mark, other in (_ENDS, _ENDS[::-1]):
-        both = [first(_BOTH, between, mark) for between in (other, " ", "'")]
-        if cell := next(filter(None, (first(_DECIMAL, mark), first(_GROUPED, other), *both)), ""):
-            decisive[mark] = cell
-    decimal = given.get("decimal") or "".join(decisive)
+    for sign, thousands in (_ENDS, _ENDS[::-1]):
+        both = [first(_BOTH, between, sign) for between in (thousands, " ", "'")]
+        cells = (first(_DECIMAL, sign), first(_GROUPED, thousands), *both)
+        decisive |= {sign: next(filter(None, cells))} if any(cells) else {}
+    decimal = answers.get("decimal") or "".join(decisive)
     if len(decimal) > 1:
         about = "some numbers have a decimal point, some a decimal comma; one kind can be read"
         return ".", None, Choice("--decimal", about, {m: f"as in {decisive[m]}" for m in _ENDS})
@@ -58,30 +60,29 @@ def marks_of(
         angles = "\n".join(t for name, t in by_column.items() if name_of(name).unit == "deg")
         whole = re.search(r"^[+\-−]?[1-9]\d{0,2}$", text, re.MULTILINE)
         unclear = first(_EITHER, ",") or (whole and first(_EITHER, ".")) or ""
-        mark = "," if "," in unclear else "."
-        large = [cell for cell in angles.split("\n") if first(_EITHER, mark, among=cell)]
-        if not unclear or any(int(re.sub(r"\D", "", cell)) > _MOST_DEG for cell in large):
-            decimal = mark  # no joint turns by thousands of degrees
-        else:
-            answers = {mark: f"{unclear} is {unclear.replace(mark, '.')}"}
-            answers["." if mark == "," else ","] = f"{unclear} is {unclear.replace(mark, '')}"
+        decimal, point = (",", ".") if "," in unclear else (".", ",")
+        large = [cell for cell in angles.split("\n") if first(_EITHER, decimal, among=cell)]
+        # No joint turns by thousands of degrees.
+        if unclear and all(int(re.sub(r"\D", "", cell)) <= _MOST_DEG for cell in large):
+            meant = {decimal: f"{unclear} is {unclear.replace(decimal, '.')}",
+                     point: f"{unclear} is {unclear.replace(decimal, '')}"}  # fmt: skip
             about = f"{unclear} may have decimals or thousands"
-            return ".", None, Choice("--decimal", about, answers)
-    if "thousands" in given:
-        return decimal, None if given["thousands"] == "none" else given["thousands"], None
-    other = "," if decimal == "." else "."
-    if "decimal" in given and first(_EITHER, other):
-        return decimal, other, None  # by the answer it stands between thousands
+            return ".", None, Choice("--decimal", about, meant)
+    if "thousands" in answers:
+        return decimal, None if answers["thousands"] == "none" else answers["thousands"], None
+    thousands = "," if decimal == "." else "."
+    if "decimal" in answers and first(_EITHER, thousands):
+        return decimal, thousands, None  # by the answer it stands between thousands
     marks = [m for m in _BETWEEN if m != decimal and not (m == " " and blanks_part)]
-    for mark in marks:
-        if first(_GROUPED, mark) or first(_BOTH, mark, decimal):
-            return decimal, mark, None
-        if mark not in _ENDS and first(_EITHER, mark):
-            return decimal, mark, None  # blanks and apostrophes stand between thousands alone
-    if other in marks and (cell := first(_EITHER, other)):
+    for sign in marks:
+        # Blanks and apostrophes stand between thousands alone.
+        alone = sign not in _ENDS and first(_EITHER, sign)
+        if alone or first(_GROUPED, sign) or first(_BOTH, sign, decimal):
+            return decimal, sign, None
+    if cell := first(_EITHER, thousands):
         about = f"the cell {cell} stands where the decimal mark of the file is {decimal}"
-        answers = {other: f"{cell} is {cell.replace(other, '')}", "none": "it is an error"}
-        return decimal, None, Choice("--thousands", about, answers)
+        meant = {thousands: f"{cell} is {cell.replace(thousands, '')}", "none": "it is an error"}
+        return decimal, None, Choice("--thousands", about, meant)
     return decimal, None, None
 
 

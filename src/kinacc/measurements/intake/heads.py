@@ -29,10 +29,10 @@ class Head:
     at; ``under``: rows between; ``width`` of the rows; ``names`` where two lines make them.
     """
 
-    line: int
-    first: int
-    under: int
-    width: int
+    line: int = 0
+    first: int = 0
+    under: int = 0
+    width: int = 0
     names: tuple[str, ...] | None = None
 
 
@@ -53,11 +53,7 @@ def head_of(rows: Sequence[Row], delimiter: str, sheet: bool = False) -> Head | 
 
     ``sheet``: the rows are those of a sheet, of any width.
     """
-    counts = [numbers_in(cells) for _, cells in rows]
-    remarks = [count > 1 and is_comment(cells, delimiter)
-               for count, (_, cells) in zip(counts, rows, strict=True)]  # fmt: skip
-    if 2 * sum(remarks) < sum(count > 1 for count in counts):  # else the points are called so
-        counts = [0 if out else count for count, out in zip(counts, remarks, strict=True)]
+    counts = [0 if is_comment(cells, delimiter) else numbers_in(cells) for _, cells in rows]
     many = [number for number, count in enumerate(counts) if count > 1]
     if not many:
         return None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import codecs
 import re
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from io import StringIO
@@ -61,7 +62,7 @@ class Looked:
     notes: tuple[str, ...] = ()
     assumed: Mapping[str, str] = field(default_factory=dict)
     stated: Mapping[str, str] = field(default_factory=dict)
-    columns: NamedColumns = field(default_factory=lambda: NamedColumns(()))
+    columns: NamedColumns = field(default_factory=NamedColumns)
     joints: dict[str, Any] | None = None
 
 
@@ -79,14 +80,14 @@ def look(path: str | Path, answers: Mapping[str, Any] | None = None) -> Looked:
     if kind not in EXCEL and (program := robot_programs.read(path)) is not None:
         return Looked(str(path), Layout(), program)
     written, head, rows, notes = (_workbook if kind in EXCEL else _text)(path, answers)
+    first_line = head.line or rows[head.first][0]
     above = [
         " ".join(str(cell) for cell in cells if cell is not None)
-        for number, (line, cells) in enumerate(rows)
-        if (line < head.line if head.line else number < head.first)
-        or str(next(iter(cells), "")).lstrip()[:1] in ("#", "/", ";", "%")
+        for line, cells in rows
+        if line < first_line or str(next(iter(cells), "")).lstrip().startswith((*"#/;%",))
     ]
     stated = heads.stated_above(above)
-    written = _named(path, written, head, rows, stated, answers)
+    written = written.but(**_names_of(path, head, rows, stated, answers))
     table = load(path, written)
     blanks = written.delimiter == BLANKS
     decimal, thousands, choice = decimals.marks_of(table.columns, answers, blanks)
@@ -104,12 +105,12 @@ def look(path: str | Path, answers: Mapping[str, Any] | None = None) -> Looked:
         written = written.but(layout=FEATURES)
         notes.append(f"a row per feature and axis: {len(table)} rows")
     elif readings := readings_of(names_in(table)):
-        way = _directions(table, readings, stated.get("angle", ""), answers)
-        written = written.but(layout=SPHERICAL, directions=way)
-        notes.append(f"{readings[0].vertical.column} is counted from the {way.vertical}")
+        ways = _directions(table, readings, stated.get("angle", ""), answers)
+        written = written.but(layout=SPHERICAL, directions=ways)
+        notes.append(f"{readings[0].vertical.column} is counted from the {ways.vertical}")
         if "horizontal" not in answers:
             name = readings[0].horizontal.column
-            assumed["horizontal"] = f"{name} counts {way.horizontal}, seen from above"
+            assumed["horizontal"] = f"{name} counts {ways.horizontal}, seen from above"
     if written.layout != "table":
         table = load(path, written)
     return Looked(str(path), written, table, tuple(notes), assumed, stated)
@@ -125,15 +126,31 @@ def _text(path: Path, answers: Mapping) -> tuple[Layout, Head, list[Row], list[s
         lines = lines[:-1] or lines  # the last one may have been cut
     lines = lines[:_LINES]
     separator = _SEP.fullmatch(lines[0]) if lines else None
-    mark = separator[1].replace("\\t", "\t") if separator else ""
-    marks = (mark,) if mark in DELIMITERS else DELIMITERS
-    split = {mark: list(rows_of_lines(lines, mark, str(path))) for mark in marks}
-    # Words that end in a mark are parted by it: "P1, 2.5, 3".
+    stated = separator[1].replace("\\t", "\t") if separator else ""
+    marks = (stated,) if stated in DELIMITERS else DELIMITERS
+    split = {delimiter: list(rows_of_lines(lines, delimiter, str(path))) for delimiter in marks}
+    # Words that end in a delimiter are parted by it: "P1, 2.5, 3".
     rows = [cells for _, cells in split.get(BLANKS, ()) if cells]
     if len(split) > 1 and 2 * sum(any(c[-1] in ",;" for c in row[:-1]) for row in rows) > len(rows):
         del split[BLANKS]
-    best = _best(split)
-    head = heads.head_of(split[best], best)
+    # Most cells are numbers where the right delimiter parts them, and the names fit to them.
+    scores = {}
+    for delimiter, rows in split.items():
+        counts = Counter[int]()  # cells that are numbers, by the width of the row
+        for _, cells in rows:
+            count = heads.numbers_in(cells)
+            counts[len(cells)] += count if count > 1 else 0
+        scores[delimiter] = max(((n, width) for width, n in counts.items()), default=(0, 0))
+    near = _NEAR * max(numbers for numbers, _ in scores.values())
+    tops = {d: heads.head_of(split[d], d) for d, (numbers, _) in scores.items() if numbers > near}
+
+    def rank(delimiter: str) -> tuple:
+        top = tops.get(delimiter)
+        named = top is not None and top.line > 0
+        return named, *scores[delimiter], -DELIMITERS.index(delimiter)
+
+    best = max(split, key=rank)
+    head = tops.get(best)
     if head is None or head.width < 2:
         message = "no line of column names above rows of numbers was found"
         raise InputError(Problem(str(path), message, "columns parted by ; , tab or blanks"))
@@ -141,58 +158,33 @@ def _text(path: Path, answers: Mapping) -> tuple[Layout, Head, list[Row], list[s
     return Layout().but(delimiter=best, encoding=encoding), head, split[best], notes
 
 
-def _best(split: Mapping[str, Sequence[Row]]) -> str:
-    """The mark that parts the columns: most cells are numbers then, and the names fit to them."""
-    scores = {}
-    for mark, rows in split.items():
-        counts: dict[int, int] = {}  # cells that are numbers, by the width of the row
-        for _, cells in rows:
-            count = heads.numbers_in(cells)
-            counts[len(cells)] = counts.get(len(cells), 0) + (count if count > 1 else 0)
-        width = max(counts, key=lambda n: (counts[n], n), default=0)
-        scores[mark] = counts.get(width, 0), width
-    most = max(numbers for numbers, _ in scores.values())
-
-    def rank(mark: str) -> tuple:
-        head = heads.head_of(split[mark], mark) if scores[mark][0] > _NEAR * most else None
-        return head is not None and head.line > 0, *scores[mark], -DELIMITERS.index(mark)
-
-    return max(split, key=rank)
-
-
 def encoding_of(path: Path) -> str:
     """The characters of a text file: by what decodes, then by what makes sense."""
     with open(path, "rb") as file:
         head = file.read(4096)
-        for mark, name in ((codecs.BOM_UTF16_LE, "utf-16-le"), (codecs.BOM_UTF16_BE, "utf-16-be")):
-            if head.startswith(mark):
+        for bom, name in ((codecs.BOM_UTF16_LE, "utf-16-le"), (codecs.BOM_UTF16_BE, "utf-16-be")):
+            if head.startswith(bom):
                 return name
-        even, odd = head[0::2].count(0), head[1::2].count(0)
-        if max(even, odd) > 0.35 * len(head) and min(even, odd) < 0.05 * len(head):
-            return "utf-16-le" if odd > even else "utf-16-be"  # without a mark
         file.seek(0)
         is_utf_8, sample = True, b""
         for line in file:
             if not line.isascii():
                 sample += line[:1000] if len(sample) < 200_000 else b""
-                is_utf_8 = is_utf_8 and _decodes(line)
+                is_utf_8 = is_utf_8 and _decodes(line, "utf-8")
     if is_utf_8:
         return "utf-8"
-    try:
-        sample.decode("cp932")
-    except UnicodeDecodeError as error:
-        if error.start < len(sample) - 2:
-            return "latin-1"
     # Japanese where the bytes are pairs that begin as its usual characters do, else Western.
     leads = [pair[0] for pair in re.findall(rb"[\x81-\x9f\xe0-\xfc].", sample)]
-    return "cp932" if leads and 2 * sum(lead < 0xA0 for lead in leads) >= len(leads) else "latin-1"
+    usual = 2 * sum(lead < 0xA0 for lead in leads) >= max(len(leads), 1)
+    return "cp932" if usual and _decodes(sample, "cp932") else "latin-1"
 
 
-def _decodes(line: bytes) -> bool:
+def _decodes(text: bytes, encoding: str) -> bool:
+    """Whether all but the last bytes, which may be cut off, are characters of an encoding."""
     try:
-        line.decode("utf-8")
-    except UnicodeDecodeError:
-        return False
+        text.decode(encoding)
+    except UnicodeDecodeError as error:
+        return encoding == "cp932" and error.start >= len(text) - 2
     return True
 
 
@@ -203,17 +195,14 @@ def _workbook(path: Path, answers: Mapping) -> tuple[Layout, Head, list[Row], li
         raise InputError(Problem(str(path), message, "a sheet with columns of joints and points"))
     # Those that may be meant have several columns and rows, those of points x, y, z.
     large = [
-        sheet
-        for sheet, (head, rows) in tables.items()
+        name
+        for name, (head, rows) in tables.items()
         if head.width >= _FEWEST_COLUMNS and len(rows) - head.first >= _FEWEST_ROWS
     ]
     names = {sheet: [*map(name_of, _names(*table))] for sheet, table in tables.items()}
-    likely = [
-        s
-        for s in large
-        if readings_of(names[s]) or {*"xyz"} <= {t for n in names[s] for t in n.terms}
-    ]
-    likely = likely or large or [*tables]
+    points = [sheet for sheet in large if readings_of(names[sheet])
+              or {*"xyz"} <= {t for name in names[sheet] for t in name.terms}]  # fmt: skip
+    likely = points or large or [*tables]
     if len(likely) > 1:
         meant = {sheet: first_few(_names(*tables[sheet]), 12) for sheet in likely}
         raise Undecided(str(path), [Choice("--sheet", "several sheets hold tables", meant)])
@@ -249,42 +238,35 @@ def _tables_of(
         return book.sheets, tables
 
 
-def _named(
-    path: Path,
-    written: Layout,
-    head: Head,
-    rows: Sequence[Row],
-    stated: Mapping[str, str],
-    answers: Mapping,
-) -> Layout:
-    """With the lines around the names; or with the names, where the file has no line of them."""
-    above = rows[head.first][0] - 1
-    if given := answers.get("names"):
-        names = tuple(name.strip() for name in given.split(","))
+def _names_of(
+    path: Path, head: Head, rows: Sequence[Row], stated: Mapping[str, str], answers: Mapping
+) -> dict[str, Any]:
+    """The lines around the names; or the names, where the file has no line of them."""
+    cells = [cells for _, cells in rows[head.first :] if len(cells) == head.width]
+    if answer := answers.get("names"):
+        names = [name.strip() for name in answer.split(",")]
         if len(names) != head.width:
             message = f"{len(names)} names for {head.width} columns"
-            raise InputError(Problem(f"--names {given}", message, f"{head.width} names"))
-        return written.but(names=[*names], skip_lines=above)
-    if head.line:
-        skipped = head.line if head.names else head.line - 1
-        return written.but(
-            names=head.names and [*head.names], skip_lines=skipped, skip_under_names=head.under
-        )
-    cells = [cells for _, cells in rows[head.first :] if len(cells) == head.width]
-    names = head.names or _point_names(cells, stated) or robot_programs.names_of_rows(cells)
+            raise InputError(Problem(f"--names {answer}", message, f"{head.width} names"))
+    elif head.line:
+        names = [*head.names] if head.names else None
+        skipped = head.line if names else head.line - 1
+        return {"names": names, "skip_lines": skipped, "skip_under_names": head.under}
+    else:
+        names = head.names or _point_names(cells, stated) or robot_programs.names_of_rows(cells)
     if names:
-        return written.but(names=[*names], skip_lines=above)
+        return {"names": [*names], "skip_lines": rows[head.first][0] - 1}
     for line, row in rows[: head.first]:
         if len(row) > 3 and len(filled(row)) == len(row) and not heads.numbers_in(row):
             message = f"{len(row)} names above rows of {head.width} cells"
-            fix = "decimal commas between commas cannot be told apart: export it with ; or tab "
+            fix = "export decimal commas with ; or tab between the columns"
             raise InputError(Problem(f"{path}: line {line}", message, "as many names", fix))
     fix = "write a line of names above the numbers, such as q1_deg,..,x_mm,y_mm,z_mm, or give "
     fix += f"--names with {head.width} names parted by commas"
     raise InputError(Problem(str(path), "the columns have no names", "one line of names", fix))
 
 
-def _point_names(rows: Sequence[Sequence], stated: Mapping[str, str]) -> tuple[str, ...]:
+def _point_names(rows: Sequence[Sequence], stated: Mapping[str, str]) -> list[str]:
     """Names of a list of points without any: collection, group, point, x, y, z."""
     columns = list(zip(*rows, strict=True))
     texts = [not any(map(heads.is_number, column)) for column in columns]
@@ -293,9 +275,9 @@ def _point_names(rows: Sequence[Sequence], stated: Mapping[str, str]) -> tuple[s
         # Points that are called 1, 2, 3.
         before += all(str(cell).strip().isdigit() for cell in columns[before])
     if not 1 <= before <= 3 or len(texts) != before + 3 or any(texts[before:]):
-        return ()
+        return []
     unit = f"_{stated['length']}" if "length" in stated else ""
-    return (*(*GROUPS, POINT)[3 - before :], *(f"{axis}{unit}" for axis in "XYZ"))
+    return [*(*GROUPS, POINT)[3 - before :], *(f"{axis}{unit}" for axis in "XYZ")]
 
 
 def _directions(
@@ -324,17 +306,18 @@ def _directions(
         about = f"{first.horizontal.column} and {first.vertical.column} state no unit of angles"
         choices.append(Choice("--direction-unit", about, meant))
     quarter = 0.5 * np.pi / PER_UNIT.get(unit, PER_UNIT["deg"])
-    counted = answers.get("vertical") or first.vertical_from
-    if not counted and np.nanmin(vertical) > 0.0 and np.nanmax(vertical) > 1.002 * quarter:
-        counted = "zenith"
-    elif not counted and np.nanmin(vertical) < 0.0 and np.nanmax(np.abs(vertical)) <= quarter:
-        counted = "horizon"
-    if not counted:
+    zero, low, high = first.vertical_from, np.nanmin(vertical), np.nanmax(vertical)
+    if not zero and low > 0.0 and high > 1.002 * quarter:
+        zero = "zenith"
+    elif not zero and low < 0.0 and max(-low, high) <= quarter:
+        zero = "horizon"
+    zero = answers.get("vertical") or zero
+    if not zero:
         meant = {"zenith": "counted from straight up", "horizon": "up from level"}
         about = f"{first.vertical.column} may be counted from the zenith or from the horizon"
         choices.append(Choice("--vertical", about, meant))
     if choices:
         raise Undecided(table.path, choices)
-    turning = "clockwise" if first.is_geodetic else "counterclockwise"
-    turning = answers.get("horizontal") or turning
-    return Directions.model_construct(unit=unit, vertical=counted, horizontal=turning)
+    turning = answers.get("horizontal")
+    turning = turning or ("clockwise" if first.is_geodetic else "counterclockwise")
+    return Directions.model_construct(unit=unit, vertical=zero, horizontal=turning)

@@ -61,7 +61,7 @@ class _Dumper(yaml.SafeDumper):
 
 
 _Dumper.add_representer(
-    list, lambda dumper, each: dumper.represent_sequence("tag:yaml.org,2002:seq", each, True)
+    list, lambda dumper, row: dumper.represent_sequence("tag:yaml.org,2002:seq", row, True)
 )
 
 
@@ -90,7 +90,7 @@ def coupled_text(text: str, joint_map: Sequence[Sequence[float]], why: str) -> s
     """The text of a robot file with another ``joint_map``, which holds the rows' signs too."""
     text = re.sub(r",?\s*\bsign:\s*[+-]?1\b", "", text)
     text = re.sub(r"^joint_map:.*\n(?:[ \t-].*\n)*", "", text, flags=re.MULTILINE)
-    rows = ", ".join(f"[{', '.join(f'{each:g}' for each in row)}]" for row in joint_map)
+    rows = ", ".join(f"[{', '.join(f'{factor:g}' for factor in row)}]" for row in joint_map)
     return f"{text.rstrip()}\n# {why}\njoint_map: [{rows}]\n"
 
 
