@@ -52,13 +52,11 @@ def _synthetic(full: Mapping[str, Any]) -> Found:
 
 def _file(file: Mapping[str, Any], folder: Path) -> Found:
     """Files that are not there, and marks of numbers that are equal."""
-    for keys in (("path",), ("joints", "path")):
-        path = file["path"] if keys == ("path",) else file["joints"]["path"]
-        if path is None and keys == ("path",):
-            message = "file, but measurements.file.path is not given"
-            allowed = "path of a CSV, text, Excel or Parquet file"
-            yield ("measurements", "source"), message, allowed
-        elif path is not None and not os.path.isfile(folder / path):
+    if file["path"] is None:
+        message = "file, but measurements.file.path is not given"
+        yield ("measurements", "source"), message, "path of a CSV, text, Excel or Parquet file"
+    for keys, path in ((("path",), file["path"]), (("joints", "path"), file["joints"]["path"])):
+        if path is not None and not os.path.isfile(folder / path):
             source = file["source"] and f"the data comes from: {' '.join(file['source'].split())}"
             fix = source or "write where the data comes from into measurements.file.source"
             yield (*_FILE, *keys), f"{path!r} does not exist", "an existing file", fix

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 from numpy import ndarray
+from scipy.spatial.distance import pdist
 from scipy.special import chdtrc, gammaincinv
 
 from kinacc.calibration.noise import means, scatter
@@ -74,24 +75,6 @@ class Noise:
         return np.sqrt(np.diag(self.covariance_mm2))
 
 
-@dataclass(frozen=True)
-class Group:
-    """Visits of one pose from one side: how many, of how many readings; per axis ``std_mm`` (3,).
-
-    ``mean_distance_mm`` of the visits from their middle, and ISO 9283's pose repeatability
-    ``rp_mm``: that mean and three standard deviations of the distances. NaN for a single visit, RP
-    also for two, which are equally far from their middle.
-    """
-
-    pose: int
-    side: int
-    visits: int
-    readings: int
-    std_mm: ndarray
-    mean_distance_mm: float
-    rp_mm: float
-
-
 def parts(read: Repeated) -> Parts:
     """Variances of instrument, visits and sides, and that of a reading from any side."""
     visit_mm, readings, side_of = _visits(read)
@@ -115,9 +98,10 @@ def parts(read: Repeated) -> Parts:
     side = _no_less_than_zero(across - of_side * arm - of_side_below * within)
     shares = (1.0 - of_visit + of_side * of_visit - of_side_below, 1.0 - of_side, 1.0)
     terms = np.array([c * np.trace(square) for c, (square, _) in zip(shares, levels, strict=True)])
-    subset = np.array([freedom for _, freedom in levels])
-    spread = np.sum(terms[subset > 0] ** 2 / subset[subset > 0])
-    freedom = terms[subset > 0].sum() ** 2 / spread if spread > 0.0 else returned
+    degrees = np.array([freedom for _, freedom in levels])
+    terms, degrees = terms[degrees > 0], degrees[degrees > 0]
+    spread = np.sum(terms**2 / degrees)
+    freedom = terms.sum() ** 2 / spread if spread > 0.0 else returned
     whole = within * bool(observed) + arm + side * bool(sides)
     return Parts(instrument, arm, side if sides else unknown, whole, float(freedom))
 
@@ -173,64 +157,65 @@ def differ_by_pose(read: Repeated, resolution_mm: ndarray) -> tuple[float, ndarr
     square = np.bincount(pose_of[group], np.sum(white**2, axis=1))
     freedom = 3.0 * np.bincount(pose_of, count - 1)
     least = np.sum(np.linalg.solve(root, np.diag(resolution_mm / math.sqrt(12.0))) ** 2) / 3.0
-    with np.errstate(invalid="ignore", divide="ignore"):
-        subset = np.maximum(square / freedom, max(least, 1e-12))
-    subset[freedom == 0] = np.nan
-    texts = freedom > 0
-    if texts.sum() < 2:
-        return math.nan, np.sqrt(subset)
-    nu, s2 = freedom[texts], subset[texts]
-    middle = np.sum(nu * s2) / nu.sum()
+    known = freedom > 0
+    nu, s2 = freedom[known], np.maximum(square[known] / freedom[known], max(least, 1e-12))
+    variance = np.full(len(freedom), np.nan)
+    variance[known] = s2
+    if known.sum() < 2:
+        return math.nan, np.sqrt(variance)
+    middle = np.average(s2, weights=nu)
     statistic = nu.sum() * math.log(middle) - float(np.sum(nu * np.log(s2)))
     correction = 1.0 + (np.sum(1.0 / nu) - 1.0 / nu.sum()) / (3.0 * (len(nu) - 1))
-    return float(chdtrc(len(nu) - 1, statistic / correction)), np.sqrt(subset / middle)
+    return float(chdtrc(len(nu) - 1, statistic / correction)), np.sqrt(variance / middle)
 
 
-def groups(read: Repeated) -> list[Group]:
-    """Every pose from every side, with ISO 9283's repeatability of its visits."""
+def by_side(read: Repeated) -> pd.DataFrame:
+    """Every pose from every side: ``visits``, ``readings``, and ISO 9283's repeatability of visits.
+
+    ``mean_distance_mm`` of the visits from their middle, pose repeatability ``rp_mm`` (that mean
+    and three standard deviations of the distances) and ``std_x_mm`` and so on. NaN for a single
+    visit, RP also for two, which are equally far from their middle.
+    """
     visit_mm, readings, side_of = _visits(read)
-    results = []
-    for side, pose in enumerate(_larger(read.side, read.pose)):
-        subset, std = visit_mm[side_of == side], np.full(3, np.nan)
-        middle = spread = math.nan
-        length = np.linalg.norm(subset - subset.mean(axis=0), axis=1)
-        if len(subset) > 1:
-            std, middle = np.std(subset, axis=0, ddof=1), float(length.mean())
-        if len(subset) >= _FEWEST_VISITS:
-            spread = float(np.std(length, ddof=1))
-        observed = int(readings[side_of == side].sum())
-        results.append(
-            Group(int(pose), side, len(subset), observed, std, middle, middle + 3.0 * spread)
-        )
-    return results
+    axes = ["std_x_mm", "std_y_mm", "std_z_mm"]
+    visits = pd.DataFrame(visit_mm, columns=axes)
+    middle = visits.groupby(side_of).transform("mean")
+    visits["distance"] = np.linalg.norm(visits - middle, axis=1)
+    group = visits.groupby(side_of)
+    count, mean, std = group.size(), group["distance"].mean(), group["distance"].std()
+    table = pd.DataFrame(
+        {
+            "pose": _larger(read.side, read.pose),
+            "side": count.index,
+            "visits": count,
+            "readings": np.bincount(side_of, readings).astype(int),
+            "mean_distance_mm": mean.where(count > 1),
+            "rp_mm": (mean + 3.0 * std).where(count >= _FEWEST_VISITS),
+        }
+    )
+    return table.join(group[axes].std())
 
 
-def pooled_rp(read: Repeated) -> tuple[float, float]:
+def pooled_rp(sides: pd.DataFrame) -> tuple[float, float]:
     """Mean distance of all visits from the middle of their pose and side, and RP over all of them.
 
-    The standard deviation is pooled. NaN without a pose that was visited thrice from one side.
+    ``sides`` are those of :func:`by_side`; standard deviations are pooled. NaN without a pose that
+    was visited thrice from one side.
     """
-    visit_mm, _, side_of = _visits(read)
-    mean, count = means(visit_mm, side_of)
-    many = count[side_of] >= _FEWEST_VISITS
-    if not many.any():
+    known = sides.dropna(subset="rp_mm")
+    if known.empty:
         return math.nan, math.nan
-    length = np.linalg.norm(visit_mm - mean[side_of], axis=1)[many]
-    subset = np.unique(side_of[many], return_inverse=True)[1]
-    square = scatter(length[:, None], subset)[0].item()
-    return float(length.mean()), float(length.mean() + 3.0 * math.sqrt(square))
+    mean = np.average(known["mean_distance_mm"], weights=known["visits"])
+    std = (known["rp_mm"] - known["mean_distance_mm"]) / 3.0
+    pooled = math.sqrt(np.average(std**2, weights=known["visits"] - 1))
+    return float(mean), float(mean + 3.0 * pooled)
 
 
 def between_sides_mm(read: Repeated) -> float:
     """ISO 9283's vAP: largest distance of a pose's middle from one side to that from another."""
     visit_mm, _, side_of = _visits(read)
-    side_mm, pose_of = means(visit_mm, side_of)[0], _larger(read.side, read.pose)
-    pairs = [side_mm[pose_of == pose] for pose in np.unique(pose_of)]
-    apart = [
-        np.linalg.norm(subset[:, None] - subset, axis=2).max()
-        for subset in pairs
-        if len(subset) > 1
-    ]
+    sides = pd.DataFrame(means(visit_mm, side_of)[0]).groupby(_larger(read.side, read.pose))
+    apart = [pdist(side_mm).max() for _, side_mm in sides if len(side_mm) > 1]
     return float(max(apart, default=math.nan))
 
 

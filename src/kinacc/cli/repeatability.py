@@ -206,7 +206,8 @@ def estimate(
         if not (std > _LEAST_MM).all():
             raise InputError(Problem(table.path, "readings of a pose are equal to the last digit"))
     by_pose, ratio = checks.differ_by_pose(read, resolution_mm)
-    mean_mm, rp_mm = checks.pooled_rp(read)
+    result = checks.by_side(read)
+    mean_mm, rp_mm = checks.pooled_rp(result)
     differ = None
     if by_pose < checks.UNEQUAL:
         worst = int(np.nanargmax(ratio))
@@ -214,9 +215,6 @@ def estimate(
         differ += f"{ratio[worst]:.2f} times as much as all."
     spans = rows.groupby("pose")["hours"].agg(["size", np.ptp])
     hours = float(spans["ptp"][spans["size"] > 1].median())
-    of_sides = checks.groups(read)
-    result = pd.DataFrame(of_sides).drop(columns="std_mm")
-    result[["std_x_mm", "std_y_mm", "std_z_mm"]] = [group.std_mm for group in of_sides]
     result["pose"] = poses[result["pose"]]
     result["side"] = rows.drop_duplicates(keys[:2])["side"].replace("", None).to_numpy()
     remarks = [*_remarks(noise, rows, hours), *([differ] if differ else [])]
