@@ -62,7 +62,7 @@ rule all:
     default_target: True
     input:
         [calibration_of(dataset) for dataset in data.settings],
-        [[*study_of(dataset), f"{RESULTS}/{dataset}/SHA256SUMS"] for dataset in data.told],
+        [[*study_of(dataset), f"{RESULTS}/{dataset}/SHA256SUMS"] for dataset in data.reported],
 
 
 rule calibration:
@@ -75,7 +75,7 @@ rule robustness:
     """everything, and the claims on further synthetic arms, whose shares go into claims.parquet"""
     input:
         rules.all.input,
-        [[*tables(dataset, "robustness").values()] for dataset in data.told if not data.is_measured(dataset)],
+        [[*tables(dataset, "robustness").values()] for dataset in data.reported if not data.is_measured(dataset)],
 
 
 onstart:
@@ -87,4 +87,4 @@ onsuccess:
     if workflow.is_main_process:
         from kinacc.report.terminal import print_summaries
 
-        print_summaries(running.calibrated(RESULTS, data.told))
+        print_summaries(running.calibrated(RESULTS, data.reported))

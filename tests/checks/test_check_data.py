@@ -2,7 +2,6 @@
 
 import json
 
-import numpy as np
 import pytest
 from command_line import call
 from good_files import simulated
@@ -60,8 +59,3 @@ def test_what_cannot_be_used_ends_with_2(configuration, tmp_path):
     assert call("check-data", config).exit_code == 2
 
 
-def test_the_noise_of_readings_of_one_pose_is_that_per_axis(tmp_path):
-    config = simulated("irb120", poses=80, repeats=3, noise_mm=0.1).write(tmp_path)
-    noise = report(config, 0)["datasets"][0]["facts"]["noise"]
-    assert noise["degrees_of_freedom"] == 160
-    np.testing.assert_allclose(noise["std_mm"], 0.1, rtol=0.25)

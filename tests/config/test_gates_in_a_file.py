@@ -40,7 +40,7 @@ def test_every_mistake_in_gates_is_told_at_once_with_its_place_and_what_is_meant
         (":2, gates[0].value", "did you mean residuals.position.p99?"),
         (":3, gates[1]", "in mm"),
         (":4, gates[2]", "chance cannot be told of bound.upper"),
-        (":5, gates[3]", "did you mean campaign?"),
+        (":5, gates[3]", "campaign"),
         (":6, gates[4]", "is not of one kind"),
         (":7, gates[5]", "has no name"),
         (":8, gates[6].on_fial", "did you mean on_fail?"),

@@ -52,7 +52,7 @@ def test_values_are_in_the_units_they_say_and_fix_without_a_prior():
         ("joint 3 e", "free", "no parameter of joints"),
         ("base z", "fixed", "no parameter of joints"),
         ("d", "loose", "'free' or 'fixed'"),
-        ("a", {"prior_std_mrad": 1.0}, "a_mm is named in another"),
+        ("a", {"prior_std_mrad": 1.0}, "rad is no unit of a_mm"),
         ("alpha", {"prior_std_deg": 1.0, "prior_std_mrad": 1.0}, "two units"),
         ("alpha", {"prior_std_deg": -1.0}, "greater than 0"),
         ("joint 1", {"value_mm": 3.0}, "no one parameter"),

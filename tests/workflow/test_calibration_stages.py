@@ -10,10 +10,8 @@ import pandas as pd
 import pytest
 
 from kinacc.geometry import Pose, compose, exp_so3, quaternion_from_rotation
-from kinacc.kinematics import dh as dh_kinematics
 from kinacc.kinematics import robot
 from kinacc.kinematics import vec as vec_kinematics
-from kinacc.kinematics.tables import models
 from kinacc.study.in_memory import RUNS
 from kinacc.synthetic import source
 from kinacc.workflow.data_sets import read_data_sets
@@ -74,39 +72,6 @@ def chain(split, **changes):
 @pytest.fixture(scope="module")
 def tables():
     return chain(source.split(columns(), SETTINGS))
-
-
-def rows(found, comparison, subset="validation"):
-    """Statistics of position errors; folds are the index, -1 for all."""
-    table = pd.DataFrame(found["residuals"])
-    kept = (table.comparison == comparison) & (table.subset == subset)
-    return table[kept & (table.quantity == "position")].fillna({"fold": -1}).set_index("fold")
-
-
-def joints(table):
-    return np.stack([table[f"q{i}"] for i in range(1, 7)], axis=1)
-
-
-def test_configurations_visited_twice_are_held_out_together(tables):
-    fold = tables["measurements"]["fold"]
-    np.testing.assert_array_equal(fold[:AGAIN], fold[-AGAIN:])
-    assert np.ptp(np.bincount(fold.astype(int))) <= 2
-    np.testing.assert_array_equal(tables["measurements"]["subset"] == "validation", fold == 0)
-
-
-def test_models_can_be_read_back_from_their_tables(tables):
-    found, measured = models(tables, robot.load("mh180").dh), tables["measurements"]
-    train = measured["subset"] == "train"
-    at = vec_kinematics.pose(found["vec"], joints(measured)).position_mm
-    seen = np.stack([measured[f"{axis}_mm"] for axis in "xyz"], axis=1)
-    size = np.linalg.norm(seen - at, axis=1)[train]
-    figures = rows(tables, "vec_vs_measured", "train").loc[-1]
-    assert figures["max"] == pytest.approx(size.max(), rel=1e-12)
-    assert figures["n"] == train.sum()
-    assert figures["rms"] == pytest.approx(0.05 * np.sqrt(3), rel=0.15)
-    apart = at - dh_kinematics.forward(found["dh"], joints(measured)).position_mm
-    mean = rows(tables, "dh_vs_vec", "train").loc[-1, "mean"]
-    assert mean == pytest.approx(np.linalg.norm(apart, axis=1)[train].mean(), rel=1e-9)
 
 
 def test_rows_of_the_validation_fold_never_reach_the_delivered_models(tables):

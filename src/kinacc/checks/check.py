@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -23,7 +24,7 @@ from kinacc.checks import (
 from kinacc.checks.findings import Finding, finding
 from kinacc.checks.meanings import Meaning
 from kinacc.checks.readings import Readings
-from kinacc.checks.report import Report
+from kinacc.checks.report import Progress, Report
 from kinacc.checks.robust_fit import Fitted
 from kinacc.errors import InputError, Problem
 from kinacc.kinematics import robot as robots
@@ -35,7 +36,6 @@ from kinacc.tables.allowed import LEFT_OUT
 from kinacc.tables.columns import Columns
 from kinacc.tables.contract import columns_of
 
-Progress = Callable[[Iterable, str], Iterable]
 _FEWEST_POSES = 6
 _SYMPTOMS = ("outliers", "outside_limits")
 _OTHER_LENGTHS = 0.01  # of the arm's: real arms are off their description by a tenth of that
@@ -43,12 +43,14 @@ _REACH = (0.02, 3.0)  # of the arm's length: what points that an arm reaches may
 _GROSS = 20.0  # robust spreads per axis: further off is no reading of this arm
 
 
-def run(inputs: Mapping, settings: Mapping, progress: Progress | None = None) -> dict[str, Columns]:
+def run(
+    inputs: Mapping[str, Columns], settings: Mapping[str, Any], progress: Progress | None = None
+) -> dict[str, Columns]:
     """``data_check``: every finding with its level and, where it was accepted, the reason.
 
     Raises InputError where findings stop the workflow, one problem each.
     """
-    report = examined(settings, "", progress or (lambda items, words: items))
+    report = examined(settings, "", progress or (lambda items, label: items))
     if report.stopping:
         title = f"{report.path} is not ready to be fitted"
         raise InputError(
@@ -79,7 +81,7 @@ def run(inputs: Mapping, settings: Mapping, progress: Progress | None = None) ->
     return {"data_check": columns_of("data_check", table)}
 
 
-def examined(settings: Mapping, dataset: str, progress: Progress) -> Report:
+def examined(settings: Mapping[str, Any], dataset: str, progress: Progress) -> Report:
     """Report on a data set's file, with what its configuration accepts.
 
     ``settings``: robot and the sections ``measurements``, ``calibration`` and ``data_check``.

@@ -15,8 +15,10 @@ from kinacc.config.parameter_rules import rules, strangers
 from kinacc.config.settings import ROBOTS
 from kinacc.errors import InputError, Problem
 
-Place = Callable[[tuple], str]
-Found = Iterator[tuple]  # keys of the setting, what is wrong, what is allowed, and a remedy
+Place = Callable[[tuple[Any, ...]], str]
+Found = Iterator[
+    tuple[Any, ...]
+]  # keys of the setting, what is wrong, what is allowed, and a remedy
 _FILE = ("measurements", "file")
 
 

@@ -105,7 +105,7 @@ def remarks_of(every: Readings, noise: Noise, distances: list[Distance]) -> tupl
     return tuple(remarks)
 
 
-def thin(coverage: list[dict]) -> list[Finding]:
+def thin(coverage: list[dict[str, Any]]) -> list[Finding]:
     """A note on every joint that hardly moves."""
     return [
         finding(
@@ -119,7 +119,7 @@ def thin(coverage: list[dict]) -> list[Finding]:
     ]
 
 
-def few_poses(columns: Columns, robot: Robot, calibration: Mapping) -> list[Finding]:
+def few_poses(columns: Columns, robot: Robot, calibration: Mapping[str, Any]) -> list[Finding]:
     """Whether the VEC model has more coefficients than the poses give independent numbers."""
     observed = from_columns({**columns, "fold": np.full(len(columns["pose"]), np.nan)}, robot)
     fit = VECEstimator.of(calibration, robot, observed)

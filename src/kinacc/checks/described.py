@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from kinacc.checks import check
 from kinacc.checks.findings import Finding
-from kinacc.checks.report import Report
+from kinacc.checks.report import Progress, Report
 from kinacc.checks.which_robot import fitting
 from kinacc.errors import InputError, Problem
 from kinacc.kinematics import robot as robots
@@ -20,8 +20,6 @@ from kinacc.measurements.intake.write import dataset_content, plain_name
 from kinacc.measurements.layout import Layout
 from kinacc.measurements.reader import MeasuredFile, read
 
-Progress = Callable[[Iterable, str], Iterable]
-
 
 def describe_files(
     files: Sequence[str | Path], robot: str | None = None, answers: Mapping[str, Any] | None = None
@@ -31,7 +29,7 @@ def describe_files(
     Parameters
     ----------
     files
-        A file with joints and measured points, or two files, one of each.
+        A file with joints and measured points, or two files, one of item.
     robot
         A shipped name, a robot file or a URDF file; None for a shipped robot that fits.
     answers
@@ -50,7 +48,7 @@ def describe_files(
     """
     guess = guesses.look(list(files), answers)
 
-    def silent(items: Iterable, _: str) -> Iterable:
+    def silent(items: Iterable[Any], _: str) -> Iterable[Any]:
         return items
 
     if robot is None:
@@ -77,8 +75,8 @@ def corrected(
     number of joints.
     """
     if robot.dh.joints != guess.joints:
-        what = f"{robot.name} has {robot.dh.joints} joints, the file {guess.joints}"
-        raise InputError(Problem("--robot", what))
+        message = f"{robot.name} has {robot.dh.joints} joints, the file {guess.joints}"
+        raise InputError(Problem("--robot", message))
     for _ in range(3):
         reading = read(guess.section, robot, strict=False)
         layout = Layout.of(guess.section)
@@ -91,13 +89,13 @@ def corrected(
     return guess, report, reading
 
 
-def _contradicted(guess: Guess, report: Report) -> dict:
+def _contradicted(guess: Guess, report: Report) -> dict[str, Any]:
     """Settings that were assumed and that the readings contradict, as they should be."""
-    settings: dict = {}
-    for each in report.suspicions:
-        if each.kind == "left_handed" and "horizontal" in guess.assumed:
+    settings: dict[str, Any] = {}
+    for item in report.suspicions:
+        if item.kind == "left_handed" and "horizontal" in guess.assumed:
             return {"horizontal": ""}
-        wanted = dict(each.values.get("setting", {}))
+        wanted = dict(item.values.get("setting", {}))
         turn = dict(wanted.pop("orientation", {}))
         about = "angle_unit" if "unit" in turn else "order" if "order" in turn else "orientation"
         if turn and about in guess.assumed:
@@ -109,10 +107,10 @@ def _contradicted(guess: Guess, report: Report) -> dict:
 
 def coupling_of(report: Report) -> Finding | None:
     """The coupling of two joints that alone explains the readings, where there is one."""
-    return next((each for each in report.suspicions if "joint_map" in each.values), None)
+    return next((item for item in report.suspicions if "joint_map" in item.values), None)
 
 
-def _set_right(guess: Guess, settings: dict) -> Guess:
+def _set_right(guess: Guess, settings: dict[str, Any]) -> Guess:
     """The guess with settings that the readings show, in place of the assumed ones."""
     settings = dict(settings)
     shown = {key: value for key, value in settings.items() if key in guess.assumed}

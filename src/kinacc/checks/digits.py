@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import scipy
@@ -52,9 +52,8 @@ def copies(every: Readings, noise_mm: float) -> Iterator[Finding]:
     there = every.earlier > 0
     again, place = np.unique(every.line[there], return_index=True)
     if again.size:
-        first = every.earlier[there][place]
-        pairs = zip(again, first, strict=True)
-        texts = [f"{names.one(line)} repeats {names.number(of)}" for line, of in pairs]
+        pairs = zip(again, every.earlier[there][place], strict=True)
+        texts = [f"{names.one(int(row))} repeats {names.number(int(of))}" for row, of in pairs]
         yield finding("repeated_reading", again, pairs=first_few(texts, 4))
 
 
@@ -133,11 +132,8 @@ def commanded(fitted: Fitted, meaning: Meaning) -> Iterator[Finding]:
 
 def _round(fitted: Fitted, q_deg: ndarray) -> Iterator[Finding]:
     """Rows on round numbers where the others are not, which fit worse; or all on a coarse grid."""
-    q_deg, remaining, observed = (
-        q_deg[:, np.ptp(q_deg, axis=0) > 0.0],
-        fitted.left_mm,
-        fitted.readings,
-    )
+    q_deg = q_deg[:, np.ptp(q_deg, axis=0) > 0.0]
+    remaining, observed = fitted.left_mm, fitted.readings
     if q_deg.shape[1] < 2:
         return
     for grid in _GRIDS_DEG:
@@ -145,46 +141,29 @@ def _round(fitted: Fitted, q_deg: ndarray) -> Iterator[Finding]:
         if len(np.unique(q_deg[on], axis=0)) < _FEWEST or fine.sum() < len(on) / 2:
             continue
         worse = float(np.median(remaining[on]) / np.median(remaining[fine]))
-        ranked = scipy.stats.mannwhitneyu(
-            remaining[on], remaining[fine], alternative="greater"
-        ).pvalue
-        if worse > _WORSE and ranked < _RANKED:
-            lines = observed.lines(on)
-            times = f"{worse:.2g}"
-            yield finding("commanded_joints", lines, grid_deg=grid, count=len(lines), times=times)
+        test = scipy.stats.mannwhitneyu(remaining[on], remaining[fine], alternative="greater")
+        if worse > _WORSE and test.pvalue < _RANKED:
+            rows, times = observed.lines(on), f"{worse:.2g}"
+            yield finding("commanded_joints", rows, grid_deg=grid, count=len(rows), times=times)
             return
-    grid = next((grid for grid in _GRIDS_DEG[:4] if _on(q_deg, grid).all()), None)
-    if grid is not None:
-        arm, slides = fitted.trial.arm, fitted.trial.nominal.prismatic
+    grid = next((item for item in _GRIDS_DEG[:4] if _on(q_deg, item).all()), 0.0)
+    if grid:
         off = np.random.default_rng(0).uniform(-0.5, 0.5, observed.q_rad.shape) * np.deg2rad(grid)
-        there = robust_fit.residuals(arm, replace(observed, q_rad=observed.q_rad + off * ~slides))
-        apart = there.predicted.position_mm - fitted.residuals.predicted.position_mm
+        moved = replace(observed, q_rad=observed.q_rad + off * ~fitted.trial.nominal.prismatic)
+        there = robust_fit.residuals(fitted.trial.arm, moved).predicted.position_mm
+        apart = there - fitted.residuals.predicted.position_mm
         rounding = float(np.median(np.linalg.norm(apart, axis=1)))
         error = float(np.sqrt(np.median(remaining**2)))
         if _FITTED_AWAY < error / rounding < 1.5:
-            text = {"error": f"{error:.3g}", "rounding": f"{rounding:.3g}"}
-            yield finding("commanded_joints/all", observed.lines(), grid_deg=grid, **text)
+            sizes = {"error": f"{error:.3g}", "rounding": f"{rounding:.3g}"}
+            yield finding("commanded_joints/all", observed.lines(), grid_deg=grid, **sizes)
 
 
 def _on(q_deg: ndarray, grid: float) -> ndarray:
     """True (n,) where all joints are whole multiples of ``grid``."""
     steps = q_deg / grid
-    return (np.abs(steps - np.round(steps)) < _EXACT * np.maximum(np.abs(steps), 1.0)).all(axis=1)
-
-
-@dataclass(frozen=True)
-class Rounding:
-    """Joints written in steps of ``step_deg``.
-
-    ``reach_mm`` is the largest distance of the flange from a joint's axis, ``step_mm`` what one
-    step moves it there, ``rms_mm`` and ``most_mm`` what rounding all joints adds to its position.
-    """
-
-    step_deg: float
-    reach_mm: float
-    step_mm: float
-    rms_mm: float
-    most_mm: float
+    whole = np.abs(steps - np.round(steps)) < _EXACT * np.maximum(np.abs(steps), 1.0)
+    return np.all(whole, axis=1)
 
 
 def smallest_step(cells: Sequence[Sequence[object]], unit: float, decimal: str) -> float:
@@ -215,14 +194,26 @@ def step_between(cells: Sequence[object], unit: float, decimal: str) -> float:
     return unit * math.gcd(*(number - whole[0] for number in whole)) * 10.0**-digits
 
 
-def cost(model: DHModel, q: ndarray, step: float) -> Rounding:
-    """What steps of ``step`` deg cost at joints (n, k): a rounded number is off by half at most."""
-    q = q[:: max(len(q) // _MOST_POSES, 1)]
-    half = 0.5 * np.deg2rad(step)
-    moves = dh.joint_jacobian(model, q)[:, :3, ~model.prismatic]
-    arm = np.linalg.norm(moves, axis=1)  # (n, joints) distances of the flange from every axis
-    reach = float(arm.max())
-    # Rounding is uniform over a step: its standard deviation is half of one over the root of 3.
-    rms = half / np.sqrt(3.0) * np.sqrt(np.mean(np.sum(arm**2, axis=1)))
-    most = half * arm.sum(axis=1).max()
-    return Rounding(step, reach, float(2.0 * half * reach), float(rms), float(most))
+def cost(model: DHModel, q: ndarray, step: float) -> tuple[float, float]:
+    """What joints written in steps cost.
+
+    Parameters
+    ----------
+    model
+        DH model of the arm.
+    q
+        Joints (n, k), rad or mm.
+    step
+        Step of the turning joints, deg; a rounded number is off by half of it at most.
+
+    Returns
+    -------
+    reach_mm, rms_mm
+        The largest distance of the flange from a joint's axis, and what rounding all joints adds
+        to its position.
+    """
+    moves = dh.joint_jacobian(model, q[:: max(len(q) // _MOST_POSES, 1)])[:, :3, ~model.prismatic]
+    lever = np.linalg.norm(moves, axis=1)  # (n, joints) distances of the flange from every axis
+    # Rounding is uniform over a step: its standard deviation is a step over the root of 12.
+    rms = np.deg2rad(step) / np.sqrt(12.0) * np.sqrt(np.mean(np.sum(lever**2, axis=1)))
+    return float(lever.max()), float(rms)

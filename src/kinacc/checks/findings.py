@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from importlib.resources import files
+from typing import Any
 
 import numpy as np
 import yaml
@@ -48,7 +49,7 @@ class Finding:
     kind: str
     what: str
     fix: str
-    values: Mapping[str, object]
+    values: Mapping[str, Any]
     lines: tuple[int, ...] = ()
     level: str = WARNING
     row_names: RowNames = field(default_factory=RowNames)
@@ -58,7 +59,7 @@ class Finding:
         """The lines in words; empty where it is about no lines."""
         return self.row_names.spans(self.lines) if self.lines else ""
 
-    def of_lines(self, lines: Iterable[int], detail: str = "", **values) -> Finding:
+    def of_lines(self, lines: Iterable[int], detail: str = "", **values: Any) -> Finding:
         """The finding at these lines, with more numbers; ``detail`` is appended to its message."""
         values = {**self.values, **values}
         message = self.what + detail.format(**values)
@@ -81,7 +82,7 @@ class Finding:
         return [f'kinacc exclude {config} --lines {lines} --reason ".."', accept]
 
 
-def finding(key: str, lines: Iterable[int] = (), **values) -> Finding:
+def finding(key: str, lines: Iterable[int] = (), **values: Any) -> Finding:
     """The finding ``key`` of ``TEXTS`` at ``lines``, each named once and in order."""
     message, fix = (text.format(**values) for text in TEXTS[key])
     kind = key.partition("/")[0]

@@ -7,9 +7,10 @@ half is believed: errors of an arm that is far from its description do not hide 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from itertools import combinations, permutations
+from typing import Any
 
 import numpy as np
 from numpy import ndarray
@@ -17,6 +18,7 @@ from numpy import ndarray
 from kinacc.checks import orientations, robust_fit
 from kinacc.checks.findings import Finding, finding
 from kinacc.checks.readings import Readings, thinned
+from kinacc.checks.report import Progress
 from kinacc.checks.robust_fit import Trial
 from kinacc.kinematics import dh
 from kinacc.kinematics.robot import Robot
@@ -24,7 +26,13 @@ from kinacc.kinematics.robot import Robot
 FAR = 0.02  # of the points' spread: what leaves more explains nothing, of this arm
 BAD_RAD = 0.02  # scatter of orientations that no arm as described leaves, calibrated or not
 MIRROR = np.array([1.0, -1.0, 1.0])  # any mirror will do: the base frame takes up the rest
-_SCALES = (("metres", 1e3), ("centimetres", 10.0), ("inches", 25.4), ("", 1e-3))
+# Units of positions: the finding, and the factor to the stated one.
+LENGTHS = (
+    (finding("length_units", unit="metres", short="m", setting={"length_unit": "m"}), 1e3),
+    (finding("length_units/other", unit="centimetres"), 10.0),
+    (finding("length_units/other", unit="inches"), 25.4),
+    (finding("length_units/small", setting={"length_unit": "mm"}), 1e-3),
+)
 _WITHIN = 5.0  # times the spread of the flange, or a fifth: what points of this arm spread over
 _TRIED = "ways to read the columns tried (units, angles, signs)"
 _TRIED_ROWS, _TURNED_ROWS, _FITTED_ROWS = 80, 120, 360
@@ -43,8 +51,6 @@ _COMMON = (
     *("joint_units", "length_units", "joint_sign", "left_handed"),
     *("joint_coupling", "joint_zero", "joint_order"),
 )
-
-Progress = Callable[[Iterable, str], Iterable]
 
 
 @dataclass(frozen=True)
@@ -73,7 +79,7 @@ class Meaning:
         rotation = read.rotation * np.outer(mirror, mirror)
         return replace(read, q_rad=self.joints(read.q), position_mm=position_mm, rotation=rotation)
 
-    def changed(self, change: Finding, **values) -> Meaning:
+    def changed(self, change: Finding, **values: Any) -> Meaning:
         """This meaning with one more change."""
         return replace(self, changes=(*self.changes, change), **values)
 
@@ -88,11 +94,9 @@ def of_units(meaning: Meaning, q: ndarray, slides: ndarray) -> Iterator[Meaning]
     """The meaning, and those with joints (n, k) in another unit that stays within two turns."""
     yield meaning
     largest = float(np.abs(q[:, ~slides]).max(initial=0.0))
-    for unit, stated, short, factor, may_be in (
-        ("radians", "degrees", "rad", 180.0 / np.pi, np.rad2deg(largest) <= _MOST_TURNS_RAD),
-        ("degrees", "radians", "deg", np.pi / 180.0, largest > _MOST_TURNS_RAD),
-    ):
-        if may_be and not slides.all():
+    for unit, stated, short, factor in orientations.ANGLE_UNITS:
+        few_turns = (np.rad2deg(largest) if short == "rad" else largest) <= _MOST_TURNS_RAD
+        if few_turns == (short == "rad") and not slides.all():
             setting = {"joint_unit": short}
             change = finding("joint_units", unit=unit, stated=stated, short=short, setting=setting)
             yield meaning.changed(change, unit=np.where(slides, 1.0, factor))
@@ -105,18 +109,9 @@ def of_scale(meaning: Meaning, ratio: float) -> Iterator[Meaning]:
     """Positions in a unit that brings their spread, now ``ratio`` times the arm's, within reach."""
     if 1.0 / _WITHIN < ratio < _WITHIN:
         yield meaning
-    for unit, factor in _SCALES:
+    for change, factor in LENGTHS:
         if 1.0 / _WITHIN < ratio * factor < _WITHIN:
-            yield meaning.changed(of_length(unit), scale=factor)
-
-
-def of_length(unit: str) -> Finding:
-    """The finding that positions are in ``unit``, a thousandth of the stated one where empty."""
-    if unit == "metres":
-        return finding("length_units", unit=unit, short="m", setting={"length_unit": "m"})
-    if not unit:
-        return finding("length_units/small", setting={"length_unit": "mm"})
-    return finding("length_units/other", unit=unit)
+            yield meaning.changed(change, scale=factor)
 
 
 def of_signs(meaning: Meaning, joints: Iterable[int]) -> Meaning:
@@ -126,16 +121,16 @@ def of_signs(meaning: Meaning, joints: Iterable[int]) -> Meaning:
     return replace(meaning, matrix=meaning.matrix * signs, changes=(*meaning.changes, *changes))
 
 
-def coupled(meaning: Meaning, joint: int, other: int, sign: float) -> Meaning:
+def coupled(meaning: Meaning, joint: int, second: int, sign: float) -> Meaning:
     """The meaning with a joint of the file counted from another one (0-based)."""
     coupling = np.eye(len(meaning.unit))
-    coupling[joint, other] = sign
+    coupling[joint, second] = sign
     matrix = meaning.matrix @ coupling + 0.0
     rows = (f"[{', '.join(f'{value:g}' for value in row)}]" for row in matrix)
     change = finding(
         "joint_coupling",
         joint=joint + 1,
-        other=other + 1,
+        other=second + 1,
         sign="plus" if sign > 0 else "minus",
         map=f"[{', '.join(rows)}]",
     )
@@ -207,16 +202,17 @@ def find(
     # One session: each has its own base, and a meaning holds for all of them.
     part = _largest_session(read, np.arange(len(read)))
     misfit = Misfit(part.select(thinned(np.arange(len(part)), _TRIED_ROWS)), robot)
-    least, tried = misfit(here), {}
+    least = misfit(here)
+    tried: dict[tuple[Any, ...], tuple[float, Meaning]] = {}
     for value, item in _searched(misfit, here, written.sigma_mm < _GOOD * spread, progress):
-        # A meaning that is found again is kept with the fewest changes.
+        # A meaning that comes again keeps the fewest changes.
         numbers = (item.matrix.tobytes(), item.unit.tobytes(), item.zero.tobytes())
         tried.setdefault((*numbers, item.scale, item.mirrored), (value, item))
-    better = [(value, item) for value, item in tried.values() if value < _PROMISING * least]
-    if not better:
+    best = min(value for value, _ in tried.values())
+    if not best < _PROMISING * least:
         return here, ()
-    best = min(value for value, _ in better)
-    close = [pair for pair in better if pair[0] < _AS_GOOD * best]
+    limit = min(_AS_GOOD * best, _PROMISING * least)
+    close = [pair for pair in tried.values() if pair[0] < limit]
     # Of meanings that do equally well, the one that changes least comes first.
     close.sort(key=lambda pair: (*_simplicity(pair[1]), pair[0]))
     many = part.select(thinned(np.arange(len(part)), _FITTED_ROWS))
@@ -227,12 +223,13 @@ def find(
     smallest = min(value for value, _ in fitted)
     if smallest >= _BETTER * _left_mm(many, robot, here) or smallest > FAR * spread:
         return here, ()
-    remaining, results = next(
-        (value, item) for value, item in fitted if value < _AS_GOOD * smallest
-    )
-    subset = {change.what for change in results.changes}
-    others = [[change.what for change in e.changes] for v, e in fitted if v < _AS_GOOD * smallest]
-    rivals = [" and ".join(w for w in e if w not in subset) for e in others if not subset <= set(e)]
+    (remaining, results), *others = (e for e in fitted if e[0] < _AS_GOOD * smallest)
+    texts = {change.what for change in results.changes}
+    rivals = []
+    for _, item in others:
+        parts = [change.what for change in item.changes]
+        if not texts <= {*parts}:
+            rivals.append(" and ".join(text for text in parts if text not in texts))
     rivals = list(dict.fromkeys(filter(None, rivals)))[:3]
     detail = " ({as_written_mm:.3g} mm per axis as written, {found_mm:.3g} mm so{equal})"
     equal = f"; as well explained by: {', or '.join(rivals)}" if rivals else ""
@@ -297,7 +294,8 @@ def _searched(
 
     Only single changes of the joints where the file as written is ``good``.
     """
-    slides, tried = misfit.robot.dh.prismatic, []
+    slides = misfit.robot.dh.prismatic
+    tried: list[tuple[float, Meaning]] = []
     rounds = [single(here, slides)] if good else _rounds(misfit, here, tried)
     for rivals in rounds:
         results = [(misfit(item), item) for item in progress(list(rivals), _TRIED)]
@@ -307,7 +305,9 @@ def _searched(
             return
 
 
-def _rounds(misfit: Misfit, here: Meaning, tried: list) -> Iterator[Iterable[Meaning]]:
+def _rounds(
+    misfit: Misfit, here: Meaning, tried: list[tuple[float, Meaning]]
+) -> Iterator[Iterable[Meaning]]:
     """Meanings by the number of their changes; ``tried`` has those of the rounds before."""
     slides = misfit.robot.dh.prismatic
     units = [
@@ -315,8 +315,8 @@ def _rounds(misfit: Misfit, here: Meaning, tried: list) -> Iterator[Iterable[Mea
         for item in of_units(here, misfit.read.q, slides)
         for scaled in of_scale(item, misfit.ratio(item))
     ]
-    remaining = finding("left_handed")
-    yield units + [item.changed(remaining, mirrored=True) for item in units]
+    change = finding("left_handed")
+    yield units + [item.changed(change, mirrored=True) for item in units]
     roots = (units or [here])[:3]
     yield [item for root in roots for item in single(root, slides)]
     joints = range(len(slides))

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import scipy
@@ -12,6 +13,7 @@ from numpy import ndarray
 from kinacc.checks import robust_fit, tails
 from kinacc.checks.findings import Finding, finding
 from kinacc.checks.readings import Distance, Readings
+from kinacc.checks.report import Progress
 from kinacc.checks.robust_fit import Fitted, Linear, fit
 from kinacc.geometry import Pose, compose, invert, log_so3
 from kinacc.kinematics.dh import DHModel
@@ -29,7 +31,6 @@ _STEADY = 0.9  # of what jumps explain; of one jump, a steady motion explains 0.
 _EXCESS = 2.0  # times what chance, or a step along a joint, explains
 _FEWEST_ROWS = 4  # on either side of a change of a distance
 
-Progress = Callable[[Iterable, str], Iterable]
 Jump = tuple[int | None, ndarray]  # a target, None for the base, that is elsewhere in rows on
 
 
@@ -61,10 +62,17 @@ def without_jumps(
     return fitted, list(_findings(whole, fitted, jumps)) if jumps else []
 
 
-def _labels(observed: Readings, target: int | None) -> tuple[str, ndarray, tuple]:
+def _labels(observed: Readings, target: int | None) -> tuple[str, ndarray, tuple[str, ...]]:
     """What the base (None) or a target is numbered by: its field, the numbers, their names."""
     kind = "session" if target is None else "target"
     return kind, getattr(observed, kind), getattr(observed, f"{kind}_names")
+
+
+def _labelled(
+    observed: Readings, kind: str, label: ndarray, names: tuple[str, ...] = ()
+) -> Readings:
+    values: dict[str, Any] = {kind: label} | ({f"{kind}_names": names} if names else {})
+    return replace(observed, **values)
 
 
 def _linearised(fitted: Fitted) -> tuple[Readings, ndarray, ndarray, Linear]:
@@ -149,7 +157,7 @@ def _parted(
     both = np.flatnonzero(np.isin(labels, frames))
     costs = []
     for frame in frames:
-        part = replace(observed.select(both), **{kind: np.full(len(both), frame)})
+        part = _labelled(observed.select(both), kind, np.full(len(both), frame))
         remaining = np.linalg.norm(robust_fit.residuals(again.trial.arm, part).position_mm, axis=1)
         costs.append(np.append(0.0, np.minimum(remaining, _CAP * again.trial.sigma_mm)))
     place = int(np.argmin(np.cumsum(costs[0]) - np.cumsum(costs[1])))
@@ -166,8 +174,8 @@ def _split(observed: Readings, row: int, target: int | None) -> tuple[Readings, 
     kind, label, names = _labels(observed, target)
     subset = label[row] if target is None else target
     rows = (np.arange(len(observed)) >= row) & (label == subset)
-    split = {kind: np.where(rows, len(names), label), f"{kind}_names": (*names, names[subset])}
-    return replace(observed, **split), np.flatnonzero(rows)
+    split = _labelled(observed, kind, np.where(rows, len(names), label), (*names, names[subset]))
+    return split, np.flatnonzero(rows)
 
 
 def _share_left(before: Fitted, after: Fitted, rows: ndarray) -> float:

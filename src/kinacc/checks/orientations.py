@@ -19,6 +19,11 @@ from kinacc.measurements.layout import ANGLES, in_order_of
 from kinacc.measurements.orientation import CONVENTIONS, rotations
 
 BETTER = 0.5  # of the scatter as written
+# In which unit angles are, in which they are said to be, its setting, and the factor.
+ANGLE_UNITS = (
+    ("radians", "degrees", "rad", 180.0 / np.pi),
+    ("degrees", "radians", "deg", np.pi / 180.0),
+)
 _LARGEST_RAD = 0.35  # scatter of a right reading, the arm being off by what it may be
 _MAJORITY = 0.7
 _ROWS = 300
@@ -75,14 +80,12 @@ def simple(stated: Orientation, raw: ndarray) -> Iterator[Turn]:
     """Ways one change away from what is stated, likely ones first."""
     yield from _backwards(Turn(None, lambda raw: rotations(raw, stated)))
     largest = np.nanmax(np.abs(raw), initial=0.0)
-    for unit, before, short, factor, may_be in (
-        ("radians", "degrees", "rad", 180.0 / np.pi, np.rad2deg(largest) <= 4.0 * np.pi),
-        ("degrees", "radians", "deg", np.pi / 180.0, largest > 2.0 * np.pi),
-    ):
+    for unit, before, short, factor in ANGLE_UNITS:
+        may_be = np.rad2deg(largest) <= 4.0 * np.pi if short == "rad" else largest > 2.0 * np.pi
         if may_be and stated.kind != "quaternion":
             setting = {"orientation": {"unit": short}}
             change = finding("angle_units", unit=unit, stated=before, short=short, setting=setting)
-            yield Turn(change, lambda raw, factor=factor: rotations(raw * factor, stated))
+            yield Turn(change, lambda raw, by=factor: rotations(raw * by, stated))  # type: ignore[misc]
     yield from _readings(stated)
 
 
@@ -104,20 +107,20 @@ def _backwards(turn: Turn) -> Iterator[Turn]:
     yield Turn(joined(change), lambda raw: np.swapaxes(turn.read(raw), 1, 2))
     for axis, name in enumerate("xyz"):
         mirror = np.where(np.arange(3) == axis, -1.0, 1.0)
-        change = finding("left_handed/turns", axis=name)
-        both = np.outer(mirror, mirror)
-        yield Turn(joined(change), lambda raw, both=both: turn.read(raw) * both)
+        change, both = finding("left_handed/turns", axis=name), np.outer(mirror, mirror)
+        yield Turn(joined(change), lambda raw, by=both: turn.read(raw) * by)  # type: ignore[misc]
 
 
 def _readings(stated: Orientation) -> Iterator[Turn]:
     if stated.kind == "quaternion":
-        for columns, order in (([3, 0, 1, 2], "xyzw"), ([1, 2, 3, 0], "wxyz")):
-            setting = {"orientation": {"order": order}}
-            change = finding("euler_convention/quaternion", order=order, setting=setting)
-            yield Turn(change, lambda raw, columns=columns: rotations(raw[:, columns], stated))
+        for shift, name in ((1, "xyzw"), (-1, "wxyz")):
+            setting = {"orientation": {"order": name}}
+            change = finding("euler_convention/quaternion", order=name, setting=setting)
+            yield Turn(change, lambda raw, by=shift: rotations(np.roll(raw, by, 1), stated))  # type: ignore[misc]
         return
     euler = stated.kind == "euler"
     names = in_order_of(stated.convention) if euler else ANGLES
+    order: list[int]
     if euler and len(set(stated.convention.lower())) == 3:
         # Angles about x, y, z as named, taken in another sequence.
         for convention in CONVENTIONS[:6]:

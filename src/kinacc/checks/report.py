@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib.resources import files
+from typing import Any
 
 import numpy as np
 
 from kinacc.checks.findings import STOPS, Finding
 
+Progress = Callable[[Iterable[Any], str], Iterable[Any]]
 CLEAN, SUSPICIOUS, UNUSABLE = 0, 1, 2
 VERDICTS = ("clean", "suspicions", "unusable")
 
@@ -36,7 +38,7 @@ class Report:
 
     dataset: str
     path: str
-    facts: Mapping[str, object]
+    facts: Mapping[str, Any]
     remarks: tuple[str, ...]
     suspicions: tuple[Finding, ...]
     notes: tuple[Finding, ...] = ()
@@ -83,7 +85,7 @@ class Report:
         return template.render(report=self)
 
 
-def to_json(reports: Sequence[Mapping]) -> str:
+def to_json(reports: Sequence[Mapping[str, Any]]) -> str:
     """All data sets in one object, with the worst verdict; numbers that are not finite are null."""
     verdict = max((item["verdict"] for item in reports), key=VERDICTS.index, default=VERDICTS[0])
     text = json.dumps({"verdict": verdict, "datasets": reports}, default=np.ndarray.tolist)

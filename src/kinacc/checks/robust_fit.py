@@ -13,6 +13,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
+import pandas as pd
 from numpy import ndarray
 
 from kinacc.calibration.frames import FrameParameters, Frames
@@ -20,7 +21,7 @@ from kinacc.calibration.hand_eye import base_from_targets, closed_form_start
 from kinacc.calibration.system import PoseSystem
 from kinacc.checks import tails
 from kinacc.checks.readings import Readings, nearest_rotation, thinned
-from kinacc.geometry import Pose, compose, log_so3
+from kinacc.geometry import Pose, compose, invert, log_so3
 from kinacc.kinematics import dh
 from kinacc.kinematics.dh import DHModel
 
@@ -45,7 +46,7 @@ _PARTS = slice(0, 3), slice(3, 6)  # positions, turns
 _DRAWS = 24  # with a third of the readings wrong, 8 of 24 draws of two are free of them, or more
 _DRAWN = 12  # configurations per draw
 _STRETCHES = (2, 3, 5)
-_KEPT = 0.5  # share of the readings a refinement of the start trusts
+_TRUSTED = 0.5  # share of the readings a refinement of the start trusts
 _JUDGED = 0.4  # share of the readings that must fit: the rest may be of another base
 _REFINEMENTS = 4
 _ASTRAY = 5.0  # times what the others leave: a target whose place was not found
@@ -120,13 +121,13 @@ def fit(observed: Readings, model: DHModel) -> Fitted:
     """The robust fit of at most ``_FITTED_ROWS`` readings, and what it leaves of all."""
     chosen = thinned(np.arange(len(observed)), _FITTED_ROWS)
     few = observed.select(chosen)
-    results = best(few, start(few, model))
-    remaining = residuals(results.arm, observed)
+    trial = best(few, start(few, model))
+    remaining = residuals(trial.arm, observed)
     lengths = []
-    for part, residual in ((slice(0, 3), remaining.position_mm), (slice(3, 6), remaining.turn_rad)):
-        length = np.linalg.norm(residual, axis=1)
-        without, over = (
-            np.linalg.norm(item[:, part], axis=1) for item in (results.left_out, results.judged)
+    for part, residual in zip(_PARTS, (remaining.position_mm, remaining.turn_rad), strict=True):
+        length, without, over = (
+            np.linalg.norm(item, axis=1)
+            for item in (residual, trial.left_out[:, part], trial.judged[:, part])
         )
         # A reading that alone determines something lies anywhere without it, however sound it is:
         # it is far only where it is so too over what the fit without it leaves open.
@@ -135,7 +136,7 @@ def fit(observed: Readings, model: DHModel) -> Fitted:
         lengths.append(length)
     limits = [tails.limit(length, 3) for length in lengths]
     left_rad = np.where(np.isfinite(lengths[1]), lengths[1], -1.0)
-    return Fitted(observed, chosen, results, remaining, lengths[0], left_rad, *limits)
+    return Fitted(observed, chosen, trial, remaining, lengths[0], left_rad, *limits)
 
 
 def residuals(arm: Arm, observed: Readings, flange: Pose | None = None) -> Residuals:
@@ -167,7 +168,7 @@ def best(observed: Readings, begin: Arm, strengths: tuple[float, ...] = STRENGTH
             continue
         arm, cap = trial.arm, cap or _CAP * trial.sigma_mm
         length = np.minimum(np.linalg.norm(trial.left_out[:, :3], axis=1), cap)
-        score = np.mean(np.bincount(number, length) / np.bincount(number))
+        score = float(np.mean(np.bincount(number, length) / np.bincount(number)))
         # Stronger corrections must pay: noise alone moves the score by a per mille or so.
         if score < 0.99 * least:
             chosen, least = trial, score
@@ -252,7 +253,7 @@ class Linear:
         gram = weighted.T @ flat + np.diag(lean)
         # What no reading shows (a base nobody sees) stays where it is.
         diagonal = np.diag(gram)
-        scale = np.where(diagonal > 0.0, np.where(diagonal > 0.0, diagonal, 1.0) ** -0.5, 0.0)
+        scale = np.divide(1.0, np.sqrt(diagonal), out=0.0 * diagonal, where=diagonal > 0.0)
         both = np.outer(scale, scale)
         inverse = np.linalg.pinv(gram * both, rcond=1e-12, hermitian=True) * both
         step = -inverse @ (weighted.T @ residual.ravel() + lean * moved)
@@ -279,28 +280,26 @@ class Linear:
         unit = np.nan_to_num(np.repeat([self.sigma_mm, self.sigma_rad], 3), nan=1.0)
         plain, judged = self.residual / unit, self.residual / unit
         scaled, share = self.design / unit[:, None], self.weights * unit**2
-        order = np.argsort(observed.pose, kind="stable")
-        sizes = np.unique(observed.pose, return_counts=True)[1]
-        begins = np.cumsum(sizes) - sizes
-        for size in np.unique(sizes):
-            rows = order[begins[sizes == size][:, None] + np.arange(size)]
+        number = pd.factorize(observed.pose)[0]
+        for size in np.unique(np.bincount(number)):
+            of_size = np.bincount(number)[number] == size
+            rows = np.flatnonzero(of_size)[np.argsort(number[of_size], kind="stable")]
+            rows = rows.reshape(-1, size)
             block = scaled[rows].reshape(len(rows), 6 * size, -1)
             open_there = block @ self.inverse @ np.swapaxes(block, 1, 2)
             # What one configuration alone determines is unknown without it: far, not infinite.
-            whole = (1.0 + _OFF_ZERO) * np.eye(6 * size)
-            rest = whole - open_there * share[rows].reshape(len(rows), 1, -1)
+            rest = (1.0 + _OFF_ZERO) * np.eye(6 * size) - open_there * share[rows].reshape(
+                len(rows), 1, -1
+            )
             rest = np.linalg.pinv(rest, rcond=1e-12)
             remaining = rest @ plain[rows].reshape(len(rows), -1, 1)
             spread = rest @ open_there
             value, axes = np.linalg.eigh(0.5 * (spread + np.swapaxes(spread, 1, 2)))
             over = np.sqrt(1.0 + np.maximum(value, 0.0))[:, :, None]
-            plain[rows] = remaining.reshape(*rows.shape, 6)
-            judged[rows] = (axes @ (np.swapaxes(axes, 1, 2) @ remaining / over)).reshape(
-                *rows.shape, 6
-            )
-        unit = np.where(
-            np.repeat([[True], [False]], 3) | observed.has_rotation[:, None], unit, np.nan
-        )
+            within = axes @ (np.swapaxes(axes, 1, 2) @ remaining / over)
+            plain[rows], judged[rows] = (e.reshape(*rows.shape, 6) for e in (remaining, within))
+        unit = np.tile(unit, (len(observed), 1))
+        unit[~observed.has_rotation, 3:] = np.nan
         return plain * unit, judged * unit
 
 
@@ -332,61 +331,52 @@ def start(
     largest = np.argmax(np.bincount(observed.session))
     part = observed.select(thinned(np.flatnonzero(observed.session == largest), _START_ROWS))
     flange = dh.forward(model, part.q_rad)
-    results, least = None, np.inf
+    arm, least = None, np.inf
     for rows in _draws(part, draws, stretches):
         for _ in range(_REFINEMENTS):
             place = Pose(*(item[rows] for item in flange))
-            arm = Arm(model, closed_form_start(part.select(rows), place))
-            misfit = np.linalg.norm(residuals(arm, part, flange).position_mm, axis=1)
+            trial = Arm(model, closed_form_start(part.select(rows), place))
+            misfit = np.linalg.norm(residuals(trial, part, flange).position_mm, axis=1)
             middle = float(np.quantile(misfit, _JUDGED))
             if middle >= least:
                 break
-            results, least = arm, middle
-            rows = np.argsort(misfit)[: max(int(_KEPT * len(misfit)), _DRAWN)]
-    frames = (
-        _placed(results, part, flange, least) if len(observed.target_names) > 1 else results.frames
-    )
-    targets = frames.targets
-    for second in np.unique(observed.session[observed.session != largest]):
-        subset = observed.select(observed.session == second)
-        place, rows = dh.forward(model, subset.q_rad), np.arange(len(subset))
+            arm, least = trial, middle
+            rows = np.argsort(misfit)[: max(int(_TRUSTED * len(misfit)), _DRAWN)]
+    frames = arm.frames
+    if len(observed.target_names) > 1:
+        _place_targets(arm, part, flange, least)
+    for session in np.unique(observed.session[observed.session != largest]):
+        part = observed.select(observed.session == session)
+        flange, rows = dh.forward(model, part.q_rad), np.arange(len(part))
         for _ in range(_REFINEMENTS):
-            base = base_from_targets(subset.select(rows), Pose(*(e[rows] for e in place)), targets)
-            frames.bases.rotation[second], frames.bases.position_mm[second] = base
-            misfit = np.linalg.norm(
-                residuals(Arm(model, frames), subset, place).position_mm, axis=1
-            )
-            rows = np.argsort(misfit)[: max(int(_KEPT * len(subset)), min(len(subset), 4))]
-    return Arm(model, frames)
+            place = Pose(*(item[rows] for item in flange))
+            base = base_from_targets(part.select(rows), place, frames.targets)
+            frames.bases.rotation[session], frames.bases.position_mm[session] = base
+            misfit = np.linalg.norm(residuals(arm, part, flange).position_mm, axis=1)
+            rows = np.argsort(misfit)[: max(int(_TRUSTED * len(part)), min(len(part), 4))]
+    return arm
 
 
 def _draws(part: Readings, draws: int, stretches: tuple[int, ...]) -> Iterator[ndarray]:
     """All readings, stretches of the file, and random configurations."""
     every, poses = np.arange(len(part)), np.unique(part.pose)
     yield every
-    for parts in stretches:
-        for piece in np.array_split(every, parts):
-            if len(np.unique(part.pose[piece])) >= _DRAWN:
-                yield piece
+    pieces = (piece for parts in stretches for piece in np.array_split(every, parts))
+    yield from (piece for piece in pieces if len(np.unique(part.pose[piece])) >= _DRAWN)
     rng = np.random.default_rng(0)
     for _ in range(draws if len(poses) > _DRAWN else 0):
         yield np.flatnonzero(np.isin(part.pose, rng.choice(poses, _DRAWN, replace=False)))
 
 
-def _placed(arm: Arm, part: Readings, flange: Pose, usual_mm: float) -> Frames:
-    """Frames with targets that were in none of the readings chosen put where theirs have them."""
+def _place_targets(arm: Arm, part: Readings, flange: Pose, usual_mm: float) -> None:
+    """Put targets that were in none of the readings chosen where their readings have them."""
     misfit = np.linalg.norm(residuals(arm, part, flange).position_mm, axis=1)
-    base = Pose(*(item[part.session[0]] for item in arm.frames.bases))
-    there = (part.position_mm - base.position_mm) @ base.rotation - flange.position_mm
-    there = (np.swapaxes(flange.rotation, 1, 2) @ there[..., None])[..., 0]
-    targets = Pose(*(item.copy() for item in arm.frames.targets))
-    for item in np.unique(part.target):
-        of = part.target == item
-        if np.median(misfit[of]) > _ASTRAY * usual_mm:
-            targets.position_mm[item] = np.median(there[of], axis=0)
-            of &= part.has_rotation
-            if of.any():
-                turned = np.swapaxes(base.rotation @ flange.rotation[of], 1, 2)
-                turned = np.median(turned @ part.rotation[of], axis=0)
-                targets.rotation[item] = nearest_rotation(turned)
-    return Frames(arm.frames.bases, targets)
+    base = Pose(*(item[part.session] for item in arm.frames.bases))
+    there = compose(invert(compose(base, flange)), Pose(part.rotation, part.position_mm))
+    for target in np.unique(part.target):
+        rows = part.target == target
+        if np.median(misfit[rows]) > _ASTRAY * usual_mm:
+            arm.frames.targets.position_mm[target] = np.median(there.position_mm[rows], axis=0)
+            if (rows := rows & part.has_rotation).any():
+                turned = nearest_rotation(np.median(there.rotation[rows], axis=0))
+                arm.frames.targets.rotation[target] = turned

@@ -50,22 +50,21 @@ def _explanations(
     def moved(position_mm: ndarray, rotation: ndarray = observed.rotation) -> Readings:
         return replace(observed, position_mm=position_mm, rotation=rotation)
 
-    for stated, factor in (("degrees", 180.0 / np.pi), ("radians", np.pi / 180.0)):
-        unit = {"degrees": "radians", "radians": "degrees"}[stated]
+    for unit, stated, _, factor in orientations.ANGLE_UNITS:
         q = observed.q * np.where(meaning.unit == 1.0, factor, 1.0)
         change = finding("joint_units", unit=unit, stated=stated, short="")
         yield change, replace(observed, q_rad=meaning.joints(q))
-    for factor, unit in ((1e3, "metres"), (1e-3, ""), (25.4, "inches")):
-        yield meanings.of_length(unit), moved(factor * observed.position_mm)
+    for change, factor in meanings.LENGTHS:
+        yield change, moved(factor * observed.position_mm)
     yield (
         finding("commanded_joints/better"),
         replace(observed, q_rad=meaning.joints(observed.commanded)),
     )
     there = observed.has_rotation
-    turns, stated = observed.turns[there], layout.orientation
-    for way in orientations.simple(stated, turns) if there.any() else ():
+    turns = observed.turns[there]
+    for way in orientations.simple(layout.orientation, turns) if there.any() else ():
         rotation = observed.rotation.copy()
-        rotation[there] = way.read(observed.turns[there])
+        rotation[there] = way.read(turns)
         yield way.change, moved(observed.position_mm, rotation)
     for mirror, name in zip(1.0 - 2.0 * np.eye(3), "xyz", strict=True):
         change, position_mm = finding("left_handed/axis", axis=name), observed.position_mm * mirror

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
 from dataclasses import replace
 
 import numpy as np
 
+from kinacc.calibration.observations import Observations
+from kinacc.checks.report import Progress
 from kinacc.errors import InputError
 from kinacc.kinematics.dh import DHModel, forward
 from kinacc.kinematics.robot import load, shipped
@@ -18,8 +19,6 @@ _TRIED, _POSES = 4, 30  # robots that a linear fit puts first, with this many po
 _SURE = 0.005  # of the points' spread: what an arm that is the one leaves, uncalibrated
 _NEXT = 0.2  # of what the next best leaves
 _SAME_ARM = 1e-6  # of the misfit: two names of one geometry
-
-Progress = Callable[[Iterable, str], Iterable]
 
 
 def fitting(guess: Guess, progress: Progress) -> list[str]:
@@ -55,7 +54,7 @@ def fitting(guess: Guess, progress: Progress) -> list[str]:
     return [] if least > _SURE or (others and least > _NEXT * others[0]) else same
 
 
-def linear_misfit(model: DHModel, observed, spread: float) -> float:
+def linear_misfit(model: DHModel, observed: Observations, spread: float) -> float:
     """Misfit of the most measured target, base and tool entering linearly, in spreads.
 
     ``point = B p + B R t + b`` is linear in B (3, 3), the products of B and t, and b; how far B is

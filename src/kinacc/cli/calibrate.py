@@ -99,4 +99,4 @@ def carried_out(
         code = run_workflow(target, configs, cores or os.cpu_count() or 1, options)
     if code:
         raise SystemExit(code)
-    return configs, [Path(RESULTS, name) for name in data.told] if is_run else []
+    return configs, [Path(RESULTS, name) for name in data.reported] if is_run else []

@@ -39,10 +39,10 @@ def remarks_on(guess: Guess, report: Report, reading: MeasuredFile, arm: Robot) 
     step = digits.smallest_step(joints, unit, decimal)
     if step > 0.0:
         q = np.stack([reading.columns[f"q{i + 1}"] for i in range(guess.joints)], axis=1)
-        cost = digits.cost(arm.dh, arm.dh_joints(q), step)
-        if cost.rms_mm >= _ROUNDED_MM:
+        reach_mm, rms_mm = digits.cost(arm.dh, arm.dh_joints(q), step)
+        if rms_mm >= _ROUNDED_MM:
             yield (
-                f"joints are written in steps of {step:.2g} deg: {cost.step_mm:.2g} mm at "
-                f"{cost.reach_mm / 1000.0:.2g} m from an axis, {cost.rms_mm:.2g} mm rms in all;"
-                " export more digits"
+                f"joints are written in steps of {step:.2g} deg: "
+                f"{reach_mm * np.deg2rad(step):.2g} mm at {reach_mm / 1000.0:.2g} m from an axis, "
+                f"{rms_mm:.2g} mm rms in all; export more digits"
             )

@@ -7,7 +7,6 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import (
     AfterValidator,
-    BeforeValidator,
     Discriminator,
     Field,
     Tag,
@@ -19,7 +18,7 @@ from pydantic import (
 
 from kinacc.config.fields import Distinct, Section, Text, distinct, refused, setting
 from kinacc.config.names import not_in_a_line
-from kinacc.config.values import did_you_mean, shown
+from kinacc.config.values import did_you_mean
 from kinacc.errors import first_few
 
 COMPARED = "residuals."  # figures of errors, pose by pose: chance can be told of these alone
@@ -95,9 +94,9 @@ def _known(figure: str) -> str:
 
 def _data_sets(names: list[str], info: ValidationInfo) -> list[str]:
     known = (info.context or {}).get("datasets", names)
-    if unknown := [item for item in names if item not in known]:
-        there = first_few([*map(str, known)], 10)
-        raise refused(f"names {first_few(unknown)}, which no data set is called", f"known: {there}")
+    if unknown := {*names} - {*known}:
+        fix = f"known: {first_few([*map(str, known)], 10)}"
+        raise refused(f"names {first_few(sorted(unknown))}, which no data set is called", fix)
     return names
 
 
@@ -252,19 +251,12 @@ KINDS = {
 }
 
 
-def _kind(gate: Any) -> str:
-    kinds = [item for item in KINDS if item in gate] if isinstance(gate, dict) else [gate.kind]
-    return f"[{kinds[0]}]"
-
-
-def _of_one_kind(gate: Any) -> Any:
-    kinds = {item for item in KINDS if isinstance(gate, dict) and item in gate}
-    if len(kinds - ({"value"} if "against" in kinds else {*()})) != 1:
-        close = [did_you_mean(item, KINDS) for item in gate] if isinstance(gate, dict) else []
-        fix = f"give one of {', '.join(KINDS)}"
-        fix = next(filter(None, [] if kinds else close), fix)
-        raise refused(f"{shown(gate)} is not of one kind", fix)
-    return gate
+def _kind(gate: Any) -> str | None:
+    """Tag of the kind of a gate, None where it has the keys of none or several."""
+    if isinstance(gate, Gate):
+        return f"[{gate.kind}]"
+    kinds = [item for item in KINDS if isinstance(gate, dict) and item in gate]
+    return f"[{kinds[0]}]" if len(kinds) == 1 or kinds == ["against", "value"] else None
 
 
 def _names_once(gates: list[Gate]) -> list[Gate]:
@@ -282,8 +274,7 @@ Gates = Annotated[
             | Annotated[Claims, Tag("[claims]")]
             | Annotated[Suspicions, Tag("[suspicions]")]
             | Annotated[History, Tag("[history]")],
-            Discriminator(_kind),
-            BeforeValidator(_of_one_kind),
+            Discriminator(_kind, "kind", f"is not of one kind: give one of {', '.join(KINDS)}"),
         ]
     ],
     Field(max_length=100),

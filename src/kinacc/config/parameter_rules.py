@@ -58,50 +58,52 @@ class Rule:
 
 
 def rules(content: Mapping[str, Any]) -> list[Rule]:
-    """Rules of a valid mapping of names to ``free``, ``fixed``, or values and priors by unit."""
-    results = []
+    """Rules of a mapping of names to ``free``, ``fixed``, or values and priors by unit.
+
+    Raises a validation error, at its name, for a rule that states nothing, the same twice, or a
+    number that its parameter does not have.
+    """
+    results: dict[Any, Rule] = {}
     for name, state in content.items():
-        known: dict[str, dict[str, float]] = {"value": {}, "prior_std": {}}
-        for key, number in state.items() if isinstance(state, Mapping) else ():
-            kind, _, short = key.rpartition("_")
-            known[kind][_UNITS[short][0]] = _UNITS[short][1] * number
-        is_free = state == FREE or bool(known["prior_std"])
-        subject = _subject(name) or (None, None, None)
-        results.append(Rule(name, *subject, is_free, known["value"], known["prior_std"]))
-    return results
+        subject, known = _subject(name) or (None, None, None), _numbers(name, state)
+        rule = Rule(name, *subject, state == FREE or bool(known["prior_std"]), *known.values())
+        wrong = {*rule.value}
+        if rule.parameter:
+            wrong = (wrong | {*rule.std}) - {unit(rule.parameter)}
+        if wrong:
+            message = f"{', '.join(wrong)} is no unit of {rule.parameter or 'no one parameter'}"
+            raise refused(message, "name one parameter, and its unit", name)
+        if subject in results:
+            raise refused(f"{name!r} is said twice, in two spellings", "", name)
+        results[subject] = rule
+    return [*results.values()]
+
+
+def _numbers(name: str, state: Any) -> dict[str, dict[str, float]]:
+    """Values and standard deviations of a rule by unit, mm and rad."""
+    known: dict[str, dict[str, float]] = {"value": {}, "prior_std": {}}
+    stated = state if isinstance(state, Mapping) else {}
+    for key, number in stated.items():
+        kind, _, short = key.rpartition("_")
+        known[kind][_UNITS[short][0]] = _UNITS[short][1] * number
+    if sum(map(len, known.values())) < max(len(stated), not isinstance(state, str)):
+        raise refused("states nothing, or the same in two units", "", name)
+    if any(std <= 0.0 for std in known["prior_std"].values()):
+        raise refused("a standard deviation should be greater than 0", "", name)
+    return known
 
 
 def _check(about: str) -> AfterValidator:
-    """Validator of the names of rules about JOINTS or FRAMES, and of units beside names."""
+    """Validator of rules about JOINTS or FRAMES."""
 
     def check(content: dict[str, Any]) -> dict[str, Any]:
-        subjects: list[Any] = []
-        for name, state in content.items():
-            subject, fix = _subject(name), ""
-            stated = [] if isinstance(state, str) else [key.rpartition("_") for key in state]
-            kinds = [(kind, _UNITS[short][0]) for kind, _, short in stated]
-            parameter = subject[2] if subject else None
-            units = {parameter and unit(parameter)}
-            wrong = [k for k, u in kinds if (parameter or k == "value") and u not in units]
+        for name in content:
+            subject = _subject(name)
             if subject is None or (subject[1] is not None) != (about == FRAMES):
-                message = f"{name!r} is no parameter of {about}"
-                second = KEYS[JOINTS if about == FRAMES else FRAMES]
-                fix = f"give {_NAMES[about]}; others belong in {second}"
-            elif subject in subjects:
-                message = f"{name!r} is said twice, in two spellings"
-            elif len({*kinds}) < len(kinds) or not (stated or isinstance(state, str)):
-                message = "states nothing, or the same in two units"
-            elif wrong:
-                message = (
-                    f"{wrong[0]} of {parameter or 'no one parameter'} is named in another unit"
-                )
-                fix = "name one parameter, and its unit"
-            elif any(k == "prior_std" and state["_".join((k, u))] <= 0.0 for k, _, u in stated):
-                message = "a standard deviation should be greater than 0"
-            else:
-                subjects.append(subject)
-                continue
-            raise refused(message, fix, name)
+                others = KEYS[JOINTS if about == FRAMES else FRAMES]
+                fix = f"give {_NAMES[about]}; others belong in {others}"
+                raise refused(f"{name!r} is no parameter of {about}", fix, name)
+        rules(content)
         return content
 
     return AfterValidator(check)

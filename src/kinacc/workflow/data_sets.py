@@ -33,18 +33,18 @@ class DataSets:
 
     def chosen(self, dataset: str, *paths: str) -> dict[str, Any]:
         """Settings of a data set at dotted paths, nested as in the configuration."""
-        found: dict[str, Any] = {}
+        selected: dict[str, Any] = {}
         for path in paths:
             *sections, key = path.split(".")
             source: Any = self.settings[dataset]
-            target = found
+            target = selected
             if (sections or [key])[0] not in source:
                 continue  # not in use
             for section in sections:
                 source, target = source[section], target.setdefault(section, {})
             if key in source:
                 target[key] = source[key]
-        return found
+        return selected
 
     def models(self, dataset: str) -> tuple[str, ...]:
         """Error models that a data set asks for, in the order they are fitted."""
@@ -63,9 +63,9 @@ class DataSets:
         return [line["name"] for line in self.settings[dataset].get("series", ())]
 
     @property
-    def told(self) -> list[str]:
+    def reported(self) -> list[str]:
         """Data sets that have a whole study: all but lines of a series, which are calibrated."""
-        return [name for name, own in self.settings.items() if "line_of" not in own]
+        return [name for name, settings in self.settings.items() if "line_of" not in settings]
 
     def robot_files(self, dataset: str) -> dict[str, str]:
         """A robot file of the user's own, and its URDF, by role."""
@@ -81,8 +81,8 @@ class DataSets:
         if not self.is_measured(dataset):
             return {}
         file = self.settings[dataset]["measurements"]["file"]
-        found = {"points_file": file["path"], "joints_file": file["joints"]["path"]}
-        return self._located({role: path for role, path in found.items() if path})
+        files = {"points_file": file["path"], "joints_file": file["joints"]["path"]}
+        return self._located({role: path for role, path in files.items() if path})
 
     def _located(self, files: Mapping[str, object]) -> dict[str, str]:
         place = os.path.abspath if self.absolute else str
@@ -114,31 +114,31 @@ def data_sets(full: Mapping[str, dict[str, Any]], absolute: bool = False) -> Dat
         if config["figures"]["formats"] != first["figures"]["formats"]
     ]
     refuse(problems)
-    found = DataSets(
+    plan = DataSets(
         {name: _in_use(without_execution_keys(config)) for name, config in full.items()},
-        min(first["study"]["chunks"], *(each["study"]["repetitions"] for each in full.values())),
+        min(first["study"]["chunks"], *(item["study"]["repetitions"] for item in full.values())),
         tuple(first["figures"]["formats"]),
         absolute,
     )
     refuse(
         Problem(path, "braces in its name would be a wildcard of Snakemake", fix="rename it")
-        for name in found.settings
-        for path in (*found.measured_files(name).values(), *found.robot_files(name).values())
+        for name in plan.settings
+        for path in (*plan.measured_files(name).values(), *plan.robot_files(name).values())
         if re.search(r"\{\s*\w.*\}", path)
     )
-    return found
+    return plan
 
 
-def _values(given: object) -> object:
+def _values(value: Any) -> Any:
     """Texts read as YAML: Snakemake hands numbers inside ``--config a='{b: 1}'`` over as text."""
     from kinacc.config.load import COMMAND_LINE
     from kinacc.config.reading import value_of
 
-    if isinstance(given, Mapping):
-        return {key: _values(value) for key, value in given.items()}
-    if isinstance(given, (list, tuple)):
-        return [_values(value) for value in given]
-    return value_of(given, COMMAND_LINE) if isinstance(given, str) else given
+    if isinstance(value, Mapping):
+        return {key: _values(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_values(item) for item in value]
+    return value_of(value, COMMAND_LINE) if isinstance(value, str) else value
 
 
 def _in_use(config: Mapping[str, Any]) -> dict[str, Any]:
@@ -159,9 +159,9 @@ def digests(files: Mapping[str, str]) -> dict[str, str]:
 
 def campaign_files(campaigns: Iterable[Path]) -> dict[str, str]:
     """Files of campaigns on the calibration of a data set, by role."""
-    found = {}
+    files = {}
     for number, campaign in enumerate(campaigns, 1):
-        found[f"campaign_{number}_file"] = str(campaign / PLAN)
+        files[f"campaign_{number}_file"] = str(campaign / PLAN)
         if (campaign / JOURNAL).is_file():
-            found[f"readings_{number}_file"] = str(campaign / JOURNAL)
-    return found
+            files[f"readings_{number}_file"] = str(campaign / JOURNAL)
+    return files

@@ -58,23 +58,27 @@ def like_those_of(folder: Path, readings: Path) -> dict[str, Any]:
     results is not found, several are, or it names more than one file.
     """
     folder = folder.resolve()
-    found: dict[str, dict[str, Any]] = {}
+    candidates: dict[str, dict[str, Any]] = {}
     for path, plan in beside(folder.parent, folder.name):
         if folder.name in plan.settings:
-            own = _of_file(load([path])[folder.name], readings)
-            if own is not None and own not in found.values():
-                found[path.name] = own
-    one = next(iter(found.values()), None)
-    if one is not None and len(found) == 1 and not one["measurements"]["file"]["joints"]["path"]:
-        return one
-    what = "is in a form that is not known: no configuration beside the results says how "
-    what += f"the readings of {folder.name} were read"
-    if len(found) > 1:
-        what = f"could be read in several ways: {', '.join(found)} describe {folder.name}"
-    elif one is not None:
-        what = f"has no joints of its own: those of {folder.name} stand in a second file"
+            settings = _of_file(load([path])[folder.name], readings)
+            if settings is not None and settings not in candidates.values():
+                candidates[path.name] = settings
+    first = next(iter(candidates.values()), None)
+    if (
+        first is not None
+        and len(candidates) == 1
+        and not first["measurements"]["file"]["joints"]["path"]
+    ):
+        return first
+    message = "is in a form that is not known: no configuration beside the results says how "
+    message += f"the readings of {folder.name} were read"
+    if len(candidates) > 1:
+        message = f"could be read in several ways: {', '.join(candidates)} describe {folder.name}"
+    elif first is not None:
+        message = f"has no joints of its own: those of {folder.name} stand in a second file"
     fix = f"`kinacc init {readings}` writes a .yaml that describes it: give that in its place"
-    raise InputError(Problem(str(readings), what, fix=fix))
+    raise InputError(Problem(str(readings), message, fix=fix))
 
 
 def _of_file(settings: Mapping[str, Any], readings: Path) -> dict[str, Any] | None:

@@ -38,4 +38,4 @@ def calibrated(results: str, datasets: Sequence[str]) -> list[Path]:
     """Results folders whose summary this run made."""
     tables = [Path(results, name, "summary.parquet") for name in datasets]
     began = _held[0][1]
-    return [each.parent for each in tables if each.is_file() and each.stat().st_mtime >= began]
+    return [path.parent for path in tables if path.is_file() and path.stat().st_mtime >= began]

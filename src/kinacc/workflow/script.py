@@ -21,7 +21,7 @@ from kinacc.tables.atomic import write_together
 from kinacc.tables.columns import Columns
 from kinacc.workflow.code import config_hash
 
-Progress = Callable[..., Iterable]
+Progress = Callable[..., Iterable[Any]]
 
 
 @dataclass(frozen=True)
@@ -43,10 +43,10 @@ class Stage:
 
     def marks(self) -> dict[str, str]:
         """What the artefacts of this job are marked with, see the artefact contract."""
-        own = config_hash(self.settings)
-        return {"kinacc_version": __version__, "config_hash": own, "seed": str(self.seed)}
+        digest = config_hash(self.settings)
+        return {"kinacc_version": __version__, "config_hash": digest, "seed": str(self.seed)}
 
-    def write_tables(self, tables: Mapping[str, Mapping]) -> None:
+    def write_tables(self, tables: Mapping[str, Mapping[str, Any]]) -> None:
         """Check every table against its schema, then write all of them and their digests."""
         marks = self.marks()
         self.write_files(
@@ -58,9 +58,9 @@ class Stage:
 
     def write_files(self, contents: Mapping[str, bytes]) -> None:
         """Write the files of this job by the names of its outputs, and their digests."""
-        found = {self.outputs[name]: content for name, content in contents.items()}
-        left = {os.path.relpath(path, self.folder): content for path, content in found.items()}
-        write_together(found | {self.outputs["sums"]: sums.text_of(left, self.read)})
+        files: dict[Path | str, bytes] = {self.outputs[name]: c for name, c in contents.items()}
+        listed = {os.path.relpath(path, self.folder): content for path, content in files.items()}
+        write_together(files | {self.outputs["sums"]: sums.text_of(listed, self.read)})
 
 
 @contextmanager
@@ -77,13 +77,15 @@ def stage(snakemake: Any) -> Iterator[Stage]:
             with suppress(OSError), open(log, "a", encoding="utf-8") as file:  # a full disk
                 file.write(f"{text}\n{details}")
 
-        def show(message, category, filename, lineno, *_) -> None:
+        def show(
+            message: Any, category: type[Warning], filename: str, lineno: int, *_: Any
+        ) -> None:
             is_plain = category is UserWarning
             tell(str(message) if is_plain else f"{category.__name__}: {message}",
                  "" if is_plain else f"{filename}:{lineno}\n")  # fmt: skip
 
         warnings.simplefilter("default")
-        warnings.showwarning = show
+        warnings.showwarning = show  # type: ignore[assignment]
         try:
             with reporting(label) as progress:
                 yield _opened(snakemake, dataset, progress)
@@ -102,7 +104,7 @@ def stage(snakemake: Any) -> Iterator[Stage]:
 
 def _opened(snakemake: Any, dataset: str, progress: Progress) -> Stage:
     sums_file = Path(snakemake.output.sums)
-    folder = next(each for each in sums_file.parents if each.name == sums.FOLDER).parent
+    folder = next(item for item in sums_file.parents if item.name == sums.FOLDER).parent
     inputs, read = _read(dict(snakemake.input.items()), folder)
     outputs = dict(snakemake.output.items())
     params = snakemake.params
@@ -126,8 +128,8 @@ def _read(
     inputs: dict[str, Any] = {}
     read: dict[str, str] = {}
     problems: list[Problem] = []
-    for role, given in paths.items():
-        listed = [given] if isinstance(given, str) else list(given)
+    for role, source in paths.items():
+        listed = [source] if isinstance(source, str) else list(source)
         contents = [Path(path).read_bytes() for path in listed]
         read |= {
             os.path.relpath(path, folder): sums.digest(content)
@@ -141,7 +143,7 @@ def _read(
             for path, content in zip(listed, contents, strict=True):
                 sums.hold(path, content)
                 parts.append(store.columns_in(store.read_arrow(path, content)))
-            inputs[role] = parts[0] if isinstance(given, str) else _joined(parts)
+            inputs[role] = parts[0] if isinstance(source, str) else _joined(parts)
     refuse(problems)
     return inputs, read
 
