@@ -57,5 +57,3 @@ def test_what_cannot_be_used_ends_with_2(configuration, tmp_path):
     assert report(config, 2)["problems"]
     config.write_text("datasets: {mh180: {robot: mh180}}\n")
     assert call("check-data", config).exit_code == 2
-
-
