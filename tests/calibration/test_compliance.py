@@ -83,7 +83,7 @@ def test_stated_masses_give_the_compliance_of_each_joint():
 def test_a_joint_that_gravity_does_not_turn_is_undetermined_and_stays_stiff():
     seen = measured()
     found = fitted(seen, [1, 2, 3])  # axis 1 is upright
-    known_of = uncertainty.of_fit(found, seen.target_names)
+    known_of = uncertainty.of_fit(found)
     place = known_of.names.index("j1.compliance_rad_per_nm")
     assert not known_of.determined[place]
     assert found.model.compliance_rad_per_nm[0] == pytest.approx(0.0, abs=1e-12)

@@ -20,7 +20,7 @@ def asked(name, kind=POSE, sessions=1):
     true, q = disturbed(arm.dh, free, rng), joints(arm, 80, rng)
     data = measure(true, q, kind, rng, sessions=sessions)
     found = fit(data, arm.dh, free)
-    known_of = uncertainty.of_fit(found, data.target_names)
+    known_of = uncertainty.of_fit(found)
     return pd.DataFrame(identified.table(found, known_of, data)).set_index("parameter")
 
 

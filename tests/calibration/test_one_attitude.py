@@ -59,9 +59,9 @@ def test_a_stated_length_of_the_tool_holds_every_model(std_mm):
     found = fitted(value_mm=230.0, prior_std_mm=std_mm)
     for kind, fit in found.items():
         assert fit.frames.tool.position_mm[2] == pytest.approx(230.0, abs=3 * std_mm), kind
-        known = uncertainty.of_fit(fit, ("t0",))
+        known = uncertainty.of_fit(fit)
         left_open = known.undetermined[:, known.names.index("t0.z_mm")]
         assert np.abs(left_open).max(initial=0.0) < 0.1, kind
-    known = uncertainty.of_fit(found["dh"], ("t0",))
+    known = uncertainty.of_fit(found["dh"])
     table = identified.table(found["dh"], known, pointing_one_way())
     assert dict(zip(table["parameter"], table["status"], strict=True))["t0.z_mm"] == "prior"

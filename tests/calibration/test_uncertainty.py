@@ -46,7 +46,7 @@ def units(names):
 
 def test_undetermined_directions_move_no_measured_pose():
     found, q = fitted(60), joints(60)
-    known = uncertainty.of_fit(found, ("t0",))
+    known = uncertainty.of_fit(found)
     assert len(known.undetermined) == 24 - found.solution.spectrum.rank > 3
     before = moved(found, known.names, np.zeros(len(known.names)), q)
     for direction in known.undetermined:
@@ -66,7 +66,7 @@ def test_undetermined_directions_move_no_measured_pose():
 def test_predicted_spread_is_that_of_repeated_fits():
     """Fit the same poses under forty draws of the noise: predictions scatter as the covariance."""
     q, fits = joints(8, 9), [fitted(40, seed) for seed in range(40)]
-    known = uncertainty.of_fit(fits[0], ("t0",))
+    known = uncertainty.of_fit(fits[0])
     none = np.zeros(len(known.names))
     scatter = np.array([moved(found, known.names, none, q).position_mm for found in fits])
     scatter = scatter.var(axis=0, ddof=1).sum(axis=1)

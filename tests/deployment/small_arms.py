@@ -80,14 +80,14 @@ def results_of(name: str, seen: Observations) -> dict:
         frames_free=True,
     )
     of = {"vec": vec_found.frames, "dh": dh_found.frames, "nominal": nominal}
-    known = uncertainty.of_fit(dh_found, ("tool",))
+    known = uncertainty.of_fit(dh_found)
     return {
         "vec_model": vec_found.model.to_columns(vec_found.std),
         "dh_model": dh_found.model.to_columns(dh_found.std.ravel()),
         "frames": tables.frames_columns(of, ("tool",)),
         "dh_fit": tables.fit_columns("dh_fit", dh_found, known),
         "dh_covariance": tables.covariance_columns(known),
-        "vec_covariance": tables.covariance_columns(uncertainty.of_fit(vec_found, ("tool",))),
+        "vec_covariance": tables.covariance_columns(uncertainty.of_fit(vec_found)),
         "residuals": _residuals(seen, of, dh_found.model, vec_found.model),
     }
 

@@ -17,7 +17,7 @@ from kinacc.calibration.observations import Observations, full_poses
 from kinacc.calibration.uncertainty import Uncertainty
 from kinacc.config import parameter_rules
 from kinacc.config.parameter_rules import Rule
-from kinacc.geometry import IDENTITY, Pose, compose
+from kinacc.geometry import IDENTITY
 from kinacc.kinematics.robot import Robot
 from kinacc.tables.columns import Columns
 
@@ -82,13 +82,10 @@ class DHEstimator(Estimator):
         frames, terms = self.common.frames(observations)
         followed = others["vec"] if self.follows_vec else None
         if followed:
-            at_target = compose(
-                followed.model.pose(observations.at),
-                _rows(followed.frames.targets, observations.target),
-            )
-            poses = full_poses(observations.q_rad, at_target)
-            observations = poses.with_targets_of(observations)
             frames, terms = Frames(IDENTITY, followed.frames.targets), None
+            one_base = replace(observations, session=np.zeros(len(observations), dtype=np.int64))
+            poses = full_poses(observations.q_rad, frames.seen(followed.model, one_base))
+            observations = poses.with_targets_of(observations)
         arm = self.arm
         free, std, held = arm.free, arm.std, False
         if not followed:
@@ -127,7 +124,3 @@ def hayati_joints(section: Mapping, arm: Robot) -> tuple[int, ...]:
     if section["hayati_joints"] == _AUTO:
         return parallel_joints(arm.dh)
     return tuple(int(joint) for joint in section["hayati_joints"])
-
-
-def _rows(targets: Pose, target: np.ndarray) -> Pose:
-    return Pose(targets.rotation[target], targets.position_mm[target])

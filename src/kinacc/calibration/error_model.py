@@ -31,7 +31,7 @@ def run(inputs: Mapping, settings: Mapping, kind: str, progress=None) -> dict[st
     name = f"{kind}_frames"
     if kind == PLAINEST:
         name, columns = "frames", _gathered(inputs, columns)
-    known = uncertainty.of_fit(fitted, every.target_names)
+    known = uncertainty.of_fit(fitted)
     return {
         f"{kind}_model": fitted.model.to_columns(fitted.std.ravel()),
         name: columns,

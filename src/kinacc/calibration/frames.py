@@ -9,7 +9,7 @@ orientation R to exp(w) R.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -17,7 +17,8 @@ from kinacc.calibration.observations import Observations
 from kinacc.config import parameter_rules
 from kinacc.config.parameter_rules import Rule
 from kinacc.errors import Problem, refuse
-from kinacc.geometry import IDENTITY, Pose, exp_so3, log_so3, skew
+from kinacc.geometry import IDENTITY, Pose, compose, exp_so3, log_so3, skew
+from kinacc.kinematics.model import ErrorModel
 
 MOTIONS = ("x_mm", "y_mm", "z_mm", "rx_rad", "ry_rad", "rz_rad")
 BASE = "base"
@@ -50,10 +51,15 @@ class Frames:
         """Number of sessions S."""
         return len(self.bases.position_mm)
 
-    @property
-    def count(self) -> int:
-        """Number of targets T."""
-        return len(self.targets.position_mm)
+    def at_rows(self, observations: Observations) -> tuple[Pose, Pose]:
+        """Base and target (n, ...) of every observation."""
+        bases = Pose(*(part[observations.session] for part in self.bases))
+        return bases, Pose(*(part[observations.target] for part in self.targets))
+
+    def seen(self, model: ErrorModel, observations: Observations) -> Pose:
+        """Poses (n, ...) of the targets in the instrument's frame, as a model predicts them."""
+        bases, targets = self.at_rows(observations)
+        return compose(bases, compose(model.pose(observations.at), targets))
 
     @property
     def tool(self) -> Pose:
@@ -99,9 +105,9 @@ def frame_terms(
     Raises InputError naming every rule about a frame that ``observations`` do not let estimate.
     """
     names = component_names(observations)
+    parts = [tuple(name.rpartition(".")[::2]) for name in names]
     frames: dict[str, list[str]] = {}
-    for name in names:
-        frame, _, component = name.rpartition(".")
+    for frame, component in parts:
         frames.setdefault(frame, []).append(component)
     refuse(
         [
@@ -109,14 +115,11 @@ def frame_terms(
             for rule, what, allowed in parameter_rules.strangers(rules, observations.joints, frames)
         ]
     )
-    at_mm = [*stated.bases.position_mm, *stated.targets.position_mm]
-    place_mm = dict(zip(frames, at_mm, strict=True))
     free, value = np.ones(len(names), dtype=bool), np.zeros(len(names))
     std = np.full(len(names), np.inf)
-    for number, name in enumerate(names):
-        frame, _, component = name.rpartition(".")
-        if component.endswith("_mm"):
-            value[number] = place_mm[frame]["xyz".index(component[0])]
+    lengths = [name.endswith("_mm") for name in names]
+    value[lengths] = np.concatenate([stated.bases.position_mm, stated.targets.position_mm]).ravel()
+    for number, (frame, component) in enumerate(parts):
         rule = parameter_rules.rule_for(rules, component, frame=frame)
         if rule is not None:
             unit = parameter_rules.unit(component)
@@ -190,19 +193,20 @@ class FrameParameters:
         order = [terms.names.index(name) for name in names]
         free, value, std = terms.free[order], terms.value[order], terms.std[order]
         bound = ~free | np.isfinite(std)
-        begin, reference = np.zeros(size), start
+        begin = np.zeros(size)
+        rotations = {kind: getattr(start, kind).rotation.copy() for kind in ("bases", "targets")}
         for kind, number, columns in _slots(names, start.sessions):
-            here, stated = getattr(start, kind), getattr(terms.stated, kind)
+            here, turned = getattr(start, kind), columns[3:]
             begin[columns[:3]] = here.position_mm[number]
-            turned = columns[3:]
             if not len(turned) or bound[turned].any():
-                rotation = getattr(reference, kind).rotation.copy()
-                rotation[number] = stated.rotation[number]
+                stated = getattr(terms.stated, kind).rotation[number]
+                rotations[kind][number] = stated
                 if len(turned):
-                    apart = here.rotation[number] @ rotation[number].T
-                    begin[turned] = log_so3(apart[None])[0]
-                moved = Pose(rotation, here.position_mm)
-                reference = replace(reference, **{kind: moved})
+                    begin[turned] = log_so3((here.rotation[number] @ stated.T)[None])[0]
+        bases, targets = (
+            Pose(rotation, getattr(start, kind).position_mm) for kind, rotation in rotations.items()
+        )
+        reference = Frames(bases, targets)
         begin[~free] = value[~free]
         mean = np.where(np.isfinite(std), value, begin)
         return cls(names, reference, begin, free, mean, std, np.zeros((0, size)))

@@ -21,9 +21,8 @@ from kinacc.calibration.one_thread import one_thread
 from kinacc.calibration.split import MOVES_SQUARED, TOUCH_SQUARED, undetermined
 from kinacc.calibration.system import PoseSystem
 from kinacc.calibration.uncertainty import Uncertainty, is_angle, named_directions, unit_of
-from kinacc.geometry import Pose, compose
+from kinacc.geometry import Pose
 from kinacc.kinematics.dh import DHModel
-from kinacc.kinematics.model import JointState
 from kinacc.tables.columns import Columns
 from kinacc.tables.contract import columns_of
 
@@ -72,7 +71,7 @@ def table(fit: ModelFit, known: Uncertainty, observations: Observations) -> Colu
 
 def left_open(fit: ModelFit, known: Uncertainty, seen: Observations) -> LeftOpen:
     """What the data cannot tell apart. ``seen``: what was fitted."""
-    hidden = named_directions(fit, seen.target_names, unseen_anywhere(fit, seen, STRUCTURAL))
+    hidden = named_directions(fit, unseen_anywhere(fit, seen, STRUCTURAL))
     return LeftOpen.of(hidden, known.undetermined, known.names, fit.frames)
 
 
@@ -98,22 +97,14 @@ def _everywhere(fit: ModelFit, observations: Observations) -> Observations:
     q_rad = joints_anywhere(fit.model.dh)
     pose, kind = np.repeat(np.arange(len(q_rad)), len(kinds)), np.tile(kinds.T, len(q_rad))
     session, target, turned = kind
-    frames = fit.frames
-    at = compose(
-        fit.model.pose(JointState(q_rad[pose])),
-        Pose(frames.targets.rotation[target], frames.targets.position_mm[target]),
+    nowhere = Pose(np.zeros((len(pose), 3, 3)), np.zeros((len(pose), 3)))
+    names = {"target_names": observations.target_names, "session_names": observations.session_names}
+    made = replace(
+        full_poses(q_rad[pose], nowhere), pose=pose, target=target, session=session, **names
     )
-    at = compose(Pose(frames.bases.rotation[session], frames.bases.position_mm[session]), at)
-    made = full_poses(q_rad[pose], at)
-    return replace(
-        made,
-        rotation=np.where(turned.astype(bool)[:, None, None], at.rotation, np.nan),
-        pose=pose,
-        target=target,
-        session=session,
-        target_names=observations.target_names,
-        session_names=observations.session_names,
-    )
+    at = fit.frames.seen(fit.model, made)
+    rotation = np.where(turned.astype(bool)[:, None, None], at.rotation, np.nan)
+    return replace(made, position_mm=at.position_mm, rotation=rotation)
 
 
 def joints_anywhere(model: DHModel) -> np.ndarray:

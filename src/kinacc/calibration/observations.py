@@ -124,31 +124,26 @@ def full_poses(
 
 def from_columns(columns: Mapping[str, np.ndarray], robot: Robot) -> Observations:
     """Observations from the columns of ``measurements``, made with ``robot``."""
-    joints = robot.dh.joints
-    reported = np.stack([columns[f"q{i}"] for i in range(1, joints + 1)], axis=1).astype(float)
-    s = np.stack([columns[f"s{i}"] for i in range(1, joints + 1)], axis=1).astype(np.int8)
-    quaternion = np.stack([columns[name] for name in ("qw", "qx", "qy", "qz")], axis=1)
-    names = columns["target"]
-    target_names = tuple(dict.fromkeys(str(name) for name in names))
-    index = {name: number for number, name in enumerate(target_names)}
-    sessions = columns.get("session", np.full(len(names), None))
-    session_names = tuple(dict.fromkeys(sessions))
-    session_index = {name: number for number, name in enumerate(session_names)}
-    fold = columns.get("fold", np.full(len(names), np.nan))
-    payload = None
-    if PAYLOAD_COLUMNS[0] in columns:
-        payload = np.stack([np.asarray(columns[name], float) for name in PAYLOAD_COLUMNS], axis=1)
+
+    def stack(*names: str) -> np.ndarray:
+        return np.stack([np.asarray(columns[name], dtype=float) for name in names], axis=1)
+
+    count, numbers = len(columns["pose"]), range(1, robot.dh.joints + 1)
+    targets = [str(name) for name in columns["target"]]
+    sessions = list(columns.get("session", [None] * count))
+    target_names, session_names = tuple(dict.fromkeys(targets)), tuple(dict.fromkeys(sessions))
+    fold = np.asarray(columns.get("fold", np.full(count, np.nan)), dtype=float)
     return Observations(
-        q_rad=robot.dh_joints(reported),
-        s=s,
-        position_mm=np.stack([columns[name] for name in ("x_mm", "y_mm", "z_mm")], axis=1),
-        rotation=rotation_from_quaternion(quaternion.astype(float)),
+        q_rad=robot.dh_joints(stack(*(f"q{i}" for i in numbers))),
+        s=stack(*(f"s{i}" for i in numbers)).astype(np.int8),
+        position_mm=stack("x_mm", "y_mm", "z_mm"),
+        rotation=rotation_from_quaternion(stack("qw", "qx", "qy", "qz")),
         pose=np.asarray(columns["pose"]).astype(np.int64),
-        target=np.array([index[str(name)] for name in names], dtype=np.int64),
+        target=np.array([target_names.index(name) for name in targets], dtype=np.int64),
         repeat=np.asarray(columns["repeat"]).astype(np.int64),
-        fold=np.nan_to_num(np.asarray(fold, dtype=float), nan=-1.0).astype(np.int64),
+        fold=np.nan_to_num(fold, nan=-1.0).astype(np.int64),
         target_names=target_names,
-        session=np.array([session_index[name] for name in sessions], dtype=np.int64),
+        session=np.array([session_names.index(name) for name in sessions], dtype=np.int64),
         session_names=session_names,
-        payload=payload,
+        payload=stack(*PAYLOAD_COLUMNS) if PAYLOAD_COLUMNS[0] in columns else None,
     )

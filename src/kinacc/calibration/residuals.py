@@ -7,12 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinacc.calibration.frames import Frames
 from kinacc.calibration.models import Fit
 from kinacc.calibration.observations import Observations
 from kinacc.config.error_models import MEASURED, comparisons
 from kinacc.distributions import gamma99
-from kinacc.geometry import Pose, compose, log_so3
+from kinacc.geometry import Pose, log_so3
 
 
 @dataclass(frozen=True)
@@ -48,8 +47,8 @@ def errors(fits: Mapping[str, Fit], observations: Observations) -> dict[str, Err
     Each is in the base of the model compared. A model that is the reference is taken through its
     own base to the instrument, and from there to that base.
     """
-    bases = {name: _bases(fit.frames, observations) for name, fit in fits.items()}
-    poses = {name: seen(fit, observations) for name, fit in fits.items()}
+    bases = {name: fit.frames.at_rows(observations)[0] for name, fit in fits.items()}
+    poses = {name: fit.frames.seen(fit.model, observations) for name, fit in fits.items()}
     poses[MEASURED] = observations.measured
     return {
         each.name: _difference(poses[each.reference], poses[each.model], bases[each.model])
@@ -97,22 +96,6 @@ def statistics(vectors: np.ndarray) -> Statistics | None:
         rms=float(np.sqrt(np.mean(magnitudes**2))),
         gamma99=gamma99(magnitudes) if magnitudes.min() > 0.0 else float("nan"),
     )
-
-
-def seen(fit: Fit, observations: Observations) -> Pose:
-    """Poses (n, ...) of the targets in the instrument's frame, as a model predicts them."""
-    targets = Pose(
-        fit.frames.targets.rotation[observations.target],
-        fit.frames.targets.position_mm[observations.target],
-    )
-    bases = _bases(fit.frames, observations)
-    return compose(bases, compose(fit.model.pose(observations.at), targets))
-
-
-def _bases(frames: Frames, observations: Observations) -> Pose:
-    """The base of every row's session, (n, ...)."""
-    rows = observations.session
-    return Pose(frames.bases.rotation[rows], frames.bases.position_mm[rows])
 
 
 def _difference(reference: Pose, model: Pose, bases: Pose) -> Errors:

@@ -60,20 +60,19 @@ def error_statistics(pose_errors: Mapping) -> pd.DataFrame:
     for quantity, prefix, unit in (("position", "e", "mm"), ("orientation", "r", "mrad")):
         parts = [np.asarray(pose_errors[f"{prefix}{axis}_{unit}"], dtype=float) for axis in "xyz"]
         errors[quantity] = np.linalg.norm(parts, axis=0)
+    known = {c.name: c for c in sorted(COMPARISONS, key=lambda c: _ORDER.index(c.model))}
+    errors = errors[errors["comparison"].isin(known)]
+    tried = errors.groupby(["estimate", "row"])["comparison"].transform("nunique")
+    errors = errors[tried == errors.groupby("estimate")["comparison"].transform("nunique")]
     rows = []
-    known = sorted(COMPARISONS, key=lambda each: _ORDER.index(each.model))
     for estimate, part in errors.groupby("estimate", sort=True):
-        of = {each: part[part["comparison"] == each.name] for each in known}
-        of = {each: group for each, group in of.items() if len(group)}
-        common = set.intersection(*(set(group["row"]) for group in of.values()))
-        for each, group in of.items():
-            shared = group[group["row"].isin(common)]
+        for name, comparison in known.items():
             for quantity, unit in (("position", "mm"), ("orientation", "mrad")):
-                size = shared[quantity].dropna()
+                size = part.loc[part["comparison"] == name, quantity].dropna()
                 if len(size):
                     large = float(np.quantile(size, LARGE_SHARE))
                     figures = (len(size), float(np.mean(size)), large, float(size.max()))
-                    rows.append((each.name, *each, estimate, quantity, unit, *figures))
+                    rows.append((name, *comparison, estimate, quantity, unit, *figures))
     names = ["comparison", "reference", "model", "estimate", "quantity", "unit"]
     return pd.DataFrame(rows, columns=[*names, "n", "mean", "quantile_99", "largest"])
 

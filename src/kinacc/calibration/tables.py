@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 
 from kinacc.calibration.fitting import ModelFit
 from kinacc.calibration.frames import Frames, stacked
-from kinacc.calibration.solve import Solution
 from kinacc.calibration.split import Spectrum
-from kinacc.calibration.uncertainty import Uncertainty, scaled_unit
+from kinacc.calibration.uncertainty import Uncertainty, scaled_unit, unit_of
 from kinacc.geometry import quaternion_from_rotation
 from kinacc.kinematics.tables import frame
 from kinacc.tables.columns import Columns
@@ -23,16 +22,17 @@ def frames_columns(
     session_names: tuple[str | None, ...] = (None,),
 ) -> Columns:
     """``frames`` of models by name: the base of every session, then every target."""
+    names = [*(("base", session) for session in session_names), *((t, None) for t in target_names)]
     rows = []
-    for model, each in frames.items():
-        for session, at, turned in zip(
-            session_names, each.bases.position_mm, each.bases.rotation, strict=True
-        ):
-            rows.append((model, "base", session, *at, *quaternion_from_rotation(turned)))
-        for name, at, turned in zip(
-            target_names, each.targets.position_mm, each.targets.rotation, strict=True
-        ):
-            rows.append((model, name, None, *at, *quaternion_from_rotation(turned)))
+    for model, item in frames.items():
+        rotation, place = (
+            np.concatenate(parts) for parts in zip(item.bases, item.targets, strict=True)
+        )
+        quaternions = quaternion_from_rotation(rotation)
+        rows += [
+            (model, *name, *at, *quaternion)
+            for name, at, quaternion in zip(names, place, quaternions, strict=True)
+        ]
     return columns_of("frames", rows)
 
 
@@ -48,33 +48,52 @@ def frames_of(
     return Frames(stacked(bases), stacked(targets))
 
 
-def vec_fit_columns(fit: ModelFit, gauge: Spectrum, uncertainty: Uncertainty) -> Columns:
-    """``vec_fit``: figures of the fit, the prior of every coefficient, singular values.
+def fit_columns(
+    name: str, fit: ModelFit, uncertainty: Uncertainty, gauge: Spectrum | None = None
+) -> Columns:
+    """``dh_fit`` or its like: figures, singular values, directions the data do not determine.
 
-    And the directions of base and targets that the data do not determine.
+    With a ``gauge``, what the data tell without priors, its singular values and the prior of every
+    parameter.
     """
-    rows = [*_solution_rows(fit.solution), *_spectrum_rows(gauge)]
-    names = fit.model.names
-    units = ["mm" if "delta" in name else "rad" for name in names]
-    rows += [
-        ("prior_std", number, name, value, unit)
-        for number, (name, value, unit) in enumerate(
-            zip(names, fit.prior_std, units, strict=True), 1
-        )
+    solution, spectrum = fit.solution, gauge or fit.solution.spectrum
+    rows: list[tuple] = [
+        ("parameters", None, None, len(solution.x), "1"),
+        ("residual_components", None, None, solution.count, "1"),
+        ("degrees_of_freedom", None, None, solution.degrees_of_freedom, "1"),
+        ("cost", None, None, solution.cost, "mm^2"),
+        ("residual_std", None, None, np.sqrt(solution.variance), "mm"),
+        ("iterations", None, None, solution.iterations, "1"),
+        ("last_step", None, None, solution.last_step, "mm or mrad"),
+        ("converged", None, None, float(solution.converged), "1"),
     ]
-    return columns_of("vec_fit", [*rows, *_undetermined_rows(uncertainty)])
-
-
-def fit_columns(name: str, fit: ModelFit, uncertainty: Uncertainty) -> Columns:
-    """``dh_fit`` or its like: figures, singular values, directions the data do not determine."""
-    rows = [*_solution_rows(fit.solution), *_spectrum_rows(fit.solution.spectrum)]
+    if spectrum is not None:
+        gap = spectrum.gap if np.isfinite(spectrum.gap) else np.nan
+        rows += [
+            ("rank", None, None, spectrum.rank, "1"),
+            ("rank_threshold", None, None, spectrum.threshold, "1"),
+            ("gap", None, None, gap, "1"),
+        ]
+        values = enumerate(spectrum.values, 1)
+        rows += [("singular_value", i, None, value, "mm per mm or mrad") for i, value in values]
     if fit.weights is not None:
         rows += [
             ("loss_scale", None, None, fit.weights.scale_mm, "mm"),
             ("rows_below_half_weight", None, None, int(np.sum(fit.weights.row < 0.5)), "1"),
             ("rows_without_weight", None, None, int(np.sum(fit.weights.row == 0.0)), "1"),
         ]
-    return columns_of(name, [*rows, *_undetermined_rows(uncertainty)])
+    if gauge is not None:
+        priors = zip(fit.model.names, fit.prior_std, strict=True)
+        rows += [
+            ("prior_std", i, parameter, std, unit_of(parameter))
+            for i, (parameter, std) in enumerate(priors, 1)
+        ]
+    rows += [
+        ("undetermined_direction", i, parameter, value, scaled_unit(parameter))
+        for i, direction in enumerate(uncertainty.undetermined, 1)
+        for parameter, value in zip(uncertainty.names, direction, strict=True)
+    ]
+    return columns_of(name, rows)
 
 
 def covariance_columns(uncertainty: Uncertainty) -> Columns:
@@ -92,30 +111,3 @@ def covariance_columns(uncertainty: Uncertainty) -> Columns:
         "covariance": covariance,
         "correlation": np.where(np.isfinite(correlation), correlation, np.nan),
     }
-
-
-def _solution_rows(solution: Solution) -> Iterable[tuple]:
-    yield ("parameters", None, None, len(solution.x), "1")
-    yield ("residual_components", None, None, solution.count, "1")
-    yield ("degrees_of_freedom", None, None, solution.degrees_of_freedom, "1")
-    yield ("cost", None, None, solution.cost, "mm^2")
-    yield ("residual_std", None, None, np.sqrt(solution.variance), "mm")
-    yield ("iterations", None, None, solution.iterations, "1")
-    yield ("last_step", None, None, solution.last_step, "mm or mrad")
-    yield ("converged", None, None, float(solution.converged), "1")
-
-
-def _undetermined_rows(uncertainty: Uncertainty) -> Iterable[tuple]:
-    for number, direction in enumerate(uncertainty.undetermined, 1):
-        for name, value in zip(uncertainty.names, direction, strict=True):
-            yield ("undetermined_direction", number, name, value, scaled_unit(name))
-
-
-def _spectrum_rows(spectrum: Spectrum | None) -> Iterable[tuple]:
-    if spectrum is None:
-        return
-    yield ("rank", None, None, spectrum.rank, "1")
-    yield ("rank_threshold", None, None, spectrum.threshold, "1")
-    yield ("gap", None, None, spectrum.gap if np.isfinite(spectrum.gap) else np.nan, "1")
-    for number, value in enumerate(spectrum.values, 1):
-        yield ("singular_value", number, None, value, "mm per mm or mrad")

@@ -41,11 +41,27 @@ class Uncertainty:
         return np.sum(self.undetermined**2, axis=0) <= TOUCH_SQUARED
 
 
-def of_fit(fit: ModelFit, target_names: tuple[str, ...]) -> Uncertainty:
+def of_fit(fit: ModelFit) -> Uncertainty:
     """Uncertainty of base and targets if estimated, then of the parameters that took part."""
-    names, change = _named(fit, target_names)
-    undetermined = _directions(fit, fit.solution.undetermined, names, change)
-    return Uncertainty(names, change @ fit.solution.covariance @ change.T, undetermined)
+    names = (*fit.parameters.names, *compress(fit.model.names, fit.free.ravel()))
+    change = _change(fit)
+    covariance = change @ fit.solution.covariance @ change.T
+    return Uncertainty(names, covariance, named_directions(fit, fit.solution.undetermined))
+
+
+def named_directions(fit: ModelFit, directions: np.ndarray) -> np.ndarray:
+    """Directions (m, P) of a fit's own coordinates, in units of its scale, as of its names."""
+    units = [scale_of(name) for name in compress(fit.model.names, fit.free.ravel())]
+    units = np.concatenate([fit.parameters.scale, units])
+    return (directions * fit.solution.scale) @ _change(fit).T / units
+
+
+def _change(fit: ModelFit) -> np.ndarray:
+    """Derivative (P, P) of motions and parameters in the fit's own coordinates."""
+    frames = fit.parameters.size
+    change = np.eye(len(fit.solution.x))
+    change[:frames, :frames] = fit.parameters.motions(fit.solution.x[:frames])
+    return change
 
 
 # Unit of a parameter by the end of its name, and what of it moves a pose as much as one mm does.
@@ -81,29 +97,3 @@ def _unit(name: str) -> tuple[str, float]:
     if ".eps_" in name:
         return _UNITS["_rad"]
     return next((unit for end, unit in _UNITS.items() if name.endswith(end)), ("mm", 1.0))
-
-
-def named_directions(
-    fit: ModelFit, target_names: tuple[str, ...], directions: np.ndarray
-) -> np.ndarray:
-    """Directions (m, P) of a fit's own coordinates, in units of its scale, as of its names."""
-    return _directions(fit, directions, *_named(fit, target_names))
-
-
-def _named(fit: ModelFit, target_names: tuple[str, ...]) -> tuple[tuple[str, ...], np.ndarray]:
-    """Names of motions and parameters, and their derivative in the fit's own coordinates."""
-    free = list(compress(fit.model.names, fit.free.ravel()))
-    frames = fit.parameters.size
-    change = np.eye(len(fit.solution.x))
-    change[:frames, :frames] = fit.parameters.motions(fit.solution.x[:frames])
-    return (*fit.parameters.names, *free), change
-
-
-def _directions(
-    fit: ModelFit, directions: np.ndarray, names: tuple[str, ...], change: np.ndarray
-) -> np.ndarray:
-    return (directions * fit.solution.scale) @ change.T / _units(names)
-
-
-def _units(names: tuple[str, ...]) -> np.ndarray:
-    return np.array([scale_of(name) for name in names])

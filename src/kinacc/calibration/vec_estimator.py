@@ -130,7 +130,7 @@ class VECEstimator(Estimator):
             fitted.frames,
             self.common.rotation_weight_mm_per_rad,
         )
-        return {"vec_fit": tables.vec_fit_columns(fitted, gauge, known)}
+        return {"vec_fit": tables.fit_columns("vec_fit", fitted, known, gauge)}
 
     def _choice(self, seen: Observations, near: pd.DataFrame | None) -> pd.DataFrame:
         frames, terms = self._begin(seen, {})
