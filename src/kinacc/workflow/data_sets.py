@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from kinacc.campaign.journal import JOURNAL, PLAN
 from kinacc.config.error_models import ERROR_MODELS, asked_for
 from kinacc.errors import Problem, refuse
 from kinacc.workflow.code import file_digest
@@ -159,6 +158,8 @@ def digests(files: Mapping[str, str]) -> dict[str, str]:
 
 def campaign_files(campaigns: Iterable[Path]) -> dict[str, str]:
     """Files of campaigns on the calibration of a data set, by role."""
+    from kinacc.campaign.folder import JOURNAL, PLAN
+
     files = {}
     for number, campaign in enumerate(campaigns, 1):
         files[f"campaign_{number}_file"] = str(campaign / PLAN)
