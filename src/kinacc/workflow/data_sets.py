@@ -93,9 +93,26 @@ def read_data_sets(
     overrides: Settings | None = None,
     absolute: bool = False,
 ) -> DataSets:
-    """The data sets of configuration files and of values given on the command line.
+    """The data sets of configuration files and of values of the command line.
 
-    Raises InputError listing every problem in them.
+    Parameters
+    ----------
+    paths
+        YAML files, in order.
+    overrides
+        Values of ``--config``, laid over them.
+    absolute
+        Whether files are named by absolute paths.
+
+    Returns
+    -------
+    DataSets
+        Settings by data set, and files.
+
+    Raises
+    ------
+    InputError
+        Listing every problem in them.
     """
     from kinacc.checks.contradictions import load
 
