@@ -86,7 +86,8 @@ def parts(read: Repeated) -> Parts:
     Returns
     -------
     Parts
-        By the analysis of variance of unweighted means; degrees of freedom by Welch and Satterthwaite.
+        By the analysis of variance of unweighted means; degrees of freedom by Welch and
+        Satterthwaite.
     """
     visit_mm, readings, side_of = _visits(read)
     side_mm, visits = means(visit_mm, side_of)
@@ -131,8 +132,8 @@ def noise_of(results: Parts, resolution_mm: ndarray) -> Noise | None:
     -------
     Noise or None
         None where no pose was revisited. Equal along the axes, with three times their degrees of
-        freedom, unless they are shown to differ: then a covariance, every direction with the degrees
-        of one.
+        freedom, unless they are shown to differ: then a covariance, every direction with the
+        degrees of one.
     """
     if not results.freedom:
         return None

@@ -40,7 +40,8 @@ def load(
 ) -> dict[str, dict[str, Any]]:
     """Read full settings of every data set, by name.
 
-    Files are merged as Snakemake merges its ``--configfile``: sections key by key, all else replaced.
+    Files are merged as Snakemake merges its ``--configfile``: sections key by
+    key, all else replaced.
 
     Parameters
     ----------
@@ -56,8 +57,8 @@ def load(
     Returns
     -------
     dict
-        ``{name: settings}``: ``robot``, ``seed`` and all sections of :class:`Settings`, numbers in the
-        units that their names carry.
+        ``{name: settings}``: ``robot``, ``seed`` and all sections of :class:`Settings`,
+        numbers in the units that their names carry.
 
     Raises
     ------
