@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -66,8 +67,8 @@ def residuals(
         plots.append(plot)
     over_file, over_joint = plots
     space = _figure("x, mm", "y, mm", tips, height=380, match_aspect=True)
-    colour = LinearColorMapper(palette="Viridis256", low=0.0, high=top_mm)
-    field = {"field": list(models)[-1], "transform": colour}
+    mapper = LinearColorMapper(palette="Viridis256", low=0.0, high=top_mm)
+    field = {"field": list(models)[-1], "transform": mapper}
     places = space.scatter(
         "x", "y", source=data, size=6, line_color=None, color=field, nonselection_alpha=0.3
     )
@@ -112,7 +113,9 @@ def accuracy_map(cells: pd.DataFrame, width_mm: float, height_mm: float) -> Layo
     mappers = {}
     for name in _QUANTITIES.values():
         low, high = (0.0, 100.0) if name == "reached" else colour_range(cells[name].to_numpy())
-        mappers[name] = LinearColorMapper("Viridis256", low=low, high=high, nan_color=_UNREACHED)
+        mappers[name] = LinearColorMapper(
+            palette="Viridis256", low=low, high=high, nan_color=_UNREACHED
+        )
     drawn = plot.rect(
         "radius", "height", width_mm, height_mm, source=data, view=CDSView(filter=shown),
         fill_color={"field": "position", "transform": mappers["position"]}, line_color=None,
@@ -135,7 +138,8 @@ def accuracy_map(cells: pd.DataFrame, width_mm: float, height_mm: float) -> Layo
 
 def _select(title: str, options: Sequence[str], code: str, **values: object) -> Select:
     """A choice whose change runs ``code`` on the ``values``; the first option is chosen."""
-    select = Select(title=title, options=[*options], value=options[0], width=160)
+    choices: list[str | tuple[Any, str]] = [*options]
+    select = Select(title=title, options=choices, value=options[0], width=160)
     select.js_on_change("value", CustomJS(args=values, code=code))
     return select
 

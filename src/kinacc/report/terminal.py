@@ -114,8 +114,14 @@ def fleet_table(
     for result in results:
         if isinstance(result, Problem):
             folder = result.where.removesuffix("/summary.parquet")
-            row = {"data_set": folder.rpartition("/")[2], "folder": folder, "robot": ""}
-            rows.append(row | {"verdict": UNDECIDED, "reason": str(result)})
+            rows.append(
+                {
+                    "data_set": folder.rpartition("/")[2],
+                    "verdict": UNDECIDED,
+                    "reason": str(result),
+                    "folder": folder,
+                }
+            )
             continue
         best = result.best if result.is_held_out else None
         status = result.campaign
