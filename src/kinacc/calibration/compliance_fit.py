@@ -8,13 +8,13 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from kinacc.calibration import fitting, tables
+from kinacc.calibration import tables
 from kinacc.calibration.dh_estimator import DHEstimator
-from kinacc.calibration.fitting import MORE_POSES, ModelFit
+from kinacc.calibration.fitting import MORE_POSES, ModelFit, scales
 from kinacc.calibration.frames import ANGLE_UNIT_RAD
 from kinacc.calibration.models import Common, Estimator, Fit
 from kinacc.calibration.observations import Observations
-from kinacc.calibration.uncertainty import Uncertainty, scale_of
+from kinacc.calibration.uncertainty import Uncertainty
 from kinacc.kinematics.compliance import ComplianceModel
 from kinacc.kinematics.robot import Robot
 from kinacc.tables.columns import Columns
@@ -44,7 +44,7 @@ class ComplianceEstimator(Estimator):
         payload = _body(section["payload"])
         links = np.full((arm.dh.joints, 4), np.nan)
         if section["links"]:
-            links = np.array([_body(each) for each in section["links"]])
+            links = np.array([_body(link) for link in section["links"]])
         coefficients = np.full((arm.dh.joints, 2), np.nan)
         bent = np.array(section["joints"]) - 1
         if not section["links"]:
@@ -67,15 +67,12 @@ class ComplianceEstimator(Estimator):
     ) -> Iterator[tuple[tuple[str, ...], str, str]]:
         """Joints the arm has not or that slide, links of another arm, no direction of gravity."""
         section, joints = calibration["compliance"], arm.dh.joints
-        beyond = [each for each in section["joints"] if each > joints]
-        if beyond:
-            what = f"{arm.name} has no joint {', '.join(map(str, beyond))}"
-            yield ("joints",), what, f"1 to {joints}"
-        sliding = [each for each in section["joints"] if each not in beyond]
-        sliding = [each for each in sliding if arm.dh.prismatic[each - 1]]
-        if sliding:
-            what = f"joint {', '.join(map(str, sliding))} of {arm.name} slides"
-            yield ("joints",), what, "joints that turn"
+        turning = 1 + np.flatnonzero(~np.asarray(arm.dh.prismatic))
+        for joint in section["joints"]:
+            if joint > joints:
+                yield ("joints",), f"{arm.name} has no joint {joint}", f"1 to {joints}"
+            elif joint not in turning:
+                yield ("joints",), f"joint {joint} of {arm.name} slides", "joints that turn"
         if section["links"] and len(section["links"]) != joints:
             what = f"{len(section['links'])} links for the {joints} joints of {arm.name}"
             yield ("links",), what, "one for each joint, or none"
@@ -92,17 +89,13 @@ class ComplianceEstimator(Estimator):
         arm = self.dh.arm
         nominal = replace(self.stiff, dh=arm.nominal)
         more = len(nominal.names) - arm.free.size
-        frames, terms = self.common.frames(observations)
-        return fitting.fit(
+        return self.common.fit(
             observations,
             nominal,
             free=np.concatenate([arm.free.ravel(), np.ones(more, dtype=bool)]),
             std=np.concatenate([arm.std.ravel(), np.full(more, np.inf)]),
             scale=_scales(nominal, observations),
-            rotation_weight_mm_per_rad=self.common.rotation_weight_mm_per_rad,
             threshold=self.dh.threshold,
-            frames=frames,
-            frame_terms=terms,
             loss=self.dh.loss,
             name=self.name,
         )
@@ -130,7 +123,7 @@ def _scales(nominal: ComplianceModel, observations: Observations) -> np.ndarray:
     """By each parameter what moves a pose as one mm; coefficients turn a joint by one mrad, rms."""
     moments = nominal.moments(observations.at)
     rms = np.sqrt(np.mean(moments**2, axis=0))[np.isfinite(nominal.coefficients)]
-    plain = np.array([scale_of(name) for name in nominal.names])
-    own = plain[-len(rms) :] if len(rms) else plain[:0]
-    np.divide(ANGLE_UNIT_RAD, rms, out=own, where=rms > _NO_MOMENT)
+    plain = scales(nominal)
+    bending = plain[len(plain) - len(rms) :]
+    np.divide(ANGLE_UNIT_RAD, rms, out=bending, where=rms > _NO_MOMENT)
     return plain

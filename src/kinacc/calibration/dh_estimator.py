@@ -8,7 +8,7 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from kinacc.calibration import fitting, identified, tables
+from kinacc.calibration import identified, tables
 from kinacc.calibration.constraints import ArmTerms, arm_terms, free_parameters, parallel_joints
 from kinacc.calibration.fitting import MORE_POSES, ModelFit, distinct
 from kinacc.calibration.frames import Frames, component_names
@@ -79,33 +79,30 @@ class DHEstimator(Estimator):
 
     def fit(self, observations: Observations, others: Mapping[str, Fit]) -> ModelFit:
         """The DH model; base and targets are those of the VEC model where it follows that."""
-        frames, terms = self.common.frames(observations)
+        arm, settings = self.arm, {}
+        free, std, held = arm.free, arm.std, False
         followed = others["vec"] if self.follows_vec else None
         if followed:
-            frames, terms = Frames(IDENTITY, followed.frames.targets), None
+            frames = Frames(IDENTITY, followed.frames.targets)
             one_base = replace(observations, session=np.zeros(len(observations), dtype=np.int64))
             poses = full_poses(observations.q_rad, frames.seen(followed.model, one_base))
             observations = poses.with_targets_of(observations)
-        arm = self.arm
-        free, std, held = arm.free, arm.std, False
-        if not followed:
+            settings = {"frames": frames, "frame_terms": None}
+        else:
             count = distinct(observations).components
-            estimated = len(component_names(observations)) if terms else 0
+            estimated = len(component_names(observations)) if self.common.frames_estimated else 0
             held = count < FEW * (estimated + self.size)
-            usual = arm.nominal.prior_std.reshape(free.shape)
-            std = np.minimum(std, usual) if held else std
+            std = np.minimum(std, arm.nominal.prior_std.reshape(free.shape)) if held else std
             free = free & (count >= estimated + LEAST)
-        fitted = fitting.fit(
+        fitted = self.common.fit(
             observations,
             arm.nominal,
             free=free,
             std=std,
             held=held and bool(free.any()),
-            rotation_weight_mm_per_rad=self.common.rotation_weight_mm_per_rad,
             threshold=self.threshold,
-            frames=frames,
-            frame_terms=terms,
             loss=self.loss,
+            **settings,
         )
         return replace(fitted, frames=followed.frames) if followed else fitted
 

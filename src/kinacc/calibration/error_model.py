@@ -26,7 +26,7 @@ def run(inputs: Mapping, settings: Mapping, kind: str, progress=None) -> dict[st
     fitted = estimator.fit(observations, delivered.delivered_fits(inputs, arm, every))
     frames = {kind: fitted.frames}
     if kind == PLAINEST:
-        frames[NOMINAL] = models.nominal_frames(observations, estimator.common)
+        frames[NOMINAL] = estimator.common.nominal_frames(observations)
     columns = tables.frames_columns(frames, every.target_names, every.session_names)
     name = f"{kind}_frames"
     if kind == PLAINEST:

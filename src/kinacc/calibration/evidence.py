@@ -103,11 +103,18 @@ def choose(
             for _ in range(_STATED_STEPS):
                 at = np.array([np.log(stated.delta_mm / noise), stated.decay])
                 least, _, noise = _negative(at, normal, count, degree)
-        rows.append((order, prior.delta_mm, 1e3 * prior.eps_rad, prior.decay, -least, at))
-        if len(rows) > PATIENCE + int(np.argmax([row[4] for row in rows])):
+        rows.append((order, prior, -least, at))
+        if len(rows) > PATIENCE + int(np.argmax([row[2] for row in rows])):
             break
-    names = ("order", "prior_std_mm", "prior_std_mrad", "prior_decay", "log_evidence", "start")
-    table = pd.DataFrame(rows, columns=names)
+    return table_of(rows)
+
+
+def table_of(rows: Sequence[tuple]) -> pd.DataFrame:
+    """The table of ``choose`` from order, prior, log evidence and start of each trial."""
+    table = pd.DataFrame(rows, columns=["order", "prior", "log_evidence", "start"])
+    for name, size in (("delta_mm", "prior_std_mm"), ("decay", "prior_decay")):
+        table[size] = [getattr(prior, name) for prior in table["prior"]]
+    table["prior_std_mrad"] = [1e3 * prior.eps_rad for prior in table["prior"]]
     table["log_evidence_less"] = table["log_evidence"] - table["log_evidence"].max()
     table["chosen"] = table.index == int(np.argmax(table["log_evidence_less"] >= -ENOUGH))
     return table

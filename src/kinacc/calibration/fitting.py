@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 
 from kinacc.calibration import robust
 from kinacc.calibration.frames import (
@@ -30,8 +31,8 @@ from kinacc.measurements.folds import configurations
 # show as much of a motion that the described arm does not: each model would follow it another way.
 SHOWN = 1e-3
 FRAME_PRIOR_UNITS = 10.0  # mm and mrad about the starting frames, where priors hold a model
-_PART = 0.1  # of a unit motion that a target must have to be what is held
-_SAME = 6  # digits to which parts are equal
+_PREFERRED = 10.0  # times the part of a motion that others have, to be what is held
+_TIE = 1e-6  # parts that are equal to this share
 MORE_POSES = "measure more poses"
 # With fewer residuals a parameter than the first, noise is at least the second.
 SURPLUS, LEAST_NOISE_MM = 2, 0.03
@@ -238,10 +239,8 @@ def placed(
     free, begin = found.free.copy(), found.begin.copy()
     free[held] = False
     if terms is not None:
-        stated = dict(zip(terms.names, terms.value, strict=True))
-        for index in held:
-            if not of_base[index] and not found.angle[index]:
-                begin[index] = stated[found.names[index]]
+        placed = held[~of_base[held] & ~found.angle[held]]
+        begin[placed] = terms.value[placed]
     motions = np.zeros((len(hidden), found.size))
     motions[:, keep] = hidden
     return replace(found, free=free, begin=begin, hidden=motions)
@@ -255,16 +254,10 @@ def _without_known(hidden: np.ndarray, known: np.ndarray) -> np.ndarray:
     return turn[int(np.sum(values**2 > TOUCH_SQUARED)) :] @ hidden
 
 
-def _pivots(motions: np.ndarray, preferred: np.ndarray) -> list[int]:
+def _pivots(motions: np.ndarray, preferred: np.ndarray) -> np.ndarray:
     """A component for each of ``motions`` (m, F) that stops it, ``preferred`` (F,) where it can.
 
     Ties go to the first, so that models of the same poses hold the same.
     """
-    rest, chosen = motions, []
-    while len(rest):
-        part = np.round(np.linalg.norm(rest, axis=0), _SAME)
-        first = np.where(preferred, part, 0.0)
-        chosen.append(int(np.argmax(first if first.max(initial=0.0) > _PART else part)))
-        # The mixtures of what is left that do not move what has been chosen.
-        rest = np.linalg.qr(rest[:, chosen[-1:]], mode="complete")[0][:, 1:].T @ rest
-    return chosen
+    scale = np.where(preferred, _PREFERRED, 1.0) * (1.0 - _TIE * np.arange(len(preferred)))
+    return scipy.linalg.qr(motions * scale, mode="r", pivoting=True)[1][: len(motions)]

@@ -9,7 +9,7 @@ orientation R to exp(w) R.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -40,6 +40,19 @@ class Frames:
         if self.bases.rotation.ndim == 2:
             alone = Pose(self.bases.rotation[None], self.bases.position_mm[None])
             object.__setattr__(self, "bases", alone)
+
+    @classmethod
+    def split(cls, frames: Pose, sessions: int) -> Frames:
+        """The first ``sessions`` of ``frames`` (S + T, ...) as bases, the others as targets."""
+        bases, targets = zip(*(np.split(part, [sessions]) for part in frames), strict=True)
+        return cls(Pose(*bases), Pose(*targets))
+
+    @property
+    def joined(self) -> Pose:
+        """Bases, then targets, (S + T, ...)."""
+        return Pose(
+            *(np.concatenate(parts) for parts in zip(self.bases, self.targets, strict=True))
+        )
 
     @property
     def base(self) -> Pose:
@@ -118,7 +131,7 @@ def frame_terms(
     free, value = np.ones(len(names), dtype=bool), np.zeros(len(names))
     std = np.full(len(names), np.inf)
     lengths = [name.endswith("_mm") for name in names]
-    value[lengths] = np.concatenate([stated.bases.position_mm, stated.targets.position_mm]).ravel()
+    value[lengths] = stated.joined.position_mm.ravel()
     for number, (frame, component) in enumerate(parts):
         rule = parameter_rules.rule_for(rules, component, frame=frame)
         if rule is not None:
@@ -164,11 +177,6 @@ class FrameParameters:
     mean: np.ndarray
     std: np.ndarray
     hidden: np.ndarray
-    angle: np.ndarray = field(init=False)
-
-    def __post_init__(self) -> None:
-        angle = np.array([name.endswith("_rad") for name in self.names], dtype=bool)
-        object.__setattr__(self, "angle", angle)
 
     @classmethod
     def none(cls, frames: Frames) -> FrameParameters:
@@ -190,26 +198,19 @@ class FrameParameters:
         terms = terms or FrameTerms(
             names, np.ones(size, bool), np.zeros(size), np.full(size, np.inf), start
         )
-        order = [terms.names.index(name) for name in names]
-        free, value, std = terms.free[order], terms.value[order], terms.std[order]
-        bound = ~free | np.isfinite(std)
-        begin = np.zeros(size)
-        rotations = {kind: getattr(start, kind).rotation.copy() for kind in ("bases", "targets")}
-        for kind, number, columns in _slots(names, start.sessions):
-            here, turned = getattr(start, kind), columns[3:]
-            begin[columns[:3]] = here.position_mm[number]
-            if not len(turned) or bound[turned].any():
-                stated = getattr(terms.stated, kind).rotation[number]
-                rotations[kind][number] = stated
-                if len(turned):
-                    begin[turned] = log_so3((here.rotation[number] @ stated.T)[None])[0]
-        bases, targets = (
-            Pose(rotation, getattr(start, kind).position_mm) for kind, rotation in rotations.items()
-        )
-        reference = Frames(bases, targets)
+        begin, free, value, std = np.zeros(size), terms.free, terms.value, terms.std
+        made = cls(names, start, begin, free, value, std, np.zeros((0, size)))
+        here, turn, turning = start.joined, made.turn, made.turning
+        stated = np.ones(len(here.position_mm), dtype=bool)
+        stated[turning] = (~free | np.isfinite(std))[turn].any(axis=1)
+        rotation = np.where(stated[:, None, None], terms.stated.joined.rotation, here.rotation)
+        apart = here.rotation[turning] @ np.swapaxes(rotation[turning], 1, 2)
+        begin[made.place] = here.position_mm
+        begin[turn] = log_so3(apart) * stated[turning][:, None]
         begin[~free] = value[~free]
+        reference = Frames.split(Pose(rotation, here.position_mm), start.sessions)
         mean = np.where(np.isfinite(std), value, begin)
-        return cls(names, reference, begin, free, mean, std, np.zeros((0, size)))
+        return replace(made, reference=reference, begin=begin, mean=mean)
 
     @property
     def size(self) -> int:
@@ -217,49 +218,56 @@ class FrameParameters:
         return len(self.names)
 
     @property
+    def angle(self) -> np.ndarray:
+        """True (F,) for components of rotation vectors."""
+        return np.array([name.endswith("_rad") for name in self.names], dtype=bool)
+
+    @property
     def scale(self) -> np.ndarray:
         """Displacements (F,) that count as one mm."""
         return np.where(self.angle, ANGLE_UNIT_RAD, 1.0)
 
     @property
+    def place(self) -> np.ndarray:
+        """Indices (S + T, 3) of the components of positions: of the bases, then of the targets."""
+        return np.flatnonzero(~self.angle).reshape(-1, 3)
+
+    @property
+    def turn(self) -> np.ndarray:
+        """Indices (K, 3) of the components of rotation vectors."""
+        return np.flatnonzero(self.angle).reshape(-1, 3)
+
+    @property
+    def turning(self) -> np.ndarray:
+        """Numbers (K,) of the frames that have a rotation vector."""
+        return np.searchsorted(self.place[:, 0], self.turn[:, 0]) - 1
+
+    @property
     def slots(self) -> list[tuple[str, int, np.ndarray]]:
         """``bases`` or ``targets``, the number of the frame and the indices of its components."""
-        return _slots(self.names, self.reference.sessions)
+        count, turning = self.reference.sessions, self.turning
+        return [
+            (
+                "bases" if frame < count else "targets",
+                frame if frame < count else frame - count,
+                first + np.arange(6 if frame in turning else 3),
+            )
+            for frame, (first, *_) in enumerate(self.place)
+        ]
 
     def frames(self, c: np.ndarray) -> Frames:
         """``Frames`` at components ``c`` (F,)."""
-        found = {
-            kind: Pose(at.rotation.copy(), at.position_mm.copy())
-            for kind in ("bases", "targets")
-            for at in (getattr(self.reference, kind),)
-        }
-        for kind, number, columns in self.slots:
-            found[kind].position_mm[number] = c[columns[:3]]
-            if len(columns) == 6:
-                turned = exp_so3(c[columns[3:]]) @ found[kind].rotation[number]
-                found[kind].rotation[number] = turned
-        return Frames(**found)
+        if not self.size:
+            return self.reference
+        rotation, turning = self.reference.joined.rotation, self.turning
+        rotation[turning] = exp_so3(c[self.turn]) @ rotation[turning]
+        return Frames.split(Pose(rotation, c[self.place]), self.reference.sessions)
 
     def motions(self, c: np.ndarray) -> np.ndarray:
         """Derivative (F, F) of shifts and turns of the frames in their components at ``c``."""
-        found = np.eye(self.size)
-        for _, _, columns in self.slots:
-            if len(columns) == 6:
-                found[np.ix_(columns[3:], columns[3:])] = left_jacobians(c[columns[3:]])
-        return found
-
-
-def _slots(names: Sequence[str], sessions: int) -> list[tuple[str, int, np.ndarray]]:
-    labels = [name.rpartition(".")[0] for name in names]
-    frames = list(dict.fromkeys(labels))
-    return [
-        (
-            "bases" if number < sessions else "targets",
-            number if number < sessions else number - sessions,
-            np.flatnonzero([label == frame for label in labels]),
-        )
-        for number, frame in enumerate(frames)
-    ]
+        motions, turn = np.eye(self.size), self.turn
+        motions[turn[:, :, None], turn[:, None, :]] = left_jacobians(c[turn])
+        return motions
 
 
 def left_jacobians(w_rad: np.ndarray) -> np.ndarray:

@@ -6,7 +6,10 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple, Self
 
-from kinacc.calibration.fitting import ModelFit, fit_frames
+import numpy as np
+
+from kinacc.calibration import fitting
+from kinacc.calibration.fitting import ModelFit
 from kinacc.calibration.frames import Frames, FrameTerms, frame_terms, known
 from kinacc.calibration.observations import Observations
 from kinacc.calibration.uncertainty import Uncertainty
@@ -74,6 +77,20 @@ class Common:
             return None, self.terms(observations)
         return self.stated(observations), None
 
+    def fit(self, observations: Observations, nominal: ErrorModel, **settings: Any) -> ModelFit:
+        """A model fitted to measurements, by ``settings`` of ``fitting.fit``."""
+        frames, terms = self.frames(observations)
+        fixed = {"frames": frames, "frame_terms": terms}
+        fixed["rotation_weight_mm_per_rad"] = self.rotation_weight_mm_per_rad
+        return fitting.fit(observations, nominal, **fixed | settings)
+
+    def nominal_frames(self, observations: Observations) -> Frames:
+        """Base and targets of the nominal arm, fitted where they are not known. Raises FitError."""
+        if not self.frames_estimated:
+            return self.stated(observations)
+        still = np.zeros(len(self.nominal.start), dtype=bool)
+        return self.fit(observations, self.nominal, free=still, name="fit of base and tool").frames
+
 
 @dataclass(frozen=True)
 class Estimator:
@@ -139,21 +156,10 @@ def fit_all(
     """Models by kind, and the nominal one, fitted to ``observations``; see ``Estimator.fit``."""
     fits: dict[str, Fit] = {}
     nominal: dict[str, Fit] = {}
-    for each in estimators:
+    for estimator in estimators:
         if not nominal:
-            arm, frames = each.common.nominal, nominal_frames(observations, each.common)
-            nominal[NOMINAL] = Fit(arm, frames)
-        fitted = each.fit(observations, fits | nominal)
-        fits[each.kind] = Fit(fitted.model, fitted.frames)
+            common = estimator.common
+            nominal[NOMINAL] = Fit(common.nominal, common.nominal_frames(observations))
+        fitted = estimator.fit(observations, fits | nominal)
+        fits[estimator.kind] = Fit(fitted.model, fitted.frames)
     return fits | nominal
-
-
-def nominal_frames(observations: Observations, common: Common) -> Frames:
-    """Base and targets of the nominal arm; nothing to fit where they are known. Raises FitError."""
-    frames, terms = common.frames(observations)
-    return frames or fit_frames(
-        observations,
-        common.nominal,
-        rotation_weight_mm_per_rad=common.rotation_weight_mm_per_rad,
-        frame_terms=terms,
-    )

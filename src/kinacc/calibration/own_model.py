@@ -8,7 +8,6 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from kinacc.calibration import fitting
 from kinacc.calibration.fitting import MORE_POSES, ModelFit
 from kinacc.calibration.models import Common, Estimator, Fit
 from kinacc.calibration.observations import Observations
@@ -71,17 +70,13 @@ class OwnEstimator(Estimator):
     def fit(self, observations: Observations, others: Mapping[str, Fit]) -> ModelFit:
         """The model closest to the measurements."""
         nominal = self.model(self.common.nominal)
-        frames, terms = self.common.frames(observations)
-        return fitting.fit(
+        return self.common.fit(
             observations,
             nominal,
             free=np.ones(self.size, dtype=bool),
             std=nominal.prior_std,
             held=bool(np.isfinite(nominal.prior_std).all()),
-            rotation_weight_mm_per_rad=self.common.rotation_weight_mm_per_rad,
             threshold=THRESHOLD,
-            frames=frames,
-            frame_terms=terms,
             name=f"{self.kind} fit",
         )
 

@@ -17,9 +17,8 @@ _BEYOND = {HUBER: 0.17863, TUKEY: 2.7995e-6}
 
 @dataclass(frozen=True)
 class Weights:
-    """``root`` (m,) factors of the residuals; ``row`` (n,) weights; ``scale_mm`` per component."""
+    """``row`` (n,) weights of the rows; ``scale_mm`` per component."""
 
-    root: np.ndarray
     row: np.ndarray
     scale_mm: float
 
@@ -50,4 +49,4 @@ def weights(
         weight = 1.0 / np.maximum(share, 1.0)
     else:
         weight = np.maximum(1.0 - share**2, 0.0) ** 2
-    return Weights(np.sqrt(weight)[row], weight, scale)
+    return Weights(weight, scale)

@@ -57,24 +57,26 @@ def error_statistics(pose_errors: Mapping) -> pd.DataFrame:
     ``unit``, ``n``, ``mean``, ``quantile_99`` and ``largest`` of magnitudes in mm or mrad.
     """
     errors = pd.DataFrame({name: pose_errors[name] for name in ("comparison", "estimate", "row")})
-    for quantity, prefix, unit in (("position", "e", "mm"), ("orientation", "r", "mrad")):
+    units = {"position": "mm", "orientation": "mrad"}
+    for prefix, (quantity, unit) in zip("er", units.items(), strict=True):
         parts = [np.asarray(pose_errors[f"{prefix}{axis}_{unit}"], dtype=float) for axis in "xyz"]
         errors[quantity] = np.linalg.norm(parts, axis=0)
     known = {c.name: c for c in sorted(COMPARISONS, key=lambda c: _ORDER.index(c.model))}
     errors = errors[errors["comparison"].isin(known)]
     tried = errors.groupby(["estimate", "row"])["comparison"].transform("nunique")
     errors = errors[tried == errors.groupby("estimate")["comparison"].transform("nunique")]
-    rows = []
-    for estimate, part in errors.groupby("estimate", sort=True):
-        for name, comparison in known.items():
-            for quantity, unit in (("position", "mm"), ("orientation", "mrad")):
-                size = part.loc[part["comparison"] == name, quantity].dropna()
-                if len(size):
-                    large = float(np.quantile(size, LARGE_SHARE))
-                    figures = (len(size), float(np.mean(size)), large, float(size.max()))
-                    rows.append((name, *comparison, estimate, quantity, unit, *figures))
+    keys = ["estimate", "comparison", "quantity"]
+    sizes = errors.melt(keys[:2], list(units), "quantity", "size").dropna()
+    groups = sizes.groupby(keys)["size"]
+    table = groups.agg(n="size", mean="mean", largest="max").reset_index()
+    table["quantile_99"] = groups.quantile(LARGE_SHARE).to_numpy()
+    table["reference"] = [known[name].reference for name in table["comparison"]]
+    table["model"] = [known[name].model for name in table["comparison"]]
+    table["unit"] = table["quantity"].map(units)
+    places = {name: i for i, name in enumerate((*known, *units))}
+    table = table.sort_values(keys, key=lambda names: names.map(places).fillna(0))
     names = ["comparison", "reference", "model", "estimate", "quantity", "unit"]
-    return pd.DataFrame(rows, columns=[*names, "n", "mean", "quantile_99", "largest"])
+    return table[[*names, "n", "mean", "quantile_99", "largest"]].reset_index(drop=True)
 
 
 def frames_are_fitted(frames: Mapping) -> bool:

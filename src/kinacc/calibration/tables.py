@@ -25,9 +25,7 @@ def frames_columns(
     names = [*(("base", session) for session in session_names), *((t, None) for t in target_names)]
     rows = []
     for model, item in frames.items():
-        rotation, place = (
-            np.concatenate(parts) for parts in zip(item.bases, item.targets, strict=True)
-        )
+        rotation, place = item.joined
         quaternions = quaternion_from_rotation(rotation)
         rows += [
             (model, *name, *at, *quaternion)

@@ -12,7 +12,7 @@ import pandas as pd
 from kinacc.calibration import evidence, tables, vec_fit
 from kinacc.calibration.fitting import ModelFit, placed
 from kinacc.calibration.frames import FrameParameters, Frames, FrameTerms
-from kinacc.calibration.models import Common, Estimator, Fit, nominal_frames
+from kinacc.calibration.models import Common, Estimator, Fit
 from kinacc.calibration.observations import Observations
 from kinacc.calibration.uncertainty import Uncertainty
 from kinacc.calibration.vec_fit import Prior
@@ -84,7 +84,8 @@ class VECEstimator(Estimator):
         parts: list[pd.DataFrame] = []
         folds = [None, *(int(fold) for fold in np.unique(every.fold) if fold >= 0)]
         if not self.open:
-            parts.append(self._without_evidence(self.order, self.prior))
+            unjudged = evidence.table_of([(self.order, self.prior, np.nan, None)])
+            parts.append(unjudged.assign(fold=np.nan))
         elif progress:
             folds = progress(folds, "shares of the poses held out")
         for fold in folds if self.open else ():
@@ -142,26 +143,11 @@ class VECEstimator(Estimator):
         orders = [order for order in self.orders if order <= most]
         if not orders:  # too few residuals to judge by
             usual = evidence.prior_of(evidence.USUAL_STD, 1.0, self.prior.offset_rad)
-            return self._without_evidence(self.orders[0], usual)
+            return evidence.table_of([(self.orders[0], usual, np.nan, None)])
         stated = self.prior if self.prior_stated else None
         observations = self._wanted(seen)
         return evidence.choose(
             observations, self._empty(1), parameters, weight, orders, stated, near
-        )
-
-    def _without_evidence(self, order: int, prior: Prior) -> pd.DataFrame:
-        """``vec_orders`` of one order and prior that nothing was compared with."""
-        return pd.DataFrame(
-            {
-                "fold": np.nan,
-                "order": [order],
-                "prior_std_mm": prior.delta_mm,
-                "prior_std_mrad": 1e3 * prior.eps_rad,
-                "prior_decay": prior.decay,
-                "log_evidence": np.nan,
-                "log_evidence_less": np.nan,
-                "chosen": True,
-            }
         )
 
     def _begin(
@@ -171,7 +157,7 @@ class VECEstimator(Estimator):
         stated, terms = self.common.frames(observations)
         if stated is None and NOMINAL in others:
             stated = others[NOMINAL].frames
-        return stated or nominal_frames(observations, self.common), terms
+        return stated or self.common.nominal_frames(observations), terms
 
     def _empty(self, order: int) -> VECModel:
         return vec.without_errors(self.common.nominal, *self.joint_range_rad, order)

@@ -27,22 +27,9 @@ def load(
     overrides: Mapping[str, Any] | None = None,
     folder: Path | str = ".",
 ) -> dict[str, dict[str, Any]]:
-    """Read full settings of every data set, held to each other and to the robots they name.
+    """Full settings of every data set, by name, held to each other and to the robots they name.
 
-    Parameters
-    ----------
-    paths, overrides, folder
-        As of :func:`kinacc.config.load.load`.
-
-    Returns
-    -------
-    dict
-        ``{name: settings}``.
-
-    Raises
-    ------
-    InputError
-        Listing every problem in all files.
+    As :func:`kinacc.config.load.load`. Raises InputError listing every problem in all files.
     """
     return configuration.load(paths, overrides, folder, contradictions)
 

@@ -17,20 +17,7 @@ from kinacc.tables.contract import PROVENANCE_KEYS
 
 
 def check_file(path: Path, artefact: Artefact) -> list[Problem]:
-    """Hold the table in a file to its schema: types, units, metadata, limits and row keys.
-
-    Parameters
-    ----------
-    path
-        A Parquet file.
-    artefact
-        Its schema.
-
-    Returns
-    -------
-    list of Problem
-        Empty for a table that conforms.
-    """
+    """Problems of the table in a file, by its schema."""
     try:
         table = store.read_arrow(path)
         frame = table.to_pandas()

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from kinacc.calibration import delivered, fitting, models, residuals
+from kinacc.calibration import delivered, fitting, residuals
 from kinacc.calibration.dh_estimator import DHEstimator
 from kinacc.calibration.fitting import ModelFit
 from kinacc.calibration.identifiability import listed
@@ -124,7 +124,7 @@ def fit_pendant(
         errors = residuals.cross_validated(every, refit, folds, [PLAINEST])[0]
     else:
         errors = residuals.errors(result, used)
-    nominal = Fit(robot.dh, models.nominal_frames(used, common))
+    nominal = Fit(robot.dh, common.nominal_frames(used))
     old, new = (_numbers(maker, robot, model, every) for model in (nominal, result[PLAINEST]))
     recorded = pd.DataFrame(tables["residuals"])
     recorded = recorded[recorded["fold"].isna()]
