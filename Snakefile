@@ -18,7 +18,7 @@ from pathlib import Path
 
 from snakemake.exceptions import WorkflowError
 
-from kinacc.campaign.journal import of_results as campaigns_of
+from kinacc.campaign.folder import of_results as campaigns_of
 from kinacc.errors import InputError
 from kinacc.workflow import running
 from kinacc.workflow.code import code_digest

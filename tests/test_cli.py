@@ -1,6 +1,7 @@
 """The command line as a person uses it: help, one stage by hand, mistakes."""
 
 import json
+from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
@@ -68,3 +69,24 @@ def test_what_is_wrong_is_said_as_json_where_the_answer_is_wanted_so(words):
     problems = json.loads(done.stdout)["problems"]
     assert all({"where", "what", "allowed", "fix"} == set(each) for each in problems)
     assert problems[0]["what"]
+
+
+@pytest.mark.parametrize(
+    ("words", "code"),
+    [
+        ("check-results results", 2),
+        ("check-results results --config wrong.yaml", 2),
+        ("add june.csv --to cell.yaml", 2),
+        ("summary results", 1),
+        ("check-data wrong.yaml", 2),
+    ],
+)
+def test_commands_of_a_build_server_end_with_the_codes_of_the_page(
+    tmp_path, monkeypatch, words, code
+):
+    monkeypatch.chdir(tmp_path)
+    Path("cell.yaml").write_text("datasets: {cell: {robot: mh180}}\n")
+    Path("wrong.yaml").write_text("datasets: {cell: {robt: mh180}}\n")
+    Path("results/cell").mkdir(parents=True)
+    Path("results/cell/robot.parquet").write_text("no table")
+    assert call(*words.split()).exit_code == code

@@ -18,10 +18,11 @@ import pyarrow.parquet as pq
 import pytest
 from command_line import call
 
-from kinacc.cli.output import print_table, write_table
+from kinacc.cli.output import write_table
 from kinacc.errors import InputError, Problem
 from kinacc.figures import campaign_plan
 from kinacc.figures.save import render
+from kinacc.report.terminal import print_table
 
 FORMULAS = ("=1+1", "+1+cmd", "-1+1", "@SUM(1)", "\t=1", "\r=1", "\n=1", "'=1", "＝1", "＠1")
 PLAIN = ("-1.5", "+2", "1e-3", "tool", "−3", "a=b", "'", "")

@@ -9,9 +9,7 @@ import numpy as np
 import pytest
 from scipy import integrate, optimize, special
 
-from kinacc.assess.adaptive import Candidates
 from kinacc.assess.attainable import limits_of, proven_excess_mm, width_limits
-from kinacc.assess.search_and_confirm import SearchAndConfirm
 from kinacc.assess.statement import CANDIDATES, MEASURED, REGION, Statement
 
 ERROR = 0.05
@@ -96,34 +94,3 @@ def test_limits_are_told_of_statements_on_the_mean_error_of_all_their_points_alo
         told(MEASURED, error_of="visit"),
     ):
         assert all(math.isnan(limit) for limit in other)
-
-
-def directed(sizes_mm, seed: int = 3) -> np.ndarray:
-    """Errors of these sizes in directions of their own."""
-    vectors = np.random.default_rng(seed).normal(size=(len(sizes_mm), 3))
-    return vectors / np.linalg.norm(vectors, axis=1)[:, None] * np.asarray(sizes_mm)[:, None]
-
-
-def ended(settings: SearchAndConfirm, errors_mm: np.ndarray, chance: np.random.Generator):
-    """What is said on all candidates at the end of a campaign with normal readings."""
-    campaign = settings.begin(Candidates.with_equal_noise(np.full(len(errors_mm), SIGMA_MM)))
-    while (row := campaign.next()) is not None:
-        campaign.record(row, errors_mm[row] + SIGMA_MM * chance.normal(size=3))
-    return next(each for each in campaign.statements() if each.target == CANDIDATES)
-
-
-@pytest.mark.parametrize(
-    ("large", "upper", "lower"), [(1, 1.25, 1.6), (2, 1.6, 2.7), (8, 2.2, 2.7)]
-)
-def test_readings_after_the_visit_are_spent_nearly_as_well_as_with_the_sizes_known(
-    large, upper, lower
-):
-    sizes = np.random.default_rng(4).uniform(0.1, 0.5, POINTS)
-    sizes[:large] = 1.2
-    chance, budget = np.random.default_rng(5), 2 * POINTS
-    settings = SearchAndConfirm(budget, noise_margin=1.0)
-    said = [ended(settings, directed(sizes), chance) for _ in range(100)]
-    excess = np.mean([max(each.upper_mm - 1.2, 0.0) for each in said])
-    assert excess <= upper * width_limits(sizes, SIGMA_MM, budget, 0.05).attainable_mm
-    least = Z * SIGMA_MM / math.sqrt(budget - POINTS + 1)
-    assert np.mean([1.2 - each.lower_mm for each in said]) <= lower * least

@@ -65,23 +65,6 @@ def test_every_assessor_keeps_its_budget_and_says_something_at_the_end(assessor,
     assert campaign.next() is None
 
 
-@pytest.mark.parametrize("assessor", LIVE, ids=lambda each: each.name)
-def test_a_campaign_told_its_readings_again_goes_on_as_before(assessor):
-    readings, candidates = world(), some_candidates()
-    first, reads, told = assessor.begin(candidates), np.zeros(30, int), []
-    while (point := first.next()) is not None:
-        if len(told) % 9 == 0:
-            again = assessor.begin(candidates)
-            for each in told:
-                assert again.next() == each[0]
-                again.record(*each)
-            assert again.next() == point
-        told.append((point, readings.reading_mm(point, int(reads[point])).copy()))
-        first.record(*told[-1])
-        reads[point] += 1
-    assert 1 <= len(told) <= 40
-
-
 @pytest.mark.parametrize(
     "wrong",
     [

@@ -10,7 +10,6 @@ import pytest
 from campaign_on_disk import SIGMA_MM, Arm, files_of, recorded, refused, standing
 from command_line import call
 
-from kinacc.assess.registry import ADAPTIVE
 from kinacc.assess.simulate import conduct
 from kinacc.campaign import folder as campaigns
 from kinacc.campaign import plan as plans
@@ -166,15 +165,6 @@ def test_a_reading_that_went_wrong_is_struck_but_stays_in_the_report(campaign):
     assert "not seated" in (folder / "report" / "report.md").read_text()
 
 
-def test_a_reading_given_twice_to_the_last_digit_is_taken_once(campaign):
-    folder, arm = campaign
-    label = arm.plan.points.label[int(arm.plan.route[0])]
-    words = ("record", folder, "--point", label, "--position-mm", arm.position(label))
-    assert call("campaign", *words).exit_code == 0
-    assert "reading 1 to the last digit" in refused(folder, *words)
-    assert call("campaign", *words, "--again").exit_code == 0
-
-
 @pytest.mark.parametrize(
     ("options", "place"),
     [
@@ -283,12 +273,3 @@ def test_a_report_holds_its_contract_and_the_numbers_of_status(begun):
     done = call("check-results", made)
     assert done.exit_code == 1
     assert "different states" in done.output
-
-
-@pytest.mark.parametrize("assessor", ADAPTIVE)
-def test_a_campaign_of_any_assessor_takes_a_reading(begun, assessor):
-    folder = begun("--noise-mm", SIGMA_MM, "--assessor", assessor, "--sure")
-    asked = standing(folder)["next_point"]
-    done = call("campaign", "record", folder, "--position-mm", Arm(folder).position(asked))
-    assert done.exit_code == 0, done.output
-    assert standing(folder)["readings"] == 1

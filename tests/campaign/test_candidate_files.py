@@ -50,20 +50,6 @@ def test_a_german_export_in_degrees_with_decimal_commas(start, joints, tmp_path)
     assert "decimal commas" in done.stderr
 
 
-def test_a_program_of_the_robot_with_its_names_of_positions(start, joints, tmp_path):
-    file = tmp_path / "check.mod"
-    lines = [
-        f"CONST jointtarget p{number * 10}:=[[{','.join(f'{each:.6f}' for each in row)}],"
-        "[9E9,9E9,9E9,9E9,9E9,9E9]];"
-        for number, row in enumerate(np.rad2deg(joints), 1)
-    ]
-    file.write_text("MODULE check\n" + "\n".join(lines) + "\nENDMODULE\n")
-    done, plan = start(file)
-    assert done.exit_code == 0, done.output
-    same(plan, joints, 7)
-    assert plan.points.label[0] == "p10"
-
-
 def test_joints_without_a_unit_that_may_be_either_are_asked_about(start, joints, tmp_path):
     file = tmp_path / "candidates.txt"
     lines = [" ".join(f"{each:.9f}" for each in row) for row in joints]

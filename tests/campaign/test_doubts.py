@@ -7,8 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 import pandas as pd
-import pyarrow as pa
-import pyarrow.parquet as pq
 import pytest
 from command_line import call
 
@@ -146,65 +144,3 @@ def test_a_campaign_without_noise_is_told_what_its_calibration_knows_of_it(start
         for way in ("kinacc repeatability FILE", "--noise estimate", "--noise-mm MM"):
             assert way in done.output
     assert not (tmp_path / "check").exists()
-
-
-@pytest.fixture
-def reflectors(tmp_path):
-    """A results folder of 30 poses read four times with two reflectors, scatter 0.06 mm."""
-    read, rng = readings_of(30, 4, 0.06), np.random.default_rng(1)
-    rows = len(read)
-    targets = np.repeat(np.array(["smr_b", "smr_a"], dtype=object), rows)
-    errors_mm = np.repeat(rng.normal(size=(30, 3)), 4, axis=0)
-    both = {f"q{i + 1}": np.tile(read.q_rad[:, i], 2) for i in range(6)}
-    both |= {f"s{i + 1}": np.zeros(2 * rows, np.int8) for i in range(6)}
-    both |= {f"{axis}_mm": np.tile(read.position_mm[:, i], 2) for i, axis in enumerate("xyz")}
-    both |= {f"q{part}": np.full(2 * rows, np.nan) for part in "wxyz"}
-    both |= {name: np.zeros(2 * rows, int) for name in ("repeat", "fold")}
-    both |= {"pose": np.tile(np.repeat(np.arange(30), 4), 2), "target": targets}
-    both["session"] = np.full(2 * rows, "0", dtype=object)
-    errors = {"row": np.arange(2 * rows), "target": targets, "pose": both["pose"]}
-    errors |= {"session": both["session"]}
-    errors |= {
-        f"e{axis}_mm": np.concatenate([errors_mm[:, i], 2.0 * errors_mm[:, i]])
-        for i, axis in enumerate("xyz")
-    }
-    errors["comparison"] = np.full(2 * rows, "dh_vs_measured", dtype=object)
-    errors["estimate"] = np.full(2 * rows, "cross_validated", dtype=object)
-    described = {"description": [robot.as_yaml(robot.load("irb120"))]}
-    folder = tmp_path / "cell"
-    folder.mkdir()
-    for name, columns in (("measurements", both), ("pose_errors", errors), ("robot", described)):
-        table = pa.table({key: pa.array(list(values)) for key, values in columns.items()})
-        pq.write_table(table, folder / f"{name}.parquet")
-    return folder
-
-
-def plan(*words):
-    return call("campaign", "plan", "--width-mm", 0.3, "--repetitions", 2, *words)
-
-
-def test_fewer_measured_errors_than_candidates_are_refused(reflectors):
-    done = plan("--noise-mm", 0.1, "--errors", reflectors, "--candidates", 200)
-    assert done.exit_code == 2
-    assert "--candidates 30" in done.output
-
-
-def test_a_plan_is_about_one_of_several_reflectors_as_a_campaign_is(reflectors):
-    words = ("--noise-mm", 0.15, "--errors", reflectors, "--candidates", 30, "--budget", 30)
-    assert "errors of smr_b (smr_b, smr_a); --point names another" in plan(*words).output
-    first, other = (
-        json.loads(plan(*words, *more, "--json").stdout)["rows"][0]["true_mm"]
-        for more in ((), ("--point", "smr_a"))
-    )
-    assert other == pytest.approx(2.0 * first, rel=1e-9)
-    done = plan(*words, "--point", "smr_c")
-    assert done.exit_code == 2
-    assert "allowed: smr_b, smr_a" in done.output
-
-
-def test_a_plan_with_less_noise_than_poses_repeat_is_asked_about(reflectors):
-    words = ("--noise-mm", 0.02, "--errors", reflectors, "--candidates", 30, "--budget", 30)
-    done = plan(*words)
-    assert done.exit_code == 2
-    assert "readings of the calibration at equal joints scatter by" in done.output
-    assert plan(*words, "--sure").exit_code == 0

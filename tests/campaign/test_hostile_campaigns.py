@@ -7,7 +7,7 @@ import json
 import pytest
 from command_line import call
 
-from kinacc.campaign import folder, journal
+from kinacc.campaign import folder
 
 
 @pytest.fixture
@@ -69,8 +69,8 @@ def said_of(begun, *entries) -> str:
     """What is said of a journal whose lines follow from one another, made by a stranger."""
     opened = folder.open_(begun)
     for entry in entries:
-        known = journal.read(begun / journal.JOURNAL, opened.digest)
-        journal.append(begun / journal.JOURNAL, known, entry)
+        known = folder.read_journal(begun / folder.JOURNAL, opened.digest)
+        folder.append(begun / folder.JOURNAL, known, entry)
     return refusal(begun)
 
 

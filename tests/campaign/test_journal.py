@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from kinacc.campaign import journal
+from kinacc.campaign import folder as journal
 from kinacc.errors import InputError
 
 SEED = "0123456789abcdef"
@@ -20,9 +20,9 @@ SEED = "0123456789abcdef"
 
 def written(path: Path, count: int) -> journal.Journal:
     for _ in range(count):
-        known = journal.read(path, SEED)
+        known = journal.read_journal(path, SEED)
         journal.append(path, known, {"kind": "test", "number": len(known.entries)})
-    return journal.read(path, SEED)
+    return journal.read_journal(path, SEED)
 
 
 def test_a_last_line_cut_anywhere_loses_only_itself(tmp_path):
@@ -32,7 +32,7 @@ def test_a_last_line_cut_anywhere_loses_only_itself(tmp_path):
     end = len(b"\n".join(whole.split(b"\n")[:2])) + 1
     for size in range(end + 1, len(whole)):
         path.write_bytes(whole[:size])
-        known = journal.read(path, SEED)
+        known = journal.read_journal(path, SEED)
         assert len(known.entries) == 2
         assert known.cut_off == size - end
         journal.append(path, known, {"kind": "test", "number": 2})
@@ -44,7 +44,7 @@ def test_a_journal_that_is_no_file_is_told_at_once(tmp_path, made):
     path = tmp_path / "j"
     os.mkfifo(path) if made == "pipe" else path.mkdir()
     with pytest.raises(InputError, match="line 1: cannot be read"):
-        journal.read(path, SEED)
+        journal.read_journal(path, SEED)
 
 
 def test_zeros_left_by_a_power_cut_are_no_line(tmp_path):
@@ -53,7 +53,7 @@ def test_zeros_left_by_a_power_cut_are_no_line(tmp_path):
     whole = path.read_bytes()
     for tail in (b"\0" * 40, b'{"sum": "\0\0\0\0\0"}\n'):
         path.write_bytes(whole + tail)
-        known = journal.read(path, SEED)
+        known = journal.read_journal(path, SEED)
         assert len(known.entries) == 2
         assert known.cut_off == len(tail)
 
@@ -66,13 +66,13 @@ def test_a_line_that_was_changed_is_noticed(tmp_path, line):
     lines[line] = lines[line].replace(b'"number": ', b'"number": 1')
     path.write_bytes(b"\n".join(lines))
     with pytest.raises(InputError, match=f"line {line + 1}"):
-        journal.read(path, SEED)
+        journal.read_journal(path, SEED)
 
 
 def test_a_journal_of_another_plan_is_noticed(tmp_path):
     written(tmp_path / "j", 2)
     with pytest.raises(InputError, match="line 1: was changed, or belongs to another"):
-        journal.read(tmp_path / "j", "f" * 16)
+        journal.read_journal(tmp_path / "j", "f" * 16)
 
 
 def test_a_journal_of_an_earlier_version_goes_on(tmp_path):
@@ -85,12 +85,12 @@ def test_a_journal_of_an_earlier_version_goes_on(tmp_path):
 WRITER = """
 import sys
 from pathlib import Path
-from kinacc.campaign import journal
+from kinacc.campaign import folder as journal
 folder = Path(sys.argv[1])
 number = 0
 while True:
-    with journal.writing(folder):
-        known = journal.read(folder / "j", sys.argv[2])
+    with journal.locked(folder):
+        known = journal.read_journal(folder / "j", sys.argv[2])
         journal.append(folder / "j", known, {"number": len(known.entries), "fill": "x" * 5000})
     print(len(known.entries), flush=True)
 """
@@ -107,20 +107,20 @@ def test_nothing_confirmed_is_lost_when_the_writer_is_killed(tmp_path):
         confirmed = [first, *writer.stdout.read().splitlines()]
         writer.wait()
         last = max(int(line) for line in confirmed if line.strip())
-        known = journal.read(tmp_path / "j", SEED)
+        known = journal.read_journal(tmp_path / "j", SEED)
         assert [each["number"] for each in known.entries][: last + 1] == list(range(last + 1))
 
 
 def test_a_second_writer_waits_and_is_then_refused(tmp_path):
     begun = time.monotonic()
     with (
-        journal.writing(tmp_path),
+        journal.locked(tmp_path),
         pytest.raises(InputError, match="another process is writing"),
-        journal.writing(tmp_path, patience_s=0.2),
+        journal.locked(tmp_path, patience_s=0.2),
     ):
         pass
     assert time.monotonic() - begun >= 0.2
-    with journal.writing(tmp_path, patience_s=0.0):
+    with journal.locked(tmp_path, patience_s=0.0):
         pass
 
 
@@ -135,6 +135,6 @@ def test_a_disk_that_does_not_take_a_line_is_told_and_nothing_before_is_lost(tmp
         patched.setattr(journal.os, "fsync", full)
         with pytest.raises(InputError, match="no space left"):
             journal.append(path, known, {"kind": "test", "number": 2})
-    assert [each["number"] for each in journal.read(path, SEED).entries][:2] == [0, 1]
-    journal.append(path, journal.read(path, SEED), {"kind": "test", "number": 3})
-    assert journal.read(path, SEED).entries[-1]["number"] == 3
+    assert [each["number"] for each in journal.read_journal(path, SEED).entries][:2] == [0, 1]
+    journal.append(path, journal.read_journal(path, SEED), {"kind": "test", "number": 3})
+    assert journal.read_journal(path, SEED).entries[-1]["number"] == 3

@@ -4,13 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from campaign_on_disk import Arm
-from command_line import call
 
 from kinacc.campaign import folder as campaigns
 from kinacc.campaign.instrument import instruments
 from kinacc.campaign.plan import from_json, to_json
-from kinacc.campaign.reading import covariance_mm2
 from kinacc.errors import InputError
 
 LASER = "laser:range_mm=0.01,range_um_per_m=5,angle_mm=0.02,angle_um_per_m=15,repeat_mm=0.03"
@@ -51,39 +48,6 @@ def test_a_laser_tracker_is_as_sure_of_each_candidate_as_its_range_and_angles_th
     order = plan.visiting(frozenset())
     told = plan.candidates(order).covariance_mm2
     np.testing.assert_array_equal(told, plan.covariance_mm2[order])
-
-
-def read_in_its_frame(folder, points, file):
-    """Take readings of so many points of the visit, as the tracker sees them; the campaign then."""
-    arm = Arm(folder)
-    turn, head = arm.plan.to_base.rotation, arm.plan.to_base.position_mm
-    lines = ["pose,x_mm,y_mm,z_mm,instrument"]
-    for point in campaigns.open_(folder).state().ahead()[:points]:
-        label = arm.plan.points.label[point]
-        seen = np.array([float(each) for each in arm.position(label).split(",")])
-        lines.append(f"{label},{','.join(map(repr, (turn.T @ (seen - head)).tolist()))},tracker")
-    file.write_text("\n".join(lines) + "\n")
-    done = call("campaign", "record", folder, file, "--accept-implausible")
-    assert done.exit_code == 0, done.output
-    return campaigns.open_(folder)
-
-
-def test_readings_of_a_laser_tracker_count_by_where_they_were_taken(begun, tmp_path):
-    folder = begun("--instrument", f"tracker={LASER}", "--instrument", "camera=0.2")
-    opened = read_in_its_frame(folder, 20, tmp_path / "readings.csv")
-    state = opened.state()
-    assert state.asked is None
-    assert len(state.told) == 20
-    for each in state.told:
-        own = covariance_mm2(opened.plan, each.reading)
-        np.testing.assert_array_equal(own, opened.plan.covariance_mm2[each.reading.point])
-    written = call("campaign", "report", folder, "--table", "csv")
-    assert written.exit_code == 0, written.output
-    head, *rows = (folder / "report" / "campaign_points.csv").read_text().splitlines()
-    cells = [dict(zip(head.split(","), row.split(","), strict=True)) for row in rows]
-    rms = np.sqrt(np.trace(opened.plan.covariance_mm2, axis1=1, axis2=2) / 3.0)
-    wanted = [rms[opened.plan.points.number(row["point"])] for row in cells]
-    np.testing.assert_allclose([float(row["noise_mm"]) for row in cells], wanted, rtol=1e-9)
 
 
 def test_a_plan_with_a_laser_tracker_is_read_as_it_was_written(begun):

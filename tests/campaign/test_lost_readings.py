@@ -5,30 +5,8 @@ from __future__ import annotations
 import hashlib
 import re
 
-from campaign_on_disk import SIGMA_MM, Arm, recorded, standing
+from campaign_on_disk import SIGMA_MM, Arm, recorded
 from command_line import call
-
-from kinacc.campaign import folder as campaigns
-
-
-def test_a_cut_off_reading_is_told_and_can_be_recorded_again(begun):
-    folder = begun("--noise-mm", SIGMA_MM, "--frame", "base")
-    arm = Arm(folder)
-    first, second = (arm.plan.points.label[point] for point in arm.plan.route[:2])
-    call("campaign", "record", folder, "--position-mm", arm.position(first))
-    journal = folder / "readings.jsonl"
-    whole = journal.read_bytes()
-    call("campaign", "record", folder, "--position-mm", arm.position(second))
-    journal.write_bytes(journal.read_bytes()[:-9])
-    shown = call("campaign", "status", folder)
-    assert "was cut off" in shown.output
-    assert standing(folder)["readings"] == 1
-    arm.reads[arm.row[arm.plan.points.number(second)]] = 0
-    done = call("campaign", "record", folder, "--position-mm", arm.position(second))
-    assert done.exit_code == 0
-    assert journal.read_bytes().startswith(whole)
-    assert "cut off" not in call("campaign", "status", folder).output
-    assert len(campaigns.open_(folder).state().told) == 2
 
 
 def test_a_report_kept_elsewhere_tells_that_its_last_readings_were_taken_away(begun):

@@ -61,14 +61,6 @@ def test_a_plan_has_the_excess_of_bounds_that_know_the_errors():
     assert few.excepted > 0
 
 
-def test_the_single_shot_bound_holds_as_often_as_it_says():
-    noise, aim = 0.1**2 * np.eye(3), Aim(target=MEASURED)
-    plan = plan_budget([field()], 30, noise, [SingleShot(measurements=30)], aim, 200, 4)
-    (row,) = plan.rows.itertuples()
-    assert row.holding / row.judged >= 0.95 - 3.0 * math.sqrt(0.95 * 0.05 / 200)
-    assert row.stated == 1.0
-
-
 def runs(*bounds):
     """Simulated campaigns by lower and upper bound, truth and verdict."""
     table = pd.DataFrame(bounds, columns=["lower_mm", "upper_mm", "true_mm", "verdict"])

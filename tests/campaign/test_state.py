@@ -52,20 +52,6 @@ def test_a_campaign_on_disk_ends_as_in_memory(make_plan, make_world, name):
     assert_same(state.statements(), wanted.statements())
 
 
-@pytest.mark.parametrize("name", ADAPTIVE)
-def test_the_first_visit_takes_the_points_in_row_order_whatever_is_read(make_plan, name):
-    plan = make_plan(name)
-    rows = plan.visiting(frozenset())
-    first = fixed_visit(plan.assessor, plan.candidates(rows))
-    assert first >= 1
-    for scale in (0.0, 0.01, 5.0):
-        campaign = plan.assessor.begin(plan.candidates(rows))
-        draw = np.random.default_rng(1)
-        for row in range(first):
-            assert campaign.next() == row
-            campaign.record(row, scale * draw.normal(size=3))
-
-
 @pytest.mark.parametrize("name", ["region_share", "gamma_quantile"])
 def test_part_of_a_visit_by_travel_says_nothing_of_the_region(make_plan, make_world, name):
     plan = make_plan(name, points=60, budget=60)
@@ -94,19 +80,6 @@ def test_readings_taken_ahead_change_nothing(make_plan, make_world):
     state, whole = restore(plan, shuffled), restore(plan, entries)
     assert not state.in_hand
     assert_same(state.statements(), whole.statements())
-
-
-def test_readings_not_asked_for_stay_in_hand(make_plan, make_world):
-    plan = make_plan()
-    world = make_world(plan)
-    entries = entries_of(plan, world)
-    asked = restore(plan, []).asked
-    others = [e for e in entries if e["readings"][0]["point"] != asked]
-    state = restore(plan, others)
-    assert state.asked == asked
-    assert not state.told
-    assert len(state.in_hand) == len(others)
-    assert state.ahead() == [asked]
 
 
 def test_a_point_left_out_is_never_asked_for_and_the_visit_stays_random(make_plan, make_world):

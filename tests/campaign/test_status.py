@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 import re
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,13 +13,12 @@ import pytest
 import kinacc
 from kinacc.assess.attainable import width_limits
 from kinacc.assess.simulate import carry_on
-from kinacc.campaign import folder, journal
+from kinacc.campaign import folder
 from kinacc.campaign.folder import Opened
 from kinacc.campaign.plan import Limits
 from kinacc.campaign.reading import Reading
-from kinacc.campaign.reasons import ADVICE, REASONS
 from kinacc.campaign.state import restore
-from kinacc.campaign.status import assumptions, status
+from kinacc.campaign.status import ADVICE, REASONS, status
 from kinacc.cli.output import plain
 
 
@@ -41,7 +39,7 @@ def measured(make_plan, make_world):
 
         carry_on(plan.assessor.begin(plan.candidates(rows)), read, limit=readings)
         entries = (folder.readings_entry(taken),)
-        opened = Opened(Path("check"), plan, journal.Journal(entries, "ab", (), 0), "ab")
+        opened = Opened(Path("check"), plan, folder.Journal(entries, "ab", (), 0), "ab")
         return status(opened, restore(plan, entries)), plan
 
     return make
@@ -92,7 +90,7 @@ def test_the_verdict_is_the_headline(measured, tolerance_mm, verdict):
 
 
 def test_the_text_has_every_number_and_condition(measured):
-    found, plan = measured(error_of="visit", arm_mm=0.03, allowance_mm=0.02, wrong_rate=0.01)
+    found, _ = measured(error_of="visit", arm_mm=0.03, allowance_mm=0.02, wrong_rate=0.01)
     bound = found.bound
     assert found.headline == bound.text
     for part in (f"at most {bound.upper_mm:.3f} mm", f"at least {bound.lower_mm:.3f} mm",
@@ -100,7 +98,6 @@ def test_the_text_has_every_number_and_condition(measured):
         assert part in bound.text
     for part in ("0.05 mm per axis", "at most 1 % wrong", "at most 0.02 mm", "independent normal"):
         assert part in found.assumes
-    assert "0.03 mm" in " ".join(assumptions(found, plan))
 
 
 def test_a_bound_on_all_but_some_is_named_so_and_the_estimate_is_called_low(measured):
@@ -109,21 +106,6 @@ def test_a_bound_on_all_but_some_is_named_so_and_the_estimate_is_called_low(meas
     assert bound.excepted == 3
     assert "all but 3 of these 60 candidates" in bound.text
     assert f"{bound.unmeasured} of 60 are not measured" in bound.text
-
-
-def test_bounds_as_small_as_the_noise_do_not_hold_for_less_noise(measured, make_plan):
-    found, plan = measured()
-    assert "at most 0.05 mm" in found.assumes
-    coarse = replace(plan.instruments[0], covariance_mm2=0.5**2 * np.eye(3))
-    plan = replace(plan, instruments=(coarse,))
-    readings = [
-        Reading(point, at + np.random.default_rng(point).normal(0.0, 0.5, 3), "tracker")
-        for point, at in enumerate(plan.points.modelled_mm)
-    ]
-    entries = (folder.readings_entry(readings * 1),)
-    opened = Opened(Path("check"), plan, journal.Journal(entries, "ab", (), 0), "ab")
-    found = status(opened, restore(plan, entries))
-    assert found.bound.upper_mm > 1.5 or "exactly 0.5 mm" in found.assumes
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,6 @@
 import shlex
 
 import pytest
-import yaml
 from click.testing import CliRunner
 from tracked_arm import table, tracked
 
@@ -63,13 +62,3 @@ def test_lines_that_are_excluded_already_or_none_leave_the_file_as_it_is(two_sli
         "exclude", "seen.yaml", "--lines", lines, "--reason", "x", code=2
     )
     assert (two_slips / "seen.yaml").read_bytes() == before
-
-
-def test_rows_are_excluded_in_a_file_written_in_flow_style_too(two_slips):
-    settings = yaml.safe_load((two_slips / "seen.yaml").read_text())
-    text = yaml.safe_dump(settings, default_flow_style=True, width=10_000)
-    (two_slips / "seen.yaml").write_text(f"# by hand\n{text}")
-    call("exclude", "seen.yaml", "--lines", "6-7", "--reason", "by hand: 5 mm")
-    assert (two_slips / "seen.yaml").read_text().startswith("# by hand\n")
-    section = load(["seen.yaml"])["seen"]["measurements"]["file"]
-    assert section["exclude"] == [{"lines": [6, 7], "reason": "by hand: 5 mm"}]

@@ -3,9 +3,11 @@
 import json
 
 import numpy as np
+import pandas as pd
 import pytest
 import shared_data
 from click.testing import CliRunner
+from scipy.spatial.transform import Rotation
 
 from kinacc.checks.contradictions import load
 from kinacc.cli.group import main
@@ -19,26 +21,13 @@ def call(*words, **more):
 @pytest.fixture
 def foreign(tmp_path):
     """A `;` file with decimal commas of an IRB 120: radians, ZYX angles, names of its own."""
-    arm = robot.load("irb120")
-    rng = np.random.default_rng(0)
-    q = np.round(rng.uniform(-1.0, 1.0, (40, 6)), 6)
-    pose = robot.forward(arm, q)
-    r = pose.rotation
-    turn = np.rad2deg(
-        np.stack(
-            [
-                np.arctan2(r[:, 2, 1], r[:, 2, 2]),
-                -np.arcsin(r[:, 2, 0]),
-                np.arctan2(r[:, 1, 0], r[:, 0, 0]),
-            ],
-            axis=1,
-        )
-    )
+    q = np.round(np.random.default_rng(0).uniform(-1.0, 1.0, (40, 6)), 6)
+    pose = robot.forward(robot.load("irb120"), q)
+    turn = Rotation.from_matrix(pose.rotation).as_euler("xyz", degrees=True)
     rows = np.column_stack([q, np.round(pose.position_mm, 4), np.round(turn, 5)])
-    head = ";".join([*(f"Achse {i}" for i in range(1, 7)), *"XYZ", "Rx", "Ry", "Rz"])
-    body = "\n".join(";".join(f"{value:.6f}".replace(".", ",") for value in row) for row in rows)
+    names = [*(f"axis {i}" for i in range(1, 7)), *"XYZ", "Rx", "Ry", "Rz"]
     path = tmp_path / "Messung 3.csv"
-    path.write_text(f"{head.replace('Achse', 'axis')}\n{body}\n", encoding="utf-8")
+    pd.DataFrame(rows, columns=names).to_csv(path, sep=";", decimal=",", index=False)
     return path
 
 
@@ -92,14 +81,11 @@ def test_without_a_terminal_every_question_names_the_option_that_answers_it(fore
     assert "--orientation" not in done.output
 
 
-def test_an_unknown_robot_gets_a_template_to_fill_in(foreign, tmp_path):
-    lines = foreign.read_text(encoding="utf-8").splitlines()
-    without = [";".join(line.split(";")[1:]) for line in lines]
-    path = tmp_path / "five.csv"
-    path.write_text("\n".join(without).replace("axis 2", "axis 1").replace("axis 3", "axis 2")
-                    .replace("axis 4", "axis 3").replace("axis 5", "axis 4")
-                    .replace("axis 6", "axis 5"))  # fmt: skip
-    done = call("init", path, "--out", tmp_path, "--yes")
+def test_an_unknown_robot_gets_a_template_to_fill_in(tmp_path):
+    rows = np.random.default_rng(0).uniform(-50.0, 50.0, (20, 8)).round(3)
+    names = [*(f"q{i}_deg" for i in range(1, 6)), "x_mm", "y_mm", "z_mm"]
+    pd.DataFrame(rows, columns=names).to_csv(tmp_path / "five.csv", index=False)
+    done = call("init", tmp_path / "five.csv", "--out", tmp_path, "--yes")
     assert done.exit_code == 0, done.output
     template = tmp_path / "five.robot.yaml"
     assert "FILL IN" in template.read_text()

@@ -7,7 +7,6 @@ from tracked_arm import (
     assert_turned,
     call,
     described,
-    refused,
     table,
     tracked,
     written,
@@ -45,15 +44,6 @@ def test_headers_of_a_language_are_read(language, tmp_path):
     assert told["unused_columns"] == dict.fromkeys(axes(nominal), "nominal")
 
 
-def test_an_answer_to_the_question_for_pulses_is_as_good_as_the_option(tmp_path):
-    names = [*(f"{a} [pulse]" for a in "SLURBT"), *XYZ]
-    files = written(tmp_path, m_csv=table(names, np.round(IT.q * 1000.0), IT.point))
-    answer = ",".join(["1000"] * 6)
-    done = call("init", *files, "--robot", "ur10", "--out", tmp_path / "cell", input=f"{answer}\n")
-    assert done.exit_code == 0, done.output
-    assert "pulses_per_deg" in (tmp_path / "cell" / "m.yaml").read_text()
-
-
 @pytest.mark.parametrize(
     ("joint", "letters", "convention"),
     [("J{}", "WPR", "xyz"), ("A{}", "ABC", "ZYX"), ("JT{}", "OAT", "ZYZ")],
@@ -64,15 +54,6 @@ def test_angles_of_fanuc_kuka_and_kawasaki(joint, letters, convention, tmp_path)
     section, _ = described(written(tmp_path, m_csv=text))
     assert section["orientation"]["convention"] == convention
     assert_turned(assert_read(section, IT), IT)
-
-
-def test_centres_that_were_not_corrected_are_asked_about(tmp_path):
-    names = [*joints("J{} [deg]"), *XYZ, "Radius uncorrected [mm]"]
-    files = written(tmp_path, m_csv=table(names, IT.q, IT.point, np.full(len(IT.q), 19.05)))
-    said = refused(files)
-    assert "--take 'X [mm]'" in said
-    section, _ = described(files, "--take", "X [mm]")
-    assert_read(section, IT)
 
 
 def test_names_that_count_but_are_poses_of_their_own_stay_so(tmp_path):

@@ -5,7 +5,6 @@ import pytest
 from tracked_arm import assert_read, call, described, refused, table, tracked, written
 
 from kinacc.checks.contradictions import load
-from kinacc.errors import InputError
 from kinacc.kinematics import robot
 from kinacc.measurements.reader import read
 
@@ -55,11 +54,6 @@ def test_as_many_rows_without_a_key_are_asked_about(tmp_path):
     done = call("init", *files, "--robot", "ur10", "--out", cell, "--name", "m", input="order\n")
     assert done.exit_code == 0, done.output
     assert load((cell / "m.yaml",))["m"]["measurements"]["file"]["joints"]["by"] == "order"
-
-
-def test_other_counts_without_a_key_are_refused(tmp_path):
-    files = written(tmp_path, joints_csv=table(Q, IT.q), tracker_csv=table(XYZ, IT.point[1:]))
-    assert "19 points" in refused(files)
 
 
 def test_a_count_of_rows_is_no_name(tmp_path):
@@ -133,13 +127,3 @@ def test_regular_times_leave_the_offset_open(tmp_path):
     assert "--clock-offset" in refused(files)
     section, _ = described(files, "--clock-offset", "-3")
     assert_read(section, IT)
-
-
-def test_joints_that_are_gone_are_named_before_a_run(tmp_path):
-    joints = table(["Name", *Q], named("P{}", range(COUNT)), IT.q)
-    points = table(["Name", *XYZ], named("P{}", range(COUNT)), IT.point)
-    files = written(tmp_path, joints_csv=joints, tracker_csv=points)
-    described(files)
-    files[0].unlink()
-    with pytest.raises(InputError, match=r"joints\.csv.*does not exist"):
-        load((tmp_path / "cell" / "m.yaml",))

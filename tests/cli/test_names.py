@@ -69,10 +69,4 @@ def test_a_name_that_does_not_stand_in_a_line_is_refused_where_it_is_given(folde
     refused("plan-poses", own)
     start = ("campaign", "start", tmp_path / "c", "--calibration", folder)
     refused(*start, "--instrument", f"{name}=0.1")
-    candidates = tmp_path / "points.csv"
-    with candidates.open("w", newline="") as file:
-        out = csv.writer(file)
-        out.writerow(["pose", *(f"q{i}_deg" for i in range(1, 7))])
-        out.writerows([[name, 0, 0, 0, 0, 60, 0], ["b", 0, 0, 0, 0, 50, 0]])
-    refused(*start, "--noise-mm", 0.1, "--candidates", candidates)
     assert not (tmp_path / "c").exists()

@@ -121,18 +121,6 @@ def test_rows_without_an_answer_are_told_and_left_out(folder, tmp_path):
     assert "q1_deg, line 3: not a finite number" in done.output
 
 
-def test_a_visit_predicted_by_the_calibration_is_no_measurement_of_it(folder, tmp_path):
-    campaign, visit = tmp_path / "check", tmp_path / "visit.csv"
-    begin(folder, campaign, "--candidates", 8)
-    assert call("campaign", "next", campaign, "--all", "-o", visit).exit_code == 0
-    made = tmp_path / "predict.csv"
-    assert call("predict", folder, visit, "--model", "dh", "-o", made).exit_code == 0
-    done = call("campaign", "record", campaign, made)
-    assert done.exit_code == 2, done.output
-    assert "kinacc predict" in done.output
-    assert not (campaign / "readings.jsonl").exists()
-
-
 def test_measured_errors_of_a_campaign_plan_the_next_one(folder, tmp_path):
     campaign = tmp_path / "check"
     begin(folder, campaign, "--candidates", 12)

@@ -14,10 +14,11 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-import yaml
 from command_line import call
 from scipy.spatial.transform import Rotation
 from stages_by_hand import run_stage
+
+from kinacc.kinematics import robot
 
 RELATIVE = 1e-6
 REACHED_MM = 15.0  # DH errors leave 1 to 3 mm; a wrong sign, unit or coupling leaves hundreds
@@ -161,16 +162,10 @@ def _rotations_right(measured: Measured, true: pd.DataFrame, found: pd.DataFrame
 
 def _reach_mm(found: pd.DataFrame, joints: list[str], results: Path) -> float:
     """Rms distance of the points of the first target from the arm's, over every base and target."""
-    arm = yaml.safe_load(pd.read_parquet(results / "robot.parquet")["description"][0])
+    text = pd.read_parquet(results / "robot.parquet")["description"][0]
     first = found[found["target"] == found["target"].iloc[0]]
-    mapped = np.array(arm.get("joint_map") or np.diag([row.get("sign", 1) for row in arm["dh"]]))
-    angles, seen = first[joints].to_numpy(float) @ mapped.T, first[XYZ].to_numpy(float)
-    turned, moved = np.tile(np.eye(3), (len(first), 1, 1)), np.zeros((len(first), 3))
-    for row, angle in zip(arm["dh"], angles.T, strict=True):
-        theta, d, a, alpha = (_number(row, key) for key in ("theta_offset", "d", "a", "alpha"))
-        about_z = Rotation.from_rotvec((angle + theta)[:, None] * [0, 0, 1]).as_matrix()
-        moved = moved + np.einsum("nij,nj->ni", turned, about_z @ [a, 0.0, 0.0] + [0.0, 0.0, d])
-        turned = turned @ about_z @ Rotation.from_euler("x", alpha).as_matrix()
+    pose = robot.forward(robot.of_text(text, "arm.yaml"), first[joints].to_numpy(float))
+    turned, moved, seen = pose.rotation, pose.position_mm, first[XYZ].to_numpy(float)
     target = np.zeros(3)
     for _ in range(60):
         reached = turned @ target + moved
@@ -180,9 +175,3 @@ def _reach_mm(found: pd.DataFrame, joints: list[str], results: Path) -> float:
         target = np.einsum("nij,ni->j", turned, wanted) / len(seen)
     off = base.apply(turned @ target + moved) + place - seen
     return float(np.sqrt((off**2).sum(axis=1).mean()))
-
-
-def _number(row: dict[str, float], key: str) -> float:
-    """A length in mm or an angle in rad of a row of a robot file."""
-    factors = {"_deg": np.pi / 180, "_rad": 1.0, "_mm": 1.0, "_m": 1000.0}
-    return next((row[key + unit] * by for unit, by in factors.items() if key + unit in row), 0.0)

@@ -89,15 +89,6 @@ def test_only_the_targets_asked_for(tmp_path, joints):
     assert "column mB_x_mm or mB_x_m: is missing" in text
 
 
-def test_mapped_names_of_several_targets(tmp_path, joints):
-    table = joints | {f"Ball A {axis}": np.arange(COUNT) * 0.01 for axis in "XYZ"} | points("mB_")
-    names = {f"mA_{axis}": f"Ball A {axis.upper()}" for axis in "xyz"}
-    columns = reading(tmp_path, table, columns=names, length_unit="m").columns
-    first = columns["target"] == "mA"
-    np.testing.assert_allclose(columns["x_mm"][first], np.arange(COUNT) * 10.0)
-    np.testing.assert_allclose(columns["y_mm"][~first], np.arange(COUNT) * 7.0 + 1)
-
-
 @pytest.mark.parametrize("order", ["wxyz", "xyzw"])
 def test_quaternions_in_a_stated_order(tmp_path, joints, order):
     turn = Rotation.random(COUNT, random_state=4)

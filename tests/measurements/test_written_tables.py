@@ -143,7 +143,7 @@ FOOTERS = {
     "Mittelwert": [["Mittelwert:", *["1.000"] * 8]],
     "Max in an empty row": [["", *[""] * 8], ["Max.", *[""] * 5, "1", "2", "3"]],
     "a closing remark": [["# 14 poses, tracker warm"]],
-    "a closing text": [["End of file"]],
+    "a closing text": [["Checked by the night shift"]],
 }
 
 

@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 import yaml
+from scipy.spatial.transform import Rotation
 
 STANDARD_GRAVITY = 9.80665  # m/s^2
 ROBOTS = Path(__file__).resolve().parents[2] / "src" / "kinacc" / "kinematics" / "robots"
@@ -111,22 +112,6 @@ def flange(arm: Arm, q: Sequence[float], payload: Body = NOTHING) -> np.ndarray:
     return frames(arm.table, np.asarray(q) + deflections(arm, q, payload))[-1].real
 
 
-def settled(arm: Arm, q: Sequence[float], payload: Body = NOTHING) -> np.ndarray:
-    """Joint angles (k,) at which springs and gravity balance: moments on the arm as it is bent."""
-    at = np.asarray(q, dtype=float)
-    for _ in range(100):
-        after = np.asarray(q) + deflections(arm, at, payload)
-        if np.max(np.abs(after - at)) < 1e-15:
-            return after
-        at = after
-    raise ArithmeticError("the arm does not come to rest")
-
-
-def flange_at_rest(arm: Arm, q: Sequence[float], payload: Body = NOTHING) -> np.ndarray:
-    """Pose (4, 4) of the last DH frame where springs and gravity balance."""
-    return frames(arm.table, settled(arm, q, payload))[-1].real
-
-
 @dataclass(frozen=True)
 class Described:
     """What a shipped robot file says, read without the package."""
@@ -164,34 +149,13 @@ def disturbed(arm: Arm, rng: np.random.Generator, hayati_joints: Sequence[int] =
     return replace(arm, table=tuple(tuple(row) for row in table.tolist()))
 
 
-def turn_about(rotation_vector: Sequence[float]) -> np.ndarray:
-    """Rotation matrix of a rotation vector (Rodrigues)."""
-    x, y, z = rotation_vector
-    angle = math.sqrt(x * x + y * y + z * z)
-    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0.0]])
-    if angle < 1e-12:
-        return np.eye(3) + cross
-    one, two = math.sin(angle) / angle, (1 - math.cos(angle)) / angle**2
-    return np.eye(3) + one * cross + two * cross @ cross
-
-
 def placed(rotation_vector: Sequence[float], position_mm: Sequence[float]) -> np.ndarray:
     """Pose (4, 4) of a frame."""
     pose = np.eye(4)
-    pose[:3, :3], pose[:3, 3] = turn_about(rotation_vector), position_mm
+    pose[:3, :3], pose[:3, 3] = Rotation.from_rotvec(rotation_vector).as_matrix(), position_mm
     return pose
 
 
 def quaternion(rotation: np.ndarray) -> np.ndarray:
-    """Unit quaternion (w, x, y, z), w >= 0: eigenvector of the largest eigenvalue (Bar-Itzhack)."""
-    r = rotation
-    upper = np.array(
-        [
-            [r[0, 0] - r[1, 1] - r[2, 2], 0, 0, 0],
-            [r[0, 1] + r[1, 0], r[1, 1] - r[0, 0] - r[2, 2], 0, 0],
-            [r[0, 2] + r[2, 0], r[1, 2] + r[2, 1], r[2, 2] - r[0, 0] - r[1, 1], 0],
-            [r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1], np.trace(r)],
-        ]
-    )
-    x, y, z, w = np.linalg.eigh(upper)[1][:, -1]
-    return np.array([w, x, y, z]) * (1.0 if w >= 0 else -1.0)
+    """Unit quaternion (w, x, y, z), w >= 0."""
+    return Rotation.from_matrix(rotation).as_quat(canonical=True, scalar_first=True)

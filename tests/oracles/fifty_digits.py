@@ -92,28 +92,10 @@ def inverse(a: Matrix) -> Matrix:
 
 
 def eigen(a: Matrix) -> tuple[Matrix, Matrix]:
-    """Eigenvalues, falling, and vectors (columns) of a symmetric matrix, by Jacobi's rotations."""
-    a, n = a.copy(), len(a)
-    vectors = eye(n)
-    small = NOTHING * max(abs(a[i, i]) for i in range(n))
-    while True:
-        turned = False
-        for p in range(n - 1):
-            for q in range(p + 1, n):
-                if abs(a[p, q]) <= small:
-                    continue
-                turned = True
-                tau = (a[q, q] - a[p, p]) / (2 * a[p, q])
-                t = (1 if tau >= 0 else -1) / (abs(tau) + (1 + tau * tau).sqrt())
-                c = 1 / (1 + t * t).sqrt()
-                s = t * c
-                for m in (a, vectors):
-                    m[:, p], m[:, q] = c * m[:, p] - s * m[:, q], s * m[:, p] + c * m[:, q]
-                a[p], a[q] = c * a[p] - s * a[q], s * a[p] + c * a[q]
-        if not turned:
-            break
-    order = sorted(range(n), key=lambda i: -a[i, i])
-    return np.array([a[i, i] for i in order], dtype=object), vectors[:, order]
+    """Eigenvalues, falling, and vectors (columns) of a symmetric matrix."""
+    values, vectors = mpmath.eigsy(mpmath.matrix(np.vectorize(mp, otypes=[object])(a).tolist()))
+    taken = np.vectorize(dec, otypes=[object])
+    return taken(list(values))[::-1], taken(vectors.tolist())[:, ::-1]
 
 
 # --- rotations and frames -------------------------------------------------------------------------
@@ -227,29 +209,6 @@ def dh_motions(table: Matrix, q: Sequence[Decimal]) -> tuple[Matrix, Matrix]:
         else:
             columns.append(np.concatenate([cross(axis) @ (at[:3, 3] - origin), axis]))
     return at, np.array(columns, dtype=object).T
-
-
-def bent_forward(
-    table: Matrix, q: Matrix, compliance: Matrix, lever: Matrix, gravity: Matrix, bodies: Matrix
-) -> Matrix:
-    """The flange where each joint gives way by ``compliance`` (rad per N m) times the moment of the
-    ``bodies`` (mass in kg, centre in mm, in the frame of their joint; last the payload, in the last
-    frame) beyond it, and ``lever`` (rad per mm) times the last frame's lever, both unbent."""
-    frames = [eye(4)]
-    for row, angle in zip(table, q, strict=True):
-        frames.append(frames[-1] @ dh_link(row, angle))
-    carrying = [*frames[1:], frames[-1]]
-    given = []
-    for joint in range(len(q)):
-        axis, origin = frames[joint][:3, 2], frames[joint][:3, 3]
-        moment = Decimal(0)
-        for number, (at, (mass, *centre)) in enumerate(zip(carrying, bodies, strict=True)):
-            if number >= joint:
-                arm_mm = at[:3, :3] @ np.array(centre) + at[:3, 3] - origin
-                moment += mass * Decimal("9.80665e-3") * (gravity @ (cross(axis) @ arm_mm))
-        of_last = gravity @ (cross(axis) @ (frames[-1][:3, 3] - origin))
-        given.append(compliance[joint] * moment + lever[joint] * of_last)
-    return dh_forward(table, q + np.array(given, dtype=object))
 
 
 def chebyshev(order: int, u: Decimal) -> Matrix:

@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 
-import mpmath
 import numpy as np
 from numpy.polynomial import chebyshev
 from scipy.spatial.transform import Rotation
@@ -152,65 +151,3 @@ def difference_jacobian(
             estimates.append(np.concatenate([ahead[:3, 3] - behind[:3, 3], spin]) / (2 * h * scale))
         columns.append((4 * estimates[0] - estimates[1]) / 3)
     return np.array(columns).T
-
-
-def mp_dh_forward(table, q, digits: int = 50):
-    """Eq. 3 in multiple precision: nested loops over mpmath numbers of the given float inputs."""
-    return mp_vec_forward(table, None, None, None, None, q, None, digits)
-
-
-def mp_vec_forward(table, series, low, high, offsets, q, s, digits: int = 50):
-    """Eqs. 3 and 5 in multiple precision; series None leaves the error matrices out."""
-    with mpmath.workdps(digits):
-        m = mpmath
-        frame = m.eye(4)
-        for i, (theta, d, a, alpha, beta) in enumerate(table):
-            if series is not None:
-                lo, hi, angle = m.mpf(low[i]), m.mpf(high[i]), m.mpf(q[i])
-                u = (2 * angle - lo - hi) / (hi - lo)
-                e = [
-                    sum((m.mpf(c) * m.chebyt(n, u) for n, c in enumerate(row)), m.mpf(0))
-                    for row in np.asarray(series[i]).tolist()
-                ]
-                if s[i]:
-                    e[5] += m.mpf(offsets[i][0 if s[i] < 0 else 1])
-                dx, dy, dz, ex, ey, ez = e
-                frame = frame * m.matrix(
-                    [[1, -ez, ey, dx], [ez, 1, -ex, dy], [-ey, ex, 1, dz], [0, 0, 0, 1]]
-                )
-            t = m.mpf(q[i]) + m.mpf(theta)
-            ct, st = m.cos(t), m.sin(t)
-            ca, sa = m.cos(m.mpf(alpha)), m.sin(m.mpf(alpha))
-            cb, sb = m.cos(m.mpf(beta)), m.sin(m.mpf(beta))
-            frame = frame * m.matrix([[ct, -st, 0, 0], [st, ct, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
-            frame = frame * m.matrix([[1, 0, 0, a], [0, 1, 0, 0], [0, 0, 1, d], [0, 0, 0, 1]])
-            frame = frame * m.matrix([[1, 0, 0, 0], [0, ca, -sa, 0], [0, sa, ca, 0], [0, 0, 0, 1]])
-            frame = frame * m.matrix([[cb, 0, sb, 0], [0, 1, 0, 0], [-sb, 0, cb, 0], [0, 0, 0, 1]])
-        return frame
-
-
-def pinocchio_forward(table: Sequence[Sequence[float]]) -> Callable[[Sequence[float]], np.ndarray]:
-    """Forward function of a pinocchio model built from joint placements.
-
-    Each joint turns about its own z; the constant part of the link before it and its own theta
-    offset are the joint's placement, the constant part of the last link is a frame's placement.
-    """
-    import pinocchio as pin
-
-    model = pin.Model()
-    before = pin.SE3.Identity()
-    parent = 0
-    for i, (theta, d, a, alpha, beta) in enumerate(table):
-        turn = pin.SE3(pin.AngleAxis(theta, np.array([0.0, 0.0, 1.0])).matrix(), np.zeros(3))
-        parent = model.addJoint(parent, pin.JointModelRZ(), before * turn, f"joint{i + 1}")
-        tilt = pin.AngleAxis(alpha, np.array([1.0, 0.0, 0.0])).matrix()
-        twist = pin.AngleAxis(beta, np.array([0.0, 1.0, 0.0])).matrix()
-        before = pin.SE3(tilt @ twist, np.array([a, 0.0, d]))
-    flange = model.addFrame(pin.Frame("flange", parent, before, pin.FrameType.OP_FRAME))
-    data = model.createData()
-
-    def forward(q: Sequence[float]) -> np.ndarray:
-        pin.framesForwardKinematics(model, data, np.asarray(q, float))
-        return data.oMf[flange].homogeneous.copy()
-
-    return forward

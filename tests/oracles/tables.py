@@ -6,13 +6,11 @@ Read with pyarrow, row by row; every pose is one chain of 4x4 matrices.
 from __future__ import annotations
 
 import math
-from collections import defaultdict
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pyarrow.parquet as pq
-from numpy.polynomial import chebyshev
 from scipy import stats
 
 from . import kinematics
@@ -44,14 +42,21 @@ class Models:
         """Flange in the robot base; the VEC's rotation projected to a true one."""
         if model == "dh":
             return kinematics.dh_forward(self.dh, q)
-        table = self.nominal
         if model == "nominal":
-            return kinematics.dh_forward(table, q)
-        frame = np.eye(4)
-        for i, row in enumerate(table):
-            frame = frame @ kinematics.error_matrix(self._errors(i + 1, q[i], s[i]))
-            frame = frame @ kinematics.dh_link(row, q[i])
-        return kinematics.projected(frame)
+            return kinematics.dh_forward(self.nominal, q)
+        series = np.zeros((len(q), 6, 1 + max(row["order"] for row in self.vec)))
+        offsets, low, high = np.zeros((len(q), 2)), np.zeros(len(q)), np.zeros(len(q))
+        for row in self.vec:
+            joint, direction = row["joint"] - 1, row["direction"]
+            low[joint], high[joint] = row["q_min_rad"], row["q_max_rad"]
+            if direction:
+                offsets[joint, direction > 0] = row["coefficient"]
+            else:
+                error = kinematics.ERROR_NAMES.index(row["error"])
+                series[joint, error, row["order"]] = row["coefficient"]
+        return kinematics.projected(
+            kinematics.vec_forward(self.nominal, series, low, high, offsets, q, s)
+        )
 
     def tool(self, model: str, q: list[float], s: list[int], frame: str = "tool") -> np.ndarray:
         """A target in the robot base."""
@@ -64,19 +69,6 @@ class Models:
     @property
     def nominal(self) -> list[tuple[float, ...]]:
         return dh_table({row["joint"]: row for row in self.vec}.values())
-
-    def _errors(self, joint: int, q: float, s: int) -> list[float]:
-        values = dict.fromkeys(kinematics.ERROR_NAMES, 0.0)
-        series: dict[tuple[str, int], dict[int, float]] = defaultdict(dict)
-        for row in self.vec:
-            if row["joint"] == joint and row["direction"] in {0, s}:
-                low, high = row["q_min_rad"], row["q_max_rad"]
-                series[row["error"], row["direction"]][row["order"]] = row["coefficient"]
-        u = (2 * q - low - high) / (high - low)
-        for (error, _), by_order in series.items():
-            coefficients = [by_order.get(n, 0.0) for n in range(max(by_order) + 1)]
-            values[error] += float(chebyshev.chebval(u, coefficients))
-        return [values[name] for name in kinematics.ERROR_NAMES]
 
 
 def dh_table(records) -> list[tuple[float, ...]]:

@@ -13,7 +13,7 @@ from stages_by_hand import run_stage
 
 from kinacc.calibration.summary import TABLES
 from kinacc.campaign import of_calibration
-from kinacc.campaign.journal import JOURNAL
+from kinacc.campaign.folder import JOURNAL
 from kinacc.deployment import folder
 from kinacc.report import summarise
 from kinacc.report.rendering import size

@@ -9,7 +9,7 @@ import matplotlib.text
 import numpy as np
 import pytest
 
-from kinacc.campaign import begin, folder, journal, report
+from kinacc.campaign import begin, folder, report
 from kinacc.campaign.folder import Opened
 from kinacc.campaign.instrument import instruments
 from kinacc.campaign.plan import Limits, assessor_of
@@ -49,7 +49,7 @@ def measured(
         asking.record(row, seen, used.covariance_mm2)
         at = Reading(int(rows[row]), plan.points.modelled_mm[rows[row]] + seen, used.name)
         entries.append(folder.readings_entry([at]))
-    journal_ = journal.Journal((*entries, *extra), "cd", (), 0)
+    journal_ = folder.Journal((*entries, *extra), "cd", (), 0)
     campaign = Opened(Path("check"), plan, journal_, "ab")
     state, tables = report.tables(campaign)
     return SimpleNamespace(opened=campaign, state=state, tables=tables)

@@ -47,11 +47,3 @@ def test_the_frame_moves_by_three_sigma_over_the_campaign(condition):
     assert moved == pytest.approx(2.7 if condition == "drift_3" else 3.0, abs=0.35)
     half = np.linalg.norm(found[26:30].mean(axis=0) - found[20:24].mean(axis=0))
     assert (half > 2.0) == (condition == "step_3")
-
-
-def test_a_noise_tested_before_is_stated_as_large_as_chance_has_it():
-    factors = [1.0 / readings("tested_60", 2, 1, key).std() for key in range(3)]
-    assert len(set(factors)) == 3
-    worlds = [drawn_world(np.ones((1, 3)), SIGMA, key_of(key), 1) for key in range(400)]
-    stated = [Course(CONDITIONS["tested_60"], world, 1).stated_mm()[0] for world in worlds]
-    assert np.std(stated) / SIGMA == pytest.approx(1 / np.sqrt(120), rel=0.15)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from research.made_up_fields import MADE_UP, made_up
+from research.made_up_fields import made_up
 
 
 @pytest.mark.parametrize(("name", "sizes_mm"), [("lone", [1.5]), ("tied2", [1.0] * 2),
@@ -19,11 +19,3 @@ def test_the_far_poses_are_candidates_in_every_campaign(name, sizes_mm):
         assert field.size_mm[chosen][large] == pytest.approx(sizes_mm)
         places += large.tolist()
     assert np.std(places) > 40.0  # anywhere in the order of the visit
-
-
-@pytest.mark.parametrize("name", MADE_UP)
-def test_a_made_up_field_is_always_the_same(name):
-    field = made_up(name)
-    assert field.points == 1000
-    assert np.array_equal(field.error_mm, made_up(name).error_mm)
-    assert np.linalg.norm(np.mean(field.error_mm / field.size_mm[:, None], axis=0)) < 0.12

@@ -9,14 +9,11 @@ import pandas as pd
 import pytest
 
 from kinacc.study.claims.evaluate import all_claims
-from kinacc.study.claims.numbers import number_claims
 from research import reasons
 from research.claims_page import claims_page
-from research.open_choices import OPEN
 
 RUNS = 200
 CLAIM = "map_nonlinear"  # any sentence
-NUMBERS = {claim.id for claim in number_claims()}
 
 
 def planted(agrees, *, arms=(True,) * 20, default="agrees") -> tuple:
@@ -93,20 +90,6 @@ def test_chance_is_not_named_as_a_reason(share):
 def test_where_a_claim_holds_follows_from_its_shares_over_arms_and_choices(agrees, arms, wanted):
     choices, _, _ = planted(agrees, arms=arms)
     assert holds_of(choices) == wanted
-
-
-def test_the_page_says_where_every_sentence_holds_and_what_decides_it():
-    choices, factors, _ = planted(lambda order, _, rng: order != "8")
-    text = claims_page(choices, factors)
-    statements = {claim.id: claim.statement for claim in all_claims()}
-    for name, statement in statements.items():
-        assert (f"| {statement} |" in text) == (name not in NUMBERS)
-    hangs = text[text.index("## Hang on a choice") : text.index("## Numbers of Tables")]
-    assert statements[CLAIM] in hangs
-    assert "`vec_order` (8: 0% of" in hangs
-    for choice in OPEN:
-        assert f"| `{choice.name}` |" in text
-    assert "in 100% of the runs below that and in 100% of those above" in text
 
 
 def test_the_page_in_the_documentation_is_what_its_tables_say():

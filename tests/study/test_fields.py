@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 
-from kinacc.errors import InputError
-from kinacc.study.fields import ErrorField, of_measurements, synthetic
+from kinacc.study.fields import of_measurements, synthetic
 
 
 def test_a_defect_and_rare_poses_make_a_heavier_tail_than_smooth_errors():
@@ -32,14 +30,3 @@ def test_measured_fields_average_the_readings_of_a_pose_and_leave_out_what_was_f
     made = of_measurements("arm", errors, measurements)
     assert made.error_mm[:, 0].tolist() == [2.0, 5.0]
     assert made.q_rad[:, 0].tolist() == [0.7, 0.8]
-
-
-def test_a_field_without_cross_validated_errors_says_what_to_do():
-    columns = {name: np.array(["train"], object) for name in ("comparison", "estimate")}
-    with pytest.raises(InputError, match=r"measurements\.folds"):
-        of_measurements("arm", columns, {})
-
-
-def test_errors_that_are_not_finite_are_refused():
-    with pytest.raises(InputError, match="not finite"):
-        ErrorField("bad", np.full((2, 3), np.nan), np.zeros((2, 6)))

@@ -8,7 +8,6 @@ import pytest
 
 from kinacc.assess.model_invalidation import ModelInvalidation
 from kinacc.config.records import of_section
-from kinacc.study import histories as stage
 from kinacc.study.histories import (
     FALLBACKS,
     KEPT,
@@ -61,12 +60,3 @@ def test_where_no_simulation_obeys_the_rule_the_nearest_is_shown_and_says_so():
     near = settings(eta_ratio_rejected=0.05, eta_ratio_larger=0.06, simulations_searched=4)
     found = examples(ERROR, near, STUDY, ASSESSOR, SEED)[0]
     assert (found.simulation, found.rule, found.rule_met) == (0, FALLBACKS[REJECTED][0], False)
-
-
-def test_stage_passes_configuration_and_point_numbers_on(table):
-    points = {"point": np.arange(200) + 1000, "true_error_mm": SIZES}
-    points |= {f"e{axis}_mm": ERROR[:, i] for i, axis in enumerate("xyz")}
-    configured = {"seed": SEED, "study": paper.study(), "histories": paper.histories()}
-    made = stage.run({"assessment_points": points}, configured)["histories"]
-    for name, column in made.items():
-        np.testing.assert_array_equal(column, table[name])

@@ -8,7 +8,6 @@ import numpy as np
 import paper_settings as paper
 import pytest
 
-from kinacc.checks.contradictions import load
 from kinacc.config.records import of_section
 from kinacc.errors import InputError
 from kinacc.study import monte_carlo
@@ -85,16 +84,6 @@ def test_a_simulation_does_not_know_its_neighbours(rows):
     assert not np.array_equal(other["assessed_mm"], alone["assessed_mm"])
 
 
-@pytest.mark.parametrize(("points", "budget"), [(1, 1), (1, 30), (40, 1), (40, 15), (15, 40)])
-@pytest.mark.parametrize("order", ["sequence", "shuffled"])
-def test_any_number_of_points_and_any_budget(points, budget, order):
-    spent = {"measurements": budget, "visiting_order": order}
-    table = simulated(ERROR[:points], [0.2], range(2), 1, **spent)
-    assert np.all(table["measurements"] <= budget)
-    assert np.all(table["points_visited"] <= min(points, budget))
-    assert np.all(np.isfinite(table["assessed_mm"]))
-
-
 def test_parts_share_out_every_repetition_once():
     for of in (1, 3, 7):
         shared = [r for number in range(1, of + 1) for r in part_of(10, number, of)]
@@ -102,9 +91,3 @@ def test_parts_share_out_every_repetition_once():
     for number, of in ((0, 3), (4, 3)):
         with pytest.raises(InputError):
             part_of(10, number, of)
-
-
-@pytest.mark.parametrize("noise", [[], [0.0], [-0.1], [np.nan], [1e-8], [0.3, 0.1]])
-def test_noise_that_means_nothing_is_refused(noise):
-    with pytest.raises(InputError, match=r"study\.noise_mm"):
-        load([ROOT / "config.yaml"], {"study": {"noise_mm": noise}}, ROOT)

@@ -10,7 +10,6 @@ from test_accuracy_map import ARM, RANGE, SPACE, TABLE_II, WANTED, wavy
 from two_models import two_models
 
 from kinacc.errors import InputError
-from kinacc.kinematics import dh, region
 from kinacc.kinematics.inverse import limits
 from kinacc.study import operating_points
 
@@ -27,16 +26,6 @@ def test_points_of_one_wrist_have_joint_5_on_one_side():
     }
     assert sorted(map(len, side.values())) == [1, 1, 2]
     assert side["noflip"] | side["flip"] == side["both"]
-
-
-def test_points_in_joints_lie_in_the_box_and_in_the_cylinder():
-    everything = ARM.q_min_rad, ARM.q_max_rad
-    q = operating_points.in_joints(ARM, MODELS, everything, "sobol", 100, SPACE)
-    assert region.contains(SPACE, dh.forward(TABLE_II, q).position_mm).all()
-    assert limits.within(q, *RANGE).all()
-    box = np.deg2rad([-10.0] * 6), np.deg2rad([10.0] * 6)
-    q = operating_points.in_joints(ARM, MODELS, box, "halton", 50)
-    assert limits.within(q, *box).all()
 
 
 def test_a_box_of_coupled_joints_is_in_reported_angles():
@@ -70,10 +59,3 @@ def test_rows_are_spread_over_the_measured_ones_each_once():
     assert len(set(rows.tolist())) == 200
     assert np.diff(np.sort(rows)).max() <= 8
     assert np.array_equal(rows[:50], operating_points.spread_rows(632, 50))
-
-
-def test_readings_are_grouped_by_configuration_and_target():
-    pose = np.array([0, 0, 1, 0, 1])
-    target = np.array(["a", "b", "a", "a", "a"], dtype=object)
-    groups = operating_points.readings_of(pose, target)
-    assert [group.tolist() for group in groups] == [[0, 3], [1], [2, 4]]

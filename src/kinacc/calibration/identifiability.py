@@ -104,7 +104,7 @@ def of_arm(names: Sequence[str]) -> np.ndarray:
     return np.array([name.partition(".")[2] not in MOTIONS for name in names])
 
 
-def listed(table: Mapping[str, Sequence]) -> list[str]:
+def listed(table: Mapping[str, Iterable]) -> list[str]:
     """Every sentence of a ``dh_identified`` table on undetermined directions, once."""
     rows = zip(table["status"], table["statement"], strict=True)
     cells = (str(cell) for status, cell in rows if status == UNDETERMINED and cell)

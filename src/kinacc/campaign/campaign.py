@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -188,7 +189,7 @@ class Campaign:
             None if points.directions is None else points.directions[point],
             self._expected_mm([point])[0],
             self.plan.instruments[0].frame,
-            sum(each.reading.point == point for each in self.state.told),
+            sum(item.reading.point == point for item in self.state.told),
         )
 
     def visit(self, every: bool = True) -> pd.DataFrame:
@@ -198,25 +199,22 @@ class Campaign:
         q1_deg, q1_rad (q1_mm where a joint slides) .., s1 .. (travel), expected_x_mm ...
         """
         folders.require_method(self.opened)
-        plan, asked = self.plan, self.state.asked
-        wanted = [] if asked is None else self.state.ahead() if every else [asked]
+        points, asked = self.plan.points, self.state.asked
+        wanted = self.state.ahead() if every and asked is not None else []
         if asked is not None and asked not in wanted:
             wanted = [asked, *wanted]
-        joints, points = plan.points.joints[wanted], plan.points
-        columns: dict[str, object] = {"pose": [points.label[each] for each in wanted]}
-        for joint, slides in enumerate(plan.slides):
-            name, values = f"q{joint + 1}", joints[:, joint]
-            columns |= (
-                {f"{name}_mm": values}
-                if slides
-                else {f"{name}_deg": np.rad2deg(values), f"{name}_rad": values}
-            )
+        table = pd.DataFrame({"pose": [points.label[point] for point in wanted]})
+        for joint, values in enumerate(points.joints[wanted].T):
+            if self.plan.slides[joint]:
+                table[f"q{joint + 1}_mm"] = values
+            else:
+                table[f"q{joint + 1}_deg"] = np.rad2deg(values)
+                table[f"q{joint + 1}_rad"] = values
         if points.directions is not None:
-            directions = points.directions[wanted]
-            columns |= {f"s{joint + 1}": each for joint, each in enumerate(directions.T)}
-        expected_mm = self._expected_mm(wanted)
-        columns |= {f"expected_{axis}_mm": expected_mm[:, i] for i, axis in enumerate("xyz")}
-        return pd.DataFrame(columns)
+            for joint, values in enumerate(points.directions[wanted].T):
+                table[f"s{joint + 1}"] = values
+        table[[f"expected_{axis}_mm" for axis in "xyz"]] = self._expected_mm(wanted)
+        return table
 
     def add_reading(
         self,
@@ -338,27 +336,30 @@ def _record(
     again: bool,
     skip_bad: bool,
 ) -> Recorded:
-    plan = opened.plan
-    problems: list[Problem] = []
-    readings = {i: row for i, row in enumerate(file.rows) if isinstance(row, Reading)}
-    known = _known_rows(readings, state, file.path, again) if file.digest else {}
-    sizes = [float(np.linalg.norm(each.error_mm)) for each in (*state.told, *state.in_hand)]
-    with np.errstate(over="ignore", invalid="ignore"):
-        sizes += [
-            float(np.linalg.norm(checks.error_mm(plan, row)))
-            for row in readings.values()
-            if file.digest and row.position_mm.shape == (3,)
-        ]
+    plan, is_file, path = opened.plan, bool(file.digest), file.path
+    recorded = [*state.told, *state.in_hand]
+    imported = state.imports.get(path, set()) if is_file else set()
+    # A row that equals a reading is known, each reading once; ``again``: of the same file alone.
+    waiting, earlier = defaultdict[tuple, list[int]](list), dict[tuple, str]()
+    for item in (*recorded, *(item for item, _ in state.struck)):
+        if is_file and (item.number in imported or not again):
+            waiting[item.reading.digits].append(item.number)
+    if not is_file:
+        earlier = {item.reading.digits: f"reading {item.number}" for item in recorded}
+    sizes = [float(np.linalg.norm(item.error_mm)) for item in recorded]
+    if is_file:
+        rows = [row for row in file.rows if isinstance(row, Reading)]
+        with np.errstate(over="ignore", invalid="ignore"):
+            sizes += [float(np.linalg.norm(checks.error_mm(plan, row))) for row in rows]
     most_mm = checks.most_plausible_mm(plan, sizes)
-    earlier: dict[tuple, str] = {}
-    if not file.digest:
-        earlier = {e.reading.digits: f"reading {e.number}" for e in (*state.told, *state.in_hand)}
-    good: list[Reading] = []
-    for i, (row, place) in enumerate(zip(file.rows, file.places, strict=True)):
+    good, known, problems = list[Reading](), list[int](), list[Problem]()
+    for row, place in zip(file.rows, file.places, strict=True):
         if isinstance(row, Problem):
             problems.append(row)
             continue
-        if i not in known:
+        if waiting[row.digits]:
+            known.append(waiting[row.digits].pop(0))
+        else:
             wrong = checks.problems_of(plan, row, place, most_mm, accept_implausible)
             if row.point in state.left_out:
                 label = plan.points.label[row.point]
@@ -369,40 +370,24 @@ def _record(
             good += [] if wrong else [row]
             problems += wrong
         earlier.setdefault(row.digits, place)
-    if file.digest and not again:
-        here = {each.number for each in (*state.told, *state.in_hand)}
-        missing = (state.imports.get(file.path, set()) & here).difference(known.values())
-        if missing:
-            what = f"does not hold {_listed(missing)} any more, recorded from it before"
-            fix = "bring the rows back, strike the readings, or give --again"
-            problems.append(Problem(file.path, what, fix=fix))
-            skip_bad = False
+    missing = imported.intersection(item.number for item in recorded).difference(known)
+    if missing and not again:
+        what = f"does not hold {_listed(missing)} any more, recorded from it before"
+        fix = "bring the rows back, strike the readings, or give --again"
+        problems.append(Problem(path, what, fix=fix))
+        skip_bad = False
     if not good and not problems:
-        what = f"has no new row: {_listed(known.values())} recorded before"
-        raise InputError(Problem(file.path, what), _NOTHING)
+        raise InputError(Problem(path, f"has no new row: {_listed(known)} recorded before"))
     if problems and not (skip_bad and good):
         raise InputError(problems, _NOTHING)
-    opened.write(folders.readings_entry(good, file.digest or None, file.path or None))
-    numbers = range(state.numbered + 1, state.numbered + 1 + len(good))
-    errors = (float(np.linalg.norm(checks.error_mm(plan, each))) for each in good)
-    skipped = tuple(map(str, problems))
-    points = tuple(plan.points.label[each.point] for each in good)
-    return Recorded(tuple(numbers), points, tuple(errors), skipped, tuple(sorted(known.values())))
-
-
-def _known_rows(
-    rows: Mapping[int, Reading], state: State, path: str, again: bool
-) -> dict[int, int]:
-    """Numbers of the readings that rows repeat to the last digit, each reading once.
-
-    With ``again`` only readings of the same file are known.
-    """
-    own = state.imports.get(path, set())
-    waiting: dict[tuple, list[int]] = {}
-    for each in (*state.told, *state.in_hand, *(each for each, _ in state.struck)):
-        if each.number in own or not again:
-            waiting.setdefault(each.reading.digits, []).append(each.number)
-    return {i: numbers.pop(0) for i, row in rows.items() if (numbers := waiting.get(row.digits))}
+    opened.write(folders.readings_entry(good, file.digest or None, path or None))
+    return Recorded(
+        tuple(range(state.numbered + 1, state.numbered + 1 + len(good))),
+        tuple(plan.points.label[row.point] for row in good),
+        tuple(float(np.linalg.norm(checks.error_mm(plan, row))) for row in good),
+        tuple(map(str, problems)),
+        tuple(sorted(known)),
+    )
 
 
 def _listed(numbers) -> str:

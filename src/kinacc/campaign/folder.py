@@ -1,21 +1,150 @@
-"""The folder of a campaign: started once, read, and written to under its lock."""
+"""The folder of a campaign: its plan, and its journal, written under a lock.
+
+The journal has one line per event, appended and flushed to disk. A line that was confirmed is on
+disk. A last line that was cut off, because the process or the machine died while writing it, was
+never confirmed and is left out; the next line takes its place. Each line carries a checksum of the
+plan, its number and its entry: one that was edited, is missing before others, or belongs to another
+plan is noticed.
+"""
 
 from __future__ import annotations
 
+import fcntl
+import hashlib
+import json
+import os
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
 from kinacc import __version__
-from kinacc.campaign import journal, plan, state
+from kinacc.campaign import plan as plans
+from kinacc.campaign import state
 from kinacc.campaign.plan import Plan
 from kinacc.campaign.reading import Reading
 from kinacc.campaign.state import READINGS, State
 from kinacc.config import json_files
-from kinacc.errors import InputError, Problem, refuse
-from kinacc.tables.atomic import write_whole
+from kinacc.errors import InputError, MachineError, Problem, refuse, refused
+from kinacc.tables.atomic import synchronise, taken, write_whole
+
+PLAN, JOURNAL, LOCK = "campaign.json", "readings.jsonl", "lock"
+_PATIENCE_S = 5.0
+_DIGITS = 16  # of a checksum
+
+
+@dataclass(frozen=True)
+class Journal:
+    """What a journal holds: its entries and its lines as they are on disk.
+
+    ``seed`` is the digest of the plan. ``cut_off``: bytes after the last line, of one that was not
+    written to its end.
+    """
+
+    entries: tuple[Mapping, ...]
+    seed: str
+    lines: tuple[bytes, ...]
+    cut_off: int
+
+    def sha256(self, entries: int | None = None) -> str:
+        """SHA-256 of the file up to so many entries, all of them by default."""
+        return hashlib.sha256(b"".join(self.lines[:entries])).hexdigest()
+
+
+def read_journal(path: Path, seed: str) -> Journal:
+    """The journal at ``path``, empty where there is no file; ``seed`` is the digest of the plan.
+
+    Raises InputError where a line cannot be read, or is not the one that was written there. Lines
+    of earlier versions carry no checksum of their own (``chain``), and are taken as they are.
+    """
+    try:
+        content = path.read_bytes() if path.is_file() or not path.exists() else b"not a file\n"
+    except FileNotFoundError:
+        content = b""
+    except OSError as error:
+        raise _damaged(str(path), f"cannot be read: {error.strerror}") from None
+    entries: list[Mapping] = []
+    whole = content.splitlines(keepends=True)
+    if whole and not whole[-1].endswith(b"\n"):
+        whole.pop()
+    for number, line in enumerate(whole, start=1):
+        try:
+            parsed = json.loads(line)
+            entry = parsed["entry"]
+            matches = "chain" in parsed or parsed["sum"] == _checksum(seed, number, entry)
+        except (ValueError, KeyError, TypeError, RecursionError):
+            if number == len(whole) and b"\0" in line:
+                break  # a machine that lost power may leave zeros where nothing was written yet
+            raise _damaged(f"{path}, line {number}", "cannot be read") from None
+        if not matches:
+            what = "was changed, or belongs to another campaign"
+            what += f", or {PLAN} was changed" if number == 1 else ""
+            raise _damaged(f"{path}, line {number}", what)
+        entries.append(entry)
+    lines = tuple(whole[: len(entries)])
+    return Journal(tuple(entries), seed, lines, len(content) - sum(map(len, lines)))
+
+
+def append(path: Path, known: Journal, entry: Mapping) -> None:
+    """Add an entry; when this returns, it is on disk. The caller holds the lock.
+
+    Raises InputError where the disk does not take it.
+    """
+    signed = {"entry": entry, "sum": _checksum(known.seed, len(known.entries) + 1, entry)}
+    line = json.dumps(signed, sort_keys=True).encode() + b"\n"
+    fresh = not path.exists()
+    try:
+        with open(path, "ab") as file:
+            if known.cut_off:
+                file.truncate(sum(map(len, known.lines)))
+            file.write(line)
+            file.flush()
+            os.fsync(file.fileno())
+        if fresh:
+            synchronise(path.parent)
+    except OSError as error:
+        raise _not_written(path, error) from None
+
+
+@contextmanager
+def locked(folder: Path, patience_s: float = _PATIENCE_S) -> Iterator[None]:
+    """Hold the campaign for one writer; the system lets go of it when the process ends.
+
+    Raises InputError where another holds it for longer than ``patience_s``.
+    """
+    try:
+        lock = open(folder / LOCK, "a+")  # noqa: SIM115 closed by the next line's block
+    except OSError as error:
+        raise _not_written(folder / LOCK, error) from None
+    with lock as file:
+        try:
+            held = taken(file.fileno(), fcntl.LOCK_EX, patience_s)
+        except OSError as error:
+            what = f"the file system of this folder holds no locks: {error.strerror}"
+            fix = "two writers could spoil the campaign: move its folder to a local disk"
+            raise InputError(Problem(str(folder), what, fix=fix)) from None
+        if not held:
+            what = "another process is writing to this campaign"
+            fix = "wait until it is done, then try again"
+            raise InputError(Problem(str(folder), what, fix=fix))
+        yield
+
+
+def _checksum(seed: str, number: int, entry: Mapping) -> str:
+    text = f"{seed} {number} {json.dumps(entry, sort_keys=True)}"
+    return hashlib.sha256(text.encode()).hexdigest()[:_DIGITS]
+
+
+def _damaged(where: str, what: str) -> InputError:
+    fix = "nothing was done; bring the file back from a copy"
+    return InputError(Problem(where, what, fix=fix))
+
+
+def _not_written(path: Path, error: OSError) -> MachineError:
+    fix = "nothing was confirmed: look at `kinacc campaign status` before trying again"
+    (problem,) = refused(error, path, "cannot be written").problems
+    return MachineError(Problem(problem.where, problem.what, fix=fix))
 
 
 @dataclass(frozen=True)
@@ -24,12 +153,12 @@ class Opened:
 
     folder: Path
     plan: Plan
-    journal: journal.Journal
+    journal: Journal
     digest: str
 
     def state(self, watch=None) -> State:
         """Return its state; ``watch`` as in ``kinacc.campaign.state.restore``."""
-        where = str(self.folder / journal.JOURNAL)
+        where = str(self.folder / JOURNAL)
         return state.restore(self.plan, self.journal.entries, watch, where)
 
     @property
@@ -40,12 +169,12 @@ class Opened:
     def write(self, entry: Mapping) -> None:
         """Append an entry, with the time; on disk when this returns. Only while ``writing``."""
         stamped = {**entry, "at": datetime.now(UTC).isoformat(timespec="seconds")}
-        journal.append(self.folder / journal.JOURNAL, self.journal, stamped)
+        append(self.folder / JOURNAL, self.journal, stamped)
 
 
 def in_the_way(folder: Path | str) -> list[Problem]:
     """Return a problem for each file of a campaign that a folder holds already."""
-    paths = [Path(folder) / name for name in (journal.PLAN, journal.JOURNAL)]
+    paths = [Path(folder) / name for name in (PLAN, JOURNAL)]
     what = "a campaign is there already"
     return [Problem(str(path), what, "a new folder") for path in paths if path.exists()]
 
@@ -53,42 +182,44 @@ def in_the_way(folder: Path | str) -> list[Problem]:
 def start(folder: Path | str, begun: Plan) -> None:
     """Put a new campaign on disk. Raises InputError where the folder holds one already."""
     refuse(in_the_way(folder), "The campaign was not begun")
-    write_whole(Path(folder) / journal.PLAN, plan.to_json(begun), on_disk=True)
+    write_whole(Path(folder) / PLAN, plans.to_json(begun), on_disk=True)
 
 
 def open_(folder: Path | str) -> Opened:
     """Read a campaign. Raises InputError where there is none, or it was damaged."""
     folder = Path(folder)
-    path = folder / journal.PLAN
+    path = folder / PLAN
     if not path.is_file():
         fix = "begin one: kinacc campaign start"
         raise InputError(Problem(str(path), "no such file: no campaign is there", fix=fix))
     text = json_files.bytes_of(path)
-    digest = plan.digest(text)
-    begun = plan.from_json(text, str(path))
-    return Opened(folder, begun, journal.read(folder / journal.JOURNAL, digest), digest)
+    digest = plans.digest(text)
+    begun = plans.from_json(text, str(path))
+    return Opened(folder, begun, read_journal(folder / JOURNAL, digest), digest)
 
 
 @contextmanager
 def writing(folder: Path | str) -> Iterator[Opened]:
     """The campaign, held for this writer alone."""
     require_method(open_(folder))  # no lock file where there is no campaign
-    with journal.writing(Path(folder)):
+    with locked(Path(folder)):
         yield open_(folder)
 
 
 def require_method(opened: Opened) -> None:
     """Raise InputError where this version computes bounds otherwise than the campaign's."""
-    if opened.plan.method != plan.METHOD:
+    if opened.plan.method != plans.METHOD:
         begun = opened.plan.about.get("kinacc_version", "an earlier version")
-        what = f"uses bounds of method {opened.plan.method}; kinacc {__version__} has {plan.METHOD}"
+        what = (
+            f"uses bounds of method {opened.plan.method}; kinacc {__version__} has {plans.METHOD}"
+        )
         fix = f"continue it with kinacc {begun}, or begin a new campaign"
         raise InputError(Problem(str(opened.folder), what, fix=fix))
 
 
 def marks_of(opened: Opened) -> dict[str, object]:
     """Return the provenance of the tables: plan and journal count as the configuration."""
-    made_of = plan.digest(f"{opened.digest} {opened.journal.sha256()}".encode())
+    made_of = plans.digest(f"{opened.digest} {opened.journal.sha256()}".encode())
     return {"kinacc_version": __version__, "config_hash": made_of, "seed": opened.plan.seed}
 
 
@@ -144,3 +275,22 @@ def readings_entry(
     entry: dict = {"kind": READINGS, "readings": [each.as_entry() for each in readings]}
     entry |= {"file": file} if file is not None else {}
     return entry | ({"path": path} if path is not None else {})
+
+
+def of_results(results: Path) -> list[Path]:
+    """Folders of campaigns on the calibration in a results folder, by the name they have of it.
+
+    They are searched beside it, beside all results, and in the working folder; each is named as a
+    person there would.
+    """
+    within, name = results.absolute().parent, results.resolve().name
+    near = {within.resolve(): results.parent, within.parent.resolve(): results.parent / ".."}
+    found = []
+    for place in (near | {Path.cwd(): Path()}).values():
+        for path in sorted(place.glob(f"*/{PLAN}")):
+            # What cannot be read is no campaign, or one that cannot state whose it is.
+            with suppress(InputError, OSError, ValueError, LookupError, TypeError, RecursionError):
+                content = json_files.values_of(json_files.bytes_of(path), str(path))
+                if content["about"]["calibration"] == name:
+                    found.append(path.parent)
+    return found

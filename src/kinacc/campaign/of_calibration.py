@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from kinacc.campaign import folder
-from kinacc.campaign.journal import JOURNAL, PLAN
+from kinacc.campaign.folder import JOURNAL, PLAN
 from kinacc.campaign.plan import Plan
 from kinacc.campaign.status import CampaignStatus, status
 from kinacc.deployment import folder as results
@@ -34,7 +34,7 @@ class Sought:
 def sought(name: str, tables: Mapping[str, Columns], places: Iterable[Path]) -> Sought:
     """Return the campaign of the calibration ``name`` among the folders ``places``, the newest.
 
-    ``tables`` are those of its results folder, ``places`` those of :func:`journal.of_results`. A
+    ``tables`` are those of its results folder, ``places`` those of :func:`folder.of_results`. A
     campaign holds the positions that its model predicts: one that was begun with an earlier
     calibration of that name is left out.
     """

@@ -7,15 +7,14 @@ import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields, replace
 from functools import cached_property
-from typing import Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
+from pydantic import ValidationError
 
 from kinacc.assess.adaptive import AdaptiveAssessor, Candidates
 from kinacc.assess.registry import ADAPTIVE
 from kinacc.assess.statement import CANDIDATES, TARGETS
-from kinacc.campaign.instrument import Instrument
+from kinacc.campaign.instrument import FRAMES, Instrument
 from kinacc.campaign.laser_tracker import LaserTracker
 from kinacc.config import json_files
 from kinacc.config.load import problems_of
@@ -194,47 +193,6 @@ def _is_like(value: object, default: object) -> bool:
     return number or value is default
 
 
-_Vector = list[FiniteFloat]
-
-
-class _Strict(BaseModel):
-    model_config = ConfigDict(strict=True)
-
-
-class _Point(_Strict):
-    label: str
-    joints: _Vector
-    directions: list[int] | None
-    modelled_mm: _Vector
-    slope: list[_Vector]
-
-
-class _Instrument(_Strict):
-    name: str
-    frame: Literal["base", "instrument"]
-    covariance_mm2: list[_Vector]
-    laser: dict[str, FiniteFloat] | None = None
-    resolution_mm: FiniteFloat = 0.0
-
-
-class _File(_Strict):
-    """The file of a plan."""
-
-    format: Literal[1]
-    method: int = 1
-    about: dict[str, str]
-    assessor: dict[str, Any]
-    instruments: list[_Instrument] = Field(min_length=1)
-    to_base: dict[str, list]
-    arm: dict[str, Any]
-    limits: dict[str, FiniteFloat | str | None]
-    seed: int = Field(ge=0)
-    order: list[int]
-    route: list[int]
-    overruled: list[str] = []
-    points: list[_Point]
-
-
 def to_json(plan: Plan) -> bytes:
     """Return the plan as text; ``from_json`` gives back equal numbers."""
     points, directions = plan.points, plan.points.directions
@@ -271,58 +229,62 @@ def to_json(plan: Plan) -> bytes:
 def from_json(text: bytes, where: str) -> Plan:
     """Return the plan written by ``to_json``. Raises InputError where it cannot be read."""
     try:
-        return _plan(_File.model_validate(json_files.values_of(text, where)))
-    except (LookupError, RecursionError, TypeError, ValueError) as error:
+        return _plan(json_files.values_of(text, where))
+    except (AttributeError, LookupError, RecursionError, TypeError, ValueError) as error:
         what = f"is no campaign: {' '.join(str(error).split())[:200]}"
         raise InputError(Problem(where, what, fix="bring it back from a copy")) from None
 
 
-def _plan(file: _File) -> Plan:
-    rows = file.points
+def _plan(file: Mapping) -> Plan:
+    rows, about = file["points"], file["about"]
+    count, joints = len(rows), len(rows[0]["joints"])
+
+    def array(value: object, *shape: int) -> np.ndarray:
+        found = np.array(value, dtype=float)
+        if found.shape != shape or not np.isfinite(found).all():
+            raise ValueError(f"{found.shape} numbers where {shape} are expected")
+        return found
+
+    turned = rows[0]["directions"] is not None
+    directions = array([row["directions"] for row in rows], count, joints) if turned else None
     points = Points(
-        tuple(each.label for each in rows),
-        np.array([each.joints for each in rows], dtype=float),
-        None
-        if rows[0].directions is None
-        else np.array([each.directions for each in rows], np.int8),
-        np.array([each.modelled_mm for each in rows], dtype=float),
-        np.array([each.slope for each in rows], dtype=float),
+        tuple(row["label"] for row in rows),
+        array([row["joints"] for row in rows], count, joints),
+        None if directions is None else directions.astype(np.int8),
+        array([row["modelled_mm"] for row in rows], count, 3),
+        array([row["slope"] for row in rows], count, 3, joints),
     )
-    count, joints = points.joints.shape
-    to_base = Pose(*(np.array(file.to_base[key], float) for key in ("rotation", "position_mm")))
-    slides = np.array(file.arm["prismatic"], dtype=bool)
     instruments = tuple(
         Instrument(
-            each.name,
-            np.array(each.covariance_mm2, dtype=float).reshape(3, 3),
-            each.frame,
-            LaserTracker(**each.laser) if each.laser else None,
-            each.resolution_mm,
+            item["name"],
+            array(item["covariance_mm2"], 3, 3),
+            {name: name for name in FRAMES}[item["frame"]],
+            LaserTracker(**item["laser"]) if item.get("laser") else None,
+            float(item.get("resolution_mm", 0.0)),
         )
-        for each in file.instruments
+        for item in file["instruments"]
     )
-    limits = Limits(**file.limits)
-    shapes = {
-        "points": (points.modelled_mm.shape, (count, 3)),
-        "slopes": (points.slope.shape, (count, 3, joints)),
-        "directions": (np.shape(points.directions), (count, joints)),
-        "order": (sorted(file.order), list(range(count))),
-        "route": (sorted({*file.route} - {*file.order}), []),
-        "to_base": (to_base.rotation.shape + to_base.position_mm.shape, (3, 3, 3)),
-        "arm": (slides.shape, (joints,)),
-        "about": ({*_ABOUT} - {*file.about}, set()),
-        "target": (limits.target in TARGETS, True),
-        "limits": (isinstance(limits.joint_rad + limits.implausible_mm, float), True),
+    limits = Limits(**file["limits"])
+    array([limits.joint_rad, limits.implausible_mm], 2)
+    valid = {
+        "format": file["format"] == FORMAT,
+        "instruments": len(instruments) > 0,
+        "order": sorted(file["order"]) == list(range(count)),
+        "route": {*file["route"]} <= {*file["order"]},
+        "seed": isinstance(file["seed"], int) and file["seed"] >= 0,
+        "about": {*_ABOUT} <= {*about},
+        "target": limits.target in TARGETS,
+        "texts": all(isinstance(text, str) for text in (*points.label, *about.values())),
     }
-    if points.directions is None:
-        del shapes["directions"]
-    for name, (shape, wanted) in shapes.items():
-        if shape != wanted:
-            raise ValueError(f"{name} does not fit the rest")
+    if wrong := [name for name, holds in valid.items() if not holds]:
+        raise ValueError(f"{', '.join(wrong)} does not fit the rest")
+    to_base = file["to_base"]
     return Plan(
-        points, np.array(file.order), np.array(file.route), _kept_assessor(**file.assessor),
-        instruments, to_base, slides, limits, file.seed, file.about, tuple(file.overruled),
-        file.method,
+        points, np.array(file["order"]), np.array(file["route"]),
+        _recorded_assessor(**file["assessor"]), instruments,
+        Pose(array(to_base["rotation"], 3, 3), array(to_base["position_mm"], 3)),
+        array(file["arm"]["prismatic"], joints).astype(bool), limits, file["seed"], about,
+        tuple(file.get("overruled", ())), file.get("method", 1),
     )  # fmt: skip
 
 
@@ -330,7 +292,7 @@ def _plan(file: _File) -> Plan:
 _FORMER = {"correct_drift": False, "assume": "nothing", "isolation": 1.25, "crowd": 0.05}
 
 
-def _kept_assessor(name: str, settings: Mapping[str, object]) -> AdaptiveAssessor:
+def _recorded_assessor(name: str, settings: Mapping[str, object]) -> AdaptiveAssessor:
     used = [key for key, value in _FORMER.items() if settings.get(key, value) != value]
     fix = "begin a new campaign; readings can be recorded in it again"
     refuse(Problem(f"setting {key}", "is gone from kinacc", fix=fix) for key in used)

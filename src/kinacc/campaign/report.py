@@ -6,13 +6,11 @@ import math
 
 import numpy as np
 
-from kinacc import __version__
 from kinacc.assess.adaptive import Campaign
 from kinacc.campaign.folder import Opened
-from kinacc.campaign.journal import JOURNAL
 from kinacc.campaign.reading import covariance_mm2
-from kinacc.campaign.reasons import reason
 from kinacc.campaign.state import State, sayable
+from kinacc.campaign.status import reason
 from kinacc.tables.columns import Columns
 from kinacc.tables.contract import columns_of
 
@@ -98,24 +96,3 @@ def _readings(state: State) -> Columns:
         for each in sorted(every, key=lambda known: known.number)
     ]
     return columns_of("campaign_readings", rows)
-
-
-def facts(opened: Opened, state: State) -> dict[str, str]:
-    """Return what was fixed and taken, by topic."""
-    plan, times = state.plan, opened.recorded
-    settings = {key: each for key, each in vars(plan.assessor).items() if each is not None}
-    large = [np.linalg.norm(each.error_mm) > plan.limits.implausible_mm for each in state.told]
-    files = {
-        str(each["file"]): each.get("path") for each in opened.journal.entries if "file" in each
-    }
-    noted = {
-        "candidates": f"{len(plan.points)}, {plan.about['candidates']}, order by seed {plan.seed}",
-        "readings not requested": str(len(state.in_hand) or ""),
-        f"readings beyond {plan.limits.implausible_mm:g} mm": str(sum(large) or ""),
-        "recorded": f"{min(times)} to {max(times)}" if times else "",
-        "assessor": f"{plan.assessor.name} ({', '.join(f'{k}={v}' for k, v in settings.items())})",
-        "files": ", ".join(f"{path or 'unnamed'} ({digest})" for digest, path in files.items()),
-        "campaign": f"{opened.digest}, kinacc {__version__}",
-        "journal": f"{state.numbered} readings; SHA-256 of {JOURNAL} {opened.journal.sha256()}",
-    }
-    return {topic: text for topic, text in noted.items() if text}

@@ -4,22 +4,20 @@ from __future__ import annotations
 
 import math
 import shlex
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, fields
 
 import numpy as np
 
 from kinacc.assess.attainable import NONE, WidthLimits, limits_of
-from kinacc.assess.conformity import ACCEPT, REJECT, Decision, decide
+from kinacc.assess.conformity import Decision, decide
 from kinacc.assess.limits import VISITS
 from kinacc.assess.noise import ESTIMATED, KNOWN
 from kinacc.assess.statement import CANDIDATES, MEAN, MEASURED, REGION, Reason, Statement
-from kinacc.campaign import consistency, instrument
-from kinacc.campaign.consistency import Scatter
+from kinacc.campaign import instrument
 from kinacc.campaign.folder import Opened
 from kinacc.campaign.plan import Plan
-from kinacc.campaign.reasons import ADVICE, reason
-from kinacc.campaign.state import State
+from kinacc.campaign.state import Scatter, State, nearness, scatter
 
 _CLEAR_OF_NOISE = 3.0  # standard deviations: larger bounds hold where the noise is smaller
 _VISIT = f"{VISITS:.0%}".replace("%", " %")
@@ -76,22 +74,25 @@ class Bound:
     @property
     def text(self) -> str:
         """The bounds in a sentence or two."""
-        value = f"estimate {self.value_mm:.3f} mm" if np.isfinite(self.value_mm) else ""
-        if value and self.unmeasured:
-            value += f", likely too low: {self.unmeasured} of {self.points} are not measured"
-        lower = f"at least {self.lower_mm:.3f} mm" if np.isfinite(self.lower_mm) else ""
+        value = lower = ""
+        if np.isfinite(self.value_mm):
+            value = f"estimate {self.value_mm:.3f} mm"
+            if self.unmeasured:
+                few = f"{self.unmeasured} of {self.points} are not measured"
+                value += f", likely too low: {few}"
+        if np.isfinite(self.lower_mm):
+            lower = f"at least {self.lower_mm:.3f} mm"
         sure = f"one-sided, {percent(self.confidence)} confidence"
         visits = f" in {_VISIT} of future visits to the worst pose" if self.error_of != MEAN else ""
         error = f"argest error at {self.about}{visits}"
         if not np.isfinite(self.upper_mm):
-            more = "; ".join(filter(None, [self.withheld, lower and f"{lower} ({sure})", value]))
-            return f"No upper bound on the l{error}: {more or 'none is stated'}."
-        text, every = f"L{error}: at most {self.upper_mm:.3f} mm", " each" if lower else ""
-        if lower and not self.excepted:
-            text += f", {lower}"
-        text += f" ({sure}{every})"
-        text += f". Largest error of all {self.points}: {lower}" if lower and self.excepted else ""
-        return f"{text}; {value}." if value else f"{text}."
+            parts = [self.withheld, lower and f"{lower} ({sure})", value]
+            return f"No upper bound on the l{error}: {'; '.join(filter(None, parts))}."
+        both = f", {lower}" if lower and not self.excepted else ""
+        text = f"L{error}: at most {self.upper_mm:.3f} mm{both} ({sure}{' each' if lower else ''})"
+        if lower and self.excepted:
+            text += f". Largest error of all {self.points}: {lower}"
+        return "; ".join(filter(None, [text, value])) + "."
 
 
 @dataclass(frozen=True)
@@ -150,67 +151,71 @@ class CampaignStatus:
     @property
     def headline(self) -> str:
         """The verdict, or the main bound without a tolerance."""
-        main = self.bound
+        main, size = self.bound, f"{self.bound.tolerance_mm or 0.0:g} mm"
         if self.against:
             stated = "BOUND IN DOUBT" if np.isfinite(main.upper_mm) else "NO BOUND"
             return f"{stated}: {self.against[0]}."
-        if main.tolerance_mm is None or not (main.verdict and np.isfinite(main.upper_mm)):
+        if not (main.verdict and np.isfinite(main.upper_mm)):
             return main.text
-        sure = f"{percent(main.confidence)} confidence"
-        size, at = f"{main.tolerance_mm:g} mm", f"largest error at {main.about}"
-        if main.verdict == ACCEPT:
-            return f"ACCEPT: {at} within {size} (upper bound {main.upper_mm:.3f} mm, {sure})."
-        if main.verdict == REJECT:
-            return f"REJECT: {at} beyond {size} (lower bound {main.lower_mm:.3f} mm, {sure})."
-        return f"UNDECIDED on {size}: {main.reason}."
+        if main.verdict not in _DECIDED:
+            return f"UNDECIDED on {size}: {main.reason}."
+        side, name = _DECIDED[main.verdict]
+        mm, sure = getattr(main, f"{name}_mm"), f"{percent(main.confidence)} confidence"
+        error = f"largest error at {main.about} {side} {size}"
+        return f"{main.verdict.upper()}: {error} ({name} bound {mm:.3f} mm, {sure})."
 
     @property
     def progress(self) -> str:
         """Readings taken, and the next point."""
         waiting = self.readings - self.readings_used
         ahead = f", {waiting} more taken ahead" if waiting else ""
-        text = (
-            f"{self.readings_used} of {self.budget} readings{ahead}, at {self.points_measured} of "
-            f"{self.candidates} candidates."
-        )
-        if self.next_point is not None:
-            return f"{text} Next point: {self.next_point}."
         spent = self.readings_used >= self.budget
-        return f"{text} {'The budget is spent' if spent else 'No further reading is needed'}."
+        end = "The budget is spent" if spent else "No further reading is needed"
+        return (
+            f"{self.readings_used} of {self.budget} readings{ahead}, at {self.points_measured} of "
+            f"{self.candidates} candidates. "
+            f"{end if self.next_point is None else f'Next point: {self.next_point}'}."
+        )
+
+
+_DECIDED = {"accept": ("within", "upper"), "reject": ("beyond", "lower")}
 
 
 def status(opened: Opened, state: State, tolerance_mm: float | None = None) -> CampaignStatus:
     """Return the status of a campaign; ``tolerance_mm`` in place of its own."""
-    plan, about = state.plan, state.plan.about
-    said, label = state.statements(), plan.points.label
+    plan, label = state.plan, state.plan.points.label
+    stated = state.statements()
     tolerance_mm = plan.limits.tolerance_mm if tolerance_mm is None else tolerance_mm
     candidates = len(plan.points) - len(state.left_out)
     visited = len(state.campaign.ledger.visited)
-    near, scattered = consistency.nearness(state), consistency.scatter(state)
-    held = None if getattr(plan.assessor, "noise", KNOWN) == ESTIMATED else scattered
+    near, repeats = nearness(state), scatter(state)
+    checked = None if getattr(plan.assessor, "noise", KNOWN) == ESTIMATED else repeats
     overstated = near is not None and near.too_small
-    bounds = [_bound(each, state, candidates, tolerance_mm, overstated) for each in said]
-    bounds.sort(key=lambda each: (math.isnan(each.upper_mm), each.target != plan.limits.target))
+    bounds = [_bound(item, state, candidates, tolerance_mm, overstated) for item in stated]
+    bounds.sort(key=lambda item: (math.isnan(item.upper_mm), item.target != plan.limits.target))
     if visited == candidates and len({(b.lower_mm, b.value_mm, b.upper_mm) for b in bounds}) == 1:
-        bounds = [each for each in bounds if each.target != MEASURED] or bounds
-    alarms = {
-        each.withheld.code: reason(each.withheld)
-        for each in said
-        if each.withheld and each.withheld.code in ADVICE
-    }
-    against = [*alarms.values()]
-    if not alarms:
-        against = [_near(near)] if overstated and near else []
-        against += [_scattered(held)] if held and held.too_large else []
-        against += [each.doubt for each in bounds if each.doubt]
-    noise = [_scattered(held)] if held and not held.too_large and not overstated else []
-    noise += [each.noise for each in bounds if each.noise]
+        bounds = [item for item in bounds if item.target != MEASURED] or bounds
+    reasons = [item.withheld for item in stated if item.withheld]
+    alarms = {item.code: reason(item) for item in reasons if item.code in ADVICE}
+    against, notes = list(alarms.values()), []
+    if alarms:
+        against += [
+            f"reading {state.told[item.number - 1].number} at point "
+            f"{label[state.rows[item.row]]} lies {item.deviations:.1f} standard deviations from "
+            "the others there"
+            for item in state.campaign.suspicious()
+        ]
+    else:
+        against += [_near(near)] if overstated and near else []
+        against += [_scattered(checked)] if checked and checked.too_large else []
+        against += [item.doubt for item in bounds if item.doubt]
+    if checked and not checked.too_large and not overstated:
+        notes.append(_scattered(checked))
+    notes += [item.noise for item in bounds if item.noise]
+    names = ("robot", "calibration", "model", "point")
     return CampaignStatus(
         folder=str(opened.folder),
-        robot=about["robot"],
-        calibration=about["calibration"],
-        model=about["model"],
-        point=about["point"],
+        **{name: plan.about[name] for name in names},
         assessor=plan.assessor.name,
         budget=plan.assessor.measurements,
         readings=state.taken,
@@ -219,15 +224,15 @@ def status(opened: Opened, state: State, tolerance_mm: float | None = None) -> C
         candidates=candidates,
         points_measured=visited,
         left_out={label[point]: why for point, why in state.left_out.items()},
-        struck={each.number: why for each, why in state.struck},
+        struck={item.number: why for item, why in state.struck},
         next_point=None if state.asked is None else label[state.asked],
         recorded=max(opened.recorded, default=""),
-        noise={each.name: instrument.noise(each) for each in plan.instruments},
-        scatter=scattered,
-        against=tuple(dict.fromkeys([*against, *_suspicious(state)] if alarms else against)),
-        advice=tuple(ADVICE[each] for each in alarms),
+        noise={device.name: instrument.noise(device) for device in plan.instruments},
+        scatter=repeats,
+        against=tuple(dict.fromkeys(against)),
+        advice=tuple(ADVICE[code] for code in alarms),
         assumes=_assumes(plan, bounds[0]),
-        notes=tuple(dict.fromkeys([*noise, *_frame(state), *_not_counted(state)])),
+        notes=tuple(dict.fromkeys([*notes, *_frame(state), *_not_counted(state)])),
         overruled=plan.overruled,
         bounds=tuple(bounds),
     )
@@ -239,118 +244,79 @@ def percent(share: float) -> str:
 
 
 def _bound(
-    said: Statement, state: State, candidates: int, tolerance_mm: float | None, overstated: bool
+    stated: Statement, state: State, candidates: int, tolerance_mm: float | None, overstated: bool
 ) -> Bound:
     visited, nan = len(state.campaign.ledger.visited), math.nan
-    limits = limits_now(said, state)
     judged = Decision("", nan, nan, nan, nan, Reason("between"))
     if tolerance_mm is not None:
-        judged = decide(said, tolerance_mm)
+        judged = decide(stated, tolerance_mm)
     doubt = ""
-    if said.upper_mm < said.lower_mm:
+    if stated.upper_mm < stated.lower_mm:
         doubt = "the bounds contradict each other"
-    elif said.value_mm > said.upper_mm:
+    elif stated.value_mm > stated.upper_mm:
         doubt = "the estimate lies above the upper bound, which cannot be relied on"
     if doubt:
         kind = "overstated" if overstated else "understated"
         doubt += f": noise {kind}, or one of the few campaigns that the confidence leaves out"
-    copied = (
-        "target", "share", "value_mm", "lower_mm", "upper_mm", "confidence", "excepted", "error_of",
-    )  # fmt: skip
-    return Bound(
-        points=visited if said.target == MEASURED else candidates,
-        unmeasured=candidates - visited if said.target == CANDIDATES else 0,
-        withheld=reason(said.withheld),
-        assumption=reason(said.assumption),
-        noise=reason(said.noise),
-        doubt=doubt,
-        tolerance_mm=tolerance_mm,
-        reason=reason(judged.reason) if judged.verdict else "",
-        attainable_mm=limits.attainable_mm,
-        proven_mm=limits.proven_mm,
-        attainable_lower_mm=limits.lower_mm,
-        **{name: getattr(said, name) for name in copied},
-        **{
-            name: getattr(judged, name)
-            for name in ("verdict", "guard_band_mm", "acceptance_limit_mm", "risk")
-        },
-    )
+    limits = limits_now(stated, state)
+    values = {
+        **vars(stated),
+        **vars(judged),
+        "points": visited if stated.target == MEASURED else candidates,
+        "unmeasured": candidates - visited if stated.target == CANDIDATES else 0,
+        **{name: reason(getattr(stated, name)) for name in ("withheld", "assumption", "noise")},
+        "doubt": doubt,
+        "tolerance_mm": tolerance_mm,
+        "reason": reason(judged.reason) if judged.verdict else "",
+        "attainable_mm": limits.attainable_mm,
+        "proven_mm": limits.proven_mm,
+        "attainable_lower_mm": limits.lower_mm,
+    }
+    return Bound(**{item.name: values[item.name] for item in fields(Bound)})
 
 
-def limits_now(said: Statement, state: State) -> WidthLimits:
+def limits_now(stated: Statement, state: State) -> WidthLimits:
     """Return how near a statement could come to the largest error; NaN where it has no bound.
 
     By the sizes of the mean readings, corrected for their noise; unread points have the median.
     """
     ledger = state.campaign.ledger
-    if math.isnan(said.upper_mm):
+    if math.isnan(stated.upper_mm):
         return NONE
     read = np.isfinite(ledger.noise_mm)
     square = np.sum(ledger.mean_mm[read] ** 2, axis=1) - 3.0 * ledger.noise_mm[read] ** 2
     sizes = np.sqrt(np.maximum(square, 0.0))
     sizes_mm = np.full(len(read), np.median(sizes))
     sizes_mm[read] = sizes
-    return limits_of(said, ledger.visited, sizes_mm, ledger.candidates.sigma_mm, ledger.taken)
+    return limits_of(stated, ledger.visited, sizes_mm, ledger.candidates.sigma_mm, ledger.taken)
 
 
 def _assumes(plan: Plan, bound: Bound) -> str:
     """The conditions of the main bound; empty where none is stated."""
     if not np.isfinite(bound.upper_mm):
         return ""
-    used, settings = plan.instruments, plan.assessor
-    stated = "; ".join(f"{each.name}: {instrument.noise(each)}" for each in used)
+    used, settings = plan.instruments, vars(plan.assessor)
+    stated = "; ".join(f"{device.name}: {instrument.noise(device)}" for device in used)
     if len(used) == 1:
         stated = instrument.noise(used[0])
-    if getattr(settings, "noise", KNOWN) != KNOWN:
-        freedom = getattr(settings, "noise_freedom", 0)
+    if settings.get("noise", KNOWN) != KNOWN:
+        freedom = settings["noise_freedom"]
         source = f"a test with {freedom} degrees of freedom" if freedom else "repeated readings"
         noise = f"a noise of {stated} up to one factor, determined by {source}"
     else:
-        largest = max(float(np.linalg.eigvalsh(each.covariance_mm2)[-1]) for each in used)
+        largest = max(float(np.linalg.eigvalsh(device.covariance_mm2)[-1]) for device in used)
         clear = bound.upper_mm > _CLEAR_OF_NOISE * math.sqrt(largest)
         noise = f"a standard deviation of {'at most' if clear else 'exactly'} {stated}"
-    wrong, allowance = (getattr(settings, name, 0.0) for name in ("wrong_rate", "allowance_mm"))
-    more = [
-        f"{bound.assumption}, " if bound.assumption else "",
-        f"at most {percent(wrong)} wrong readings, " if wrong else "",
-        f"at most {allowance:g} mm of what no repeat shows, " if allowance else "",
+    wrong, allowance = settings.get("wrong_rate", 0.0), settings.get("allowance_mm", 0.0)
+    parts = [
+        noise,
+        bound.assumption,
+        f"at most {percent(wrong)} wrong readings" if wrong else "",
+        f"at most {allowance:g} mm of what no repeat shows" if allowance else "",
+        "and a fixed base, tool and instrument",
     ]
-    fixed = "a fixed base, tool and instrument"
-    return f"Assumes independent normal readings with {noise}, {''.join(more)}and {fixed}."
-
-
-def assumptions(status: CampaignStatus, plan: Plan) -> list[str]:
-    """Return everything that the bounds rest on, a sentence each."""
-    settings = vars(plan.assessor)
-    meant = "The error is the mean of measured minus modelled position at a pose."
-    if status.bound.error_of != MEAN:
-        arm_mm = settings["arm_mm"]
-        arm = "all of the noise" if arm_mm is None else f"{arm_mm:g} mm per axis"
-        meant = f"The error is the one that {_VISIT} of future visits keep; the arm scatters {arm}."
-    rate, allowance_mm = settings.get("wrong_rate", 0.0), settings.get("allowance_mm", 0.0)
-    lines = [
-        status.assumes,
-        meant,
-        "The noise includes the instrument, its target, and how well the arm repeats a pose. What "
-        "the instrument gets wrong every time at a pose counts as an error of the arm.",
-        "Candidates were drawn without regard to their errors; none was left out for its error.",
-        f"At most {percent(rate)} of the readings are wrong, each at random."
-        if rate
-        else "No reading is wrong without differing from others of its pose.",
-        f"Frame, tool offset and scale of the instrument are wrong by at most {allowance_mm:g} mm."
-        if allowance_mm
-        else "Frame, tool offset and scale of the instrument are right: no repeat checks them.",
-        "No drift or step is too small for the reference poses to show."
-        if settings.get("references")
-        else "Nothing drifted or moved: no reference poses check it.",
-    ]
-    if any(each.frame == instrument.INSTRUMENT for each in plan.instruments):
-        lines.append("The instrument stands where the calibration placed it.")
-    if "confidence" in settings:
-        sure = settings["confidence"] - rate
-        both = percent(max(2.0 * sure - 1.0, 0.0))
-        lines.append(f"Each bound holds with {percent(sure)} confidence, both with {both}.")
-    return [each for each in lines if each]
+    text = ", ".join(filter(None, parts))
+    return f"Assumes independent normal readings with {text}."
 
 
 def _near(near: Scatter) -> str:
@@ -360,14 +326,14 @@ def _near(near: Scatter) -> str:
     )
 
 
-def _scattered(found: Scatter) -> str:
+def _scattered(repeats: Scatter) -> str:
     text = (
-        f"repeated readings scatter {found.ratio:.2f} times the stated noise ({found.freedom} "
+        f"repeated readings scatter {repeats.ratio:.2f} times the stated noise ({repeats.freedom} "
         "degrees of freedom)"
     )
-    if found.too_large:
+    if repeats.too_large:
         return f"{text}, more than chance allows: noise understated, or something moved"
-    return f"{text}: noise overstated, bounds wider than needed" if found.too_small else text
+    return f"{text}: noise overstated, bounds wider than needed" if repeats.too_small else text
 
 
 def _frame(state: State) -> Iterable[str]:
@@ -382,20 +348,81 @@ def _frame(state: State) -> Iterable[str]:
         )
 
 
-def _suspicious(state: State) -> Sequence[str]:
-    """Readings that do not fit the others of their pose, by number in the journal."""
-    return [
-        f"reading {state.told[each.number - 1].number} at point "
-        f"{state.plan.points.label[state.rows[each.row]]} lies {each.deviations:.1f} standard "
-        "deviations from the others there"
-        for each in state.campaign.suspicious()
-    ]
-
-
 def _not_counted(state: State) -> Iterable[str]:
     label = state.plan.points.label
     for point, why in state.left_out.items():
         yield f"point {label[point]} was left out: {why}"
-    for each, why in state.struck:
-        at = f"{np.linalg.norm(each.error_mm):.3f} mm at {label[each.reading.point]}"
-        yield f"reading {each.number} ({at}) was struck: {why}"
+    for item, why in state.struck:
+        place = f"{np.linalg.norm(item.error_mm):.3f} mm at {label[item.reading.point]}"
+        yield f"reading {item.number} ({place}) was struck: {why}"
+
+
+# Texts of the codes of assessors.
+REASONS = {
+    # assumptions
+    "drawn_at_random": "points drawn at random from the region",
+    # no bound
+    "nothing_measured": "no reading yet",
+    "first_visit": "{left} more points of the first visit are needed",
+    "first_visit_by_travel": "{left} points of the first visit, made in order of travel, are open",
+    "predicted": "all {read} readings equal the predicted positions to the last digit: were "
+    "predictions recorded?",
+    "unmeasured": "{left} of {points} candidates are not measured",
+    "few_points": "{read} points read; {share:.0%} of the region needs {needed}",
+    "few_sizes": "{read} points read; a distribution needs at least {needed} of different size",
+    "much_noise": "noise makes up {part:.0%} of the mean square of the readings",
+    "not_gamma": "the largest reading does not fit a gamma distribution",
+    "drift": "the reference poses show a drift of {size:.3f} mm over the campaign "
+    "({x:+.3f}, {y:+.3f}, {z:+.3f}; standard deviation {deviation:.3f} mm)",
+    "step": "the reference poses show a step of {size:.3f} mm between readings {after} and "
+    "{before} ({x:+.3f}, {y:+.3f}, {z:+.3f}; standard deviation {deviation:.3f} mm)",
+    "scatter": "readings of one pose in a row scatter {ratio:.2f} times the stated noise "
+    "({freedom:.0f} degrees of freedom): noise understated, or something moves",
+    "tails": "readings of one pose lie {farthest:.1f} standard deviations apart: some are wrong, "
+    "or the noise is not normal",
+    "wrong_readings": "{readings:.0f} readings do not fit the others of their pose",
+    "noise_unknown": "the noise is not estimated yet: {freedom:.0f} of {needed:.0f} degrees of "
+    "freedom",
+    # noise of the bounds
+    "noise_margin": "too few repeated readings to check the stated noise: bounds use {margin:g} "
+    "times the stated value (--set noise_margin=1 takes it as stated)",
+    "noise_shown": "bounds use {factor:.2f} times the stated noise, as repeated readings show "
+    "({freedom:.0f} degrees of freedom)",
+    "noise_estimated": "noise estimated in this campaign: {factor:.2f} times the planned value "
+    "({freedom:.0f} degrees of freedom)",
+    "noise_tested": "noise of a repeatability test ({freedom:.0f} degrees of freedom)",
+    "noise_limited": "bounds use {factor:.2f} times the noise of the repeatability test, its upper "
+    "limit ({freedom:.0f} degrees of freedom), as readings may be wrong",
+    "noise_bounded": "no repeated readings: noise at most {factor:.2f} times the planned value, by "
+    "the size of all readings",
+    # small budgets
+    "excepted_ahead": "the bound will leave {excepted:.0f} candidates out; {enough:.0f} readings "
+    "bound all of them",
+    # decisions
+    "between": "the tolerance lies between lower and upper bound: measure more",
+    "contradict": "bounds and estimate contradict each other: is the noise understated?",
+    "within": "the upper bound is within the tolerance",
+    "beyond": "the lower bound exceeds the tolerance",
+    "some_excepted": "the upper bound is within the tolerance but leaves {excepted:.0f} candidates "
+    "out: measure more points",
+    "no_upper": "no upper bound is stated",
+}
+
+
+# What to do where readings contradict an assumption of the bounds.
+ADVICE = {
+    "predicted": "Begin a new campaign, and record readings of an instrument.",
+    "scatter": "Check whether something moves; begin a new campaign with the noise tested (kinacc "
+    "repeatability) or estimated (--noise estimate).",
+    "tails": "Check the readings; begin a new campaign, with --wrong-readings where some may go "
+    "wrong.",
+    "wrong_readings": "Check each reading named: strike it where something went wrong (kinacc "
+    "campaign strike FOLDER NUMBER --reason ..), else begin a new campaign with --wrong-readings.",
+    "drift": "Find what moved or warmed up, and begin a new campaign.",
+    "step": "Find what moved, and begin a new campaign.",
+}
+
+
+def reason(why: Reason | None) -> str:
+    """Return the text of a reason; empty for None."""
+    return "" if why is None else REASONS[why.code].format(**why.numbers)

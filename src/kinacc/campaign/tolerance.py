@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from kinacc.assess.conformity import ACCEPT, REJECT, UNDECIDED, decide
 from kinacc.assess.statement import Statement
 from kinacc.calibration.summary import LARGE_SHARE, Tolerance
-from kinacc.campaign.reasons import reason
+from kinacc.campaign.status import reason
 
 BOUND, MEAN = "bound", "mean"
 OF_CONFIGURATION, OF_CAMPAIGN = "the configuration's", "the campaign's"

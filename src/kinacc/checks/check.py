@@ -82,10 +82,26 @@ def run(
 
 
 def examined(settings: Mapping[str, Any], dataset: str, progress: Progress) -> Report:
-    """Report on a data set's file, with what its configuration accepts.
+    """Check a data set's file, with what its configuration accepts.
 
-    ``settings``: robot and the sections ``measurements``, ``calibration`` and ``data_check``.
-    Raises InputError where the file cannot be read or holds too few poses.
+    Parameters
+    ----------
+    settings
+        ``robot`` and the sections ``measurements``, ``calibration`` and ``data_check``.
+    dataset
+        Its name in the report.
+    progress
+        Called on what is iterated and a label.
+
+    Returns
+    -------
+    Report
+        Facts, remarks and findings.
+
+    Raises
+    ------
+    InputError
+        Where the file cannot be read or holds fewer than 6 poses.
     """
     arm, section = robots.load(settings["robot"]), settings["measurements"]["file"]
     reading = read(section, arm, strict=False)

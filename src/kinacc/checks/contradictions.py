@@ -27,9 +27,22 @@ def load(
     overrides: Mapping[str, Any] | None = None,
     folder: Path | str = ".",
 ) -> dict[str, dict[str, Any]]:
-    """Full settings of every data set, by name, held to each other and to the robots they name.
+    """Read full settings of every data set, held to each other and to the robots they name.
 
-    As :func:`kinacc.config.load.load`. Raises InputError listing every problem in all files.
+    Parameters
+    ----------
+    paths, overrides, folder
+        As of :func:`kinacc.config.load.load`.
+
+    Returns
+    -------
+    dict
+        ``{name: settings}``.
+
+    Raises
+    ------
+    InputError
+        Listing every problem in all files.
     """
     return configuration.load(paths, overrides, folder, contradictions)
 

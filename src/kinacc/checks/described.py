@@ -69,10 +69,28 @@ def describe_files(
 def corrected(
     guess: Guess, robot: Robot, name: str, progress: Progress
 ) -> tuple[Guess, Report, MeasuredFile]:
-    """The guess with assumed settings corrected where the readings contradict them.
+    """Correct assumed settings of a file where its readings contradict them.
 
-    Also the check of the readings, and the readings. Raises InputError where the robot has another
-    number of joints.
+    Parameters
+    ----------
+    guess
+        Settings of the file, of which some are assumed.
+    robot
+        The arm that was measured.
+    name
+        Name of the data set in the report.
+    progress
+        Called on what is iterated and a label.
+
+    Returns
+    -------
+    guess, report, readings
+        The corrected guess, the check of the readings, and the readings.
+
+    Raises
+    ------
+    InputError
+        Where the robot has another number of joints.
     """
     if robot.dh.joints != guess.joints:
         message = f"{robot.name} has {robot.dh.joints} joints, the file {guess.joints}"

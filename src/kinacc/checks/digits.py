@@ -169,8 +169,19 @@ def _on(q_deg: ndarray, grid: float) -> ndarray:
 def smallest_step(cells: Sequence[Sequence[object]], unit: float, decimal: str) -> float:
     """The step of numbers as written: the most digits that any cell has behind its mark.
 
-    ``unit`` is that of the file in the unit wanted. Zero where the file holds no texts, whose
-    numbers are not rounded.
+    Parameters
+    ----------
+    cells
+        Columns of cells.
+    unit
+        The unit of the file in the unit of the result.
+    decimal
+        The decimal mark.
+
+    Returns
+    -------
+    float
+        Zero where the file holds no texts, whose numbers are not rounded.
     """
     texts = [cell for column in cells for cell in column]
     if not all(isinstance(cell, str) and "e" not in cell.lower() for cell in texts):
@@ -182,8 +193,19 @@ def smallest_step(cells: Sequence[Sequence[object]], unit: float, decimal: str) 
 def step_between(cells: Sequence[object], unit: float, decimal: str) -> float:
     """The largest step of which all numbers of a column are whole multiples away from each other.
 
-    ``unit`` is that of the file in the unit wanted. Zero where all are equal, or a cell is no
-    number.
+    Parameters
+    ----------
+    cells
+        Cells of the column.
+    unit
+        The unit of the file in the unit of the result.
+    decimal
+        The decimal mark.
+
+    Returns
+    -------
+    float
+        Zero where all are equal, or a cell is no number.
     """
     texts = [str(cell).strip().replace("\u2212", "-").replace(decimal, ".") for cell in cells]
     digits = max((len(text.partition(".")[2]) for text in texts), default=0)

@@ -76,7 +76,19 @@ class Noise:
 
 
 def parts(read: Repeated) -> Parts:
-    """Variances of instrument, visits and sides, and that of a reading from any side."""
+    """Covariances of instrument, visits and sides, and of a reading from any side.
+
+    Parameters
+    ----------
+    read
+        Readings with their poses, sides and visits.
+
+    Returns
+    -------
+    Parts
+        By the analysis of variance of unweighted means; degrees of freedom by Welch and
+        Satterthwaite.
+    """
     visit_mm, readings, side_of = _visits(read)
     side_mm, visits = means(visit_mm, side_of)
     pose_of = _larger(read.side, read.pose)
@@ -107,10 +119,21 @@ def parts(read: Repeated) -> Parts:
 
 
 def noise_of(results: Parts, resolution_mm: ndarray) -> Noise | None:
-    """The noise of a reading, no less than the rounding of ``resolution_mm`` (3,).
+    """The noise of a reading, no less than rounding.
 
-    None where it is not told. Equal along the axes, with three times their degrees of freedom,
-    unless they are shown to differ: then a covariance, every direction with the degrees of one.
+    Parameters
+    ----------
+    results
+        Covariances of :func:`parts`.
+    resolution_mm
+        Steps (3,) of the values.
+
+    Returns
+    -------
+    Noise or None
+        None where no pose was revisited. Equal along the axes, with three times their degrees of
+        freedom, unless they are shown to differ: then a covariance, every direction with the
+        degrees of one.
     """
     if not results.freedom:
         return None
@@ -234,7 +257,20 @@ def far_off(read: Repeated) -> ndarray:
 
 
 def limits(std_mm: ndarray, freedom: float) -> tuple[ndarray, ndarray]:
-    """95 % limits of standard deviations of ``freedom`` degrees each."""
+    """95 % limits of standard deviations.
+
+    Parameters
+    ----------
+    std_mm
+        Standard deviations (m,).
+    freedom
+        Degrees of freedom of each.
+
+    Returns
+    -------
+    low_mm, high_mm
+        Each (m,).
+    """
     low, high = (np.sqrt(freedom / (2.0 * gammaincinv(freedom / 2.0, p))) for p in (0.975, 0.025))
     return std_mm * low, std_mm * high
 

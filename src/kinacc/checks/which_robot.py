@@ -22,9 +22,21 @@ _SAME_ARM = 1e-6  # of the misfit: two names of one geometry
 
 
 def fitting(guess: Guess, progress: Progress) -> list[str]:
-    """Names of the shipped robots that fit the file: one, or those of equal geometry; or none.
+    """Fit the shipped robots to a file.
 
     The arms are taken as described: corrected, an arm of similar build would fit as well.
+
+    Parameters
+    ----------
+    guess
+        What a measured file holds.
+    progress
+        Called on what is iterated and a label.
+
+    Returns
+    -------
+    list of str
+        Names of the robots that fit: one, or those of equal geometry; or none.
     """
     from kinacc.checks import readings, robust_fit
 

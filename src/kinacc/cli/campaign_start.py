@@ -65,7 +65,7 @@ def start(out: Output, **options) -> None:
     """
     from kinacc.campaign import begin, doubts, folder, instrument, known_noise
     from kinacc.campaign.plan import Limits
-    from kinacc.campaign.reasons import reason
+    from kinacc.campaign.status import reason
     from kinacc.cli import campaign_options, rows
     from kinacc.errors import refuse
 

@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 TABLES = (".csv", ".json", ".parquet", ".xlsx")
 PICTURES = (".svg", ".png", ".pdf")
 PAGES = (".html",)
-_WIDE = 4000  # characters: a terminal wraps what is wider than it
 
 
 @dataclass(frozen=True)
@@ -66,6 +65,8 @@ class Output:
             return
         table = table if shown is None else shown
         if len(table):
+            from kinacc.report.terminal import print_table
+
             print_table(table, most)
 
     def say(self, facts: object, text: str) -> None:
@@ -150,31 +151,6 @@ def write_table(table: pd.DataFrame, path: Path | str, answer: object = None) ->
         else:
             safe.to_excel(content, index=False, freeze_panes=(1, 0))
     write_whole(path, content.getvalue())
-
-
-def print_table(table: pd.DataFrame, most: int = 24) -> None:
-    """Print the first rows of a table."""
-    from rich.table import Table
-
-    from kinacc.report.terminal import screen
-
-    grid = Table(box=None, pad_edge=False)
-    for name, values in table.items():
-        numeric = pd.api.types.is_numeric_dtype(values)
-        grid.add_column(as_seen(str(name)), justify="right" if numeric else "left", no_wrap=True)
-    for row in table.head(most).itertuples(index=False):
-        grid.add_row(*map(_shown, row))
-    screen(_WIDE).print(grid)
-    if len(table) > most:
-        click.echo(f".. {len(table) - most} more rows (--out)")
-
-
-def _shown(value: object) -> str:
-    if value is None or value != value:
-        return "-"
-    if not isinstance(value, float):
-        return as_seen(str(value))
-    return f"{value:.4f}" if abs(value) >= 0.01 or abs(value) < 5e-5 else f"{value:.3g}"
 
 
 def plain(value: Any) -> Any:

@@ -46,7 +46,7 @@ def written(folder: str, out: str | None = None, without: Collection[str] = ()) 
     ``without``: tables to leave out. Raises InputError naming all tables missing.
     """
     from kinacc import __version__
-    from kinacc.campaign.journal import of_results
+    from kinacc.campaign.folder import of_results
     from kinacc.deployment.folder import read_tables
     from kinacc.report import dataset
     from kinacc.report.page import html

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import reduce
 from typing import Any
 
 import yaml
@@ -13,7 +14,7 @@ from kinacc.errors import InputError, Problem
 Path = Sequence[str]
 
 
-def with_added(text: str, path: Path, value: Any, name: str, without: Path = ()) -> str:
+def with_added(text: str, path: Path, value: Any, name: str, emptied: Path = ()) -> str:
     """The text with ``value`` joined to the list or mapping at a path of keys.
 
     Parameters
@@ -21,13 +22,13 @@ def with_added(text: str, path: Path, value: Any, name: str, without: Path = ())
     text
         A YAML document whose top level is a mapping.
     path
-        Keys that lead to the list or mapping; those that are missing are made.
+        Keys that lead to the list or mapping; missing keys are added.
     value
         A list or mapping: its items come after those that are there.
     name
         Name of the file in messages.
-    without
-        Keys that lead to a value which is left out, with its line.
+    emptied
+        Keys that lead to a value in place of which null is written.
 
     Raises
     ------
@@ -35,16 +36,24 @@ def with_added(text: str, path: Path, value: Any, name: str, without: Path = ())
         Where the text cannot be changed without changing more than that.
     """
     try:
-        changed, wanted = text, value_of(text, name)
-        if without:
-            changed = _without(changed, wanted, without)
+        wanted, changed = value_of(text, name), text
+        if emptied:
+            reduce(dict.__getitem__, emptied[:-1], wanted)[emptied[-1]] = None
+            node = _deepest(text, emptied)[0]
+            node = next(item for key, item in node.value if key.value == emptied[-1])
+            changed = text[: node.start_mark.index] + "null" + text[node.end_mark.index :]
+        parent = reduce(lambda section, key: _section(section, key, {}), path[:-1], wanted)
+        _section(parent, path[-1], type(value)())
+        parent[path[-1]] = (
+            parent[path[-1]] | value if isinstance(value, Mapping) else parent[path[-1]] + value
+        )
         changed = _joined(changed, wanted, path, value)
         if value_of(changed, name) == wanted:
             return changed
-    except (yaml.YAMLError, TypeError, AttributeError, KeyError):
+    except (yaml.YAMLError, TypeError, AttributeError, LookupError, StopIteration):
         pass
     message = f"cannot be changed safely at {'.'.join(path)}"
-    instead = f", in place of {'.'.join(without)}" if without else ""
+    instead = f", in place of {'.'.join(emptied)}" if emptied else ""
     items = [value] if isinstance(value, Mapping) else value
     fix = f"add by hand{instead}: {' '.join(f'- {flow(item)}' for item in items)}"
     raise InputError(Problem(name, message, fix=fix))
@@ -57,67 +66,45 @@ def flow(value: Any) -> str:
     return text.removesuffix("\n").removesuffix("\n...")
 
 
-def _without(text: str, data: Any, path: Path) -> str:
-    """The text without the value at a path; ``data``, its values, lose it too."""
-    *above, key = path
-    parent, node, _ = _deepest(text, data, above)
-    del parent[key]
-    if node.flow_style:
-        return text[: node.start_mark.index] + flow(parent) + text[node.end_mark.index :]
-    begin, end = next((k.start_mark, v.end_mark) for k, v in node.value if k.value == key)
-    if not parent:  # what is left is null
-        holder, _, _ = _deepest(text, data, above[:-1])
-        holder[above[-1]] = None
-    return text[: begin.index - begin.column] + text[_line_end(text, end.index) :]
+def _section(parent: dict[str, Any], key: str, empty: Any) -> Any:
+    """The value of a key, ``empty`` where it has none."""
+    parent[key] = empty if parent.get(key) is None else parent[key]
+    return parent[key]
 
 
-def _joined(text: str, data: Any, path: Path, value: Any) -> str:
-    """The text with a value behind what is at a path; ``data``, its values, get it too."""
-    subset, node, depth = _deepest(text, data, path)
-    rest = path[depth:]
-    for key in rest[:-1]:
-        subset[key] = subset.get(key) or {}
-        subset = subset[key]
-    if rest:
-        before = subset.get(rest[-1]) or type(value)()
-        subset[rest[-1]] = {**before, **value} if isinstance(value, Mapping) else [*before, *value]
-    elif isinstance(subset, dict):
-        subset.update(value)
-    else:
-        subset.extend(value)
-    whole, _, _ = _deepest(text, data, path[:depth])
+def _joined(text: str, wanted: Any, path: Path, value: Any) -> str:
+    """The text with a value behind what is at a path; ``wanted`` are its values with that."""
+    node, depth = _deepest(text, path)
     if node.flow_style or not node.value:
-        return text[: node.start_mark.index] + flow(whole) + text[node.end_mark.index :]
-    if rest and rest[0] in {key.value for key, _ in node.value}:
-        raise KeyError(rest[0])  # null, or a value of another kind
+        whole = flow(reduce(dict.__getitem__, path[:depth], wanted))
+        return text[: node.start_mark.index] + whole + text[node.end_mark.index :]
+    if path[depth:] and path[depth] in {key.value for key, _ in node.value}:
+        raise KeyError(path[depth])  # null, or a value of another kind
     newline = "\r\n" if "\r\n" in text else "\n"
     indent, lines = " " * node.start_mark.column, []
-    for key in rest:
+    for key in path[depth:]:
         lines.append(f"{indent}{key}:")
         indent += "  "
-    if isinstance(value, Mapping):
-        lines += [f"{indent}{flow(key)}: {flow(item)}" for key, item in value.items()]
-    else:
-        lines += [f"{indent}- {flow(item)}" for item in value]
+    items = (
+        [f"{flow(key)}: {flow(item)}" for key, item in value.items()]
+        if isinstance(value, Mapping)
+        else [f"- {flow(item)}" for item in value]
+    )
+    lines += [indent + item for item in items]
     while isinstance(node, yaml.CollectionNode) and not node.flow_style and node.value:
         last = node.value[-1]  # block nodes end at what follows: their last value does not
         node = last[1] if isinstance(last, tuple) else last
-    stop = _line_end(text, node.end_mark.index)
+    stop = text.find("\n", node.end_mark.index) + 1 or len(text)
     gap = "" if text[stop - 1] == "\n" else newline
     return text[:stop] + gap + "".join(f"{line}{newline}" for line in lines) + text[stop:]
 
 
-def _deepest(text: str, data: Any, path: Path) -> tuple[Any, Any, int]:
-    """Values and YAML node of the deepest list or mapping on a path, and how deep it is."""
+def _deepest(text: str, path: Path) -> tuple[Any, int]:
+    """YAML node of the deepest list or mapping on a path, and how deep it is."""
     node: Any = yaml.compose(text, Loader=yaml.SafeLoader)
     for depth, key in enumerate(path):
-        results = {item.value: inner for item, inner in node.value}.get(key)
-        if not isinstance(results, yaml.CollectionNode):
-            return data, node, depth
-        node, data = results, data[key]
-    return data, node, len(path)
-
-
-def _line_end(text: str, place: int) -> int:
-    """Where the line of a place ends, its line feed included."""
-    return text.find("\n", place) + 1 or len(text)
+        inner = {item.value: inner for item, inner in node.value}.get(key)
+        if not isinstance(inner, yaml.CollectionNode):
+            return node, depth
+        node = inner
+    return node, len(path)

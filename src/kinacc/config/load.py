@@ -38,16 +38,32 @@ def load(
     folder: Path | str = ".",
     contradictions: Contradictions = lambda *_: (),
 ) -> dict[str, dict[str, Any]]:
-    """Full settings of every data set, by name.
+    """Read full settings of every data set, by name.
 
-    ``paths`` are merged in order as Snakemake merges its ``--configfile``: sections key by key, all
-    else replaced. ``overrides`` (nested, as from ``--config``) come last. Paths of data and robots
-    are relative to the file they stand in, those of ``overrides`` to the current ``folder``, and so
-    are those returned. ``contradictions`` (full settings, place, folder) yields what is wrong with
-    settings that are valid one by one. Every data set has ``robot``, ``seed`` and all sections of
-    :class:`Settings`, numbers in the units their names carry.
+    Files are merged as Snakemake merges its ``--configfile``: sections key by
+    key, all else replaced.
 
-    Raises InputError listing every problem in all files.
+    Parameters
+    ----------
+    paths
+        YAML files, in order; paths of data and robots in them are relative to the file.
+    overrides
+        Nested values laid over them, as from ``--config``; their paths are relative to ``folder``.
+    folder
+        What paths of the result are relative to.
+    contradictions
+        Yields Problems of settings that are valid one by one, of (full settings, place, folder).
+
+    Returns
+    -------
+    dict
+        ``{name: settings}``: ``robot``, ``seed`` and all sections of :class:`Settings`,
+        numbers in the units that their names carry.
+
+    Raises
+    ------
+    InputError
+        Listing every problem in all files.
     """
     documents: list[Document] = []
     problems: list[Problem] = []
@@ -102,9 +118,19 @@ def _line(problem: Problem) -> tuple[str, int]:
 def overlay(
     below: Mapping[str, Any], above: Mapping[str, Any], whole: Sequence[str] = ()
 ) -> dict[str, Any]:
-    """``below`` with the values of ``above`` laid over it, section by section.
+    """Lay values over settings, section by section.
 
-    Mappings named in ``whole`` are replaced as other values are.
+    Parameters
+    ----------
+    below, above
+        Nested settings; a value of ``above`` replaces that of ``below``.
+    whole
+        Names of mappings that are replaced as other values are.
+
+    Returns
+    -------
+    dict
+        A copy; ``below`` and ``above`` stay as they are.
     """
     merged = dict(below)
     for name, value in above.items():

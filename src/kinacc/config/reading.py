@@ -60,39 +60,44 @@ def dotted(path: KeyPath) -> str:
 
 def read(path: Path | str) -> tuple[Document, list[Problem]]:
     """One YAML file; problems instead of exceptions for all that is wrong with it as YAML."""
-    name = str(path)
     try:
-        # No more is read than shows that it is too much: the file may be a device.
-        with open(path, "rb") as stream:
+        return parsed(_text(str(path)), str(path))
+    except InputError as error:
+        return Document(str(path), {}), [*error.problems]
+
+
+def _text(name: str) -> str:
+    """Text of a file; no more is read than shows that it is too much: it may be a device."""
+    try:
+        with open(name, "rb") as stream:
             content = stream.read(_MOST_BYTES + 1)
+        if Path(name).suffix.lower() in _TABLES:
+            fix = f"{shlex.join(['kinacc', 'init', name])} writes a YAML file: give that"
+            raise InputError(Problem(name, "holds readings", "a .yaml file", fix))
+        if len(content) > _MOST_BYTES:
+            allowed = f"at most {_MOST_BYTES // 1000} kB"
+            raise InputError(Problem(name, "is too large for a description", allowed))
+        return content.decode("utf-8-sig")
     except OSError as error:
-        return Document(name, {}), [*refused(error, name).problems]
-    except ValueError as error:  # a name that no file can have
-        return Document(name, {}), [Problem(name, f"cannot be read: {error}", "a YAML file")]
-    if Path(path).suffix.lower() in _TABLES:
-        fix = f"{shlex.join(['kinacc', 'init', name])} writes a YAML file: give that"
-        return Document(name, {}), [Problem(name, "holds readings", "a .yaml file", fix)]
-    if len(content) > _MOST_BYTES:
-        allowed = f"at most {_MOST_BYTES // 1000} kB"
-        return Document(name, {}), [Problem(name, "is too large for a description", allowed)]
-    try:
-        return parsed(content.decode("utf-8-sig"), name)
+        raise refused(error, name) from None
     except UnicodeDecodeError as error:
         message = f"is not text in UTF-8 (byte {error.start})"
-        return Document(name, {}), [Problem(name, message, "a YAML file")]
+        raise InputError(Problem(name, message, "a YAML file")) from None
+    except ValueError as error:  # a name that no file can have
+        raise InputError(Problem(name, f"cannot be read: {error}", "a YAML file")) from None
 
 
 def parsed(text: str, name: str) -> tuple[Document, list[Problem]]:
-    """A YAML text whose top level is a mapping, and keys that are given twice."""
+    """A YAML text whose top level is a mapping, and keys that are given twice.
+
+    Raises InputError where it is anything else.
+    """
     lines: dict[KeyPath, int] = {}
     problems: list[Problem] = []
-    try:
-        data = value_of(text, name, lines, problems)
-    except InputError as error:
-        return Document(name, {}), [*error.problems]
+    data = value_of(text, name, lines, problems)
     if not isinstance(data, dict):
         message = "is empty" if data is None else "holds no keys"
-        return Document(name, {}), [Problem(name, message, "a mapping such as seed: 1")]
+        raise InputError(Problem(name, message, "a mapping such as seed: 1"))
     return Document(name, data, lines), problems
 
 
@@ -115,12 +120,11 @@ def value_of(
         if count > _MOST_VALUES or len(path) > _DEEPEST:  # aliases may stand for themselves
             message = "its aliases (*name) stand for too many values, or for themselves"
             raise InputError(Problem(name, message, f"at most {_MOST_VALUES} values"))
-        if isinstance(node, yaml.SequenceNode):
-            for number, item in enumerate(node.value):
-                lines[(*path, number)] = item.start_mark.line + 1
-            return [plain(item, (*path, number)) for number, item in enumerate(node.value)]
         if isinstance(node, yaml.ScalarNode):
             return _scalar(node)
+        if isinstance(node, yaml.SequenceNode):
+            lines.update(((*path, n), e.start_mark.line + 1) for n, e in enumerate(node.value))
+            return [plain(item, (*path, number)) for number, item in enumerate(node.value)]
         mapping: dict[Any, Any] = {}
         for key_node, value_node in node.value:
             key = _scalar(key_node) if isinstance(key_node, yaml.ScalarNode) else "<values>"
@@ -143,10 +147,10 @@ def value_of(
                 raise InputError(Problem(name, "holds too much", allowed))
         node = yaml.compose(text, Loader=_LOADER)
     except (yaml.YAMLError, ValueError) as error:
-        label = getattr(error, "problem_mark", None)
+        mark = getattr(error, "problem_mark", None)
         reason = getattr(error, "problem", None) or str(error).splitlines()[0]
-        where = name if label is None else f"{name}:{label.line + 1}"
         fix = "indent with blanks, not tabs" if "\\t" in reason else ""
+        where = f"{name}:{mark.line + 1}" if mark else name
         raise InputError(Problem(where, f"is not YAML: {reason}", fix=fix)) from None
     return None if node is None else plain(node, ())
 
@@ -157,9 +161,7 @@ def _scalar(node: yaml.ScalarNode) -> Any:
         return float(node.value)
     try:
         value = yaml.constructor.SafeConstructor().construct_object(node)
-        plain = isinstance(value, (str, int, float, date, type(None)))
-        return (
-            value if plain and not (isinstance(value, int) and abs(value) > 1e300) else node.value
-        )
     except (ArithmeticError, AttributeError, LookupError, ValueError, yaml.YAMLError):
         return node.value
+    is_plain = isinstance(value, (str, int, float, date, type(None)))
+    return node.value if not is_plain or (isinstance(value, int) and abs(value) > 1e300) else value

@@ -10,9 +10,24 @@ Record = TypeVar("Record")
 
 
 def of_section(record: type[Record], section: Mapping[str, Any]) -> Record:
-    """A dataclass ``record`` of the values that a section has under the names of its fields.
+    """A dataclass of the values that a section has under the names of its fields.
 
-    Lists become tuples. The section's other values are left out; TypeError where one is missing.
+    Parameters
+    ----------
+    record
+        A dataclass.
+    section
+        Values by name; those without a field are left out.
+
+    Returns
+    -------
+    record
+        With lists as tuples.
+
+    Raises
+    ------
+    TypeError
+        Where a value is missing.
     """
     named = (item.name for item in fields(record) if item.name in section)  # type: ignore[arg-type]
     return record(**{name: _fixed(section[name]) for name in named})

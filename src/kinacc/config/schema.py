@@ -53,7 +53,20 @@ def defaults(model: type[Section] = Settings) -> dict[str, Any]:
 
 
 def without_execution_keys(values: Mapping[str, Any], path: str = "") -> dict[str, Any]:
-    """Settings without the keys that change only how a run is carried out, for hashing."""
+    """Settings without the keys that change only how a run is carried out, for hashing.
+
+    Parameters
+    ----------
+    values
+        Full settings of a data set, or of the section at ``path``.
+    path
+        Dotted path of the section, as ``study``.
+
+    Returns
+    -------
+    dict
+        A copy without keys that are marked ``execution``.
+    """
     selected: dict[str, Any] = {}
     for name, value in values.items():
         here = f"{path}.{name}".lstrip(".")

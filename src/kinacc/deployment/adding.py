@@ -89,9 +89,9 @@ def add(
     new: list[dict[str, Any]] = [
         {"path": _beside(config, path), "date": day, "base": base, "tool": tool}
     ]
-    without: Sequence[str] = ()
+    emptied: Sequence[str] = ()
     if not lines:
-        without = ("datasets", name, "measurements", "file", "path")
+        emptied = ("datasets", name, "measurements", "file", "path")
         written = read(config)[0].data["datasets"][name].get("measurements") or {}
         first = (written.get("file") or {}).get("path") or _beside(config, known[0])
         new.insert(0, {"path": first, "date": last})
@@ -99,7 +99,7 @@ def add(
         line["date"] = datetime.date.fromisoformat(line["date"])
     place = Path(os.path.realpath(config))
     text = place.read_bytes().decode("utf-8")  # as bytes: line ends stay
-    changed = with_added(text, ("datasets", name, "series"), new, config, without)
+    changed = with_added(text, ("datasets", name, "series"), new, config, emptied)
     mode = place.stat().st_mode
     write_whole(place, changed.encode("utf-8"), on_disk=True)
     place.chmod(mode & 0o7777)

@@ -93,9 +93,7 @@ def _moved(ax: Axes, lines: pd.DataFrame) -> None:
             ax.plot(heights[rows], marker, color=colour, label=label, clip_on=False, zorder=3)
     for day, joint in lines["joint"][lines["verdict"] == RECALIBRATE].dropna().items():
         side = -1 if day > lines.index.to_numpy().mean() else 1  # where there is room
-        ax.annotate(
-            f"joint {joint:.0f}", (day, heights[day]), (5 * side, 3), textcoords="offset points",
-            ha="left" if side > 0 else "right", fontsize=style.SMALL_PT, color=style.VERMILION,
-        )  # fmt: skip
+        ax.text(day, heights[day], f"  joint {joint:.0f}  ", ha="left" if side > 0 else "right",
+                va="bottom", color=style.VERMILION)  # fmt: skip
     ax.set(ylabel="Moved (mm rms)", ylim=(0.0, 1.15 * np.nanmax([*moved, *chance, 0.0]) or 1.0))
     style.legend_above(ax, 7)

@@ -17,7 +17,20 @@ from kinacc.tables.contract import PROVENANCE_KEYS
 
 
 def check_file(path: Path, artefact: Artefact) -> list[Problem]:
-    """Problems of the table in a file, by its schema."""
+    """Hold the table in a file to its schema: types, units, metadata, limits and row keys.
+
+    Parameters
+    ----------
+    path
+        A Parquet file.
+    artefact
+        Its schema.
+
+    Returns
+    -------
+    list of Problem
+        Empty for a table that conforms.
+    """
     try:
         table = store.read_arrow(path)
         frame = table.to_pandas()

@@ -177,11 +177,12 @@ def _of_errors(name: str, tables: RunTables, gate: Mapping[str, Any], unit: str)
 
 
 def _of_bound(tables: RunTables, unit: str, word: str) -> Figure:
-    from kinacc.campaign import journal, of_calibration
+    from kinacc.campaign import of_calibration
+    from kinacc.campaign.folder import of_results
     from kinacc.deployment import folder
 
     known = folder.read_tables(tables.folder, "robot")
-    name, places = tables.folder.resolve().name, journal.of_results(tables.folder)
+    name, places = tables.folder.resolve().name, of_results(tables.folder)
     required = of_calibration.sought(name, known, places)
     results = required.status
     if results is None:

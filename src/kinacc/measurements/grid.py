@@ -96,6 +96,8 @@ def tabled(path: str, rows: Iterable[Row], layout: Layout, sheet: bool = False) 
     readings = [(n, c if len(c) <= width or filled(c[width:]) else c[:width]) for n, c in readings]
     again = [row for row in readings if row[1][0] == names[0] and [*map(str, row[1])] == names]
     readings = [row for row in readings if row not in again] if again else readings
+    while len(readings) > 1 and _is_text(readings[-1][1], width):
+        again.append(readings.pop())
     aside = sorted([*aside, *again], key=lambda row: row[0])
     places = [place for place, name in enumerate(names)
               if name or any(filled(row[place : place + 1]) for _, row in readings)]  # fmt: skip
@@ -123,6 +125,14 @@ def tabled(path: str, rows: Iterable[Row], layout: Layout, sheet: bool = False) 
     labels = dict.fromkeys(str(filled(row)[0]).strip()[:30] for _, row in aside)
     lines = table.row_names.few(table.not_rows)
     return replace(table, notes=(f"{lines}: not read ({', '.join([*labels][:3])})",))
+
+
+def _is_text(cells: list, width: int) -> bool:
+    """Whether a row under the last reading is a text of few cells."""
+    there = filled(cells)
+    texts = sum(isinstance(c, str) and c.strip()[:1] not in "+-.0123456789" for c in there)
+    short = len(cells) < width if len(cells) != width else 2 * len(there) < width
+    return short and 0 < len(there) <= 2 * texts and len(there) < 4
 
 
 def _units_behind(cells: pd.DataFrame, units: dict[str, str]) -> dict[str, str]:

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from kinacc.config.measured import JointsFile
-from kinacc.errors import InputError, Problem, refuse
+from kinacc.errors import InputError, Problem, first_few, refuse
 from kinacc.measurements.reader import AGAIN
 from kinacc.measurements.table import RawTable
 from kinacc.measurements.times import seconds
@@ -49,12 +49,13 @@ def joined(points: RawTable, joints: RawTable, how: JointsFile) -> RawTable:
     if not there.size:
         message = f"no row belongs to any of {joints.path}, joined by {how.by}"
         raise InputError(Problem(points.path, message, fix="correct measurements.file.joints"))
-    notes = [_left_out(points, (row < 0) & ~moving, f"without a partner in {joints.path}")]
+    notes = [_left_out(points, (row < 0) & ~moving, how.key_of_points, joints)]
     if how.by == NAME:
-        spare = ~np.isin(np.arange(len(joints)), row)
-        notes.append(_left_out(joints, spare, f"without a partner in {points.path}"))
+        notes.append(_left_out(joints, ~np.isin(np.arange(len(joints)), row), how.key, points))
         points = points.with_pose_names(how.key_of_points)
-    notes.append(_left_out(points, moving, "the arm was moving"))
+    if moving.any():
+        lines = points.rows_in_words(np.flatnonzero(moving))
+        notes.append(f"{points.path}: left out, the arm was moving: {lines}")
     beside = joints.columns.iloc[row[there]].reset_index(drop=True)
     if (joints.decimal, joints.thousands) != (points.decimal, points.thousands):
         # Cells are numbers of their own file.
@@ -77,10 +78,13 @@ def beside_name(column: str, points: RawTable) -> str:
     return f"{_PREFIX}{column}" if column in points.columns else column
 
 
-def _left_out(table: RawTable, rows: np.ndarray, why: str) -> str:
-    """A note on the rows where ``rows`` (n,) is True; empty where it nowhere is."""
+def _left_out(table: RawTable, rows: np.ndarray, key: str | None, partner: RawTable) -> str:
+    """A note on the rows where ``rows`` (n,) is True, with their keys; empty for none."""
+    if not rows.any():
+        return ""
     lines = table.rows_in_words(np.flatnonzero(rows))
-    return f"{table.path}: left out, {why}: {lines}" if rows.any() else ""
+    keys = f", {key} {first_few([*table.columns[key][rows]])}" if key else ""
+    return f"{table.path}: left out, without a partner in {partner.path}: {lines}{keys}"
 
 
 def rows_by_name(points: RawTable, joints: RawTable, how: JointsFile) -> np.ndarray:

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from kinacc.config.measured import Orientation
-from kinacc.geometry import exp_so3, rotation_from_quaternion, skew
+from kinacc.geometry import exp_so3, rotation_from_quaternion
 
 CONVENTIONS = tuple(
     order if intrinsic else order.lower()
@@ -16,7 +16,7 @@ CONVENTIONS = tuple(
         *("XYX", "XZX", "YXY", "YZY", "ZXZ", "ZYZ"),
     )
 )
-_SMALL_ANGLE_RAD = 1e-6
+_STEP_RAD = 1e-5
 
 
 def quaternions(turns: np.ndarray, orientation: Orientation) -> np.ndarray:
@@ -53,28 +53,13 @@ def euler(angles_rad: np.ndarray, convention: str) -> np.ndarray:
 def rotation_std(turns: np.ndarray, std: np.ndarray, orientation: Orientation) -> np.ndarray:
     """Standard deviations (n, 3) of the rotation vector w of ``exp(w) R``, instrument's frame.
 
-    ``std`` (n, 3): of its angles or rotation vector components, taken as independent.
+    ``std`` (n, 3): of its angles or rotation vector components, taken as independent. By central
+    differences, to 1e-9 of their size.
     """
-    if orientation.kind == "rotation_vector":
-        jacobian = _left_jacobians(turns)
-    else:
-        # The axis of an angle is turned by the factors left of it in the product.
-        letters = orientation.convention.upper()
-        order = range(3) if orientation.convention.isupper() else range(2, -1, -1)
-        jacobian = np.empty((len(turns), 3, 3))
-        product = Rotation.identity(len(turns))
-        for number in order:
-            axis = np.eye(3)["XYZ".index(letters[number])]
-            jacobian[:, :, number] = product.apply(axis)
-            product = product * Rotation.from_rotvec(turns[:, number, None] * axis)
-    return np.sqrt(np.einsum("nij,nj->ni", jacobian**2, std**2))
-
-
-def _left_jacobians(vectors: np.ndarray) -> np.ndarray:
-    angle = np.linalg.norm(vectors, axis=1)
-    small = angle < _SMALL_ANGLE_RAD
-    safe = np.where(small, 1.0, angle)
-    versine = np.where(small, 0.5, (1 - np.cos(safe)) / safe**2)[:, None, None]
-    excess = np.where(small, 1 / 6, (safe - np.sin(safe)) / safe**3)[:, None, None]
-    cross = skew(vectors)
-    return np.eye(3) + versine * cross + excess * (cross @ cross)
+    variance = np.zeros((len(turns), 3))
+    for part, step in enumerate(_STEP_RAD * np.eye(3)):
+        ahead, behind = (Rotation.from_matrix(rotations(turns + sign * step, orientation))
+                         for sign in (1.0, -1.0))  # fmt: skip
+        slope = (ahead * behind.inv()).as_rotvec() / (2.0 * _STEP_RAD)
+        variance += (slope * std[:, part, None]) ** 2
+    return np.sqrt(variance)

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import asdict
 
 import numpy as np
 import pandas as pd
 
+from kinacc import __version__
 from kinacc.assess.conformity import ACCEPT, REJECT
-from kinacc.campaign import consistency, folder, report
+from kinacc.campaign import folder
 from kinacc.campaign.folder import Opened
-from kinacc.campaign.state import State
-from kinacc.campaign.status import Bound, CampaignStatus, assumptions, percent, status
+from kinacc.campaign.instrument import INSTRUMENT
+from kinacc.campaign.state import State, deviations
+from kinacc.campaign.status import Bound, CampaignStatus, percent, status
 from kinacc.config.error_models import model_name
 from kinacc.figures import campaign as drawing
 from kinacc.report.page import FirstScreen, Page, Part, Table
@@ -44,8 +47,17 @@ def section(opened: Opened, state: State, tables: Mapping[str, Columns]) -> Part
         "left_out": [{"point": name, "reason": why} for name, why in summary.left_out.items()],
         "struck": readings[readings["struck"].notna()],
         "instruments": _instruments(summary, state, readings),
-        "assumptions": assumptions(summary, state.plan),
-        "facts": [{"topic": k, "fact": text} for k, text in report.facts(opened, state).items()],
+        "assumptions": lines(
+            "assumptions.txt",
+            status=summary,
+            settings=defaultdict(int, vars(state.plan.assessor)),
+            frames=any(device.frame == INSTRUMENT for device in state.plan.instruments),
+            percent=percent,
+        ),
+        "facts": [
+            dict(zip(("topic", "fact"), line.split(": ", 1), strict=True))
+            for line in lines("campaign_facts.txt", **_facts(opened, state))
+        ],
     }
     return Part("campaign", values, figures=figures)
 
@@ -107,7 +119,7 @@ def _row(bound: Bound) -> dict:
 def _instruments(summary: CampaignStatus, state: State, readings: pd.DataFrame) -> pd.DataFrame:
     """Readings by instrument, and the scatter of repeats over the stated noise."""
     table = readings[["instrument"]].assign(
-        repeat=readings["reading"].map(consistency.deviations(state)).astype(float),
+        repeat=readings["reading"].map(deviations(state)).astype(float),
         struck=readings["struck"].notna(),
         used=readings["used"].notna(),
         size=readings["error_mm"].where(readings["used"].notna()),
@@ -122,6 +134,24 @@ def _instruments(summary: CampaignStatus, state: State, readings: pd.DataFrame) 
     counts = ["used", "waiting", "struck", "repeats"]
     rows[counts] = rows[counts].fillna(0).astype(int)
     return rows.assign(name=rows.index, noise=list(summary.noise.values()))
+
+
+def _facts(opened: Opened, state: State) -> dict[str, object]:
+    """What was fixed and taken, as the template of facts takes it."""
+    sizes = np.array([np.linalg.norm(item.error_mm) for item in state.told])
+    return {
+        "opened": opened,
+        "state": state,
+        "plan": state.plan,
+        "settings": vars(state.plan.assessor),
+        "large": int(np.sum(sizes > state.plan.limits.implausible_mm)),
+        "files": {
+            str(entry["file"]): entry.get("path")
+            for entry in opened.journal.entries
+            if "file" in entry
+        },
+        "version": __version__,
+    }
 
 
 def _population(summary: CampaignStatus, state: State) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -22,12 +23,11 @@ from bokeh.plotting import figure as bokeh_figure
 from kinacc.figures.fig3 import colour_range
 
 # Okabe and Ito's colours.
-BLUE, ORANGE, GREEN, VERMILION, GREY = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#8a8a8a"
-_PLANES = (("x", "y"), ("x", "z"), ("y", "z"))
+BLUE, VERMILION, GREY = "#0072B2", "#D55E00", "#8a8a8a"
 _QUANTITIES = {
-    "position": "position, mm",
-    "orientation": "orientation, mrad",
-    "reached": "poses reached, %",
+    "position, mm": "position",
+    "orientation, mrad": "orientation",
+    "poses reached, %": "reached",
 }
 _UNREACHED = "#b9b9bd"
 
@@ -49,14 +49,12 @@ def residuals(
         Error of the selected model from which all rows have the last colour.
     """
     data = ColumnDataSource(_small(rows))
-    told = [
-        ("", "@name"),
-        *((label, f"@{{{model}}}{{0.000}} mm") for model, label in models.items()),
-    ]
+    tips = [("", "@name")]
+    tips += [(label, f"@{{{model}}}{{0.000}} mm") for model, label in models.items()]
     looks = dict(zip(models, (("triangle", GREY), ("circle", BLUE)), strict=False))
     plots, glyphs = [], []
     for x, label in (("order", "row"), (joints[0], joints[0])):
-        plot = _figure(label, "position error, mm", told)
+        plot = _figure(label, "position error, mm", tips)
         for model, (marker, colour) in looks.items():
             drawn = plot.scatter(
                 x, model, source=data, marker=marker, color=colour, size=5, fill_alpha=0.5,
@@ -68,34 +66,25 @@ def residuals(
         plot.y_range.update(start=0.0)
         plots.append(plot)
     over_file, over_joint = plots
-    space = _figure("x, mm", "y, mm", told, height=380, match_aspect=True)
-    colour = LinearColorMapper(palette="Viridis256", low=0.0, high=top_mm)
-    best = list(models)[-1]
+    space = _figure("x, mm", "y, mm", tips, height=380, match_aspect=True)
+    mapper = LinearColorMapper(palette="Viridis256", low=0.0, high=top_mm)
+    field = {"field": list(models)[-1], "transform": mapper}
     places = space.scatter(
-        "x", "y", source=data, size=6, line_color=None, color={"field": best, "transform": colour},
-        nonselection_alpha=0.3,
-    )  # fmt: skip
+        "x", "y", source=data, size=6, line_color=None, color=field, nonselection_alpha=0.3
+    )
     space.add_layout(places.construct_color_bar(title="mm", width=10), "right")
-    joint = Select(title="Joint", options=list(joints), value=joints[0], width=120)
-    joint.js_on_change(
-        "value",
-        CustomJS(
-            args={"glyphs": glyphs[len(looks) :], "axis": over_joint.xaxis[0]},
-            code="for (const g of glyphs) g.x = {field: this.value}; axis.axis_label = this.value",
-        ),
-    )
-    planes = [f"{across} and {up}" for across, up in _PLANES]
-    plane = Select(title="Plane", options=planes, value=planes[0], width=120)
-    plane.js_on_change(
-        "value",
-        CustomJS(
-            args={"glyph": places.glyph, "across": space.xaxis[0], "up": space.yaxis[0]},
-            code="const [a, b] = this.value.split(' and '); glyph.x = {field: a}; "
-            "glyph.y = {field: b}; across.axis_label = a + ', mm'; up.axis_label = b + ', mm'",
-        ),
-    )
-    parts = [over_file, joint, over_joint, plane, space]
-    return column(*parts, sizing_mode="stretch_width")
+    joint = _select(
+        "Joint", joints,
+        "for (const g of glyphs) g.x = {field: this.value}; axis.axis_label = this.value",
+        glyphs=glyphs[len(looks) :], axis=over_joint.xaxis[0],
+    )  # fmt: skip
+    plane = _select(
+        "Plane", ["x and y", "x and z", "y and z"],
+        "const [a, b] = this.value.split(' and '); glyph.x = {field: a}; "
+        "glyph.y = {field: b}; across.axis_label = a + ', mm'; up.axis_label = b + ', mm'",
+        glyph=places.glyph, across=space.xaxis[0], up=space.yaxis[0],
+    )  # fmt: skip
+    return column(over_file, joint, over_joint, plane, space, sizing_mode="stretch_width")
 
 
 def accuracy_map(cells: pd.DataFrame, width_mm: float, height_mm: float) -> LayoutDOM:
@@ -110,9 +99,9 @@ def accuracy_map(cells: pd.DataFrame, width_mm: float, height_mm: float) -> Layo
         Size of a cell.
     """
     data = ColumnDataSource(_small(cells))
-    slices = list(dict.fromkeys(cells["slice"]))
+    slices = list(cells["slice"].unique())
     shown = GroupFilter(column_name="slice", group=slices[0])
-    told = [
+    tips = [
         ("", "@radius{0} mm out, @height{0} mm high"),
         ("position", "@position{0.000} mm"),
         ("orientation", "@orientation{0.000} mrad"),
@@ -120,11 +109,13 @@ def accuracy_map(cells: pd.DataFrame, width_mm: float, height_mm: float) -> Layo
         ("pose", "@pose"),
         ("joints", "@joints"),
     ]
-    plot = _figure("radius, mm", "height, mm", told, height=420)
+    plot = _figure("radius, mm", "height, mm", tips, height=420)
     mappers = {}
-    for name in _QUANTITIES:
+    for name in _QUANTITIES.values():
         low, high = (0.0, 100.0) if name == "reached" else colour_range(cells[name].to_numpy())
-        mappers[name] = LinearColorMapper("Viridis256", low=low, high=high, nan_color=_UNREACHED)
+        mappers[name] = LinearColorMapper(
+            palette="Viridis256", low=low, high=high, nan_color=_UNREACHED
+        )
     drawn = plot.rect(
         "radius", "height", width_mm, height_mm, source=data, view=CDSView(filter=shown),
         fill_color={"field": "position", "transform": mappers["position"]}, line_color=None,
@@ -133,26 +124,24 @@ def accuracy_map(cells: pd.DataFrame, width_mm: float, height_mm: float) -> Layo
     bar = drawn.construct_color_bar(title="position, mm", width=10)
     plot.add_layout(bar, "right")
     plot.grid.visible = False
-    piece = Select(title="Slice", options=slices, value=slices[0], width=120)
-    piece.js_on_change(
-        "value",
-        CustomJS(
-            args={"shown": shown, "data": data},
-            code="shown.group = this.value; data.change.emit()",
-        ),
-    )
-    labels = {label: name for name, label in _QUANTITIES.items()}
-    quantity = Select(title="Quantity", options=list(labels), value="position, mm", width=180)
-    quantity.js_on_change(
-        "value",
-        CustomJS(
-            args={"glyph": drawn.glyph, "bar": bar, "mappers": mappers, "names": labels},
-            code="const name = names[this.value]; const mapper = mappers[name]; "
-            "glyph.fill_color = {field: name, transform: mapper}; "
-            "bar.color_mapper = mapper; bar.title = this.value",
-        ),
-    )
+    piece = _select("Slice", slices, "shown.group = this.value; data.change.emit()",
+                    shown=shown, data=data)  # fmt: skip
+    quantity = _select(
+        "Quantity", [*_QUANTITIES],
+        "const name = names[this.value]; const mapper = mappers[name]; "
+        "glyph.fill_color = {field: name, transform: mapper}; "
+        "bar.color_mapper = mapper; bar.title = this.value",
+        glyph=drawn.glyph, bar=bar, mappers=mappers, names=_QUANTITIES,
+    )  # fmt: skip
     return column(row(piece, quantity), plot, sizing_mode="stretch_width")
+
+
+def _select(title: str, options: Sequence[str], code: str, **values: object) -> Select:
+    """A choice whose change runs ``code`` on the ``values``; the first option is chosen."""
+    choices: list[str | tuple[Any, str]] = [*options]
+    select = Select(title=title, options=choices, value=options[0], width=160)
+    select.js_on_change("value", CustomJS(args=values, code=code))
+    return select
 
 
 def _small(table: pd.DataFrame) -> dict[str, np.ndarray | list]:
@@ -165,7 +154,7 @@ def _small(table: pd.DataFrame) -> dict[str, np.ndarray | list]:
     }
 
 
-def _figure(x_label: str, y_label: str, told: Sequence[tuple[str, str]], height=300, **more):
+def _figure(x_label: str, y_label: str, tips: Sequence[tuple[str, str]], height=300, **more):
     plot = bokeh_figure(
         height=height,
         sizing_mode="stretch_width",
@@ -175,5 +164,5 @@ def _figure(x_label: str, y_label: str, told: Sequence[tuple[str, str]], height=
         **more,
     )
     plot.toolbar.update(logo=None, autohide=True)
-    plot.add_tools(HoverTool(tooltips=list(told)))
+    plot.add_tools(HoverTool(tooltips=list(tips)))
     return plot

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+import numpy as np
+
 from kinacc.campaign import folder as campaigns
-from kinacc.campaign import of_calibration, report
+from kinacc.campaign import report
 from kinacc.kinematics import robot
 from kinacc.report import campaign, fit_sections, study_sections, terminal
 from kinacc.report.page import FirstScreen, Page, Table
@@ -38,17 +40,16 @@ def run(inputs: Mapping, settings: Mapping) -> Page:
     ``outdated`` tables that are left out, and ``reason``, why all results are outdated.
     """
     name = settings["dataset"]
-    files = {role: each for role, each in inputs.items() if isinstance(each, Path)}
-    tables = {role: each for role, each in inputs.items() if role not in files}
-    places = [each.parent for role, each in files.items() if role.startswith("campaign_")]
+    files = {role: path for role, path in inputs.items() if isinstance(path, Path)}
+    tables = {role: table for role, table in inputs.items() if role not in files}
+    places = [path.parent for role, path in files.items() if role.startswith("campaign_")]
     place = Path(settings.get("folder", f"results/{name}"))
     summary = summarise(place, tables, places, settings.get("reason", ""))
     arm = robot.of_text(str(tables["robot"]["description"][0]), "robot.parquet")
     sections = [make(tables, arm) for needed, make in _OF_THE_FIT if needed in tables]
     sections.append(fit_sections.selection(tables, terminal.selection(summary)))
-    assessed = of_calibration.sought(name, tables, places).status
-    if assessed is not None:
-        opened = campaigns.open_(assessed.folder)
+    if summary.campaign is not None:
+        opened = campaigns.open_(summary.campaign.folder)
         sections.append(campaign.section(opened, *report.tables(opened)))
     sections += [make(tables, arm) for needed, make in _OF_THE_STUDY if needed in tables]
     return Page(first_screen(summary, settings.get("outdated", ())), sections)
@@ -61,9 +62,7 @@ def first_screen(summary: CalibrationSummary, left_out: Sequence[str] = ()) -> F
     """
     errors = summary.error_table()
     columns = [["model", "model"], *([name, name, ""] for name in errors.columns[1:])]
-    rows = errors.to_dict("records")
-    for model, row in zip(errors.index, rows, strict=True):
-        row |= {"remark": "selected"} if model == summary.selected else {}
+    errors["remark"] = np.where(errors.index == summary.selected, "selected", "")
     where = "held-out" if summary.is_held_out else "fitted"
     count = counted(summary.best.n, "reading")
     about, *answers = terminal.headline(summary)
@@ -77,7 +76,13 @@ def first_screen(summary: CalibrationSummary, left_out: Sequence[str] = ()) -> F
         about,
         _badge(summary),
         answers,
-        [Table(f"Errors at the same {count} ({where}) for every model", rows, columns)],
+        [
+            Table(
+                f"Errors at the same {count} ({where}) for every model",
+                errors.to_dict("records"),
+                columns,
+            )
+        ],
         notes,
     )
 

@@ -55,7 +55,7 @@ def residuals(tables: Tables, robot: Robot) -> Part:
     labels[best] += ", selected"
     rows = errors.assign(order=errors.index, name=np.array(_row_names(measurements))[errors.index])
     joints = []
-    for n, slides in enumerate(robot.dh.prismatic, start=1):
+    for n, slides in enumerate(np.asarray(robot.dh.prismatic), start=1):
         joints.append(f"J{n}, {'mm' if slides else 'deg'}")
         joint = np.asarray(measurements[f"q{n}"], dtype=float)[errors.index]
         rows[joints[-1]] = joint if slides else np.rad2deg(joint)
@@ -200,7 +200,7 @@ def parameters(tables: Tables, robot: Robot) -> Part:
         "largest": largest,
         "offsets": offsets[offsets["direction"] != 0],
     }
-    units = ["mm" if slides else "deg" for slides in robot.dh.prismatic]
+    units = ["mm" if slides else "deg" for slides in np.asarray(robot.dh.prismatic)]
     figure = joint_errors.draw(joints, errors, std, units)
     return Part("parameters", values, figures={"errors": figure})
 

@@ -115,9 +115,10 @@ def html(
 
 def _items(charts: Mapping[str, LayoutDOM]) -> str:
     """Charts as JSON that can stand inside a script element, whatever texts it holds."""
+    from bokeh.core.types import ID
     from bokeh.embed import json_item
 
-    text = json.dumps({name: json_item(chart, name) for name, chart in charts.items()})
+    text = json.dumps({name: json_item(chart, ID(name)) for name, chart in charts.items()})
     for character in "<>&\u2028\u2029":
         text = text.replace(character, f"\\u{ord(character):04x}")
     return text

@@ -42,7 +42,7 @@ def history(tables: Tables, robot: Robot) -> Part:
 def accuracy_map(tables: Tables, robot: Robot) -> Part:
     """The cells of ``accuracy_map``."""
     table = pd.DataFrame(dict(tables["accuracy_map"]))
-    slides = robot.dh.prismatic
+    slides = np.asarray(robot.dh.prismatic)
     names = [f"q{joint}" for joint in range(1, len(slides) + 1)]
     degrees = table[names].to_numpy() * np.where(slides, 1.0, 180.0 / np.pi)
     reached = (table["solutions"] > 0).to_numpy()
@@ -68,7 +68,7 @@ def accuracy_map(tables: Tables, robot: Robot) -> Part:
         "wanted": int(table["wanted"].max()),
         "unreached": int((~reached).sum()),
         "beyond": int((~reached & (table["extrapolating"] > 0)).sum()),
-        "slides": any(slides),
+        "slides": bool(slides.any()),
         "largest": largest[:_LARGEST],
     }
     size = (_step(cells["radius"]), _step(cells["height"]))

@@ -14,7 +14,8 @@ import pandas as pd
 from kinacc.calibration import identifiability, misfit
 from kinacc.calibration import summary as figures
 from kinacc.calibration.summary import Tolerance
-from kinacc.campaign import journal, of_calibration
+from kinacc.campaign import of_calibration
+from kinacc.campaign.folder import PLAN, of_results
 from kinacc.config.error_models import ERROR_MODELS, MEASURED, PLAINEST
 from kinacc.deployment import applicability
 from kinacc.deployment import folder as results
@@ -75,7 +76,7 @@ def summarise(
         tables = results.read_tables(folder, needed=figures.TABLES, optional=OPTIONAL)
     arm = robot.of_text(str(tables["robot"]["description"][0]), "robot.parquet")
     name = folder.resolve().name
-    places = journal.of_results(folder) if campaigns is None else campaigns
+    places = of_results(folder) if campaigns is None else campaigns
     sought = of_calibration.sought(name, tables, places)
     measurements, check = tables["measurements"], tables.get("data_check")
     fits = misfit.misfits(tables, arm)
@@ -137,7 +138,7 @@ def data_set_folders(folders: Iterable[Path]) -> list[Path]:
             if any(folder.glob("*.parquet"))
             else sorted(filter(Path.is_dir, folder.glob("[!.]*")))
         )
-        with_results = [path for path in inside if not (path / journal.PLAN).is_file()]
+        with_results = [path for path in inside if not (path / PLAN).is_file()]
         found += with_results
         if not with_results:
             fix = "calibrate a data set: kinacc calibrate FILE.yaml"
@@ -148,7 +149,6 @@ def data_set_folders(folders: Iterable[Path]) -> list[Path]:
 
 def summarise_all(folders: Sequence[Path]) -> list[CalibrationSummary | Problem]:
     """The summary of every results folder, or why it has none."""
-    campaigns = journal.of_each(folders)
     summaries: list[CalibrationSummary | Problem] = []
     for folder in folders:
         try:
@@ -156,7 +156,7 @@ def summarise_all(folders: Sequence[Path]) -> list[CalibrationSummary | Problem]
             if path.is_file() and path.name in sums.outdated(folder):
                 what = "was made from other tables than those now beside it"
                 raise InputError(Problem(str(path), what, fix=store.remake(path)))
-            summaries.append(summarise(folder, campaigns=campaigns[folder]))
+            summaries.append(summarise(folder))
         except InputError as error:
             summaries.append(error.problems[0])
     return summaries

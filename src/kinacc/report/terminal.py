@@ -22,6 +22,7 @@ from kinacc.report.summary import BOUND, STATISTICS, CalibrationSummary
 
 FEW = 4  # data sets whose summaries are printed one after another
 WIDTH = 100
+_WIDE = 4000  # characters: a terminal wraps what is wider than it
 _MOST = 3  # findings, rows and parameters without --verbose
 _DAY = 10  # characters of a time
 
@@ -113,8 +114,14 @@ def fleet_table(
     for result in results:
         if isinstance(result, Problem):
             folder = result.where.removesuffix("/summary.parquet")
-            row = {"data_set": folder.rpartition("/")[2], "folder": folder, "robot": ""}
-            rows.append(row | {"verdict": UNDECIDED, "reason": str(result)})
+            rows.append(
+                {
+                    "data_set": folder.rpartition("/")[2],
+                    "verdict": UNDECIDED,
+                    "reason": str(result),
+                    "folder": folder,
+                }
+            )
             continue
         best = result.best if result.is_held_out else None
         status = result.campaign
@@ -166,23 +173,34 @@ def print_fleet(table: pd.DataFrame, by: str) -> None:
         "held_out_largest_mm": "largest mm",
         "file_date": "date",
     }
-    grid = Table(box=None, pad_edge=False)
-    cells = []
-    for name, head in columns.items():
-        values = table.get(name, pd.Series("", table.index)).astype(object).fillna("")
-        if (values != "").any():
-            is_number = name.endswith("_mm") or name == "confidence"
-            form = ".0%" if name == "confidence" else ".3f"
-            grid.add_column(head, justify="right" if is_number else "left")
-            cells.append([as_seen(x) if isinstance(x, str) else format(x, form) for x in values])
-    for row in zip(*cells, strict=True):
-        grid.add_row(*row)
-    console.print(grid)
+    shown = table.reindex(columns=[*columns]).replace("", None).dropna(axis=1, how="all")
+    print_table(shown.rename(columns=columns), len(shown))
     console.print("Position errors of the selected model at held-out poses.")
     texts = table.melt("data_set", [name for name in ("reason", "remarks") if name in table])
     texts = texts[texts["value"].fillna("") != ""]
     for text, names in texts.groupby("value", sort=False)["data_set"]:
         console.print(as_seen(f"{first_few([*names], _MOST)}: {text}"), soft_wrap=True)
+
+
+def print_table(table: pd.DataFrame, most: int = 24) -> None:
+    """Print the first rows of a table."""
+    grid = Table(box=None, pad_edge=False)
+    for name, values in table.items():
+        numeric = pd.api.types.is_numeric_dtype(values)
+        grid.add_column(as_seen(str(name)), justify="right" if numeric else "left", no_wrap=True)
+    for row in table.head(most).itertuples(index=False):
+        grid.add_row(*map(_shown, row))
+    screen(_WIDE).print(grid)
+    if len(table) > most:
+        print(f".. {len(table) - most} more rows (--out)")
+
+
+def _shown(value: object) -> str:
+    if value is None or value != value:
+        return "-"
+    if not isinstance(value, float):
+        return as_seen(str(value))
+    return f"{value:.4f}" if abs(value) >= 0.01 or abs(value) < 5e-5 else f"{value:.3g}"
 
 
 def _error_table(summary: CalibrationSummary, verbose: bool) -> Table:

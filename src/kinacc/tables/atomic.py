@@ -25,10 +25,26 @@ def unfinished(path: Path | str) -> Path:
 
 
 def taken(handle: int, how: int, patience_s: float | None = None) -> bool:
-    """Whether a lock of an open file was had (``fcntl.LOCK_EX`` or ``LOCK_SH``), within a time.
+    """Take a lock of an open file.
 
-    For as long as it takes where no ``patience_s`` is given. OSError where the file system of the
-    file has no locks.
+    Parameters
+    ----------
+    handle
+        Descriptor of the file.
+    how
+        ``fcntl.LOCK_EX`` or ``LOCK_SH``.
+    patience_s
+        Seconds to wait; None for as long as it takes.
+
+    Returns
+    -------
+    bool
+        Whether the lock was had.
+
+    Raises
+    ------
+    OSError
+        Where the file system of the file has no locks.
     """
     until = None if patience_s is None else time.monotonic() + patience_s
     while True:
@@ -47,8 +63,17 @@ def taken(handle: int, how: int, patience_s: float | None = None) -> bool:
 def replacing(paths: Sequence[Path | str], on_disk: bool = False) -> Iterator[list[Path]]:
     """Temporary paths beside ``paths``; renamed to them on success, removed on any failure.
 
-    ``on_disk``: the files have reached the disk when this returns, and not only the system.
-    Raises MachineError, which names the file, where the system does not take one.
+    Parameters
+    ----------
+    paths
+        Files that appear together.
+    on_disk
+        Whether files have reached the disk when this returns, and not only the system.
+
+    Raises
+    ------
+    MachineError
+        Naming the file, where the system does not take one.
     """
     targets = [Path(path) for path in paths]
     temporary = [unfinished(path) for path in targets]

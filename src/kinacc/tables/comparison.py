@@ -55,9 +55,22 @@ class Difference:
 
 
 def compare_folders(before: Path, now: Path) -> Iterator[Difference]:
-    """Differences of all tables below two folders; see :func:`compare_tables`.
+    """Compare all tables below two folders.
 
-    Tables that only ``now`` has do not count. Raises InputError where ``before`` has no table.
+    Parameters
+    ----------
+    before, now
+        Folders of results. Tables that only ``now`` has do not count.
+
+    Yields
+    ------
+    Difference
+        Of every column that differs by more than its tolerance, see :func:`compare_tables`.
+
+    Raises
+    ------
+    InputError
+        Where ``before`` has no table.
     """
     paths = sorted(before.rglob("*.parquet"))
     if not paths:
@@ -71,7 +84,23 @@ def compare_folders(before: Path, now: Path) -> Iterator[Difference]:
 
 
 def compare_tables(before: Path, now: Path) -> Iterator[Difference]:
-    """Differences of two tables of one artefact. Raises InputError for a file that is no table."""
+    """Compare two tables of one artefact.
+
+    Parameters
+    ----------
+    before, now
+        Parquet files named by their artefact.
+
+    Yields
+    ------
+    Difference
+        Of columns and rows that one lacks, and of every column that differs.
+
+    Raises
+    ------
+    InputError
+        For a file that is no table.
+    """
     name = before.stem if before.stem in ARTEFACTS else before.parent.name
     artefact = ARTEFACTS.get(name)
     old, new = map(store.read_table, (before, now))

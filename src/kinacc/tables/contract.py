@@ -49,8 +49,17 @@ ARTEFACTS = {item.name: item for topic in TOPICS for item in _artefacts(topic)}
 def columns_of(artefact: str, rows: Iterable[Mapping[str, Any] | Sequence[Any]]) -> Columns:
     """Rows as columns of an artefact; None in a column of numbers is NaN.
 
-    A row holds its values by column name, or one after the other as the contract has its columns.
-    Whole numbers that may be null are held as floats. Without rows the columns are empty.
+    Parameters
+    ----------
+    artefact
+        Name of the table.
+    rows
+        Values by column name, or one after the other as the contract has its columns.
+
+    Returns
+    -------
+    dict
+        Arrays (n,) by column; whole numbers that may be null are floats. Empty without rows.
     """
     supplied: list[Any] = list(rows)
     contract = ARTEFACTS[artefact]

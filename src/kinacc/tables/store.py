@@ -68,8 +68,17 @@ def write_table(
 ) -> None:
     """Hold a table to the schema of an artefact and write it whole, or leave what was there.
 
-    ``provenance`` becomes the metadata of the file: ``PROVENANCE_KEYS``. Errors as of
-    :func:`to_table`.
+    Parameters
+    ----------
+    path
+        The Parquet file.
+    artefact, table, provenance
+        As of :func:`to_table`.
+
+    Raises
+    ------
+    InputError
+        As :func:`to_table`.
     """
     write_whole(path, content_of(to_table(artefact, table, provenance)))
 
@@ -101,11 +110,27 @@ def arrow_schema(
 def to_table(
     artefact: str, columns: pd.DataFrame | Mapping[str, Any], provenance: Mapping[str, object]
 ) -> pa.Table:
-    """A table as an Arrow table of the artefact's schema, with ``provenance`` as its metadata.
+    """Hold a table to the schema of an artefact.
 
-    NaN and None become null; optional columns that are not given are null throughout. Raises
-    InputError naming every column that is missing, unknown or of another length, null where none
-    may be, number that is not finite, and value of a wrong type.
+    Parameters
+    ----------
+    artefact
+        Name of the table in the contract.
+    columns
+        Values by column. NaN and None become null; absent optional columns are null throughout.
+    provenance
+        Metadata of the table: ``PROVENANCE_KEYS``.
+
+    Returns
+    -------
+    pyarrow.Table
+        Of the artefact's schema, with unit and meaning of every column.
+
+    Raises
+    ------
+    InputError
+        Naming every column that is missing, unknown or of another length, null where none may be,
+        number that is not finite, and value of a wrong type.
     """
     contract, where = ARTEFACTS[artefact], f"table {artefact}"
     problems = []

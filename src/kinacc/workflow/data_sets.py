@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from kinacc.campaign.journal import JOURNAL, PLAN
 from kinacc.config.error_models import ERROR_MODELS, asked_for
 from kinacc.errors import Problem, refuse
 from kinacc.workflow.code import file_digest
@@ -94,9 +93,26 @@ def read_data_sets(
     overrides: Settings | None = None,
     absolute: bool = False,
 ) -> DataSets:
-    """The data sets of configuration files and of values given on the command line.
+    """The data sets of configuration files and of values of the command line.
 
-    Raises InputError listing every problem in them.
+    Parameters
+    ----------
+    paths
+        YAML files, in order.
+    overrides
+        Values of ``--config``, laid over them.
+    absolute
+        Whether files are named by absolute paths.
+
+    Returns
+    -------
+    DataSets
+        Settings by data set, and files.
+
+    Raises
+    ------
+    InputError
+        Listing every problem in them.
     """
     from kinacc.checks.contradictions import load
 
@@ -159,6 +175,8 @@ def digests(files: Mapping[str, str]) -> dict[str, str]:
 
 def campaign_files(campaigns: Iterable[Path]) -> dict[str, str]:
     """Files of campaigns on the calibration of a data set, by role."""
+    from kinacc.campaign.folder import JOURNAL, PLAN
+
     files = {}
     for number, campaign in enumerate(campaigns, 1):
         files[f"campaign_{number}_file"] = str(campaign / PLAN)

@@ -34,7 +34,17 @@ def beside(results: Path, dataset: str) -> Iterator[tuple[Path, DataSets]]:
 def calibration_settings(folder: Path, configs: Sequence[str] = ()) -> Mapping[str, Any]:
     """The section ``calibration`` by which the results in a folder were made.
 
-    Of ``configs``, or of a configuration beside the results; the defaults where none names them.
+    Parameters
+    ----------
+    folder
+        Folder of a data set's results.
+    configs
+        Configuration files; without them, those beside the results.
+
+    Returns
+    -------
+    Mapping
+        The defaults where no configuration names the data set.
     """
     folder = folder.resolve()
     plans = (

@@ -222,6 +222,17 @@ BASE_DATA[2].z=BASE_DATA[2].z+155\nBAS(#BASE,0)\nLIN {frame}""",
     assert [bool(each.refused) for each in program.positions] == [True, False]
 
 
+def test_poses_that_no_move_uses_are_left_alone(tmp_path):
+    text = (EXAMPLES / "weld.mod").read_text()
+    stale = "CONST robtarget stale:=[[500,0,600],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];"
+    text = text.replace("CONST robtarget", f"{stale}\n  CONST robtarget", 1)
+    (tmp_path / "weld.mod").write_text(text)
+    _, found = corrected("weld.mod", folder=tmp_path)
+    assert not found.refused
+    assert "stale" in found.not_corrected[-1]
+    assert stale.encode() in found.files[tmp_path / "weld.mod"]
+
+
 def test_shifts_of_a_job_are_no_positions(tmp_path):
     program = _read(tmp_path, "own.jbi", """///TOOL 0\n///POSTYPE BASE\n///RECTAN
 P0000=0.5,-151,-1,0,0,0\nP00100=275.0,0,875,180,45,0\n//INST
@@ -249,6 +260,19 @@ def test_waypoints_of_polyscope_start_from_their_joints(tmp_path):
             [4, 5],
         ),
         (
+            "weld.src",
+            "$TOOL=$NULLFRAME\nPTP {A1 0, A2 -90, A3 90, A4 0, A5 0, A6 0}\nF_ABOVE=F_PICK:{X 0, "
+            "Y 0, Z -100, A 0, B 0, C 0}\n$BASE=BASE_DATA[1]:F_PICK\n",
+            [3],
+        ),
+        (
+            "weld.mod",
+            "CONST robtarget p1:=[[500,0,600],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];\n"
+            "PROC main()\nMoveL p1,v100,z10,tool0;\nIF p2_ok THEN\n p1:=p2;\nELSE\n MoveL "
+            "p2,v9,z10,tool0;\nENDIF\nmove_ok:=FALSE;\nENDPROC\n",
+            [5, 7],
+        ),
+        (
             "weld.mod",
             "CONST robtarget p1:=[[500,0,600],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];\n"
             "MoveL p1,v100,z10,tool0;\nMoveL p9,v100,z10,tool0;\n",
@@ -259,4 +283,5 @@ def test_waypoints_of_polyscope_start_from_their_joints(tmp_path):
 def test_moves_to_positions_that_are_not_there_are_listed(name, text, expected):
     language = kuka if name.endswith(".src") else abb
     found = language.read([Source(Path(name), text)], {}, None)
-    assert [int(line.split(":")[1]) for line in found.not_corrected] == expected
+    assert sorted(int(line.split(":")[1]) for line in found.not_corrected) == expected
+    assert all(each.tool is not None for each in found.positions if each.scale is None)

@@ -40,11 +40,18 @@ _TARGET_DATA = re.compile(r"\b(?:robtarget|jointtarget)\s+(\w+)[^:]*:=", re.I)
 _FRAME_DATA = re.compile(
     r"\b(?:(tool)|wobj)data\s+(\w+)\s*:=\s*\[\s*(\w+)\s*,\s*(\w+)?([^;]*)", re.I
 )
-_MOVE = re.compile(r"\s*(?:\w+\s*:\s*)?(?:Move|Trigg|Search|Arc|Spot|Paint|Disp)\w*\b", re.I)
+_MOVE = re.compile(
+    r"\s*(?:\w+\s*:\s*)?(?:Move|Trigg|Search|Arc|Spot|Paint|Disp)\w*\b(?!\s*:=)", re.I
+)
 _COMPUTED = re.compile(
     r"\b(?:Offs|RelTool|CRobT|CalcRobT)\s*\(|\.(?:trans|rot|robconf|robax)\b[^;]*:=", re.I
 )
 _SET = re.compile(r"\s*(\w+)\.(?:[tou]frame|robhold|ufprog)\b[^;=]*:=", re.I)
+_CONTROL = re.compile(
+    r"\b(?:THEN|ELSE|DO|ERROR|UNDO|END(?:IF|WHILE|FOR|PROC|FUNC|TEST|TRAP)|CASE\b[^:\n]*:|DEFAULT\s*:|"
+    r"(?:PROC|TRAP|FUNC\s+\w+)\s+\w+\s*(?:\([^)]*\))?)(?!\w)",
+    re.I,
+)
 _UNUSED = 8.9e9
 
 
@@ -69,7 +76,7 @@ def read(sources: Sequence[Source], frames: Frames, _: np.ndarray | None) -> Pro
     ends = {target.start(): target.end() for target in _TARGET.finditer(text)}
     names: dict[int, str] = {}
     uses: dict[int, set[tuple[str | None, str | None]]] = {}
-    computed, refused, moves = [], {}, []
+    computed, refused, moves, assignments = [], {}, [], []
     for data in _FRAME_DATA.finditer(text):
         holds, programmed = data[3].upper(), data[1] or (data[4] or "").upper()
         if holds == ("FALSE" if data[1] else "TRUE") or programmed == "FALSE":
@@ -94,12 +101,15 @@ def read(sources: Sequence[Source], frames: Frames, _: np.ndarray | None) -> Pro
                 uses.setdefault(start, set()).add(way)
         else:
             ends = {start: end for start, end in ends.items() if start not in here}
+            if assigned := re.match(r"\s*(\w+)\s*(?:\{[^}]*\}\s*)?:=", statement):
+                assignments.append((line, assigned[1].upper()))
         if _COMPUTED.search(statement):
             computed.append(line)
         if changed := _SET.match(statement):
             refused[changed[1].upper()] = CHANGED
     defined = {name.upper() for name in names.values()}
     computed += [line for line, words in moves if not words & defined]
+    computed += [line for line, name in assignments if name in defined and line not in computed]
     positions = []
     for start, end in ends.items():
         position = _position(source, start, end)
@@ -130,7 +140,9 @@ def _stated(numbers: Iterable[float]) -> tuple[str, ...]:
 
 
 def _plain(source: Source) -> str:
-    return blanked(source.text, r'"[^"\r\n]*"', r"!.*")
+    """The text without comments and strings; words of control end a statement as ``;`` does."""
+    text = blanked(source.text, r'"[^"\r\n]*"', r"!.*")
+    return _CONTROL.sub(lambda word: word[0][:-1] + ";", text)
 
 
 def posture(sides: Sequence[bool], q_deg: np.ndarray) -> tuple[str, ...]:

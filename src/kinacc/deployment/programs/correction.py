@@ -176,7 +176,9 @@ def compensate_program(
     language, program = read_program(path, frame_files, pulses_per_degree)
     convention = program.convention or language.convention
     _refuse_second_time(program)
-    frames = _all_frames(program, convention, {TOOL: tools or {}, BASE: bases or {}}, ask)
+    given_frames = {TOOL: tools or {}, BASE: bases or {}}
+    program = _in_use(program, given_frames)
+    frames = _all_frames(program, convention, given_frames, ask)
     positions, robot = program.positions, calibration.robot
     tool, base = (
         [frames.get((kind, getattr(item, kind) or ""), IDENTITY) for item in positions]
@@ -294,6 +296,25 @@ def _refuse_second_time(program: Program) -> None:
         if digest in mark.read_text(errors="replace"):
             fix = "give the program it was made from"
             raise InputError(Problem(str(path), f"was compensated before ({mark.name})", fix=fix))
+
+
+def _in_use(program: Program, given: Mapping) -> Program:
+    """The program without poses that no move uses, unless a frame for all of them is given."""
+    unused = [
+        item
+        for item in program.positions
+        if item.scale is None and item.tool is None and item.base is None and not item.refused
+    ]
+    if "" in given[TOOL] or "" in given[BASE] or len(unused) == len(program.positions):
+        return program
+    return replace(
+        program,
+        positions=[item for item in program.positions if item not in unused],
+        not_corrected=[
+            *program.not_corrected,
+            *(f"{item.where}: {item.name}, which no move uses" for item in unused),
+        ],
+    )
 
 
 def _all_frames(

@@ -99,7 +99,7 @@ def read(sources: Sequence[Source], frames: Frames, _: np.ndarray | None) -> Pro
                     still = "#TCP" in parts.get("IPO_FRAME", ("",))[0].upper()
                     data[name] = parts["TOOL_NO"][0], parts["BASE_NO"][0], STILL if still else ""
                 elif "_DATA" not in name and (position := _position(source, parts)):
-                    if name in positions or re.search(r"\}\s*:", text):
+                    if name in positions or re.search(r"\}\s*:|:\s*\{", text):
                         computed.append(statement)
                     else:
                         positions[name] = position

@@ -41,9 +41,10 @@ def chain_of(
     frame = base = _first_frame(axes.point_mm[0], axes.direction[0])
     rows = []
     for joint in range(1, len(axes.direction)):
-        rows.append(_row(frame, axes.point_mm[joint], axes.direction[joint], nearly_parallel))
+        axis = _first_frame(axes.point_mm[joint], axes.direction[joint])
+        rows.append(_row(frame, axis, nearly_parallel))
         frame = compose(frame, _across(rows[-1]))
-    rows.append(_last_row(frame, flange))
+    rows.append(_row(frame, flange, NEARLY_PARALLEL, last=True))
     frame = compose(frame, _across(rows[-1]))
     rest = compose(invert(frame), flange)
     columns = np.array(rows).T + 0.0  # no negative zeros
@@ -63,65 +64,37 @@ def _first_frame(point: np.ndarray, direction: np.ndarray) -> Pose:
 
 
 def _row(
-    frame: Pose,
-    point: np.ndarray,
-    direction: np.ndarray,
-    nearly_parallel: float = NEARLY_PARALLEL,
+    frame: Pose, target: Pose, nearly_parallel: float, last: bool = False
 ) -> tuple[float, ...]:
-    """theta, d, a, alpha, beta from a frame on one axis to a frame on the next."""
-    w = frame.rotation.T @ direction
-    p = frame.rotation.T @ (point - frame.position_mm)
+    """theta, d, a, alpha, beta from a frame on an axis to the axis z of ``target``.
+
+    The last row ends at the origin of ``target``, as far as it can, and at its x axis where this
+    lies on the axis before.
+    """
+    w, facing = (frame.rotation.T @ target.rotation[:, 2 - 2 * i] for i in range(2))
+    p = frame.rotation.T @ (target.position_mm - frame.position_mm)
     sine = np.hypot(w[0], w[1])
     if sine < nearly_parallel:
-        at = p - p[2] / w[2] * w
-        theta, a = _theta_and_length(at[0], at[1])
-        return (theta, 0.0, a, *_tilt(theta, w))
-    x, y, alpha = _normal(w, sine)
-    along = (p @ y) / -np.sin(alpha)
-    d = p[2] - along * w[2]
-    return np.arctan2(x[1], x[0]), d, p @ x, alpha, 0.0
-
-
-def _last_row(frame: Pose, flange: Pose) -> tuple[float, ...]:
-    """The row from the last axis to the flange: all of it where their z axes are parallel."""
-    w = frame.rotation.T @ flange.rotation[:, 2]
-    p = frame.rotation.T @ (flange.position_mm - frame.position_mm)
-    if np.hypot(w[0], w[1]) >= NEARLY_PARALLEL:
-        return _row(frame, flange.position_mm, flange.rotation[:, 2])
-    theta, a = _theta_and_length(p[0], p[1])
-    if a == 0.0:
-        x = frame.rotation.T @ flange.rotation[:, 0]
-        theta = np.arctan2(x[1], x[0])
-    return (theta, p[2], a, *_tilt(theta, w))
-
-
-def _normal(w: np.ndarray, sine: float) -> tuple[np.ndarray, np.ndarray, float]:
-    """Direction x of the common normal of z and ``w``, y = z cross x, and alpha about x.
-
-    Of the two senses the one that keeps theta within a quarter turn, so that an arm drawn in its
-    zero pose has the table people draw up for it.
-    """
+        x, y = (p if last else p - p[2] / w[2] * w)[:2]
+        length = np.hypot(x, y)
+        theta, a = np.arctan2(y, x), length
+        if length < _ON_AXIS_MM:
+            theta, a = np.arctan2(facing[1], facing[0]) if last else 0.0, 0.0
+        elif x < -_TIE * length or (abs(x) <= _TIE * length and y < 0.0):
+            theta, a = np.arctan2(-y, -x), -length
+        u = rotation_z(theta).T @ w
+        beta = np.arctan2(u[0], np.hypot(u[1], u[2]))
+        beta = beta if abs(beta) > _ROUND_OFF_RAD else 0.0
+        return theta, p[2] if last else 0.0, a, np.arctan2(-u[1], u[2]), beta
+    # Direction of the common normal. Of the two senses the one that keeps theta within a quarter
+    # turn, so that an arm drawn in its zero pose has the table people draw up for it.
     x = np.array([-w[1], w[0], 0.0]) / sine
     if x[0] < -_TIE or (abs(x[0]) <= _TIE and x[1] < 0.0):
         x = -x
     y = np.array([-x[1], x[0], 0.0])
-    return x, y, float(np.arctan2(-(w @ y), w[2]))
-
-
-def _theta_and_length(x: float, y: float) -> tuple[float, float]:
-    length = float(np.hypot(x, y))
-    if length < _ON_AXIS_MM:
-        return 0.0, 0.0
-    if x < -_TIE * length or (abs(x) <= _TIE * length and y < 0.0):
-        return float(np.arctan2(-y, -x)), -length
-    return float(np.arctan2(y, x)), length
-
-
-def _tilt(theta: float, w: np.ndarray) -> tuple[float, float]:
-    """alpha and beta that turn z into the direction ``w``, after theta."""
-    u = rotation_z(theta).T @ w
-    beta = float(np.arctan2(u[0], np.hypot(u[1], u[2])))
-    return float(np.arctan2(-u[1], u[2])), beta if abs(beta) > _ROUND_OFF_RAD else 0.0
+    alpha = np.arctan2(-(w @ y), w[2])
+    d = p[2] - (p @ y) / -np.sin(alpha) * w[2]
+    return np.arctan2(x[1], x[0]), d, p @ x, alpha, 0.0
 
 
 def _across(row: tuple[float, ...]) -> Pose:

@@ -13,6 +13,7 @@ from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import (
+    AfterValidator,
     BaseModel,
     BeforeValidator,
     ConfigDict,
@@ -41,69 +42,93 @@ from kinacc.kinematics.robot.record import FEWEST_JOINTS, MOST_JOINTS, Robot
 _SHIPPED = Path(__file__).parents[1] / "robots"
 _LARGEST = 1e9  # of any number: beyond, nothing about an arm is meant, and products overflow
 _SHORTEST_MM = 20.0  # of all lengths together
-_MOST_TURNS_RAD = 4.0 * pi
+_LEAST_TURN_RAD = 0.11  # some joint of every arm turns further
 _SUGGESTIONS = 20
-_UNITS = {"deg": pi / 180.0, "rad": 1.0, "mm": 1.0, "m": 1e3}
+# Units a key may end in, the one its field ends in, and the factor.
+_UNITS = {"_deg": ("_rad", pi / 180.0), "_m": ("_mm", 1e3)}
 
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-_LARGEST, le=_LARGEST)]
-Limits = tuple[Number, Number]
+Turn = Annotated[Number, Field(ge=-2.0 * pi - 1e-3, le=2.0 * pi + 1e-3)]
 Vector = tuple[Number, Number, Number]
 Text = Annotated[str, BeforeValidator(lambda value: "" if value is None else str(value))]
+
+
+def _times(value: Any, factor: float) -> Any:
+    """Numbers, also those in lists, times a factor; anything else stays for pydantic."""
+    if isinstance(value, list):
+        return [_times(item, factor) for item in value]
+    is_number = type(value) in (int, float) and abs(value) <= _LARGEST
+    return value * factor if is_number else value
+
+
+def _rising(limits: tuple[float, float]) -> tuple[float, float]:
+    if not limits[0] < limits[1]:
+        raise ValueError(f"limits {list(limits)} are reversed or empty")
+    return limits
+
+
+def _spellings(key: Any) -> list[Any]:
+    """A key, then the same quantity in its other unit."""
+    others = (
+        key.removesuffix(unit) + ending
+        for ending, (unit, _) in _UNITS.items()
+        if isinstance(key, str) and key.endswith(unit)
+    )
+    return [key, *others]
+
+
+Limits = Annotated[tuple[Number, Number], AfterValidator(_rising)]
+TurnLimits = Annotated[
+    tuple[Annotated[Number, Field(ge=-4.0 * pi)], Annotated[Number, Field(le=4.0 * pi)]],
+    AfterValidator(_rising),
+]
 
 
 class _Strict(BaseModel):
     model_config = ConfigDict(extra="forbid")
 
-    def given(self, stem: str) -> tuple[str, Any] | None:
-        """Unit and value of a quantity whose key names its unit; ValueError where two are given."""
-        keys = [f"{stem}_{unit}" for unit in _UNITS]
-        found = [key for key in keys if getattr(self, key, None) is not None]
-        if len(found) > 1:
-            raise ValueError(f"{stem} is given twice: {' and '.join(found)}")
-        return (found[0].rpartition("_")[2], getattr(self, found[0])) if found else None
-
-    def quantity(self, stem: str, default: Any = None) -> Any:
-        """A length in mm or an angle in rad; ValueError where it is missing."""
-        found = self.given(stem) or (None if default is None else ("rad", default))
-        if found is None:
-            units = [unit for unit in _UNITS if f"{stem}_{unit}" in type(self).model_fields]
-            raise ValueError(
-                f"{stem} is missing: {' or '.join(f'{stem}_{unit}' for unit in units)}"
-            )
-        return np.multiply(found[1], _UNITS[found[0]])
+    @model_validator(mode="before")
+    @classmethod
+    def _in_rad_and_mm(cls, data: Any) -> Any:
+        if not isinstance(data, dict):
+            return data
+        converted: dict[Any, Any] = {}
+        for key, value in data.items():
+            name = key
+            for ending, (unit, factor) in _UNITS.items():
+                stem = str(key).removesuffix(ending)
+                if stem != str(key) and stem + unit in cls.model_fields:
+                    name, value = stem + unit, _times(value, factor)
+            if name in converted:
+                raise ValueError(f"{name.rpartition('_')[0]} is given twice, in two units")
+            converted[name] = value
+        return converted
 
 
 class Frame(_Strict):
     """A frame by a position and one form of orientation."""
 
-    position_mm: Vector | None = None
-    position_m: Vector | None = None
+    position_mm: Vector = (0.0, 0.0, 0.0)
     quaternion_wxyz: tuple[Number, Number, Number, Number] | None = None
-    rotation_vector_deg: Vector | None = None
     rotation_vector_rad: Vector | None = None
-    rpy_deg: Vector | None = None
     rpy_rad: Vector | None = None
 
     @model_validator(mode="after")
     def _one_orientation(self) -> Self:
-        self.pose()
+        if len(self.model_fields_set - {"position_mm"}) > 1:
+            raise ValueError("a second orientation: give one")
+        if self.quaternion_wxyz and abs(np.linalg.norm(self.quaternion_wxyz) - 1.0) > 1e-3:
+            raise ValueError("quaternion_wxyz is no unit quaternion w, x, y, z")
         return self
 
     def pose(self) -> Pose:
         """The frame; identity where nothing is given."""
-        turns = [stem for stem in ("rotation_vector", "rpy") if self.given(stem)]
-        if len(turns) + (self.quaternion_wxyz is not None) > 1:
-            raise ValueError("a second orientation: give one")
-        rotation = np.eye(3)
+        turn = Rotation.from_rotvec(self.rotation_vector_rad or (0.0, 0.0, 0.0))
         if self.quaternion_wxyz is not None:
-            if abs(np.linalg.norm(self.quaternion_wxyz) - 1.0) > 1e-3:
-                raise ValueError("quaternion_wxyz is no unit quaternion w, x, y, z")
-            rotation = Rotation.from_quat(np.roll(self.quaternion_wxyz, -1)).as_matrix()
-        elif turns == ["rpy"]:  # as in URDF: about fixed x, then y, then z
-            rotation = Rotation.from_euler("xyz", self.quantity("rpy")).as_matrix()
-        elif turns:
-            rotation = Rotation.from_rotvec(self.quantity("rotation_vector")).as_matrix()
-        return Pose(rotation, np.array(self.quantity("position", (0.0, 0.0, 0.0)), dtype=float))
+            turn = Rotation.from_quat(np.roll(self.quaternion_wxyz, -1))
+        elif self.rpy_rad is not None:  # as in URDF: about fixed x, then y, then z
+            turn = Rotation.from_euler("xyz", self.rpy_rad)
+        return Pose(turn.as_matrix(), np.array(self.position_mm))
 
 
 class Row(_Strict):
@@ -111,58 +136,21 @@ class Row(_Strict):
 
     joint: Literal["revolute", "prismatic"] = "revolute"
     name: Text = ""
-    theta_offset_deg: Number | None = None
-    theta_offset_rad: Number | None = None
-    d_mm: Number | None = None
-    d_m: Number | None = None
-    a_mm: Number | None = None
-    a_m: Number | None = None
-    alpha_deg: Number | None = None
-    alpha_rad: Number | None = None
-    beta_deg: Number | None = None
-    beta_rad: Number | None = None
+    theta_offset_rad: Turn
+    d_mm: Number
+    a_mm: Number
+    alpha_rad: Turn
+    beta_rad: Turn = 0.0
     sign: Literal[1, -1] = 1
-    limits_deg: Limits | None = None
-    limits_rad: Limits | None = None
+    limits_rad: TurnLimits | None = None
     limits_mm: Limits | None = None
-    limits_m: Limits | None = None
-
-    @field_validator("theta_offset_rad", "alpha_rad", "beta_rad")
-    @classmethod
-    def _not_in_deg(cls, value: float | None) -> float | None:
-        if value and abs(value) > 2.0 * pi + 1e-3:
-            raise ValueError("more than a turn: write _deg")
-        return value
 
     @model_validator(mode="after")
-    def _whole(self) -> Self:
-        self.parameters()
-        found, units = self.given("limits"), ("mm", "m") if self.slides else ("deg", "rad")
-        if found and found[0] not in units:
-            kind = "slides" if self.slides else "turns"
-            raise ValueError(f"the joint {kind}: give its limits in {' or '.join(units)}")
-        if found:
-            _limits_of(*found)
+    def _limits_of_its_kind(self) -> Self:
+        if (self.limits_rad if self.joint == "prismatic" else self.limits_mm) is not None:
+            units = "mm or m" if self.joint == "prismatic" else "deg or rad"
+            raise ValueError(f"the joint is {self.joint}: give its limits in {units}")
         return self
-
-    @property
-    def slides(self) -> bool:
-        """Whether the joint is prismatic."""
-        return self.joint == "prismatic"
-
-    def parameters(self) -> tuple[float, ...]:
-        """theta, d, a, alpha, beta in rad and mm."""
-        needed = [float(self.quantity(stem)) for stem in ("theta_offset", "d", "a", "alpha")]
-        return (*needed, float(self.quantity("beta", 0.0)))
-
-
-def _limits_of(unit: str, limits: Limits) -> np.ndarray:
-    """Limits (2,) in rad or mm; ValueError where they are reversed or look like degrees."""
-    if limits[0] >= limits[1]:
-        raise ValueError(f"limits {list(limits)} are reversed or empty")
-    if unit == "rad" and max(map(abs, limits)) > _MOST_TURNS_RAD:
-        raise ValueError(f"limits {list(limits)} look like degrees: write limits_deg")
-    return np.multiply(limits, _UNITS[unit])
 
 
 class _About(_Strict):
@@ -179,14 +167,15 @@ class _About(_Strict):
             raise ValueError(fault.what)
         return value
 
-    def matrix(self, count: int) -> np.ndarray:
+    def matrix(self, default: np.ndarray) -> np.ndarray:
         """Matrix (k, k) from reported to DH joints; ValueError where it is none."""
-        rows = self.joint_map or []
-        if len(rows) != count or any(len(row) != count for row in rows):
-            raise ValueError(f"joint_map is no {count} x {count} matrix")
-        if abs(np.linalg.det(rows)) < 1e-9:
+        if self.joint_map is None:
+            return default
+        if [len(row) for row in self.joint_map] != [len(default)] * len(default):
+            raise ValueError(f"joint_map is no {len(default)} x {len(default)} matrix")
+        if abs(np.linalg.det(self.joint_map)) < 1e-9:
             raise ValueError("joint_map is singular")
-        return np.array(rows)
+        return np.array(self.joint_map)
 
 
 class Table(_About):
@@ -194,8 +183,7 @@ class Table(_About):
 
     convention: Literal["standard", "modified"] = "standard"
     dh: list[Row]
-    limits_deg: list[Limits] | None = None
-    limits_rad: list[Limits] | None = None
+    limits_rad: list[TurnLimits] | None = None
     base: Frame = Frame()
     flange: Frame = Frame()
 
@@ -206,29 +194,22 @@ class Table(_About):
             raise ValueError(f"has {len(rows)} joints, not {FEWEST_JOINTS} to {MOST_JOINTS}")
         return rows
 
-    @model_validator(mode="after")
-    def _whole(self) -> Self:
-        self.robot()
-        return self
-
     def robot(self) -> Robot:
         """The arm; ValueError where parts of the file contradict each other."""
-        columns = np.array([row.parameters() for row in self.dh]).T
+        columns = [[getattr(row, name) for row in self.dh] for name in PARAMETERS]
         total = np.abs(columns[1:3]).sum()
         if 0.0 < total < _SHORTEST_MM:
             raise ValueError(f"all lengths together are {total:g} mm: write d_m and a_m")
-        slides = np.array([row.slides for row in self.dh])
-        table, base = DHModel(*columns, slides), self.base.pose()
+        slides = np.array([row.joint == "prismatic" for row in self.dh])
+        table, base = DHModel(*np.array(columns), slides), self.base.pose()
         if self.convention == "modified":
             table, before = from_modified(table)
             base = compose(base, before)
-        signs = [row.sign for row in self.dh]
-        joint_map = np.diag(np.array(signs, dtype=float))
-        if self.joint_map is not None:
-            if any("sign" in row.model_fields_set for row in self.dh):
-                raise ValueError("joint_map is given beside a joint's sign")
-            joint_map = self.matrix(len(self.dh))
+        if self.joint_map is not None and any("sign" in row.model_fields_set for row in self.dh):
+            raise ValueError("joint_map is given beside a joint's sign")
         limits = self._limits()
+        if np.abs(limits[~slides]).max(initial=0.0) < _LEAST_TURN_RAD and not slides.all():
+            raise ValueError("no joint turns more than 6.3 deg: write limits_rad")
         return Robot(
             name=self.name or "robot",
             source=self.source,
@@ -236,7 +217,7 @@ class Table(_About):
             dh=table,
             q_min_rad=limits[:, 0],
             q_max_rad=limits[:, 1],
-            joint_map=joint_map,
+            joint_map=self.matrix(np.diag([float(row.sign) for row in self.dh])),
             base=base,
             flange=self.flange.pose(),
             tool=self.tool.pose(),
@@ -245,24 +226,19 @@ class Table(_About):
 
     def _limits(self) -> np.ndarray:
         """Limits (k, 2) of the reported joints, from the rows or from one list for all."""
-        shared = self.given("limits")
-        if shared and len(shared[1]) != len(self.dh):
-            raise ValueError(f"limits_{shared[0]} has {len(shared[1])} pairs, not {len(self.dh)}")
-        limits, in_degrees = [], []
-        for number, row in enumerate(self.dh):
-            found = row.given("limits")
-            if shared and not row.slides:
-                if found:
-                    raise ValueError(f"joint {number + 1}: its limits are given twice")
-                found = shared[0], shared[1][number]
-            if found is None:
-                units = ("mm", "m") if row.slides else ("deg", "rad")
-                names = " or ".join(f"limits_{unit}" for unit in units)
-                raise ValueError(f"joint {number + 1}: its limits are missing: {names}")
-            limits.append(_limits_of(*found))
-            in_degrees += found[1] if found[0] == "deg" else ()
-        if in_degrees and max(map(abs, in_degrees)) < 6.3:
-            raise ValueError("no joint turns more than 6.3 deg: write limits_rad")
+        shared = self.limits_rad or [None] * len(self.dh)
+        if len(shared) != len(self.dh):
+            raise ValueError(f"limits: {len(shared)} pairs for {len(self.dh)} joints")
+        limits = []
+        for number, (row, listed) in enumerate(zip(self.dh, shared, strict=True), 1):
+            slides = row.joint == "prismatic"
+            ends = row.limits_mm if slides else row.limits_rad or listed
+            if not slides and row.limits_rad and listed:
+                raise ValueError(f"joint {number}: its limits are given twice")
+            if ends is None:
+                units = "limits_mm or limits_m" if slides else "limits_deg or limits_rad"
+                raise ValueError(f"joint {number}: its limits are missing: {units}")
+            limits.append(ends)
         return np.array(limits)
 
 
@@ -282,7 +258,20 @@ def shipped() -> list[str]:
 def load(name_or_path: str | Path) -> Robot:
     """Robot of a shipped name, of a YAML file or of a URDF file.
 
-    Raises InputError listing what is wrong with the description.
+    Parameters
+    ----------
+    name_or_path : str or pathlib.Path
+        One of ``shipped()``, or the path of a file (docs/robots.md has its keys).
+
+    Returns
+    -------
+    Robot
+        The arm, in mm and rad.
+
+    Raises
+    ------
+    InputError
+        With the faults of the description, each with line and key.
     """
     path = _path(name_or_path)
     if path.suffix.lower() in (".urdf", ".xacro", ".xml"):
@@ -317,79 +306,63 @@ def _path(name_or_path: str | Path) -> Path:
     name = str(name_or_path)
     if name in shipped():
         return _SHIPPED / f"{name}.yaml"
-    path = Path(name)
-    if not os.path.isfile(path):  # false, too, for a name no file can have
-        close = difflib.get_close_matches(name[:100].lower(), shipped(), n=1)
-        allowed = "a name listed in docs/robots.md, or the path of a robot YAML or URDF"
-        fix = f"did you mean {close[0]}?" if close else ""
-        raise InputError(Problem(name, "is neither a shipped robot nor a file", allowed, fix))
-    return path
+    if os.path.isfile(name):  # false, too, for a name no file can have
+        return Path(name)
+    close = difflib.get_close_matches(name[:100].lower(), shipped(), n=1)
+    allowed = "a name listed in docs/robots.md, or the path of a robot YAML or URDF"
+    fix = f"did you mean {close[0]}?" if close else ""
+    raise InputError(Problem(name, "is neither a shipped robot nor a file", allowed, fix))
 
 
 def _described(document: Document, problems: list[Problem], path: Path) -> Robot:
     title = f"The robot description {document.name} cannot be used"
     refuse(problems, title)
-    kind: type[_About] = ByUrdf if "urdf" in document.data else Table
     try:
-        described = kind.model_validate(document.data)
-        if isinstance(described, Table):
-            return described.robot()
-        return _by_urdf(described, document, path)
+        if "urdf" not in document.data:
+            return Table.model_validate(document.data).robot()
+        described = ByUrdf.model_validate(document.data)
+        file = path.parent / described.urdf
+        if not os.path.isfile(file):
+            where = document.place(("urdf",))
+            raise InputError(Problem(where, f"{file}: there is no such file"))
+        robot = _urdf.load(file, described.base_link, described.tip_link)
+        return replace(
+            robot,
+            name=described.name or robot.name,
+            source=described.source or robot.source,
+            date=described.date,
+            joint_map=described.matrix(robot.joint_map),
+            tool=described.tool.pose(),
+        )
     except ValidationError as error:
-        raise InputError(_problems(error, document, kind), title) from None
+        raise InputError(_problems(error, document), title) from None
     except ValueError as error:
         raise InputError(Problem(document.name, str(error)), title) from None
 
 
-def _by_urdf(described: ByUrdf, document: Document, path: Path) -> Robot:
-    file = path.parent / described.urdf
-    if not os.path.isfile(file):
-        raise InputError(Problem(document.place(("urdf",)), f"{file}: there is no such file"))
-    robot = _urdf.load(file, described.base_link, described.tip_link)
-    matrix = robot.joint_map
-    if described.joint_map is not None:
-        matrix = described.matrix(len(matrix))
-    return replace(
-        robot,
-        name=described.name or robot.name,
-        source=described.source or robot.source,
-        date=described.date,
-        joint_map=matrix,
-        tool=described.tool.pose(),
-    )
-
-
-def _problems(error: ValidationError, document: Document, kind: type) -> list[Problem]:
-    """What pydantic found, as it stands in the file."""
-    found = []
-    for number, each in enumerate(error.errors(include_url=False)):
-        place, value = each["loc"], each["input"]
-        while place and not document.gives(place):
-            place = place[:-1]
-        what = each["msg"].removeprefix("Value error, ")
-        if each["type"] == "extra_forbidden":
-            what = "unknown key"
-            if number < _SUGGESTIONS:
-                what += _nearest(str(place[-1]), _keys(kind, place))
-        elif not isinstance(value, Mapping | list):
-            what = f"{str(value)[:60]}: {what}"
-        if len(each["loc"]) > len(place) and each["type"] == "missing":
-            what = f"{each['loc'][-1]} is missing"
-        found.append((document.lines.get(place, 0), Problem(document.place(place), what)))
-    return [problem for _, problem in sorted(found, key=lambda pair: pair[0])]
-
-
-def _keys(kind: type, place: tuple) -> list[str]:
-    inner = {"dh": Row, "base": Frame, "flange": Frame, "tool": Frame}
-    return list(inner.get(place[0] if len(place) > 1 else "", kind).model_fields)
-
-
-def _nearest(name: str, known: list[str]) -> str:
-    """What to write instead of an unknown key; empty where nothing is like it."""
-    stem = name.rpartition("_")[0] if name.rpartition("_")[2] in _UNITS else name
-    same = [f"{stem}_{unit}" for unit in _UNITS if f"{stem}_{unit}" in known]
-    close = same or difflib.get_close_matches(name[:100].lower(), known, n=1, cutoff=0.55)
-    return f"; did you mean {' or '.join(close)}?" if close else ""
+def _problems(error: ValidationError, document: Document) -> list[Problem]:
+    """The faults pydantic lists, as they stand in the file."""
+    models = (Row, Frame, Table, ByUrdf)
+    known = {name for model in models for key in model.model_fields for name in _spellings(key)}
+    problems = []
+    for number, fault in enumerate(error.errors(include_url=False)):
+        place: tuple[Any, ...] = ()
+        for part in fault["loc"]:
+            deeper = [(*place, key) for key in _spellings(part) if document.gives((*place, key))]
+            if not deeper:
+                break
+            place = deeper[0]
+        what = fault["msg"].removeprefix("Value error, ")
+        if fault["type"] == "extra_forbidden":
+            name = str(place[-1])[:100].lower()
+            close = difflib.get_close_matches(name, known, n=1) if number < _SUGGESTIONS else []
+            what = "unknown key" + (f"; did you mean {close[0]}?" if close else "")
+        elif fault["type"] == "missing":
+            what = f"{fault['loc'][-1]} is missing"
+        elif not isinstance(fault["input"], Mapping | list):
+            what = f"{str(fault['input'])[:60]}: {what}"
+        problems.append((document.lines.get(place, 0), Problem(document.place(place), what)))
+    return [problem for _, problem in sorted(problems, key=lambda pair: pair[0])]
 
 
 def from_modified(table: DHModel) -> tuple[DHModel, Pose]:
@@ -405,10 +378,20 @@ def from_modified(table: DHModel) -> tuple[DHModel, Pose]:
 
 
 def as_yaml(robot: Robot, heading: Iterable[str] = ()) -> str:
-    """Robot file of ``robot`` in standard DH, lengths in mm and angles in rad.
+    """Robot file of an arm in standard DH, lengths in mm and angles in rad.
 
-    ``heading`` are lines of comment at the top. ``of_text`` reads joints and limits back bit by
-    bit, and turns of the frames to rounding.
+    Parameters
+    ----------
+    robot : Robot
+        The arm.
+    heading : iterable of str
+        Lines of comment at the top.
+
+    Returns
+    -------
+    str
+        Text of which ``of_text`` reads joints and limits back bit by bit, and turns of the frames
+        to rounding.
     """
     about = {"name": robot.name, "source": robot.source, "date": robot.date}
     lines = [f"# {line}" for line in heading]
@@ -417,22 +400,19 @@ def as_yaml(robot: Robot, heading: Iterable[str] = ()) -> str:
     simple = np.array_equal(robot.joint_map, np.diag(signs)) and (np.abs(signs) == 1.0).all()
     lines.append("dh:")
     for joint, slides in enumerate(robot.dh.prismatic):
-        row = [f"{name}: {float(getattr(robot.dh, name)[joint])!r}" for name in PARAMETERS]
-        if robot.joint_names and robot.joint_names[joint] != f"joint {joint + 1}":
-            row.insert(0, f"name: {json.dumps(robot.joint_names[joint])}")
-        if slides:
-            row.append("joint: prismatic")
+        name = robot.joint_names[joint] if robot.joint_names else f"joint {joint + 1}"
+        row: dict[str, Any] = {} if name == f"joint {joint + 1}" else {"name": json.dumps(name)}
+        row |= {key: float(getattr(robot.dh, key)[joint]) for key in PARAMETERS}
         ends = [float(robot.q_min_rad[joint]), float(robot.q_max_rad[joint])]
-        row.append(f"limits_{'mm' if slides else 'rad'}: {ends}")
+        row |= {"joint": "prismatic", "limits_mm": ends} if slides else {"limits_rad": ends}
         if simple and signs[joint] < 0.0:
-            row.append("sign: -1")
-        lines.append(f"  - {{{', '.join(row)}}}")
+            row["sign"] = -1
+        lines.append(f"  - {{{', '.join(f'{key}: {value}' for key, value in row.items())}}}")
     if not simple:
         lines.append("joint_map: # DH joints = joint_map times reported joints")
-        lines += [f"  - {row}" for row in robot.joint_map.tolist()]
-    for name in ("base", "flange", "tool"):
-        pose = getattr(robot, name)
-        if not all(np.array_equal(own, none) for own, none in zip(pose, IDENTITY, strict=True)):
+        lines += [f"  - {values}" for values in robot.joint_map.tolist()]
+    for name, pose in (("base", robot.base), ("flange", robot.flange), ("tool", robot.tool)):
+        if not all(map(np.array_equal, pose, IDENTITY)):
             turn = quaternion_from_rotation(pose.rotation).tolist()
             position = f"  position_mm: {pose.position_mm.tolist()}"
             lines += [f"{name}:", position, f"  quaternion_wxyz: {turn}"]
