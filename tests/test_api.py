@@ -29,11 +29,6 @@ def calibration(config):
     return kinacc.calibrate(kinacc.read_measurements(config))
 
 
-@pytest.mark.parametrize("name", kinacc.__all__)
-def test_every_public_name_is_there(name):
-    assert getattr(kinacc, name) is not None
-
-
 def test_tables_are_those_of_the_workflow(calibration, config, tmp_path):
     for stage in STAGES:
         folder = perform(stage, [str(config)], tmp_path / "results")
@@ -96,12 +91,6 @@ def test_measured_files_are_read_without_a_configuration(tmp_path):
         assert (read.name, read.robot.name, read.settings["seed"]) == ("tracker", "ur10", 5)
         np.testing.assert_allclose(read.table[[f"q{n}" for n in range(1, 7)]], q_rad)
         np.testing.assert_allclose(read.table[["x_mm", "y_mm", "z_mm"]], point, atol=1e-9)
-    table[["DX", "DY", "DZ"]] = table[["X [m]", "Y [m]", "Z [m]"]] + 0.1
-    table.rename(columns=lambda name: name.replace("D", "raw ")).to_csv(path, index=False)
-    with pytest.raises(kinacc.errors.InputError, match="take"):
-        kinacc.read_measurements(path, robot="ur10")
-    read = kinacc.read_measurements(path, robot="ur10", take=["X [m]"])
-    np.testing.assert_allclose(read.table["x_mm"], point[:, 0], atol=1e-9)
 
 
 def test_rows_taken_out_are_not_fitted(config):

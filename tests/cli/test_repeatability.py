@@ -168,7 +168,7 @@ A,1,left,12:00,m2,1,zwei,3
 @pytest.mark.parametrize(
     ("content", "problems"),
     [
-        (BAD, 5),
+        (BAD, 4),
         ("pose,visit,x_mm,y_mm,z_mm\n" + "A,{},0.123456789,5.123456789,7.123456789\n" * 9, 1),
         ("pose,x_mm,y_mm,z_mm\nA,1,2,3\nB,4,5,6\n", 1),
         ("x_mm,y_mm,z_mm\n1,2,3\n4,5,6\n", 1),

@@ -28,7 +28,6 @@ from kinacc.report.rendering import size
 _A_DAY_H = 1.0  # readings of a pose within less time do not show the changes of a day
 _USUAL_VISITS = 30  # of each pose, by ISO 9283
 _LEAST_MM = 1e-6  # no instrument scatters less
-_FARTHEST_MM = 1e6
 _NAMES = {"pose": ("pose",), "side": ("side", "direction"), "visit": ("visit", "approach")}
 _EMPTY = ("", "nan", "None")  # + and - are names of sides
 _SINGLE = ("target", "session", "instrument")
@@ -153,9 +152,6 @@ def read_repeats(
             problems.append(Problem(where, message, "whether the arm left the pose", fix))
         if rows_are != "stays":
             rows["visit"] = rows.index
-    if (far := np.flatnonzero(abs(position).max(1) > _FARTHEST_MM)).size:
-        where = f"{path}: {table.rows_in_words(far)}"
-        problems.append(Problem(where, "a position beyond a kilometre", "x, y, z in mm or m"))
     if not problems and rows["pose"].is_unique:
         problems.append(Problem(path, "no pose has more than one reading"))
     refuse(problems, f"{path} cannot be used")
