@@ -149,11 +149,6 @@ def test_vec_parameter_jacobian_equals_differences(case):
     np.testing.assert_allclose(analytic[3:], numeric[3:], rtol=0, atol=2e-9)
 
 
-def uniform_joints(limits_deg, count: int, seed: int) -> np.ndarray:
-    low, high = np.radians(limits_deg).T
-    return np.random.default_rng(seed).uniform(low, high, (count, len(low)))
-
-
 @settings(max_examples=60)
 @given(case=vec_cases())
 def test_vec_forward_equals_the_plain_loop(case):

@@ -171,15 +171,6 @@ def test_one_of_three_targets_that_moved(name, tmp_path):
     assert found.values["target"] == "mB"
 
 
-def in_sessions(file, counts):
-    """The file as measured from several places, each with a base frame of its own."""
-    session, rng = np.repeat(range(len(counts)), counts), np.random.default_rng(7)
-    for number in range(1, len(counts)):
-        rows = np.flatnonzero(session == number)
-        file = plants.jumped(file, rng.uniform(-2000, 2000, 3), 1e3 * rng.normal(), rows)
-    return file, session.astype(float)
-
-
 def test_two_jumps_have_sizes_of_their_own(tmp_path):
     file = simulated("irb120", poses=90)
     for begin in (30, 60):

@@ -8,7 +8,6 @@ import pytest
 import yaml
 
 from kinacc.config.gate_rules import KINDS
-from kinacc.config.reading import read
 from kinacc.config.schema import defaults, json_schema
 from kinacc.config.settings import Configuration
 
@@ -32,13 +31,6 @@ def test_config_yaml_states_every_default_and_its_meaning():
     for section, name in KEYS:
         if section not in gates | {"DataSet", "Line", "Link", "Excluded"}:
             assert " ".join(DEFINED[section]["properties"][name]["description"].split()) in told
-
-
-def test_the_reader_agrees_with_plain_yaml():
-    for name in ("config.yaml", "examples/ur10.yaml"):
-        read_here, problems = read(ROOT / name)
-        assert not problems
-        assert read_here.data == yaml.safe_load((ROOT / name).read_text(encoding="utf-8"))
 
 
 @pytest.mark.parametrize(("section", "name"), KEYS, ids=".".join)

@@ -123,19 +123,6 @@ def test_a_table_that_is_not_as_its_stage_and_schema_have_it_fails(here, spoil, 
     assert says in found["says"]
 
 
-@pytest.mark.parametrize(("limit_mm", "code", "verdict"), [(50, 0, "passed"), (1e-4, 1, "failed")])
-def test_a_threshold_of_the_configuration_is_held(here, limit_mm, code, verdict):
-    Path("limits.yaml").write_text(
-        "datasets: {mh180: {robot: mh180}}\n"
-        f"gates: [{{name: mean, value: residuals.position.mean, at_most_mm: {limit_mm}}}]\n"
-    )
-    found = told("results", "--config", "limits.yaml", code=code)["mean"]
-    assert found["verdict"] == verdict
-    assert found["figures"]["at_most_mm"] == limit_mm
-    mean_mm = held_out_mm(Path("results/mh180")).mean()
-    assert found["figures"]["value_mm"] == pytest.approx(mean_mm, rel=1e-9)
-
-
 def test_reports_for_machines_can_be_read_by_them(here):
     names = ["check.json", "metrics.json", "check.xml", "check.md", "check.txt"]
     words = [word for name in names for word in ("--out", name)]

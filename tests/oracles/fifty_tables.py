@@ -308,22 +308,12 @@ def chi_square(square: Decimal) -> Decimal:
     return dec(mpmath.erf(root) - 2 * root / mpmath.sqrt(mpmath.pi) * mpmath.exp(-at / 2))
 
 
-@dataclass(frozen=True)
-class Step:
-    point: int
-    repeat: int
-    measured: Decimal
-    averaged: Decimal
-    probability: Decimal
-
-
-def invalidation(world: World, points: int, eta: Decimal, budget: int, alpha: Decimal):
-    """The steps of one pass at one bound; rejected where the last probability is above alpha."""
+def invalidation(world: World, points: int, eta: Decimal, budget: int, alpha: Decimal) -> Decimal:
+    """The probability after one pass at one bound, which is rejected where it is above alpha."""
     sums: dict[int, Matrix] = {}
     counts: dict[int, int] = defaultdict(int)
     distance: dict[int, Decimal] = {}
-    kept: dict[int, Decimal] = {}
-    steps: list[Step] = []
+    chances: dict[int, Decimal] = {}
     probability = Decimal(0)
     for _ in range(budget):
         if probability > alpha:
@@ -333,15 +323,12 @@ def invalidation(world: World, points: int, eta: Decimal, budget: int, alpha: De
         else:
             break
         counts[point] += 1
-        value = world(point, counts[point])
-        sums[point] = sums.get(point, fd.zeros(3)) + value
-        averaged = size(sums[point] / counts[point])
-        beyond = max(averaged - eta, Decimal(0))
+        sums[point] = sums.get(point, fd.zeros(3)) + world(point, counts[point])
+        beyond = max(size(sums[point] / counts[point]) - eta, Decimal(0))
         distance[point] = beyond * Decimal(counts[point]).sqrt() / world.noise
-        kept[point] = 1 - chi_square(distance[point] ** 2) if beyond else Decimal(1)
-        probability = 1 - _product(kept.values())
-        steps.append(Step(point, counts[point], size(value), averaged, probability))
-    return steps
+        chances[point] = 1 - chi_square(distance[point] ** 2) if beyond else Decimal(1)
+        probability = 1 - _product(chances.values())
+    return probability
 
 
 def _product(values) -> Decimal:

@@ -21,9 +21,6 @@ _OF_ROWS = {"outside_limits", "target_swapped", "duplicate_rows", "repeated_read
 _WARN = _OF_ROWS | {"commanded_joints"}  # they stop a workflow where a reading is far off
 _NOTES = {"thin_coverage", LEFT_OUT}
 _NEVER_STOP = _NOTES | {"largest_rows"}
-STOPPING = tuple(
-    dict.fromkeys(k for k in (key.partition("/")[0] for key in TEXTS) if k not in _NEVER_STOP)
-)
 
 
 @dataclass(frozen=True)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import fields, replace
+from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import click
 
@@ -59,11 +59,6 @@ SELECTED = option(
 )
 SESSION = option("--session", help="Session whose instrument is meant. [the first]")
 POINT = option("--point", help="Target, or flange. [the tool]")
-
-
-def record_of(kind: type[Record], options: Mapping[str, Any]) -> Record:
-    """The options of a command that are the fields of a record."""
-    return kind(**{field.name: options[field.name] for field in fields(kind)})
 
 
 def together(*options: Callable[[Callable], Callable]) -> Callable[[Callable], Callable]:
