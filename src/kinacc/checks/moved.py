@@ -31,7 +31,8 @@ _STEADY = 0.9  # of what jumps explain; of one jump, a steady motion explains 0.
 _EXCESS = 2.0  # times what chance, or a step along a joint, explains
 _FEWEST_ROWS = 4  # on either side of a change of a distance
 
-Jump = tuple[int | None, ndarray]  # a target, None for the base, that is elsewhere in rows on
+Place = tuple[int, str, int]  # a reading before which a frame may have moved: field, number in it
+Jump = tuple[str, ndarray]  # session (the base) or target, and the readings from there on
 
 
 def without_jumps(
@@ -44,12 +45,12 @@ def without_jumps(
     few = len(np.unique(np.round(observed.q_rad, 6), axis=0)) < _FEW
     for _ in progress(range(_MOST_SPLITS), "searches for a moved instrument or target"):
         best, least = None, _PLAIN if few else 1.0
-        for row, kind in _places(fitted):
-            others = np.unique(
-                fitted.readings.target[fitted.readings.session == fitted.readings.session[row]]
-            )
-            for target in dict.fromkeys((kind, None, *others.tolist())):
-                split = _parted(fitted, row, target, model)
+        for row, kind, number in _places(fitted):
+            session = fitted.readings.session[row]
+            targets = np.unique(fitted.readings.target[fitted.readings.session == session])
+            rivals = [(kind, number), ("session", session), *(("target", n) for n in targets)]
+            for frame in dict.fromkeys(rivals):
+                split = _parted(fitted, (row, *frame), model)
                 share = _share_left(fitted, split[0], split[1][1]) if split else np.inf
                 if share < least:
                     best, least = split, share
@@ -62,17 +63,8 @@ def without_jumps(
     return fitted, list(_findings(whole, fitted, jumps)) if jumps else []
 
 
-def _labels(observed: Readings, target: int | None) -> tuple[str, ndarray, tuple[str, ...]]:
-    """What the base (None) or a target is numbered by: its field, the numbers, their names."""
-    kind = "session" if target is None else "target"
-    return kind, getattr(observed, kind), getattr(observed, f"{kind}_names")
-
-
-def _labelled(
-    observed: Readings, kind: str, label: ndarray, names: tuple[str, ...] = ()
-) -> Readings:
-    values: dict[str, Any] = {kind: label} | ({f"{kind}_names": names} if names else {})
-    return replace(observed, **values)
+def _names(observed: Readings, kind: str) -> tuple[str, ...]:
+    return observed.session_names if kind == "session" else observed.target_names
 
 
 def _linearised(fitted: Fitted) -> tuple[Readings, ndarray, ndarray, Linear]:
@@ -87,8 +79,8 @@ def _linearised(fitted: Fitted) -> tuple[Readings, ndarray, ndarray, Linear]:
     return few, design, linear.residual * root + design @ linear.step, linear
 
 
-def _places(fitted: Fitted) -> list[tuple[int, int | None]]:
-    """Readings before which base (None) or a target may have moved, likely places first.
+def _places(fitted: Fitted) -> list[Place]:
+    """Readings before which base or target may have moved, likely places first.
 
     A step is judged by how much of the residuals it explains (score test of further frames, under
     Huber's loss, with the parameters of the fit free). Residuals of real arms vary smoothly with
@@ -99,29 +91,27 @@ def _places(fitted: Fitted) -> list[tuple[int, int | None]]:
         return []
     few, design, residual, linear = _linearised(fitted)
     slots, places = linear.frames.slots, []
-    for kind, number, position in slots:
-        target, width = (None, 6) if kind == "bases" else (number, 3)
-        rows = np.flatnonzero(_labels(few, target)[1] == number)
+    for slot, number, position in slots:
+        kind, width = ("session", 6) if slot == "bases" else ("target", 3)
+        rows = np.flatnonzero(getattr(few, kind) == number)
         if len(rows) < 4 * _FEWEST:
             continue
-        columns, subset, inside = (
-            design[rows][:, :, position[:width]],
-            design[rows],
-            slice(_FEWEST, len(rows) - _FEWEST + 1),
-        )
-        gains, steps, inner = _gains(columns, residual[rows], subset, linear.inverse)
+        part, inside = design[rows], slice(_FEWEST, len(rows) - _FEWEST + 1)
+        columns = part[:, :, position[:width]]
+        gains, steps, inner = _gains(columns, residual[rows], part, linear.inverse)
         place = _FEWEST + int(np.argmax(gains[inside]))
         after = (np.arange(len(rows)) >= place)[:, None]
         rest = residual[rows] - columns @ steps[place] * after
-        rest = rest + subset @ (linear.inverse @ inner[place])
+        rest = rest + part @ (linear.inverse @ inner[place])
         reference = scipy.special.chdtri(width, tails.FAMILY_WISE / (len(rows) * len(slots)))
         for along in (*few.q_rad[rows].T, *few.position_mm[rows].T):
             order = np.argsort(along, kind="stable")
-            steps_along = _gains(columns[order], rest[order], subset[order], linear.inverse)[0]
+            steps_along = _gains(columns[order], rest[order], part[order], linear.inverse)[0]
             reference = max(reference, steps_along[inside].max())
         if gains[place] > _EXCESS * reference:
-            places.append((gains[place] / reference, int(fitted.chosen[rows[place]]), target))
-    return [place[1:] for place in sorted(places, key=lambda place: -place[0])[:_TRIED]]
+            row = int(fitted.chosen[rows[place]])
+            places.append((gains[place] / reference, (row, kind, number)))
+    return [place for _, place in sorted(places, key=lambda pair: -pair[0])[:_TRIED]]
 
 
 def _gains(
@@ -143,39 +133,36 @@ def _gains(
     return np.sum(step * score, axis=(1, 2)), step[..., 0], (across @ step)[..., 0]
 
 
-def _parted(
-    fitted: Fitted, row: int, target: int | None, model: DHModel
-) -> tuple[Fitted, Jump] | None:
-    """The fit without a jump of base or target near a reading, and the jump; None if there is none.
+def _parted(fitted: Fitted, place: Place, model: DHModel) -> tuple[Fitted, Jump] | None:
+    """The fit without a jump near a place, and the jump; None if there is none.
 
-    The reading is the one that parts the two frames best.
+    The jump is before the reading that parts the two frames best.
     """
-    observed, rows = _split(fitted.readings, row, target)
+    (row, kind, number), new = place, len(_names(fitted.readings, place[1]))
+    observed, rows = _split(fitted.readings, row, kind, number)
     again = fit(observed, model)
-    kind, labels, _ = _labels(observed, target)
-    frames = _labels(fitted.readings, target)[1][row], labels[row]
-    both = np.flatnonzero(np.isin(labels, frames))
+    both = np.flatnonzero(np.isin(getattr(observed, kind), (number, new)))
     costs = []
-    for frame in frames:
-        part = _labelled(observed.select(both), kind, np.full(len(both), frame))
+    for frame in (number, new):
+        part = replace(observed.select(both), **{kind: np.full(len(both), frame)})  # type: ignore[arg-type]
         remaining = np.linalg.norm(robust_fit.residuals(again.trial.arm, part).position_mm, axis=1)
         costs.append(np.append(0.0, np.minimum(remaining, _CAP * again.trial.sigma_mm)))
-    place = int(np.argmin(np.cumsum(costs[0]) - np.cumsum(costs[1])))
-    if min(len(np.unique(observed.pose[side])) for side in np.split(both, [place])) < _FEWEST:
+    first = int(np.argmin(np.cumsum(costs[0]) - np.cumsum(costs[1])))
+    if min(len(np.unique(observed.pose[side])) for side in np.split(both, [first])) < _FEWEST:
         return None
-    if both[place] != row:
-        observed, rows = _split(fitted.readings, both[place], target)
+    if both[first] != row:
+        observed, rows = _split(fitted.readings, both[first], kind, number)
         again = fit(observed, model)
-    return again, (target, rows)
+    return again, (kind, rows)
 
 
-def _split(observed: Readings, row: int, target: int | None) -> tuple[Readings, ndarray]:
-    """Frames split before reading ``row``: a new base for the rest of its session, or target."""
-    kind, label, names = _labels(observed, target)
-    subset = label[row] if target is None else target
-    rows = (np.arange(len(observed)) >= row) & (label == subset)
-    split = _labelled(observed, kind, np.where(rows, len(names), label), (*names, names[subset]))
-    return split, np.flatnonzero(rows)
+def _split(observed: Readings, row: int, kind: str, number: int) -> tuple[Readings, ndarray]:
+    """Readings whose frame ``number`` is another one from ``row`` on, and those from there on."""
+    label, names = getattr(observed, kind), _names(observed, kind)
+    rows = (np.arange(len(observed)) >= row) & (label == number)
+    split: dict[str, Any] = {kind: np.where(rows, len(names), label)}
+    split[f"{kind}_names"] = (*names, names[number])
+    return replace(observed, **split), np.flatnonzero(rows)
 
 
 def _share_left(before: Fitted, after: Fitted, rows: ndarray) -> float:
@@ -198,31 +185,30 @@ def _findings(whole: Fitted, fitted: Fitted, jumps: list[Jump]) -> Iterator[Find
     for name, drift in drifts.items():
         subset = [observed.session_names[item] == name for item in observed.session]
         yield finding("drift", observed.line[subset], by=_signed(drift), drift_mm=drift.tolist())
-    for target, rows in jumps:
-        _, label, names = _labels(observed, target)
-        name = names[label[rows[0]]]
-        if target is None and name in drifts:
+    for kind, rows in jumps:
+        label = getattr(observed, kind)
+        names = np.array(_names(observed, kind))[label]
+        name, first = names[rows[0]], int(observed.line[rows[0]])
+        is_base = kind == "session"
+        if is_base and name in drifts:
             continue
-        before = [row for row in range(rows[0]) if names[label[row]] == name][-1]
-        poses = frames.bases if target is None else frames.targets
+        before = np.flatnonzero(names[: rows[0]] == name)[-1]
+        poses = frames.bases if is_base else frames.targets
         old, new = (Pose(*(e[n] for e in poses)) for n in label[[before, rows[0]]])
-        shift, turn = new.position_mm - old.position_mm, 0.0
-        if target is None:
+        shift, motion = new.position_mm - old.position_mm, compose(new, invert(old))
+        if is_base:
             # How far points in the middle of the readings went.
             middle = fitted.residuals.predicted.position_mm[rows].mean(axis=0)
-            motion = compose(new, invert(old))
             shift = middle - motion.rotation.T @ (middle - motion.position_mm)
-            turn = float(np.linalg.norm(log_so3(motion.rotation)))
-        first = int(observed.line[rows[0]])
         yield finding(
-            "base_jump" if target is None else "target_moved",
+            "base_jump" if is_base else "target_moved",
             observed.lines(rows),
             row=observed.row_names.one(first),
             target=name or "",
             by=_signed(shift),
             first_line=first,
             shift_mm=shift.tolist(),
-            turn_mrad=1e3 * turn,
+            turn_mrad=1e3 * float(np.linalg.norm(log_so3(motion.rotation))) * is_base,
         )
 
 
@@ -269,10 +255,9 @@ def by_distances(every: Readings, distances: list[Distance]) -> tuple[list[Findi
         target = int(np.argmax(counts))
         mine = [step for step in steps if target in (step[0].first, step[0].second)]
         steps = [step for step in steps if step not in mine]
-        first = int(line[mine[0][0].rows[mine[0][1]][0]])
-        rows = (every.target == target) & (line >= first)
-        numbers = np.where(rows, len(moved.target_names), moved.target)
-        moved = replace(moved, target=numbers, target_names=(*moved.target_names, names[target]))
+        is_there = line == line[mine[0][0].rows[mine[0][1], 0]]
+        first = int(np.flatnonzero(is_there & (every.target == target))[0])
+        moved, rows = _split(moved, first, "target", target)
         changes = (f"{n:+.3g} mm to {names[d.first + d.second - target]}" for d, _, n in mine)
         findings.append(
             finding(
@@ -280,13 +265,14 @@ def by_distances(every: Readings, distances: list[Distance]) -> tuple[list[Findi
                 line[rows],
                 target=names[target],
                 sure="" if len(names) > 2 else " (or the other of the two)",
-                row=every.row_names.one(first),
+                row=every.row_names.one(int(line[first])),
                 by=", ".join(changes),
-                first_line=first,
+                first_line=int(line[first]),
                 largest_change_mm=max(abs(size) for _, _, size in mine),
             )
         )
-    off, largest = [], 0.0
+    off: list[int] = []
+    largest = 0.0
     for distance, place, size in moves:
         length = distance.length_mm - size * (np.arange(len(distance.rows)) >= (place or np.inf))
         away = np.abs(length - np.median(length))
@@ -294,7 +280,7 @@ def by_distances(every: Readings, distances: list[Distance]) -> tuple[list[Findi
         off += line[distance.rows[far, 0]].tolist()
         largest = max(largest, float(away[far].max(initial=0.0)))
     if off:
-        count = len(set(off))
+        count = len({*off})
         findings.append(finding("outliers/distances", off, count=count, largest_mm=largest))
     return findings, moved
 
@@ -310,6 +296,6 @@ def _move(length: ndarray) -> tuple[int | None, float]:
     row = int(place[np.argmax(step**2 * place * (count - place))])
     middles = [float(np.median(side)) for side in np.split(length, [row])]
     # A distance that only drifts is no move: it must leave what both sides scatter by far.
-    rest = np.abs(length - np.where(np.arange(count) < row, *middles))
+    rest = np.abs(length - np.repeat(middles, [row, count - row]))
     size = middles[1] - middles[0]
     return (row, size) if abs(size) > tails.limit(rest, 1) else (None, 0.0)
