@@ -26,7 +26,19 @@ def draw(
     tolerance_mm: float | None = None,
     name: str | None = None,
 ) -> Figure:
-    """Draw ``campaign_points`` and ``campaign_bounds``; ``first_visit`` readings come unasked."""
+    """Draw every measured point with its limits, and the bounds as they grew.
+
+    Parameters
+    ----------
+    points, bounds
+        Tables ``campaign_points`` and ``campaign_bounds``.
+    first_visit
+        Number of readings that are taken before the assessor chooses.
+    tolerance_mm
+        Largest error allowed.
+    name
+        Name above the figure.
+    """
     with style.house():
         figure = style.new_figure(style.DOUBLE_COLUMN_IN, 2.9)
         left, right = figure.subplots(1, 2, sharey=True)

@@ -15,7 +15,13 @@ _SYMBOLS = {"theta_offset": "θ", "d": "d", "a": "a", "alpha": "α", "beta": "β
 
 
 def draw(difference: Difference) -> Figure:
-    """Draw a comparison."""
+    """Draw changes of the parameters, and the share of poses that moved no more than a distance.
+
+    Parameters
+    ----------
+    difference
+        Comparison of two calibrations; lengths in mm.
+    """
     parameters = difference.parameters
     rows = 0 if parameters is None else len(parameters)
     with style.house():

@@ -9,7 +9,15 @@ from kinacc.figures import style
 
 
 def draw(index: np.ndarray, robot: str | None = None) -> Figure:
-    """Draw the index (n,) after each added pose, the last one after all swaps."""
+    """Draw the observability index against the number of poses.
+
+    Parameters
+    ----------
+    index
+        O1 (n,) after each added pose, the last one after all swaps, mm or mrad.
+    robot
+        Name above the figure.
+    """
     with style.house():
         figure = style.new_figure(style.SINGLE_COLUMN_IN, 2.6)
         ax = figure.subplots()

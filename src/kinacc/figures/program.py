@@ -9,7 +9,14 @@ from kinacc.figures import style
 
 
 def draw(table: pd.DataFrame) -> Figure:
-    """Changes in mm and mrad by position; refused positions have no bar."""
+    """Draw the correction of every position of a program.
+
+    Parameters
+    ----------
+    table
+        ``position``, ``status``, ``change_mm`` and ``change_mrad``; positions that are not
+        ``corrected`` have no bar.
+    """
     moved = table.where(table["status"] == "corrected")
     with style.house():
         figure = Figure(figsize=(7.0, 5.0), layout="constrained")

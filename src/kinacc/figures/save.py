@@ -26,18 +26,36 @@ FORMATS = tuple(_SAVED)
 
 
 def render(figure: Figure, formats: Iterable[str]) -> dict[str, bytes]:
-    """Return the file content for each format; InputError for others than svg, png and pdf."""
+    """The content of the files of a figure.
+
+    Parameters
+    ----------
+    figure
+        Its layout is settled by this.
+    formats
+        Of svg, png and pdf.
+
+    Returns
+    -------
+    dict of bytes
+        Content by format; the same bytes for the same figure and versions.
+
+    Raises
+    ------
+    InputError
+        With each format that is none of these.
+    """
     formats = tuple(formats)
     unknown = [name for name in formats if name not in FORMATS]
     refuse([Problem("figures.formats", f"{name!r}", ", ".join(FORMATS)) for name in unknown])
-    found = {}
+    contents = {}
     with style.house():
         settle(figure)
         for name in formats:
             buffer, (dpi, marks) = BytesIO(), _SAVED[name]
             figure.savefig(buffer, format=name, dpi=dpi, metadata=dict.fromkeys(marks))
-            found[name] = buffer.getvalue()
-    return found
+            contents[name] = buffer.getvalue()
+    return contents
 
 
 def settle(figure: Figure) -> None:
@@ -50,6 +68,14 @@ def settle(figure: Figure) -> None:
 
 
 def write(figure: Figure, paths: Mapping[str, Path]) -> None:
-    """Write one file per format; each appears whole, and none appears unless all rendered."""
+    """Write one file per format; each appears whole, and none appears unless all rendered.
+
+    Parameters
+    ----------
+    figure
+        See ``render``.
+    paths
+        Path by format.
+    """
     contents = render(figure, paths)
     write_together({path: contents[name] for name, path in paths.items()})

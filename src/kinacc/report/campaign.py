@@ -63,14 +63,40 @@ def section(opened: Opened, state: State, tables: Mapping[str, Columns]) -> Part
 
 
 def markdown(opened: Opened, state: State, tables: Mapping[str, Columns], picture: str) -> str:
-    """Return the report as text, with the values of the page."""
+    """The report as Markdown, with the values of the page.
+
+    Parameters
+    ----------
+    opened, state, tables
+        As for ``campaign_page``.
+    picture
+        Path of the picture of the bounds.
+
+    Returns
+    -------
+    str
+        Markdown.
+    """
     values = section(opened, state, tables).rows()
     template = environment(is_page=False).get_template("campaign.md")
     return template.render({**values, "picture": picture})
 
 
 def campaign_page(opened: Opened, state: State, tables: Mapping[str, Columns]) -> Page:
-    """Return the page of a campaign, from the tables of ``campaign.report.tables``."""
+    """The page of a campaign.
+
+    Parameters
+    ----------
+    opened
+        The campaign.
+    state, tables
+        Its state and tables, as ``campaign.report.tables`` returns them.
+
+    Returns
+    -------
+    Page
+        Bounds and verdict, then readings, points, assumptions and origin.
+    """
     summary = status(opened, state)
     main = summary.bound
     answers = [summary.headline, *(text for text in (main.text, summary.assumes) if text)]

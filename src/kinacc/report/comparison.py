@@ -20,14 +20,37 @@ _NEXT = "Where a change matters: measure the poses of the first again, calibrate
 
 
 def lines(difference: Difference) -> list[str]:
-    """The verdict, its evidence, and what the figures include."""
+    """The verdict, its evidence, and what the figures include.
+
+    Parameters
+    ----------
+    difference
+        Comparison of two calibrations.
+
+    Returns
+    -------
+    list of str
+        A sentence or two each, the verdict first.
+    """
     return rendering.lines("comparison.txt", found=difference, compare=compare)
 
 
 def comparison_page(difference: Difference, first: Calibration, q_rad: np.ndarray) -> Page:
-    """The page of a comparison at reported joints ``q_rad`` (n, k), rad and mm, all given to it.
+    """The page of a comparison.
 
-    ``first``: the first of the two calibrations.
+    Parameters
+    ----------
+    difference
+        Comparison of two calibrations.
+    first
+        The first of them.
+    q_rad
+        Reported joints (n, k) at which they were to be compared, rad (mm where a joint slides).
+
+    Returns
+    -------
+    Page
+        Verdict, shifts of the poses and changes of the parameters.
     """
     poses, names, verdict = difference.poses, difference.names, difference.verdict
     slides = np.asarray(first.robot.dh.prismatic)

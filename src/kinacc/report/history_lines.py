@@ -10,7 +10,20 @@ from kinacc.report.rendering import lines
 
 
 def sentence(history: Mapping, row: int = -1) -> str:
-    """What a row of ``history.parquet`` says of the calibration in force, the last by default."""
+    """What a row of ``history.parquet`` says of the calibration in force.
+
+    Parameters
+    ----------
+    history
+        The table, by column.
+    row
+        Number of the row, the last by default.
+
+    Returns
+    -------
+    str
+        The verdict with its evidence (mm), without a full stop.
+    """
     table = pd.DataFrame(dict(history))
     line = table.iloc[row]
     dates = dict(zip(table["series"], table["date"], strict=True))

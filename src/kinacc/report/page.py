@@ -86,7 +86,19 @@ def html(
 ) -> str:
     """The page as one file.
 
-    ``marks`` are its provenance and ``read`` the digests of the files that were read for it.
+    Parameters
+    ----------
+    page
+        First screen and sections.
+    marks
+        Provenance by name, beside that of the page.
+    read
+        SHA-256 by name of the files that were read for it.
+
+    Returns
+    -------
+    str
+        HTML with all styles, pictures and scripts in it.
     """
     charts = {
         f"chart-{part.key}-{name}": chart

@@ -11,7 +11,18 @@ if TYPE_CHECKING:
     from kinacc.deployment.export.pendant import Pendant
 
 
-def pendant_page(found: Pendant) -> str:
-    """The page as HTML, to be printed."""
+def pendant_page(pendant: Pendant) -> str:
+    """The page on values to enter into a controller.
+
+    Parameters
+    ----------
+    pendant
+        Old and new values (deg, mm or as the controller has them) and mean errors.
+
+    Returns
+    -------
+    str
+        HTML, to be printed.
+    """
     template = environment().get_template("pendant.html")
-    return template.render(found=found, version=__version__)
+    return template.render(found=pendant, version=__version__)

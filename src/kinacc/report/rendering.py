@@ -22,7 +22,7 @@ def cell(value: object, form: str = "") -> str:
 
 
 def size(value: float) -> str:
-    """A number with three significant digits, without an exponent."""
+    """A number with three significant digits, without an exponent: ``0.307``, ``4680``."""
     if not math.isfinite(value) or value == 0.0:
         return f"{value:.3g}"
     return f"{value:.{max(0, 2 - math.floor(math.log10(abs(value))))}f}"
@@ -48,7 +48,7 @@ def text_of(name: str) -> str:
 @cache
 def environment(is_page: bool = True) -> Environment:
     """Templates of pages, which escape values, or of texts, which write each value in a line."""
-    made = Environment(
+    templates = Environment(
         loader=FunctionLoader(text_of),
         autoescape=is_page,
         undefined=StrictUndefined,
@@ -57,8 +57,8 @@ def environment(is_page: bool = True) -> Environment:
         finalize=None if is_page else _in_line,
     )
     filters = {"cell": cell, "counted": counted, "few": few, "size": size}
-    made.filters |= filters | {"md": in_markdown, "model": model_name}
-    return made
+    templates.filters |= filters | {"md": in_markdown, "model": model_name}
+    return templates
 
 
 def _in_line(value: object) -> object:

@@ -77,7 +77,7 @@ def summarise(
     arm = robot.of_text(str(tables["robot"]["description"][0]), "robot.parquet")
     name = folder.resolve().name
     places = of_results(folder) if campaigns is None else campaigns
-    sought = of_calibration.sought(name, tables, places)
+    assessed = of_calibration.sought(name, tables, places)
     measurements, check = tables["measurements"], tables.get("data_check")
     fits = misfit.misfits(tables, arm)
     listed = identifiability.listed(tables["dh_identified"])
@@ -114,23 +114,38 @@ def summarise(
         compliance=compliance(tables.get("compliance_model")),
         noise_mm=fits[0].noise.per_axis_mm,
         held_out_over_noise={fit.model: fit.ratio for fit in fits},
-        campaign=sought.status,
-        remarks=sought.remarks,
+        campaign=assessed.status,
+        remarks=assessed.remarks,
         tolerance=tolerance_of(tables),
         claims=_claims(tables["claims"]) if synthetic and "claims" in tables else None,
         other_errors=_other_errors(tables),
         history=sentence(tables["history"]) if "history" in tables else "",
         outdated=outdated,
-        next_steps=_next_steps(str(folder), results.calibration(tables, arm).choice, sought.status),
+        next_steps=_next_steps(
+            str(folder), results.calibration(tables, arm).choice, assessed.status
+        ),
     )
 
 
 def data_set_folders(folders: Iterable[Path]) -> list[Path]:
     """Results folders of data sets among the ``folders`` and inside them, by name.
 
-    Raises InputError for each folder that holds none.
+    Parameters
+    ----------
+    folders
+        Results folders, or folders of these.
+
+    Returns
+    -------
+    list of Path
+        Each data set once.
+
+    Raises
+    ------
+    InputError
+        With each folder that holds none.
     """
-    found: list[Path] = []
+    places: list[Path] = []
     problems = []
     for folder in folders:
         inside = (
@@ -139,16 +154,27 @@ def data_set_folders(folders: Iterable[Path]) -> list[Path]:
             else sorted(filter(Path.is_dir, folder.glob("[!.]*")))
         )
         with_results = [path for path in inside if not (path / PLAN).is_file()]
-        found += with_results
+        places += with_results
         if not with_results:
             fix = "calibrate a data set: kinacc calibrate FILE.yaml"
             problems.append(Problem(str(folder), "holds no results", "results of data sets", fix))
     refuse(problems)
-    return list(dict.fromkeys(found))
+    return list(dict.fromkeys(places))
 
 
 def summarise_all(folders: Sequence[Path]) -> list[CalibrationSummary | Problem]:
-    """The summary of every results folder, or why it has none."""
+    """The summary of every results folder, or why it has none.
+
+    Parameters
+    ----------
+    folders
+        Results folders of data sets.
+
+    Returns
+    -------
+    list of CalibrationSummary or Problem
+        In the order of the folders.
+    """
     summaries: list[CalibrationSummary | Problem] = []
     for folder in folders:
         try:
@@ -290,8 +316,8 @@ def excluded(tables: Tables) -> pd.DataFrame:
         return pd.DataFrame(columns=names)
     rows = RowNames.of_columns({**table, "row": table["line"]})
     errors = figures.excluded_errors(table, figures.selected(tables["model_selection"]))
-    found = [(line, rows.one(line), reason, error_mm) for line, reason, error_mm in errors]
-    return pd.DataFrame(found, columns=names)
+    named = [(line, rows.one(line), reason, error_mm) for line, reason, error_mm in errors]
+    return pd.DataFrame(named, columns=names)
 
 
 def compliance(model: Columns | None) -> pd.DataFrame:
@@ -310,7 +336,18 @@ def _fact(tables: Tables, topic: str, column: str = "value") -> Any:
 
 
 def tolerance_of(tables: Tables) -> Tolerance | None:
-    """The tolerance that the table ``summary`` states."""
+    """The tolerance that the table ``summary`` states.
+
+    Parameters
+    ----------
+    tables
+        Tables of a results folder by name.
+
+    Returns
+    -------
+    Tolerance or None
+        In mm, with the statistic it is about; None without one.
+    """
     mm = _fact(tables, "tolerance")
     return None if mm is None else Tolerance(float(mm), str(_fact(tables, "tolerance", "item")))
 
@@ -326,13 +363,13 @@ def _claims(claims: Columns) -> dict[str, Any]:
 
 def _other_errors(tables: Tables) -> dict[str, float]:
     """Largest difference of the DH model from the VEC model, mm, by population."""
-    found = {}
+    largest = {}
     if (points := tables.get("assessment_points")) is not None:
-        found[f"{len(points['point'])} operating points"] = float(np.max(points["true_error_mm"]))
+        largest[f"{len(points['point'])} operating points"] = float(np.max(points["true_error_mm"]))
     cells = pd.Series(tables.get("accuracy_map", {}).get("position_max_mm", ()), dtype=float)
     if cells.notna().any():
-        found[f"accuracy map of {cells.count()} cells"] = float(cells.max())
-    return found
+        largest[f"accuracy map of {cells.count()} cells"] = float(cells.max())
+    return largest
 
 
 def _written(path: Path) -> str:

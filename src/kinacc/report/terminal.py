@@ -69,7 +69,12 @@ def print_summary(
 def print_summaries(folders: Sequence[Path], without: Sequence[str] = ()) -> None:
     """Print half a page each for a few results folders, a table for many.
 
-    ``without``: tables of an earlier run to leave out.
+    Parameters
+    ----------
+    folders
+        Results folders of data sets.
+    without
+        Names of tables of an earlier run, to leave out.
     """
     if len(folders) > FEW:
         print_fleet(fleet_table(summarise_all(folders), BOUND), BOUND)
@@ -183,7 +188,15 @@ def print_fleet(table: pd.DataFrame, by: str) -> None:
 
 
 def print_table(table: pd.DataFrame, most: int = 24) -> None:
-    """Print the first rows of a table."""
+    """Print the first rows of a table.
+
+    Parameters
+    ----------
+    table
+        Numbers with four decimals, a dash where there is none.
+    most
+        Number of rows that are printed.
+    """
     grid = Table(box=None, pad_edge=False)
     for name, values in table.items():
         numeric = pd.api.types.is_numeric_dtype(values)
