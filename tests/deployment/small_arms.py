@@ -5,8 +5,9 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
+import pandas as pd
 
-from kinacc.calibration import fitting, frames, tables, uncertainty, vec_fit
+from kinacc.calibration import fitting, tables, uncertainty, vec_fit
 from kinacc.calibration.constraints import free_parameters
 from kinacc.calibration.frames import Frames
 from kinacc.calibration.observations import Observations, full_poses
@@ -88,7 +89,7 @@ def results_of(name: str, seen: Observations) -> dict:
         "dh_fit": tables.fit_columns("dh_fit", dh_found, known),
         "dh_covariance": tables.covariance_columns(known),
         "vec_covariance": tables.covariance_columns(uncertainty.of_fit(vec_found)),
-        "residuals": _residuals(seen, of, dh_found.model, vec_found.model),
+        "residuals": _residuals(seen, of, dh=dh_found.model, vec=vec_found.model),
     }
 
 
@@ -97,33 +98,12 @@ def calibrated(name: str, model: str = "dh", count: int = 80, seed: int = 3):
     return calibration(results(name, count, seed), robot.load(name), model, name)
 
 
-def _residuals(seen: Observations, of: dict[str, Frames], by_dh, by_vec) -> dict:
-    rows = []
-    for model, flange in (
-        ("dh", dh.forward(by_dh, seen.q_rad)),
-        ("vec", vec.pose(by_vec, seen.q_rad)),
-    ):
-        pose = compose(of[model].base, compose(flange, of[model].tool))
-        off = np.linalg.norm(pose.position_mm - seen.position_mm, axis=1)
-        rows.append((f"{model}_vs_measured", float(np.sqrt(np.mean(off**2)))))
-    return {
-        "comparison": np.array([row[0] for row in rows], dtype=object),
-        "subset": np.array(["validation"] * 2, dtype=object),
-        "fold": np.full(2, np.nan),
-        "quantity": np.array(["position"] * 2, dtype=object),
-        "rms": np.array([row[1] for row in rows]),
-    }
-
-
-__all__ = [
-    "BASE",
-    "TOOL",
-    "calibrated",
-    "frames",
-    "joints",
-    "measured",
-    "measured_at",
-    "results",
-    "results_of",
-    "truth",
-]
+def _residuals(seen: Observations, of: dict[str, Frames], **models) -> dict:
+    rms = {}
+    for name, model in models.items():
+        pose = compose(of[name].base, compose(model.pose(seen.at), of[name].tool))
+        off_mm = np.linalg.norm(pose.position_mm - seen.position_mm, axis=1)
+        rms[f"{name}_vs_measured"] = float(np.sqrt(np.mean(off_mm**2)))
+    table = pd.DataFrame({"comparison": rms.keys(), "rms": rms.values()})
+    table = table.assign(subset="validation", fold=np.nan, quantity="position")
+    return {name: column.to_numpy() for name, column in table.items()}

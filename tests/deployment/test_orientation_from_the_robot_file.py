@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import yaml
 from command_line import call
 from oracles.controllers import measured
 from oracles.controllers.arms import ARMS, errors
@@ -51,17 +50,3 @@ def test_flange_and_tool_are_turned_as_the_robot_file_says(
     wanted = [(ARM.pose(q, true=model != "nominal") @ behind)[:3, :3] for q in SHOWN]
     assert apart_deg(Rotation.from_quat(found, scalar_first=True), wanted) < allowed_deg
     assert answer["orientation"] == "stated"
-
-
-def test_exports_turn_the_tool_and_tell_measured_from_stated_orientations(results, tmp_path):
-    assert call("export", results, "--out", tmp_path).exit_code == 0
-    content = json.loads((tmp_path / "arm.json").read_text())
-    assert content["orientation_of_targets"] == {"tool": "stated"}
-    last = content["targets_in_last_dh_frame"]["tool"]["quaternion_wxyz"]
-    described = yaml.safe_load((tmp_path / "arm.yaml").read_text())["tool"]["quaternion_wxyz"]
-    for turn, wanted in ((last, ARM.behind @ TOOL), (described, TOOL)):
-        assert apart_deg(Rotation.from_quat([turn], scalar_first=True), [wanted[:3, :3]]) < 1e-6
-    origin = (tmp_path / "arm.urdf").read_text().split('name="tool_fixed"')[1].split('rpy="')[1]
-    turn = Rotation.from_euler("xyz", [[*map(float, origin.split('"')[0].split())]])
-    assert apart_deg(turn, [TOOL[:3, :3]]) < 1e-6
-    assert "stated" in (tmp_path / "arm.csv").read_text()

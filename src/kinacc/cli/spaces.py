@@ -98,7 +98,4 @@ def ranges(option: str, text: str | None, count: int, problems: list[Problem]) -
 def joint_ranges(text: str | None, robot: robots.Robot, problems: list[Problem]) -> Ends | None:
     """Ends (k,), (k,) of ``--joints-deg`` in rad, mm where a joint slides; None where not given."""
     ends = ranges("--joints-deg", text, robot.dh.joints, problems)
-    if ends is None:
-        return None
-    low, high = robots.in_own_units(robot, np.stack(ends))
-    return low, high
+    return ends and tuple(robots.in_own_units(robot, np.stack(ends)))

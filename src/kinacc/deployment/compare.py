@@ -147,8 +147,8 @@ def compare(
     }
     poses = {"pose": 1 + np.flatnonzero(covered), "measured_by_both": measured}
     for prefix, change in zip(("", "arm_"), moved, strict=True):
-        poses[f"{prefix}moved_mm"] = np.linalg.norm(change[:, :3], axis=1)
-        poses[f"{prefix}turned_mrad"] = 1e3 * np.linalg.norm(change[:, 3:], axis=1)
+        for name, vectors in (("moved_mm", change[:, :3]), ("turned_mrad", 1e3 * change[:, 3:])):
+            poses[prefix + name] = np.linalg.norm(vectors, axis=1)
     frames = ("as fitted", "best base and tool")
     return Difference(
         names,
@@ -167,17 +167,17 @@ def compare(
 
 
 def require_alike(first: Calibration, second: Calibration) -> None:
-    """InputError where the joints of after arms do not mean the same."""
+    """InputError where the joints of two arms do not mean the same."""
     before, after = first.robot, second.robot
-    message = ""
     if before.dh.joints != after.dh.joints:
         message = f"has {after.dh.joints} joints, {first.name} {before.dh.joints}"
     elif not np.array_equal(before.dh.prismatic, after.dh.prismatic):
         message = f"has other sliding joints than {first.name}"
     elif not np.array_equal(before.joint_map, after.joint_map):
         message = f"has another joint_map than {first.name}"
-    if message:
-        raise InputError(Problem(second.name, message, "the same kind of robot"))
+    else:
+        return
+    raise InputError(Problem(second.name, message, "the same kind of robot"))
 
 
 class _Knowledge(NamedTuple):

@@ -48,6 +48,8 @@ LEVEL = 0.05 / 12  # of a decision: monthly calibrations raise a false alarm in 
 ENOUGH = 0.5  # of the readings, in the joint ranges of the series in force
 MOST = 1500  # configurations of a series: what more would add is small beside the misfit
 
+_SIZES = ("mean", "quantile_99", "largest")
+
 
 @dataclass(frozen=True)
 class Session:
@@ -252,13 +254,9 @@ def _share_inside(q_rad: np.ndarray, ranged_rad: np.ndarray, prismatic: np.ndarr
 
 def _sizes(kind: str, errors_mm: np.ndarray) -> dict[str, float]:
     """Mean, 99 % and largest of errors (n,), NaN of none."""
-    if not len(errors_mm):
-        errors_mm = np.array([np.nan])
-    return {
-        f"{kind}_mean_mm": float(np.mean(errors_mm)),
-        f"{kind}_quantile_99_mm": float(np.quantile(errors_mm, LARGE_SHARE)),
-        f"{kind}_largest_mm": float(np.max(errors_mm)),
-    }
+    sizes = pd.Series(errors_mm, dtype=float)
+    values = sizes.mean(), sizes.quantile(LARGE_SHARE), sizes.max()
+    return dict(zip((f"{kind}_{name}_mm" for name in _SIZES), map(float, values), strict=True))
 
 
 def _count(observations: Observations) -> int:

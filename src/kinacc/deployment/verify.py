@@ -40,6 +40,7 @@ SET_UP_MOVED = "the instrument or the tool was moved"
 FEW_HELD_OUT = "too few held-out configurations"
 LEAST_HELD_OUT = 20  # configurations: fewer do not tell the size of errors
 DOUBLED = 2.0  # readings that would not show errors this many times as large decide nothing
+_STATISTICS = ("mean", "quantile_99", "largest", "rms")
 _FAR_MM = 10.0
 _SLACK = 1e-9  # rad and mm beyond the fitted range: rounding
 
@@ -177,27 +178,19 @@ def model_errors(
     fitted = models(tables, robot.dh)
     inside = [covers(model, observations.q_rad).all(axis=1) for model in fitted.values()]
     part = observations.select(np.all(inside, axis=0))
-    statistics = {
-        "mean": np.mean,
-        "quantile_99": lambda sizes: np.quantile(sizes, LARGE_SHARE),
-        "largest": np.max,
-        "rms": lambda sizes: np.sqrt(np.mean(sizes**2)),
-    }
     rows = []
     for kind in sorted(fitted, key=(NOMINAL, *ERROR_MODELS).index) if len(part) else ():
         model = fitted[kind]
         of_sessions = _of_sessions(tables, robot, kind, part.session_names, moved)
         frames = frames_at(of_sessions, part, moved, rotation_weight_mm_per_rad)
         off = errors({kind: Fit(model, frames)}, part)[Comparison(MEASURED, kind).name]
-        row: dict[str, object] = {"model": kind, "readings": len(part)}
-        for vectors, unit in ((off.position_mm, "mm"), (1e3 * off.rotation_rad, "mrad")):
-            sizes = np.linalg.norm(vectors[np.isfinite(vectors).all(axis=1)], axis=1)
-            row |= {
-                f"{name}_{unit}": statistic(sizes) if len(sizes) else np.nan
-                for name, statistic in statistics.items()
-            }
+        row: list[object] = [kind, len(part)]
+        for vectors in (off.position_mm, 1e3 * off.rotation_rad):
+            sizes = pd.Series(np.linalg.norm(vectors, axis=1))  # NaN where nothing was measured
+            rms = np.sqrt((sizes**2).mean())
+            row += [sizes.mean(), sizes.quantile(LARGE_SHARE), sizes.max(), rms]
         rows.append(row)
-    columns = [f"{name}_{unit}" for unit in ("mm", "mrad") for name in statistics]
+    columns = [f"{name}_{unit}" for unit in ("mm", "mrad") for name in _STATISTICS]
     return pd.DataFrame(rows, columns=["model", "readings", *columns])
 
 

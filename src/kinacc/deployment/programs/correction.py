@@ -87,20 +87,21 @@ class CorrectedProgram:
     def write(self, out: Path | str, force: bool = False) -> None:
         """Write the program; InputError for positions refused, or files that are there."""
         refuse(self.refused, "Positions cannot be corrected; nothing was written")
-        out, first = Path(out), next(iter(self.files))
+        out, (first, *others) = Path(out), self.files
         facts = {
             "from": [path.name for path in self.files],
             "calibration": self.calibration,
             "sha256": _digest(self.files.values()),
         }
-        contents = {
-            out if path == first else out.with_suffix(path.suffix): content
-            for path, content in self.files.items()
-        }
+        contents = {out: self.files[first]}
+        contents |= {out.with_suffix(path.suffix): self.files[path] for path in others}
         contents[out.with_name(out.name + _RECORD)] = f"{json.dumps(facts, indent=1)}\n".encode()
-        there = [] if force else [path for path in contents if path.exists()]
         fix = "give --force to replace it"
-        refuse(Problem(str(path), "is there already", fix=fix) for path in there)
+        refuse(
+            Problem(str(path), "is there already", fix=fix)
+            for path in contents
+            if path.exists() and not force
+        )
         write_together(contents)
 
 
@@ -121,11 +122,11 @@ def read_program(
         known = ", ".join(ending for item in LANGUAGES for ending in item.endings)
         raise InputError(Problem(str(path), f"ends in {ending!r}: no robot language", known))
     beside = {item.name.lower(): item for item in path.parent.iterdir() if item != path}
-    partners = [path.stem.lower() + suffix for suffix in language.partners]
-    sources = [Source.read(item) for item in (path, *(beside[n] for n in partners if n in beside))]
-    named = [beside[name] for name in language.frame_files if name in beside]
-    frames = {}
-    for source in [*(Source.read(Path(item)) for item in (*named, *frame_files)), *sources]:
+    partners = (beside.get(path.stem.lower() + suffix) for suffix in language.partners)
+    named = map(beside.get, language.frame_files)
+    sources = [Source.read(item) for item in (path, *filter(None, partners))]
+    frames: Frames = {}
+    for source in [*map(Source.read, map(Path, (*filter(None, named), *frame_files))), *sources]:
         is_yaml = source.path.suffix.lower() == ".yaml"
         frames |= frames_of(source, language.convention) if is_yaml else language.frames(source)
     program = language.read(sources, frames, pulses_per_degree)
