@@ -113,14 +113,14 @@ def _beside(config: str, path: str) -> str:
     return os.path.relpath(path, Path(config).absolute().parent).replace(os.sep, "/")
 
 
-def _day(option: str, given: str | None, path: str, settings: Mapping) -> str:
+def _day(option: str, date: str | None, path: str, settings: Mapping) -> str:
     """A day as given, or of the times of the file."""
-    if given is None:
+    if date is None:
         days = times.days(files.load(path, Layout.of(settings["measurements"]["file"])))
     else:
-        days = [day_of(given)]
+        days = [day_of(date)]
     if len(days) != 1 or days[0] is None:
-        raise InputError(Problem(option, f"{given or path} has no day", "a day as 2026-06-02"))
+        raise InputError(Problem(option, f"{date or path} has no day", "a day as 2026-06-02"))
     return days[0]
 
 

@@ -204,9 +204,9 @@ class _Knowledge(NamedTuple):
 
 
 def _parameters(
-    names: tuple[str, ...], one: np.ndarray, two: np.ndarray, known: list[_Knowledge]
+    names: tuple[str, ...], first: np.ndarray, second: np.ndarray, known: list[_Knowledge]
 ) -> pd.DataFrame:
-    """Parameters ``one`` and ``two`` (P,) in mm and mrad, and what is known of them."""
+    """Parameters ``first`` and ``second`` (P,) in mm and mrad, and what is known of them."""
     hidden = [np.sum(item.undetermined**2, axis=0) > _TOUCHED for item in known]
     std = np.sqrt(sum(np.diag(item.covariance) for item in known))
     std[np.any(hidden, axis=0)] = np.nan
@@ -215,15 +215,15 @@ def _parameters(
             name.rpartition("_")[0] if unit_of(name) in ("rad", "mm") else name for name in names
         ],
         "unit": [scaled_unit(name) for name in names],
-        "first": one,
-        "second": two,
-        "difference": two - one,
+        "first": first,
+        "second": second,
+        "difference": second - first,
         "std": std,
-        "sigmas": np.divide(two - one, std, out=np.full(len(std), np.nan), where=std > 0.0),
+        "sigmas": np.divide(second - first, std, out=np.full(len(std), np.nan), where=std > 0.0),
         "undetermined": np.array(["", "first", "second", "both"])[hidden[0] + 2 * hidden[1]],
     })  # fmt: skip
     fitted = known[0].fitted | known[1].fitted
-    return table[fitted | (np.abs(two - one) > ROUNDING)].reset_index(drop=True)
+    return table[fitted | (np.abs(second - first) > ROUNDING)].reset_index(drop=True)
 
 
 def _test(difference: np.ndarray, known: list[_Knowledge]) -> tuple[float, int, float]:

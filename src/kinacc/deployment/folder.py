@@ -26,7 +26,7 @@ Tables = Mapping[str, Mapping[str, np.ndarray]]
 _NEEDED = (*(f"{kind}_model" for kind in ALWAYS), "frames")
 # Used where they are there.
 _WANTED = (
-    *(f"{kind}_{what}" for kind in ERROR_MODELS for what in ("model", "fit", "covariance")),
+    *(f"{kind}_{table}" for kind in ERROR_MODELS for table in ("model", "fit", "covariance")),
     *("measurements", "dh_identified", "residuals", "model_selection"),
 )
 _SAME = 1e-9
@@ -214,21 +214,21 @@ def uncertainty(tables: Tables, choice: str) -> Uncertainty | None:
     return Uncertainty(tuple(map(str, parameters)), covariance, directions)
 
 
-def require_same_robot(recorded: Robot, given: Robot, place: str) -> None:
+def require_same_robot(recorded: Robot, robot: Robot, place: str) -> None:
     """InputError where a robot given is not the one results were made with.
 
     Limits and tool may differ: they are no part of what was fitted.
     """
-    _require_same_arm(recorded.dh, given, place)
+    _require_same_arm(recorded.dh, robot, place)
     pairs = {
-        "sliding joints": (recorded.dh.prismatic, given.dh.prismatic),
-        "joint_map or signs": (recorded.joint_map, given.joint_map),
-        "base": (np.column_stack(recorded.base), np.column_stack(given.base)),
-        "flange": (np.column_stack(recorded.flange), np.column_stack(given.flange)),
+        "sliding joints": (recorded.dh.prismatic, robot.dh.prismatic),
+        "joint_map or signs": (recorded.joint_map, robot.joint_map),
+        "base": (np.column_stack(recorded.base), np.column_stack(robot.base)),
+        "flange": (np.column_stack(recorded.flange), np.column_stack(robot.flange)),
     }
     for message, (first, two) in pairs.items():
         if not np.allclose(first, two, rtol=_SAME, atol=_SAME):
-            raise _another_robot(place, given, message)
+            raise _another_robot(place, robot, message)
 
 
 def _require_same_arm(nominal: DHModel, robot: Robot, place: str) -> None:
@@ -241,6 +241,6 @@ def _require_same_arm(nominal: DHModel, robot: Robot, place: str) -> None:
             raise _another_robot(place, robot, f"{parameter} of joint {apart[0] + 1} {message}")
 
 
-def _another_robot(place: str, robot: Robot, what: str) -> InputError:
-    text = f"was made with another robot than {robot.name}: {what}"
+def _another_robot(place: str, robot: Robot, difference: str) -> InputError:
+    text = f"was made with another robot than {robot.name}: {difference}"
     return InputError(Problem(place or "results", text, fix="give its robot (--robot)"))

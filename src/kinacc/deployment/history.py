@@ -103,7 +103,7 @@ def history(
     comparison = _Comparison(rotation_weight_mm_per_rad, seed, level, {})
     rows: list[dict[str, Any]] = []
     force, setup = None, Setup(True, True)
-    for session in sorted(sessions, key=lambda each: each.date):
+    for session in sorted(sessions, key=lambda session: session.date):
         setup = Setup(
             setup.same_base & (session.base == SAME), setup.same_tool & (session.tool == SAME)
         )
@@ -121,7 +121,7 @@ def history(
         rows.append(row)
         if row["verdict"] in (FIRST, RECALIBRATE):
             force, setup = session, Setup(True, True)
-    columns = [each.name for each in ARTEFACTS["history"].columns]
+    columns = [column.name for column in ARTEFACTS["history"].columns]
     return columns_of("history", [[row.get(name) for name in columns] for row in rows])
 
 

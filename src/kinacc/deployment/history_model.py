@@ -309,14 +309,14 @@ def _seen_directions(pair: Pair) -> np.ndarray:
 
 
 def _variances(
-    gram: np.ndarray, seen: np.ndarray, pair: Pair, split: int, group: np.ndarray
+    gram: np.ndarray, observed: np.ndarray, pair: Pair, split: int, group: np.ndarray
 ) -> tuple[float, np.ndarray]:
     """Variance of noise, and of every group of random effects, by the evidence."""
-    beside = np.column_stack([gram[:split, split:], seen[:split]])
+    beside = np.column_stack([gram[:split, split:], observed[:split]])
     free = np.linalg.solve(gram[:split, :split], beside)
     inner = gram[split:, split:] - gram[split:, :split] @ free[:, :-1]
-    right = seen[split:] - gram[split:, :split] @ free[:, -1]
-    square = float(pair.residual @ pair.residual - seen[:split] @ free[:, -1])
+    right = observed[split:] - gram[split:, :split] @ free[:, -1]
+    square = float(pair.residual @ pair.residual - observed[:split] @ free[:, -1])
     remaining = len(pair.residual) - split
     prior, noise = np.full(group.max() + 1, _START_MM**2), 0.3 * square / remaining
     for _ in range(_ROUNDS):
@@ -346,10 +346,10 @@ def _inverse(matrix: np.ndarray) -> np.ndarray:
 
 
 def _shares(
-    pair: Pair, columns: np.ndarray, found: np.ndarray, inverse: np.ndarray, changes: slice
+    pair: Pair, columns: np.ndarray, solution: np.ndarray, inverse: np.ndarray, changes: slice
 ) -> np.ndarray:
     """Share (c, d) of every configuration in the change, by residuals of a fit without it."""
-    remaining, pull = pair.residual - columns @ found, columns @ inverse
+    remaining, pull = pair.residual - columns @ solution, columns @ inverse
     order = np.argsort(pair.cluster, kind="stable")
     label, begin, size = np.unique(pair.cluster[order], return_index=True, return_counts=True)
     shares = np.empty((len(label), changes.stop - changes.start))
@@ -366,15 +366,15 @@ def _shares(
     return shares
 
 
-def joint_of(found: Moved, prismatic: np.ndarray) -> int | None:
+def joint_of(movement: Moved, prismatic: np.ndarray) -> int | None:
     """The joint (1-based) that a change of explains most of the movement; None where unclear.
 
     Offsets first, as belts, encoders and collisions change these; then all DH parameters of a
     joint. Clear: it explains most beyond chance, and is it with the probability ``_CLEAR``.
     """
-    white = found.white()
+    white = movement.white()
     chance = float(np.sum(white**2))
-    observed = scipy.linalg.solve_triangular(white, found.change, lower=True)
+    observed = scipy.linalg.solve_triangular(white, movement.change, lower=True)
     slide, turn, along, about_ = (
         ERRORS.index(item) for item in ("delta_z", "eps_z", "delta_x", "eps_x")
     )
@@ -385,18 +385,18 @@ def joint_of(found: Moved, prismatic: np.ndarray) -> int | None:
         for joint in range(count):
             link = [size + along, size + about_] if joint + 1 < count else []  # else the tool's
             local = [slide, turn, *link] if whole else [slide if prismatic[joint] else turn]
-            way = found.along(units[:, [size * joint + item for item in local]])
+            way = movement.along(units[:, [size * joint + item for item in local]])
             way = way[:, np.linalg.norm(way, axis=0) > _UNSEEN_MM]
             fit = np.linalg.lstsq(scipy.linalg.solve_triangular(white, way, lower=True), observed)[
                 0
             ]
-            beside = found.change - way @ fit
+            beside = movement.change - way @ fit
             explained[joint] = observed @ scipy.linalg.solve_triangular(
                 white, way @ fit, lower=True
             )
             remaining[joint] = beside @ beside
         best = int(np.argmax(explained))
-        most = remaining[best] - chance <= (1.0 - _MOST) * (found.moved_mm**2 - chance)
+        most = remaining[best] - chance <= (1.0 - _MOST) * (movement.moved_mm**2 - chance)
         clear = np.sum(np.exp(0.5 * (explained - explained[best]))) <= 1.0 / _CLEAR
         if most and clear and explained[best] > 0.0:
             return best + 1

@@ -194,10 +194,10 @@ def model_errors(
     return pd.DataFrame(rows, columns=["model", "readings", *columns])
 
 
-def _whole_configurations(seen: Observations, counted: np.ndarray) -> np.ndarray:
+def _whole_configurations(readings: Observations, counted: np.ndarray) -> np.ndarray:
     """Rows (m, K) of configurations with all K targets: the first counted reading of each."""
-    rows, targets = np.flatnonzero(counted), range(len(seen.target_names))
-    part = seen.select(rows)
+    rows, targets = np.flatnonzero(counted), range(len(readings.target_names))
+    part = readings.select(rows)
     table = pd.DataFrame({
         "configuration": configurations(part.pose, part.q_rad), "target": part.target, "row": rows,
     })  # fmt: skip
@@ -211,13 +211,13 @@ def _held_out(
     kind: str,
     model: ErrorModel,
     robot: Robot,
-    seen: Observations,
+    readings: Observations,
     moved: Sequence[str],
 ) -> Columns | None:
-    """Held-out errors of configurations with as many targets as ``seen``; None where none are."""
+    """Held-out errors of configurations with the targets of ``readings``; None where none are."""
     if not {"pose_errors", "measurements"} <= set(tables):
         return None
-    measured, names = from_columns(tables["measurements"], robot), seen.target_names
+    measured, names = from_columns(tables["measurements"], robot), readings.target_names
     if TOOL in moved:
         names = measured.target_names[: len(names)]
     target = pd.Index(names).get_indexer(list(measured.target_names))[measured.target]
@@ -289,15 +289,15 @@ def _of_sessions(
 
 def frames_at(
     calibrations: Sequence[Calibration],
-    seen: Observations,
+    readings: Observations,
     moved: Sequence[str],
     rotation_weight_mm_per_rad: float,
 ) -> Frames:
-    """Base and targets of ``seen``: those of the calibration, or fitted to it where ``moved``.
+    """Base and targets of ``readings``: those of the calibration, or fitted to it where ``moved``.
 
     ``calibrations``: one for each session, with its base; the joint model stays as fitted.
     """
-    calibration, names = calibrations[0], seen.target_names
+    calibration, names = calibrations[0], readings.target_names
     tool = carried(calibration.robot)
     targets = [
         calibration.targets.get(name, tool) if TOOL in moved else calibration.point(name)
@@ -306,11 +306,13 @@ def frames_at(
     frames = Frames(stacked([item.base for item in calibrations]), stacked(targets))
     if not moved:
         return frames
-    terms = frame_terms(seen, frames)
+    terms = frame_terms(readings, frames)
     of_base = np.arange(len(terms.names)) < len(MOTIONS) * len(calibrations)  # these stand first
     terms = replace(terms, free=np.where(of_base, BASE in moved, TOOL in moved))
     weight = rotation_weight_mm_per_rad
-    return fit_frames(seen, calibration.model, rotation_weight_mm_per_rad=weight, frame_terms=terms)
+    return fit_frames(
+        readings, calibration.model, rotation_weight_mm_per_rad=weight, frame_terms=terms
+    )
 
 
 def covers(model: ErrorModel, q_rad: np.ndarray) -> np.ndarray:

@@ -19,7 +19,7 @@ from kinacc.kinematics.robot import Robot
 from kinacc.tables import store
 from kinacc.tables.atomic import replacing
 
-FORMATS = tuple(each.name for each in pkgutil.iter_modules(_formats.__path__))
+FORMATS = tuple(module.name for module in pkgutil.iter_modules(_formats.__path__))
 
 
 def format_named(name: str) -> ModuleType:
@@ -83,9 +83,9 @@ def notes(source: Source) -> list[str]:
     return lines
 
 
-def write(made: Mapping[str, str], target: Path | str, force: bool = False) -> list[str]:
+def write(files: Mapping[str, str], target: Path | str, force: bool = False) -> list[str]:
     """Write files into a folder, all or none; InputError for those already there."""
-    paths = [Path(target) / name for name in made]
+    paths = [Path(target) / name for name in files]
     refuse(
         [
             Problem(str(path), "is there already", fix="give --force to replace it")
@@ -95,6 +95,6 @@ def write(made: Mapping[str, str], target: Path | str, force: bool = False) -> l
         "Nothing was written",
     )
     with replacing(paths) as temporary:
-        for part, text in zip(temporary, made.values(), strict=True):
+        for part, text in zip(temporary, files.values(), strict=True):
             part.write_text(text, encoding="utf-8")
     return [str(path) for path in paths]

@@ -64,16 +64,18 @@ def with_deviation(value: float, std: float) -> str:
 
 def _residuals(source: Source, comparison: str, name: str, caption: str) -> PaperTable:
     table = pd.DataFrame(
-        {key: np.asarray(each) for key, each in source.tables["residuals"].items()}
+        {key: np.asarray(column) for key, column in source.tables["residuals"].items()}
     )
     table = table[table["fold"].astype(float).isna() & (table["comparison"] == comparison)]
-    table = table.sort_values("subset", key=lambda each: each.map([*POSES].index), kind="stable")
+    table = table.sort_values(
+        "subset", key=lambda subset: subset.map([*POSES].index), kind="stable"
+    )
     cells = pd.DataFrame({
         "": table["quantity"] + " [" + table["unit"] + "], " + table["subset"].map(POSES),
         "points": table["n"].astype(int).astype(str),
     })  # fmt: skip
     for key, head in _STATISTICS.items():
-        cells[head] = [f"{each:.3f}" if np.isfinite(each) else "-" for each in table[key]]
+        cells[head] = [f"{value:.3f}" if np.isfinite(value) else "-" for value in table[key]]
     note = "99 % gamma: quantile of a gamma distribution fitted to the magnitudes."
     return PaperTable(name, caption, cells, [note])
 

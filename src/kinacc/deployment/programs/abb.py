@@ -90,12 +90,12 @@ def read(sources: Sequence[Source], frames: Frames, _: np.ndarray | None) -> Pro
             bare = re.sub(r"\[.*?\](?=\s*[,\\])|\(.*\)", "", statement, flags=re.S).upper()
             tool = re.match(r"\s*(\w+)", bare.split(",")[-1])
             work = re.search(r"\\WOBJ\s*:=\s*(\w+)", statement.upper())
-            words = {*re.findall(r"(?<!\\)\b[A-Z]\w*", bare)}
+            names_used = {*re.findall(r"(?<!\\)\b[A-Z]\w*", bare)}
             if not here and not _COMPUTED.search(statement):
-                moves.append((line, words))
+                moves.append((line, names_used))
             for start in [
                 *here,
-                *(start for start, name in names.items() if name.upper() in words),
+                *(start for start, name in names.items() if name.upper() in names_used),
             ]:
                 way = tool and tool[1], work[1] if work else "WOBJ0"
                 uses.setdefault(start, set()).add(way)
@@ -108,7 +108,7 @@ def read(sources: Sequence[Source], frames: Frames, _: np.ndarray | None) -> Pro
         if changed := _SET.match(statement):
             refused[changed[1].upper()] = CHANGED
     defined = {name.upper() for name in names.values()}
-    computed += [line for line, words in moves if not words & defined]
+    computed += [line for line, names_used in moves if not names_used & defined]
     computed += [line for line, name in assignments if name in defined and line not in computed]
     positions = []
     for start, end in ends.items():

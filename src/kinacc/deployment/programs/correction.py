@@ -177,9 +177,9 @@ def compensate_program(
     language, program = read_program(path, frame_files, pulses_per_degree)
     convention = program.convention or language.convention
     _refuse_second_time(program)
-    given_frames = {TOOL: tools or {}, BASE: bases or {}}
-    program = _in_use(program, given_frames)
-    frames = _all_frames(program, convention, given_frames, ask)
+    options = {TOOL: tools or {}, BASE: bases or {}}
+    program = _in_use(program, options)
+    frames = _all_frames(program, convention, options, ask)
     positions, robot = program.positions, calibration.robot
     tool, base = (
         [frames.get((kind, getattr(item, kind) or ""), IDENTITY) for item in positions]
@@ -293,20 +293,20 @@ def _digest(contents: Iterable[bytes]) -> str:
 def _refuse_second_time(program: Program) -> None:
     path = program.sources[0].path
     digest = _digest(source.text.encode("latin-1") for source in program.sources)
-    for mark in sorted(path.parent.glob(f"*{_RECORD}")):
-        if digest in mark.read_text(errors="replace"):
+    for record in sorted(path.parent.glob(f"*{_RECORD}")):
+        if digest in record.read_text(errors="replace"):
             fix = "give the program it was made from"
-            raise InputError(Problem(str(path), f"was compensated before ({mark.name})", fix=fix))
+            raise InputError(Problem(str(path), f"was compensated before ({record.name})", fix=fix))
 
 
-def _in_use(program: Program, given: Mapping) -> Program:
+def _in_use(program: Program, options: Mapping) -> Program:
     """The program without poses that no move uses, unless a frame for all of them is given."""
     unused = [
         item
         for item in program.positions
         if item.scale is None and item.tool is None and item.base is None and not item.refused
     ]
-    if "" in given[TOOL] or "" in given[BASE] or len(unused) == len(program.positions):
+    if "" in options[TOOL] or "" in options[BASE] or len(unused) == len(program.positions):
         return program
     return replace(
         program,
@@ -319,15 +319,15 @@ def _in_use(program: Program, given: Mapping) -> Program:
 
 
 def _all_frames(
-    program: Program, convention: Convention, given: Mapping, ask: Ask | None
+    program: Program, convention: Convention, options: Mapping, ask: Ask | None
 ) -> Frames:
     """The program's frames and those a person gave; InputError naming those that are missing."""
     frames, problems = dict(program.frames), []
     poses = [item for item in program.positions if item.scale is None and not item.refused]
     wanted = {(kind, getattr(item, kind) or "") for item in poses for kind in (TOOL, BASE)}
-    wanted |= {(TOOL, "")} if "" in given[TOOL] else set()
+    wanted |= {(TOOL, "")} if "" in options[TOOL] else set()
     for kind, name in sorted(wanted - set(frames)):
-        numbers = given[kind].get(name, given[kind].get(""))
+        numbers = options[kind].get(name, options[kind].get(""))
         if numbers is None and ask is not None:
             numbers = ask(kind, name)
         if numbers is None:

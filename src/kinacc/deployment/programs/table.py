@@ -41,7 +41,7 @@ def read(sources: Sequence[Source], frames: Frames, _: np.ndarray | None) -> Pro
     (source,) = sources
     lines = [line for line in re.finditer(r"[^\r\n]+", source.text) if line[0].strip()]
     head = lines[0][0] if lines else ""
-    separator = next((mark for mark in ";\t" if mark in head), ",")
+    separator = next((sign for sign in ";\t" if sign in head), ",")
     units = {}
     for cell in head.split(separator):
         column = _COLUMN.fullmatch(cell.strip('\xef\xbb\xbf" ').lower())

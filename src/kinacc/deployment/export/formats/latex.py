@@ -9,7 +9,7 @@ from kinacc.deployment.export.source import Source
 
 ENDING, ANY_MODEL = "_tables.tex", False
 _MARKS = {"\\": r"\textbackslash ", "^": r"\^{}", "~": r"\~{}", "±": r"$\pm$", "†": r"$^\dagger$"}
-_MARKS |= {mark: f"\\{mark}" for mark in "&%_#${}"}
+_MARKS |= {sign: f"\\{sign}" for sign in "&%_#${}"}
 
 
 def text(source: Source) -> str:
@@ -28,5 +28,5 @@ def text(source: Source) -> str:
     return "\n".join(parts)
 
 
-def _tex(words: str) -> str:
-    return re.sub(r"[\\^~±†&%_#${}]", lambda mark: _MARKS[mark[0]], words)
+def _tex(text: str) -> str:
+    return re.sub(r"[\\^~±†&%_#${}]", lambda sign: _MARKS[sign[0]], text)
