@@ -94,7 +94,6 @@ def scale_problems(table: RawTable, columns: Mapping, robot: Robot) -> Iterator[
     elif ratio > 3.0 and turning.max() < np.deg2rad(2.0 * np.pi) + 1e-9:
         hint = "the joints look like radians"
     if hint:
-        message = f"the points spread over {measured:.4g} mm rms, the joints move {robot.name} by "
-        message += f"{expected:.4g} mm rms"
+        message = f"the points spread over {measured:.4g} mm rms, the arm over {expected:.4g} mm"
         where = f"{table.path}: columns x, y, z and q1 .. q{joints}"
         yield Problem(where, message, "about the same", hint)

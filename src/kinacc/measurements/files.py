@@ -93,8 +93,7 @@ def opened(path: Path, encoding: str):
 
 
 def _refuse_too_much(path: str, amount: str) -> None:
-    allowed = f"at most {MOST_ROWS} rows, {MOST_COLUMNS} columns, {MOST_CELLS} cells and "
-    allowed += f"{MOST_BYTES // 1_000_000} MB unpacked"
+    allowed = f"at most {MOST_ROWS} rows, {MOST_COLUMNS} columns, {MOST_CELLS} cells, 500 MB"
     fix = "give the rows and columns of the measurements alone"
     raise InputError(Problem(path, amount, allowed, fix))
 

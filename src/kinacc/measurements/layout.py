@@ -260,8 +260,7 @@ class _Finder:
         unclear = [n for n in points if n not in read and roles[n] == column_names.OPEN]
         unclear = unclear if read or named else unclear or [n for n in points if n not in read]
         if unclear:
-            fix = "name those that were measured in measurements.file.targets (of: "
-            fix += f"{', '.join(points)})"
+            fix = f"name those measured in measurements.file.targets, of {', '.join(points)}"
             message = "the name does not say that this was measured"
             self.problem(", ".join(points[n] for n in unclear), message, "measured points", fix)
         return list(dict.fromkeys([*read, *named])) or [TOOL]
@@ -294,8 +293,7 @@ class _Finder:
         there = any(self.place(name) or name in self.layout.columns for name in names)
         if ordered or there or not alone:  # of several targets some may be bare points
             return ordered or self.group(names, required=alone)
-        fix = "set measurements.file.orientation.kind (none for positions alone), or map them in "
-        fix += "measurements.file.columns"
+        fix = "set measurements.file.orientation.kind: none for positions alone"
         message = "are missing: the file states no orientation"
         self.problem(", ".join(names), message, listed(self.table), fix)
         return ()

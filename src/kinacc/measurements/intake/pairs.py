@@ -113,16 +113,15 @@ def _join(joints: Looked, points: Looked, answers: Mapping) -> tuple[JointsFile,
         return _by_name(key, key_of_points or key), ()
     if answer != TIME and (how := _by_names(joints, points)):
         count = int(np.sum(rows_by_name(points.table, joints.table, how) >= 0))
-        note = f"joined where {how.key} of {joints.table.path} is {how.key_of_points} of "
-        note += f"{points.table.path}: {count} of {len(points.table)} points have joints"
+        note = f"joined where {how.key} of the joints is {how.key_of_points} of the points: "
+        note += f"{count} of {len(points.table)} points have joints"
         return how, (note,)
     times = _times(joints), _times(points)
     if all(times):
         return _by_clock(joints, points, *times, answers)
     if len(points.table) == len(joints.table):
         raise _undecided(joints, points, [])
-    message = f"the joints of its {len(points.table)} points among the {len(joints.table)} of "
-    message += f"{joints.table.path} are unknown"
+    message = f"its {len(points.table)} points belong to unknown rows of {joints.table.path}"
     fix = "add a column with the names of poses, or with times, to both; --join A=B names them"
     raise InputError(Problem(points.table.path, message, fix=fix))
 
@@ -194,8 +193,8 @@ def _by_clock(
     if answer is None:
         ways = clocks.offsets(here, stands, within)
         if len(ways) != 1:
-            about = f"{'several' if ways else 'no'} offsets of the clocks put {key_of_points} of "
-            about += f"{points.table.path} at the standstills by {key} of {joints.table.path}"
+            about = f"{'several' if ways else 'no'} offsets of the clocks put the points, by "
+            about += f"{key_of_points}, at the standstills of the arm, by {key}"
             meant = {f"{way:.3f}": f"{way:.3f} s are added to times of points" for way in ways[:4]}
             meant = meant or {"0": "both clocks showed the same"}
             raise Undecided(points.table.path, [Choice("--clock-offset", about, meant)])
@@ -217,6 +216,5 @@ def _undecided(joints: Looked, points: Looked, ways: Sequence[JointsFile]) -> Un
                for how in ways}  # fmt: skip
     if count == others:
         answers[ORDER] = "the first row belongs to the first, and so on"
-    about = f"nothing decides which joints of {joints.table.path} ({others} rows) belong to which "
-    about += f"points ({count} rows)"
+    about = f"nothing decides which of {others} rows of joints belong to {count} points"
     return Undecided(points.table.path, [Choice("--join", about, answers)])

@@ -261,8 +261,7 @@ def _names_of(
             message = f"{len(row)} names above rows of {head.width} cells"
             fix = "export decimal commas with ; or tab between the columns"
             raise InputError(Problem(f"{path}: line {line}", message, "as many names", fix))
-    fix = "write a line of names above the numbers, such as q1_deg,..,x_mm,y_mm,z_mm, or give "
-    fix += f"--names with {head.width} names parted by commas"
+    fix = f"write a line of names above the numbers, or give --names with {head.width} names"
     raise InputError(Problem(str(path), "the columns have no names", "one line of names", fix))
 
 
