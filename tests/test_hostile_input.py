@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import shutil
-from contextlib import suppress
 from pathlib import Path
 
 import pyarrow as pa
@@ -14,22 +13,10 @@ from command_line import call, small_study
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from kinacc.errors import KinaccError
-from kinacc.kinematics import robot
-
 EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
 DATA = "data/ur10_tmac/series_B.csv"
 SERIES = "".join((EXAMPLES / DATA).read_text().splitlines(keepends=True)[:11])
 CONFIG = (EXAMPLES / "ur10.yaml").read_text().partition("  ur10_d:")[0]
-ROBOT = (EXAMPLES / "ur5.robot.yaml").read_text()
-OF_URDF = "name: own\nurdf: arm.urdf\nbase_link: l0\ntip_link: l4\njoint_map: {couplings: []}\n"
-LINKS = "".join(
-    f'<link name="l{i}"/>\n<joint name="j{i}" type="{kind}">\n<origin xyz="0 {i}.2 0.1" '
-    f'rpy="0 1.5708 0"/>\n<parent link="l{i}"/><child link="l{i + 1}"/>\n<axis xyz="0 0 1"/>\n'
-    f'<limit lower="-2.5" upper="2.0" effort="1" velocity="1"/>\n</joint>\n'
-    for i, kind in enumerate(("revolute", "continuous", "prismatic", "revolute"))
-)
-URDF = f'<?xml version="1.0"?>\n<robot name="arm">\n{LINKS}<link name="l4"/>\n</robot>\n'
 
 WORDS = "- nan inf -1e400 1e99 0x1F 1,5 =1/0 null true [1,2] {a:1} *a &a !!binary 2020-13-01 12:61"
 WORDS += " é \ufeff \0 ' \" <a> &lt; q1 x_mm ; ../x"
@@ -116,18 +103,6 @@ def test_a_measured_file_with_a_description(folder, text, encoding):
 def test_a_configuration(folder, text):
     (folder / "odd.yaml").write_bytes(text.encode("utf-8", "replace"))
     taken_or_refused("check-data", folder / "odd.yaml")
-
-
-@settings(max_examples=150)
-@given(edited(ROBOT) | edited(OF_URDF) | st.just(OF_URDF), edited(URDF))
-@example(OF_URDF.replace("arm.urdf", "null"), URDF)
-def test_a_robot_file_and_its_urdf(folder, text, urdf):
-    (folder / "arm.yaml").write_bytes(text.encode("utf-8", "replace"))
-    (folder / "arm.urdf").write_bytes(urdf.encode("utf-8", "replace"))
-    for name in ("arm.yaml", "arm.urdf"):
-        with suppress(KinaccError):
-            arm = robot.load(folder / name)
-            robot.forward(arm, 0.5 * (arm.q_min_rad + arm.q_max_rad)[None])
 
 
 TABLES = st.sampled_from(["vec_model", "dh_model", "frames", "dh_fit", "measurements", "robot"])

@@ -56,13 +56,6 @@ def test_angles_of_fanuc_kuka_and_kawasaki(joint, letters, convention, tmp_path)
     assert_turned(assert_read(section, IT), IT)
 
 
-def test_names_that_count_but_are_poses_of_their_own_stay_so(tmp_path):
-    names = [f"P{row // 2}_{row % 2 + 1}" for row in range(len(IT.q))]
-    text = table(["Point", *joints("q{}_deg"), *XYZ], names, IT.q, IT.point)
-    section, _ = described(written(tmp_path, m_csv=text))
-    assert len(set(assert_read(section, IT)["pose"].tolist())) == len(IT.q)
-
-
 def test_rounded_joints_are_said_to_cost_what_they_do(tmp_path):
     arm = tracked(digits=2)
     text = table([*joints("q{}_deg"), *XYZ], arm.q, arm.point)

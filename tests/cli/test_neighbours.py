@@ -5,11 +5,8 @@ from __future__ import annotations
 import csv
 import json
 
-import numpy as np
 import pytest
 from command_line import call, small_study
-
-from kinacc.tables import store
 
 KINDS = ("csv", "json", "parquet")
 
@@ -119,19 +116,3 @@ def test_rows_without_an_answer_are_told_and_left_out(folder, tmp_path):
     done = call("predict", folder, joints, "--model", "dh")
     assert done.exit_code == 2
     assert "q1_deg, line 3: not a finite number" in done.output
-
-
-def test_measured_errors_of_a_campaign_plan_the_next_one(folder, tmp_path):
-    campaign = tmp_path / "check"
-    begin(folder, campaign, "--candidates", 12)
-    record_all(campaign, tmp_path / "readings.csv")
-    assert call("campaign", "report", campaign).exit_code == 0
-    points = campaign / "report" / "campaign_points.parquet"
-    assert np.isnan(store.read(points)["ex_mm"]).any()
-    for name in ("campaign_points", "campaign_readings"):
-        errors = campaign / "report" / f"{name}.parquet"
-        done = call("campaign", "plan", "--noise-mm", 0.05, "--candidates", 5, "--budget", 5,
-                    "--errors", errors, "--repetitions", 2, "--json")  # fmt: skip
-        assert done.exit_code == 0, done.output
-        (row,) = json.loads(done.stdout)["rows"]
-        assert row["true_mm"] == pytest.approx(0.1 * 3**0.5, abs=1e-6)
