@@ -7,8 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from kinacc.assess.looks import boundary, look_counts
-from kinacc.assess.lower_average import LowerAverage
+from kinacc.assess.looks import LowerAverage, boundary, look_counts
 from kinacc.assess.wrong_readings import clip_of
 
 ERROR, WALKS = 0.05, 200_000

@@ -10,7 +10,7 @@ from command_line import call
 from kinacc.assess.random_numbers import key_of
 from kinacc.assess.world import drawn_world
 from kinacc.campaign import folder as campaigns
-from kinacc.campaign.reading import Reading
+from kinacc.campaign.state import Reading
 
 SIGMA_MM = 0.05
 

@@ -7,8 +7,7 @@ import pytest
 from scipy.stats import kstest
 
 from kinacc.campaign import folder
-from kinacc.campaign.reading import Reading
-from kinacc.campaign.state import Told, nearness, restore, scatter
+from kinacc.campaign.state import Reading, Told, nearness, restore, scatter
 
 SPREAD = np.diag([0.05, 0.05, 0.15])
 

@@ -3,8 +3,7 @@
 import numpy as np
 
 from kinacc.campaign import folder
-from kinacc.campaign.reading import Reading
-from kinacc.campaign.state import restore
+from kinacc.campaign.state import Reading, restore
 
 PLANNED = {"points": 30, "budget": 70, "references": 20}
 

@@ -12,8 +12,7 @@ from kinacc.assess.registry import ADAPTIVE
 from kinacc.assess.simulate import conduct
 from kinacc.campaign import folder
 from kinacc.campaign.plan import fixed_visit, from_json, to_json
-from kinacc.campaign.reading import Reading
-from kinacc.campaign.state import restore
+from kinacc.campaign.state import Reading, restore
 
 
 def reading_of(plan, world, state):

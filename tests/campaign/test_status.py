@@ -16,8 +16,7 @@ from kinacc.assess.simulate import carry_on
 from kinacc.campaign import folder
 from kinacc.campaign.folder import Opened
 from kinacc.campaign.plan import Limits
-from kinacc.campaign.reading import Reading
-from kinacc.campaign.state import restore
+from kinacc.campaign.state import Reading, restore
 from kinacc.campaign.status import ADVICE, REASONS, status
 from kinacc.cli.output import plain
 

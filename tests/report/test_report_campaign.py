@@ -13,7 +13,7 @@ from kinacc.campaign import begin, folder, report
 from kinacc.campaign.folder import Opened
 from kinacc.campaign.instrument import instruments
 from kinacc.campaign.plan import Limits, assessor_of
-from kinacc.campaign.reading import Reading
+from kinacc.campaign.state import Reading
 from kinacc.deployment.planning import spread
 from kinacc.deployment.record import nominal
 from kinacc.figures.campaign import draw

@@ -3,17 +3,50 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
 
-from kinacc.assess.adaptive import AdaptiveAssessor, Candidates, check_settings
-from kinacc.assess.confirming import MISSED, SearchAndConfirmCampaign
+from kinacc.assess.adaptive import (
+    FIRST_SHARE,
+    AdaptiveAssessor,
+    Campaign,
+    Candidates,
+    check_settings,
+)
 from kinacc.assess.counts import excepted, hardly_missed
-from kinacc.assess.noise import ENOUGH, ESTIMATED, FEWEST, KNOWN
-from kinacc.assess.reference_poses import poses_of
-from kinacc.assess.statement import CONFIDENCE, MEAN, VISIT, Reason
+from kinacc.assess.looks import (
+    EARLY,
+    SHARE,
+    Looks,
+    LowerAverage,
+    boundary,
+    direction_of,
+    look_counts,
+)
+from kinacc.assess.noise import (
+    ENOUGH,
+    ESTIMATED,
+    FEWEST,
+    KNOWN,
+    CampaignNoise,
+    factor_limit,
+    noise_plan,
+)
+from kinacc.assess.population import largest_size
+from kinacc.assess.reference_poses import Change, found, planned_readings, poses_of, schedule
+from kinacc.assess.statement import (
+    CANDIDATES,
+    CONFIDENCE,
+    MEAN,
+    MEASURED,
+    VISIT,
+    Reason,
+    Statement,
+    Suspicious,
+)
+from kinacc.assess.wrong_readings import at_most_wrong, suspicious_readings
 
 VISITED = 0.9  # of the budget, where it is smaller than the number of candidates
 MARGIN = 1.2  # how much larger than stated noise may be that nothing can check
@@ -25,13 +58,12 @@ class SearchAndConfirm(AdaptiveAssessor):
     """Visit all candidates if the budget has readings for them; then confirm the likely largest.
 
     Readings left after the visit go, block by block, to the point with the largest upper limit
-    whose next look they can reach, and a share of them to the largest mean, for the lower bound
-    (:mod:`kinacc.assess.confirming`). With fewer readings than candidates nine tenths of them visit
-    new points.
+    whose next look they can reach, and a share of them to the largest mean, for the lower bound.
+    With fewer readings than candidates nine tenths of them visit new points.
 
     ``measured``: upper limits that hold at all looks at once (:mod:`kinacc.assess.looks`), and a
     lower bound by an average of readings along directions seen before
-    (:mod:`kinacc.assess.lower_average`). Both hold whatever the errors are, for readings that are
+    (:mod:`kinacc.assess.looks`). Both hold whatever the errors are, for readings that are
     normal with known covariance (eq. 9). ``candidates``: the same where all are visited. Otherwise
     half of the allowed error is for the largest errors that all were missed: the upper bound is of
     all but the fewest candidates with which that is improbable enough, and assumes nothing but the
@@ -49,7 +81,7 @@ class SearchAndConfirm(AdaptiveAssessor):
     ``allowance_mm`` is what no repeat sees; it widens both
     bounds. ``wrong_rate`` is the largest share of readings that go wrong and are guarded against
     (:mod:`kinacc.assess.wrong_readings`): it is lost from the confidence. Without it, bounds are
-    withheld where a reading stands apart (:mod:`kinacc.assess.suspicious_readings`). The value is
+    withheld where a reading stands apart (:mod:`kinacc.assess.wrong_readings`). The value is
     the median of the posterior of :mod:`kinacc.assess.population`.
     """
 
@@ -111,3 +143,236 @@ class SearchAndConfirm(AdaptiveAssessor):
     def begin(self, candidates: Candidates) -> SearchAndConfirmCampaign:
         """A new campaign."""
         return SearchAndConfirmCampaign(self, candidates)
+
+
+MISSED = 0.5  # of the allowed error, where candidates are left that may hold the largest
+_VISIT_PART = 0.05  # of the lower bound's error, for single points until the average speaks
+_ONCE = 0.6  # of the upper bound's error for the visit, where hardly any reading comes after it
+_FEW = 0.25  # of the visit: with fewer readings after it, the visit has more of the error
+
+
+class SearchAndConfirmCampaign(Campaign):
+    """A visit of ``first`` points, then blocks of readings up to a point's next look.
+
+    After every block the point with the largest upper limit is read, among those whose next look
+    the readings left can reach. What the block begins with is the point of the largest mean, its
+    readings count for the lower bound; where no more readings are left than must still count, that
+    point is read. Decisions go by means of whole blocks and planned noise: scatter within a block
+    has no part in them. Beside these, readings go to reference poses, in their places of the
+    sequence whatever is read.
+    """
+
+    settings: SearchAndConfirm
+
+    def __init__(self, settings: SearchAndConfirm, candidates: Candidates) -> None:
+        super().__init__(settings, candidates)
+        points, rate = candidates.points, settings.wrong_rate
+        self.first = settings.visit(points)
+        noise = noise_plan(settings, self.first)
+        self.noise_plan, self.factor, self.allowed = noise, noise.margin, 1.0 - settings.confidence
+        self.plan = schedule(settings.measurements, points, settings.references)
+        self.reference_poses = self.plan.poses
+        self.extra = max(settings.measurements - self.first - settings.references, 0)
+        allowed = noise.mean_share * self.allowed
+        self.counts = look_counts(self.extra)
+        wanted = math.floor(SHARE * self.extra) if self.extra > 1 else 0
+        lower_error = (1.0 - _VISIT_PART) * allowed if wanted else 0.0
+        # Where the noise is an estimate, half of the error of single points is for its limit.
+        self.single_error = allowed - lower_error
+        single = self.single_error * (1.0 if math.isinf(noise.freedom) else 0.5)
+        each = single / max(min(self.first, points), 1)
+        shares = np.diff(np.array(self.counts) / self.counts[-1], prepend=0.0)
+        if len(shares) > 1:  # half for the first look
+            shares = np.append(0.5, 0.5 * shares[1:] / shares[1:].sum())
+        else:
+            shares = np.ones(1)
+        wrong = 0
+        if rate:
+            # Half of the error of single points is for more wrong readings than are counted on.
+            each *= 0.5
+            wrong = at_most_wrong(settings.measurements, rate, 0.5 * self.single_error)
+        self.average = LowerAverage(wanted, lower_error, noise.freedom, rate)
+        upper = self.boundary_of(allowed)
+        self.looks = Looks(self.ledger, upper, each, shares, self.factor, rate, wrong)
+        self.blocks: list[int] = []  # of every reading in order the number of its block
+        self.noise = CampaignNoise(settings, noise, self.ledger, self.blocks, self.first)
+        self._row, self._left, self._counted = -1, 0, False
+        self._block, self._begins = 0, True
+        self._direction = [1.0, 0.0, 0.0]
+        self._mean_mm = [[0.0] * 3] * points  # at the ends of blocks
+        self._size_mm = np.full(points, -1.0)  # of these
+
+    def boundary_of(self, error: float, freedom: float = math.inf):
+        """The boundary of the looks of this campaign for an error of the upper limits."""
+        few = max(1.0 - self.extra / (_FEW * max(self.first, 1)), 0.0)
+        early = EARLY + (_ONCE - EARLY) * few
+        return boundary(self.counts, error, freedom, early, rate=self.settings.wrong_rate)
+
+    def visit(self) -> tuple[int, ...]:
+        """The first rows, with the reference poses in their places."""
+        return self.plan.visit(self.first)
+
+    def next(self) -> int | None:
+        """The next point of the visit, then the point of the block."""
+        if (planned := self.plan.row_at.get(self.ledger.taken)) is not None:
+            return planned
+        if (visited := len(self.ledger.visited)) < self.first:
+            return visited
+        return self._row if self._left else None
+
+    def record(self, point: int, reading_mm, covariance_mm2=None) -> None:
+        """Take a reading, and look at the point where that is due."""
+        taken = self.ledger.taken
+        is_planned = taken in self.plan.row_at
+        super().record(point, reading_mm, covariance_mm2)
+        is_due = self.looks.missing(point) == 0
+        in_block = bool(self._left) and point == self._row
+        if not in_block or is_planned:
+            self.blocks.append(-len(self.blocks) - 1)
+        else:
+            self._block, self._begins = self._block + self._begins, False
+            self.blocks.append(self._block)
+        if in_block:
+            self._left -= 1
+            if self._counted and not is_planned:
+                along, spread = np.array(self._direction), self.ledger.covariances([taken])[0]
+                noise = math.sqrt(float(along @ spread @ along))
+                self.average.record(point, self._direction, self.ledger.readings[-1][1], noise)
+                # A bound stated inside a block is of a mean of its own: a new block begins.
+                self._begins = self.average.at_stage
+        self.looks.update(point)
+        # A planned reading ends a block only where the point is looked at.
+        if is_due or not (self._left or is_planned):
+            x, y, z = self._mean_mm[point] = self.ledger.mean_mm[point].tolist()
+            self._size_mm[point] = math.sqrt(x * x + y * y + z * z)
+        if not self._left and len(self.ledger.visited) >= self.first:
+            left = self.settings.measurements - taken - 1 - self.plan.left(taken + 1)
+            if left > 0:
+                self._begin_block(left)
+
+    def reading_blocks(self) -> list[int]:
+        """Of every reading in order the number of its block."""
+        return self.blocks
+
+    def _begin_block(self, left: int) -> None:
+        """Choose where the next readings are taken, and how many of them."""
+        missing = self.average.missing
+        likely = int(np.argmax(self._size_mm))
+        row, count = likely, left
+        if left > missing:
+            for each in np.argsort(-self.looks.upper_mm[self.ledger.visited], kind="stable"):
+                point = self.ledger.visited[each]
+                wanted = self.looks.missing(point)
+                if wanted <= (left if point == likely else left - missing):
+                    row, count = point, int(wanted)
+                    break
+        else:
+            count = int(min(left, self.looks.missing(likely)))
+        # A mean of one reading is the largest more often by its noise than by its error.
+        is_confirmed = self.ledger.count.item(row) > 1 or left <= missing
+        self._counted = row == likely and missing > 0 and is_confirmed
+        if self._counted:
+            count = min(count, missing)
+        self._row, self._left, self._begins = row, count, True
+        self._direction = direction_of(self._mean_mm[row])
+
+    def statements(self) -> tuple[Statement, ...]:
+        """On the measured points, and on all candidates."""
+        ledger, settings = self.ledger, self.settings
+        seen, points = len(ledger.visited), ledger.candidates.points
+        if (left := max(math.ceil(FIRST_SHARE * self.first), 1) - seen) > 0:
+            early = Reason("first_visit", {"left": left})
+            return Statement(MEASURED, withheld=early), Statement(CANDIDATES, withheld=early)
+        posterior = largest_size(ledger.sizes_mm(), ledger.noise_mm[ledger.visited], points - seen)
+        value_mm = posterior.quantile_mm(0.5, measured_only=True)
+        measured = Statement(MEASURED, value_mm, error_of=settings.error_of)
+        everywhere = replace(measured, target=CANDIDATES, value_mm=posterior.quantile_mm(0.5))
+        if missing := self.noise.missing():
+            return replace(measured, withheld=missing), replace(everywhere, withheld=missing)
+        noise = self.noise.taken(self.allowed)
+        if against := self._withheld():
+            stated = [replace(each, withheld=against) for each in (measured, everywhere)]
+        else:
+            bounds = {
+                "lower_mm": self._lower_mm(),
+                "upper_mm": self._upper_mm(self.allowed, value_mm),
+                "confidence": settings.confidence - settings.wrong_rate,
+            }
+            stated = [replace(each, **bounds) for each in (measured, everywhere)]
+            if seen < points:
+                left = excepted(points, seen, MISSED * self.allowed)
+                least = 0.0 if left else everywhere.value_mm
+                upper_mm = self._upper_mm((1.0 - MISSED) * self.allowed, least)
+                stated[1] = replace(stated[1], upper_mm=upper_mm, excepted=left)
+        stated = [replace(each, noise=noise.said) for each in stated]
+        if settings.error_of != MEAN:
+            arms_mm = self.noise.arms_mm(noise)
+            stated = [each.of_future_visits(arms_mm) for each in stated]
+        return tuple(stated)
+
+    def change(self) -> Change | None:
+        """What the reference poses show of a drift or step; None where too few are read."""
+        if self.ledger.taken < self.plan.poses or not self.plan.poses:
+            return None
+        tested = math.inf if self.settings.noise == KNOWN else self.settings.noise_freedom
+        return found(self.plan, planned_readings(self.plan, self.ledger), tested)
+
+    def point_limits(self) -> dict[int, tuple[float, float]]:
+        """The limits that hold at every look, with the noise as bounds take it."""
+        if self.noise.missing():
+            return dict.fromkeys(self.ledger.visited, (0.0, math.inf))
+        upper = self._limits_mm(self.allowed).tolist()
+        lower = self.looks.lower_limits_mm(self._single_factor()).tolist()
+        if self.settings.wrong_rate:
+            lower = [0.0] * len(lower)  # any single point may have been read wrong
+        return {row: (lower[row], upper[row]) for row in self.ledger.visited}
+
+    def alarms(self) -> tuple[Reason, ...]:
+        """What the readings say against what the bounds rest on."""
+        alarms: tuple[Reason, ...] = ()
+        if suspicious := self.suspicious():
+            first = {"readings": len(suspicious), "number": suspicious[0].number}
+            alarms = (Reason("wrong_readings", first),)
+        # A few wrong readings look like too much scatter: what tells more comes first.
+        if (change := self.change()) is not None and change.is_found:
+            alarms += (change.reason,)
+        return (*alarms, *self.noise.alarms())
+
+    def suspicious(self) -> tuple[Suspicious, ...]:
+        """Readings that stand apart from others of their point."""
+        if self.noise.missing():
+            return ()
+        # Where all readings scatter more than stated, none is wrong for doing so too.
+        factor = max(self.noise.taken(self.allowed).value, self.noise.usual_scatter())
+        planned = self.extra + self.settings.references
+        return suspicious_readings(
+            self.ledger, self.blocks, self.counts, planned, factor, self.noise_plan.freedom
+        )
+
+    def _withheld(self) -> Reason | None:
+        """The alarm by which bounds are withheld; wrong readings are none where guarded against."""
+        guarded = "wrong_readings" if self.settings.wrong_rate else ""
+        return next((each for each in self.alarms() if each.code != guarded), None)
+
+    def _limits_mm(self, error: float) -> np.ndarray:
+        """Upper limits (m,) of single points for an allowed error."""
+        plan, own = self.noise_plan, self.noise.taken(error).own
+        return self.looks.limits_mm(self.boundary_of(plan.mean_share * error, plan.freedom), own)
+
+    def _single_factor(self) -> np.ndarray:
+        """Factors (m,) on the noise that lower limits of single points rest on."""
+        noise = self.noise.taken(self.allowed)
+        return noise.own * factor_limit(noise.freedom, 1.0 - 0.5 * self.single_error)
+
+    def _upper_mm(self, error: float, value_mm: float) -> float:
+        """The largest upper limit of the visited points for an allowed error."""
+        # Where unlucky readings put the bound below the likely size, that is the better bound.
+        largest = max(float(self._limits_mm(error)[self.ledger.visited].max()), value_mm)
+        return largest + self.settings.allowance_mm
+
+    def _lower_mm(self) -> float:
+        if self.average.has_spoken:
+            found_mm = self.average.bound_mm(self.noise.taken(self.allowed).own)
+        else:
+            found_mm = self.looks.largest_lower_mm(self._single_factor())
+        return max(found_mm - self.settings.allowance_mm, 0.0)

@@ -15,11 +15,17 @@ from numpy.typing import ArrayLike
 from kinacc.assess.registry import RECOMMENDED
 from kinacc.campaign import begin
 from kinacc.campaign import folder as folders
-from kinacc.campaign import reading as checks
 from kinacc.campaign.instrument import INSTRUMENT, Instrument, covariance_of
 from kinacc.campaign.plan import Limits, Plan, assessor_of, with_references
-from kinacc.campaign.reading import Reading
-from kinacc.campaign.state import LEAVE_OUT, STRIKE, State
+from kinacc.campaign.state import (
+    LEAVE_OUT,
+    STRIKE,
+    Reading,
+    State,
+    error_mm,
+    most_plausible_mm,
+    problems_of,
+)
 from kinacc.campaign.status import Bound, CampaignStatus, status
 from kinacc.deployment.record import Calibration
 from kinacc.errors import InputError, Problem, refuse
@@ -350,8 +356,8 @@ def _record(
     if is_file:
         rows = [row for row in file.rows if isinstance(row, Reading)]
         with np.errstate(over="ignore", invalid="ignore"):
-            sizes += [float(np.linalg.norm(checks.error_mm(plan, row))) for row in rows]
-    most_mm = checks.most_plausible_mm(plan, sizes)
+            sizes += [float(np.linalg.norm(error_mm(plan, row))) for row in rows]
+    most_mm = most_plausible_mm(plan, sizes)
     good, known, problems = list[Reading](), list[int](), list[Problem]()
     for row, place in zip(file.rows, file.places, strict=True):
         if isinstance(row, Problem):
@@ -360,7 +366,7 @@ def _record(
         if waiting[row.digits]:
             known.append(waiting[row.digits].pop(0))
         else:
-            wrong = checks.problems_of(plan, row, place, most_mm, accept_implausible)
+            wrong = problems_of(plan, row, place, most_mm, accept_implausible)
             if row.point in state.left_out:
                 label = plan.points.label[row.point]
                 wrong.append(Problem(place, f"point {label} was left out of the campaign"))
@@ -384,7 +390,7 @@ def _record(
     return Recorded(
         tuple(range(state.numbered + 1, state.numbered + 1 + len(good))),
         tuple(plan.points.label[row.point] for row in good),
-        tuple(float(np.linalg.norm(checks.error_mm(plan, row))) for row in good),
+        tuple(float(np.linalg.norm(error_mm(plan, row))) for row in good),
         tuple(map(str, problems)),
         tuple(sorted(known)),
     )

@@ -23,8 +23,7 @@ from kinacc import __version__
 from kinacc.campaign import plan as plans
 from kinacc.campaign import state
 from kinacc.campaign.plan import Plan
-from kinacc.campaign.reading import Reading
-from kinacc.campaign.state import READINGS, State
+from kinacc.campaign.state import READINGS, Reading, State
 from kinacc.config import json_files
 from kinacc.errors import InputError, MachineError, Problem, refuse, refused
 from kinacc.tables.atomic import synchronise, taken, write_whole

@@ -8,8 +8,7 @@ import numpy as np
 
 from kinacc.assess.adaptive import Campaign
 from kinacc.campaign.folder import Opened
-from kinacc.campaign.reading import covariance_mm2
-from kinacc.campaign.state import State, sayable
+from kinacc.campaign.state import State, covariance_mm2, sayable
 from kinacc.campaign.status import reason
 from kinacc.tables.columns import Columns
 from kinacc.tables.contract import columns_of
