@@ -11,7 +11,7 @@ from kinacc.assess.reference_poses import (
     FALSE_ALARMS,
     Readings,
     _thresholds,
-    found,
+    find_change,
     schedule,
     stages,
 )
@@ -50,7 +50,7 @@ def test_any_number_of_revisits_finds_its_places(references):
 def test_a_drift_is_what_least_squares_make_of_the_references(covariance):
     plan, rng = schedule(300, 200, 20), np.random.default_rng(5)
     readings = read(plan, rng, lambda time: 2.0 * time, covariance)
-    found_change = found(plan, readings)
+    found_change = find_change(plan, readings)
     # the oracle: one constant for each pose and a slope, by plain least squares
     design = np.column_stack([readings.row[:, None] == np.arange(5), readings.place / 300])
     slope = np.linalg.lstsq(design, readings.vector_mm, rcond=None)[0][5]
@@ -93,7 +93,7 @@ def test_references_without_a_change_alarm_as_rarely_as_stated(freedom):
 )
 def test_a_drift_or_step_of_three_deviations_is_said(change, freedom):
     plan, rng = schedule(200, 180, 20), np.random.default_rng(3)
-    said = [found(plan, read(plan, rng, change), freedom).is_found for _ in range(300)]
+    said = [find_change(plan, read(plan, rng, change), freedom).is_found for _ in range(300)]
     assert np.mean(said) >= 0.95
 
 

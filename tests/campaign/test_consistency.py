@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import kstest
 
 from kinacc.campaign import folder
-from kinacc.campaign.state import Reading, Told, nearness, restore, scatter
+from kinacc.campaign.state import Reading, Told, restore, scatter, size_scatter
 
 SPREAD = np.diag([0.05, 0.05, 0.15])
 
@@ -80,10 +80,10 @@ def test_noise_stated_far_above_noise_and_errors_is_told_for_bounds_may_fall_sho
     plan = make_plan(assessor)
     state, largest_mm = near(plan, 0.006, 0.005)  # 0.05 mm is stated
     assert all((said.upper_mm < largest_mm) == short for said in state.statements())
-    assert nearness(state).too_small
+    assert size_scatter(state).too_small
 
 
 def test_readings_of_a_perfect_arm_with_the_noise_stated_are_not_called_too_near(make_plan):
     plan = make_plan()
-    assert not any(nearness(near(plan, 0.0, 0.05, seed)[0]).too_small for seed in range(60))
-    assert nearness(restore(plan, [])) is None
+    assert not any(size_scatter(near(plan, 0.0, 0.05, seed)[0]).too_small for seed in range(60))
+    assert size_scatter(restore(plan, [])) is None

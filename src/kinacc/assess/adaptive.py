@@ -146,13 +146,15 @@ class Ledger:
     def covariances(self, places: Iterable[int]) -> np.ndarray:
         """Covariances (n, 3, 3) of the readings at these places (0 = first)."""
         read, planned = [self.readings[place] for place in places], self.candidates.covariance_mm2
-        found = [planned[row] if own is None else own for row, _, own in read]
-        return np.array(found).reshape(-1, 3, 3)
+        spreads = [
+            planned[row] if covariance is None else covariance for row, _, covariance in read
+        ]
+        return np.array(spreads).reshape(-1, 3, 3)
 
     def readings_of(self, point: int, number: int) -> tuple[np.ndarray, np.ndarray]:
         """The first readings of a point (number, 3) and their covariances (number, 3, 3)."""
-        places = [at for at, (row, _, _) in enumerate(self.readings) if row == point][:number]
-        return np.array([self.readings[at][1] for at in places]), self.covariances(places)
+        places = [place for place, (row, _, _) in enumerate(self.readings) if row == point][:number]
+        return np.array([self.readings[place][1] for place in places]), self.covariances(places)
 
     def sizes_mm(self) -> np.ndarray:
         """Sizes of the mean readings of the visited points, in visiting order."""
@@ -270,13 +272,13 @@ class OnceCampaign(Campaign):
         return self.settings.state(self.ledger)
 
 
-def about_all_if_all_measured(said: Statement, ledger: Ledger) -> tuple[Statement, ...]:
+def about_all_if_all_measured(statement: Statement, ledger: Ledger) -> tuple[Statement, ...]:
     """A statement on the measured points, and the same on all candidates where they are all."""
-    points, seen = ledger.candidates.points, len(ledger.visited)
-    if seen == points:
-        return said, replace(said, target=CANDIDATES)
-    withheld = Reason("unmeasured", {"left": points - seen, "points": points})
-    return said, Statement(CANDIDATES, value_mm=said.value_mm, withheld=withheld)
+    points, visited = ledger.candidates.points, len(ledger.visited)
+    if visited == points:
+        return statement, replace(statement, target=CANDIDATES)
+    withheld = Reason("unmeasured", {"left": points - visited, "points": points})
+    return statement, Statement(CANDIDATES, value_mm=statement.value_mm, withheld=withheld)
 
 
 def covariance_faults(covariance_mm2: np.ndarray) -> list[tuple[int, str]]:
@@ -289,8 +291,8 @@ def covariance_faults(covariance_mm2: np.ndarray) -> list[tuple[int, str]]:
     skewed = np.abs(safe - np.swapaxes(safe, 1, 2)).max(axis=(1, 2)) > _SYMMETRY * scale
     flat = np.linalg.eigvalsh(safe)[:, 0] <= 1e-14 * scale
     faults = {"not finite": ~finite, "not symmetric": skewed, "not positive definite": flat}
-    found = [(int(row), text) for text, bad in faults.items() for row in np.flatnonzero(bad)]
-    return sorted(dict(reversed(found)).items())
+    pairs = [(int(row), text) for text, bad in faults.items() for row in np.flatnonzero(bad)]
+    return sorted(dict(reversed(pairs)).items())
 
 
 def _check_covariances(covariance_mm2: np.ndarray, name: str) -> list[Problem]:

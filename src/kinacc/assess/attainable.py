@@ -37,27 +37,29 @@ class WidthLimits(NamedTuple):
 NONE = WidthLimits(math.nan, math.nan, math.nan)
 
 
-def points_bounded(said: Statement, visited: Sequence[int], candidates: int) -> np.ndarray:
+def points_bounded(statement: Statement, visited: Sequence[int], candidates: int) -> np.ndarray:
     """Rows of the points whose largest mean error a statement bounds, in ascending order.
 
     None where it states no upper bound, or another: on a region, all but some, single visits.
     """
-    other = said.target == REGION or said.excepted > 0 or said.error_of != MEAN
-    if math.isnan(said.upper_mm) or other:
+    unlimited = statement.target == REGION or statement.excepted > 0 or statement.error_of != MEAN
+    if math.isnan(statement.upper_mm) or unlimited:
         return np.empty(0, dtype=int)
-    return np.sort(np.asarray(visited, int)) if said.target == MEASURED else np.arange(candidates)
+    return (
+        np.sort(np.asarray(visited, int)) if statement.target == MEASURED else np.arange(candidates)
+    )
 
 
 def limits_of(
-    said: Statement,
+    statement: Statement,
     visited: Sequence[int],
     sizes_mm: np.ndarray,
     noise_mm: np.ndarray,
     readings: int,
 ) -> WidthLimits:
     """Limits of a statement, of sizes and noise (m,) of all candidates; NaN where it has none."""
-    rows = points_bounded(said, visited, len(sizes_mm))
-    return width_limits(sizes_mm[rows], noise_mm[rows], readings, 1.0 - said.confidence)
+    rows = points_bounded(statement, visited, len(sizes_mm))
+    return width_limits(sizes_mm[rows], noise_mm[rows], readings, 1.0 - statement.confidence)
 
 
 def width_limits(
@@ -166,8 +168,8 @@ def _filled(wanted: np.ndarray, readings: int) -> np.ndarray:
     holds = np.flatnonzero(factors * ordered > 1.0)
     exact = np.maximum((factors[holds[-1]] if holds.size else 0.0) * wanted, 1.0)
     counts = np.floor(exact).astype(np.int64)
-    left = readings - int(counts.sum())
-    counts[np.argsort(counts - exact, kind="stable")[:left]] += 1
+    spare = readings - int(counts.sum())
+    counts[np.argsort(counts - exact, kind="stable")[:spare]] += 1
     return counts
 
 

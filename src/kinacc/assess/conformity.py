@@ -28,7 +28,7 @@ class Decision:
     reason: Reason
 
 
-def decide(said: Statement, tolerance_mm: float) -> Decision:
+def decide(statement: Statement, tolerance_mm: float) -> Decision:
     """Hold a statement to a tolerance.
 
     Accept where the upper bound is at most the tolerance, reject where the lower bound exceeds it,
@@ -41,18 +41,18 @@ def decide(said: Statement, tolerance_mm: float) -> Decision:
     """
     if not (tolerance_mm > 0.0 and math.isfinite(tolerance_mm)):
         raise InputError(Problem("tolerance", f"{tolerance_mm}", "above 0, in mm"))
-    band = said.upper_mm - said.value_mm
+    band = statement.upper_mm - statement.value_mm
     verdict, reason = UNDECIDED, Reason("between")
-    if said.upper_mm < said.lower_mm or band < 0.0:
+    if statement.upper_mm < statement.lower_mm or band < 0.0:
         reason = Reason("contradict")
-    elif said.lower_mm > tolerance_mm:
+    elif statement.lower_mm > tolerance_mm:
         verdict, reason = REJECT, Reason("beyond")
-    elif said.upper_mm <= tolerance_mm and said.excepted:
+    elif statement.upper_mm <= tolerance_mm and statement.excepted:
         # The largest error may be among those the bound leaves out.
-        reason = Reason("some_excepted", {"excepted": said.excepted})
-    elif said.upper_mm <= tolerance_mm:
+        reason = Reason("some_excepted", {"excepted": statement.excepted})
+    elif statement.upper_mm <= tolerance_mm:
         verdict, reason = ACCEPT, Reason("within")
-    elif math.isnan(said.upper_mm):
-        reason = said.withheld or Reason("no_upper")
-    risk = 1.0 - said.confidence
+    elif math.isnan(statement.upper_mm):
+        reason = statement.withheld or Reason("no_upper")
+    risk = 1.0 - statement.confidence
     return Decision(verdict, tolerance_mm, band, tolerance_mm - band, risk, reason)

@@ -24,10 +24,10 @@ def binomial_interval(hits: int, trials: int) -> tuple[float, float]:
 
 def hardly_missed(points: int, error: float) -> int:
     """Return the number of random points that hold the largest of ``points`` but for ``error``."""
-    return next(seen for seen in range(points + 1) if points - seen <= error * points)
+    return next(drawn for drawn in range(points + 1) if points - drawn <= error * points)
 
 
-def companions(points: int, seen: int, error: float) -> int:
+def companions(points: int, drawn: int, error: float) -> int:
     """Return the number of points of which one is among ``seen`` of ``points`` but for ``error``.
 
     The ``seen`` are drawn at random without replacement: all of n are missed with probability
@@ -35,15 +35,15 @@ def companions(points: int, seen: int, error: float) -> int:
     """
     missed = 1.0
     for number in count(1):
-        missed *= max(points - seen - number + 1, 0) / (points - number + 1)
+        missed *= max(points - drawn - number + 1, 0) / (points - number + 1)
         if missed <= error:
             break
     return number
 
 
-def excepted(points: int, seen: int, error: float) -> int:
+def excepted(points: int, drawn: int, error: float) -> int:
     """Return the K that all but K points are no larger than the largest of ``seen`` random ones.
 
     But for probability ``error``, whatever their errors are.
     """
-    return companions(points, seen, error) - 1
+    return companions(points, drawn, error) - 1

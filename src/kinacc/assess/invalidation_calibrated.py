@@ -69,13 +69,13 @@ class CalibratedCampaign(ChallengeCampaign):
     def statements(self) -> tuple[Statement, ...]:
         """The calibrated bounds; the value is the smallest bound not rejected."""
         if self.ledger.taken < self.first:
-            left = Reason("first_visit", {"left": self.first - self.ledger.taken})
-            return (Statement(MEASURED, withheld=left),)
-        said = Statement(
+            early = Reason("first_visit", {"left": self.first - self.ledger.taken})
+            return (Statement(MEASURED, withheld=early),)
+        statement = Statement(
             MEASURED,
             value_mm=self.smallest_mm(),
             lower_mm=self.looks.largest_lower_mm(np.ones(self.ledger.candidates.points)),
             upper_mm=float(self.looks.upper_mm[self.ledger.visited].max()),
             confidence=self.settings.confidence,
         )
-        return about_all_if_all_measured(said, self.ledger)
+        return about_all_if_all_measured(statement, self.ledger)

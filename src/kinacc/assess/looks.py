@@ -48,11 +48,11 @@ class Boundary:
 
 def look_counts(extra: int) -> tuple[int, ...]:
     """Numbers of readings at which a point is looked at: 1, 3, then by a quarter, extra + 1."""
-    last, found, count = extra + 1, [1], _SECOND
+    last, counts, count = extra + 1, [1], _SECOND
     while count < _NEAR * last:
-        found.append(count)
+        counts.append(count)
         count = max(count + 2, math.ceil(count * _GROWTH))
-    return tuple(found) if last == 1 else (*found, last)
+    return tuple(counts) if last == 1 else (*counts, last)
 
 
 @lru_cache(maxsize=256)
@@ -79,14 +79,16 @@ def boundary(
     """
     from scipy.special import ndtri, stdtrit
 
-    at = np.array(counts)
+    readings = np.array(counts)
     if late is None:
-        shares = np.full(len(at), error / len(at))
+        shares = np.full(len(readings), error / len(readings))
     else:
-        shares = np.diff(error * (early + (1.0 - early) * (at / at[-1]) ** late), prepend=0.0)
+        shares = np.diff(
+            error * (early + (1.0 - early) * (readings / readings[-1]) ** late), prepend=0.0
+        )
     alone = -(ndtri(shares) if math.isinf(freedom) else stdtrit(freedom, shares))
     if rate:
-        alone = alone + rate * clip_of(rate) * np.sqrt(at)
+        alone = alone + rate * clip_of(rate) * np.sqrt(readings)
     rng = np.random.default_rng(_SEED)
     total, farthest, before = np.zeros(WALKS), np.full(WALKS, -math.inf), 0
     for count, width in zip(counts, alone.tolist(), strict=True):
@@ -109,7 +111,7 @@ def boundary(
     if counts[0] == 1:
         safe /= 1.0 - rate  # a wrong first reading is paid for by itself
     scale = float(np.quantile(farthest, 1.0 - safe))
-    return Boundary(at, alone * (scale if rate else min(scale, 1.0)), alone)
+    return Boundary(readings, alone * (scale if rate else min(scale, 1.0)), alone)
 
 
 class _Look(NamedTuple):
@@ -151,10 +153,10 @@ class Looks:
         """Look at a point if its number of readings asks for it."""
         if self.missing(point):
             return
-        ledger, seen = self.ledger, self._seen[point]
+        ledger, looks = self.ledger, self._seen[point]
         planned = ledger.as_planned(point)
-        seen.append(_Look(ledger.mean_mm[point].copy(), ledger.noise(point), planned))
-        limit = self._upper_mm(point, len(seen) - 1, self.boundary, self.factor)
+        looks.append(_Look(ledger.mean_mm[point].copy(), ledger.noise(point), planned))
+        limit = self._upper_mm(point, len(looks) - 1, self.boundary, self.factor)
         self.upper_mm[point] = min(self.upper_mm[point], limit)
 
     def missing(self, point: int) -> float:
@@ -169,19 +171,19 @@ class Looks:
         if boundary is self.boundary and (factor == self.factor).all():
             return self.upper_mm
         limits = [
-            [self._upper_mm(point, look, boundary, own) for look in range(len(self._seen[point]))]
-            for point, own in enumerate(factor.tolist())
+            [self._upper_mm(point, look, boundary, scale) for look in range(len(self._seen[point]))]
+            for point, scale in enumerate(factor.tolist())
         ]
-        return np.array([min(each, default=math.inf) for each in limits])
+        return np.array([min(of_point, default=math.inf) for of_point in limits])
 
     def lower_limits_mm(self, factor: np.ndarray) -> np.ndarray:
         """Lower limits (m,), noise (m,) times as planned; 0 where a point was not looked at."""
-        found = np.zeros(len(self._seen))
-        for point, own in enumerate(factor.tolist()):
+        largest = np.zeros(len(self._seen))
+        for point, scale in enumerate(factor.tolist()):
             for look, error in zip(self._seen[point], self.lower_errors, strict=False):
-                noise = look.noise * (own if isinstance(look.noise, float) else own**2)
-                found[point] = max(found[point], lower_limit_mm(look.mean_mm, noise, error))
-        return found
+                noise = look.noise * (scale if isinstance(look.noise, float) else scale**2)
+                largest[point] = max(largest[point], lower_limit_mm(look.mean_mm, noise, error))
+        return largest
 
     def largest_lower_mm(self, factor: np.ndarray) -> float:
         """Lower bound on the largest error of the visited points, from single ones.
@@ -259,21 +261,21 @@ class LowerAverage:
     def bound_mm(self, factor: np.ndarray) -> float:
         """The largest bound of the stages reached, 0 before; noise (m,) times as planned."""
         along, noise = np.array(self._along_mm), np.array(self._noise_mm)
-        own, bounds = factor[self._rows], [0.0] if self._rate else []
+        scale, bounds = factor[self._rows], [0.0] if self._rate else []
         for count, z in self._stages.items():
             if count > len(along):
                 break
             if self._rate:
-                stated = own[:count] * noise[:count]
+                stated = scale[:count] * noise[:count]
                 bounds.append(guarded_lower_mm(along[:count], stated, z, self._rate))
                 continue
             weight = 1.0 / noise[:count]
-            off = z * math.sqrt(float(np.sum(own[:count] ** 2)))
+            off = z * math.sqrt(float(np.sum(scale[:count] ** 2)))
             bounds.append((float(along[:count] @ weight) - off) / float(weight.sum()))
         return max(bounds, default=0.0)
 
 
 def direction_of(mean_mm: list[float]) -> list[float]:
     """The unit vector (3,) along a mean; the first axis where it is zero."""
-    length = math.sqrt(sum(each * each for each in mean_mm))
-    return [each / length for each in mean_mm] if length > 0.0 else [1.0, 0.0, 0.0]
+    length = math.sqrt(sum(component * component for component in mean_mm))
+    return [component / length for component in mean_mm] if length > 0.0 else [1.0, 0.0, 0.0]

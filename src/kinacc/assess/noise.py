@@ -67,8 +67,8 @@ class Contrasts(NamedTuple):
         Readings that go wrong and are guarded against tell nothing of the noise of others; one is
         in many differences of its block.
         """
-        own = np.asarray(blocks)[self.places]
-        near = ~np.isin(own, own[self.squares > _FAR])
+        block = np.asarray(blocks)[self.places]
+        near = ~np.isin(block, block[self.squares > _FAR])
         return Contrasts(*(column[near] for column in self))
 
 
@@ -82,19 +82,19 @@ def contrasts(ledger: Ledger, blocks: Sequence[int]) -> Contrasts:
     for place, (block, (row, reading, covariance)) in enumerate(
         zip(blocks, ledger.readings, strict=True)
     ):
-        own = ledger.candidates.covariance_mm2[row] if covariance is None else covariance
+        spread = ledger.candidates.covariance_mm2[row] if covariance is None else covariance
         if block not in under_way:
-            under_way[block] = np.array(reading), np.linalg.inv(own)
+            under_way[block] = np.array(reading), np.linalg.inv(spread)
             continue
         mean, weight = under_way[block]
-        apart, added = np.array(reading) - mean, np.linalg.inv(own)
+        apart, added = np.array(reading) - mean, np.linalg.inv(spread)
         rows.append(row)
         places.append(place)
-        values.append(np.linalg.solve(np.linalg.cholesky(own + np.linalg.inv(weight)), apart))
+        values.append(np.linalg.solve(np.linalg.cholesky(spread + np.linalg.inv(weight)), apart))
         weight = weight + added
         under_way[block] = mean + np.linalg.solve(weight, added @ apart), weight
-    found = np.array(values).reshape(-1, 3)
-    return Contrasts(np.array(rows, dtype=np.int64), np.array(places, dtype=np.int64), found)
+    differences = np.array(values).reshape(-1, 3)
+    return Contrasts(np.array(rows, dtype=np.int64), np.array(places, dtype=np.int64), differences)
 
 
 def largest_factor(
@@ -210,39 +210,43 @@ class CampaignNoise:
     @property
     def telling(self) -> Contrasts:
         """Those that tell of the noise: of blocks without a wrong reading, where some may be."""
-        found = self.contrasts
-        return found.without_wrong_blocks(self._blocks) if self.settings.wrong_rate else found
+        differences = self.contrasts
+        return (
+            differences.without_wrong_blocks(self._blocks)
+            if self.settings.wrong_rate
+            else differences
+        )
 
     def missing(self) -> Reason | None:
         """Why the noise is not known yet; None where it is."""
         if self.plan.estimating and self.contrasts.freedom < self.plan.estimating:
-            found = {"freedom": self.contrasts.freedom, "needed": self.plan.estimating}
-            return Reason("noise_unknown", found)
+            numbers = {"freedom": self.contrasts.freedom, "needed": self.plan.estimating}
+            return Reason("noise_unknown", numbers)
         if self.plan.is_bounded and len(self.ledger.visited) < self.first:
             return Reason("first_visit", {"left": self.first - len(self.ledger.visited)})
         return None
 
     def taken(self, error: float) -> NoiseTaken:
         """The noise for bounds that may err with this probability; not where it is ``missing``."""
-        plan, part, own = self.plan, _NOISE_PART * error, np.ones(self.ledger.candidates.points)
+        plan, part, factors = self.plan, _NOISE_PART * error, np.ones(self.ledger.candidates.points)
         if self.settings.noise == KNOWN:
-            most, said = self._stated_or_shown()
-            return NoiseTaken(most, math.inf, most * own, 1.0, most, said)
+            most, reason = self._stated_or_shown()
+            return NoiseTaken(most, math.inf, most * factors, 1.0, most, reason)
         if plan.is_bounded:
             rows = np.array(self.ledger.visited[: self.first])
             first = np.array([self.ledger.readings_of(row, 1)[0][0] for row in rows])
             most = largest_factor(self.ledger.candidates, rows, first, part)
-            said = Reason("noise_bounded", {"factor": most})
-            return NoiseTaken(most, math.inf, most * own, 0.0, most, said)
+            reason = Reason("noise_bounded", {"factor": most})
+            return NoiseTaken(most, math.inf, most * factors, 0.0, most, reason)
         freedom = plan.limited or plan.freedom
         least, most = factor_limit(freedom, part), factor_limit(freedom, 1.0 - part)
         if plan.limited:
-            said = Reason("noise_limited", {"factor": most, "freedom": plan.limited})
-            return NoiseTaken(most, math.inf, most * own, least, most, said)
-        value, own = estimated_factor(self.contrasts, plan.estimating, len(own))
+            reason = Reason("noise_limited", {"factor": most, "freedom": plan.limited})
+            return NoiseTaken(most, math.inf, most * factors, least, most, reason)
+        value, factors = estimated_factor(self.contrasts, plan.estimating, len(factors))
         code = "noise_estimated" if plan.estimating else "noise_tested"
-        said = Reason(code, {"factor": value, "freedom": freedom})
-        return NoiseTaken(value, freedom, own, value * least, value * most, said)
+        reason = Reason(code, {"factor": value, "freedom": freedom})
+        return NoiseTaken(value, freedom, factors, value * least, value * most, reason)
 
     def alarms(self) -> tuple[Reason, ...]:
         """What readings of the same block say against the noise stated, and against normal ones."""
@@ -256,7 +260,7 @@ class CampaignNoise:
                 margin=self.plan.margin,
                 false=false_scatter(self.settings.references),
             )
-        return tuple(each for each in (scatter, tails) if each is not None)
+        return tuple(alarm for alarm in (scatter, tails) if alarm is not None)
 
     def usual_scatter(self) -> float:
         """Factor on the noise planned that most differences within blocks have; 0 where few are.
@@ -287,24 +291,28 @@ class CampaignNoise:
 
         Where the noise is as stated, bounds are never less sure for being wider.
         """
-        found, margin = self.telling, self.plan.margin
-        shown = math.sqrt(float(found.squares.sum()) / max(found.freedom, 1))
-        if found.freedom >= FEWEST and shown > margin:
-            return shown, Reason("noise_shown", {"factor": shown, "freedom": found.freedom})
+        differences, margin = self.telling, self.plan.margin
+        shown = math.sqrt(float(differences.squares.sum()) / max(differences.freedom, 1))
+        if differences.freedom >= FEWEST and shown > margin:
+            return shown, Reason("noise_shown", {"factor": shown, "freedom": differences.freedom})
         return margin, Reason("noise_margin", {"margin": margin}) if margin > 1.0 else None
 
 
-def estimated_factor(found: Contrasts, estimating: int, points: int) -> tuple[float, np.ndarray]:
+def estimated_factor(
+    differences: Contrasts, estimating: int, points: int
+) -> tuple[float, np.ndarray]:
     """The factor that the first ``estimating`` numbers tell, or, with none, a test before: 1.
 
     And of every point (m,): one with 30 degrees of freedom of its own keeps the larger of its own
     factor and this one.
     """
-    first = found.values.reshape(-1)[:estimating]
+    first = differences.values.reshape(-1)[:estimating]
     value = math.sqrt(float(np.mean(first**2))) if estimating else 1.0
-    count = 3 * np.bincount(found.rows, minlength=points)
-    own = np.sqrt(np.bincount(found.rows, found.squares, points) / np.maximum(count, 1))
-    return value, np.where(count >= FEWEST, np.maximum(own, value), value)
+    count = 3 * np.bincount(differences.rows, minlength=points)
+    factors = np.sqrt(
+        np.bincount(differences.rows, differences.squares, points) / np.maximum(count, 1)
+    )
+    return value, np.where(count >= FEWEST, np.maximum(factors, value), value)
 
 
 def false_scatter(references: int) -> float:
@@ -313,7 +321,7 @@ def false_scatter(references: int) -> float:
 
 
 def scatter_alarm(
-    found: Contrasts, *, tested: float = math.inf, margin: float = 1.0, false: float = SCATTER
+    differences: Contrasts, *, tested: float = math.inf, margin: float = 1.0, false: float = SCATTER
 ) -> Reason | None:
     """That readings of the same block differ more than the noise stated allows.
 
@@ -324,7 +332,7 @@ def scatter_alarm(
     1, so it ever exceeds 1/p with a probability of p at most (Ville's inequality). With a noise
     that was tested, both likelihoods are averaged over all sizes of it.
     """
-    total = np.cumsum(found.squares) / margin**2
+    total = np.cumsum(differences.squares) / margin**2
     freedom = 3.0 * np.arange(1, len(total) + 1)
     if math.isinf(tested):
         ratios = 0.5 * total * (1.0 - 1.0 / _LARGER**2) - freedom * math.log(_LARGER)
@@ -333,11 +341,11 @@ def scatter_alarm(
         ratios = 0.5 * (tested + freedom) * nearer - freedom * math.log(_LARGER_THAN_TESTED)
     if ratios.max(initial=-math.inf) < -math.log(false):
         return None
-    ratio = math.sqrt(float(np.mean(found.squares)) / 3.0)
-    return Reason("scatter", {"ratio": ratio, "freedom": found.freedom})
+    ratio = math.sqrt(float(np.mean(differences.squares)) / 3.0)
+    return Reason("scatter", {"ratio": ratio, "freedom": differences.freedom})
 
 
-def tails_alarm(found: Contrasts) -> Reason | None:
+def tails_alarm(differences: Contrasts) -> Reason | None:
     """That some differences within blocks are too far out for normal readings of any noise.
 
     Ratio of two likelihoods, each averaged over all sizes of noise: heavy-tailed readings (half of
@@ -345,10 +353,10 @@ def tails_alarm(found: Contrasts) -> Reason | None:
     readings are normal its mean is 1 at all times, so it ever exceeds exp(5.5) with a probability
     of 0.4 % at most (Ville's inequality); how far it jumps beyond makes that 0.2 %.
     """
-    if found.freedom < FEWEST or heavy_over_normal(found.values) <= _TAILS:
+    if differences.freedom < FEWEST or heavy_over_normal(differences.values) <= _TAILS:
         return None
-    farthest = float(np.abs(found.values).max() / _scale(found.values))
-    return Reason("tails", {"farthest": farthest, "freedom": found.freedom})
+    farthest = float(np.abs(differences.values).max() / _scale(differences.values))
+    return Reason("tails", {"farthest": farthest, "freedom": differences.freedom})
 
 
 def heavy_over_normal(values: np.ndarray) -> float:

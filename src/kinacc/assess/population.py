@@ -76,8 +76,8 @@ def reading_densities(x: np.ndarray, noise: np.ndarray, true: np.ndarray) -> np.
     """
     gap = ((x - true) / noise) ** 2
     away = -np.expm1(-2.0 * np.maximum(x / noise, _NO_SIZE) * true / noise)
-    found = np.exp(0.5 * (gap.min(axis=1, keepdims=True) - gap)) * away / true
-    return found / found.max(axis=1, keepdims=True)
+    density = np.exp(0.5 * (gap.min(axis=1, keepdims=True) - gap)) * away / true
+    return density / density.max(axis=1, keepdims=True)
 
 
 def _chi_density(size_mm: np.ndarray, unit_mm: np.ndarray) -> np.ndarray:

@@ -76,7 +76,7 @@ def schedule(measurements: int, points: int, references: int) -> Schedule:
     between = references - start - end
     low, high = poses + start, measurements - end
     places = [*range(low)]
-    places += [low + (each + 1) * (high - low) // (between + 1) for each in range(between)]
+    places += [low + (revisit + 1) * (high - low) // (between + 1) for revisit in range(between)]
     places += range(high, measurements)
     return Schedule(measurements, poses, {place: k % poses for k, place in enumerate(places)})
 
@@ -101,8 +101,8 @@ class Readings(NamedTuple):
 
 def planned_readings(plan: Schedule, ledger: Ledger) -> Readings:
     """Of the readings of a ledger, those planned of reference poses."""
-    place = [at for at in sorted(plan.row_at) if at < ledger.taken]
-    read = [ledger.readings[at] for at in place]
+    place = [index for index in sorted(plan.row_at) if index < ledger.taken]
+    read = [ledger.readings[index] for index in place]
     rows = np.array([row for row, _, _ in read], dtype=np.intp)
     vectors = np.array([vector for _, vector, _ in read]).reshape(-1, 3)
     return Readings(np.array(place), rows, vectors, ledger.covariances(place))
@@ -145,11 +145,11 @@ def stages(plan: Schedule) -> tuple[tuple[int, float], ...]:
     earlier = [*range(_LEAST_ROUNDS * plan.poses, total, plan.poses)] if plan.poses else []
     if not earlier:
         return ((total, FALSE_ALARMS),) if plan.poses else ()
-    each = _EARLIER * FALSE_ALARMS / len(earlier)
-    return (*((count, each) for count in earlier), (total, (1.0 - _EARLIER) * FALSE_ALARMS))
+    share = _EARLIER * FALSE_ALARMS / len(earlier)
+    return (*((count, share) for count in earlier), (total, (1.0 - _EARLIER) * FALSE_ALARMS))
 
 
-def found(plan: Schedule, readings: Readings, freedom: float = math.inf) -> Change | None:
+def find_change(plan: Schedule, readings: Readings, freedom: float = math.inf) -> Change | None:
     """What the readings show at the last stage reached; found is what any stage found.
 
     ``freedom``: inf where the noise is as stated. Otherwise it is right up to one factor, and this
@@ -184,21 +184,23 @@ def _at_stage(plan: Schedule, readings: Readings, error: float, freedom: float) 
     shapes = np.vstack([place / plan.measurements, np.arange(count) >= gaps[:, None]])
     shapes = centred(shapes)
     length = np.sqrt(np.sum(shapes**2 * weight, axis=1))
-    told = length > 1e-9
-    gaps, shapes, length = np.append(0, gaps)[told], shapes[told], length[told]
+    usable = length > 1e-9
+    gaps, shapes, length = np.append(0, gaps)[usable], shapes[usable], length[usable]
     whitened = inverse @ vectors.T  # (3, n)
     along = (shapes * weight / length[:, None]) @ whitened.T  # (shapes, 3)
     square = np.sum(along**2, axis=1)
     within = float(np.sum(centred(whitened) ** 2 * weight))
-    own = 3.0 * (count - plan.poses)
+    degrees = 3.0 * (count - plan.poses)
     factor, stands_out = 1.0, True
     if math.isfinite(freedom):
-        within, freedom = within + freedom, own + freedom
+        within, freedom = within + freedom, degrees + freedom
         square, factor = square / within, math.sqrt((within - square.max()) / (freedom - 3.0))
-    elif own > _LEAST_FREEDOM:
+    elif degrees > _LEAST_FREEDOM:
         # Noise larger than stated, or one reading that went wrong, is no change: that has to stand
         # out from the scatter of the readings as well.
-        stands_out = bool(np.any(square / within > _thresholds(len(gaps), _BESIDE * error, own)))
+        stands_out = bool(
+            np.any(square / within > _thresholds(len(gaps), _BESIDE * error, degrees))
+        )
     least = _thresholds(len(gaps), error, freedom)
     best = _likelier(square, freedom)
     widest = factor * math.sqrt(float(np.linalg.eigvalsh(root @ root.T)[-1]))

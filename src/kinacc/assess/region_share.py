@@ -62,7 +62,7 @@ class RegionShare(OnceAssessor):
         spread = np.sqrt(np.linalg.eigvalsh(ledger.spread_mm2[ledger.visited])[:, -1])
         raised = np.sort(sizes + self.deviations * spread)[::-1]
         lowered = np.sort(sizes - math.sqrt(float(chdtri(3, _LIFTED))) * spread)[::-1]
-        said = Statement(
+        statement = Statement(
             REGION,
             value_mm=float(np.quantile(sizes, self.share)),
             lower_mm=max(float(lowered[lower]), 0.0) if lower < count else 0.0,
@@ -71,4 +71,4 @@ class RegionShare(OnceAssessor):
             share=self.share,
             assumption=Reason("drawn_at_random"),
         )
-        return (said,)
+        return (statement,)

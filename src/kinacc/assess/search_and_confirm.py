@@ -35,7 +35,7 @@ from kinacc.assess.noise import (
     noise_plan,
 )
 from kinacc.assess.population import largest_size
-from kinacc.assess.reference_poses import Change, found, planned_readings, poses_of, schedule
+from kinacc.assess.reference_poses import Change, find_change, planned_readings, poses_of, schedule
 from kinacc.assess.statement import (
     CANDIDATES,
     CONFIDENCE,
@@ -125,20 +125,20 @@ class SearchAndConfirm(AdaptiveAssessor):
 
     def visit(self, points: int) -> int:
         """How many of the candidates are visited in any case."""
-        enough, own = self.enough_for_all(points), self.measurements - self.references
-        if own >= points + (points - enough):
+        enough, budget = self.enough_for_all(points), self.measurements - self.references
+        if budget >= points + (points - enough):
             return points
-        if own >= enough:
+        if budget >= enough:
             return enough
-        return max(math.ceil(VISITED * own), 1)
+        return max(math.ceil(VISITED * budget), 1)
 
     def shortfall(self, points: int, joints: int) -> Reason | None:
         """What a larger budget would be good for with so many candidates; None if nothing."""
         enough = self.enough_for_all(points) + self.references
         if self.measurements >= enough:
             return None
-        left = excepted(points, self.visit(points), MISSED * (1.0 - self.confidence))
-        return Reason("excepted_ahead", {"enough": enough, "excepted": left})
+        excluded = excepted(points, self.visit(points), MISSED * (1.0 - self.confidence))
+        return Reason("excepted_ahead", {"enough": enough, "excepted": excluded})
 
     def begin(self, candidates: Candidates) -> SearchAndConfirmCampaign:
         """A new campaign."""
@@ -180,7 +180,7 @@ class SearchAndConfirmCampaign(Campaign):
         # Where the noise is an estimate, half of the error of single points is for its limit.
         self.single_error = allowed - lower_error
         single = self.single_error * (1.0 if math.isinf(noise.freedom) else 0.5)
-        each = single / max(min(self.first, points), 1)
+        point_error = single / max(min(self.first, points), 1)
         shares = np.diff(np.array(self.counts) / self.counts[-1], prepend=0.0)
         if len(shares) > 1:  # half for the first look
             shares = np.append(0.5, 0.5 * shares[1:] / shares[1:].sum())
@@ -189,11 +189,11 @@ class SearchAndConfirmCampaign(Campaign):
         wrong = 0
         if rate:
             # Half of the error of single points is for more wrong readings than are counted on.
-            each *= 0.5
+            point_error *= 0.5
             wrong = at_most_wrong(settings.measurements, rate, 0.5 * self.single_error)
         self.average = LowerAverage(wanted, lower_error, noise.freedom, rate)
         upper = self.boundary_of(allowed)
-        self.looks = Looks(self.ledger, upper, each, shares, self.factor, rate, wrong)
+        self.looks = Looks(self.ledger, upper, point_error, shares, self.factor, rate, wrong)
         self.blocks: list[int] = []  # of every reading in order the number of its block
         self.noise = CampaignNoise(settings, noise, self.ledger, self.blocks, self.first)
         self._row, self._left, self._counted = -1, 0, False
@@ -246,30 +246,30 @@ class SearchAndConfirmCampaign(Campaign):
             x, y, z = self._mean_mm[point] = self.ledger.mean_mm[point].tolist()
             self._size_mm[point] = math.sqrt(x * x + y * y + z * z)
         if not self._left and len(self.ledger.visited) >= self.first:
-            left = self.settings.measurements - taken - 1 - self.plan.left(taken + 1)
-            if left > 0:
-                self._begin_block(left)
+            remaining = self.settings.measurements - taken - 1 - self.plan.left(taken + 1)
+            if remaining > 0:
+                self._begin_block(remaining)
 
     def reading_blocks(self) -> list[int]:
         """Of every reading in order the number of its block."""
         return self.blocks
 
-    def _begin_block(self, left: int) -> None:
+    def _begin_block(self, remaining: int) -> None:
         """Choose where the next readings are taken, and how many of them."""
         missing = self.average.missing
         likely = int(np.argmax(self._size_mm))
-        row, count = likely, left
-        if left > missing:
-            for each in np.argsort(-self.looks.upper_mm[self.ledger.visited], kind="stable"):
-                point = self.ledger.visited[each]
+        row, count = likely, remaining
+        if remaining > missing:
+            for place in np.argsort(-self.looks.upper_mm[self.ledger.visited], kind="stable"):
+                point = self.ledger.visited[place]
                 wanted = self.looks.missing(point)
-                if wanted <= (left if point == likely else left - missing):
+                if wanted <= (remaining if point == likely else remaining - missing):
                     row, count = point, int(wanted)
                     break
         else:
-            count = int(min(left, self.looks.missing(likely)))
+            count = int(min(remaining, self.looks.missing(likely)))
         # A mean of one reading is the largest more often by its noise than by its error.
-        is_confirmed = self.ledger.count.item(row) > 1 or left <= missing
+        is_confirmed = self.ledger.count.item(row) > 1 or remaining <= missing
         self._counted = row == likely and missing > 0 and is_confirmed
         if self._counted:
             count = min(count, missing)
@@ -279,11 +279,13 @@ class SearchAndConfirmCampaign(Campaign):
     def statements(self) -> tuple[Statement, ...]:
         """On the measured points, and on all candidates."""
         ledger, settings = self.ledger, self.settings
-        seen, points = len(ledger.visited), ledger.candidates.points
-        if (left := max(math.ceil(FIRST_SHARE * self.first), 1) - seen) > 0:
-            early = Reason("first_visit", {"left": left})
+        visited, points = len(ledger.visited), ledger.candidates.points
+        if (missing_points := max(math.ceil(FIRST_SHARE * self.first), 1) - visited) > 0:
+            early = Reason("first_visit", {"left": missing_points})
             return Statement(MEASURED, withheld=early), Statement(CANDIDATES, withheld=early)
-        posterior = largest_size(ledger.sizes_mm(), ledger.noise_mm[ledger.visited], points - seen)
+        posterior = largest_size(
+            ledger.sizes_mm(), ledger.noise_mm[ledger.visited], points - visited
+        )
         value_mm = posterior.quantile_mm(0.5, measured_only=True)
         measured = Statement(MEASURED, value_mm, error_of=settings.error_of)
         everywhere = replace(measured, target=CANDIDATES, value_mm=posterior.quantile_mm(0.5))
@@ -291,23 +293,23 @@ class SearchAndConfirmCampaign(Campaign):
             return replace(measured, withheld=missing), replace(everywhere, withheld=missing)
         noise = self.noise.taken(self.allowed)
         if against := self._withheld():
-            stated = [replace(each, withheld=against) for each in (measured, everywhere)]
+            stated = [replace(item, withheld=against) for item in (measured, everywhere)]
         else:
             bounds = {
                 "lower_mm": self._lower_mm(),
                 "upper_mm": self._upper_mm(self.allowed, value_mm),
                 "confidence": settings.confidence - settings.wrong_rate,
             }
-            stated = [replace(each, **bounds) for each in (measured, everywhere)]
-            if seen < points:
-                left = excepted(points, seen, MISSED * self.allowed)
-                least = 0.0 if left else everywhere.value_mm
+            stated = [replace(item, **bounds) for item in (measured, everywhere)]
+            if visited < points:
+                missing_points = excepted(points, visited, MISSED * self.allowed)
+                least = 0.0 if missing_points else everywhere.value_mm
                 upper_mm = self._upper_mm((1.0 - MISSED) * self.allowed, least)
-                stated[1] = replace(stated[1], upper_mm=upper_mm, excepted=left)
-        stated = [replace(each, noise=noise.said) for each in stated]
+                stated[1] = replace(stated[1], upper_mm=upper_mm, excepted=missing_points)
+        stated = [replace(item, noise=noise.said) for item in stated]
         if settings.error_of != MEAN:
             arms_mm = self.noise.arms_mm(noise)
-            stated = [each.of_future_visits(arms_mm) for each in stated]
+            stated = [item.of_future_visits(arms_mm) for item in stated]
         return tuple(stated)
 
     def change(self) -> Change | None:
@@ -315,7 +317,7 @@ class SearchAndConfirmCampaign(Campaign):
         if self.ledger.taken < self.plan.poses or not self.plan.poses:
             return None
         tested = math.inf if self.settings.noise == KNOWN else self.settings.noise_freedom
-        return found(self.plan, planned_readings(self.plan, self.ledger), tested)
+        return find_change(self.plan, planned_readings(self.plan, self.ledger), tested)
 
     def point_limits(self) -> dict[int, tuple[float, float]]:
         """The limits that hold at every look, with the noise as bounds take it."""
@@ -352,12 +354,12 @@ class SearchAndConfirmCampaign(Campaign):
     def _withheld(self) -> Reason | None:
         """The alarm by which bounds are withheld; wrong readings are none where guarded against."""
         guarded = "wrong_readings" if self.settings.wrong_rate else ""
-        return next((each for each in self.alarms() if each.code != guarded), None)
+        return next((alarm for alarm in self.alarms() if alarm.code != guarded), None)
 
     def _limits_mm(self, error: float) -> np.ndarray:
         """Upper limits (m,) of single points for an allowed error."""
-        plan, own = self.noise_plan, self.noise.taken(error).own
-        return self.looks.limits_mm(self.boundary_of(plan.mean_share * error, plan.freedom), own)
+        plan, factor = self.noise_plan, self.noise.taken(error).own
+        return self.looks.limits_mm(self.boundary_of(plan.mean_share * error, plan.freedom), factor)
 
     def _single_factor(self) -> np.ndarray:
         """Factors (m,) on the noise that lower limits of single points rest on."""

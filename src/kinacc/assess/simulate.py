@@ -64,11 +64,13 @@ def assess_world(assessor, world: World, budget: int) -> tuple[Assessment, float
     campaign = assessor.begin(Candidates.with_equal_noise(world.sigma_mm))
     carry_on(campaign, reading_mm, limit=budget)
     stated = campaign.statements()
-    said = next((each for each in stated if each.target == CANDIDATES), stated[0])
-    found = Assessment(said.value_mm, len(rows), len(set(rows)), said.lower_mm, said.upper_mm)
-    if said.target == REGION:
-        return found, float(np.quantile(size, said.share, method="inverted_cdf"))
-    return found, truth_mm(said, size, rows)
+    statement = next((item for item in stated if item.target == CANDIDATES), stated[0])
+    assessment = Assessment(
+        statement.value_mm, len(rows), len(set(rows)), statement.lower_mm, statement.upper_mm
+    )
+    if statement.target == REGION:
+        return assessment, float(np.quantile(size, statement.share, method="inverted_cdf"))
+    return assessment, truth_mm(statement, size, rows)
 
 
 def noisy(errors_mm: np.ndarray, noise_root: np.ndarray, visits: int, *entropy: int) -> Reading:
@@ -83,7 +85,7 @@ def noisy(errors_mm: np.ndarray, noise_root: np.ndarray, visits: int, *entropy: 
 
 
 def truth_mm(
-    said: Statement,
+    statement: Statement,
     size_mm: np.ndarray,
     visited: list[int] | None,
     arm_mm: float | np.ndarray = 0.0,
@@ -92,10 +94,10 @@ def truth_mm(
 
     ``arm_mm``: standard deviation of a visit per axis, of each candidate or of all.
     """
-    if said.error_of == VISIT:
+    if statement.error_of == VISIT:
         size_mm = visit_mm(size_mm, arm_mm)
-    if said.target == CANDIDATES:
-        return float(np.sort(size_mm)[-1 - said.excepted])
-    if said.target == MEASURED and visited:
+    if statement.target == CANDIDATES:
+        return float(np.sort(size_mm)[-1 - statement.excepted])
+    if statement.target == MEASURED and visited:
         return float(size_mm[visited].max())
     return math.nan

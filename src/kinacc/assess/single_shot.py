@@ -39,11 +39,11 @@ class SingleShot(OnceAssessor):
             return (Statement(MEASURED, withheld=Reason("nothing_measured")),)
         error, points = 1.0 - self.confidence, min(self.measurements, ledger.candidates.points)
         lower, upper = zip(*ledger.limits_mm(error / points, error).values(), strict=True)
-        said = Statement(
+        statement = Statement(
             MEASURED,
             value_mm=float(ledger.sizes_mm().max()),
             lower_mm=max(lower),
             upper_mm=max(upper),
             confidence=self.confidence,
         )
-        return about_all_if_all_measured(said, ledger)
+        return about_all_if_all_measured(statement, ledger)

@@ -45,7 +45,7 @@ class World:
     @property
     def arrays(self) -> tuple[np.ndarray, ...]:
         """The fields in their order."""
-        return tuple(getattr(self, each.name) for each in fields(self))
+        return tuple(getattr(self, field.name) for field in fields(self))
 
     def reading_mm(self, row: int, visit: int) -> np.ndarray:
         """Error vector (3,) of reading number ``visit`` (0 = first) at a row, robot base frame."""
@@ -81,22 +81,14 @@ def drawn_world(
     Raises
     ------
     InputError
-        For errors or noise that cannot be used, and an order that does not name every point once.
+        For errors or noise that cannot be used.
     """
     error, sigma = checked_errors(error_mm), np.array(sigma_mm, dtype=np.float64)
-    points = len(error)
-    index = np.arange(points) if order is None else np.array(order, dtype=np.int64)
-    allowed = "a number above 0, or one per point, in mm"
-    if sigma.shape not in ((), (points,)):
-        raise InputError(Problem("noise", f"shape {sigma.shape}", allowed))
-    if not np.all(np.isfinite(sigma) & (sigma > 0.0)):
-        raise InputError(Problem("noise", f"smallest value {sigma.min():g} mm", allowed))
-    if visits < 1:
-        raise InputError(Problem("visits", f"{visits}", "at least 1"))
-    if not np.array_equal(np.sort(index), np.arange(points)):
-        what = "does not name every point once"
-        raise InputError(Problem("visiting order", what, f"0 to {points - 1}"))
-    return draw(error[index], np.broadcast_to(sigma, points)[index], key, visits, index)
+    index = np.arange(len(error)) if order is None else np.array(order, dtype=np.int64)
+    if sigma.shape not in ((), (len(error),)) or not np.all(np.isfinite(sigma) & (sigma > 0.0)):
+        allowed = "a number above 0, or one per point, in mm"
+        raise InputError(Problem("noise", f"{sigma_mm}"[:60], allowed))
+    return draw(error[index], np.broadcast_to(sigma, len(error))[index], key, visits, index)
 
 
 def draw(error_mm, sigma_mm, key, visits: int, index) -> World:
@@ -116,12 +108,12 @@ def checked_errors(error_mm: ArrayLike) -> np.ndarray:
     """Return true errors as (m, 3) float64; InputError where they cannot be used."""
     errors = np.ascontiguousarray(error_mm, dtype=np.float64)
     if errors.ndim != 2 or errors.shape[1] != 3 or errors.shape[0] == 0:
-        what, allowed = f"shape {errors.shape}", "(m, 3) with m at least 1, in mm"
-        raise InputError(Problem("true errors", what, allowed))
+        message, allowed = f"shape {errors.shape}", "(m, 3) with m at least 1, in mm"
+        raise InputError(Problem("true errors", message, allowed))
     bad = np.flatnonzero(~np.isfinite(errors).all(axis=1))
     if bad.size:
-        what = f"points {bad[:5].tolist()} are not finite"
-        raise InputError(Problem("true errors", what, "numbers in mm"))
+        message = f"points {bad[:5].tolist()} are not finite"
+        raise InputError(Problem("true errors", message, "numbers in mm"))
     return errors
 
 

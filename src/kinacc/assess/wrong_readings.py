@@ -111,8 +111,8 @@ def sizes_at(along: np.ndarray, sigma: np.ndarray, clip: float, wanted: float) -
 @lru_cache
 def _around(number: int) -> np.ndarray:
     """Directions (number, 3) evenly all around: a spiral from pole to pole."""
-    at = np.arange(number) + 0.5
-    height, turn = 1.0 - 2.0 * at / number, math.pi * (1.0 + math.sqrt(5.0)) * at
+    rank = np.arange(number) + 0.5
+    height, turn = 1.0 - 2.0 * rank / number, math.pi * (1.0 + math.sqrt(5.0)) * rank
     radius = np.sqrt(1.0 - height**2)
     return np.column_stack([radius * np.cos(turn), radius * np.sin(turn), height])
 
@@ -140,37 +140,39 @@ def suspicious_readings(
     """
     in_block = factor * _limit(0.5 * false_alarm / max(planned, 1), freedom)
     of_first = factor * _limit(0.5 * false_alarm / ledger.candidates.points, freedom)
-    found = []
+    suspicious = []
     for row in np.flatnonzero(ledger.count > 1).tolist():
-        places = [place for place, each in enumerate(ledger.readings) if each[0] == row]
+        places = [place for place, reading in enumerate(ledger.readings) if reading[0] == row]
         values, spreads = ledger.readings_of(row, len(places))
 
-        def distance(at: int, others: np.ndarray, values=values, spreads=spreads) -> float:
+        def distance(index: int, others: np.ndarray, values=values, spreads=spreads) -> float:
             """Distance from the mean of others, in standard deviations of the difference."""
-            apart = values[at] - values[others].mean(axis=0)
-            spread = spreads[at] + spreads[others].sum(axis=0) / len(others) ** 2
+            apart = values[index] - values[others].mean(axis=0)
+            spread = spreads[index] + spreads[others].sum(axis=0) / len(others) ** 2
             return math.sqrt(float(apart @ np.linalg.solve(spread, apart)))
 
         looks = np.searchsorted(counts, np.arange(len(places)), side="right")
-        block = np.where([blocks[each] < 0 for each in places], -np.array(places) - 1, looks)
+        block = np.where([blocks[reading] < 0 for reading in places], -np.array(places) - 1, looks)
         named: dict[int, float] = {}
         for number in np.unique(block):
-            own = np.flatnonzero(block == number)
-            if len(own) < 2:
+            members = np.flatnonzero(block == number)
+            if len(members) < 2:
                 continue
-            apart = [distance(at, own[own != at]) for at in own]
+            apart = [distance(index, members[members != index]) for index in members]
             if (far := max(apart)) > in_block:
                 # Of two, neither tells which it is: the one farther from the other readings.
                 others = np.flatnonzero(block != number)
-                if len(own) == 2 and len(others):
-                    apart = [distance(at, others) for at in own]
-                named[int(own[np.argmax(apart)])] = far
-        if len(places) > _LATER and not any(at <= _LATER for at in named):
+                if len(members) == 2 and len(others):
+                    apart = [distance(index, others) for index in members]
+                named[int(members[np.argmax(apart)])] = far
+        if len(places) > _LATER and not any(index <= _LATER for index in named):
             first = distance(0, np.arange(1, _LATER + 1))
             if first > of_first:
                 named[0] = first
-        found += [Suspicious(places[at] + 1, row, far / factor) for at, far in named.items()]
-    return tuple(sorted(found))
+        suspicious += [
+            Suspicious(places[index] + 1, row, far / factor) for index, far in named.items()
+        ]
+    return tuple(sorted(suspicious))
 
 
 def _limit(error: float, freedom: float) -> float:

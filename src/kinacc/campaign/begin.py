@@ -35,27 +35,48 @@ def points_of(
     directions: np.ndarray | None = None,
     point: str | None = None,
 ) -> Points:
-    """Candidates at reported joints (m, k), modelled in the robot's base.
+    """Model candidates in the robot's base; candidates at the same joints become one.
 
-    Candidates at the same joints become one. Raises InputError where fewer than two are left, or
-    where the model says nothing of a candidate's joints.
+    Parameters
+    ----------
+    arm : Calibration
+        Calibrated model whose errors are bounded.
+    joints : (m, k) array
+        Reported joints, rad (mm where a joint slides).
+    label : sequence of str
+        Names of the candidates.
+    directions : (m, k) array, optional
+        Directions of travel on arrival: -1, 0 (unknown), 1.
+    point : str, optional
+        Target that is measured, the tool by default.
+
+    Returns
+    -------
+    Points
+        Positions in mm, robot base frame, with their derivatives by the joints.
+
+    Raises
+    ------
+    InputError
+        Where fewer than two candidates differ, or joints lie outside the robot's limits or the
+        range of the model.
     """
     places = joints if directions is None else np.hstack([joints, directions])
-    kept = np.sort(np.unique(places, axis=0, return_index=True)[1])
-    if len(kept) < 2:
-        what = "only one" if len(joints) == 1 else f"all {len(joints)} are at the same joints"
-        raise InputError(Problem("candidates", what, "at least 2 different points"))
-    joints, label = joints[kept], [str(label[i]).strip() for i in kept]
-    directions = None if directions is None else directions[kept]
+    rows = np.sort(np.unique(places, axis=0, return_index=True)[1])
+    if len(rows) < 2:
+        message = "only one" if len(joints) == 1 else f"all {len(joints)} are at the same joints"
+        raise InputError(Problem("candidates", message, "at least 2 different points"))
+    joints, label = joints[rows], [str(label[i]).strip() for i in rows]
+    directions = None if directions is None else directions[rows]
     problems = _outside(arm, joints, label)
     problems += [fault for each in label for fault in not_in_a_line("candidates, pose", each)]
     if doubled := sorted(name for name, count in Counter(label).items() if count > 1):
-        what = f"names given to different joints: {', '.join(doubled[:5])}"
-        problems.append(Problem("candidates", what, "one name per point"))
+        message = f"names given to different joints: {', '.join(doubled[:5])}"
+        problems.append(Problem("candidates", message, "one name per point"))
     refuse(problems, "These candidates cannot be measured against the model")
-    at = JointState(arm.robot.dh_joints(joints), directions)
-    where = arm.pose(at, "base", point).position_mm
-    slope = arm.joint_jacobian(at, "base", point)[:, :3] @ arm.robot.joint_map
+    state = JointState(arm.robot.dh_joints(joints), directions)
+    where = arm.pose(state, "base", point).position_mm
+    slope = arm.joint_jacobian(state, "base", point)[:, :3] @ arm.robot.joint_map
     return Points(tuple(label), joints, directions, where, slope)
 
 
@@ -70,10 +91,32 @@ def plan_of(
     about: dict[str, str],
     by_travel: bool = True,
 ) -> Plan:
-    """The plan of a campaign: the candidates' order follows from ``seed`` alone.
+    """Return the plan of a campaign; the order of the candidates follows from ``seed`` alone.
 
-    ``start`` (k,): reported joints the arm stands at. Without ``by_travel`` the first visit keeps
-    the random order.
+    Parameters
+    ----------
+    arm : Calibration
+        Calibrated model whose errors are bounded.
+    points : Points
+        Candidates (:func:`points_of`).
+    assessor : AdaptiveAssessor
+        Method and budget.
+    instruments : sequence of Instrument
+        The first is planned with.
+    limits : Limits
+        Plausible size (infinite: by the residual of the calibration), tolerance and wanted width.
+    seed : int
+        Seed of the random order.
+    start : (k,) array
+        Reported joints the arm stands at, rad (mm where a joint slides).
+    about : dict
+        Robot, calibration, model, point and source of the candidates (:func:`about`).
+    by_travel : bool
+        Order the first visit for little travel, else keep the random order.
+
+    Returns
+    -------
+    Plan
     """
     order = np.random.default_rng(seed).permutation(len(points))
     to_base = compose(arm.origin("base"), invert(arm.origin("instrument")))
@@ -157,10 +200,10 @@ def _short_path(places: np.ndarray, start: np.ndarray) -> np.ndarray:
     if len(places) <= _ROUTED:
         return shortest_path(distances(whole))[1:] - 1
     # Improving a path takes time with the cube of its length: go by nearest neighbour first.
-    left, path, here = list(range(len(places))), [], start
-    while left:
-        nearest = int(np.argmin(np.abs(places[left] - here).max(axis=1)))
-        path.append(left.pop(nearest))
+    remaining, path, here = list(range(len(places))), [], start
+    while remaining:
+        nearest = int(np.argmin(np.abs(places[remaining] - here).max(axis=1)))
+        path.append(remaining.pop(nearest))
         here = places[path[-1]]
     return np.array(path)
 

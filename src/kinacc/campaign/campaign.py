@@ -258,13 +258,15 @@ class Campaign:
             state, plan = opened.state(), opened.plan
             asked = state.asked if point is None else plan.points.number(point)
             if asked is None:
-                what = "no further reading is needed" if point is None else f"{point!r} is unknown"
-                raise InputError(Problem("point", what, fix="name a candidate"), _NOTHING)
+                message = (
+                    "no further reading is needed" if point is None else f"{point!r} is unknown"
+                )
+                raise InputError(Problem("point", message, fix="name a candidate"), _NOTHING)
             name = plan.instrument(instrument).name
             values = np.asarray(position_mm, dtype=float).reshape(-1)
-            at = None if joints is None else np.asarray(joints, dtype=float).reshape(-1)
-            found = Reading(asked, values, name, at, std_mm)
-            rows = RowsOfFile([found], ["the reading"], "", "")
+            reported = None if joints is None else np.asarray(joints, dtype=float).reshape(-1)
+            reading = Reading(asked, values, name, reported, std_mm)
+            rows = RowsOfFile([reading], ["the reading"], "", "")
             recorded = _record(opened, state, rows, accept_implausible, again, skip_bad=False)
         self._load()
         return recorded
@@ -307,7 +309,7 @@ class Campaign:
         with folders.writing(self.folder) as opened:
             state = opened.state()
             problems = {
-                "was struck before": number in {each.number for each, _ in state.struck},
+                "was struck before": number in {item.number for item, _ in state.struck},
                 f"does not exist ({state.numbered} readings)": not 1 <= number <= state.numbered,
             }
             _refuse(f"reading {number}", problems, reason)
@@ -371,16 +373,18 @@ def _record(
                 label = plan.points.label[row.point]
                 wrong.append(Problem(place, f"point {label} was left out of the campaign"))
             if row.digits in earlier and not again:
-                what = f"equals {earlier[row.digits]} to the last digit"
-                wrong.append(Problem(place, what, fix="--again takes it as a reading of its own"))
+                message = f"equals {earlier[row.digits]} to the last digit"
+                wrong.append(
+                    Problem(place, message, fix="--again takes it as a reading of its own")
+                )
             good += [] if wrong else [row]
             problems += wrong
         earlier.setdefault(row.digits, place)
     missing = imported.intersection(item.number for item in recorded).difference(known)
     if missing and not again:
-        what = f"does not hold {_listed(missing)} any more, recorded from it before"
+        message = f"does not hold {_listed(missing)} any more, recorded from it before"
         fix = "bring the rows back, strike the readings, or give --again"
-        problems.append(Problem(path, what, fix=fix))
+        problems.append(Problem(path, message, fix=fix))
         skip_bad = False
     if not good and not problems:
         raise InputError(Problem(path, f"has no new row: {_listed(known)} recorded before"))
@@ -403,7 +407,7 @@ def _listed(numbers) -> str:
 
 
 def _refuse(where: str, problems: Mapping[str, bool], reason: str) -> None:
-    found = [Problem(where, what) for what, is_so in problems.items() if is_so]
+    faults = [Problem(where, message) for message, is_so in problems.items() if is_so]
     if not reason.strip():
-        found.append(Problem("--reason", "is empty"))
-    refuse(found, "Nothing was changed")
+        faults.append(Problem("--reason", "is empty"))
+    refuse(faults, "Nothing was changed")

@@ -37,14 +37,15 @@ def of_noise(instruments: Sequence[Instrument], left_mm: float = math.nan) -> li
     than = f"than the {left_mm:.3g} mm that the calibration left" if known else "than trackers do"
     return [
         Problem(
-            f"noise of {each.name}",
-            f"{noise(each)}: the readings would scatter more {than}",
+            f"noise of {device.name}",
+            f"{noise(device)}: the readings would scatter more {than}",
             "millimetres",
             "are micrometres meant? Then it is "
-            f"{1e-3 * np.sqrt(np.diag(each.covariance_mm2)).max():g} mm. --sure takes it as it is",
+            f"{1e-3 * np.sqrt(np.diag(device.covariance_mm2)).max():g} mm. "
+            "--sure takes it as it is",
         )
-        for each in instruments
-        if math.sqrt(np.trace(each.covariance_mm2)) > most_mm
+        for device in instruments
+        if math.sqrt(np.trace(device.covariance_mm2)) > most_mm
     ]
 
 
@@ -54,14 +55,14 @@ def of_little_noise(instruments: Sequence[Instrument], known: Noise | None) -> l
         return []
     return [
         Problem(
-            f"noise of {each.name}",
-            f"{noise(each)}: readings of the calibration at equal joints scatter by "
+            f"noise of {device.name}",
+            f"{noise(device)}: readings of the calibration at equal joints scatter by "
             f"{known.per_axis_mm:.3g} mm per axis ({known.freedom} degrees of freedom)",
             fix=f"include how the arm repeats a pose: {known.per_axis_mm:.2g} mm or more; --sure "
             "takes it as it is",
         )
-        for each in instruments
-        if math.sqrt(np.trace(each.covariance_mm2) / 3.0) < _LITTLE_NOISE * known.per_axis_mm
+        for device in instruments
+        if math.sqrt(np.trace(device.covariance_mm2) / 3.0) < _LITTLE_NOISE * known.per_axis_mm
     ]
 
 
@@ -79,7 +80,7 @@ def noise_by_repeats(known: Noise | None) -> str:
     """Return the scatter of repeated readings of a calibration; empty where there are too few."""
     if known is None or known.freedom < _FEWEST_FREEDOM or not (known.std_mm > 0.0).all():
         return ""
-    std_mm = ",".join(f"{each:.2g}" for each in known.std_mm)
+    std_mm = ",".join(f"{std:.2g}" for std in known.std_mm)
     return (
         f"{known.readings} readings of the calibration at {known.configurations} configurations "
         f"scatter by {std_mm} mm along x,y,z of the instrument: a lower limit of the noise"
@@ -99,12 +100,12 @@ def of_candidates(arm: Calibration, points: Points, point: str | None) -> list[P
     if far <= _FAR_SHARE * len(points):
         return []
     largest_mm = float(np.max(position_std_mm(arm, _at(arm, points), point)))
-    what = (
+    message = (
         f"{far} of {len(points)} lie outside the joint ranges of the calibration, or have a larger "
         f"standard deviation than {LIKE_FITTED:.0%} of its poses (up to {largest_mm:.3g} mm)"
     )
     fix = "--region measured draws them between measured poses; --sure takes them as they are"
-    return [Problem("candidates", what, f"at most {_FAR_SHARE:.0%} of them", fix)]
+    return [Problem("candidates", message, f"at most {_FAR_SHARE:.0%} of them", fix)]
 
 
 def _at(arm: Calibration, points: Points) -> JointState:

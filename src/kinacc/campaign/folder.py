@@ -77,9 +77,9 @@ def read_journal(path: Path, seed: str) -> Journal:
                 break  # a machine that lost power may leave zeros where nothing was written yet
             raise _damaged(f"{path}, line {number}", "cannot be read") from None
         if not matches:
-            what = "was changed, or belongs to another campaign"
-            what += f", or {PLAN} was changed" if number == 1 else ""
-            raise _damaged(f"{path}, line {number}", what)
+            message = "was changed, or belongs to another campaign"
+            message += f", or {PLAN} was changed" if number == 1 else ""
+            raise _damaged(f"{path}, line {number}", message)
         entries.append(entry)
     lines = tuple(whole[: len(entries)])
     return Journal(tuple(entries), seed, lines, len(content) - sum(map(len, lines)))
@@ -120,13 +120,13 @@ def locked(folder: Path, patience_s: float = _PATIENCE_S) -> Iterator[None]:
         try:
             held = taken(file.fileno(), fcntl.LOCK_EX, patience_s)
         except OSError as error:
-            what = f"the file system of this folder holds no locks: {error.strerror}"
+            message = f"the file system of this folder holds no locks: {error.strerror}"
             fix = "two writers could spoil the campaign: move its folder to a local disk"
-            raise InputError(Problem(str(folder), what, fix=fix)) from None
+            raise InputError(Problem(str(folder), message, fix=fix)) from None
         if not held:
-            what = "another process is writing to this campaign"
+            message = "another process is writing to this campaign"
             fix = "wait until it is done, then try again"
-            raise InputError(Problem(str(folder), what, fix=fix))
+            raise InputError(Problem(str(folder), message, fix=fix))
         yield
 
 
@@ -135,9 +135,9 @@ def _checksum(seed: str, number: int, entry: Mapping) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:_DIGITS]
 
 
-def _damaged(where: str, what: str) -> InputError:
+def _damaged(where: str, message: str) -> InputError:
     fix = "nothing was done; bring the file back from a copy"
-    return InputError(Problem(where, what, fix=fix))
+    return InputError(Problem(where, message, fix=fix))
 
 
 def _not_written(path: Path, error: OSError) -> MachineError:
@@ -163,7 +163,7 @@ class Opened:
     @property
     def recorded(self) -> tuple[str, ...]:
         """The times of its entries."""
-        return tuple(str(each["at"]) for each in self.journal.entries if "at" in each)
+        return tuple(str(entry["at"]) for entry in self.journal.entries if "at" in entry)
 
     def write(self, entry: Mapping) -> None:
         """Append an entry, with the time; on disk when this returns. Only while ``writing``."""
@@ -174,8 +174,8 @@ class Opened:
 def in_the_way(folder: Path | str) -> list[Problem]:
     """Return a problem for each file of a campaign that a folder holds already."""
     paths = [Path(folder) / name for name in (PLAN, JOURNAL)]
-    what = "a campaign is there already"
-    return [Problem(str(path), what, "a new folder") for path in paths if path.exists()]
+    message = "a campaign is there already"
+    return [Problem(str(path), message, "a new folder") for path in paths if path.exists()]
 
 
 def start(folder: Path | str, begun: Plan) -> None:
@@ -185,7 +185,23 @@ def start(folder: Path | str, begun: Plan) -> None:
 
 
 def open_(folder: Path | str) -> Opened:
-    """Read a campaign. Raises InputError where there is none, or it was damaged."""
+    """Read a campaign.
+
+    Parameters
+    ----------
+    folder : path
+        Folder that ``kinacc campaign start`` made.
+
+    Returns
+    -------
+    Opened
+        Plan and journal.
+
+    Raises
+    ------
+    InputError
+        Where there is no campaign, or a file was damaged or changed.
+    """
     folder = Path(folder)
     path = folder / PLAN
     if not path.is_file():
@@ -209,11 +225,11 @@ def require_method(opened: Opened) -> None:
     """Raise InputError where this version computes bounds otherwise than the campaign's."""
     if opened.plan.method != plans.METHOD:
         begun = opened.plan.about.get("kinacc_version", "an earlier version")
-        what = (
+        message = (
             f"uses bounds of method {opened.plan.method}; kinacc {__version__} has {plans.METHOD}"
         )
         fix = f"continue it with kinacc {begun}, or begin a new campaign"
-        raise InputError(Problem(str(opened.folder), what, fix=fix))
+        raise InputError(Problem(str(opened.folder), message, fix=fix))
 
 
 def marks_of(opened: Opened) -> dict[str, object]:
@@ -271,7 +287,7 @@ def readings_entry(
 
     ``file`` is the digest of their file, ``path`` where it lies from the campaign's folder.
     """
-    entry: dict = {"kind": READINGS, "readings": [each.as_entry() for each in readings]}
+    entry: dict = {"kind": READINGS, "readings": [reading.as_entry() for reading in readings]}
     entry |= {"file": file} if file is not None else {}
     return entry | ({"path": path} if path is not None else {})
 
@@ -284,12 +300,12 @@ def of_results(results: Path) -> list[Path]:
     """
     within, name = results.absolute().parent, results.resolve().name
     near = {within.resolve(): results.parent, within.parent.resolve(): results.parent / ".."}
-    found = []
+    campaigns = []
     for place in (near | {Path.cwd(): Path()}).values():
         for path in sorted(place.glob(f"*/{PLAN}")):
             # What cannot be read is no campaign, or one that cannot state whose it is.
             with suppress(InputError, OSError, ValueError, LookupError, TypeError, RecursionError):
                 content = json_files.values_of(json_files.bytes_of(path), str(path))
                 if content["about"]["calibration"] == name:
-                    found.append(path.parent)
-    return found
+                    campaigns.append(path.parent)
+    return campaigns

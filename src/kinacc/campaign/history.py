@@ -23,17 +23,17 @@ def run(inputs: Mapping, settings: Mapping) -> dict[str, Columns]:
 def _sessions(inputs: Mapping, settings: Mapping) -> Iterator[Session]:
     tolerance_mm = settings["tolerance"]["mm"]
     tolerance_mm = np.nan if tolerance_mm is None else tolerance_mm
-    campaigns = [each.parent for role, each in sorted(inputs.items()) if "/campaign_" in role]
+    campaigns = [value.parent for role, value in sorted(inputs.items()) if "/campaign_" in role]
     for line in settings["series"]:
         tables = {
-            role.removeprefix(f"{line['name']}/"): each
-            for role, each in inputs.items()
-            if role.startswith(f"{line['name']}/") and not isinstance(each, Path)
+            role.removeprefix(f"{line['name']}/"): value
+            for role, value in inputs.items()
+            if role.startswith(f"{line['name']}/") and not isinstance(value, Path)
         }
-        found = session_of(tables, line["name"], line["date"], line["base"], line["tool"])
+        session = session_of(tables, line["name"], line["date"], line["base"], line["tool"])
         yield replace(
-            found,
+            session,
             digest=store.digest_of("measurements", tables["measurements"]),
-            bound_mm=of_calibration.finished(tables, found.calibration.choice, campaigns),
+            bound_mm=of_calibration.finished(tables, session.calibration.choice, campaigns),
             tolerance_mm=tolerance_mm,
         )

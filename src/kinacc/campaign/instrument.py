@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
@@ -49,16 +48,16 @@ class Instrument:
         """
         turn = to_base.rotation
         if self.laser is not None:
-            seen = self.laser.covariance_mm2(from_head_mm(to_base, at_mm))
-            turned = turn @ floored(seen, self.resolution_mm) @ turn.T
+            local = self.laser.covariance_mm2(from_head_mm(to_base, at_mm))
+            turned = turn @ floored(local, self.resolution_mm) @ turn.T
             return 0.5 * (turned + np.swapaxes(turned, 1, 2))
         even = self.covariance_mm2[0, 0] * np.eye(3)
         if self.frame == BASE or np.array_equal(self.covariance_mm2, even):
-            own = self.covariance_mm2  # turning equal noise would only add rounding
+            covariance = self.covariance_mm2  # turning equal noise would only add rounding
         else:
             turned = turn @ self.covariance_mm2 @ turn.T
-            own = 0.5 * (turned + turned.T)
-        return np.tile(own, (len(at_mm), 1, 1))
+            covariance = 0.5 * (turned + turned.T)
+        return np.tile(covariance, (len(at_mm), 1, 1))
 
     def placed(self, to_base: Pose, at_mm: np.ndarray) -> Instrument:
         """The instrument with the largest covariance that it has at places (m, 3) in the base."""
@@ -69,8 +68,8 @@ class Instrument:
 
     def of_reading(self, covariance_mm2: np.ndarray) -> Instrument:
         """The same instrument with the covariance (3, 3) that a reading brings itself."""
-        own = floored(covariance_mm2, self.resolution_mm)
-        return replace(self, covariance_mm2=own, laser=None)
+        covariance = floored(covariance_mm2, self.resolution_mm)
+        return replace(self, covariance_mm2=covariance, laser=None)
 
 
 def floored(covariance_mm2: np.ndarray, resolution_mm: float) -> np.ndarray:
@@ -94,71 +93,62 @@ def instruments(
     ``tracker=laser:..`` is read by :func:`kinacc.campaign.laser_tracker.of_text`. Raises
     InputError naming everything that is wrong with any of them.
     """
-    found: dict[str, Instrument] = {}
+    devices: dict[str, Instrument] = {}
     problems: list[Problem] = []
     for text in texts:
-        name, mark, numbers = text.partition("=")
+        name, equals, numbers = text.partition("=")
         name = name.strip()
-        if not mark or not name:
+        if not equals or not name:
             problems.append(Problem("--instrument", repr(text), f"NAME={_FORMS}"))
             continue
-        if name in found:
+        if name in devices:
             problems.append(Problem(f"instrument {name}", "is given twice"))
         problems += not_in_a_line("--instrument", name)
         where, laser = f"noise of {name}", None
         if numbers.strip().startswith(laser_tracker.PREFIX):
             laser = laser_tracker.of_text(numbers.strip(), where, problems)
             if laser is not None and frame == BASE:
-                what = "a laser tracker's noise hangs on where it stands"
-                problems.append(Problem(where, what, "--frame instrument"))
+                message = "a laser tracker's noise hangs on where it stands"
+                problems.append(Problem(where, message, "--frame instrument"))
             covariance = None if laser is None else laser.largest_mm(np.zeros((1, 3))) ** 2 * _EVEN
         else:
             covariance = covariance_of(numbers, where, problems)
         if covariance is not None:
-            own = floored(covariance, resolution_mm)
-            found[name] = Instrument(name, own, frame, laser, resolution_mm)
+            total = floored(covariance, resolution_mm)
+            devices[name] = Instrument(name, total, frame, laser, resolution_mm)
     refuse(problems, "These instruments cannot be used")
-    return tuple(found.values())
+    return tuple(devices.values())
 
 
 def covariance_of(text: str, where: str, problems: list[Problem]) -> np.ndarray | None:
     """Covariance (3, 3) of a text with 1, 3 or 9 numbers; None with what is wrong noted."""
     values = numbers_of(text)
-    if values.size not in (1, 3, 9):
-        fix = ""
-        if re.fullmatch(r"\s*-?\d+,\d+\s*", text):
-            fix = f"a comma stands between numbers: write {text.strip().replace(',', '.')}"
-        problems.append(Problem(where, repr(text), _FORMS, fix))
-        return None
     if values.size == 9:
         covariance = values.reshape(3, 3)
-        for _, said in covariance_faults(covariance[None]):
-            problems.append(Problem(where, said, "symmetric, positive definite, in mm^2"))
-            return None
-        return covariance
-    if not (values > 0.0).all():
-        allowed = "above 0, in mm: no instrument is without noise"
-        problems.append(Problem(where, f"standard deviation {text.strip()}", allowed))
-        return None
-    if (values < _SMALLEST_STD_MM).any():
-        allowed = f"at least {_SMALLEST_STD_MM:g} mm"
-        problems.append(Problem(where, f"standard deviation {text.strip()} mm", allowed))
-        return None
-    if (values > _LARGEST_STD_MM).any():
-        problems.append(Problem(where, f"standard deviation {text.strip()} mm", "below 1 m"))
-        return None
-    return np.diag(np.broadcast_to(values, 3) ** 2)
+        faults = covariance_faults(covariance[None])
+        fault = faults[0][1] if faults else ""
+        allowed = "symmetric, positive definite, in mm^2"
+    elif values.size in (1, 3):
+        covariance = np.diag(np.broadcast_to(values, 3) ** 2)
+        usable = (values >= _SMALLEST_STD_MM) & (values <= _LARGEST_STD_MM)
+        fault = "" if usable.all() else f"standard deviation {text.strip()} mm"
+        allowed = f"at least {_SMALLEST_STD_MM:g} mm, at most {_LARGEST_STD_MM:g} mm"
+    else:
+        covariance, fault, allowed = None, repr(text), _FORMS
+    if fault:
+        problems.append(Problem(where, fault, allowed))
+    return None if fault else covariance
 
 
-def noise(each: Instrument) -> str:
+def noise(device: Instrument) -> str:
     """The noise of an instrument in few words."""
-    steps = f", read in steps of {each.resolution_mm:g} mm" if each.resolution_mm else ""
-    std = np.sqrt(np.diag(each.covariance_mm2))
-    if each.laser is not None:
+    steps = f", read in steps of {device.resolution_mm:g} mm" if device.resolution_mm else ""
+    std = np.sqrt(np.diag(device.covariance_mm2))
+    if device.laser is not None:
         most = f"{std[0]:.3g} mm per axis at the farthest candidate, less nearer"
-        return f"{most} ({each.laser.in_words()}){steps}"
-    if np.array_equal(each.covariance_mm2, np.diag(np.diag(each.covariance_mm2))):
+        return f"{most} ({device.laser.in_words()}){steps}"
+    if np.array_equal(device.covariance_mm2, np.diag(np.diag(device.covariance_mm2))):
         same = np.all(std == std[0])
-        said = f"{std[0]:g} mm" if same else f"{std[0]:g}, {std[1]:g}, {std[2]:g} mm"
-        return f"{said} per axis{steps}"
+        axes = f"{std[0]:g} mm" if same else f"{std[0]:g}, {std[1]:g}, {std[2]:g} mm"
+        return f"{axes} per axis{steps}"
     return f"{std[0]:.3g}, {std[1]:.3g}, {std[2]:.3g} mm, correlated{steps}"

@@ -45,26 +45,42 @@ class _File(BaseModel):
 
 
 def read(path: str | Path) -> KnownNoise:
-    """Return the noise of a file. Raises InputError where it has none."""
+    """Return the noise of a file that ``kinacc repeatability -o`` wrote.
+
+    Parameters
+    ----------
+    path : path
+        JSON file.
+
+    Returns
+    -------
+    KnownNoise
+        Covariance in mm^2 in the frame of its readings, with its degrees of freedom.
+
+    Raises
+    ------
+    InputError
+        Where the file holds no noise, or too few degrees of freedom.
+    """
     where = f"--repeatability {path}"
     try:
-        found = _File.model_validate(json_files.values_of(json_files.bytes_of(path), str(path)))
-        covariance = np.array(found.noise.covariance_mm2 if found.noise else np.eye(3))
+        content = _File.model_validate(json_files.values_of(json_files.bytes_of(path), str(path)))
+        covariance = np.array(content.noise.covariance_mm2 if content.noise else np.eye(3))
         covariance = covariance.reshape(3, 3)
     except OSError:
         raise InputError(Problem(where, "no such file", fix=_FIX)) from None
     except (RecursionError, ValueError):
-        what = "is no answer of kinacc repeatability"
-        raise InputError(Problem(where, what, fix=_FIX)) from None
-    if found.noise is None:
+        message = "is no answer of kinacc repeatability"
+        raise InputError(Problem(where, message, fix=_FIX)) from None
+    if content.noise is None:
         raise InputError(Problem(where, "has no noise: no pose was visited again", fix=_FIX))
     problems = [Problem(where, fault, fix=_FIX) for _, fault in covariance_faults(covariance[None])]
-    freedom = int(found.noise.freedom)
+    freedom = int(content.noise.freedom)
     if freedom < FEWEST:
         allowed = f"at least {FEWEST}; {ENOUGH} are wanted"
         problems.append(Problem(where, f"{freedom} degrees of freedom", allowed, _FIX))
     refuse(problems)
-    return KnownNoise(covariance, freedom, found.file, found.poses_differ or "")
+    return KnownNoise(covariance, freedom, content.file, content.poses_differ or "")
 
 
 def doubts(known: KnownNoise | None) -> list[Problem]:

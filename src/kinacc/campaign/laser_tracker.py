@@ -37,9 +37,9 @@ class LaserTracker:
         along, across = self._std_mm(distance_mm)
         with np.errstate(invalid="ignore"):
             beam = np.nan_to_num(from_head_mm / distance_mm[:, None])
-        own = beam[:, :, None] * beam[:, None, :]
+        outer = beam[:, :, None] * beam[:, None, :]
         even = (across**2 + self.repeat_mm**2)[:, None, None] * np.eye(3)
-        return even + (along**2 - across**2)[:, None, None] * own
+        return even + (along**2 - across**2)[:, None, None] * outer
 
     def largest_mm(self, from_head_mm: np.ndarray) -> float:
         """Largest standard deviation in any direction at any of the places (m, 3)."""
@@ -63,16 +63,18 @@ class LaserTracker:
 
 def of_text(text: str, where: str, problems: list[Problem]) -> LaserTracker | None:
     """Return a tracker of a text that begins with ``laser:``; None with what is wrong noted."""
-    known = [each.name for each in fields(LaserTracker)]
+    known = [number.name for number in fields(LaserTracker)]
     parts = [part.partition("=")[::2] for part in text.removeprefix(PREFIX).split(",")]
     values = {name.strip(): numbers_of(value) for name, value in parts}
     wrong = [name for name in values if name not in known]
-    wrong += [name for name, each in values.items() if each.size != 1 or not 0 <= each[0] < 1e3]
+    wrong += [
+        name for name, number in values.items() if number.size != 1 or not 0 <= number[0] < 1e3
+    ]
     wrong += ["repeat_mm"] if "repeat_mm" not in values else []
     if not wrong and len(values) == len(parts):
-        found = LaserTracker(**{name: float(values.get(name, [0.0])[0]) for name in known})
-        if (np.array(found._std_mm(np.array([1e3]))) > _SMALLEST_MM).all():
-            return found
+        tracker = LaserTracker(**{name: float(values.get(name, [0.0])[0]) for name in known})
+        if (np.array(tracker._std_mm(np.array([1e3]))) > _SMALLEST_MM).all():
+            return tracker
         wrong = ["range and angle must be above 0"]
     problems.append(Problem(where, f"{text!r} ({', '.join(wrong) or 'a key twice'})", _FORM))
     return None

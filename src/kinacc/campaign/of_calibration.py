@@ -31,7 +31,7 @@ class Sought:
     remarks: tuple[str, ...] = ()
 
 
-def sought(name: str, tables: Mapping[str, Columns], places: Iterable[Path]) -> Sought:
+def newest(name: str, tables: Mapping[str, Columns], places: Iterable[Path]) -> Sought:
     """Return the campaign of the calibration ``name`` among the folders ``places``, the newest.
 
     ``tables`` are those of its results folder, ``places`` those of :func:`folder.of_results`. A
@@ -39,28 +39,40 @@ def sought(name: str, tables: Mapping[str, Columns], places: Iterable[Path]) -> 
     calibration of that name is left out.
     """
     remarks = []
-    newest = sorted(set(places), key=_last_reading, reverse=True)
-    for number, place in enumerate(newest, 1):
+    ordered = sorted(set(places), key=_last_reading, reverse=True)
+    for number, place in enumerate(ordered, 1):
         try:
             opened = folder.open_(place)
             if not _is_of(opened.plan, tables):
                 remarks.append(f"campaign {place} was begun with another calibration of {name}")
                 continue
-            found = status(opened, opened.state())
+            summary = status(opened, opened.state())
         except InputError:
             command = shlex.join(["kinacc", "campaign", "status", str(place)])
             remarks.append(f"campaign {place} cannot be read: {command}")
             continue
-        if others := [str(each) for each in newest[number:]]:
+        if others := [str(path) for path in ordered[number:]]:
             remarks.append(f"there are older campaigns: {', '.join(others)}")
-        return Sought(found, tuple(remarks))
+        return Sought(summary, tuple(remarks))
     return Sought(None, tuple(remarks))
 
 
 def finished(tables: Mapping[str, Columns], model: str, places: Iterable[Path]) -> float:
-    """Return the upper bound, mm, of the last finished campaign on a calibration's ``model``.
+    """Return the upper bound of the last finished campaign on a calibration.
 
-    The last by the times of its journal. NaN where there is none.
+    Parameters
+    ----------
+    tables : mapping
+        Tables of the results folder.
+    model : str
+        Model that the campaign is about.
+    places : iterable of path
+        Folders of campaigns (:func:`kinacc.campaign.folder.of_results`).
+
+    Returns
+    -------
+    float
+        Upper bound in mm, by the times of the journals the last; NaN where there is none.
     """
     ended = []
     for place in places:
@@ -68,10 +80,10 @@ def finished(tables: Mapping[str, Columns], model: str, places: Iterable[Path]) 
             opened = folder.open_(place)
             if opened.plan.about["model"] != model or not _is_of(opened.plan, tables):
                 continue
-            found = status(opened, opened.state())
-            bound = found.of_all
-            if found.next_point is None and np.isfinite(bound.upper_mm) and not bound.excepted:
-                ended.append((found.recorded, bound.upper_mm))
+            summary = status(opened, opened.state())
+            bound = summary.of_all
+            if summary.next_point is None and np.isfinite(bound.upper_mm) and not bound.excepted:
+                ended.append((summary.recorded, bound.upper_mm))
     return max(ended, default=("", np.nan))[1]
 
 
@@ -89,8 +101,8 @@ def _is_of(plan: Plan, tables: Mapping[str, Columns]) -> bool:
             return False
         about = plan.about
         calibration = results.calibration(tables, arm, about["model"], about["calibration"])
-        at = JointState(arm.dh_joints(plan.points.joints), plan.points.directions)
-        seen = calibration.pose(at, "base", about["point"]).position_mm
+        state = JointState(arm.dh_joints(plan.points.joints), plan.points.directions)
+        modelled_mm = calibration.pose(state, "base", about["point"]).position_mm
     except InputError:
         return False  # the model or the target is not there any more
-    return bool(np.abs(seen - plan.points.modelled_mm).max() < _SAME_MM)
+    return bool(np.abs(modelled_mm - plan.points.modelled_mm).max() < _SAME_MM)

@@ -111,10 +111,10 @@ class Plan:
         """An instrument by name, the first where none is named. InputError for another name."""
         if name is None:
             return self.instruments[0]
-        found = {each.name: each for each in self.instruments}
-        if name not in found:
-            raise InputError(Problem("instrument", f"{name!r} is not there", ", ".join(found)))
-        return found[name]
+        devices = {device.name: device for device in self.instruments}
+        if name not in devices:
+            raise InputError(Problem("instrument", f"{name!r} is not there", ", ".join(devices)))
+        return devices[name]
 
     def visiting(self, left_out: frozenset[int]) -> np.ndarray:
         """Points in the order in which the assessor numbers them, without those left out.
@@ -148,23 +148,23 @@ def assessor_of(name: str, settings: Mapping[str, object]) -> AdaptiveAssessor:
         raise InputError(Problem("--assessor", f"{name!r} is not there", ", ".join(ADAPTIVE)))
     known = {field.name: field for field in fields(ADAPTIVE[name])}
     # A campaign's budget is its own: it may be larger than that of a simulation.
-    own = {*known} - {"measurements"}
-    shared = own & {*Study.model_fields}
-    asked = {each: value for each, value in settings.items() if each in shared}
+    free = {*known} - {"measurements"}
+    shared = free & {*Study.model_fields}
+    asked = {key: value for key, value in settings.items() if key in shared}
     problems: list[Problem] = []
     try:
         Study.model_validate(asked)
     except ValidationError as error:
         problems += problems_of(error, lambda path: f"setting {path[0]} of {name}")
-    for each, value in settings.items():
-        where = f"setting {each} of {name}"
-        if each not in known:
+    for key, value in settings.items():
+        where = f"setting {key} of {name}"
+        if key not in known:
             problems.append(Problem(where, "is not there", ", ".join(known)))
-        elif each not in shared and not _is_like(value, known[each].default):
-            allowed = {str: "a word", bool: "true or false"}.get(type(known[each].default))
+        elif key not in shared and not _is_like(value, known[key].default):
+            allowed = {str: "a word", bool: "true or false"}.get(type(known[key].default))
             problems.append(Problem(where, f"{value!r}"[:60], allowed or "a number"))
     refuse(problems)
-    defaults = {each: getattr(Study(), each) for each in shared}
+    defaults = {key: getattr(Study(), key) for key in shared}
     return ADAPTIVE[name](**{**defaults, **settings})
 
 
@@ -231,8 +231,8 @@ def from_json(text: bytes, where: str) -> Plan:
     try:
         return _plan(json_files.values_of(text, where))
     except (AttributeError, LookupError, RecursionError, TypeError, ValueError) as error:
-        what = f"is no campaign: {' '.join(str(error).split())[:200]}"
-        raise InputError(Problem(where, what, fix="bring it back from a copy")) from None
+        message = f"is no campaign: {' '.join(str(error).split())[:200]}"
+        raise InputError(Problem(where, message, fix="bring it back from a copy")) from None
 
 
 def _plan(file: Mapping) -> Plan:
@@ -240,10 +240,10 @@ def _plan(file: Mapping) -> Plan:
     count, joints = len(rows), len(rows[0]["joints"])
 
     def array(value: object, *shape: int) -> np.ndarray:
-        found = np.array(value, dtype=float)
-        if found.shape != shape or not np.isfinite(found).all():
-            raise ValueError(f"{found.shape} numbers where {shape} are expected")
-        return found
+        numbers = np.array(value, dtype=float)
+        if numbers.shape != shape or not np.isfinite(numbers).all():
+            raise ValueError(f"{numbers.shape} numbers where {shape} are expected")
+        return numbers
 
     turned = rows[0]["directions"] is not None
     directions = array([row["directions"] for row in rows], count, joints) if turned else None

@@ -11,7 +11,7 @@ import pandas as pd
 
 from kinacc.assess.adaptive import AdaptiveAssessor, Candidates
 from kinacc.assess.attainable import limits_of
-from kinacc.assess.conformity import UNDECIDED, decide
+from kinacc.assess.conformity import ACCEPT, REJECT, UNDECIDED, decide
 from kinacc.assess.counts import binomial_interval
 from kinacc.assess.simulate import carry_on, noisy, truth_mm
 from kinacc.assess.statement import CANDIDATES
@@ -145,7 +145,7 @@ def simulate(
     )
     candidates = Candidates(np.tile(covariance_mm2, (points, 1, 1)))
     root, sigma_mm = np.linalg.cholesky(covariance_mm2), candidates.sigma_mm
-    most = max(each.measurements for each in assessors)
+    most = max(item.measurements for item in assessors)
     work = [
         (number, repetition) for number in range(len(fields)) for repetition in range(repetitions)
     ]
@@ -158,13 +158,13 @@ def simulate(
         for assessor in assessors:
             campaign = assessor.begin(candidates)
             readings, visited = carry_on(campaign, reading), campaign.ledger.visited
-            stated = [each for each in campaign.statements() if each.target == aim.target]
+            stated = [item for item in campaign.statements() if item.target == aim.target]
             if not stated:
-                what = f"{assessor.name} states nothing about {aim.target}"
-                raise InputError(Problem("--assessor", what, fix="choose another, or --target"))
-            said, arm_mm = stated[0], getattr(assessor, "arm_mm", None)
-            limits = limits_of(said, visited, size_mm, sigma_mm, assessor.measurements)
-            width_mm = math.nan if said.excepted else said.upper_mm - said.lower_mm
+                message = f"{assessor.name} states nothing about {aim.target}"
+                raise InputError(Problem("--assessor", message, fix="choose another, or --target"))
+            statement, arm_mm = stated[0], getattr(assessor, "arm_mm", None)
+            limits = limits_of(statement, visited, size_mm, sigma_mm, assessor.measurements)
+            width_mm = math.nan if statement.excepted else statement.upper_mm - statement.lower_mm
             tolerance_mm = aim.tolerance_mm
             runs.append(
                 {
@@ -173,13 +173,15 @@ def simulate(
                     "repetition": repetition,
                     "readings": readings,
                     "true_mm": truth_mm(
-                        said, size_mm, visited, sigma_mm if arm_mm is None else arm_mm
+                        statement, size_mm, visited, sigma_mm if arm_mm is None else arm_mm
                     ),
-                    "excepted": said.excepted,
-                    "lower_mm": said.lower_mm,
-                    "upper_mm": said.upper_mm,
+                    "excepted": statement.excepted,
+                    "lower_mm": statement.lower_mm,
+                    "upper_mm": statement.upper_mm,
                     "width_mm": math.inf if math.isnan(width_mm) else max(width_mm, 0.0),
-                    "verdict": decide(said, tolerance_mm).verdict if tolerance_mm else UNDECIDED,
+                    "verdict": decide(statement, tolerance_mm).verdict
+                    if tolerance_mm
+                    else UNDECIDED,
                     "attainable_mm": limits.attainable_mm,
                     "proven_mm": limits.proven_mm,
                 }
@@ -194,10 +196,10 @@ def smallest_budget(budget: pd.Series, share: pd.Series, aim: Aim) -> int | None
     """
     enough = None
     worst = share.groupby(budget).min().sort_index(ascending=False)
-    for each, lowest in worst.items() if aim.is_set else ():
+    for level, lowest in worst.items() if aim.is_set else ():
         if lowest < aim.power:
             break
-        enough = int(each)
+        enough = int(level)
     return enough
 
 
@@ -206,33 +208,29 @@ def _row(errors: str, budget: int, runs: pd.DataFrame, aim: Aim) -> dict:
     above_mm = stated["upper_mm"] - stated["true_mm"]
     holding, judged = int((above_mm >= 0.0).sum()), len(stated)
     within = int((stated["width_mm"] <= (aim.width_mm or math.inf)).sum())
-    decided = {each: float((runs["verdict"] == each).mean()) for each in ("accept", "reject")}
-    undecided = 1.0 - sum(decided.values())
-    reached = [within] if aim.width_mm is not None or aim.tolerance_mm is None else []
-    reached += [round(count * (1.0 - undecided))] if aim.tolerance_mm is not None else []
-    ordered = np.sort(runs["width_mm"])  # of order, without interpolation: some are infinite
-    widths = [float(ordered[math.ceil(share * count) - 1]) for share in (0.05, 0.5, 0.95)]
-    low, high = binomial_interval(holding, judged) if judged else (math.nan, math.nan)
+    accept, reject = (float((runs["verdict"] == verdict).mean()) for verdict in (ACCEPT, REJECT))
+    reached = within if aim.width_mm is not None or aim.tolerance_mm is None else count
+    if aim.tolerance_mm is not None:
+        reached = min(reached, round(count * (accept + reject)))
+    # Of order, without interpolation: some widths are infinite.
+    widths = np.quantile(runs["width_mm"], (0.05, 0.5, 0.95), method="inverted_cdf").tolist()
+    limits = binomial_interval(holding, judged) if judged else (math.nan, math.nan)
     return {
         "errors": errors,
         "budget": budget,
-        "readings": float(runs["readings"].mean()),
-        "true_mm": float(runs["true_mm"].mean()),
+        **runs[["readings", "true_mm"]].mean(),
         "excepted": int(runs["excepted"].max()),
-        "width_q05_mm": widths[0],
-        "width_median_mm": widths[1],
-        "width_q95_mm": widths[2],
+        **dict(zip(("width_q05_mm", "width_median_mm", "width_q95_mm"), widths, strict=True)),
         "excess_mm": float(above_mm.mean()),
-        "attainable_mm": float(stated["attainable_mm"].mean()),
-        "proven_mm": float(stated["proven_mm"].mean()),
+        **stated[["attainable_mm", "proven_mm"]].mean(),
         "stated": judged / count,
         "holding": holding,
         "judged": judged,
-        "holds_low": low,
-        "holds_high": high,
+        **dict(zip(("holds_low", "holds_high"), limits, strict=True)),
         "within": within / count,
-        "undecided": undecided,
-        "reached": min(reached),
-        "reached_low": binomial_interval(min(reached), count)[0],
-        **decided,
+        "undecided": 1.0 - (accept + reject),
+        "reached": reached,
+        "reached_low": binomial_interval(reached, count)[0],
+        "accept": accept,
+        "reject": reject,
     }

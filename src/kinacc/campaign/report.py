@@ -17,7 +17,20 @@ _MOMENTS = 150  # of a campaign at which bounds are stated, at most
 
 
 def tables(opened: Opened) -> tuple[State, dict[str, Columns]]:
-    """Return the state of a campaign, and its tables campaign_points, _readings and _bounds."""
+    """Return the state of a campaign, and its tables.
+
+    Parameters
+    ----------
+    opened : Opened
+        The campaign as read.
+
+    Returns
+    -------
+    state : State
+        Its readings as the assessor has them.
+    tables : dict
+        Columns of campaign_points, campaign_readings and campaign_bounds, in mm.
+    """
     total = len(opened.state().told)
     pause = max(-(-total // _MOMENTS), 1)
     rows: list[tuple] = []
@@ -39,11 +52,19 @@ def _bounds(opened: Opened, campaign: Campaign) -> list[tuple]:
     taken, visited = campaign.ledger.taken, len(campaign.ledger.visited)
     return [
         (
-            *(taken, visited, said.target, said.share, said.value_mm, said.lower_mm, said.upper_mm),
-            *(said.excepted, said.confidence),
-            *(reason(each) or None for each in (said.assumption, said.withheld)),
+            *(
+                taken,
+                visited,
+                statement.target,
+                statement.share,
+                statement.value_mm,
+                statement.lower_mm,
+                statement.upper_mm,
+            ),
+            *(statement.excepted, statement.confidence),
+            *(reason(code) or None for code in (statement.assumption, statement.withheld)),
         )
-        for said in sayable(opened.plan, campaign)
+        for statement in sayable(opened.plan, campaign)
     ]
 
 
@@ -63,10 +84,10 @@ def _points(state: State) -> Columns:
     count[:used] = ledger.count
     names = ("ex_mm", "ey_mm", "ez_mm", "error_mm", "noise_mm", "lower_mm", "upper_mm")
     return {
-        "point": np.array([points.label[each] for each in order], dtype=object),
+        "point": np.array([points.label[column] for column in order], dtype=object),
         "visit": np.where(np.arange(len(order)) < used, np.arange(len(order)) + 1.0, math.nan),
-        **{f"q{i + 1}": each for i, each in enumerate(points.joints[order].T)},
-        **{f"s{i + 1}": each for i, each in enumerate(directions[order].T)},
+        **{f"q{i + 1}": column for i, column in enumerate(points.joints[order].T)},
+        **{f"s{i + 1}": column for i, column in enumerate(directions[order].T)},
         **{f"{axis}_mm": points.modelled_mm[order, i] for i, axis in enumerate("xyz")},
         "readings": count,
         **dict(zip(names, values.T, strict=True)),
@@ -76,22 +97,22 @@ def _points(state: State) -> Columns:
 
 def _readings(state: State) -> Columns:
     plan = state.plan
-    used = {each.number: place for place, each in enumerate(state.told, start=1)}
-    void = {each.number: why for each, why in state.struck}
-    every = (*state.told, *state.in_hand, *(each for each, _ in state.struck))
+    used = {item.number: place for place, item in enumerate(state.told, start=1)}
+    void = {item.number: why for item, why in state.struck}
+    every = (*state.told, *state.in_hand, *(item for item, _ in state.struck))
     rows = [
         (
-            each.number,
-            plan.points.label[each.reading.point],
-            used.get(each.number, math.nan),
-            each.reading.instrument,
-            plan.instrument(each.reading.instrument).frame,
-            *each.reading.position_mm,
-            *each.error_mm,
-            float(np.linalg.norm(each.error_mm)),
-            math.sqrt(float(np.trace(covariance_mm2(plan, each.reading))) / 3.0),
-            void.get(each.number),
+            item.number,
+            plan.points.label[item.reading.point],
+            used.get(item.number, math.nan),
+            item.reading.instrument,
+            plan.instrument(item.reading.instrument).frame,
+            *item.reading.position_mm,
+            *item.error_mm,
+            float(np.linalg.norm(item.error_mm)),
+            math.sqrt(float(np.trace(covariance_mm2(plan, item.reading))) / 3.0),
+            void.get(item.number),
         )
-        for each in sorted(every, key=lambda known: known.number)
+        for item in sorted(every, key=lambda known: known.number)
     ]
     return columns_of("campaign_readings", rows)

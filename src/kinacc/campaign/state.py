@@ -52,28 +52,28 @@ class Reading:
         """Return the reading in plain numbers."""
         entry = {
             "point": self.point,
-            "position_mm": [float(each) for each in self.position_mm],
+            "position_mm": [float(value) for value in self.position_mm],
             "instrument": self.instrument,
         }
         if self.joints is not None:
-            entry["joints"] = [float(each) for each in self.joints]
+            entry["joints"] = [float(value) for value in self.joints]
         return entry | ({"std": self.std} if self.std is not None else {})
 
     @classmethod
     def of_entry(cls, entry: Mapping, plan: Plan) -> Reading:
         """Return the reading that ``as_entry`` wrote; ValueError where it is none of the plan."""
         joints = entry.get("joints")
-        found = cls(
+        reading = cls(
             int(entry["point"]),
             np.array(entry["position_mm"], dtype=float),
             entry["instrument"],
             None if joints is None else np.array(joints, dtype=float),
             entry.get("std"),
         )
-        if not 0 <= found.point < len(plan.points) or faults_of(plan, found, ""):
+        if not 0 <= reading.point < len(plan.points) or faults_of(plan, reading, ""):
             raise ValueError(f"no reading of this campaign: {entry}")
-        plan.instrument(found.instrument)
-        return found
+        plan.instrument(reading.instrument)
+        return reading
 
 
 def error_mm(plan: Plan, reading: Reading) -> np.ndarray:
@@ -117,7 +117,7 @@ def faults_of(plan: Plan, reading: Reading, where: str) -> list[Problem]:
         if values is None:
             continue
         if values.shape != (count,) or not (np.abs(values) <= _FARTHEST_MM).all():
-            text = ", ".join(f"{each:g}" for each in values.ravel())
+            text = ", ".join(f"{value:g}" for value in values.ravel())
             allowed = f"{count} numbers within {_FARTHEST_MM:g}"
             problems.append(Problem(where, f"{name} ({text})", allowed))
     if reading.std is not None:
@@ -156,8 +156,8 @@ def problems_of(
         "check pose, target, unit and frame, and read again; --accept-implausible takes a reading "
         "that stands (dropping it for its size makes the bound wrong)"
     )
-    what = f"{size:.3f} mm from the model at point {label}"
-    return [Problem(where, what, f"at most {most_mm:.3g} mm", fix)]
+    message = f"{size:.3f} mm from the model at point {label}"
+    return [Problem(where, message, f"at most {most_mm:.3g} mm", fix)]
 
 
 def most_plausible_mm(plan: Plan, sizes_mm: Sequence[float]) -> float:
@@ -228,7 +228,7 @@ class State:
 
     def ahead(self) -> list[int]:
         """Return points to be read whatever is read, in order, planned revisits in their places."""
-        have = Counter(each.reading.point for each in (*self.told, *self.in_hand))
+        have = Counter(item.reading.point for item in (*self.told, *self.in_hand))
         wanted = []
         for point in self.rows[list(self.campaign.visit())].tolist():
             if have[point]:
@@ -245,19 +245,19 @@ def sayable(plan: Plan, campaign: Campaign) -> tuple[Statement, ...]:
     stated about points that were not measured. Readings that all equal the prediction to the last
     digit are none: whatever the errors, noise keeps them apart.
     """
-    said = campaign.statements()
+    stated = campaign.statements()
     if campaign.ledger.taken and not campaign.ledger.sizes_mm().any():
         reason = Reason("predicted", {"read": campaign.ledger.taken})
-        return tuple(Statement(each.target, share=each.share, withheld=reason) for each in said)
-    left = campaign.first - len(campaign.ledger.visited)
-    if left <= 0 or not plan.by_travel:
-        return said
-    reason = Reason("first_visit_by_travel", {"left": left})
+        return tuple(Statement(item.target, share=item.share, withheld=reason) for item in stated)
+    missing = campaign.first - len(campaign.ledger.visited)
+    if missing <= 0 or not plan.by_travel:
+        return stated
+    reason = Reason("first_visit_by_travel", {"left": missing})
     return tuple(
-        each
-        if each.target == MEASURED or each.withheld
-        else Statement(each.target, share=each.share, withheld=reason)
-        for each in said
+        item
+        if item.target == MEASURED or item.withheld
+        else Statement(item.target, share=item.share, withheld=reason)
+        for item in stated
     )
 
 
@@ -281,7 +281,7 @@ def restore(
                 raise ValueError("a time without a time zone")
             if entry["kind"] == READINGS:
                 before = len(readings)
-                readings += [Reading.of_entry(each, plan) for each in entry["readings"]]
+                readings += [Reading.of_entry(item, plan) for item in entry["readings"]]
                 if entry.get("file"):
                     numbers = {*range(before + 1, len(readings) + 1), *entry.get("was", ())}
                     imports.setdefault(entry.get("path"), set()).update(numbers)
@@ -294,8 +294,10 @@ def restore(
                 raise ValueError(f"{place} {entry[place]}")
             known[int(entry[place])] = str(entry["reason"])
         except _UNREADABLE as error:
-            what = f"is no entry of this campaign: {type(error).__name__}: {error}"
-            problem = Problem(f"{where}, line {line}", what, fix="bring the file back from a copy")
+            message = f"is no entry of this campaign: {type(error).__name__}: {error}"
+            problem = Problem(
+                f"{where}, line {line}", message, fix="bring the file back from a copy"
+            )
             raise InputError(problem) from None
     return _replayed(plan, readings, left_out, void, imports, watch)
 
@@ -305,14 +307,14 @@ def _replayed(plan, readings, left_out, void, imports, watch) -> State:
     rows = plan.visiting(frozenset(left_out))
     waiting: dict[int, deque[Told]] = {}
     struck = []
-    for number, each in enumerate(readings, start=1):
-        known = Told(number, each, error_mm(plan, each))
+    for number, item in enumerate(readings, start=1):
+        known = Told(number, item, error_mm(plan, item))
         if number in void:
             struck.append((known, void[number]))
         else:
-            waiting.setdefault(each.point, deque()).append(known)
+            waiting.setdefault(item.point, deque()).append(known)
     campaign = plan.assessor.begin(plan.candidates(rows))
-    told: list[Told] = []
+    used: list[Told] = []
     asked = None
     # The assessor is asked before every reading, as it was then: some remember when they were.
     while (row := campaign.next()) is not None:
@@ -321,19 +323,19 @@ def _replayed(plan, readings, left_out, void, imports, watch) -> State:
             break
         known = waiting[asked].popleft()
         campaign.record(row, known.error_mm, unplanned_mm2(plan, known.reading))
-        told.append(known)
+        used.append(known)
         asked = None
         if watch is not None:
             watch(campaign, known)
     in_hand = sorted(
-        (each for queue in waiting.values() for each in queue), key=lambda each: each.number
+        (item for queue in waiting.values() for item in queue), key=lambda item: item.number
     )
-    return State(plan, campaign, rows, told, in_hand, asked, left_out, struck, imports)
+    return State(plan, campaign, rows, used, in_hand, asked, left_out, struck, imports)
 
 
 def readings_in(entries: Iterable[Mapping]) -> int:
     """Return the number of readings in entries of a journal."""
-    return sum(len(each["readings"]) for each in entries if each["kind"] == READINGS)
+    return sum(len(entry["readings"]) for entry in entries if entry["kind"] == READINGS)
 
 
 @dataclass(frozen=True)
@@ -372,16 +374,16 @@ def scatter(state: State) -> Scatter | None:
     return _scatter(float(np.sum(values.values**2)), values.freedom, alarm is not None)
 
 
-def nearness(state: State) -> Scatter | None:
+def size_scatter(state: State) -> Scatter | None:
     """Return the size of all readings as scatter about the predictions; None without a reading.
 
     Errors make readings larger than noise alone would, never smaller: ``too_small`` contradicts
     the stated noise, whatever the errors are.
     """
     square, readings = 0.0, [*state.told, *state.in_hand]
-    for each in readings:
-        covariance = covariance_mm2(state.plan, each.reading)
-        square += float(each.error_mm @ np.linalg.solve(covariance, each.error_mm))
+    for item in readings:
+        covariance = covariance_mm2(state.plan, item.reading)
+        square += float(item.error_mm @ np.linalg.solve(covariance, item.error_mm))
     return _scatter(square, 3 * len(readings)) if readings else None
 
 
@@ -392,7 +394,7 @@ def deviations(state: State) -> dict[int, float]:
     as stated.
     """
     values = _within_blocks(state)
-    numbers = [each.number for each in (*state.told, *state.in_hand)]
+    numbers = [item.number for item in (*state.told, *state.in_hand)]
     sizes = np.sqrt(np.mean(values.values**2, axis=1)).tolist()
     return {numbers[place]: size for place, size in zip(values.places, sizes, strict=True)}
 
@@ -405,12 +407,12 @@ def _within_blocks(state: State) -> Contrasts:
     """Readings used by the blocks in which they were requested, those in hand by point."""
     ledger, blocks = Ledger(state.campaign.ledger.candidates), state.campaign.reading_blocks()
     row_of = {int(point): row for row, point in enumerate(state.rows)}
-    in_hand = [each for each in state.in_hand if each.reading.point in row_of]
-    for each in (*state.told, *in_hand):
-        covariance = unplanned_mm2(state.plan, each.reading)
-        ledger.record(row_of[each.reading.point], each.error_mm, covariance)
+    in_hand = [item for item in state.in_hand if item.reading.point in row_of]
+    for item in (*state.told, *in_hand):
+        covariance = unplanned_mm2(state.plan, item.reading)
+        ledger.record(row_of[item.reading.point], item.error_mm, covariance)
     beyond = max(blocks, default=0) + 1
-    every = [*blocks, *(beyond + row_of[each.reading.point] for each in in_hand)]
+    every = [*blocks, *(beyond + row_of[item.reading.point] for item in in_hand)]
     values = contrasts(ledger, every)
     guarded = getattr(state.plan.assessor, "wrong_rate", 0.0) > 0.0
     return values.without_wrong_blocks(every) if guarded else values

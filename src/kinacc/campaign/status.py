@@ -17,7 +17,7 @@ from kinacc.assess.statement import CANDIDATES, MEAN, MEASURED, REGION, Reason, 
 from kinacc.campaign import instrument
 from kinacc.campaign.folder import Opened
 from kinacc.campaign.plan import Plan
-from kinacc.campaign.state import Scatter, State, nearness, scatter
+from kinacc.campaign.state import Scatter, State, scatter, size_scatter
 
 _CLEAR_OF_NOISE = 3.0  # standard deviations: larger bounds hold where the noise is smaller
 _VISIT = f"{VISITS:.0%}".replace("%", " %")
@@ -140,7 +140,7 @@ class CampaignStatus:
     def of_all(self) -> Bound:
         """The bound on all candidates, else on a share of the region, else on measured points."""
         order = (CANDIDATES, REGION, MEASURED)
-        return min(self.bounds, key=lambda each: order.index(each.target))
+        return min(self.bounds, key=lambda bound: order.index(bound.target))
 
     @property
     def next_command(self) -> str:
@@ -182,13 +182,28 @@ _DECIDED = {"accept": ("within", "upper"), "reject": ("beyond", "lower")}
 
 
 def status(opened: Opened, state: State, tolerance_mm: float | None = None) -> CampaignStatus:
-    """Return the status of a campaign; ``tolerance_mm`` in place of its own."""
+    """Return the status of a campaign: bounds, verdict, conditions, remarks and the next point.
+
+    Parameters
+    ----------
+    opened : Opened
+        The campaign as read (:func:`kinacc.campaign.folder.open_`).
+    state : State
+        Its readings as the assessor has them (``opened.state()``).
+    tolerance_mm : float, optional
+        Largest error allowed, in place of the campaign's own.
+
+    Returns
+    -------
+    CampaignStatus
+        Bounds in mm, the main target first.
+    """
     plan, label = state.plan, state.plan.points.label
     stated = state.statements()
     tolerance_mm = plan.limits.tolerance_mm if tolerance_mm is None else tolerance_mm
     candidates = len(plan.points) - len(state.left_out)
     visited = len(state.campaign.ledger.visited)
-    near, repeats = nearness(state), scatter(state)
+    near, repeats = size_scatter(state), scatter(state)
     checked = None if getattr(plan.assessor, "noise", KNOWN) == ESTIMATED else repeats
     overstated = near is not None and near.too_small
     bounds = [_bound(item, state, candidates, tolerance_mm, overstated) for item in stated]

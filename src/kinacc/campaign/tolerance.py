@@ -30,14 +30,14 @@ def by_held_out(tolerance: Tolerance, held_out: Mapping[str, float]) -> tuple[st
     return ACCEPT, "99 % of the errors held out are within the tolerance"
 
 
-def by_bound(tolerance_mm: float, said: Statement | None, in_doubt: bool) -> tuple[str, str]:
+def by_bound(tolerance_mm: float, statement: Statement | None, in_doubt: bool) -> tuple[str, str]:
     """Verdict and why, by what a campaign says; None without a campaign.
 
     ``in_doubt``: something speaks against its bounds.
     """
     if in_doubt:
         return UNDECIDED, "its bound cannot be relied on"
-    if said is None:
+    if statement is None:
         return UNDECIDED, "no campaign bounds it"
-    decided = decide(said, tolerance_mm)
+    decided = decide(statement, tolerance_mm)
     return decided.verdict, reason(decided.reason)

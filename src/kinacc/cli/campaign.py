@@ -59,11 +59,11 @@ def next_(folder, every, out) -> None:
       kinacc campaign next check
       kinacc campaign next check --all -o visit.csv
     """
-    found = _open(folder)
-    table, pose, progress = found.visit(every), found.next_pose(), found.status().progress
+    opened = _open(folder)
+    table, pose, progress = opened.visit(every), opened.next_pose(), opened.status().progress
     shown, lines = table[[name for name in table if not name.endswith("_rad")]], [progress]
     if pose is not None and not every and out.table is None:
-        shown, lines = shown.head(0), _pose_lines(found, pose)
+        shown, lines = shown.head(0), _pose_lines(opened, pose)
     out.show({"rows": table, "progress": progress}, table, lines, shown)
 
 
@@ -79,9 +79,9 @@ def leave_out(folder, point, reason, out) -> None:
     Example:
       kinacc campaign leave-out check 17 --reason "hidden behind the column"
     """
-    found = _open(folder)
-    found.leave_out(point, reason)
-    _show(found.status(), out)
+    opened = _open(folder)
+    opened.leave_out(point, reason)
+    _show(opened.status(), out)
 
 
 @campaign.command("strike")
@@ -98,9 +98,9 @@ def strike(folder, number, reason, out) -> None:
     Example:
       kinacc campaign strike check 31 --reason "reflector was not seated"
     """
-    found = _open(folder)
-    found.strike(number, reason)
-    _show(found.status(), out)
+    opened = _open(folder)
+    opened.strike(number, reason)
+    _show(opened.status(), out)
 
 
 @campaign.command("status")
@@ -134,10 +134,10 @@ def report(folder, to, formats, out) -> None:
     Example:
       kinacc campaign report check --page check.html --table xlsx
     """
-    found = _open(folder)
-    into = Path(to or found.folder / "report")
-    files = _write_report(found, into, formats, out, out.force or to is None)
-    result = found.status()
+    opened = _open(folder)
+    into = Path(to or opened.folder / "report")
+    files = _write_report(opened, into, formats, out, out.force or to is None)
+    result = opened.status()
     lines = [result.headline, f"{into}: {', '.join(files)}", out.page or ""]
     answer = {**vars(result), "report": str(into), "files": files, "page": out.page}
     out.show(answer, pd.DataFrame(), filter(None, lines))
@@ -160,16 +160,20 @@ def verify(folder, sha256, readings, out) -> None:
     from kinacc.campaign import folder as folders
 
     opened = folders.open_(folder)
-    found = folders.verify(opened, sha256, readings)
-    verdict = f"FAIL: {'; '.join(found.problems)}." if found.problems else "PASS."
-    text = f"{found.entries} entries are whole, {found.readings} readings, SHA-256 {found.sha256}"
-    out.show(found, pd.DataFrame(), [verdict, f"{opened.folder}: {text}", *folders.doubts(opened)])
-    if found.problems:
+    checked = folders.verify(opened, sha256, readings)
+    verdict = f"FAIL: {'; '.join(checked.problems)}." if checked.problems else "PASS."
+    text = f"{checked.entries} entries are whole, {checked.readings} readings"
+    out.show(
+        checked,
+        pd.DataFrame(),
+        [verdict, f"{opened.folder}: {text}, SHA-256 {checked.sha256}", *folders.doubts(opened)],
+    )
+    if checked.problems:
         raise SystemExit(AGAINST)
 
 
 def _write_report(
-    found: Campaign, into: Path, formats: Sequence[str], out: Output, force: bool
+    opened: Campaign, into: Path, formats: Sequence[str], out: Output, force: bool
 ) -> list[str]:
     """Write the report; the names of its files."""
     from kinacc.campaign import report as reports
@@ -181,10 +185,10 @@ def _write_report(
     from kinacc.tables.atomic import write_together
     from kinacc.tables.store import content_of, to_table
 
-    if not found.state.told:
-        raise InputError(Problem(str(found.folder), "no reading was requested and taken yet"))
-    state, tables = reports.tables(found.opened)
-    metadata = marks_of(found.opened)
+    if not opened.state.told:
+        raise InputError(Problem(str(opened.folder), "no reading was requested and taken yet"))
+    state, tables = reports.tables(opened.opened)
+    metadata = marks_of(opened.opened)
     figure = drawing.draw(
         tables["campaign_points"],
         tables["campaign_bounds"],
@@ -198,36 +202,36 @@ def _write_report(
     }
     pictures = render(figure, ("svg", "png"))
     contents |= {f"campaign.{kind}": content for kind, content in pictures.items()}
-    contents["report.md"] = markdown(found.opened, state, tables, "campaign.svg").encode()
+    contents["report.md"] = markdown(opened.opened, state, tables, "campaign.svg").encode()
     sheets = {f"{name}.{kind}": name for kind in dict.fromkeys(formats) for name in tables}
     require_writable([into / name for name in (*contents, *sheets)], force)
     write_together({into / name: content for name, content in contents.items()})
     for path, name in sheets.items():
         write_table(pd.DataFrame(tables[name]), into / path)
     if out.page is not None:
-        out.write_page(campaign_page(found.opened, state, tables))
+        out.write_page(campaign_page(opened.opened, state, tables))
     return [*contents, *sheets]
 
 
-def _show(found: CampaignStatus, out: Output) -> None:
-    out.show(found, pd.DataFrame(), status_lines(found, out.verbose))
+def _show(summary: CampaignStatus, out: Output) -> None:
+    out.show(summary, pd.DataFrame(), status_lines(summary, out.verbose))
 
 
-def status_lines(found: CampaignStatus, verbose: bool = False) -> list[str]:
+def status_lines(summary: CampaignStatus, verbose: bool = False) -> list[str]:
     """Return the verdict, the bounds, their conditions, and the progress."""
-    bounds = [bound for bound in found.bounds if math.isfinite(bound.upper_mm)]
+    bounds = [bound for bound in summary.bounds if math.isfinite(bound.upper_mm)]
     texts = [
-        found.headline,
-        *(bound.text for bound in bounds if not found.against),
-        found.assumes,
-        *(f"{text}." for text in found.against[1:]),
-        *found.advice,
-        found.progress,
-        *(f"Note: {text}." for text in found.notes),
-        *(f"Overruled at the start: {text}." for text in found.overruled),
+        summary.headline,
+        *(bound.text for bound in bounds if not summary.against),
+        summary.assumes,
+        *(f"{text}." for text in summary.against[1:]),
+        *summary.advice,
+        summary.progress,
+        *(f"Note: {text}." for text in summary.notes),
+        *(f"Overruled at the start: {text}." for text in summary.overruled),
     ]
     if verbose:
-        texts += [f"Instrument {name}: {noise}." for name, noise in found.noise.items()]
+        texts += [f"Instrument {name}: {noise}." for name, noise in summary.noise.items()]
         texts += [
             f"Mean excess of the upper bound ({bound.about}): {bound.attainable_mm:.3f} mm with "
             f"all errors known, no reliable bound below {bound.proven_mm:.3f} mm; now "
@@ -238,11 +242,13 @@ def status_lines(found: CampaignStatus, verbose: bool = False) -> list[str]:
     return list(filter(None, dict.fromkeys(texts)))
 
 
-def _pose_lines(found: Campaign, pose: NextPose) -> list[str]:
+def _pose_lines(opened: Campaign, pose: NextPose) -> list[str]:
     """The joints of a pose, and where the model expects the reading."""
-    lines = [f"Point {pose.point}, reading {len(found.state.told) + 1} of {found.status().budget}"]
+    lines = [
+        f"Point {pose.point}, reading {len(opened.state.told) + 1} of {opened.status().budget}"
+    ]
     travel = np.zeros(len(pose.joints), int) if pose.directions is None else pose.directions
-    for joint, (value, slides) in enumerate(zip(pose.joints, found.plan.slides, strict=True)):
+    for joint, (value, slides) in enumerate(zip(pose.joints, opened.plan.slides, strict=True)):
         turn = f"{math.degrees(value):12.4f} deg  {value:12.7f} rad"
         arrival = ("", "  arriving up", "  arriving down")[travel[joint]]
         lines.append(f"  q{joint + 1} {f'{value:12.4f} mm' if slides else turn}{arrival}")
@@ -258,10 +264,10 @@ def _open(folder: str) -> Campaign:
     from kinacc.campaign.campaign import Campaign
     from kinacc.campaign.folder import doubts
 
-    found = Campaign(folder)
-    for line in doubts(found.opened):
+    opened = Campaign(folder)
+    for line in doubts(opened.opened):
         click.echo(line, err=True)
-    return found
+    return opened
 
 
 _COMPUTED = {"predict": "unexplained_mm", "compensate": "solver_residual_mm"}  # columns of theirs
@@ -296,8 +302,8 @@ def record(out, folder, file, **options) -> None:
     from kinacc.errors import InputError, Problem
 
     if (options["position_mm"] is None) == (file is None):
-        what = "is given twice" if file else "is not given"
-        raise InputError(Problem("the reading", what, "--position-mm, or a FILE"))
+        message = "is given twice" if file else "is not given"
+        raise InputError(Problem("the reading", message, "--position-mm, or a FILE"))
     campaign = Campaign(folder)
     flags = {name: options[name] for name in ("accept_implausible", "again")}
     requested, plan = campaign.state.asked, campaign.plan
@@ -315,9 +321,9 @@ def record(out, folder, file, **options) -> None:
         first = f"Recorded {len(taken.numbers)} readings of {file}{known}."
     for problem in taken.skipped:
         click.echo(f"not taken: {problem}", err=True)
-    found = campaign.status()
-    answer = {**vars(taken), "status": found}
-    out.show(answer, pd.DataFrame(), [first, *status_lines(found)])
+    summary = campaign.status()
+    answer = {**vars(taken), "status": summary}
+    out.show(answer, pd.DataFrame(), [first, *status_lines(summary)])
 
 
 def _single(options: Mapping, slides: np.ndarray) -> dict[str, object]:

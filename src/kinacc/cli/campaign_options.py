@@ -73,5 +73,5 @@ def assessor(
             settings[key.strip()] = json.loads(value)
         except (ValueError, RecursionError):
             settings[key.strip()] = value.strip()
-    found = assessor_of(options["assessor"] or RECOMMENDED, settings)
-    return with_references(found, points, options["references"])
+    chosen = assessor_of(options["assessor"] or RECOMMENDED, settings)
+    return with_references(chosen, points, options["references"])

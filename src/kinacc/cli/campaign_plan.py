@@ -60,7 +60,9 @@ def plan(out, **options) -> None:
     fields, points, covariance, assessors = _question(options)
     repetitions, seed = options["repetitions"], options["seed"]
     with reporting("campaign plan", bar=True) as progress:
-        found = plan_budget(fields, points, covariance, assessors, aim, repetitions, seed, progress)
+        budgets = plan_budget(
+            fields, points, covariance, assessors, aim, repetitions, seed, progress
+        )
     if out.picture is not None:
         from kinacc.figures import campaign_plan
 
@@ -69,17 +71,20 @@ def plan(out, **options) -> None:
                 str(name),
                 group["budget"].to_numpy(float),
                 group[["width_q05_mm", "width_median_mm", "width_q95_mm"]].to_numpy(),
-                group["reached"].to_numpy() / found.repetitions,
+                group["reached"].to_numpy() / budgets.repetitions,
             )
-            for name, group in found.rows.groupby("errors", sort=False)
+            for name, group in budgets.rows.groupby("errors", sort=False)
         ]
-        power, budget = aim.power if aim.is_set else None, found.budget_shown or found.budget
+        power, budget = (
+            aim.power if aim.is_set else None,
+            budgets.budget_shown or budgets.budget,
+        )
         out.draw(campaign_plan.draw(curves, aim.width_mm, power, budget))
-    table = found.rows.replace(math.inf, math.nan)
+    table = budgets.rows.replace(math.inf, math.nan)
     shown = [name for name in _SHOWN if name != "excepted" or table[name].any()]
     shown += ["within"] if aim.width_mm is not None else []
     shown += ["accept", "reject", "undecided"] if aim.tolerance_mm is not None else []
-    out.show(found, table, _lines(found, aim), table[shown])
+    out.show(budgets, table, _lines(budgets, aim), table[shown])
 
 
 def _question(options: Mapping) -> tuple:
@@ -99,10 +104,10 @@ def _question(options: Mapping) -> tuple:
         refuse(problems, "Nothing was simulated")
     budgets = sorted({*(options["budget"] or [max(round(s * points), 2) for s in SHARES])})
     if points * budgets[-1] > _MOST_READINGS:
-        what = f"{points} candidates with up to {budgets[-1]} readings each"
+        message = f"{points} candidates with up to {budgets[-1]} readings each"
         allowed = f"a product of at most {_MOST_READINGS:,}"
-        raise InputError(Problem("--candidates, --budget", what, allowed))
-    assessors = [campaign_options.assessor(options, each, points, tested) for each in budgets]
+        raise InputError(Problem("--candidates, --budget", message, allowed))
+    assessors = [campaign_options.assessor(options, budget, points, tested) for budget in budgets]
     chosen = [errors_of(name, options["point"]) for name in names]
     if (largest_mm := options["largest_mm"]) is not None:
         chosen = [
@@ -170,14 +175,14 @@ def _errors_of_folder(path: Path, point: str | None) -> ErrorField:
     )  # fmt: skip
 
 
-def _lines(found: BudgetPlan, aim: Aim) -> list[str]:
+def _lines(budgets: BudgetPlan, aim: Aim) -> list[str]:
     """The budget, the simulation, and how near an upper bound can come."""
     lines = [
-        _verdict(found, aim),
-        f"Simulated: {found.repetitions} campaigns a row with {found.assessor}, largest error of "
-        f"{found.target} among {found.candidates}, noise {max(found.noise_mm):.3g} mm.",
+        _verdict(budgets, aim),
+        f"Simulated: {budgets.repetitions} campaigns a row with {budgets.assessor}, largest error "
+        f"of {budgets.target} among {budgets.candidates}, noise {max(budgets.noise_mm):.3g} mm.",
     ]
-    judged = found.rows.dropna(subset="attainable_mm")
+    judged = budgets.rows.dropna(subset="attainable_mm")
     if len(judged):
         last = judged[judged["budget"] == judged["budget"].max()]
         lines.append(
@@ -190,7 +195,7 @@ def _lines(found: BudgetPlan, aim: Aim) -> list[str]:
     return lines
 
 
-def _verdict(found: BudgetPlan, aim: Aim) -> str:
+def _verdict(budgets: BudgetPlan, aim: Aim) -> str:
     if not aim.is_set:
         return "No budget named: give --width-mm or --tolerance-mm."
     wanted = {
@@ -198,17 +203,17 @@ def _verdict(found: BudgetPlan, aim: Aim) -> str:
         f"a decision on {aim.tolerance_mm} mm": aim.tolerance_mm,
     }
     goal = " and ".join(text for text, value in wanted.items() if value is not None)
-    budget = found.budget_shown or found.budget or int(found.rows["budget"].max())
-    of_budget = found.rows[found.rows["budget"] == budget]
+    budget = budgets.budget_shown or budgets.budget or int(budgets.rows["budget"].max())
+    of_budget = budgets.rows[budgets.rows["budget"] == budget]
     worst = of_budget.loc[of_budget["reached"].idxmin()]
     count = (
-        f"{worst['reached']} of {found.repetitions} simulated campaigns (errors: "
+        f"{worst['reached']} of {budgets.repetitions} simulated campaigns (errors: "
         f"{worst['errors']}; at least {worst['reached_low']:.0%} with 97.5 % confidence)"
     )
-    if found.budget is None:
+    if budgets.budget is None:
         return f"No budget up to {budget} gives {goal} in {aim.power:.0%} of campaigns: {count}."
-    if found.budget_shown is None:
+    if budgets.budget_shown is None:
         repeat = "Show it with more --repetitions."
         return f"{budget} readings may suffice for {goal}: {count}. {repeat}"
     text = f"{budget} readings give {goal} in at least {aim.power:.0%} of campaigns: {count}."
-    return text if found.budget == budget else f"{text} {found.budget} may suffice."
+    return text if budgets.budget == budget else f"{text} {budgets.budget} may suffice."

@@ -155,16 +155,18 @@ def _candidates(options: Mapping, arm):
     only_measured = region == "measured" or not (options["region"] or options["joints_deg"])
     for times in (1, 4, 16, _MOST_DRAWS):
         joints = draw(times * count)
-        at = JointState(arm.robot.dh_joints(joints))
+        state = JointState(arm.robot.dh_joints(joints))
         if only_measured:
-            joints = joints[is_measured_there(arm, at, options["point"])]
+            joints = joints[is_measured_there(arm, state, options["point"])]
         elif arm.model.domain is not None:  # coupled joints have no box of their own
-            joints = joints[~arm.outside_range(at.q_rad).any(axis=1)]
+            joints = joints[~arm.outside_range(state.q_rad).any(axis=1)]
         if len(joints) >= count:
             labels = [str(number) for number in range(1, count + 1)]
             return joints[:count], labels, None, _SOURCES[region]
-    what = f"only {len(joints)} of {_MOST_DRAWS * count} joint values drawn are near measured poses"
-    raise InputError(Problem("candidates", what, f"{count}", "narrow the region"))
+    message = (
+        f"only {len(joints)} of {_MOST_DRAWS * count} joint values drawn are near measured poses"
+    )
+    raise InputError(Problem("candidates", message, f"{count}", "narrow the region"))
 
 
 def _region(options: Mapping, arm):
@@ -188,11 +190,11 @@ def _region(options: Mapping, arm):
             box = configured.box if box is None else box
             inside = inside or configured.inside
     if region == "measured" and usual != region:
-        what = "the results do not hold the poses that were fitted"
-        raise InputError(Problem("--region measured", what, "fitted, limits, configured"))
+        message = "the results do not hold the poses that were fitted"
+        raise InputError(Problem("--region measured", message, "fitted, limits, configured"))
     if region == "limits" and arm.model.domain is not None and box is None:
-        what = f"the {arm.choice.upper()} model ends at the joints the data cover"
-        raise InputError(Problem("--region limits", what, "measured, fitted"))
+        message = f"the {arm.choice.upper()} model ends at the joints the data cover"
+        raise InputError(Problem("--region limits", message, "measured, fitted"))
     low, high = robot.q_min_rad, robot.q_max_rad
     if region not in ("measured", "limits") and arm.fitted_range_rad is not None:
         low, high = limits.cut_to_range(robot, low, high, arm.fitted_range_rad)

@@ -183,7 +183,7 @@ def _of_bound(tables: RunTables, unit: str, word: str) -> Figure:
 
     known = folder.read_tables(tables.folder, "robot")
     name, places = tables.folder.resolve().name, of_results(tables.folder)
-    required = of_calibration.sought(name, known, places)
+    required = of_calibration.newest(name, known, places)
     results = required.status
     if results is None:
         message = "; ".join(required.remarks) or "no campaign on this calibration"

@@ -77,7 +77,7 @@ def summarise(
     arm = robot.of_text(str(tables["robot"]["description"][0]), "robot.parquet")
     name = folder.resolve().name
     places = of_results(folder) if campaigns is None else campaigns
-    assessed = of_calibration.sought(name, tables, places)
+    assessed = of_calibration.newest(name, tables, places)
     measurements, check = tables["measurements"], tables.get("data_check")
     fits = misfit.misfits(tables, arm)
     listed = identifiability.listed(tables["dh_identified"])

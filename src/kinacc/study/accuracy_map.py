@@ -35,8 +35,8 @@ class Equipped(NamedTuple):
 
     def tool_poses(self, q_rad: np.ndarray, travel: np.ndarray | None) -> Pose:
         """Tool poses (n, ...) at joints (n, k), which travel in the directions (k,)."""
-        at = JointState(q_rad, None if travel is None else np.broadcast_to(travel, q_rad.shape))
-        end = compose(self.model.pose(at), self.tool)
+        state = JointState(q_rad, None if travel is None else np.broadcast_to(travel, q_rad.shape))
+        end = compose(self.model.pose(state), self.tool)
         return end if self.base is None else compose(self.base, end)
 
 
@@ -141,13 +141,13 @@ def _block(robot: Robot, models: Models, cells: Cells, wanted: PosesWanted) -> A
     turned = np.tile(orientations.rotation, (count, 1, 1))
     tool = tool_poses(repeated, wanted.reference, turned, wanted.frame)
     solved = joints_of(robot, models, tool, wanted.invert_with)
-    found = solved.status == Status.FOUND
-    position, orientation = np.full((2, *found.shape), -np.inf)
-    error = errors_at(models, solved.q_rad[found])
-    position[found] = np.linalg.norm(error[:, :3], axis=1)
-    orientation[found] = np.linalg.norm(error[:, 3:], axis=1) * 1e3
+    reached = solved.status == Status.FOUND
+    position, orientation = np.full((2, *reached.shape), -np.inf)
+    error = errors_at(models, solved.q_rad[reached])
+    position[reached] = np.linalg.norm(error[:, :3], axis=1)
+    orientation[reached] = np.linalg.norm(error[:, 3:], axis=1) * 1e3
     shape = (count, turns * len(branches))
-    solutions = found.reshape(shape).sum(axis=1)
+    solutions = reached.reshape(shape).sum(axis=1)
     position, orientation = position.reshape(shape), orientation.reshape(shape)
     position_max, worst = _largest(position, orientations, branches)
     orientation_max, orientation_worst = _largest(orientation, orientations, branches)

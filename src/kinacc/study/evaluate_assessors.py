@@ -103,8 +103,8 @@ def assess_worlds(
     ]
     if not levels.size or not np.all(np.isfinite(levels) & (levels > 0.0)):
         problems.append(Problem("noise_mm", f"{noise_mm}", "above 0, in mm"))
-    chosen = [_with_budget(each, budget) for each in assessors]
-    names = [getattr(each, "name", type(each).__name__) for each in chosen]
+    chosen = [_with_budget(assessor, budget) for assessor in assessors]
+    names = [getattr(assessor, "name", type(assessor).__name__) for assessor in chosen]
     if twice := sorted({name for name in names if names.count(name) > 1}):
         problems.append(Problem("assessors", f"{', '.join(twice)} occurs twice", "a name each"))
     if problems:
@@ -114,7 +114,7 @@ def assess_worlds(
     for noise in levels.tolist():
         for repetition in range(repetitions):
             world = world_of(error_mm, noise, repetition, visits, seed)
-            rows += [assessed_row(noise, repetition, each, world) for each in chosen]
+            rows += [assessed_row(noise, repetition, assessor, world) for assessor in chosen]
     table = pd.DataFrame(rows)
     bounds = ["lower_mm", "upper_mm", "bounded_mm"]
     return table.astype(dict.fromkeys(bounds, float))

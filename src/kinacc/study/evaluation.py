@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
 from kinacc.assess.world import error_vectors
 from kinacc.config.error_models import PLAINEST
-from kinacc.config.records import of_section
 from kinacc.geometry import Pose, compose, invert
 from kinacc.kinematics import region, robot, tables
 from kinacc.kinematics.inverse import limits
@@ -18,7 +16,6 @@ from kinacc.kinematics.region import Cylinder
 from kinacc.kinematics.robot import Robot
 from kinacc.study import operating_points
 from kinacc.study.accuracy_map import Equipped, Models, PosesWanted, accuracy_map
-from kinacc.study.operating_points import OperatingPoints
 from kinacc.tables.columns import Columns
 
 
@@ -56,54 +53,24 @@ def poses_wanted(evaluation: Mapping) -> PosesWanted:
     )
 
 
-@dataclass(frozen=True)
-class Equipment:
-    """What the models carry, from the flange, and how all joints travel (0 for unknown)."""
-
-    tool_mm: tuple[float, float, float]
-    travel_direction: int
-
-
-def equipped(inputs: Mapping, equipment: Equipment, arm: Robot) -> Models:
+def equipped(inputs: Mapping, evaluation: Mapping, arm: Robot) -> Models:
     """The arm's models with their bases and tools, joints travelling as the settings say.
 
-    The nominal model carries the tool of the DH model.
+    A tool is the one fitted with the model, else the configured one on the arm's flange; the
+    nominal model carries that of the DH model.
     """
-    direction = equipment.travel_direction
-    by_name = {
-        name: Equipped(
-            model,
-            _tool(inputs, equipment, arm, model.kind),
-            _base(inputs, name) if model.table is None else None,
-        )
-        for name, model in tables.models(inputs, arm.dh).items()
-    }
+    direction, carried = evaluation["travel_direction"], robot.carried(arm)
+    offset = compose(carried, Pose(np.eye(3), np.array(evaluation["tool_mm"], dtype=float)))
+    frames = inputs.get("frames")
+    by_name = {}
+    for name, model in tables.models(inputs, arm.dh).items():
+        tool, base = tables.fitted_tool(frames, model.kind, carried), None
+        if model.table is None and frames is not None:  # its base in that of the DH model
+            fitted, plain = (tables.frame(frames, kind, "base") for kind in (name, PLAINEST))
+            if not all(np.array_equal(a, b) for a, b in zip(fitted, plain, strict=True)):
+                base = compose(invert(plain), fitted)
+        by_name[name] = Equipped(model, offset if tool is None else tool, base)
     return Models(by_name, np.full(arm.dh.joints, direction) if direction else None)
-
-
-def _base(inputs: Mapping, model: str) -> Pose | None:
-    """A model's base in that of the DH model; None where both were fitted to one."""
-    if "frames" not in inputs:
-        return None
-    own, dh = (tables.frame(inputs["frames"], name, "base") for name in (model, PLAINEST))
-    same = all(np.array_equal(a, b) for a, b in zip(own, dh, strict=True))
-    return None if same else compose(invert(dh), own)
-
-
-def _tool(inputs: Mapping, equipment: Equipment, arm: Robot, model: str) -> Pose:
-    """The tool fitted with a model; the configured one, on the arm's flange, where none was."""
-    own = robot.carried(arm)
-    fitted = tables.fitted_tool(inputs.get("frames"), model, own)
-    offset = np.array(equipment.tool_mm)
-    return compose(own, Pose(np.eye(3), offset)) if fitted is None else fitted
-
-
-@dataclass(frozen=True)
-class MapSettings:
-    """The ``map`` section of the configuration: angles of the slices, spacing of their grid."""
-
-    slices_deg: tuple[float, ...]
-    grid_mm: float
 
 
 def mapped(inputs: Mapping, settings: Mapping) -> dict[str, dict[str, np.ndarray]]:
@@ -111,77 +78,52 @@ def mapped(inputs: Mapping, settings: Mapping) -> dict[str, dict[str, np.ndarray
 
     ``settings["cells"]``: numbers of the only cells mapped (default: all).
     """
-    layout = of_section(MapSettings, settings["map"])
+    slices_deg = np.array(settings["map"]["slices_deg"], dtype=float)
     wanted = poses_wanted(settings["evaluation"])
-    equipment = of_section(Equipment, settings["evaluation"])
-    cells = region.grid(wanted.cylinder, np.deg2rad(layout.slices_deg), layout.grid_mm)
+    cells = region.grid(wanted.cylinder, np.deg2rad(slices_deg), settings["map"]["grid_mm"])
     # The slice as configured: degrees that went through radians and back are not the same number.
-    per_slice = len(cells.radius_mm) // len(layout.slices_deg)
-    slice_deg = np.repeat(np.array(layout.slices_deg), per_slice)
+    slice_deg = np.repeat(slices_deg, len(cells.radius_mm) // len(slices_deg))
     if "cells" in settings:
         slice_deg = slice_deg[settings["cells"]]
         cells = region.Cells(*(axis[settings["cells"]] for axis in cells))
     arm = robot.load(settings["robot"])
-    models = equipped(inputs, equipment, arm)
+    models = equipped(inputs, settings["evaluation"], arm)
     result = accuracy_map(arm, models, cells, wanted)._asdict()
     joints = limits.reported_joints(arm, result.pop("worst_q_rad"))
     columns = {
         "slice_deg": slice_deg,
         "radius_mm": cells.radius_mm,
         "height_mm": cells.height_mm,
+        **result,
     }
-    columns |= result | {f"q{n + 1}": joints[:, n] for n in range(joints.shape[1])}
-    return {"accuracy_map": columns}
-
-
-@dataclass(frozen=True)
-class PointSettings:
-    """How many points are drawn, by which sequence, in which space, as poses or as joints.
-
-    ``wrist``: the wrist configurations of poses.
-    """
-
-    space: str
-    sequence: str
-    points: int
-    points_in: str
-    wrist: str | None = None
+    return {"accuracy_map": columns | _numbered("q", joints)}
 
 
 def points(inputs: Mapping, settings: Mapping) -> dict[str, Columns]:
     """``assessment_points`` of a modelled space, or chosen from what was measured."""
-    section = settings["evaluation"]
-    wanted = of_section(PointSettings, section)
-    arm = robot.load(settings["robot"])
-    if wanted.space == "measured":
-        return {"assessment_points": _measured(inputs, wanted.points)}
-    models = equipped(inputs, of_section(Equipment, section), arm)
-    return {"assessment_points": _columns(arm, _drawn(arm, models, wanted, section))}
-
-
-def _drawn(arm: Robot, models: Models, wanted: PointSettings, section: Mapping) -> OperatingPoints:
+    section, arm = settings["evaluation"], robot.load(settings["robot"])
+    if section["space"] == "measured":
+        return {"assessment_points": _measured(inputs, section["points"])}
+    models, drawn = equipped(inputs, section, arm), (section["sequence"], section["points"])
     limited = arm.q_min_rad, arm.q_max_rad
-    drawn = wanted.sequence, wanted.points
-    if wanted.space == "joint_box":
+    if section["space"] == "joint_box":
         box = joint_box(section, arm) or limited
         q_rad = operating_points.in_joints(arm, models, box, *drawn)
-    elif wanted.points_in == "joints":
-        space = cylinder(section)
-        q_rad = operating_points.in_joints(arm, models, limited, *drawn, space)
+    elif section["points_in"] == "joints":
+        q_rad = operating_points.in_joints(arm, models, limited, *drawn, cylinder(section))
     else:
-        poses = poses_wanted(section)
-        q_rad = operating_points.in_space(arm, models, poses, *drawn, wanted.wrist)
-    return operating_points.with_errors(models, q_rad)
+        wrist = section.get("wrist")
+        q_rad = operating_points.in_space(arm, models, poses_wanted(section), *drawn, wrist)
+    chosen = operating_points.with_errors(models, q_rad)
+    columns: Columns = {"point": np.arange(len(q_rad))}
+    columns |= _numbered("q", limits.reported_joints(arm, chosen.q_rad))
+    columns |= _numbered("s", chosen.travel)
+    return {"assessment_points": columns | _error_columns(chosen.error_mm)}
 
 
-def _columns(arm: Robot, points: OperatingPoints) -> Columns:
-    reported = limits.reported_joints(arm, points.q_rad)
-    columns: Columns = {"point": np.arange(len(reported))}
-    for joint in range(reported.shape[1]):
-        columns[f"q{joint + 1}"] = reported[:, joint]
-    for joint in range(reported.shape[1]):
-        columns[f"s{joint + 1}"] = points.travel[:, joint]
-    return {**columns, **_error_columns(points.error_mm)}
+def _numbered(letter: str, values: np.ndarray) -> Columns:
+    """Columns of values (n, k): q1, q2, .."""
+    return {f"{letter}{number}": column for number, column in enumerate(values.T, 1)}
 
 
 def _error_columns(error_mm: np.ndarray) -> Columns:

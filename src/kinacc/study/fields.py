@@ -57,8 +57,8 @@ class ErrorField:
                 Problem(f"field {self.name}", shapes, "(n, 3) and (n, k), n at least 1")
             )
         if not np.all(np.isfinite(self.error_mm)):
-            what = "holds errors that are not finite"
-            raise InputError(Problem(f"field {self.name}", what, "numbers in mm"))
+            message = "holds errors that are not finite"
+            raise InputError(Problem(f"field {self.name}", message, "numbers in mm"))
 
     @property
     def points(self) -> int:
@@ -92,11 +92,30 @@ def of_measurements(
     model: str = PLAINEST,
     target: str | None = None,
 ) -> ErrorField:
-    """Held-out errors of a ``model`` at measured configurations, readings averaged.
+    """Return held-out errors of a model at measured configurations, readings averaged.
 
-    Of one ``target``, or of all of them where none is named. errors: ``pose_errors``;
-    measurements: ``measurements``. The errors hold the noise of the instrument, which counts as
-    truth here.
+    The errors include the noise of the instrument, which counts as truth here.
+
+    Parameters
+    ----------
+    name : str
+        Name of the field.
+    errors, measurements : mapping
+        Columns of the tables ``pose_errors`` and ``measurements``.
+    model : str
+        Model whose errors are taken.
+    target : str, optional
+        Target, all of them by default.
+
+    Returns
+    -------
+    ErrorField
+        Errors in mm, robot base frame.
+
+    Raises
+    ------
+    InputError
+        Where no errors are held out.
     """
     wanted = (np.asarray(errors["comparison"]) == Comparison(MEASURED, model).name) & (
         np.asarray(errors["estimate"]) == "cross_validated"
@@ -104,12 +123,12 @@ def of_measurements(
     if target is not None:
         wanted &= np.asarray(errors["target"]).astype(str) == target
     if not wanted.any():
-        what = f"pose_errors holds no held-out errors of the {model_name(model)} model"
-        raise InputError(Problem(f"field {name}", what, fix="set measurements.folds"))
+        message = f"pose_errors holds no held-out errors of the {model_name(model)} model"
+        raise InputError(Problem(f"field {name}", message, fix="set measurements.folds"))
     rows = np.flatnonzero(wanted)
     groups = readings_of(np.asarray(errors["pose"])[rows], np.asarray(errors["target"])[rows])
     vectors, q_rad = error_vectors(errors), _stacked(measurements, "q")
-    pose_of = {int(each): row for row, each in reversed([*enumerate(measurements["pose"])])}
+    pose_of = {int(number): row for row, number in reversed([*enumerate(measurements["pose"])])}
     first = [pose_of[int(np.asarray(errors["pose"])[rows[group[0]]])] for group in groups]
     means = np.array([vectors[rows[group]].mean(axis=0) for group in groups])
     meaning = f"held-out errors of the {model_name(model)} model at measured configurations"
@@ -118,20 +137,32 @@ def of_measurements(
 
 
 def synthetic(name: str, draw: int) -> ErrorField:
-    """Physical arm of an accepted draw less the DH model calibrated to it, at other poses.
+    """Return errors of the DH model of a synthetic arm at poses that were not fitted.
 
-    ``name`` is one of :data:`FAMILIES`. The calibration sees no noise, so all that is left is
-    deterministic; DH parameters and base are fitted to positions by least squares.
+    The calibration has no noise: the errors are deterministic. DH parameters and base are fitted
+    to positions by least squares.
+
+    Parameters
+    ----------
+    name : str
+        One of :data:`FAMILIES`.
+    draw : int
+        Number of the accepted draw of the arm.
+
+    Returns
+    -------
+    ErrorField
+        Errors in mm, robot base frame, with joints in rad.
     """
-    made = accepted_draw(draw)
-    arm = physical_robot(made.seed, made.scales, made.geometry)
+    accepted = accepted_draw(draw)
+    arm = physical_robot(accepted.seed, accepted.scales, accepted.geometry)
     change = FAMILIES[name]
     nominal = robots.load("mh180")
     q_rad = plan.configurations(nominal, CALIBRATION_POSES + POINTS)
     arm = change.arm(arm)
     true_mm = pose(arm, _quiet_visits(q_rad)).position_mm
     error_mm = true_mm - dh.forward(arm.dh, q_rad).position_mm
-    rng = np.random.default_rng([made.seed, 4])
+    rng = np.random.default_rng([accepted.seed, 4])
     error_mm = change.after(error_mm, q_rad, arm, rng)
     fitted = slice(None, CALIBRATION_POSES)
     left_mm = _beyond_dh(arm, q_rad, error_mm, fitted)
@@ -153,8 +184,8 @@ def _only(**factors: float) -> Callable[[PhysicalRobot], PhysicalRobot]:
 
     def change(arm: PhysicalRobot) -> PhysicalRobot:
         parts = ("compliance", "ripple_rad", "backlash_rad", "drift", "repeatability_rad")
-        own = {part: getattr(arm.beyond, part) * factors.get(part, 0.0) for part in parts}
-        return replace(arm, beyond=replace(arm.beyond, **own))
+        parts_of = {part: getattr(arm.beyond, part) * factors.get(part, 0.0) for part in parts}
+        return replace(arm, beyond=replace(arm.beyond, **parts_of))
 
     return change
 

@@ -126,7 +126,7 @@ def examples(
     sizes = np.sqrt(np.sum(error_mm**2, axis=1))
     truth, worst = float(sizes.max()), int(sizes.argmax())
     eta, larger = truth * settings.eta_ratio_rejected, truth * settings.eta_ratio_larger
-    kept = truth * settings.eta_ratio_kept
+    smaller = truth * settings.eta_ratio_kept
 
     def rejects(world: World) -> bool:
         return assessor.run(world, eta).rejected
@@ -138,11 +138,11 @@ def examples(
         return last.repeat > 1 and world.index[last.row] == worst
 
     def keeps(world: World) -> bool:
-        return not assessor.run(world, kept).rejected
+        return not assessor.run(world, smaller).rejected
 
     def shows_fig6(world: World) -> bool:
-        found = assessor.run(world, kept)
-        return not found.rejected and found.measurements > found.points_visited
+        outcome = assessor.run(world, smaller)
+        return not outcome.rejected and outcome.measurements > outcome.points_visited
 
     def search(name: str, bound: float, wanted: Callable, less: Callable) -> Example:
         second = None
@@ -156,7 +156,7 @@ def examples(
         return Example(name, second or 0, bound, FALLBACKS[name][second is None], False)
 
     fig5 = search(REJECTED, eta, shows_fig5, rejects)
-    fig6 = search(KEPT, kept, shows_fig6, keeps)
+    fig6 = search(KEPT, smaller, shows_fig6, keeps)
     return [fig5, Example(LARGER, fig5.simulation, larger, RULES[LARGER], fig5.rule_met), fig6]
 
 

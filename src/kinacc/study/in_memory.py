@@ -35,10 +35,10 @@ def run(
     ``config`` is the complete configuration of one data set; ``extra`` are settings by stage that
     no configuration has.
     """
-    found = dict(tables)
+    results = dict(tables)
     for name in names:
-        found |= RUNS[name](found, {**config, **(extra or {}).get(name, {})})
-    return found
+        results |= RUNS[name](results, {**config, **(extra or {}).get(name, {})})
+    return results
 
 
 def without_folds(measurements: Mapping) -> dict[str, np.ndarray]:
@@ -54,7 +54,7 @@ def lean(name: str, config: Mapping, tables: Mapping) -> dict[str, Mapping]:
 
     No claim is about held-out poses or other readings than the configured one.
     """
-    made = RUNS[name](tables, {**config, "all_readings": False})
+    results = RUNS[name](tables, {**config, "all_readings": False})
     if name == "measurements":
-        made = {**made, name: without_folds(made[name])}
-    return made
+        results = {**results, name: without_folds(results[name])}
+    return results

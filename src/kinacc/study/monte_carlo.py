@@ -57,7 +57,7 @@ def assessors(section: Mapping[str, object], all_readings: bool = True) -> list[
     Each under every reading of the paper (see :mod:`kinacc.assess`), or only the one configured.
     """
     if all_readings:
-        return [each for cls in ASSESSORS.values() for each in every_reading(cls, section)]
+        return [assessor for cls in ASSESSORS.values() for assessor in every_reading(cls, section)]
     return [of_section(cls, section) for cls in ASSESSORS.values()]
 
 
@@ -99,21 +99,43 @@ def simulate(
     assessors: Sequence[Assessor],
     progress=None,
 ) -> Columns:
-    """Run every assessor on the given repetitions of each noise.
+    """Run every assessor on repetitions of each noise.
 
-    error_mm: (m, 3) true errors at the operating points, robot base frame, mm. noise_mm: standard
-    deviations per axis, mm. ``progress(iterable, what, total)`` reports on the simulations.
-    Returns the columns of ``study_chunk``, one row per noise, repetition and assessor.
-    Raises InputError for errors of the wrong shape or not finite.
+    Parameters
+    ----------
+    error_mm : (m, 3) array
+        True errors at the operating points, mm, robot base frame.
+    noise_mm : sequence of float
+        Standard deviations of a reading per axis, mm.
+    repetitions : iterable of int
+        Numbers of the simulations.
+    visits : Visits
+        Budget and visiting order.
+    seed : int
+        Seed of the study.
+    assessors : sequence of Assessor
+        All see the same worlds.
+    progress : callable, optional
+        ``progress(iterable, what, total)`` reports on the simulations.
+
+    Returns
+    -------
+    dict
+        Columns of ``study_chunk``, one row per noise, repetition and assessor.
+
+    Raises
+    ------
+    InputError
+        For errors of the wrong shape or not finite.
     """
     errors = checked_errors(error_mm)
     jobs = [(noise, repetition) for noise in noise_mm for repetition in repetitions]
     rows = []
     for noise, repetition in progress(jobs, "simulations", len(jobs)) if progress else jobs:
         world = world_of(errors, noise, repetition, visits, seed)
-        for each in assessors:
-            switches = {switch: getattr(each, switch, None) for switch in SWITCHES}
-            row = assessed_row(noise, repetition, each, world)
+        for assessor in assessors:
+            switches = {switch: getattr(assessor, switch, None) for switch in SWITCHES}
+            row = assessed_row(noise, repetition, assessor, world)
             row.pop("bounded_mm")
             rows.append({**row, **switches})
     return ordered(columns_of("study_chunk", rows))
@@ -121,10 +143,10 @@ def simulate(
 
 def assessed_row(noise_mm: float, repetition: int, assessor, world: World) -> dict:
     """One assessment, with the size that its upper bound is held to (``bounded_mm``)."""
-    found, bounded_mm = assess_world(assessor, world, world.visits)
+    assessment, bounded_mm = assess_world(assessor, world, world.visits)
     name = getattr(assessor, "name", type(assessor).__name__)
     place = {"noise_mm": noise_mm, "repetition": repetition, "assessor": name}
-    return {**place, **found._asdict(), "bounded_mm": bounded_mm}
+    return {**place, **assessment._asdict(), "bounded_mm": bounded_mm}
 
 
 def ordered(rows: Columns) -> Columns:
@@ -170,8 +192,8 @@ def summary(study: Columns, true_mm: float) -> Columns:
 def readings(rows: Columns, true_mm: float) -> Columns:
     """Columns of ``readings``: every reading of the assessors that have more than one."""
     keep = np.array([bool(ASSESSORS[name].switches) for name in rows["assessor"]], bool)
-    kept = {name: column[keep] for name, column in rows.items()}
-    return _by_assessor("readings", kept, ["assessor", *SWITCHES, "noise_mm"], true_mm)
+    chosen = {name: column[keep] for name, column in rows.items()}
+    return _by_assessor("readings", chosen, ["assessor", *SWITCHES, "noise_mm"], true_mm)
 
 
 def _by_assessor(artefact: str, rows: Columns, keys: list[str], true_mm: float) -> Columns:
@@ -179,7 +201,7 @@ def _by_assessor(artefact: str, rows: Columns, keys: list[str], true_mm: float) 
     table = statistics(rows, keys, true_mm)
     rank = table["assessor"].map(list(ASSESSORS).index)
     table = table.assign(rank=rank).sort_values(["rank", *keys[1:]], kind="stable")
-    known = [each.name for each in ARTEFACTS[artefact].columns]
+    known = [column.name for column in ARTEFACTS[artefact].columns]
     table = table[[name for name in known if name in table]].astype(object)
     return columns_of(artefact, table.where(table.notna(), None).to_dict("records"))
 

@@ -72,31 +72,31 @@ def _drawn(
     solve: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]],
 ) -> np.ndarray:
     """The first ``count`` of the joints that ``solve`` finds, with their status, for draws."""
-    found, counts, block = [], np.zeros(len(Status), dtype=int), max(count, 256)
+    blocks, counts, block = [], np.zeros(len(Status), dtype=int), max(count, 256)
     for first in range(1, _DRAWS_PER_POINT * block, block):
         q_rad, status = solve(region.points(sequence, block, dimensions, first))
         counts += np.bincount(status, minlength=len(Status))
-        found.append(q_rad[status == Status.FOUND])
+        blocks.append(q_rad[status == Status.FOUND])
         if counts[Status.FOUND] >= count:
-            return np.concatenate(found)[:count]
+            return np.concatenate(blocks)[:count]
     reasons = ", ".join(
         f"{number} {status.name.lower().replace('_', ' ')}"
         for status, number in zip(Status, counts, strict=True)
         if status != Status.FOUND and number
     )
-    what = f"only {counts[Status.FOUND]} of {counts.sum()} draws can be assessed ({reasons})"
+    message = f"only {counts[Status.FOUND]} of {counts.sum()} draws can be assessed ({reasons})"
     fix = "move or enlarge the evaluation space, or fit the VEC model over a wider joint range"
-    raise InputError(Problem("evaluation.cylinder", what, f"{count} points", fix))
+    raise InputError(Problem("evaluation.cylinder", message, f"{count} points", fix))
 
 
 def _branches(robot: Robot, wrist: str | None) -> np.ndarray:
     """Numbers of the machining branches that have the ``wrist``."""
     names = inverse.machining_branches(robot)
-    kept = [i for i, name in enumerate(names) if wrist in (*_ALL, name.rpartition("-")[2])]
-    if not kept:
-        what = f"{wrist}, but robot {robot.name} has no branch of that wrist"
-        raise InputError(Problem("evaluation.wrist", what, "both"))
-    return np.array(kept)
+    chosen = [i for i, name in enumerate(names) if wrist in (*_ALL, name.rpartition("-")[2])]
+    if not chosen:
+        message = f"{wrist}, but robot {robot.name} has no branch of that wrist"
+        raise InputError(Problem("evaluation.wrist", message, "both"))
+    return np.array(chosen)
 
 
 def in_joints(

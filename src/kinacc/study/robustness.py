@@ -48,10 +48,10 @@ def claims_on(draw: int, config: Mapping) -> Columns:
     """Rows of ``robustness`` of one accepted draw under the configuration of a data set."""
     measurements = config["measurements"]
     synthetic = {**measurements["synthetic"], "draw": draw}
-    own = {**config, "measurements": {**measurements, "synthetic": synthetic}}
+    settings = {**config, "measurements": {**measurements, "synthetic": synthetic}}
     tables: dict = {}
     for name in ("measurements", *STAGES):
-        tables |= in_memory.lean(name, own, tables)
+        tables |= in_memory.lean(name, settings, tables)
     claims = evaluate(tables, paper_arm=True)
     rows = {name: claims[name] for name in ("claim", "reproduced", "verdict")}
     return {"draw": np.full(len(claims["claim"]), draw), **rows}

@@ -24,11 +24,21 @@ def all_claims() -> list[Claim]:
 def evaluate(
     tables: Tables, *, paper_arm: bool, shares: Mapping[str, float] | None = None
 ) -> Columns:
-    """Rows of ``claims`` for the tables of one data set.
+    """Evaluate every claim on the tables of one data set.
 
-    ``tables`` maps artefact names to columns; a claim whose evidence is not there, or that
-    compares with the paper's arm while ``paper_arm`` is false, is ``not comparable``. ``shares``
-    gives per claim how often it held over further draws of the synthetic arm.
+    Parameters
+    ----------
+    tables : mapping
+        Columns by the name of their artefact.
+    paper_arm : bool
+        Whether numbers of the paper's own arm are compared.
+    shares : mapping, optional
+        How often a claim held over further draws of the synthetic arm.
+
+    Returns
+    -------
+    dict
+        Columns of ``claims``. A claim without its evidence is ``not comparable``.
     """
     rows = []
     for claim in all_claims():

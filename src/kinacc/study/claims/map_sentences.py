@@ -60,8 +60,8 @@ def _slices(tables: Tables, quantity: str, angles_deg: tuple[float, ...] = ()) -
     names = ["slice_deg", "radius_mm", "height_mm", *columns]
     rows = pd.DataFrame({name: tables["accuracy_map"][name] for name in names})
     slices = []
-    for angle, own in rows.groupby("slice_deg"):
-        maps = own.pivot(index="height_mm", columns="radius_mm", values=columns)
+    for angle, group in rows.groupby("slice_deg"):
+        maps = group.pivot(index="height_mm", columns="radius_mm", values=columns)
         value, branch, solutions = (maps[name].to_numpy() for name in columns)
         value = value.astype(float)
         if np.isfinite(value).any() and (not angles_deg or angle in angles_deg):
@@ -70,10 +70,10 @@ def _slices(tables: Tables, quantity: str, angles_deg: tuple[float, ...] = ()) -
 
 
 def _nonlinear(tables: Tables) -> float:
-    def plane_share(one: _Slice) -> float:
+    def plane_share(heat_map: _Slice) -> float:
         """Share of the variance that a plane explains."""
-        rows, columns = np.nonzero(np.isfinite(one.value))
-        values = one.value[rows, columns]
+        rows, columns = np.nonzero(np.isfinite(heat_map.value))
+        values = heat_map.value[rows, columns]
         if values.size < 4 or np.ptp(values) == 0.0:
             return math.nan
         design = np.column_stack([np.ones_like(values), rows, columns])
@@ -81,13 +81,13 @@ def _nonlinear(tables: Tables) -> float:
         return 1.0 - float(np.var(values - fitted) / np.var(values))
 
     return max(
-        float(np.mean([plane_share(one) for one in _slices(tables, quantity)]))
+        float(np.mean([plane_share(heat_map) for heat_map in _slices(tables, quantity)]))
         for quantity in _QUANTITIES
     )
 
 
 def _distances(slices: list[_Slice]) -> list[float]:
-    places = [one.worst() for one in slices]
+    places = [heat_map.worst() for heat_map in slices]
     return [float(np.linalg.norm(a - b)) for a, b in combinations(places, 2)]
 
 
@@ -98,7 +98,7 @@ def _changes_location(tables: Tables) -> float:
 
 def _outer_reaches(tables: Tables) -> float:
     slices = _slices(tables, "position", _OUTER_DEG)
-    return min((float(one.worst()[0]) for one in slices), default=math.nan)
+    return min((float(heat_map.worst()[0]) for heat_map in slices), default=math.nan)
 
 
 def _less_predictable_inside(tables: Tables) -> float:
@@ -119,9 +119,9 @@ def _orientation_less_predictable(tables: Tables) -> float:
 def _discontinuities(slices: list[_Slice]) -> np.ndarray:
     """Largest steps between neighbouring cells (n, 5): slice number, then row, column of both."""
     steps, sizes = [np.empty((0, 5), dtype=int)], [np.empty(0)]
-    for number, one in enumerate(slices):
+    for number, heat_map in enumerate(slices):
         for axis in (0, 1):
-            size = np.abs(np.diff(one.value, axis=axis))
+            size = np.abs(np.diff(heat_map.value, axis=axis))
             cell = np.argwhere(np.isfinite(size))
             slice_number = np.full((len(cell), 1), number)
             steps.append(np.hstack([slice_number, cell, cell + np.eye(2, dtype=int)[axis]]))
@@ -135,12 +135,12 @@ def _near_discontinuities(tables: Tables) -> float:
     slices = _slices(tables, "orientation")
     jumps = _discontinuities(slices)
     distances, values = [], []
-    for number, one in enumerate(slices):
+    for number, heat_map in enumerate(slices):
         broken = jumps[jumps[:, 0] == number, 1:].reshape(-1, 2)
         if len(broken):
-            cells = np.argwhere(np.isfinite(one.value))
+            cells = np.argwhere(np.isfinite(heat_map.value))
             distances.append(cdist(cells, broken).min(axis=1))
-            values.append(one.value[tuple(cells.T)])
+            values.append(heat_map.value[tuple(cells.T)])
     if not values:
         return math.nan
     distance, value = np.concatenate(distances), np.concatenate(values)
@@ -155,8 +155,10 @@ def _at_wrist_changes(tables: Tables) -> float:
 
     def state(number: int, row: int, column: int) -> tuple[str, int]:
         """Wrist, the part of a branch name after its last comma, and combinations reached."""
-        one = slices[number]
-        return one.branch[row, column].rpartition(",")[2].strip(), one.solutions[row, column]
+        heat_map = slices[number]
+        return heat_map.branch[row, column].rpartition(",")[2].strip(), heat_map.solutions[
+            row, column
+        ]
 
     jumps = _discontinuities(slices).tolist()
     changed = [state(number, *cells[:2]) != state(number, *cells[2:]) for number, *cells in jumps]

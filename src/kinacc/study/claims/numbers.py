@@ -53,7 +53,7 @@ def _residual_claims(table: str) -> list[Claim]:
     return [
         Claim(
             f"{table}_{quantity}_{column}",
-            f"{title}: {words} of the {quantity} residual between {between} is {value} {unit}",
+            f"{title}: {text} of the {quantity} residual between {between} is {value} {unit}",
             f"{column} of comparison {comparison}, subset train, {quantity}; "
             f"within {RELATIVE_TOLERANCE:.0%}",
             "residuals",
@@ -63,7 +63,7 @@ def _residual_claims(table: str) -> list[Claim]:
             arm_specific=True,
         )
         for quantity, unit in (("position", "mm"), ("orientation", "mrad"))
-        for (column, words), value in zip(
+        for (column, text), value in zip(
             _STATISTICS.items(), _RESIDUAL_VALUES[table, quantity], strict=True
         )
     ]
@@ -89,9 +89,12 @@ def _table_2() -> list[Claim]:
     for column, values in TABLE_2.items():
         name, unit = column.rsplit("_", 1)
         tolerance = ANGLE_TOLERANCE_RAD if unit == "rad" else LENGTH_TOLERANCE_MM
-        words = ", as an angle modulo 2 pi" if unit == "rad" else ""
+        remark = ", as an angle modulo 2 pi" if unit == "rad" else ""
         for joint, value in enumerate(values, 1):
-            statistic, paired = f"{column} of joint {joint}{words}", name == "d" and joint in (2, 3)
+            statistic, paired = (
+                f"{column} of joint {joint}{remark}",
+                name == "d" and joint in (2, 3),
+            )
             if paired:
                 statistic += "; not judged alone, only d2 - d3 can be seen"
             claims.append(

@@ -57,7 +57,7 @@ def study_claims() -> list[Claim]:
         "model_invalidation_performs_well": lambda c: _over_others(c.bias.abs().max()),
         "model_invalidation_less_sensitive": _less_sensitive,
     }
-    compute = {name: _of_curves(each) for name, each in curves.items()}
+    compute = {name: _of_curves(curve) for name, curve in curves.items()}
     return sentences("study", {"few_points_near_limit": _near_limit, **compute})
 
 
