@@ -87,7 +87,7 @@ def drawn_world(
     index = np.arange(len(error)) if order is None else np.array(order, dtype=np.int64)
     if sigma.shape not in ((), (len(error),)) or not np.all(np.isfinite(sigma) & (sigma > 0.0)):
         allowed = "a number above 0, or one per point, in mm"
-        raise InputError(Problem("noise", f"{sigma_mm}"[:60], allowed))
+        raise InputError(Problem("noise", f"{sigma_mm!r}"[:60], allowed))
     return draw(error[index], np.broadcast_to(sigma, len(error))[index], key, visits, index)
 
 
