@@ -77,7 +77,7 @@ class VECModel(ErrorModel):
     @property
     def prior_std(self) -> np.ndarray:
         """Usual size (P,) of the coefficients: 1 mm and 1 mrad."""
-        return np.where(np.array(self.units) == "mm", 1.0, 1e-3)
+        return np.array([1.0 if unit == "mm" else 1e-3 for unit in self.units])
 
     def with_parameters(self, x: np.ndarray) -> Self:
         """The model with the coefficients and offsets of (P,), ordered as ``start``."""

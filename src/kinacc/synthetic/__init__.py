@@ -22,13 +22,38 @@ _SAME_ARM_MM = 25.0
 
 
 def measure(robot: Robot, settings: Mapping, attitude: Attitude = DOWN) -> dict[str, np.ndarray]:
-    """Columns of ``measurements``, but for fold and subset, of an accepted draw of the arm.
+    """Simulated measurements of an accepted draw of the arm. All chance belongs to the draw.
 
-    ``settings``: those of ``measurements.synthetic``; without a roughness the draw has the one it
-    was accepted with. ``attitude``: that of the flange about which the poses are planned. All
-    chance belongs to the draw. Raises InputError for an unknown draw and for another arm.
+    Parameters
+    ----------
+    robot : Robot
+        The nominal arm; only that of the draws can be measured.
+    settings : mapping
+        Those of ``measurements.synthetic``; without a roughness the draw has the one it was
+        accepted with.
+    attitude : Attitude
+        Orientation of the flange about which the poses are planned.
+
+    Returns
+    -------
+    dict of str to numpy.ndarray
+        Columns (n,) of the table ``measurements``, but for fold and subset: joints in rad,
+        positions in mm in the robot base.
+
+    Raises
+    ------
+    InputError
+        For an unknown draw and for another arm.
     """
-    _require_the_arm(robot)
+    same = robot.dh.joints == TABLE_II.joints and np.array_equal(robot.joint_map, np.eye(6))
+    if same:
+        q_rad = np.random.default_rng(0).uniform(-1.0, 1.0, (50, 6))
+        nominal, drawn = (dh.forward(arm, q_rad).position_mm for arm in (robot.dh, TABLE_II))
+        same = bool(np.linalg.norm(nominal - drawn, axis=1).max() < _SAME_ARM_MM)
+    if not same:
+        what = f"is synthetic, but robot {robot.name} is not the arm that was synthesised"
+        fix = "give the measurements of this robot in a file (measurements.source: file)"
+        raise InputError(Problem("measurements.source", what, "robot: mh180", fix))
     stated = {name: settings[name] for name in AS_TUNED._fields if name in settings}
     draw = replace(accepted_draw(int(settings["draw"])), roughness=AS_TUNED._replace(**stated))
     run = calibration_run(robot, int(settings["poses"]), draw.seed, attitude)
@@ -36,34 +61,16 @@ def measure(robot: Robot, settings: Mapping, attitude: Attitude = DOWN) -> dict[
 
 
 def columns(draw: AcceptedDraw, run: Run, tracker_noise_mm: float) -> dict[str, np.ndarray]:
-    """Columns of a calibration run on the arm of ``draw``."""
+    """Columns of a calibration run on the arm of ``draw``, as ``measure`` returns them."""
     arm = physical_robot(draw.seed, draw.scales, draw.geometry, draw.roughness)
-    seen = measured(arm, run, tracker_noise_mm)
-    quaternion = quaternion_from_rotation(seen.rotation)
-    poses, joints = len(seen.position_mm), range(arm.dh.joints)
+    poses = measured(arm, run, tracker_noise_mm)
+    quaternion, count = quaternion_from_rotation(poses.rotation), len(poses.position_mm)
     return {
-        "pose": np.arange(poses),
-        **{f"q{j + 1}": run.visits.q_rad[:, j] for j in joints},
-        **{f"s{j + 1}": run.visits.s[:, j] for j in joints},
-        "target": np.full(poses, "tool", dtype=object),
-        **{f"{axis}_mm": seen.position_mm[:, i] for i, axis in enumerate("xyz")},
-        **{f"q{part}": quaternion[:, i] for i, part in enumerate("wxyz")},
-        "repeat": np.zeros(poses, dtype=int),
+        "pose": np.arange(count),
+        **{f"q{j + 1}": joint for j, joint in enumerate(run.visits.q_rad.T)},
+        **{f"s{j + 1}": joint for j, joint in enumerate(run.visits.s.T)},
+        "target": np.full(count, "tool", dtype=object),
+        **dict(zip(("x_mm", "y_mm", "z_mm"), poses.position_mm.T, strict=True)),
+        **dict(zip(("qw", "qx", "qy", "qz"), quaternion.T, strict=True)),
+        "repeat": np.zeros(count, dtype=int),
     }
-
-
-def _require_the_arm(robot: Robot) -> None:
-    same = robot.dh.joints == TABLE_II.joints and np.array_equal(robot.joint_map, np.eye(6))
-    if same:
-        q_rad = np.random.default_rng(0).uniform(-1.0, 1.0, (50, 6))
-        own, drawn = (dh.forward(each, q_rad).position_mm for each in (robot.dh, TABLE_II))
-        same = bool(np.linalg.norm(own - drawn, axis=1).max() < _SAME_ARM_MM)
-    if not same:
-        raise InputError(
-            Problem(
-                "measurements.source",
-                f"is synthetic, but robot {robot.name} is not the arm that was synthesised",
-                "robot: mh180",
-                "give the measurements of this robot in a file (measurements.source: file)",
-            )
-        )

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import csv
 from dataclasses import dataclass
 from functools import cache
 from importlib import resources
 
 import numpy as np
+import pandas as pd
 
 from kinacc.errors import InputError, Problem
 from kinacc.kinematics.dh import DHModel
@@ -38,47 +38,49 @@ def geometry_columns() -> list[str]:
 
 
 @cache
-def rows() -> tuple[dict[str, str], ...]:
-    """The table's rows as texts, in order of their seeds; lines starting with # are remarks."""
-    text = (resources.files("kinacc") / "synthetic" / FILE).read_text(encoding="utf-8")
-    lines = [line for line in text.splitlines() if not line.startswith("#")]
-    return tuple(csv.DictReader(lines))
+def rows() -> list[dict[str, str]]:
+    """Rows of the table of accepted draws, in order of their seeds; lines with # are remarks."""
+    with (resources.files("kinacc") / "synthetic" / FILE).open(encoding="utf-8") as file:
+        return pd.read_csv(file, comment="#", dtype=str).to_dict("records")
 
 
 def accepted_draw(number: int) -> AcceptedDraw:
-    """Accepted draw ``number``, counted from 0. Raises InputError where there are fewer."""
-    table = rows()
-    if not 0 <= number < len(table):
-        raise InputError(
-            Problem(
-                "measurements.synthetic.draw",
-                f"there is no accepted draw {number}",
-                f"0 to {len(table) - 1}",
-                "the rule arms of research/Snakefile searches for more",
-            )
-        )
-    row = table[number]
+    """One accepted draw.
+
+    Parameters
+    ----------
+    number : int
+        Number of the draw, counted from 0.
+
+    Returns
+    -------
+    AcceptedDraw
+        The arm; lengths in mm, angles in rad.
+
+    Raises
+    ------
+    InputError
+        Where there are fewer draws.
+    """
+    _require("measurements.synthetic.draw", number + 1)
+    row = rows()[number]
     values = np.array([float(row[name]) for name in geometry_columns()]).reshape(JOINTS, -1)
-    return AcceptedDraw(
-        int(row["seed"]),
-        Scales(*(float(row[name]) for name in Scales._fields)),
-        DHModel(*values.T, np.zeros(JOINTS)),
-    )
+    scales = Scales(*(float(row[name]) for name in Scales._fields))
+    return AcceptedDraw(int(row["seed"]), scales, DHModel(*values.T, [0.0] * JOINTS))
 
 
 def further_draws(own: int, count: int) -> list[int]:
-    """Numbers of the first ``count`` accepted draws other than ``own``.
+    """Numbers of the first ``count`` accepted draws but the ``own`` one.
 
     Raises InputError where there are fewer.
     """
-    others = [number for number in range(len(rows())) if number != own]
-    if count > len(others):
-        raise InputError(
-            Problem(
-                "robustness.draws",
-                f"{count} further draws are wanted",
-                f"at most {len(others)}",
-                "the rule arms of research/Snakefile searches for more",
-            )
-        )
-    return others[:count]
+    _require("robustness.draws", count + 1)
+    return [number for number in range(count + 1) if number != own][:count]
+
+
+def _require(key: str, count: int) -> None:
+    """InputError by the name of a key unless there are that many draws."""
+    if not 1 <= count <= len(rows()):
+        what = f"{count} accepted draws are wanted, there are {len(rows())}"
+        fix = "the rule arms of research/Snakefile searches for more"
+        raise InputError(Problem(key, what, "", fix))

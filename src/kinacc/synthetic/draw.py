@@ -88,16 +88,12 @@ def _smooth(rng: np.random.Generator, scales: Scales, decay: float) -> Smooth:
     size[:, 3:] = _ARM_MRAD * 1e-3 * scales.smooth_arm
     size[3, 5] = size[4:, 3:] = _WRIST_MRAD * 1e-3 * scales.smooth_wrist
     shape = (6, 6, HALF_PERIODS)
-    usual, fallen = _fallen(AS_TUNED.wave_decay), _fallen(decay)
+    number = np.arange(1.0, HALF_PERIODS + 1)
+    usual, fallen = number**AS_TUNED.wave_decay, number**decay
     same_size = np.linalg.norm(1.0 / usual) / np.linalg.norm(1.0 / fallen)
     amplitude = size[..., None] * same_size / fallen * rng.uniform(0.5, 1.5, shape)
     low, high = np.deg2rad(RANGE_DEG).T
     return Smooth(low, high, amplitude, rng.uniform(0.0, 2.0 * np.pi, shape))
-
-
-def _fallen(decay: float) -> np.ndarray:
-    """What the waves 1, 2, 3, ... are divided by."""
-    return np.arange(1.0, HALF_PERIODS + 1) ** decay
 
 
 def _beyond(rng: np.random.Generator, scales: Scales, gears: float) -> Beyond:

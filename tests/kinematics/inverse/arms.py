@@ -2,109 +2,27 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
 from kinacc.geometry import Pose
-from kinacc.kinematics import inverse
+from kinacc.kinematics import inverse, robot
 from kinacc.kinematics.dh import DHModel
 from kinacc.kinematics.inverse import grid_of, limits, newton
 from kinacc.kinematics.model import ErrorModel, JointState
 from kinacc.kinematics.robot import Robot
 
-
-def made(name, theta_deg, d_mm, a_mm, alpha_deg, ends, prismatic=None) -> Robot:
-    """A robot from columns in degrees and mm; ``ends`` are limits in degrees or mm."""
-    model = DHModel(
-        np.deg2rad(theta_deg), d_mm, a_mm, np.deg2rad(alpha_deg), np.zeros(len(d_mm)), prismatic
-    )
-    box = np.array(ends, dtype=float)
-    box[~model.prismatic] = np.deg2rad(box[~model.prismatic])
-    return Robot(name, model, box[:, 0], box[:, 1], np.eye(len(d_mm)), "made up")
-
-
-TURN = [(-180, 180)] * 6
-OFFSET_WRIST = made(  # axis 5 beside axis 4, as on FANUC's CRX
-    "offset",
-    [0, -90, 0, 0, 0, 0],
-    [245, 0, 0, 540, -150, 160],
-    [0, 710, 0, 0, 0, 0],
-    [-90, 0, -90, 90, -90, 0],
-    TURN,
-)
-GENERAL = made(
-    "general",
-    [20, -140, 60, 10, 95, -30],
-    [200, -150, 120, 280, -90, 160],
-    [120, 350, -80, 60, -40, 30],
-    [-85, 40, -70, 95, -100, 20],
-    TURN,
-)
-STANFORD = made(
-    "stanford",
-    [0] * 6,
-    [412, 154, 0, 0, 0, 263],
-    [0] * 6,
-    [-90, 90, 0, -90, 90, 0],
-    [(-170, 170), (-170, 170), (200, 1200), (-170, 170), (-110, 110), (-170, 170)],
-    [0, 0, 1, 0, 0, 0],
-)
-SCARA = made(
-    "scara",
-    [0] * 4,
-    [400, 0, 0, 0],
-    [325, 275, 0, 0],
-    [0, 180, 0, 0],
-    [(-130, 130), (-145, 145), (0, 200), (-180, 180)],
-    [0, 0, 1, 0],
-)
-FIVE = made(
-    "five",
-    [0, -90, 0, 0, 0],
-    [290, 0, 0, 302, 72],
-    [0, 270, 70, 0, 0],
-    [-90, 0, -90, 90, -90],
-    [(-165, 165), (-110, 110), (-110, 70), (-160, 160), (-120, 120)],
-)
-ON_A_TRACK = made(
-    "track",
-    [90, 0, -90, 0, 0, 0, 0],
-    [0, 290, 0, 0, 302, 0, 72],
-    [0, 0, 270, 70, 0, 30, 0],
-    [90, -90, 0, -90, 90, -90, 0],
-    [
-        (0, 2000),
-        (-165, 165),
-        (-110, 110),
-        (-110, 70),
-        (-160, 160),
-        (-120, 120),
-        (-180, 180),
-    ],
-    [1, 0, 0, 0, 0, 0, 0],
-)
-OFFSET_ELBOW = made(  # seven axes with offsets at elbow and wrist
-    "elbow",
-    [0] * 7,
-    [333, 0, 316, 0, 384, 0, 107],
-    [0, 0, 82.5, -82.5, 0, 88, 0],
-    [-90, 90, 90, -90, 90, 90, 0],
-    [(-166, 166), (-101, 101), (-166, 166), (-176, -4), (-166, 166), (-1, 215), (-166, 166)],
+_TEXTS = Path(__file__).with_name("arms.yaml").read_text().split("---\n")
+OFFSET_WRIST, GENERAL, STANFORD, SCARA, FIVE, ON_A_TRACK, OFFSET_ELBOW = (
+    robot.of_text(text, "arms.yaml") for text in _TEXTS
 )
 
 
 def calibrated(arm: Robot, size: float = 0.3, seed: int = 5) -> DHModel:
     """The arm's model off by ``size`` mm and mrad in every parameter."""
-    rng, k = np.random.default_rng(seed), arm.dh.joints
-    return replace(
-        arm.dh,
-        theta_offset_rad=arm.dh.theta_offset_rad + rng.normal(0, 1e-3 * size, k),
-        d_mm=arm.dh.d_mm + rng.normal(0, size, k),
-        a_mm=arm.dh.a_mm + rng.normal(0, size, k),
-        alpha_rad=arm.dh.alpha_rad + rng.normal(0, 1e-3 * size, k),
-        beta_rad=rng.normal(0, 1e-3 * size, k),
-    )
+    off = np.random.default_rng(seed).normal(0, size, (5, arm.dh.joints)).T
+    return arm.dh.with_parameters(arm.dh.start + (off * [1e-3, 1, 1, 1e-3, 1e-3]).ravel())
 
 
 def joints_within(arm: Robot, count: int, seed: int = 6) -> np.ndarray:

@@ -31,23 +31,7 @@ COUPLED["fanuc_r2000ic_165f"] = 0.0  # its measured data counts joint 3 from the
 # Reach (mm) as the makers state it: of a frame (5: wrist centre, 6: flange) from axis 1 (0) or the
 # foot of axis 2 (1), and the tolerance: rounding, and what limits take off the stretched arm.
 # The makers of UR, CRX, TM and Franka state a reach that is no distance between two such points.
-REACH = {
-    "kr6_r700_sixx": (706.7, 5, 0, 0.1), "kr6_r900_sixx": (901.5, 5, 0, 0.1),
-    "kr10_r1100_2": (1101, 5, 0, 1), "kr16_r1610_2": (1612, 5, 0, 1),
-    "kr16_r2010_2": (2013, 5, 0, 1), "kr120_r2700_2": (2701, 5, 0, 5),
-    "kr210_r2700_2": (2701, 5, 0, 5), "iiwa7": (800, 6, 1, 1), "iiwa14": (820, 6, 1, 1),
-    "irb120": (580, 5, 0, 1), "irb1200_5_90": (901, 5, 0, 1), "irb1600_10_145": (1450, 5, 0, 1),
-    "irb2400_12_155": (1550, 5, 0, 25), "irb2600_12_165": (1653, 5, 0, 1),
-    "irb4600_60_205": (2051, 5, 0, 1), "irb6700_200_260": (2604, 5, 0, 1),
-    "fanuc_lrmate200id": (717, 5, 0, 1), "fanuc_lrmate200id_7l": (911, 5, 0, 1),
-    "fanuc_m10ia": (1420, 5, 0, 1), "fanuc_m20ia": (1811, 5, 0, 1),
-    "fanuc_m710ic_50": (2050, 5, 0, 1), "fanuc_r2000ic_165f": (2655, 5, 0, 40),
-    "fanuc_r2000ic_210f": (2655, 5, 0, 40), "gp7": (927, 5, 0, 1), "gp12": (1440, 5, 0, 1),
-    "gp25": (1730, 5, 0, 1), "gp225": (2702, 5, 0, 40), "mh50": (2061, 5, 0, 1),
-    "mh180": (2702, 5, 0, 40), "tx2_60": (670, 6, 0, 1), "tx2_90": (1000, 6, 0, 2),
-    "tx2_90l": (1200, 6, 0, 2), "ur10": (1300, 5, 0, 11), "meca500": (330, 6, 1, 1),
-    "doosan_m1013": (1300, 6, 1, 1),
-}  # fmt: skip
+REACH = pd.read_csv(Path(__file__).with_name("reach.csv"), index_col="robot")
 
 
 def by_urdf(name: str, q_rad: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -99,9 +83,10 @@ def test_zero_pose_and_others_are_those_of_the_published_model(name):
         assert np.abs(pose.rotation[0] - rotation).max() < 1e-9
 
 
-@pytest.mark.parametrize("name", REACH)
+@pytest.mark.parametrize("name", REACH.index)
 def test_reach_is_the_makers(name):
-    reach, frame, about, within = REACH[name]
+    reach, frame, about, within = REACH.loc[name]
+    frame, about = int(frame), int(about)
     arm = robot.load(name)
 
     def apart(q: np.ndarray) -> np.ndarray:

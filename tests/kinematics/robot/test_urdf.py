@@ -220,6 +220,12 @@ def test_a_yaml_chooses_the_chain_and_adds_what_a_urdf_lacks(tmp_path):
         ('name="j2"', 'name="j1"', "joint j1 is given more than once"),
         ('<child link="l3"/>', '<child link="l2"/>', "child link l2 is given more than once"),
         ("</robot>", "", "is not XML"),
+        ("?>\n", '?><!DOCTYPE r [<!ENTITY x SYSTEM "file:///etc/passwd">]>\n', "entities"),
+        ("0 0 0.1273", "0 0 1e308", "origin xyz='0 0 1e308'"),
+        ("0 0 0.1273", "0 0 0_1", "origin xyz='0 0 0_1'"),
+        ('<link name="l1"/>', '<link name="l1"/>' + "<link>" * 1000, "depth"),
+        ("</robot>", 20_000 * '<joint type="fixed"/>' + "</robot>", "has 20007 joints"),
+        ("</robot>", 11_000_000 * " " + "</robot>", "at most 10 MB"),
         ('<robot name="arm">', "<robot>", "is no <robot"),
         ('<parent link="l3"/>', '<parent link="x3"/>', "'x3'"),
         (
@@ -234,39 +240,6 @@ def test_each_fault_is_named(old, new, words, tmp_path):
     assert old in text
     path = tmp_path / "arm.urdf"
     path.write_text(text.replace(old, new, 1))
-    assert words in refusal(robot.load, path)
-
-
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        (("?>\n", '?><!DOCTYPE r [<!ENTITY x SYSTEM "file:///etc/passwd">]>\n'), "entities"),
-        (("0 0 0.1273", "0 0 1e308"), "origin xyz='0 0 1e308'; allowed: 3 finite numbers"),
-        (("0 0 0.1273", "0 0 0_1"), "origin xyz='0 0 0_1'"),
-        (('<link name="l1"/>', '<link name="l1"/>' + "<link>" * 1000), "depth"),
-    ],
-    ids=["entities", "far away", "underscores", "nesting"],
-)
-def test_a_urdf_file_made_to_do_harm_is_refused_in_a_line(tmp_path, change, words):
-    path = tmp_path / "arm.urdf"
-    text = text_of(UR10).replace(*change, 1)
-    assert change[1] in text
-    path.write_text(text)
-    with pytest.raises(InputError) as caught:
-        robot.load(path)
-    assert words in str(caught.value)
-    assert len(str(caught.value)) < 1000
-
-
-def test_tens_of_thousands_of_joints_are_refused_at_once(tmp_path):
-    path = tmp_path / "arm.urdf"
-    path.write_text(text_of([("fixed", "0 0 0", "0 0 0", None)] * 20_000))
-    with pytest.raises(InputError, match="has 20000 joints; allowed: at most 2000"):
-        robot.load(path)
-
-
-def test_a_large_file_is_refused_before_it_is_read_to_its_end(tmp_path):
-    path = tmp_path / "arm.urdf"
-    path.write_text(text_of(UR10, " " * 11_000_000))
-    with pytest.raises(InputError, match="at most 10 MB"):
-        robot.load(path)
+    message = refusal(robot.load, path)
+    assert words in message
+    assert len(message) < 1000
