@@ -9,7 +9,6 @@ import re
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from kinacc.calibration.hand_eye import closed_form_start
 from kinacc.calibration.observations import full_poses
@@ -183,9 +182,17 @@ def _set_origin(joint, origin: Pose) -> None:
     if element is None:
         element = etree.Element("origin")
         joint.insert(0, element)
-    rpy = Rotation.from_matrix(origin.rotation).as_euler("xyz", suppress_warnings=True)
     element.set("xyz", " ".join(_digits(value * _M_PER_MM) for value in origin.position_mm))
-    element.set("rpy", " ".join(map(_digits, rpy)))
+    element.set("rpy", " ".join(_digits(value) for value in rpy(origin.rotation)))
+
+
+def rpy(rotation: np.ndarray) -> np.ndarray:
+    """Roll, pitch, yaw (3,) of a rotation (3, 3): ``Rz(yaw) Ry(pitch) Rx(roll)``, also upright."""
+    yaw = np.arctan2(rotation[1, 0], rotation[0, 0])
+    pitch = np.arctan2(-rotation[2, 0], np.hypot(rotation[0, 0], rotation[1, 0]))
+    # What yaw and pitch leave is a turn about x, however ill they are defined.
+    rest = (rotation_z(yaw) @ rotation_y(pitch)).T @ rotation
+    return np.array([np.arctan2(rest[2, 1], rest[1, 1]), pitch, yaw])
 
 
 def _digits(value: float) -> str:
