@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
 import pytest
 from command_line import call
 
-from kinacc.calibration import noise
-from kinacc.calibration.observations import full_poses
 from kinacc.campaign import doubts
 from kinacc.campaign.instrument import instruments
-from kinacc.geometry import Pose, exp_so3
-from kinacc.kinematics import dh, robot
 
 
 @pytest.fixture
@@ -103,44 +99,10 @@ def test_a_report_has_spreadsheets_and_a_page_that_is_not_overwritten(visited, t
     assert page.read_text("utf-8") == text
 
 
-def readings_of(poses, times, std_mm, sessions=1, seed=3):
-    """Positions of poses read several times, with a base of its own in each session."""
-    rng, arm = np.random.default_rng(seed), robot.load("irb120")
-    at = np.tile(np.repeat(np.arange(poses), times), sessions)
-    session = np.repeat(np.arange(sessions), poses * times)
-    q = rng.uniform(-1, 1, (poses, 6))[at] + rng.normal(size=(len(at), 6)) * 1e-4
-    flange = dh.forward(arm.dh, q)
-    point = flange.position_mm + flange.rotation @ [50.0, 20.0, 80.0]
-    bases = exp_so3(rng.normal(size=(sessions, 3)))[session]
-    measured = (bases @ point[..., None])[..., 0] + rng.normal(size=point.shape) * std_mm
-    read = full_poses(q, Pose(np.full_like(bases, np.nan), measured))
-    return replace(read, session=session, session_names=tuple(map(str, range(sessions))))
-
-
-def noise_of(*given, **options):
-    """The noise of :func:`readings_of`."""
-    return noise.of_readings(readings_of(*given, **options), robot.load("irb120").dh)
-
-
-@pytest.mark.parametrize("sessions", [1, 2])
-def test_noise_below_the_scatter_of_repeated_readings_is_asked_about(sessions):
-    known = noise_of(30, 4, 0.06, sessions)
-    assert known.freedom == 90 * sessions
-    assert known.std_mm == pytest.approx(0.06, rel=0.25)
-    (problem,) = doubts.of_little_noise(instruments(["tracker=0.03"], "base"), known)
-    assert "scatter by 0.0" in problem.what
-    assert not doubts.of_little_noise(instruments(["tracker=0.06"], "base"), known)
-
-
-@pytest.mark.parametrize(("poses", "times"), [(120, 1), (9, 2)])
-def test_where_hardly_any_joints_were_read_again_the_calibration_tells_no_noise(poses, times):
-    assert doubts.noise_by_repeats(noise_of(poses, times, 0.06)) == ""
-
-
-def test_a_campaign_without_noise_is_told_what_its_calibration_knows_of_it(start, tmp_path):
-    for done in (start(), call("campaign", "plan"), call("campaign", "plan", "--errors", tmp_path)):
-        assert done.exit_code == 2
-        assert "noise: is not given; give it in one of three ways:" in done.output
-        for way in ("kinacc repeatability FILE", "--noise estimate", "--noise-mm MM"):
-            assert way in done.output
-    assert not (tmp_path / "check").exists()
+@pytest.mark.parametrize(
+    ("freedom", "noise_mm", "doubted"), [(90, 0.03, 1), (90, 0.06, 0), (9, 0.03, 0)]
+)
+def test_noise_below_the_scatter_of_repeated_readings_is_asked_about(freedom, noise_mm, doubted):
+    known = SimpleNamespace(freedom=freedom, per_axis_mm=0.06)
+    used = instruments([f"tracker={noise_mm}"], "base")
+    assert len(doubts.of_little_noise(used, known)) == doubted

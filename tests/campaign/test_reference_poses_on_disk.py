@@ -34,11 +34,3 @@ def test_all_that_is_certain_lists_planned_revisits_in_their_places(make_plan, m
     assert read[: len(ahead)] == ahead
     for done in (3, 7, 25):
         assert restore(plan, entries[:done]).ahead() == ahead[done:]
-
-
-def test_a_drift_is_said_where_the_campaign_stands(make_plan, make_world):
-    plan = make_plan(**PLANNED)
-    entries = entries_of(plan, make_world(plan))
-    assert not restore(plan, entries).campaign.change().is_found
-    state = restore(plan, entries_of(plan, make_world(plan), (0.5, 0.0, 0.0)))
-    assert {each.withheld.code for each in state.statements()} == {"drift"}
