@@ -54,9 +54,20 @@ def limit_mm(calibration: Calibration, point: str | None = None) -> float:
 def is_measured_there(
     calibration: Calibration, at: JointState, point: str | None = None
 ) -> np.ndarray:
-    """True (n,) where every joint is in its fitted range, and the position within ``limit_mm``.
+    """Whether configurations are near measured ones.
 
-    Of a calibration that knows no covariance, the ranges tell alone.
+    Parameters
+    ----------
+    at
+        n configurations in DH joints.
+    point
+        A target by name or ``flange``; the tool where not given.
+
+    Returns
+    -------
+    numpy.ndarray
+        True (n,) where every joint is in its fitted range, and the position within ``limit_mm``.
+        Without a covariance the ranges decide alone.
     """
     inside = ~calibration.outside_range(at.q_rad).any(axis=1)
     most_mm = limit_mm(calibration, point)

@@ -98,10 +98,25 @@ def compare(
     rotation_weight_mm_per_rad: float,
     shared: SharedReadings = NONE_SHARED,
 ) -> Difference:
-    """Compare ``second`` with ``first`` at reported joints ``q_rad`` (n, k), rad and mm.
+    """Compare a second calibration of an arm with a first one.
 
-    ``shared``: readings that both were fitted to. Raises InputError for different kinds of arm,
-    and where a model covers hardly any of the joints.
+    Parameters
+    ----------
+    q_rad
+        (n, k) reported joints at which poses are compared, rad (mm where a joint slides).
+    rotation_weight_mm_per_rad
+        Weight of a turn where base and tool are aligned.
+    shared
+        Readings that both were fitted to.
+
+    Returns
+    -------
+    Difference
+
+    Raises
+    ------
+    InputError
+        For different kinds of arm, and where a model covers hardly any of the joints.
     """
     require_alike(first, second)
     both = (first, second)

@@ -72,13 +72,34 @@ def compensate(
     point: str | None = None,
     payload: np.ndarray | None = None,
 ) -> Compensation:
-    """Joints at which ``calibration`` puts ``point`` at ``wanted`` (n, ...) in ``frame``.
+    """Joints at which a calibrated arm puts a point at wanted poses.
 
-    Of all postures within the joint limits the one nearest to ``near_rad`` (n, k) or (k,),
-    reported joints, is taken; where that is not given, the one nearest to zero among those the
-    data cover. The largest joint movement counts. ``s`` (n, k): directions the joints will travel
-    in, for a VEC model that knows them; ``payload`` (n, 4) as in a ``JointState``.
-    Raises InputError for an unknown frame or point, and for poses that are no numbers.
+    Of all postures within the joint limits the one nearest to ``near_rad`` is taken; where that is
+    not given, the one nearest to zero among those the data cover. The largest movement counts.
+
+    Parameters
+    ----------
+    wanted
+        (n, ...) poses in ``frame``, mm.
+    near_rad
+        (n, k) or (k,) reported joints, rad (mm where a joint slides).
+    s
+        (n, k) directions the joints will travel in, for a VEC model that knows them.
+    frame
+        ``base`` of the robot, or ``instrument``.
+    point
+        A target by name or ``flange``; the tool where not given.
+    payload
+        (n, 4) as in ``JointState``.
+
+    Returns
+    -------
+    Compensation
+
+    Raises
+    ------
+    InputError
+        For an unknown frame or point, and for poses that are no numbers.
     """
     known = np.isfinite(wanted.position_mm).all(axis=1)
     known &= np.isfinite(wanted.rotation).all(axis=(1, 2))

@@ -40,8 +40,19 @@ def read_tables(
 ) -> dict[str, dict[str, np.ndarray]]:
     """The tables of a data set's results folder: columns (rows,) by table and name.
 
-    ``optional`` ones and ``more`` are read where they are there. Units stand in the names (_mm,
-    _rad). Raises InputError naming all ``needed`` tables that are missing, and damaged ones.
+    Parameters
+    ----------
+    folder
+        Results folder. Units stand in the names of its columns (_mm, _rad).
+    needed
+        Tables without which it holds no calibration.
+    more, optional
+        Tables that are read where they are there.
+
+    Raises
+    ------
+    InputError
+        Naming all ``needed`` tables that are missing, and damaged ones.
     """
     folder = Path(folder)
     paths = {name: folder / f"{name}.parquet" for name in (*needed, *optional, *more)}
@@ -82,11 +93,25 @@ def calibration(
     name: str = "",
     session: str | None = None,
 ) -> Calibration:
-    """The calibration in ``tables`` (``read_tables``): ``model``, or the one selected.
+    """The calibration in the tables of a results folder.
 
-    ``session`` chooses the base where several were measured; the first where not given.
-    Raises InputError where the robot is not the one the tables were made with, and where these
-    cannot be used.
+    Parameters
+    ----------
+    tables
+        As of ``read_tables``.
+    robot
+        The robot that the tables were made with.
+    model
+        Kind of the model; the selected one where not given.
+    name
+        Name of the data set.
+    session
+        Session whose base is meant; the first where not given.
+
+    Raises
+    ------
+    InputError
+        For another robot, model or session, and where the tables cannot be used.
     """
     try:
         return _calibration(tables, robot, model, name, session)

@@ -94,11 +94,26 @@ def history(
     seed: int,
     level: float = LEVEL,
 ) -> Columns:
-    """The table ``history``: one row a session, in the order of their dates.
+    """The history of one robot: a verdict on every series, in the order of their dates.
 
-    The same whatever order they are given in, and a row the same whatever comes after it: all
-    chance follows from ``seed`` and the names of the two series compared. ``level``: share of
-    decisions on an unchanged arm that may be false alarms.
+    A row is the same whatever comes after it: all chance follows from ``seed`` and the names of the
+    two series compared.
+
+    Parameters
+    ----------
+    sessions
+        The series, in any order.
+    rotation_weight_mm_per_rad
+        Weight of an orientation.
+    seed
+        Of the random draws.
+    level
+        Share of decisions on an unchanged arm that may be false alarms.
+
+    Returns
+    -------
+    Columns
+        The table ``history``: one row a session.
     """
     comparison = _Comparison(rotation_weight_mm_per_rad, seed, level, {})
     rows: list[dict[str, Any]] = []

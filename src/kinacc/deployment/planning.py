@@ -154,10 +154,28 @@ def spread(
     inside: Callable[[np.ndarray], np.ndarray] | None = None,
     tool: Pose | None = None,
 ) -> np.ndarray:
-    """``count`` reported joints (count, k) from a Sobol sequence over ``box_rad`` (the limits).
+    """Reported joints from a Sobol sequence over a box.
 
-    ``inside`` takes tool positions (m, 3) mm in the robot's base and returns which are allowed.
-    Raises InputError where too few are, or the box lies outside the limits.
+    Parameters
+    ----------
+    count
+        Number of configurations.
+    box_rad
+        (k,), (k,) ends of the box, rad (mm where a joint slides); the limits where not given.
+    inside
+        Takes tool positions (m, 3) in the robot's base, mm; returns which are allowed, (m,).
+    tool
+        Tool in the last DH frame, for ``inside``.
+
+    Returns
+    -------
+    numpy.ndarray
+        (count, k) reported joints.
+
+    Raises
+    ------
+    InputError
+        Where too few are inside, or the box lies outside the limits.
     """
     low, high = (robot.q_min_rad, robot.q_max_rad) if box_rad is None else box_rad
     low, high = np.maximum(low, robot.q_min_rad), np.minimum(high, robot.q_max_rad)

@@ -15,10 +15,23 @@ BLOCK = 512  # poses in a pass: bounds the memory
 def deviations(
     calibration: Calibration, at: JointState, frame: str = "base", point: str | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Standard deviations (n, 6) and movement (n, 2) along undetermined directions, mm and rad.
+    """Standard deviations of predicted poses, and their undetermined movement.
 
-    NaN without a covariance. The movement is that by 1 mm or 1 mrad of each direction, root of
-    the summed squares, by the DH model, which other models follow along these.
+    Parameters
+    ----------
+    at
+        n configurations in DH joints.
+    frame
+        ``base`` of the robot, or ``instrument``.
+    point
+        A target by name or ``flange``; the tool where not given.
+
+    Returns
+    -------
+    tuple of numpy.ndarray
+        Standard deviations (n, 6): x, y, z (mm) and small turns (rad). Movement (n, 2), mm and rad,
+        by 1 mm or 1 mrad of each undetermined direction, root of the summed squares, by the DH
+        model, which other models follow along these. NaN without a covariance.
     """
     std, undetermined = np.full((len(at), 6), np.nan), np.full((len(at), 2), np.nan)
     if calibration.known is None:
