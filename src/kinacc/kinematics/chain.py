@@ -103,29 +103,29 @@ class Walk:
             trace = self.stretch[0, 0] + self.stretch[1, 1] + self.stretch[2, 2]
             self.rate = _inverse(trace * np.eye(3)[..., None] - self.stretch)
 
-    def shift(self, at: Columns, axis: int, into: np.ndarray) -> None:
-        """Motion (6, n) of the flange per mm along an axis of the frames ``at``."""
-        into[:3], into[3:] = at[axis], 0.0
+    def shift(self, frames: Columns, axis: int, into: np.ndarray) -> None:
+        """Motion (6, n) of the flange per mm along an axis of ``frames``."""
+        into[:3], into[3:] = frames[axis], 0.0
 
     def turn(
         self,
-        at: Columns,
+        frames: Columns,
         axis: int,
         into: np.ndarray,
         behind: tuple[np.ndarray, np.ndarray] | None = None,
     ) -> None:
-        """Motion (6, n) of the flange per rad about an axis of the frames ``at``: mm, then rad.
+        """Motion (6, n) of the flange per rad about an axis of ``frames``: mm, then rad.
 
         ``behind``: ``inverse`` of the frames that follow, where frames are not quite orthonormal.
         """
         if behind is None:
-            into[:3], into[3:] = cross(at[axis], self.end.p_mm - at.p_mm), at[axis]
+            into[:3], into[3:] = cross(frames[axis], self.end.p_mm - frames.p_mm), frames[axis]
             return
         # F [e] G^-1 of frames F and, behind, G, as v r_u' - u r_v' of axes of F and rows of G^-1.
         pushed, reach = behind
         u, v = (axis + 1) % 3, (axis + 2) % 3
-        into[:3] = at[v] * reach[u] - at[u] * reach[v]
-        into[3:] = _times(self.rate, cross(pushed[u], at[v]) - cross(pushed[v], at[u]))
+        into[:3] = frames[v] * reach[u] - frames[u] * reach[v]
+        into[3:] = _times(self.rate, cross(pushed[u], frames[v]) - cross(pushed[v], frames[u]))
 
     def inverse(self, frames: Columns) -> tuple[np.ndarray, np.ndarray]:
         """Rows of the inverse axes (3, 3, n), stretched, and the flange (3, n) seen from there."""

@@ -98,19 +98,21 @@ class ComplianceModel(ErrorModel):
             lever_coefficient_rad_per_mm=own[:, 1],
         )
 
-    def pose(self, at: JointState) -> Pose:
+    def pose(self, state: JointState) -> Pose:
         """Poses (n, ...) of the bent arm."""
-        return _dh.forward(self.dh, at.q_rad + self._give(self.moments(at)))
+        return _dh.forward(self.dh, state.q_rad + self._give(self.moments(state)))
 
-    def moments(self, at: JointState) -> np.ndarray:
+    def moments(self, state: JointState) -> np.ndarray:
         """What bends the joints (n, k, 2): moments of known masses, N m, and levers, mm."""
-        walk = _chain.Walk(self.dh, at.q_rad)
-        own = np.broadcast_to(self.payload, (len(at), 4))
-        payload = own if at.payload is None else np.where(np.isnan(at.payload), own, at.payload)
+        walk = _chain.Walk(self.dh, state.q_rad)
+        own = np.broadcast_to(self.payload, (len(state), 4))
+        payload = (
+            own if state.payload is None else np.where(np.isnan(state.payload), own, state.payload)
+        )
         links = np.nan_to_num(self.links)
         # Weights and their first moments (3, n) beyond a joint, from the last joint on.
         weight, first = payload[:, 0], payload[:, 0] * _place(walk.end, payload[:, 1:].T)
-        moments = np.empty((len(at), self.joints, 2))
+        moments = np.empty((len(state), self.joints, 2))
         ends = [*walk.before[1:], walk.end]
         for joint in range(self.joints - 1, -1, -1):
             weight = weight + links[joint, 0]

@@ -99,17 +99,17 @@ class DHModel(ErrorModel):
             self, **dict(zip(PARAMETERS, np.reshape(x, (self.joints, 5)).T, strict=True))
         )
 
-    def pose(self, at: JointState) -> Pose:
+    def pose(self, state: JointState) -> Pose:
         """Poses (n, ...) by the joints alone; see ``forward``."""
-        return forward(self, at.q_rad)
+        return forward(self, state.q_rad)
 
-    def joint_jacobian(self, at: JointState) -> np.ndarray:
+    def joint_jacobian(self, state: JointState) -> np.ndarray:
         """Jacobian (n, 6, k) of ``pose`` in the joints."""
-        return joint_jacobian(self, at.q_rad)
+        return joint_jacobian(self, state.q_rad)
 
-    def motions(self, at: JointState) -> tuple[Pose, np.ndarray, np.ndarray, None]:
+    def motions(self, state: JointState) -> tuple[Pose, np.ndarray, np.ndarray, None]:
         """Motions (5k, 6, n) of the flange by the parameters, exact."""
-        walk = _chain.Walk(self, at.q_rad)
+        walk = _chain.Walk(self, state.q_rad)
         moved = walk.by_parameters().reshape(5 * self.joints, 6, -1)
         return walk.pose, moved, np.arange(5 * self.joints), None
 

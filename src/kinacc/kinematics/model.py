@@ -88,11 +88,11 @@ class ErrorModel:
         """The model with parameters (P,)."""
         raise NotImplementedError
 
-    def pose(self, at: JointState) -> Pose:
+    def pose(self, state: JointState) -> Pose:
         """Poses (n, ...)."""
         raise NotImplementedError
 
-    def motions(self, at: JointState) -> tuple[Pose, np.ndarray, np.ndarray, np.ndarray | None]:
+    def motions(self, state: JointState) -> tuple[Pose, np.ndarray, np.ndarray, np.ndarray | None]:
         """Poses (n, ...) and how the parameters move the flange.
 
         Returns
@@ -107,19 +107,21 @@ class ErrorModel:
             How much of it, shape (P, n); None: one.
         """
         step = np.array([_STEPS.get(unit, _COEFFICIENT_STEP) for unit in self.units])
-        moved = _differences(lambda x: self.with_parameters(x).pose(at), self.start, step)
-        return self.pose(at), moved.transpose(2, 1, 0), np.arange(step.size), None
+        moved = _differences(lambda x: self.with_parameters(x).pose(state), self.start, step)
+        return self.pose(state), moved.transpose(2, 1, 0), np.arange(step.size), None
 
-    def linearised(self, at: JointState) -> tuple[Pose, np.ndarray]:
+    def linearised(self, state: JointState) -> tuple[Pose, np.ndarray]:
         """Poses (n, ...) and their Jacobian (n, 6, P) in the parameters."""
-        pose, motions, of, factors = self.motions(at)
+        pose, motions, of, factors = self.motions(state)
         slopes = motions[of] if factors is None else motions[of] * factors[:, None]
         return pose, np.ascontiguousarray(slopes.transpose(2, 1, 0))
 
-    def joint_jacobian(self, at: JointState) -> np.ndarray:
+    def joint_jacobian(self, state: JointState) -> np.ndarray:
         """Jacobian (n, 6, k) of ``pose`` in the joints."""
         step = np.where(self.dh.prismatic, 1e-3, 1e-6)
-        return _differences(lambda x: self.pose(at.moved(at.q_rad + x)), np.zeros(step.size), step)
+        return _differences(
+            lambda x: self.pose(state.moved(state.q_rad + x)), np.zeros(step.size), step
+        )
 
     @property
     def joints(self) -> int:

@@ -88,27 +88,27 @@ class VECModel(ErrorModel):
             direction_offsets_rad=np.reshape(x[split:], self.direction_offsets_rad.shape),
         )
 
-    def pose(self, at: JointState) -> Pose:
+    def pose(self, state: JointState) -> Pose:
         """Poses (n, ...) with the rotation projected to SO(3)."""
-        return pose(self, at.q_rad, at.s)
+        return pose(self, state.q_rad, state.s)
 
-    def joint_jacobian(self, at: JointState) -> np.ndarray:
+    def joint_jacobian(self, state: JointState) -> np.ndarray:
         """Jacobian (n, 6, k) of ``pose`` in the joints. Exact."""
-        moving = walk(self, at.q_rad, at.s)
-        slopes = _slopes(self, at.q_rad)
-        moved = np.empty((self.joints, 6, len(at)))
+        moving = walk(self, state.q_rad, state.s)
+        slopes = _slopes(self, state.q_rad)
+        moved = np.empty((self.joints, 6, len(state)))
         for joint, (into, by_errors) in enumerate(zip(moved, moving.by_errors(), strict=True)):
             moving.by_joint(joint, into)
             into += np.einsum("ern,ne->rn", by_errors, slopes[:, joint])
         return np.ascontiguousarray(moved.transpose(2, 1, 0))
 
-    def motions(self, at: JointState) -> tuple[Pose, np.ndarray, np.ndarray, np.ndarray]:
+    def motions(self, state: JointState) -> tuple[Pose, np.ndarray, np.ndarray, np.ndarray]:
         """The joints' errors (6k, 6, n), spread over their Chebyshev polynomials. Exact."""
-        moving, (joints, count, terms) = walk(self, at.q_rad, at.s), self.coefficients.shape
-        s = np.zeros(at.q_rad.shape) if at.s is None else at.s
-        basis = chebyshev_basis(self, at.q_rad).transpose(1, 2, 0)
-        basis = np.repeat(basis, count, axis=0).reshape(-1, len(at))
-        travelled = direction_basis(s).transpose(1, 2, 0).reshape(-1, len(at))
+        moving, (joints, count, terms) = walk(self, state.q_rad, state.s), self.coefficients.shape
+        s = np.zeros(state.q_rad.shape) if state.s is None else state.s
+        basis = chebyshev_basis(self, state.q_rad).transpose(1, 2, 0)
+        basis = np.repeat(basis, count, axis=0).reshape(-1, len(state))
+        travelled = direction_basis(s).transpose(1, 2, 0).reshape(-1, len(state))
         about_z = count * np.arange(joints) + ERRORS.index("eps_z")
         of = np.append(np.repeat(np.arange(joints * count), terms), np.repeat(about_z, 2))
         return (

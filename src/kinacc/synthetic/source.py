@@ -19,13 +19,13 @@ def run(inputs: Mapping, settings: Mapping) -> dict[str, Columns]:
     """``measurements`` of the configured source, with fold and subset, and ``robot``."""
     arm, section = robot.load(settings["robot"]), settings["measurements"]
     if section["source"] == "synthetic":
-        seen = measure(arm, section["synthetic"], attitude(settings["evaluation"]))
+        columns = measure(arm, section["synthetic"], attitude(settings["evaluation"]))
     else:
         reading = read(section["file"], arm)
-        for words in reading.left_out():
-            warnings.warn(words, stacklevel=1)
-        seen = reading.columns
-    return {"measurements": split(seen, settings), "robot": _robot(arm)}
+        for message in reading.left_out():
+            warnings.warn(message, stacklevel=1)
+        columns = reading.columns
+    return {"measurements": split(columns, settings), "robot": _robot(arm)}
 
 
 def attitude(evaluation: Mapping) -> region.Attitude:

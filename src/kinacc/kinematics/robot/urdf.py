@@ -73,13 +73,13 @@ def load(path: str | Path, base_link: str | None = None, tip_link: str | None = 
         where, size = f"{path}:{joint.line}, joint {joint.name}", np.linalg.norm(joint.axis)
         low, high = joint.limits
         if joint.mimics:
-            what = f"follows joint {joint.mimics} (mimic)"
-            raise _refusal(path, where, what, "independent joints")
+            fault = f"follows joint {joint.mimics} (mimic)"
+            raise _refusal(path, where, fault, "independent joints")
         if size < 1e-9:
             raise _refusal(path, where, "its axis has no direction", 'e.g. <axis xyz="0 0 1"/>')
         if not low < high:
-            what = f"limits {low:g} to {high:g}"
-            raise _refusal(path, where, what, '<limit lower=".." upper=".."/>')
+            fault = f"limits {low:g} to {high:g}"
+            raise _refusal(path, where, fault, '<limit lower=".." upper=".."/>')
         points.append(here.position_mm)
         directions.append(here.rotation @ (joint.axis / size))
         limits.append(np.multiply(joint.limits, _MM_PER_M if joint.kind == "prismatic" else 1.0))
@@ -106,8 +106,8 @@ def joints_between(
     return _chain(Path(path), base_link, tip_link)[1]
 
 
-def _refusal(path: Path, where: str, what: str, allowed: str = "", fix: str = "") -> InputError:
-    return InputError(Problem(where, what, allowed, fix), f"{path} cannot be used as a robot")
+def _refusal(path: Path, where: str, fault: str, allowed: str = "", fix: str = "") -> InputError:
+    return InputError(Problem(where, fault, allowed, fix), f"{path} cannot be used as a robot")
 
 
 def _chain(path: Path, base: str | None, tip: str | None) -> tuple[str, list[Joint]]:
@@ -115,22 +115,22 @@ def _chain(path: Path, base: str | None, tip: str | None) -> tuple[str, list[Joi
     place, root = str(path), _root(path)
     links = [link.get("name", "") for link in root.findall("link")]
     joints = [_joint(element, path, links) for element in root.findall("joint")]
-    for what, names in (
+    for kind, names in (
         ("joint", [joint.name for joint in joints]),
         ("child link", [joint.child for joint in joints]),
     ):
         name, count = Counter(names).most_common(1)[0] if names else ("", 0)
         if count > 1:
-            raise _refusal(path, place, f"{what} {name} is given more than once")
+            raise _refusal(path, place, f"{kind} {name} is given more than once")
     for key, link in (("base_link", base), ("tip_link", tip)):
         if link is not None and link not in links:
-            what = f"there is no link {link!r}"
-            raise _refusal(path, f"{place}, {key}", what, ", ".join(links))
+            fault = f"there is no link {link!r}"
+            raise _refusal(path, f"{place}, {key}", fault, ", ".join(links))
     above = {joint.child: joint for joint in joints}
     roots = [link for link in links if link not in above]
     if base is None and len(roots) != 1:
-        what = f"has {len(roots)} links without a parent"
-        raise _refusal(path, place, what, "one root, or base_link", ", ".join(roots or links))
+        fault = f"has {len(roots)} links without a parent"
+        raise _refusal(path, place, fault, "one root, or base_link", ", ".join(roots or links))
     base = base or roots[0]
     parents = {joint.parent for joint in joints}
     chains, usable = {}, {}
@@ -147,13 +147,13 @@ def _chain(path: Path, base: str | None, tip: str | None) -> tuple[str, list[Joi
     if len(usable) == 1:
         return root.get("name"), next(iter(usable.values()))
     if tip is not None and not chains:
-        what = f"link {tip} does not hang on {base}"
-        raise _refusal(path, f"{place}, tip_link", what, "a link below base_link")
+        fault = f"link {tip} does not hang on {base}"
+        raise _refusal(path, f"{place}, tip_link", fault, "a link below base_link")
     ends = "; ".join(f"{link} ({count} moving joints)" for link, count in chains.items())
-    what = f"the chain from {base} can end at {len(chains)} links: {ends}"
+    fault = f"the chain from {base} can end at {len(chains)} links: {ends}"
     allowed = f"one with {FEWEST_JOINTS} to {MOST_JOINTS} moving joints before it"
     fix = f"write a robot YAML with urdf: {path.name}, base_link and tip_link"
-    raise _refusal(path, place, what, allowed, fix)
+    raise _refusal(path, place, fault, allowed, fix)
 
 
 def _root(path: Path) -> etree._Element:
@@ -180,8 +180,8 @@ def _root(path: Path) -> etree._Element:
     if root.tag != "robot" or not root.get("name"):
         raise _refusal(path, place, "is no <robot name=..>", "a URDF file")
     if any("xacro" in str(element.tag) for element in root.iter("{*}*")):
-        what = "holds xacro macros"
-        raise _refusal(path, place, what, "plain URDF", "expand it with xacro first")
+        fault = "holds xacro macros"
+        raise _refusal(path, place, fault, "plain URDF", "expand it with xacro first")
     count = len(root.findall("joint"))
     if count > _MOST_JOINTS:
         allowed = f"at most {_MOST_JOINTS}, fixed included"
