@@ -77,22 +77,23 @@ def test_differences_of_evidence_are_those_of_the_marginal_likelihood():
         shape = np.eye(rest.shape[1]) + spread @ spread.T / NOISE_MM**2
         variance = noise @ np.linalg.solve(shape, noise) / noise.size
         wanted = multivariate_normal(cov=variance * shape).logpdf(noise)
-        at = np.array([np.log(prior.delta_mm / NOISE_MM), prior.decay])
+        at = np.log([prior.delta_mm / NOISE_MM, prior.decay])
         value = evidence._negative(at, normal, noise.size, np.repeat([1, 2], 36))[0]
         got.append(-value - wanted)
     assert got[0] == pytest.approx(got[1], abs=1e-3)
 
 
-def test_slopes_of_the_evidence_are_its_finite_differences():
+def test_slopes_and_curvature_of_the_evidence_are_its_finite_differences():
     empty = vec.without_errors(ARM.dh, LOW, HIGH, 1)
     normal, count = evidence._Linear(observed(3), empty, FIXED, WEIGHT).above_constants(3, 3)
-    at, degree = np.array([1.5, 0.8]), np.repeat([1, 2, 3], 36)
-    slopes = evidence._negative(at, normal, count, degree)[1]
-    for i, step in enumerate(1e-5 * np.eye(2)):
+    at, degree = np.array([1.5, -0.2]), np.repeat([1, 2, 3], 36)
+    _, slopes, curvature, _ = evidence._negative(at, normal, count, degree)
+    for i, step in enumerate(1e-4 * np.eye(2)):
         ahead, behind = (
-            evidence._negative(at + way * step, normal, count, degree)[0] for way in (1, -1)
+            evidence._negative(at + way * step, normal, count, degree) for way in (1, -1)
         )
-        assert slopes[i] == pytest.approx((ahead - behind) / 2e-5, rel=1e-4)
+        assert slopes[i] == pytest.approx((ahead[0] - behind[0]) / 2e-4, rel=1e-5)
+        np.testing.assert_allclose(curvature[i], (ahead[1] - behind[1]) / 2e-4, rtol=1e-5)
 
 
 def orders(arm, calibration, seen):

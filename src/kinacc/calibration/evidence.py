@@ -14,7 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 import scipy
-from scipy.linalg import lapack
+from scipy.linalg import blas, lapack
 
 from kinacc.calibration.fitting import distinct, once, scales
 from kinacc.calibration.frames import FrameParameters
@@ -36,6 +36,8 @@ FAR = 4.0  # medians of the error; a reading farther off than that counts less
 _SCREENINGS = 3
 _STATED_STEPS = 6  # until the noise under a stated prior has settled
 _GAUGE_RIDGE = 1e-9  # holds constants no pose shows, as a share of those it does
+_STEPS, _LONGEST, _FLAT = 30, 2.0, 1e-6  # of the search for a prior
+_GAIN = 0.005  # of log evidence, that a further step or order must have
 _FIRST = 12  # normal equations reach up to this order at first
 
 
@@ -84,27 +86,28 @@ def choose(
     pandas.DataFrame
         Orders tried: ``order``, ``prior_std_mm``, ``prior_std_mrad`` and ``prior_decay`` that suit
         it best, ``log_evidence``, ``log_evidence_less`` (than the best), ``chosen``, and
-        ``start`` (2,), the log of the width of the prior over the noise, and the decay.
+        ``start`` (2,), the logs of the width of the prior over the noise and of the decay.
     """
     near = pd.DataFrame(columns=["order", "start"]) if near is None else near
     starts = dict(zip(near["order"], near["start"], strict=True))
     linear = _Linear(observations, empty, parameters, rotation_weight_mm_per_rad)
     rows: list[tuple] = []
-    at = np.array([0.0, 0.8])
+    at = np.log([1.0, 0.8])
     for order in orders:
         normal, count = linear.above_constants(order, max(orders))
         degree = np.repeat(np.arange(1, order + 1), linear.motions)
         if stated is None:
             at = starts.get(order, at)
             least, at, noise = _best(normal, count, degree, at)
-            prior = prior_of(float(np.exp(at[0])) * noise, float(at[1]), 0.0)
+            prior = prior_of(float(np.exp(at[0])) * noise, float(np.exp(at[1])), 0.0)
         else:
             prior, noise = stated, 0.1
             for _ in range(_STATED_STEPS):
-                at = np.array([np.log(stated.delta_mm / noise), stated.decay])
-                least, _, noise = _negative(at, normal, count, degree)
+                at = np.log([stated.delta_mm / noise, stated.decay])
+                least, _, _, noise = _negative(at, normal, count, degree)
         rows.append((order, prior, -least, at))
-        if len(rows) > PATIENCE + int(np.argmax([row[2] for row in rows])):
+        reached = np.array([row[2] for row in rows])
+        if len(rows) > PATIENCE + int(np.argmax(reached > reached.max() - _GAIN)):
             break
     return table_of(rows)
 
@@ -179,42 +182,59 @@ def _steady(normal: np.ndarray) -> np.ndarray:
 def _best(
     normal: np.ndarray, count: float, degree: np.ndarray, start: np.ndarray
 ) -> tuple[float, np.ndarray, float]:
-    """Least negative log evidence, log of width over noise and fall there, and the noise."""
-    bounds = [tuple(np.log(WIDTHS)), FALLS]
-    if degree[-1] == 1:
-        bounds[1] = (start[1], start[1])  # nothing falls
-    noise: dict[bytes, float] = {}
+    """Least negative log evidence, logs of width over noise and of fall there, and the noise.
 
-    def value(at: np.ndarray) -> tuple[float, np.ndarray]:
-        least, slopes, noise[at.tobytes()] = _negative(at, normal, count, degree)
-        return least, slopes
-
-    found = scipy.optimize.minimize(
-        value, start, jac=True, method="L-BFGS-B", bounds=bounds,
-        options={"ftol": 1e-6, "gtol": 1.0, "maxiter": 30},
-    )  # fmt: skip
-    return float(found.fun), found.x, noise[found.x.tobytes()]
+    By Newton steps within bounds; where the evidence is not concave, as if it were.
+    """
+    low, high = np.log([WIDTHS, FALLS]).T
+    at, step, least, noise = start, np.zeros(2), np.inf, np.nan
+    for _ in range(_STEPS):
+        value, slopes, curvature, deviation = _negative(at + step, normal, count, degree)
+        if value > least + _GAIN:
+            step = step / 4.0
+            continue
+        at, least, noise = at + step, value, deviation
+        (of_width, mixed), (_, of_fall) = curvature
+        of_width = max(abs(of_width), _FLAT)
+        fall = mixed / of_width * slopes[0] - slopes[1]
+        fall /= max(abs(of_fall - mixed**2 / of_width), _FLAT)
+        fall = np.clip(at[1] + fall, low[1], high[1]) - at[1]
+        step = np.array([-(slopes[0] + mixed * fall) / of_width, fall])
+        step *= min(1.0, _LONGEST / max(np.abs(step).max(), _FLAT))
+        step[0] = np.clip(at[0] + step[0], low[0], high[0]) - at[0]
+        gain = -slopes @ step
+        if gain < _GAIN:
+            break
+    return least - gain / 2.0, at + step, noise
 
 
 def _negative(
     at: np.ndarray, normal: np.ndarray, count: float, degree: np.ndarray
-) -> tuple[float, np.ndarray, float]:
-    """Negative log evidence, its slopes, and the residual standard deviation profiled out.
+) -> tuple[float, np.ndarray, np.ndarray, float]:
+    """Negative log evidence, slopes (2,), curvature (2, 2), and the noise profiled out.
 
-    ``at``: log of the width of the prior over that deviation, and the fall. With scaled J'J = M and
-    J'r = g: 2 E = count log(r'r - g'(1 + M)^-1 g) + log det(1 + M).
+    ``at``: logs of the width of the prior over the noise, and of the fall. With scaled J'J = M and
+    J'r = g, B = (1 + M)^-1: 2 E = count log(r'r - g'B g) - log det B. By the log of each standard
+    deviation, dB = -B D (1 - B) - (1 - B) D B and d(B g) = 2 B D B g - D B g.
     """
-    std = np.exp(at[0]) * at[1] ** (degree - 1.0)
+    change = np.stack([np.ones(len(degree)), degree - 1.0])
+    std = np.exp(at @ change)
     gradient = std * normal[0, 1:]
     matrix = normal[1:, 1:] * std
     matrix *= std[:, None]
     matrix[np.diag_indices_from(matrix)] += 1.0
-    factor, _ = lapack.dpotrf(matrix.T, overwrite_a=1)  # transposed: in place
+    factor, _ = lapack.dpotrf(matrix.T, clean=0, overwrite_a=1)
     step = lapack.dpotrs(factor, gradient)[0]
     misfit = max(normal[0, 0] - gradient @ step, np.finfo(float).tiny)
     value = 0.5 * count * np.log(misfit) + np.sum(np.log(np.diag(factor)))
-    root, _ = lapack.dtrtri(factor, overwrite_c=1)
-    # What data decide of each coefficient, less its square beside its prior.
-    share = 1.0 - np.einsum("ij,ij->i", root, root) - count / misfit * step**2
-    slopes = np.array([np.sum(share), np.sum(share * (degree - 1.0)) / at[1]])
-    return value, slopes, float(np.sqrt(misfit / count))
+    inverse, _ = lapack.dpotri(factor, overwrite_c=1)
+    diagonal, ratio = np.diag(inverse).copy(), count / misfit
+    squares = change @ step**2
+    slopes = change @ (1.0 - diagonal) - ratio * squares
+    moved = change * step
+    half = moved @ blas.dtrmm(1.0, inverse, moved.T) * (2.0 * ratio)
+    half += change @ blas.dtrmm(1.0, np.square(inverse, out=inverse), change.T)
+    of_each = diagonal * (1.0 + diagonal) + ratio * step**2 * (1.0 + 2.0 * diagonal)
+    curvature = (change * of_each) @ change.T - half - half.T
+    curvature -= ratio / misfit * np.outer(squares, squares)
+    return value, slopes, 2.0 * curvature, np.sqrt(misfit / count)
