@@ -57,9 +57,9 @@ def frame(columns: Columns, model: str, name: str, session: str | None = None) -
         known = ", ".join(str(other) for other in names[models == model]) or "none"
         raise InputError(Problem("table frames", f"has no frame {name!r} of model {model}", known))
     row = rows[0]
-    quaternion = np.array([columns[part][row] for part in ("qw", "qx", "qy", "qz")], dtype=float)
-    position = np.array([columns[part][row] for part in ("x_mm", "y_mm", "z_mm")], dtype=float)
-    return Pose(rotation_from_quaternion(quaternion), position)
+    parts = ("qw", "qx", "qy", "qz", "x_mm", "y_mm", "z_mm")
+    values = np.array([columns[part][row] for part in parts], dtype=float)
+    return Pose(rotation_from_quaternion(values[:4]), values[4:])
 
 
 def fitted_tool(columns: Columns | None, model: str, own: Pose) -> Pose | None:
