@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -21,7 +22,9 @@ from kinacc.synthetic.tracker import Run, calibration_run, measured
 _SAME_ARM_MM = 25.0
 
 
-def measure(robot: Robot, settings: Mapping, attitude: Attitude = DOWN) -> dict[str, np.ndarray]:
+def measure(
+    robot: Robot, settings: Mapping[str, Any], attitude: Attitude = DOWN
+) -> dict[str, np.ndarray]:
     """Simulated measurements of an accepted draw of the arm. All chance belongs to the draw.
 
     Parameters

@@ -66,7 +66,8 @@ def accepted_draw(number: int) -> AcceptedDraw:
     row = rows()[number]
     values = np.array([float(row[name]) for name in geometry_columns()]).reshape(JOINTS, -1)
     scales = Scales(*(float(row[name]) for name in Scales._fields))
-    return AcceptedDraw(int(row["seed"]), scales, DHModel(*values.T, [0.0] * JOINTS))
+    geometry = dict(zip(GEOMETRY, values.T, strict=True))
+    return AcceptedDraw(int(row["seed"]), scales, DHModel(**geometry, beta_rad=np.zeros(JOINTS)))
 
 
 def further_draws(own: int, count: int) -> list[int]:

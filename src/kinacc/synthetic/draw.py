@@ -17,11 +17,11 @@ from kinacc.synthetic.physical import Beyond, PhysicalRobot, Smooth
 
 # Table II, with 3.141 for the misprinted 3.114 of joint 5.
 TABLE_II = DHModel(
-    theta_offset_rad=[0.001, -1.568, 0.001, -3.142, -3.141, 0.002],
-    d_mm=[-1.157, -0.898, 0.066, -1226.154, -0.104, -224.698],
-    a_mm=[323.453, 1151.356, 299.501, 0.029, 0.026, 0.028],
-    alpha_rad=[-1.573, 3.140, -1.571, -1.571, -1.571, 3.142],
-    beta_rad=[0.0] * 6,
+    theta_offset_rad=np.array([0.001, -1.568, 0.001, -3.142, -3.141, 0.002]),
+    d_mm=np.array([-1.157, -0.898, 0.066, -1226.154, -0.104, -224.698]),
+    a_mm=np.array([323.453, 1151.356, 299.501, 0.029, 0.026, 0.028]),
+    alpha_rad=np.array([-1.573, 3.140, -1.571, -1.571, -1.571, 3.142]),
+    beta_rad=np.zeros(6),
 )
 
 # Working ranges of the calibration plan, over which the smooth errors are waves.

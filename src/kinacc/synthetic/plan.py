@@ -32,7 +32,7 @@ def configurations(robot: Robot, poses: int, attitude: Attitude = DOWN) -> np.nd
     ``attitude`` is that of the flange before its turns. A longer plan begins with the shorter one.
     """
     rng = np.random.default_rng(_PLAN_SEED)
-    form = closed_form.recognise(robot.dh)
+    form = closed_form.SixAxes(robot.dh, parallel=False)
     found = np.empty((0, 6))
     while len(found) < poses:
         q_rad, reached = form.solve(_poses(rng, attitude))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from kinacc.tables.columns import Columns
 from kinacc.tables.contract import columns_of
 
 
-def run(inputs: Mapping, settings: Mapping) -> dict[str, Columns]:
+def run(inputs: Mapping[str, Any], settings: Mapping[str, Any]) -> dict[str, Columns]:
     """``measurements`` of the configured source, with fold and subset, and ``robot``."""
     arm, section = robot.load(settings["robot"]), settings["measurements"]
     if section["source"] == "synthetic":
@@ -28,7 +29,7 @@ def run(inputs: Mapping, settings: Mapping) -> dict[str, Columns]:
     return {"measurements": split(columns, settings), "robot": _robot(arm)}
 
 
-def attitude(evaluation: Mapping) -> region.Attitude:
+def attitude(evaluation: Mapping[str, Any]) -> region.Attitude:
     """The flange's attitude in the ``evaluation`` settings, which a calibration has to cover."""
     euler_rad = np.deg2rad(evaluation["reference_orientation_deg"])
     return region.Attitude(region.reference_rotation(euler_rad), evaluation["reference_frame"])
