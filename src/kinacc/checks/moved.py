@@ -46,10 +46,8 @@ def without_jumps(
     for _ in progress(range(_MOST_SPLITS), "searches for a moved instrument or target"):
         best, least = None, _PLAIN if few else 1.0
         for row, kind, number in _places(fitted):
-            session = fitted.readings.session[row]
-            targets = np.unique(fitted.readings.target[fitted.readings.session == session])
-            rivals = [(kind, number), ("session", session), *(("target", n) for n in targets)]
-            for frame in dict.fromkeys(rivals):
+            frames = [(e, int(getattr(fitted.readings, e)[row])) for e in ("session", "target")]
+            for frame in dict.fromkeys([(kind, number), *frames]):
                 split = _parted(fitted, (row, *frame), model)
                 share = _share_left(fitted, split[0], split[1][1]) if split else np.inf
                 if share < least:
@@ -204,7 +202,7 @@ def _findings(whole: Fitted, fitted: Fitted, jumps: list[Jump]) -> Iterator[Find
             "base_jump" if is_base else "target_moved",
             observed.lines(rows),
             row=observed.row_names.one(first),
-            target=name or "",
+            target=str(name or ""),
             by=_signed(shift),
             first_line=first,
             shift_mm=shift.tolist(),
