@@ -8,7 +8,7 @@ rotation about a frame's own axis mixes two columns, several times faster than 4
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -93,7 +93,8 @@ class Walk:
             self.frames.append((here, ahead, twisted))
             here = behind
         self.end = here
-        self.pose, self.stretch = to_pose(here), None
+        self.pose = to_pose(here)
+        self.stretch: Any = None  # an array where there are errors
         if errors is not None:
             self.pose = Pose(project_so3(self.pose.rotation), self.pose.position_mm)
             rotation = np.ascontiguousarray(self.pose.rotation.transpose(1, 2, 0))

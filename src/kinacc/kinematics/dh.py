@@ -38,7 +38,7 @@ class DHModel(ErrorModel):
     a_mm: np.ndarray
     alpha_rad: np.ndarray
     beta_rad: np.ndarray
-    prismatic: np.ndarray | None = None
+    prismatic: np.ndarray = None  # type: ignore[assignment]  # until __post_init__
 
     kind: ClassVar[str] = "dh"
 
@@ -126,7 +126,9 @@ class DHModel(ErrorModel):
     ) -> Self:
         """The model of a ``dh_model`` table; ``prismatic`` (k,) is the robot's to say."""
         order = np.argsort(columns["joint"], kind="stable")
-        return cls(*(np.asarray(columns[name], float)[order] for name in PARAMETERS), prismatic)
+        parameters = {name: np.asarray(columns[name], float)[order] for name in PARAMETERS}
+        slides = np.zeros(len(order), dtype=bool) if prismatic is None else prismatic
+        return cls(**parameters, prismatic=slides)
 
 
 def forward(model: DHModel, q_rad: np.ndarray) -> Pose:

@@ -154,7 +154,7 @@ def points(sequence: str, count: int, dimensions: int, first: int = 1) -> np.nda
     enters.
     """
     if sequence == "halton":
-        engine = qmc.Halton(dimensions, scramble=False)
+        engine: qmc.QMCEngine = qmc.Halton(dimensions, scramble=False)
     else:
         engine = qmc.Sobol(dimensions, scramble=False, bits=30)
     with warnings.catch_warnings():

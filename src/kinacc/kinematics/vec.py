@@ -167,7 +167,8 @@ class VECModel(ErrorModel):
         offsets = np.zeros((len(first), 2))
         offsets[joint[~both], (direction[~both] + 1) // 2] = value[~both]
         span = per_joint.pop("q_min_rad"), per_joint.pop("q_max_rad")
-        return cls(DHModel(**per_joint, prismatic=prismatic), *span, coefficients, offsets)
+        slides = np.zeros(len(first), dtype=bool) if prismatic is None else prismatic
+        return cls(DHModel(**per_joint, prismatic=slides), *span, coefficients, offsets)
 
 
 def without_errors(

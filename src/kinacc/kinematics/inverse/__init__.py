@@ -156,7 +156,7 @@ def solve(
     InputError
         For a branch that the arm does not have.
     """
-    grid = grid_of(robot) if grid_rad is None and robot.dh.joints == 7 else grid_rad
+    grid = grid_of(robot) if grid_rad is None else grid_rad
     known = branches_of(robot, grid)
     names = known if branches is None else tuple(branches)
     for name in names:
@@ -231,7 +231,7 @@ def _searched(onto: _Onto, pose: Pose, first: float | None) -> tuple[np.ndarray,
     """
     dh, fixed = onto.robot.dh, int(first is not None)
     seven = closed_form.recognise_seven(dh)
-    if seven is not None:
+    if seven is not None and first is not None:
         starts, error = seven.solve(pose, first, _NEAR_MISS_MM, _BEND_RAD)
         rows, slots = np.nonzero(np.isfinite(error))
         start, error = starts[rows, slots], error[rows, slots]
@@ -245,7 +245,7 @@ def _searched(onto: _Onto, pose: Pose, first: float | None) -> tuple[np.ndarray,
         tail = slice(fixed, None)
         table = postures.table_of(dh.part(tail), low[tail], high[tail])
         rows, start, error = postures.search(table, compose(invert(before), pose), _NEAR_MISS_MM)
-    if fixed:
+    if first is not None:
         start = np.insert(start, 0, first, axis=1)
     q_rad, converged = onto.converge(pose.select(rows), start, fixed)
     exact, count = error < 1e-6, len(pose.position_mm)

@@ -76,7 +76,7 @@ def within_limits(robot: Robot, q_rad: np.ndarray) -> np.ndarray:
 def within(q_rad: np.ndarray, lower_rad: np.ndarray, upper_rad: np.ndarray) -> np.ndarray:
     """Whether joints (..., k) lie in the box (k,), (k,), its faces included; (...)."""
     inside = (q_rad >= lower_rad - _ROUND_OFF_RAD) & (q_rad <= upper_rad + _ROUND_OFF_RAD)
-    return inside.all(axis=-1)
+    return np.asarray(inside.all(axis=-1))
 
 
 def take_turns(

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kinacc.geometry import Pose, compose, invert, rotation_x, rotation_y, rotation_z
-from kinacc.kinematics.dh import DHModel
+from kinacc.kinematics.dh import PARAMETERS, DHModel
 
 NEARLY_PARALLEL = 0.02  # sine of the angle between two axes below which a Hayati angle is used
 _ON_AXIS_MM = 1e-10
@@ -48,7 +48,11 @@ def chain_of(
     frame = compose(frame, _across(rows[-1]))
     rest = compose(invert(frame), flange)
     columns = np.array(rows).T + 0.0  # no negative zeros
-    return base, DHModel(*columns, prismatic), _without_round_off(rest)
+    return (
+        base,
+        DHModel(**dict(zip(PARAMETERS, columns, strict=True)), prismatic=prismatic),
+        _without_round_off(rest),
+    )
 
 
 def _first_frame(point: np.ndarray, direction: np.ndarray) -> Pose:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import json
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from math import pi
 from pathlib import Path
@@ -196,12 +196,12 @@ class Table(_About):
 
     def robot(self) -> Robot:
         """The arm; ValueError where parts of the file contradict each other."""
-        columns = [[getattr(row, name) for row in self.dh] for name in PARAMETERS]
-        total = np.abs(columns[1:3]).sum()
+        columns = {n: np.array([getattr(row, n) for row in self.dh]) for n in PARAMETERS}
+        total = np.abs([columns["d_mm"], columns["a_mm"]]).sum()
         if 0.0 < total < _SHORTEST_MM:
             raise ValueError(f"all lengths together are {total:g} mm: write d_m and a_m")
         slides = np.array([row.joint == "prismatic" for row in self.dh])
-        table, base = DHModel(*np.array(columns), slides), self.base.pose()
+        table, base = DHModel(**columns, prismatic=slides), self.base.pose()
         if self.convention == "modified":
             table, before = from_modified(table)
             base = compose(base, before)
@@ -226,7 +226,7 @@ class Table(_About):
 
     def _limits(self) -> np.ndarray:
         """Limits (k, 2) of the reported joints, from the rows or from one list for all."""
-        shared = self.limits_rad or [None] * len(self.dh)
+        shared: Sequence[tuple[float, float] | None] = self.limits_rad or [None] * len(self.dh)
         if len(shared) != len(self.dh):
             raise ValueError(f"limits: {len(shared)} pairs for {len(self.dh)} joints")
         limits = []

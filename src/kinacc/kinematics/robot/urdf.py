@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from lxml import etree
@@ -145,7 +146,7 @@ def _chain(path: Path, base: str | None, tip: str | None) -> tuple[str, list[Joi
             if FEWEST_JOINTS <= chains[end] <= MOST_JOINTS:
                 usable[end] = chain
     if len(usable) == 1:
-        return root.get("name"), next(iter(usable.values()))
+        return str(root.get("name")), next(iter(usable.values()))
     if tip is not None and not chains:
         fault = f"link {tip} does not hang on {base}"
         raise _refusal(path, f"{place}, tip_link", fault, "a link below base_link")
@@ -174,7 +175,7 @@ def _root(path: Path) -> etree._Element:
         root = etree.fromstring(text, parser)
     except etree.XMLSyntaxError as error:
         raise _refusal(path, f"{place}:{error.lineno or 1}", f"is not XML: {error.msg}") from None
-    definitions = root.getroottree().docinfo.internalDTD
+    definitions: Any = root.getroottree().docinfo.internalDTD
     if definitions is not None and any(True for _ in definitions.iterentities()):
         raise _refusal(path, place, "defines entities", "plain URDF")
     if root.tag != "robot" or not root.get("name"):
@@ -221,4 +222,5 @@ def _joint(element: etree._Element, path: Path, links: list[str]) -> Joint:
     limits = (-_TURN_RAD, _TURN_RAD) if kind == "continuous" else (low, high)
     mimics = "" if element.find("mimic") is None else text("mimic", "joint", "?")
     axis = numbers("axis", "xyz", "1 0 0")
-    return Joint(name, kind, parent, child, origin, axis, limits, mimics, element.sourceline)
+    line = int(str(element.sourceline))
+    return Joint(name, kind, parent, child, origin, axis, limits, mimics, line)
