@@ -16,7 +16,17 @@ _LEAST_GAP = 1e-12
 
 
 class GammaFit(NamedTuple):
-    """Shape (1) and scale (unit of the sample); a sample of one repeated value has shape inf."""
+    """Gamma distribution with location 0.
+
+    Attributes
+    ----------
+    shape : float
+        Shape k, without unit; infinite for a sample of one repeated value.
+    scale : float
+        Scale, in the unit of the sample; 0 for a sample of one repeated value.
+    mean : float
+        Mean of the sample, in its unit.
+    """
 
     shape: float
     scale: float
@@ -24,11 +34,25 @@ class GammaFit(NamedTuple):
 
 
 def fit(magnitudes: ArrayLike) -> GammaFit:
-    """Fit a gamma distribution with location 0 to positive magnitudes by maximum likelihood.
+    """Fit a gamma distribution with location 0 by maximum likelihood.
 
-    magnitudes: (n,), n >= 1, any unit. Solves log k - digamma(k) = log mean(x) - mean(log x) for
-    the shape k by Newton steps in 1/k; the scale is mean / k.
-    Raises InputError for an empty sample and for values that are not finite or not positive.
+    Solves ``log k - digamma(k) = log mean(x) - mean(log x)`` for the shape k by Newton steps in 1/k
+    (Minka 2002); the scale is mean / k.
+
+    Parameters
+    ----------
+    magnitudes : array_like
+        Sample, shape (n,), n >= 1, any unit.
+
+    Returns
+    -------
+    GammaFit
+        The fitted distribution.
+
+    Raises
+    ------
+    InputError
+        For an empty sample and for values that are not finite or not above 0.
     """
     x = np.asarray(magnitudes, dtype=np.float64).ravel()
     if x.size == 0 or not np.all(np.isfinite(x)) or np.any(x <= 0.0):
@@ -51,14 +75,43 @@ def fit(magnitudes: ArrayLike) -> GammaFit:
 
 
 def quantile(fitted: GammaFit, probability: float) -> float:
-    """Quantile of a fitted gamma distribution, in the unit of its sample."""
+    """Quantile of a fitted gamma distribution.
+
+    Parameters
+    ----------
+    fitted : GammaFit
+        The distribution.
+    probability : float
+        Probability, 0 to 1.
+
+    Returns
+    -------
+    float
+        The quantile, in the unit of the sample.
+    """
     if np.isinf(fitted.shape):
         return fitted.mean
     return float(scipy.special.gammaincinv(fitted.shape, probability) * fitted.scale)
 
 
 def gamma99(magnitudes: ArrayLike) -> float:
-    """99 % quantile of the gamma distribution fitted to positive magnitudes (n,), same unit."""
+    """99 % quantile of the gamma distribution fitted to a sample: the paper's "99 % gamma".
+
+    Parameters
+    ----------
+    magnitudes : array_like
+        Sample, shape (n,), any unit, all above 0.
+
+    Returns
+    -------
+    float
+        The quantile, in the unit of the sample.
+
+    Raises
+    ------
+    InputError
+        As ``fit``.
+    """
     return quantile(fit(magnitudes), 0.99)
 
 

@@ -28,7 +28,18 @@ class Pose(NamedTuple):
     position_mm: np.ndarray
 
     def select(self, rows: np.ndarray | slice) -> Pose:
-        """The frames of ``rows`` (mask, indices or slice) of the first axis."""
+        """Select frames of the first axis.
+
+        Parameters
+        ----------
+        rows : numpy.ndarray or slice
+            Mask (n,), indices (m,) or slice.
+
+        Returns
+        -------
+        Pose
+            The m frames, in the same parent frame, mm.
+        """
         return Pose(self.rotation[rows], self.position_mm[rows])
 
 
@@ -36,20 +47,55 @@ IDENTITY = Pose(np.eye(3), np.zeros(3))
 
 
 def compose(first: Pose, second: Pose) -> Pose:
-    """Frame of ``second`` (given in ``first``) in the parent of ``first``; broadcasts."""
+    """Chain two frames: ``T = T_first T_second``.
+
+    Parameters
+    ----------
+    first : Pose
+        Poses (...) in their parent frame, mm.
+    second : Pose
+        Poses (...) in the frame ``first``, mm; leading axes broadcast.
+
+    Returns
+    -------
+    Pose
+        ``second`` in the parent frame of ``first``, mm.
+    """
     rotation = first.rotation @ second.rotation
     position = (first.rotation @ second.position_mm[..., None])[..., 0] + first.position_mm
     return Pose(rotation, position)
 
 
 def invert(pose: Pose) -> Pose:
-    """Parent frame seen from ``pose``."""
+    """Invert frames: ``(R, p)`` becomes ``(R', -R' p)``.
+
+    Parameters
+    ----------
+    pose : Pose
+        Poses (...) in their parent frame, mm.
+
+    Returns
+    -------
+    Pose
+        The parent frame in ``pose``, mm.
+    """
     transposed = np.swapaxes(pose.rotation, -1, -2)
     return Pose(transposed, -(transposed @ pose.position_mm[..., None])[..., 0])
 
 
 def skew(vector: np.ndarray) -> np.ndarray:
-    """Cross-product matrix (..., 3, 3) of ``vector`` (..., 3)."""
+    """Cross-product matrix: ``skew(v) @ u = v x u``.
+
+    Parameters
+    ----------
+    vector : numpy.ndarray
+        Vectors, shape (..., 3), any unit.
+
+    Returns
+    -------
+    numpy.ndarray
+        Matrices, shape (..., 3, 3), same unit.
+    """
     vector = np.asarray(vector, dtype=float)
     matrix = np.zeros((*vector.shape[:-1], 3, 3))
     x, y, z = vector[..., 0], vector[..., 1], vector[..., 2]
@@ -60,17 +106,28 @@ def skew(vector: np.ndarray) -> np.ndarray:
 
 
 def rotation_x(angle_rad: np.ndarray | float) -> np.ndarray:
-    """Rotation (..., 3, 3) about x by ``angle_rad`` (...)."""
+    """Rotation about x.
+
+    Parameters
+    ----------
+    angle_rad : numpy.ndarray or float
+        Angles, shape (...).
+
+    Returns
+    -------
+    numpy.ndarray
+        Rotations, shape (..., 3, 3).
+    """
     return _axis_rotation(angle_rad, 0)
 
 
 def rotation_y(angle_rad: np.ndarray | float) -> np.ndarray:
-    """Rotation (..., 3, 3) about y by ``angle_rad`` (...)."""
+    """Rotation about y; shapes and units as ``rotation_x``."""
     return _axis_rotation(angle_rad, 1)
 
 
 def rotation_z(angle_rad: np.ndarray | float) -> np.ndarray:
-    """Rotation (..., 3, 3) about z by ``angle_rad`` (...)."""
+    """Rotation about z; shapes and units as ``rotation_x``."""
     return _axis_rotation(angle_rad, 2)
 
 
@@ -86,7 +143,18 @@ def _axis_rotation(angle_rad: np.ndarray | float, axis: int) -> np.ndarray:
 
 
 def exp_so3(rotation_vector_rad: np.ndarray) -> np.ndarray:
-    """Rotation (..., 3, 3) of a rotation vector (..., 3) in rad (Rodrigues)."""
+    """Rotation of a rotation vector (Rodrigues' formula).
+
+    Parameters
+    ----------
+    rotation_vector_rad : numpy.ndarray
+        Axis times angle, shape (..., 3), rad.
+
+    Returns
+    -------
+    numpy.ndarray
+        Rotations, shape (..., 3, 3).
+    """
     vector = np.asarray(rotation_vector_rad, dtype=float)
     angle_sq = np.sum(vector * vector, axis=-1)
     angle = np.sqrt(angle_sq)
@@ -99,7 +167,18 @@ def exp_so3(rotation_vector_rad: np.ndarray) -> np.ndarray:
 
 
 def log_so3(rotation: np.ndarray) -> np.ndarray:
-    """Rotation vector (..., 3) in rad, length at most pi, of a rotation (..., 3, 3)."""
+    """Rotation vector of a rotation; inverse of ``exp_so3``.
+
+    Parameters
+    ----------
+    rotation : numpy.ndarray
+        Rotations, shape (..., 3, 3).
+
+    Returns
+    -------
+    numpy.ndarray
+        Axis times angle, shape (..., 3), rad, length at most pi.
+    """
     quaternion = quaternion_from_rotation(rotation)
     scalar, vector = quaternion[..., 0], quaternion[..., 1:]
     length = np.linalg.norm(vector, axis=-1)
@@ -115,10 +194,20 @@ def log_so3(rotation: np.ndarray) -> np.ndarray:
 
 
 def project_so3(matrix: np.ndarray) -> np.ndarray:
-    """Nearest rotation (polar factor) of ``matrix`` (..., 3, 3) with positive determinant.
+    """Nearest rotation (polar factor) of a matrix.
 
-    Newton's iteration for the polar factor on cofactors; quadratic near a rotation, where the
-    first-order products of eq. 6 live.
+    Newton's iteration for the polar factor on cofactors (Higham 1986); quadratic near a rotation,
+    where the first-order products of eq. 6 lie.
+
+    Parameters
+    ----------
+    matrix : numpy.ndarray
+        Matrices with positive determinant, shape (..., 3, 3).
+
+    Returns
+    -------
+    numpy.ndarray
+        Rotations, shape (..., 3, 3).
     """
     matrices = np.asarray(matrix, dtype=float)
     # Numbers first, matrices last: one operation for all of them.
@@ -141,7 +230,18 @@ def project_so3(matrix: np.ndarray) -> np.ndarray:
 
 
 def rotation_from_quaternion(quaternion: np.ndarray) -> np.ndarray:
-    """Rotation (..., 3, 3) of a unit quaternion ``w, x, y, z`` (..., 4)."""
+    """Rotation of a unit quaternion.
+
+    Parameters
+    ----------
+    quaternion : numpy.ndarray
+        Unit quaternions ``w, x, y, z``, shape (..., 4).
+
+    Returns
+    -------
+    numpy.ndarray
+        Rotations, shape (..., 3, 3).
+    """
     w, x, y, z = np.moveaxis(np.asarray(quaternion, dtype=float), -1, 0)
     rows = [
         [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
@@ -152,7 +252,18 @@ def rotation_from_quaternion(quaternion: np.ndarray) -> np.ndarray:
 
 
 def quaternion_from_rotation(rotation: np.ndarray) -> np.ndarray:
-    """Unit quaternion ``w, x, y, z`` (..., 4) with ``w >= 0`` of a rotation (..., 3, 3)."""
+    """Unit quaternion of a rotation.
+
+    Parameters
+    ----------
+    rotation : numpy.ndarray
+        Rotations, shape (..., 3, 3).
+
+    Returns
+    -------
+    numpy.ndarray
+        Quaternions ``w, x, y, z`` with ``w >= 0``, shape (..., 4).
+    """
     rotation = np.asarray(rotation, dtype=float)
     diagonal = np.diagonal(rotation, axis1=-2, axis2=-1)
     trace = diagonal.sum(axis=-1)

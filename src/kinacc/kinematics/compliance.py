@@ -31,11 +31,22 @@ _GRAVITY = ("gravity_x", "gravity_y", "gravity_z")
 
 @dataclass(frozen=True)
 class ComplianceModel(ErrorModel):
-    """Coefficients of k joints acting on ``dh``, each array (k,), NaN where a joint has none.
+    """Joint compliance of k joints acting on a DH arm; coefficients are NaN where a joint has none.
 
-    ``gravity`` (3,): its direction in the first DH frame, of unit length. ``links`` (k, 4): mass in
-    kg and centre in mm in the DH frame each joint carries, NaN where unknown. ``payload`` (4,): the
-    same in the last DH frame, where a state says nothing of it.
+    Attributes
+    ----------
+    dh : DHModel
+        The arm of k joints.
+    compliance_rad_per_nm : numpy.ndarray
+        Turn per gravity moment of known masses, shape (k,), rad/(N m).
+    lever_coefficient_rad_per_mm : numpy.ndarray
+        Turn per lever of a unit weight at the last origin, shape (k,), rad/mm.
+    gravity : numpy.ndarray
+        Direction of gravity in the first DH frame, unit length, shape (3,).
+    links : numpy.ndarray
+        Mass in kg and centre in mm in the DH frame each joint carries, shape (k, 4); NaN: unknown.
+    payload : numpy.ndarray
+        The same in the last DH frame, shape (4,), for states without a payload of their own.
     """
 
     dh: DHModel
@@ -103,7 +114,19 @@ class ComplianceModel(ErrorModel):
         return _dh.forward(self.dh, state.q_rad + self._give(self.moments(state)))
 
     def moments(self, state: JointState) -> np.ndarray:
-        """What bends the joints (n, k, 2): moments of known masses, N m, and levers, mm."""
+        """Compute the moments that bend the joints.
+
+        Parameters
+        ----------
+        state : JointState
+            n states.
+
+        Returns
+        -------
+        numpy.ndarray
+            Shape (n, k, 2): gravity moments of known masses, N m, and levers of a unit weight, mm,
+            about the axes of the unbent arm.
+        """
         walk = _chain.Walk(self.dh, state.q_rad)
         own = np.broadcast_to(self.payload, (len(state), 4))
         payload = (

@@ -28,9 +28,14 @@ _BLOCK = 4096  # poses of one block stay in the cache
 
 @dataclass(frozen=True)
 class DHModel(ErrorModel):
-    """DH parameters of k joints, each array (k,): angles in rad, lengths in mm.
+    """Denavit-Hartenberg arm of k joints with Hayati terms (eqs. 1-4).
 
-    ``prismatic`` (k,) says which joints slide; none when not given.
+    Attributes
+    ----------
+    theta_offset_rad, d_mm, a_mm, alpha_rad, beta_rad : numpy.ndarray
+        Parameters of the joints, each of shape (k,).
+    prismatic : numpy.ndarray
+        Joints that slide, shape (k,), bool; none when not given.
     """
 
     theta_offset_rad: np.ndarray
@@ -53,7 +58,18 @@ class DHModel(ErrorModel):
             object.__setattr__(self, field.name, value)
 
     def part(self, joints: slice) -> DHModel:
-        """Some joints in a row, as an arm by themselves."""
+        """Some consecutive joints as an arm by themselves.
+
+        Parameters
+        ----------
+        joints : slice
+            The joints, from 0.
+
+        Returns
+        -------
+        DHModel
+            The arm of these joints.
+        """
         return DHModel(*(getattr(self, field.name)[joints] for field in fields(self)))
 
     @property
@@ -132,7 +148,20 @@ class DHModel(ErrorModel):
 
 
 def forward(model: DHModel, q_rad: np.ndarray) -> Pose:
-    """Flange poses (n, ...) in the robot base at joints ``q_rad`` (n, k) (eqs. 3-4)."""
+    """Flange poses: products of ``Rz(q + theta) Tz(d) Tx(a) Rx(alpha) Ry(beta)`` (eqs. 3-4).
+
+    Parameters
+    ----------
+    model : DHModel
+        Arm of k joints.
+    q_rad : numpy.ndarray
+        DH joints, shape (n, k) or (k,), rad (mm where a joint slides).
+
+    Returns
+    -------
+    Pose
+        Poses (n, ...) of the last DH frame in the first one, mm.
+    """
     q_rad = np.atleast_2d(np.asarray(q_rad, dtype=float))
     pose = Pose(np.empty((len(q_rad), 3, 3)), np.empty((len(q_rad), 3)))
     for begin in range(0, len(q_rad), _BLOCK):
@@ -146,17 +175,40 @@ def forward(model: DHModel, q_rad: np.ndarray) -> Pose:
 
 
 def chain(model: DHModel, q_rad: np.ndarray) -> Pose:
-    """Every frame of the arm, leading axes (n, k+1), from the base (0) to the flange (k)."""
+    """Compute every frame of the arm.
+
+    Parameters
+    ----------
+    model : DHModel
+        Arm of k joints.
+    q_rad : numpy.ndarray
+        DH joints, shape (n, k) or (k,), rad (mm where a joint slides).
+
+    Returns
+    -------
+    Pose
+        Poses (n, k + 1, ...) in the first DH frame, from itself (0) to the last one (k), mm.
+    """
     walk = _chain.Walk(model, np.atleast_2d(np.asarray(q_rad, dtype=float)))
     poses = [_chain.to_pose(frames) for frames in (*walk.before, walk.end)]
     return Pose(*(np.stack(parts, axis=1) for parts in zip(*poses, strict=True)))
 
 
 def joint_jacobian(model: DHModel, q_rad: np.ndarray) -> np.ndarray:
-    """Jacobian (n, 6, k) of the flange pose in the joints, in the robot base.
+    """Compute the Jacobian of the flange pose in the joints.
 
-    Rows 0-2: position, mm/rad. Rows 3-5: rotation vector w with R(q + dq) = exp(w) R(q), rad/rad.
-    Columns of prismatic joints are per mm.
+    Parameters
+    ----------
+    model : DHModel
+        Arm of k joints.
+    q_rad : numpy.ndarray
+        DH joints, shape (n, k) or (k,), rad (mm where a joint slides).
+
+    Returns
+    -------
+    numpy.ndarray
+        Shape (n, 6, k), in the first DH frame. Rows 0-2: position, mm/rad. Rows 3-5: rotation
+        vector w with R(q + dq) = exp(w) R(q), rad/rad. Columns of prismatic joints are per mm.
     """
     q_rad = np.atleast_2d(np.asarray(q_rad, dtype=float))
     walk = _chain.Walk(model, q_rad)

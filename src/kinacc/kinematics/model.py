@@ -20,11 +20,17 @@ PAYLOAD_COLUMNS = ("payload_kg", "payload_x_mm", "payload_y_mm", "payload_z_mm")
 
 @dataclass(frozen=True)
 class JointState:
-    """How an arm of k joints stands, n times: all that its pose can depend on.
+    """States of an arm of k joints: all that its pose can depend on.
 
-    ``q_rad`` (n, k): DH joints, in mm where a joint slides. ``s`` (n, k): directions they travelled
-    in (-1, +1), 0 where unknown; None: all unknown. ``payload`` (n, 4): what the last DH frame
-    carries, mass in kg and centre in that frame in mm; NaN, or None for all: as the model states.
+    Attributes
+    ----------
+    q_rad : numpy.ndarray
+        DH joints, shape (n, k), rad (mm where a joint slides).
+    s : numpy.ndarray or None
+        Travel directions of the joints (-1, +1; 0: unknown), shape (n, k). None: all unknown.
+    payload : numpy.ndarray or None
+        Load on the last DH frame: mass in kg and centre in that frame in mm, shape (n, 4). NaN, or
+        None for all: as the model states.
     """
 
     q_rad: np.ndarray
@@ -35,7 +41,18 @@ class JointState:
         return len(self.q_rad)
 
     def select(self, rows: np.ndarray | slice) -> JointState:
-        """The states of ``rows`` (mask, indices or slice)."""
+        """Select states.
+
+        Parameters
+        ----------
+        rows : numpy.ndarray or slice
+            Mask (n,), indices (m,) or slice.
+
+        Returns
+        -------
+        JointState
+            The m states.
+        """
         return JointState(
             self.q_rad[rows],
             None if self.s is None else self.s[rows],
@@ -43,7 +60,18 @@ class JointState:
         )
 
     def moved(self, q_rad: np.ndarray) -> JointState:
-        """These directions and payloads at joints (n, k); those of one state at all of them."""
+        """These travel directions and payloads at other joints.
+
+        Parameters
+        ----------
+        q_rad : numpy.ndarray
+            DH joints, shape (m, k), rad and mm; m = n, or any m for a single state.
+
+        Returns
+        -------
+        JointState
+            The m states.
+        """
         return JointState(
             q_rad,
             None if self.s is None else np.broadcast_to(self.s, q_rad.shape),
@@ -85,15 +113,42 @@ class ErrorModel:
             """Usual size (P,) of the parameters' errors, in ``units``; inf: nothing is known."""
 
     def with_parameters(self, x: np.ndarray) -> Self:
-        """The model with parameters (P,)."""
+        """Return the model with other parameters.
+
+        Parameters
+        ----------
+        x : numpy.ndarray
+            Parameters, shape (P,), ordered as ``names``, in ``units``.
+
+        Returns
+        -------
+        ErrorModel
+            A model of the same kind.
+        """
         raise NotImplementedError
 
     def pose(self, state: JointState) -> Pose:
-        """Poses (n, ...)."""
+        """Compute poses of the last DH frame in the first one.
+
+        Parameters
+        ----------
+        state : JointState
+            n states.
+
+        Returns
+        -------
+        Pose
+            Poses (n, ...), mm.
+        """
         raise NotImplementedError
 
     def motions(self, state: JointState) -> tuple[Pose, np.ndarray, np.ndarray, np.ndarray | None]:
-        """Poses (n, ...) and how the parameters move the flange.
+        """Compute poses and how the parameters move the flange.
+
+        Parameters
+        ----------
+        state : JointState
+            n states.
 
         Returns
         -------
@@ -102,22 +157,46 @@ class ErrorModel:
         motions : numpy.ndarray
             E motions, shape (E, 6, n): mm and rad per unit, robot base.
         of : numpy.ndarray
-            Which motion each parameter makes, shape (P,).
+            Index of the motion each parameter makes, shape (P,).
         factors : numpy.ndarray or None
-            How much of it, shape (P, n); None: one.
+            Factor of that motion, shape (P, n); None: one.
         """
         step = np.array([_STEPS.get(unit, _COEFFICIENT_STEP) for unit in self.units])
         moved = _differences(lambda x: self.with_parameters(x).pose(state), self.start, step)
         return self.pose(state), moved.transpose(2, 1, 0), np.arange(step.size), None
 
     def linearised(self, state: JointState) -> tuple[Pose, np.ndarray]:
-        """Poses (n, ...) and their Jacobian (n, 6, P) in the parameters."""
+        """Compute poses and their Jacobian in the parameters.
+
+        Parameters
+        ----------
+        state : JointState
+            n states.
+
+        Returns
+        -------
+        pose : Pose
+            Poses (n, ...), mm.
+        jacobian : numpy.ndarray
+            Shape (n, 6, P): mm and rad per unit of the parameter, in the robot base.
+        """
         pose, motions, of, factors = self.motions(state)
         slopes = motions[of] if factors is None else motions[of] * factors[:, None]
         return pose, np.ascontiguousarray(slopes.transpose(2, 1, 0))
 
     def joint_jacobian(self, state: JointState) -> np.ndarray:
-        """Jacobian (n, 6, k) of ``pose`` in the joints."""
+        """Compute the Jacobian of ``pose`` in the joints.
+
+        Parameters
+        ----------
+        state : JointState
+            n states.
+
+        Returns
+        -------
+        numpy.ndarray
+            Shape (n, 6, k): mm and rad per rad (per mm where a joint slides), in the robot base.
+        """
         step = np.where(self.dh.prismatic, 1e-3, 1e-6)
         return _differences(
             lambda x: self.pose(state.moved(state.q_rad + x)), np.zeros(step.size), step
@@ -149,14 +228,43 @@ class ErrorModel:
         return None
 
     def to_columns(self, std: np.ndarray) -> dict[str, np.ndarray]:
-        """The table ``<kind>_model``; ``std`` (P,), NaN where undetermined."""
+        """Write the table ``<kind>_model``.
+
+        Parameters
+        ----------
+        std : numpy.ndarray
+            Standard deviations of the parameters, shape (P,), in ``units``; NaN where undetermined.
+
+        Returns
+        -------
+        dict of numpy.ndarray
+            Columns by name.
+        """
         raise NotImplementedError
 
     @classmethod
     def from_columns(
         cls, columns: Mapping[str, np.ndarray], prismatic: np.ndarray | None = None
     ) -> Self:
-        """The model of such a table; ``prismatic`` (k,): joints that slide, the robot's to say."""
+        """Read the model of a table that ``to_columns`` wrote.
+
+        Parameters
+        ----------
+        columns : mapping of numpy.ndarray
+            Columns by name.
+        prismatic : numpy.ndarray, optional
+            Joints that slide, shape (k,), as the robot states; none when not given.
+
+        Returns
+        -------
+        ErrorModel
+            The model.
+
+        Raises
+        ------
+        LookupError, TypeError, ValueError
+            For a table that lacks columns or rows.
+        """
         raise NotImplementedError
 
 

@@ -23,7 +23,17 @@ _ROUND_OFF_MM = 1e-9
 
 @dataclass(frozen=True)
 class Cylinder:
-    """Sector of a hollow cylinder about the base z axis: radii, heights (mm), angles (rad)."""
+    """Sector of a hollow cylinder about the z axis of the robot base.
+
+    Attributes
+    ----------
+    inner_radius_mm, radial_span_mm : float
+        Inner radius, and outer minus inner radius.
+    bottom_mm, height_mm : float
+        Lowest z, and highest minus lowest z.
+    angle_min_rad, angle_max_rad : float
+        Ends of the sector, counted from the base x axis.
+    """
 
     inner_radius_mm: float
     radial_span_mm: float
@@ -44,7 +54,13 @@ class Cylinder:
 
 
 class Cells(NamedTuple):
-    """Points in cylinder coordinates, each (n,)."""
+    """Points in cylinder coordinates of the robot base.
+
+    Attributes
+    ----------
+    angle_rad, radius_mm, height_mm : numpy.ndarray
+        Coordinates, each (n,).
+    """
 
     angle_rad: np.ndarray
     radius_mm: np.ndarray
@@ -52,21 +68,50 @@ class Cells(NamedTuple):
 
 
 class Attitude(NamedTuple):
-    """Flange orientation (3, 3) before the rotations, in the frame ``SLICE`` or ``BASE``."""
+    """Flange orientation before the rotations.
+
+    Attributes
+    ----------
+    reference : numpy.ndarray
+        Rotation, shape (3, 3).
+    frame : str
+        Frame of ``reference``: ``SLICE`` (turns with the point about the base z axis) or ``BASE``.
+    """
 
     reference: np.ndarray
     frame: str = SLICE
 
 
 class Orientations(NamedTuple):
-    """Flange rotations (m, 3, 3) relative to the reference orientation, and their names."""
+    """Flange rotations relative to the reference orientation.
+
+    Attributes
+    ----------
+    rotation : numpy.ndarray
+        Rotations, shape (m, 3, 3).
+    names : tuple of str
+        Their names (m,).
+    """
 
     rotation: np.ndarray
     names: tuple[str, ...]
 
 
 def contains(cylinder: Cylinder, position_mm: np.ndarray) -> np.ndarray:
-    """Whether positions (..., 3) lie in the cylinder, its faces included; (...)."""
+    """Test whether positions lie in the cylinder, its faces included.
+
+    Parameters
+    ----------
+    cylinder : Cylinder
+        The sector.
+    position_mm : numpy.ndarray
+        Positions in the robot base, shape (..., 3).
+
+    Returns
+    -------
+    numpy.ndarray
+        Booleans, shape (...).
+    """
     x, y, z = np.moveaxis(np.asarray(position_mm, dtype=float), -1, 0)
     radius = np.hypot(x, y)
     # Angles relative to the start of the sector, so that it may cross +-180 degrees.
@@ -82,13 +127,41 @@ def contains(cylinder: Cylinder, position_mm: np.ndarray) -> np.ndarray:
 
 
 def levels_mm(first_mm: float, span_mm: float, spacing_mm: float) -> np.ndarray:
-    """Grid values over a span, both edges included, evenly spaced and nowhere wider than asked."""
+    """Evenly spaced grid values over a span, both edges included.
+
+    Parameters
+    ----------
+    first_mm, span_mm : float
+        First value, and last minus first value.
+    spacing_mm : float
+        Largest distance between neighbours.
+
+    Returns
+    -------
+    numpy.ndarray
+        Values, shape (m,), mm.
+    """
     steps = max(1, int(np.ceil(span_mm / spacing_mm - 1e-9)))
     return first_mm + span_mm * np.arange(steps + 1) / steps
 
 
 def grid(cylinder: Cylinder, slices_rad: np.ndarray, spacing_mm: float) -> Cells:
-    """Cells of radial slices, edges included: by slice, then radius, then height."""
+    """Grid points of radial slices, edges included.
+
+    Parameters
+    ----------
+    cylinder : Cylinder
+        The sector.
+    slices_rad : numpy.ndarray
+        Angles of the slices, shape (m,).
+    spacing_mm : float
+        Largest distance between neighbours, in radius and height.
+
+    Returns
+    -------
+    Cells
+        Points by slice, then radius, then height.
+    """
     radii = levels_mm(cylinder.inner_radius_mm, cylinder.radial_span_mm, spacing_mm)
     heights = levels_mm(cylinder.bottom_mm, cylinder.height_mm, spacing_mm)
     mesh = np.meshgrid(np.asarray(slices_rad, dtype=float), radii, heights, indexing="ij")
@@ -96,7 +169,20 @@ def grid(cylinder: Cylinder, slices_rad: np.ndarray, spacing_mm: float) -> Cells
 
 
 def fill(cylinder: Cylinder, unit: np.ndarray) -> Cells:
-    """Points (n, 3) of the unit cube (radius, angle, height) spread evenly over the volume."""
+    """Map points of the unit cube evenly onto the volume of the cylinder.
+
+    Parameters
+    ----------
+    cylinder : Cylinder
+        The sector.
+    unit : numpy.ndarray
+        Points (radius, angle, height) of the unit cube, shape (n, 3).
+
+    Returns
+    -------
+    Cells
+        The n points.
+    """
     inner_sq, outer_sq = cylinder.inner_radius_mm**2, cylinder.outer_radius_mm**2
     return Cells(
         cylinder.angle_min_rad + unit[:, 1] * (cylinder.angle_max_rad - cylinder.angle_min_rad),
@@ -108,8 +194,18 @@ def fill(cylinder: Cylinder, unit: np.ndarray) -> Cells:
 def orientations(angle_rad: float, rotations: str) -> Orientations:
     """Rotations by +-angle about the flange's own X, then Y, then Z axis.
 
-    ``signs_and_zero``: the eight sign combinations and no rotation. ``all_27``: every combination
-    of minus, none and plus. Names read ``X+ Y- Z0``.
+    Parameters
+    ----------
+    angle_rad : float
+        The angle.
+    rotations : str
+        ``signs_and_zero``: the eight combinations of signs and no rotation. ``all_27``: every
+        combination of minus, none and plus.
+
+    Returns
+    -------
+    Orientations
+        9 or 27 rotations, named like ``X+ Y- Z0``.
     """
     signs = (-1, 0, 1) if rotations == "all_27" else (-1, 1)
     combinations = list(product(signs, repeat=3))
@@ -124,18 +220,43 @@ def orientations(angle_rad: float, rotations: str) -> Orientations:
 
 
 def reference_rotation(euler_rad: np.ndarray) -> np.ndarray:
-    """Rotation (3, 3) of intrinsic XYZ angles (3,): the reference flange orientation."""
+    """Rotation of intrinsic XYZ angles: the reference flange orientation.
+
+    Parameters
+    ----------
+    euler_rad : numpy.ndarray
+        Angles about x, y, z, shape (3,).
+
+    Returns
+    -------
+    numpy.ndarray
+        Rotation, shape (3, 3).
+    """
     return rotation_x(euler_rad[0]) @ rotation_y(euler_rad[1]) @ rotation_z(euler_rad[2])
 
 
 def tool_poses(
     cells: Cells, reference: np.ndarray, relative: np.ndarray, frame: str = SLICE
 ) -> Pose:
-    """Tool poses (n, ...) at cells (n,), turned by ``relative``, (n, 3, 3) or (3, 3).
+    """Tool poses at cells of the cylinder.
 
-    ``reference`` (3, 3) is given in ``frame``. ``SLICE``: x outward, z up, orientation =
-    Rz(angle) @ reference @ relative, so that a pose keeps its place relative to the arm when the
-    slice turns. ``BASE``: reference @ relative, so that the tool keeps its attitude to a workpiece.
+    Parameters
+    ----------
+    cells : Cells
+        n points.
+    reference : numpy.ndarray
+        Reference orientation in ``frame``, shape (3, 3).
+    relative : numpy.ndarray
+        Rotations relative to the reference, shape (n, 3, 3) or (3, 3).
+    frame : str
+        ``SLICE``: x outward, z up; orientation = Rz(angle) @ reference @ relative, so a pose keeps
+        its place relative to the arm when the slice turns. ``BASE``: reference @ relative, so the
+        tool keeps its attitude to a workpiece.
+
+    Returns
+    -------
+    Pose
+        Poses (n, ...) in the robot base, mm.
     """
     turn = rotation_z(cells.angle_rad if frame == SLICE else np.zeros_like(cells.angle_rad))
     rotation = turn @ reference @ relative
@@ -147,11 +268,21 @@ def tool_poses(
 
 
 def points(sequence: str, count: int, dimensions: int, first: int = 1) -> np.ndarray:
-    """Points ``first`` to ``first + count - 1`` of an unscrambled sequence, (count, dimensions).
+    """Consecutive points of an unscrambled low-discrepancy sequence; no seed enters.
 
-    ``sobol`` (Joe and Kuo's direction numbers) or ``halton`` (first primes). Point 0 is the origin,
-    a corner of every space, so sequences start at 1 by default. Unscrambled and unshifted: no seed
-    enters.
+    Parameters
+    ----------
+    sequence : str
+        ``sobol`` (direction numbers of Joe and Kuo 2008) or ``halton`` (first primes).
+    count, dimensions : int
+        Numbers of points and of coordinates.
+    first : int
+        Index of the first point. Point 0 is the origin, a corner of every space.
+
+    Returns
+    -------
+    numpy.ndarray
+        Points of the unit cube, shape (count, dimensions).
     """
     if sequence == "halton":
         engine: qmc.QMCEngine = qmc.Halton(dimensions, scramble=False)

@@ -17,9 +17,24 @@ _ROUNDING = 1e-9
 
 
 def models(tables: Mapping[str, Columns], nominal: DHModel) -> dict[str, ErrorModel]:
-    """Every model of an arm by name: those of tables ``<kind>_model``, and its ``nominal`` one.
+    """Read every error model of an arm.
 
-    Raises InputError where a table lacks rows of a model, or has some twice.
+    Parameters
+    ----------
+    tables : mapping of Columns
+        Tables by name; those named ``<kind>_model`` are read.
+    nominal : DHModel
+        Nominal arm.
+
+    Returns
+    -------
+    dict of ErrorModel
+        Models by name, the nominal one last.
+
+    Raises
+    ------
+    InputError
+        For a table that lacks rows of a model, or has some twice.
     """
     made: dict[str, ErrorModel] = {}
     for kind in MODELS:
@@ -38,15 +53,34 @@ def models(tables: Mapping[str, Columns], nominal: DHModel) -> dict[str, ErrorMo
 
 
 def of_kind(kind: str) -> type[ErrorModel]:
-    """The class of models of one kind."""
+    """Class of the models of a kind, such as ``dh`` or ``vec``."""
     return loaded(MODELS[kind])
 
 
 def frame(columns: Columns, model: str, name: str, session: str | None = None) -> Pose:
-    """One frame of a ``frames`` table: ``base``, ``tool`` or a target of ``model``.
+    """Read one frame of a ``frames`` table.
 
-    ``session`` chooses among the bases of several sessions; without it the first is taken.
-    Raises InputError naming the frames there are.
+    Parameters
+    ----------
+    columns : Columns
+        The table.
+    model : str
+        Name of the model.
+    name : str
+        ``base``, ``tool`` or the name of a target.
+    session : str, optional
+        Session of the base; the first one when not given.
+
+    Returns
+    -------
+    Pose
+        Pose (3, 3), (3,) of the frame, mm: the robot base in the instrument frame, tools and
+        targets in the last DH frame.
+
+    Raises
+    ------
+    InputError
+        For a frame that the table lacks; the message lists those it has.
     """
     models, names = np.asarray(columns["model"]), np.asarray(columns["frame"])
     chosen = (models == model) & (names == name)
@@ -63,9 +97,27 @@ def frame(columns: Columns, model: str, name: str, session: str | None = None) -
 
 
 def fitted_tool(columns: Columns | None, model: str, own: Pose) -> Pose | None:
-    """The tool a ``frames`` table has for ``model``; None where it is the arm's ``own``, or none.
+    """Read the tool that was estimated with a model.
 
-    A tool that was not estimated stands in the table as the arm's own.
+    Parameters
+    ----------
+    columns : Columns or None
+        A ``frames`` table.
+    model : str
+        Name of the model.
+    own : Pose
+        Tool of the robot description in the last DH frame, mm.
+
+    Returns
+    -------
+    Pose or None
+        The tool in the last DH frame, mm; None where the table has none or only ``own``, which it
+        holds where no tool was estimated.
+
+    Raises
+    ------
+    InputError
+        For a table with tools but none of ``model``.
     """
     if columns is None or not (np.asarray(columns["frame"]) == "tool").any():
         return None

@@ -26,10 +26,18 @@ _DIRECTIONS = np.array([-1, 1])
 
 @dataclass(frozen=True)
 class VECModel(ErrorModel):
-    """Errors of k joints acting on ``dh``.
+    """Joint-dependent errors of k joints acting on a DH arm (eqs. 5-6).
 
-    ``coefficients`` (k, 6, order + 1) in mm (delta) and rad (eps); ``direction_offsets_rad`` (k, 2)
-    of eps_z for s = -1 and s = +1; joint range ``q_min_rad``, ``q_max_rad`` (k,).
+    Attributes
+    ----------
+    dh : DHModel
+        The arm of k joints.
+    q_min_rad, q_max_rad : numpy.ndarray
+        Range of the DH joints mapped to [-1, 1], each (k,), rad (mm where a joint slides).
+    coefficients : numpy.ndarray
+        Chebyshev coefficients of ``ERRORS``, shape (k, 6, order + 1), mm (delta) and rad (eps).
+    direction_offsets_rad : numpy.ndarray
+        Offsets of eps_z for travel directions s = -1 and s = +1, shape (k, 2).
     """
 
     dh: DHModel
@@ -174,29 +182,96 @@ class VECModel(ErrorModel):
 def without_errors(
     dh: DHModel, q_min_rad: np.ndarray, q_max_rad: np.ndarray, order: int
 ) -> VECModel:
-    """The model whose errors are all zero: it equals ``dh``."""
+    """Model whose errors are all zero: its poses equal those of ``dh``.
+
+    Parameters
+    ----------
+    dh : DHModel
+        Arm of k joints.
+    q_min_rad, q_max_rad : numpy.ndarray
+        Range of the DH joints, each (k,), rad (mm where a joint slides).
+    order : int
+        Order of the Chebyshev polynomials.
+
+    Returns
+    -------
+    VECModel
+        The model.
+    """
     shape = (dh.joints, len(ERRORS), order + 1)
     return VECModel(dh, q_min_rad, q_max_rad, np.zeros(shape), np.zeros((dh.joints, 2)))
 
 
 def mapped_joints(model: VECModel, q_rad: np.ndarray) -> np.ndarray:
-    """Joints (n, k) mapped from the fitted range to [-1, 1]; beyond it the model extrapolates."""
+    """Map joints from the fitted range to [-1, 1].
+
+    Parameters
+    ----------
+    model : VECModel
+        Model of k joints.
+    q_rad : numpy.ndarray
+        DH joints, shape (n, k), rad (mm where a joint slides).
+
+    Returns
+    -------
+    numpy.ndarray
+        Mapped joints, shape (n, k); beyond -1 and 1 the model extrapolates.
+    """
     span = model.q_max_rad - model.q_min_rad
     return (2.0 * np.asarray(q_rad, dtype=float) - model.q_min_rad - model.q_max_rad) / span
 
 
 def chebyshev_basis(model: VECModel, q_rad: np.ndarray) -> np.ndarray:
-    """Chebyshev polynomials of the first kind (n, k, order + 1) at joints (n, k)."""
+    """Chebyshev polynomials of the first kind at mapped joints.
+
+    Parameters
+    ----------
+    model : VECModel
+        Model of k joints.
+    q_rad : numpy.ndarray
+        DH joints, shape (n, k), rad (mm where a joint slides).
+
+    Returns
+    -------
+    numpy.ndarray
+        T_0 to T_order, shape (n, k, order + 1).
+    """
     return chebyshev.chebvander(mapped_joints(model, q_rad), model.order)
 
 
 def direction_basis(s: np.ndarray) -> np.ndarray:
-    """Indicators (n, k, 2) of the travel directions -1 and +1 in ``s`` (n, k)."""
+    """Indicators of the travel directions -1 and +1.
+
+    Parameters
+    ----------
+    s : numpy.ndarray
+        Travel directions -1, 0, +1, shape (n, k).
+
+    Returns
+    -------
+    numpy.ndarray
+        0 or 1, shape (n, k, 2).
+    """
     return (np.asarray(s)[..., None] == _DIRECTIONS).astype(float)
 
 
 def errors(model: VECModel, q_rad: np.ndarray, s: np.ndarray | None = None) -> np.ndarray:
-    """Joint errors (n, k, 6) in mm and rad at joints (n, k) and travel directions s (n, k)."""
+    """Evaluate the errors of every joint: ``sum_n c_n T_n(q)``, and the direction offset for eps_z.
+
+    Parameters
+    ----------
+    model : VECModel
+        Model of k joints.
+    q_rad : numpy.ndarray
+        DH joints, shape (n, k), rad (mm where a joint slides).
+    s : numpy.ndarray, optional
+        Travel directions -1, 0, +1, shape (n, k).
+
+    Returns
+    -------
+    numpy.ndarray
+        Errors as ``ERRORS``, shape (n, k, 6), mm and rad, in the frame in front of the joint.
+    """
     basis = chebyshev_basis(model, np.atleast_2d(q_rad))
     values = np.einsum("nkt,ket->nke", basis, model.coefficients)
     if s is not None:
@@ -205,17 +280,43 @@ def errors(model: VECModel, q_rad: np.ndarray, s: np.ndarray | None = None) -> n
 
 
 def forward(model: VECModel, q_rad: np.ndarray, s: np.ndarray | None = None) -> Pose:
-    """Flange poses (n, ...) as eqs. 5-6 print them: the rotation is not quite orthonormal."""
+    """Compute flange poses as eqs. 5-6 are printed: the rotation is not quite orthonormal.
+
+    Parameters and result are those of ``pose``.
+    """
     return _chain.to_pose(walk(model, q_rad, s).end)
 
 
 def pose(model: VECModel, q_rad: np.ndarray, s: np.ndarray | None = None) -> Pose:
-    """Flange poses (n, ...) with the rotation projected to SO(3)."""
+    """Compute flange poses (eqs. 5-6), the rotation projected to SO(3).
+
+    Parameters
+    ----------
+    model : VECModel
+        Model of k joints.
+    q_rad : numpy.ndarray
+        DH joints, shape (n, k) or (k,), rad (mm where a joint slides).
+    s : numpy.ndarray, optional
+        Travel directions -1, 0, +1, shape (n, k); unknown when not given.
+
+    Returns
+    -------
+    Pose
+        Poses (n, ...) of the last DH frame in the first one, mm.
+    """
     return walk(model, q_rad, s).pose
 
 
 def walk(model: VECModel, q_rad: np.ndarray, s: np.ndarray | None = None) -> _chain.Walk:
-    """The walk along the arm: poses, and how the joints' errors move them (``by_errors``)."""
+    """Walk along the arm: poses, and how the joints' errors move them (``by_errors``).
+
+    Parameters are those of ``pose``.
+
+    Returns
+    -------
+    kinacc.kinematics.chain.Walk
+        Frames of n poses in the first DH frame, mm.
+    """
     q_rad = np.atleast_2d(np.asarray(q_rad, dtype=float))
     made = errors(model, q_rad, s).transpose(1, 2, 0)
     return _chain.Walk(model.dh, q_rad, np.ascontiguousarray(made))

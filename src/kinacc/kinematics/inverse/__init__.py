@@ -53,9 +53,15 @@ class Status(IntEnum):
 class Solutions(NamedTuple):
     """Joints per pose and branch.
 
-    ``q_rad`` (n, b, k): DH joints, NaN where the model has no such solution; solutions
-    outside limits or range are kept and say so in ``status`` (n, b), a ``Status``.
-    ``branches``: names of the b branches.
+    Attributes
+    ----------
+    q_rad : numpy.ndarray
+        DH joints, shape (n, b, k), rad (mm where a joint slides); NaN where the model has no such
+        solution. Solutions outside limits or range are included.
+    status : numpy.ndarray
+        A ``Status`` each, shape (n, b).
+    branches : tuple of str
+        Names of the b branches.
     """
 
     q_rad: np.ndarray
@@ -66,7 +72,16 @@ class Solutions(NamedTuple):
 def grid_of(robot: Robot) -> np.ndarray:
     """Values of DH joint 1 at which the freedom of a seven-axis arm is sampled.
 
-    Every 30 degrees within the limits and one turn; nine places for a joint that slides.
+    Parameters
+    ----------
+    robot : Robot
+        Arm of seven joints.
+
+    Returns
+    -------
+    numpy.ndarray
+        Every 30 degrees within the limits and one turn, rad; nine places, mm, for a joint that
+        slides.
     """
     low, high = (limit[0] for limit in limits.dh_limits(robot))
     if robot.dh.prismatic[0]:
@@ -78,7 +93,17 @@ def grid_of(robot: Robot) -> np.ndarray:
 def branches_of(robot: Robot, grid_rad: np.ndarray | None = None) -> tuple[str, ...]:
     """Names of all branches ``solve`` gives for an arm, in its order.
 
-    ``grid_rad``: values of joint 1 at which the freedom of a seven-axis arm is sampled.
+    Parameters
+    ----------
+    robot : Robot
+        The arm.
+    grid_rad : numpy.ndarray, optional
+        Values of DH joint 1 of a seven-axis arm; ``grid_of`` when not given.
+
+    Returns
+    -------
+    tuple of str
+        The names.
     """
     if closed_form.recognise(robot.dh) is not None:
         return BRANCHES
@@ -96,10 +121,19 @@ def branches_of(robot: Robot, grid_rad: np.ndarray | None = None) -> tuple[str, 
 
 
 def machining_branches(robot: Robot) -> tuple[str, ...]:
-    """The branches an arm works in: facing the work, elbow up, either wrist.
+    """Branches an arm works in: facing the work, elbow up, either wrist.
 
-    Names count up along axis 1; in a table whose axis 1 points down an elbow up is a ``down``. All
-    branches of arms that are not named so.
+    Names count up along axis 1; in a table whose axis 1 points down an elbow up is a ``down``.
+
+    Parameters
+    ----------
+    robot : Robot
+        The arm.
+
+    Returns
+    -------
+    tuple of str
+        The names; all branches of arms whose branches are not named so.
     """
     names = branches_of(robot)
     elbow = "front-up" if robot.base.rotation[2, 2] >= 0.0 else "front-down"

@@ -30,12 +30,18 @@ _SIDES = np.array([1.0, -1.0])
 
 
 class Start(NamedTuple):
-    """How the closed form is bent into starts for a refinement onto a slightly different arm.
+    """Changes that make the closed form a start for a refinement onto a slightly different arm.
 
-    Poses up to ``reach_margin_mm`` beyond reach start from the stretched (or folded) arm. A
-    refinement cannot leave a singular posture sideways, nor tell there which branch was meant: so
-    the elbow is bent by at least ``least_bend_rad``, and joint 1 faces the wrist centre as if that
-    were at least ``least_radius_mm`` off axis 1.
+    A refinement cannot leave a singular posture sideways, nor tell there which branch was meant.
+
+    Attributes
+    ----------
+    reach_margin_mm : float
+        Poses up to this far beyond reach start from the stretched (or folded) arm.
+    least_bend_rad : float
+        Least angle between the elbow and its stretched or folded posture.
+    least_radius_mm : float
+        Joint 1 faces the wrist centre as if that were at least this far from axis 1.
     """
 
     reach_margin_mm: float = 20.0
@@ -48,17 +54,39 @@ EXACT = Start(0.0, 0.0, 0.0)
 
 @dataclass(frozen=True)
 class SixAxes:
-    """An arm with a closed form; ``parallel``: axes 2 to 4, else the wrist is spherical."""
+    """An arm of six axes with a closed form.
+
+    Attributes
+    ----------
+    dh : DHModel
+        The arm.
+    parallel : bool
+        True: axes 2 to 4 are parallel. False: the wrist is spherical.
+    """
 
     dh: DHModel
     parallel: bool
 
     def solve(self, pose: Pose, start: Start = EXACT) -> tuple[np.ndarray, np.ndarray]:
-        """DH joint angles (n, 8, 6) in (-pi, pi] of flange poses (n, ...), and reached (n, 8).
+        """Joints of flange poses in all eight branches.
 
-        Columns as ``BRANCHES``; angles out of reach are those of the nearest posture. Aligned
-        wrists have joint 4 (of parallel axes: joint 6) at zero, a wrist centre on axis 1 theta_1 at
-        zero.
+        Aligned wrists have joint 4 (of parallel axes: joint 6) at zero, a wrist centre on axis 1
+        has theta_1 at zero.
+
+        Parameters
+        ----------
+        pose : Pose
+            Poses (n, ...) of the last DH frame in the first one, mm.
+        start : Start
+            Changes for a later refinement; none by default.
+
+        Returns
+        -------
+        q_rad : numpy.ndarray
+            DH joints in (-pi, pi], shape (n, 8, 6), columns as ``BRANCHES``; out of reach those of
+            the nearest posture.
+        reached : numpy.ndarray
+            Whether a pose is in reach, shape (n, 8).
         """
         dh = self.dh
         sine, cosine = np.sign(np.sin(dh.alpha_rad)), np.sign(np.cos(dh.alpha_rad))
@@ -115,7 +143,18 @@ class SixAxes:
 
 
 def recognise(dh: DHModel) -> SixAxes | None:
-    """The closed form of six axes of ``dh``, or None where none applies."""
+    """Closed form of an arm of six axes.
+
+    Parameters
+    ----------
+    dh : DHModel
+        The arm.
+
+    Returns
+    -------
+    SixAxes or None
+        None where no closed form applies.
+    """
     if dh.joints != 6 or dh.prismatic.any() or np.abs(dh.beta_rad[:5]).max() > _TOLERANCE:
         return None
     sine, cosine = np.abs(np.sin(dh.alpha_rad)), np.abs(np.cos(dh.alpha_rad))
@@ -133,18 +172,40 @@ def recognise(dh: DHModel) -> SixAxes | None:
 
 @dataclass(frozen=True)
 class SevenAxes:
-    """An arm with spherical shoulder and wrist."""
+    """An arm of seven axes with spherical shoulder and wrist.
+
+    Attributes
+    ----------
+    dh : DHModel
+        The arm.
+    """
 
     dh: DHModel
 
     def solve(
         self, pose: Pose, q1_rad: float, margin_mm: float = 0.0, least_bend_rad: float = 0.0
     ) -> tuple[np.ndarray, np.ndarray]:
-        """DH joints 2 to 7 (n, 8, 6) of flange poses (n, ...) at joint 1, and by how much (mm) the
-        wrist is out of reach (n, 8): zero for solutions, infinite beyond ``margin_mm``.
+        """Joints 2 to 7 of flange poses where joint 1 is known.
 
-        With ``least_bend_rad`` the arm is kept that far from stretched, folded and aligned
-        postures, which a refinement onto a slightly different arm cannot leave.
+        Parameters
+        ----------
+        pose : Pose
+            Poses (n, ...) of the last DH frame in the first one, mm.
+        q1_rad : float
+            DH joint 1.
+        margin_mm : float
+            Wrists up to this far out of reach get the nearest posture.
+        least_bend_rad : float
+            Least distance from stretched, folded and aligned postures, which a refinement onto a
+            slightly different arm cannot leave.
+
+        Returns
+        -------
+        q_rad : numpy.ndarray
+            DH joints 2 to 7 in (-pi, pi], shape (n, 8, 6).
+        missed_mm : numpy.ndarray
+            Distance of the wrist from reach, shape (n, 8): 0 for solutions, infinite beyond
+            ``margin_mm``.
         """
         dh, s = self.dh, np.sign(np.sin(self.dh.alpha_rad))
         rotation, point = _wrist_centre(dh, pose)
@@ -182,7 +243,18 @@ class SevenAxes:
 
 
 def recognise_seven(dh: DHModel) -> SevenAxes | None:
-    """The closed form of seven axes of ``dh``, or None where it does not apply."""
+    """Closed form of an arm of seven axes.
+
+    Parameters
+    ----------
+    dh : DHModel
+        The arm.
+
+    Returns
+    -------
+    SevenAxes or None
+        None where it does not apply.
+    """
     if dh.joints != 7 or dh.prismatic.any():
         return None
     zero = *np.cos(dh.alpha_rad[:6]), *dh.a_mm[:6], *dh.d_mm[[1, 3, 5]], *dh.beta_rad[:6]

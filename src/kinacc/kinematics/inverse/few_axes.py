@@ -22,11 +22,28 @@ _SINGULAR = 1e-9  # share of the largest singular value
 def refine(
     model: ErrorModel, target: Pose, carried: Pose, q: np.ndarray, like: JointState | None = None
 ) -> np.ndarray:
-    """Joints (n, k), rad and mm, that put ``carried`` at ``target`` (n, ...), from ``q`` (n, k).
+    """Joints of an arm of four or five axes that put a point where it is wanted.
 
     Gauss-Newton on the rotation error in the directions of the joints that leave the position,
-    Newton on the position in the others. ``carried`` is given in the last frame; the arm travels
-    and is loaded as in the one state ``like``. Whether the point was reached shows in the pose.
+    Newton on the position in the others.
+
+    Parameters
+    ----------
+    model : ErrorModel
+        Model of k joints.
+    target : Pose
+        Wanted poses (n, ...) of ``carried`` in the first DH frame, mm.
+    carried : Pose
+        The tool in the last DH frame, mm.
+    q : numpy.ndarray
+        DH joints to start from, shape (n, k), rad (mm where a joint slides).
+    like : JointState, optional
+        One state whose travel directions and payload the arm has at every pose.
+
+    Returns
+    -------
+    numpy.ndarray
+        DH joints, shape (n, k). Whether a point was reached shows in its pose.
     """
     unit = np.where(model.dh.prismatic, _MM_PER_UNIT, 1.0)
     q = np.array(q, dtype=float)

@@ -16,19 +16,54 @@ _OUTSIDE = 100.0  # more than any angle in rad that is compared
 
 
 def reported_joints(robot: Robot, q_rad: np.ndarray) -> np.ndarray:
-    """Joints (..., k) as the controller reports them, of DH joints (..., k)."""
+    """Convert DH joints to joints as the controller reports them.
+
+    Parameters
+    ----------
+    robot : Robot
+        Arm of k joints.
+    q_rad : numpy.ndarray
+        DH joints, shape (..., k), rad (mm where a joint slides).
+
+    Returns
+    -------
+    numpy.ndarray
+        Reported joints, shape (..., k).
+    """
     if np.array_equal(robot.joint_map, np.eye(len(robot.joint_map))):
         return q_rad
     return q_rad @ np.linalg.inv(robot.joint_map).T
 
 
 def travel_unit(robot: Robot) -> np.ndarray:
-    """Movement (k,) of each joint that counts as a radian: one, or a metre where it slides."""
+    """Movement of each joint that counts as a radian.
+
+    Parameters
+    ----------
+    robot : Robot
+        Arm of k joints.
+
+    Returns
+    -------
+    numpy.ndarray
+        1 rad, or 1000 mm where a joint slides, shape (k,).
+    """
     return np.where(robot.dh.prismatic, 1000.0, 1.0)
 
 
 def dh_limits(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
-    """Limits (k,), (k,) of the DH joints; infinite where a joint is coupled to others."""
+    """Limits of the DH joints.
+
+    Parameters
+    ----------
+    robot : Robot
+        Arm of k joints.
+
+    Returns
+    -------
+    tuple of numpy.ndarray
+        Ends (k,), (k,), rad (mm where a joint slides); infinite where a joint is coupled to others.
+    """
     ends = np.diagonal(robot.joint_map) * np.stack([robot.q_min_rad, robot.q_max_rad])
     free = uncoupled(robot)
     return np.where(free, ends.min(axis=0), -np.inf), np.where(free, ends.max(axis=0), np.inf)
@@ -63,18 +98,55 @@ def cut_to_range(
 
 
 def uncoupled(robot: Robot) -> np.ndarray:
-    """Whether a reported joint (k,) turns the DH joint of its number and no other joint does."""
+    """Test whether a reported joint moves the DH joint of its number and no other joint does.
+
+    Parameters
+    ----------
+    robot : Robot
+        Arm of k joints.
+
+    Returns
+    -------
+    numpy.ndarray
+        Booleans, shape (k,).
+    """
     present = robot.joint_map != 0.0
     return np.diagonal(present) & (present.sum(axis=0) == 1) & (present.sum(axis=1) == 1)
 
 
 def within_limits(robot: Robot, q_rad: np.ndarray) -> np.ndarray:
-    """Whether DH joints (..., k) respect the limits of the reported joints, (...)."""
+    """Test whether DH joints respect the limits of the reported joints.
+
+    Parameters
+    ----------
+    robot : Robot
+        Arm of k joints.
+    q_rad : numpy.ndarray
+        DH joints, shape (..., k), rad (mm where a joint slides).
+
+    Returns
+    -------
+    numpy.ndarray
+        Booleans, shape (...).
+    """
     return within(reported_joints(robot, q_rad), robot.q_min_rad, robot.q_max_rad)
 
 
 def within(q_rad: np.ndarray, lower_rad: np.ndarray, upper_rad: np.ndarray) -> np.ndarray:
-    """Whether joints (..., k) lie in the box (k,), (k,), its faces included; (...)."""
+    """Test whether joints lie in a box, its faces included.
+
+    Parameters
+    ----------
+    q_rad : numpy.ndarray
+        Joints, shape (..., k), rad (mm where a joint slides).
+    lower_rad, upper_rad : numpy.ndarray
+        Ends of the box, each (k,).
+
+    Returns
+    -------
+    numpy.ndarray
+        Booleans, shape (...).
+    """
     inside = (q_rad >= lower_rad - _ROUND_OFF_RAD) & (q_rad <= upper_rad + _ROUND_OFF_RAD)
     return np.asarray(inside.all(axis=-1))
 

@@ -28,7 +28,17 @@ _CLOSE_MM = 2.0
 
 
 class Refined(NamedTuple):
-    """Joints (n, k), errors (n,) in mm (a radian as a metre), whether they meet the tolerance."""
+    """Joints that ``refine`` reached.
+
+    Attributes
+    ----------
+    q_rad : numpy.ndarray
+        DH joints, shape (n, k), rad (mm where a joint slides).
+    error_mm : numpy.ndarray
+        Pose errors, shape (n,); a radian counts as a metre.
+    converged : numpy.ndarray
+        Whether they meet the tolerance, shape (n,).
+    """
 
     q_rad: np.ndarray
     error_mm: np.ndarray

@@ -22,7 +22,15 @@ _ROUND_OFF_RAD = 1e-15
 
 
 class Axes(NamedTuple):
-    """k joint axes at zero joints in the base frame: points (k, 3) and unit directions (k, 3)."""
+    """Axes of k joints at zero joints, in the base frame.
+
+    Attributes
+    ----------
+    point_mm : numpy.ndarray
+        A point of each axis, shape (k, 3).
+    direction : numpy.ndarray
+        Unit directions, shape (k, 3).
+    """
 
     point_mm: np.ndarray
     direction: np.ndarray
@@ -31,12 +39,30 @@ class Axes(NamedTuple):
 def chain_of(
     axes: Axes, flange: Pose, prismatic: np.ndarray, nearly_parallel: float = NEARLY_PARALLEL
 ) -> tuple[Pose, DHModel, Pose]:
-    """Base, DH chain and flange with ``base chain(q) flange`` the arm's forward kinematics.
+    """DH chain of an arm with known axes: ``base chain(q) flange`` is its forward kinematics.
 
-    ``flange`` is the arm's flange at zero joints in the base frame. The base is the identity where
-    axis 1 is the base z axis, the returned flange where the last row can reach it by itself.
-    Axes are joined by their common normal where the sine of their angle is ``nearly_parallel`` or
-    more.
+    Axes are joined by their common normal, or with a Hayati angle where they are nearly parallel
+    (Hayati and Mirmirani 1985).
+
+    Parameters
+    ----------
+    axes : Axes
+        Axes of k joints.
+    flange : Pose
+        Flange at zero joints in the base frame, mm.
+    prismatic : numpy.ndarray
+        Joints that slide, shape (k,).
+    nearly_parallel : float
+        Sine of the angle between two axes below which a Hayati angle is used.
+
+    Returns
+    -------
+    base : Pose
+        First DH frame in the base frame, mm; identity where axis 1 is the base z axis.
+    chain : DHModel
+        The arm.
+    flange : Pose
+        Flange in the last DH frame, mm; identity where the last row can reach it by itself.
     """
     frame = base = _first_frame(axes.point_mm[0], axes.direction[0])
     rows = []

@@ -283,15 +283,46 @@ def load(name_or_path: str | Path) -> Robot:
 
 
 def of_text(text: str, name: str) -> Robot:
-    """Robot of the text of a robot YAML, as ``as_yaml`` writes it; ``name`` is for messages.
+    """Robot of the text of a robot YAML, as ``as_yaml`` writes it.
 
-    Raises InputError as ``load`` does.
+    Parameters
+    ----------
+    text : str
+        The YAML.
+    name : str
+        Name of the file, for messages.
+
+    Returns
+    -------
+    Robot
+        The arm, in mm and rad.
+
+    Raises
+    ------
+    InputError
+        As ``load``.
     """
     return _described(*parsed(text, name), Path(name))
 
 
 def files(name_or_path: str | Path) -> list[Path]:
-    """Files outside the package that a description is read from; none for a shipped robot."""
+    """Files outside the package that a description is read from.
+
+    Parameters
+    ----------
+    name_or_path : str or pathlib.Path
+        As for ``load``.
+
+    Returns
+    -------
+    list of pathlib.Path
+        The YAML and the URDF it names; empty for a shipped robot.
+
+    Raises
+    ------
+    InputError
+        For a name that is neither a shipped robot nor a file.
+    """
     path = _path(name_or_path)
     if path.parent == _SHIPPED:
         return []
@@ -368,9 +399,20 @@ def _problems(error: ValidationError, document: Document) -> list[Problem]:
 def from_modified(table: DHModel) -> tuple[DHModel, Pose]:
     """Standard chain and base of a modified (Craig) table, exactly.
 
-    Row i of ``table`` reads ``Tx(a) Rx(alpha) Ry(beta) Rz(q + theta) Tz(d)``: a, alpha and beta lie
-    before the joint. Regrouping the same product hands them to the row above; those of the first
-    row become the base (first DH frame in the arm's base frame), those of the last row vanish.
+    Row i reads ``Tx(a) Rx(alpha) Ry(beta) Rz(q + theta) Tz(d)``: a, alpha and beta lie before the
+    joint. Regrouping the same product moves them to the row above.
+
+    Parameters
+    ----------
+    table : DHModel
+        Arm of k joints whose rows are of the modified convention.
+
+    Returns
+    -------
+    table : DHModel
+        The same arm by the standard convention; a, alpha and beta of the last row are 0.
+    base : Pose
+        First DH frame in the arm's base frame, mm.
     """
     handed_up = {name: np.append(getattr(table, name)[1:], 0.0) for name in PARAMETERS[2:]}
     first = rotation_x(table.alpha_rad[0]) @ rotation_y(table.beta_rad[0])

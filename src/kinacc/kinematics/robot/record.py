@@ -20,12 +20,27 @@ FEWEST_JOINTS, MOST_JOINTS = 4, 7
 class Robot:
     """An arm as its maker describes it.
 
-    ``dh`` is the nominal model; ``q_min_rad`` and ``q_max_rad`` (k,) limit the reported joints (mm
-    where a joint slides); ``joint_map`` (k, k) turns reported joints into DH joints (signs and
-    couplings); ``source`` and ``date`` say where the figures come from. ``base`` is the first DH
-    frame in the arm's own base frame, ``flange`` the mechanical flange in the last DH frame and
-    ``tool`` the tool centre point in the flange frame; the first two differ from identity only
-    where the description was converted from another form.
+    Attributes
+    ----------
+    name : str
+        Name of the arm.
+    dh : DHModel
+        Nominal model of k joints.
+    q_min_rad, q_max_rad : numpy.ndarray
+        Limits of the reported joints, each (k,), rad (mm where a joint slides).
+    joint_map : numpy.ndarray
+        Matrix (k, k) from reported to DH joints: signs and couplings.
+    source, date : str
+        Origin of the figures.
+    base : Pose
+        First DH frame in the arm's own base frame, mm.
+    flange : Pose
+        Mechanical flange in the last DH frame, mm. It and ``base`` differ from identity only where
+        the description was converted from another form.
+    tool : Pose
+        Tool centre point in the flange frame, mm.
+    joint_names : tuple of str
+        Names (k,) of the joints.
     """
 
     name: str
@@ -109,9 +124,22 @@ class Robot:
         return forward(self, q_rad)
 
     def dh_joints(self, reported: np.ndarray) -> np.ndarray:
-        """DH joints (..., k) of reported joints (..., k), rad (mm where a joint slides).
+        """Convert reported joints to DH joints; ``limits.reported_joints`` goes back.
 
-        ``limits.reported_joints`` goes back. InputError for joints of another shape.
+        Parameters
+        ----------
+        reported : numpy.ndarray
+            Joints as the controller reports them, shape (..., k), rad (mm where a joint slides).
+
+        Returns
+        -------
+        numpy.ndarray
+            DH joints, shape (..., k).
+
+        Raises
+        ------
+        InputError
+            For joints of another shape.
         """
         try:
             joints = np.asarray(reported, dtype=float)
@@ -124,34 +152,99 @@ class Robot:
         return joints @ self.joint_map.T
 
     def dh_box(self, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Ends (k,), (k,) of the DH joints over a box of reported joints (k,), (k,)."""
+        """Range of the DH joints over a box of reported joints.
+
+        Parameters
+        ----------
+        low, high : numpy.ndarray
+            Ends of the box, each (k,), rad (mm where a joint slides).
+
+        Returns
+        -------
+        tuple of numpy.ndarray
+            Ends (k,), (k,) of the DH joints.
+        """
         centre, half = 0.5 * (low + high), 0.5 * (high - low)
         centre, half = self.joint_map @ centre, np.abs(self.joint_map) @ half
         return centre - half, centre + half
 
 
 def forward(robot: Robot, q_rad: np.ndarray) -> Pose:
-    """Flange poses (n, ...) in the arm's base frame at reported joints (n, k), nominal model."""
+    """Compute flange poses by the nominal model.
+
+    Parameters
+    ----------
+    robot : Robot
+        Arm of k joints.
+    q_rad : numpy.ndarray
+        Reported joints, shape (n, k) or (k,), rad (mm where a joint slides).
+
+    Returns
+    -------
+    Pose
+        Poses (n, ...) of the flange in the arm's base frame, mm.
+
+    Raises
+    ------
+    InputError
+        For joints of another shape.
+    """
     end = _dh.forward(robot.dh, robot.dh_joints(np.atleast_2d(q_rad)))
     return compose(compose(robot.base, end), robot.flange)
 
 
 def in_own_units(robot: Robot, joints: np.ndarray) -> np.ndarray:
-    """Reported joints (..., k) given in degrees, mm where a joint slides, in rad and mm."""
+    """Convert reported joints from degrees to rad; joints that slide stay in mm.
+
+    Parameters
+    ----------
+    robot : Robot
+        Arm of k joints.
+    joints : numpy.ndarray
+        Joints, shape (..., k), deg (mm where a joint slides).
+
+    Returns
+    -------
+    numpy.ndarray
+        Joints, shape (..., k), rad and mm.
+    """
     return np.where(robot.dh.prismatic, joints, np.deg2rad(joints))
 
 
 def carried(robot: Robot) -> Pose:
-    """Tool centre point of the description in the last DH frame: flange, then tool."""
+    """Tool centre point of the description in the last DH frame: flange, then tool.
+
+    Parameters
+    ----------
+    robot : Robot
+        The arm.
+
+    Returns
+    -------
+    Pose
+        Pose (3, 3), (3,), mm.
+    """
     return compose(robot.flange, robot.tool)
 
 
 @dataclass(frozen=True)
 class OutsideLimits:
-    """Rows (m,) in which a reported joint, from 1, is beyond its limits.
+    """Rows in which a reported joint is beyond its limits.
 
-    ``values`` (m,) of these rows and ``allowed`` are in ``unit``, deg or mm. What turns by more
-    than two turns either way ``looks_like_degrees``.
+    Attributes
+    ----------
+    joint : int
+        Number of the joint, from 1.
+    rows : numpy.ndarray
+        Indices of the rows, shape (m,).
+    values : numpy.ndarray
+        Joint in these rows, shape (m,), in ``unit``.
+    unit : str
+        deg, or mm where the joint slides.
+    allowed : str
+        The limits as text.
+    looks_like_degrees : bool
+        Whether the joint turns by more than two turns either way.
     """
 
     joint: int
@@ -163,7 +256,22 @@ class OutsideLimits:
 
 
 def outside_limits(robot: Robot, joints: np.ndarray, slack: float) -> Iterator[OutsideLimits]:
-    """Every joint of which a row of reported joints (n, k) is beyond the limits by ``slack``."""
+    """Find the joints that are beyond their limits in some row.
+
+    Parameters
+    ----------
+    robot : Robot
+        Arm of k joints.
+    joints : numpy.ndarray
+        Reported joints, shape (n, k), rad (mm where a joint slides).
+    slack : float
+        Excess that is allowed, rad (mm where a joint slides).
+
+    Yields
+    ------
+    OutsideLimits
+        One per joint with such rows.
+    """
     limits = zip(joints.T, robot.q_min_rad, robot.q_max_rad, robot.dh.prismatic, strict=True)
     for joint, (values, low, high, slides) in enumerate(limits, 1):
         rows = np.flatnonzero((values < low - slack) | (values > high + slack))

@@ -27,7 +27,23 @@ _NO_LIMIT = 1e20  # some write limits of 1e16 where they mean none
 
 @dataclass(frozen=True)
 class Joint:
-    """One joint of the file: its frame in the parent link (mm), axis in that frame, limits."""
+    """One joint of a URDF file.
+
+    Attributes
+    ----------
+    name, kind, parent, child : str
+        Name and type of the joint, names of its links.
+    origin : Pose
+        Frame of the joint in the parent link, mm.
+    axis : numpy.ndarray
+        Axis in that frame, shape (3,), as written.
+    limits : tuple of float
+        Ends of the joint, rad (m where it slides).
+    mimics : str
+        Joint it follows; empty where it is independent.
+    line : int
+        Line of the file.
+    """
 
     name: str
     kind: str
@@ -103,7 +119,25 @@ def load(path: str | Path, base_link: str | None = None, tip_link: str | None = 
 def joints_between(
     path: str | Path, base_link: str | None = None, tip_link: str | None = None
 ) -> list[Joint]:
-    """Joints of the chain ``load`` takes, from base to tip, fixed ones included."""
+    """Joints of the chain that ``load`` takes, from base to tip, fixed ones included.
+
+    Parameters
+    ----------
+    path : str or pathlib.Path
+        The URDF file.
+    base_link, tip_link : str, optional
+        As for ``load``.
+
+    Returns
+    -------
+    list of Joint
+        The joints.
+
+    Raises
+    ------
+    InputError
+        As ``load``, for the file and its chain.
+    """
     return _chain(Path(path), base_link, tip_link)[1]
 
 
