@@ -31,8 +31,18 @@ class ArmTerms:
 def parallel_joints(model: DHModel) -> tuple[int, ...]:
     """Joints (1-based) whose axis is nearly parallel to the next one's.
 
-    The sine of the angle between both axes is below ``robot.axes.NEARLY_PARALLEL``: there the
-    common normal, and with it d and theta, is ill defined (Hayati, Proc. CDC 1983).
+    There the common normal, and with it d and theta, is ill defined (Hayati, Proc. CDC 1983).
+
+    Parameters
+    ----------
+    model : DHModel
+        An arm.
+
+    Returns
+    -------
+    tuple of int
+        Joints where the sine of the angle between both axes is below
+        ``robot.axes.NEARLY_PARALLEL``.
     """
     # The next axis, seen from a joint's own: Rx(alpha) Ry(beta) z.
     x = np.sin(model.beta_rad)
@@ -44,9 +54,22 @@ def parallel_joints(model: DHModel) -> tuple[int, ...]:
 def free_parameters(
     joints: int, hayati_joints: Sequence[int] = (), instead: bool = False
 ) -> np.ndarray:
-    """Mask (k, 5): four DH parameters per joint, and beta on ``hayati_joints`` (1-based).
+    """Mask of the DH parameters a fit estimates: four per joint, and beta where the axis is
+    parallel.
 
-    ``instead``: beta in place of d, else beside it.
+    Parameters
+    ----------
+    joints : int
+        Number of joints k.
+    hayati_joints : sequence of int
+        Joints (1-based) with a free beta (Hayati, Proc. CDC 1983).
+    instead : bool
+        Beta in place of d, else beside it.
+
+    Returns
+    -------
+    numpy.ndarray
+        True where estimated, shape (k, 5) in the order of ``dh.PARAMETERS``.
     """
     free = np.ones((joints, 5), dtype=bool)
     free[:, _BETA] = False
@@ -57,9 +80,22 @@ def free_parameters(
 
 
 def arm_terms(nominal: DHModel, free: np.ndarray, rules: Sequence[Rule] = ()) -> ArmTerms:
-    """Terms of an arm: ``free`` (k, 5) by default, changed by ``rules``.
+    """Terms of an arm: free by default or by rules.
 
-    A rule for a whole joint speaks of the parameters that are free by default.
+    Parameters
+    ----------
+    nominal : DHModel
+        The arm with k joints before a fit.
+    free : numpy.ndarray
+        Parameters that are free by default, shape (k, 5).
+    rules : sequence of Rule
+        What the configuration fixes or knows; one for a whole joint speaks of those free by
+        default.
+
+    Returns
+    -------
+    ArmTerms
+        Mask, nominal values and standard deviations of priors, in mm and rad.
     """
     values = nominal.start.reshape(free.shape).copy()
     chosen, std = free.copy(), np.full(free.shape, np.inf)

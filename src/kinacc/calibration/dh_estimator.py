@@ -28,11 +28,22 @@ LEAST = 9  # numbers beside base and tool below which the nominal arm predicts b
 
 @dataclass(frozen=True)
 class DHEstimator(Estimator):
-    """Settings of ``calibration.dh``.
+    """How DH models are fitted: settings of ``calibration.dh``.
 
-    ``follows_vec``: the DH model follows the VEC at the measured joints instead of the
-    measurements. ``hayati_instead``: beta in place of d at ``hayati_joints``, else beside it.
-    ``rules``: parameters that are fixed or known beforehand.
+    Attributes
+    ----------
+    follows_vec : bool
+        The DH model follows the VEC at the measured joints instead of the measurements.
+    hayati_joints : tuple of int
+        Joints (1-based) with a free beta (Hayati, Proc. CDC 1983).
+    hayati_instead : bool
+        Beta in place of d, else beside it.
+    rules : tuple of Rule
+        Parameters that are fixed or known beforehand.
+    loss : str
+        squares, huber or tukey.
+    threshold : float
+        Share of the largest singular value below which directions stay nominal.
     """
 
     follows_vec: bool
@@ -117,7 +128,20 @@ class DHEstimator(Estimator):
 
 
 def hayati_joints(section: Mapping, arm: Robot) -> tuple[int, ...]:
-    """Joints (1-based) with a Hayati angle, by the ``calibration.dh`` settings."""
+    """Joints with a Hayati angle.
+
+    Parameters
+    ----------
+    section : mapping
+        ``calibration.dh`` settings.
+    arm : Robot
+        The arm, whose nearly parallel joints ``auto`` chooses.
+
+    Returns
+    -------
+    tuple of int
+        Numbers of joints, 1-based.
+    """
     if section["hayati_joints"] == _AUTO:
         return parallel_joints(arm.dh)
     return tuple(int(joint) for joint in section["hayati_joints"])

@@ -13,9 +13,32 @@ from kinacc.tables.columns import Columns
 
 
 def run(inputs: Mapping, settings: Mapping, kind: str, progress=None) -> dict[str, Columns]:
-    """``<kind>_model``, its covariance, its frames and what else its estimator tells.
+    """Fit the model of one kind to the training rows.
 
     The plainest kind, which is fitted last, gathers the ``frames`` of all models.
+
+    Parameters
+    ----------
+    inputs : mapping
+        Tables ``measurements`` and those of models fitted before.
+    settings : mapping
+        Sections ``robot`` and ``calibration`` of the configuration.
+    kind : str
+        ``vec``, ``dh``, ``compliance`` or a registered one.
+    progress : callable, optional
+        Wraps an iterable to show how far a choice is, with a label.
+
+    Returns
+    -------
+    dict
+        ``<kind>_model``, its covariance, its frames and what else its estimator tells.
+
+    Raises
+    ------
+    FitError
+        The fit does not converge.
+    InputError
+        There are fewer residuals than parameters, or a rule speaks of a frame that is not there.
     """
     arm = robot.load(settings["robot"])
     every, train = delivered.observed(inputs, arm)

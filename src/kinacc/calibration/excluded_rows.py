@@ -20,9 +20,21 @@ _STATED = tuple(each.name for each in ARTEFACTS["excluded_rows"].columns if not 
 
 
 def run(inputs: Mapping, settings: Mapping) -> dict[str, Columns]:
-    """``excluded_rows``: errors of the delivered models at the rows left out, with the reasons.
+    """Errors of the delivered models at the rows left out, with the reasons.
 
-    Null errors where a row cannot be read, or where its target or session stands nowhere else.
+    Parameters
+    ----------
+    inputs : mapping
+        Tables ``measurements``, of models and of frames.
+    settings : mapping
+        Sections ``robot`` and ``measurements`` of the configuration.
+
+    Returns
+    -------
+    dict
+        ``excluded_rows``: errors in mm and mrad in the robot base, null where a row cannot be read
+        or
+        where its target or session stands nowhere else.
     """
     arm, section = robot.load(settings["robot"]), settings["measurements"]["file"]
     reasons = excluded_lines(section)

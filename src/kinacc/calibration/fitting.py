@@ -40,11 +40,27 @@ SURPLUS, LEAST_NOISE_MM = 2, 0.03
 
 @dataclass(frozen=True)
 class ModelFit:
-    """A fitted ``model`` and its ``frames``.
+    """A fitted model of P parameters, base and targets.
 
-    ``std`` (P,) and ``free`` (P,) as the model's parameters, std NaN where undetermined;
-    ``prior_std`` (P,), inf without a prior. ``solution`` has the figures of the fit, the frames'
-    components (``parameters``) first. ``weights`` of the rows, where the loss had some.
+    Attributes
+    ----------
+    model : ErrorModel
+        The model.
+    frames : Frames
+        Base and targets.
+    std : numpy.ndarray
+        Standard deviations in the parameters' units, of the shape of ``free``; NaN where
+        undetermined.
+    free : numpy.ndarray
+        Parameters that were estimated, shape (P,) or (k, 5).
+    prior_std : numpy.ndarray
+        Of the shape of ``free``, inf without a prior.
+    solution : Solution
+        Figures of the fit, the components of the frames first.
+    parameters : FrameParameters
+        Those components.
+    weights : Weights or None
+        Of the rows, where the loss had some.
     """
 
     model: ErrorModel
@@ -193,7 +209,31 @@ def fit_frames(
     rotation_weight_mm_per_rad: float,
     frame_terms: FrameTerms | None = None,
 ) -> Frames:
-    """Fit base and targets of ``observations``, the arm held at ``model``. Raises FitError."""
+    """Fit base and targets, the arm held at a model.
+
+    Parameters
+    ----------
+    observations : Observations
+        Measured points and poses.
+    model : ErrorModel
+        The arm.
+    rotation_weight_mm_per_rad : float
+        Position error that weighs as much as one radian.
+    frame_terms : FrameTerms, optional
+        What is known of base and targets.
+
+    Returns
+    -------
+    Frames
+        Base in the instrument's frame, targets in the flange frame, mm.
+
+    Raises
+    ------
+    FitError
+        The fit does not converge.
+    InputError
+        There are fewer residuals than components.
+    """
     return fit(
         observations,
         model,

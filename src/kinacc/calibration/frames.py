@@ -28,9 +28,15 @@ _SMALL_ANGLE_RAD = 1e-3
 
 @dataclass(frozen=True)
 class Frames:
-    """``bases``: robot base in the instrument's frame, S sessions; ``targets``: T in the flange.
+    """Robot bases and targets.
 
-    A single base may be given without its leading axis.
+    Attributes
+    ----------
+    bases : Pose
+        Robot base of S sessions in the instrument's frame, shape (S, ...) in mm; one may be given
+        without its leading axis.
+    targets : Pose
+        T targets in the flange frame, shape (T, ...) in mm.
     """
 
     bases: Pose
@@ -70,7 +76,20 @@ class Frames:
         return bases, Pose(*(part[observations.target] for part in self.targets))
 
     def seen(self, model: ErrorModel, observations: Observations) -> Pose:
-        """Poses (n, ...) of the targets in the instrument's frame, as a model predicts them."""
+        """Poses of the targets in the instrument's frame, as a model predicts them.
+
+        Parameters
+        ----------
+        model : ErrorModel
+            The arm.
+        observations : Observations
+            n rows: joints, session and target.
+
+        Returns
+        -------
+        Pose
+            ``base . flange . target``, shape (n, ...) in mm.
+        """
         bases, targets = self.at_rows(observations)
         return compose(bases, compose(model.pose(observations.at), targets))
 
@@ -83,12 +102,38 @@ class Frames:
 def known(
     base: Pose = IDENTITY, tool: Pose = IDENTITY, sessions: int = 1, targets: int = 1
 ) -> Frames:
-    """Frames with ``base`` in every session and every target at ``tool``."""
+    """Frames with the same base in every session and every target at one place.
+
+    Parameters
+    ----------
+    base : Pose
+        Robot base in the instrument's frame, mm.
+    tool : Pose
+        Target in the flange frame, mm.
+    sessions, targets : int
+        How many there are.
+
+    Returns
+    -------
+    Frames
+        Bases (sessions, ...) and targets (targets, ...).
+    """
     return Frames(stacked([base] * sessions), stacked([tool] * targets))
 
 
 def stacked(poses: Sequence[Pose]) -> Pose:
-    """Single poses as one with a leading axis."""
+    """Single poses as one of shape (n, ...).
+
+    Parameters
+    ----------
+    poses : sequence of Pose
+        n poses in one unit of length.
+
+    Returns
+    -------
+    Pose
+        Rotation (n, 3, 3) and position (n, 3).
+    """
     return Pose(
         np.stack([pose.rotation for pose in poses]), np.stack([pose.position_mm for pose in poses])
     )
@@ -113,9 +158,26 @@ class FrameTerms:
 def frame_terms(
     observations: Observations, stated: Frames, rules: Sequence[Rule] = ()
 ) -> FrameTerms:
-    """Terms of base and targets, all free but for ``rules``; ``stated``: where a fixed one is.
+    """Terms of base and targets, all free but for rules.
 
-    Raises InputError naming every rule about a frame that ``observations`` do not let estimate.
+    Parameters
+    ----------
+    observations : Observations
+        Measured points and poses.
+    stated : Frames
+        Where a fixed frame is.
+    rules : sequence of Rule
+        What the configuration fixes or knows of components.
+
+    Returns
+    -------
+    FrameTerms
+        Of the F components that can be estimated, in mm and rad.
+
+    Raises
+    ------
+    InputError
+        Names every rule about a frame that ``observations`` do not let estimate.
     """
     names = component_names(observations)
     parts = [tuple(name.rpartition(".")[::2]) for name in names]
@@ -162,12 +224,25 @@ def orientations_measured(observations: Observations) -> np.ndarray:
 
 @dataclass(frozen=True)
 class FrameParameters:
-    """F components of base and targets as parameters of a fit.
+    """F components of base and targets as parameters of a fit, in mm and rad.
 
-    ``begin`` (F,): where they start, about the orientations of ``reference``. ``free`` (F,): those
-    that are estimated. Priors expect ``mean`` (F,) within ``std`` (F,), inf for none. ``hidden``
-    (m, F): motions of unit length (mm and mrad) that the poses do not show and that are held.
     No components (F = 0): base and targets are known, at ``reference``.
+
+    Attributes
+    ----------
+    names : tuple of str
+        The components.
+    reference : Frames
+        Whose orientations the rotation vectors turn.
+    begin : numpy.ndarray
+        Where they start, shape (F,).
+    free : numpy.ndarray
+        True for those that are estimated, shape (F,).
+    mean, std : numpy.ndarray
+        Of priors, shapes (F,); std inf for none.
+    hidden : numpy.ndarray
+        Motions of unit length (mm and mrad) that the poses do not show and that are held, shape (m,
+        F).
     """
 
     names: tuple[str, ...]

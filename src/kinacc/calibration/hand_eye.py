@@ -102,7 +102,27 @@ def _one_session(observations: Observations, flange: Pose) -> tuple[Pose, np.nda
 def base_from_targets(
     observations: Observations, flange: Pose, targets: Pose, placed: np.ndarray | None = None
 ) -> Pose:
-    """Base that best carries targets onto their measured points; ``placed`` (T,): those known."""
+    """Base that best carries targets onto their measured points.
+
+    Closed form of absolute orientation by singular values (Arun, Huang and Blostein, PAMI 9, 1987),
+    where orientations count as points ``_LEVER_MM`` away.
+
+    Parameters
+    ----------
+    observations : Observations
+        n points and poses of one session.
+    flange : Pose
+        Flange in the robot base, shape (n, ...) in mm.
+    targets : Pose
+        Targets in the flange frame, shape (T, ...) in mm.
+    placed : numpy.ndarray, optional
+        True for the targets that are known, shape (T,); all if not given.
+
+    Returns
+    -------
+    Pose
+        Robot base in the instrument's frame, mm.
+    """
     rows = np.ones(len(observations), bool) if placed is None else placed[observations.target]
     at = targets.position_mm[observations.target[rows]]
     by_arm = flange.position_mm[rows] + (flange.rotation[rows] @ at[..., None])[..., 0]

@@ -105,7 +105,18 @@ def of_arm(names: Sequence[str]) -> np.ndarray:
 
 
 def listed(table: Mapping[str, Iterable]) -> list[str]:
-    """Every sentence of a ``dh_identified`` table on undetermined directions, once."""
+    """Every sentence of a table on undetermined directions, once.
+
+    Parameters
+    ----------
+    table : mapping
+        Columns of ``dh_identified``.
+
+    Returns
+    -------
+    list of str
+        Parts in mm and mrad, the base's along the robot's own axes.
+    """
     rows = zip(table["status"], table["statement"], strict=True)
     cells = (str(cell) for status, cell in rows if status == UNDETERMINED and cell)
     texts = dict.fromkeys(text for cell in cells for text in cell.split(_JOIN))
@@ -113,7 +124,18 @@ def listed(table: Mapping[str, Iterable]) -> list[str]:
 
 
 def weak(sentences: Iterable[str]) -> list[str]:
-    """Those of ``listed`` that other poses would determine, without saying so."""
+    """Those of ``listed`` that other poses would determine, without saying so.
+
+    Parameters
+    ----------
+    sentences : iterable of str
+        See ``listed``.
+
+    Returns
+    -------
+    list of str
+        Their parameters and parts.
+    """
     return [
         text.removesuffix(POORLY_DETERMINED)
         for text in sentences
@@ -133,7 +155,18 @@ def statements(left_open: LeftOpen) -> dict[str, str]:
 
 
 def parameter_name(name: str) -> str:
-    """A parameter in words, as ``calibration.frames`` names those of base and targets."""
+    """A parameter in words, as ``calibration.frames`` names those of base and targets.
+
+    Parameters
+    ----------
+    name : str
+        As ``j1.d_mm`` or ``base.x_mm``.
+
+    Returns
+    -------
+    str
+        As ``d of joint 1`` or ``base x``.
+    """
     where, _, parameter = name.rpartition(".")
     short = parameter.partition("_")[0]
     return f"{short} of joint {where[1:]}" if parameter in PARAMETERS else f"{where} {short}"

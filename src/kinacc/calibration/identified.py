@@ -108,6 +108,17 @@ def _everywhere(fit: ModelFit, observations: Observations) -> Observations:
 
 
 def joints_anywhere(model: DHModel) -> np.ndarray:
-    """Joints (n, k) of all kinds, beyond any limits: a whole turn each, or a metre either way."""
+    """Joints of all kinds, beyond any limits: a whole turn each, or a metre either way.
+
+    Parameters
+    ----------
+    model : DHModel
+        An arm with k joints.
+
+    Returns
+    -------
+    numpy.ndarray
+        Random DH joints, the same at each call, shape (UNSEEN_POSES, k) in rad or mm.
+    """
     reach = np.where(model.prismatic, 1e3, np.pi)
     return np.random.default_rng(0).uniform(-reach, reach, (UNSEEN_POSES, model.joints))

@@ -23,9 +23,16 @@ GIVEN = "valid given the model"
 
 @dataclass(frozen=True)
 class Misfit:
-    """Error of ``model`` at held-out poses beside the noise of one reading.
+    """Error of a model at held-out poses beside the noise of one reading.
 
-    ``held_out_mm``: rms of the position error per axis, NaN where nothing was held out.
+    Attributes
+    ----------
+    model : str
+        Kind of the model.
+    held_out_mm : float
+        Root mean square of the position error per axis, NaN where nothing was held out.
+    noise : Noise
+        Of one reading, per axis.
     """
 
     model: str
@@ -50,19 +57,56 @@ class Misfit:
 
 
 def misfit(tables: Mapping[str, Columns], robot: Robot, model: str) -> Misfit:
-    """Misfit of ``model`` by the tables ``model_selection`` and ``measurements``."""
+    """Misfit of one model.
+
+    Parameters
+    ----------
+    tables : mapping
+        Tables ``model_selection`` and ``measurements``; what is missing is unknown.
+    robot : Robot
+        The arm that was measured.
+    model : str
+        Kind of the model.
+
+    Returns
+    -------
+    Misfit
+        Held-out error and noise in mm, per axis.
+    """
     return Misfit(model, _held_out_mm(tables, model), _noise_of(tables, robot))
 
 
 def misfits(tables: Mapping[str, Columns], robot: Robot) -> list[Misfit]:
-    """Misfit of every model of the table ``model_selection``."""
+    """Misfit of every model of the table ``model_selection``.
+
+    Parameters
+    ----------
+    tables, robot
+        See ``misfit``.
+
+    Returns
+    -------
+    list of Misfit
+        In the order of the table.
+    """
     noise = _noise_of(tables, robot)
     models = [str(each) for each in tables["model_selection"]["model"]]
     return [Misfit(each, _held_out_mm(tables, each), noise) for each in models]
 
 
 def in_words(found: Sequence[Misfit]) -> str:
-    """What standard deviations of one or more models of one calibration are worth."""
+    """What standard deviations of models of one calibration are worth, in words.
+
+    Parameters
+    ----------
+    found : sequence of Misfit
+        One or more.
+
+    Returns
+    -------
+    str
+        Held-out error over noise of each model.
+    """
     return f"{GIVEN}; {over_noise(found)}"
 
 

@@ -24,7 +24,15 @@ from kinacc.tables.columns import Columns
 
 
 class Fit(NamedTuple):
-    """A model with the base and targets it was fitted with."""
+    """A model with the base and targets it was fitted with.
+
+    Attributes
+    ----------
+    model : ErrorModel
+        The arm.
+    frames : Frames
+        Base in the instrument's frame, targets in the flange frame, mm.
+    """
 
     model: ErrorModel
     frames: Frames
@@ -142,7 +150,22 @@ class Estimator:
 
 
 def estimators(calibration: Mapping, arm: Robot, every: Observations) -> dict[str, Estimator]:
-    """The estimators that ``calibration`` settings ask for, by kind, in the order of fitting."""
+    """The estimators that settings ask for.
+
+    Parameters
+    ----------
+    calibration : mapping
+        Section ``calibration`` of the configuration.
+    arm : Robot
+        The nominal arm.
+    every : Observations
+        All observations of the data set.
+
+    Returns
+    -------
+    dict
+        Estimators by kind, in the order of fitting.
+    """
     return {
         kind: error_models.loaded(error_models.ESTIMATORS[kind]).of(calibration, arm, every)
         for kind in error_models.asked_for(calibration)
@@ -153,7 +176,27 @@ def fit_all(
     observations: Observations,
     estimators: Iterable[Estimator],
 ) -> dict[str, Fit]:
-    """Models by kind, and the nominal one, fitted to ``observations``; see ``Estimator.fit``."""
+    """Fit models of all kinds, and base and targets of the nominal arm.
+
+    Parameters
+    ----------
+    observations : Observations
+        Measured points and poses.
+    estimators : iterable of Estimator
+        In the order of fitting.
+
+    Returns
+    -------
+    dict
+        ``Fit`` by kind, the nominal one last.
+
+    Raises
+    ------
+    FitError
+        A fit does not converge.
+    InputError
+        There are fewer residuals than parameters.
+    """
     fits: dict[str, Fit] = {}
     nominal: dict[str, Fit] = {}
     for estimator in estimators:

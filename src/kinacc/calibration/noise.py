@@ -51,7 +51,20 @@ UNKNOWN = Noise(np.full(3, np.nan), 0, 0, 0)
 
 
 def of_measurements(columns: Mapping[str, np.ndarray], robot: Robot) -> Noise:
-    """Noise of the table ``measurements``, see :func:`of_readings`."""
+    """Noise of one reading, see :func:`of_readings`.
+
+    Parameters
+    ----------
+    columns : mapping
+        Table ``measurements``.
+    robot : Robot
+        The arm that was measured.
+
+    Returns
+    -------
+    Noise
+        Standard deviations per axis of the instrument, mm.
+    """
     return of_readings(from_columns(columns, robot), robot.dh)
 
 
@@ -92,14 +105,42 @@ def of_readings(observations: Observations, nominal: DHModel) -> Noise:
 
 
 def scatter(values: np.ndarray, group: np.ndarray) -> tuple[np.ndarray, int]:
-    """Mean square (k, k) of values (n, k) about the means of their groups, and its freedom."""
+    """Mean square of values about the means of their groups.
+
+    Parameters
+    ----------
+    values : numpy.ndarray
+        Shape (n, k).
+    group : numpy.ndarray
+        Number of the group of each row, shape (n,), from 0 without gaps.
+
+    Returns
+    -------
+    mean_square : numpy.ndarray
+        Shape (k, k), in the square of the unit of ``values``.
+    freedom : int
+        Rows beyond the first of each group.
+    """
     mean, count = means(values, group)
     centred, freedom = values - mean[group], int(np.sum(count - 1))
     return centred.T @ centred / max(freedom, 1), freedom
 
 
 def means(values: np.ndarray, group: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Mean (g, k) of values (n, k) in every group (n,), and how many there are (g,)."""
+    """Mean of values in every group.
+
+    Parameters
+    ----------
+    values, group
+        See ``scatter``.
+
+    Returns
+    -------
+    mean : numpy.ndarray
+        Shape (g, k).
+    count : numpy.ndarray
+        Rows of each group, shape (g,).
+    """
     count = np.bincount(group)
     sums = [np.bincount(group, column) for column in values.T]
     return np.stack(sums, axis=1) / count[:, None], count

@@ -19,12 +19,22 @@ TOOL = "tool"
 class Observations:
     """n measurements of targets carried by a k-joint arm; a pose may show several targets.
 
-    ``q_rad`` (n, k) DH joint angles; ``s`` (n, k) travel direction -1, 0 (unknown), +1;
-    ``position_mm`` (n, 3) and ``rotation`` (n, 3, 3) in the instrument's frame, a rotation of NaN
-    where only the position was measured; ``pose``, ``target`` (index into ``target_names``),
-    ``repeat`` and ``fold`` (n,) integers, fold -1 where no fold is assigned; ``session`` (n,) index
-    into ``session_names``, each with a base frame of its own (one session where not given);
-    ``payload`` (n, 4): mass in kg and centre in the last DH frame in mm, NaN where not stated.
+    Attributes
+    ----------
+    q_rad : numpy.ndarray
+        DH joints, shape (n, k), rad or mm.
+    s : numpy.ndarray
+        Travel directions -1, 0 (unknown) or 1, shape (n, k).
+    position_mm : numpy.ndarray
+        In the instrument's frame, shape (n, 3).
+    rotation : numpy.ndarray
+        In the instrument's frame, shape (n, 3, 3); NaN where only the position was measured.
+    pose, target, repeat, fold : numpy.ndarray
+        Integers, shape (n,): target an index into ``target_names``, fold -1 where none is assigned.
+    session : numpy.ndarray
+        Index into ``session_names``, shape (n,), each with a base of its own; one if not given.
+    payload : numpy.ndarray
+        Mass in kg and centre in the last DH frame in mm, shape (n, 4); NaN where not stated.
     """
 
     q_rad: np.ndarray
@@ -106,7 +116,24 @@ def full_poses(
     s: np.ndarray | None = None,
     fold: np.ndarray | None = None,
 ) -> Observations:
-    """Observations of one full-pose target at joints ``q_rad`` (n, k), one row per pose."""
+    """Observations of one full-pose target, one row per pose.
+
+    Parameters
+    ----------
+    q_rad : numpy.ndarray
+        DH joints, shape (n, k), rad or mm.
+    poses : Pose
+        Measured poses in the instrument's frame, shape (n, ...) in mm.
+    s : numpy.ndarray, optional
+        Travel directions, shape (n, k); unknown if not given.
+    fold : numpy.ndarray, optional
+        Folds, shape (n,); none if not given.
+
+    Returns
+    -------
+    Observations
+        n rows of the target ``tool``.
+    """
     q_rad = np.asarray(q_rad, dtype=float)
     count = len(q_rad)
     zeros = np.zeros(count, dtype=np.int64)
@@ -123,7 +150,22 @@ def full_poses(
 
 
 def from_columns(columns: Mapping[str, np.ndarray], robot: Robot) -> Observations:
-    """Observations from the columns of ``measurements``, made with ``robot``."""
+    """Observations from the columns of ``measurements``.
+
+    Parameters
+    ----------
+    columns : mapping
+        Reported joints ``q1`` .., directions ``s1`` .., position in mm, quaternion, and the numbers
+        of
+        pose, target, repeat; session, fold and payload where there are any.
+    robot : Robot
+        The arm they were made with, which turns reported joints into DH joints.
+
+    Returns
+    -------
+    Observations
+        One row for each of the table.
+    """
 
     def stack(*names: str) -> np.ndarray:
         return np.stack([np.asarray(columns[name], dtype=float) for name in names], axis=1)

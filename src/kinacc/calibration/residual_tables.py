@@ -21,10 +21,30 @@ from kinacc.tables.contract import columns_of
 
 
 def run(inputs: Mapping, settings: Mapping, progress=None) -> dict[str, Columns]:
-    """``residuals``, ``pose_errors`` and what follows from them of every comparison.
+    """Errors of every comparison, in sample and held out, and what follows from them.
 
     Train rows are of the delivered models at the rows they were fitted to. Validation rows are of
     rows held out: pooled over all folds, each fold refitted without its rows, and fold by fold.
+
+    Parameters
+    ----------
+    inputs : mapping
+        Tables ``measurements``, of models and of frames, and ``vec_orders``.
+    settings : mapping
+        Sections ``robot`` and ``calibration`` of the configuration.
+    progress : callable, optional
+        Wraps an iterable to show how far the folds are, with a label.
+
+    Returns
+    -------
+    dict
+        ``residuals``, ``pose_errors``, ``joint_bias``, ``model_selection``, ``worst_rows``; mm,
+        mrad.
+
+    Raises
+    ------
+    FitError
+        A fit without a fold does not converge.
     """
     arm, measurements = robot.load(settings["robot"]), inputs["measurements"]
     every, train = observed(inputs, arm)

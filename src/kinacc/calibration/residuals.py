@@ -42,10 +42,22 @@ class Statistics:
 
 
 def errors(fits: Mapping[str, Fit], observations: Observations) -> dict[str, Errors]:
-    """Errors of every comparison by its name at ``observations``, of models by theirs.
+    """Errors of every comparison, each in the base of the model compared.
 
-    Each is in the base of the model compared. A model that is the reference is taken through its
-    own base to the instrument, and from there to that base.
+    A model that is the reference is taken through its own base to the instrument, and from there to
+    that base.
+
+    Parameters
+    ----------
+    fits : mapping
+        ``Fit`` by kind.
+    observations : Observations
+        n measured points and poses.
+
+    Returns
+    -------
+    dict
+        ``Errors`` (n, 3) by name of the comparison, mm and rad.
     """
     bases = {name: fit.frames.at_rows(observations)[0] for name, fit in fits.items()}
     poses = {name: fit.frames.seen(fit.model, observations) for name, fit in fits.items()}
@@ -81,9 +93,19 @@ def cross_validated(
 
 
 def statistics(vectors: np.ndarray) -> Statistics | None:
-    """Statistics of the magnitudes of ``vectors`` (n, 3); None without a finite one.
+    """Statistics of magnitudes.
 
-    gamma99 is NaN where a magnitude is zero: the likelihood has no maximum there.
+    Parameters
+    ----------
+    vectors : numpy.ndarray
+        Shape (n, 3), of any unit.
+
+    Returns
+    -------
+    Statistics or None
+        Of the finite ones, None without any; gamma99 is NaN where a magnitude is zero: the
+        likelihood
+        has no maximum there.
     """
     magnitudes = np.linalg.norm(vectors, axis=1)
     magnitudes = magnitudes[np.isfinite(magnitudes)]

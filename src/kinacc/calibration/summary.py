@@ -28,7 +28,15 @@ _LEAST_LENGTH = 1e-9
 
 @dataclass(frozen=True)
 class Tolerance:
-    """Largest position error allowed, and the statistic it is about: a key of TOLERANCE_OF."""
+    """Largest position error allowed.
+
+    Attributes
+    ----------
+    mm : float
+        The error.
+    of : str
+        The statistic it is about: a key of ``TOLERANCE_OF``.
+    """
 
     mm: float
     of: str
@@ -38,7 +46,18 @@ class Tolerance:
 
 
 def selected(choice: Mapping) -> str:
-    """The selected model of a ``model_selection`` table."""
+    """The selected model of a table.
+
+    Parameters
+    ----------
+    choice : mapping
+        Columns of ``model_selection``.
+
+    Returns
+    -------
+    str
+        Kind of the model.
+    """
     return next(str(n) for n, yes in zip(choice["model"], choice["selected"], strict=True) if yes)
 
 

@@ -40,7 +40,27 @@ def frames_of(
     target_names: tuple[str, ...],
     session_names: tuple[str | None, ...] = (None,),
 ) -> Frames:
-    """The ``Frames`` of one model in a ``frames`` table. Raises InputError for a missing one."""
+    """Base and targets of one model from a table.
+
+    Parameters
+    ----------
+    columns : mapping
+        Columns of ``frames``.
+    model : str
+        Kind of the model.
+    target_names, session_names : tuple
+        Those wanted, in this order.
+
+    Returns
+    -------
+    Frames
+        Base in the instrument's frame, targets in the flange frame, mm.
+
+    Raises
+    ------
+    InputError
+        The table lacks one.
+    """
     bases = [frame(columns, model, "base", name) for name in session_names]
     targets = [frame(columns, model, name) for name in target_names]
     return Frames(stacked(bases), stacked(targets))

@@ -26,9 +26,15 @@ if TYPE_CHECKING:
 class Uncertainty:
     """What a fit knows of its P parameters, and what it does not.
 
-    ``covariance`` (P, P) in mm and rad, of the directions the data determine;
-    ``undetermined`` (m, P): the others, each a displacement of unit length in mm and mrad of the
-    model's parameters (base and targets following) that changes no measured pose.
+    Attributes
+    ----------
+    names : tuple of str
+        The parameters, those of base and targets first.
+    covariance : numpy.ndarray
+        Of the directions the data determine, shape (P, P) in mm and rad.
+    undetermined : numpy.ndarray
+        The others, shape (m, P): each a displacement of unit length in mm and mrad of the model's
+        parameters (base and targets following) that changes no measured pose.
     """
 
     names: tuple[str, ...]
@@ -42,7 +48,18 @@ class Uncertainty:
 
 
 def of_fit(fit: ModelFit) -> Uncertainty:
-    """Uncertainty of base and targets if estimated, then of the parameters that took part."""
+    """Uncertainty of base and targets if estimated, then of the parameters that took part.
+
+    Parameters
+    ----------
+    fit : ModelFit
+        A fit.
+
+    Returns
+    -------
+    Uncertainty
+        Of shifts and turns of the frames (mm, rad) and of parameters in their units.
+    """
     names = (*fit.parameters.names, *compress(fit.model.names, fit.free.ravel()))
     change = _change(fit)
     covariance = change @ fit.solution.covariance @ change.T
@@ -73,23 +90,67 @@ _UNITS = {
 
 
 def unit_of(name: str) -> str:
-    """Unit of a named parameter: mm, rad, or what a coefficient of it is per."""
+    """Unit of a named parameter.
+
+    Parameters
+    ----------
+    name : str
+        As ``j1.d_mm``.
+
+    Returns
+    -------
+    str
+        mm, rad, or what a coefficient of it is per.
+    """
     return _unit(name)[0]
 
 
 def scale_of(name: str) -> float:
-    """In the parameter's unit what counts as one mm: 1 mm, one mrad, 1e-6 of a coefficient."""
+    """What of a parameter counts as one mm.
+
+    Parameters
+    ----------
+    name : str
+        As ``j1.d_mm``.
+
+    Returns
+    -------
+    float
+        In the parameter's unit: 1 mm, one mrad, 1e-6 of a coefficient.
+    """
     return _unit(name)[1]
 
 
 def scaled_unit(name: str) -> str:
-    """Unit of a displacement measured in ``scale_of``: mm, mrad."""
+    """Unit of a displacement measured in ``scale_of``.
+
+    Parameters
+    ----------
+    name : str
+        As ``j1.d_mm``.
+
+    Returns
+    -------
+    str
+        mm, mrad, or 1e-6 of a coefficient's unit.
+    """
     unit = unit_of(name)
     return {"mm": unit, "rad": "mrad"}.get(unit, f"1e-6 {unit}")
 
 
 def is_angle(name: str) -> bool:
-    """Whether a named parameter is in rad."""
+    """Whether a parameter is in rad.
+
+    Parameters
+    ----------
+    name : str
+        As ``j1.theta_rad``.
+
+    Returns
+    -------
+    bool
+        True for rad.
+    """
     return unit_of(name) == "rad"
 
 

@@ -28,10 +28,22 @@ _AUTO = "auto"
 
 @dataclass(frozen=True)
 class VECEstimator(Estimator):
-    """Settings of ``calibration.vec``.
+    """How VEC models are fitted: settings of ``calibration.vec``.
 
-    ``joint_range_rad`` (k,), (k,) of the DH joints. ``orders`` to choose from; ``order`` is that of
-    a fit. ``prior_stated``: only the order is chosen.
+    Attributes
+    ----------
+    joint_range_rad : tuple of numpy.ndarray
+        Least and largest DH joints, shapes (k,), rad or mm.
+    order : int
+        Of a fit.
+    prior : Prior
+        Of a fit.
+    orders : tuple of int
+        To choose from, by evidence.
+    prior_stated : bool
+        Only the order is chosen.
+    travel_direction : bool
+        Errors depend on the direction a joint travelled in.
     """
 
     joint_range_rad: tuple[np.ndarray, np.ndarray]

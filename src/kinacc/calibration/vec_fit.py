@@ -24,10 +24,19 @@ RANK_THRESHOLD = 1e-10  # far below every weak direction, far above rounding: ex
 class Prior:
     """Zero-mean Gaussian prior of a Chebyshev coefficient of order n.
 
-    Standard deviation ``delta_mm`` or ``eps_rad`` at order 0 and 1, times ``decay ** (n - 1)``
-    above: a smooth error has a falling spectrum. ``offset_rad`` is that of a direction offset.
-    ``constant_mm`` and ``constant_rad`` are those of order 0 where it differs: constants are what
-    a DH model can express as well.
+    A smooth error has a falling spectrum: standard deviations at orders 0 and 1, times
+    ``decay ** (n - 1)`` above.
+
+    Attributes
+    ----------
+    delta_mm, eps_rad : float
+        Standard deviation at order 1 of a displacement and of a rotation.
+    decay : float
+        From each order to the next.
+    offset_rad : float
+        Of a direction offset.
+    constant_mm, constant_rad : float or None
+        At order 0 where it differs: constants are what a DH model can express as well.
     """
 
     delta_mm: float
