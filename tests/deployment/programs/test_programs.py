@@ -282,6 +282,6 @@ def test_waypoints_of_polyscope_start_from_their_joints(tmp_path):
 )
 def test_moves_to_positions_that_are_not_there_are_listed(name, text, expected):
     language = kuka if name.endswith(".src") else abb
-    found = language.read([Source(Path(name), text)], {}, None)
+    found = language.read([Source(Path(name), text)], None)
     assert sorted(int(line.split(":")[1]) for line in found.not_corrected) == expected
     assert all(each.tool is not None for each in found.positions if each.scale is None)

@@ -23,7 +23,7 @@ from kinacc.deployment.programs.record import (
     blanked,
     in_use,
 )
-from kinacc.geometry import IDENTITY, compose
+from kinacc.geometry import compose
 
 CONVENTION = Convention(QUATERNION)
 
@@ -56,8 +56,8 @@ _UNUSED = 8.9e9
 
 
 def frames_of(source: Source) -> Frames:
-    """Tools and work objects that a module declares, and tool0 and wobj0."""
-    frames = {(TOOL, "TOOL0"): IDENTITY, (BASE, "WOBJ0"): IDENTITY}
+    """Tools and work objects that a module declares."""
+    frames = {}
     text = _plain(source)
     for data in _FRAME_DATA.finditer(text):
         spans = [frame.span() for frame in _FRAME.finditer(text, *data.span())]
@@ -69,14 +69,15 @@ def frames_of(source: Source) -> Frames:
     return frames
 
 
-def read(sources: Sequence[Source], frames: Frames, _: np.ndarray | None) -> Program:
+def read(sources: Sequence[Source], _: np.ndarray | None) -> Program:
     """Positions of a module."""
     (source,) = sources
     text = _plain(source)
     ends = {target.start(): target.end() for target in _TARGET.finditer(text)}
     names: dict[int, str] = {}
     uses: dict[int, set[tuple[str | None, str | None]]] = {}
-    computed, refused, moves, assignments = [], {}, [], []
+    refused: dict[str | None, str] = {}
+    computed, moves, assignments = [], [], []
     for data in _FRAME_DATA.finditer(text):
         holds, programmed = data[3].upper(), data[1] or (data[4] or "").upper()
         if holds == ("FALSE" if data[1] else "TRUE") or programmed == "FALSE":
@@ -93,10 +94,8 @@ def read(sources: Sequence[Source], frames: Frames, _: np.ndarray | None) -> Pro
             names_used = {*re.findall(r"(?<!\\)\b[A-Z]\w*", bare)}
             if not here and not _COMPUTED.search(statement):
                 moves.append((line, names_used))
-            for start in [
-                *here,
-                *(start for start, name in names.items() if name.upper() in names_used),
-            ]:
+            here += [start for start, name in names.items() if name.upper() in names_used]
+            for start in here:
                 way = tool and tool[1], work[1] if work else "WOBJ0"
                 uses.setdefault(start, set()).add(way)
         else:
@@ -112,26 +111,25 @@ def read(sources: Sequence[Source], frames: Frames, _: np.ndarray | None) -> Pro
     computed += [line for line, name in assignments if name in defined and line not in computed]
     positions = []
     for start, end in ends.items():
-        position = _position(source, start, end)
         ways: set[Use] = {
-            (tool, base, refused.get(tool or "") or refused.get(base or "") or "")
+            (tool, base, refused.get(tool) or refused.get(base, ""))
             for tool, base in uses.get(start, {(None, None)})
         }
         array = [item for item, name in names.items() if name == names.get(start)]
         index = f"{{{array.index(start) + 1}}}" if len(array) > 1 else ""
-        name = names.get(start, f"line {position.where.split(':')[1]}") + index
-        positions.append(in_use(position, name, ways))
-    return Program(sources, positions, frames, computed)
+        name = names.get(start, source.line(start)) + index
+        positions.append(in_use(_position(name, source, start, end), ways))
+    return Program(sources, positions, computed)
 
 
-def _position(source: Source, start: int, end: int) -> Position:
+def _position(name: str, source: Source, start: int, end: int) -> Position:
     places = source.numbers(start, end)
     values = source.values(places)
     moves = bool(np.any((np.abs(values[-6:]) < _UNUSED) & (values[-6:] != 0.0)))
     if len(places) == 12:
-        return Position("", source, places[:6], 4, 1.0, moves_outside=moves)
+        return Position(name, source, places[:6], 4, 1.0, moves_outside=moves)
     stated, decimals = _stated(values[7:11]), (3, 3, 3, 9, 9, 9, 9)
-    return Position("", source, places[:7], decimals, posture=stated, moves_outside=moves)
+    return Position(name, source, places[:7], decimals, posture=stated, moves_outside=moves)
 
 
 def _stated(numbers: Iterable[float]) -> tuple[str, ...]:

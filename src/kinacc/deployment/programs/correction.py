@@ -32,6 +32,7 @@ from kinacc.deployment.programs.frame_files import frames_of
 from kinacc.deployment.programs.orientation import Convention
 from kinacc.deployment.programs.record import (
     BASE,
+    KNOWN,
     TOOL,
     Frames,
     Language,
@@ -125,16 +126,16 @@ def read_program(
     partners = (beside.get(path.stem.lower() + suffix) for suffix in language.partners)
     named = map(beside.get, language.frame_files)
     sources = [Source.read(item) for item in (path, *filter(None, partners))]
-    frames: Frames = {}
+    frames = dict(KNOWN)
     for source in [*map(Source.read, map(Path, (*filter(None, named), *frame_files))), *sources]:
         is_yaml = source.path.suffix.lower() == ".yaml"
         frames |= frames_of(source, language.convention) if is_yaml else language.frames(source)
-    program = language.read(sources, frames, pulses_per_degree)
+    program = language.read(sources, pulses_per_degree)
     if not program.positions:
         message = "is computed, incomplete or defined elsewhere"
         computed = [Problem(line, message) for line in program.not_corrected]
         raise InputError([Problem(str(path), "has no positions that can be corrected"), *computed])
-    return language, program
+    return language, replace(program, frames=frames | program.frames)
 
 
 def compensate_program(
@@ -275,7 +276,7 @@ def _obstacle(
         return f"the calibrated arm: {PoseStatus(row['outcome']).name.lower().replace('_', ' ')}"
     if row["change_mm"] > at_most_mm:
         return f"would move by {row['change_mm']:.3g} mm (--at-most-mm)"
-    if position.posture is None or language.posture is None:
+    if not position.posture:
         return ""
     changed = posture.unmatched(robot, language.posture, position.posture, row["q_rad"])
     return f"the posture would change: {changed}" if changed else ""

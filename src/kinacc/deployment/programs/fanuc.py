@@ -9,9 +9,7 @@ import numpy as np
 
 from kinacc.deployment.programs.orientation import FIXED, Convention
 from kinacc.deployment.programs.record import (
-    NO_FRAMES,
     NUMBER,
-    Frames,
     Language,
     Position,
     Program,
@@ -28,7 +26,7 @@ _MOTION = re.compile(r"^\s*\d*\s*:\s*[JLCAS]\s+P(R?)\[.*", re.M)
 _OFFSET = re.compile(r"\b(?:Tool_)?Offset\b|\bINC\b|\bSkip", re.I)
 
 
-def read(sources: Sequence[Source], frames: Frames, _: np.ndarray | None) -> Program:
+def read(sources: Sequence[Source], _: np.ndarray | None) -> Program:
     """Positions of a listing, group 1; other groups stay as they are."""
     (source,) = sources
     computed = [
@@ -38,7 +36,7 @@ def read(sources: Sequence[Source], frames: Frames, _: np.ndarray | None) -> Pro
     ]
     start = max(source.text.find("/POS"), 0)
     positions = [_position(source, match) for match in _POSITION.finditer(source.text, start)]
-    return Program(sources, [*filter(None, positions)], {**NO_FRAMES, **frames}, computed)
+    return Program(sources, [*filter(None, positions)], computed)
 
 
 def _position(source: Source, match: re.Match) -> Position | None:
@@ -57,7 +55,7 @@ def _position(source: Source, match: re.Match) -> Position | None:
         None if is_pose else 1.0,
         numbered.get("T"),
         numbered.get("F"),
-        _stated(config) if config and is_pose else None,
+        _stated(config) if config and is_pose else (),
         moves_outside=any(float(value[2]) for key, value in values.items() if key[0] == "E"),
         refused="has a joint in mm" if slides else "",
     )

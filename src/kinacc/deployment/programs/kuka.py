@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,7 +12,6 @@ from kinacc.deployment.programs.orientation import KUKA, Convention
 from kinacc.deployment.programs.record import (
     BASE,
     CHANGED,
-    NO_FRAMES,
     NUMBER,
     STILL,
     TOOL,
@@ -60,7 +60,7 @@ def frames_of(source: Source) -> Frames:
     return frames
 
 
-def read(sources: Sequence[Source], frames: Frames, _: np.ndarray | None) -> Program:
+def read(sources: Sequence[Source], _: np.ndarray | None) -> Program:
     """Positions of a KRL program."""
     data: dict[str, Use] = {}
     positions: dict[str, Position] = {}
@@ -73,9 +73,8 @@ def read(sources: Sequence[Source], frames: Frames, _: np.ndarray | None) -> Pro
             use = _in_force(use, text, data, source.where(offset))
             changed |= {(kind.lower(), str(int(n))) for kind, n in _CHANGED.findall(text)}
             if motion := _MOTION.match(text):
-                line = f"line {source.where(offset).split(':')[1]}"
                 inline = {
-                    line + " end" * number: _position(source, parts)
+                    source.line(offset) + " end" * number: _position(source, parts)
                     for number, parts in enumerate(aggregates[: 2 if motion[1] else 1])
                 }
                 target = re.split(r"\bWITH\b|\bC_\w+", re.sub(r"\{[^}]*\}", "", motion[3]))[0]
@@ -111,10 +110,10 @@ def read(sources: Sequence[Source], frames: Frames, _: np.ndarray | None) -> Pro
             (tool, base, CHANGED if {(TOOL, tool), (BASE, base)} & changed else reason)
             for tool, base, reason in ways
         }
-        result.append(in_use(position, name, ways))
+        result.append(in_use(replace(position, name=name), ways))
     result.sort(key=lambda position: (_ending(position.source), position.places[0]))
     computed += [statement for statement, names in moves if not defined.issuperset(names)]
-    return Program(sources, result, {**NO_FRAMES, **frames}, computed)
+    return Program(sources, result, computed)
 
 
 def _ending(source: Source) -> str:
@@ -188,7 +187,7 @@ def _position(source: Source, parts: Parts) -> Position | None:
         return Position("", source, places, 4, 1.0) if places else None
     outer = [parts[key][0] for key in parts if re.fullmatch(r"E[1-6]", key)]
     moves = any(re.fullmatch(NUMBER, text) and float(text) for text in outer)
-    stated = _bits(*(_whole(parts[key][0]) for key in "ST")) if {*"ST"} <= set(parts) else None
+    stated = _bits(*(_whole(parts[key][0]) for key in "ST")) if {*"ST"} <= set(parts) else ()
     return Position("", source, places, 4, posture=stated, moves_outside=moves)
 
 

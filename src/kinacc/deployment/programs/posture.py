@@ -50,8 +50,8 @@ def postures_of(robot: Robot, flange: Sequence[Pose]) -> Sequence[np.ndarray]:
 def choose(
     robot: Robot,
     ways: np.ndarray,
-    posture: Posture | None,
-    stated: Stated | None,
+    posture: Posture,
+    stated: Stated,
     near_rad: np.ndarray | None,
 ) -> np.ndarray | str:
     """Of postures (m, k) on all turns within the limits the one stated, nearest to ``near_rad``.
@@ -63,7 +63,7 @@ def choose(
     inside = (ways >= robot.q_min_rad - 1e-9) & (ways <= robot.q_max_rad + 1e-9)
     ways = ways[inside.all(axis=1)]
     texts = "within its limits"
-    if stated is not None and posture is not None:
+    if stated:
         fits = [not unmatched(robot, posture, stated, way, _ROUNDING_DEG) for way in ways]
         ways, texts = ways[fits], f"in the posture {', '.join(filter(None, stated))}"
     elif near_rad is None and len(ways) > 1:

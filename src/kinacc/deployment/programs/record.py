@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -22,10 +22,11 @@ TOOL, BASE = "tool", "base"
 CHANGED = "the program changes its tool or base"
 SEVERAL = "is used with different tools or bases"
 STILL = "the tool stands still"
-FIXED_BASE = {("base", ""): IDENTITY}  # of languages whose positions are in the robot's base
+ROBOT = "of the robot"  # name of the base of positions in the robot's base
 Place = tuple[int, int]
 Frames = dict[tuple[str, str], Pose]
-NO_FRAMES: Frames = {(kind, "0"): IDENTITY for kind in (TOOL, BASE)}
+NAMES = [(TOOL, "0"), (BASE, "0"), (BASE, ROBOT), (TOOL, "TOOL0"), (BASE, "WOBJ0")]
+KNOWN: Frames = dict.fromkeys(NAMES, IDENTITY)
 
 
 @dataclass(frozen=True)
@@ -43,10 +44,14 @@ class Source:
             raise InputError(Problem(str(path), "is no text of one byte a character"))
         return cls(path, content.decode("latin-1"))
 
+    def line(self, offset: int) -> str:
+        """What a position is called that has no name but its line."""
+        newlines = self.text.count("\n", 0, offset)
+        return f"line {newlines + 1}"
+
     def where(self, offset: int) -> str:
         """File and line of an offset."""
-        newlines = self.text.count("\n", 0, offset)
-        return f"{self.path.name}:{newlines + 1}"
+        return self.line(offset).replace("line ", f"{self.path.name}:")
 
     def statement(self, offset: int, text: str) -> str:
         """File, line and words of a statement."""
@@ -68,7 +73,7 @@ class Position:
     ``places``: of its numbers in ``source``, in the language's units: a pose, or joints where
     ``scale`` is given: written units per degree (mm where a joint slides). ``decimals``: digits
     after the point that new numbers have at least. ``tool`` and ``base`` name frames of the
-    program, None where it states none. ``posture`` is compared with ``Language.posture``, None
+    program, None where it states none. ``posture`` is compared with ``Language.posture``, empty
     where none is stated; ``near_rad``: joints near to it. ``moves_outside``: an external axis is
     not at zero. ``refused``: why it cannot be corrected.
     """
@@ -80,7 +85,7 @@ class Position:
     scale: np.ndarray | float | None = None
     tool: str | None = None
     base: str | None = None
-    posture: tuple[str | None, ...] | None = None
+    posture: tuple[str | None, ...] = ()
     near_rad: np.ndarray | None = None
     moves_outside: bool = False
     refused: str = ""
@@ -99,34 +104,34 @@ class Position:
 Use = tuple[str | None, str | None, str]  # tool, base, and why these cannot be corrected
 
 
-def in_use(position: Position, name: str, uses: Collection[Use]) -> Position:
-    """The position with its name and the frames of its uses; refused where these differ."""
+def in_use(position: Position, uses: Collection[Use]) -> Position:
+    """The position with the frames of its uses; refused where these differ."""
     tool, base, reason = next(iter(uses))
     reason = SEVERAL if len(uses) > 1 else reason
-    return replace(position, name=name, tool=tool, base=base, refused=reason)
+    return replace(position, tool=tool, base=base, refused=reason)
 
 
 @dataclass(frozen=True)
 class Program:
     """A program as read.
 
-    ``frames``: tools and bases by kind and name. ``not_corrected``: statements whose positions are
-    computed, incomplete or defined elsewhere. ``convention``: that of this file, where files of the
-    language differ.
+    ``not_corrected``: statements whose positions are computed, incomplete or defined elsewhere.
+    ``convention``: that of this file, where files of the language differ. ``frames``: tools and
+    bases by kind and name; of a language's ``read`` those of the program's own statements.
     """
 
     sources: Sequence[Source]
     positions: Sequence[Position]
-    frames: Frames
     not_corrected: Sequence[str] = ()
     convention: Convention | None = None
+    frames: Mapping[tuple[str, str], Pose] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
 class Language:
     """One language: how its programs are read and its numbers are meant.
 
-    ``read(sources, frames, pulses_per_degree)`` gives a Program; ``frames(source)`` the tools and
+    ``read(sources, pulses_per_degree)`` gives a Program; ``frames(source)`` the tools and
     bases that a file holds. ``partners``: endings of files written together with the program;
     ``frame_files``: names, in lower case, of files with frames beside it. ``posture``: what the
     controller calls the posture, from the sides (front, elbow up, wrist of joint 5 positive) and
@@ -136,9 +141,9 @@ class Language:
     name: str
     endings: tuple[str, ...]
     convention: Convention
-    read: Callable[[Sequence[Source], Frames, np.ndarray | None], Program]
+    read: Callable[[Sequence[Source], np.ndarray | None], Program]
     frames: Callable[[Source], Frames] = lambda source: {}
-    posture: Callable[[Sequence[bool], np.ndarray], tuple[str, ...]] | None = None
+    posture: Callable[[Sequence[bool], np.ndarray], tuple[str, ...]] = lambda sides, q_deg: ()
     partners: tuple[str, ...] = ()
     frame_files: tuple[str, ...] = ()
     robots: tuple[str, ...] = ()
@@ -154,14 +159,11 @@ def blanked(text: str, *patterns: str) -> str:
 def replaced(source: Source, new: Mapping[Position, np.ndarray]) -> bytes:
     """The file with new numbers of its positions."""
     text = source.text
-    changes = [
-        (place, value, least)
-        for position, values in new.items()
-        if position.source is source
-        for place, value, least in zip(
-            position.places, values, np.broadcast_to(position.decimals, len(values)), strict=True
-        )
-    ]
+    changes: list[tuple[Place, float, int]] = []
+    for position, values in new.items():
+        if position.source is source:
+            decimals = np.broadcast_to(position.decimals, len(values))
+            changes += zip(position.places, values, decimals, strict=True)
     for (start, end), value, least in sorted(changes, reverse=True):
         text = text[:start] + _written(text[start:end], value, least) + text[end:]
     return text.encode("latin-1")

@@ -16,8 +16,7 @@ from kinacc.deployment.programs.orientation import (
     Convention,
 )
 from kinacc.deployment.programs.record import (
-    FIXED_BASE,
-    Frames,
+    ROBOT,
     Language,
     Position,
     Program,
@@ -36,7 +35,7 @@ _TURNS = {
 _COLUMN = re.compile(r"(\w+?)(?:(?:_|\s*[\[(])(mm|m|deg|rad)[\])]?)?")
 
 
-def read(sources: Sequence[Source], frames: Frames, _: np.ndarray | None) -> Program:
+def read(sources: Sequence[Source], _: np.ndarray | None) -> Program:
     """Positions of a CSV file: joints where it has them, else poses in the robot's base."""
     (source,) = sources
     lines = [line for line in re.finditer(r"[^\r\n]+", source.text) if line[0].strip()]
@@ -61,18 +60,16 @@ def read(sources: Sequence[Source], frames: Frames, _: np.ndarray | None) -> Pro
     for line in lines[1:]:
         spans = [cell.span(1) for cell in cells.finditer(source.text, *line.span())]
         row = dict(zip(units, spans, strict=False))
-        where = source.where(line.start())
         try:
             places = [row[key] for key in keys]
             source.values(places)
         except (KeyError, ValueError):
             message = f"has no number in a column of {', '.join(keys)}"
-            raise InputError(Problem(f"{source.path.parent / where}", message)) from None
-        label = f"line {where.split(':')[1]}"
-        if "pose" in row:
-            label = source.text[slice(*row["pose"])]
-        positions.append(Position(label, source, places, 6, scale, tool="", base=""))
-    return Program(sources, positions, {**frames, **FIXED_BASE}, convention=convention)
+            where = source.path.parent / source.where(line.start())
+            raise InputError(Problem(str(where), message)) from None
+        label = source.text[slice(*row["pose"])] if "pose" in row else source.line(line.start())
+        positions.append(Position(label, source, places, 6, scale, "", ROBOT))
+    return Program(sources, positions, convention=convention)
 
 
 LANGUAGE = Language("CSV", (".csv",), Convention(FIXED), read)

@@ -9,8 +9,8 @@ import numpy as np
 
 from kinacc.deployment.programs.orientation import VECTOR, Convention
 from kinacc.deployment.programs.record import (
-    FIXED_BASE,
     NUMBER,
+    ROBOT,
     TOOL,
     Frames,
     Language,
@@ -32,28 +32,27 @@ _ARGUMENT = re.compile(
 )
 
 
-def read(sources: Sequence[Source], frames: Frames, _: np.ndarray | None) -> Program:
+def read(sources: Sequence[Source], _: np.ndarray | None) -> Program:
     """Positions of a script: the targets of its moves, written there or in a variable."""
     (source,) = sources
     text = blanked(source.text, r"#.*", r'"[^"\r\n]*"')
+    names = {item.span(2): item[1] for item in _ASSIGNED.finditer(text)}
     named: dict[str, list[Place]] = {}
-    for item in _ASSIGNED.finditer(text):
-        named.setdefault(item[1], []).append(item.span(2))
-    names = {span: name for name, spans in named.items() for span in spans}
-    frames, tool = {**frames, **FIXED_BASE}, None
+    for place, name in names.items():
+        named.setdefault(name, []).append(place)
+    frames: Frames = {}
     uses: dict[Place, set[Use]] = {}
-    near, computed = {}, []
+    tool, near, computed = None, {}, []
     for call in _CALL.finditer(text):
-        start, where = call.end(), source.where(call.start())
+        start = call.end()
         for _number in range(2 if call[1] == "movec" else 1):
             argument = _ARGUMENT.match(text, start)
-            if argument is None:
-                spans = []
-            else:
+            spans = []
+            if argument:
                 start = argument.end()
                 spans = [argument.span(2)] if argument[2] else named.get(argument[3], [])
             if call[1] == "set_tcp":
-                tool = f"set_tcp in line {where.split(':')[1]}" if spans else "set_tcp"
+                tool = f"set_tcp in {source.line(call.start())}" if spans else "set_tcp"
                 if len(spans) == 1:
                     frames[TOOL, tool] = CONVENTION.pose(source.values(source.numbers(*spans[0])))
                 break
@@ -62,16 +61,16 @@ def read(sources: Sequence[Source], frames: Frames, _: np.ndarray | None) -> Pro
                 computed.append(source.statement(call.start(), line))
                 break
             for span in spans:
-                uses.setdefault(span, set()).add((tool, "", ""))
+                uses.setdefault(span, set()).add((tool, ROBOT, ""))
                 if argument and argument[1] and argument[4] in named:
                     near[span] = source.values(source.numbers(*named[argument[4]][-1]))
     positions = []
     for span in sorted(uses):
         scale = None if text[span[0]] == "p" else np.pi / 180.0
-        position = Position("", source, source.numbers(*span), 6, scale, near_rad=near.get(span))
-        name = names.get(span, f"line {position.where.split(':')[1]}")
-        positions.append(in_use(position, name, uses[span]))
-    return Program(sources, positions, frames, computed)
+        name, places = names.get(span, source.line(span[0])), source.numbers(*span)
+        position = Position(name, source, places, 6, scale, near_rad=near.get(span))
+        positions.append(in_use(position, uses[span]))
+    return Program(sources, positions, computed, frames=frames)
 
 
 LANGUAGE = Language("URScript", (".script", ".urscript"), CONVENTION, read, robots=("ur",))

@@ -10,7 +10,7 @@ import numpy as np
 from kinacc.deployment.programs.orientation import FIXED, Convention
 from kinacc.deployment.programs.record import (
     BASE,
-    NO_FRAMES,
+    ROBOT,
     TOOL,
     Frames,
     Language,
@@ -19,7 +19,6 @@ from kinacc.deployment.programs.record import (
     Source,
 )
 from kinacc.errors import InputError, Problem
-from kinacc.geometry import IDENTITY
 
 CONVENTION = Convention(FIXED)
 _POSITION = re.compile(r"^(B?C|B?P|E[CX])(\d+)\s*=(.*)|^///(\w+)(.*)", re.M)
@@ -48,14 +47,13 @@ def frames_of(source: Source) -> Frames:
     return frames
 
 
-def read(
-    sources: Sequence[Source], frames: Frames, pulses_per_degree: np.ndarray | None
-) -> Program:
+def read(sources: Sequence[Source], pulses: np.ndarray | None) -> Program:
     """Positions of a job; those of base and station axes, and shifts, stay as they are."""
     (source,) = sources
     end = source.text.find("//INST") % (len(source.text) + 1)
     reached: set[int] = set()
-    computed, shifts, moving, positions = [], set(), set(), []
+    shifts: set[int] = set()
+    computed, moving, positions = [], set(), []
     for line in _INSTRUCTION.finditer(source.text, end):
         numbers = map(int, re.findall(r"\bP(\d+)\b", line[0]))
         (reached if line[1] else shifts).update(numbers)
@@ -72,16 +70,11 @@ def read(
             moving |= {name} if source.values(places).any() else set()
         elif kind == "C" or int(name) in reached - shifts:
             positions.append((kind, name, places, dict(state)))
-    frames = {**NO_FRAMES, (BASE, "ROBOT"): IDENTITY, (BASE, "BASE"): IDENTITY, **frames}
-    return Program(
-        sources,
-        [
-            _position(source, kind + name, places, state, pulses_per_degree, name in moving)
-            for kind, name, places, state in positions
-        ],
-        frames,
-        computed,
-    )
+    read = [
+        _position(source, kind + name, places, state, pulses, name in moving)
+        for kind, name, places, state in positions
+    ]
+    return Program(sources, read, computed)
 
 
 def _position(
@@ -100,8 +93,8 @@ def _position(
         places[:6],
         (3, 3, 3, 4, 4, 4),
         tool=str(int(state.get("TOOL", "0").split(",")[0])),
-        base=str(int(state.get("USER") or 0)) if reference == "USER" else reference,
-        posture=_named(map(int, rconf.split(","))) if rconf else None,
+        base=str(int(state.get("USER") or 0)) if reference == "USER" else ROBOT,
+        posture=_named(map(int, rconf.split(","))) if rconf else (),
         moves_outside=moves or bool(source.values(places[6:]).any()),
         refused="" if known else f"is in the frame {reference or 'of its axes'}",
     )
