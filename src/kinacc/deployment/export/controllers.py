@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import pandas as pd
 import yaml
 
 from kinacc.deployment.programs.orientation import (
@@ -27,7 +28,7 @@ from kinacc.kinematics.robot.axes import Axes, chain_of
 Numbers = dict[str, tuple[float, str]]  # by name: value and unit
 
 ZEROS = PARAMETERS[:1]
-_RAD = 180.0 / np.pi
+_UNITS = {"mm": 1.0, "m": 1e3, "deg": 1.0, "rad": 180.0 / np.pi, "": 1.0}
 _PARALLEL = 1e-12  # sine of an angle between axes, below which a common normal has no direction
 _UR_LINKS = ("shoulder", "upper_arm", "forearm", "wrist_1", "wrist_2", "wrist_3")
 _UR_ALPHA = np.deg2rad([90.0, 0.0, 0.0, 90.0, -90.0, 0.0])
@@ -44,31 +45,33 @@ class Controller:
     """
 
     name: str
-    takes: Sequence[str]
-    group: str
     arm: Callable[[Robot, DHModel], Numbers]
     frame: Callable[[Pose], Numbers]
     enter: str
     remark: str = ""
+    group: str = "joint zeros"
+    takes: Sequence[str] = ZEROS
     text: Callable[[Numbers], str] = lambda numbers: ""
     ending: str = ""
 
 
-def _zeros(names: Sequence[str]) -> Callable[[Robot, DHModel], Numbers]:
+def _zeros(names: str) -> Callable[[Robot, DHModel], Numbers]:
     """Angles (deg) of reported joints at which the axes stand when the pendant shows 0."""
 
     def numbers(robot: Robot, model: DHModel) -> Numbers:
         shift = model.theta_offset_rad - robot.dh.theta_offset_rad
         angles = np.rad2deg(reported_joints(robot, shift))
-        return {name: (float(x), "deg") for name, x in zip(names, angles, strict=False)}
+        return {name: (float(x), "deg") for name, x in zip(names.split(","), angles, strict=False)}
 
     return numbers
 
 
-def _frame(names: str, convention: Convention) -> Callable[[Pose], Numbers]:
-    """Names and numbers of a frame; units by those of the convention."""
-    length, turn = ("mm", "deg") if convention.length_mm == 1.0 else ("m", "rad")
-    units = [length] * 3 + ["" if convention.orientation == QUATERNION else turn] * 4
+def _frame(
+    names: str, orientation: str, length: str = "mm", angle: str = "deg"
+) -> Callable[[Pose], Numbers]:
+    """Names, numbers and units of a frame."""
+    convention = Convention(orientation, *(_UNITS[unit] for unit in (length, angle)))
+    units = [length] * 3 + [angle] * 4
 
     def numbers(pose: Pose) -> Numbers:
         values = convention.numbers(pose, np.zeros(len(names.split()))).tolist()
@@ -91,10 +94,11 @@ def _staubli(robot: Robot, model: DHModel) -> Numbers:
     theta, d_mm, a_mm, alpha, beta = (
         getattr(model, name) - getattr(robot.dh, name) for name in PARAMETERS
     )
-    lengths = {"d": d_mm, "a": a_mm, "b": 0.0 * a_mm}
-    angles = {"theta": theta, "alpha": alpha, "beta": beta}
-    columns = {name: (values, "mm") for name, values in lengths.items()}
-    return _by_joint(columns | {name: (np.rad2deg(x), "deg") for name, x in angles.items()})
+    return _by_joint({
+        "d": (d_mm, "mm"), "a": (a_mm, "mm"), "b": (0.0 * a_mm, "mm"),
+        "theta": (np.rad2deg(theta), "deg"), "alpha": (np.rad2deg(alpha), "deg"),
+        "beta": (np.rad2deg(beta), "deg"),
+    })  # fmt: skip
 
 
 def _ur(robot: Robot, model: DHModel) -> Numbers:
@@ -131,57 +135,51 @@ def _ros(robot: Robot, model: DHModel) -> Numbers:
     return numbers
 
 
-_ros_frame = _frame("x y z roll pitch yaw", Convention(FIXED, 1e3, _RAD))
+_ros_frame = _frame("x y z roll pitch yaw", FIXED, "m", "rad")
 
 
-def _nested(numbers: Numbers, outer: int) -> dict[str, dict[str, float]]:
-    """Numbers by the first or second (``outer`` 0 or 1) part of their name, and by the other."""
+def _nested(numbers: Numbers) -> dict[str, dict[str, float]]:
+    """Numbers by the two parts of their names."""
     result: dict[str, dict[str, float]] = {}
     for name, (value, _) in numbers.items():
-        parts = name.rstrip("]").replace("[", " ").split()
-        result.setdefault(parts[outer], {})[parts[1 - outer]] = value
+        outer, inner = name.rstrip("]").replace("[", " ").split()
+        result.setdefault(outer, {})[inner] = value
     return result
 
 
 def _ur_text(numbers: Numbers) -> str:
     rows = [
         f"{name} = [ {', '.join(f'{x:.17g}' for x in row.values())}]"
-        for name, row in _nested(numbers, 0).items()
+        for name, row in _nested(numbers).items()
     ]
     return "\n".join(["[mounting]", *rows])
 
 
 def _staubli_text(numbers: Numbers) -> str:
     rows = [
-        f'  <DH index="{int(joint) - 1}" '
-        + " ".join(f'{key}="{x:.9f}"' for key, x in row.items())
-        + " />"
-        for joint, row in _nested(numbers, 1).items()
+        " ".join([f'  <DH index="{joint}"', *(f'{key}="{x:.9f}"' for key, x in row.items()), "/>"])
+        for joint, row in enumerate(pd.DataFrame(_nested(numbers)).to_dict("records"))
     ]
     return "\n".join(['<DhArray name="dhOffset">', *rows, "</DhArray>"])
 
 
 def _ros_text(numbers: Numbers) -> str:
-    content = {"kinematics": {**_nested(numbers, 0), "hash": "calib_kinacc"}}
+    content = {"kinematics": {**_nested(numbers), "hash": "calib_kinacc"}}
     return yaml.safe_dump(content, sort_keys=False)
 
 
 CONTROLLERS = {
     "kuka": Controller(
         "KUKA",
-        ZEROS,
-        "joint zeros",
-        _zeros([f"A{i}" for i in range(1, 8)]),
-        _frame("X Y Z A B C", Convention(KUKA)),
+        _zeros("A1,A2,A3,A4,A5,A6,A7"),
+        _frame("X Y Z A B C", KUKA),
         "Joint zeros: add to $MAMES of each axis in the machine data, or drive every axis to minus "
         "the value and master it there as 0. TOOL and BASE: Start-up, Calibrate, Numeric input.",
     ),
     "abb": Controller(
         "ABB",
-        ZEROS,
-        "joint zeros",
-        _zeros([f"axis {i}" for i in range(1, 8)]),
-        _frame("x y z q1 q2 q3 q4", Convention(QUATERNION)),
+        _zeros("axis 1,axis 2,axis 3,axis 4,axis 5,axis 6,axis 7"),
+        _frame("x y z q1 q2 q3 q4", QUATERNION, angle=""),
         "Joint zeros: jog every axis to minus the value, then Calibration, Fine calibration. "
         "TOOL: tframe of the tooldata; BASE: uframe of the wobjdata (robhold FALSE).",
         "Absolute Accuracy files (absacc, .cfg of CalibWare) cannot be written: their format is "
@@ -189,54 +187,50 @@ CONTROLLERS = {
     ),
     "fanuc": Controller(
         "FANUC",
-        ZEROS,
-        "joint zeros",
-        _zeros([f"J{i}" for i in range(1, 8)]),
-        _frame("X Y Z W P R", Convention(FIXED)),
+        _zeros("J1,J2,J3,J4,J5,J6,J7"),
+        _frame("X Y Z W P R", FIXED),
         "Joint zeros: jog all joints to 0, then SINGLE AXIS MASTER with the value as MSTR POS. "
         "TOOL: UTOOL, direct entry; BASE: UFRAME, direct entry.",
     ),
     "ur": Controller(
         "Universal Robots",
-        PARAMETERS,
-        "DH deltas",
         _ur,
-        _frame("x y z rx ry rz", Convention(VECTOR, 1e3, _RAD)),
+        _frame("x y z rx ry rz", VECTOR, "m", "rad"),
         "DH deltas: they replace those in section [mounting] of the controller's calibration.conf; "
         "keep its other lines. TOOL: set_tcp; BASE: a plane feature.",
         "Large delta_d of joints 2 to 4 are usual: their axes are nearly parallel.",
+        "DH deltas",
+        PARAMETERS,
         _ur_text,
         ".conf",
     ),
     "yaskawa": Controller(
         "Yaskawa",
-        ZEROS,
-        "joint zeros",
-        _zeros("SLURBTE"),
-        _frame("X Y Z Rx Ry Rz", Convention(FIXED)),
+        _zeros("S,L,U,R,B,T,E"),
+        _frame("X Y Z Rx Ry Rz", FIXED),
         "Joint zeros: jog every axis to minus the value, then ROBOT, HOME POSITION, register it. "
         "TOOL: tool file; BASE: user frame, as coordinates in the robot frame.",
     ),
     "staubli": Controller(
         "Staubli",
-        PARAMETERS,
-        "DH offsets",
         _staubli,
-        _frame("x y z rx ry rz", Convention(INTRINSIC)),
+        _frame("x y z rx ry rz", INTRINSIC),
         "DH offsets: array dhOffset of /usr/configs/arm.cfx; they are added to the standard DH "
         "table of the robot file. TOOL: trsf of the tool; BASE: trsf of the frame.",
+        group="DH offsets",
+        takes=PARAMETERS,
         text=_staubli_text,
         ending=".cfx",
     ),
     "ros": Controller(
         "ROS",
-        PARAMETERS,
-        "joint origins",
         _ros,
         _ros_frame,
         "Joint origins: kinematics_params_file of ur_robot_driver or ur_description. TOOL: a fixed "
         "joint from the last link; BASE: a fixed joint from the base.",
         "Other arms: kinacc export --format urdf.",
+        "joint origins",
+        PARAMETERS,
         _ros_text,
         ".yaml",
     ),

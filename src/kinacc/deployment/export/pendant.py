@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from kinacc.calibration import delivered, fitting, residuals
+from kinacc.calibration import delivered, residuals
 from kinacc.calibration.dh_estimator import DHEstimator
 from kinacc.calibration.fitting import ModelFit
 from kinacc.calibration.identifiability import listed
@@ -22,8 +22,6 @@ from kinacc.errors import InputError, Problem
 from kinacc.geometry import Pose, compose, invert
 from kinacc.kinematics.dh import PARAMETERS
 from kinacc.kinematics.robot import Robot
-
-_QUANTITIES = ("position", "orientation")
 
 
 @dataclass(frozen=True)
@@ -97,16 +95,12 @@ def fit_pendant(
     free = terms.free & np.isin(PARAMETERS, maker.takes)
 
     def fit(observations: Observations) -> ModelFit:
-        frames, known = common.frames(observations)
-        return fitting.fit(
+        return common.fit(
             observations,
             terms.nominal,
             free=free,
             std=terms.std,
-            rotation_weight_mm_per_rad=common.rotation_weight_mm_per_rad,
             threshold=estimator.threshold,
-            frames=frames,
-            frame_terms=known,
             loss=estimator.loss,
             name=f"fit for {maker.name}",
         )
@@ -129,23 +123,33 @@ def fit_pendant(
     recorded = pd.DataFrame(tables["residuals"])
     recorded = recorded[recorded["fold"].isna()]
     subset = max(recorded["subset"])  # validation, where there is one
-    recorded = recorded[recorded["subset"] == subset].set_index(["comparison", "quantity"])
-    comparison, selected = f"{PLAINEST}_vs_measured", selected_model(tables)
-    off = errors[comparison]
-    of_maker = map(residuals.statistics, (off.position_mm, 1e3 * off.rotation_rad))
-    rows = [[part.mean if part else np.nan for part in of_maker]]
-    rows += [
-        [
-            recorded["mean"].get((f"{kind}_vs_measured", quantity), np.nan)
-            for quantity in _QUANTITIES
-        ]
-        for kind in (selected, NOMINAL)
-    ]
-    mean_errors = pd.DataFrame(rows, columns=["position_mm", "orientation_mrad"])
-    named = f"calibrated ({model_name(selected)})", "nominal, base and tool fitted"
-    mean_errors.insert(0, "model", [f"{maker.name} controller", *named])
-    mean_errors["points"] = int(np.isfinite(off.position_mm).all(axis=1).sum())
-    mean_errors["poses"] = POSES[subset]
+    means = recorded[recorded["subset"] == subset].pivot(
+        index="comparison", columns="quantity", values="mean"
+    )
+    selected, off = selected_model(tables), errors[f"{PLAINEST}_vs_measured"]
+    means = means.reindex([f"{selected}_vs_measured", f"{NOMINAL}_vs_measured"])
+    mean_errors = pd.DataFrame(
+        {
+            "model": [
+                f"{maker.name} controller",
+                f"calibrated ({model_name(selected)})",
+                "nominal, base and tool fitted",
+            ],
+            **{
+                name: [part.mean if part else np.nan, *means.get(quantity, [np.nan] * 2)]
+                for name, quantity, part in (
+                    ("position_mm", "position", residuals.statistics(off.position_mm)),
+                    (
+                        "orientation_mrad",
+                        "orientation",
+                        residuals.statistics(1e3 * off.rotation_rad),
+                    ),
+                )
+            },
+            "points": int(np.isfinite(off.position_mm).all(axis=1).sum()),
+            "poses": POSES[subset],
+        }
+    )
     values = [
         (group, key, unit, *(round(float(x), 12) + 0.0 for x in (old[group][key][0], value)))
         for group, numbers in new.items()
