@@ -19,67 +19,86 @@ seven: three such products, and a triangular factor of twice the operations at h
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from importlib.metadata import version
 
 import numpy as np
 from harness import Contender, Work
+from scipy.optimize import least_squares
 
+from kinacc.calibration import fitting, vec_fit
+from kinacc.calibration.constraints import free_parameters
+from kinacc.calibration.frames import FrameParameters, known
+from kinacc.calibration.observations import Observations, full_poses
+from kinacc.calibration.system import PoseSystem
+from kinacc.geometry import Pose, compose, exp_so3
+from kinacc.kinematics import dh, robot, vec
+
+ARM = robot.load("mh180")
 WEIGHT = 500.0  # mm per rad
 NOISE_MM, NOISE_RAD = 0.05, 1e-4
+ERRORS = np.array([1e-3, 0.5, 0.5, 1e-3, 1e-3])  # of the arm's rows, in mm and rad
 GRAM = "one Gram product"
 
 
 def works(smoke: bool) -> list[Work]:
-    """DH fits beside scipy and pybotics, VEC fits and choices of order beside matrix products."""
+    """DH fits beside scipy and pybotics, VEC fits beside matrix products."""
     poses = 60 if smoke else 500
     own, scipy = version("kinacc"), version("scipy")
-    fitted = Work(
-        f"DH fit, {poses} full poses", "fit", 1,
-        (
-            Contender("kinacc", own, _dh(smoke)),
-            Contender("scipy 2-point", scipy, _scipy(smoke, analytic=False)),
-            Contender("scipy analytic", scipy, _scipy(smoke, analytic=True)),
-        ),
-        _same_cost, {"scipy 2-point": 4.0},
-    )  # fmt: skip
+    free = free_parameters(6, (1, 2, 3, 4, 5))
+    seen = _observations(poses, free, 1)
+    of_tool = free_parameters(6)
+    of_tool[5, 2:4] = False  # pybotics' tool has them
+    positions = _observations(30, of_tool, 2)
+    positions = replace(positions, rotation=np.full_like(positions.rotation, np.nan))
     count, order = (120, 2) if smoke else (1000, 5)
     rows = np.random.default_rng(0).normal(size=(6 * count, 36 * (order + 1)))
-    product = Contender(GRAM, np.__version__, lambda: rows.T @ rows)
     return [
-        fitted,
+        Work(
+            f"DH fit, {poses} full poses", "fit", 1,
+            (
+                Contender("kinacc", own, lambda: _cost(_fit(seen, free, 1e-2))),
+                Contender("scipy 2-point", scipy, _scipy(seen, free, analytic=False)),
+                Contender("scipy analytic", scipy, _scipy(seen, free, analytic=True)),
+            ),
+            _same_cost, {"scipy 2-point": 4.0},
+        ),
         Work(
             "DH fit, 30 positions", "fit", 1,
-            (Contender("kinacc", own, dh_positions()), *_pybotics()), _same_rms,
-            {"pybotics": 200.0},
+            (
+                Contender("kinacc", own, lambda: _rms(_fit(positions, of_tool, 1e-5))),
+                *_pybotics(positions),
+            ),
+            _same_rms, {"pybotics": 200.0},
         ),
         Work(
             f"VEC fit, {count} poses x {rows.shape[1]}, with rank report", "fit", 1,
-            (Contender("kinacc", own, vec_with_rank(count, order)), product),
+            (
+                Contender("kinacc", own, _vec_with_rank(count, order)),
+                Contender(GRAM, np.__version__, lambda: rows.T @ rows),
+            ),
             lambda outputs: None, {GRAM: 1 / 25},
         ),
     ]  # fmt: skip
 
 
-def dh_positions() -> Callable[[], float]:
-    """A DH fit to positions: the rms of its residuals."""
-    from kinacc.calibration import fitting
-
-    nominal, free, seen, frames = _positions()
-
-    def run() -> float:
-        found = fitting.fit(
-            seen, nominal, free=free, frames=frames, rotation_weight_mm_per_rad=WEIGHT,
-            threshold=1e-5,
-        )  # fmt: skip
-        return float(np.sqrt(found.solution.cost / found.solution.count))
-
-    return run
+def _fit(seen: Observations, free: np.ndarray, threshold: float):
+    return fitting.fit(
+        seen, ARM.dh, free=free, frames=known(), rotation_weight_mm_per_rad=WEIGHT,
+        threshold=threshold,
+    ).solution  # fmt: skip
 
 
-def vec_with_rank(count: int, order: int) -> Callable[[], tuple[float, int]]:
+def _cost(solution) -> tuple[float, int]:
+    return solution.cost, len(solution.undetermined)
+
+
+def _rms(solution) -> float:
+    return float(np.sqrt(solution.cost / solution.count))
+
+
+def _vec_with_rank(count: int, order: int) -> Callable[[], tuple[float, int]]:
     """A VEC fit with base and tool, and its rank report: cost and rank."""
-    from kinacc.calibration import fitting, vec_fit
-
     seen, empty = _wavy(count, order)
     frames = fitting.fit_frames(seen, empty.dh, rotation_weight_mm_per_rad=WEIGHT)
     prior = vec_fit.Prior(1.0, 1e-3, 1.0, 1e-3)
@@ -89,39 +108,16 @@ def vec_with_rank(count: int, order: int) -> Callable[[], tuple[float, int]]:
             seen, empty, prior=prior, rotation_weight_mm_per_rad=WEIGHT, frames=frames,
             frames_free=True,
         )  # fmt: skip
-        told = vec_fit.gauge(seen, found.model, found.frames, WEIGHT)
-        return found.solution.cost, told.rank
+        gauge = vec_fit.gauge(seen, found.model, found.frames, WEIGHT)
+        return found.solution.cost, gauge.rank
 
     return run
 
 
-def _dh(smoke: bool) -> Callable[[], tuple[float, int]]:
-    from kinacc.calibration import fitting
-
-    nominal, free, seen, frames = _full_poses(60 if smoke else 500)
-
-    def run() -> tuple[float, int]:
-        found = fitting.fit(
-            seen, nominal, free=free, frames=frames, rotation_weight_mm_per_rad=WEIGHT,
-            threshold=1e-2,
-        )  # fmt: skip
-        return found.solution.cost, len(found.solution.undetermined)
-
-    return run
-
-
-def _scipy(smoke: bool, analytic: bool) -> Callable[[], tuple[float, None]]:
-    from scipy.optimize import least_squares
-
-    from kinacc.calibration.frames import FrameParameters
-    from kinacc.calibration.system import PoseSystem
-
-    nominal, free, seen, frames = _full_poses(60 if smoke else 500)
-    system = PoseSystem(seen, nominal, free.ravel(), FrameParameters.none(frames), WEIGHT)
-    start, scale = (
-        nominal.start[free.ravel()],
-        np.tile([1e-3, 1.0, 1.0, 1e-3, 1e-3], len(free))[free.ravel()],
-    )
+def _scipy(seen: Observations, free: np.ndarray, analytic: bool) -> Callable:
+    system = PoseSystem(seen, ARM.dh, free.ravel(), FrameParameters.none(known()), WEIGHT)
+    start = ARM.dh.start[free.ravel()]
+    scale = np.tile([1e-3, 1.0, 1.0, 1e-3, 1e-3], len(free))[free.ravel()]
 
     def jacobian(z: np.ndarray) -> np.ndarray:
         return np.concatenate([each for _, each in system.blocks(start + scale * z)]) * scale
@@ -136,105 +132,63 @@ def _scipy(smoke: bool, analytic: bool) -> Callable[[], tuple[float, None]]:
     return run
 
 
-def _pybotics() -> tuple[Contender, ...]:
+def _pybotics(seen: Observations) -> tuple[Contender, ...]:
     try:
         from pybotics.optimization import OptimizationHandler, optimize_accuracy
         from pybotics.robot import Robot
     except ImportError:
         return ()
-    from scipy.optimize import least_squares
-
-    nominal, _, seen, _ = _positions()
-    alpha, a = np.roll(nominal.alpha_rad, 1), np.roll(nominal.a_mm, 1)
+    alpha, a = np.roll(ARM.dh.alpha_rad, 1), np.roll(ARM.dh.a_mm, 1)
     c, s = np.cos(alpha[0]), np.sin(alpha[0])
     tool = np.array([[1, 0, 0, a[0]], [0, c, -s, 0], [0, s, c, 0], [0, 0, 0, 1.0]])
     alpha[0] = a[0] = 0.0
-    table = np.stack([alpha, a, nominal.theta_offset_rad, nominal.d_mm], axis=1)
+    table = np.stack([alpha, a, ARM.dh.theta_offset_rad, ARM.dh.d_mm], axis=1)
 
     def run() -> float:
-        robot = Robot.from_parameters(table.ravel().copy())
-        robot.tool.matrix = tool
-        handler = OptimizationHandler(robot, kinematic_chain_mask=True)
+        arm = Robot.from_parameters(table.ravel().copy())
+        arm.tool.matrix = tool
+        handler = OptimizationHandler(arm, kinematic_chain_mask=True)
         start = handler.generate_optimization_vector()
-        given = handler, seen.q_rad, seen.position_mm
-        found = least_squares(optimize_accuracy, start, method="lm", args=given)
+        data = handler, seen.q_rad, seen.position_mm
+        found = least_squares(optimize_accuracy, start, method="lm", args=data)
         return float(np.sqrt(2.0 * found.cost / seen.position_mm.size))
 
     return (Contender("pybotics", version("pybotics"), run),)
 
 
-def _full_poses(count: int) -> tuple:
-    """Nominal arm, free parameters, full poses, known frames."""
-    from kinacc.calibration.constraints import free_parameters
-    from kinacc.calibration.frames import known
-    from kinacc.calibration.observations import full_poses
-    from kinacc.kinematics import dh, robot
-
-    arm, rng = robot.load("mh180"), np.random.default_rng(1)
-    free = free_parameters(6, (1, 2, 3, 4, 5))
-    q_rad = _joints(arm, count, rng)
-    poses = dh.forward(_off(arm.dh, free, rng), q_rad)
-    return arm.dh, free, full_poses(q_rad, _noisy(poses, rng)), known()
-
-
-def _positions() -> tuple:
-    """Nominal arm, free parameters, positions alone, known frames."""
-    from dataclasses import replace
-
-    from kinacc.calibration.constraints import free_parameters
-    from kinacc.calibration.frames import known
-    from kinacc.calibration.observations import full_poses
-    from kinacc.kinematics import dh, robot
-
-    arm, rng = robot.load("mh180"), np.random.default_rng(2)
-    q_rad = _joints(arm, 30, rng)
-    free = free_parameters(6)
-    free[5, 2:4] = False  # of pybotics' tool, which it is told
-    poses = dh.forward(_off(arm.dh, free, rng), q_rad)
-    seen = full_poses(q_rad, _noisy(poses, rng))
-    return arm.dh, free, replace(seen, rotation=np.full_like(seen.rotation, np.nan)), known()
+def _observations(count: int, free: np.ndarray, seed: int) -> Observations:
+    """Full poses of an arm with its ``free`` parameters off as a calibration finds them."""
+    rng = np.random.default_rng(seed)
+    q_rad = _joints(count, rng)
+    off = free * ERRORS * rng.normal(size=free.shape)
+    true = ARM.dh.with_parameters(ARM.dh.start + off.ravel())
+    return _noisy(q_rad, dh.forward(true, q_rad), rng)
 
 
 def _wavy(count: int, order: int) -> tuple:
     """Full poses of an arm with wavy joints somewhere, and its VEC model without errors."""
-    from dataclasses import replace
-
-    from kinacc.calibration.observations import full_poses
-    from kinacc.geometry import Pose, compose, exp_so3
-    from kinacc.kinematics import robot, vec
-
-    arm, rng = robot.load("mh180"), np.random.default_rng(3)
-    q_rad = _joints(arm, count, rng)
+    rng = np.random.default_rng(3)
+    q_rad = _joints(count, rng)
     span = q_rad.min(axis=0) - 0.02, q_rad.max(axis=0) + 0.02
-    true = vec.without_errors(arm.dh, *span, order + 2)
+    true = vec.without_errors(ARM.dh, *span, order + 2)
     unit = np.array([1.0, 1.0, 1.0, 1e-3, 1e-3, 1e-3])[:, None] / (1.0 + np.arange(order + 3))
     true = replace(true, coefficients=0.3 * unit * rng.normal(size=true.coefficients.shape))
     base, tool = (
         Pose(exp_so3(rng.normal(size=3)), far * rng.normal(size=3)) for far in (1500.0, 80.0)
     )
     poses = compose(base, compose(vec.pose(true, q_rad), tool))
-    return full_poses(q_rad, _noisy(poses, rng)), vec.without_errors(arm.dh, *span, order)
+    return _noisy(q_rad, poses, rng), vec.without_errors(ARM.dh, *span, order)
 
 
-def _joints(arm, count: int, rng: np.random.Generator) -> np.ndarray:
-    low, high = np.maximum(arm.q_min_rad, -np.pi), np.minimum(arm.q_max_rad, np.pi)
-    return rng.uniform(low, high, (count, arm.dh.joints)) @ arm.joint_map.T
+def _joints(count: int, rng: np.random.Generator) -> np.ndarray:
+    low, high = np.maximum(ARM.q_min_rad, -np.pi), np.minimum(ARM.q_max_rad, np.pi)
+    return rng.uniform(low, high, (count, ARM.dh.joints)) @ ARM.joint_map.T
 
 
-def _off(nominal, free: np.ndarray, rng: np.random.Generator):
-    """The arm with its ``free`` parameters off as a calibration finds them."""
-
-    unit = np.array([1e-3, 0.5, 0.5, 1e-3, 1e-3])
-    off = free * unit * rng.normal(size=free.shape)
-    return nominal.with_parameters(nominal.start + off.ravel())
-
-
-def _noisy(poses, rng: np.random.Generator):
-    from kinacc.geometry import Pose, exp_so3
-
-    count = len(poses.position_mm)
-    turn = exp_so3(NOISE_RAD * rng.normal(size=(count, 3)))
-    return Pose(turn @ poses.rotation, poses.position_mm + NOISE_MM * rng.normal(size=(count, 3)))
+def _noisy(q_rad: np.ndarray, poses: Pose, rng: np.random.Generator) -> Observations:
+    turn = exp_so3(NOISE_RAD * rng.normal(size=(len(q_rad), 3)))
+    off_mm = NOISE_MM * rng.normal(size=(len(q_rad), 3))
+    return full_poses(q_rad, Pose(turn @ poses.rotation, poses.position_mm + off_mm))
 
 
 def _same_cost(outputs: Sequence[tuple[float, int | None]]) -> None:

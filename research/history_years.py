@@ -1,6 +1,6 @@
 """False alarms of a robot's history over simulated years, and how small a change it sees.
 
-    python tools/history_years.py --same 1000 --other 100 --out docs/history
+    python research/history_years.py --same 1000 --other 100 --out docs/history
 
 Without a number of years the picture alone is drawn.
 
