@@ -37,6 +37,7 @@ KINACC := .venv/.kinacc-$(call key,requirements/run.txt pyproject.toml)
 TOOLS := .venv/.tools-$(call key,requirements/test.txt)
 CLUSTER := .venv/.cluster-$(call key,requirements/cluster.txt)
 AUDIT := .venv-audit/.audit-$(call key,requirements/audit.txt)
+ROBOTKINECAL := .venv-robotkinecal/.peer-$(call key,requirements/robotkinecal.txt)
 PEERS := .venv-bench/.peers-$(call key,requirements/run.txt requirements/bench.txt pyproject.toml)
 
 reproduce: $(KINACC)
@@ -69,8 +70,8 @@ test-all: lint $(CLUSTER)
 size:
 	@$$(sh requirements/find-python $(PYTHON)) tools/size.py
 
-# The other libraries have an environment of their own: nothing else needs them.
-bench: $(PEERS)
+# The other libraries have environments of their own: nothing else needs them.
+bench: $(PEERS) $(ROBOTKINECAL)
 	@.venv-bench/bin/python benchmarks/run.py $(TOPICS)
 
 SITE = $(PY) -m sphinx -q -W --keep-going -c docs
@@ -83,7 +84,7 @@ docs-links: $(KINACC) $(TOOLS)
 
 # A package that the database does not answer for fails the audit as well.
 audit: $(AUDIT)
-	@for each in run test cluster bench audit; do echo "requirements/$$each.txt"; \
+	@for each in run test cluster bench robotkinecal audit; do echo "requirements/$$each.txt"; \
 	  .venv-audit/bin/pip-audit --strict --require-hashes --disable-pip --progress-spinner off \
 	    -r requirements/$$each.txt || exit 1; done
 
@@ -135,6 +136,15 @@ $(PEERS):
 	@.venv-bench/bin/python -m compileall -q src
 	@touch $@
 
+# It needs numpy below 2.
+$(ROBOTKINECAL):
+	@echo "kinacc: installing robotkinecal into .venv-robotkinecal"
+	@"$$(sh requirements/find-python $(PYTHON))" -m venv --clear .venv-robotkinecal
+	@.venv-robotkinecal/bin/python -m pip install -qq --disable-pip-version-check \
+	  --require-hashes -r requirements/robotkinecal.txt || { rm -rf .venv-robotkinecal/bin; \
+	  echo "kinacc: robotkinecal cannot be installed here, and is left out"; }
+	@touch $@
+
 $(AUDIT):
 	@echo "kinacc: installing the tools of an audit into .venv-audit"
 	@"$$(sh requirements/find-python $(PYTHON))" -m venv --clear .venv-audit
@@ -149,6 +159,7 @@ lock:
 	$(LOCK) requirements/test.in --output-file requirements/test.txt
 	$(LOCK) requirements/run.in --constraints requirements/test.txt --output-file requirements/run.txt
 	$(LOCK) requirements/bench.in --constraints requirements/test.txt --output-file requirements/bench.txt
+	$(LOCK) requirements/robotkinecal.in --output-file requirements/robotkinecal.txt
 	$(LOCK) requirements/audit.in --output-file requirements/audit.txt
 	$(LOCK) requirements/cluster.in --constraints requirements/run.txt \
 	  $$(sed -n 's/^\([a-z0-9-]*\)==.*/--no-emit-package \1/p' requirements/run.txt) \
@@ -158,4 +169,4 @@ clean:
 	rm -rf results public-robots .snakemake docs/_build
 
 distclean: clean
-	rm -rf .venv .venv-bench .venv-audit
+	rm -rf .venv .venv-bench .venv-robotkinecal .venv-audit

@@ -24,11 +24,15 @@ ROUNDS = (3, 25)  # fewest and most
 
 @dataclass(frozen=True)
 class Contender:
-    """One way to do a work; all of a work give the same outputs."""
+    """One way to do a work; all of a work give the same outputs.
+
+    ``taken_s``: seconds of a run by its output, where another process measures them.
+    """
 
     name: str
     version: str
     run: Callable[[], object]
+    taken_s: Callable | None = None
 
 
 @dataclass(frozen=True)
@@ -48,18 +52,20 @@ class Work:
     agree: Callable[[Sequence], None]
     wanted: Mapping[str, float] = field(default_factory=dict)
     wall: bool = False  # wall-clock instead of CPU time
+    error_mm: Callable | None = None  # of an output, where errors are compared as well
     seconds: float = 6.0  # rounds go on for about this long
 
 
-def sample_s(run: Callable[[], object], times: int, wall: bool) -> float:
+def sample_s(contender: Contender, times: int, wall: bool) -> float:
     """Seconds of a run, of this process and of those it waits for; mean of ``times`` in a row."""
     gc.collect()
     gc.disable()
     try:
         begin = _now_s(wall)
         for _ in range(times):
-            run()
-        return (_now_s(wall) - begin) / times
+            output = contender.run()
+        each_s = (_now_s(wall) - begin) / times
+        return contender.taken_s(output) if contender.taken_s else each_s
     finally:
         gc.enable()
 
@@ -74,30 +80,33 @@ def measure(work: Work, smoke: bool = False) -> list[dict]:
 
     ``ratio`` is the time over kinacc's, with quartiles. Smoke size is run once, to compare.
     """
-    runs = [each.run for each in work.contenders]
-    work.agree([run() for run in runs])
-    taken_s = np.ones((1, len(runs))) if smoke else _in_turns(work, runs)
+    outputs = [each.run() for each in work.contenders]
+    work.agree(outputs)
+    taken_s = np.ones((1, len(outputs))) if smoke else _in_turns(work)
     ratios = taken_s / taken_s[:, :1]
     rows = []
-    for contender, own, ratio in zip(work.contenders, taken_s.T, ratios.T, strict=True):
+    for contender, output, own, ratio in zip(
+        work.contenders, outputs, taken_s.T, ratios.T, strict=True
+    ):
         low, middle, high = np.quantile(ratio, (0.25, 0.5, 0.75))
         rows.append({
             "work": work.name, "unit": work.unit, "beside": contender.name,
             "version": contender.version, "ns": 1e9 * np.median(own) / work.count,
             "ratio": middle, "ratio_low": low, "ratio_high": high,
             "wanted": work.wanted.get(contender.name),
+            "error_mm": work.error_mm(output) if work.error_mm else np.nan,
         })  # fmt: skip
     return rows
 
 
-def _in_turns(work: Work, runs: Sequence[Callable[[], object]]) -> np.ndarray:
+def _in_turns(work: Work) -> np.ndarray:
     """Seconds (rounds, contenders) of a run."""
-    once_s = [sample_s(run, 1, work.wall) for run in runs]
+    once_s = [sample_s(each, 1, work.wall) for each in work.contenders]
     times = [max(1, round(SAMPLE_S / max(each, 1e-7))) for each in once_s]
     a_round_s = sum(each * many for each, many in zip(once_s, times, strict=True))
     count = int(np.clip(work.seconds / a_round_s, *ROUNDS))
-    taken_s = np.empty((count, len(runs)))
+    taken_s = np.empty((count, len(times)))
     for number in range(count):
-        for place in np.roll(np.arange(len(runs)), -number):
-            taken_s[number, place] = sample_s(runs[place], times[place], work.wall)
+        for place in np.roll(np.arange(len(times)), -number):
+            taken_s[number, place] = sample_s(work.contenders[place], times[place], work.wall)
     return taken_s

@@ -17,17 +17,18 @@ from datetime import date
 from importlib import import_module
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 from harness import ROOT, measure
 
 HERE = Path(__file__).resolve().parent
-TOPICS = ("kinematics", "fits", "processes")
+TOPICS = ("kinematics", "fits", "held_out", "processes")
 PAGE = """\
 # Benchmarks
 
 Times of kinacc beside those of what one would have used otherwise. `make bench` measures them
-anew, with the other libraries in an environment of their own, and writes this page. What models
-reach on measured arms is [another page](../benchmarks/README.md).
+anew, with the other libraries in environments of their own, and writes this page: do not edit
+it. What models reach on measured arms is [another page](../benchmarks/README.md).
 
 {sections}
 ## How it is measured
@@ -45,23 +46,29 @@ def page(tables: dict[str, pd.DataFrame]) -> str:
     for topic, rows in tables.items():
         told = ast.get_docstring(ast.parse((HERE / "works" / f"{topic}.py").read_text()))
         title, _, text = (told or "").replace("``", "`").partition("\n\n")
-        own_ns = rows.groupby("work", sort=False)["ns"].first()
+        own = rows.drop_duplicates("work").set_index("work")
         others = rows[rows.groupby("work").cumcount() > 0]
         lines = ["| work | beside | its time | kinacc's | kinacc is | wanted |", "|---" * 6 + "|"]
-        lines += [_line(row, own_ns[row.work]) for row in others.itertuples()]
+        lines += [_line(row, own.loc[row.work]) for row in others.itertuples()]
         sections.append("\n".join([f"## {title}", "", text, "", *lines, "", rows.attrs["on"], ""]))
     return PAGE.format(sections="\n".join(sections))
 
 
-def _line(row, own_ns: float) -> str:
+def _line(row, own) -> str:
     low, high = sorted([max(each, 1.0 / each) for each in (row.ratio_low, row.ratio_high)])
     wanted = _times(row.wanted)
     if wanted and row.ratio < row.wanted:
         wanted = f"**{wanted}: not met**"
+    faster = f"{_times(row.ratio)} ({low:.3g} to {high:.3g})"
     return (
-        f"| {row.work} | {row.beside} {row.version} | {duration(row.ns)} a {row.unit} "
-        f"| {duration(own_ns)} | {_times(row.ratio)} ({low:.3g} to {high:.3g}) | {wanted} |"
+        f"| {row.work} | {row.beside} {row.version} | {duration(row.ns)} a {row.unit}{_error(row)} "
+        f"| {duration(own.ns)}{_error(own)} | {faster} | {wanted} |"
     )
+
+
+def _error(row) -> str:
+    error_mm = getattr(row, "error_mm", np.nan)
+    return "" if pd.isna(error_mm) else f", {error_mm:.4f} mm"
 
 
 def _times(ratio: float) -> str:

@@ -57,6 +57,14 @@ def test_a_wish_that_is_not_met_stands_out_on_the_page():
     assert "**1e+09 x faster: not met**" in run.page({"fits": table})
 
 
+def test_errors_stand_on_the_page_beside_seconds_that_another_process_measured():
+    other = harness.Contender("other", "3.1", lambda: 1, taken_s=lambda output: 2.0 * output)
+    rows = harness.measure(work(other, error_mm=lambda output: 0.25 * output, seconds=0.0))
+    table = pd.DataFrame(rows)
+    table.attrs["on"] = ""
+    assert "| 2 s a number, 0.2500 mm |" in run.page({"fits": table})
+
+
 def test_the_page_is_written_from_the_results():
     written = (harness.ROOT / "docs" / "benchmarks.md").read_text(encoding="utf-8")
     assert written == run.page(run.read()), "run make bench"
