@@ -30,12 +30,12 @@ def held_out_fold(every: Observations, train: np.ndarray) -> int | None:
 
 def delivered_fits(inputs: Mapping, robot: Robot, every: Observations) -> dict[str, Fit]:
     """The models ``inputs`` have with their frames, for targets and sessions of ``every``."""
-    names, found = (every.target_names, every.session_names), {}
+    names, fits = (every.target_names, every.session_names), {}
     for kind, model in models(inputs, robot.dh).items():
         frames = inputs.get("frames", inputs.get(f"{kind}_frames"))
         if frames is not None:
-            found[kind] = Fit(model, frames_of(frames, kind, *names))
-    return found
+            fits[kind] = Fit(model, frames_of(frames, kind, *names))
+    return fits
 
 
 def require_enough_rows(inputs: Mapping, robot: Robot, calibration: Mapping) -> None:
@@ -44,9 +44,9 @@ def require_enough_rows(inputs: Mapping, robot: Robot, calibration: Mapping) -> 
     The fits ask themselves as well; asked beforehand, nothing is remade from data that cannot do.
     """
     every, train = observed(inputs, robot)
-    seen = every.select(train)
+    training = every.select(train)
     for estimator in estimators(calibration, robot, every).values():
         frames, common = 0, estimator.common
-        if common.frames_estimated and len(seen):
-            frames = int(common.terms(seen).free.sum())
-        require_enough(seen, estimator.required + frames, estimator.name, estimator.fix)
+        if common.frames_estimated and len(training):
+            frames = int(common.terms(training).free.sum())
+        require_enough(training, estimator.required + frames, estimator.name, estimator.fix)

@@ -64,11 +64,11 @@ def run(inputs: Mapping, settings: Mapping, kind: str, progress=None) -> dict[st
     }
 
 
-def _gathered(inputs: Mapping, own: Columns) -> Columns:
-    """Frames of the models fitted before, then ``own``."""
+def _gathered(inputs: Mapping, new: Columns) -> Columns:
+    """Frames of the models fitted before, then ``new``."""
     kinds = reversed(ESTIMATORS)
     others = [inputs[f"{kind}_frames"] for kind in kinds if f"{kind}_frames" in inputs]
     return {
-        name: np.concatenate([*(np.asarray(each[name]) for each in others), values])
-        for name, values in own.items()
+        name: np.concatenate([*(np.asarray(columns[name]) for columns in others), values])
+        for name, values in new.items()
     }

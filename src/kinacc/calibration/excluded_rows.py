@@ -16,7 +16,9 @@ from kinacc.measurements.row_names import RowNames
 from kinacc.tables.columns import Columns
 from kinacc.tables.contract import ARTEFACTS, columns_of
 
-_STATED = tuple(each.name for each in ARTEFACTS["excluded_rows"].columns if not each.may_be_absent)
+_STATED = tuple(
+    column.name for column in ARTEFACTS["excluded_rows"].columns if not column.may_be_absent
+)
 
 
 def run(inputs: Mapping, settings: Mapping) -> dict[str, Columns]:
@@ -52,14 +54,14 @@ def run(inputs: Mapping, settings: Mapping) -> dict[str, Columns]:
             if name in used
         }
         joined["fold"] = np.full(len(joined["pose"]), np.nan)
-        seen = errors(fits, from_columns(joined, arm).select(slice(len(every), None)))
+        of_models = errors(fits, from_columns(joined, arm).select(slice(len(every), None)))
         lines = left_out["row"].astype(int).tolist()
-        for name, found in seen.items():
-            rows += _rows(name, left_out, lines, reasons, found, count)
+        for name, errors_of in of_models.items():
+            rows += _rows(name, left_out, lines, reasons, errors_of, count)
     told = {row[1] for row in rows}
-    for each in comparisons(fits):
+    for comparison in comparisons(fits):
         rows += [
-            (each.name, line, None, None, reasons[line], *[np.nan] * 6)
+            (comparison.name, line, None, None, reasons[line], *[np.nan] * 6)
             for line in sorted(set(reasons) - told)
         ]
     columns = columns_of("excluded_rows", [dict(zip(_STATED, row, strict=True)) for row in rows])
@@ -78,7 +80,9 @@ def _known(columns: Mapping, used: Mapping) -> Columns:
     }
 
 
-def _rows(name: str, columns: Mapping, lines: list, reasons: Mapping, seen: Errors, count: int):
+def _rows(
+    name: str, columns: Mapping, lines: list, reasons: Mapping, errors_of: Errors, count: int
+):
     return [
         (
             name,
@@ -86,8 +90,8 @@ def _rows(name: str, columns: Mapping, lines: list, reasons: Mapping, seen: Erro
             columns["target"][i],
             columns["session"][i],
             reasons[lines[i]],
-            *seen.position_mm[i],
-            *(1e3 * seen.rotation_rad[i]),
+            *errors_of.position_mm[i],
+            *(1e3 * errors_of.rotation_rad[i]),
         )
         for i in range(count)
     ]

@@ -186,8 +186,12 @@ def frame_terms(
         frames.setdefault(frame, []).append(component)
     refuse(
         [
-            Problem(f"{parameter_rules.KEYS[parameter_rules.FRAMES]}, {rule.name!r}", what, allowed)
-            for rule, what, allowed in parameter_rules.strangers(rules, observations.joints, frames)
+            Problem(
+                f"{parameter_rules.KEYS[parameter_rules.FRAMES]}, {rule.name!r}", message, allowed
+            )
+            for rule, message, allowed in parameter_rules.strangers(
+                rules, observations.joints, frames
+            )
         ]
     )
     free, value = np.ones(len(names), dtype=bool), np.zeros(len(names))
@@ -217,9 +221,9 @@ def component_names(observations: Observations) -> tuple[str, ...]:
 
 def orientations_measured(observations: Observations) -> np.ndarray:
     """True (T,) for targets of which any orientation was measured."""
-    found = np.zeros(len(observations.target_names), dtype=bool)
-    found[np.unique(observations.target[observations.has_rotation])] = True
-    return found
+    measured = np.zeros(len(observations.target_names), dtype=bool)
+    measured[np.unique(observations.target[observations.has_rotation])] = True
+    return measured
 
 
 @dataclass(frozen=True)
@@ -274,18 +278,18 @@ class FrameParameters:
             names, np.ones(size, bool), np.zeros(size), np.full(size, np.inf), start
         )
         begin, free, value, std = np.zeros(size), terms.free, terms.value, terms.std
-        made = cls(names, start, begin, free, value, std, np.zeros((0, size)))
-        here, turn, turning = start.joined, made.turn, made.turning
+        parameters = cls(names, start, begin, free, value, std, np.zeros((0, size)))
+        here, turn, turning = start.joined, parameters.turn, parameters.turning
         stated = np.ones(len(here.position_mm), dtype=bool)
         stated[turning] = (~free | np.isfinite(std))[turn].any(axis=1)
         rotation = np.where(stated[:, None, None], terms.stated.joined.rotation, here.rotation)
         apart = here.rotation[turning] @ np.swapaxes(rotation[turning], 1, 2)
-        begin[made.place] = here.position_mm
+        begin[parameters.place] = here.position_mm
         begin[turn] = log_so3(apart) * stated[turning][:, None]
         begin[~free] = value[~free]
         reference = Frames.split(Pose(rotation, here.position_mm), start.sessions)
         mean = np.where(np.isfinite(std), value, begin)
-        return replace(made, reference=reference, begin=begin, mean=mean)
+        return replace(parameters, reference=reference, begin=begin, mean=mean)
 
     @property
     def size(self) -> int:

@@ -145,13 +145,13 @@ def weak(sentences: Iterable[str]) -> list[str]:
 
 def statements(left_open: LeftOpen) -> dict[str, str]:
     """What poses leave open of each parameter that takes part, for ``dh_identified``."""
-    lines, found = left_open.sentences, {}
+    lines, texts_of = left_open.sentences, {}
     for name, members in zip(left_open.names, left_open.members.T, strict=True):
         texts = [lines[i] for i in np.flatnonzero(members)]
         more = [f"{len(texts) - _MOST_SENTENCES} more"] if len(texts) > _MOST_SENTENCES else []
         if texts:
-            found[name] = _JOIN.join(texts[:_MOST_SENTENCES] + more)
-    return found
+            texts_of[name] = _JOIN.join(texts[:_MOST_SENTENCES] + more)
+    return texts_of
 
 
 def parameter_name(name: str) -> str:
@@ -178,11 +178,11 @@ def _apart(rows: np.ndarray, arm: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     alone, others = rows[~moving], rows[moving]
     if not len(others):
         return alone, others
-    left, values, _ = np.linalg.svd(others[:, arm])
+    directions, values, _ = np.linalg.svd(others[:, arm])
     count = int(np.sum(values > _RANK * values[0]))
     if count == len(others):
         return alone, others
-    mixed = left.T @ others
+    mixed = directions.T @ others
     return np.concatenate([alone, mixed[count:]]), mixed[:count]
 
 
@@ -194,8 +194,8 @@ def _beside(rows: np.ndarray, exact: np.ndarray, among: np.ndarray) -> np.ndarra
     basis = right[values > _RANK * values[0]]
     rows = rows / np.linalg.norm(rows[:, among], axis=1, keepdims=True)
     part = rows[:, among]
-    left, values, _ = np.linalg.svd(part - part @ basis.T @ basis, full_matrices=False)
-    rest = left[:, values > _SEPARATE].T @ rows
+    directions, values, _ = np.linalg.svd(part - part @ basis.T @ basis, full_matrices=False)
+    rest = directions[:, values > _SEPARATE].T @ rows
     return rest - rest[:, among] @ np.linalg.pinv(exact[:, among], rcond=_RANK) @ exact
 
 
@@ -206,7 +206,7 @@ def _sparse(rows: np.ndarray, among: np.ndarray) -> np.ndarray:
     """
     if not len(rows):
         return rows
-    left, upper, pivot = scipy.linalg.qr(rows[:, among], mode="economic", pivoting=True)
-    mixed = scipy.linalg.solve_triangular(upper[:, : len(rows)], left.T @ rows)
+    directions, upper, pivot = scipy.linalg.qr(rows[:, among], mode="economic", pivoting=True)
+    mixed = scipy.linalg.solve_triangular(upper[:, : len(rows)], directions.T @ rows)
     mixed = mixed[np.argsort(pivot[: len(rows)])]
     return mixed / np.abs(mixed).max(axis=1, keepdims=True)

@@ -69,9 +69,9 @@ def table(fit: ModelFit, known: Uncertainty, observations: Observations) -> Colu
     return columns_of("dh_identified", rows)
 
 
-def left_open(fit: ModelFit, known: Uncertainty, seen: Observations) -> LeftOpen:
-    """What the data cannot tell apart. ``seen``: what was fitted."""
-    hidden = named_directions(fit, unseen_anywhere(fit, seen, STRUCTURAL))
+def left_open(fit: ModelFit, known: Uncertainty, observations: Observations) -> LeftOpen:
+    """What the data cannot tell apart. ``observations``: what was fitted."""
+    hidden = named_directions(fit, unseen_anywhere(fit, observations, STRUCTURAL))
     return LeftOpen.of(hidden, known.undetermined, known.names, fit.frames)
 
 
@@ -83,8 +83,8 @@ def unseen_anywhere(fit: ModelFit, observations: Observations, threshold: float)
     joints' turns (prismatic ones: a metre) are put where the model has them: without residuals what
     cannot be seen is null to rounding.
     """
-    seen = _everywhere(fit, observations)
-    system = PoseSystem(seen, fit.model, fit.free.ravel(), fit.parameters, UNSEEN_WEIGHT)
+    everywhere = _everywhere(fit, observations)
+    system = PoseSystem(everywhere, fit.model, fit.free.ravel(), fit.parameters, UNSEEN_WEIGHT)
     return undetermined(system, fit.solution.x, fit.solution.scale, threshold)
 
 
@@ -99,12 +99,12 @@ def _everywhere(fit: ModelFit, observations: Observations) -> Observations:
     session, target, turned = kind
     nowhere = Pose(np.zeros((len(pose), 3, 3)), np.zeros((len(pose), 3)))
     names = {"target_names": observations.target_names, "session_names": observations.session_names}
-    made = replace(
+    observed = replace(
         full_poses(q_rad[pose], nowhere), pose=pose, target=target, session=session, **names
     )
-    at = fit.frames.seen(fit.model, made)
-    rotation = np.where(turned.astype(bool)[:, None, None], at.rotation, np.nan)
-    return replace(made, position_mm=at.position_mm, rotation=rotation)
+    predicted = fit.frames.seen(fit.model, observed)
+    rotation = np.where(turned.astype(bool)[:, None, None], predicted.rotation, np.nan)
+    return replace(observed, position_mm=predicted.position_mm, rotation=rotation)
 
 
 def joints_anywhere(model: DHModel) -> np.ndarray:

@@ -52,7 +52,7 @@ class Misfit:
             "noise_per_axis_mm": self.noise.per_axis_mm,
             "held_out_over_noise": self.ratio,
         }
-        known = {name: each if math.isfinite(each) else None for name, each in numbers.items()}
+        known = {name: value if math.isfinite(value) else None for name, value in numbers.items()}
         return {"valid": "given the model", **known, "noise_freedom": self.noise.freedom}
 
 
@@ -90,16 +90,16 @@ def misfits(tables: Mapping[str, Columns], robot: Robot) -> list[Misfit]:
         In the order of the table.
     """
     noise = _noise_of(tables, robot)
-    models = [str(each) for each in tables["model_selection"]["model"]]
-    return [Misfit(each, _held_out_mm(tables, each), noise) for each in models]
+    models = [str(model) for model in tables["model_selection"]["model"]]
+    return [Misfit(model, _held_out_mm(tables, model), noise) for model in models]
 
 
-def in_words(found: Sequence[Misfit]) -> str:
+def in_words(misfits: Sequence[Misfit]) -> str:
     """What standard deviations of models of one calibration are worth, in words.
 
     Parameters
     ----------
-    found : sequence of Misfit
+    misfits : sequence of Misfit
         One or more.
 
     Returns
@@ -107,16 +107,18 @@ def in_words(found: Sequence[Misfit]) -> str:
     str
         Held-out error over noise of each model.
     """
-    return f"{GIVEN}; {over_noise(found)}"
+    return f"{GIVEN}; {over_noise(misfits)}"
 
 
-def over_noise(found: Sequence[Misfit]) -> str:
+def over_noise(misfits: Sequence[Misfit]) -> str:
     """Held-out errors of models over the noise of their readings, in words."""
-    noise = found[0].noise
+    noise = misfits[0].noise
     if not noise.per_axis_mm > 0.0:
         return "noise unknown (no configuration was read twice)"
-    ratios = (f"{each.ratio:.3g}" if math.isfinite(each.ratio) else "unknown" for each in found)
-    pairs = zip((model_name(each.model) for each in found), ratios, strict=True)
+    ratios = (
+        f"{misfit.ratio:.3g}" if math.isfinite(misfit.ratio) else "unknown" for misfit in misfits
+    )
+    pairs = zip((model_name(misfit.model) for misfit in misfits), ratios, strict=True)
     listed = ", ".join(map(" ".join, pairs))
     return f"held-out error over noise ({noise.per_axis_mm:.3g} mm): {listed}"
 

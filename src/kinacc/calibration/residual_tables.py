@@ -95,11 +95,11 @@ def selection(every: Observations, held_out: Mapping[str, Errors]) -> pd.DataFra
     return model_comparison.select(of_kinds, configuration, every.fold)
 
 
-def _statistics(name: str, subset: str, fold: float, found: Errors) -> Iterator[tuple]:
+def _statistics(name: str, subset: str, fold: float, off: Errors) -> Iterator[tuple]:
     """Rows of ``residuals``."""
     for quantity, unit, vectors in (
-        ("position", "mm", found.position_mm),
-        ("orientation", "mrad", 1e3 * found.rotation_rad),
+        ("position", "mm", off.position_mm),
+        ("orientation", "mrad", 1e3 * off.rotation_rad),
     ):
         figures = statistics(vectors)
         if figures is not None:
@@ -107,12 +107,12 @@ def _statistics(name: str, subset: str, fold: float, found: Errors) -> Iterator[
 
 
 def error_rows(
-    measurements: Mapping, comparison: str, estimate: str, rows: np.ndarray, found: Errors
+    measurements: Mapping, comparison: str, estimate: str, rows: np.ndarray, off: Errors
 ) -> pd.DataFrame:
     """``pose_errors`` of the ``rows`` of measurements that the errors are of."""
     table = pd.DataFrame({"comparison": comparison, "estimate": estimate, "row": rows})
     for name in ("pose", "target", "repeat", "subset", "fold"):
         table[name] = np.asarray(measurements[name])[rows]
-    table[["ex_mm", "ey_mm", "ez_mm"]] = found.position_mm
-    table[["rx_mrad", "ry_mrad", "rz_mrad"]] = 1e3 * found.rotation_rad
+    table[["ex_mm", "ey_mm", "ez_mm"]] = off.position_mm
+    table[["rx_mrad", "ry_mrad", "rz_mrad"]] = 1e3 * off.rotation_rad
     return table

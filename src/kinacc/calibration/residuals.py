@@ -63,8 +63,10 @@ def errors(fits: Mapping[str, Fit], observations: Observations) -> dict[str, Err
     poses = {name: fit.frames.seen(fit.model, observations) for name, fit in fits.items()}
     poses[MEASURED] = observations.measured
     return {
-        each.name: _difference(poses[each.reference], poses[each.model], bases[each.model])
-        for each in comparisons(fits)
+        comparison.name: _difference(
+            poses[comparison.reference], poses[comparison.model], bases[comparison.model]
+        )
+        for comparison in comparisons(fits)
     }
 
 
@@ -80,14 +82,17 @@ def cross_validated(
     (-1) always train and stay NaN.
     """
     count = len(observations)
-    held_out = {each.name: Errors(*np.full((2, count, 3), np.nan)) for each in comparisons(models)}
+    held_out = {
+        comparison.name: Errors(*np.full((2, count, 3), np.nan))
+        for comparison in comparisons(models)
+    }
     trained: dict[int, dict[str, Errors]] = {}
     for fold in folds:
         out = observations.fold == fold
         fitted = refit(observations.select(~out), fold)
-        for name, each in errors(fitted, observations.select(out)).items():
-            held_out[name].position_mm[out] = each.position_mm
-            held_out[name].rotation_rad[out] = each.rotation_rad
+        for name, off in errors(fitted, observations.select(out)).items():
+            held_out[name].position_mm[out] = off.position_mm
+            held_out[name].rotation_rad[out] = off.rotation_rad
         trained[fold] = errors(fitted, observations.select(~out))
     return held_out, trained
 

@@ -90,24 +90,24 @@ def minimise_robust(task: Task, loss: str) -> tuple[Solution, Weights | None]:
     A robust loss is minimised by reweighted squares (see ``robust``); ``variance`` is then that of
     its scale. Raises FitError where the passes do not settle.
     """
-    found = _Descent(task).run()
+    solution = _Descent(task).run()
     if loss == robust.SQUARES:
-        return found, None
+        return solution, None
     weights, observations = None, task.system.observations
     for number in range(MAX_PASSES):
-        before = found.x
+        before = solution.x
         scale = weights.scale_mm if weights and number >= SCALE_PASSES else None
         weights = robust.weights(loss, task.system.residual(before), observations, scale)
         weighted = replace(task, system=task.system.weighted(np.sqrt(weights.row)), start=before)
-        found = _Descent(weighted).run()
-        moved = float(np.max(np.abs(found.x - before) / task.scale, initial=0.0))
+        solution = _Descent(weighted).run()
+        moved = float(np.max(np.abs(solution.x - before) / task.scale, initial=0.0))
         if moved <= SETTLED:
-            factor = weights.scale_mm**2 / found.variance if found.variance > 0.0 else 1.0
+            factor = weights.scale_mm**2 / solution.variance if solution.variance > 0.0 else 1.0
             scaled = replace(
-                found,
-                variance=factor * found.variance,
-                covariance=factor * found.covariance,
-                std=np.sqrt(factor) * found.std,
+                solution,
+                variance=factor * solution.variance,
+                covariance=factor * solution.covariance,
+                std=np.sqrt(factor) * solution.std,
             )
             return scaled, weights
     raise FitError(

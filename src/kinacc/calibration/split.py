@@ -93,19 +93,21 @@ class Split:
         placed = np.eye(frames)[weight[:frames] > 0.0]
         base = normal[:frames, :frames]
         known = [(placed, TOUCH_SQUARED)] if reported else []
-        kept, lost_base, at = _cut(base, thresholds[0], most and most[0], known)
-        root_base = _root(kept, base)
+        directions, lost_base, base_spectrum = _cut(base, thresholds[0], most and most[0], known)
+        root_base = _root(directions, base)
         follow = np.eye(len(normal))
         follow[:frames, arm] = -root_base @ (root_base.T @ normal[:frames, arm])
         rest = normal[arm, arm] + normal[arm, :frames] @ follow[:frames, arm]
         known = [(np.eye(len(rest))[weight[arm] > 0.0], TOUCH_SQUARED)]
         known += [(placed @ follow[:frames, arm], MOVES_SQUARED)] if reported else []
-        kept, lost_arm, spectrum = _cut(rest, thresholds[1], most and most[1], known)
-        root_arm = _root(kept, rest + np.diag(weight[arm] ** 2))
+        directions, lost_arm, spectrum = _cut(rest, thresholds[1], most and most[1], known)
+        root_arm = _root(directions, rest + np.diag(weight[arm] ** 2))
         root = follow @ scipy.linalg.block_diag(root_base, root_arm)
         anchor = scipy.linalg.block_diag(lost_base, lost_arm)
         effective = float(np.sum(root * (gram[:-1, :-1] @ root)))
-        return cls(root, follow @ anchor, anchor, effective, spectrum, (at.rank, spectrum.rank))
+        return cls(
+            root, follow @ anchor, anchor, effective, spectrum, (base_spectrum.rank, spectrum.rank)
+        )
 
     def step(
         self, gradient: np.ndarray, displacement: np.ndarray, weight_sq: np.ndarray
@@ -128,18 +130,18 @@ def _cut(
     """
     values, vectors = np.linalg.eigh(normal)
     spectrum = Spectrum.of(np.sqrt(np.maximum(values[::-1], 0.0)), threshold, most)
-    kept, lost = np.split(vectors[:, ::-1], [spectrum.rank], axis=1)
+    directions, lost = np.split(vectors[:, ::-1], [spectrum.rank], axis=1)
     for derivative, least in known:
         if len(derivative) and lost.size:
             _, change, turn = np.linalg.svd(derivative @ lost)
             back, lost = np.split(lost @ turn.T, [int(np.sum(change**2 > least))], axis=1)
-            kept = np.concatenate([kept, back], axis=1)
-    return kept, lost, spectrum
+            directions = np.concatenate([directions, back], axis=1)
+    return directions, lost, spectrum
 
 
-def _root(kept: np.ndarray, normal: np.ndarray) -> np.ndarray:
-    """Matrix (P, r) whose product with its transpose inverts ``normal`` on ``kept`` (P, r)."""
-    return kept @ np.linalg.inv(np.linalg.cholesky(kept.T @ normal @ kept)).T
+def _root(directions: np.ndarray, normal: np.ndarray) -> np.ndarray:
+    """Matrix (P, r) whose product with its transpose inverts ``normal`` on the directions."""
+    return directions @ np.linalg.inv(np.linalg.cholesky(directions.T @ normal @ directions)).T
 
 
 def singular_values(jacobians: Iterable[np.ndarray], frames: int = 0) -> np.ndarray:

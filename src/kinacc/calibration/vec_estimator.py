@@ -101,8 +101,8 @@ class VECEstimator(Estimator):
         elif progress:
             folds = progress(folds, "shares of the poses held out")
         for fold in folds if self.open else ():
-            seen = every if fold is None else every.select(every.fold != fold)
-            parts.append(self._choice(seen, parts[0] if parts else None).assign(fold=fold))
+            training = every if fold is None else every.select(every.fold != fold)
+            parts.append(self._choice(training, parts[0] if parts else None).assign(fold=fold))
         table = pd.concat([part.astype({"fold": float, "chosen": int}) for part in parts])
         names = [column.name for column in ARTEFACTS["vec_orders"].columns]
         return {"vec_orders": {name: table[name].to_numpy() for name in names}}
@@ -145,19 +145,19 @@ class VECEstimator(Estimator):
         )
         return {"vec_fit": tables.fit_columns("vec_fit", fitted, known, gauge)}
 
-    def _choice(self, seen: Observations, near: pd.DataFrame | None) -> pd.DataFrame:
-        frames, terms = self._begin(seen, {})
+    def _choice(self, training: Observations, near: pd.DataFrame | None) -> pd.DataFrame:
+        frames, terms = self._begin(training, {})
         weight, arm = self.common.rotation_weight_mm_per_rad, self.common.nominal
         parameters = FrameParameters.none(frames)
         if terms is not None:
-            parameters = placed(seen, arm, terms, weight, start=frames)
-        most = evidence.highest_order(seen, arm.joints, parameters.size)
+            parameters = placed(training, arm, terms, weight, start=frames)
+        most = evidence.highest_order(training, arm.joints, parameters.size)
         orders = [order for order in self.orders if order <= most]
         if not orders:  # too few residuals to judge by
             usual = evidence.prior_of(evidence.USUAL_STD, 1.0, self.prior.offset_rad)
             return evidence.table_of([(self.orders[0], usual, np.nan, None)])
         stated = self.prior if self.prior_stated else None
-        observations = self._wanted(seen)
+        observations = self._wanted(training)
         return evidence.choose(
             observations, self._empty(1), parameters, weight, orders, stated, near
         )

@@ -50,13 +50,13 @@ class Prior:
         """Standard deviations (P,) ordered as the parameters of a VEC model."""
         falling = self.decay ** np.maximum(np.arange(model.order + 1) - 1, 0)
         per_error = np.where(np.arange(len(ERRORS)) < 3, self.delta_mm, self.eps_rad)
-        one = np.outer(per_error, falling)
+        deviation = np.outer(per_error, falling)
         if self.constant_mm is not None:
-            one[:3, 0] = self.constant_mm
+            deviation[:3, 0] = self.constant_mm
         if self.constant_rad is not None:
-            one[3:, 0] = self.constant_rad
+            deviation[3:, 0] = self.constant_rad
         offsets = np.full(model.direction_offsets_rad.size, self.offset_rad)
-        return np.concatenate([np.tile(one.ravel(), model.joints), offsets])
+        return np.concatenate([np.tile(deviation.ravel(), model.joints), offsets])
 
 
 def fit(
@@ -99,7 +99,7 @@ def fit(
     InputError
         There are fewer residuals than parameters.
     """
-    found = fitting.fit(
+    fitted = fitting.fit(
         observations,
         empty,
         free=informed(observations, empty),
@@ -113,7 +113,7 @@ def fit(
         name="VEC fit",
         fix=VEC_FIX,
     )
-    return _with_centred_offsets(found, observations, prior.std(empty))
+    return _with_centred_offsets(fitted, observations, prior.std(empty))
 
 
 @one_thread
@@ -161,7 +161,7 @@ def _with_centred_offsets(fit: ModelFit, observations: Observations, std: np.nda
     covariance = mapping @ solution.covariance @ mapping.T
     deviation = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     solution = replace(solution, x=mapping @ solution.x, covariance=covariance, std=deviation)
-    vector, found = np.zeros(free.size), np.full(free.size, np.nan)
-    vector[free], found[free] = solution.x[frames:], deviation[frames:]
+    vector, fitted_std = np.zeros(free.size), np.full(free.size, np.nan)
+    vector[free], fitted_std[free] = solution.x[frames:], deviation[frames:]
     model = fit.model.with_parameters(vector)
-    return replace(fit, model=model, std=found, prior_std=std, solution=solution)
+    return replace(fit, model=model, std=fitted_std, prior_std=std, solution=solution)

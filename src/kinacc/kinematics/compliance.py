@@ -77,8 +77,8 @@ class ComplianceModel(ErrorModel):
     def names(self) -> tuple[str, ...]:
         """Names (P,): of the DH arm, then j2.compliance_rad_per_nm, .."""
         places = np.argwhere(np.isfinite(self.coefficients))
-        own = (f"j{joint + 1}.{COEFFICIENTS[kind]}" for joint, kind in places)
-        return (*self.dh.names, *own)
+        coefficients = (f"j{joint + 1}.{COEFFICIENTS[kind]}" for joint, kind in places)
+        return (*self.dh.names, *coefficients)
 
     @property
     def units(self) -> tuple[str, ...]:
@@ -89,24 +89,24 @@ class ComplianceModel(ErrorModel):
     @property
     def start(self) -> np.ndarray:
         """Parameters (P,): of the DH arm, then joint by joint the coefficients there are."""
-        own = self.coefficients
-        return np.concatenate([self.dh.start, own[np.isfinite(own)]])
+        coefficients = self.coefficients
+        return np.concatenate([self.dh.start, coefficients[np.isfinite(coefficients)]])
 
     @property
     def prior_std(self) -> np.ndarray:
         """Those of the DH arm (P,); nothing is known of coefficients."""
-        own = np.full(int(np.isfinite(self.coefficients).sum()), np.inf)
-        return np.concatenate([self.dh.prior_std, own])
+        coefficients = np.full(int(np.isfinite(self.coefficients).sum()), np.inf)
+        return np.concatenate([self.dh.prior_std, coefficients])
 
     def with_parameters(self, x: np.ndarray) -> Self:
         """The model with parameters (P,), ordered as ``start``."""
-        own, split = self.coefficients, len(self.dh.names)
-        own[np.isfinite(own)] = x[split:]
+        coefficients, split = self.coefficients, len(self.dh.names)
+        coefficients[np.isfinite(coefficients)] = x[split:]
         return replace(
             self,
             dh=self.dh.with_parameters(x[:split]),
-            compliance_rad_per_nm=own[:, 0],
-            lever_coefficient_rad_per_mm=own[:, 1],
+            compliance_rad_per_nm=coefficients[:, 0],
+            lever_coefficient_rad_per_mm=coefficients[:, 1],
         )
 
     def pose(self, state: JointState) -> Pose:
@@ -128,9 +128,11 @@ class ComplianceModel(ErrorModel):
             about the axes of the unbent arm.
         """
         walk = _chain.Walk(self.dh, state.q_rad)
-        own = np.broadcast_to(self.payload, (len(state), 4))
+        usual = np.broadcast_to(self.payload, (len(state), 4))
         payload = (
-            own if state.payload is None else np.where(np.isnan(state.payload), own, state.payload)
+            usual
+            if state.payload is None
+            else np.where(np.isnan(state.payload), usual, state.payload)
         )
         links = np.nan_to_num(self.links)
         # Weights and their first moments (3, n) beyond a joint, from the last joint on.

@@ -383,16 +383,16 @@ def _problems(error: ValidationError, document: Document) -> list[Problem]:
             if not deeper:
                 break
             place = deeper[0]
-        what = fault["msg"].removeprefix("Value error, ")
+        message = fault["msg"].removeprefix("Value error, ")
         if fault["type"] == "extra_forbidden":
             name = str(place[-1])[:100].lower()
             close = difflib.get_close_matches(name, known, n=1) if number < _SUGGESTIONS else []
-            what = "unknown key" + (f"; did you mean {close[0]}?" if close else "")
+            message = "unknown key" + (f"; did you mean {close[0]}?" if close else "")
         elif fault["type"] == "missing":
-            what = f"{fault['loc'][-1]} is missing"
+            message = f"{fault['loc'][-1]} is missing"
         elif not isinstance(fault["input"], Mapping | list):
-            what = f"{str(fault['input'])[:60]}: {what}"
-        problems.append((document.lines.get(place, 0), Problem(document.place(place), what)))
+            message = f"{str(fault['input'])[:60]}: {message}"
+        problems.append((document.lines.get(place, 0), Problem(document.place(place), message)))
     return [problem for _, problem in sorted(problems, key=lambda pair: pair[0])]
 
 
