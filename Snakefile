@@ -52,17 +52,18 @@ scattergather:
 
 
 include: "workflow/rules/common.smk"
-include: "workflow/rules/calibration.smk"
-include: "workflow/rules/assessment.smk"
-include: "workflow/rules/pages.smk"
 
 
-rule all:
+rule all:  # the first rule, and so the default, unless this is a module below rules of another workflow
     """every table, picture and page of every data set"""
-    default_target: True
     input:
         [calibration_of(dataset) for dataset in data.settings],
         [[*study_of(dataset), f"{RESULTS}/{dataset}/SHA256SUMS"] for dataset in data.reported],
+
+
+include: "workflow/rules/calibration.smk"
+include: "workflow/rules/assessment.smk"
+include: "workflow/rules/pages.smk"
 
 
 rule calibration:

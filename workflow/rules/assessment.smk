@@ -1,5 +1,4 @@
 # From the models to the assessed accuracy: map (Fig. 3), operating points, study (Fig. 4), histories, claims.
-STUDY = ("assessment_points", "study", "study_summary", "readings", "histories")
 
 
 rule accuracy_map:

@@ -1,4 +1,8 @@
 # Functions that rules call for their inputs and parameters.
+STUDY = ("assessment_points", "study", "study_summary", "readings", "histories")
+FIGURES = ("fig1", "fig2", "fig4", "fig5", "fig6")  # each drawn by kinacc.figures.<name>
+
+
 def job(script, sections="", shown=False, measured=False, **keys):
     """Parameters of a rule: all that makes its files anew beside its tables, by content, not date.
 

@@ -1,7 +1,5 @@
 # Pictures, the page of a data set and the digests of all its files.
 
-FIGURES = ("fig1", "fig2", "fig4", "fig5", "fig6")  # each drawn by kinacc.figures.<name>
-
 
 rule figures:
     """Figs. 1, 2, 4, 5 and 6"""

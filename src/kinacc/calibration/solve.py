@@ -19,7 +19,7 @@ from kinacc.calibration.system import PoseSystem
 from kinacc.errors import FitError
 
 STEP_TOLERANCE = 1e-6  # mm and mrad
-MAX_ITERATIONS = 60
+MAX_ITERATIONS = 200
 PATIENCE, HELD_PATIENCE = 12, 8  # steps after which standing still counts as arrived
 STANDSTILL, NO_CHANGE = 1e-9, 1e-5  # share of the objective; of the variance
 MAX_HALVINGS = 12

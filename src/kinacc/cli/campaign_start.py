@@ -113,14 +113,16 @@ def start(out: Output, **options) -> None:
     noise = "; ".join(f"{name}: {text}" for name, text in answer["noise"].items())
     lines = [
         "Campaign {folder}: largest error of {point} ({model} model of {calibration}) at {points} "
-        "candidates, {candidates}; tolerance (mm): {tolerance_mm}.",
+        "candidates, {candidates}; {tolerance}.",
         "{budget} readings by {assessor}: {first_visit} points first, {references} readings at "
         f"reference poses. Noise: {noise}.",
         "Note: {shortfall}." if answer["shortfall"] else "",
         *(f"Overruled: {text}." for text in plan.overruled),
         f"Next: kinacc campaign next {shlex.quote(options['folder'])}",
     ]
-    out.show(answer, pd.DataFrame(), [line.format(**answer) for line in lines if line])
+    limit = plan.limits.tolerance_mm
+    shown = answer | {"tolerance": "no tolerance" if limit is None else f"tolerance {limit:g} mm"}
+    out.show(answer, pd.DataFrame(), [line.format(**shown) for line in lines if line])
 
 
 def _tolerance_mm(tolerance_mm: float | None, results: Path) -> float | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import click
@@ -58,7 +59,10 @@ def check_results(
 
     if (results / sums.FOLDER).is_dir():  # one data set was named in place of the folder of all
         results, datasets = results.resolve().parent, (*datasets, results.resolve().name)
-    configs = config or ((CONFIG,) if Path(CONFIG).is_file() else ())
+    configs = config
+    if not config and Path(CONFIG).is_file():  # beside another workflow it may be that workflow's
+        is_own = re.search("^datasets:", Path(CONFIG).read_text("utf-8"), re.MULTILINE)
+        configs = (CONFIG,) if is_own else ()
     report = check.check_results(results, load(configs) if configs else {}, against, datasets)
     for path in files:
         outputs.write(report, path)

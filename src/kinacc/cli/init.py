@@ -133,7 +133,7 @@ def init(measurement_files: tuple[str, ...], out: Output, **options) -> None:
 
     \b
     Example:
-      kinacc init ../shared/data/ur10_tmac/series_D.csv --robot ur10 --name ur10_d
+      kinacc init series_D.csv --robot ur10 --name ur10_d
       kinacc init tracker.csv --robot arm.urdf --orientation ZYX --out cell3 --yes
       kinacc init log.csv --take actual_q_0 --take X
       kinacc init joints.csv points.csv --join Name=Point
@@ -243,7 +243,7 @@ def _dataset(
     note += [f"{how}: {text}." for text in guess.assumed.values()]
     note += [f"Not read: {names} ({why})." for why, names in _unread(guess.unused()) if why]
     check = shlex.join(["kinacc", "check-data", str(path)])
-    note.append(f"Everything not given here is as in config.yaml.\n    {check}")
+    note.append(f"Everything not given here has its default (docs/configuration.md).\n    {check}")
     poses = int(report.facts["poses"]) if report else _FOLDS_UNKNOWN
     files = {"path": write.seen_from(path.parent, guess.section["path"])}
     if joints := guess.section.get("joints"):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shlex
 from pathlib import Path
 
@@ -67,7 +68,13 @@ def listing(folder: Path) -> pd.DataFrame:
     for path in sorted(folder.glob("*.parquet")):
         meaning = ARTEFACTS[path.stem].meaning if path.stem in ARTEFACTS else ""
         try:
-            rows.append((path.stem, str(store.row_count(path)), meaning.partition(". ")[0]))
+            rows.append(
+                (
+                    path.stem,
+                    str(store.row_count(path)),
+                    re.split(r"(?<!Fig)(?<!Figs)[.] ", meaning)[0],
+                )
+            )
         except InputError as error:
             rows.append((path.stem, "", error.problems[0].what))
     if rows:

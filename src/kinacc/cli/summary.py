@@ -57,7 +57,7 @@ def summary(folders: tuple[Path, ...], tolerance_mm: float | None, by: str, out)
         try:
             result = [summaries.summarise(places[0], outdated=choice.say_outdated(places[0]))]
         except InputError as error:
-            result = [error.problems[0]]
+            result = [summaries.of_folder(places[0], error)]
     else:
         result = summaries.summarise_all(places)
     known = [item for item in result if not isinstance(item, Problem)]

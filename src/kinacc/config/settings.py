@@ -432,7 +432,7 @@ class Settings(Section):
     tolerance: Tolerance = Tolerance()
     gates: Gates = setting(
         [],
-        "what `kinacc gate` holds results to (docs/pipeline.md)",
+        "what `kinacc check-results` holds results to (docs/pipeline.md)",
         execution=True,
     )
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -162,6 +163,14 @@ def data_set_folders(folders: Iterable[Path]) -> list[Path]:
     return list(dict.fromkeys(places))
 
 
+def of_folder(folder: Path, error: InputError) -> Problem:
+    """The first problem of ``error`` as one of ``folder``."""
+    problem = error.problems[0]
+    if problem.where == str(folder / "summary.parquet"):
+        return problem
+    return replace(problem, where=str(folder), what=f"{problem.where}: {problem.what}")
+
+
 def summarise_all(folders: Sequence[Path]) -> list[CalibrationSummary | Problem]:
     """The summary of every results folder, or why it has none.
 
@@ -184,7 +193,7 @@ def summarise_all(folders: Sequence[Path]) -> list[CalibrationSummary | Problem]
                 raise InputError(Problem(str(path), what, fix=store.remake(path)))
             summaries.append(summarise(folder))
         except InputError as error:
-            summaries.append(error.problems[0])
+            summaries.append(of_folder(folder, error))
     return summaries
 
 
