@@ -172,7 +172,7 @@ def cross(one: np.ndarray, other: np.ndarray) -> np.ndarray:
 
 
 def _dot(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    return one[0] * other[0] + one[1] * other[1] + one[2] * other[2]
+    return np.asarray(np.sum(one * other, axis=0))
 
 
 def _times(matrix: np.ndarray, vector: np.ndarray) -> np.ndarray:

@@ -13,6 +13,7 @@ from dataclasses import dataclass, fields, replace
 from typing import ClassVar, Self
 
 import numpy as np
+import pandas as pd
 from numpy.polynomial import chebyshev
 
 from kinacc.geometry import Pose
@@ -103,7 +104,8 @@ class VECModel(ErrorModel):
     def joint_jacobian(self, state: JointState) -> np.ndarray:
         """Jacobian (n, 6, k) of ``pose`` in the joints. Exact."""
         moving = walk(self, state.q_rad, state.s)
-        slopes = _slopes(self, state.q_rad)
+        slopes = _polynomials(self, state.q_rad, chebyshev.chebder(self.coefficients, axis=-1))
+        slopes *= (2.0 / (self.q_max_rad - self.q_min_rad))[:, None]
         moved = np.empty((self.joints, 6, len(state)))
         for joint, (into, by_errors) in enumerate(zip(moved, moving.by_errors(), strict=True)):
             moving.by_joint(joint, into)
@@ -114,8 +116,8 @@ class VECModel(ErrorModel):
         """The joints' errors (6k, 6, n), spread over their Chebyshev polynomials. Exact."""
         moving, (joints, count, terms) = walk(self, state.q_rad, state.s), self.coefficients.shape
         s = np.zeros(state.q_rad.shape) if state.s is None else state.s
-        basis = chebyshev_basis(self, state.q_rad).transpose(1, 2, 0)
-        basis = np.repeat(basis, count, axis=0).reshape(-1, len(state))
+        basis = chebyshev.chebvander(mapped_joints(self, state.q_rad), self.order)
+        basis = np.repeat(basis.transpose(1, 2, 0), count, axis=0).reshape(-1, len(state))
         travelled = direction_basis(s).transpose(1, 2, 0).reshape(-1, len(state))
         about_z = count * np.arange(joints) + ERRORS.index("eps_z")
         of = np.append(np.repeat(np.arange(joints * count), terms), np.repeat(about_z, 2))
@@ -159,24 +161,18 @@ class VECModel(ErrorModel):
 
         ``prismatic`` (k,): joints that slide, which is the robot's to say.
         """
-        joint = np.asarray(columns["joint"]).astype(int) - 1
-        order = np.asarray(columns["order"]).astype(int)
-        direction = np.asarray(columns["direction"]).astype(int)
-        error = np.array([ERRORS.index(name) for name in columns["error"]])
-        value = np.asarray(columns["coefficient"], dtype=float)
-        first = [np.flatnonzero(joint == number)[0] for number in range(joint.max() + 1)]
-        per_joint = {
-            name: np.asarray(columns[name], dtype=float)[first]
-            for name in (*PARAMETERS, "q_min_rad", "q_max_rad")
-        }
-        both = direction == 0
-        coefficients = np.zeros((len(first), len(ERRORS), order.max() + 1))
+        table = pd.DataFrame(dict(columns))
+        arm = table.groupby("joint").first()
+        error = table["error"].map(ERRORS.index)
+        joint, order, direction = table["joint"] - 1, table["order"], table["direction"]
+        coefficients = np.zeros((len(arm), len(ERRORS), order.max() + 1))
+        offsets = np.zeros((len(arm), 2))
+        both, value = direction == 0, table["coefficient"]
         coefficients[joint[both], error[both], order[both]] = value[both]
-        offsets = np.zeros((len(first), 2))
         offsets[joint[~both], (direction[~both] + 1) // 2] = value[~both]
-        span = per_joint.pop("q_min_rad"), per_joint.pop("q_max_rad")
-        slides = np.zeros(len(first), dtype=bool) if prismatic is None else prismatic
-        return cls(DHModel(**per_joint, prismatic=slides), *span, coefficients, offsets)
+        slides = np.zeros(len(arm), dtype=bool) if prismatic is None else prismatic
+        dh = DHModel(*(arm[name] for name in PARAMETERS), slides)
+        return cls(dh, arm["q_min_rad"], arm["q_max_rad"], coefficients, offsets)
 
 
 def without_errors(
@@ -221,24 +217,6 @@ def mapped_joints(model: VECModel, q_rad: np.ndarray) -> np.ndarray:
     return (2.0 * np.asarray(q_rad, dtype=float) - model.q_min_rad - model.q_max_rad) / span
 
 
-def chebyshev_basis(model: VECModel, q_rad: np.ndarray) -> np.ndarray:
-    """Chebyshev polynomials of the first kind at mapped joints.
-
-    Parameters
-    ----------
-    model : VECModel
-        Model of k joints.
-    q_rad : numpy.ndarray
-        DH joints, shape (n, k), rad (mm where a joint slides).
-
-    Returns
-    -------
-    numpy.ndarray
-        T_0 to T_order, shape (n, k, order + 1).
-    """
-    return chebyshev.chebvander(mapped_joints(model, q_rad), model.order)
-
-
 def direction_basis(s: np.ndarray) -> np.ndarray:
     """Indicators of the travel directions -1 and +1.
 
@@ -272,8 +250,7 @@ def errors(model: VECModel, q_rad: np.ndarray, s: np.ndarray | None = None) -> n
     numpy.ndarray
         Errors as ``ERRORS``, shape (n, k, 6), mm and rad, in the frame in front of the joint.
     """
-    basis = chebyshev_basis(model, np.atleast_2d(q_rad))
-    values = np.einsum("nkt,ket->nke", basis, model.coefficients)
+    values = _polynomials(model, np.atleast_2d(q_rad), model.coefficients)
     if s is not None:
         values[..., 5] += np.sum(direction_basis(s) * model.direction_offsets_rad, axis=-1)
     return values
@@ -322,9 +299,7 @@ def walk(model: VECModel, q_rad: np.ndarray, s: np.ndarray | None = None) -> _ch
     return _chain.Walk(model.dh, q_rad, np.ascontiguousarray(made))
 
 
-def _slopes(model: VECModel, q_rad: np.ndarray) -> np.ndarray:
-    """Derivatives (n, k, 6) of the joint errors in their own joint, per rad."""
-    coefficients = chebyshev.chebder(model.coefficients, axis=-1)
+def _polynomials(model: VECModel, q_rad: np.ndarray, coefficients: np.ndarray) -> np.ndarray:
+    """Values (n, k, 6) at joints (n, k) of the polynomials with ``coefficients`` (k, 6, terms)."""
     basis = chebyshev.chebvander(mapped_joints(model, q_rad), coefficients.shape[-1] - 1)
-    values = np.einsum("nkt,ket->nke", basis, coefficients)
-    return values * (2.0 / (model.q_max_rad - model.q_min_rad))[:, None]
+    return np.einsum("nkt,ket->nke", basis, coefficients)

@@ -210,8 +210,8 @@ def test_units_that_only_make_sense_in_another_are_noticed(arm):
 
 def test_too_few_and_too_many_joints_are_refused(arm):
     last = GOOD.splitlines()[-1] + "\n"
-    assert "has 8 joints" in faults(arm, GOOD + 4 * last)
-    assert "has 3 joints" in faults(arm, GOOD.removesuffix(last))
+    assert "dh: List should have at most 7 items" in faults(arm, GOOD + 4 * last)
+    assert "dh: List should have at least 4 items" in faults(arm, GOOD.removesuffix(last))
 
 
 def test_an_unknown_robot_names_the_nearest():

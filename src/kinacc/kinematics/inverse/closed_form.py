@@ -91,7 +91,7 @@ class SixAxes:
         dh = self.dh
         sine, cosine = np.sign(np.sin(dh.alpha_rad)), np.sign(np.cos(dh.alpha_rad))
         s1, s2, s3, s4, s5 = sine[0], cosine[1], cosine[2], sine[3], sine[4]
-        rotation, point = _wrist_centre(dh, pose)
+        rotation, point = before_last(dh, pose)
         sideways = dh.d_mm[1] + s2 * (dh.d_mm[2] + np.cos(dh.alpha_rad[2]) * dh.d_mm[3])
         side = -s1 * sideways if abs(sideways) > _TOLERANCE else 0.0
         x, y, z = point.T[..., None]
@@ -208,7 +208,7 @@ class SevenAxes:
             ``margin_mm``.
         """
         dh, s = self.dh, np.sign(np.sin(self.dh.alpha_rad))
-        rotation, point = _wrist_centre(dh, pose)
+        rotation, point = before_last(dh, pose)
         first = _across(q1_rad + dh.theta_offset_rad[0], dh.alpha_rad[0])
         w = (point - [0.0, 0.0, dh.d_mm[0]]) @ first
         upper, fore = dh.d_mm[2], dh.d_mm[4]
@@ -262,11 +262,10 @@ def recognise_seven(dh: DHModel) -> SevenAxes | None:
     return SevenAxes(dh) if meeting else None
 
 
-def _wrist_centre(dh: DHModel, pose: Pose) -> tuple[np.ndarray, np.ndarray]:
-    """Rotations (n, 3, 3) behind the last joint's angle, and points (n, 3) on its axis at d = 0."""
+def before_last(dh: DHModel, pose: Pose) -> Pose:
+    """Frames (n, ...) on the last axis, behind its joint at d = 0, of flange poses (n, ...)."""
     turn = rotation_x(dh.alpha_rad[-1]) @ rotation_y(dh.beta_rad[-1])
-    wrist = compose(pose, invert(Pose(turn, np.array([dh.a_mm[-1], 0.0, dh.d_mm[-1]]))))
-    return wrist.rotation, wrist.position_mm
+    return compose(pose, invert(Pose(turn, np.array([dh.a_mm[-1], 0.0, dh.d_mm[-1]]))))
 
 
 def _across(theta_rad: np.ndarray | float, alpha_rad: float) -> np.ndarray:

@@ -26,11 +26,11 @@ import numpy as np
 from scipy.spatial import cKDTree
 from scipy.stats import qmc
 
-from kinacc.geometry import Pose, compose, invert, rotation_x, rotation_y, rotation_z
+from kinacc.geometry import Pose, rotation_z
 from kinacc.kinematics import dh as _dh
 from kinacc.kinematics.dh import PARAMETERS, DHModel
 from kinacc.kinematics.inverse import newton
-from kinacc.kinematics.inverse.closed_form import BRANCHES
+from kinacc.kinematics.inverse.closed_form import BRANCHES, before_last
 
 _ENTRIES, _MOST_ENTRIES = {2: 4_000, 3: 20_000, 4: 60_000}, 400_000  # by number of joints
 _NEAREST, _MOST_STARTS = 192, 64
@@ -117,7 +117,7 @@ def search(
     tuple of numpy.ndarray
         Of m postures: the pose (m,), joints (m, k) in (-pi, pi], and the error (m,) in mm.
     """
-    goal = pose if table.inner.start == 0 else _before_last(table.dh, pose)
+    goal = pose if table.inner.start == 0 else before_last(table.dh, pose)
     wanted = _features(table.dh, goal, table.reach_mm)
     parts = [
         _starts(table, wanted[begin : begin + _BLOCK], begin)
@@ -193,13 +193,6 @@ def _closed(dh: DHModel, between: np.ndarray, want: Pose) -> np.ndarray:
     sine, cosine = axes[:, 1, 0] - axes[:, 0, 1], axes[:, 0, 0] + axes[:, 1, 1]
     q_rad[:, -1] = np.arctan2(sine, cosine) - dh.theta_offset_rad[-1]
     return q_rad
-
-
-def _before_last(model: DHModel, pose: Pose) -> Pose:
-    """Frames (n, ...) on the last axis, some way along and about it, of flange poses (n, ...)."""
-    turn = rotation_x(model.alpha_rad[-1]) @ rotation_y(model.beta_rad[-1])
-    shift = np.array([model.a_mm[-1], 0.0, model.d_mm[-1]])
-    return compose(pose, invert(Pose(turn, shift)))
 
 
 def _features(model: DHModel, frame: Pose, reach_mm: float) -> np.ndarray:

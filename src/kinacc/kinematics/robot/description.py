@@ -44,8 +44,10 @@ _LARGEST = 1e9  # of any number: beyond, nothing about an arm is meant, and prod
 _SHORTEST_MM = 20.0  # of all lengths together
 _LEAST_TURN_RAD = 0.11  # some joint of every arm turns further
 _SUGGESTIONS = 20
-# Units a key may end in, the one its field ends in, and the factor.
-_UNITS = {"_deg": ("_rad", pi / 180.0), "_m": ("_mm", 1e3)}
+# Keys in another unit, with their fields and the factors.
+_ANGLES = ("theta_offset", "alpha", "beta", "limits", "rotation_vector", "rpy")
+_OTHER_UNITS = {f"{name}_deg": (f"{name}_rad", pi / 180.0) for name in _ANGLES}
+_OTHER_UNITS |= {f"{name}_m": (f"{name}_mm", 1e3) for name in ("d", "a", "limits", "position")}
 
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-_LARGEST, le=_LARGEST)]
 Turn = Annotated[Number, Field(ge=-2.0 * pi - 1e-3, le=2.0 * pi + 1e-3)]
@@ -67,16 +69,6 @@ def _rising(limits: tuple[float, float]) -> tuple[float, float]:
     return limits
 
 
-def _spellings(key: Any) -> list[Any]:
-    """A key, then the same quantity in its other unit."""
-    others = (
-        key.removesuffix(unit) + ending
-        for ending, (unit, _) in _UNITS.items()
-        if isinstance(key, str) and key.endswith(unit)
-    )
-    return [key, *others]
-
-
 Limits = Annotated[tuple[Number, Number], AfterValidator(_rising)]
 TurnLimits = Annotated[
     tuple[Annotated[Number, Field(ge=-4.0 * pi)], Annotated[Number, Field(le=4.0 * pi)]],
@@ -95,10 +87,9 @@ class _Strict(BaseModel):
         converted: dict[Any, Any] = {}
         for key, value in data.items():
             name = key
-            for ending, (unit, factor) in _UNITS.items():
-                stem = str(key).removesuffix(ending)
-                if stem != str(key) and stem + unit in cls.model_fields:
-                    name, value = stem + unit, _times(value, factor)
+            if key in _OTHER_UNITS:
+                name, factor = _OTHER_UNITS[key]
+                value = _times(value, factor)
             if name in converted:
                 raise ValueError(f"{name.rpartition('_')[0]} is given twice, in two units")
             converted[name] = value
@@ -182,17 +173,10 @@ class Table(_About):
     """A robot file with a table of DH rows."""
 
     convention: Literal["standard", "modified"] = "standard"
-    dh: list[Row]
+    dh: list[Row] = Field(min_length=FEWEST_JOINTS, max_length=MOST_JOINTS)
     limits_rad: list[TurnLimits] | None = None
     base: Frame = Frame()
     flange: Frame = Frame()
-
-    @field_validator("dh", mode="before")
-    @classmethod
-    def _as_many_joints(cls, rows: Any) -> Any:
-        if isinstance(rows, list) and not FEWEST_JOINTS <= len(rows) <= MOST_JOINTS:
-            raise ValueError(f"has {len(rows)} joints, not {FEWEST_JOINTS} to {MOST_JOINTS}")
-        return rows
 
     def robot(self) -> Robot:
         """The arm; ValueError where parts of the file contradict each other."""
@@ -374,12 +358,13 @@ def _described(document: Document, problems: list[Problem], path: Path) -> Robot
 def _problems(error: ValidationError, document: Document) -> list[Problem]:
     """The faults pydantic lists, as they stand in the file."""
     models = (Row, Frame, Table, ByUrdf)
-    known = {name for model in models for key in model.model_fields for name in _spellings(key)}
+    known = {name for model in models for name in model.model_fields} | set(_OTHER_UNITS)
     problems = []
     for number, fault in enumerate(error.errors(include_url=False)):
         place: tuple[Any, ...] = ()
         for part in fault["loc"]:
-            deeper = [(*place, key) for key in _spellings(part) if document.gives((*place, key))]
+            keys = [part, *(key for key, (name, _) in _OTHER_UNITS.items() if name == part)]
+            deeper = [(*place, key) for key in keys if document.gives((*place, key))]
             if not deeper:
                 break
             place = deeper[0]
