@@ -111,7 +111,8 @@ class ComplianceModel(ErrorModel):
 
     def pose(self, state: JointState) -> Pose:
         """Poses (n, ...) of the bent arm."""
-        return _dh.forward(self.dh, state.q_rad + self._give(self.moments(state)))
+        turns = np.sum(self.moments(state) * np.nan_to_num(self.coefficients), axis=2)
+        return _dh.forward(self.dh, state.q_rad + turns)
 
     def moments(self, state: JointState) -> np.ndarray:
         """Compute the moments that bend the joints.
@@ -179,10 +180,6 @@ class ComplianceModel(ErrorModel):
             of(_LINK),
             of(PAYLOAD_COLUMNS)[0],
         )
-
-    def _give(self, moments: np.ndarray) -> np.ndarray:
-        """Angles (n, k) by which joints give way under moments (n, k, 2)."""
-        return np.sum(moments * np.nan_to_num(self.coefficients), axis=2)
 
 
 def _place(frames: _chain.Columns, centre: np.ndarray) -> np.ndarray:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+import pandas as pd
 
 from kinacc.config.error_models import MODELS, NOMINAL, OWN, loaded
 from kinacc.errors import InputError, Problem
@@ -82,17 +83,15 @@ def frame(columns: Columns, model: str, name: str, session: str | None = None) -
     InputError
         For a frame that the table lacks; the message lists those it has.
     """
-    models, names = np.asarray(columns["model"]), np.asarray(columns["frame"])
-    chosen = (models == model) & (names == name)
+    table = pd.DataFrame(dict(columns))
+    table = table[table["model"] == model]
+    rows = table[table["frame"] == name]
     if session is not None:
-        chosen &= np.asarray(columns["session"]) == session
-    rows = np.flatnonzero(chosen)
-    if len(rows) == 0:
-        known = ", ".join(str(other) for other in names[models == model]) or "none"
+        rows = rows[rows["session"] == session]
+    if rows.empty:
+        known = ", ".join(table["frame"]) or "none"
         raise InputError(Problem("table frames", f"has no frame {name!r} of model {model}", known))
-    row = rows[0]
-    parts = ("qw", "qx", "qy", "qz", "x_mm", "y_mm", "z_mm")
-    values = np.array([columns[part][row] for part in parts], dtype=float)
+    values = rows[["qw", "qx", "qy", "qz", "x_mm", "y_mm", "z_mm"]].to_numpy(dtype=float)[0]
     return Pose(rotation_from_quaternion(values[:4]), values[4:])
 
 

@@ -86,7 +86,7 @@ class VECModel(ErrorModel):
     @property
     def prior_std(self) -> np.ndarray:
         """Usual size (P,) of the coefficients: 1 mm and 1 mrad."""
-        return np.array([1.0 if unit == "mm" else 1e-3 for unit in self.units])
+        return np.where(np.array(self.units) == "mm", 1.0, 1e-3)
 
     def with_parameters(self, x: np.ndarray) -> Self:
         """The model with the coefficients and offsets of (P,), ordered as ``start``."""
@@ -171,7 +171,7 @@ class VECModel(ErrorModel):
         coefficients[joint[both], error[both], order[both]] = value[both]
         offsets[joint[~both], (direction[~both] + 1) // 2] = value[~both]
         slides = np.zeros(len(arm), dtype=bool) if prismatic is None else prismatic
-        dh = DHModel(*(arm[name] for name in PARAMETERS), slides)
+        dh = DHModel(**{name: arm[name] for name in PARAMETERS}, prismatic=slides)
         return cls(dh, arm["q_min_rad"], arm["q_max_rad"], coefficients, offsets)
 
 

@@ -155,19 +155,16 @@ def recognise(dh: DHModel) -> SixAxes | None:
     SixAxes or None
         None where no closed form applies.
     """
-    if dh.joints != 6 or dh.prismatic.any() or np.abs(dh.beta_rad[:5]).max() > _TOLERANCE:
+    if dh.joints != 6 or dh.prismatic.any():
         return None
-    sine, cosine = np.abs(np.sin(dh.alpha_rad)), np.abs(np.cos(dh.alpha_rad))
-    a, d = np.abs(dh.a_mm), np.abs(dh.d_mm)
-    if cosine[[0, 3, 4]].max() > _TOLERANCE or max(sine[1], a[4]) > _TOLERANCE:
+    sine = np.sin(dh.alpha_rad)
+    zero = *np.cos(dh.alpha_rad[[0, 3, 4]]), sine[1], dh.a_mm[4], *dh.beta_rad[:5]
+    if np.abs(zero).max() > _TOLERANCE or abs(dh.a_mm[1]) <= _TOLERANCE:
         return None
-    if a[1] <= _TOLERANCE:
-        return None
-    if sine[2] <= _TOLERANCE and a[2] > _TOLERANCE:
+    if abs(sine[2]) <= _TOLERANCE < abs(dh.a_mm[2]):
         return SixAxes(dh, True)
-    if max(a[3], d[4]) > _TOLERANCE or np.hypot(a[2], sine[2] * d[3]) <= _TOLERANCE:
-        return None
-    return SixAxes(dh, False)
+    wrist, forearm = np.hypot(dh.a_mm[3], dh.d_mm[4]), np.hypot(dh.a_mm[2], sine[2] * dh.d_mm[3])
+    return SixAxes(dh, False) if wrist <= _TOLERANCE < forearm else None
 
 
 @dataclass(frozen=True)

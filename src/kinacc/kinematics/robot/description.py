@@ -260,10 +260,7 @@ def load(name_or_path: str | Path) -> Robot:
     path = _path(name_or_path)
     if path.suffix.lower() in (".urdf", ".xacro", ".xml"):
         return _urdf.load(path)
-    document, problems = read(path)
-    if path.parent == _SHIPPED:
-        document = replace(document, name=path.name)
-    return _described(document, problems, path)
+    return _described(*read(path), path)
 
 
 def of_text(text: str, name: str) -> Robot:

@@ -150,13 +150,10 @@ def _chain(path: Path, base: str | None, tip: str | None) -> tuple[str, list[Joi
     place, root = str(path), _root(path)
     links = [link.get("name", "") for link in root.findall("link")]
     joints = [_joint(element, path, links) for element in root.findall("joint")]
-    for kind, names in (
-        ("joint", [joint.name for joint in joints]),
-        ("child link", [joint.child for joint in joints]),
-    ):
-        name, count = Counter(names).most_common(1)[0] if names else ("", 0)
-        if count > 1:
-            raise _refusal(path, place, f"{kind} {name} is given more than once")
+    for kind, key in (("joint", "name"), ("child link", "child")):
+        for name, count in Counter(getattr(joint, key) for joint in joints).items():
+            if count > 1:
+                raise _refusal(path, place, f"{kind} {name} is given more than once")
     for key, link in (("base_link", base), ("tip_link", tip)):
         if link is not None and link not in links:
             fault = f"there is no link {link!r}"
