@@ -222,6 +222,16 @@ BASE_DATA[2].z=BASE_DATA[2].z+155\nBAS(#BASE,0)\nLIN {frame}""",
     assert [bool(each.refused) for each in program.positions] == [True, False]
 
 
+def test_columns_and_turns_are_read_where_and_as_they_are_written(tmp_path):
+    text = "note,note,x,y,z,a,b,c\nu,v,1,2,3,4,5,6"
+    (position,) = _read(tmp_path, "own.csv", text).positions
+    assert position.numbers.tolist() == [1, 2, 3, 4, 5, 6]
+    frame = "{X 1,Y 2,Z 3,A 0,B 0,C 0,S 'B010',T 'H1B'}"
+    (position,) = _read(tmp_path, "own.src", f"LIN {frame}").positions
+    bits = [part for part in position.posture if part.endswith("1")]
+    assert bits == ["S bit 1 1", "T bit 0 1", "T bit 1 1", "T bit 3 1", "T bit 4 1"]
+
+
 def test_poses_that_no_move_uses_are_left_alone(tmp_path):
     text = (EXAMPLES / "weld.mod").read_text()
     stale = "CONST robtarget stale:=[[500,0,600],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import defaultdict
 from collections.abc import Iterable, Sequence
 
 import numpy as np
@@ -60,8 +61,10 @@ def frames_of(source: Source) -> Frames:
     frames = {}
     text = _plain(source)
     for data in _FRAME_DATA.finditer(text):
-        spans = [frame.span() for frame in _FRAME.finditer(text, *data.span())]
-        poses = [CONVENTION.pose(source.values(source.numbers(*span))) for span in spans]
+        poses = [
+            CONVENTION.pose(source.values(source.numbers(*frame.span())))
+            for frame in _FRAME.finditer(text, *data.span())
+        ]
         if data[1] and poses:
             frames[TOOL, data[2].upper()] = poses[0]
         elif len(poses) > 1:
@@ -75,9 +78,10 @@ def read(sources: Sequence[Source], _: np.ndarray | None) -> Program:
     text = _plain(source)
     ends = {target.start(): target.end() for target in _TARGET.finditer(text)}
     names: dict[int, str] = {}
-    uses: dict[int, set[tuple[str | None, str | None]]] = {}
+    uses: dict[int, set[tuple[str | None, str | None]]] = defaultdict(set)
     refused: dict[str | None, str] = {}
-    computed, moves, assignments = [], [], []
+    computed: list[str] = []
+    depending: list[tuple[str, set[str], bool]] = []  # listed if a name is, or none is, a target
     for data in _FRAME_DATA.finditer(text):
         holds, programmed = data[3].upper(), data[1] or (data[4] or "").upper()
         if holds == ("FALSE" if data[1] else "TRUE") or programmed == "FALSE":
@@ -93,22 +97,23 @@ def read(sources: Sequence[Source], _: np.ndarray | None) -> Program:
             work = re.search(r"\\WOBJ\s*:=\s*(\w+)", statement.upper())
             names_used = {*re.findall(r"(?<!\\)\b[A-Z]\w*", bare)}
             if not here and not _COMPUTED.search(statement):
-                moves.append((line, names_used))
+                depending.append((line, names_used, False))
             here += [start for start, name in names.items() if name.upper() in names_used]
             for start in here:
                 way = tool and tool[1], work[1] if work else "WOBJ0"
-                uses.setdefault(start, set()).add(way)
+                uses[start].add(way)
         else:
             ends = {start: end for start, end in ends.items() if start not in here}
             if assigned := re.match(r"\s*(\w+)\s*(?:\{[^}]*\}\s*)?:=", statement):
-                assignments.append((line, assigned[1].upper()))
+                depending.append((line, {assigned[1].upper()}, True))
         if _COMPUTED.search(statement):
             computed.append(line)
         if changed := _SET.match(statement):
             refused[changed[1].upper()] = CHANGED
     defined = {name.upper() for name in names.values()}
-    computed += [line for line, names_used in moves if not names_used & defined]
-    computed += [line for line, name in assignments if name in defined and line not in computed]
+    for line, words, listed in depending:
+        if bool(words & defined) == listed and line not in computed:
+            computed.append(line)
     positions = []
     for start, end in ends.items():
         ways: set[Use] = {
@@ -125,7 +130,7 @@ def read(sources: Sequence[Source], _: np.ndarray | None) -> Program:
 def _position(name: str, source: Source, start: int, end: int) -> Position:
     places = source.numbers(start, end)
     values = source.values(places)
-    moves = bool(np.any((np.abs(values[-6:]) < _UNUSED) & (values[-6:] != 0.0)))
+    moves = bool(np.any((values[-6:] != 0.0) & (np.abs(values[-6:]) < _UNUSED)))
     if len(places) == 12:
         return Position(name, source, places[:6], 4, 1.0, moves_outside=moves)
     stated, decimals = _stated(values[7:11]), (3, 3, 3, 9, 9, 9, 9)

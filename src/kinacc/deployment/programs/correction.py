@@ -57,7 +57,6 @@ _RECORD = ".kinacc.json"
 _SAME_TOOL_MM, _SAME_TOOL_RAD = 5.0, np.deg2rad(1.0)
 _SAME = 1e-6  # mm and mrad: a pose that is no other
 _SINGULAR = 0.02  # smallest singular value of the Jacobian in rad and units of the reach
-_HIDDEN = ["q_rad", "pose", "outcome"]
 _SHOWN = [
     "change_mm", "change_mrad", "largest_joint_change_deg", "expected_error_mm",
     "is_measured_there", "is_near_singular",
@@ -118,10 +117,11 @@ def read_program(
     """
     path = Path(path)
     ending = path.suffix.lower()
-    language = next((item for item in LANGUAGES if ending in item.endings), None)
-    if language is None:
-        known = ", ".join(ending for item in LANGUAGES for ending in item.endings)
-        raise InputError(Problem(str(path), f"ends in {ending!r}: no robot language", known))
+    languages = {known: item for item in LANGUAGES for known in item.endings}
+    if ending not in languages:
+        message = f"ends in {ending!r}: no robot language"
+        raise InputError(Problem(str(path), message, ", ".join(languages)))
+    language = languages[ending]
     beside = {item.name.lower(): item for item in path.parent.iterdir() if item != path}
     partners = (beside.get(path.stem.lower() + suffix) for suffix in language.partners)
     named = map(beside.get, language.frame_files)
@@ -196,7 +196,7 @@ def compensate_program(
     remarks = []
     if language.robots and makers - {language.name}:
         remarks = [f"{language.name}: robot {robot.name} has a controller of another maker."]
-    parts = [pd.DataFrame(columns=[*_HIDDEN, *_SHOWN])]
+    parts = [pd.DataFrame(columns=_SHOWN)]
     for name in dict.fromkeys(positions[number].tool for number in starts):
         group = [number for number in starts if positions[number].tool == name]
         place, remark = _carried(calibration, tool[group[0]], point)
@@ -218,7 +218,7 @@ def compensate_program(
         "file": [item.where for item in positions],
         "kind": ["pose" if item.scale is None else "joints" for item in positions],
     }).join(rows[_SHOWN])  # fmt: skip
-    table["status"] = [reasons.get(number, "corrected") for number in range(len(positions))]
+    table["status"] = [reasons.get(number, "corrected") for number in table.index]
     return CorrectedProgram(
         language.name,
         f"{calibration.name}, {calibration.choice}",
@@ -302,21 +302,16 @@ def _refuse_second_time(program: Program) -> None:
 
 def _in_use(program: Program, options: Mapping) -> Program:
     """The program without poses that no move uses, unless a frame for all of them is given."""
-    unused = [
-        item
-        for item in program.positions
-        if item.scale is None and item.tool is None and item.base is None and not item.refused
-    ]
-    if "" in options[TOOL] or "" in options[BASE] or len(unused) == len(program.positions):
+    used: list[Position] = []
+    lines = [*program.not_corrected]
+    for item in program.positions:
+        if item.scale is None and item.tool is None and item.base is None and not item.refused:
+            lines.append(f"{item.where}: {item.name}, which no move uses")
+        else:
+            used.append(item)
+    if "" in {*options[TOOL], *options[BASE]} or not used:
         return program
-    return replace(
-        program,
-        positions=[item for item in program.positions if item not in unused],
-        not_corrected=[
-            *program.not_corrected,
-            *(f"{item.where}: {item.name}, which no move uses" for item in unused),
-        ],
-    )
+    return replace(program, positions=used, not_corrected=lines)
 
 
 def _all_frames(
@@ -326,7 +321,7 @@ def _all_frames(
     frames, problems = dict(program.frames), []
     poses = [item for item in program.positions if item.scale is None and not item.refused]
     wanted = {(kind, getattr(item, kind) or "") for item in poses for kind in (TOOL, BASE)}
-    wanted |= {(TOOL, "")} if "" in options[TOOL] else set()
+    wanted |= {(TOOL, name) for name in options[TOOL] if not name}
     for kind, name in sorted(wanted - set(frames)):
         numbers = options[kind].get(name, options[kind].get(""))
         if numbers is None and ask is not None:
@@ -384,13 +379,19 @@ def _corrected(
     slopes = dh.joint_jacobian(robot.dh, robot.dh_joints(q_rad))
     slopes[:, :3] /= np.sum(np.abs(robot.dh.a_mm) + np.abs(robot.dh.d_mm))
     errors_mm = np.nan_to_num([known.unexplained[:, 0], known.std_position_mm])
-    columns = [
-        list(q_rad), [Pose(*parts) for parts in zip(*new, strict=True)], result.status,
-        shift_mm, 1e3 * turn_rad, np.rad2deg(np.abs(q_rad - start).max(axis=1)),
-        np.hypot(*errors_mm), known.near,
-        np.linalg.svd(slopes, compute_uv=False)[:, -1] < _SINGULAR,
-    ]  # fmt: skip
-    return pd.DataFrame(dict(zip([*_HIDDEN, *_SHOWN], columns, strict=True)))
+    return pd.DataFrame(
+        {
+            "q_rad": list(q_rad),
+            "pose": [Pose(*parts) for parts in zip(*new, strict=True)],
+            "outcome": result.status,
+            "change_mm": shift_mm,
+            "change_mrad": 1e3 * turn_rad,
+            "largest_joint_change_deg": np.rad2deg(np.abs(q_rad - start).max(axis=1)),
+            "expected_error_mm": np.hypot(*errors_mm),
+            "is_measured_there": known.near,
+            "is_near_singular": np.linalg.svd(slopes, compute_uv=False)[:, -1] < _SINGULAR,
+        }
+    )
 
 
 def _nominal(robot: Robot, q_rad: np.ndarray, tool: Pose) -> Pose:

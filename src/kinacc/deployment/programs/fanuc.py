@@ -69,9 +69,8 @@ def _stated(config: re.Match) -> tuple[str | None, ...]:
 def posture(sides: Sequence[bool], q_deg: np.ndarray) -> tuple[str, ...]:
     """Wrist N or F, elbow U or D, front T or B, and turns of J1, J4 and J6."""
     turns = [f"J{axis} turn {int((q_deg[axis - 1] + 180.0) // 360.0)}" for axis in (1, 4, 6)]
-    pairs = zip(("BT", "DU", "NF"), sides, strict=True)
-    front, elbow, wrist = (pair[int(is_first)] for pair, is_first in pairs)
-    return (wrist, elbow, front, *turns)
+    is_ahead, is_above, is_positive = map(int, sides)
+    return ("NF"[is_positive], "DU"[is_above], "BT"[is_ahead], *turns)
 
 
 LANGUAGE = Language(

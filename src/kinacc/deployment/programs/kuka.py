@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
@@ -51,12 +52,10 @@ def frames_of(source: Source) -> Frames:
     """TOOL_DATA and BASE_DATA, and frames written in assignments to $TOOL and $BASE."""
     frames = {}
     for offset, text in _lines(source.text):
-        if data := _DATA.match(text):
-            for parts in list(_aggregates(offset, text))[:1]:
-                if places := _places(parts, _FRAME):
-                    name = str(int(data[3])) if data[3] else source.where(offset)
-                    kind = (data[1] or data[2]).lower()
-                    frames[kind, name] = CONVENTION.pose(source.values(places))
+        data, places = _DATA.match(text), _places(next(_aggregates(offset, text), {}), _FRAME)
+        if data and places:
+            name = str(int(data[3])) if data[3] else source.where(offset)
+            frames[(data[1] or data[2]).lower(), name] = CONVENTION.pose(source.values(places))
     return frames
 
 
@@ -64,9 +63,9 @@ def read(sources: Sequence[Source], _: np.ndarray | None) -> Program:
     """Positions of a KRL program."""
     data: dict[str, Use] = {}
     positions: dict[str, Position] = {}
-    uses: dict[str, set[Use]] = {}
+    uses: dict[str, set[Use]] = defaultdict(set)
     changed, computed, moves = set(), [], []
-    for source in sorted(sources, key=_ending):  # .dat first
+    for source in sorted(sources, key=lambda source: source.path.suffix.lower()):  # .dat first
         use = _UNUSED
         for offset, text in _lines(source.text):
             statement, aggregates = source.statement(offset, text), list(_aggregates(offset, text))
@@ -85,11 +84,10 @@ def read(sources: Sequence[Source], _: np.ndarray | None) -> Program:
                 target = re.sub(r"\[.*?\]", "", target.upper())
                 names = {*re.findall(r"\$?\b[A-Z_]\w*", target)} - {"CA"}
                 moves.append((statement, names))
-                frames_named = [
-                    data[word] for word in re.findall(r"\w+", text.upper()) if word in data
-                ]
+                in_line = (data[word] for word in re.findall(r"\w+", text.upper()) if word in data)
+                way = next(in_line, use)
                 for name in (*names, *inline):
-                    uses.setdefault(name, set()).add([*frames_named, use][0])
+                    uses[name].add(way)
             elif _COMPONENT.match(text):
                 computed.append(statement)
             elif aggregates and (assigned := _ASSIGNED.match(text)):
@@ -105,19 +103,14 @@ def read(sources: Sequence[Source], _: np.ndarray | None) -> Program:
     defined = {name.split("[")[0] for name in positions}
     result = []
     for name, position in positions.items():
-        ways = uses.get(name.split("[")[0]) or {data.get(f"F{name[1:]}", _UNUSED)}
         ways = {
             (tool, base, CHANGED if {(TOOL, tool), (BASE, base)} & changed else reason)
-            for tool, base, reason in ways
+            for tool, base, reason in uses.get(name.split("[")[0])
+            or [data.get(f"F{name[1:]}", _UNUSED)]
         }
         result.append(in_use(replace(position, name=name), ways))
-    result.sort(key=lambda position: (_ending(position.source), position.places[0]))
     computed += [statement for statement, names in moves if not defined.issuperset(names)]
     return Program(sources, result, computed)
-
-
-def _ending(source: Source) -> str:
-    return source.path.suffix.lower()
 
 
 def posture(sides: Sequence[bool], q_deg: np.ndarray) -> tuple[str, ...]:
@@ -164,27 +157,26 @@ def _in_force(use: Use, text: str, data: dict[str, Use], where: str) -> Use:
     """The frames after a line that may set them."""
     if active := re.search(r"\bFDAT_ACT\s*=\s*(\w+)", text, re.I):
         return data.get(active[1].upper(), _UNUSED)
-    state = dict(zip((TOOL, BASE, "reason"), use, strict=True))
+    *frames, reason = use
     if mode := re.search(r"\bIPO_MODE\s*=\s*#(TCP|BASE)\b", text, re.I):
-        state["reason"] = STILL if mode[1].upper() == "TCP" else ""
+        reason = STILL if mode[1].upper() == "TCP" else ""
     for kind, number, named, variable in _SET.findall(text):
+        column = (TOOL, BASE).index(kind.lower())
         if number or variable.upper() == "$NULLFRAME":
-            state[kind.lower()] = str(int(number or 0))
+            frames[column] = str(int(number or 0))
         elif named:
-            source = data.get(named.upper(), _UNUSED)
-            state[kind.lower()] = source[0 if kind.lower() == TOOL else 1]
+            frames[column] = data.get(named.upper(), _UNUSED)[column]
         else:
-            state[kind.lower()] = variable or where
-    if _MOVED.search(text):
-        state["reason"] = CHANGED
-    return state[TOOL], state[BASE], state["reason"] or ""
+            frames[column] = variable or where
+    return frames[0], frames[1], CHANGED if _MOVED.search(text) else reason
 
 
 def _position(source: Source, parts: Parts) -> Position | None:
     """The position of an aggregate; None where some of its numbers are missing."""
+    if places := _places(parts, _AXES):
+        return Position("", source, places, 4, 1.0)
     if not (places := _places(parts, _FRAME)):
-        places = _places(parts, _AXES)
-        return Position("", source, places, 4, 1.0) if places else None
+        return None
     outer = [parts[key][0] for key in parts if re.fullmatch(r"E[1-6]", key)]
     moves = any(re.fullmatch(NUMBER, text) and float(text) for text in outer)
     stated = _bits(*(_whole(parts[key][0]) for key in "ST")) if {*"ST"} <= set(parts) else ()
@@ -193,8 +185,7 @@ def _position(source: Source, parts: Parts) -> Position | None:
 
 def _whole(text: str) -> int:
     """A status or turn: 6, 'B110' or 'H6'."""
-    base = {"'B": 2, "'H": 16}.get(text[:2].upper(), 10)
-    return int(text.strip("'BbHh") if base != 10 else text, base)
+    return int(re.sub("^'[BH]|'", "", text.upper()), {"B": 2, "H": 16}.get(text[1:2].upper(), 10))
 
 
 LANGUAGE = Language(

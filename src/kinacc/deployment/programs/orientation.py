@@ -61,9 +61,9 @@ class Convention(NamedTuple):
 
     def typed(self, numbers: np.ndarray) -> Pose:
         """A frame as a person gives it, in mm and degrees; fixed angles for a quaternion."""
-        convention = Convention(self.orientation)
-        if self.orientation == QUATERNION and len(numbers) == 6:
-            convention = Convention(FIXED)
-        if len(numbers) != (7 if convention.orientation == QUATERNION else 6):
-            raise InputError(Problem("frame", f"has {len(numbers)} numbers", "6, mm and deg"))
-        return convention.pose(numbers)
+        orientation, count = self.orientation, len(numbers)
+        if orientation == QUATERNION and count == 6:
+            orientation = FIXED
+        if count != 6 + (orientation == QUATERNION):
+            raise InputError(Problem("frame", f"has {count} numbers", "6, mm and deg"))
+        return Convention(orientation).pose(numbers)

@@ -124,7 +124,7 @@ class Program:
     positions: Sequence[Position]
     not_corrected: Sequence[str] = ()
     convention: Convention | None = None
-    frames: Mapping[tuple[str, str], Pose] = field(default_factory=dict)
+    frames: Frames = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -25,12 +25,12 @@ from kinacc.deployment.programs.record import (
 from kinacc.errors import InputError, Problem
 
 _UNITS = {"rad": 180.0 / np.pi, "m": 1e3}  # deg and mm where not stated
-_TURNS = {
-    QUATERNION: ["qw", "qx", "qy", "qz"],
-    VECTOR: ["rvx", "rvy", "rvz"],
-    INTRINSIC: ["rx", "ry", "rz"],
-    KUKA: ["a", "b", "c"],
-    FIXED: ["w", "p", "r"],
+_KEYS = {
+    QUATERNION: "x y z qw qx qy qz",
+    VECTOR: "x y z rvx rvy rvz",
+    INTRINSIC: "x y z rx ry rz",
+    KUKA: "x y z a b c",
+    FIXED: "x y z w p r",
 }
 _COLUMN = re.compile(r"(\w+?)(?:(?:_|\s*[\[(])(mm|m|deg|rad)[\])]?)?")
 
@@ -38,28 +38,28 @@ _COLUMN = re.compile(r"(\w+?)(?:(?:_|\s*[\[(])(mm|m|deg|rad)[\])]?)?")
 def read(sources: Sequence[Source], _: np.ndarray | None) -> Program:
     """Positions of a CSV file: joints where it has them, else poses in the robot's base."""
     (source,) = sources
-    lines = [line for line in re.finditer(r"[^\r\n]+", source.text) if line[0].strip()]
+    lines = [*re.finditer(r"[^\r\n]*\S[^\r\n]*", source.text)]
     head = lines[0][0] if lines else ""
     separator = next((sign for sign in ";\t" if sign in head), ",")
-    units = {}
+    names, units = [], {}
     for cell in head.split(separator):
         column = _COLUMN.fullmatch(cell.strip('\xef\xbb\xbf" ').lower())
-        units[column[1] if column else cell] = _UNITS.get(column[2] if column else "", 1.0)
+        names.append(column[1] if column else cell)
+        units[names[-1]] = _UNITS.get(column[2] if column else "", 1.0)
     convention = scale = None
     if keys := sorted(name for name in units if re.fullmatch(r"q[1-9]", name)):
         scale = np.array([1.0 / units[key] for key in keys])
-    else:
-        kind = next((kind for kind, turn in _TURNS.items() if {*"xyz", *turn} <= {*units}), None)
-        if kind is None:
-            allowed = "q1_deg .., or x_mm .. with qw .., rvx_deg .., rx_deg .., a .. c or w, p, r"
-            raise InputError(Problem(f"{source.path}:1", "names no columns of positions", allowed))
-        keys = [*"xyz", *_TURNS[kind]]
+    elif kind := next((kind for kind in _KEYS if {*_KEYS[kind].split()} <= {*units}), ""):
+        keys = _KEYS[kind].split()
         convention = Convention(kind, units["x"], units[keys[-1]])
+    else:
+        allowed = "q1_deg .., or x_mm .. with qw .., rvx_deg .., rx_deg .., a .. c or w, p, r"
+        raise InputError(Problem(f"{source.path}:1", "names no columns of positions", allowed))
     positions = []
     cells = re.compile(rf'[ \t]*"?([^{separator}"\r\n]*?)"?[ \t]*(?:{separator}|$)', re.M)
     for line in lines[1:]:
         spans = [cell.span(1) for cell in cells.finditer(source.text, *line.span())]
-        row = dict(zip(units, spans, strict=False))
+        row = dict(zip(names, spans, strict=False))
         try:
             places = [row[key] for key in keys]
             source.values(places)

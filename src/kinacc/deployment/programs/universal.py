@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import defaultdict
 from collections.abc import Sequence
 
 import numpy as np
@@ -37,11 +38,11 @@ def read(sources: Sequence[Source], _: np.ndarray | None) -> Program:
     (source,) = sources
     text = blanked(source.text, r"#.*", r'"[^"\r\n]*"')
     names = {item.span(2): item[1] for item in _ASSIGNED.finditer(text)}
-    named: dict[str, list[Place]] = {}
+    named: dict[str, list[Place]] = defaultdict(list)
     for place, name in names.items():
-        named.setdefault(name, []).append(place)
+        named[name].append(place)
     frames: Frames = {}
-    uses: dict[Place, set[Use]] = {}
+    uses: dict[Place, set[Use]] = defaultdict(set)
     tool, near, computed = None, {}, []
     for call in _CALL.finditer(text):
         start = call.end()
@@ -61,7 +62,7 @@ def read(sources: Sequence[Source], _: np.ndarray | None) -> Program:
                 computed.append(source.statement(call.start(), line))
                 break
             for span in spans:
-                uses.setdefault(span, set()).add((tool, ROBOT, ""))
+                uses[span].add((tool, ROBOT, ""))
                 if argument and argument[1] and argument[4] in named:
                     near[span] = source.values(source.numbers(*named[argument[4]][-1]))
     positions = []
