@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from kinacc.calibration.noise import of_measurements
+from kinacc.calibration.noise import of_readings
 from kinacc.checks import (
     coverage,
     digits,
@@ -122,7 +122,7 @@ def check(
     distances = readings.distances(every)
     by_distances, renamed = moved.by_distances(every, distances)
     single, cell, away_mm = readings.merged(every)
-    scatter = of_measurements(reading.columns, robot)
+    scatter = of_readings(every, robot.dh)
     fitted, meaning, findings = _meant(single, layout, robot, progress)
     kinds = {item.kind for item in findings}
     findings += by_distances

@@ -11,7 +11,7 @@ from kinacc.calibration.noise import Noise
 from kinacc.calibration.observations import from_columns
 from kinacc.calibration.vec_estimator import VECEstimator
 from kinacc.checks.findings import Finding, finding
-from kinacc.checks.readings import Distance, Readings
+from kinacc.checks.readings import Distance, Readings, thinned
 from kinacc.checks.robust_fit import Fitted
 from kinacc.kinematics.robot import Robot
 from kinacc.measurements import folds
@@ -21,6 +21,7 @@ _WEAK = 0.1  # of a joint's range
 # Of the largest residual expected: larger jumps of the base were found in four files, two of them
 # measured; in one of these a jump of a third less stayed unfound.
 _SMALLEST_MOVE = 1.5
+_ENOUGH_ROWS = 10_000  # that show whether there are poses enough, in nearly every long file
 _PER_POSE = 6  # independent numbers of a rigid body, however many targets it carries
 
 
@@ -121,17 +122,20 @@ def thin(coverage: list[dict[str, Any]]) -> list[Finding]:
 
 def few_poses(columns: Columns, robot: Robot, calibration: Mapping[str, Any]) -> list[Finding]:
     """Whether the VEC model has more coefficients than the poses give independent numbers."""
-    observed = from_columns({**columns, "fold": np.full(len(columns["pose"]), np.nan)}, robot)
+    observed = from_columns(columns, robot)
     fit = VECEstimator.of(calibration, robot, observed)
-    same = folds.configurations_of(columns)
-    # A target adds three components to a pose, an orientation three; repeats add none.
-    pairs, first = np.unique(np.stack([same, observed.target]), axis=1, return_index=True)
-    turned = np.zeros(same.max() + 1)
-    np.maximum.at(turned, pairs[0], 3.0 * observed.has_rotation[first])
-    components = np.minimum(3.0 * np.bincount(pairs[0]) + turned, _PER_POSE)
     frames = int(fit.common.terms(observed).free.sum()) if fit.common.frames_estimated else 0
-    if components.sum() >= fit.required + frames:
-        return []
+    every = np.arange(len(observed))
+    for rows in (thinned(every, _ENOUGH_ROWS), every):
+        same = folds.configurations_of({name: columns[name][rows] for name in columns})
+        # A target adds three components to a pose, an orientation three; repeats add none.
+        label = np.stack([same, observed.target[rows]])
+        pairs, first = np.unique(label, axis=1, return_index=True)
+        turned = np.zeros(same.max() + 1)
+        np.maximum.at(turned, pairs[0], 3.0 * observed.has_rotation[rows][first])
+        components = np.minimum(3.0 * np.bincount(pairs[0]) + turned, _PER_POSE)
+        if components.sum() >= fit.required + frames:
+            return []
     few = finding(
         "few_poses",
         poses=len(components),

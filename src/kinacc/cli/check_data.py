@@ -17,7 +17,6 @@ from kinacc.cli.exclude import measured_data_set
 from kinacc.cli.output import Output, answers
 from kinacc.config.edit import with_added
 from kinacc.errors import InputError, Problem, refuse
-from kinacc.figures.checked_data import draw
 from kinacc.progress import reporting
 from kinacc.tables.atomic import write_whole
 
@@ -106,6 +105,8 @@ def _sections(files: tuple[str, ...], wanted: tuple[str, ...]) -> dict[str, dict
 
 
 def _drawn(report):
+    from kinacc.figures.checked_data import draw
+
     suspects = {item.kind: item.lines for item in report.suspicions}
     limit_mm = report.facts.get("quick_fit", {}).get("most_expected_mm", float("nan"))
     return draw(report.facts["joint_coverage"], report.line, report.left_mm, limit_mm, suspects)

@@ -79,7 +79,7 @@ def tabled(path: str, rows: Iterable[Row], layout: Layout, sheet: bool = False) 
 
     ``sheet``: the rows are those of a sheet.
     """
-    rows = [row for row in rows if row[0] > layout.skip_lines and filled(row[1])]
+    rows = [(n, c) for n, c in rows if n > layout.skip_lines and (filled(c[:1]) or filled(c))]
     line, head = (0, list(layout.names)) if layout.names is not None else (0, [])
     if not head and rows:
         line, head = rows.pop(0)

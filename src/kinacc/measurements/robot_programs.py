@@ -120,8 +120,9 @@ def expanded(table: RawTable) -> RawTable:
     """The table with cells such as {A1 10, A2 -90 ..} and [[10,-90,..],[9E9,..]] as columns."""
     columns: dict[str, Sequence] = {}
     for name in table.columns:
-        texts = table.texts(name)
-        of = next((of for shape, of in _SHAPES.items() if re.match(shape, texts[0])), None)
+        first = str(table.columns[name][0]).strip()
+        of = next((of for shape, of in _SHAPES.items() if re.match(shape, first)), None)
+        texts = table.texts(name) if of else []
         rows = [of(text) for text in texts] if of and all(map(_LIST.fullmatch, texts)) else [{}]
         if rows[0] and all(row.keys() == rows[0].keys() for row in rows):
             columns |= {f"{name} {part}": [repr(row[part]) for row in rows] for part in rows[0]}

@@ -15,7 +15,6 @@ from kinacc.measurements.row_names import RowNames
 
 # What instruments, controllers and spreadsheets write where there is nothing.
 _NOTHING = frozenset(WORDS["nothing"])
-_LONGEST_NOTHING = max(map(len, _NOTHING))
 _DASHES = frozenset("-–—*./")  # --, ---.---, ****
 _LARGEST_CELL = 1e75  # its fourth power is still a float
 _LARGEST = 1e12  # beyond all lengths and angles
@@ -55,14 +54,15 @@ class RawTable:
     def is_gap(cell: object) -> bool:
         """Whether a cell is empty, or holds one of the words that programs and people write."""
         if isinstance(cell, str):
-            if "1" <= cell[:1] <= "9" or len(word := cell.strip()) > _LONGEST_NOTHING:
-                return False
-            return word.lower() in _NOTHING or _DASHES.issuperset(word)
+            word = cell.strip().lower()
+            return word in _NOTHING or _DASHES.issuperset(word)
         return cell is None or cell is pd.NaT or cell != cell
 
     def gaps(self, name: str) -> np.ndarray:
         """True (n,) where the cell of column ``name`` is empty."""
-        return np.array([self.is_gap(cell) for cell in self.columns[name]], dtype=bool)
+        empty = np.isnan(self.values(name))
+        empty[empty] = [self.is_gap(cell) for cell in self.columns[name][empty]]
+        return empty
 
     def texts(self, name: str) -> list[str]:
         """Cells of a column as texts."""
