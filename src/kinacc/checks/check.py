@@ -146,7 +146,6 @@ def check(
     fit = None if "does_not_fit" in kinds else fitted
     facts = coverage.facts_of(every, robot, scatter, distances, fit)
     unread = dict.fromkeys((*reading.notes, *reading.left_out()))
-    lines = np.unique(every.line).size
     return Report(
         dataset,
         path,
@@ -154,7 +153,7 @@ def check(
         coverage.remarks_of(every, scatter, distances),
         tuple(
             replace(item.held_to(gross), row_names=reading.row_names)
-            for item in _once(findings, lines)
+            for item in _once(findings, facts["rows"])
         ),
         (
             *(finding(LEFT_OUT, words=text) for text in unread),

@@ -24,13 +24,13 @@ def bytes_of(path: Path | str) -> bytes:
     return content
 
 
-def values_of(content: bytes, name: str, **options: Any) -> Any:
+def values_of(content: bytes, name: str) -> Any:
     """The values of a JSON text. Raises InputError where they are too many, ValueError for no JSON.
 
-    ``name`` is what the problem calls it; ``options`` are those of ``json.loads``.
+    ``name`` is what the problem calls it.
     """
     values = sum(map(content.count, (b",", b"[", b"{")))  # at least as many as there are
     if values > _MOST_VALUES:
         allowed = f"at most {_MOST_VALUES:,}"
         raise InputError(Problem(name, "holds too many values", allowed))
-    return json.loads(content, **options)
+    return json.loads(content)

@@ -31,7 +31,6 @@ from kinacc.measurements.reader import payload, stacked, travel
 from kinacc.measurements.table import RawTable, frame
 
 POINTS, POSES = "points", "poses"
-_DIGITS = 15  # a whole number of more is no count
 _FIRST_NAMES = {  # of a file under our names
     JOINTS: r"q1_(?:deg|rad|mm|m)",
     POINTS: r"e?x_(?:mm|m)",
@@ -220,13 +219,9 @@ def _of_json(path: Path) -> RawTable:
     """The rows of an answer that a command gave as JSON."""
     try:
         content = json_files.bytes_of(path)
-        rows = json_files.values_of(content, str(path), parse_int=_whole)["rows"]
+        rows = json_files.values_of(content, str(path))["rows"]
         columns = {name: [row.get(name) for row in rows] for name in rows[0]}
     except (ValueError, KeyError, IndexError, TypeError, AttributeError, RecursionError):
         allowed = "a table of rows, as commands write with -o NAME.json"
         raise InputError(Problem(str(path), "holds no rows", allowed)) from None
     return RawTable(str(path), frame(columns), np.arange(1, len(rows) + 1))
-
-
-def _whole(digits: str) -> int | float:
-    return int(digits) if len(digits) <= _DIGITS else float(digits)
