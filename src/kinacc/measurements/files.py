@@ -136,10 +136,10 @@ def rows_of_lines(lines: Iterable[str], delimiter: str, path: str) -> Iterator[R
 def _limited(rows: Iterable[Row], path: str) -> Iterator[Row]:
     """The rows, as long as they are not too many. Raises InputError then."""
     held = 0
-    for count, (line, cells) in enumerate(rows):
-        held += len(cells)
-        _refuse_shape(path, count, len(cells), held)
-        yield line, cells
+    for count, row in enumerate(rows):
+        held += (width := len(row[1]))
+        _refuse_shape(path, count, width, held)
+        yield row
 
 
 class Workbook:

@@ -116,7 +116,7 @@ def numbers(table: RawTable, name: str, problems: list[Problem], *, gaps: bool =
     values = table.values(name)
     bad = np.flatnonzero(~(np.abs(values) < _LARGEST_CELL))
     if gaps and bad.size:
-        bad = bad[[not table.is_gap(table.columns[name][row]) for row in bad]]
+        bad = bad[~table.gaps(name)[bad]]
     if bad.size:
         cells = table.columns[name][bad].tolist()
         shown = ", ".join(repr(cell)[:60] for cell in cells[:_SHOWN])
