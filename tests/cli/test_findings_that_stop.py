@@ -29,7 +29,9 @@ def two_slips(tmp_path, monkeypatch):
 
 
 def next_commands(printed):
-    return [shlex.split(line) for line in printed.split("next:")[1].splitlines() if line.strip()]
+    return [
+        shlex.split(line) for line in printed.split("next:")[1].splitlines()[1:] if line.strip()
+    ]
 
 
 def test_the_command_after_outliers_excludes_their_rows_and_keeps_the_rest_of_the_file(two_slips):

@@ -73,7 +73,8 @@ def check_data(
         click.echo(to_json(reports))
     elif code < UNUSABLE:
         lines = following or [shlex.join(["kinacc", "calibrate", *files])]
-        click.echo("\n  ".join(["next:", *lines]))
+        first = "next: correct what is named above and check again, or" if following else "next:"
+        click.echo("\n  ".join([first, *lines]))
     sys.exit(code)
 
 
