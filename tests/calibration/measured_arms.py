@@ -5,6 +5,8 @@ from __future__ import annotations
 from contextlib import chdir
 from pathlib import Path
 
+import yaml
+
 from kinacc.calibration.observations import from_columns
 from kinacc.kinematics import robot
 from kinacc.synthetic import source
@@ -15,8 +17,10 @@ ROOT = Path(__file__).resolve().parents[2]
 
 def measured_arm(name):
     """Arm, calibration settings and observations of a data set."""
-    with chdir(ROOT):
-        settings = read_data_sets(["benchmarks/reach.yaml"]).settings[name]
+    with chdir(ROOT / "benchmarks"):
+        config = yaml.safe_load(Path("reach.yaml").read_text("utf-8"))
+        config["datasets"] = {name: config["datasets"][name]}  # data of others may be absent
+        settings = read_data_sets([], config, absolute=True).settings[name]
         columns = source.run({}, settings)["measurements"]
     arm = robot.load(settings["robot"])
     return arm, settings["calibration"], from_columns(columns, arm)
