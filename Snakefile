@@ -1,8 +1,7 @@
 """kinacc: how large is the largest error of a calibrated robot model?
 
 measurements -> data_check -> fit_vec -> fit_dh -> residuals (Tables I to III) -> summary
-    -> accuracy_map (Fig. 3)
-    -> operating_points -> study_part .. -> study (Fig. 4), histories (Figs. 5, 6) -> claims
+    -> accuracy_map (Fig. 3); operating_points -> study_part .. -> study (Fig. 4), histories (Figs. 5, 6) -> claims
     -> figures, map_figure, report, digests
 
 Every data set of the configuration goes through all of it, in results/<data set>/. Tables are

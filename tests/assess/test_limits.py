@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 from scipy.special import chndtr, ndtri
-from scipy.stats import ncx2
+from scipy.stats import chi2, ncx2
 
 from kinacc.assess.counts import excepted
 from kinacc.assess.limits import (
@@ -43,6 +43,12 @@ def test_limits_miss_as_seldom_as_they_say_whatever_the_direction(ratio):
             missed.append(sum(upper_limit_mm(m, noise, allowed) < size for m in means))
             missed.append(sum(lower_limit_mm(m, noise, allowed) > size for m in means))
     assert max(missed) < allowed * draws + 4 * math.sqrt(allowed * draws)
+
+
+def test_the_lower_limit_under_equal_noise_given_as_a_matrix_is_off_by_chi_of_three():
+    mean, noise = np.array([3.0, -4.0, 12.0]), 0.2
+    limit = 13.0 - noise * math.sqrt(chi2.ppf(0.95, 3))
+    assert lower_limit_mm(mean, noise**2 * np.eye(3), 0.05) == pytest.approx(limit, abs=1e-9)
 
 
 def turned(variances, seed=1):

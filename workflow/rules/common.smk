@@ -1,5 +1,4 @@
 # Functions that rules call for their inputs and parameters.
-STUDY = ("assessment_points", "study", "study_summary", "readings", "histories")
 FIGURES = ("fig1", "fig2", "fig4", "fig5", "fig6")  # each drawn by kinacc.figures.<name>
 
 
@@ -70,8 +69,8 @@ def calibrated(dataset):
 
 def studied(dataset):
     """Tables of the study of a data set."""
-    found = tables(dataset, *STUDY) | mapped(dataset)
-    return found | ({} if data.is_measured(dataset) else tables(dataset, "claims"))
+    found = tables(dataset, "assessment_points", "study", "study_summary", "readings", "histories")
+    return found | mapped(dataset) | ({} if data.is_measured(dataset) else tables(dataset, "claims"))
 
 
 def campaigns(dataset):
