@@ -17,8 +17,3 @@ def compiled(function: Callable[..., Any], **options: Any) -> Any:
         return njit(cache=True, nogil=True, **options)(function)
     except RuntimeError:  # no folder to keep it in, unless NUMBA_CACHE_DIR names one
         return njit(nogil=True, **options)(function)
-
-
-def compiled_without_checks(function: Callable[..., Any]) -> Any:
-    """As ``compiled``, but a division by zero gives what IEEE 754 says, as in numpy."""
-    return compiled(function, error_model="numpy")

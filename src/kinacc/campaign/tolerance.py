@@ -11,7 +11,6 @@ from kinacc.campaign.status import reason
 
 BOUND, MEAN = "bound", "mean"
 OF_CONFIGURATION, OF_CAMPAIGN = "the configuration's", "the campaign's"
-OF_BOTH = f"{OF_CONFIGURATION} and {OF_CAMPAIGN}"
 _FEWEST = round(1.0 / (1.0 - LARGE_SHARE))  # rows of which that share is less than all
 
 

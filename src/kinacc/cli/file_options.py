@@ -50,11 +50,6 @@ file_options = together(
         help="How horizontal angles are counted, seen from above.",
     ),
 )
-# Their names among the options, which are the keys of the choices they answer.
-ANSWERS = (
-    *("encoding", "sheet", "decimal", "thousands", "names", "no_reading", "sigma"),
-    *("direction_unit", "vertical", "horizontal"),
-)
 
 # What a file of joints alone may leave open.
 joint_file_options = together(

@@ -97,7 +97,8 @@ def _arm(ax: Axes3D, model: dh.DHModel, q_rad: np.ndarray, tool_mm: np.ndarray) 
     corners = origin[:-1] + model.d_mm[:, None] * axes
     path = np.stack([origin[:-1], corners], axis=1).reshape(-1, 3)
     links = np.concatenate([path, [origin[-1]]])
-    ax.plot(*links.T, color=LINK, lw=5.0, label="arm at a point in their middle", zorder=3)
+    look = {"color": LINK, "lw": 5.0, "solid_capstyle": "butt", "zorder": 3}
+    ax.plot(*links.T, **look, label="arm at a point in their middle")
     ax.plot(*np.stack([origin[-1], origin[-1] + rotation[-1] @ tool_mm], axis=1), color=JOINT)
     half = _HALF_JOINT * (np.abs(model.a_mm).sum() + np.abs(model.d_mm).sum()) * axes
     for low, high in zip(origin[:-1] - half, origin[:-1] + half, strict=True):

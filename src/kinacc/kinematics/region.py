@@ -15,7 +15,6 @@ from scipy.stats import qmc
 
 from kinacc.geometry import Pose, rotation_x, rotation_y, rotation_z
 
-SEQUENCES = ("sobol", "halton")
 SLICE, BASE = "slice", "base"  # frames a flange orientation may be given in
 
 _ROUND_OFF_MM = 1e-9

@@ -12,7 +12,6 @@ if TYPE_CHECKING:
 
 Columns = dict[str, "np.ndarray"]  # a table in memory: a null number is NaN, a null text None
 JOINTS_MIN, JOINTS_MAX = 4, 7
-SLIDES = "mm where it slides"  # of a joint's position
 # Two runs of one work may differ by so much, by the unit of a column: rounding differs from machine
 # to machine. What an arm is sure of begins at 1e-3 mm; 1e-9 rad is 1e-6 mm at a metre. Pure numbers
 # are held to as much as radians, which are pure numbers too.
@@ -26,8 +25,6 @@ SAME_WITHIN = {
 SAME_AMONG = {**SAME_WITHIN, "1": 1e-6}
 # Where a column is not held to its unit: what it is held to in its place.
 BY_ROW, BY_POSES, BY_STD = "the row's unit", "predicted poses", "standard deviations"
-# Means of simulations that were drawn anew, by another seed or number of them, are held to it.
-BY_STD_ERROR = "study_summary.std_error_mm"
 
 
 @dataclass(frozen=True)
