@@ -27,7 +27,7 @@ def test_config_yaml_states_every_default_and_its_meaning():
     assert list(plain.pop("datasets")) == ["mh180"]
     assert plain == defaults()
     told = " ".join(text.replace("#", " ").split())
-    gates = {kind.__name__ for kind in KINDS.values()}
+    gates = {kind.title() for kind in KINDS}
     for section, name in KEYS:
         if section not in gates | {"DataSet", "Line", "Link", "Excluded"}:
             assert " ".join(DEFINED[section]["properties"][name]["description"].split()) in told

@@ -45,7 +45,7 @@ def test_every_mistake_in_gates_is_told_at_once_with_its_place_and_what_is_meant
         (":7, gates[5]", "has no name"),
         (":8, gates[6].on_fial", "did you mean on_fail?"),
         (":9, gates[7]", "give one of"),
-        (":10, gates[8]", "give one of allow_mm"),
+        (":10, gates[8]", "has no allowance"),
         (":11, gates[9]", "7 is not of one kind"),
     ]
     assert len(told) == len(wanted)

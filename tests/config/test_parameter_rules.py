@@ -49,8 +49,8 @@ def test_values_are_in_the_units_they_say_and_fix_without_a_prior():
 @pytest.mark.parametrize(
     ("name", "state", "words"),
     [
-        ("joint 3 e", "free", "no parameter of joints"),
-        ("base z", "fixed", "no parameter of joints"),
+        ("joint 3 e", "free", "is no parameter"),
+        ("base z", "fixed", "does not belong here"),
         ("d", "loose", "'free' or 'fixed'"),
         ("a", {"prior_std_mrad": 1.0}, "rad is no unit of a_mm"),
         ("alpha", {"prior_std_deg": 1.0, "prior_std_mrad": 1.0}, "two units"),
@@ -76,5 +76,5 @@ def test_frames_are_named_as_in_the_tables():
         ("tool", "rz_rad"),
         ("mA", "x_mm"),
     ]
-    with pytest.raises(ValidationError, match="no parameter of frames"):
+    with pytest.raises(ValidationError, match="does not belong here"):
         Calibration(frames={"joint 3 d": "fixed"}, base_and_tool="estimated")

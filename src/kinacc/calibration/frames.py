@@ -186,9 +186,7 @@ def frame_terms(
         frames.setdefault(frame, []).append(component)
     refuse(
         [
-            Problem(
-                f"{parameter_rules.KEYS[parameter_rules.FRAMES]}, {rule.name!r}", message, allowed
-            )
+            Problem(f"{parameter_rules.FRAMES}, {rule.name!r}", message, allowed)
             for rule, message, allowed in parameter_rules.strangers(
                 rules, observations.joints, frames
             )

@@ -26,12 +26,13 @@ def load(
     paths: Sequence[Path | str],
     overrides: Mapping[str, Any] | None = None,
     folder: Path | str = ".",
+    source: str = configuration.COMMAND_LINE,
 ) -> dict[str, dict[str, Any]]:
     """Read full settings of every data set, held to each other and to the robots they name.
 
     Parameters
     ----------
-    paths, overrides, folder
+    paths, overrides, folder, source
         As of :func:`kinacc.config.load.load`.
 
     Returns
@@ -44,7 +45,7 @@ def load(
     InputError
         Listing every problem in all files.
     """
-    return configuration.load(paths, overrides, folder, contradictions)
+    return configuration.load(paths, overrides, folder, contradictions, source)
 
 
 def contradictions(full: Mapping[str, Any], place: Place, folder: Path) -> Iterator[Problem]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import reduce
+from textwrap import indent
 from typing import Any
 
 import yaml
@@ -39,14 +40,15 @@ def with_added(text: str, path: Path, value: Any, name: str, emptied: Path = ())
         wanted, changed = value_of(text, name), text
         if emptied:
             reduce(dict.__getitem__, emptied[:-1], wanted)[emptied[-1]] = None
-            node = _deepest(text, emptied)[0]
-            node = next(item for key, item in node.value if key.value == emptied[-1])
+            section = _deepest(text, emptied)[0]
+            node = next(item for key, item in section.value if key.value == emptied[-1])
             changed = text[: node.start_mark.index] + "null" + text[node.end_mark.index :]
-        parent = reduce(lambda section, key: _section(section, key, {}), path[:-1], wanted)
-        _section(parent, path[-1], type(value)())
-        parent[path[-1]] = (
-            parent[path[-1]] | value if isinstance(value, Mapping) else parent[path[-1]] + value
-        )
+        parent = wanted
+        for key in path[:-1]:
+            parent[key] = parent.get(key) or {}
+            parent = parent[key]
+        old = parent.get(path[-1]) or type(value)()
+        parent[path[-1]] = old | value if isinstance(value, Mapping) else old + value
         changed = _joined(changed, wanted, path, value)
         if value_of(changed, name) == wanted:
             return changed
@@ -54,22 +56,15 @@ def with_added(text: str, path: Path, value: Any, name: str, emptied: Path = ())
         pass
     message = f"cannot be changed safely at {'.'.join(path)}"
     instead = f", in place of {'.'.join(emptied)}" if emptied else ""
-    items = [value] if isinstance(value, Mapping) else value
-    fix = f"add by hand{instead}: {' '.join(f'- {flow(item)}' for item in items)}"
-    raise InputError(Problem(name, message, fix=fix))
+    raise InputError(Problem(name, message, fix=f"add by hand{instead}: {flow(value)}"))
 
 
 def flow(value: Any) -> str:
     """A value as YAML in one line: ``{path: june.csv, base: moved}``."""
-    text = yaml.safe_dump(value, default_flow_style=True, allow_unicode=True, sort_keys=False,
-                          width=10_000)  # fmt: skip
+    text = yaml.safe_dump(
+        value, default_flow_style=True, allow_unicode=True, sort_keys=False, width=10_000
+    )
     return text.removesuffix("\n").removesuffix("\n...")
-
-
-def _section(parent: dict[str, Any], key: str, empty: Any) -> Any:
-    """The value of a key, ``empty`` where it has none."""
-    parent[key] = empty if parent.get(key) is None else parent[key]
-    return parent[key]
 
 
 def _joined(text: str, wanted: Any, path: Path, value: Any) -> str:
@@ -78,25 +73,20 @@ def _joined(text: str, wanted: Any, path: Path, value: Any) -> str:
     if node.flow_style or not node.value:
         whole = flow(reduce(dict.__getitem__, path[:depth], wanted))
         return text[: node.start_mark.index] + whole + text[node.end_mark.index :]
-    if path[depth:] and path[depth] in {key.value for key, _ in node.value}:
-        raise KeyError(path[depth])  # null, or a value of another kind
+    added = "".join(f"- {flow(item)}\n" for item in value)
+    if isinstance(value, Mapping):
+        added = "".join(f"{flow(key)}: {flow(item)}\n" for key, item in value.items())
+    for key in reversed(path[depth:]):
+        added = f"{key}:\n{indent(added, '  ')}"
+    last = node
+    while isinstance(last, yaml.CollectionNode) and not last.flow_style and last.value:
+        # Block nodes end at what follows: their last value does not.
+        last = last.value[-1][1] if isinstance(last, yaml.MappingNode) else last.value[-1]
+    before, line_end, after = text[last.end_mark.index :].partition("\n")
+    lines = indent(added, " " * node.start_mark.column)
     newline = "\r\n" if "\r\n" in text else "\n"
-    indent, lines = " " * node.start_mark.column, []
-    for key in path[depth:]:
-        lines.append(f"{indent}{key}:")
-        indent += "  "
-    items = (
-        [f"{flow(key)}: {flow(item)}" for key, item in value.items()]
-        if isinstance(value, Mapping)
-        else [f"- {flow(item)}" for item in value]
-    )
-    lines += [indent + item for item in items]
-    while isinstance(node, yaml.CollectionNode) and not node.flow_style and node.value:
-        last = node.value[-1]  # block nodes end at what follows: their last value does not
-        node = last[1] if isinstance(last, tuple) else last
-    stop = text.find("\n", node.end_mark.index) + 1 or len(text)
-    gap = "" if text[stop - 1] == "\n" else newline
-    return text[:stop] + gap + "".join(f"{line}{newline}" for line in lines) + text[stop:]
+    start = text[: last.end_mark.index] + before + (line_end or newline)
+    return start + lines.replace("\n", newline) + after
 
 
 def _deepest(text: str, path: Path) -> tuple[Any, int]:

@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar
 
 from pydantic import (
     AfterValidator,
     BaseModel,
     ConfigDict,
+    Discriminator,
     Field,
-    GetCoreSchemaHandler,
-    GetJsonSchemaHandler,
+    Tag,
     model_validator,
 )
-from pydantic_core import PydanticCustomError, core_schema
+from pydantic_core import PydanticCustomError
 
 from kinacc.errors import first_few
 
@@ -68,28 +67,6 @@ def _rising(values: list[float]) -> list[float]:
     return values
 
 
-@dataclass(frozen=True)
-class Or:
-    """Beside what a key takes otherwise: one of these words."""
-
-    literals: tuple[str, ...]
-
-    def __get_pydantic_core_schema__(
-        self, source: Any, handler: GetCoreSchemaHandler
-    ) -> core_schema.CoreSchema:
-        text = core_schema.literal_schema([*self.literals])
-        kind = handler(source)
-        return core_schema.tagged_union_schema(
-            {"[word]": text, "[value]": kind},
-            lambda value: "[word]" if isinstance(value, str) else "[value]",
-        )
-
-    def __get_pydantic_json_schema__(
-        self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
-    ) -> dict[str, Any]:
-        return {"anyOf": [handler(item) for item in schema["choices"].values()]}
-
-
 Text = Annotated[str, Field(min_length=1)]
 Distinct = AfterValidator(distinct)
 Rising = AfterValidator(_rising)
@@ -98,4 +75,10 @@ Pair = Annotated[
     Field(min_length=2, max_length=2, json_schema_extra={"pair": True}),
     Rising,
 ]
-AUTO = Or(("auto",))
+_T = TypeVar("_T")
+_Word = TypeVar("_Word")
+# A value, or one of some words; which of them is meant, its type tells.
+OrWord = Annotated[
+    Annotated[_T, Tag("[value]")] | Annotated[_Word, Tag("[word]")],
+    Discriminator(lambda value: "[word]" if isinstance(value, str) else "[value]"),
+]

@@ -5,8 +5,6 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from copy import deepcopy
-from dataclasses import replace
 from functools import reduce
 from pathlib import Path
 from typing import Any
@@ -14,11 +12,11 @@ from typing import Any
 from pydantic import ValidationError
 
 from kinacc.config import series
-from kinacc.config.reading import Document, KeyPath, Place, read
+from kinacc.config.reading import KeyPath, Place, dotted, paths_of, read
 from kinacc.config.schema import keys
 from kinacc.config.settings import ROBOTS, Configuration
 from kinacc.config.values import did_you_mean, shown
-from kinacc.errors import InputError, Problem
+from kinacc.errors import InputError, Problem, gathered, refuse
 
 Contradictions = Callable[..., Iterable[Problem]]
 COMMAND_LINE = "command line"
@@ -28,8 +26,9 @@ _MOST_PROBLEMS = 100  # nobody reads more, and each is held against all names
 _FILES = ("robot", "path", "campaign")
 # One value each, not a section: a data set's own replaces that of the top level.
 _MAPPINGS = ("columns", "parameters", "frames", "accept")
+_PATH = ("measurements", "file", "path")
 # Given in two files, two different data sets share a name.
-_IDENTITY = (("measurements", "source"), ("measurements", "file", "path"), ("series",))
+_IDENTITY = (("measurements", "source"), _PATH, ("series",))
 
 
 def load(
@@ -37,6 +36,7 @@ def load(
     overrides: Mapping[str, Any] | None = None,
     folder: Path | str = ".",
     contradictions: Contradictions = lambda *_: (),
+    source: str = COMMAND_LINE,
 ) -> dict[str, dict[str, Any]]:
     """Read full settings of every data set, by name.
 
@@ -53,6 +53,8 @@ def load(
         What paths of the result are relative to.
     contradictions
         Yields Problems of settings that are valid one by one, of (full settings, place, folder).
+    source
+        What problems call the place of ``overrides``.
 
     Returns
     -------
@@ -65,54 +67,52 @@ def load(
     InputError
         Listing every problem in all files.
     """
-    documents: list[Document] = []
+    contents: list[dict[str, Any]] = []
     problems: list[Problem] = []
+    places: dict[KeyPath, str] = {}
     for path in paths:
         document, wrong = read(path)
         beside = os.path.relpath(Path(path).absolute().parent, folder)
-        documents.append(
-            replace(document, data=_relocated(document.data, beside, Path(folder)))
-            if os.path.realpath(Path(path).parent) != os.path.realpath(folder)
-            else document
-        )
+        contents.append(_relocated(document.data, beside, Path(folder)))
         problems += wrong
+        for keys_ in document.lines:
+            if keys_[2:] in _IDENTITY and keys_ in places:
+                message = f"data set {keys_[1]!r} has its measurements given in two files"
+                fix = "give the second data set a name of its own"
+                allowed = f"once; first in {places[keys_]}"
+                problems.append(Problem(document.place(keys_), message, allowed, fix))
+        places |= {keys_: f"{path}:{line}" for keys_, line in document.lines.items()}
     if overrides:
-        documents.append(Document(COMMAND_LINE, deepcopy(dict(overrides))))
-    if not documents:
+        contents.append(dict(overrides))
+        places |= dict.fromkeys(paths_of(overrides), source)
+    if not contents:
         raise InputError(Problem("configuration", "no file given", fix="give config.yaml"))
-    merged = reduce(overlay, (item.data for item in documents))
+    merged = reduce(overlay, contents)
+    shared = {key: value for key, value in merged.items() if key != "datasets"}
+    datasets = merged.get("datasets")
     resolved: dict[str, dict[str, Any]] = {}
-    if merged or not problems:
-        problems += _given_twice(documents)
-        shared = {key: value for key, value in merged.items() if key != "datasets"}
-        datasets = merged.get("datasets")
-        if not isinstance(datasets, Mapping) or not 0 < len(datasets) <= _MOST_DATASETS:
-            message = (
-                "no data set is given" if not datasets else "is no mapping of data sets by name"
-            )
-            allowed = f"datasets: with a section for each of at most {_MOST_DATASETS}"
-            where = next((e.place(("datasets",)) for e in documents if "datasets" in e.data), None)
-            problems.append(Problem(where or documents[0].name, message, allowed))
-            datasets = {}
-        for name, subset in datasets.items():
-            context = {"folder": Path(folder), "dataset": name, "datasets": datasets}
-            try:
-                resolved |= _data_set(subset, shared, documents, context, contradictions)
-            except InputError as error:
-                problems += error.problems
+    if isinstance(datasets, Mapping) and 0 < len(datasets) <= _MOST_DATASETS:
+        for name in datasets:
+            with gathered(problems):
+                resolved |= _data_set(name, datasets, shared, places, Path(folder), contradictions)
             if len(problems) > _MOST_PROBLEMS:
                 break
+    elif merged or not problems:
+        message = "is no mapping of data sets by name" if datasets else "no data set is given"
+        allowed = f"datasets: with a section for each of at most {_MOST_DATASETS}"
+        where = places.get(("datasets",), str([*paths, source][0]))
+        problems.append(Problem(where, message, allowed))
     if problems:
-        problems = sorted(dict.fromkeys(problems), key=_line)[:_MOST_PROBLEMS]
+        problems = sorted(dict.fromkeys(problems), key=_by_line)[:_MOST_PROBLEMS]
         title = f"{len(problems)} problems in the configuration" if len(problems) > 1 else ""
         raise InputError(problems, title)
     return resolved
 
 
-def _line(problem: Problem) -> tuple[str, int]:
-    """File and line of a problem, to sort by."""
-    file, _, rest = problem.where.partition(", ")[0].rpartition(":")
-    return (file, int(rest)) if rest.isdecimal() else (problem.where, 0)
+def _by_line(problem: Problem) -> list[Any]:
+    """Texts and numbers of a place in turn, by which line 9 comes before line 10."""
+    parts = re.split(r"(\d+)", problem.where)
+    return [int(part) if part.isdecimal() else part for part in parts]
 
 
 def overlay(
@@ -154,50 +154,47 @@ def _relocated(value: Any, beside: str, folder: Path, key: Any = None) -> Any:
 
 
 def _data_set(
-    subset: Any,
+    name: str,
+    datasets: Mapping[str, Any],
     shared: Mapping[str, Any],
-    documents: Sequence[Document],
-    context: Mapping[str, Any],
+    places: Mapping[KeyPath, str],
+    folder: Path,
     contradictions: Contradictions,
 ) -> dict[str, dict[str, Any]]:
     """Full settings of a data set, and of those its series stands for, by name."""
-    name = context["dataset"]
+    subset, base = datasets[name], ("datasets", name)
 
     def place(path: KeyPath) -> str:
-        """Where a key was given last, else where the section was that it would stand in."""
+        """Where a key was given last, else the section that it would stand in."""
         return next(
-            document.place(base + path)
+            f"{places[start + path[:length]]}, {dotted(start + path)}"
             for length in range(len(path), -1, -1)
-            for base in (("datasets", name), ())
-            for document in reversed(documents)
-            if base + path[:length] and document.gives(base + path[:length])
+            for start in (base, ())
+            if start + path[:length] in places
         )
 
     content = overlay(shared, subset, _MAPPINGS) if isinstance(subset, Mapping) else subset
     try:
-        whole = Configuration.model_validate({"datasets": {name: content}}, context=context)
+        whole = Configuration.model_validate(
+            {"datasets": {name: content}}, context={"folder": folder}
+        )
     except ValidationError as error:
         raise InputError(problems_of(error, lambda path: place(path[2:]))) from None
     full, problems = whole.datasets[name].model_dump(by_alias=True), []
-    if subset.get("gates") and any(item["datasets"] for item in full["gates"]):
-        message = "names data sets inside of a data set, which its gates are about alone"
-        problems.append(Problem(place(("gates",)), message, fix="leave datasets out of the gate"))
-    full["gates"] = [item for item in full["gates"] if name in (item["datasets"] or [name])]
-    resolved = series.expanded(name, full)
     lines = [line.get("path") for line in subset.get("series") or ()]
+    resolved = series.expanded(name, full)
     for item, settings in resolved.items():
-        if item != name and item in context["datasets"]:
+        if item != name and item in datasets:
             message = f"its line {item} has the name of another data set"
             problems.append(Problem(place(("series",)), message, "another name"))
         path = settings["measurements"]["file"]["path"]
 
         def of_line(keys: KeyPath, path: str = path) -> str:
-            is_line = path in lines and keys == _IDENTITY[1]
+            is_line = keys == _PATH and path in lines
             return place(("series", lines.index(path), "path") if is_line else keys)
 
-        problems += contradictions(settings, of_line, context["folder"])
-    if problems:
-        raise InputError(problems)
+        problems += contradictions(settings, of_line, folder)
+    refuse(problems)
     return resolved
 
 
@@ -231,17 +228,3 @@ def _meant(path: KeyPath) -> str:
     return did_you_mean(key, there) or (
         f"it belongs at {' or '.join(homes)}" if homes else f"known: {', '.join(there)}"
     )
-
-
-def _given_twice(documents: Sequence[Document]) -> Iterator[Problem]:
-    """Data sets whose measurements are given in two files; the command line replaces on purpose."""
-    first: dict[KeyPath, Document] = {}
-    for document in documents:
-        datasets = document.data.get("datasets") if document.name != COMMAND_LINE else None
-        for name in datasets if isinstance(datasets, Mapping) else ():
-            for path in (("datasets", name, *steps) for steps in _IDENTITY):
-                if document.gives(path) and first.setdefault(path, document) is not document:
-                    message = f"data set {name!r} has its measurements given in two files"
-                    allowed = f"once; first in {first[path].place(path)}"
-                    fix = "give the second data set a name of its own"
-                    yield Problem(document.place(path), message, allowed, fix)

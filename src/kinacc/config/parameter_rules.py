@@ -12,28 +12,27 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Annotated, Any
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field
 
-from kinacc.config.fields import Or, Text, refused
+from kinacc.config.fields import OrWord, Text, refused
 
-FREE, FIXED = "free", "fixed"
-JOINTS, FRAMES = "joints", "frames"
-KEYS = {JOINTS: "calibration.dh.parameters", FRAMES: "calibration.frames"}
-_PARAMETERS = {name: f"{name}_rad" for name in ("theta_offset", "alpha", "beta")}
-_PARAMETERS |= {"theta": "theta_offset_rad", "d": "d_mm", "a": "a_mm"}
-_COMPONENTS = {name: f"{name}_mm" for name in "xyz"}
-_COMPONENTS |= {f"r{name}": f"r{name}_rad" for name in "xyz"}
+FREE = "free"
+FRAMES = "calibration.frames"
+_IN_TABLES = {name: f"{name}_mm" for name in ("d", "a", "x", "y", "z")}
+_IN_TABLES |= {name: f"{name}_rad" for name in ("theta_offset", "alpha", "beta", "rx", "ry", "rz")}
+_IN_TABLES["theta"] = "theta_offset_rad"
+_NAMES = f"{FRAMES} has base, base rz, tool x and the like, with x, y, z, rx, ry, rz; "
+_NAMES += "calibration.dh.parameters d, joint 3, joint 3 d, with theta, d, a, alpha, beta"
 _UNITS = {"mm": ("mm", 1.0), "rad": ("rad", 1.0), "mrad": ("rad", 1e-3)}
 _UNITS["deg"] = ("rad", math.pi / 180.0)
-_JOINT = re.compile(r"(?:joint ?|j)(\d{1,9})(?:[ .](\w+?)(?:_mm|_rad)?)?")
-_FRAME = re.compile(r"([^ .]+)(?:[ .]+(r?[xyz])(?:_mm|_rad)?)?")
-_NAMES = {
-    JOINTS: "d, joint 3, joint 3 d and the like, with theta, d, a, alpha, beta",
-    FRAMES: "base, base rz, tool x and the like, with x, y, z, rx, ry, rz",
-}
+_OF_JOINTS = re.compile(
+    r"(?=.)(?:j(?:oint ?)?(?P<joint>\d{1,9})(?:[ .](?=.)|$))?"
+    r"(?:(?P<parameter>theta_offset|theta|d|a|alpha|beta)(?:_mm|_rad)?)?"
+)
+_OF_FRAMES = re.compile(r"(?P<frame>[^ .]+)(?:[ .](?P<parameter>r?[xyz])(?:_mm|_rad)?)?")
 
 
 @dataclass(frozen=True)
@@ -48,13 +47,8 @@ class Rule:
     frame: str | None
     parameter: str | None
     free: bool
-    value: Mapping[str, float] = field(default_factory=dict)
-    std: Mapping[str, float] = field(default_factory=dict)
-
-    @property
-    def weight(self) -> int:
-        """How much the rule says about a parameter."""
-        return 2 * (self.joint is not None or self.frame is not None) + bool(self.parameter)
+    value: Mapping[str, float]
+    std: Mapping[str, float]
 
 
 def rules(content: Mapping[str, Any]) -> list[Rule]:
@@ -65,45 +59,43 @@ def rules(content: Mapping[str, Any]) -> list[Rule]:
     """
     results: dict[Any, Rule] = {}
     for name, state in content.items():
-        subject, known = _subject(name) or (None, None, None), _numbers(name, state)
-        rule = Rule(name, *subject, state == FREE or bool(known["prior_std"]), *known.values())
-        wrong = {*rule.value}
-        if rule.parameter:
-            wrong = (wrong | {*rule.std}) - {unit(rule.parameter)}
-        if wrong:
-            message = f"{', '.join(wrong)} is no unit of {rule.parameter or 'no one parameter'}"
-            raise refused(message, "name one parameter, and its unit", name)
+        text = " ".join(name.split())
+        match = _OF_JOINTS.fullmatch(text.lower()) or _OF_FRAMES.fullmatch(text)
+        if match is None:
+            raise refused(f"{name!r} is no parameter", _NAMES, name)
+        about: dict[str, str | None] = {"joint": None, "frame": None} | match.groupdict()
+        parameter = _IN_TABLES.get(about["parameter"] or "")
+        joint = int(about["joint"]) if about["joint"] else None
+        subject = joint, about["frame"], parameter
+        known: dict[str, dict[str, float]] = {"value": {}, "prior_std": {}}
+        for key, number in state.items() if isinstance(state, Mapping) else ():
+            kind, _, short = key.rpartition("_")
+            known[kind][_UNITS[short][0]] = _UNITS[short][1] * number
+        value, std = known["value"], known["prior_std"]
+        wrong = {*value, *std} - {unit(parameter)} if parameter else {*value}
+        message, fix = "", ""
         if subject in results:
-            raise refused(f"{name!r} is said twice, in two spellings", "", name)
-        results[subject] = rule
+            message = f"{name!r} is said twice, in two spellings"
+        elif not isinstance(state, str) and len(value) + len(std) < max(len(state), 1):
+            message = "states nothing, or the same in two units"
+        elif any(item <= 0.0 for item in std.values()):
+            message = "a standard deviation should be greater than 0"
+        elif wrong:
+            message = f"{', '.join(wrong)} is no unit of {parameter or 'no one parameter'}"
+            fix = "name one parameter, and its unit"
+        if message:
+            raise refused(message, fix, name)
+        results[subject] = Rule(name, *subject, state == FREE or bool(std), value, std)
     return [*results.values()]
 
 
-def _numbers(name: str, state: Any) -> dict[str, dict[str, float]]:
-    """Values and standard deviations of a rule by unit, mm and rad."""
-    known: dict[str, dict[str, float]] = {"value": {}, "prior_std": {}}
-    stated = state if isinstance(state, Mapping) else {}
-    for key, number in stated.items():
-        kind, _, short = key.rpartition("_")
-        known[kind][_UNITS[short][0]] = _UNITS[short][1] * number
-    if sum(map(len, known.values())) < max(len(stated), not isinstance(state, str)):
-        raise refused("states nothing, or the same in two units", "", name)
-    if any(std <= 0.0 for std in known["prior_std"].values()):
-        raise refused("a standard deviation should be greater than 0", "", name)
-    return known
-
-
-def _check(about: str) -> AfterValidator:
-    """Validator of rules about JOINTS or FRAMES."""
+def _about(of_frames: bool) -> AfterValidator:
+    """Validator of rules about frames, or about joints."""
 
     def check(content: dict[str, Any]) -> dict[str, Any]:
-        for name in content:
-            subject = _subject(name)
-            if subject is None or (subject[1] is not None) != (about == FRAMES):
-                others = KEYS[JOINTS if about == FRAMES else FRAMES]
-                fix = f"give {_NAMES[about]}; others belong in {others}"
-                raise refused(f"{name!r} is no parameter of {about}", fix, name)
-        rules(content)
+        for rule in rules(content):
+            if (rule.frame is not None) != of_frames:
+                raise refused(f"{rule.name!r} does not belong here", _NAMES, rule.name)
         return content
 
     return AfterValidator(check)
@@ -112,9 +104,9 @@ def _check(about: str) -> AfterValidator:
 _Key = Annotated[str, Field(pattern="^(value|prior_std)_(mm|rad|mrad|deg)$")]
 # Beyond, squares overflow.
 _Known = dict[_Key, Annotated[float, Field(gt=-1e100, lt=1e100)]]
-_State = Annotated[_Known, Or((FREE, FIXED))]
-JointRules = Annotated[dict[Text, _State], _check(JOINTS)]
-FrameRules = Annotated[dict[Text, _State], _check(FRAMES)]
+_Rules = dict[Text, OrWord[_Known, Literal["free", "fixed"]]]
+JointRules = Annotated[_Rules, _about(of_frames=False)]
+FrameRules = Annotated[_Rules, _about(of_frames=True)]
 
 
 def strangers(
@@ -140,22 +132,9 @@ def rule_for(
     """The rule that says most about ``parameter`` of a joint (1-based) or of a frame."""
     about = [rule for rule in results if rule.parameter in (None, parameter)]
     about = [rule for rule in about if rule.frame == frame and rule.joint in (None, joint)]
-    return max(about, key=lambda rule: rule.weight, default=None)
+    return max(about, key=lambda r: (bool(r.joint or r.frame), bool(r.parameter)), default=None)
 
 
 def unit(parameter: str) -> str:
     """mm or rad, by the end of a parameter's name."""
     return parameter.rpartition("_")[2]
-
-
-def _subject(name: str) -> tuple[int | None, str | None, str | None] | None:
-    """Joint, frame and parameter a name stands for; None where it stands for none."""
-    text = " ".join(name.split())
-    lower = text.lower().removesuffix("_mm").removesuffix("_rad")
-    if lower in _PARAMETERS:
-        return None, None, _PARAMETERS[lower]
-    if match := _JOINT.fullmatch(text.lower()):
-        is_known = match[2] is None or match[2] in _PARAMETERS
-        return (int(match[1]), None, _PARAMETERS.get(match[2])) if is_known else None
-    match = _FRAME.fullmatch(text)
-    return (None, match[1], _COMPONENTS.get(match[2])) if match else None

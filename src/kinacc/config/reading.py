@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import shlex
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from datetime import date
 from pathlib import Path
@@ -50,6 +50,14 @@ class Document:
             known = known[:-1]
         line = f":{self.lines[known]}" if known else ""
         return f"{self.name}{line}, {dotted(path)}" if path else f"{self.name}{line}"
+
+
+def paths_of(value: Any, path: KeyPath = ()) -> Iterator[KeyPath]:
+    """Path of every value that stands in a nested one."""
+    yield path
+    inner = value.items() if isinstance(value, Mapping) else ()
+    for key, item in enumerate(value) if isinstance(value, list) else inner:
+        yield from paths_of(item, (*path, key))
 
 
 def dotted(path: KeyPath) -> str:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from functools import cache
+from copy import deepcopy
+from functools import cache, reduce
 from typing import Any
 
 from pydantic import BaseModel
@@ -52,28 +53,13 @@ def defaults(model: type[Section] = Settings) -> dict[str, Any]:
     return model().model_dump(by_alias=True)
 
 
-def without_execution_keys(values: Mapping[str, Any], path: str = "") -> dict[str, Any]:
-    """Settings without the keys that change only how a run is carried out, for hashing.
-
-    Parameters
-    ----------
-    values
-        Full settings of a data set, or of the section at ``path``.
-    path
-        Dotted path of the section, as ``study``.
-
-    Returns
-    -------
-    dict
-        A copy without keys that are marked ``execution``.
-    """
-    selected: dict[str, Any] = {}
-    for name, value in values.items():
-        here = f"{path}.{name}".lstrip(".")
-        node = keys().get(here, {})
-        if not node.get("execution"):
-            is_section = isinstance(value, Mapping) and "properties" in node
-            selected[name] = without_execution_keys(value, here) if is_section else value
+def without_execution_keys(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Settings of a data set without the keys that change only how a run is carried out."""
+    selected = deepcopy(dict(values))
+    for path, node in keys().items():
+        if node.get("execution"):
+            *sections, name = path.split(".")
+            reduce(dict.__getitem__, sections, selected).pop(name, None)
     return selected
 
 

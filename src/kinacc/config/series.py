@@ -5,12 +5,12 @@ The arm's data set itself is its newest line, with everything a data set has.
 
 from __future__ import annotations
 
+import datetime
 from collections.abc import Mapping
-from datetime import date, datetime
 from itertools import pairwise
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BeforeValidator, Field
+from pydantic import AfterValidator, Field
 
 from kinacc.config.fields import Section, Text, refused, setting
 
@@ -19,24 +19,6 @@ FLAGS = {
     "base": "the robot and the instrument stand to each other",
     "tool": "the tool or targets sit on the flange",
 }
-
-
-def day_of(value: Any) -> str | None:
-    """A day as ISO text, from a date of YAML or a text as 2026-03-01; None for anything else."""
-    try:
-        day = value if isinstance(value, date) else date.fromisoformat(value)
-    except (TypeError, ValueError):
-        return None
-    is_day = not isinstance(day, datetime) and str(value) == day.isoformat()
-    return day.isoformat() if is_day else None
-
-
-def _day(value: Any) -> str:
-    if (day := day_of(value)) is None:
-        raise refused(f"{str(value)[:60]!r} is no day", "write a day as 2026-03-01")
-    return day
-
-
 Moved = Literal["same", "moved"] | None
 
 
@@ -44,7 +26,7 @@ class Line(Section):
     """One file of a series; whether base and tool moved is since the line before it by date."""
 
     path: Text = setting(..., "measured file, relative to the folder of the file this stands in")
-    date: Annotated[str, BeforeValidator(_day)] = setting(
+    date: Annotated[datetime.date, Field(strict=False)] = setting(
         ..., "day it was measured", allowed="a day as 2026-03-01"
     )
     base: Moved = setting(None, f"how {FLAGS['base']}; null in the first")
@@ -81,14 +63,13 @@ def expanded(name: str, full: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
     rest = {key: value for key, value in full.items() if key != "series"}
     if not full["series"]:
         return {name: rest}
-    files: dict[str, dict[str, Any]] = {}
-    series: list[dict[str, Any]] = []
+    measurements, series, files = rest["measurements"], [], {}
     for line in full["series"]:
-        file = {**rest["measurements"]["file"], "path": line["path"]}
-        measurements = {**rest["measurements"], "file": file}
+        item, day = f"{name}-{line['date']}", str(line["date"])
         flags = {flag: line[flag] if series else None for flag in FLAGS}
-        series.append({"name": f"{name}-{line['date']}", "date": line["date"], **flags})
-        files[series[-1]["name"]] = {**rest, "measurements": measurements}
-    newest = {**files[series[-1]["name"]], "series": series}
+        series.append({"name": item, "date": day, **flags})
+        file = {**measurements["file"], "path": line["path"]}
+        files[item] = {**rest, "measurements": {**measurements, "file": file}}
+    newest = {**files[item], "series": series}
     lines = {item: {**subset, "line_of": name, "gates": []} for item, subset in files.items()}
     return {name: newest} | lines

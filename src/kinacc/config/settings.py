@@ -7,13 +7,12 @@ are what is plausible in it, so that a value in another unit is caught. Defaults
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Literal, Self
 
-from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, model_validator
+from pydantic import AfterValidator, Field, ValidationInfo, model_validator
 
-from kinacc.config.fields import AUTO, Distinct, Or, Pair, Rising, Section, Text, refused, setting
+from kinacc.config.fields import Distinct, OrWord, Pair, Rising, Section, Text, refused, setting
 from kinacc.config.gate_rules import Gates, require_limits
 from kinacc.config.measured import Measurements
 from kinacc.config.names import LONGEST
@@ -76,7 +75,7 @@ class DataCheck(Section):
 class VecFit(Section):
     """Volumetric error compensation model (eqs. 5 and 6)."""
 
-    order: Annotated[int, Field(ge=0, le=40), AUTO] = setting(
+    order: OrWord[Annotated[int, Field(ge=0, le=40)], Literal["auto"]] = setting(
         5,
         "order of the Chebyshev polynomials, or auto: chosen by evidence",
     )
@@ -85,7 +84,7 @@ class VecFit(Section):
         "stated",
         "the prior stated below, or one chosen by evidence, with the order",
     )
-    joint_range: Annotated[JointPairs, Or(("data", "limits"))] = setting(
+    joint_range: OrWord[JointPairs, Literal["data", "limits"]] = setting(
         "data",
         "joint range mapped to -1..1: of the data, the joint limits, or one pair per joint",
         "deg",
@@ -127,7 +126,7 @@ class DhFit(Section):
         "vec",
         "fit to the VEC at the measured configurations, or to the measurements",
     )
-    hayati_joints: Annotated[JointNumbers, AUTO] = setting(
+    hayati_joints: OrWord[JointNumbers, Literal["auto"]] = setting(
         [],
         "joints with a Hayati twist beta beside d, or auto: beta in place of d where the next "
         "axis is nearly parallel",
@@ -437,7 +436,7 @@ class Settings(Section):
     )
 
     @model_validator(mode="after")
-    def _together(self, info: ValidationInfo) -> Self:
+    def _together(self) -> Self:
         """Settings of different sections that cannot be together."""
         cylinder = self.evaluation.cylinder
         low, high = cylinder.angle_deg
@@ -445,9 +444,7 @@ class Settings(Section):
         if self.evaluation.space == "cylinder" and outside:
             message = f"slices at {outside} deg lie outside of {low:g} to {high:g} deg"
             raise refused(message, "see evaluation.cylinder.angle_deg", "map", "slices_deg")
-        name = (info.context or {}).get("dataset")
-        about = [item for item in self.gates if name in (item.datasets or (name,))]
-        require_limits(about, self.tolerance.mm, self.tolerance.of)
+        require_limits(self.gates, self.tolerance.mm, self.tolerance.of)
         return self
 
 
@@ -459,15 +456,6 @@ def _robot(robot: str, info: ValidationInfo) -> str:
         fix = meant or "give a name listed in docs/robots.md or the path of a robot file"
         raise refused(f"there is no robot {'file ' * is_file}{robot!r}", fix)
     return robot
-
-
-def _data_set_name(name: Any) -> Any:
-    """A name becomes a folder below results/, so that it may not lead anywhere else."""
-    text = name if isinstance(name, str) else ""
-    if not re.fullmatch("[A-Za-z0-9_][A-Za-z0-9_-]*", text) or len(text) > LONGEST:
-        allowed = f"give a text of at most {LONGEST} letters, digits, _ and -, the first not -"
-        raise refused(f"{name!r} cannot be the name of a data set", allowed)
-    return name
 
 
 class DataSet(Settings):
@@ -493,6 +481,7 @@ class DataSet(Settings):
 class Configuration(Settings):
     """A whole configuration: data sets by name, and what holds for all of them."""
 
-    datasets: dict[Annotated[str, BeforeValidator(_data_set_name)], DataSet] = setting(
-        {}, "data sets by name"
-    )
+    # A name becomes a folder below results/, so that it may not lead anywhere else.
+    datasets: dict[
+        Annotated[str, Field(pattern="^[A-Za-z0-9_][A-Za-z0-9_-]*$", max_length=LONGEST)], DataSet
+    ] = setting({}, "data sets by name")

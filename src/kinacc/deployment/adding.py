@@ -6,6 +6,7 @@ import datetime
 import os
 import warnings
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,7 @@ from kinacc.calibration import delivered
 from kinacc.checks.contradictions import load
 from kinacc.config.edit import flow, with_added
 from kinacc.config.reading import read
-from kinacc.config.series import MOVED, day_of
+from kinacc.config.series import MOVED
 from kinacc.deployment.shared_readings import known_rows
 from kinacc.errors import InputError, Problem, first_few
 from kinacc.kinematics import robot
@@ -115,11 +116,13 @@ def _beside(config: str, path: str) -> str:
 
 def _day(option: str, date: str | None, path: str, settings: Mapping) -> str:
     """A day as given, or of the times of the file."""
+    days: list[str] = []
     if date is None:
         days = times.days(files.load(path, Layout.of(settings["measurements"]["file"])))
     else:
-        days = [day_of(date)]
-    if len(days) != 1 or days[0] is None:
+        with suppress(ValueError):
+            days = [datetime.date.fromisoformat(date).isoformat()]
+    if len(days) != 1:
         raise InputError(Problem(option, f"{date or path} has no day", "a day as 2026-06-02"))
     return days[0]
 

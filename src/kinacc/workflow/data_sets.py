@@ -115,8 +115,12 @@ def read_data_sets(
         Listing every problem in them.
     """
     from kinacc.checks.contradictions import load
+    from kinacc.config.load import COMMAND_LINE
 
-    return data_sets(load([Path(path) for path in paths], _values(overrides or {})), absolute)
+    source = "config of the module" if absolute else COMMAND_LINE
+    overrides = _values(overrides or {}, source)
+    full = load([Path(path) for path in paths], overrides, source=source)
+    return data_sets(full, absolute)
 
 
 def data_sets(full: Mapping[str, dict[str, Any]], absolute: bool = False) -> DataSets:
@@ -145,16 +149,15 @@ def data_sets(full: Mapping[str, dict[str, Any]], absolute: bool = False) -> Dat
     return plan
 
 
-def _values(value: Any) -> Any:
+def _values(value: Any, source: str) -> Any:
     """Texts read as YAML: Snakemake hands numbers inside ``--config a='{b: 1}'`` over as text."""
-    from kinacc.config.load import COMMAND_LINE
     from kinacc.config.reading import value_of
 
     if isinstance(value, Mapping):
-        return {key: _values(item) for key, item in value.items()}
+        return {key: _values(item, source) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
-        return [_values(item) for item in value]
-    return value_of(value, COMMAND_LINE) if isinstance(value, str) else value
+        return [_values(item, source) for item in value]
+    return value_of(value, source) if isinstance(value, str) else value
 
 
 def _in_use(config: Mapping[str, Any]) -> dict[str, Any]:
