@@ -63,13 +63,15 @@ def expanded(name: str, full: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
     rest = {key: value for key, value in full.items() if key != "series"}
     if not full["series"]:
         return {name: rest}
-    measurements, series, files = rest["measurements"], [], {}
+    measurements = rest["measurements"]
+    series: list[dict[str, Any]] = []
+    files: dict[str, dict[str, Any]] = {}
     for line in full["series"]:
         item, day = f"{name}-{line['date']}", str(line["date"])
         flags = {flag: line[flag] if series else None for flag in FLAGS}
         series.append({"name": item, "date": day, **flags})
         file = {**measurements["file"], "path": line["path"]}
         files[item] = {**rest, "measurements": {**measurements, "file": file}}
-    newest = {**files[item], "series": series}
+    newest = {**files[series[-1]["name"]], "series": series}
     lines = {item: {**subset, "line_of": name, "gates": []} for item, subset in files.items()}
     return {name: newest} | lines

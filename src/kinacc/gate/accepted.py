@@ -31,7 +31,7 @@ _SEED = 16
 _FAR = 3.0  # standard deviations beyond which a parameter counts as moved
 
 
-def accept(results: Path, folder: Path, datasets: Sequence[str], reason: str) -> dict:
+def accept(results: Path, folder: Path, datasets: Sequence[str], reason: str) -> dict[str, Any]:
     """Copy tables and digests of data sets to the folder of the accepted run, with a note.
 
     Raises InputError without a reason, or where the folder holds something else.

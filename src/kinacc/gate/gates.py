@@ -92,11 +92,12 @@ def _found(verdict: str, says: str, fix: str = "", **figures: Any) -> Outcome:
 
 
 def _value(gate: Gate, results: Figure, tolerance_mm: float | None) -> Outcome:
-    key, limit = next(iter(gate["limit"].items()), ("at_most", tolerance_mm))
+    limits: Mapping[str, Any] = gate["limit"] or {"at_most": tolerance_mm}
+    ((key, limit),) = limits.items()
     word = "at_least" if key.startswith("at_least") else "at_most"
     allowed = f"{word.replace('_', ' ')} {results.worded(limit)} allowed"
     allowed += "" if gate["limit"] else " (the tolerance of the configuration)"
-    figures = {f"value{results.key}": results.size, f"{word}{results.key}": limit}
+    figures: dict[str, Any] = {f"value{results.key}": results.size, f"{word}{results.key}": limit}
     figures |= {"of": results.called, **results.about}
     held = results.size <= limit if word == "at_most" else results.size >= limit
     if results.open and (held or np.isnan(results.size)):
@@ -114,12 +115,12 @@ def _change(gate: Gate, tables: RunTables, accepted: RunTables | None) -> Outcom
         return _found(FAILED, f"no accepted run of {tables.folder.name}", fix)
     name, confidence, (allowed,) = gate["value"], gate["beyond_chance"], gate["limit"].values()
     now, before = (figure(name, item, gate) for item in (tables, accepted))
-    samples = [sample(name, item, gate) for item in (tables, accepted)]
+    first, second = (sample(name, item, gate) for item in (tables, accepted))
     measured, measured_before = (
         sums.stated(item.folder).get("measurements.parquet") for item in (tables, accepted)
     )
     paired = measured is not None and measured == measured_before
-    results = chance.change(name.rpartition(".")[2], *samples, paired, confidence)
+    results = chance.change(name.rpartition(".")[2], first, second, paired, confidence)
     figures = {
         f"value{now.key}": now.size,
         f"accepted{now.key}": before.size,
@@ -139,7 +140,7 @@ def _change(gate: Gate, tables: RunTables, accepted: RunTables | None) -> Outcom
     if results.open:
         return _found(UNDECIDED, f"undecided: {says}; {results.open}", **figures)
     if results.least != results.difference:
-        poses = " and ".join(str(item.count) for item in samples[: 1 if paired else 2])
+        poses = f"{first.count}" if paired else f"{first.count} and {second.count}"
         says += f"; at least {now.worded(results.least)} worse"
         says += f" ({confidence:.4g} confidence, {poses} poses)"
     fix = f"kinacc check-results --against {accepted.folder.parent} lists what changed"
