@@ -97,6 +97,16 @@ def test_results_as_the_stages_left_them_pass(here):
     assert [each["dataset"] for each in told("results/mh180").values()] == ["mh180"]
 
 
+def test_results_of_other_settings_than_the_configuration_has_are_noticed(here):
+    for week, verdict in (("first", "passed"), ("next", "warned")):
+        Path("config.yaml").write_text(SMALL % WEEKS[week])
+        found = told("results")["files"]
+        assert (found["verdict"], "summary.parquet" in found["says"]) == (
+            verdict,
+            verdict == "warned",
+        )
+
+
 def _edited(path):
     pq.write_table(pq.read_table(path).slice(1), path)
 
@@ -127,8 +137,8 @@ def test_reports_for_machines_can_be_read_by_them(here):
     names = ["check.json", "metrics.json", "check.xml", "check.md", "check.txt"]
     words = [word for name in names for word in ("--out", name)]
     Path("config.yaml").write_text(
-        "datasets: {mh180: {robot: mh180}}\n"
-        "gates: [{name: 'a <b> & \"c\"', value: residuals.position.mean, at_most_mm: 1e-4}]\n"
+        SMALL % WEEKS["first"]
+        + "gates: [{name: 'a <b> & \"c\"', value: residuals.position.mean, at_most_mm: 1e-4}]\n"
     )
     assert call("check-results", *words).exit_code == 1
     assert json.loads(Path("check.json").read_text())["passed"] is False

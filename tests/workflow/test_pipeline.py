@@ -94,30 +94,6 @@ def test_a_table_that_was_deleted_is_made_anew(project):
     assert project.to_do() == set()
 
 
-def test_an_edited_table_is_refused_by_the_next_stage_and_by_the_check(project):
-    import pyarrow.parquet as pq
-
-    before = project.digests()
-    path = project.folder / ARM / "dh_model.parquet"
-    table = pq.read_table(path)
-    place = table.schema.get_field_index("d_mm")
-    edited = table.column("d_mm").to_numpy() + 1.0
-    pq.write_table(table.set_column(place, table.schema.field("d_mm"), [edited]), path)
-
-    text = project.snakemake(f"{ARM}/residuals.parquet", ok=False)
-    wanted = f"{ARM}/dh_model.parquet"
-    assert re.search(rf"own residuals: .*{wanted}: changed since .*rm {wanted}", text, re.S), text
-    assert "Traceback" not in text
-    assert "Traceback" in (project.folder / ARM / "logs" / "residuals.log").read_text()
-    done = call("check-results", project.folder / ARM)
-    assert done.exit_code == 1
-    assert "dh_model.parquet" in done.output
-
-    path.unlink()
-    project.snakemake()
-    assert project.digests() == before
-
-
 def test_lint_finds_nothing(project):
     text = project.snakemake(options=("--lint",))
     assert "Congratulations" in text, text

@@ -79,7 +79,7 @@ rule study:
     conda:
         "../envs/kinacc.yaml"
     params:
-        **job("study.py", "seed", study="outlier_rule distance covariance search"),
+        **job("study.py", "seed study"),
     message:
         "{wildcards.dataset}: summing up the study (Fig. 4)"
     script:
@@ -124,7 +124,7 @@ rule claims:
     conda:
         "../envs/kinacc.yaml"
     params:
-        **job("claims.py", "robot"),
+        **job("claims.py", "robot measurements calibration evaluation map study histories"),
     message:
         "{wildcards.dataset}: holding the paper's claims to the results"
     script:

@@ -7,13 +7,15 @@ from pathlib import Path
 from typing import Any
 
 from kinacc.config.schema import defaults
-from kinacc.errors import InputError, Problem, first_few
+from kinacc.errors import InputError, Problem, and_more, first_few
 from kinacc.gate.accepted import compared
 from kinacc.gate.conformity import check_file
 from kinacc.gate.gates import judged
 from kinacc.gate.outcome import FAILED, PASSED, WARNED, CheckReport, Outcome
 from kinacc.tables import store, sums
 from kinacc.tables.contract import ARTEFACTS
+from kinacc.workflow.data_sets import DataSets, data_sets
+from kinacc.workflow.outdated import made_with_other_settings
 
 _NEEDED = ("measurements", "robot", "vec_model", "dh_model", "frames", "residuals", "pose_errors")
 _SHOWN = 3
@@ -48,7 +50,8 @@ def check_results(
     names = list(datasets) or sorted({*configurations, *data_sets_in(results)})
     if not names:
         raise InputError(Problem(str(results), "holds no data set", "a folder of results"))
-    outcomes = [check_files(results / name) for name in names]
+    data = data_sets(configurations) if configurations else None
+    outcomes = [check_files(results / name, data) for name in names]
     broken = {item.dataset for item in outcomes if item.verdict == FAILED}
     chosen = {name: subset for name, subset in configurations.items() if name in names}
     outcomes += judged(results, chosen, against, broken)
@@ -82,11 +85,17 @@ def check_campaign(folder: Path) -> Outcome:
     return _files(folder, problems, says, len(subset), "run `kinacc campaign report` again")
 
 
-def check_files(folder: Path) -> Outcome:
-    """Whether every file of a data set is there, as its stage left it, and fits its schema."""
-    problems = list(_problems(folder))
+def check_files(folder: Path, data: DataSets | None = None) -> Outcome:
+    """Whether every file of a data set is there, as its stage left it, and fits its schema.
+
+    A warning where files or settings (``data``, where the data set is in it) have changed since.
+    """
+    problems, says = list(_problems(folder)), ""
     if not problems and (old := sums.outdated(folder)):
         says = f"{len(old)} files were made from files that have changed since: {first_few(old)}"
+    elif not problems and data is not None and (old := made_with_other_settings(folder, data)):
+        says = f"made with other settings than the configuration has now: {first_few(old)}"
+    if says:
         return Outcome(folder.name, "files", "files", WARNED, says, "run the workflow again")
     count = 0 if problems else len(sums.stated(folder))
     says = f"{count} files are as their stages left them, and tables fit their schemas"
@@ -97,7 +106,8 @@ def _files(
     folder: Path, problems: Sequence[Problem], says: str, count: int, fix: str = ""
 ) -> Outcome:
     if problems:
-        says = first_few(problems, _SHOWN)
+        listed = [str(item) for item in problems[:_SHOWN]]
+        says = "\n".join([*listed, *filter(None, [and_more(len(problems) - _SHOWN).strip()])])
     figures = {"problems": len(problems)} if problems else {"files": count}
     verdict = FAILED if problems else PASSED
     return Outcome(folder.name, "files", "files", verdict, says, fix if problems else "", figures)

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Mapping
 
 import pandas as pd
 
+from kinacc.config.schema import defaults
+from kinacc.errors import first_few
 from kinacc.study.claims.claim import Claim, Tables, verdict
 from kinacc.study.claims.history_sentences import history_claims
 from kinacc.study.claims.map_sentences import map_claims
@@ -14,6 +17,8 @@ from kinacc.study.claims.numbers import number_claims
 from kinacc.study.claims.study_sentences import study_claims
 from kinacc.tables.columns import Columns
 from kinacc.tables.contract import columns_of
+
+SECTIONS = ("measurements", "calibration", "evaluation", "map", "study", "histories")
 
 
 def all_claims() -> list[Claim]:
@@ -61,11 +66,24 @@ def evaluate(
     return columns_of("claims", rows)
 
 
+def _unlike_the_paper(settings: Mapping) -> list[str]:
+    """Settings whose values are not the defaults, which are the paper's."""
+    values, paper = (
+        pd.json_normalize([{key: dict(source[key]) for key in SECTIONS if key in source}]).iloc[0]
+        for source in (settings, defaults())
+    )
+    return [f"{key} {values[key]}" for key in values.index if values[key] != paper[key]]
+
+
 def table_of(inputs: Mapping, settings: Mapping) -> dict[str, Mapping]:
     """Return ``claims``; numbers of Tables I to III are compared on the paper's arm only.
 
-    A share is that of the further draws on which the claim could be judged.
+    A share is that of the further draws on which the claim could be judged. Warns of settings
+    other than the paper's.
     """
+    if settings["robot"] == "mh180" and (changed := _unlike_the_paper(settings)):
+        message = f"the paper's claims are about other settings: {first_few(changed)} here"
+        warnings.warn(message, stacklevel=2)
     tables, shares = dict(inputs), None
     if (robustness := tables.pop("robustness", None)) is not None:
         draws = pd.DataFrame({name: robustness[name] for name in ("claim", "verdict")})
