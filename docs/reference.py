@@ -91,14 +91,15 @@ def allowed(node, unit=""):
     unit = node.get("unit", unit)
     if "allowed" in node:
         return str(node["allowed"])
-    if "anyOf" in node:
-        return " or ".join(allowed(each, unit) for each in node["anyOf"])
+    choices = node.get("anyOf", node.get("oneOf", ()))
+    if any("$ref" in each for each in choices):
+        return "mappings, each with the key of one kind"
+    if choices:
+        return " or ".join(allowed(each, unit) for each in choices)
     if words := node.get("enum", [node["const"]] if "const" in node else None):
         return ", ".join(repr(each) if not str(each).strip() else str(each) for each in words)
     if "properties" in node:
         return ", ".join(node["properties"])
-    if "oneOf" in node:
-        return "mappings, each with the key of one kind"
     kind = node.get("type", "")
     if kind == "array":
         if "pair" in node:

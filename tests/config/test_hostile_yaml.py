@@ -33,7 +33,7 @@ def read_or_refused(text: str) -> None:
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 1_000_000
 
 
-@settings(max_examples=150, deadline=5000)
+@settings(max_examples=80, deadline=5000)
 @given(VALUES, st.sampled_from(sorted(defaults())), st.data())
 def test_any_values_in_any_section(value, section, data):
     own = {"robot": "mh180", section: value}
@@ -42,7 +42,7 @@ def test_any_values_in_any_section(value, section, data):
     read_or_refused(yaml.dump({"datasets": {"a": own}, section: value}))
 
 
-@settings(max_examples=150, deadline=5000)
+@settings(max_examples=80, deadline=5000)
 @given(VALUES | st.text(alphabet="ab:-{}[],&*!|>'\"# \n\t1"))
 def test_any_text(value):
     read_or_refused(value if isinstance(value, str) else yaml.dump(value))

@@ -79,10 +79,10 @@ IN_FULL = bool(os.environ.get("KINACC_PAGES_IN_FULL"))
 # Few poses of a series that a page calibrates only to show how, among them a repeated reading. With
 # 103 order 12 is the highest for all of them, and can still be fitted where a fold is left out.
 THINNED = {"series_B.csv": (*range(1, 1500, 15), 2, 3, 533, 534)}
-# The paper's arm as it is, and the two series with models that are fitted in seconds.
+# The paper's arm and the two series with models that are fitted in seconds.
 SHORT = "".join(
     f"  {name}: {{measurements: {{folds: 2}}, calibration: {{vec: {{order: 2}}}}}}\n"
-    for name in ("ur10_b", "ur10_d")
+    for name in ("mh180", "ur10_b", "ur10_d")
 )
 PARTS = ("config.yaml", "Snakefile", "workflow", "profiles", "src", "docs", "tools", "config")
 

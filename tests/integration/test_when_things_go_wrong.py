@@ -1,8 +1,7 @@
 """Bad input and failing stages: a reason a person can act on, and nothing half done."""
 
-import pytest
-
 CSV = "own data/poses.csv"
+TABLE = "results/own/measurements.parquet"
 
 
 def test_a_stage_that_fails(project):
@@ -42,26 +41,22 @@ def test_a_data_file_that_is_not_there(project):
     assert project.digests() == before
 
 
-@pytest.mark.parametrize(
-    ("row", "column", "value", "said"),
-    [(3, 6, "123o.4", "x_mm"), (5, 9, "0.2", "quaternion"), (9, 1, "500", "q2")],
-)
-def test_a_row_that_cannot_be_right(project, row, column, value, said):
+def test_a_row_that_cannot_be_right(project):
     before = project.digests()
     path = project.folder / CSV
     good = path.read_text()
     lines = good.splitlines()
-    fields = lines[row].split(",")
-    fields[column] = value
-    lines[row] = ",".join(fields)
+    fields = lines[3].split(",")
+    fields[6] = "123o.4"
+    lines[3] = ",".join(fields)
     path.write_text("\n".join(lines) + "\n")
     for _ in range(2):  # the second run must not take the earlier table for this file's
-        text = project.snakemake(ok=False)
-        assert said in text
+        text = project.snakemake(TABLE, ok=False)
+        assert "x_mm" in text
         assert "poses.csv" in text
         assert "Traceback" not in text
         after = project.digests()
         assert {name: before[name] for name in after} == after
     path.write_text(good)
-    project.snakemake()
+    project.snakemake(TABLE)
     assert project.digests() == before

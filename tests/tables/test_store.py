@@ -115,7 +115,7 @@ def test_a_failure_while_writing_leaves_nothing_and_two_writers_do_not_meet(tmp_
     assert path.read_text() == "slow"
 
 
-@settings(max_examples=300, deadline=5000)
+@settings(max_examples=150, deadline=5000)
 @given(st.lists(st.tuples(st.floats(0, 1), st.binary(max_size=8)), max_size=6), st.floats(0, 1))
 def test_a_damaged_file_is_refused_or_read_within_a_gigabyte_and_five_seconds(damage, kept):
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss

@@ -10,7 +10,6 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from kinacc.config.fields import Section
 from kinacc.config.settings import Configuration, DataSet, Settings
 
 Node = dict[str, Any]
@@ -23,10 +22,10 @@ def json_schema(model: type[BaseModel] = Settings) -> Node:
 
 
 @cache
-def keys(model: type[BaseModel] = DataSet) -> dict[str, Node]:
+def keys() -> dict[str, Node]:
     """Schema of every section and key by its path: ``study.alpha``, no places in lists."""
     results: dict[str, Node] = {}
-    definitions = json_schema(model).get("$defs", {})
+    definitions = json_schema(DataSet)["$defs"]
 
     def walk(node: Node, path: str) -> None:
         if "$ref" in node:
@@ -39,7 +38,7 @@ def keys(model: type[BaseModel] = DataSet) -> dict[str, Node]:
         for inner in (*parts, *node.get("oneOf", ()), *node.get("anyOf", ())):
             walk(inner, path)
 
-    walk(json_schema(model), "")
+    walk(json_schema(DataSet), "")
     return results
 
 
@@ -48,9 +47,9 @@ def key(path: str) -> Node:
     return keys()[path]
 
 
-def defaults(model: type[Section] = Settings) -> dict[str, Any]:
-    """Default values of a section (all settings if none) as nested dictionaries and lists."""
-    return model().model_dump(by_alias=True)
+def defaults() -> dict[str, Any]:
+    """Default values of all settings, as nested dictionaries and lists."""
+    return Settings().model_dump(by_alias=True)
 
 
 def without_execution_keys(values: Mapping[str, Any]) -> dict[str, Any]:

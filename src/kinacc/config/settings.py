@@ -484,4 +484,4 @@ class Configuration(Settings):
     # A name becomes a folder below results/, so that it may not lead anywhere else.
     datasets: dict[
         Annotated[str, Field(pattern="^[A-Za-z0-9_][A-Za-z0-9_-]*$", max_length=LONGEST)], DataSet
-    ] = setting({}, "data sets by name")
+    ] = setting({}, "data sets by name", allowed="{name of letters, digits, _ and -: settings}")

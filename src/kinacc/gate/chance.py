@@ -97,18 +97,20 @@ def _resampled(
     of: Callable[[np.ndarray], float], now: Sample, before: Sample, paired: bool
 ) -> np.ndarray:
     """Differences of a statistic (about 2000,) between resamples of two samples."""
-    draw = np.random.default_rng(_SEED)
-    shift = 0 if paired else 1 + now.configuration.max() - before.configuration.min()
-    both = np.concatenate([now.configuration, before.configuration + shift])
-    is_now = np.arange(len(both)) < len(now.sizes)
-    sizes = np.concatenate([now.sizes, before.sizes])
-    place = np.unique(both, return_inverse=True)[1]
-    groups = [np.unique(place)] if paired else [np.unique(place[is_now]), np.unique(place[~is_now])]
-    results = []
+    draw, results = np.random.default_rng(_SEED), []
+    if paired:
+        both = np.concatenate([now.configuration, before.configuration])
+        first, second = np.split(np.unique(both, return_inverse=True)[1], [len(now.sizes)])
+    else:
+        first, second = (
+            np.unique(item.configuration, return_inverse=True)[1] for item in (now, before)
+        )
+    counts = [number.max() + 1 for number in (first, second)]
+    counts = [max(counts)] if paired else counts
     for _ in range(_RESAMPLES):
-        chosen = np.concatenate([draw.choice(group, len(group)) for group in groups])
-        times = np.bincount(chosen, minlength=place.max() + 1)[place]
-        values = [sizes[subset].repeat(times[subset]) for subset in (is_now, ~is_now)]
-        if all(map(len, values)):
-            results.append(of(values[0]) - of(values[1]))
+        times = [np.bincount(draw.integers(count, size=count), minlength=count) for count in counts]
+        new = now.sizes.repeat(times[0][first])
+        old = before.sizes.repeat(times[-1][second])
+        if len(new) and len(old):
+            results.append(of(new) - of(old))
     return np.array(results)
