@@ -123,7 +123,7 @@ def read_data_sets(
     return data_sets(full, absolute)
 
 
-def data_sets(full: Mapping[str, dict[str, Any]], absolute: bool = False) -> DataSets:
+def data_sets(full: Mapping[str, Mapping[str, Any]], absolute: bool = False) -> DataSets:
     """The data sets of full settings by name. Raises InputError listing every problem in them."""
     from kinacc.config.schema import without_execution_keys
 
