@@ -301,7 +301,9 @@ class Calibration:
         """
         return libraries.to_pybotics(Source(self.model, self.tables), point)
 
-    def values_for(self, controller: str, settings: Mapping | None = None) -> pendants.Pendant:
+    def values_for(
+        self, controller: str, settings: Mapping[str, Any] | None = None
+    ) -> pendants.Pendant:
         """Numbers to enter into a controller: kuka, abb, fanuc, ur, yaskawa, staubli, ros.
 
         Parameters

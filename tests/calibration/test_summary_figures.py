@@ -32,7 +32,7 @@ def test_models_are_compared_at_rows_that_all_of_them_were_tried_on():
         ("dh_vs_vec", "cross_validated", 1, 2.0, 5.0),
         ("dh_vs_vec", "cross_validated", 2, 4.0, nan),
         ("dh_vs_measured", "train", 1, 0.25, nan),
-    ))  # fmt: skip
+    ), np.arange(5))  # fmt: skip
     found = table.set_index(["comparison", "estimate", "quantity"])
     dh = found.loc["dh_vs_measured", "cross_validated", "position"]
     # Two rows: the 99 % quantile lies 99 hundredths of the way from the smaller to the larger.
@@ -45,3 +45,17 @@ def test_models_are_compared_at_rows_that_all_of_them_were_tried_on():
     assert found.loc["dh_vs_vec", "cross_validated", "position"]["mean"] == 3.0
     assert found.loc["dh_vs_measured", "train", "position"]["mean"] == 0.25
     assert ("dh_vs_measured", "cross_validated", "orientation") not in found.index
+
+
+def test_the_standard_error_is_that_of_the_means_of_configurations():
+    sizes = np.array([[1.0, 1.2], [2.0, 2.6], [0.4, 0.5]])
+    rows = [("dh_vs_measured", "cross_validated", row, size, np.nan)
+            for row, size in enumerate(sizes.ravel())]  # fmt: skip
+    table = summary.error_statistics(pose_errors(*rows), np.repeat([5, 3, 9], 2))
+    (found,) = table.itertuples()
+    means = sizes.mean(axis=1)
+    assert found.configurations == 3
+    assert found.std_error == pytest.approx(means.std(ddof=1) / np.sqrt(3.0), rel=1e-12)
+    assert found.rms == pytest.approx(np.sqrt(np.mean(sizes**2)), rel=1e-12)
+    (alone,) = summary.error_statistics(pose_errors(*rows), np.zeros(6, dtype=int)).itertuples()
+    assert np.isnan(alone.std_error)

@@ -1,6 +1,7 @@
 """Files as the makers of robots name their joints and poses: right, asked about or refused."""
 
 import numpy as np
+import pandas as pd
 import pytest
 from tracked_arm import (
     assert_read,
@@ -68,23 +69,21 @@ def test_rounded_joints_are_said_to_cost_what_they_do(tmp_path):
     assert not any("steps of" in words for words in told["remarks"])
 
 
-@pytest.mark.parametrize("flag", ["--yes", None])
-def test_the_first_poses_are_shown_as_understood_before_anything_is_written(flag, tmp_path):
+def test_the_first_poses_are_shown_as_understood_before_anything_is_written(tmp_path):
     names = [*joints("q{}_deg"), *XYZ, "rx_deg", "ry_deg", "rz_deg"]
     text = table(names, IT.q, IT.point, IT.turn.as_euler("XYZ", degrees=True))
     files = written(tmp_path, m_csv=text)
-    words = ["init", *files, "--robot", "ur10", "--out", tmp_path / "cell"]
-    done = call(*words, *([flag] if flag else ["--orientation", "XYZ"]))
+    _, told = described(files, "--orientation", "XYZ")
+    shown = pd.DataFrame(told["first_poses"])
+    assert list(shown["where"]) == ["line 2", "line 3", "line 4"]
+    np.testing.assert_allclose(shown[[f"q{i}_deg" for i in range(1, 7)]], IT.q[:3], atol=1e-4)
+    np.testing.assert_allclose(shown[["x_mm", "y_mm", "z_mm"]], IT.point[:3], atol=1e-6)
+    vector = IT.turn[:3].as_rotvec(degrees=True)
+    np.testing.assert_allclose(shown[["rvx_deg", "rvy_deg", "rvz_deg"]], vector, atol=1e-4)
+    words = ["init", *files, "--robot", "ur10", "--out", tmp_path / "cell", "--name", "again"]
+    done = call(*words, "--orientation", "XYZ")
     assert done.exit_code == 0, done.output
-    lines = done.output.splitlines()
-    shown = [line for line in lines if line.startswith("  line ")]
-    assert len(shown) == 3
-    assert shown[0] == "  line 2: joints " + ", ".join(f"{v:.3f}" for v in IT.q[0])
-    tool = lines[lines.index(shown[0]) + 1]
-    assert "tool at " + ", ".join(f"{v:.3f}" for v in IT.point[0]) in tool
-    assert f"turned by {np.rad2deg(IT.turn[0].magnitude()):.3f} deg" in tool
-    written_at = next(i for i, line in enumerate(lines) if line.startswith("written:"))
-    assert lines.index(shown[2]) < written_at
+    assert done.output.index("line 4") < done.output.index("written:")
 
 
 def test_points_a_controller_calculated_are_told_so_though_they_are_rounded(tmp_path):

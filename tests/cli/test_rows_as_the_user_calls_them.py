@@ -55,7 +55,7 @@ def _options(configs):
 
 
 def test_the_first_poses_have_the_names_of_the_file(two_files):
-    assert "line 2 (P1_1) of tracker.csv: joints" in two_files[2]
+    assert "line 2 (P1_1) of tracker.csv " in two_files[2]
 
 
 def test_a_suspicion_names_the_pose_and_the_file_of_its_line(two_files):

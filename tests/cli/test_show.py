@@ -12,7 +12,7 @@ import pytest
 from command_line import call
 
 from kinacc.tables import store
-from kinacc.tables.contract import PROVENANCE_KEYS
+from kinacc.tables.contract import ARTEFACTS, PROVENANCE_KEYS
 
 POSES = 60
 
@@ -73,6 +73,7 @@ def test_columns_are_described_with_unit_and_meaning(folder):
     known = {row["column"]: row for row in rows(folder, "measurements", "--describe")}
     assert known["q1"]["unit"] == "rad"
     assert known["pose"]["holds"] == "0 to 59"
+    assert {name for name, row in known.items() if row["key"]} == {*ARTEFACTS["measurements"].key}
     assert known["x_mm"]["meaning"]
 
 

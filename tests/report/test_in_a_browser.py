@@ -47,7 +47,7 @@ def folder(tmp_path_factory) -> Path:
 
 @pytest.fixture(scope="session")
 def path(folder) -> Path:
-    from kinacc.cli.report import written
+    from kinacc.cli.results import written
 
     return written(str(folder))
 

@@ -61,21 +61,31 @@ def selected(choice: Mapping) -> str:
     return next(str(n) for n, yes in zip(choice["model"], choice["selected"], strict=True) if yes)
 
 
-def error_statistics(pose_errors: Mapping) -> pd.DataFrame:
+def error_statistics(pose_errors: Mapping, configuration: np.ndarray) -> pd.DataFrame:
     """Statistics of every comparison over the rows that all comparisons of an estimate share.
 
     Parameters
     ----------
     pose_errors
         Table ``pose_errors``.
+    configuration
+        Configuration number (n,) of every measured row.
 
     Returns
     -------
     One row for each comparison, estimate (``cross_validated``, ``train``) and quantity, the
     simplest model first: ``comparison``, ``reference``, ``model``, ``estimate``, ``quantity``,
-    ``unit``, ``n``, ``mean``, ``quantile_99`` and ``largest`` of magnitudes in mm or mrad.
+    ``unit``, ``n``, ``mean``, ``quantile_99``, ``largest`` and ``rms`` of magnitudes in mm or mrad,
+    and ``std_error`` of the mean over ``configurations``.
+
+    Notes
+    -----
+    Readings of one configuration share its error, so the standard error is that of a ratio of sums
+    over configurations (Cochran, Sampling Techniques, 1977, eq. 6.13); NaN for a single one. It
+    assumes configurations drawn independently, and fitted models as they are.
     """
     errors = pd.DataFrame({name: pose_errors[name] for name in ("comparison", "estimate", "row")})
+    errors["configuration"] = configuration[errors["row"]]
     units = {"position": "mm", "orientation": "mrad"}
     for prefix, (quantity, unit) in zip("er", units.items(), strict=True):
         parts = [np.asarray(pose_errors[f"{prefix}{axis}_{unit}"], dtype=float) for axis in "xyz"]
@@ -85,17 +95,26 @@ def error_statistics(pose_errors: Mapping) -> pd.DataFrame:
     tried = errors.groupby(["estimate", "row"])["comparison"].transform("nunique")
     errors = errors[tried == errors.groupby("estimate")["comparison"].transform("nunique")]
     keys = ["estimate", "comparison", "quantity"]
-    sizes = errors.melt(keys[:2], list(units), "quantity", "size").dropna()
+    names = [*keys[:2], "configuration"]
+    sizes = errors.melt(names, list(units), "quantity", "size").dropna()
     groups = sizes.groupby(keys)["size"]
     table = groups.agg(n="size", mean="mean", largest="max").reset_index()
     table["quantile_99"] = groups.quantile(LARGE_SHARE).to_numpy()
+    table["rms"] = np.sqrt(groups.agg(lambda size: np.mean(size**2)).to_numpy())
+    sizes["off"] = sizes["size"] - groups.transform("mean")
+    of_configurations = sizes.groupby([*keys, "configuration"])["off"].sum().groupby(keys)
+    count = table["configurations"] = of_configurations.size().to_numpy()
+    square = of_configurations.agg(lambda off: np.sum(off**2)).to_numpy()
+    others = np.where(count > 1, count - 1.0, np.nan)
+    table["std_error"] = np.sqrt(square * count / others) / table["n"]
     table["reference"] = [known[name].reference for name in table["comparison"]]
     table["model"] = [known[name].model for name in table["comparison"]]
     table["unit"] = table["quantity"].map(units)
     places = {name: i for i, name in enumerate((*known, *units))}
     table = table.sort_values(keys, key=lambda names: names.map(places).fillna(0))
     names = ["comparison", "reference", "model", "estimate", "quantity", "unit"]
-    return table[[*names, "n", "mean", "quantile_99", "largest"]].reset_index(drop=True)
+    names += ["n", "mean", "quantile_99", "largest", "rms", "std_error", "configurations"]
+    return table[names].reset_index(drop=True)
 
 
 def frames_are_fitted(frames: Mapping) -> bool:

@@ -14,7 +14,6 @@ from kinacc.assess.noise import ENOUGH, FEWEST
 from kinacc.config import json_files
 from kinacc.errors import InputError, Problem, refuse
 
-FORMAT = "kinacc repeatability 1"
 _FIX = "write it with kinacc repeatability FILE -o noise.json"
 
 

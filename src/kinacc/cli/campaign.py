@@ -13,9 +13,9 @@ import pandas as pd
 
 from kinacc.cli import campaign_plan, campaign_start
 from kinacc.cli.choice import option, positive
-from kinacc.cli.exit_codes import AGAINST
 from kinacc.cli.group import InOrder
 from kinacc.cli.output import Output, answers, require_writable, write_table
+from kinacc.cli.process import AGAINST
 
 if TYPE_CHECKING:
     from kinacc.campaign.campaign import Campaign, NextPose
@@ -124,7 +124,7 @@ def status(folder, tolerance_mm, out) -> None:
 @option("--table", "formats", multiple=True, type=click.Choice(["csv", "xlsx"]),
         help="Further form of the tables; repeatable.")  # fmt: skip
 @answers("JSON of the status.", page="Page for a browser: an .html file.",
-         force="Replacement of existing files.")  # fmt: skip
+         force=True)  # fmt: skip
 def report(folder, to, formats, out) -> None:
     """Write tables, picture and text of a campaign.
 

@@ -12,7 +12,6 @@ import pandas as pd
 
 from kinacc.cli import choice
 from kinacc.cli.choice import option
-from kinacc.cli.file_options import joint_file_options
 from kinacc.cli.output import Output, answers
 
 _SOURCES = {
@@ -34,12 +33,12 @@ _MOST_CANDIDATES = 20_000
 @choice.SESSION
 @choice.POINT
 @option("--candidates", default="200", help="File of joints, or number of joints to draw.")
-@joint_file_options
+@choice.joint_file_options
 @option("--region", type=click.Choice([*_SOURCES]),
         help="Where joints are drawn. [configured if a space is configured, fitted with "
         "--joints-deg, else measured]")  # fmt: skip
-@option("--joints-deg", help='Ranges to draw from, e.g. "-90:90,-60:60,...".')
-@option("--inside-mm", help='Box of the tool in the base: "x0:x1,y0:y1,z0:z1".')
+@choice.JOINTS_DEG
+@choice.INSIDE
 @option("--instrument", multiple=True,
         help="NAME=noise: 1, 3 or 9 numbers, or laser:KEY=..; repeatable.")  # fmt: skip
 @option("--frame", type=click.Choice(["instrument", "base"]), default="instrument",
@@ -49,7 +48,7 @@ _MOST_CANDIDATES = 20_000
 @option("--joint-tolerance-deg", default=0.02, type=choice.positive,
         help="Largest distance of reported joints from those of the pose.")  # fmt: skip
 @option("--implausible-mm", type=choice.positive, help="Error beyond which a reading is refused.")
-@option("--from-deg", help="Joints the arm starts at. [zero]")
+@choice.FROM_DEG
 @option("--visit", type=click.Choice(["travel", "random"]), default="travel",
         help="Order of the first visit.")  # fmt: skip
 @answers("JSON of the campaign.")
@@ -76,9 +75,7 @@ def start(out: Output, **options) -> None:
     arm = choice.calibration_of(results, *(options[name] for name in names))
     joints, labels, directions, source = _candidates(options, arm)
     points = begin.points_of(arm, joints, labels, directions, point)
-    stand = np.zeros(arm.robot.dh.joints)
-    if options["from_deg"] is not None:
-        stand = rows.of_arguments((options["from_deg"],), "deg", arm.robot, "--from-deg")[0]
+    stand = rows.stand_of(arm.robot, options["from_deg"])
     limits = Limits(
         np.deg2rad(options["joint_tolerance_deg"]),
         options["implausible_mm"] or np.inf,
@@ -140,16 +137,16 @@ def _tolerance_mm(tolerance_mm: float | None, results: Path) -> float | None:
 def _candidates(options: Mapping, arm):
     """Joints (m, k), labels, directions (m, k) or None, and the source of the candidates."""
     from kinacc.cli import rows
-    from kinacc.cli.file_options import joint_answers
     from kinacc.deployment.applicability import is_measured_there
     from kinacc.errors import InputError, Problem
     from kinacc.kinematics.model import JointState
 
     path = options["candidates"]
     if not path.lstrip("-").isdecimal():
-        file = rows.candidates(path, arm.robot, _MOST_CANDIDATES, joint_answers(options))
+        answered = choice.joint_answers(options)
+        file, joints = rows.candidates(path, arm.robot, _MOST_CANDIDATES, answered)
         label = list(map(str, file.label))
-        return file.joints, label, file.directions, f"rows of {Path(path).name}"
+        return joints, label, file.directions, f"rows of {Path(path).name}"
     count = int(path)
     if not 2 <= count <= _MOST_CANDIDATES:
         raise InputError(Problem("--candidates", path, f"2 to {_MOST_CANDIDATES}, or a file"))

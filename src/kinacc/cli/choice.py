@@ -1,12 +1,12 @@
-"""Options the commands share: which calibration, which robot, which point."""
+"""Options the commands share: which calibration, robot, point and campaign; forms of a file."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TypeVar
+from typing import Any
 
 import click
 
@@ -21,15 +21,15 @@ from kinacc.tables.allowed import SELECTABLE
 from kinacc.workflow.data_sets import read_data_sets
 from kinacc.workflow.outdated import outdated_reason
 
-Record = TypeVar("Record")
 CONFIG = "config.yaml"
-
-
+_FILE = "measurements.file"
+Command = Callable[..., Any]
+Decorator = Callable[[Command], Command]
 option = partial(click.option, show_default=True)
 MODEL = click.Choice([*SELECTABLE, "nominal"])
 
 
-def values_of(path: str) -> click.ParamType:
+def values_of(path: str) -> click.ParamType[Any]:
     """Values of an option for a key of the configuration, such as measurements.file.decimal."""
     key = schema.key(path)
     if "enum" in key:
@@ -50,21 +50,29 @@ def share(text: str) -> float:
     return float(text.strip().removesuffix("%")) * (0.01 if "%" in text else 1.0)
 
 
-ROBOT = option("--robot", help="Robot of the results: a shipped name or file. [as the results say]")
-NAMING = option("--config", multiple=True, help="Configuration naming the robot.")
+ROBOT = option("--robot", help="Robot of the results: a shipped name or a file. [as recorded]")
+NAMING = option("--config", multiple=True, help="Configuration file with the robot; repeatable.")
 SELECTED = option(
     "--model",
     type=MODEL,
-    help="Model to use. [the one selected; else the better on held-out poses]",
+    help="Error model. [the selected one]",
 )
-SESSION = option("--session", help="Session whose instrument is meant. [the first]")
+DATASET = option("--dataset", help="Data set; needed where the configuration has several.")
+REASON = option("--reason", help="Reason of the decision, kept with it.")
+SESSION = option("--session", help="Session of the instrument. [the first]")
+CONFIGS = option("--config", multiple=True, help=f"Configuration file; repeatable. [{CONFIG}]")
+JOINTS_DEG = option(
+    "--joints-deg", help='Ranges of joints to draw, e.g. "-90:90,-60:60,...". [limits]'
+)
+INSIDE = option("--inside-mm", help='Box of the tool in the base: "x0:x1,y0:y1,z0:z1".')
+FROM_DEG = option("--from-deg", help="Joints where the arm starts. [zero]")
 POINT = option("--point", help="Target, or flange. [the tool]")
 
 
-def together(*options: Callable[[Callable], Callable]) -> Callable[[Callable], Callable]:
+def together(*options: Decorator) -> Decorator:
     """Several options as one decorator, in their order."""
 
-    def decorate(command: Callable) -> Callable:
+    def decorate(command: Command) -> Command:
         for option in reversed(options):
             command = option(command)
         return command
@@ -80,11 +88,63 @@ point_options = together(
         "--frame",
         type=click.Choice(["base", "instrument"]),
         default="base",
-        help="The robot's own base, or the instrument that measured it.",
+        help="Base of the robot, or the instrument that measured it.",
     ),
     POINT,
     SESSION,
 )
+# How a measured file is written, where the file itself leaves it open.
+_text = (
+    option("--encoding", type=values_of(f"{_FILE}.encoding"), help="Characters of a text file."),
+    option("--sheet", help="Sheet of an Excel workbook."),
+    option("--decimal", type=values_of(f"{_FILE}.decimal"), help="Decimal mark."),
+    option(
+        "--thousands",
+        type=click.Choice([".", ",", " ", "'", "none"]),
+        help="Mark between thousands.",
+    ),
+    option("--names", metavar="A,B,..", help="Names of the columns of a file without any."),
+)
+_joints = (
+    option("--take", multiple=True, metavar="COLUMN",
+           help="Column to read, with those that go with it; repeatable."),
+    option("--joint-unit", type=values_of(f"{_FILE}.joint_unit"), help="Unit of the joints."),
+    option("--pulses-per-deg", metavar="A,B,..", help="Pulses of each joint in a degree."),
+)  # fmt: skip
+file_options = together(
+    *_joints,
+    *_text,
+    option(
+        "--no-reading",
+        metavar="NUMBER",
+        help="Number for a missing reading, such as 0 (all of x, y, z) or 9999; or none.",
+    ),
+    option(
+        "--sigma",
+        type=click.Choice(["1", "2", "3", "none"]),
+        help="Standard deviations in an uncertainty of the file; none leaves it out.",
+    ),
+    option(
+        "--direction-unit",
+        type=values_of(f"{_FILE}.directions.unit"),
+        help="Unit of an instrument's horizontal and vertical angles.",
+    ),
+    option(
+        "--vertical",
+        type=values_of(f"{_FILE}.directions.vertical"),
+        help="Zero of vertical angles.",
+    ),
+    option(
+        "--horizontal",
+        type=values_of(f"{_FILE}.directions.horizontal"),
+        help="Sense of horizontal angles, seen from above.",
+    ),
+)
+
+# What a file of joints alone may leave open.
+joint_file_options = together(*_text, *_joints)
+_JOINT_ANSWERS = ("encoding", "sheet", "decimal", "thousands", "names", "take", "joint_unit",
+                  "pulses_per_deg")  # fmt: skip
 # Noise, assessor and aims of a campaign that is begun or planned.
 campaign_options = together(
     option("--noise-mm", help="Standard deviation per axis: one number, or three."),
@@ -142,6 +202,11 @@ campaign_options = together(
 )
 
 
+def joint_answers(options: Mapping[str, Any]) -> dict[str, Any]:
+    """Answers of a command's options to what a file of joints leaves open."""
+    return {name: options[name] for name in _JOINT_ANSWERS if options.get(name)}
+
+
 def robot_of(folder: str | Path, robot: str | None, config: tuple[str, ...]) -> Robot:
     """The robot a results folder belongs to: as given, as it says itself, or as configured.
 
@@ -177,12 +242,12 @@ def calibration_of(
     tables = results.read_tables(folder)
     arm = robot_of(folder, robot, config)
     calibration = results.calibration(tables, arm, model, Path(folder).resolve().name, session)
-    return replace(calibration, outdated=say_outdated(folder))
+    return replace(calibration, outdated=print_outdated(folder))
 
 
-def say_outdated(folder: str | Path) -> str:
+def print_outdated(folder: str | Path) -> str:
     """Print why results are outdated, if they are; returns the reason, empty where they are not."""
     reason = outdated_reason(folder)
     if reason:
-        click.echo(f"{folder} is outdated: {reason}; run kinacc calibrate again", err=True)
+        click.echo(f"{folder} is outdated: {reason}", err=True)
     return reason

@@ -15,40 +15,42 @@ from typing import NoReturn
 import click
 
 from kinacc import __version__
-from kinacc.cli.exit_codes import AGAINST, NOBODY_READS, STOPPED, TERMINATED, UNUSABLE
+from kinacc.cli.process import AGAINST, NOBODY_READS, STOPPED, TERMINATED, UNUSABLE
 from kinacc.errors import InputError, KinaccError, MachineError, Problem, refused
 from kinacc.workflow.start import ONE_THREAD
 
 _AS_JSON = f"{__name__}.as_json"
 _HELP = ("-h", "--help")
+# The commands by purpose, each with the module of its code and what it does.
 SECTIONS = {
     "Measured data": {
-        "init": "describe a file of measurements, and its robot",
-        "check-data": "look for mistakes before anything is fitted",
-        "exclude": "rows that no fit shall use",
-        "plan-poses": "choose poses for a calibration, in a short order",
-        "calibrate": "fit the models and show their held-out errors",
-        "add": "new readings of the same arm, to its series",
+        "init": ("init", "describe a file of measurements, and its robot"),
+        "check-data": ("data", "look for mistakes before anything is fitted"),
+        "exclude": ("data", "rows that no fit shall use"),
+        "plan-poses": ("plan_poses", "choose poses for a calibration, in a short order"),
+        "calibrate": ("run", "fit the models and show their held-out errors"),
+        "add": ("data", "new readings of the same arm, to its series"),
     },
     "The study": {
-        "study": "maps, assessors under noise, figures and claims",
-        "show": "any table of results in the terminal, or as CSV",
-        "check-results": "digests, thresholds and the accepted run",
+        "study": ("run", "maps, assessors under noise, figures and claims"),
+        "show": ("results", "any table of results in the terminal, or as CSV"),
+        "check-results": ("results", "digests, thresholds and the accepted run"),
     },
     "A calibrated arm": {
-        "summary": "errors of one calibration, or a table of many",
-        "report": "one page to read, mail and keep",
-        "predict": "joints to the pose of the tool, with uncertainty",
-        "compensate": "poses or a program to the joints that reach them",
-        "export": "the model for other programs and controllers",
-        "verify": "does the calibration still hold at new readings?",
-        "compare": "differences of two calibrations",
+        "summary": ("results", "errors of one calibration, or a table of many"),
+        "report": ("results", "one page to read, mail and keep"),
+        "predict": ("poses", "joints to the pose of the tool, with uncertainty"),
+        "compensate": ("poses", "poses or a program to the joints that reach them"),
+        "export": ("export", "the model for other programs and controllers"),
+        "verify": ("verify", "does the calibration still hold at new readings?"),
+        "compare": ("compare", "differences of two calibrations"),
     },
     "Its largest error": {
-        "repeatability": "noise of a reading, from poses read again and again",
-        "campaign": "bounds: plan, start, next, record, status, report",
+        "repeatability": ("repeatability", "noise of a reading, from repeated readings"),
+        "campaign": ("campaign", "bounds: plan, start, next, record, status, report"),
     },
 }
+_MODULES = {name: item[0] for names in SECTIONS.values() for name, item in names.items()}
 
 
 class InOrder(click.Group):
@@ -75,20 +77,21 @@ class Commands(InOrder):
 
     def list_commands(self, context: click.Context) -> list[str]:
         """Names in the order of the work."""
-        return [name for names in SECTIONS.values() for name in names]
+        return [*_MODULES]
 
     def get_command(self, context: click.Context, name: str) -> click.Command | None:
-        """The command ``a-name``: ``a_name`` of the module ``kinacc.cli.a_name``."""
-        if name not in self.list_commands(context):
+        """The command ``a-name``: ``a_name`` of its module."""
+        if name not in _MODULES:
             return None
-        name = name.replace("-", "_")
-        return getattr(import_module(f"kinacc.cli.{name}"), name)
+        module = import_module(f"kinacc.cli.{_MODULES[name]}")
+        command: click.Command = getattr(module, name.replace("-", "_"))
+        return command
 
     def format_commands(self, context: click.Context, formatter: click.HelpFormatter) -> None:
         """The commands by purpose."""
         for title, names in SECTIONS.items():
             with formatter.section(title):
-                formatter.write_dl(list(names.items()))
+                formatter.write_dl([(name, purpose) for name, (_, purpose) in names.items()])
 
     def parse_args(self, context: click.Context, args: list[str]) -> list[str]:
         """Note whether problems are asked for as JSON; more threads of BLAS are not."""

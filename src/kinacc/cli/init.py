@@ -3,35 +3,44 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import click
 import numpy as np
+import pandas as pd
+from scipy.spatial.transform import Rotation
 
+from kinacc.checks import digits
 from kinacc.checks.described import corrected, coupling_of
 from kinacc.checks.report import Report
 from kinacc.checks.which_robot import fitting
 from kinacc.cli import choice
 from kinacc.cli.choice import option
-from kinacc.cli.file_options import file_options
-from kinacc.cli.first_poses import first_poses, in_words, poses_without_robot
 from kinacc.cli.init_questions import confirmed, guessed, unanswered
-from kinacc.cli.init_remarks import remarks_on
 from kinacc.cli.output import Output, answers, require_writable
 from kinacc.config.names import LONGEST
 from kinacc.errors import InputError, Problem
 from kinacc.kinematics import robot as robots
+from kinacc.kinematics.robot import Robot
 from kinacc.measurements.intake import write
 from kinacc.measurements.intake.groups import listed
 from kinacc.measurements.intake.guess import Guess
+from kinacc.measurements.reader import MeasuredFile, read
 from kinacc.progress import reporting
+from kinacc.report import rendering
+from kinacc.report.terminal import print_table
 from kinacc.tables.atomic import replacing
 
 _FILE = "measurements.file"
 _FOLDS_UNKNOWN = 60
+_FIRST_POSES = 3
+_CALCULATED_MM = 0.002  # closer to an arm than any instrument measures
+_FINE_MM = 0.01  # coarser steps would hide what instruments measure
+_ROUNDED_MM = 0.02  # rms; less is nothing beside what instruments measure with
+_QUATERNION = ["qx", "qy", "qz", "qw"]
 
 
 @dataclass(frozen=True)
@@ -59,7 +68,8 @@ class Description:
     remarks
         Limits of the readings that contradict nothing.
     first_poses
-        The first poses as understood.
+        A row for each target of the first poses, as understood: joints (deg, mm), position (mm),
+        rotation vector (deg), and number of readings.
     next
         The commands that follow.
     """
@@ -75,7 +85,7 @@ class Description:
     unused_columns: dict[str, str]
     suspicions: list[str]
     remarks: list[str]
-    first_poses: list[dict]
+    first_poses: pd.DataFrame
     next: list[str]
 
 
@@ -84,58 +94,30 @@ class Description:
 @option("--robot", help="A shipped name, a robot file or a URDF file. [found by fitting]")
 @option("--out", "folder", default=".", help="Folder to write to.")
 @option("--name", help="Name of the data set. [as the file]")
-@option("--joint-unit", type=choice.values_of(f"{_FILE}.joint_unit"), help="Unit of the joints.")
-@option(
-    "--length-unit", type=choice.values_of(f"{_FILE}.length_unit"), help="Unit of the positions."
-)
-@option(
-    "--angle-unit", type=choice.values_of(f"{_FILE}.orientation.unit"), help="Unit of orientations."
-)
-@option(
-    "--orientation",
-    help="quaternion (scalar first), quaternion_xyzw, rotation_vector, none, or an Euler "
-    "convention such as XYZ.",
-)
-@option(
-    "--take",
-    multiple=True,
-    metavar="COLUMN",
-    help="Read this column, and those that go with it, where the names leave several readings "
-    "open. May be given again.",
-)
-@file_options
-@option(
-    "--join",
-    metavar="HOW",
-    help="How joints and points of two files belong together: A=B (column A of the joints names "
-    "the poses as B of the points), time or order.",
-)
-@option(
-    "--clock-offset",
-    metavar="SECONDS",
-    help="Seconds to add to times of points to get the joints'.",
-)
-@option("--pulses-per-deg", metavar="A,B,..", help="Pulses of each joint in a degree.")
-@option(
-    "--yes",
-    is_flag=True,
-    help="Ask nothing; take the guesses, which are stated. Stops where there is no guess.",
-)
-@answers("Print the answer as JSON; asks nothing.", force="Replace files that are there.")
-def init(measurement_files: tuple[str, ...], out: Output, **options) -> None:
+@option("--length-unit", type=choice.values_of(f"{_FILE}.length_unit"),
+        help="Unit of the positions.")  # fmt: skip
+@option("--angle-unit", type=choice.values_of(f"{_FILE}.orientation.unit"),
+        help="Unit of orientations.")  # fmt: skip
+@option("--orientation",
+        help="quaternion (scalar first), quaternion_xyzw, rotation_vector, none, or an Euler "
+        "convention such as XYZ.")  # fmt: skip
+@choice.file_options
+@option("--join", metavar="HOW",
+        help="Join of joints and points of two files: A=B (column A of the joints names the poses "
+        "as B of the points), time or order.")  # fmt: skip
+@option("--clock-offset", metavar="SECONDS",
+        help="Seconds added to times of points to get the joints'.")  # fmt: skip
+@option("--yes", is_flag=True, help="No questions: guesses are taken, and stated.")
+@answers(force=True)
+def init(measurement_files: tuple[str, ...], out: Output, **options: Any) -> None:
     """Describe MEASUREMENT_FILES: write their data set and, where needed, its robot.
 
-    Looks at the names and numbers of the file, asks what they do not say, and tries the answer on
-    the readings themselves. What was measured is read, and not what was wanted or how far off it
-    was; joints read back are read, and not commanded ones. Writes NAME.yaml and NAME.robot.yaml,
-    which name every column that is read, and overwrites nothing. Two files are joints and points
-    of the same poses.
+    Asks what the files leave open; with --yes or --json, stops where there is no guess. Two files
+    are joints and points of the same poses.
 
     \b
     Example:
       kinacc init series_D.csv --robot ur10 --name ur10_d
-      kinacc init tracker.csv --robot arm.urdf --orientation ZYX --out cell3 --yes
-      kinacc init log.csv --take actual_q_0 --take X
       kinacc init joints.csv points.csv --join Name=Point
     """
     ask = not (options["yes"] or out.as_json)
@@ -146,41 +128,37 @@ def init(measurement_files: tuple[str, ...], out: Output, **options) -> None:
         raise InputError(Problem("--name", name, f"at most {LONGEST} letters, digits, _ and -"))
     dataset = Path(options["folder"], f"{name}.yaml")
     robot_file = dataset.with_name(f"{name}.robot.yaml")
-    robot_option = options["robot"]
-    stays = (
-        robot_option is not None
-        and Path(robot_option).suffix in (".yaml", ".yml")
-        and Path(robot_option).is_file()
-    )
+    known = Path(options["robot"] or "")
+    stays = known.suffix in (".yaml", ".yml") and known.is_file()
     require_writable([dataset] if stays else [dataset, robot_file], out.force)
-    if ask and (changed := confirmed(guess, robot_option)):
+    if ask and (changed := confirmed(guess, options["robot"])):
         guess = guessed(measurement_files, stated | changed, ask)
-    robot, chosen = _robot(guess, robot_option, ask)
+    robot, chosen = _robot(guess, options["robot"], ask)
     text = _robot_text(robot, guess.joints, name, robot_file.parent)
     texts = {} if text is None else {robot_file: text}
     report, remarks = None, []
-    if robot is None:
-        poses = poses_without_robot(guess)
+    if robot is None:  # joints need no robot to be read
+        arm = robots.of_text(write.template_text("any", guess.joints), "any.yaml")
+        reading = read(guess.section, arm, strict=False)
     else:
         arm = robots.load(robot)
         with reporting(f"init {name}", bar=True) as progress:
             guess, report, reading = corrected(guess, arm, name, progress)
-            if texts and (coupling := coupling_of(report)) is not None:
+            if text is not None and (coupling := coupling_of(report)) is not None:
                 matrix = coupling.values["joint_map"]
                 why = f"found by trying it on the readings: {coupling.what}"
-                texts = {
-                    robot_file: write.coupled_text(text, matrix, f"Joints are coupled, {why}.")
-                }
+                texts[robot_file] = write.coupled_text(text, matrix, f"Joints are coupled, {why}.")
                 note = f"joint_map of the robot file that is written couples joints, {why}"
                 arm = replace(arm, joint_map=np.array(matrix, dtype=float))
                 guess = replace(guess, notes=(*guess.notes, note))
                 guess, report, reading = corrected(guess, arm, name, progress)
-        poses = first_poses(reading, arm.dh.prismatic)
-        remarks = list(remarks_on(guess, report, reading, arm))
+        remarks = list(_remarks_on(guess, report, reading, arm))
+    poses = _first_poses(reading, arm.dh.prismatic)
     if not out.as_json:
-        click.echo("\n".join(in_words(poses)))
+        click.echo("First poses as understood (joints in deg, positions in mm, rotation vectors):")
+        print_table(poses.dropna(axis=1, how="all"))
     texts[dataset] = _dataset(
-        dataset, name, str(robot_file) if text else robot, guess, report, chosen
+        dataset, name, robot if robot and text is None else str(robot_file), guess, report, chosen
     )
     with replacing(list(texts)) as parts:
         for part, content in zip(parts, texts.values(), strict=True):
@@ -200,7 +178,43 @@ def init(measurement_files: tuple[str, ...], out: Output, **options) -> None:
         poses,
         [shlex.join(["kinacc", command, str(dataset)]) for command in ("check-data", "calibrate")],
     )
-    out.say(result, "\n".join(_lines(result, guess, report)))
+    columns = guess.columns
+    lines = rendering.lines(
+        "description.txt",
+        d=result,
+        joints=listed([name.column for name in columns.joints]),
+        targets={
+            name: listed([target[axis].column for axis in "xyz"])
+            for name, target in columns.targets.items()
+        },
+        single={quantity: name.column for quantity, name in columns.single.items()},
+        commanded=listed([name.column for name in columns.commanded]),
+        how=_how(report),
+        unread=_unread(result.unused_columns),
+    )
+    out.show(result, lines=lines)
+
+
+def _first_poses(reading: MeasuredFile, prismatic: np.ndarray) -> pd.DataFrame:
+    """A row for each target of the first poses, as it was read first, in deg and mm."""
+    table = pd.DataFrame(reading.columns)
+    table = table[table["pose"].isin(table["pose"].unique()[:_FIRST_POSES])]
+    table["readings"] = table.groupby(["pose", "target"])["pose"].transform("size")
+    table = table.drop_duplicates(["pose", "target"])
+    first = pd.DataFrame({"where": [reading.row_names.one(int(line)) for line in table["row"]]})
+    for joint, slides in enumerate(prismatic, 1):
+        values = table[f"q{joint}"].to_numpy(float)
+        first[f"q{joint}_{'mm' if slides else 'deg'}"] = values if slides else np.rad2deg(values)
+    for name in ("target", "x_mm", "y_mm", "z_mm"):
+        first[name] = table[name].to_numpy()
+    quaternion = table[_QUATERNION].to_numpy(float)
+    turned = np.isfinite(quaternion).all(axis=1)
+    vector = np.full((len(table), 3), np.nan)
+    if turned.any():
+        vector[turned] = Rotation.from_quat(quaternion[turned]).as_rotvec(degrees=True)
+    first[["rvx_deg", "rvy_deg", "rvz_deg"]] = vector
+    first["readings"] = table["readings"].to_numpy()
+    return first
 
 
 def _robot(guess: Guess, stated: str | None, ask: bool) -> tuple[str | None, str]:
@@ -257,37 +271,40 @@ def _how(report: Report | None) -> str:
     return "assumed" if report is None or report.stopping else "assumed, and the readings agree"
 
 
-def _unread(unused: dict[str, str]) -> Iterator[tuple[str, str]]:
+def _unread(unused: Mapping[str, str]) -> list[tuple[str, str]]:
     """Reasons, each with the columns that are not read for it."""
-    for why in dict.fromkeys(unused.values()):
-        yield why, ", ".join(name for name in unused if unused[name] == why)
+    return [
+        (why, ", ".join(name for name in unused if unused[name] == why))
+        for why in dict.fromkeys(unused.values())
+    ]
 
 
-def _lines(result: Description, guess: Guess, report: Report | None) -> Iterator[str]:
-    """The description as it is printed."""
-    columns, section, turn = guess.columns, guess.section, guess.section["orientation"]
-    yield from (f"file: {text}" for text in result.notes)
-    yield f"robot: {result.robot or result.written[0]} ({result.robot_because})"
-    names = listed([name.column for name in columns.joints])
-    yield f"joints: {result.joints}, in {section['joint_unit']}: {names}"
-    targets = [f"{name} ({listed([target[axis].column for axis in 'xyz'])})"
-               for name, target in columns.targets.items()]  # fmt: skip
-    yield f"targets, in {section['length_unit']}: {', '.join(targets)}"
-    kind = f"Euler angles {turn['convention']}" if turn["kind"] == "euler" else turn["kind"]
-    unit = f", in {turn['unit']}" if turn["kind"] in ("euler", "rotation_vector") else ""
-    yield f"orientation: {kind}{unit}"
-    also = [f"{quantity} ({name.column})" for quantity, name in columns.single.items()]
-    if columns.commanded:
-        also.append(f"commanded joints ({listed([name.column for name in columns.commanded])})")
-    if also:
-        yield f"also read: {', '.join(also)}"
-    yield from (f"{_how(report)}: {text}" for text in result.assumed.values())
-    for why, unread in _unread(result.unused_columns):
-        yield f"columns not used: {unread}" + (f" ({why})" if why else "")
-    if result.suspicions:
-        yield f"suspicions: {', '.join(dict.fromkeys(result.suspicions))} (details: check-data)"
-    yield from (f"note: {text}" for text in result.remarks)
-    yield from (f"written: {path}" for path in result.written)
-    if report is None:
-        yield "fill in the robot file first"
-    yield from ("next:", *(f"  {command}" for command in result.next))
+def _remarks_on(guess: Guess, report: Report, reading: MeasuredFile, arm: Robot) -> Iterator[str]:
+    """What limits the use of the readings."""
+    cells, decimal = guess.table.columns, guess.table.decimal
+    targets = guess.columns.targets.values()
+    points = [cells[target[axis].column] for target in targets for axis in "xyz"]
+    unit = 1.0 if guess.section["length_unit"] == "mm" else 1000.0
+    step = digits.smallest_step(points, unit, decimal)
+    fit = report.facts.get("quick_fit")
+    residual = fit["left_per_axis_mm"] if isinstance(fit, Mapping) else np.inf
+    # Rounding alone leaves 0.3 of a step.
+    if residual <= max(_CALCULATED_MM, 0.4 * min(step, _FINE_MM)):
+        yield (
+            f"the points follow the joints to {residual:.1g} mm, closer than instruments measure:"
+            " were they calculated by the controller or a simulation?"
+        )
+    if guess.section.get("pulses_per_deg") or arm.dh.prismatic.any():
+        return
+    unit = 1.0 if guess.section["joint_unit"] == "deg" else 180.0 / np.pi
+    joints = [cells[name.column] for name in guess.columns.joints]
+    step = digits.smallest_step(joints, unit, decimal)
+    if step > 0.0:
+        q = np.stack([reading.columns[f"q{i + 1}"] for i in range(guess.joints)], axis=1)
+        reach_mm, rms_mm = digits.cost(arm.dh, arm.dh_joints(q), step)
+        if rms_mm >= _ROUNDED_MM:
+            yield (
+                f"joints are written in steps of {step:.2g} deg: "
+                f"{reach_mm * np.deg2rad(step):.2g} mm at {reach_mm / 1000.0:.2g} m from an axis, "
+                f"{rms_mm:.2g} mm rms in all; export more digits"
+            )

@@ -1,4 +1,4 @@
-"""Where the answer of a command goes: the screen, as words or JSON, a table, a picture."""
+"""Where the answer of a command goes: the screen, as text or JSON, a table, a picture, a page."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ import pandas as pd
 
 from kinacc.config.names import in_csv
 from kinacc.errors import Problem, as_seen, refuse
+from kinacc.report.terminal import print_table
 from kinacc.tables.atomic import write_whole
 
 if TYPE_CHECKING:
@@ -27,11 +28,12 @@ if TYPE_CHECKING:
 TABLES = (".csv", ".json", ".parquet", ".xlsx")
 PICTURES = (".svg", ".png", ".pdf")
 PAGES = (".html",)
+Command = Callable[..., None]
 
 
 @dataclass(frozen=True)
 class Output:
-    """What the options of :func:`answers` say."""
+    """Values of the options of :func:`answers`."""
 
     as_json: bool = False
     table: str | None = None
@@ -40,10 +42,16 @@ class Output:
     force: bool = False
     verbose: bool = False
 
+    def __post_init__(self) -> None:
+        """Raise InputError where a file could not or should not be written."""
+        require_writable([self.table], self.force, TABLES)
+        require_writable([self.picture], self.force, PICTURES)
+        require_writable([self.page], self.force, PAGES)
+
     def show(
         self,
         answer: object,
-        table: pd.DataFrame,
+        table: pd.DataFrame | None = None,
         lines: Iterable[str] = (),
         shown: pd.DataFrame | None = None,
         most: int = 24,
@@ -53,6 +61,7 @@ class Output:
         ``answer`` is the result of the command, a dataclass or a mapping; ``shown`` are the rows
         of the screen, where they are not those of ``table``, and ``most`` the number of these.
         """
+        table = pd.DataFrame() if table is None else table
         if self.table is not None:
             write_table(table, self.table, answer)
         if self.as_json:
@@ -60,18 +69,11 @@ class Output:
             return
         for line in lines:
             click.echo(as_seen(line))
+        table = table if shown is None else shown
         if self.table is not None:
             click.echo(f"{self.table}: {len(table)} rows")
-            return
-        table = table if shown is None else shown
-        if len(table):
-            from kinacc.report.terminal import print_table
-
+        elif len(table):
             print_table(table, most)
-
-    def say(self, facts: object, text: str) -> None:
-        """Print the answer for a machine or for a person."""
-        click.echo(json.dumps(plain(facts), indent=1) if self.as_json else text)
 
     def draw(self, figure: Figure) -> None:
         """Write the picture."""
@@ -88,48 +90,41 @@ class Output:
 
 
 def answers(
-    as_json: str = "Print the answer as JSON.",
+    as_json: str = "Answer as JSON.",
     table: bool = False,
     picture: str = "",
     page: str = "",
-    force: str = "",
+    force: bool = False,
     verbose: bool = False,
-) -> Callable[[Callable], Callable]:
+) -> Callable[[Command], Command]:
     """Options of a command's answer, handed over as ``out``; its files can be written then.
 
-    ``as_json``, ``picture``, ``page`` and ``force`` are helps of options, ``table`` is for --out.
+    ``as_json``, ``picture`` and ``page`` are helps of options; ``table`` is for --out; ``force``
+    for a command that writes other files.
     """
-    file = {"type": click.Path()}
-    options = {
-        "out": table and click.option(
-            "--out", "-o", "table", **file, help="Write to a .csv, .xlsx, .json or .parquet file."
-        ),
-        "picture": picture and click.option("--picture", **file, help=picture),
-        "page": page and click.option("--page", **file, help=page),
-        "json": click.option("--json", "as_json", is_flag=True, help=as_json),
-        "verbose": verbose
-        and click.option("--verbose", is_flag=True, help="Every row and detail."),
-        "force": (table or picture or page or force)
-        and click.option("--force", is_flag=True, help=force or "Replace a file that is there."),
-    }  # fmt: skip
+    file = click.Path()
+    options = (
+        (table, ("--out", "-o", "table"), "Table as .csv, .xlsx, .json or .parquet.", file),
+        (picture, ("--picture",), picture, file),
+        (page, ("--page",), page, file),
+        (True, ("--json", "as_json"), as_json, None),
+        (verbose, ("--verbose",), "Every row and detail.", None),
+        (table or picture or page or force, ("--force",), "Replacement of existing files.", None),
+    )
 
-    def decorate(command: Callable) -> Callable:
+    def decorate(command: Command) -> Command:
         @wraps(command)
-        def run(**options: object) -> None:
-            out = Output(**{name: options.pop(name) for name in _NAMES if name in options})
-            require_writable([out.table], out.force, TABLES)
-            require_writable([out.picture], out.force, PICTURES)
-            require_writable([out.page], out.force, PAGES)
-            command(out=out, **options)
+        def run(**options: Any) -> None:
+            values = {item.name: options.pop(item.name) for item in fields(Output)
+                      if item.name in options}  # fmt: skip
+            command(out=Output(**values), **options)
 
-        for option in filter(None, reversed(options.values())):
-            run = option(run)
+        for has, names, text, kind in reversed(options):
+            if has:
+                run = click.option(*names, type=kind, is_flag=kind is None, help=text)(run)
         return run
 
     return decorate
-
-
-_NAMES = tuple(item.name for item in fields(Output))
 
 
 def write_table(table: pd.DataFrame, path: Path | str, answer: object = None) -> None:

@@ -1,4 +1,7 @@
-"""A command as a process: its standard streams, the signals that stop it, and how it ends."""
+"""A command as a process: its streams, the signals that stop it, and its exit codes.
+
+docs/commands.md lists the meaning of each code.
+"""
 
 from __future__ import annotations
 
@@ -9,8 +12,10 @@ from io import TextIOWrapper
 from types import FrameType
 from typing import NoReturn
 
-from kinacc.cli.exit_codes import AGAINST, DONE, STOPPED
 from kinacc.errors import refused
+
+DONE, AGAINST, UNUSABLE, UNDECIDED = 0, 1, 2, 3
+STOPPED, NOBODY_READS, TERMINATED = 130, 141, 143  # as a shell has them of signals
 
 
 def main(prog_name: str = "kinacc") -> NoReturn:

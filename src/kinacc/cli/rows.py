@@ -2,26 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import click
 import numpy as np
 
-from kinacc.cli.exit_codes import AGAINST
+from kinacc.cli.process import AGAINST
+from kinacc.deployment.record import Calibration
 from kinacc.errors import InputError, Problem, first_few, refuse
 from kinacc.kinematics.robot import Robot, outside_limits
 from kinacc.measurements.layout import ANGLE
 from kinacc.measurements.rows import Rows, read_rows
 from kinacc.measurements.table import numbers_of
 
-if TYPE_CHECKING:
-    from kinacc.deployment.record import Calibration
-
 _MUCH_MOVED_MM = 0.1  # by a mm or mrad of undetermined parameters
 
 
-def read(path: str, robot: Robot, need: str = "joints", answers: Mapping | None = None) -> Rows:
+def read(
+    path: str, robot: Robot, need: str = "joints", answers: Mapping[str, Any] | None = None
+) -> Rows:
     """Rows of a file, as ``read_rows``; notes on how it was read go to the error stream."""
     rows = read_rows(path, robot.dh.prismatic, need, answers)
     for note in rows.notes:
@@ -29,7 +29,16 @@ def read(path: str, robot: Robot, need: str = "joints", answers: Mapping | None 
     return rows
 
 
-def of_arguments(texts: tuple[str, ...], unit: str, robot: Robot, option: str) -> np.ndarray:
+def read_joints(
+    path: str, robot: Robot, answers: Mapping[str, Any] | None = None
+) -> tuple[Rows, np.ndarray]:
+    """Rows of a file and their joints (n, k)."""
+    rows = read(path, robot, answers=answers)
+    assert rows.joints is not None  # read_rows refuses a file without them
+    return rows, rows.joints
+
+
+def of_arguments(texts: Sequence[str], unit: str, robot: Robot, option: str) -> np.ndarray:
     """Joints (n, k) of arguments such as "10,-20,30,0,45,0" in ``unit``; InputError if unfit."""
     slides, rows = robot.dh.prismatic, [numbers_of(text) for text in texts]
     allowed = f"{len(slides)} numbers, one per joint of {robot.name}"
@@ -38,23 +47,36 @@ def of_arguments(texts: tuple[str, ...], unit: str, robot: Robot, option: str) -
     return np.array(rows) * np.where(slides, 1.0, ANGLE[unit])
 
 
-def given_joints(
-    robot: Robot, path: str | None, in_deg: tuple, in_rad: tuple, answers: Mapping
-) -> Rows:
-    """Joints of a file or of arguments. InputError without any, or outside the limits.
+def stand_of(robot: Robot, text: str | None) -> np.ndarray:
+    """Joints (k,) of ``--from-deg``, zero where it is not given."""
+    if text is None:
+        return np.zeros(robot.dh.joints)
+    joints: np.ndarray = of_arguments((text,), "deg", robot, "--from-deg")[0]
+    return joints
 
-    ``answers`` to what the file leaves open, by option.
+
+def joints_of(
+    robot: Robot,
+    path: str | None,
+    in_deg: Sequence[str],
+    in_rad: Sequence[str],
+    answers: Mapping[str, Any],
+) -> tuple[Rows, np.ndarray]:
+    """Rows and joints (n, k) of a file or of arguments.
+
+    InputError without any, or outside the limits. ``answers`` to what the file leaves open, by
+    option.
     """
     if [path is not None, bool(in_deg), bool(in_rad)].count(True) != 1:
         raise InputError(Problem("joints", "are needed once", "a file, --joints-deg, --joints-rad"))
     if path is not None:
-        rows = read(path, robot, answers=answers)
+        rows, joints = read_joints(path, robot, answers)
     else:
         unit = "deg" if in_deg else "rad"
         joints = of_arguments(in_deg or in_rad, unit, robot, f"--joints-{unit}")
         rows = Rows(np.arange(1, len(joints) + 1), joints)
-    require_within_limits(robot, rows, path or "joints")
-    return rows
+    require_within_limits(robot, rows.label, joints, path or "joints")
+    return rows, joints
 
 
 def joint_columns(prismatic: np.ndarray, joints: np.ndarray) -> dict[str, np.ndarray]:
@@ -65,22 +87,26 @@ def joint_columns(prismatic: np.ndarray, joints: np.ndarray) -> dict[str, np.nda
     }
 
 
-def candidates(path: str, robot: Robot, most: int, answers: Mapping | None = None) -> Rows:
-    """Joints of a file to choose from; InputError outside the limits and for more than ``most``."""
-    rows = read(path, robot, answers=answers)
-    require_within_limits(robot, rows, path, "Candidates")
-    if len(rows.label) > most:
-        raise InputError(Problem(path, f"{len(rows.label)} candidates", f"at most {most}"))
-    return rows
+def candidates(
+    path: str, robot: Robot, most: int, answers: Mapping[str, Any] | None = None
+) -> tuple[Rows, np.ndarray]:
+    """Rows and joints of a file to choose from; InputError outside limits or for over ``most``."""
+    rows, joints = read_joints(path, robot, answers)
+    require_within_limits(robot, rows.label, joints, path, "Candidates")
+    if len(joints) > most:
+        raise InputError(Problem(path, f"{len(joints)} candidates", f"at most {most}"))
+    return rows, joints
 
 
-def require_within_limits(robot: Robot, rows: Rows, where: str, title: str = "Joints") -> None:
+def require_within_limits(
+    robot: Robot, label: np.ndarray, joints: np.ndarray, where: str, title: str = "Joints"
+) -> None:
     """Raise InputError with every joint of which a row lies outside the robot's limits."""
     problems = []
-    for fault in outside_limits(robot, rows.joints, 1e-9):
+    for fault in outside_limits(robot, joints, 1e-9):
         name = f"q{fault.joint}"
         fix = f"the column looks like degrees: name it {name}_deg"
-        place = f"{where}, {name}, rows {first_few(rows.label[fault.rows])}"
+        place = f"{where}, {name}, rows {first_few(label[fault.rows])}"
         value = f"{fault.values[0]:g} {fault.unit}"
         problems.append(
             Problem(place, value, fault.allowed, fix if fault.looks_like_degrees else "")
@@ -88,7 +114,7 @@ def require_within_limits(robot: Robot, rows: Rows, where: str, title: str = "Jo
     refuse(problems, f"{title} outside the robot's limits")
 
 
-def say_unused(rows: Rows, calibration: Calibration) -> None:
+def print_unused(rows: Rows, calibration: Calibration) -> None:
     """Name the columns of a file that were not used, on the error stream."""
     if rows.unused:
         click.echo(f"not used: {', '.join(rows.unused)}", err=True)

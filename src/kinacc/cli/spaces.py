@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -19,7 +20,7 @@ Inside = Callable[[np.ndarray], np.ndarray]
 
 @dataclass(frozen=True)
 class Settings:
-    """What is fitted of a robot and where.
+    """Fitted parameters and region of a robot.
 
     ``box``: ends (k,), (k,) of the reported joints; ``inside`` tests positions (n, 3) of the tool.
     """
@@ -39,7 +40,7 @@ def without_dataset() -> Settings:
     return Settings(None, True, calibration["rotation_weight_mm_per_rad"], hayati)
 
 
-def settings_of(dataset: str, config: tuple[str, ...]) -> Settings:
+def settings_of(dataset: str, config: Sequence[str]) -> Settings:
     """The settings of a configured data set. Raises InputError."""
     from kinacc.calibration.dh_estimator import hayati_joints
     from kinacc.workflow.data_sets import read_data_sets
@@ -61,7 +62,9 @@ def settings_of(dataset: str, config: tuple[str, ...]) -> Settings:
     )
 
 
-def _configured(evaluation: Mapping, robot: robots.Robot) -> tuple[Ends | None, Inside | None]:
+def _configured(
+    evaluation: Mapping[str, Any], robot: robots.Robot
+) -> tuple[Ends | None, Inside | None]:
     """Joint box and test of positions of a data set's evaluation space."""
     from kinacc.study.evaluation import cylinder, joint_box
 
@@ -69,14 +72,14 @@ def _configured(evaluation: Mapping, robot: robots.Robot) -> tuple[Ends | None, 
         return joint_box(evaluation, robot), None
     if evaluation["space"] == "cylinder":
         space = cylinder(evaluation)
-        return None, lambda position_mm: region.contains(space, position_mm)
+        return None, lambda position_mm: np.asarray(region.contains(space, position_mm))
     return None, None
 
 
 def inside_box(space: Ends) -> Inside:
     """Test of positions (n, 3) for lying in a box (3,), (3,)."""
     low, high = space
-    return lambda position_mm: ((position_mm >= low) & (position_mm <= high)).all(axis=1)
+    return lambda position_mm: np.all((position_mm >= low) & (position_mm <= high), axis=1)
 
 
 def ranges(option: str, text: str | None, count: int, problems: list[Problem]) -> Ends | None:

@@ -92,6 +92,18 @@ class Verification:
     smallest_factor: float = np.inf
     smallest_offsets: np.ndarray | None = None
 
+    @property
+    def hidden_joints(self) -> list[int]:
+        """Joints, from 1, of which no offset is detected."""
+        offsets = np.zeros(0) if self.smallest_offsets is None else self.smallest_offsets
+        return [int(joint) + 1 for joint in np.flatnonzero(np.isinf(offsets))]
+
+    @property
+    def least_visible_joint(self) -> int:
+        """The other joint, from 1, with the largest offset that is just detected."""
+        offsets = np.zeros(1) if self.smallest_offsets is None else self.smallest_offsets
+        return int(np.argmax(np.where(np.isfinite(offsets), offsets, -1.0))) + 1
+
 
 def verify(
     tables: Tables,

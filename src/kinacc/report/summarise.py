@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shlex
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -23,6 +24,7 @@ from kinacc.deployment import folder as results
 from kinacc.errors import InputError, Problem, refuse
 from kinacc.kinematics import robot
 from kinacc.kinematics.robot import Robot
+from kinacc.measurements.folds import configurations_of
 from kinacc.measurements.row_names import RowNames
 from kinacc.report.history_lines import sentence
 from kinacc.report.summary import CalibrationSummary
@@ -45,6 +47,7 @@ ON_PAGE = (
 )
 _ESTIMATES = {"cross_validated": "held_out", "train": "training"}
 _STATISTICS = ("n", "mean", "quantile_99", "largest")
+_DAY_OF_A_LINE = re.compile(r"-(\d{4}-\d{2}-\d{2})$")
 Tables = Mapping[str, Columns]
 
 
@@ -83,7 +86,9 @@ def summarise(
     fits = misfit.misfits(tables, arm)
     listed = identifiability.listed(tables["dh_identified"])
     always = (text for text in listed if not text.endswith(identifiability.POORLY_DETERMINED))
-    errors = figures.error_statistics(tables["pose_errors"]).drop(columns="comparison")
+    configuration = configurations_of(measurements)
+    errors = figures.error_statistics(tables["pose_errors"], configuration)
+    errors = errors.drop(columns="comparison")
     errors["estimate"] = errors["estimate"].map(_ESTIMATES)
     turned = (errors["quantity"] == "orientation") & (errors["reference"] == MEASURED)
     rows = np.asarray(measurements.get("row", [np.nan]), dtype=float)
@@ -92,6 +97,7 @@ def summarise(
         name=name,
         folder=str(folder),
         written=_written(folder / "model_selection.parquet"),
+        measured=_measured(name, tables.get("history")),
         robot=arm.name,
         synthetic=synthetic,
         readings=len(measurements["pose"]),
@@ -114,6 +120,7 @@ def summarise(
         excluded=excluded(tables),
         compliance=compliance(tables.get("compliance_model")),
         noise_mm=fits[0].noise.per_axis_mm,
+        stated_noise_mm=_stated_noise_mm(measurements),
         held_out_over_noise={fit.model: fit.ratio for fit in fits},
         campaign=assessed.status,
         remarks=assessed.remarks,
@@ -379,6 +386,20 @@ def _other_errors(tables: Tables) -> dict[str, float]:
     if cells.notna().any():
         largest[f"accuracy map of {cells.count()} cells"] = float(cells.max())
     return largest
+
+
+def _stated_noise_mm(measurements: Columns) -> float:
+    """Rms over readings and axes of the standard deviations in the file, NaN without any."""
+    axes = [measurements[f"std_{axis}_mm"] for axis in "xyz" if f"std_{axis}_mm" in measurements]
+    return float(np.sqrt(np.mean(np.square(axes)))) if axes else np.nan
+
+
+def _measured(name: str, history: Columns | None) -> str:
+    """Day of a line of a series, or of the newest line; empty without a series."""
+    if history is not None:
+        return str(max(history["date"]))
+    day = _DAY_OF_A_LINE.search(name)
+    return day[1] if day else ""
 
 
 def _written(path: Path) -> str:

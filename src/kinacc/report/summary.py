@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -40,10 +41,13 @@ class CalibrationSummary:
 
     Attributes
     ----------
+    measured
+        Day of the measurement, of a line of a series or of its newest line; else empty.
     errors
         A row for each model, reference (``measured`` or another model), estimate (``held_out`` or
         ``training``) and quantity (position, orientation): ``unit``, ``n`` rows that every model
-        was tried on, ``mean``, ``quantile_99`` and ``largest``.
+        was tried on, ``mean``, ``quantile_99``, ``largest``, ``rms``, and ``std_error`` of the mean
+        over ``configurations``.
     selection
         ``model_selection`` with the ``order`` of a VEC model, the lowest and highest order chosen
         in folds, and the highest that was tried; None where there is none.
@@ -61,6 +65,9 @@ class CalibrationSummary:
         Rows that the configuration excludes, each with its error by the selected model.
     compliance
         Joints that bend; NaN where a coefficient was not fitted.
+    noise_mm, stated_noise_mm
+        Noise of a reading per axis: of repeated readings, and of standard deviations in the file;
+        NaN where unknown.
     held_out_over_noise
         By model, NaN where the noise is unknown.
     claims
@@ -73,6 +80,7 @@ class CalibrationSummary:
     name: str
     folder: str
     written: str
+    measured: str
     robot: str
     synthetic: bool
     readings: int
@@ -95,6 +103,7 @@ class CalibrationSummary:
     excluded: pd.DataFrame
     compliance: pd.DataFrame
     noise_mm: float
+    stated_noise_mm: float
     held_out_over_noise: Mapping[str, float]
     campaign: CampaignStatus | None
     remarks: tuple[str, ...]
@@ -124,6 +133,15 @@ class CalibrationSummary:
     def best(self) -> Any:
         """Position errors of the selected model: ``n``, ``mean``, ``quantile_99``, ``largest``."""
         return next(self.position_errors.loc[[self.selected]].itertuples())
+
+    @property
+    def rms_without_noise_mm(self) -> float:
+        """Noise-corrected rms of ``best``: root of rms^2 - 3 sigma^2, sigma as stated; 0 at least.
+
+        NaN where the file states no standard deviations.
+        """
+        square = self.best.rms**2 - 3.0 * self.stated_noise_mm**2
+        return math.sqrt(max(square, 0.0)) if math.isfinite(square) else math.nan
 
     @property
     def open_findings(self) -> pd.DataFrame:

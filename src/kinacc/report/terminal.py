@@ -145,6 +145,7 @@ def fleet_table(
                 "lower_mm": getattr(bound, "lower_mm", math.nan),
                 "confidence": getattr(bound, "confidence", math.nan),
                 "campaign_date": status.recorded[:_DAY] if status else "",
+                "measured": result.measured,
                 "file_date": result.written,
                 "tolerance_mm": getattr(verdict, "tolerance_mm", math.nan),
                 "reason": getattr(verdict, "reason", ""),
@@ -176,6 +177,7 @@ def print_fleet(table: pd.DataFrame, by: str) -> None:
         "held_out_mean_mm": "mean mm",
         "held_out_99_mm": f"{LARGE_SHARE:.0%} mm",
         "held_out_largest_mm": "largest mm",
+        "measured": "measured",
         "file_date": "date",
     }
     shown = table.reindex(columns=[*columns]).replace("", None).dropna(axis=1, how="all")

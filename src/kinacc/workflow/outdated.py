@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import shlex
 from pathlib import Path
 
 from kinacc.errors import InputError, first_few
@@ -38,19 +40,39 @@ def made_with_other_settings(folder: Path, data: DataSets) -> list[str]:
 
 
 def outdated_reason(folder: Path | str) -> str:
-    """Why the calibration in a results folder is outdated, in one line; empty where it is not.
+    """Why the calibration in a results folder is outdated, and the command that makes it anew.
 
     Measured files, robot files and tables are held to the digests that the stages left, settings
-    to those of a configuration beside the results, if there is one.
+    to those of the configurations beside the results, where there are any.
+
+    Parameters
+    ----------
+    folder
+        Results folder of a data set.
+
+    Returns
+    -------
+    str
+        One line; empty where the calibration is not outdated, or cannot be read.
     """
     folder = Path(folder).resolve()
     try:
         changed = sums.changed_since(folder)
-        if changed:
-            return f"changed since the calibration: {first_few(changed, 3)}"
+        of_results: list[str] = []
+        others: list[str] = []
         for path, data in beside(folder.parent, folder.name):
-            if "summary.parquet" in made_with_other_settings(folder, data):
-                return f"settings in {path.name} changed since the calibration"
+            if folder.name in data.settings:
+                is_other = "summary.parquet" in made_with_other_settings(folder, data)
+                (others if is_other else of_results).append(os.path.relpath(path))
     except (InputError, OSError):
         return ""  # whoever reads the results reports what is wrong with them
-    return ""
+    if changed:
+        again = shlex.join(["kinacc", "calibrate", *(of_results or others)[:1]])
+        return f"changed since the calibration: {first_few(changed, 3)}; run {again}"
+    if not others:
+        return ""
+    again = shlex.join(["kinacc", "calibrate", others[0]])
+    if of_results:
+        made = f"made with the settings of {of_results[0]}; {others[0]} has other settings for"
+        return f"{made} {folder.name}; to use these run {again}"
+    return f"settings in {others[0]} changed since the calibration; run {again}"

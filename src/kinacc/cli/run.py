@@ -1,4 +1,4 @@
-"""``kinacc calibrate``: from a data set to its models and their errors."""
+"""``kinacc calibrate`` and ``study``: the workflow up to a target, and what it made."""
 
 from __future__ import annotations
 
@@ -10,60 +10,79 @@ from pathlib import Path
 
 import click
 
-from kinacc.cli.choice import CONFIG, together
-from kinacc.cli.report import written
-from kinacc.cli.summary import as_plain
+from kinacc.cli.choice import CONFIG, option, together
+from kinacc.cli.results import as_plain, written
 from kinacc.errors import InputError, Problem
 from kinacc.report.summarise import summarise_all
 from kinacc.report.terminal import FEW, print_summaries
 from kinacc.workflow.data_sets import RESULTS, read_data_sets
 from kinacc.workflow.running import held
-from kinacc.workflow.start import run_workflow
+from kinacc.workflow.start import SNAKEFILE, run_workflow
 
 # Made by a study, perhaps of an earlier calibration.
-STUDIED = (
+_STUDIED = (
     *("accuracy_map", "assessment_points", "study", "study_summary", "readings", "histories"),
     "claims",
 )
-workflow_options = together(
-    click.option(
-        "--cores", "-c", type=click.IntRange(1), help="Processor cores to use. [all there are]"
-    ),
-    click.option("--json", "as_json", is_flag=True, help="Print the answer as JSON."),
+_options = together(
+    option("--cores", "-c", type=click.IntRange(1), help="Processor cores. [all]"),
+    option("--json", "as_json", is_flag=True, help="Answer as JSON."),
     click.argument("arguments", nargs=-1, type=click.UNPROCESSED, metavar="[FILE.yaml|FOLDER]..."),
 )
 
 
 @click.command("calibrate", context_settings={"ignore_unknown_options": True})
-@workflow_options
+@_options
 def calibrate(arguments: tuple[str, ...], cores: int | None, as_json: bool) -> None:
     """Fit the models of the data sets of FILE.yaml, and show their held-out errors.
 
-    Checks the measurements, fits the VEC and the DH model, holds poses out to judge them, and
-    leaves all tables in results/, in the folder it is called in. What is up to date is not made
-    again. Several files, or all of a FOLDER, are merged in order. Of many data sets a table is
-    shown, that of `kinacc summary`, and no pages are written. Words after -- go to Snakemake.
+    Results go to results/ in the current folder. Several files, or all of a FOLDER, are merged in
+    order. Words after -- go to Snakemake.
 
     \b
     Example:
       kinacc calibrate tracker.yaml
-      kinacc calibrate robots
       kinacc calibrate tracker.yaml -- --dry-run
     """
-    configs, folders = carried_out("calibration", arguments, cores, None)
+    configs, folders = _carried_out("calibration", arguments, cores, None)
     if not folders:
         return
     if as_json:
         click.echo(json.dumps(as_plain(summarise_all(folders)), indent=2))
         return
-    pages = [written(str(folder), without=STUDIED) for folder in folders if len(folders) <= FEW]
-    print_summaries(folders, without=STUDIED)
+    pages = [written(str(folder), without=_STUDIED) for folder in folders if len(folders) <= FEW]
+    print_summaries(folders, without=_STUDIED)
     if pages:
         click.echo(f"Page: {', '.join(map(str, pages))}")
     click.echo(f"Accuracy map, study and claims: {shlex.join(['kinacc', 'study', *configs])}")
 
 
-def carried_out(
+@click.command("study", context_settings={"ignore_unknown_options": True})
+@_options
+def study(arguments: tuple[str, ...], cores: int | None, as_json: bool) -> None:
+    """Carry out the whole study of the data sets of FILE.yaml.
+
+    Calibration, map of errors, operating points, the paper's assessors under noise, figures and
+    claims. Without FILE.yaml: config.yaml or, where there is none, the paper. Words after -- go to
+    Snakemake.
+
+    \b
+    Example:
+      kinacc study tracker.yaml
+    """
+    configs, folders = _carried_out("all", arguments, cores, SNAKEFILE.with_name("config.yaml"))
+    if not folders:
+        return
+    if as_json:
+        click.echo(json.dumps({"results": [str(folder) for folder in folders]}))
+        return
+    print_summaries(folders)
+    options = [word for name in configs for word in ("--config", name)]
+    check = shlex.join(["kinacc", "check-results", RESULTS, *options])
+    click.echo(f"Tables and figures: {', '.join(map(str, folders))}. Check them: {check}")
+
+
+def _carried_out(
     target: str, arguments: tuple[str, ...], cores: int | None, default: Path | None
 ) -> tuple[list[str], list[Path]]:
     """Run the workflow up to a target: the configuration files and, after a real run, folders.

@@ -1,0 +1,257 @@
+"""Noise and repeatability of a file of repeated readings: what ``kinacc repeatability`` states."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pandas as pd
+
+from kinacc.checks import repeatability as checks
+from kinacc.checks.digits import smallest_step, step_between
+from kinacc.checks.repeatability import Noise, Repeated
+from kinacc.errors import InputError, Problem, first_few, refuse
+from kinacc.measurements.layout import POSITION, Place, find, listed
+from kinacc.measurements.reader import stacked
+from kinacc.measurements.rows import open_table
+from kinacc.measurements.table import RawTable, numbers
+
+FORMAT = "kinacc repeatability 1"
+_LEAST_MM = 1e-6  # no instrument scatters less
+_NAMES = {"pose": ("pose",), "side": ("side", "direction"), "visit": ("visit", "approach")}
+_EMPTY = ("", "nan", "None")  # + and - are names of sides
+_SINGLE = ("target", "session", "instrument")
+_HOURS = {"time_s": 1.0 / 3600.0, "time_min": 1.0 / 60.0, "time_h": 1.0}
+
+
+@dataclass(frozen=True)
+class RepeatedFile:
+    """Readings of a file.
+
+    Attributes
+    ----------
+    table
+        The file.
+    position_mm
+        Positions (n, 3).
+    rows
+        ``pose``, ``side``, ``visit`` and ``hours`` of each reading.
+    resolution_mm
+        Steps (3,) of the values.
+    notes
+        How the file was read, and its columns that are not used.
+    """
+
+    table: RawTable
+    position_mm: np.ndarray
+    rows: pd.DataFrame
+    resolution_mm: np.ndarray
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Repeatability:
+    """Noise and repeatability of repeated readings; NaN where the readings do not determine it.
+
+    Attributes
+    ----------
+    format
+        Name of this record, for ``kinacc campaign start --repeatability``.
+    file, poses, visits, readings
+        The file, and number of its poses, visits and readings.
+    noise, std_mm, std_low_mm, std_high_mm
+        Noise of one reading of a campaign (None where no pose was revisited), its standard
+        deviations (3,) and their 95 % limits.
+    instrument_std_mm, one_side_std_mm, all_sides_std_mm
+        Standard deviations (3,) of the instrument, and of the arm from one and from all sides.
+    mean_distance_mm, rp_mm, between_sides_mm
+        ISO 9283: mean distance from the mean position, RP, and vAP, pooled over the poses.
+    poses_equal_probability, poses_differ
+        Probability that poses differ as much by chance, and which scatters most, or None.
+    resolution_mm
+        Step (3,) of the values.
+    hours_at_a_pose
+        Median time from the first to the last reading of a pose.
+    sides_known
+        Whether the file states sides of approach.
+    far_off
+        Rows far from the other readings of their pose, as text.
+    rows
+        A row for each pose and side.
+    """
+
+    format: str
+    file: str
+    poses: int
+    visits: int
+    readings: int
+    noise: Noise | None
+    std_mm: np.ndarray
+    std_low_mm: np.ndarray
+    std_high_mm: np.ndarray
+    instrument_std_mm: np.ndarray
+    one_side_std_mm: np.ndarray
+    all_sides_std_mm: np.ndarray
+    mean_distance_mm: float
+    rp_mm: float
+    between_sides_mm: float
+    poses_equal_probability: float
+    poses_differ: str | None
+    resolution_mm: np.ndarray
+    hours_at_a_pose: float
+    sides_known: bool
+    far_off: str
+    rows: pd.DataFrame
+
+
+def read_repeats(path: str, rows_are: str | None) -> RepeatedFile:
+    """Read a file of repeated readings.
+
+    Parameters
+    ----------
+    path
+        File with positions and ``pose``; ``side``, ``visit`` and times where it has these.
+    rows_are
+        Whether rows of a pose without a visit are ``visits`` or ``stays``.
+
+    Returns
+    -------
+    RepeatedFile
+        Its readings.
+
+    Raises
+    ------
+    InputError
+        With all problems of the file.
+    """
+    problems: list[Problem] = []
+    table, layout, notes = open_table(path)
+    layout_columns = find(table, layout, np.zeros(0), problems, POSITION)
+    refuse(problems, f"{path} cannot be used")
+    axes = layout_columns.targets[0].position
+    position = stacked(table, axes, problems, gaps=False)
+    singles = {place.column: name for name, place in layout_columns.single.items()}
+    table = replace(table, columns=table.columns.rename(columns=singles))
+    rows = pd.DataFrame({"side": "", "visit": "", "hours": math.nan}, index=range(len(table)))
+    if "pose" not in table.columns:
+        problems.append(Problem(f"{path}: column pose", "is missing", fix=listed(table)))
+    columns = {name: [n for n in names if n in table.columns] for name, names in _NAMES.items()}
+    for name, column in ((name, names[0]) for name, names in columns.items() if names):
+        rows[name] = [str(cell).strip().removesuffix(".0") for cell in table.columns[column]]
+        gaps = np.flatnonzero(rows[name].isin(_EMPTY))
+        if gaps.size:
+            problems.append(Problem(table.where(column, gaps), "an empty cell", fix="fill it in"))
+    for name in table.columns.columns.intersection(_SINGLE):
+        if len(kinds := {*table.texts(name)}) > 1:
+            message, fix = f"holds several: {first_few(sorted(kinds))}", "one file for each"
+            problems.append(Problem(table.where(name), message, "one", fix))
+    if timed := [name for name in (*_HOURS, "time") if name in table.columns]:
+        rows["hours"] = _hours(table, timed[0], problems)
+    if "pose" in rows and not columns["visit"]:
+        again = np.flatnonzero(rows["pose"] == rows["pose"].shift())
+        if rows_are is None and again.size:
+            where = f"{path}: {table.rows_in_words(again)}"
+            fix = "--rows visits, --rows stays or a column visit"
+            allowed = "whether the arm left the pose"
+            problems.append(Problem(where, "the pose of the row before", allowed, fix))
+        if rows_are != "stays":
+            rows["visit"] = rows.index
+    if not problems and rows["pose"].is_unique:
+        problems.append(Problem(path, "no pose has more than one reading"))
+    refuse(problems, f"{path} cannot be used")
+    used = {axis.column for axis in axes}.union(*_NAMES.values(), _SINGLE, _HOURS, ["time"])
+    unused = ", ".join(name for name in table.columns if name not in used)
+    notes = (*notes, f"not used: {unused}") if unused else notes
+    return RepeatedFile(table, position, rows, _steps_mm(table, axes), notes)
+
+
+def _hours(table: RawTable, name: str, problems: list[Problem]) -> np.ndarray:
+    """Hours (n,) of the readings by a column of times."""
+    if name in _HOURS:
+        return np.asarray(numbers(table, name, problems)) * _HOURS[name]
+    texts = pd.Series(table.texts(name)).str.replace(r"^(\d):", r"0\1:", regex=True)
+    texts = texts.where(~texts.str.match(r"\d\d:"), "2000-01-01T" + texts)
+    times = pd.to_datetime(texts, format="ISO8601", utc=True, errors="coerce")
+    if (bad := np.flatnonzero(times.isna())).size:
+        message, allowed = f"no time: {texts[bad[0]]!r}", "2026-05-04T13:20:05 or 13:20:05"
+        problems.append(Problem(table.where(name, bad), message, allowed))
+    return np.asarray((times - times.min()) / pd.Timedelta(hours=1))
+
+
+def _steps_mm(table: RawTable, axes: Sequence[Place]) -> np.ndarray:
+    """Steps (3,) of the values of the axes; of equal values, that of the other axes or digits."""
+    cells = [(table.columns[axis.column], axis.factor) for axis in axes]
+    steps = np.array([step_between(values, unit, table.decimal) for values, unit in cells])
+    digits = max(smallest_step([values], unit, table.decimal) for values, unit in cells)
+    return np.where(steps > 0.0, steps, steps.max() or digits)
+
+
+def estimate(file: RepeatedFile) -> Repeatability:
+    """Estimate noise and repeatability.
+
+    Parameters
+    ----------
+    file
+        Readings of :func:`read_repeats`.
+
+    Returns
+    -------
+    Repeatability
+        Noise of a reading, its parts, and ISO 9283's repeatability, mm.
+
+    Raises
+    ------
+    InputError
+        Where readings of a pose are equal to the last digit.
+    """
+    table, rows = file.table, file.rows
+    keys = ["pose", "side", "visit"]
+    groups = [rows.groupby(keys[:n], sort=False).ngroup().to_numpy() for n in (1, 2, 3)]
+    read = Repeated(file.position_mm, *groups)
+    poses = rows["pose"].unique()
+    parts = checks.parts(read)
+    noise = checks.noise_of(parts, file.resolution_mm)
+    std, low, high = [np.full(3, np.nan)] * 3
+    if noise is not None:
+        std = noise.std_mm
+        low, high = checks.limits(std, noise.freedom)
+        if not (std > _LEAST_MM).all():
+            raise InputError(Problem(table.path, "readings of a pose are equal to the last digit"))
+    by_pose, ratio = checks.differ_by_pose(read, file.resolution_mm)
+    result = checks.by_side(read)
+    mean_mm, rp_mm = checks.pooled_rp(result)
+    differ = None
+    if by_pose < checks.UNEQUAL:
+        worst = int(np.nanargmax(ratio))
+        differ = f"Poses scatter differently (p = {by_pose:.2g}): pose {poses[worst]} "
+        differ += f"{ratio[worst]:.2f} times as much as all."
+    spans = rows.groupby("pose")["hours"].agg(["size", np.ptp])
+    result["pose"] = poses[result["pose"]]
+    result["side"] = rows.drop_duplicates(keys[:2])["side"].replace("", None).to_numpy()
+    far = checks.far_off(read)
+    return Repeatability(
+        format=FORMAT,
+        file=table.path,
+        poses=len(poses),
+        visits=int(read.visit.max()) + 1,
+        readings=len(rows),
+        noise=noise,
+        std_mm=std,
+        std_low_mm=low,
+        std_high_mm=high,
+        instrument_std_mm=np.sqrt(np.diag(parts.instrument)),
+        one_side_std_mm=np.sqrt(np.diag(parts.visits)),
+        all_sides_std_mm=np.sqrt(np.diag(parts.visits + parts.sides)),
+        mean_distance_mm=mean_mm,
+        rp_mm=rp_mm,
+        between_sides_mm=checks.between_sides_mm(read),
+        poses_equal_probability=by_pose,
+        poses_differ=differ,
+        resolution_mm=file.resolution_mm,
+        hours_at_a_pose=float(spans["ptp"][spans["size"] > 1].median()),
+        sides_known=bool((rows["side"] != "").any()),
+        far_off=table.rows_in_words(far) if far.size else "",
+        rows=result,
+    )

@@ -1,0 +1,222 @@
+"""``kinacc check-data``, ``exclude`` and ``add``: the measured files of a configuration."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from kinacc.checks.check import examined
+from kinacc.checks.contradictions import load
+from kinacc.checks.report import UNUSABLE, VERDICTS, Report, to_json
+from kinacc.cli.choice import CONFIG, DATASET, REASON, option
+from kinacc.cli.output import Output, answers
+from kinacc.config.edit import with_added
+from kinacc.config.series import MOVED, SAME
+from kinacc.deployment import adding
+from kinacc.errors import InputError, Problem, first_few, refuse
+from kinacc.kinematics import robot
+from kinacc.measurements.reader import excluded_lines, read
+from kinacc.progress import reporting
+from kinacc.tables.atomic import write_whole
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_MOST = 100_000  # lines of a range
+_SETUP = click.Choice([SAME, MOVED])
+_EMPTY_REASON = Problem("--reason", "is empty", "why, in words")
+
+
+@click.command("check-data")
+@click.argument("files", nargs=-1, type=click.Path())
+@option("--dataset", multiple=True, help="Data set of the configuration; repeatable. [all]")
+@option("--accept", metavar="FINDING", help="Finding to go on with, kept in FILE.yaml.")
+@REASON
+@answers(picture="Picture of one data set: .svg, .png or .pdf.")
+def check_data(
+    files: tuple[str, ...],
+    dataset: tuple[str, ...],
+    accept: str | None,
+    reason: str | None,
+    out: Output,
+) -> None:
+    """Check measured files before anything is fitted.
+
+    FILES are configuration files [config.yaml]. Exit code 1: there are suspicions; 2: the file or
+    its description cannot be used.
+
+    \b
+    Example:
+      kinacc check-data examples/ur10_published.yaml --picture checked.svg
+    """
+    files = files or (CONFIG,)
+    if accept is not None:
+        _accept(files, dataset, accept, reason or "")
+    sections = _sections(files, dataset)
+    if out.picture is not None and len(sections) > 1:
+        message = "draws one data set, and there are several"
+        raise InputError(Problem("--picture", message, ", ".join(sections), "give --dataset"))
+    code = 0
+    reports: list[Mapping[str, Any]] = []
+    following: list[str] = []
+    for name, settings in sections.items():
+        try:
+            with reporting(f"check-data {name}", bar=True) as progress:
+                report = examined(settings, name, progress)
+        except InputError as error:
+            code = UNUSABLE
+            path = settings["measurements"]["file"]["path"]
+            problems = [asdict(problem) for problem in error.problems]
+            facts = {"dataset": name, "path": path, "verdict": VERDICTS[code]}
+            reports.append({**facts, "problems": problems})
+            text = f"{error}\n"
+        else:
+            code = max(code, report.code)
+            reports.append(report.as_dict())
+            following += [line for item in report.stopping for line in item.commands(files[0])]
+            text = report.as_text() + "\n"
+            if out.picture is not None:
+                out.draw(_drawn(report))
+        if not out.as_json:
+            click.echo(text, err="problems" in reports[-1])
+    if out.as_json:
+        click.echo(to_json(reports))
+    elif code < UNUSABLE:
+        lines = following or [shlex.join(["kinacc", "calibrate", *files])]
+        first = "next: correct what is named above and check again, or" if following else "next:"
+        click.echo("\n  ".join([first, *lines]))
+    sys.exit(code)
+
+
+def _accept(files: Sequence[str], dataset: Sequence[str], kind: str, reason: str) -> None:
+    """Write to the configuration that the workflow goes on with a finding."""
+    problems = [] if reason.strip() else [_EMPTY_REASON]
+    problems += [] if len(files) == 1 else [Problem("--accept", "needs one FILE.yaml")]
+    refuse(problems)
+    name, _ = _measured_data_set(files[0], next(iter(dataset), None))
+    _add(files[0], ("datasets", name, "data_check", "accept"), {kind: reason})
+
+
+def _add(file: str, path: Sequence[str], content: object) -> None:
+    """Add ``content`` to a configuration file below the keys of ``path``."""
+    write_whole(file, with_added(Path(file).read_text("utf-8"), path, content, file).encode())
+
+
+def _sections(files: Sequence[str], wanted: Sequence[str]) -> dict[str, dict[str, Any]]:
+    """The data sets to check: the wanted ones, or all that are read from a file."""
+    full = load(files)
+    measured = [name for name, c in full.items() if c["measurements"]["source"] == "file"]
+    # The newest line of a series is the arm's own file.
+    chosen = wanted or [name for name in measured if "series" not in full[name]]
+    refuse(
+        Problem("--dataset", f"{name!r} is not read from a file", ", ".join(measured))
+        for name in chosen
+        if name not in measured
+    )
+    if not chosen:
+        raise InputError(Problem(", ".join(files), "no data set is read from a file"))
+    return {name: full[name] for name in chosen}
+
+
+def _drawn(report: Report) -> Figure:
+    from kinacc.figures.checked_data import draw
+
+    suspects = {item.kind: item.lines for item in report.suspicions}
+    limit_mm = report.facts.get("quick_fit", {}).get("most_expected_mm", float("nan"))
+    return draw(report.facts["joint_coverage"], report.line, report.left_mm, limit_mm, suspects)
+
+
+@click.command("exclude")
+@click.argument("file", metavar="FILE.yaml")
+@option("--lines", required=True, metavar="12,15-18", help="Lines of the measured file.")
+@REASON
+@DATASET
+@answers()
+def exclude(file: str, lines: str, reason: str | None, dataset: str | None, out: Output) -> None:
+    """Exclude rows of a measured file from all fits and figures.
+
+    \b
+    Example:
+      kinacc exclude tracker.yaml --lines 12,15-18 --reason "reflector moved"
+    """
+    name, settings = _measured_data_set(file, dataset)
+    section = settings["measurements"]["file"]
+    numbers = _numbers(lines)
+    known = [number for number in numbers if number in excluded_lines(section)]
+    problems = [Problem("--lines", f"{first_few(known)} excluded already")] if known else []
+    problems += [] if (reason or "").strip() else [_EMPTY_REASON]
+    refuse(problems)
+    item = {"lines": numbers, "reason": reason}
+    read({**section, "exclude": [*section["exclude"], item]}, robot.load(settings["robot"]))
+    _add(file, ("datasets", name, "measurements", "file", "exclude"), [item])
+    count = f"{len(numbers)} line{'s' if len(numbers) > 1 else ''}"
+    text = [
+        f"{file}: {count} of {section['path']} excluded",
+        "next:",
+        f"  kinacc check-data {file}",
+    ]
+    out.show({"file": file, "dataset": name, **item}, lines=text)
+
+
+def _measured_data_set(file: str, dataset: str | None) -> tuple[str, dict[str, Any]]:
+    """Name and settings of a measured data set; InputError where it is not clear which."""
+    measured = {
+        name: settings
+        for name, settings in load([file]).items()
+        if settings["measurements"]["source"] == "file"
+        and {"line_of", "series"}.isdisjoint(settings)
+    }
+    name = dataset or (next(iter(measured)) if len(measured) == 1 else "")
+    if name not in measured:
+        message = f"{name!r} is not a data set of one file" if name else "is not given"
+        raise InputError(Problem("--dataset", message, ", ".join(measured) or "a measured file"))
+    return name, measured[name]
+
+
+def _numbers(text: str) -> list[int]:
+    """Line numbers of a text such as 12,15-18. InputError for others."""
+    numbers: set[int] = set()
+    for part in text.split(","):
+        ends = re.fullmatch(r"(\d{1,9})(?:-(\d{1,9}))?", part)
+        first, last = (int(ends[1]), int(ends[2] or ends[1])) if ends else (1, 0)
+        if not first <= last < first + _MOST:
+            raise InputError(Problem("--lines", repr(text), "numbers and ranges such as 12,15-18"))
+        numbers |= {*range(first, last + 1)}
+    return sorted(numbers)
+
+
+@click.command("add")
+@click.argument("measurement_file", metavar="FILE", type=click.Path())
+@option("--to", "config", required=True, type=click.Path(), help="Configuration file of the arm.")
+@DATASET
+@option("--date", help="Day of the measurement, as 2026-06-02. [from times in the file]")
+@option("--base", type=_SETUP, required=True, help="Robot and instrument since the newest line.")
+@option("--tool", type=_SETUP, required=True, help="Tool or targets since the newest line.")
+@option("--first-date", help="Day of the first file, where it is no series yet.")
+@answers()
+def add(
+    measurement_file: str,
+    config: str,
+    dataset: str | None,
+    date: str | None,
+    base: str,
+    tool: str,
+    first_date: str | None,
+    out: Output,
+) -> None:
+    """Add a measured FILE of the same arm to its series, as a line of the configuration.
+
+    \b
+    Example:
+      kinacc add june.csv --to tracker.yaml --date 2026-06-02 --base moved --tool same
+    """
+    result = adding.add(measurement_file, config, base, tool, dataset, date, first_date)
+    lines = [f"{config}, series of {result.dataset}:", *(f"  - {line}" for line in result.written)]
+    out.show(result, lines=[*lines, f"Next: {shlex.join(['kinacc', 'calibrate', config])}"])
