@@ -8,42 +8,36 @@ import re
 
 import pyarrow.parquet as pq
 import pytest
-from command_line import call, small_study
+from command_line import call
 
 from kinacc.config.names import in_csv, of_csv
 from kinacc.kinematics import robot
 
 
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    """Results of a small synthetic study, made by the workflow's own stages."""
-    return small_study(tmp_path_factory.mktemp("study"))
-
-
 @pytest.mark.parametrize("name", ["../../evil", "/tmp/evil", "a/b", "..", "", "-x", "a\nb", "a "])
-def test_an_export_stays_in_its_folder_whatever_its_name(folder, tmp_path, name):
+def test_an_export_stays_in_its_folder_whatever_its_name(study, tmp_path, name):
     inside = tmp_path / "a" / "b"
     inside.mkdir(parents=True)
-    done = call("export", folder, "--out", inside, "--name", name)
+    done = call("export", study, "--out", inside, "--name", name)
     assert done.exit_code == 2, done.output
     assert "--name" in done.output
     assert [path for path in tmp_path.rglob("*") if path.is_file()] == []
 
 
-def test_text_that_would_be_a_formula_is_read_back_as_it_was(folder, tmp_path):
+def test_text_that_would_be_a_formula_is_read_back_as_it_was(study, tmp_path):
     names = ["=cmd|x", "+a", "-5", "-a", "@b", "'plain"]
     joints, found = tmp_path / "joints.csv", tmp_path / "found.csv"
     head = ",".join(["pose", *(f"q{i}_deg" for i in range(1, 7))])
     joints.write_text("\n".join([head, *(f"{name},0,0,0,0,{60 + i},0"
                                          for i, name in enumerate(names))]) + "\n")  # fmt: skip
-    assert call("predict", folder, joints, "-o", found).exit_code == 0
+    assert call("predict", study, joints, "-o", found).exit_code == 0
     rows = list(csv.reader(found.open()))[1:]
     assert [row[0] for row in rows] == ["'=cmd|x", "'+a", "-5", "'-a", "'@b", "'plain"]
     assert not any(cell[:1] in "=+@\t\r" for row in rows for cell in row if cell)
     text = found.read_text().replace("row,", "pose,", 1)
     found.write_text(text)
     again = tmp_path / "again.parquet"
-    assert call("predict", folder, found, "-o", again).exit_code == 0
+    assert call("predict", study, found, "-o", again).exit_code == 0
     assert pq.read_table(again).column("row").to_pylist() == names
 
 
@@ -57,7 +51,7 @@ def test_every_text_comes_back_from_a_cell(text):
 
 
 @pytest.mark.parametrize("name", ["two\nlines", "\x1b[31mred", "\u202eleft"])
-def test_a_name_that_does_not_stand_in_a_line_is_refused_where_it_is_given(folder, tmp_path, name):
+def test_a_name_that_does_not_stand_in_a_line_is_refused_where_it_is_given(study, tmp_path, name):
     def refused(*words):
         done = call(*words)
         assert done.exit_code == 2, done.output
@@ -67,6 +61,6 @@ def test_a_name_that_does_not_stand_in_a_line_is_refused_where_it_is_given(folde
     text = re.sub(r"name: .*", lambda _: f"name: {json.dumps(name)}", text, count=1)
     own.write_text(text)
     refused("plan-poses", own)
-    start = ("campaign", "start", tmp_path / "c", "--calibration", folder)
+    start = ("campaign", "start", tmp_path / "c", "--calibration", study)
     refused(*start, "--instrument", f"{name}=0.1")
     assert not (tmp_path / "c").exists()

@@ -4,49 +4,44 @@ from __future__ import annotations
 
 import csv
 import json
+from itertools import product
 
 import pytest
-from command_line import call, small_study
+from command_line import call
 
 KINDS = ("csv", "json", "parquet")
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    """Results of a small synthetic study, made by the workflow's own stages."""
-    return small_study(tmp_path_factory.mktemp("study"))
-
-
-@pytest.fixture(scope="module")
-def written(folder, tmp_path_factory):
+def written(study, tmp_path_factory):
     """A file of every command that writes joints or poses, in every form, by command and kind."""
     base = tmp_path_factory.mktemp("written by others")
     campaign = base / "check"
-    begin(folder, campaign, "--candidates", 8)
+    begin(study, campaign, "--candidates", 8)
     record_all(campaign, base / "readings.csv")
     assert call("campaign", "report", campaign).exit_code == 0
     again = base / "again"
-    begin(folder, again, "--candidates", 8)
+    begin(study, again, "--candidates", 8)
     made = {}
     for kind in KINDS:
         commands = {
             "plan-poses": ("plan-poses", "mh180", "--poses", 8, "--candidates", 60, "--joints-deg",
                            "-30:30,-20:20,-20:20,-30:30,40:70,-30:30", "--hayati", "2"),
             "campaign next": ("campaign", "next", again, "--all"),
-            "predict": ("predict", folder, base / f"plan-poses.{kind}", "--model", "dh"),
-            "compensate": ("compensate", folder, base / f"predict.{kind}", "--model", "dh"),
+            "predict": ("predict", study, base / f"plan-poses.{kind}", "--model", "dh"),
+            "compensate": ("compensate", study, base / f"predict.{kind}", "--model", "dh"),
         }  # fmt: skip
         for name, words in commands.items():
             made[name, kind] = base / f"{name}.{kind}"
             done = call(*words, "-o", made[name, kind])
             assert done.exit_code == 0, (name, kind, done.output)
     made["campaign report", "parquet"] = campaign / "report" / "campaign_points.parquet"
-    made["measurements", "parquet"] = folder / "measurements.parquet"
+    made["measurements", "parquet"] = study / "measurements.parquet"
     return made
 
 
-def begin(folder, campaign, *words):
-    done = call("campaign", "start", campaign, "--calibration", folder, "--model", "dh",
+def begin(study, campaign, *words):
+    done = call("campaign", "start", campaign, "--calibration", study, "--model", "dh",
                 "--noise-mm", 0.05, "--frame", "base", "--budget", 8, "--sure", *words)  # fmt: skip
     assert done.exit_code == 0, done.output
 
@@ -63,37 +58,35 @@ def record_all(campaign, file):
     assert done.exit_code == 0, done.output
 
 
-JOINTS = [
-    *((name, kind) for name in ("plan-poses", "campaign next", "predict", "compensate")
-      for kind in KINDS),
-    ("campaign report", "parquet"),
-    ("measurements", "parquet"),
-]  # fmt: skip
+TABLES = (("campaign report", "parquet"), ("measurements", "parquet"))
+WRITERS = ("plan-poses", "campaign next", "predict", "compensate")
+READERS = ("plan-poses --candidates", "campaign start --candidates", "compare --joints")
+# One reader takes every form of every command; the others share its reading, and take one form.
+PAIRS = [
+    *(("predict", wrote) for wrote in (*product(WRITERS, KINDS), *TABLES)),
+    *product(READERS, (*((name, "csv") for name in WRITERS), *TABLES)),
+]
 
 
-@pytest.mark.parametrize("wrote", JOINTS, ids=" ".join)
-@pytest.mark.parametrize("reads", ["predict", "plan-poses --candidates",
-                                   "campaign start --candidates", "compare --joints"])  # fmt: skip
-def test_joints_that_a_command_wrote_are_read_by_the_others(
-    folder, written, tmp_path, wrote, reads
-):
+@pytest.mark.parametrize(("reads", "wrote"), PAIRS, ids=str)
+def test_joints_that_a_command_wrote_are_read_by_the_others(study, written, tmp_path, wrote, reads):
     file = written[wrote]
     words = {
-        "predict": ("predict", folder, file, "--model", "dh"),
+        "predict": ("predict", study, file, "--model", "dh"),
         "plan-poses --candidates": ("plan-poses", "mh180", "--candidates", file, "--poses", 7),
         "campaign start --candidates": (
-            "campaign", "start", tmp_path / "new", "--calibration", folder, "--model", "dh",
+            "campaign", "start", tmp_path / "new", "--calibration", study, "--model", "dh",
             "--noise-mm", 0.05, "--candidates", file, "--sure",
         ),
-        "compare --joints": ("compare", "mh180", folder, "--joints", file),
+        "compare --joints": ("compare", "mh180", study, "--joints", file),
     }[reads]  # fmt: skip
     done = call(*words, "--json")
     assert done.exit_code == 0, done.output
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_poses_that_predict_wrote_are_wanted_of_compensate(folder, written, kind):
-    done = call("compensate", folder, written["predict", kind], "--model", "dh", "--json")
+def test_poses_that_predict_wrote_are_wanted_of_compensate(study, written, kind):
+    done = call("compensate", study, written["predict", kind], "--model", "dh", "--json")
     assert done.exit_code == 0, done.output
     found = json.loads(done.stdout)["rows"]
     planned = json.loads(written["plan-poses", "json"].read_text())["rows"]
@@ -102,17 +95,17 @@ def test_poses_that_predict_wrote_are_wanted_of_compensate(folder, written, kind
             assert one[f"q{joint}_deg"] == pytest.approx(other[f"q{joint}_deg"], abs=1e-6)
 
 
-def test_rows_without_an_answer_are_told_and_left_out(folder, tmp_path):
+def test_rows_without_an_answer_are_told_and_left_out(study, tmp_path):
     wanted, joints, back = (tmp_path / name for name in ("wanted.csv", "joints.csv", "back.csv"))
     near = "1500,200,900,0,1,0,0"
     wanted.write_text(f"x_mm,y_mm,z_mm,qw,qx,qy,qz\n{near}\n9000,0,0,1,0,0,0\n{near}\n")
-    assert call("compensate", folder, wanted, "--model", "dh", "-o", joints).exit_code == 1
-    done = call("predict", folder, joints, "--model", "dh", "-o", back)
+    assert call("compensate", study, wanted, "--model", "dh", "-o", joints).exit_code == 1
+    done = call("predict", study, joints, "--model", "dh", "-o", back)
     assert done.exit_code == 0, done.output
     assert "left out, without joints by their status: line 3" in done.stderr
     assert [row["row"] for row in csv.DictReader(back.open())] == ["2", "4"]
     own = joints.read_text().replace("status", "remark")
     joints.write_text(own)
-    done = call("predict", folder, joints, "--model", "dh")
+    done = call("predict", study, joints, "--model", "dh")
     assert done.exit_code == 2
     assert "q1_deg, line 3: not a finite number" in done.output

@@ -8,15 +8,9 @@ import shlex
 
 import numpy as np
 import pytest
-from command_line import call, small_study
+from command_line import call
 
 from kinacc.kinematics import robot
-
-
-@pytest.fixture(scope="module")
-def calibration(tmp_path_factory):
-    """Results of a small synthetic study, made by the workflow's own stages."""
-    return small_study(tmp_path_factory.mktemp("study"))
 
 
 @pytest.fixture
@@ -54,9 +48,9 @@ def test_what_init_writes_into_its_file_and_its_json_runs_as_printed(described, 
         assert run(line).exit_code == 0, line
 
 
-def test_what_campaign_start_names_next_runs_as_printed(calibration, tmp_path):
+def test_what_campaign_start_names_next_runs_as_printed(study, tmp_path):
     folder = tmp_path / "my arm's check"
-    done = call("campaign", "start", folder, "--calibration", calibration, "--model", "dh",
+    done = call("campaign", "start", folder, "--calibration", study, "--model", "dh",
                 "--candidates", 5, "--budget", 5, "--noise-mm", 0.05)  # fmt: skip
     assert done.exit_code == 0, done.output
     line = re.search(r"^Next: (.*)$", done.output, re.MULTILINE)[1]

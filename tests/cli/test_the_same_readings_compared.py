@@ -9,7 +9,7 @@ from tracked_arm import call, table, tracked
 
 Q = [f"q{i}_deg" for i in range(1, 7)]
 HEAD = ["pose", *Q, "x_mm", "y_mm", "z_mm"]
-STAGES = ("measurements", "data_check", "vec", "dh", "residuals")
+STAGES = ("measurements", "vec", "dh", "residuals")
 ROWS = 50
 
 
@@ -31,8 +31,7 @@ def results(tmp_path_factory):
         numbers = np.column_stack([np.arange(rows), it.q[:rows], point[:rows]])
         (base / f"{file}.csv").write_text(table(HEAD, numbers))
         lines.append(
-            f"  {name}: {{robot: ur10, evaluation: {{space: measured}}, data_check: "
-            "{accept: {few_poses: a test}}, calibration: "
+            f"  {name}: {{robot: ur10, evaluation: {{space: measured}}, calibration: "
             f"{{base_and_tool: estimated, vec: {{order: 1}}, dh: {dh}}}, measurements: {{source: "
             f"file, file: {{path: {file}.csv, orientation: {{kind: none}}}}}}}}"
         )

@@ -4,15 +4,9 @@ import json
 from pathlib import Path
 
 import pytest
-from command_line import call, small_study
+from command_line import call
 
 from kinacc.kinematics import robot
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    """Results of a small synthetic study, made by the workflow's own stages."""
-    return small_study(tmp_path_factory.mktemp("study"))
 
 
 @pytest.mark.parametrize(
@@ -23,24 +17,24 @@ def folder(tmp_path_factory):
         ("compensate", "x_mm,y_mm,z_mm,qw,qx,qy,qz\n1,2,3,0.5,0,0,0\n"),
     ],
 )
-def test_mistakes_in_a_file_are_named(folder, tmp_path, command, text):
+def test_mistakes_in_a_file_are_named(study, tmp_path, command, text):
     (tmp_path / "bad.csv").write_text(text)
-    done = call(command, folder, tmp_path / "bad.csv")
+    done = call(command, study, tmp_path / "bad.csv")
     assert done.exit_code == 2, done.output
     assert "bad.csv" in done.output
 
 
-def test_export_writes_every_form(folder, tmp_path):
-    done = call("export", folder, "--robot", "mh180", "--out", tmp_path, "--json")
+def test_export_writes_every_form(study, tmp_path):
+    done = call("export", study, "--robot", "mh180", "--out", tmp_path, "--json")
     assert done.exit_code == 0, done.output
     files = [Path(name).name for name in json.loads(done.stdout)["files"]]
     assert sorted(files) == ["mh180.csv", "mh180.json", "mh180.urdf", "mh180.yaml",
                              "mh180_tables.md", "mh180_tables.tex"]  # fmt: skip
     left_open = json.loads((tmp_path / "mh180.json").read_text())["undetermined"]
-    (known,) = json.loads(call("summary", folder, "--json").output).values()
+    (known,) = json.loads(call("summary", study, "--json").output).values()
     assert len(left_open) == len(known["unidentifiable"] + known["poorly_determined"]) > 0
     assert f"Left open by the poses: {left_open[0]}" in (tmp_path / "mh180_tables.md").read_text()
-    compared = call("compare", tmp_path / "mh180.yaml", folder, "--robot", "mh180", "--json")
+    compared = call("compare", tmp_path / "mh180.yaml", study, "--robot", "mh180", "--json")
     assert compared.exit_code == 0, compared.output
     assert json.loads(compared.stdout)["shifts"][0]["largest_mm"] < 1e-9
 
@@ -52,9 +46,9 @@ def test_compare_says_that_robots_differ_and_refuses_what_cannot_be_compared():
     assert call("compare", "mh180", "iiwa14").exit_code == 2
 
 
-def test_results_say_which_robot_they_were_made_with(folder, tmp_path, monkeypatch):
+def test_results_say_which_robot_they_were_made_with(study, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)  # no configuration here
-    words = ("predict", folder.resolve(), "--joints-deg", "0,0,0,0,60,0")
+    words = ("predict", study.resolve(), "--joints-deg", "0,0,0,0,60,0")
     told = call(*words)
     assert told.exit_code == 0, told.output
     assert told.output == call(*words, "--robot", "mh180").output
@@ -63,8 +57,8 @@ def test_results_say_which_robot_they_were_made_with(folder, tmp_path, monkeypat
     other.write_text(text)
     refused = call(*words, "--robot", other)
     assert refused.exit_code == 2
-    (folder / "robot.parquet").rename(tmp_path / "robot.parquet")
+    (study / "robot.parquet").rename(tmp_path / "robot.parquet")
     try:
         assert "--robot" in call(*words).output
     finally:
-        (tmp_path / "robot.parquet").rename(folder / "robot.parquet")
+        (tmp_path / "robot.parquet").rename(study / "robot.parquet")
