@@ -132,27 +132,19 @@ WRONG = {
     "five joints": lambda calibration, _: calibration.predict(np.zeros(5)),
     "a text": lambda calibration, _: calibration.predict("home"),
     "directions of two": lambda calibration, _: calibration.predict(np.zeros((3, 6)), s=[1, 1]),
-    "an unknown frame": lambda calibration, _: calibration.predict(np.zeros(6), frame="world"),
     "joints to compensate": lambda calibration, _: calibration.compensate(np.zeros((3, 6))),
-    "near joints of five": lambda calibration, _: calibration.compensate(
-        calibration.predict(np.zeros(6)).pose, near_rad=np.zeros(5)
-    ),
     "no program": lambda calibration, folder: calibration.compensate_program(folder / "a.src"),
     "no such format": lambda calibration, folder: calibration.export(folder, "docx"),
     "no such controller": lambda calibration, _: calibration.values_for("arduino"),
     "no such table": lambda calibration, _: calibration.table("residual"),
     "a missing file": lambda _, folder: kinacc.calibrate(str(folder / "arm.yaml")),
     "a folder": lambda _, folder: kinacc.calibrate(folder),
-    "a number": lambda *_: kinacc.calibrate(5),
     "no paths": lambda *_: kinacc.read_measurements(),
     "no folder": lambda _, folder: kinacc.load_calibration(folder / "results"),
     "no calibration": lambda calibration, _: kinacc.compare(calibration, "results/arm"),
     "joints of five": lambda calibration, _: kinacc.compare(
         calibration, calibration, np.zeros((2, 5))
     ),
-    "no campaign": lambda _, folder: kinacc.Campaign(folder),
-    "joints of seven": lambda calibration, _: calibration.robot.forward(np.zeros(7)),
-    "an unknown robot": lambda *_: kinacc.Robot.from_name("ur11x"),
 }
 
 

@@ -1,5 +1,0 @@
-"""``python -m kinacc.cli``, as ``kinacc``."""
-
-from kinacc.cli.process import main
-
-main()
