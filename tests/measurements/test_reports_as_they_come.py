@@ -68,7 +68,7 @@ def test_a_list_of_points_without_names_is_collection_group_point(mark, tmp_path
     assert found.stated["length"] == "mm"
 
 
-@pytest.mark.parametrize("name", ["U{}", "U{} (k=2) [mm]", "Unc. {} [mm] (k = 2)"])
+@pytest.mark.parametrize("name", ["U{}", "U({})", "U{} (k=2) [mm]", "Unc. {} [mm] (k = 2)"])
 def test_uncertainties_are_so_many_standard_deviations_as_stated_or_answered(name, tmp_path):
     unit = " [mm]" if "k" in name else ""
     names = [*JOINTS, *(f"{a}{unit}" for a in "XYZ"), *(name.format(axis) for axis in "xyz")]
@@ -81,6 +81,15 @@ def test_uncertainties_are_so_many_standard_deviations_as_stated_or_answered(nam
     else:
         assert "--sigma 1 or --sigma 2 or --sigma none" in undecided(path)
         np.testing.assert_allclose(reading(path, sigma="2").columns["std_y_mm"], 0.02)
+
+
+@pytest.mark.parametrize("name", ["u({})", "u({}) [mm]"])
+def test_a_standard_uncertainty_as_metrologists_write_it_is_one_standard_deviation(name, tmp_path):
+    point = XYZ if "mm" in name else [*"XYZ"]
+    names = [*JOINTS, *point, *(name.format(axis) for axis in "XYZ")]
+    path = file(tmp_path, lines([[*row, "0.02", "0.04", "0.06"] for row in cells()], names))
+    assert looked(path).section["sigma"] == 1
+    np.testing.assert_allclose(reading(path).columns["std_y_mm"], 0.04)
 
 
 def report(names, axes=("X", "Y", "Z"), once=False):

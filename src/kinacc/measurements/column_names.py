@@ -60,6 +60,8 @@ _SIGNS = str.maketrans({"º": "°", "˚": "°", "∆": "Δ", "µ": "μ", "ß": "
 _NO_UNIT = "-/ ?\ufffd"  # no more remains of a degree sign in the wrong encoding
 _AXIS = re.compile(r"(?:rv|r|q)?[xyzw]|q|j")
 _COVERAGE = re.compile(r"(?<![^\W_])k\s*=\s*([123])(?!\d|[.,]\d)", re.IGNORECASE)  # (k=2)
+# u(X) is the standard uncertainty of X, U(X) an expanded one.
+_OF_AXIS = re.compile(r"(?<![^\W_])([uU])\s*\(\s*((?:[Rr][Vv]?)?[XYZxyz])\s*\)")
 _JOINED = re.compile(r"(.{1,4}?)(mm|deg|rad|grad|cm|um|μm)")
 _JAPANESE = re.compile("|".join(sorted(WORDS["japanese"], key=len, reverse=True)))
 _WIDE = {code: code - 0xFEE0 for code in range(0xFF01, 0xFF5F)} | {0x3000: " "}
@@ -88,7 +90,10 @@ def name_of(column: str, unit: str = "") -> Name:
     """The name taken apart; ``unit`` is that of a line of units."""
     covered = _COVERAGE.search(f"{column} {unit}")
     stated = [unit_of(_COVERAGE.sub("", unit))]
-    text = _in_english(_COVERAGE.sub("", column)).translate(_SIGNS)
+    of_axis = _OF_AXIS.search(column)
+    coverage = int(covered[1]) if covered else int(of_axis is not None and of_axis[1] == "u")
+    text = _OF_AXIS.sub(r"\1\2", _COVERAGE.sub("", column))
+    text = _in_english(text).translate(_SIGNS)
     text = re.sub("t-mac", "tmac", text, flags=re.IGNORECASE)
 
     def put_aside(bracket: re.Match[str]) -> str:
@@ -118,7 +123,7 @@ def name_of(column: str, unit: str = "") -> Name:
         tuple(word for word, _ in terms),
         " or ".join(dict.fromkeys(filter(None, stated))),
         tuple(spelled for _, spelled in terms),
-        int(covered[1]) if covered else 0,
+        coverage,
     )
 
 

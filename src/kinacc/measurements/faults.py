@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -10,6 +10,7 @@ from kinacc.errors import Problem
 from kinacc.kinematics.robot import Robot, forward, outside_limits
 from kinacc.measurements.layout import Place
 from kinacc.measurements.table import RawTable
+from kinacc.tables.columns import Columns
 
 BEYOND = 1e8  # no unit makes a length of this
 LIMIT_SLACK = 1e-6  # a joint may be beyond its limits by the last written digit
@@ -74,7 +75,7 @@ def limit_problems(
         yield Problem(table.where(place.column, rows), message, fault.allowed)
 
 
-def scale_problems(table: RawTable, columns: Mapping, robot: Robot) -> Iterator[Problem]:
+def scale_problems(table: RawTable, columns: Columns, robot: Robot) -> Iterator[Problem]:
     """Units that cannot be meant: measured points spread unlike the points the arm reaches."""
     joints = robot.dh.joints
     q_rad = np.stack([columns[f"q{i + 1}"] for i in range(joints)], axis=1)

@@ -9,20 +9,27 @@ import csv
 import re
 import zipfile
 from collections.abc import Iterable, Iterator
+from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
+from typing import TextIO
 
 import numpy as np
 import pandas as pd
+import pyarrow as pa
 
+from kinacc.config import json_files
 from kinacc.errors import InputError, Problem
 from kinacc.measurements import robot_programs
+from kinacc.measurements.features import by_feature
 from kinacc.measurements.grid import Row, tabled
-from kinacc.measurements.layout import FEATURES, SPHERICAL, Layout
+from kinacc.measurements.layout import ANGLE, FEATURES, LENGTH, SPHERICAL, Layout
+from kinacc.measurements.spherical import cartesian
 from kinacc.measurements.table import RawTable, frame
+from kinacc.tables import store
 
 BLANKS = "blanks"
 GROUPS, POINT = ("Collection", "Group"), "Point"  # columns of a list of points without names
-PARQUET = (".parquet", ".pq")
 EXCEL = (".xlsx", ".xlsm")
 _OTHERS = {
     ".xls": "a workbook of the old Excel format",
@@ -36,7 +43,6 @@ _KINDS = "a CSV, text, Excel (.xlsx) or Parquet file"
 MOST_ROWS, MOST_COLUMNS, MOST_CELLS = 1_000_000, 10_000, 10_000_000
 MOST_BYTES, _MOST_UNPACKED = 500_000_000, 150_000_000  # a sheet of a million cells has some 40 MB
 _MOST_LINES = MOST_ROWS + 10_000  # titles and the like beside
-_MOST_GROUPS = MOST_ROWS // 100  # of rows in a Parquet file
 _WITH_BRACKETS = re.compile(r"(?:\{[^{}]*\}|\[(?:[^\[\]]|\[[^\[\]]*\])*\]|\S)+")
 
 
@@ -47,33 +53,32 @@ def load(path: str | Path, layout: Layout | None = None, source: str | None = No
     """
     path, layout = Path(path), layout or Layout()
     refuse_other_files(path, source)
-    if path.suffix.lower() in PARQUET:
-        table = _of_parquet(path)
-    elif path.suffix.lower() in EXCEL:
+    if (table := as_it_is(path)) is not None:
+        return table
+    if path.suffix.lower() in EXCEL:
         with Workbook(path) as book:
             sheet = layout.sheet or book.sheets[0]
             if sheet not in book.sheets:
                 where = f"{path}: measurements.file.sheet"
                 raise InputError(Problem(where, f"no sheet {sheet!r}", ", ".join(book.sheets)))
-            rows = book.rows(sheet)
-        table = tabled(f"{path}, sheet {sheet!r}", rows, layout, sheet=True)
-    elif (program := robot_programs.read(path)) is not None:
-        return program
+            table = tabled(f"{path}, sheet {sheet!r}", book.rows(sheet), layout, sheet=True)
     else:
         refuse_large(path)
         with opened(path, layout.encoding) as stream:
-            rows = list(_limited(rows_of_lines(stream, layout.delimiter, str(path)), str(path)))
-        table = tabled(str(path), rows, layout)
+            rows = _limited(rows_of_lines(stream, layout.delimiter, str(path)), str(path))
+            table = tabled(str(path), rows, layout)
     table = robot_programs.expanded(table)
     if layout.layout == FEATURES:
-        from kinacc.measurements.features import by_feature
-
         return by_feature(table)
-    if layout.layout == SPHERICAL:
-        from kinacc.measurements.spherical import cartesian
+    return cartesian(table, layout.directions) if layout.layout == SPHERICAL else table
 
-        return cartesian(table, layout.directions)
-    return table
+
+def as_it_is(path: Path) -> RawTable | None:
+    """The table of a file that has one layout only: Parquet, JSON, a robot's program; else None."""
+    kind = path.suffix.lower()
+    if kind in (".parquet", ".pq"):
+        return _of_parquet(path)
+    return _of_json(path) if kind == ".json" else robot_programs.read(path)
 
 
 def refuse_other_files(path: Path, source: str | None = None) -> None:
@@ -86,7 +91,7 @@ def refuse_other_files(path: Path, source: str | None = None) -> None:
         raise InputError(Problem(str(path), f"is {kind}, which is not read", _KINDS, fix))
 
 
-def opened(path: Path, encoding: str):
+def opened(path: Path, encoding: str) -> TextIO:
     """A text file in one of our encodings; bytes that are none of its characters become U+FFFD."""
     codec = {"utf-8": "utf-8-sig", "latin-1": "cp1252"}.get(encoding, encoding)
     return open(path, newline="", encoding=codec, errors="replace")
@@ -201,59 +206,41 @@ def _cell(value: object) -> object:
 
 
 def _of_parquet(path: Path) -> RawTable:
-    """The rows of a Parquet file, whose footer is looked at before it is unpacked."""
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    where = str(path)
+    """The rows of a Parquet file; a nested column, or one that Python cannot hold, by its type."""
     try:
-        with pq.ParquetFile(path) as file:
-            schema, footer = file.schema_arrow, file.metadata
-        rows, width, groups = footer.num_rows, footer.num_columns, footer.num_row_groups
-        _refuse_shape(where, rows, width, rows * width)
-        size = sum(footer.row_group(n).total_byte_size for n in range(min(groups, _MOST_GROUPS)))
-        if groups > _MOST_GROUPS or size > MOST_BYTES:
-            _refuse_too_much(where, f"{size / 1e6:.0f} MB in {groups} groups of rows")
-        if doubled := sorted({n for n in schema.names if schema.names.count(n) > 1}):
-            raise InputError(Problem(where, f"column names given twice: {', '.join(doubled)}"))
-        flat = [field.name for field in schema if not pa.types.is_nested(field.type)]
-        # The same text in a million rows is held once.
-        texts = [n for n in flat if str(schema.field(n).type) in ("string", "large_string")]
-        with pq.ParquetFile(path, read_dictionary=texts) as file:
-            table = file.read(columns=flat)
-    except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
-        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise InputError(Problem(where, f"not a Parquet file: {reason}")) from None
+        table = store.read_arrow(path, any_type=True)
+    except InputError as error:
+        fix = "give the rows and columns of the measurements alone"
+        raise InputError([replace(problem, fix=fix) for problem in error.problems]) from None
+    where, rows = str(path), table.num_rows
+    _refuse_shape(where, rows, table.num_columns, rows * table.num_columns)
+    names = table.column_names
+    if doubled := sorted({name for name in names if names.count(name) > 1}):
+        raise InputError(Problem(where, f"column names given twice: {', '.join(doubled)}"))
     if not rows:
         raise InputError(Problem(where, "the table has no rows", "at least one row"))
-    columns = {
-        field.name: _cells(table.column(field.name), where)
-        if field.name in flat
-        else [f"<{field.type}>"] * rows  # one cell of a list may hold a million values
-        for field in schema
-    }
-    units = {field.name: unit for field in schema
-             if (unit := (field.metadata or {}).get(b"unit", b"").decode(errors="replace"))
-             in ("deg", "rad", "mm", "m")}  # fmt: skip
+    columns, units = {}, {}
+    for field, column in zip(table.schema, table.columns, strict=True):
+        cells = [f"<{field.type}>"] * rows
+        if not pa.types.is_nested(field.type):  # one cell of a list may hold a million values
+            with suppress(pa.ArrowException, ArithmeticError, LookupError, ValueError):
+                cells = column.to_pylist()  # but a date outside the calendar
+        name, unit = field.name, (field.metadata or {}).get(b"unit", b"").decode(errors="replace")
+        if unit in {**ANGLE, **LENGTH}:
+            whole = f"{name}_{unit}"  # joints of our tables have the unit beside their name
+            name = whole if re.fullmatch(r"q\d", name) and whole not in names else name
+            units[name] = unit
+        columns[name] = cells
     return RawTable(where, frame(columns), np.arange(1, rows + 1), units=units)
 
 
-def _cells(column, where: str) -> list:
-    """Values of a Parquet column; the column's type as text where Python has no such value.
-
-    Raises InputError where a few long texts, repeated, are more than could be worked through.
-    """
-    import pyarrow as pa
-    import pyarrow.compute as pc
-
+def _of_json(path: Path) -> RawTable:
+    """The rows of an answer that a command gave as JSON."""
     try:
-        if not pa.types.is_dictionary(column.type):
-            return column.to_pylist()
-        lengths = [pc.binary_length(part.dictionary).take(part.indices) for part in column.chunks]
-        size = sum(pc.sum(part).as_py() or 0 for part in lengths)
-        if size > MOST_BYTES:
-            _refuse_too_much(where, f"texts of {size / 1e6:.0f} MB in one column")
-        return column.to_pandas().astype(object).tolist()
-    except (pa.ArrowException, ArithmeticError, LookupError, ValueError):
-        # A date outside the calendar, text that is not UTF-8.
-        return [f"<{column.type}>"] * len(column)
+        content = json_files.bytes_of(path)
+        rows = json_files.values_of(content, str(path))["rows"]
+        columns = {name: [row.get(name) for row in rows] for name in rows[0]}
+    except (ValueError, KeyError, IndexError, TypeError, AttributeError, RecursionError):
+        allowed = "a table of rows, as commands write with -o NAME.json"
+        raise InputError(Problem(str(path), "holds no rows", allowed)) from None
+    return RawTable(str(path), frame(columns), np.arange(1, len(rows) + 1))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -20,7 +20,7 @@ LEAST_ROWS = 3  # that place a base or a target
 SAME_CONFIGURATION_RAD = np.deg2rad(0.1)  # joints this close are one configuration visited again
 
 
-def configurations_of(columns: Mapping) -> np.ndarray:
+def configurations_of(columns: Columns) -> np.ndarray:
     """Number (n,) of every measured row's configuration, see :func:`configurations`."""
     names = [name for name in columns if name[:1] == "q" and name[1:].isdigit()]
     q_rad = np.stack([np.asarray(columns[name], dtype=float) for name in names], axis=1)
@@ -41,10 +41,11 @@ def configurations(
 
 def neighbours(q_rad: np.ndarray, tolerance_rad: float = SAME_CONFIGURATION_RAD) -> np.ndarray:
     """Pairs (m, 2) of rows whose joints (n, k) agree within ``tolerance_rad``, full turns apart."""
-    if np.abs(q_rad).max(initial=0.0) < np.pi - tolerance_rad:
-        tree = cKDTree(q_rad)  # no two are full turns apart: three times as fast
-    else:
-        tree = cKDTree(np.mod(q_rad, 2.0 * np.pi) % (2.0 * np.pi), boxsize=2.0 * np.pi)
+    box: np.ndarray | None = None
+    if np.abs(q_rad).max(initial=0.0) >= np.pi - tolerance_rad:
+        box = np.full(q_rad.shape[1], 2.0 * np.pi)
+        q_rad = np.mod(q_rad, box) % box
+    tree = cKDTree(q_rad, boxsize=box)  # three times as fast where no two are full turns apart
     return tree.query_pairs(tolerance_rad, p=np.inf, output_type="ndarray")
 
 
@@ -121,7 +122,7 @@ def always_trained(
     return trained
 
 
-def split(columns: Mapping, settings: Mapping) -> Columns:
+def split(columns: Columns, settings: Mapping[str, Any]) -> Columns:
     """The columns with ``fold`` and ``subset``: whole configurations held out together.
 
     ``settings``: seed and the ``measurements`` section. Fold null without folds, and for the
@@ -137,7 +138,8 @@ def split(columns: Mapping, settings: Mapping) -> Columns:
             fold = blocks(same, int(section["folds"])).astype(float)
         else:
             fold = assign(same, int(section["folds"]), int(settings["seed"])).astype(float)
-        labels = {kind: columns[kind] for kind in ("session", "target") if kind in columns}
+        kinds = columns.keys() & {"session", "target"}
+        labels = {kind: columns[kind] for kind in sorted(kinds)}
         for kind, value, rows in always_trained(fold, labels, same):
             fold[rows] = np.nan
             warnings.warn(

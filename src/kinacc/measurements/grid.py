@@ -6,6 +6,7 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -15,7 +16,8 @@ from kinacc.measurements.column_names import WORDS
 from kinacc.measurements.layout import Layout
 from kinacc.measurements.table import RawTable, frame
 
-Row = tuple[int, list]  # the line it ends on, its cells
+Cells = Sequence[Any]
+Row = tuple[int, list[Any]]  # the line it ends on, its cells
 
 _COMMENTS = ("#", "//", "%", "!", ";")
 _LABELLED = frozenset(WORDS["statistics"])
@@ -30,12 +32,12 @@ def number_of(cell: str) -> tuple[str, str]:
     return (match[1], match[2]) if match else (cell, "")
 
 
-def filled(cells: Sequence) -> list:
+def filled(cells: Cells) -> list[Any]:
     """The cells that hold something."""
     return [c for c in cells if (c.strip() if isinstance(c, str) else c is not None)]
 
 
-def is_comment(cells: Sequence, delimiter: str = "") -> bool:
+def is_comment(cells: Cells, delimiter: str = "") -> bool:
     """Whether a row is a remark, or a rule of dashes, by its beginning."""
     first = cells[0].lstrip() if cells and isinstance(cells[0], str) else ""
     if first.startswith(_COMMENTS) and not (delimiter == ";" and first.startswith(";")):
@@ -47,7 +49,7 @@ def is_comment(cells: Sequence, delimiter: str = "") -> bool:
     )
 
 
-def _is_reading(cells: Sequence, delimiter: str) -> bool:
+def _is_reading(cells: Cells, delimiter: str) -> bool:
     """Whether a row is no remark, and no mean or spread by its label."""
     first = cells[0]
     if first is not None and (type(first) is not str or first.lstrip("+-−")[:1].isdigit()):
@@ -57,7 +59,7 @@ def _is_reading(cells: Sequence, delimiter: str) -> bool:
     return not is_comment(cells, delimiter) and not (known and len(label) < 60)
 
 
-def header_cells(cells: list, width: int) -> list[str]:
+def header_cells(cells: Cells, width: int) -> list[str]:
     """The names of a line of names above rows of ``width`` cells.
 
     Where blanks part the cells, units in brackets stand behind their name.
@@ -85,7 +87,7 @@ def tabled(path: str, rows: Iterable[Row], layout: Layout, sheet: bool = False) 
         line, head = rows.pop(0)
     readings: list[Row] = []
     aside: list[Row] = []
-    under, skip = [], layout.skip_under_names
+    under, skip = list[Any](), layout.skip_under_names
     for row in rows:
         if skip and not is_comment(row[1], layout.delimiter):
             under, skip = row[1], skip - 1
@@ -127,7 +129,7 @@ def tabled(path: str, rows: Iterable[Row], layout: Layout, sheet: bool = False) 
     return replace(table, notes=(f"{lines}: not read ({', '.join([*labels][:3])})",))
 
 
-def _is_text(cells: list, width: int) -> bool:
+def _is_text(cells: Cells, width: int) -> bool:
     """Whether a row under the last reading is a text of few cells."""
     there = filled(cells)
     texts = sum(isinstance(c, str) and c.strip()[:1] not in "+-.0123456789" for c in there)
@@ -137,7 +139,7 @@ def _is_text(cells: list, width: int) -> bool:
 
 def _units_behind(cells: pd.DataFrame, units: dict[str, str]) -> dict[str, str]:
     """Take the unit off columns whose every number carries the same; the units by column."""
-    behind = {}
+    behind: dict[str, str] = {}
     for name in cells:
         column = cells[name]
         first = next((cell for cell in column if not RawTable.is_gap(cell)), None)

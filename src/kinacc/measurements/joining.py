@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,12 +12,12 @@ import pandas as pd
 
 from kinacc.config.measured import JointsFile
 from kinacc.errors import InputError, Problem, first_few, refuse
-from kinacc.measurements.reader import AGAIN
+from kinacc.measurements.intake import columns
 from kinacc.measurements.table import RawTable
-from kinacc.measurements.times import seconds
+from kinacc.measurements.times import STILL_RAD, seconds
 
 NAME, TIME, ORDER = "name", "time", "order"
-STILL_RAD = np.deg2rad(0.02)  # joints that move less stand still
+AGAIN = re.compile(r"(?<=\d)[_-]\d+$")  # P12_1, P12-2: the readings of P12
 _NUMBER = re.compile(r"(?<!\d)\d{1,100}(?!\d)")  # longer ones number nothing
 _BESIDE = re.compile(r"[\s\[\](){}\"']+")
 _PREFIX = "joints file "  # before columns of the joints' file whose name the points' file has too
@@ -29,10 +29,11 @@ def joined(points: RawTable, joints: RawTable, how: JointsFile) -> RawTable:
     ``notes`` of the table name the rows without a partner. Raises InputError where keys are
     missing, doubled with other joints, or match nothing.
     """
-    keys = (("key", how.key, joints), ("key_of_points", how.key_of_points, points))
+    key, key_of_points = how.key or "", how.key_of_points or ""
+    keys = (("key", key, joints), ("key_of_points", key_of_points, points))
     refuse(
-        Problem(f"measurements.file.joints.{key}", f"{table.path} has no column {name}")
-        for key, name, table in keys
+        Problem(f"measurements.file.joints.{ours}", f"{table.path} has no column {name}")
+        for ours, name, table in keys
         if how.by != ORDER and name not in table.columns
     )
     if how.by == ORDER and len(points) != len(joints):
@@ -40,7 +41,7 @@ def joined(points: RawTable, joints: RawTable, how: JointsFile) -> RawTable:
         raise InputError(Problem(points.path, message, "as many of both to join them by order"))
     moving = np.zeros(len(points), dtype=bool)
     if how.by == NAME:
-        row = rows_by_name(points, joints, how)
+        row = rows_by_name(points, joints, key, key_of_points)
     elif how.by == TIME:
         row, moving = _rows_by_time(points, joints, how)
     else:
@@ -49,10 +50,10 @@ def joined(points: RawTable, joints: RawTable, how: JointsFile) -> RawTable:
     if not there.size:
         message = f"no row belongs to any of {joints.path}, joined by {how.by}"
         raise InputError(Problem(points.path, message, fix="correct measurements.file.joints"))
-    notes = [_left_out(points, (row < 0) & ~moving, how.key_of_points, joints)]
+    notes = [_left_out(points, (row < 0) & ~moving, key_of_points, joints)]
     if how.by == NAME:
-        notes.append(_left_out(joints, ~np.isin(np.arange(len(joints)), row), how.key, points))
-        points = points.with_pose_names(how.key_of_points)
+        notes.append(_left_out(joints, ~np.isin(np.arange(len(joints)), row), key, points))
+        points = points.with_pose_names(key_of_points)
     if moving.any():
         lines = points.rows_in_words(np.flatnonzero(moving))
         notes.append(f"{points.path}: left out, the arm was moving: {lines}")
@@ -69,7 +70,7 @@ def joined(points: RawTable, joints: RawTable, how: JointsFile) -> RawTable:
         units={**{names[n]: u for n, u in joints.units.items()}, **points.units},
         notes=(*points.notes, *joints.notes, *filter(None, notes)),
         points_file=Path(points.path).name,
-        key=how.key_of_points,
+        key=key_of_points or None,
     )
 
 
@@ -78,7 +79,7 @@ def beside_name(column: str, points: RawTable) -> str:
     return f"{_PREFIX}{column}" if column in points.columns else column
 
 
-def _left_out(table: RawTable, rows: np.ndarray, key: str | None, partner: RawTable) -> str:
+def _left_out(table: RawTable, rows: np.ndarray, key: str, partner: RawTable) -> str:
     """A note on the rows where ``rows`` (n,) is True, with their keys; empty for none."""
     if not rows.any():
         return ""
@@ -87,12 +88,12 @@ def _left_out(table: RawTable, rows: np.ndarray, key: str | None, partner: RawTa
     return f"{table.path}: left out, without a partner in {partner.path}: {lines}{keys}"
 
 
-def rows_by_name(points: RawTable, joints: RawTable, how: JointsFile) -> np.ndarray:
-    """Row of the joints (n,) of the same name as every point, -1 for none.
+def rows_by_name(points: RawTable, joints: RawTable, key: str, key_of_points: str) -> np.ndarray:
+    """Row of the joints (n,) of the same name in ``key`` as every point, -1 for none.
 
     Raises InputError where one name has joints that are not the same.
     """
-    here, there = labels(points.columns[how.key_of_points]), labels(joints.columns[how.key])
+    here, there = labels(points.columns[key_of_points]), labels(joints.columns[key])
     ways = [(here, there), ([AGAIN.sub("", name) for name in here], there)]
     if (counts := _counts(here)) and (others := _counts(there)):
         ways.append((counts, others))
@@ -103,12 +104,12 @@ def rows_by_name(points: RawTable, joints: RawTable, how: JointsFile) -> np.ndar
     doubled = np.flatnonzero(names.duplicated(keep=False) & (names != "") & apart)
     if doubled.size:
         message = "a name stands for several rows of joints"
-        raise InputError(Problem(joints.where(how.key, doubled), message, "a name for every pose"))
+        raise InputError(Problem(joints.where(key, doubled), message, "a name for every pose"))
     first = names[~names.duplicated() & (names != "")]
     return pd.Series(first.index, index=first).reindex(here).fillna(-1).to_numpy(int)
 
 
-def labels(cells: Sequence[object]) -> list[str]:
+def labels(cells: Iterable[object]) -> list[str]:
     """Names as they are compared: ``P[07]`` is p7, 12.0 is 12."""
     texts = ("" if RawTable.is_gap(c) else _BESIDE.sub("", str(c)).casefold() for c in cells)
     return [_NUMBER.sub(lambda n: str(int(n[0])), text.removesuffix(".0")) for text in texts]
@@ -122,8 +123,6 @@ def _counts(names: list[str]) -> list[str]:
 
 def joint_values(joints: RawTable) -> np.ndarray:
     """Joints (n, k) of a file in rad, by the unit they state or that their size shows."""
-    from kinacc.measurements.intake import columns
-
     names = columns.of_table(joints).joints
     if not names:
         return np.full((len(joints), 1), np.inf)
@@ -137,8 +136,8 @@ def _rows_by_time(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Row of the joints (n,) next in time to every point, -1 for none; and where the arm moved."""
     problems: list[Problem] = []
-    here = seconds(points, how.key_of_points, problems) + how.clock_offset_s
-    there = seconds(joints, how.key, problems)
+    here = seconds(points, how.key_of_points or "", problems) + how.clock_offset_s
+    there = seconds(joints, how.key or "", problems)
     refuse(problems)
     q = joint_values(joints)
     row, moving = np.full(len(here), -1), np.zeros(len(here), dtype=bool)

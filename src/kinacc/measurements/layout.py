@@ -15,11 +15,19 @@ import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from kinacc.config.fields import Section
-from kinacc.config.measured import Directions, JointsFile, MeasuredFile, Orientation, Written
+from kinacc.config.measured import (
+    POINT,
+    Directions,
+    JointsFile,
+    MeasuredFile,
+    Orientation,
+    Written,
+)
 from kinacc.errors import Problem
 from kinacc.measurements import column_names
 from kinacc.measurements.column_names import KNOWN, name_of
@@ -47,11 +55,9 @@ QUATERNION_IN_ORDER = ("quat1", "quat2", "quat3", "quat4")
 ANGLES = ("rx", "ry", "rz")
 ANGLES_IN_ORDER = ("e1", "e2", "e3")
 _TURNS = (*ANGLES, *ANGLES_IN_ORDER, *STD_TURN)
-_OF_TARGETS = (*POSITION, *STD, *COVARIANCE, *QUATERNION, *QUATERNION_IN_ORDER, *_TURNS)
 # The longest quantity counts: mA_std_x is no x of a target named mA_std.
-_OF_TARGET = re.compile(rf"(?:(.*?)_)??({'|'.join(_OF_TARGETS)})", re.DOTALL)
+_OF_TARGET = re.compile(rf"(?:(.*?)_)??({'|'.join(POINT)})", re.DOTALL)
 _NAMES = ("pose", "repeat", "target", "session")
-_JOINT = re.compile(r"q(\d)(?:_cmd)?")
 _READ = (column_names.MEASURED, column_names.REPORTED, column_names.PLAIN)
 
 
@@ -59,7 +65,7 @@ class Layout(MeasuredFile):
     """The ``measurements.file`` section of the settings: all there is to know of a file."""
 
     @classmethod
-    def of(cls, section: Mapping) -> Layout:
+    def of(cls, section: Mapping[str, Any]) -> Layout:
         """From a section that was validated; a key that is not there is at its default."""
         parts: dict[str, type[Section]] = {
             "orientation": Orientation, "directions": Directions, "joints": JointsFile
@@ -132,7 +138,7 @@ def find(
     layout: Layout,
     prismatic: np.ndarray,
     problems: list[Problem],
-    need: Sequence[str] = (JOINTS, POSITION),
+    need: Sequence[str | tuple[str, ...]] = (JOINTS, POSITION),
 ) -> FileColumns:
     """Columns of every quantity; columns that are missing are added to ``problems``.
 
@@ -175,57 +181,66 @@ def find(
     return columns
 
 
-@dataclass(frozen=True)
 class _Finder:
     """Columns of a table by our names; what is wrong is added to ``problems``."""
 
-    table: RawTable
-    layout: Layout
-    prismatic: np.ndarray
-    problems: list[Problem]
+    def __init__(
+        self, table: RawTable, layout: Layout, prismatic: np.ndarray, problems: list[Problem]
+    ) -> None:
+        self.table, self.layout, self.problems = table, layout, problems
+        self.slides = {f"q{n}{end}" for n in np.flatnonzero(prismatic) + 1 for end in ("", "_cmd")}
+        self.mapped_keys = {self.kind(name)[2] for name in layout.columns}
+
+    def kind(self, quantity: str) -> tuple[Mapping[str, float], str, str]:
+        """Units of a quantity with factors, that of a mapped column, and the key that states it."""
+        layout, part = self.layout, split(quantity)[1]
+        if quantity in (*self.slides, *PAYLOAD[1:]) or part in (*POSITION, *STD):
+            return LENGTH, layout.length_unit, "length_unit"
+        if re.fullmatch(r"q\d(?:_cmd)?", quantity):
+            return ANGLE, layout.joint_unit, "" if layout.pulses_per_deg else "joint_unit"
+        if part in _TURNS:
+            return ANGLE, layout.orientation.unit, "orientation.unit"
+        if part in COVARIANCE:
+            return _AREA, f"{layout.length_unit}2", ""
+        return _SINGLE.get(quantity, ({"": 1.0}, "", ""))
 
     def place(self, name: str) -> Place | None:
         """The column of ``name``, if there is one; in two units it has to hold the same twice."""
-        units, unit, key = _kind(name, self.layout, self.prismatic)
-        if name in self.layout.columns:
-            column = self.layout.columns[name]
-            if column not in self.table.columns:
-                return None
-            self._hold_to(column, _stated_unit(self.table, column), unit, key)
-            return Place(column, units[unit])
-        present = columns_of_quantity(self.table, name, units)
+        units, unit, key = self.kind(name)
+        mapped = self.layout.columns.get(name)
+        names = {f"{name}_{u}" if u else name: factor for u, factor in units.items()}
+        present = [Place(column, factor) for column, factor in
+                   ({mapped: units[unit]} if mapped else names).items()
+                   if column in self.table.columns]  # fmt: skip
+        if not present:
+            return None
+        column = present[0].column
         if len(present) > 1:
             first, *others = (self.table.values(p.column) * p.factor for p in present)
             rounding = _ROUNDED_RAD if units is ANGLE else _ROUNDED_MM
             if not all(np.allclose(first, x, 0.0, rounding, equal_nan=True) for x in others):
-                names = " or ".join(place.column for place in present)
-                self.problem(names, "is given in two units that do not say the same")
+                both = " or ".join(place.column for place in present)
+                self.problem(both, "is given in two units that do not say the same")
+        stated = _stated_unit(self.table, column)
         # A key that is the default may not be meant, and one may be about a mapped column.
-        mapped = any(_kind(ours, self.layout, self.prismatic)[2] == key
-                     for ours in self.layout.columns)  # fmt: skip
-        if present and unit not in ("deg", "mm") and not mapped:
-            self._hold_to(present[0].column, present[0].column.rpartition("_")[2], unit, key)
-        return present[0] if present else None
-
-    def _hold_to(self, column: str, stated: str | None, unit: str, key: str) -> None:
-        """Note a column that states another unit than the key that is about it."""
-        if key and stated not in (None, unit):
+        is_meant = mapped or (unit not in ("deg", "mm") and key not in self.mapped_keys)
+        if key and is_meant and stated not in (None, unit):
             message = f"says {stated}, but measurements.file.{key} says {unit}"
             self.problem(column, message, "the same in both places")
+        return present[0]
 
     def group(self, names: Sequence[str], required: bool = False) -> tuple[Place, ...]:
         """Columns of quantities that come together, or none of them where not ``required``."""
-        places = {name: self.place(name) for name in names}
-        missing = [name for name, place in places.items() if place is None]
+        places = {name: place for name in names if (place := self.place(name))}
+        missing = [name for name in names if name not in places]
         if missing and required:
             for name in (name for name in missing if name not in self.layout.columns):
-                units = _kind(name, self.layout, self.prismatic)[0]
+                units = self.kind(name)[0]
                 fix = f"or map {name} in measurements.file.columns"
                 column = " or ".join([f"{name}_{unit}" if unit else name for unit in units][:2])
                 self.problem(column, "is missing", listed(self.table), fix)
-        elif missing and len(missing) < len(names):
-            there = ", ".join(name for name in names if name not in missing)
-            self.problem(", ".join(missing), f"is missing beside {there}")
+        elif missing and places:
+            self.problem(", ".join(missing), f"is missing beside {', '.join(places)}")
         return () if missing else tuple(places.values())
 
     def in_pulses(self, places: tuple[Place, ...]) -> tuple[Place, ...]:
@@ -247,18 +262,20 @@ class _Finder:
         """
         if self.layout.targets is not None:
             return list(self.layout.targets)
-        mapped = [split(name) for name in self.layout.columns]
-        named = [target or TOOL for target, quantity in mapped if quantity == "x"]
-        parts = {c: c.rpartition("_") for c in map(str, self.table.columns)}
-        points = {split(ours)[0] or TOOL: column for column, (ours, _, unit) in parts.items()
-                  if unit in LENGTH and split(ours)[1] == "x"}  # fmt: skip
+        named = [target or TOOL for target, part in map(split, self.layout.columns) if part == "x"]
+        points = {}
+        for column in map(str, self.table.columns):
+            ours, _, unit = column.rpartition("_")
+            target, part = split(ours)
+            if part == "x" and unit in LENGTH:
+                points[target or TOOL] = column
         roles = {name: column_names.role(name_of(f"{name} x").terms) for name in points}
-        read = [n for n in points if roles[n] in _READ or n in named]
-        frames = [n for n in points if n not in read and column_names.is_frame(name_of(n).terms)]
-        if not read and not named and len(frames) == 1:
-            read = frames  # the tool centre point, under its usual name
+        read = [name for name in points if roles[name] in _READ or name in named]
+        if not read and not named:  # the tool centre point, under its usual name
+            frames = [name for name in points if column_names.is_frame(name_of(name).terms)]
+            read = frames if len(frames) == 1 else []
         unclear = [n for n in points if n not in read and roles[n] == column_names.OPEN]
-        unclear = unclear if read or named else unclear or [n for n in points if n not in read]
+        unclear = unclear if read or named else unclear or [*points]
         if unclear:
             fix = f"name those measured in measurements.file.targets, of {', '.join(points)}"
             message = "the name does not say that this was measured"
@@ -280,19 +297,20 @@ class _Finder:
         return Target(name, position, turn, std, std_turn, covariance)
 
     def _turn(self, prefix: str, alone: bool) -> tuple[Place, ...]:
-        kind = self.layout.orientation.kind
-        if kind == "none":
+        turn = self.layout.orientation
+        if turn.kind == "none":
             return ()
-        usual = in_order_of(self.layout.orientation.convention) if kind == "euler" else ANGLES
-        usual = QUATERNION if kind == "quaternion" else usual
-        in_order = {"quaternion": QUATERNION_IN_ORDER, "euler": ANGLES_IN_ORDER}.get(kind, ())
-        ordered = self.group([f"{prefix}{part}" for part in in_order])
-        if ordered and kind == "quaternion":
-            return tuple(ordered[self.layout.orientation.order.index(part)] for part in "wxyz")
-        names = [f"{prefix}{part}" for part in usual]
+        by_axis, in_order = {
+            "quaternion": (QUATERNION, QUATERNION_IN_ORDER),
+            "euler": (in_order_of(turn.convention), ANGLES_IN_ORDER),
+        }.get(turn.kind, (ANGLES, ()))
+        if ordered := self.group([f"{prefix}{part}" for part in in_order]):
+            order = [turn.order.index(part) for part in "wxyz"]
+            return tuple(ordered[n] for n in order) if turn.kind == "quaternion" else ordered
+        names = [f"{prefix}{part}" for part in by_axis]
         there = any(self.place(name) or name in self.layout.columns for name in names)
-        if ordered or there or not alone:  # of several targets some may be bare points
-            return ordered or self.group(names, required=alone)
+        if there or not alone:  # of several targets some may be bare points
+            return self.group(names, required=alone)
         fix = "set measurements.file.orientation.kind: none for positions alone"
         message = "are missing: the file states no orientation"
         self.problem(", ".join(names), message, listed(self.table), fix)
@@ -303,21 +321,6 @@ class _Finder:
         problem = Problem(f"{self.table.path}: column {column}", message, allowed, fix)
         if problem not in self.problems:
             self.problems.append(problem)
-
-
-def _kind(quantity: str, layout: Layout, prismatic: Sequence) -> tuple[dict, str, str]:
-    """Units of a quantity with factors, that of a mapped column, and the key that states it."""
-    joint, part = _JOINT.fullmatch(quantity), split(quantity)[1]
-    slides = joint and int(joint[1]) <= len(prismatic) and prismatic[int(joint[1]) - 1]
-    if slides or part in (*POSITION, *STD) or quantity in PAYLOAD[1:]:
-        return LENGTH, layout.length_unit, "length_unit"
-    if joint:
-        return ANGLE, layout.joint_unit, "" if layout.pulses_per_deg else "joint_unit"
-    if part in _TURNS:
-        return ANGLE, layout.orientation.unit, "orientation.unit"
-    if part in COVARIANCE:
-        return _AREA, f"{layout.length_unit}2", ""
-    return _SINGLE.get(quantity, ({"": 1.0}, "", ""))
 
 
 def _stated_unit(table: RawTable, column: str) -> str | None:
@@ -340,12 +343,6 @@ def split(name: str) -> tuple[str, str]:
     """Target (may be empty) and quantity of a name such as std_x or mA_std_x; empty if neither."""
     match = _OF_TARGET.fullmatch(name) if name not in PAYLOAD else None
     return (match[1] or "", match[2]) if match else ("", "")
-
-
-def columns_of_quantity(table: RawTable, name: str, units: Mapping[str, float]) -> list[Place]:
-    """The columns of a table that hold a quantity: one for every unit it is given in."""
-    places = [Place(f"{name}_{unit}" if unit else name, factor) for unit, factor in units.items()]
-    return [place for place in places if place.column in table.columns]
 
 
 def listed(table: RawTable) -> str:

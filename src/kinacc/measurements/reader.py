@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -15,15 +16,8 @@ from kinacc.kinematics.model import PAYLOAD_COLUMNS
 from kinacc.kinematics.robot import Robot
 from kinacc.measurements import faults
 from kinacc.measurements.files import load
-from kinacc.measurements.layout import (
-    STD,
-    TABLE,
-    FileColumns,
-    Layout,
-    Place,
-    Target,
-    find,
-)
+from kinacc.measurements.joining import AGAIN, joined
+from kinacc.measurements.layout import STD, TABLE, FileColumns, Layout, Place, Target, find
 from kinacc.measurements.orientation import quaternions, rotation_std
 from kinacc.measurements.row_names import RowNames
 from kinacc.measurements.table import RawTable, numbers
@@ -36,7 +30,6 @@ UNCERTAINTY = (
     *("corr_xy", "corr_xz", "corr_yz"),
     *("std_rx_rad", "std_ry_rad", "std_rz_rad"),
 )
-AGAIN = re.compile(r"(?<=\d)[_-]\d+$")  # P12_1, P12-2: the readings of P12
 _LARGEST_WHOLE = 2.0**53  # beyond, neighbours are the same number
 _MOST_WITHOUT_JOINTS = 0.2  # of the points; beyond, joints may stand for the rows below them
 
@@ -65,7 +58,7 @@ class MeasuredFile:
         return [*unused, *self.notes]
 
 
-def read(section: Mapping, robot: Robot, strict: bool = True) -> MeasuredFile:
+def read(section: Mapping[str, Any], robot: Robot, strict: bool = True) -> MeasuredFile:
     """Measurements of the file that ``section`` (``measurements.file``) names.
 
     ``strict``: values that cannot be meant (joints outside their limits, metres taken for
@@ -78,13 +71,15 @@ def read(section: Mapping, robot: Robot, strict: bool = True) -> MeasuredFile:
     return convert(table, Layout.of(section), robot, strict)
 
 
-def read_excluded(section: Mapping, robot: Robot) -> tuple[MeasuredFile | None, list[Problem]]:
+def read_excluded(
+    section: Mapping[str, Any], robot: Robot
+) -> tuple[MeasuredFile | None, list[Problem]]:
     """The rows that ``section`` excludes, as far as they can be read, and the problems of others.
 
     None where no row can be. Raises InputError where the file itself cannot be read.
     """
     table = _loaded(section)
-    layout, readable, problems = Layout.of(section), [], []
+    layout, readable, problems = Layout.of(section), [], list[Problem]()
     for row in np.flatnonzero(np.isin(table.line, list(excluded_lines(section)))):
         with gathered(problems):
             convert(table.select(np.array([row])), layout, robot, strict=False)
@@ -94,12 +89,12 @@ def read_excluded(section: Mapping, robot: Robot) -> tuple[MeasuredFile | None, 
     return convert(table.select(np.array(readable)), layout, robot, strict=False), problems
 
 
-def excluded_lines(section: Mapping) -> dict[int, str]:
+def excluded_lines(section: Mapping[str, Any]) -> dict[int, str]:
     """The lines that ``section`` (``measurements.file``) excludes, each with its reason."""
     return {line: item["reason"] for item in section.get("exclude", ()) for line in item["lines"]}
 
 
-def _loaded(section: Mapping) -> RawTable:
+def _loaded(section: Mapping[str, Any]) -> RawTable:
     """The whole file. Raises InputError where it excludes lines that hold no reading."""
     table = load(section["path"], Layout.of(section), section.get("source"))
     excluded, where = excluded_lines(section), "measurements.file.exclude"
@@ -113,16 +108,7 @@ def _loaded(section: Mapping) -> RawTable:
     joints = section.get("joints") or {}
     if not joints.get("path"):
         return table
-    from kinacc.measurements.joining import joined
-
-    of_joints = {
-        **section,
-        "exclude": (),
-        "source": None,
-        "layout": TABLE,
-        **joints,
-        "joints": None,
-    }
+    of_joints = {**section, "exclude": (), "source": None, "layout": TABLE, **joints, "joints": {}}
     return joined(table, _loaded(of_joints), JointsFile.model_construct(**joints))
 
 
@@ -131,10 +117,9 @@ def convert(table: RawTable, layout: Layout, robot: Robot, strict: bool = True) 
     problems: list[Problem] = []
     title = f"{table.path} cannot be used"
     columns = find(table, layout, robot.dh.prismatic, problems)
-    refuse(problems, title)
-    if not columns.targets:
+    if not columns.targets and not problems:
         problems.append(Problem(table.path, "no target is asked for", "measurements.file.targets"))
-        raise InputError(problems, title)
+    refuse(problems, title)
     if "pose" in columns.single and not table.pose_name:
         table = table.with_pose_names(columns.single["pose"].column)
     q_rad = stacked(table, columns.joints, problems)
@@ -142,32 +127,31 @@ def convert(table: RawTable, layout: Layout, robot: Robot, strict: bool = True) 
     shared = _shared(table, columns, layout, problems)
     shared |= {f"q{i + 1}": values for i, values in enumerate(q_rad.T)}
     parts = [_target(table, target, layout, problems) for target in columns.targets]
+    there, void = (np.array([part.pop(key) for part in parts]) for key in ("there", "void"))
     posed = np.isfinite(q_rad).all(axis=1)
-    nothing = ~np.any([part["there"] for part in parts], axis=0)
+    nothing = ~np.array(there.any(axis=0))
     missing = ~nothing & ~posed
     if missing.sum() > _MOST_WITHOUT_JOINTS * (~nothing).sum() and not problems:
         message = f"empty beside {missing.sum()} of {(~nothing).sum()} points"
-        joints_of_all = "joints in every row"
-        problems += faults.of_rows(table, columns.joints, missing, message, joints_of_all)
+        allowed = "joints in every row"
+        problems += faults.of_rows(table, columns.joints, missing, message, allowed)
     without = [(posed & nothing, "no reading")]
-    for target, part in zip(columns.targets, parts, strict=True):
-        without.append((part.pop("void") & posed & ~nothing, f"no reading of {target.name}"))
+    for target, rows_ in zip(columns.targets, void & posed & ~nothing, strict=True):
+        without.append((rows_, f"no reading of {target.name}"))
     without.append((~posed, "no joints" if nothing[~posed].all() else "not all joints"))
     notes = (*table.notes, *(
         f"{rows.sum()} {'rows hold' if rows.sum() > 1 else 'row holds'} {quantity}: "
         f"{table.rows_in_words(np.flatnonzero(rows))}" for rows, quantity in without if rows.any()
     ))  # fmt: skip
-    there = [part.pop("there") & posed for part in parts]
-    if not np.any(there) and not problems:
+    there &= posed
+    if not there.any() and not problems:
         problems.append(Problem(table.path, "no target was measured in any row", "positions"))
     if strict:
         problems += faults.limit_problems(table, q_rad, robot, columns.joints)
     # One after the other: all targets of a row of the file.
-    rows = pd.concat([pd.DataFrame(shared | part)[read] for part, read in
+    rows = pd.concat([pd.DataFrame(part | shared)[read] for part, read in
                       zip(parts, there, strict=True)]).sort_index(kind="stable")  # fmt: skip
     order = rows.index.to_numpy()
-    if "label" in rows:
-        rows["target"] = rows.pop("label")
     keys = ["pose", "target"]
     if "repeat" not in columns.single:
         rows["repeat"] = rows.groupby(keys, sort=False).cumcount()
@@ -178,7 +162,7 @@ def convert(table: RawTable, layout: Layout, robot: Robot, strict: bool = True) 
             where = f"{table.path}: {table.rows_in_words(np.unique(order[again]))}"
             message = f"pose {first['pose']}, repeat {first['repeat']} is given again"
             problems.append(Problem(where, message, "one row per pose, repeat and target"))
-    turns = rows[[name for name in rows if name.startswith("turn ")]]
+    turns = rows.filter(like="turn ")
     measured = {name: rows[name].to_numpy() for name in rows if name not in turns}
     measured["row"] = table.line[order]
     measured |= table.row_names.columns(measured["row"])
@@ -186,7 +170,7 @@ def convert(table: RawTable, layout: Layout, robot: Robot, strict: bool = True) 
         problems += faults.scale_problems(table, measured, robot)
     refuse(problems, title)
     unused = tuple(name for name in columns.unused(table) if name != table.key)
-    commanded = commanded if commanded is None else commanded[order]
+    commanded = None if commanded is None else commanded[order]
     return MeasuredFile(measured, unused, notes, commanded, turns.to_numpy(), table.row_names)
 
 
@@ -201,13 +185,15 @@ def stacked(
 def _whole_rows(table: RawTable, places: Sequence[Place], problems: list[Problem]) -> np.ndarray:
     """Columns as ``stacked``; rows of which some cells alone are empty are a problem."""
     cells = np.stack([table.gaps(place.column) for place in places], axis=1)
-    partly = cells.any(axis=1) & ~cells.all(axis=1)
+    partly = np.array(cells.any(axis=1) & ~cells.all(axis=1))
     message = "some of them are empty"
     problems += faults.of_rows(table, places, partly, message, "all of them, or none")
     return stacked(table, places, problems)
 
 
-def _target(table: RawTable, target: Target, layout: Layout, problems: list[Problem]) -> dict:
+def _target(
+    table: RawTable, target: Target, layout: Layout, problems: list[Problem]
+) -> dict[str, Any]:
     """Columns (n,) of a target; ``there``: it was measured, ``void``: half of it was."""
     position = stacked(table, target.position, problems)
     gaps = np.isnan(position)
@@ -215,21 +201,22 @@ def _target(table: RawTable, target: Target, layout: Layout, problems: list[Prob
     factors = np.array([place.factor for place in target.position])
     for number in layout.no_reading:
         void |= faults.none_read(np.where(position == number * factors, number, np.nan), number)
-    part = {"there": ~gaps.all(axis=1) & ~void, "void": void, "target": target.name}
-    turn = np.full((len(table), 4 if layout.orientation.kind == "quaternion" else 3), np.nan)
-    turned = np.full((len(table), 4), np.nan)
+    is_quaternion = layout.orientation.kind == "quaternion"
+    turn = np.full((len(table), 4 if is_quaternion else 3), np.nan)
     if target.turn:
         turn = _whole_rows(table, target.turn, problems)
-        if layout.orientation.kind == "quaternion":
+        if is_quaternion:
             problems += faults.quaternion_problems(table, turn, target.turn)
-        turned = quaternions(turn, layout.orientation)
+    part = {"there": ~gaps.all(axis=1) & ~void, "void": void, "target": target.name}
     part |= dict(zip(POSITION, position.T, strict=True))
-    part |= dict(zip(QUATERNION, turned.T, strict=True))
+    part |= dict(zip(QUATERNION, quaternions(turn, layout.orientation).T, strict=True))
     part |= _uncertainty(table, target, turn, layout, problems)
     return part | {f"turn {number}": values for number, values in enumerate(turn.T)}
 
 
-def _uncertainty(table, target: Target, turn: np.ndarray, layout: Layout, problems) -> dict:
+def _uncertainty(
+    table: RawTable, target: Target, turn: np.ndarray, layout: Layout, problems: list[Problem]
+) -> dict[str, np.ndarray]:
     """Standard deviations and correlations (n,) of a target, NaN where the file has none."""
 
     def spread(places: Sequence[Place]) -> np.ndarray:
@@ -259,10 +246,12 @@ def _uncertainty(table, target: Target, turn: np.ndarray, layout: Layout, proble
     return dict(zip(UNCERTAINTY, values, strict=True))
 
 
-def _shared(table: RawTable, columns: FileColumns, layout: Layout, problems: list) -> dict:
+def _shared(
+    table: RawTable, columns: FileColumns, layout: Layout, problems: list[Problem]
+) -> dict[str, np.ndarray]:
     """Columns (n,) that the targets of a row have in common; without poses every row is one."""
     count, single = len(table), columns.single
-    shared: dict = {
+    shared = {
         "pose": np.arange(count),
         "repeat": np.zeros(count, dtype=np.int64),
         "session": np.full(count, None, dtype=object),
@@ -270,23 +259,25 @@ def _shared(table: RawTable, columns: FileColumns, layout: Layout, problems: lis
     }
     if "temperature" in single:
         shared["temperature_c"] = numbers(table, single["temperature"].column, problems, gaps=True)
-    for name, label in (("session", "session"), ("target", "label")):
+    for name in ("session", "target"):
         if name in single:
-            shared[label] = _labels(table, single[name], problems)
+            shared[name] = _labels(table, single[name], problems)
     for name in ("pose", "repeat"):
         if name in single and (name == "repeat" or table.is_numbered(single[name].column)):
             shared[name] = _whole(table, single[name], problems)
         elif name in single:
-            labels = _labels(table, single[name], problems)
-            again = AGAIN if layout.repeats_in_names else re.compile(r"(?!)")
-            shared[name] = pd.factorize(np.array([again.sub("", label) for label in labels]))[0]
+            labels = pd.Series(_labels(table, single[name], problems))
+            labels = (
+                labels.str.replace(AGAIN, "", regex=True) if layout.repeats_in_names else labels
+            )
+            shared[name] = pd.factorize(labels)[0]
     if "session" in single and "pose" in single:  # every session may count its poses from 0
-        shared["pose"] = pd.factorize(pd.MultiIndex.from_arrays(
-            [shared["session"], shared["pose"]]))[0]  # fmt: skip
-    shared |= {f"s{n + 1}": values.astype(np.int8) for n, values in
-               enumerate(travel(table, columns, problems).T)}  # fmt: skip
+        poses = pd.MultiIndex.from_arrays([shared["session"], shared["pose"]])
+        shared["pose"] = pd.factorize(poses)[0]
+    ways = travel(table, columns, problems).astype(np.int8)
+    shared |= {f"s{joint}": values for joint, values in enumerate(ways.T, 1)}
     if columns.payload:
-        load = payload(table, columns, problems, _whole_rows)
+        load = payload(table, columns, problems)
         shared |= dict(zip(PAYLOAD_COLUMNS, load.T, strict=True))
     return shared
 
@@ -303,9 +294,12 @@ def travel(table: RawTable, columns: FileColumns, problems: list[Problem]) -> np
     return directions
 
 
-def payload(table: RawTable, columns: FileColumns, problems: list[Problem], rows=stacked):
+def payload(
+    table: RawTable, columns: FileColumns, problems: list[Problem], gaps: bool = True
+) -> np.ndarray:
     """Mass and centre (n, 4) of the payload in kg and mm; a mass alone hangs at the last frame."""
-    load = rows(table, columns.payload, problems)
+    read = _whole_rows if gaps else partial(stacked, gaps=False)
+    load = read(table, columns.payload, problems)
     mass = load[:, 0]
     message = f"a mass of {np.nanmin(mass, initial=0.0):g} kg"
     problems += faults.of_rows(table, columns.payload[:1], mass < 0.0, message, "0 or above")
@@ -315,14 +309,13 @@ def payload(table: RawTable, columns: FileColumns, problems: list[Problem], rows
 def _labels(table: RawTable, place: Place, problems: list[Problem]) -> np.ndarray:
     empty = table.gaps(place.column)
     problems += faults.of_rows(table, [place], empty, "is empty", "a name in every row")
-    return np.array([*table.texts(place.column), None], dtype=object)[:-1]
+    return np.array(table.texts(place.column), dtype=object)
 
 
 def _whole(table: RawTable, place: Place, problems: list[Problem]) -> np.ndarray:
     """Whole numbers (n,)."""
     values = numbers(table, place.column, problems)
-    bad = (values < 0) | (values > _LARGEST_WHOLE) | (values % 1 != 0)
-    bad &= np.isfinite(values)
+    bad = np.isfinite(values) & ((values < 0) | (values > _LARGEST_WHOLE) | (values % 1 != 0))
     message = f"{next(iter(values[bad]), 0.0):g}"
     problems += faults.of_rows(table, [place], bad, message, "whole numbers from 0")
     return np.where(np.isfinite(values) & ~bad, values, 0).astype(np.int64)

@@ -7,9 +7,10 @@ no measurement; its joint positions are those of a pose, which a tracker's file 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -62,8 +63,8 @@ def read(path: Path) -> RawTable | None:
         message = f"holds {len(cartesian)} {_TARGETS}"
         raise InputError(Problem(str(path), message, allowed, fix))
     names = _NAMES.get(maker, [f"J{number} [deg]" for number in range(1, 8)])
-    notes = (_HORIZONTAL,) if maker is _of_fanuc else ()
-    notes += (f"{path}: {first_few(cartesian)}: {_TARGETS}",) if cartesian else ()
+    notes = [_HORIZONTAL] if maker is _of_fanuc else []
+    notes += [f"{path}: {first_few(cartesian)}: {_TARGETS}"] if cartesian else []
     lines = np.array([text.count("\n", 0, place) + 1 for _, place, _ in rows])
     widths = np.array([len(joints) for _, _, joints in rows])
     odd = (widths != widths.min()) | (widths < 4) | (widths > 7)
@@ -72,7 +73,7 @@ def read(path: Path) -> RawTable | None:
         raise InputError(Problem(where, "another number of joints", "4 to 7, the same in all"))
     columns = {"name": [name for name, _, _ in rows]}
     columns |= {names[n]: [repr(joints[n]) for _, _, joints in rows] for n in range(widths[0])}
-    return RawTable(str(path), frame(columns), lines, notes=notes)
+    return RawTable(str(path), frame(columns), lines, notes=tuple(notes))
 
 
 def _of_abb(text: str) -> list[Position]:
@@ -118,7 +119,7 @@ def _parts(text: str) -> dict[str, float]:
 
 def expanded(table: RawTable) -> RawTable:
     """The table with cells such as {A1 10, A2 -90 ..} and [[10,-90,..],[9E9,..]] as columns."""
-    columns: dict[str, Sequence] = {}
+    columns: dict[str, Iterable[Any]] = {}
     for name in table.columns:
         first = str(table.columns[name][0]).strip()
         of = next((of for shape, of in _SHAPES.items() if re.match(shape, first)), None)
@@ -139,7 +140,7 @@ def numbers_within(cell: object) -> int:
     return len(_LISTED.findall(text)) if _LIST.fullmatch(text) else 0
 
 
-def names_of_rows(rows: Sequence[Sequence]) -> tuple[str, ...]:
+def names_of_rows(rows: Sequence[Sequence[Any]]) -> tuple[str, ...]:
     """Names of columns whose cells name their parts, as {E6AXIS: A1 10, ..}: by the word before.
 
     A first column of texts names the poses; a frame that no word calls measured is one of the

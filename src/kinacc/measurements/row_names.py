@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -26,7 +27,7 @@ class RowNames:
     word: str = "line"
 
     @classmethod
-    def of_columns(cls, columns: Mapping) -> RowNames:
+    def of_columns(cls, columns: Mapping[str, Any]) -> RowNames:
         """From ``row``, ``pose_name``, ``file`` and ``row_kind`` of ``measurements``."""
         names, files = columns.get("pose_name", ()), columns.get("file", ())
         pairs = zip(columns["row"], names, strict=True) if len(names) else ()

@@ -3,32 +3,32 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from kinacc.config import json_files
 from kinacc.config.measured import Orientation
 from kinacc.config.names import of_csv
 from kinacc.errors import InputError, Problem, refuse
 from kinacc.geometry import Pose
 from kinacc.measurements import faults
-from kinacc.measurements.files import EXCEL, PARQUET, load, opened, refuse_other_files
+from kinacc.measurements.intake import pairs
+from kinacc.measurements.intake.guess import described
 from kinacc.measurements.layout import (
-    ANGLE,
     JOINTS,
-    LENGTH,
     POSITION,
     TOOL,
     FileColumns,
     Layout,
+    Place,
     find,
 )
 from kinacc.measurements.orientation import rotations
 from kinacc.measurements.reader import payload, stacked, travel
-from kinacc.measurements.table import RawTable, frame
+from kinacc.measurements.table import RawTable
 
 POINTS, POSES = "points", "poses"
 _FIRST_NAMES = {  # of a file under our names
@@ -37,7 +37,6 @@ _FIRST_NAMES = {  # of a file under our names
     POSES: r"(?:qw|rv?x_(?:deg|rad))",
 }
 _TURNS = {"quaternion": "qw", "rotation_vector": "rvx", "euler": "rx"}
-_HEAD = 1_000_000  # characters of a line looked at
 
 
 @dataclass(frozen=True)
@@ -83,7 +82,7 @@ def read_rows(
     path: str | Path,
     prismatic: np.ndarray,
     need: str = JOINTS,
-    answers: Mapping | None = None,
+    answers: Mapping[str, Any] | None = None,
     spoilt: list[Problem] | None = None,
 ) -> Rows:
     """Rows of a file that must hold ``need``: joints, points or poses.
@@ -123,15 +122,14 @@ def read_rows(
             table = table.select(np.flatnonzero(~none))
     cells = problems if spoilt is None else spoilt
 
-    def values(places) -> np.ndarray | None:
+    def values(places: Sequence[Place]) -> np.ndarray | None:
         return stacked(table, places, cells, gaps=False) if places else None
 
-    joints, position = values(columns.joints), values(target and target.position)
+    joints, position = values(columns.joints), values(target.position if target else ())
     directions = travel(table, columns, problems) if columns.directions else None
-    load = values(columns.payload) if columns.payload else None
-    load = payload(table, columns, problems) if load is not None else None
+    load = payload(table, columns, cells, gaps=False) if columns.payload else None
     pose = None
-    if need == POSES and target:
+    if need == POSES and target and position is not None:
         turn = stacked(table, target.turn, cells, gaps=False)
         if layout.orientation.kind == "quaternion":
             problems += faults.quaternion_problems(table, turn, target.turn)
@@ -142,7 +140,7 @@ def read_rows(
     if name is not None:
         label = np.array([text.removesuffix(".0") for text in table.texts(name)], dtype=object)
     unused = tuple(column for column in columns.unused(table) if column != name)
-    std = values(target and target.std)
+    std = values(target.std if target else ())
     return Rows(label, joints, directions, position, pose, std, load, unused, notes, table, columns)
 
 
@@ -159,69 +157,32 @@ def _label(table: RawTable, columns: FileColumns) -> str | None:
 
 
 def open_table(
-    path: str | Path, need: str = POINTS, answers: Mapping | None = None
+    path: str | Path, need: str = POINTS, answers: Mapping[str, Any] | None = None
 ) -> tuple[RawTable, Layout, tuple[str, ...]]:
-    """A file of ``need``, the meaning of its columns, and notes on how it was understood.
-
-    Files that commands write are read as well: JSON, and text of a CSV with the apostrophe that
-    keeps it from being a formula.
-    """
-    path = Path(path)
-    refuse_other_files(path)
-    kind = path.suffix.lower()
-    if kind == ".json":
-        table = _of_json(path)
-        return table, _plain_layout(table, need), ()
-    if kind in PARQUET:
-        table = load(path)
-        names = {name: f"{name}_{unit}" for name, unit in table.units.items()
-                 if re.fullmatch(r"q\d+", name) and unit in (*ANGLE, *LENGTH)}  # fmt: skip
-        names = {name: whole for name, whole in names.items() if whole not in table.columns}
-        table = replace(table, columns=table.columns.rename(columns=names))
-        return table, _plain_layout(table, need), ()
-    if kind in EXCEL:
-        if re.search(rf"^{_FIRST_NAMES[need]}$", "\n".join((table := load(path)).columns), re.M):
-            return table, _plain_layout(table, need), ()
-    else:
-        with opened(path, "utf-8") as file:
-            head, first = file.readline(_HEAD), file.readline(_HEAD)
-        if re.search(rf"(?<![^\s,;\"']){_FIRST_NAMES[need]}(?![^\s,;\"'])", head):
-            delimiter = next((sign for sign in ";\t" if sign in head), ",")
-            comma = delimiter == ";" and "," in first and "." not in first
-            table = load(path, Layout(delimiter=delimiter, decimal="," if comma else "."))
-            table = replace(table, columns=table.columns.map(of_csv))
-            return table, _plain_layout(table, need), ()
-    from kinacc.measurements.intake import guess as guesses
-
+    """A file of ``need``, the meaning of its columns, and notes on how it was understood."""
     answers = {key: value for key, value in (answers or {}).items() if value}
-    guess = guesses.look(path, answers, need)
+    looked = pairs.look(path, answers, wanted=need == POSES)
+    if any(re.fullmatch(_FIRST_NAMES[need], name) for name in looked.table.columns):
+        # Texts of a CSV have an apostrophe that keeps them from being a formula.
+        cells = looked.table.columns.map(lambda c: of_csv(c) if isinstance(c, str) else c)
+        table = replace(looked.table, columns=cells)
+        return table, _plain_layout(table, need), looked.notes
+    guess = described(looked, answers, need)
     notes = (*guess.notes, *guess.assumed.values(), *guess.columns.lines())
     return guess.table, Layout.of(guess.section), notes
 
 
 def _plain_layout(table: RawTable, need: str) -> Layout:
     """The layout of a table under our names, by the kind of its orientations."""
-    names = set(table.columns)
+    names = {*table.columns} if need == POSES else set()
     kinds = [kind for kind, name in _TURNS.items()
-             if need == POSES and names & {name, f"{name}_deg", f"{name}_rad"}]  # fmt: skip
+             if names & {name, f"{name}_deg", f"{name}_rad"}]  # fmt: skip
     if len(kinds) > 1:
         message = "is given in more than one form"
         raise InputError(Problem(f"{table.path}: orientation", message, "one form"))
     kind = next(iter(kinds), "none")
-    unit = next((unit for unit in ANGLE if f"rvx_{unit}" in names), "deg")
+    unit = "rad" if "rvx_rad" in table.columns else "deg"
     vector = {f"r{axis}": f"rv{axis}_{unit}" for axis in "xyz"}
     columns = vector if kind == "rotation_vector" else {}
-    turn = Orientation(kind=kind, unit=unit)
+    turn = Orientation.model_construct(kind=kind, unit=unit)
     return Layout().but(columns=columns, orientation=turn, targets=[TOOL])
-
-
-def _of_json(path: Path) -> RawTable:
-    """The rows of an answer that a command gave as JSON."""
-    try:
-        content = json_files.bytes_of(path)
-        rows = json_files.values_of(content, str(path))["rows"]
-        columns = {name: [row.get(name) for row in rows] for name in rows[0]}
-    except (ValueError, KeyError, IndexError, TypeError, AttributeError, RecursionError):
-        allowed = "a table of rows, as commands write with -o NAME.json"
-        raise InputError(Problem(str(path), "holds no rows", allowed)) from None
-    return RawTable(str(path), frame(columns), np.arange(1, len(rows) + 1))

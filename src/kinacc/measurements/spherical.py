@@ -6,8 +6,9 @@ Counterclockwise ones, as of trackers in the mathematical sense, count from x to
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -84,7 +85,9 @@ def cartesian(table: RawTable, directions: Directions) -> RawTable:
         message = "has no columns of a horizontal angle, a vertical angle and a distance"
         problems.append(Problem(table.path, message, "such as Hz, V and D"))
     spent = {name for reading in readings for name in reading.names}
-    columns: dict[str, Sequence] = {n: table.columns[n] for n in table.columns if n not in spent}
+    columns: dict[str, Iterable[Any]] = {
+        n: table.columns[n] for n in table.columns if n not in spent
+    }
     for reading in readings:
         column, unit = reading.horizontal.column, reading.distance.unit
         stated = reading.angle_units - {directions.unit}

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -103,12 +104,14 @@ class RawTable:
         return f"{self.path}: column{'s' * (', ' in column)} {column}{lines}"
 
 
-def frame(columns: Mapping[str, Sequence]) -> pd.DataFrame:
+def frame(columns: Mapping[str, Iterable[Any]]) -> pd.DataFrame:
     """Columns of cells as they are."""
     return pd.DataFrame({n: pd.Series(list(c), dtype=object) for n, c in columns.items()})
 
 
-def numbers(table: RawTable, name: str, problems: list[Problem], *, gaps: bool = False):
+def numbers(
+    table: RawTable, name: str, problems: list[Problem], *, gaps: bool = False
+) -> np.ndarray:
     """Column ``name`` as floats (n,); cells that are no finite number are added to ``problems``.
 
     With ``gaps`` an empty cell is allowed and becomes NaN.
@@ -143,7 +146,7 @@ def numbers_of(text: str) -> np.ndarray:
     return values if (np.abs(values) <= _LARGEST).all() else np.zeros(0)
 
 
-def _converted(cells: list, decimal: str, thousands: str | None) -> np.ndarray:
+def _converted(cells: list[Any], decimal: str, thousands: str | None) -> np.ndarray:
     """Cells as floats (n,), NaN where one is none."""
     try:  # all at once
         text = "\n".join(cells) if thousands is None else "_"
@@ -156,7 +159,7 @@ def _converted(cells: list, decimal: str, thousands: str | None) -> np.ndarray:
     return np.array([_number(cell, decimal, thousands) for cell in cells], dtype=float)
 
 
-def _number(cell: object, decimal: str, thousands: str | None) -> float:
+def _number(cell: Any, decimal: str, thousands: str | None) -> float:
     try:
         if not isinstance(cell, str):
             return float(cell)

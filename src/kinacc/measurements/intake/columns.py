@@ -149,7 +149,9 @@ def recognise(
 class _Choice:
     """Selection among the groups of a file; ``questions`` grow."""
 
-    def __init__(self, names: Sequence[Name], values, take: set[str], sigma: str, wanted: bool):
+    def __init__(
+        self, names: Sequence[Name], values: Values | None, take: set[str], sigma: str, wanted: bool
+    ) -> None:
         self.values, self.take, self.sigma = values, take, sigma
         self.every = all_groups(names, values)
         self.groups = [g for g in self.every if g.kind != POSE and not g.wrong_units]
@@ -179,7 +181,9 @@ class _Choice:
                 distinct.append(group)
         return [group for group in candidates if group in distinct]
 
-    def _ask(self, about: str, groups: Sequence[Group], several=False, without=False) -> Group:
+    def _ask(
+        self, about: str, groups: Sequence[Group], several: bool = False, without: bool = False
+    ) -> Group:
         answers = {group.names[0]: group.text for group in groups}
         self.questions.append(Choice(TAKE, about, answers, several and len(groups) > 1, without))
         return groups[0]
@@ -284,7 +288,9 @@ class _Choice:
         about = f"the names do not tell the orientation measured with {point.target}"
         return self._ask(about, rest, without=True)
 
-    def spreads(self, points: Sequence[Group], turns: dict[str, Group]) -> dict[str, dict]:
+    def spreads(
+        self, points: Sequence[Group], turns: dict[str, Group]
+    ) -> dict[str, dict[str, Name]]:
         """Standard deviations by target, in the unit of the values that they belong to."""
         spreads: dict[str, dict[str, Name]] = {}
         unclear: list[Group] = []

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
+
+import pandas as pd
 
 from kinacc.measurements.column_names import name_of
 from kinacc.measurements.intake.choices import Choice
 
-_ENDS = (",", ".")
 _BLANK = "[ \u00a0\u2007\u2009\u202f]"
 _BETWEEN = {" ": _BLANK, "'": "['\u2019]", ",": ",", ".": r"\."}
 _MOST_DEG = 7200  # no joint turns further
@@ -30,38 +31,40 @@ def shaped_as_number(cell: str) -> bool:
     return bool(_SHAPED.fullmatch(cell))
 
 
+def _first(text: str, mark: str, *shapes: str, other: str = ".") -> str:
+    """The first line of a text of one of these shapes, empty for none."""
+    shape = "|".join(shapes).replace("m", _BETWEEN[mark]).replace("o", _BETWEEN[other])
+    found = re.search(_BETWEEN[mark], text)
+    found = found and re.search(rf"^[+\-−]?(?:{shape})$", text, re.MULTILINE)
+    return found[0].strip() if found else ""
+
+
 def marks_of(
-    columns: Mapping[str, Sequence], answers: Mapping[str, str], blanks_part: bool = False
+    columns: pd.DataFrame, answers: Mapping[str, str], delimiter: str
 ) -> tuple[str, str | None, Choice | None]:
     """The two marks of the text cells of a table, or the question to ask first.
 
-    ``answers``: decimal and thousands as answered. ``blanks_part``: blanks part the columns.
+    ``answers``: decimal and thousands as answered. ``delimiter`` parts the columns.
     """
     by_column = {str(name): _text(columns[name]) for name in columns}
     text = "\n".join(filter(None, by_column.values()))
-
-    def first(shape: str, sign: str, after: str = ".", among: str = text) -> str:
-        if not re.search(_BETWEEN[sign], among):
-            return ""
-        shape = shape.replace("m", _BETWEEN[sign]).replace("o", _BETWEEN[after])
-        match = re.search(rf"^[+\-−]?(?:{shape})$", among, re.MULTILINE)
-        return match[0].strip() if match else ""
-
-    decisive = {}
-    for sign, thousands in (_ENDS, _ENDS[::-1]):
-        both = [first(_BOTH, between, sign) for between in (thousands, " ", "'")]
-        cells = (first(_DECIMAL, sign), first(_GROUPED, thousands), *both)
-        decisive |= {sign: next(filter(None, cells))} if any(cells) else {}
+    decisive: dict[str, str] = {}
+    for mark, other in (",.", ".,"):
+        cells = [_first(text, mark, _DECIMAL), _first(text, other, _GROUPED)]
+        cells += [_first(text, between, _BOTH, other=mark) for between in (other, " ", "'")]
+        decisive |= {mark: next(filter(None, cells))} if any(cells) else {}
     decimal = answers.get("decimal") or "".join(decisive)
     if len(decimal) > 1:
         about = "some numbers have a decimal point, some a decimal comma; one kind can be read"
-        return ".", None, Choice("--decimal", about, {m: f"as in {decisive[m]}" for m in _ENDS})
+        return ".", None, Choice("--decimal", about, {m: f"as in {decisive[m]}" for m in decisive})
+    if not decimal and delimiter == "," and "," not in text:
+        decimal = "."  # nobody writes thousands alone by points, between commas
     if not decimal:
-        angles = "\n".join(t for name, t in by_column.items() if name_of(name).unit == "deg")
         whole = re.search(r"^[+\-−]?[1-9]\d{0,2}$", text, re.MULTILINE)
-        unclear = first(_EITHER, ",") or (whole and first(_EITHER, ".")) or ""
-        decimal, point = (",", ".") if "," in unclear else (".", ",")
-        large = [cell for cell in angles.split("\n") if first(_EITHER, decimal, among=cell)]
+        unclear = _first(text, ",", _EITHER) or (_first(text, ".", _EITHER) if whole else "")
+        decimal, point = ",." if "," in unclear else ".,"
+        angles = [by_column[name] for name in by_column if name_of(name).unit == "deg"]
+        large = [cell for cell in "\n".join(angles).split("\n") if _first(cell, decimal, _EITHER)]
         # No joint turns by thousands of degrees.
         if unclear and all(int(re.sub(r"\D", "", cell)) <= _MOST_DEG for cell in large):
             meant = {decimal: f"{unclear} is {unclear.replace(decimal, '.')}",
@@ -71,22 +74,21 @@ def marks_of(
     if "thousands" in answers:
         return decimal, None if answers["thousands"] == "none" else answers["thousands"], None
     thousands = "," if decimal == "." else "."
-    if "decimal" in answers and first(_EITHER, thousands):
+    if "decimal" in answers and _first(text, thousands, _EITHER):
         return decimal, thousands, None  # by the answer it stands between thousands
-    marks = [m for m in _BETWEEN if m != decimal and not (m == " " and blanks_part)]
-    for sign in marks:
+    for mark in [m for m in _BETWEEN if m != decimal and not (m == " " and delimiter == "blanks")]:
         # Blanks and apostrophes stand between thousands alone.
-        alone = sign not in _ENDS and first(_EITHER, sign)
-        if alone or first(_GROUPED, sign) or first(_BOTH, sign, decimal):
-            return decimal, sign, None
-    if cell := first(_EITHER, thousands):
+        alone = [_EITHER] if mark in " '" else []
+        if _first(text, mark, *alone, _GROUPED, _BOTH, other=decimal):
+            return decimal, mark, None
+    if cell := _first(text, thousands, _EITHER):
         about = f"the cell {cell} stands where the decimal mark of the file is {decimal}"
         meant = {thousands: f"{cell} is {cell.replace(thousands, '')}", "none": "it is an error"}
         return decimal, None, Choice("--thousands", about, meant)
     return decimal, None, None
 
 
-def _text(cells: Sequence) -> str:
+def _text(cells: Iterable[object]) -> str:
     """Cells that are text, a line each; a column of names and rounded time stamps are left out."""
     texts = [cell.strip() for cell in cells if isinstance(cell, str)]
     texts = [text for text in texts if text and not _HUGE.fullmatch(text)]

@@ -131,7 +131,7 @@ def _alike(
     label is there twice (X and x_mm), columns of one unit and spelling belong together.
     """
     pattern = re.compile(rf"(?<![^_])({stem})({label})(?![^_])")
-    groups: dict[tuple, list[tuple[str, Name]]] = {}
+    groups: dict[tuple[str, int, str], list[tuple[str, Name]]] = {}
     for name in names:
         joined = "_".join(name.terms)
         for match in pattern.finditer(joined):
@@ -140,7 +140,7 @@ def _alike(
     for (around, _, stem_), columns in groups.items():
         terms = tuple(filter(None, around.split("_")))
         twice = len({text for text, _ in columns}) < len(columns)
-        rows: dict[tuple, dict[str, Name]] = {}
+        rows: dict[tuple[object, ...], dict[str, Name]] = {}
         for text, name in columns:
             spelled = [s for t, s in zip(name.terms, name.spelled, strict=True) if t in terms]
             small = any(s.islower() for s in name.spelled)

@@ -29,7 +29,7 @@ _MOST_DEG = 7200.0  # no joint turns further
 _FAR = 1.5  # times the extent of the other points
 # By setting: the units that are known, the usual and the small one, and the largest number that is
 # taken for the small one.
-_UNITS: dict[str, tuple[Mapping, str, str, float]] = {
+_UNITS: dict[str, tuple[Mapping[str, float], str, str, float]] = {
     "joint_unit": (ANGLE, "deg", "rad", _FULL_TURN_RAD),
     "length_unit": (LENGTH, "mm", "m", _LARGEST_M),
     "angle_unit": (ANGLE, "deg", "rad", _FULL_TURN_RAD),
@@ -101,7 +101,11 @@ def look(
     where units contradict each other, and where ``take`` names columns that cannot be read.
     """
     answers = answers or {}
-    looked = pairs.look(path, answers, need == POSES)
+    return described(pairs.look(path, answers, need == POSES), answers, need)
+
+
+def described(looked: Looked, answers: Mapping[str, Any], need: str) -> Guess:
+    """The best guess at a file whose table is known, as ``look``."""
     table, columns = looked.table, _needed(looked.columns, need)
     questions = list(columns.questions)
     if need in (POINTS, POSES) and len(columns.targets) > 1 and not questions:
@@ -190,7 +194,7 @@ class _Guesser:
     ``void``: numbers in place of a reading.
     """
 
-    def __init__(self, looked: Looked, columns: NamedColumns, answers: Mapping) -> None:
+    def __init__(self, looked: Looked, columns: NamedColumns, answers: Mapping[str, Any]) -> None:
         self.looked, self.table, self.columns, self.answers = looked, looked.table, columns, answers
         self.first = next(iter(columns.targets.values()), {})
         self.assumed, self.problems = dict(looked.assumed), list[Problem]()

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from kinacc.measurements.column_names import UNITS, plain
-from kinacc.measurements.grid import Row, filled, header_cells, is_comment, number_of
+from kinacc.measurements.grid import Cells, Row, filled, header_cells, is_comment, number_of
 from kinacc.measurements.intake.decimals import shaped_as_number
 from kinacc.measurements.layout import ANGLE, LENGTH
 from kinacc.measurements.robot_programs import numbers_within
@@ -43,9 +43,18 @@ def is_number(cell: object) -> bool:
     return isinstance(cell, (int, float)) and not isinstance(cell, bool)
 
 
-def numbers_in(cells: Sequence) -> int:
+def numbers_in(cells: Cells) -> int:
     """How many numbers a row holds, those within cells such as {A1 10, A2 -90} included."""
     return sum(is_number(cell) or numbers_within(cell) for cell in cells)
+
+
+def most_numbers(rows: Sequence[Row]) -> tuple[int, int]:
+    """How many cells are numbers in rows of the width that has most of them, and that width."""
+    counts = Counter[int]()
+    for _, cells in rows:
+        count = numbers_in(cells)
+        counts[len(cells)] += count if count > 1 else 0
+    return max(((count, width) for width, count in counts.items()), default=(0, 0))
 
 
 def head_of(rows: Sequence[Row], delimiter: str, sheet: bool = False) -> Head | None:
@@ -54,41 +63,35 @@ def head_of(rows: Sequence[Row], delimiter: str, sheet: bool = False) -> Head | 
     ``sheet``: the rows are those of a sheet, of any width.
     """
     counts = [0 if is_comment(cells, delimiter) else numbers_in(cells) for _, cells in rows]
-    many = [number for number, count in enumerate(counts) if count > 1]
-    if not many:
+    widths = {number: len(rows[number][1]) for number, count in enumerate(counts) if count > 1}
+    if not widths:
         return None
-    widths = [len(rows[number][1]) for number in many]
-    width = max(widths) if sheet else Counter(widths).most_common(1)[0][0]
-    many = [number for number in many if sheet or len(rows[number][1]) == width]
+    width = max(widths.values()) if sheet else Counter(widths.values()).most_common(1)[0][0]
+    many = [number for number in widths if sheet or widths[number] == width]
     usual = sorted(counts[number] for number in many)[len(many) // 2]
     first = next(number for number in many if 2 * counts[number] >= usual)
-    above = [
-        n for n in range(first) if _can_name(rows[n][1], rows[first][1], width, delimiter, sheet)
-    ]
-    units = 0
+    above = [n for n in range(first)
+             if _can_name(rows[n][1], rows[first][1], width, delimiter, sheet)]  # fmt: skip
+    under = 0
     while above and _are_units(rows[above[-1]][1]):
         above.pop()
-        units += 1
+        under += 1
     if not above:
         return Head(0, first, 0, width, _in_remark(rows[:first], width, delimiter))
     most = max(len(filled(rows[number][1])) for number in above)
     place = max(number for number in above if 2 * len(filled(rows[number][1])) >= most)
     line, cells = rows[place][0], header_cells(rows[place][1], width)
     over = rows[place - 1][1] if place else []
-    if (
-        len({*filled(cells)}) < len(filled(cells))
-        and filled(over)
-        and not is_comment(over, delimiter)
-    ):
-        names, group = [], ""
-        for number, name in enumerate(cells):  # names under those of groups: Measured over X, Y, Z
-            group = (
-                str(over[number] or "").strip() if number < len(over) and over[number] else group
-            )
-            names.append(f"{group} {name}".strip())
-        if len({*names}) == len(names):
-            return Head(line, first, units, width, tuple(names))
-    return Head(line, first, units, width)
+    names = None
+    if len({*filled(cells)}) < len(filled(cells)) and not is_comment(over, delimiter):
+        # Names under those of groups: Measured over X, Y, Z.
+        texts = [str(cell or "").strip() for cell in (*over, *[""] * width)]
+        groups = [""]
+        for text in texts:
+            groups.append(text or groups[-1])
+        both = [f"{group} {name}".strip() for group, name in zip(groups[1:], cells, strict=False)]
+        names = tuple(both) if len({*both}) == len(both) else None
+    return Head(line, first, under, width, names)
 
 
 def _in_remark(rows: Sequence[Row], width: int, delimiter: str) -> tuple[str, ...] | None:
@@ -106,7 +109,7 @@ def _in_remark(rows: Sequence[Row], width: int, delimiter: str) -> tuple[str, ..
     return None
 
 
-def _can_name(cells: list, numbers: list, width: int, delimiter: str, sheet: bool) -> bool:
+def _can_name(cells: Cells, numbers: Cells, width: int, delimiter: str, sheet: bool) -> bool:
     if not filled(cells) or is_comment(cells, delimiter) or numbers_in(cells) > 1:
         return False
     if sheet:
@@ -117,7 +120,7 @@ def _can_name(cells: list, numbers: list, width: int, delimiter: str, sheet: boo
     return fits or count in (width, width - (not numbers[-1].strip()))
 
 
-def _are_units(cells: Sequence) -> bool:
+def _are_units(cells: Cells) -> bool:
     texts = [str(cell).strip() for cell in cells if cell is not None and str(cell).strip("-/ ")]
     units = [plain(text.strip("[](){}<> ")) for text in texts]
     return bool(texts) and all(unit in UNITS or unit == "in" for unit in units)

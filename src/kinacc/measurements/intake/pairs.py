@@ -14,7 +14,7 @@ from kinacc.config.measured import JointsFile, Written
 from kinacc.errors import InputError, Problem, gathered, refuse
 from kinacc.measurements.column_names import OTHER, WORDS, name_of
 from kinacc.measurements.files import EXCEL
-from kinacc.measurements.intake import clocks, columns, text
+from kinacc.measurements.intake import columns, text
 from kinacc.measurements.intake.choices import Choice, Undecided
 from kinacc.measurements.intake.groups import Group
 from kinacc.measurements.intake.text import Looked
@@ -29,7 +29,7 @@ from kinacc.measurements.joining import (
     rows_by_name,
 )
 from kinacc.measurements.layout import ANGLE, LENGTH
-from kinacc.measurements.times import seconds
+from kinacc.measurements.times import offsets, seconds, standstills
 
 _FEWEST_NAMES = 0.05  # of the rows: targets of a pose stand in rows of their own
 _SHARE = 0.5  # of the points: fewer in common are no key
@@ -44,9 +44,11 @@ def look(
     Undecided where a choice is open.
     """
     paths = [path] if isinstance(path, (str, Path)) else [*path]
-    sheets = _sheets(paths[0], answers) if len(paths) == 1 else []
+    sheets = _sheets(Path(paths[0]), answers) if len(paths) == 1 else []
     files = []
-    for name, sheet in [(paths[0], sheet) for sheet in sheets] or [(path, None) for path in paths]:
+    for name, sheet in zip(
+        2 * paths if sheets else paths, sheets or [""] * len(paths), strict=True
+    ):
         looked = text.look(name, {**answers, "sheet": sheet} if sheet else answers)
         take = [column for column in answers.get("take", ()) if column in looked.table.columns]
         turned, sigma = answers.get("orientation") != "none", answers.get("sigma", "")
@@ -55,13 +57,11 @@ def look(
     return files[0] if len(files) == 1 else _together(files, answers)
 
 
-def _sheets(path: str | Path, answers: Mapping) -> list[str]:
+def _sheets(path: Path, answers: Mapping[str, Any]) -> list[str]:
     """The sheets of a workbook that holds joints on one and points on another, else none."""
-    if Path(path).suffix.lower() in EXCEL and "sheet" not in answers and Path(path).is_file():
-        sheets = {
-            sheet: columns.recognise([*map(name_of, names)])
-            for sheet, names in text.names_of_sheets(Path(path)).items()
-        }
+    if path.suffix.lower() in EXCEL and "sheet" not in answers and path.is_file():
+        sheets = {sheet: columns.recognise([*map(name_of, names)])
+                  for sheet, names in text.names_of_sheets(path).items()}  # fmt: skip
         joints = [sheet for sheet, meaning in sheets.items() if meaning.joints]
         points = [sheet for sheet, meaning in sheets.items() if meaning.targets]
         if len(joints) == len(points) == 1 and joints != points:
@@ -80,30 +80,33 @@ def _together(files: Sequence[Looked], answers: Mapping[str, Any]) -> Looked:
         fix = "name the columns q1_deg .. and x_mm, y_mm, z_mm"
         raise InputError(Problem(paths, message, fix=fix))
     joints, points = holding[0], others[0]
-    how, note = _join(joints, points, answers)
+    how, notes = _join(joints, points, answers)
     names = {n.column: replace(n, column=beside_name(n.column, points.table))
              for n in columns.names_in(joints.table)}  # fmt: skip
-    read = {part: tuple(names[n.column] for n in getattr(joints.columns, part))
-            for part in ("joints", "commanded")}  # fmt: skip
-    used = {n.column for n in (*joints.columns.joints, *joints.columns.commanded)} | {how.key}
+    read = (*joints.columns.joints, *joints.columns.commanded)
+    used = {*(name.column for name in read), how.key}
     spare = [Group("", OTHER, "", {c: name}) for c, name in names.items() if c not in used]
     questions = [q for file in (joints, points) for q in file.columns.questions
                  if q.about.startswith(columns.ABOUT_JOINTS) == (file is joints)]  # fmt: skip
+    pose = {"pose": names[how.key]} if how.by == NAME and how.key else {}
     meaning = replace(
         points.columns,
-        **read,
-        single=points.columns.single | ({"pose": names[how.key]} if how.by == NAME else {}),
+        joints=tuple(names[name.column] for name in joints.columns.joints),
+        commanded=tuple(names[name.column] for name in joints.columns.commanded),
+        single=points.columns.single | pose,
         aside=(*points.columns.aside, *spare),
         questions=tuple(questions),
     )
     written = joints.written.model_dump(include={*Written.model_fields})
     section = {**how.model_dump(), **written, "path": joints.path}
-    notes = (*points.notes, *joints.notes, *note)
+    notes = (*points.notes, *joints.notes, *notes)
     table = joined(points.table, joints.table, how)
     return replace(points, table=table, columns=meaning, joints=section, notes=notes)
 
 
-def _join(joints: Looked, points: Looked, answers: Mapping) -> tuple[JointsFile, tuple[str, ...]]:
+def _join(
+    joints: Looked, points: Looked, answers: Mapping[str, Any]
+) -> tuple[JointsFile, tuple[str, ...]]:
     """How the rows belong together, as answered or as the files leave no doubt."""
     answer = answers.get("join")
     if answer == ORDER:
@@ -111,11 +114,11 @@ def _join(joints: Looked, points: Looked, answers: Mapping) -> tuple[JointsFile,
     if answer and answer != TIME:
         key, _, key_of_points = answer.partition("=")
         return _by_name(key, key_of_points or key), ()
-    if answer != TIME and (how := _by_names(joints, points)):
-        count = int(np.sum(rows_by_name(points.table, joints.table, how) >= 0))
-        note = f"joined where {how.key} of the joints is {how.key_of_points} of the points: "
+    if answer != TIME and (keys := _by_names(joints, points)):
+        count = int(np.sum(rows_by_name(points.table, joints.table, *keys) >= 0))
+        note = f"joined where {keys[0]} of the joints is {keys[1]} of the points: "
         note += f"{count} of {len(points.table)} points have joints"
-        return how, (note,)
+        return _by_name(*keys), (note,)
     times = _times(joints), _times(points)
     if all(times):
         return _by_clock(joints, points, *times, answers)
@@ -130,24 +133,23 @@ def _by_name(key: str, key_of_points: str) -> JointsFile:
     return JointsFile.model_construct(by="name", key=key, key_of_points=key_of_points)
 
 
-def _by_names(joints: Looked, points: Looked) -> JointsFile | None:
+def _by_names(joints: Looked, points: Looked) -> tuple[str, str] | None:
     """The columns whose names of poses are those of the other file. Asks where several differ."""
-    certain: list[tuple[int, JointsFile, bytes]] = []
-    counting: list[tuple[int, JointsFile, bytes]] = []
+    ways: list[tuple[int, tuple[str, str], bytes, bool]] = []
     as_many = len(joints.table) == len(points.table)
-    for key, key_of_points in product(_keys(joints), _keys(points)):
-        how = _by_name(key, key_of_points)
+    for keys in product(_keys(joints), _keys(points)):
         with gathered([]):
-            row = rows_by_name(points.table, joints.table, how)
+            row = rows_by_name(points.table, joints.table, *keys)
             count = int(np.sum(row >= 0))
             if count >= max(_SHARE * min(len(row), len(joints.table)), 2):
-                mere = _counts_rows(joints, key, as_many)
-                mere = mere and _counts_rows(points, key_of_points, as_many)
-                (counting if mere else certain).append((count, how, row.tobytes()))
-    ways = sorted(certain or counting, key=lambda way: -way[0])
+                counts = all(_counts_rows(file, key, as_many)
+                             for file, key in zip((joints, points), keys, strict=True))  # fmt: skip
+                ways.append((count, keys, row.tobytes(), counts))
     # A count of rows is no name: a point that was left out shifts all behind it.
-    if ways and (not certain or len({rows for *_, rows in ways}) > 1):
-        raise _undecided(joints, points, [how for _, how, _ in ways])
+    certain = [way for way in ways if not way[3]]
+    ways = sorted(certain or ways, key=lambda way: -way[0])
+    if ways and (not certain or len({rows for _, _, rows, _ in ways}) > 1):
+        raise _undecided(joints, points, [keys for _, keys, *_ in ways])
     return ways[0][1] if ways else None
 
 
@@ -181,39 +183,39 @@ def _times(file: Looked) -> str:
 
 
 def _by_clock(
-    joints: Looked, points: Looked, key: str, key_of_points: str, answers: Mapping
+    joints: Looked, points: Looked, key: str, key_of_points: str, answers: Mapping[str, Any]
 ) -> tuple[JointsFile, tuple[str, ...]]:
     problems: list[Problem] = []
     there = seconds(joints.table, key, problems)
     here = seconds(points.table, key_of_points, problems)
     refuse(problems, "the times are no key")
     good = np.isfinite(there)
-    stands, within = clocks.standstills(there[good], joint_values(joints.table)[good])
-    answer, note = answers.get("clock_offset"), ()
+    stands, within = standstills(there[good], joint_values(joints.table)[good])
+    answer, notes = answers.get("clock_offset"), list[str]()
     if answer is None:
-        ways = clocks.offsets(here, stands, within)
+        ways = offsets(here, stands, within)
         if len(ways) != 1:
             about = f"{'several' if ways else 'no'} offsets of the clocks put the points, by "
             about += f"{key_of_points}, at the standstills of the arm, by {key}"
             meant = {f"{way:.3f}": f"{way:.3f} s are added to times of points" for way in ways[:4]}
             meant = meant or {"0": "both clocks showed the same"}
             raise Undecided(points.table.path, [Choice("--clock-offset", about, meant)])
-        answer = ways[0]
-        note = (f"joined by time: {answer:g} s are added to {key_of_points} of "
-                f"{points.table.path}",)  # fmt: skip
+        answer, where = ways[0], points.table.path
+        notes.append(f"joined by time: {answer:g} s are added to {key_of_points} of {where}")
     try:
-        times = {"clock_offset_s": float(answer), "within_s": within}
+        offset_s = float(answer)
     except ValueError:
         raise InputError(Problem("--clock-offset", repr(answer), "seconds")) from None
-    keys = {"key": key, "key_of_points": key_of_points}
-    return JointsFile.model_construct(by="time", **keys, **times), note
+    how = JointsFile.model_construct(
+        by="time", key=key, key_of_points=key_of_points, clock_offset_s=offset_s, within_s=within
+    )
+    return how, tuple(notes)
 
 
-def _undecided(joints: Looked, points: Looked, ways: Sequence[JointsFile]) -> Undecided:
+def _undecided(joints: Looked, points: Looked, ways: Sequence[tuple[str, str]]) -> Undecided:
     """The question which rows belong together; the order is an answer where there are as many."""
     count, others = len(points.table), len(joints.table)
-    answers = {f"{how.key}={how.key_of_points}": f"{how.key} of the joints is {how.key_of_points}"
-               for how in ways}  # fmt: skip
+    answers = {f"{key}={other}": f"{key} of the joints is {other}" for key, other in ways}
     if count == others:
         answers[ORDER] = "the first row belongs to the first, and so on"
     about = f"nothing decides which of {others} rows of joints belong to {count} points"

@@ -12,7 +12,7 @@ from kinacc.errors import InputError, Problem
 from kinacc.measurements.column_names import WORDS, name_of
 from kinacc.measurements.intake.columns import NamedColumns
 from kinacc.measurements.intake.groups import RADIUS, keeps_distance
-from kinacc.measurements.reader import AGAIN
+from kinacc.measurements.joining import AGAIN
 from kinacc.measurements.table import RawTable
 
 _APART_MM = 5.0  # readings of one target of a pose lie nearer to one another
@@ -39,7 +39,7 @@ def with_targets(
     if np.max(_spans(q_rad, pose), initial=0.0) > _STILL_RAD:
         pose = np.full(len(pose), -1)
     target = columns.single.get("target")
-    radius = next((g.names[0] for g in columns.aside if g.kind == RADIUS), None)
+    radius = next((g.names[0] for g in columns.aside if g.kind == RADIUS), "")
     size = np.nan_to_num(table.values(radius)) if radius else np.zeros(len(table))
     if np.ptp(size) > _SAME_RADIUS * np.max(size):
         # A reflector of another radius has its centre elsewhere in the same nest.
@@ -54,7 +54,7 @@ def with_targets(
         return columns if target else _with_target(columns, radius)
     if target or not _are_apart(point_mm, pose):
         return columns
-    ways: dict[tuple, str] = {}
+    ways: dict[tuple[int, ...], str] = {}
     for column in (name for name in table.columns if name not in columns.read()):
         labels = np.array(table.texts(column), dtype=object)
         if _names_targets(labels, point_mm, pose):

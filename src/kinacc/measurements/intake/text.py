@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import codecs
 import re
-from collections import Counter
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from io import StringIO
 from pathlib import Path
@@ -22,16 +22,16 @@ from kinacc.measurements.files import (
     BLANKS,
     EXCEL,
     GROUPS,
-    PARQUET,
     POINT,
     Workbook,
+    as_it_is,
     load,
     opened,
     refuse_large,
     refuse_other_files,
     rows_of_lines,
 )
-from kinacc.measurements.grid import Row, filled
+from kinacc.measurements.grid import Cells, Row, filled
 from kinacc.measurements.intake import decimals, heads
 from kinacc.measurements.intake.choices import Choice, Undecided
 from kinacc.measurements.intake.columns import NamedColumns, names_in
@@ -45,6 +45,7 @@ _LINES, _CHARACTERS = 400, 1_000_000  # looked at
 _NEAR = 0.6  # of the most numbers: so many there are if names are parted by the right mark
 _SEP = re.compile(r'"?sep=(.|\\t)"?\s*', re.IGNORECASE)
 _FEWEST_ROWS, _FEWEST_COLUMNS = 3, 4  # of a sheet that may be meant
+_Written = tuple[Layout, Head, list[Row], list[str]]  # with the first rows, and notes
 
 
 @dataclass(frozen=True)
@@ -74,12 +75,10 @@ def look(path: str | Path, answers: Mapping[str, Any] | None = None) -> Looked:
     """
     path, answers = Path(path), answers or {}
     refuse_other_files(path)
-    kind = path.suffix.lower()
-    if kind in PARQUET:
-        return Looked(str(path), Layout(), load(path))
-    if kind not in EXCEL and (program := robot_programs.read(path)) is not None:
-        return Looked(str(path), Layout(), program)
-    written, head, rows, notes = (_workbook if kind in EXCEL else _text)(path, answers)
+    if (table := as_it_is(path)) is not None:
+        return Looked(str(path), Layout(), table)
+    is_workbook = path.suffix.lower() in EXCEL
+    written, head, rows, notes = (_workbook if is_workbook else _text)(path, answers)
     first_line = head.line or rows[head.first][0]
     above = [
         " ".join(str(cell) for cell in cells if cell is not None)
@@ -89,8 +88,7 @@ def look(path: str | Path, answers: Mapping[str, Any] | None = None) -> Looked:
     stated = heads.stated_above(above)
     written = written.but(**_names_of(path, head, rows, stated, answers))
     table = load(path, written)
-    blanks = written.delimiter == BLANKS
-    decimal, thousands, choice = decimals.marks_of(table.columns, answers, blanks)
+    decimal, thousands, choice = decimals.marks_of(table.columns, answers, written.delimiter)
     if choice:
         raise Undecided(str(path), [choice])
     written = written.but(decimal=decimal, thousands=thousands)
@@ -116,15 +114,14 @@ def look(path: str | Path, answers: Mapping[str, Any] | None = None) -> Looked:
     return Looked(str(path), written, table, tuple(notes), assumed, stated)
 
 
-def _text(path: Path, answers: Mapping) -> tuple[Layout, Head, list[Row], list[str]]:
+def _text(path: Path, answers: Mapping[str, Any]) -> _Written:
     refuse_large(path)
     encoding = answers.get("encoding") or encoding_of(path)
     with opened(path, encoding) as stream:
         text = stream.read(_CHARACTERS).removeprefix("\ufeff")
     lines = list(StringIO(text, newline=""))
-    if len(text) == _CHARACTERS:
-        lines = lines[:-1] or lines  # the last one may have been cut
-    lines = lines[:_LINES]
+    is_cut = len(text) == _CHARACTERS and len(lines) > 1
+    lines = lines[: len(lines) - is_cut][:_LINES]
     separator = _SEP.fullmatch(lines[0]) if lines else None
     stated = separator[1].replace("\\t", "\t") if separator else ""
     marks = (stated,) if stated in DELIMITERS else DELIMITERS
@@ -134,61 +131,37 @@ def _text(path: Path, answers: Mapping) -> tuple[Layout, Head, list[Row], list[s
     if len(split) > 1 and 2 * sum(any(c[-1] in ",;" for c in row[:-1]) for row in rows) > len(rows):
         del split[BLANKS]
     # Most cells are numbers where the right delimiter parts them, and the names fit to them.
-    scores = {}
-    for delimiter, rows in split.items():
-        counts = Counter[int]()  # cells that are numbers, by the width of the row
-        for _, cells in rows:
-            count = heads.numbers_in(cells)
-            counts[len(cells)] += count if count > 1 else 0
-        scores[delimiter] = max(((n, width) for width, n in counts.items()), default=(0, 0))
-    near = _NEAR * max(numbers for numbers, _ in scores.values())
-    tops = {d: heads.head_of(split[d], d) for d, (numbers, _) in scores.items() if numbers > near}
-
-    def rank(delimiter: str) -> tuple:
-        top = tops.get(delimiter)
-        named = top is not None and top.line > 0
-        return named, *scores[delimiter], -DELIMITERS.index(delimiter)
-
-    best = max(split, key=rank)
-    head = tops.get(best)
-    if head is None or head.width < 2:
+    scores = {delimiter: heads.most_numbers(rows) for delimiter, rows in split.items()}
+    near = _NEAR * max(scores.values())[0]
+    tops = {d: head for d, (count, _) in scores.items() if count > near
+            and (head := heads.head_of(split[d], d)) is not None and head.width > 1}  # fmt: skip
+    if not tops:
         message = "no line of column names above rows of numbers was found"
         raise InputError(Problem(str(path), message, "columns parted by ; , tab or blanks"))
+    best = max(tops, key=lambda d: (tops[d].line > 0, scores[d], -DELIMITERS.index(d)))
     notes = [f"read as {encoding}"] if encoding != "utf-8" else []
-    return Layout().but(delimiter=best, encoding=encoding), head, split[best], notes
+    return Layout().but(delimiter=best, encoding=encoding), tops[best], split[best], notes
 
 
 def encoding_of(path: Path) -> str:
     """The characters of a text file: by what decodes, then by what makes sense."""
-    with open(path, "rb") as file:
-        head = file.read(4096)
-        for bom, name in ((codecs.BOM_UTF16_LE, "utf-16-le"), (codecs.BOM_UTF16_BE, "utf-16-be")):
-            if head.startswith(bom):
-                return name
-        file.seek(0)
-        is_utf_8, sample = True, b""
-        for line in file:
-            if not line.isascii():
-                sample += line[:1000] if len(sample) < 200_000 else b""
-                is_utf_8 = is_utf_8 and _decodes(line, "utf-8")
-    if is_utf_8:
-        return "utf-8"
+    content = path.read_bytes()
+    for bom, name in ((codecs.BOM_UTF16_LE, "utf-16-le"), (codecs.BOM_UTF16_BE, "utf-16-be")):
+        if content.startswith(bom):
+            return name
+    decodes = []
+    for name in ("utf-8", "cp932"):
+        with suppress(UnicodeDecodeError):
+            content.decode(name)
+            decodes.append(name)
     # Japanese where the bytes are pairs that begin as its usual characters do, else Western.
-    leads = [pair[0] for pair in re.findall(rb"[\x81-\x9f\xe0-\xfc].", sample)]
-    usual = 2 * sum(lead < 0xA0 for lead in leads) >= max(len(leads), 1)
-    return "cp932" if usual and _decodes(sample, "cp932") else "latin-1"
+    leads = re.findall(rb"([\x81-\x9f\xe0-\xfc]).", content)
+    if "utf-8" not in decodes and 2 * sum(lead < b"\xa0" for lead in leads) < max(len(leads), 1):
+        return "latin-1"
+    return next(iter(decodes), "latin-1")
 
 
-def _decodes(text: bytes, encoding: str) -> bool:
-    """Whether all but the last bytes, which may be cut off, are characters of an encoding."""
-    try:
-        text.decode(encoding)
-    except UnicodeDecodeError as error:
-        return encoding == "cp932" and error.start >= len(text) - 2
-    return True
-
-
-def _workbook(path: Path, answers: Mapping) -> tuple[Layout, Head, list[Row], list[str]]:
+def _workbook(path: Path, answers: Mapping[str, Any]) -> _Written:
     sheets, tables = _tables_of(path, answers.get("sheet"))
     if not tables:
         message = "no sheet has rows of numbers under names"
@@ -239,10 +212,15 @@ def _tables_of(
 
 
 def _names_of(
-    path: Path, head: Head, rows: Sequence[Row], stated: Mapping[str, str], answers: Mapping
+    path: Path,
+    head: Head,
+    rows: Sequence[Row],
+    stated: Mapping[str, str],
+    answers: Mapping[str, Any],
 ) -> dict[str, Any]:
     """The lines around the names; or the names, where the file has no line of them."""
     cells = [cells for _, cells in rows[head.first :] if len(cells) == head.width]
+    names: Sequence[str] | None
     if answer := answers.get("names"):
         names = [name.strip() for name in answer.split(",")]
         if len(names) != head.width:
@@ -265,7 +243,7 @@ def _names_of(
     raise InputError(Problem(str(path), "the columns have no names", "one line of names", fix))
 
 
-def _point_names(rows: Sequence[Sequence], stated: Mapping[str, str]) -> list[str]:
+def _point_names(rows: Sequence[Cells], stated: Mapping[str, str]) -> list[str]:
     """Names of a list of points without any: collection, group, point, x, y, z."""
     columns = list(zip(*rows, strict=True))
     texts = [not any(map(heads.is_number, column)) for column in columns]
@@ -280,7 +258,7 @@ def _point_names(rows: Sequence[Sequence], stated: Mapping[str, str]) -> list[st
 
 
 def _directions(
-    table: RawTable, readings: Sequence[Reading], stated: str, answers: Mapping
+    table: RawTable, readings: Sequence[Reading], stated: str, answers: Mapping[str, Any]
 ) -> Directions:
     """How the angles of spherical readings are counted; ``stated``: their unit, above the rows.
 
