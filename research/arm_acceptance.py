@@ -11,8 +11,7 @@ from collections.abc import Mapping
 
 from kinacc.config.error_models import ALWAYS
 from kinacc.study import in_memory
-from kinacc.study.claims.claim import Claim
-from kinacc.study.claims.numbers import number_claims
+from kinacc.study.claims.claim import Claim, number_claims
 
 # Numbers may differ in the last digits between machines: accepted arms keep off the edge.
 SHARE_OF_TOLERANCE = 0.97

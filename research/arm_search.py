@@ -13,7 +13,7 @@ from kinacc.calibration.vec_estimator import VECEstimator
 from kinacc.kinematics import robot, vec
 from kinacc.kinematics.robot import Robot
 from kinacc.study import in_memory
-from kinacc.study.claims.numbers import number_claims
+from kinacc.study.claims.claim import number_claims
 from kinacc.synthetic import columns
 from kinacc.synthetic.accepted import GEOMETRY, AcceptedDraw, geometry_columns
 from kinacc.synthetic.draw import TABLE_II, Scales

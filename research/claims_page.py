@@ -8,8 +8,8 @@ import numpy as np
 import pandas as pd
 
 from kinacc.config.schema import defaults
+from kinacc.study.claims.claim import number_claims
 from kinacc.study.claims.evaluate import all_claims
-from kinacc.study.claims.numbers import TRUE_ACCURACY_MM
 from kinacc.study.claims.study_sentences import study_claims
 from research import reasons
 from research.dotted import value_at
@@ -122,6 +122,7 @@ def _beside_noise(choices: pd.DataFrame, factors: pd.DataFrame) -> str:
     """How the sentences on Fig. 4 fare where the largest true error is small, and large."""
     agrees, values = reasons.table_of(choices, factors, ALL_AND_ARM)
     middle = values["largest_mm"].median()
+    paper_mm = next(claim.paper for claim in number_claims() if claim.id == "true_accuracy")
     held = agrees[[claim.id for claim in study_claims()]]
     small, large = (
         np.nanmean(held[side].to_numpy())
@@ -129,7 +130,7 @@ def _beside_noise(choices: pd.DataFrame, factors: pd.DataFrame) -> str:
     )
     return (
         "Varying all choices also makes the largest true error larger: in half of the runs it is "
-        f"above {middle:.2f} mm, where the paper has {TRUE_ACCURACY_MM} mm beside noise of 0.05 to "
+        f"above {middle:.2f} mm, where the paper has {paper_mm} mm beside noise of 0.05 to "
         f"0.3 mm. The sentences on Fig. 4 hold on average in {small:.0%} of the runs below that "
         f"and in {large:.0%} of those above: they are about noise that counts beside the error."
     )

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import dataclasses
 import zlib
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
@@ -19,12 +19,11 @@ import numpy as np
 import pandas as pd
 
 from kinacc.assess.adaptive import Campaign, Candidates
-from kinacc.assess.attainable import NONE, WidthLimits, limits_of, points_bounded
-from kinacc.assess.random_numbers import key_of
+from kinacc.assess.attainable import NONE, limits_of
 from kinacc.assess.registry import ADAPTIVE, ASSESSORS, RECOMMENDED
 from kinacc.assess.simulate import assess_world, carry_on, truth_mm
 from kinacc.assess.statement import CANDIDATES, REGION, Reason, Statement
-from kinacc.assess.world import World, drawn_world
+from kinacc.assess.world import World, drawn_world, key_of
 from kinacc.config.records import of_section
 from kinacc.study.fields import FAMILIES, ErrorField, of_measurements, of_points, synthetic
 from kinacc.tables import store
@@ -267,17 +266,17 @@ def campaigns(job: Job, repetitions: Iterable[int], contest: Contest) -> pd.Data
             "repetition": repetition,
         }
         world = world_of(cell, repetition, job.budget, contest.seed)
-        near = _limits_in(world, job.budget)
+        size_mm = np.linalg.norm(world.error_mm, axis=1)
         for name in contest.assessors:
             own = {**place, "assessor": name}
             found = assessed(name, settings, world, job.world)
             graded = _graded(found, world, cell.field, job)
-            if repetition < LIMITED:
-                limits = [near(each, found.visited) for each in found.statements]
-            else:
-                limits = [NONE] * len(graded)
-            for each, (attainable_mm, proven_mm, _) in zip(graded, limits, strict=True):
-                each |= {"attainable_mm": attainable_mm, "proven_mm": proven_mm}
+            for each, said in zip(graded, found.statements, strict=True):
+                limits = NONE
+                if repetition < LIMITED:
+                    visited = found.visited or ()
+                    limits = limits_of(said, visited, size_mm, world.sigma_mm, job.budget)
+                each |= {"attainable_mm": limits.attainable_mm, "proven_mm": limits.proven_mm}
                 rows.append({**own, **each})
     return pd.DataFrame(rows)
 
@@ -316,24 +315,6 @@ def _graded(found: Assessed, world: World, field: ErrorField, job: Job) -> list[
         }
         for each in found.statements
     ]
-
-
-def _limits_in(world: World, budget: int) -> Callable[[Statement, list[int] | None], WidthLimits]:
-    """What bounds could be like in a world, by statement and rows visited; NaN without a bound.
-
-    Computed once for statements on the same points.
-    """
-    size = np.linalg.norm(world.error_mm, axis=1)
-    known: dict[tuple, WidthLimits] = {}
-
-    def near(said: Statement, visited: list[int] | None) -> WidthLimits:
-        rows = points_bounded(said, visited or (), size.size)
-        key = rows.tobytes(), said.confidence
-        if key not in known:
-            known[key] = limits_of(said, visited or (), size, world.sigma_mm, budget)
-        return known[key]
-
-    return near
 
 
 def _truth(

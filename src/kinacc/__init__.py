@@ -12,7 +12,7 @@ _ELSEWHERE = {
     "read_table": "kinacc.tables.store",
     "plan_poses": "kinacc.deployment.planning",
     "Campaign": "kinacc.campaign.campaign",
-    "evaluate_assessors": "kinacc.study.evaluate_assessors",
+    "evaluate_assessors": "kinacc.study.monte_carlo",
     "register_error_model": "kinacc.calibration.own_model",
 }
 __all__ = [
@@ -48,7 +48,7 @@ if TYPE_CHECKING:
     from kinacc.deployment.planning import plan_poses
     from kinacc.geometry import Pose
     from kinacc.kinematics.robot import Robot
-    from kinacc.study.evaluate_assessors import evaluate_assessors
+    from kinacc.study.monte_carlo import evaluate_assessors
     from kinacc.tables.store import read_table
 
 

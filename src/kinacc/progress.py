@@ -48,6 +48,9 @@ class Progress:
         return f"{self.label}: {', '.join(filter(None, [self.state, elapsed]))}"
 
 
+SILENT = Progress("")  # counts and shows nothing
+
+
 @contextmanager
 def reporting(label: str, bar: bool = False) -> Iterator[Progress]:
     """A Progress whose line is printed while the block runs longer than two seconds."""

@@ -10,19 +10,27 @@ import pytest
 from scipy.stats import gamma
 
 from kinacc.assess.adaptive import Candidates, Ledger
-from kinacc.assess.conformity import ACCEPT, REJECT, UNDECIDED, decide
 from kinacc.assess.gamma_quantile import GammaQuantile
-from kinacc.assess.invalidation_calibrated import InvalidationCalibrated
-from kinacc.assess.invalidation_full import ModelInvalidationFull
+from kinacc.assess.invalidation_adaptive import InvalidationCalibrated, ModelInvalidationFull
 from kinacc.assess.model_invalidation import mahalanobis_excess, point_probability
-from kinacc.assess.random_numbers import key_of
 from kinacc.assess.region_share import RegionShare
 from kinacc.assess.registry import ADAPTIVE
 from kinacc.assess.search_and_confirm import SearchAndConfirm
 from kinacc.assess.simulate import conduct
 from kinacc.assess.single_shot import SingleShot
-from kinacc.assess.statement import CANDIDATES, MEASURED, REGION, TARGETS, Reason, Statement
-from kinacc.assess.world import drawn_world
+from kinacc.assess.statement import (
+    ACCEPT,
+    CANDIDATES,
+    MEASURED,
+    REGION,
+    REJECT,
+    TARGETS,
+    UNDECIDED,
+    Reason,
+    Statement,
+    decide,
+)
+from kinacc.assess.world import drawn_world, key_of
 from kinacc.errors import InputError
 
 BOUNDING = [SingleShot, InvalidationCalibrated, SearchAndConfirm]

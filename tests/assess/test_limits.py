@@ -11,7 +11,6 @@ from scipy.optimize import minimize
 from scipy.special import chndtr, ndtri
 from scipy.stats import chi2, ncx2
 
-from kinacc.assess.counts import excepted
 from kinacc.assess.limits import (
     BallDistances,
     largest_size,
@@ -20,6 +19,7 @@ from kinacc.assess.limits import (
     upper_limit_mm,
     visit_mm,
 )
+from kinacc.assess.population import excepted
 
 
 @pytest.mark.parametrize("a", [0.0, 1e-5, 1e-3, 0.1, 1.0, 4.0, 30.0])

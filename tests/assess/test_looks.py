@@ -7,8 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from kinacc.assess.looks import LowerAverage, boundary, look_counts
-from kinacc.assess.wrong_readings import clip_of
+from kinacc.assess.limits import LowerAverage, boundary, clip_of, look_counts
 
 ERROR, WALKS = 0.05, 200_000
 CLOSE = 4.0 * np.sqrt(ERROR * (1.0 - ERROR) / WALKS)  # four standard deviations of a share
@@ -107,7 +106,7 @@ def lower_bounds(wanted, campaigns, rng, factor=1.0):
         average, sigma, noise = LowerAverage(wanted, ERROR), 1.0, rng.normal(size=wanted)
         for number in range(wanted):
             along = 1.0 + sigma * noise.item(number)
-            average.record(number % 7, [0.0, 0.6, 0.8], [9.0, 0.6 * along, 0.8 * along], sigma)
+            average.record(number % 7, along, sigma)
             sigma = 0.3 if along > 1.0 else 2.0
         found[campaign] = average.bound_mm(np.full(7, factor))
     return found

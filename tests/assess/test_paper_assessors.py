@@ -14,11 +14,9 @@ from measured_worlds import measured_world
 from oracles import assessors as oracle
 from oracles.worlds import philox_words
 
-from kinacc.assess import random_numbers
-from kinacc.assess.invalidation_kernels import chi2_3
+from kinacc.assess.invalidation_kernels import chi2_3, philox
 from kinacc.assess.model_invalidation import ModelInvalidation, point_probability
-from kinacc.assess.random_numbers import key_of
-from kinacc.assess.world import drawn_world
+from kinacc.assess.world import drawn_world, key_of
 from kinacc.study import monte_carlo
 
 PAPER = monte_carlo.ASSESSORS
@@ -192,7 +190,5 @@ def test_scans_of_any_world_equal_every_single_run(
 
 @given(key0=words, key1=words, visit=st.integers(0, 1000), point=st.integers(0, 10**6))
 def test_words_are_those_of_numpy_philox(key0, key1, visit, point):
-    mine = random_numbers.philox(
-        np.uint64(key0), np.uint64(key1), np.uint64(visit), np.uint64(point)
-    )
+    mine = philox(np.uint64(key0), np.uint64(key1), np.uint64(visit), np.uint64(point))
     assert [int(x) for x in mine] == philox_words([key0, key1], visit, point)

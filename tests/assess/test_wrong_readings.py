@@ -11,13 +11,13 @@ from scipy.optimize import brentq, minimize
 from scipy.stats import norm
 
 from kinacc.assess.adaptive import Candidates
-from kinacc.assess.looks import boundary
-from kinacc.assess.search_and_confirm import SearchAndConfirm
-from kinacc.assess.wrong_readings import (
+from kinacc.assess.limits import (
+    boundary,
     clip_of,
     guarded_lower_mm,
     guarded_upper_mm,
 )
+from kinacc.assess.search_and_confirm import SearchAndConfirm
 
 POINTS, BUDGET, LARGEST = 60, 120, 6.0
 RATE = 0.02

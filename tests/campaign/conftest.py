@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from command_line import call, small_study
 
-from kinacc.assess.random_numbers import key_of
-from kinacc.assess.world import drawn_world
+from kinacc.assess.world import drawn_world, key_of
 from kinacc.campaign import begin
 from kinacc.campaign.instrument import instruments
 from kinacc.campaign.plan import Limits, Plan, assessor_of

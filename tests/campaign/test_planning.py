@@ -11,12 +11,11 @@ import pytest
 from command_line import call
 
 from kinacc.assess.attainable import width_limits
-from kinacc.assess.random_numbers import key_of
 from kinacc.assess.search_and_confirm import SearchAndConfirm
 from kinacc.assess.simulate import conduct
 from kinacc.assess.single_shot import SingleShot
 from kinacc.assess.statement import MEASURED
-from kinacc.assess.world import drawn_world
+from kinacc.assess.world import drawn_world, key_of
 from kinacc.campaign import planning
 from kinacc.campaign.planning import Aim, plan_budget, simulate, smallest_budget
 from kinacc.errors import InputError

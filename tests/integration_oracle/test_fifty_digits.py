@@ -19,7 +19,7 @@ from oracles import fifty_tables as ft
 from oracles import kinematics, small_study, tables
 
 from kinacc import distributions
-from kinacc.assess import counts, limits
+from kinacc.assess import limits, population
 from kinacc.kinematics.dh import DHModel
 from kinacc.kinematics.model import JointState
 from kinacc.kinematics.vec import VECModel
@@ -376,7 +376,7 @@ def test_limits_on_a_size_from_one_averaged_reading():
 def test_limits_on_a_probability_from_counts():
     found = []
     for hits, trials in ((3, 40), (17, 20), (1, 9)):
-        low, high = counts.binomial_interval(hits, trials)
+        low, high = population.binomial_interval(hits, trials)
         expected = [
             ft.binomial_end(hits, trials, 0.5 * (1.0 - 0.95), low),
             ft.binomial_end(hits + 1, trials, 1.0 - 0.5 * (1.0 - 0.95), high),

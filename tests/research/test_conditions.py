@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import kurtosis
 
-from kinacc.assess.random_numbers import key_of
-from kinacc.assess.world import drawn_world
+from kinacc.assess.world import drawn_world, key_of
 from research.conditions import CONDITIONS, Course
 
 SIGMA = 0.2

@@ -14,7 +14,7 @@ from kinacc.assess.single_shot import SingleShot
 from kinacc.assess.statement import Statement
 from kinacc.errors import InputError
 from kinacc.study import monte_carlo
-from kinacc.study.evaluate_assessors import assess_worlds, evaluate_assessors
+from kinacc.study.monte_carlo import evaluate_assessors
 
 ERRORS = np.random.default_rng(11).normal(size=(40, 3)) * 0.3
 TRUE = float(np.linalg.norm(ERRORS, axis=1).max())
@@ -58,7 +58,7 @@ def test_a_maximum_of_ones_own_gives_the_rows_of_the_study():
     section = paper.study(measurements=40)
     visits = monte_carlo.Visits(40, section["visiting_order"])
     study = monte_carlo.simulate(ERRORS, [0.1, 0.3], range(5), visits, 3, [Maximum(40)])
-    own = assess_worlds(ERRORS, [LargestReading()], [0.1, 0.3], 40, 5, 3)
+    own = monte_carlo.simulate(ERRORS, [0.1, 0.3], range(5), visits, 3, [LargestReading()])
     for name in ("noise_mm", "repetition", "measurements", "points_visited"):
         assert own[name].tolist() == study[name].tolist()
     assert own["assessed_mm"].to_numpy() == pytest.approx(study["assessed_mm"], rel=1e-12)

@@ -21,6 +21,7 @@ def test_measured_fields_average_the_readings_of_a_pose_and_leave_out_what_was_f
         "comparison": np.array(["dh_vs_measured"] * 4 + ["vec_vs_measured"], object),
         "estimate": np.array(["cross_validated"] * 3 + ["train"] * 2, object),
         "pose": np.array([7, 7, 8, 9, 9]),
+        "row": np.array([2, 3, 1, 0, 0]),
         "target": np.array(["tool"] * 5, object),
         "ex_mm": np.array([1.0, 3.0, 5.0, 50.0, 50.0]),
         "ey_mm": np.zeros(5),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import paper_settings as paper
 import pytest
 
@@ -39,24 +40,22 @@ def configured(**study) -> dict:
     return {"seed": 3, "study": SECTION | study}
 
 
-def simulated(error, noise_mm, repetitions, seed, progress=None, **changes) -> dict:
-    section = SECTION | changes
-    visits = of_section(StudySettings, section)
-    return simulate(error, noise_mm, repetitions, visits, seed, assessors(section), progress)
+def simulated(error, noise_mm, repetitions, seed) -> pd.DataFrame:
+    return monte_carlo.ordered(
+        simulate(error, noise_mm, repetitions, SMALL, seed, assessors(SECTION))
+    ).drop(columns="bounded_mm")
 
 
-def equal(one: dict, other: dict) -> bool:
-    assert list(one) == list(other)
-    return all(
-        one[name].tobytes() == other[name].tobytes()
-        if one[name].dtype != object
-        else one[name].tolist() == other[name].tolist()
-        for name in one
+def equal(one, other) -> bool:
+    return (
+        pd.DataFrame(dict(one))
+        .reset_index(drop=True)
+        .equals(pd.DataFrame(dict(other)).reset_index(drop=True))
     )
 
 
 @pytest.fixture(scope="module")
-def rows() -> dict:
+def rows() -> pd.DataFrame:
     return simulated(ERROR, SMALL.noise_mm, range(4), 3)
 
 
@@ -71,15 +70,14 @@ def test_parts_joined_in_any_order_give_the_same_bytes(rows):
         joined = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
         inputs = {"assessment_points": POINTS, "study_chunk": joined}
         made = monte_carlo.summed_up(inputs, configured())
-        assert equal(made["study"], default_reading(rows, SECTION))
+        assert equal(made["study"], monte_carlo._columns("study", default_reading(rows, SECTION)))
         assert equal(made["study_summary"], summary(default_reading(rows, SECTION), TRUE))
         assert equal(made["readings"], readings(rows, TRUE))
 
 
 def test_a_simulation_does_not_know_its_neighbours(rows):
     alone = simulated(ERROR, [0.3], [2], 3)
-    mine = (rows["noise_mm"] == 0.3) & (rows["repetition"] == 2)
-    assert equal(alone, {name: column[mine] for name, column in rows.items()})
+    assert equal(alone, rows[(rows["noise_mm"] == 0.3) & (rows["repetition"] == 2)])
     other = simulated(ERROR, [0.3], [2], 4)
     assert not np.array_equal(other["assessed_mm"], alone["assessed_mm"])
 

@@ -16,8 +16,9 @@ from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar, Protocol
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from kinacc.assess.limits import lower_limit_mm, upper_limit_mm
+from kinacc.assess.limits import Noise, lower_limit_mm, upper_limit_mm
 from kinacc.assess.statement import CANDIDATES, Reason, Statement, Suspicious
 from kinacc.errors import Problem, refuse
 
@@ -106,26 +107,27 @@ class Ledger:
         """Number of readings."""
         return len(self.readings)
 
-    def record(self, point: int, reading_mm, covariance_mm2=None) -> None:
+    def record(
+        self, point: int, reading_mm: ArrayLike, covariance_mm2: ArrayLike | None = None
+    ) -> None:
         """Take one reading, or raise InputError and take nothing."""
-        points, reading = self.candidates.points, np.asarray(reading_mm, dtype=float)
-        problems = []
+        points, reading, problems = self.candidates.points, np.asarray(reading_mm, dtype=float), []
+        covariance = None if covariance_mm2 is None else np.array(covariance_mm2, dtype=float)
         if not 0 <= point < points:
             problems.append(Problem("point", f"{point}", f"0 to {points - 1}"))
         if reading.shape != (3,) or not np.all(np.isfinite(reading)):
             problems.append(Problem("reading", f"{reading.tolist()}", "three numbers, in mm"))
-        if covariance_mm2 is not None:
-            covariance_mm2 = np.array(covariance_mm2, dtype=float)
-            problems += _check_covariances(covariance_mm2[None], "covariance")
+        if covariance is not None:
+            problems += _check_covariances(covariance[None], "covariance")
         refuse(problems, "this reading cannot be recorded")
         if not self.count[point]:
             self.visited.append(point)
-        inverse = self.candidates.inverses[point]
-        if covariance_mm2 is not None:
-            self._unplanned.add(point)
-            inverse = np.linalg.inv(covariance_mm2)
         self.count[point] += 1
-        self.readings.append((point, reading.tolist(), covariance_mm2))
+        self.readings.append((point, reading.tolist(), covariance))
+        inverse = self.candidates.inverses[point]
+        if covariance is not None:
+            self._unplanned.add(point)
+            inverse = np.linalg.inv(covariance)
         self._weight[point] += inverse
         self._weighted[point] += inverse @ reading
         spread = np.linalg.inv(self._weight[point])
@@ -133,7 +135,7 @@ class Ledger:
         self.mean_mm[point] = spread @ self._weighted[point]
         self.noise_mm[point] = math.sqrt(spread.trace() / 3.0)
 
-    def noise(self, point: int) -> float | np.ndarray:
+    def noise(self, point: int) -> Noise:
         """Noise of a point's mean: standard deviation per axis (mm), or covariance (3, 3)."""
         spread, noise = self.spread_mm2[point], self.noise_mm.item(point)
         uneven = np.abs(spread - noise**2 * np.eye(3)).max() > _SYMMETRY * noise**2
@@ -146,9 +148,7 @@ class Ledger:
     def covariances(self, places: Iterable[int]) -> np.ndarray:
         """Covariances (n, 3, 3) of the readings at these places (0 = first)."""
         read, planned = [self.readings[place] for place in places], self.candidates.covariance_mm2
-        spreads = [
-            planned[row] if covariance is None else covariance for row, _, covariance in read
-        ]
+        spreads = [planned[row] if own is None else own for row, _, own in read]
         return np.array(spreads).reshape(-1, 3, 3)
 
     def readings_of(self, point: int, number: int) -> tuple[np.ndarray, np.ndarray]:
@@ -201,7 +201,9 @@ class Campaign:
         """Rows in the order in which they are read whatever is read, until readings decide."""
         return tuple(range(self.first))
 
-    def record(self, point: int, reading_mm, covariance_mm2=None) -> None:
+    def record(
+        self, point: int, reading_mm: ArrayLike, covariance_mm2: ArrayLike | None = None
+    ) -> None:
         """Take a reading (3,) at a row: measured minus modelled position, robot base frame.
 
         covariance_mm2: (3, 3) of this reading where it is not the planned one. InputError, and
@@ -290,9 +292,9 @@ def covariance_faults(covariance_mm2: np.ndarray) -> list[tuple[int, str]]:
     scale = np.abs(safe).max(axis=(1, 2))
     skewed = np.abs(safe - np.swapaxes(safe, 1, 2)).max(axis=(1, 2)) > _SYMMETRY * scale
     flat = np.linalg.eigvalsh(safe)[:, 0] <= 1e-14 * scale
-    faults = {"not finite": ~finite, "not symmetric": skewed, "not positive definite": flat}
-    pairs = [(int(row), text) for text, bad in faults.items() for row in np.flatnonzero(bad)]
-    return sorted(dict(reversed(pairs)).items())
+    names = ["not finite", "not symmetric", "not positive definite"]
+    faults = np.select([~finite, skewed, flat], names, "")
+    return [(int(row), str(faults[row])) for row in np.flatnonzero(faults != "")]
 
 
 def _check_covariances(covariance_mm2: np.ndarray, name: str) -> list[Problem]:

@@ -14,11 +14,13 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
+from scipy.optimize import brentq
+from scipy.special import chndtrix, ndtr, ndtri, rel_entr
 
 from kinacc.assess.limits import reading_below
 from kinacc.assess.statement import MEAN, MEASURED, REGION, Statement
 
-_NODES = 96  # of a quadrature, densest at its beginning
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(96)  # of a quadrature, dense at its beginning
 _BEYOND = 6.0  # standard deviations behind which nothing is left of an integrand
 _TABLE_TO = 30.0  # standard deviations of size up to which quantiles of lengths are tabulated
 # Of noise over distance from a level: 2 evens quantiles out, 2/3 ties of unequal noise.
@@ -37,19 +39,6 @@ class WidthLimits(NamedTuple):
 NONE = WidthLimits(math.nan, math.nan, math.nan)
 
 
-def points_bounded(statement: Statement, visited: Sequence[int], candidates: int) -> np.ndarray:
-    """Rows of the points whose largest mean error a statement bounds, in ascending order.
-
-    None where it states no upper bound, or another: on a region, all but some, single visits.
-    """
-    unlimited = statement.target == REGION or statement.excepted > 0 or statement.error_of != MEAN
-    if math.isnan(statement.upper_mm) or unlimited:
-        return np.empty(0, dtype=int)
-    return (
-        np.sort(np.asarray(visited, int)) if statement.target == MEASURED else np.arange(candidates)
-    )
-
-
 def limits_of(
     statement: Statement,
     visited: Sequence[int],
@@ -57,8 +46,14 @@ def limits_of(
     noise_mm: np.ndarray,
     readings: int,
 ) -> WidthLimits:
-    """Limits of a statement, of sizes and noise (m,) of all candidates; NaN where it has none."""
-    rows = points_bounded(statement, visited, len(sizes_mm))
+    """Limits of a statement, of sizes and noise (m,) of all candidates.
+
+    NaN where it states no upper bound, or another: on a region, all but some, single visits.
+    """
+    unlimited = statement.target == REGION or statement.excepted > 0 or statement.error_of != MEAN
+    if math.isnan(statement.upper_mm) or unlimited:
+        return NONE
+    rows = np.sort(visited) if statement.target == MEASURED else np.arange(len(sizes_mm))
     return width_limits(sizes_mm[rows], noise_mm[rows], readings, 1.0 - statement.confidence)
 
 
@@ -70,35 +65,29 @@ def width_limits(
     The lower one where all points but the largest are read once. Infinite with fewer readings than
     points.
     """
-    if len(sizes_mm) == 0:
-        return NONE
-    attainable = lower = math.inf
+    noise, attainable, lower = np.broadcast_to(noise_mm, len(sizes_mm)), math.inf, math.inf
     if readings >= len(sizes_mm):
-        counts = best_counts(sizes_mm, noise_mm, readings, error)
-        attainable = mean_excess_mm(sizes_mm, noise_mm, counts, error)
-        largest = np.broadcast_to(noise_mm, len(sizes_mm)).item(int(np.argmax(sizes_mm)))
-        lower = _deviate(error) * largest / math.sqrt(readings - len(sizes_mm) + 1)
-    proven = proven_excess_mm(sizes_mm, noise_mm, readings, error)
-    return WidthLimits(attainable, proven, lower)
+        counts = best_counts(sizes_mm, noise, readings, error)
+        attainable = mean_excess_mm(sizes_mm, noise, counts, error)
+        spread = float(noise[np.argmax(sizes_mm)]) / math.sqrt(readings - len(sizes_mm) + 1)
+        lower = -float(ndtri(error)) * spread
+    return WidthLimits(attainable, proven_excess_mm(sizes_mm, noise, readings, error), lower)
 
 
 def best_counts(
-    sizes_mm: np.ndarray, noise_mm: np.ndarray | float, readings: int, error: float
+    sizes_mm: np.ndarray, noise_mm: np.ndarray, readings: int, error: float
 ) -> np.ndarray:
     """Readings (m,) of each point, at least one, that make the mean excess least.
 
     The best of those counts that are in proportion to a power of noise over distance from a common
-    level; what single readings moved by trial still gain is 2 %. ValueError: fewer than points.
+    level; what single readings moved by trial still gain is 2 %.
     """
-    if readings < len(sizes_mm):
-        raise ValueError("every point is read at least once")
-    noise = np.broadcast_to(np.asarray(noise_mm, dtype=float), len(sizes_mm))
-    below = float(np.max(sizes_mm)) - sizes_mm
+    below = np.max(sizes_mm) - sizes_mm
     # A level hardly above the largest size gives it all; one far above all shares equally.
-    first, last = 0.1 * noise.min() / math.sqrt(readings), noise.max() * 10.0 + below.max()
+    first, last = 0.1 * noise_mm.min() / math.sqrt(readings), noise_mm.max() * 10.0 + below.max()
     for _ in range(_ROUNDS):
         levels = np.geomspace(first, last, _LEVELS)
-        tried = [_filled((noise / (level + below)) ** _POWER, readings) for level in levels]
+        tried = [_filled((noise_mm / (level + below)) ** _POWER, readings) for level in levels]
         excess = [mean_excess_mm(sizes_mm, noise_mm, counts, error) for counts in tried]
         best = int(np.argmin(excess))
         first, last = levels[max(best - 1, 0)], levels[min(best + 1, _LEVELS - 1)]
@@ -106,7 +95,7 @@ def best_counts(
 
 
 def mean_excess_mm(
-    sizes_mm: np.ndarray, noise_mm: np.ndarray | float, counts: np.ndarray, error: float
+    sizes_mm: np.ndarray, noise_mm: np.ndarray, counts: np.ndarray, error: float
 ) -> float:
     """Mean of what the largest upper limit is above the largest size, by readings (m,) of a point.
 
@@ -114,7 +103,7 @@ def mean_excess_mm(
     its point with probability ``error`` exactly.
     """
     top, spread = float(np.max(sizes_mm)), noise_mm / np.sqrt(counts)
-    reaches = sizes_mm - top + (_deviate(error) + _BEYOND) * spread
+    reaches = sizes_mm - top + (-float(ndtri(error)) + _BEYOND) * spread
     sizes, spread = sizes_mm[reaches > 0.0], spread[reaches > 0.0]  # others are never the largest
     gaps, weights = _quadrature(float(reaches.max()))
     shortest = _short_length((top + gaps)[:, None] / spread, error)
@@ -122,7 +111,7 @@ def mean_excess_mm(
 
 
 def proven_excess_mm(
-    sizes_mm: np.ndarray, noise_mm: np.ndarray | float, readings: int, error: float
+    sizes_mm: np.ndarray, noise_mm: np.ndarray, readings: int, error: float
 ) -> float:
     """Mean excess that every rule has whose bound fails with probability ``error`` at most.
 
@@ -132,75 +121,59 @@ def proven_excess_mm(
     that of the best test with all readings on one point: the largest p that all this leaves,
     integrated over u. Infinite where readings are less than 1 - error of the points.
     """
-    from scipy.special import ndtr, xlogy
-
     points = len(sizes_mm)
     if readings <= (1.0 - error) * points:
         return math.inf
-    noise = np.broadcast_to(np.asarray(noise_mm, dtype=float), points)
-    z, widest = _deviate(error), float(noise.max())
+    z = -float(ndtri(error))
     # From here on the readings pay for certainty, or the best test is certain.
     certain = math.sqrt(-2.0 * math.log(error) * points / (readings - (1.0 - error) * points))
-    gaps, weights = _quadrature(widest * max(certain, (z + _BEYOND) / math.sqrt(readings)))
-    deviations = (gaps[:, None] + (np.max(sizes_mm) - sizes_mm)) / noise
+    gaps, weights = _quadrature(
+        float(noise_mm.max()) * max(certain, (z + _BEYOND) / math.sqrt(readings))
+    )
+    deviations = (gaps[:, None] + (np.max(sizes_mm) - sizes_mm)) / noise_mm
 
     def needed(probability: np.ndarray) -> np.ndarray:
         """Mean readings it takes that P(bound < level) is so large, by level."""
-        rest = 1.0 - probability
-        divergence = xlogy(probability, probability / error) + xlogy(rest, rest / (1.0 - error))
+        divergence = rel_entr(probability, error) + rel_entr(1.0 - probability, 1.0 - error)
         return np.maximum(2.0 * divergence[:, None] / deviations**2, 1.0 - error).sum(axis=1)
 
     low, high = np.full(len(gaps), error), np.ones(len(gaps))
-    paid = needed(high) <= readings
     for _ in range(40):
         middle = 0.5 * (low + high)
         enough = needed(middle) <= readings
         low, high = np.where(enough, middle, low), np.where(enough, high, middle)
     best_test = ndtr(deviations.min(axis=1) * math.sqrt(readings) - z)
-    return float(weights @ (1.0 - np.minimum(best_test, np.where(paid, 1.0, low))))
+    return float(weights @ (1.0 - np.minimum(best_test, low)))
 
 
 def _filled(wanted: np.ndarray, readings: int) -> np.ndarray:
     """Whole counts in proportion to those wanted (m,), at least 1, ``readings`` together."""
-    ordered = np.sort(wanted)[::-1]
-    filled = np.arange(1, len(wanted) + 1)
-    factors = (readings - len(wanted) + filled) / np.cumsum(ordered)  # if so many are above 1
-    holds = np.flatnonzero(factors * ordered > 1.0)
-    exact = np.maximum((factors[holds[-1]] if holds.size else 0.0) * wanted, 1.0)
+
+    def excess(factor: float) -> float:
+        return float(np.maximum(factor * wanted, 1.0).sum()) - readings
+
+    factor = float(brentq(excess, 0.0, readings / wanted.max()))
+    exact = np.maximum(factor * wanted, 1.0)
     counts = np.floor(exact).astype(np.int64)
     spare = readings - int(counts.sum())
     counts[np.argsort(counts - exact, kind="stable")[:spare]] += 1
     return counts
 
 
-@lru_cache(maxsize=1)
-def _legendre() -> tuple[np.ndarray, np.ndarray]:
-    return np.polynomial.legendre.leggauss(_NODES)
-
-
 def _quadrature(end: float) -> tuple[np.ndarray, np.ndarray]:
     """Nodes and weights from 0 to ``end``, by the cube of a Gauss-Legendre variable."""
-    nodes, weights = _legendre()
-    share = 0.5 * (nodes + 1.0)
-    return end * share**3, end * 1.5 * share**2 * weights
+    share = 0.5 * (_NODES + 1.0)
+    return end * share**3, end * 1.5 * share**2 * _WEIGHTS
 
 
 def _short_length(sizes: np.ndarray, error: float) -> np.ndarray:
     """Length that a reading of noise 1 stays below with probability ``error``, by true size."""
-    z, far = _deviate(error), np.maximum(sizes, _TABLE_TO)
+    z, far = -ndtri(error), np.maximum(sizes, _TABLE_TO)
     beyond = far - z + 1.0 / far + 0.5 * z / (far * far)
     return np.where(sizes < _TABLE_TO, np.interp(sizes, *_short_lengths(error)), beyond)
 
 
 @lru_cache(maxsize=16)
 def _short_lengths(error: float) -> tuple[np.ndarray, np.ndarray]:
-    from scipy.special import chndtrix
-
     sizes = np.linspace(0.0, _TABLE_TO, 3001)
     return sizes, np.sqrt(chndtrix(error, 3.0, sizes**2))
-
-
-def _deviate(error: float) -> float:
-    from scipy.special import ndtri
-
-    return -float(ndtri(error))

@@ -30,8 +30,8 @@ class GammaQuantile(OnceAssessor):
 
     measurements: int
     share: float = 0.99
+    confidence: float = CONFIDENCE  # of limits on single points; its statement has none
     name: ClassVar[str] = "gamma_quantile"
-    confidence: ClassVar[float] = CONFIDENCE  # of limits on single points; its statement has none
 
     def __post_init__(self) -> None:
         check_settings(self, ("share", 0.0 < self.share < 1.0, "above 0 and below 1"))

@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from kinacc.assess.assessor import Assessment, Assessor
-from kinacc.assess.world import World
+from kinacc.assess.world import Assessment, Assessor, World
 
 
 @dataclass(frozen=True)

@@ -12,12 +12,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from kinacc.assess.assessor import Assessment, Assessor
-from kinacc.assess.world import World
+from kinacc.assess.world import Assessment, Assessor, World
 from kinacc.errors import InputError, Problem
 
 GRID_PER_MM = 1000
@@ -131,14 +130,14 @@ class ModelInvalidation(Assessor):
             steps.append(Step(row, counts[row], _magnitude(reading), average_mm, rejection))
         return steps
 
-    def _scan(self, world: World, bounds_mm: np.ndarray, wanted: bool) -> tuple:
+    def _scan(self, world: World, bounds_mm: np.ndarray, wanted: bool) -> tuple[Any, ...]:
         """The scan of :func:`kinacc.assess.invalidation_kernels.scan` with these settings."""
         from kinacc.assess.invalidation_kernels import scan
 
         self._check_visits(world)
         roots = np.arange(self.measurements + 1.0) ** _POWERS[self.covariance]
         squared = self.distance == "squared"
-        return scan(world.arrays, bounds_mm, wanted, float(self.alpha), squared, roots)
+        return scan(tuple(world), bounds_mm, wanted, float(self.alpha), squared, roots)
 
     def _check_visits(self, world: World) -> None:
         if world.visits < self.measurements:

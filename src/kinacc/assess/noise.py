@@ -10,13 +10,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from scipy.special import betaincinv, chdtri, fdtri, gammaln
 
 from kinacc.assess.adaptive import Candidates, Ledger
-from kinacc.assess.statement import VISIT, Reason
+from kinacc.assess.statement import VISIT, Reason, Suspicious
 
 if TYPE_CHECKING:
     from kinacc.assess.search_and_confirm import SearchAndConfirm
@@ -36,6 +36,8 @@ _LARGER = 1.2  # times the noise stated: what readings are held against
 _LARGER_THAN_TESTED = 1.5  # the same where a test says the noise: no test tells it to 20 %
 _TAILS = 5.5  # logarithm of the ratio of likelihoods that tells heavy tails; false in 0.2 %
 _HEAVY = 8.0  # degrees of freedom of the heavy-tailed readings that normal ones are held against
+FALSE_ALARM = 0.002  # chance that a campaign without a wrong reading has a suspicious one
+_LATER = 2  # readings after the first that it is held to, fixed as their number must be
 _STEP = 0.7  # of the standard deviation of a logarithm of scale: nodes of the integral over it
 
 
@@ -77,24 +79,23 @@ def contrasts(ledger: Ledger, blocks: Sequence[int]) -> Contrasts:
 
     blocks: of each reading the number of its block; readings of a block are of one point.
     """
+    spreads = ledger.covariances(range(len(blocks)))
     under_way: dict[int, tuple[np.ndarray, np.ndarray]] = {}  # mean, and inverse of its covariance
-    rows, places, values = [], [], []
-    for place, (block, (row, reading, covariance)) in enumerate(
-        zip(blocks, ledger.readings, strict=True)
-    ):
-        spread = ledger.candidates.covariance_mm2[row] if covariance is None else covariance
+    places, values = [], []
+    for place, (block, spread) in enumerate(zip(blocks, spreads, strict=True)):
+        reading, added = np.array(ledger.readings[place][1]), np.linalg.inv(spread)
         if block not in under_way:
-            under_way[block] = np.array(reading), np.linalg.inv(spread)
+            under_way[block] = reading, added
             continue
         mean, weight = under_way[block]
-        apart, added = np.array(reading) - mean, np.linalg.inv(spread)
-        rows.append(row)
-        places.append(place)
+        apart = reading - mean
         values.append(np.linalg.solve(np.linalg.cholesky(spread + np.linalg.inv(weight)), apart))
+        places.append(place)
         weight = weight + added
         under_way[block] = mean + np.linalg.solve(weight, added @ apart), weight
+    rows = [ledger.readings[place][0] for place in places]
     differences = np.array(values).reshape(-1, 3)
-    return Contrasts(np.array(rows, dtype=np.int64), np.array(places, dtype=np.int64), differences)
+    return Contrasts(np.array(rows, np.int64), np.array(places, np.int64), differences)
 
 
 def largest_factor(
@@ -107,8 +108,6 @@ def largest_factor(
     at least that of as many central chi-squares with three degrees of freedom, times the factor
     squared. The median says more than the sum where a few errors are large.
     """
-    from scipy.special import betaincinv, chdtri
-
     square = np.einsum("ni,nij,nj->n", readings_mm, candidates.inverses[rows], readings_mm)
     rank = (len(square) + 1) // 2
     # The share of a chi-square below its order statistic is a beta variable.
@@ -116,150 +115,114 @@ def largest_factor(
     return math.sqrt(float(np.sort(square)[rank - 1]) / float(chdtri(3, 1.0 - below)))
 
 
-@dataclass(frozen=True)
-class NoisePlan:
-    """What is known of the noise before anything is read.
-
-    ``margin``: times the noise stated that bounds allow for. ``freedom``: degrees of freedom that
-    limits on means are calibrated with, infinite where the factor is no estimate; ``estimating``:
-    of the campaign's own, 0 where a test brings them. ``is_bounded``: nothing but the size of
-    readings says how large the noise may be. ``mean_share``: part of an allowed error that limits
-    on means may spend; the rest is for limits of the noise. ``limited``: degrees of freedom of the
-    test whose upper limit is taken for the noise, where readings may be wrong; else 0.
-    """
-
-    margin: float = 1.0
-    freedom: float = math.inf
-    estimating: int = 0
-    is_bounded: bool = False
-    mean_share: float = 1.0
-    limited: int = 0
-
-
-def noise_plan(settings: SearchAndConfirm, first: int) -> NoisePlan:
-    """Of a campaign that visits ``first`` points."""
-    # Sure to come whatever is decided: a block has two readings or more, but for a few; so half of
-    # all others tell of the noise.
-    spare = settings.measurements - first - settings.references
-    within = 3 * max((spare - _SINGLES + 1) // 2, 0)
-    tested = settings.noise_freedom
-    if settings.noise == KNOWN:
-        return NoisePlan(margin=1.0 if within >= MOST else settings.noise_margin)
-    if settings.wrong_rate:
-        # The law of clipped scores is known for a stated noise alone, or one that is no larger.
-        return NoisePlan(mean_share=1.0 - _NOISE_PART, limited=tested)
-    # All that is sure to come, so that bounds are sure to come; no more than helps.
-    estimating = min(within, MOST) if within >= FEWEST and not tested else 0
-    if not tested and not estimating:
-        return NoisePlan(is_bounded=True, mean_share=1.0 - _NOISE_PART)
-    of_arm = settings.error_of == VISIT and settings.arm_mm is None
-    share = 1.0 - _NOISE_PART if of_arm else 1.0
-    return NoisePlan(freedom=tested or estimating, estimating=estimating, mean_share=share)
-
-
 def factor_limit(freedom: float, above: float) -> float:
     """Factor that the true one is below with probability ``above``, over one that was estimated."""
-    from scipy.special import chdtri
-
     return 1.0 if math.isinf(freedom) else math.sqrt(freedom / float(chdtri(freedom, above)))
 
 
-@dataclass(frozen=True)
-class NoiseTaken:
+class NoiseTaken(NamedTuple):
     """Factor on the standard deviations planned, for bounds.
 
-    ``value``, from ``freedom`` degrees, infinite where it is no estimate; ``own`` (m,): factors of
-    candidates that were read so often that they have one of their own, the larger of it and
+    ``value``, from ``freedom`` degrees, infinite where it is no estimate; ``by_point`` (m,): of
+    candidates that were read so often that they have a factor of their own, the larger of it and
     ``value``; elsewhere ``value``. ``least`` and ``most``: what the noise itself is not below and
-    not above; ``said``: how all this was had, None where the noise is as stated.
+    not above; ``reason``: how all this was had, None where the noise is as stated.
     """
 
     value: float
     freedom: float
-    own: np.ndarray
+    by_point: np.ndarray
     least: float
     most: float
-    said: Reason | None
+    reason: Reason | None
 
 
 class CampaignNoise:
     """The noise of one campaign, by its settings and the readings of its ledger.
 
-    ``blocks``: of every reading of the ledger the number of its block.
+    ``margin``: times the noise stated that bounds allow for. ``freedom``: degrees of freedom that
+    limits on means are calibrated with, infinite where the factor is no estimate; ``estimating``:
+    of the campaign's own, 0 where a test brings them. ``is_bounded``: nothing but the size of
+    readings says how large the noise may be. ``mean_share``: part of an allowed error that limits
+    on means may spend; the rest is for limits of the noise. ``blocks``: of every reading of the
+    ledger the number of its block; ``first``: points that are visited whatever is read.
     """
 
     def __init__(
-        self,
-        settings: SearchAndConfirm,
-        plan: NoisePlan,
-        ledger: Ledger,
-        blocks: Sequence[int],
-        first: int,
+        self, settings: SearchAndConfirm, ledger: Ledger, blocks: Sequence[int], first: int
     ) -> None:
-        self.settings, self.plan, self.ledger = settings, plan, ledger
-        self.first, self._blocks = first, blocks
-        self._known: tuple[int, Contrasts] = (-1, contrasts(ledger, []))
+        self.settings, self.ledger, self.first, self._blocks = settings, ledger, first, blocks
+        self._taken, self._latest = 0, contrasts(ledger, blocks)
+        # Sure to come whatever is decided: a block has two readings or more, but for a few; so half
+        # of all others tell of the noise.
+        spare = settings.measurements - first - settings.references
+        within, tested = 3 * max((spare - _SINGLES + 1) // 2, 0), settings.noise_freedom
+        self.is_known, self._guarded = settings.noise == KNOWN, settings.wrong_rate > 0.0
+        self.margin = settings.noise_margin if self.is_known and within < MOST else 1.0
+        # The law of clipped scores is known for a stated noise alone, or one that is no larger:
+        # where readings may be wrong, the upper limit of the test is taken for the noise.
+        is_estimate = not self.is_known and not self._guarded
+        # All that is sure to come, so that bounds are sure to come; no more than helps.
+        estimates = is_estimate and not tested and within >= FEWEST
+        self.estimating = min(within, MOST) if estimates else 0
+        self.is_bounded = is_estimate and not tested and not estimates
+        self.freedom = (tested or self.estimating or math.inf) if is_estimate else math.inf
+        of_arm = settings.error_of == VISIT and settings.arm_mm is None
+        is_limited = self._guarded or self.is_bounded or of_arm
+        self.mean_share = 1.0 - _NOISE_PART if is_limited and not self.is_known else 1.0
 
     @property
     def contrasts(self) -> Contrasts:
         """Differences within the blocks of all readings so far."""
-        if self._known[0] != self.ledger.taken:
-            self._known = self.ledger.taken, contrasts(self.ledger, self._blocks)
-        return self._known[1]
+        if self._taken != self.ledger.taken:
+            self._taken, self._latest = self.ledger.taken, contrasts(self.ledger, self._blocks)
+        return self._latest
 
     @property
     def telling(self) -> Contrasts:
         """Those that tell of the noise: of blocks without a wrong reading, where some may be."""
-        differences = self.contrasts
-        return (
-            differences.without_wrong_blocks(self._blocks)
-            if self.settings.wrong_rate
-            else differences
-        )
+        found = self.contrasts
+        return found.without_wrong_blocks(self._blocks) if self._guarded else found
 
     def missing(self) -> Reason | None:
         """Why the noise is not known yet; None where it is."""
-        if self.plan.estimating and self.contrasts.freedom < self.plan.estimating:
-            numbers = {"freedom": self.contrasts.freedom, "needed": self.plan.estimating}
+        if self.estimating and self.contrasts.freedom < self.estimating:
+            numbers = {"freedom": self.contrasts.freedom, "needed": self.estimating}
             return Reason("noise_unknown", numbers)
-        if self.plan.is_bounded and len(self.ledger.visited) < self.first:
+        if self.is_bounded and len(self.ledger.visited) < self.first:
             return Reason("first_visit", {"left": self.first - len(self.ledger.visited)})
         return None
 
     def taken(self, error: float) -> NoiseTaken:
         """The noise for bounds that may err with this probability; not where it is ``missing``."""
-        plan, part, factors = self.plan, _NOISE_PART * error, np.ones(self.ledger.candidates.points)
-        if self.settings.noise == KNOWN:
-            most, reason = self._stated_or_shown()
-            return NoiseTaken(most, math.inf, most * factors, 1.0, most, reason)
-        if plan.is_bounded:
+        part, factors = _NOISE_PART * error, np.ones(self.ledger.candidates.points)
+        if self.is_known:
+            value, reason = self._stated_or_shown()
+            return NoiseTaken(value, math.inf, value * factors, 1.0, value, reason)
+        if self.is_bounded:
             rows = np.array(self.ledger.visited[: self.first])
             first = np.array([self.ledger.readings_of(row, 1)[0][0] for row in rows])
-            most = largest_factor(self.ledger.candidates, rows, first, part)
-            reason = Reason("noise_bounded", {"factor": most})
-            return NoiseTaken(most, math.inf, most * factors, 0.0, most, reason)
-        freedom = plan.limited or plan.freedom
+            value = largest_factor(self.ledger.candidates, rows, first, part)
+            reason = Reason("noise_bounded", {"factor": value})
+            return NoiseTaken(value, math.inf, value * factors, 0.0, value, reason)
+        freedom = self.settings.noise_freedom or self.estimating
         least, most = factor_limit(freedom, part), factor_limit(freedom, 1.0 - part)
-        if plan.limited:
-            reason = Reason("noise_limited", {"factor": most, "freedom": plan.limited})
+        if self._guarded:
+            reason = Reason("noise_limited", {"factor": most, "freedom": freedom})
             return NoiseTaken(most, math.inf, most * factors, least, most, reason)
-        value, factors = estimated_factor(self.contrasts, plan.estimating, len(factors))
-        code = "noise_estimated" if plan.estimating else "noise_tested"
+        value, factors = estimated_factor(self.contrasts, self.estimating, len(factors))
+        code = "noise_estimated" if self.estimating else "noise_tested"
         reason = Reason(code, {"factor": value, "freedom": freedom})
         return NoiseTaken(value, freedom, factors, value * least, value * most, reason)
 
     def alarms(self) -> tuple[Reason, ...]:
         """What readings of the same block say against the noise stated, and against normal ones."""
-        scatter = tails = None
-        if not self.settings.wrong_rate:
-            tails = tails_alarm(self.contrasts)
-        if not self.plan.estimating and not self.plan.is_bounded:
-            scatter = scatter_alarm(
-                self.telling,
-                tested=self.settings.noise_freedom or math.inf,
-                margin=self.plan.margin,
-                false=false_scatter(self.settings.references),
-            )
+        tails = None if self._guarded else tails_alarm(self.contrasts)
+        scatter = None
+        if not self.estimating and not self.is_bounded:
+            tested, margin = self.settings.noise_freedom or math.inf, self.margin
+            false = false_scatter(self.settings.references)
+            scatter = scatter_alarm(self.telling, tested=tested, margin=margin, false=false)
         return tuple(alarm for alarm in (scatter, tails) if alarm is not None)
 
     def usual_scatter(self) -> float:
@@ -280,10 +243,10 @@ class CampaignNoise:
             return (self.settings.arm_mm,) * 3
         visited = self.ledger.visited
         variances = np.linalg.eigvalsh(self.ledger.candidates.covariance_mm2[visited])
-        unknown = self.plan.is_bounded or self.settings.noise == KNOWN
+        unknown = self.is_bounded or self.is_known
         likely = float(np.sqrt(variances.mean())) * (1.0 if unknown else noise.value)
         least = noise.least * math.sqrt(float(variances.min()))
-        largest = float((noise.own[visited] * np.sqrt(variances[:, -1])).max())
+        largest = float((noise.by_point[visited] * np.sqrt(variances[:, -1])).max())
         return least, likely, noise.most * largest / noise.value
 
     def _stated_or_shown(self) -> tuple[float, Reason | None]:
@@ -291,7 +254,7 @@ class CampaignNoise:
 
         Where the noise is as stated, bounds are never less sure for being wider.
         """
-        differences, margin = self.telling, self.plan.margin
+        differences, margin = self.telling, self.margin
         shown = math.sqrt(float(differences.squares.sum()) / max(differences.freedom, 1))
         if differences.freedom >= FEWEST and shown > margin:
             return shown, Reason("noise_shown", {"factor": shown, "freedom": differences.freedom})
@@ -361,8 +324,6 @@ def tails_alarm(differences: Contrasts) -> Reason | None:
 
 def heavy_over_normal(values: np.ndarray) -> float:
     """Logarithm of the ratio of likelihoods of :func:`tails_alarm` for contrasts (n, 3)."""
-    from scipy.special import gammaln
-
     half = values.size / 2.0
     step = _STEP / math.sqrt(2.0 * values.size)
     log_scale = math.log(_scale(values)) + np.arange(-0.8, 0.8 + step, step)
@@ -383,3 +344,64 @@ def heavy_over_normal(values: np.ndarray) -> float:
 def _scale(values: np.ndarray) -> float:
     """Standard deviation of normal contrasts, by their median: far ones do not move it."""
     return float(np.median(np.abs(values))) / 0.6745
+
+
+def suspicious_readings(
+    ledger: Ledger,
+    blocks: Sequence[int],
+    counts: Sequence[int],
+    planned: int,
+    factor: float,
+    freedom: float,
+) -> tuple[Suspicious, ...]:
+    """All suspicious readings of the points read again, by number.
+
+    blocks: of all readings of the ledger, below 0 where planned. counts: at which a point is looked
+    at; all readings between two looks are taken as one block: what interrupts them goes by looks.
+    planned: readings beyond the visit. factor: by which standard deviations are larger than stated,
+    from ``freedom`` degrees. With probability ``FALSE_ALARM`` at most there is one where every
+    reading is as the noise says.
+    """
+    in_block = factor * _limit(0.5 * FALSE_ALARM / max(planned, 1), freedom)
+    of_first = factor * _limit(0.5 * FALSE_ALARM / ledger.candidates.points, freedom)
+    suspicious = []
+    for row in np.flatnonzero(ledger.count > 1).tolist():
+        places = np.array([at for at, reading in enumerate(ledger.readings) if reading[0] == row])
+        readings = ledger.readings_of(row, len(places))
+        looks = np.searchsorted(counts, np.arange(len(places)), side="right")
+        block = np.where(np.array(blocks)[places] < 0, -places - 1, looks)
+        named: dict[int, float] = {}
+        for number in np.unique(block):
+            members, others = np.flatnonzero(block == number), np.flatnonzero(block != number)
+            if len(members) < 2:
+                continue
+            apart = [_apart(*readings, index, members[members != index]) for index in members]
+            if (far := max(apart)) > in_block:
+                # Of two, neither tells which it is: the one farther from the other readings.
+                if len(members) == 2 and len(others):
+                    apart = [_apart(*readings, index, others) for index in members]
+                named[int(members[np.argmax(apart)])] = far
+        if len(places) > _LATER and min(named, default=len(places)) > _LATER:
+            first = _apart(*readings, 0, np.arange(1, _LATER + 1))
+            if first > of_first:
+                named[0] = first
+        suspicious += [
+            Suspicious(int(places[i]) + 1, row, far / factor) for i, far in named.items()
+        ]
+    return tuple(sorted(suspicious))
+
+
+def _apart(
+    values: np.ndarray, spreads: np.ndarray, index: int | np.intp, others: np.ndarray
+) -> float:
+    """Distance from the mean of others, in standard deviations of the difference."""
+    apart = values[index] - values[others].mean(axis=0)
+    spread = spreads[index] + spreads[others].sum(axis=0) / len(others) ** 2
+    return math.sqrt(float(apart @ np.linalg.solve(spread, apart)))
+
+
+def _limit(error: float, freedom: float) -> float:
+    """Distance in standard deviations that noise in three directions exceeds so rarely."""
+    if math.isinf(freedom):
+        return math.sqrt(float(chdtri(3, error)))
+    return math.sqrt(3.0 * float(fdtri(3.0, freedom, 1.0 - error)))

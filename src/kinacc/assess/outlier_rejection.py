@@ -8,8 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from kinacc.assess.assessor import Assessment, Assessor
-from kinacc.assess.world import World
+from kinacc.assess.world import Assessment, Assessor, World
 from kinacc.distributions import gamma99
 
 

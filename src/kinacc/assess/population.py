@@ -1,4 +1,4 @@
-"""The largest error as a random quantity, points taken as a sample of one population of sizes.
+"""What measured points tell of all: the largest error as a random quantity, and limits on counts.
 
 Empirical Bayes: the density of the true sizes is a mixture of smooth bumps of fixed relative width
 whose weights are fitted to the readings by maximum likelihood (EM). Given it, every point's true
@@ -85,3 +85,34 @@ def _chi_density(size_mm: np.ndarray, unit_mm: np.ndarray) -> np.ndarray:
     ratio = size_mm / unit_mm[:, None]
     log = (_FREEDOM - 1) * np.log(ratio) - 0.5 * ratio**2
     return np.exp(log - log.max(axis=1, keepdims=True))
+
+
+def binomial_interval(hits: int, trials: int) -> tuple[float, float]:
+    """Return two-sided 95 % limits on the probability of ``hits`` in ``trials``.
+
+    References
+    ----------
+    Clopper and Pearson, Biometrika 26 (1934) 404-413.
+    """
+    from scipy.stats import binomtest
+
+    low, high = binomtest(hits, trials).proportion_ci(0.95, "exact")
+    return float(low), float(high)
+
+
+def hardly_missed(points: int, error: float) -> int:
+    """Return the number of random points that hold the largest of ``points`` but for ``error``."""
+    return next(drawn for drawn in range(points + 1) if points - drawn <= error * points)
+
+
+def excepted(points: int, drawn: int, error: float) -> int:
+    """Return the K that all but K points are no larger than the largest of ``drawn`` random ones.
+
+    But for probability ``error``, whatever their errors are: K + 1 points are all missed with
+    probability C(points - K - 1, drawn) / C(points, drawn).
+    """
+    missed, number = (points - drawn) / points, 0
+    while missed > error:
+        number += 1
+        missed *= max(points - drawn - number, 0) / (points - number)
+    return number

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from kinacc.assess.assessor import Assessor
 from kinacc.assess.gamma_quantile import GammaQuantile
-from kinacc.assess.invalidation_calibrated import InvalidationCalibrated
-from kinacc.assess.invalidation_full import ModelInvalidationFull
+from kinacc.assess.invalidation_adaptive import InvalidationCalibrated, ModelInvalidationFull
 from kinacc.assess.maximum import Maximum
 from kinacc.assess.model_invalidation import ModelInvalidation
 from kinacc.assess.outlier_rejection import OutlierRejection
 from kinacc.assess.region_share import RegionShare
 from kinacc.assess.search_and_confirm import SearchAndConfirm
 from kinacc.assess.single_shot import SingleShot
+from kinacc.assess.world import Assessor
 
-# These look back at a world (kinacc.assess.assessor).
+# These look back at a world (kinacc.assess.world).
 PAPER: dict[str, type[Assessor]] = {
     each.name: each for each in (Maximum, OutlierRejection, ModelInvalidation)
 }

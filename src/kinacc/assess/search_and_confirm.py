@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
+from numpy.typing import ArrayLike
+from scipy.special import bdtrc
 
 from kinacc.assess.adaptive import (
     FIRST_SHARE,
@@ -15,16 +17,7 @@ from kinacc.assess.adaptive import (
     Candidates,
     check_settings,
 )
-from kinacc.assess.counts import excepted, hardly_missed
-from kinacc.assess.looks import (
-    EARLY,
-    SHARE,
-    Looks,
-    LowerAverage,
-    boundary,
-    direction_of,
-    look_counts,
-)
+from kinacc.assess.limits import EARLY, SHARE, Boundary, Looks, LowerAverage, boundary, look_counts
 from kinacc.assess.noise import (
     ENOUGH,
     ESTIMATED,
@@ -32,9 +25,9 @@ from kinacc.assess.noise import (
     KNOWN,
     CampaignNoise,
     factor_limit,
-    noise_plan,
+    suspicious_readings,
 )
-from kinacc.assess.population import largest_size
+from kinacc.assess.population import excepted, hardly_missed, largest_size
 from kinacc.assess.reference_poses import Change, find_change, planned_readings, poses_of, schedule
 from kinacc.assess.statement import (
     CANDIDATES,
@@ -46,7 +39,6 @@ from kinacc.assess.statement import (
     Statement,
     Suspicious,
 )
-from kinacc.assess.wrong_readings import at_most_wrong, suspicious_readings
 
 VISITED = 0.9  # of the budget, where it is smaller than the number of candidates
 MARGIN = 1.2  # how much larger than stated noise may be that nothing can check
@@ -61,13 +53,12 @@ class SearchAndConfirm(AdaptiveAssessor):
     whose next look they can reach, and a share of them to the largest mean, for the lower bound.
     With fewer readings than candidates nine tenths of them visit new points.
 
-    ``measured``: upper limits that hold at all looks at once (:mod:`kinacc.assess.looks`), and a
-    lower bound by an average of readings along directions seen before
-    (:mod:`kinacc.assess.looks`). Both hold whatever the errors are, for readings that are
-    normal with known covariance (eq. 9). ``candidates``: the same where all are visited. Otherwise
-    half of the allowed error is for the largest errors that all were missed: the upper bound is of
-    all but the fewest candidates with which that is improbable enough, and assumes nothing but the
-    random order.
+    ``measured``: upper limits that hold at all looks at once, and a lower bound by an average of
+    readings along directions seen before (:mod:`kinacc.assess.limits`). Both hold whatever the
+    errors are, for readings that are normal with known covariance (eq. 9). ``candidates``: the
+    same where all are visited. Otherwise half of the allowed error is for the largest errors that
+    all were missed: the upper bound is of all but the fewest candidates with which that is
+    improbable enough, and assumes nothing but the random order.
 
     Where too few readings are planned at points read before to check a noise that is stated as
     known, it is taken ``noise_margin`` times as large, and always at least as large as readings of
@@ -80,8 +71,8 @@ class SearchAndConfirm(AdaptiveAssessor):
     these show a drift or step, bounds are withheld (:mod:`kinacc.assess.reference_poses`).
     ``allowance_mm`` is what no repeat sees; it widens both
     bounds. ``wrong_rate`` is the largest share of readings that go wrong and are guarded against
-    (:mod:`kinacc.assess.wrong_readings`): it is lost from the confidence. Without it, bounds are
-    withheld where a reading stands apart (:mod:`kinacc.assess.wrong_readings`). The value is
+    (:mod:`kinacc.assess.limits`): it is lost from the confidence. Without it, bounds are
+    withheld where a reading stands apart (:mod:`kinacc.assess.noise`). The value is
     the median of the posterior of :mod:`kinacc.assess.population`.
     """
 
@@ -167,42 +158,42 @@ class SearchAndConfirmCampaign(Campaign):
     def __init__(self, settings: SearchAndConfirm, candidates: Candidates) -> None:
         super().__init__(settings, candidates)
         points, rate = candidates.points, settings.wrong_rate
-        self.first = settings.visit(points)
-        noise = noise_plan(settings, self.first)
-        self.noise_plan, self.factor, self.allowed = noise, noise.margin, 1.0 - settings.confidence
+        self.first, self.allowed = settings.visit(points), 1.0 - settings.confidence
+        self.blocks: list[int] = []  # of every reading in order the number of its block
+        self.noise = CampaignNoise(settings, self.ledger, self.blocks, self.first)
+        self.factor = self.noise.margin
         self.plan = schedule(settings.measurements, points, settings.references)
         self.reference_poses = self.plan.poses
         self.extra = max(settings.measurements - self.first - settings.references, 0)
-        allowed = noise.mean_share * self.allowed
+        allowed = self.noise.mean_share * self.allowed
         self.counts = look_counts(self.extra)
         wanted = math.floor(SHARE * self.extra) if self.extra > 1 else 0
         lower_error = (1.0 - _VISIT_PART) * allowed if wanted else 0.0
         # Where the noise is an estimate, half of the error of single points is for its limit.
         self.single_error = allowed - lower_error
-        single = self.single_error * (1.0 if math.isinf(noise.freedom) else 0.5)
-        point_error = single / max(min(self.first, points), 1)
+        single = self.single_error * (1.0 if math.isinf(self.noise.freedom) else 0.5)
+        point_error, wrong = single / max(min(self.first, points), 1), 0
         shares = np.diff(np.array(self.counts) / self.counts[-1], prepend=0.0)
         if len(shares) > 1:  # half for the first look
             shares = np.append(0.5, 0.5 * shares[1:] / shares[1:].sum())
-        else:
-            shares = np.ones(1)
-        wrong = 0
         if rate:
             # Half of the error of single points is for more wrong readings than are counted on.
             point_error *= 0.5
-            wrong = at_most_wrong(settings.measurements, rate, 0.5 * self.single_error)
-        self.average = LowerAverage(wanted, lower_error, noise.freedom, rate)
+            numbers = np.arange(settings.measurements + 1)
+            exceeded = bdtrc(numbers, settings.measurements, rate)
+            wrong = int(np.argmax(exceeded <= 0.5 * self.single_error))
+        self.average = LowerAverage(wanted, lower_error, self.noise.freedom, rate)
         upper = self.boundary_of(allowed)
         self.looks = Looks(self.ledger, upper, point_error, shares, self.factor, rate, wrong)
-        self.blocks: list[int] = []  # of every reading in order the number of its block
-        self.noise = CampaignNoise(settings, noise, self.ledger, self.blocks, self.first)
+        # The block under way: its row, readings it still takes, whether these count for the lower
+        # bound and along which direction; its number, and whether the next reading begins it.
         self._row, self._left, self._counted = -1, 0, False
+        self._direction = np.eye(3)[0]
         self._block, self._begins = 0, True
-        self._direction = [1.0, 0.0, 0.0]
-        self._mean_mm = [[0.0] * 3] * points  # at the ends of blocks
+        self._mean_mm = np.zeros((points, 3))  # at the ends of blocks
         self._size_mm = np.full(points, -1.0)  # of these
 
-    def boundary_of(self, error: float, freedom: float = math.inf):
+    def boundary_of(self, error: float, freedom: float = math.inf) -> Boundary:
         """The boundary of the looks of this campaign for an error of the upper limits."""
         few = max(1.0 - self.extra / (_FEW * max(self.first, 1)), 0.0)
         early = EARLY + (_ONCE - EARLY) * few
@@ -220,35 +211,35 @@ class SearchAndConfirmCampaign(Campaign):
             return visited
         return self._row if self._left else None
 
-    def record(self, point: int, reading_mm, covariance_mm2=None) -> None:
+    def record(
+        self, point: int, reading_mm: ArrayLike, covariance_mm2: ArrayLike | None = None
+    ) -> None:
         """Take a reading, and look at the point where that is due."""
-        taken = self.ledger.taken
-        is_planned = taken in self.plan.row_at
-        super().record(point, reading_mm, covariance_mm2)
-        is_due = self.looks.missing(point) == 0
-        in_block = bool(self._left) and point == self._row
-        if not in_block or is_planned:
-            self.blocks.append(-len(self.blocks) - 1)
-        else:
+        ledger, place = self.ledger, self.ledger.taken
+        ledger.record(point, reading_mm, covariance_mm2)
+        is_planned, is_due = place in self.plan.row_at, self.looks.missing(point) == 0
+        in_block = self._left > 0 and point == self._row
+        if in_block and not is_planned:
             self._block, self._begins = self._block + self._begins, False
             self.blocks.append(self._block)
+        else:
+            self.blocks.append(-len(self.blocks) - 1)
         if in_block:
             self._left -= 1
             if self._counted and not is_planned:
-                along, spread = np.array(self._direction), self.ledger.covariances([taken])[0]
-                noise = math.sqrt(float(along @ spread @ along))
-                self.average.record(point, self._direction, self.ledger.readings[-1][1], noise)
+                along, spread = self._direction, ledger.covariances([place])[0]
+                noise_mm = math.sqrt(float(along @ spread @ along))
+                self.average.record(point, float(along @ ledger.readings[-1][1]), noise_mm)
                 # A bound stated inside a block is of a mean of its own: a new block begins.
                 self._begins = self.average.at_stage
         self.looks.update(point)
         # A planned reading ends a block only where the point is looked at.
         if is_due or not (self._left or is_planned):
-            x, y, z = self._mean_mm[point] = self.ledger.mean_mm[point].tolist()
-            self._size_mm[point] = math.sqrt(x * x + y * y + z * z)
-        if not self._left and len(self.ledger.visited) >= self.first:
-            remaining = self.settings.measurements - taken - 1 - self.plan.left(taken + 1)
-            if remaining > 0:
-                self._begin_block(remaining)
+            self._mean_mm[point] = ledger.mean_mm[point]
+            self._size_mm[point] = np.linalg.norm(self._mean_mm[point])
+        remaining = self.settings.measurements - ledger.taken - self.plan.left(ledger.taken)
+        if not self._left and len(ledger.visited) >= self.first and remaining > 0:
+            self._begin_block(remaining)
 
     def reading_blocks(self) -> list[int]:
         """Of every reading in order the number of its block."""
@@ -256,8 +247,7 @@ class SearchAndConfirmCampaign(Campaign):
 
     def _begin_block(self, remaining: int) -> None:
         """Choose where the next readings are taken, and how many of them."""
-        missing = self.average.missing
-        likely = int(np.argmax(self._size_mm))
+        missing, likely = self.average.missing, int(np.argmax(self._size_mm))
         row, count = likely, remaining
         if remaining > missing:
             for place in np.argsort(-self.looks.upper_mm[self.ledger.visited], kind="stable"):
@@ -271,52 +261,51 @@ class SearchAndConfirmCampaign(Campaign):
         # A mean of one reading is the largest more often by its noise than by its error.
         is_confirmed = self.ledger.count.item(row) > 1 or remaining <= missing
         self._counted = row == likely and missing > 0 and is_confirmed
-        if self._counted:
-            count = min(count, missing)
-        self._row, self._left, self._begins = row, count, True
-        self._direction = direction_of(self._mean_mm[row])
+        self._row, self._left = row, min(count, missing) if self._counted else count
+        self._begins = True
+        size_mm = self._size_mm.item(row)
+        self._direction = self._mean_mm[row] / size_mm if size_mm > 0.0 else np.eye(3)[0]
 
     def statements(self) -> tuple[Statement, ...]:
         """On the measured points, and on all candidates."""
         ledger, settings = self.ledger, self.settings
         visited, points = len(ledger.visited), ledger.candidates.points
-        if (missing_points := max(math.ceil(FIRST_SHARE * self.first), 1) - visited) > 0:
-            early = Reason("first_visit", {"left": missing_points})
+        if (open_points := max(math.ceil(FIRST_SHARE * self.first), 1) - visited) > 0:
+            early = Reason("first_visit", {"left": open_points})
             return Statement(MEASURED, withheld=early), Statement(CANDIDATES, withheld=early)
-        posterior = largest_size(
-            ledger.sizes_mm(), ledger.noise_mm[ledger.visited], points - visited
-        )
+        sizes, noise_mm = ledger.sizes_mm(), ledger.noise_mm[ledger.visited]
+        posterior = largest_size(sizes, noise_mm, points - visited)
         value_mm = posterior.quantile_mm(0.5, measured_only=True)
         measured = Statement(MEASURED, value_mm, error_of=settings.error_of)
         everywhere = replace(measured, target=CANDIDATES, value_mm=posterior.quantile_mm(0.5))
         if missing := self.noise.missing():
             return replace(measured, withheld=missing), replace(everywhere, withheld=missing)
         noise = self.noise.taken(self.allowed)
-        if against := self._withheld():
-            stated = [replace(item, withheld=against) for item in (measured, everywhere)]
-        else:
-            bounds = {
-                "lower_mm": self._lower_mm(),
-                "upper_mm": self._upper_mm(self.allowed, value_mm),
-                "confidence": settings.confidence - settings.wrong_rate,
-            }
-            stated = [replace(item, **bounds) for item in (measured, everywhere)]
+        # Wrong readings withhold no bound where they are guarded against.
+        guarded = "wrong_readings" if settings.wrong_rate else ""
+        against = next((alarm for alarm in self.alarms() if alarm.code != guarded), None)
+        bounds: dict[str, Any] = {"withheld": against, "noise": noise.reason}
+        excluded = {}
+        if against is None:
+            bounds["lower_mm"] = self._lower_mm()
+            bounds["upper_mm"] = self._upper_mm(self.allowed, value_mm)
+            bounds["confidence"] = settings.confidence - settings.wrong_rate
             if visited < points:
-                missing_points = excepted(points, visited, MISSED * self.allowed)
-                least = 0.0 if missing_points else everywhere.value_mm
-                upper_mm = self._upper_mm((1.0 - MISSED) * self.allowed, least)
-                stated[1] = replace(stated[1], upper_mm=upper_mm, excepted=missing_points)
-        stated = [replace(item, noise=noise.said) for item in stated]
-        if settings.error_of != MEAN:
-            arms_mm = self.noise.arms_mm(noise)
-            stated = [item.of_future_visits(arms_mm) for item in stated]
-        return tuple(stated)
+                number = excepted(points, visited, MISSED * self.allowed)
+                least_mm = 0.0 if number else everywhere.value_mm
+                upper_mm = self._upper_mm((1.0 - MISSED) * self.allowed, least_mm)
+                excluded = {"upper_mm": upper_mm, "excepted": number}
+        stated = replace(measured, **bounds), replace(everywhere, **{**bounds, **excluded})
+        if settings.error_of == MEAN:
+            return stated
+        arms_mm = self.noise.arms_mm(noise)
+        return tuple(item.of_future_visits(arms_mm) for item in stated)
 
     def change(self) -> Change | None:
         """What the reference poses show of a drift or step; None where too few are read."""
         if self.ledger.taken < self.plan.poses or not self.plan.poses:
             return None
-        tested = math.inf if self.settings.noise == KNOWN else self.settings.noise_freedom
+        tested = math.inf if self.noise.is_known else self.settings.noise_freedom
         return find_change(self.plan, planned_readings(self.plan, self.ledger), tested)
 
     def point_limits(self) -> dict[int, tuple[float, float]]:
@@ -331,13 +320,13 @@ class SearchAndConfirmCampaign(Campaign):
 
     def alarms(self) -> tuple[Reason, ...]:
         """What the readings say against what the bounds rest on."""
-        alarms: tuple[Reason, ...] = ()
+        alarms: list[Reason] = []
         if suspicious := self.suspicious():
             first = {"readings": len(suspicious), "number": suspicious[0].number}
-            alarms = (Reason("wrong_readings", first),)
+            alarms.append(Reason("wrong_readings", first))
         # A few wrong readings look like too much scatter: what tells more comes first.
         if (change := self.change()) is not None and change.is_found:
-            alarms += (change.reason,)
+            alarms.append(change.reason)
         return (*alarms, *self.noise.alarms())
 
     def suspicious(self) -> tuple[Suspicious, ...]:
@@ -346,25 +335,18 @@ class SearchAndConfirmCampaign(Campaign):
             return ()
         # Where all readings scatter more than stated, none is wrong for doing so too.
         factor = max(self.noise.taken(self.allowed).value, self.noise.usual_scatter())
-        planned = self.extra + self.settings.references
-        return suspicious_readings(
-            self.ledger, self.blocks, self.counts, planned, factor, self.noise_plan.freedom
-        )
-
-    def _withheld(self) -> Reason | None:
-        """The alarm by which bounds are withheld; wrong readings are none where guarded against."""
-        guarded = "wrong_readings" if self.settings.wrong_rate else ""
-        return next((alarm for alarm in self.alarms() if alarm.code != guarded), None)
+        planned, freedom = self.extra + self.settings.references, self.noise.freedom
+        return suspicious_readings(self.ledger, self.blocks, self.counts, planned, factor, freedom)
 
     def _limits_mm(self, error: float) -> np.ndarray:
         """Upper limits (m,) of single points for an allowed error."""
-        plan, factor = self.noise_plan, self.noise.taken(error).own
-        return self.looks.limits_mm(self.boundary_of(plan.mean_share * error, plan.freedom), factor)
+        limits = self.boundary_of(self.noise.mean_share * error, self.noise.freedom)
+        return self.looks.limits_mm(limits, self.noise.taken(error).by_point)
 
     def _single_factor(self) -> np.ndarray:
         """Factors (m,) on the noise that lower limits of single points rest on."""
         noise = self.noise.taken(self.allowed)
-        return noise.own * factor_limit(noise.freedom, 1.0 - 0.5 * self.single_error)
+        return noise.by_point * factor_limit(noise.freedom, 1.0 - 0.5 * self.single_error)
 
     def _upper_mm(self, error: float, value_mm: float) -> float:
         """The largest upper limit of the visited points for an allowed error."""
@@ -374,7 +356,7 @@ class SearchAndConfirmCampaign(Campaign):
 
     def _lower_mm(self) -> float:
         if self.average.has_spoken:
-            found_mm = self.average.bound_mm(self.noise.taken(self.allowed).own)
+            bound_mm = self.average.bound_mm(self.noise.taken(self.allowed).by_point)
         else:
-            found_mm = self.looks.largest_lower_mm(self._single_factor())
-        return max(found_mm - self.settings.allowance_mm, 0.0)
+            bound_mm = self.looks.largest_lower_mm(self._single_factor())
+        return max(bound_mm - self.settings.allowance_mm, 0.0)

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
 from kinacc.assess.adaptive import AdaptiveAssessor, Campaign, Candidates
-from kinacc.assess.assessor import Assessment
 from kinacc.assess.limits import visit_mm
-from kinacc.assess.random_numbers import key_of
 from kinacc.assess.statement import CANDIDATES, MEASURED, REGION, VISIT, Statement
-from kinacc.assess.world import World, drawn_world
+from kinacc.assess.world import Assessment, World, drawn_world, key_of
 
 Reading = Callable[[int, int], np.ndarray]  # (row, how often it was read before): (3,), mm
 
@@ -46,7 +45,7 @@ def conduct(assessor: AdaptiveAssessor, world: World) -> Campaign:
     return campaign
 
 
-def assess_world(assessor, world: World, budget: int) -> tuple[Assessment, float]:
+def assess_world(assessor: Any, world: World, budget: int) -> tuple[Assessment, float]:
     """One assessment of a world, whichever the interface, and what its upper bound is held to, mm.
 
     An assessor that looks back has ``assess``; one that chooses as it goes has ``begin`` and is

@@ -1,23 +1,36 @@
-"""A world: every reading one simulation could take, fixed before any of them is taken."""
+"""Worlds, every reading one simulation could take, and assessors that look back at one.
+
+A reading is a function of its address alone: a counter-based generator (Philox 4x64, 10 rounds, as
+in numpy) is asked at counter (v, j, 0, 0) for reading v at point j of the simulation that the key
+names. No reading depends on which others were taken, on their order, or on how many points there
+are, so a simulation is one fixed world and only the readings somebody takes are ever computed.
+
+The paper's three assessors look back. Model Invalidation replays what did not happen, so it cannot
+be asked live; those that can are :class:`kinacc.assess.adaptive.AdaptiveAssessor`. To add one: a
+module with a frozen dataclass that inherits :class:`Assessor`, and a line in
+:mod:`kinacc.assess.registry`.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from collections.abc import Iterator, Mapping
+from itertools import product
+from typing import ClassVar, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from kinacc.assess.invalidation_kernels import extend, extend_all
+from kinacc.config.records import of_section
 from kinacc.errors import InputError, Problem
 
 
-@dataclass(frozen=True)
-class World:
+class World(NamedTuple):
     """Readings of m operating points, rows in the order in which they are visited.
 
     readings_mm: (m, V, 3) error vectors, robot base frame, of which row i holds the first
     ``known[i]``; sigma_mm: (m,) noise per axis, equal in the three axes. Readings are computed as
-    they are asked for, from the errors (m, 3), the key and the points' own numbers ``index``: what
+    they are asked for, from the errors (m, 3), the key and the points' own numbers ``point``: what
     a reading is never depends on when it is asked for. Beside them: sums_mm (m, 3) of the readings
     known, and sizes_mm (m, V), the magnitude of the mean of a point's readings up to each. The
     compiled kernels unpack the fields in this order.
@@ -28,7 +41,7 @@ class World:
     sigma_mm: np.ndarray
     error_mm: np.ndarray
     key: np.ndarray
-    index: np.ndarray
+    point: np.ndarray
     sums_mm: np.ndarray
     sizes_mm: np.ndarray
 
@@ -42,22 +55,20 @@ class World:
         """Readings available at each point, V."""
         return self.readings_mm.shape[1]
 
-    @property
-    def arrays(self) -> tuple[np.ndarray, ...]:
-        """The fields in their order."""
-        return tuple(getattr(self, field.name) for field in fields(self))
-
     def reading_mm(self, row: int, visit: int) -> np.ndarray:
         """Error vector (3,) of reading number ``visit`` (0 = first) at a row, robot base frame."""
         if visit >= self.known[row]:
-            from kinacc.assess.random_numbers import extend
-
-            extend(self.arrays, row, visit)
+            extend(tuple(self), row, visit)
         return self.readings_mm[row, visit]
 
     def magnitudes_mm(self, measurements: int) -> np.ndarray:
         """Magnitudes of the first readings that fit the budget, in visiting order."""
         return self.sizes_mm[:measurements, 0].copy()
+
+
+def key_of(*entropy: int) -> np.ndarray:
+    """Key (2,) uint64 of the simulation named by non-negative integers (seed first)."""
+    return np.random.SeedSequence(list(entropy)).generate_state(2, np.uint64)
 
 
 def drawn_world(
@@ -73,7 +84,7 @@ def drawn_world(
     ----------
     error_mm : (m, 3) true errors, robot base frame
     sigma_mm : a number or (m,), standard deviation per axis
-    key : (2,) uint64 from :func:`kinacc.assess.random_numbers.key_of`
+    key : (2,) uint64 from :func:`key_of`
     visits : readings available at each point
     order : (m,) point numbers in visiting order, default 0 .. m-1. The noise at a point belongs to
         its number, not to its place in the order.
@@ -88,19 +99,12 @@ def drawn_world(
     if sigma.shape not in ((), (len(error),)) or not np.all(np.isfinite(sigma) & (sigma > 0.0)):
         allowed = "a number above 0, or one per point, in mm"
         raise InputError(Problem("noise", f"{sigma_mm!r}"[:60], allowed))
-    return draw(error[index], np.broadcast_to(sigma, len(error))[index], key, visits, index)
-
-
-def draw(error_mm, sigma_mm, key, visits: int, index) -> World:
-    """As :func:`drawn_world`, rows already in visiting order and known to be good."""
-    from kinacc.assess.random_numbers import extend_all
-
-    points = index.size
+    points, sigma = index.size, np.broadcast_to(sigma, len(error))[index]
     # Repeats stay untouched until asked for.
     readings, sizes = np.empty((points, visits, 3)), np.empty((points, visits))
     known, sums = np.zeros(points, np.int64), np.zeros((points, 3))
-    world = World(readings, known, sigma_mm, error_mm, key, index, sums, sizes)
-    extend_all(world.arrays, 0)
+    world = World(readings, known, sigma, error[index], key, index, sums, sizes)
+    extend_all(tuple(world), 0)
     return world
 
 
@@ -117,6 +121,43 @@ def checked_errors(error_mm: ArrayLike) -> np.ndarray:
     return errors
 
 
-def error_vectors(columns: Mapping) -> np.ndarray:
+def error_vectors(columns: Mapping[str, ArrayLike]) -> np.ndarray:
     """Return the error vectors (n, 3) in the columns ex_mm, ey_mm and ez_mm of a table."""
     return np.stack([np.asarray(columns[f"e{axis}_mm"], dtype=float) for axis in "xyz"], axis=1)
+
+
+class Assessment(NamedTuple):
+    """Assessed accuracy with what it took; bounds are None where the assessor states none."""
+
+    assessed_mm: float
+    measurements: int
+    points_visited: int
+    lower_mm: float | None = None
+    upper_mm: float | None = None
+
+
+class Assessor(Protocol):
+    """A method of assessment that looks back at one fixed world.
+
+    ``name`` is its name in tables; ``switches`` maps each field that is a reading of the paper to
+    its choices; ``measurements`` is the budget. What is a key of the
+    configuration's ``study`` has no default here.
+    """
+
+    name: ClassVar[str]
+    switches: ClassVar[dict[str, tuple[str, ...]]] = {}
+    measurements: int
+
+    def assess(self, world: World) -> Assessment:
+        """Assess the accuracy in one world."""
+        ...
+
+
+A = TypeVar("A", bound=Assessor)
+
+
+def every_reading(cls: type[A], settings: Mapping[str, object]) -> Iterator[A]:
+    """An assessor under every combination of its switches, other settings as given."""
+    for values in product(*cls.switches.values()):
+        switched = dict(zip(cls.switches, values, strict=True))
+        yield of_section(cls, {**settings, **switched})

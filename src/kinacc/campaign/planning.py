@@ -11,10 +11,9 @@ import pandas as pd
 
 from kinacc.assess.adaptive import AdaptiveAssessor, Candidates
 from kinacc.assess.attainable import limits_of
-from kinacc.assess.conformity import ACCEPT, REJECT, UNDECIDED, decide
-from kinacc.assess.counts import binomial_interval
+from kinacc.assess.population import binomial_interval
 from kinacc.assess.simulate import carry_on, noisy, truth_mm
-from kinacc.assess.statement import CANDIDATES
+from kinacc.assess.statement import ACCEPT, CANDIDATES, REJECT, UNDECIDED, decide
 from kinacc.errors import InputError, Problem, refuse
 from kinacc.study.fields import ErrorField
 

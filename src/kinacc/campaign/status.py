@@ -10,10 +10,18 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from kinacc.assess.attainable import NONE, WidthLimits, limits_of
-from kinacc.assess.conformity import Decision, decide
 from kinacc.assess.limits import VISITS
 from kinacc.assess.noise import ESTIMATED, KNOWN
-from kinacc.assess.statement import CANDIDATES, MEAN, MEASURED, REGION, Reason, Statement
+from kinacc.assess.statement import (
+    CANDIDATES,
+    MEAN,
+    MEASURED,
+    REGION,
+    Decision,
+    Reason,
+    Statement,
+    decide,
+)
 from kinacc.campaign import instrument
 from kinacc.campaign.folder import Opened
 from kinacc.campaign.plan import Plan

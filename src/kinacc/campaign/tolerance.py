@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from kinacc.assess.conformity import ACCEPT, REJECT, UNDECIDED, decide
-from kinacc.assess.statement import Statement
+from kinacc.assess.statement import ACCEPT, REJECT, UNDECIDED, Statement, decide
 from kinacc.calibration.summary import LARGE_SHARE, Tolerance
 from kinacc.campaign.status import reason
 

@@ -7,6 +7,7 @@ from dataclasses import fields
 from typing import Any, TypeVar
 
 Record = TypeVar("Record")
+Settings = Mapping[str, Any]  # a configuration or a section of it
 
 
 def of_section(record: type[Record], section: Mapping[str, Any]) -> Record:

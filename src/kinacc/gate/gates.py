@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from kinacc.assess.conformity import ACCEPT, REJECT
+from kinacc.assess.statement import ACCEPT, REJECT
 from kinacc.config.values import did_you_mean
 from kinacc.errors import InputError, first_few
 from kinacc.gate import chance

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from kinacc import __version__
-from kinacc.assess.conformity import ACCEPT, REJECT
+from kinacc.assess.statement import ACCEPT, REJECT
 from kinacc.campaign import folder
 from kinacc.campaign.folder import Opened
 from kinacc.campaign.instrument import INSTRUMENT

@@ -9,8 +9,7 @@ from typing import Any
 
 import pandas as pd
 
-from kinacc.assess.conformity import UNDECIDED
-from kinacc.assess.statement import CANDIDATES, Statement
+from kinacc.assess.statement import CANDIDATES, UNDECIDED, Statement
 from kinacc.calibration.summary import LARGE_SHARE, Tolerance
 from kinacc.campaign import tolerance
 from kinacc.campaign.status import CampaignStatus

@@ -11,7 +11,7 @@ import pandas as pd
 from rich.console import Console
 from rich.table import Table
 
-from kinacc.assess.conformity import UNDECIDED
+from kinacc.assess.statement import UNDECIDED
 from kinacc.calibration.summary import LARGE_SHARE, TABLES
 from kinacc.config.error_models import PLAINEST, model_name
 from kinacc.deployment.folder import read_tables

@@ -120,55 +120,33 @@ def accuracy_map(robot: Robot, models: Models, cells: Cells, wanted: PosesWanted
     ``worst_q_rad`` are the DH joints of the largest position error. Cells without a solution have
     NaN maxima and joints, and None branches, which read ``X+ Y- Z0, front-up-flip``.
     """
-    count = len(cells.radius_mm)
+    blocks = range(0, len(cells.radius_mm), _CELLS_PER_BLOCK)
     parts = [
-        _block(
-            robot,
-            models,
-            Cells(*(axis[begin : begin + _CELLS_PER_BLOCK] for axis in cells)),
-            wanted,
-        )
-        for begin in range(0, count, _CELLS_PER_BLOCK)
+        _block(robot, models, Cells(*(axis[i : i + _CELLS_PER_BLOCK] for axis in cells)), wanted)
+        for i in blocks
     ]
     return AccuracyMap(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
 
 
 def _block(robot: Robot, models: Models, cells: Cells, wanted: PosesWanted) -> AccuracyMap:
     orientations, branches = wanted.orientations, inverse.machining_branches(robot)
-    turns = len(orientations.names)
-    count = len(cells.radius_mm)
+    count, turns = len(cells.radius_mm), len(orientations.names)
     repeated = Cells(*(np.repeat(axis, turns) for axis in cells))
     turned = np.tile(orientations.rotation, (count, 1, 1))
     tool = tool_poses(repeated, wanted.reference, turned, wanted.frame)
     solved = joints_of(robot, models, tool, wanted.invert_with)
-    reached = solved.status == Status.FOUND
-    position, orientation = np.full((2, *reached.shape), -np.inf)
+    reached, tried = solved.status == Status.FOUND, turns * len(branches)
     error = errors_at(models, solved.q_rad[reached])
-    position[reached] = np.linalg.norm(error[:, :3], axis=1)
-    orientation[reached] = np.linalg.norm(error[:, 3:], axis=1) * 1e3
-    shape = (count, turns * len(branches))
-    solutions = reached.reshape(shape).sum(axis=1)
-    position, orientation = position.reshape(shape), orientation.reshape(shape)
-    position_max, worst = _largest(position, orientations, branches)
-    orientation_max, orientation_worst = _largest(orientation, orientations, branches)
-    outside = (solved.status == Status.OUTSIDE_RANGE).reshape(shape).sum(axis=1)
-    tried = np.full(count, shape[1])
-    q_rad = solved.q_rad.reshape(*shape, -1)[np.arange(count), position.argmax(axis=1)]
-    q_rad[solutions == 0] = np.nan
-    return AccuracyMap(
-        position_max, orientation_max, worst, orientation_worst, solutions, tried, outside, q_rad
-    )
-
-
-def _largest(
-    values: np.ndarray, orientations: Orientations, branches: tuple[str, ...]
-) -> tuple[np.ndarray, np.ndarray]:
-    """Largest value per row, NaN where there is none, and the name of its combination."""
-    names = np.array(
-        [f"{turn}, {branch}" for turn in orientations.names for branch in branches] + [None],
-        dtype=object,
-    )
-    place = values.argmax(axis=1)
-    largest = np.take_along_axis(values, place[:, None], axis=1)[:, 0]
-    empty = np.isneginf(largest)
-    return np.where(empty, np.nan, largest), names[np.where(empty, len(names) - 1, place)]
+    size = np.full((2, *reached.shape), -np.inf)  # of position and orientation
+    size[:, reached] = np.linalg.norm(error.reshape(-1, 2, 3), axis=2).T * [[1.0], [1e3]]
+    size = size.reshape(2, count, tried)
+    solutions = reached.reshape(count, tried).sum(axis=1)
+    outside = (solved.status == Status.OUTSIDE_RANGE).reshape(count, tried).sum(axis=1)
+    place, largest = size.argmax(axis=2), size.max(axis=2)
+    names = [f"{turn}, {branch}" for turn in orientations.names for branch in branches]
+    worst = np.array(names, dtype=object)[place]
+    q_rad = solved.q_rad.reshape(count, tried, -1)[np.arange(count), place[0]]
+    unreached = solutions == 0
+    q_rad[unreached], largest[:, unreached], worst[:, unreached] = np.nan, np.nan, None
+    counts = solutions, np.full(count, tried), outside
+    return AccuracyMap._make([*largest, *worst, *counts, q_rad])

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
 
 import numpy as np
 
-from kinacc.assess.world import error_vectors
-from kinacc.config.error_models import PLAINEST
+from kinacc.config.error_models import MEASURED, PLAINEST, Comparison
+from kinacc.config.records import Settings
 from kinacc.geometry import Pose, compose, invert
 from kinacc.kinematics import region, robot, tables
 from kinacc.kinematics.inverse import limits
@@ -16,10 +15,10 @@ from kinacc.kinematics.region import Cylinder
 from kinacc.kinematics.robot import Robot
 from kinacc.study import operating_points
 from kinacc.study.accuracy_map import Equipped, Models, PosesWanted, accuracy_map
-from kinacc.tables.columns import Columns
+from kinacc.tables.columns import Columns, Tables
 
 
-def joint_box(evaluation: Mapping, arm: Robot) -> tuple[np.ndarray, np.ndarray] | None:
+def joint_box(evaluation: Settings, arm: Robot) -> tuple[np.ndarray, np.ndarray] | None:
     """Ends (k,), (k,) of the reported joints in the ``evaluation`` settings; None: the limits."""
     ranges = evaluation["joint_box"]["joints_deg"]
     if ranges is None:
@@ -28,7 +27,7 @@ def joint_box(evaluation: Mapping, arm: Robot) -> tuple[np.ndarray, np.ndarray] 
     return low, high
 
 
-def cylinder(evaluation: Mapping) -> Cylinder:
+def cylinder(evaluation: Settings) -> Cylinder:
     """The cylinder of the ``evaluation`` settings."""
     section = evaluation["cylinder"]
     first, last = np.deg2rad(section["angle_deg"])
@@ -42,7 +41,7 @@ def cylinder(evaluation: Mapping) -> Cylinder:
     )
 
 
-def poses_wanted(evaluation: Mapping) -> PosesWanted:
+def poses_wanted(evaluation: Settings) -> PosesWanted:
     """The tool poses of the ``evaluation`` settings and the model they are inverted with."""
     return PosesWanted(
         cylinder(evaluation),
@@ -53,7 +52,7 @@ def poses_wanted(evaluation: Mapping) -> PosesWanted:
     )
 
 
-def equipped(inputs: Mapping, evaluation: Mapping, arm: Robot) -> Models:
+def equipped(inputs: Tables, evaluation: Settings, arm: Robot) -> Models:
     """The arm's models with their bases and tools, joints travelling as the settings say.
 
     A tool is the one fitted with the model, else the configured one on the arm's flange; the
@@ -73,7 +72,7 @@ def equipped(inputs: Mapping, evaluation: Mapping, arm: Robot) -> Models:
     return Models(by_name, np.full(arm.dh.joints, direction) if direction else None)
 
 
-def mapped(inputs: Mapping, settings: Mapping) -> dict[str, dict[str, np.ndarray]]:
+def mapped(inputs: Tables, settings: Settings) -> dict[str, dict[str, np.ndarray]]:
     """``accuracy_map`` from ``vec_model`` and ``dh_model`` (and ``frames``, if given).
 
     ``settings["cells"]``: numbers of the only cells mapped (default: all).
@@ -99,7 +98,7 @@ def mapped(inputs: Mapping, settings: Mapping) -> dict[str, dict[str, np.ndarray
     return {"accuracy_map": columns | _numbered("q", joints)}
 
 
-def points(inputs: Mapping, settings: Mapping) -> dict[str, Columns]:
+def points(inputs: Tables, settings: Settings) -> dict[str, Columns]:
     """``assessment_points`` of a modelled space, or chosen from what was measured."""
     section, arm = settings["evaluation"], robot.load(settings["robot"])
     if section["space"] == "measured":
@@ -131,25 +130,16 @@ def _error_columns(error_mm: np.ndarray) -> Columns:
     return {**components, "true_error_mm": np.linalg.norm(error_mm, axis=1)}
 
 
-def _measured(inputs: Mapping, count: int) -> Columns:
+def _measured(inputs: Tables, count: int) -> Columns:
     """Configurations spread over the measured ones, errors averaged over repeated readings."""
     errors, measurements = inputs["pose_errors"], inputs["measurements"]
-    wanted = np.asarray(errors["comparison"]) == "dh_vs_measured"
+    wanted = np.asarray(errors["comparison"]) == Comparison(MEASURED, PLAINEST).name
     held_out = wanted & (np.asarray(errors["estimate"]) == "cross_validated")
     if not held_out.any():
         warnings.warn("no held-out errors: the points use training errors", stacklevel=2)
         held_out = wanted
-    rows = np.flatnonzero(held_out)
-    groups = operating_points.readings_of(
-        np.asarray(errors["pose"])[rows], np.asarray(errors["target"])[rows]
-    )
-    chosen = [rows[groups[i]] for i in operating_points.spread_rows(len(groups), count)]
-    vectors = error_vectors(errors)
-    first = np.array([np.asarray(errors["row"])[group[0]] for group in chosen]).astype(int)
+    rows, error_mm = operating_points.measured_errors(errors, held_out)
+    chosen = operating_points.spread_rows(len(rows), count)
     names = [name for name in measurements if name[:1] in "qs" and name[1:].isdigit()]
-    columns: Columns = {"point": np.arange(len(chosen))}
-    columns |= {name: np.asarray(measurements[name])[first] for name in names}
-    return {
-        **columns,
-        **_error_columns(np.array([vectors[group].mean(axis=0) for group in chosen])),
-    }
+    columns = {name: np.asarray(measurements[name])[rows[chosen]] for name in names}
+    return {"point": np.arange(len(chosen)), **columns, **_error_columns(error_mm[chosen])}

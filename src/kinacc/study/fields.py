@@ -6,7 +6,7 @@ draw their candidates from it at random.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -18,11 +18,12 @@ from kinacc.errors import InputError, Problem
 from kinacc.kinematics import dh
 from kinacc.kinematics import robot as robots
 from kinacc.kinematics.model import JointState
-from kinacc.study.operating_points import readings_of
+from kinacc.study.operating_points import measured_errors
 from kinacc.synthetic import plan
 from kinacc.synthetic.accepted import accepted_draw
 from kinacc.synthetic.draw import physical_robot
 from kinacc.synthetic.physical import PhysicalRobot, Visits, pose
+from kinacc.tables.columns import Columns
 
 CALIBRATION_POSES = 400
 POINTS = 1000
@@ -52,7 +53,7 @@ class ErrorField:
         count = len(self.error_mm)
         joints = self.q_rad is None or (self.q_rad.ndim == 2 and len(self.q_rad) == count)
         if self.error_mm.shape != (count, 3) or not count or not joints:
-            shapes = f"errors {self.error_mm.shape}, joints {np.shape(self.q_rad)}"
+            shapes = f"errors {self.error_mm.shape}, joints {getattr(self.q_rad, 'shape', ())}"
             raise InputError(
                 Problem(f"field {self.name}", shapes, "(n, 3) and (n, k), n at least 1")
             )
@@ -79,7 +80,7 @@ class ErrorField:
         return rng.permutation(np.append(np.arange(self.kept), others)[:count])
 
 
-def of_points(name: str, points: Mapping) -> ErrorField:
+def of_points(name: str, points: Columns) -> ErrorField:
     """The paper's field: ``assessment_points`` of a modelled space."""
     meaning = "errors of the DH model at the operating points of the study"
     return ErrorField(name, error_vectors(points), _stacked(points, "q"), "paper", meaning)
@@ -87,8 +88,8 @@ def of_points(name: str, points: Mapping) -> ErrorField:
 
 def of_measurements(
     name: str,
-    errors: Mapping,
-    measurements: Mapping,
+    errors: Columns,
+    measurements: Columns,
     model: str = PLAINEST,
     target: str | None = None,
 ) -> ErrorField:
@@ -125,15 +126,10 @@ def of_measurements(
     if not wanted.any():
         message = f"pose_errors holds no held-out errors of the {model_name(model)} model"
         raise InputError(Problem(f"field {name}", message, fix="set measurements.folds"))
-    rows = np.flatnonzero(wanted)
-    groups = readings_of(np.asarray(errors["pose"])[rows], np.asarray(errors["target"])[rows])
-    vectors, q_rad = error_vectors(errors), _stacked(measurements, "q")
-    pose_of = {int(number): row for row, number in reversed([*enumerate(measurements["pose"])])}
-    first = [pose_of[int(np.asarray(errors["pose"])[rows[group[0]]])] for group in groups]
-    means = np.array([vectors[rows[group]].mean(axis=0) for group in groups])
+    rows, error_mm = measured_errors(errors, wanted)
     meaning = f"held-out errors of the {model_name(model)} model at measured configurations"
     meaning += f", target {target}" if target else ""
-    return ErrorField(name, means, q_rad[first], "measured", meaning)
+    return ErrorField(name, error_mm, _stacked(measurements, "q")[rows], "measured", meaning)
 
 
 def synthetic(name: str, draw: int) -> ErrorField:
@@ -164,10 +160,8 @@ def synthetic(name: str, draw: int) -> ErrorField:
     error_mm = true_mm - dh.forward(arm.dh, q_rad).position_mm
     rng = np.random.default_rng([accepted.seed, 4])
     error_mm = change.after(error_mm, q_rad, arm, rng)
-    fitted = slice(None, CALIBRATION_POSES)
-    left_mm = _beyond_dh(arm, q_rad, error_mm, fitted)
-    q_rad, left_mm = q_rad[CALIBRATION_POSES:], left_mm[CALIBRATION_POSES:]
-    return ErrorField(f"{name}_{draw}", left_mm, q_rad, "synthetic", change.meaning)
+    beyond_mm, q_rad = _beyond_dh(arm, q_rad, error_mm), q_rad[CALIBRATION_POSES:]
+    return ErrorField(f"{name}_{draw}", beyond_mm, q_rad, "synthetic", change.meaning)
 
 
 @dataclass(frozen=True)
@@ -194,7 +188,9 @@ def _small(arm: PhysicalRobot) -> PhysicalRobot:
     return replace(_only()(arm), smooth=replace(arm.smooth, amplitude=0.35 * arm.smooth.amplitude))
 
 
-def _with_defect(error_mm, q_rad, arm, rng) -> np.ndarray:
+def _with_defect(
+    error_mm: np.ndarray, q_rad: np.ndarray, arm: PhysicalRobot, rng: np.random.Generator
+) -> np.ndarray:
     """A worn spot of joint 2: it jumps over a few degrees that hold 2 % of the poses."""
     angle = q_rad[:, 1]
     start = rng.uniform(0.3, 0.7)
@@ -204,7 +200,9 @@ def _with_defect(error_mm, q_rad, arm, rng) -> np.ndarray:
     return error_mm + np.where(worn[:, None], lever * _DEFECT_RAD, 0.0)
 
 
-def _with_rare(error_mm, q_rad, arm, rng) -> np.ndarray:
+def _with_rare(
+    error_mm: np.ndarray, q_rad: np.ndarray, arm: PhysicalRobot, rng: np.random.Generator
+) -> np.ndarray:
     """Single poses far off, for no reason a model could know."""
     size = np.where(rng.random(len(q_rad)) < _RARE_SHARE, rng.uniform(*_RARE_MM, len(q_rad)), 0.0)
     turn = rng.normal(size=(len(q_rad), 3))
@@ -235,22 +233,23 @@ def _quiet_visits(q_rad: np.ndarray) -> Visits:
     return Visits(q_rad, plan.directions(q_rad), plan.time_h(count), np.zeros(q_rad.shape))
 
 
-def _beyond_dh(arm: PhysicalRobot, q_rad, error_mm, fitted: slice) -> np.ndarray:
-    """What DH parameters and base, fitted by linear least squares, leave of small errors."""
+def _beyond_dh(arm: PhysicalRobot, q_rad: np.ndarray, error_mm: np.ndarray) -> np.ndarray:
+    """What DH parameters and base, fitted by linear least squares, leave at poses not fitted."""
     count = len(q_rad)
-    parameters = arm.dh.linearised(JointState(q_rad))[1].reshape(count, 6, -1, 5)
-    parameters = parameters[:, :3, :, :4].reshape(count, 3, -1)
+    derivatives = arm.dh.linearised(JointState(q_rad))[1].reshape(count, 6, -1, 5)
+    parameters = derivatives[:, :3, :, :4].reshape(count, 3, -1)
     tip_mm = dh.forward(arm.dh, q_rad).position_mm
     turns = np.stack([np.cross(axis, tip_mm) for axis in np.eye(3)], axis=2)
     shifts = np.broadcast_to(np.eye(3), (count, 3, 3))
     matrix = np.concatenate([parameters, turns, shifts], axis=2)
     size = np.linalg.norm(matrix.reshape(3 * count, -1), axis=0)
     matrix = matrix / np.where(size > 1e-9 * size.max(), size, 1.0)  # some move no position
-    known = matrix[fitted].reshape(-1, matrix.shape[2])
-    solved, *_ = np.linalg.lstsq(known, error_mm[fitted].ravel(), rcond=_TRUNCATION)
-    return error_mm - matrix @ solved
+    known = matrix[:CALIBRATION_POSES].reshape(-1, matrix.shape[2])
+    wanted = error_mm[:CALIBRATION_POSES].ravel()
+    solved, *_ = np.linalg.lstsq(known, wanted, rcond=_TRUNCATION)
+    return (error_mm - matrix @ solved)[CALIBRATION_POSES:]
 
 
-def _stacked(columns: Mapping, letter: str) -> np.ndarray:
+def _stacked(columns: Columns, letter: str) -> np.ndarray:
     names = [name for name in columns if name[:1] == letter and name[1:].isdigit()]
     return np.stack([np.asarray(columns[name], dtype=float) for name in names], axis=1)

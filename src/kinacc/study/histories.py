@@ -6,8 +6,9 @@ the rule of an example is shown.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -15,9 +16,10 @@ from numpy.typing import ArrayLike
 
 from kinacc.assess.model_invalidation import ModelInvalidation
 from kinacc.assess.world import World, checked_errors, error_vectors
-from kinacc.config.records import of_section
+from kinacc.config.records import Settings, of_section
+from kinacc.progress import SILENT, Progress
 from kinacc.study.monte_carlo import Visits, world_of
-from kinacc.tables.columns import Columns
+from kinacc.tables.columns import Columns, Tables
 from kinacc.tables.contract import columns_of
 
 REJECTED, LARGER, KEPT = "rejected", "rejected_larger_eta", "not_rejected"
@@ -58,11 +60,10 @@ class HistorySettings:
     simulations_searched: int
 
 
-@dataclass(frozen=True)
-class Example:
-    """One run to show: its simulation, its bound, and the rule it was chosen by."""
+class Example(NamedTuple):
+    """One run to show: its name, simulation and bound, and the rule it was chosen by."""
 
-    name: str
+    example: str
     simulation: int
     eta_mm: float
     rule: str
@@ -76,7 +77,7 @@ def histories(
     assessor: ModelInvalidation,
     seed: int,
     point: ArrayLike | None = None,
-    progress=None,
+    progress: Progress = SILENT,
 ) -> Columns:
     """Columns of ``histories``: each example measurement by measurement.
 
@@ -85,28 +86,16 @@ def histories(
     errors that cannot be used.
     """
     errors = checked_errors(error_mm)
-    numbers = np.arange(errors.shape[0]) if point is None else np.asarray(point, np.int64)
-    sizes = np.sqrt(np.sum(errors**2, axis=1))
-    tables = []
+    numbers = np.arange(len(errors)) if point is None else np.asarray(point, np.int64)
+    sizes, tables = np.linalg.norm(errors, axis=1), []
+    settled = {name: getattr(assessor, name) for name in ("alpha", "distance", "covariance")}
     for example in examples(errors, settings, visits, assessor, seed, progress):
         world = world_of(errors, settings.noise_mm, example.simulation, visits, seed)
         steps = pd.DataFrame(assessor.history(world, example.eta_mm))
-        rows = world.index[steps["row"]]
-        columns = {
-            "example": example.name,
-            "simulation": example.simulation,
-            "rule": example.rule,
-            "rule_met": int(example.rule_met),
-            "noise_mm": settings.noise_mm,
-            "alpha": assessor.alpha,
-            "distance": assessor.distance,
-            "covariance": assessor.covariance,
-            "iteration": np.arange(len(steps)) + 1,
-            "point": numbers[rows],
-            "eta_mm": example.eta_mm,
-            "true_mm": sizes[rows],
-        }
-        tables.append(steps.drop(columns="row").assign(**columns))
+        rows = world.point[steps.pop("row")]
+        columns = {**example._asdict(), **settled, "noise_mm": settings.noise_mm}
+        columns |= {"iteration": np.arange(len(steps)) + 1, "rule_met": int(example.rule_met)}
+        tables.append(steps.assign(**columns, point=numbers[rows], true_mm=sizes[rows]))
     return columns_of("histories", pd.concat(tables).to_dict("records"))
 
 
@@ -116,59 +105,56 @@ def examples(
     visits: Visits,
     assessor: ModelInvalidation,
     seed: int,
-    progress=None,
+    progress: Progress = SILENT,
 ) -> list[Example]:
     """The runs to show, each the first simulation that satisfies its rule (see RULES).
 
     Where none of the simulations searched does, the closest thing that exists is shown and said to
     be that (FALLBACKS), with ``rule_met`` false.
     """
-    sizes = np.sqrt(np.sum(error_mm**2, axis=1))
+    sizes = np.linalg.norm(error_mm, axis=1)
     truth, worst = float(sizes.max()), int(sizes.argmax())
-    eta, larger = truth * settings.eta_ratio_rejected, truth * settings.eta_ratio_larger
-    smaller = truth * settings.eta_ratio_kept
+    larger = truth * settings.eta_ratio_larger
 
-    def rejects(world: World) -> bool:
-        return assessor.run(world, eta).rejected
-
-    def shows_fig5(world: World) -> bool:
-        if not rejects(world) or assessor.run(world, larger).rejected:
+    def shows_fig5(world: World, eta: float) -> bool:
+        if assessor.run(world, larger).rejected:
             return False
         last = assessor.history(world, eta)[-1]
-        return last.repeat > 1 and world.index[last.row] == worst
+        return last.repeat > 1 and bool(world.point[last.row] == worst)
 
-    def keeps(world: World) -> bool:
-        return not assessor.run(world, smaller).rejected
+    def shows_fig6(world: World, eta: float) -> bool:
+        outcome = assessor.run(world, eta)
+        return outcome.measurements > outcome.points_visited
 
-    def shows_fig6(world: World) -> bool:
-        outcome = assessor.run(world, smaller)
-        return not outcome.rejected and outcome.measurements > outcome.points_visited
-
-    def search(name: str, bound: float, wanted: Callable, less: Callable) -> Example:
-        second = None
-        simulations = range(settings.simulations_searched)
-        for number in progress(simulations, "simulations searched") if progress else simulations:
+    def search(name: str, eta: float, shows: Callable[[World, float], bool]) -> Example:
+        """The first simulation rejected (or not, for Fig. 6) at eta that shows what it is for."""
+        nearest, simulations = None, range(settings.simulations_searched)
+        for number in progress(simulations, "simulations searched"):
             world = world_of(error_mm, settings.noise_mm, number, visits, seed)
-            if wanted(world):
-                return Example(name, number, bound, RULES[name], True)
-            if second is None and less(world):
-                second = number
-        return Example(name, second or 0, bound, FALLBACKS[name][second is None], False)
+            if assessor.run(world, eta).rejected != (name == REJECTED):
+                continue
+            if shows(world, eta):
+                return Example(name, number, eta, RULES[name], True)
+            nearest = number if nearest is None else nearest
+        return Example(name, nearest or 0, eta, FALLBACKS[name][nearest is None], False)
 
-    fig5 = search(REJECTED, eta, shows_fig5, rejects)
-    fig6 = search(KEPT, smaller, shows_fig6, keeps)
-    return [fig5, Example(LARGER, fig5.simulation, larger, RULES[LARGER], fig5.rule_met), fig6]
+    fig5 = search(REJECTED, truth * settings.eta_ratio_rejected, shows_fig5)
+    fig6 = search(KEPT, truth * settings.eta_ratio_kept, shows_fig6)
+    return [fig5, fig5._replace(example=LARGER, eta_mm=larger, rule=RULES[LARGER]), fig6]
 
 
-def run(inputs: Mapping, settings: Mapping, progress=None) -> dict[str, dict]:
+def run(
+    inputs: Tables,
+    settings: Settings,
+    progress: Progress = SILENT,
+) -> dict[str, Columns]:
     """Return ``histories``."""
-    points = inputs["assessment_points"]
-    error_mm = error_vectors(points)
+    points, study = inputs["assessment_points"], settings["study"]
     rows = histories(
-        error_mm,
+        error_vectors(points),
         of_section(HistorySettings, settings["histories"]),
-        of_section(Visits, settings["study"]),
-        of_section(ModelInvalidation, settings["study"]),
+        of_section(Visits, study),
+        of_section(ModelInvalidation, study),
         settings["seed"],
         points["point"],
         progress,

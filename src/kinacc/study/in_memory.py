@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
 import numpy as np
 
 from kinacc.calibration import error_model, residual_tables
 from kinacc.config.error_models import ALWAYS
+from kinacc.config.records import Settings
 from kinacc.study import evaluation, histories, monte_carlo
 from kinacc.synthetic import source
+from kinacc.tables.columns import Columns, Tables
 
-RUNS = {
+RUNS: dict[str, Callable[..., dict[str, Columns]]] = {
     "measurements": source.run,
     **{kind: partial(error_model.run, kind=kind) for kind in ALWAYS},
     "residuals": residual_tables.run,
@@ -26,10 +28,10 @@ RUNS = {
 
 def run(
     names: Sequence[str],
-    config: Mapping,
-    tables: Mapping,
-    extra: Mapping[str, Mapping] | None = None,
-) -> dict[str, Mapping]:
+    config: Settings,
+    tables: Tables,
+    extra: Mapping[str, Settings] | None = None,
+) -> dict[str, Columns]:
     """``tables`` and all that the stages ``names``, in this order, make of them.
 
     ``config`` is the complete configuration of one data set; ``extra`` are settings by stage that
@@ -41,7 +43,7 @@ def run(
     return results
 
 
-def without_folds(measurements: Mapping) -> dict[str, np.ndarray]:
+def without_folds(measurements: Columns) -> dict[str, np.ndarray]:
     """Columns of ``measurements`` with no fold named, so that nothing is cross-validated.
 
     Rows that train stay those that train: the delivered fits and their tables are the same.
@@ -49,7 +51,7 @@ def without_folds(measurements: Mapping) -> dict[str, np.ndarray]:
     return {**measurements, "fold": np.full(len(measurements["pose"]), np.nan)}
 
 
-def lean(name: str, config: Mapping, tables: Mapping) -> dict[str, Mapping]:
+def lean(name: str, config: Settings, tables: Tables) -> dict[str, Columns]:
     """What a stage makes where only claims are wanted: without folds and further readings.
 
     No claim is about held-out poses or other readings than the configured one.

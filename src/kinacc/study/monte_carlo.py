@@ -1,4 +1,4 @@
-"""The Monte Carlo study of the assessors over noise and repetitions (section IV-C, Fig. 4).
+"""Simulations of assessors on known errors: the study of section IV-C (Fig. 4), and others.
 
 Every simulation is one world, and every assessor sees that same world. Its readings are addressed
 by (seed, noise in nm, repetition, point, visit): a key from
@@ -10,24 +10,35 @@ whatever led there.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+import dataclasses
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from kinacc.assess.assessor import Assessor, every_reading
 from kinacc.assess.registry import PAPER as ASSESSORS
 from kinacc.assess.simulate import assess_world
-from kinacc.assess.world import World, checked_errors, draw, error_vectors
-from kinacc.config.records import of_section
-from kinacc.errors import InputError, Problem
-from kinacc.tables.columns import Columns
+from kinacc.assess.world import (
+    Assessor,
+    World,
+    checked_errors,
+    drawn_world,
+    error_vectors,
+    every_reading,
+    key_of,
+)
+from kinacc.config.records import Settings, of_section
+from kinacc.errors import InputError, Problem, refuse
+from kinacc.progress import SILENT, Progress
+from kinacc.tables.columns import Columns, Tables
 from kinacc.tables.contract import ARTEFACTS, columns_of
 
 NM_PER_MM = 1_000_000
 SWITCHES = tuple(switch for cls in ASSESSORS.values() for switch in cls.switches)
+KEYS = ["assessor", "noise_mm"]
 _SHUFFLE = 1  # keeps the key of the order apart from the key of the readings
 
 
@@ -51,7 +62,7 @@ class StudySettings(Visits):
     repetitions: int
 
 
-def assessors(section: Mapping[str, object], all_readings: bool = True) -> list[Assessor]:
+def assessors(section: Settings, all_readings: bool = True) -> list[Assessor]:
     """The paper's assessors by the configuration's ``study``, in the order of the paper.
 
     Each under every reading of the paper (see :mod:`kinacc.assess`), or only the one configured.
@@ -79,15 +90,12 @@ def world_of(
 
     Holds the points the budget can reach, in visiting order.
     """
-    from kinacc.assess.random_numbers import key_of
-
     entropy = (seed, round(float(noise_mm) * NM_PER_MM), repetition)
     order = np.arange(error_mm.shape[0])
     if visits.visiting_order == "shuffled":
         order = np.random.default_rng([*entropy, _SHUFFLE]).permutation(order)
     order = order[: visits.measurements]
-    sigma = np.full(order.size, float(noise_mm))
-    return draw(error_mm[order], sigma, key_of(*entropy), visits.measurements, order)
+    return drawn_world(error_mm, noise_mm, key_of(*entropy), visits.measurements, order)
 
 
 def simulate(
@@ -96,9 +104,9 @@ def simulate(
     repetitions: Iterable[int],
     visits: Visits,
     seed: int,
-    assessors: Sequence[Assessor],
-    progress=None,
-) -> Columns:
+    assessors: Sequence[Any],
+    progress: Progress = SILENT,
+) -> pd.DataFrame:
     """Run every assessor on repetitions of each noise.
 
     Parameters
@@ -113,15 +121,16 @@ def simulate(
         Budget and visiting order.
     seed : int
         Seed of the study.
-    assessors : sequence of Assessor
+    assessors : sequence
         All see the same worlds.
-    progress : callable, optional
-        ``progress(iterable, what, total)`` reports on the simulations.
+    progress : Progress, optional
+        Reports on the simulations.
 
     Returns
     -------
-    dict
-        Columns of ``study_chunk``, one row per noise, repetition and assessor.
+    DataFrame
+        A row per noise, repetition and assessor: columns of ``study_chunk``, and bounded_mm, the
+        true size that the upper bound is held to.
 
     Raises
     ------
@@ -131,52 +140,126 @@ def simulate(
     errors = checked_errors(error_mm)
     jobs = [(noise, repetition) for noise in noise_mm for repetition in repetitions]
     rows = []
-    for noise, repetition in progress(jobs, "simulations", len(jobs)) if progress else jobs:
+    for noise, repetition in progress(jobs, "simulations"):
         world = world_of(errors, noise, repetition, visits, seed)
         for assessor in assessors:
+            assessment, bounded_mm = assess_world(assessor, world, world.visits)
+            place = {"noise_mm": noise, "repetition": repetition, "assessor": name_of(assessor)}
             switches = {switch: getattr(assessor, switch, None) for switch in SWITCHES}
-            row = assessed_row(noise, repetition, assessor, world)
-            row.pop("bounded_mm")
-            rows.append({**row, **switches})
-    return ordered(columns_of("study_chunk", rows))
+            rows.append({**place, **assessment._asdict(), **switches, "bounded_mm": bounded_mm})
+    return pd.DataFrame(rows).astype({"lower_mm": float, "upper_mm": float})
 
 
-def assessed_row(noise_mm: float, repetition: int, assessor, world: World) -> dict:
-    """One assessment, with the size that its upper bound is held to (``bounded_mm``)."""
-    assessment, bounded_mm = assess_world(assessor, world, world.visits)
-    name = getattr(assessor, "name", type(assessor).__name__)
-    place = {"noise_mm": noise_mm, "repetition": repetition, "assessor": name}
-    return {**place, **assessment._asdict(), "bounded_mm": bounded_mm}
+def name_of(assessor: object) -> str:
+    """Name of an assessor in tables."""
+    return str(getattr(assessor, "name", type(assessor).__name__))
 
 
-def ordered(rows: Columns) -> Columns:
+def evaluate_assessors(
+    errors: ArrayLike,
+    assessors: Sequence[Any],
+    noise_mm: float | Sequence[float],
+    budget: int,
+    repetitions: int,
+    seed: int,
+) -> pd.DataFrame:
+    """Evaluate assessors on simulated readings of known errors.
+
+    Every repetition of a noise is one world of readings, which all assessors see (common random
+    numbers): the worlds of the study with the same ``seed``.
+
+    Parameters
+    ----------
+    errors : (m, 3) array
+        True errors in mm, robot base frame, of points in random order.
+    assessors : sequence
+        Of the paper (:data:`kinacc.assess.registry.PAPER`), of those that choose as they go
+        (:data:`kinacc.assess.registry.ADAPTIVE`), or of one's own: an object whose
+        ``begin(candidates)`` returns a campaign (:class:`kinacc.assess.adaptive.Campaign`).
+        ``name`` is its name in the table; its field ``measurements`` is set to the budget.
+    noise_mm : float or sequence of floats
+        Standard deviations of a reading per axis, mm.
+    budget : int
+        Readings of an assessment.
+    repetitions : int
+        Worlds for each noise.
+    seed : int
+        Seed of all worlds.
+
+    Returns
+    -------
+    DataFrame
+        A row for each assessor and noise, with the columns of ``study_summary`` that Fig. 4 draws
+        (mean_mm, min_mm, max_mm, bias_mm, rmse_mm against the largest true error, repetitions), and
+        of the bounds: stated (share of worlds with an upper bound), coverage and lower_coverage
+        (share of these whose upper, lower bound holds for the points it is about), width_mm (mean
+        of upper less lower bound). NaN where no bound is stated.
+
+    Raises
+    ------
+    InputError
+        For errors, noise or numbers that cannot be used, and for names that occur twice.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from kinacc.assess.maximum import Maximum
+    >>> from kinacc.assess.single_shot import SingleShot
+    >>> errors = np.random.default_rng(1).normal(0.0, 0.2, (50, 3))
+    >>> table = evaluate_assessors(errors, [Maximum(50), SingleShot(50)], 0.05, 50, 20, 1)
+    >>> table["assessor"].tolist()
+    ['maximum', 'single_shot']
+    """
+    error_mm, levels = checked_errors(errors), np.atleast_1d(np.asarray(noise_mm, dtype=float))
+    problems = [
+        Problem(name, f"{value!r}", "a whole number, at least 1")
+        for name, value in (("budget", budget), ("repetitions", repetitions))
+        if not isinstance(value, (int, np.integer)) or value < 1
+    ]
+    if not levels.size or not np.all(np.isfinite(levels) & (levels > 0.0)):
+        problems.append(Problem("noise_mm", f"{noise_mm}", "above 0, in mm"))
+    names = [name_of(assessor) for assessor in assessors]
+    if twice := sorted({name for name in names if names.count(name) > 1}):
+        problems.append(Problem("assessors", f"{', '.join(twice)} occurs twice", "a name each"))
+    refuse(problems)
+    chosen: list[Any] = [
+        dataclasses.replace(each, measurements=budget) if hasattr(each, "measurements") else each
+        for each in assessors
+    ]
+    visits = Visits(budget, "sequence")
+    rows = simulate(error_mm, levels.tolist(), range(repetitions), visits, seed, chosen)
+    truth, stated = true_accuracy_mm(np.linalg.norm(error_mm, axis=1)), rows["upper_mm"].notna()
+    rows["coverage"] = (rows["upper_mm"] >= rows["bounded_mm"]).where(stated).astype(float)
+    rows["lower_coverage"] = (rows["lower_mm"] <= truth).where(stated).astype(float)
+    rows["width_mm"] = rows["upper_mm"] - rows["lower_mm"]
+    rows["stated"] = stated.astype(float)
+    bounds = rows.groupby(KEYS)[["stated", "coverage", "lower_coverage", "width_mm"]].mean()
+    return statistics(rows, KEYS, truth).join(bounds, on=KEYS)
+
+
+def ordered(rows: pd.DataFrame) -> pd.DataFrame:
     """Rows by noise, repetition, assessor (as in the paper) and switches (alphabetically)."""
-    ranks = {name: rank for rank, name in enumerate(ASSESSORS)}
-    keys = [np.array([ranks[name] for name in rows["assessor"]], np.int64)]
-    for switch in SWITCHES:
-        keys.append(np.array(["" if value is None else value for value in rows[switch]], str))
-    keys = [rows["noise_mm"], rows["repetition"], *keys]
-    order = np.lexsort(keys[::-1])
-    return {name: np.asarray(column)[order] for name, column in rows.items()}
+    keys = ["noise_mm", "repetition", "assessor", *SWITCHES]
+    rank = rows["assessor"].map(list(ASSESSORS).index)
+    order = rows[keys].assign(assessor=rank).fillna(dict.fromkeys(SWITCHES, "")).sort_values(keys)
+    return rows.loc[order.index]
 
 
-def default_reading(rows: Columns, section: Mapping[str, object]) -> Columns:
+def default_reading(rows: pd.DataFrame, section: Settings) -> pd.DataFrame:
     """The rows of the reading that the section ``study`` names: the columns of ``study``."""
-    keep = np.ones(rows["noise_mm"].size, bool)
-    for switch in SWITCHES:
-        keep &= np.array([value in (None, section[switch]) for value in rows[switch]], bool)
-    return {name: column[keep] for name, column in rows.items() if name not in SWITCHES}
+    named = pd.Series({switch: section[switch] for switch in SWITCHES})
+    keep = (rows[[*SWITCHES]].isna() | (rows[[*SWITCHES]] == named)).all(axis=1)
+    return rows[keep].drop(columns=[*SWITCHES])
 
 
-def statistics(rows: Columns | pd.DataFrame, keys: Sequence[str], true_mm: float) -> pd.DataFrame:
+def statistics(rows: pd.DataFrame, keys: Sequence[str], true_mm: float) -> pd.DataFrame:
     """Statistics of ``assessed_mm`` over the rows that agree in the key columns, a row each.
 
     Columns mean_mm, min_mm, max_mm, bias_mm and rmse_mm against the true accuracy, repetitions and
     std_error_mm of the mean (NaN of one value).
     """
-    frame = pd.DataFrame(dict(rows))
-    frame["square"] = (frame["assessed_mm"] - true_mm) ** 2
-    groups = frame.groupby(list(keys), sort=False, dropna=False)
+    rows = rows.assign(square=(rows["assessed_mm"] - true_mm) ** 2)
+    groups = rows.groupby(list(keys), sort=False, dropna=False)
     chosen = {"mean_mm": "mean", "min_mm": "min", "max_mm": "max"}
     table = groups["assessed_mm"].agg(**chosen, repetitions="size", std_error_mm="sem")
     table["bias_mm"] = table["mean_mm"] - true_mm
@@ -184,26 +267,30 @@ def statistics(rows: Columns | pd.DataFrame, keys: Sequence[str], true_mm: float
     return table.reset_index()
 
 
-def summary(study: Columns, true_mm: float) -> Columns:
+def summary(study: pd.DataFrame, true_mm: float) -> Columns:
     """Columns of ``study_summary``: each assessor and noise against the true accuracy (mm)."""
-    return _by_assessor("study_summary", study, ["assessor", "noise_mm"], true_mm)
+    return _by_assessor("study_summary", study, KEYS, true_mm)
 
 
-def readings(rows: Columns, true_mm: float) -> Columns:
+def readings(rows: pd.DataFrame, true_mm: float) -> Columns:
     """Columns of ``readings``: every reading of the assessors that have more than one."""
-    keep = np.array([bool(ASSESSORS[name].switches) for name in rows["assessor"]], bool)
-    chosen = {name: column[keep] for name, column in rows.items()}
-    return _by_assessor("readings", chosen, ["assessor", *SWITCHES, "noise_mm"], true_mm)
+    switched = [name for name, cls in ASSESSORS.items() if cls.switches]
+    rows = rows[rows["assessor"].isin(switched)]
+    return _by_assessor("readings", rows, ["assessor", *SWITCHES, "noise_mm"], true_mm)
 
 
-def _by_assessor(artefact: str, rows: Columns, keys: list[str], true_mm: float) -> Columns:
+def _by_assessor(artefact: str, rows: pd.DataFrame, keys: list[str], true_mm: float) -> Columns:
     """Columns of an artefact, by assessor as in the paper, then by the other keys."""
     table = statistics(rows, keys, true_mm)
     rank = table["assessor"].map(list(ASSESSORS).index)
-    table = table.assign(rank=rank).sort_values(["rank", *keys[1:]], kind="stable")
-    known = [column.name for column in ARTEFACTS[artefact].columns]
-    table = table[[name for name in known if name in table]].astype(object)
-    return columns_of(artefact, table.where(table.notna(), None).to_dict("records"))
+    return _columns(artefact, table.assign(rank=rank).sort_values(["rank", *keys[1:]]))
+
+
+def _columns(artefact: str, table: pd.DataFrame) -> Columns:
+    """Columns of an artefact, of a table that may have more."""
+    known = [column.name for column in ARTEFACTS[artefact].columns if column.name in table]
+    cells = table[known].astype(object)
+    return columns_of(artefact, cells.where(cells.notna(), None).to_dict("records"))
 
 
 def true_accuracy_mm(true_error_mm: ArrayLike) -> float:
@@ -216,36 +303,37 @@ def true_accuracy_mm(true_error_mm: ArrayLike) -> float:
     return float(values.max())
 
 
-def simulated(inputs: Mapping, settings: Mapping, progress=None) -> dict[str, dict]:
+def simulated(
+    inputs: Tables,
+    settings: Settings,
+    progress: Progress = SILENT,
+) -> dict[str, Columns]:
     """Return ``study_chunk`` for ``settings["part"]`` (default: all repetitions).
 
     ``settings["all_readings"]`` false: the reading that ``study`` names alone;
     ``settings["only"]``: the repetitions simulated.
     """
-    points = inputs["assessment_points"]
     study = of_section(StudySettings, settings["study"])
     part = settings.get("part") or {"number": 1, "of": 1}
-    error_mm = error_vectors(points)
-    repetitions = settings.get("only") or part_of(study.repetitions, part["number"], part["of"])
     rows = simulate(
-        error_mm,
+        error_vectors(inputs["assessment_points"]),
         study.noise_mm,
-        repetitions,
+        settings.get("only") or part_of(study.repetitions, part["number"], part["of"]),
         study,
         settings["seed"],
         assessors(settings["study"], settings.get("all_readings", True)),
         progress,
     )
-    return {"study_chunk": rows}
+    return {"study_chunk": _columns("study_chunk", ordered(rows))}
 
 
-def summed_up(inputs: Mapping, settings: Mapping) -> dict[str, dict]:
+def summed_up(inputs: Tables, settings: Settings) -> dict[str, Columns]:
     """Return ``study``, ``study_summary`` and ``readings``."""
     true_mm = true_accuracy_mm(inputs["assessment_points"]["true_error_mm"])
-    rows = ordered(inputs["study_chunk"])
+    rows = ordered(pd.DataFrame(dict(inputs["study_chunk"])))
     default = default_reading(rows, settings["study"])
     return {
-        "study": default,
+        "study": _columns("study", default),
         "study_summary": summary(default, true_mm),
         "readings": readings(rows, true_mm),
     }

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
+import pandas as pd
 
 from kinacc.errors import InputError, Problem, refuse
 from kinacc.geometry import compose
@@ -14,6 +15,7 @@ from kinacc.kinematics.inverse import Status, limits
 from kinacc.kinematics.region import Cylinder
 from kinacc.kinematics.robot import Robot
 from kinacc.study.accuracy_map import Models, PosesWanted, errors_at, joints_of
+from kinacc.tables.columns import Columns
 
 _ALL = (None, "both")  # wrists: what is said where none is chosen
 _DRAWS_PER_POINT = 500  # draws spent per wanted point before the space is called out of reach
@@ -156,9 +158,12 @@ def spread_rows(total: int, count: int) -> np.ndarray:
     return np.array(rows[:count], dtype=int)
 
 
-def readings_of(pose: np.ndarray, target: np.ndarray) -> list[np.ndarray]:
-    """Row numbers of every (configuration, target) pair of ``pose`` (n,), ``target`` (n,)."""
-    groups: dict[tuple, list[int]] = {}
-    for row, key in enumerate(zip(pose.tolist(), target.tolist(), strict=True)):
-        groups.setdefault(key, []).append(row)
-    return [np.array(rows) for rows in groups.values()]
+def measured_errors(errors: Columns, wanted: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Mean errors (n, 3) of the configurations and targets in the ``wanted`` rows of pose_errors.
+
+    Before them the row (n,) of each one's first reading in the measurements.
+    """
+    axes = ["ex_mm", "ey_mm", "ez_mm"]
+    table = pd.DataFrame({name: errors[name] for name in ("pose", "target", "row", *axes)})[wanted]
+    groups = table.groupby(["pose", "target"], sort=False, dropna=False)
+    return groups["row"].first().to_numpy(int), groups[axes].mean().to_numpy()

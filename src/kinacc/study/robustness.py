@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from kinacc.config.error_models import ALWAYS
+from kinacc.config.records import Settings
+from kinacc.progress import SILENT, Progress
 from kinacc.study import in_memory
 from kinacc.study.claims.evaluate import evaluate
 from kinacc.synthetic.accepted import further_draws
-from kinacc.tables.columns import Columns
+from kinacc.tables.columns import Columns, Tables
 from kinacc.tables.contract import columns_of
 
 STAGES = (
@@ -24,7 +24,7 @@ STAGES = (
 )
 
 
-def run(inputs: Mapping, settings: Mapping, progress=None) -> dict[str, dict]:
+def run(inputs: Tables, settings: Settings, progress: Progress = SILENT) -> dict[str, Columns]:
     """Return ``robustness_chunk`` for ``settings["part"]`` (default: all further draws).
 
     Raises InputError where fewer draws were accepted than are wanted.
@@ -34,8 +34,7 @@ def run(inputs: Mapping, settings: Mapping, progress=None) -> dict[str, dict]:
     part = settings.get("part") or {"number": 1, "of": 1}
     chosen = draws[part["number"] - 1 :: part["of"]]
     config = {name: value for name, value in settings.items() if name != "part"}
-    counted = progress(chosen, "further synthetic arms studied") if progress else chosen
-    parts = [claims_on(draw, config) for draw in counted]
+    parts = [claims_on(draw, config) for draw in progress(chosen, "further synthetic arms studied")]
     return {
         "robustness_chunk": {
             name: np.concatenate([empty, *(part[name] for part in parts)])
@@ -44,12 +43,12 @@ def run(inputs: Mapping, settings: Mapping, progress=None) -> dict[str, dict]:
     }
 
 
-def claims_on(draw: int, config: Mapping) -> Columns:
+def claims_on(draw: int, config: Settings) -> Columns:
     """Rows of ``robustness`` of one accepted draw under the configuration of a data set."""
     measurements = config["measurements"]
     synthetic = {**measurements["synthetic"], "draw": draw}
     settings = {**config, "measurements": {**measurements, "synthetic": synthetic}}
-    tables: dict = {}
+    tables: dict[str, Columns] = {}
     for name in ("measurements", *STAGES):
         tables |= in_memory.lean(name, settings, tables)
     claims = evaluate(tables, paper_arm=True)
@@ -57,7 +56,7 @@ def claims_on(draw: int, config: Mapping) -> Columns:
     return {"draw": np.full(len(claims["claim"]), draw), **rows}
 
 
-def gathered(inputs: Mapping, settings: Mapping) -> dict[str, dict]:
+def gathered(inputs: Tables, settings: Settings) -> dict[str, Columns]:
     """Return ``robustness``: by draw, then in the order of the claims."""
     rows = inputs["robustness_chunk"]
     order = np.argsort(rows["draw"], kind="stable")

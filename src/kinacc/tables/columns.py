@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from itertools import groupby
 from typing import TYPE_CHECKING
@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     import numpy as np
 
 Columns = dict[str, "np.ndarray"]  # a table in memory: a null number is NaN, a null text None
+Tables = Mapping[str, Columns]  # by their names
 JOINTS_MIN, JOINTS_MAX = 4, 7
 # Two runs of one work may differ by so much, by the unit of a column: rounding differs from machine
 # to machine. What an arm is sure of begins at 1e-3 mm; 1e-9 rad is 1e-6 mm at a metre. Pure numbers

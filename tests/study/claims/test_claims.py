@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from kinacc.study.claims import all_claims, evaluate
-from kinacc.study.claims.history_sentences import KEPT, LARGER, REJECTED
-from kinacc.study.claims.numbers import TABLE_2
+from kinacc.study.histories import KEPT, LARGER, REJECTED
+from kinacc.synthetic.draw import TABLE_II
 
 NOISE_MM = np.arange(0.05, 0.301, 0.05)
 TRUTH_MM = 0.9
@@ -135,7 +135,10 @@ def test_few_points_near_the_limit_counts_points():
 
 
 def dh_model() -> dict[str, np.ndarray]:
-    return {"joint": np.arange(1, 7)} | {name: np.array(v) for name, v in TABLE_2.items()}
+    return {"joint": np.arange(1, 7)} | {
+        name: getattr(TABLE_II, name).copy()
+        for name in ("theta_offset_rad", "d_mm", "a_mm", "alpha_rad")
+    }
 
 
 def test_table_2_angles_are_compared_modulo_a_turn():

@@ -8,14 +8,13 @@ from collections.abc import Mapping
 
 import pandas as pd
 
+from kinacc.config.records import Settings
 from kinacc.config.schema import defaults
 from kinacc.errors import first_few
-from kinacc.study.claims.claim import Claim, Tables, verdict
-from kinacc.study.claims.history_sentences import history_claims
+from kinacc.study.claims.claim import Claim, number_claims, verdict
 from kinacc.study.claims.map_sentences import map_claims
-from kinacc.study.claims.numbers import number_claims
-from kinacc.study.claims.study_sentences import study_claims
-from kinacc.tables.columns import Columns
+from kinacc.study.claims.study_sentences import history_claims, study_claims
+from kinacc.tables.columns import Columns, Tables
 from kinacc.tables.contract import columns_of
 
 SECTIONS = ("measurements", "calibration", "evaluation", "map", "study", "histories")
@@ -66,7 +65,7 @@ def evaluate(
     return columns_of("claims", rows)
 
 
-def _unlike_the_paper(settings: Mapping) -> list[str]:
+def _unlike_the_paper(settings: Settings) -> list[str]:
     """Settings whose values are not the defaults, which are the paper's."""
     values, paper = (
         pd.json_normalize([{key: dict(source[key]) for key in SECTIONS if key in source}]).iloc[0]
@@ -75,7 +74,7 @@ def _unlike_the_paper(settings: Mapping) -> list[str]:
     return [f"{key} {values[key]}" for key in values.index if values[key] != paper[key]]
 
 
-def table_of(inputs: Mapping, settings: Mapping) -> dict[str, Mapping]:
+def table_of(inputs: Tables, settings: Settings) -> dict[str, Columns]:
     """Return ``claims``; numbers of Tables I to III are compared on the paper's arm only.
 
     A share is that of the further draws on which the claim could be judged. Warns of settings

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
-from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
-from scipy.spatial.distance import cdist
+from scipy.ndimage import distance_transform_edt
+from scipy.spatial.distance import pdist
 
-from kinacc.study.claims.claim import Claim, Tables, sentences
+from kinacc.study.claims.claim import Claim, sentences
+from kinacc.tables.columns import Tables
 
 _JUMP_SHARE = 0.05  # the largest steps between neighbouring cells that count as discontinuities
 _TOP_SHARE = 0.01  # the largest cells of a map
@@ -22,18 +23,18 @@ _QUANTITIES = {
 }
 
 
-class _Slice(NamedTuple):
-    """One heat map, (heights, radii); unreachable cells are NaN, their branch None."""
+class _Maps(NamedTuple):
+    """Heat maps (slices, heights, radii); unreachable cells are NaN, their branch None."""
 
-    angle_deg: float
     value: np.ndarray
     branch: np.ndarray
     solutions: np.ndarray
 
     def worst(self) -> np.ndarray:
-        """Place of the largest value as fractions of the slice: (radius, height)."""
-        place = np.array(np.unravel_index(np.nanargmax(self.value), self.value.shape))
-        return (place / np.maximum(np.array(self.value.shape) - 1, 1))[::-1]
+        """Places (slices, 2) of the largest values as fractions of a slice: (height, radius)."""
+        slices, *shape = self.value.shape
+        place = np.nanargmax(self.value.reshape(slices, -1), axis=1) if slices else []
+        return np.transpose(np.unravel_index(place, shape)) / np.maximum(np.array(shape) - 1, 1)
 
 
 def map_claims() -> list[Claim]:
@@ -55,25 +56,23 @@ def map_claims() -> list[Claim]:
     )
 
 
-def _slices(tables: Tables, quantity: str, angles_deg: tuple[float, ...] = ()) -> list[_Slice]:
-    columns = [*_QUANTITIES[quantity], "solutions"]
-    names = ["slice_deg", "radius_mm", "height_mm", *columns]
-    rows = pd.DataFrame({name: tables["accuracy_map"][name] for name in names})
-    slices = []
-    for angle, group in rows.groupby("slice_deg"):
-        maps = group.pivot(index="height_mm", columns="radius_mm", values=columns)
-        value, branch, solutions = (maps[name].to_numpy() for name in columns)
-        value = value.astype(float)
-        if np.isfinite(value).any() and (not angles_deg or angle in angles_deg):
-            slices.append(_Slice(float(angle), value, branch, solutions))
-    return slices
+def _maps(tables: Tables, quantity: str, angles_deg: tuple[float, ...] = ()) -> _Maps:
+    """The maps of the slices at these angles, by default all, that have a value."""
+    place, columns = ["slice_deg", "height_mm", "radius_mm"], [*_QUANTITIES[quantity], "solutions"]
+    rows = pd.DataFrame({name: tables["accuracy_map"][name] for name in (*place, *columns)})
+    rows = rows[rows["slice_deg"].isin(angles_deg or rows["slice_deg"])].sort_values(place)
+    value, branch, solutions = (
+        rows[name].to_numpy().reshape(rows[place].nunique().to_list()) for name in columns
+    )
+    reached = np.isfinite(value.astype(float)).any(axis=(1, 2))
+    return _Maps(value.astype(float)[reached], branch[reached], solutions[reached])
 
 
 def _nonlinear(tables: Tables) -> float:
-    def plane_share(heat_map: _Slice) -> float:
+    def plane_share(value: np.ndarray) -> float:
         """Share of the variance that a plane explains."""
-        rows, columns = np.nonzero(np.isfinite(heat_map.value))
-        values = heat_map.value[rows, columns]
+        rows, columns = np.nonzero(np.isfinite(value))
+        values = value[rows, columns]
         if values.size < 4 or np.ptp(values) == 0.0:
             return math.nan
         design = np.column_stack([np.ones_like(values), rows, columns])
@@ -81,85 +80,74 @@ def _nonlinear(tables: Tables) -> float:
         return 1.0 - float(np.var(values - fitted) / np.var(values))
 
     return max(
-        float(np.mean([plane_share(heat_map) for heat_map in _slices(tables, quantity)]))
+        float(np.mean([plane_share(value) for value in _maps(tables, quantity).value]))
         for quantity in _QUANTITIES
     )
 
 
-def _distances(slices: list[_Slice]) -> list[float]:
-    places = [heat_map.worst() for heat_map in slices]
-    return [float(np.linalg.norm(a - b)) for a, b in combinations(places, 2)]
+def _distances(tables: Tables, quantity: str, angles_deg: tuple[float, ...] = ()) -> np.ndarray:
+    """Distances between the places of the largest values of every two slices."""
+    places = _maps(tables, quantity, angles_deg).worst()
+    return pdist(places) if len(places) > 1 else np.empty(0)
 
 
 def _changes_location(tables: Tables) -> float:
-    both = [value for name in _QUANTITIES for value in _distances(_slices(tables, name))]
-    return min(both, default=math.nan)
+    both = [_distances(tables, quantity) for quantity in _QUANTITIES]
+    return float(min(np.concatenate(both), default=math.nan))
 
 
 def _outer_reaches(tables: Tables) -> float:
-    slices = _slices(tables, "position", _OUTER_DEG)
-    return min((float(heat_map.worst()[0]) for heat_map in slices), default=math.nan)
+    return float(min(_maps(tables, "position", _OUTER_DEG).worst()[:, 1], default=math.nan))
 
 
 def _less_predictable_inside(tables: Tables) -> float:
-    inside, outside = (
-        _distances(_slices(tables, "position", angles)) for angles in (_INNER_DEG, _OUTER_DEG)
-    )
-    if not inside or not outside:
+    inside, outside = (_distances(tables, "position", deg) for deg in (_INNER_DEG, _OUTER_DEG))
+    if not inside.size or not outside.size:
         return math.nan
     # Equal places at 0 and 60 deg are the most predictable there is: the ratio has no bound.
-    return float(np.mean(inside)) / max(float(np.mean(outside)), 1e-9)
+    return float(inside.mean()) / max(float(outside.mean()), 1e-9)
 
 
 def _orientation_less_predictable(tables: Tables) -> float:
-    position, orientation = (_distances(_slices(tables, name)) for name in _QUANTITIES)
-    return float(np.mean(orientation) / np.mean(position)) if any(position) else math.nan
+    position, orientation = (_distances(tables, quantity) for quantity in _QUANTITIES)
+    return float(orientation.mean() / position.mean()) if position.any() else math.nan
 
 
-def _discontinuities(slices: list[_Slice]) -> np.ndarray:
-    """Largest steps between neighbouring cells (n, 5): slice number, then row, column of both."""
-    steps, sizes = [np.empty((0, 5), dtype=int)], [np.empty(0)]
-    for number, heat_map in enumerate(slices):
-        for axis in (0, 1):
-            size = np.abs(np.diff(heat_map.value, axis=axis))
-            cell = np.argwhere(np.isfinite(size))
-            slice_number = np.full((len(cell), 1), number)
-            steps.append(np.hstack([slice_number, cell, cell + np.eye(2, dtype=int)[axis]]))
-            sizes.append(size[np.isfinite(size)])
-    every, size = np.concatenate(steps), np.concatenate(sizes)
-    order = np.lexsort((*every.T[::-1], -size))
-    return every[order[: max(1, round(_JUMP_SHARE * len(size)))]]
+def _discontinuities(value: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Cells (n, 3), (n, 3) on both sides of the largest steps: slice, row, column."""
+    steps = []
+    for axis in (1, 2):
+        size = np.abs(np.diff(value, axis=axis))
+        cell = np.argwhere(np.isfinite(size))
+        steps.append(np.column_stack([size[tuple(cell.T)], cell, cell + np.eye(3)[axis]]))
+    rows = np.concatenate(steps)
+    rows = rows[np.argsort(-rows[:, 0], kind="stable")]
+    cells = rows[: max(1, round(_JUMP_SHARE * len(rows))), 1:].astype(int)
+    return cells[:, :3], cells[:, 3:]
 
 
 def _near_discontinuities(tables: Tables) -> float:
-    slices = _slices(tables, "orientation")
-    jumps = _discontinuities(slices)
-    distances, values = [], []
-    for number, heat_map in enumerate(slices):
-        broken = jumps[jumps[:, 0] == number, 1:].reshape(-1, 2)
-        if len(broken):
-            cells = np.argwhere(np.isfinite(heat_map.value))
-            distances.append(cdist(cells, broken).min(axis=1))
-            values.append(heat_map.value[tuple(cells.T)])
-    if not values:
+    value = _maps(tables, "orientation").value
+    broken = np.zeros(value.shape, bool)
+    for cells in _discontinuities(value):
+        broken[tuple(cells.T)] = True
+    if not broken.any():
         return math.nan
-    distance, value = np.concatenate(distances), np.concatenate(values)
-    top = value >= np.quantile(value, 1.0 - _TOP_SHARE)
+    slices = broken.any(axis=(1, 2))
+    finite = np.isfinite(value[slices])
+    away = np.array([distance_transform_edt(~part) for part in broken[slices]])
+    distance, values = away[finite], value[slices][finite]
+    top = values >= np.quantile(values, 1.0 - _TOP_SHARE)
     typical = float(np.median(distance))
     # With half of all cells touching a discontinuity there is no "near" to speak of.
     return float(np.median(distance[top])) / typical if typical else math.nan
 
 
 def _at_wrist_changes(tables: Tables) -> float:
-    slices = _slices(tables, "orientation")
-
-    def state(number: int, row: int, column: int) -> tuple[str, int]:
-        """Wrist, the part of a branch name after its last comma, and combinations reached."""
-        heat_map = slices[number]
-        return heat_map.branch[row, column].rpartition(",")[2].strip(), heat_map.solutions[
-            row, column
-        ]
-
-    jumps = _discontinuities(slices).tolist()
-    changed = [state(number, *cells[:2]) != state(number, *cells[2:]) for number, *cells in jumps]
-    return float(np.mean(changed)) if changed else math.nan
+    maps = _maps(tables, "orientation")
+    sides = _discontinuities(maps.value)
+    # The wrist is the part of a branch name after its last comma.
+    wrists = [[name.rpartition(",")[2].strip() for name in maps.branch[tuple(s.T)]] for s in sides]
+    reached = [maps.solutions[tuple(side.T)] for side in sides]
+    changed = (np.array(wrists[0]) != np.array(wrists[1])) | (reached[0] != reached[1])
+    return float(np.mean(changed)) if changed.size else math.nan
