@@ -9,9 +9,14 @@ from command_line import call
 
 from kinacc.assess.world import drawn_world, key_of
 from kinacc.campaign import folder as campaigns
-from kinacc.campaign.state import Reading
+from kinacc.campaign.state import Reading, Readings
 
 SIGMA_MM = 0.05
+
+
+def entry_of(readings):
+    """The entry of a journal with these readings."""
+    return Readings(readings=readings).model_dump(exclude_none=True)
 
 
 class Arm:
@@ -59,8 +64,8 @@ def recorded(folder, arm, count):
     """Take the next ``count`` readings through one file per reading of the arm."""
     for _ in range(count):
         with campaigns.writing(folder) as opened:
-            state = opened.state()
-            label = arm.plan.points.label[state.asked]
+            state = opened.state
+            label = arm.plan.points.label[state.requested]
             seen = [float(each) for each in arm.position(label).split(",")]
-            taken = Reading(state.asked, np.array(seen), arm.plan.instruments[0].name)
-            opened.write(campaigns.readings_entry([taken]))
+            taken = Reading(state.requested, np.array(seen), arm.plan.instruments[0].name)
+            opened.write(Readings(readings=[taken]))

@@ -115,7 +115,7 @@ def test_a_reading_at_slightly_other_joints_is_held_to_the_model_there(begun, ca
     done = call("campaign", "record", folder, "--joints-rad", written(joints),
                 "--position-mm", written(there))  # fmt: skip
     assert done.exit_code == 0, done.output
-    (told,) = campaigns.open_(folder).state().told
+    (told,) = campaigns.open_(folder).state.used
     assert np.linalg.norm(told.error_mm) < 2e-3
 
 
@@ -246,8 +246,8 @@ def test_a_report_holds_its_contract_and_the_numbers_of_status(begun):
     arm = Arm(folder)
     refused(folder, "report", folder)
     recorded(folder, arm, 18)
-    state = campaigns.open_(folder).state()
-    point = next(each for each in state.rows if each not in {e.reading.point for e in state.told})
+    state = campaigns.open_(folder).state
+    point = next(each for each in state.rows if each not in {e.reading.point for e in state.used})
     label = arm.plan.points.label[point]
     call("campaign", "leave-out", folder, label, "--reason", "hidden")
     done = call("campaign", "report", folder)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from campaign_on_disk import entry_of
 from scipy.stats import kstest
 
-from kinacc.campaign import folder
-from kinacc.campaign.state import Reading, Told, restore, scatter, size_scatter
+from kinacc.campaign.state import Reading, Taken, restore, scatter, size_scatter
 
 SPREAD = np.diag([0.05, 0.05, 0.15])
 
@@ -20,7 +20,7 @@ def read(plan, factor, repeats=6, points=4, seed=0):
                 "camera")
         for point in map(int, plan.route[:points]) for _ in range(repeats)
     ]  # fmt: skip
-    return restore(plan, [folder.readings_entry(readings)])
+    return restore(plan, [entry_of(readings)])
 
 
 @pytest.fixture
@@ -49,7 +49,7 @@ def test_points_read_again_for_being_large_do_not_pass_for_scatter(make_plan):
             begun.campaign.record(row, error)
             point = int(begun.rows[row])
             reading = Reading(point, plan.points.modelled_mm[point] + error, "tracker")
-            begun.told.append(Told(len(begun.told) + 1, reading, error))
+            begun.used.append(Taken(len(begun.used) + 1, reading, error))
         found = scatter(begun)
         assert not found.too_large
         assert found.freedom >= 36
@@ -68,7 +68,7 @@ def near(plan, error_mm, noise_mm, seed=0):
         for point, at in enumerate(plan.points.modelled_mm + errors)
     ]
     largest_mm = np.linalg.norm(errors, axis=1).max()
-    return restore(plan, [folder.readings_entry(readings)]), largest_mm
+    return restore(plan, [entry_of(readings)]), largest_mm
 
 
 @pytest.mark.parametrize(

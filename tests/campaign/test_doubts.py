@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 from command_line import call
 
-from kinacc.campaign import doubts
+from kinacc.campaign.begin import noise_doubts
 from kinacc.campaign.instrument import instruments
 
 
@@ -105,4 +105,4 @@ def test_a_report_has_spreadsheets_and_a_page_that_is_not_overwritten(visited, t
 def test_noise_below_the_scatter_of_repeated_readings_is_asked_about(freedom, noise_mm, doubted):
     known = SimpleNamespace(freedom=freedom, per_axis_mm=0.06)
     used = instruments([f"tracker={noise_mm}"], "base")
-    assert len(doubts.of_little_noise(used, known)) == doubted
+    assert len(noise_doubts(used, known=known)) == doubted

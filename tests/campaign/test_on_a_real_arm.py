@@ -111,9 +111,9 @@ def test_the_series_itself_imported_whole_says_what_it_says_in_memory(ur10_d, tm
     plan = begun(ur10_d, folder, "--assessor", "single_shot")
     done = call("campaign", "record", folder, ur10_d[1])
     assert done.exit_code == 0, done.output
-    state = campaigns.open_(folder).state()
-    assert len(state.told) == len(plan.points)
-    errors = np.array([each.error_mm for each in state.told])
+    state = campaigns.open_(folder).state
+    assert len(state.used) == len(plan.points)
+    errors = np.array([each.error_mm for each in state.used])
     # These are the held-out residuals of the calibration itself, in another frame.
     columns = store.read(ur10_d[0] / "residuals.parquet")
     row = (columns["comparison"] == "dh_vs_measured") & (columns["subset"] == "validation")

@@ -16,8 +16,7 @@ from kinacc.assess.simulate import conduct
 from kinacc.assess.single_shot import SingleShot
 from kinacc.assess.statement import MEASURED
 from kinacc.assess.world import drawn_world, key_of
-from kinacc.campaign import planning
-from kinacc.campaign.planning import Aim, plan_budget, simulate, smallest_budget
+from kinacc.campaign.planning import Aim, counted, plan_budget, simulate, smallest_budget
 from kinacc.errors import InputError
 from kinacc.study.fields import ErrorField
 
@@ -63,11 +62,9 @@ def test_a_plan_has_the_excess_of_bounds_that_know_the_errors():
 def runs(*bounds):
     """Simulated campaigns by lower and upper bound, truth and verdict."""
     table = pd.DataFrame(bounds, columns=["lower_mm", "upper_mm", "true_mm", "verdict"])
-    width = table["upper_mm"] - table["lower_mm"]
     return table.assign(
-        width_mm=width.clip(lower=0.0).fillna(math.inf), readings=10, excepted=0,
-        attainable_mm=0.0, proven_mm=0.0,
-    )  # fmt: skip
+        errors="x", budget=10, readings=10, excepted=0, attainable_mm=0.0, proven_mm=0.0
+    )
 
 
 def test_rows_count_what_is_stated_wanted_held_and_decided():
@@ -77,7 +74,7 @@ def test_rows_count_what_is_stated_wanted_held_and_decided():
         (1.3, 2.0, 1.5, "reject"),
         (0.9, math.nan, 1.0, "undecided"),
     )
-    row = pd.Series(planning._row("x", 10, table, Aim(width_mm=0.5, tolerance_mm=1.2)))
+    (row,) = counted(table, Aim(width_mm=0.5, tolerance_mm=1.2)).itertuples()
     assert (row.stated, row.within, row.reached) == (0.75, 0.5, 2)
     assert (row.holding, row.judged) == (2, 3)
     # Clopper, Pearson: 3 p^2 - 2 p^3 = 0.025 below; p^3 = 0.975 above

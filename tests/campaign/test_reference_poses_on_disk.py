@@ -1,8 +1,8 @@
 """A campaign on disk whose reference poses are read again by plan."""
 
 import numpy as np
+from campaign_on_disk import entry_of
 
-from kinacc.campaign import folder
 from kinacc.campaign.state import Reading, restore
 
 PLANNED = {"points": 30, "budget": 70, "references": 20}
@@ -20,7 +20,7 @@ def entries_of(plan, world, drift_mm=(0.0, 0.0, 0.0)):
         point = int(rows[row])
         position = plan.points.modelled_mm[point] + error
         reading = Reading(point, position, plan.instruments[0].name)
-        entries.append(folder.readings_entry([reading]))
+        entries.append(entry_of([reading]))
     return entries
 
 

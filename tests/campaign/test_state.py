@@ -6,28 +6,29 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from campaign_on_disk import entry_of
 from command_line import call
 
 from kinacc.assess.registry import ADAPTIVE
 from kinacc.assess.simulate import conduct
 from kinacc.campaign import folder
-from kinacc.campaign.plan import fixed_visit, from_json, to_json
-from kinacc.campaign.state import Reading, restore
+from kinacc.campaign.plan import from_json, to_json
+from kinacc.campaign.state import Reading, Readings, restore
 
 
 def reading_of(plan, world, state):
     """What is read next: the world's own next reading of the point that is asked for."""
-    row = int(np.flatnonzero(state.rows == state.asked)[0])
-    visit = sum(each.reading.point == state.asked for each in state.told)
-    position = plan.points.modelled_mm[state.asked] + world.reading_mm(row, visit)
-    return Reading(state.asked, position, plan.instruments[0].name)
+    row = int(np.flatnonzero(state.rows == state.requested)[0])
+    visit = sum(each.reading.point == state.requested for each in state.used)
+    position = plan.points.modelled_mm[state.requested] + world.reading_mm(row, visit)
+    return Reading(state.requested, position, plan.instruments[0].name)
 
 
 def entries_of(plan, world):
     """The journal of a whole campaign, one reading at a time."""
     entries = []
-    while (state := restore(plan, entries)).asked is not None:
-        entries.append(folder.readings_entry([reading_of(plan, world, state)]))
+    while (state := restore(plan, entries)).requested is not None:
+        entries.append(entry_of([reading_of(plan, world, state)]))
     return entries
 
 
@@ -47,7 +48,7 @@ def test_a_campaign_on_disk_ends_as_in_memory(make_plan, make_world, name):
     entries = entries_of(plan, world)
     wanted = conduct(plan.assessor, world)
     state = restore(from_json(to_json(plan), "here"), entries)
-    assert len(state.told) == wanted.ledger.taken
+    assert len(state.used) == wanted.ledger.taken
     assert_same(state.statements(), wanted.statements())
 
 
@@ -77,7 +78,7 @@ def test_readings_taken_ahead_change_nothing(make_plan, make_world):
         for place, entry in zip(places, own, strict=True):
             shuffled[place] = entry
     state, whole = restore(plan, shuffled), restore(plan, entries)
-    assert not state.in_hand
+    assert not state.waiting
     assert_same(state.statements(), whole.statements())
 
 
@@ -85,7 +86,7 @@ def test_a_point_left_out_is_never_asked_for_and_the_visit_stays_random(make_pla
     plan = make_plan(points=60, budget=60)
     gone = int(plan.route[4])
     rows = plan.visiting(frozenset([gone]))
-    first = fixed_visit(plan.assessor, plan.candidates(rows))
+    first = plan.assessor.begin(plan.candidates(rows)).first
     kept = [point for point in plan.order if point != gone]
     assert gone not in rows
     assert set(rows[:first]) == set(kept[:first])
@@ -93,11 +94,11 @@ def test_a_point_left_out_is_never_asked_for_and_the_visit_stays_random(make_pla
     entries = [{"kind": "leave_out", "point": gone, "reason": "hidden"}]
     asked = set()
     world = make_world(plan, frozenset([gone]))
-    while (state := restore(plan, entries)).asked is not None:
-        asked.add(state.asked)
-        entries.append(folder.readings_entry([reading_of(plan, world, state)]))
+    while (state := restore(plan, entries)).requested is not None:
+        asked.add(state.requested)
+        entries.append(entry_of([reading_of(plan, world, state)]))
     assert gone not in asked
-    assert len(state.told) == 60
+    assert len(state.used) == 60
 
 
 def test_another_instrument_counts_with_its_own_covariance(make_plan, make_world):
@@ -106,11 +107,11 @@ def test_another_instrument_counts_with_its_own_covariance(make_plan, make_world
     entries = []
     for _ in range(24):
         state = restore(plan, entries)
-        entries.append(folder.readings_entry([reading_of(plan, world, state)]))
+        entries.append(entry_of([reading_of(plan, world, state)]))
     by_tracker = restore(plan, entries)
     entries[10]["readings"][0]["instrument"] = "camera"
     with_camera = restore(plan, entries)
-    place = int(np.flatnonzero(by_tracker.rows == by_tracker.told[10].reading.point)[0])
+    place = int(np.flatnonzero(by_tracker.rows == by_tracker.used[10].reading.point)[0])
     assert by_tracker.campaign.ledger.noise_mm[place] == pytest.approx(0.05)
     assert with_camera.campaign.ledger.noise_mm[place] == pytest.approx(0.5)
 
@@ -120,12 +121,11 @@ def test_a_plan_comes_back_to_the_last_bit(make_plan):
     assert to_json(from_json(to_json(plan), "here")) == to_json(plan)
 
 
-def entry_at(plan, positions_mm):
-    """A journal's entry of the same readings again and again, more than are asked for."""
+def readings_at(plan, positions_mm):
+    """The same readings again and again, more than are requested."""
     name = plan.instruments[0].name
-    return folder.readings_entry(
-        [Reading(point, at, name) for _ in range(4) for point, at in enumerate(positions_mm)]
-    )
+    repeated = [Reading(point, at, name) for _ in range(4) for point, at in enumerate(positions_mm)]
+    return Readings(readings=repeated)
 
 
 @pytest.mark.parametrize("name", ["search_and_confirm", "single_shot"])
@@ -134,7 +134,7 @@ def test_predictions_recorded_as_readings_bound_nothing(make_plan, name, tmp_pat
     path = tmp_path / "check"
     folder.start(path, plan)
     with folder.writing(path) as opened:
-        opened.write(entry_at(plan, plan.points.modelled_mm))
+        opened.write(readings_at(plan, plan.points.modelled_mm))
     for command in ("status", "report"):
         done = call("campaign", command, path)
         assert done.exit_code == 0, done.output

@@ -2,8 +2,7 @@
 
 import pytest
 
-from kinacc.assess.search_and_confirm import SearchAndConfirm
-from kinacc.campaign.plan import with_references
+from kinacc.campaign.plan import assessor_of
 
 
 @pytest.mark.parametrize(
@@ -18,5 +17,5 @@ from kinacc.campaign.plan import with_references
     ],
 )
 def test_references_that_a_campaign_plans(budget, candidates, given, planned):
-    own = SearchAndConfirm(measurements=budget, references=given or 0)
-    assert with_references(own, candidates, given).references == planned
+    settings = {"measurements": budget} | ({} if given is None else {"references": given})
+    assert assessor_of("search_and_confirm", settings, candidates).references == planned

@@ -195,7 +195,7 @@ def campaign_course() -> dict:
         ]
         course.append({"reading": reading.number, "point": reading.reading.point, "said": said})
 
-    state = opened.state(watch)
+    state = opened.watched(watch)
     limits = {str(row): list(each) for row, each in state.campaign.point_limits().items()}
     return {"course": course, "limits_mm": limits, "struck": [e.number for e, _ in state.struck]}
 

@@ -13,7 +13,7 @@ from kinacc.campaign import begin, folder, report
 from kinacc.campaign.folder import Opened
 from kinacc.campaign.instrument import instruments
 from kinacc.campaign.plan import Limits, assessor_of
-from kinacc.campaign.state import Reading
+from kinacc.campaign.state import Reading, Readings
 from kinacc.deployment.planning import spread
 from kinacc.deployment.record import nominal
 from kinacc.figures.campaign import draw
@@ -48,15 +48,14 @@ def measured(
         used = plan.instruments[len(entries) % len(plan.instruments)]
         asking.record(row, seen, used.covariance_mm2)
         at = Reading(int(rows[row]), plan.points.modelled_mm[rows[row]] + seen, used.name)
-        entries.append(folder.readings_entry([at]))
+        entries.append(Readings(readings=[at]).model_dump(exclude_none=True))
     journal_ = folder.Journal((*entries, *extra), "cd", (), 0)
     campaign = Opened(Path("check"), plan, journal_, "ab")
-    state, tables = report.tables(campaign)
-    return SimpleNamespace(opened=campaign, state=state, tables=tables)
+    return SimpleNamespace(opened=campaign, state=campaign.state, tables=report.tables(campaign))
 
 
 def parts(campaign):
-    return campaign.opened, campaign.state, campaign.tables
+    return campaign.opened, campaign.tables
 
 
 def first_of(campaign):
@@ -81,7 +80,7 @@ def test_the_badge_is_the_verdict(change, badge):
     assert first.badge == badge
     if badge[0] == "NO BOUND":
         assert {row["sure"] for row in first.tables[0].rows} == {""}
-    if campaign.state.asked is not None:
+    if campaign.state.requested is not None:
         assert "kinacc campaign next check" in first.notes["NEXT"]
 
 

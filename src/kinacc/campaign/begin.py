@@ -1,7 +1,8 @@
-"""Make a plan: model the candidates, draw their order, route the first visit."""
+"""Start a campaign: model the candidates, draw their order, route the first visit, list doubts."""
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
@@ -11,21 +12,34 @@ import numpy as np
 
 from kinacc import __version__
 from kinacc.assess.adaptive import AdaptiveAssessor, Candidates
-from kinacc.calibration.noise import Noise
+from kinacc.calibration.noise import Noise, of_measurements
 from kinacc.campaign import folder as folders
-from kinacc.campaign.doubts import of_candidates, of_little_noise, of_noise
 from kinacc.campaign.instrument import Instrument
 from kinacc.campaign.plan import Limits, Plan, Points
 from kinacc.config.names import not_in_a_line
+from kinacc.deployment.applicability import LIKE_FITTED, is_measured_there, position_std_mm
 from kinacc.deployment.planning import distances, shortest_path
 from kinacc.deployment.record import Calibration
 from kinacc.errors import InputError, Problem, first_few, refuse
 from kinacc.geometry import compose, invert
+from kinacc.kinematics import robot as robots
 from kinacc.kinematics.inverse.limits import travel_unit
 from kinacc.kinematics.model import JointState
 from kinacc.kinematics.robot import outside_limits
+from kinacc.tables import store
 
-_ROUTED = 400  # points beyond which the route is built in stretches of so many
+_ROUTED = 400  # points beyond which the route goes to the nearest neighbour
+_MUCH_NOISE = 2.0  # times what the calibration left unexplained, noise included
+_MUCH_NOISE_MM = 1.0  # where nothing is known of the calibration
+_LITTLE_NOISE = 0.8  # of the scatter that was measured
+_FEWEST_FREEDOM = 10  # degrees of freedom that show a noise
+_FAR_SHARE = 0.1  # of the candidates
+_SURE = "--sure takes it as it is"
+WAYS_TO_NOISE = """give it in one of three ways:
+      a test (the surest): visit 20 poses three times each, leaving them between,
+        run kinacc repeatability FILE -o noise.json, then --repeatability noise.json
+      an estimate: --noise-mm MM --noise estimate (MM is a guess)
+      a number: --noise-mm MM, or --covariance-mm2, or --instrument NAME=MM"""
 
 
 def points_of(
@@ -69,7 +83,7 @@ def points_of(
     joints, label = joints[rows], [str(label[i]).strip() for i in rows]
     directions = None if directions is None else directions[rows]
     problems = _outside(arm, joints, label)
-    problems += [fault for each in label for fault in not_in_a_line("candidates, pose", each)]
+    problems += [fault for name in label for fault in not_in_a_line("candidates, pose", name)]
     if doubled := sorted(name for name, count in Counter(label).items() if count > 1):
         message = f"names given to different joints: {', '.join(doubled[:5])}"
         problems.append(Problem("candidates", message, "one name per point"))
@@ -80,6 +94,24 @@ def points_of(
     return Points(tuple(label), joints, directions, where, slope)
 
 
+def _outside(arm: Calibration, joints: np.ndarray, label: Sequence[str]) -> list[Problem]:
+    beyond = [
+        (fault.rows, f"joint {fault.joint} outside the limits of {arm.robot.name}")
+        for fault in outside_limits(arm.robot, joints, 1e-9)
+    ]
+    if arm.model.domain is not None:
+        outside = arm.outside_range(arm.robot.dh_joints(joints))
+        beyond += [
+            (rows, f"joint {joint} outside the range the data cover: no prediction")
+            for joint, column in enumerate(outside.T, 1)
+            if len(rows := np.flatnonzero(column))
+        ]
+    return [
+        Problem(f"candidates {first_few([label[row] for row in rows])}", text)
+        for rows, text in beyond
+    ]
+
+
 def plan_of(
     arm: Calibration,
     points: Points,
@@ -87,7 +119,7 @@ def plan_of(
     instruments: Sequence[Instrument],
     limits: Limits,
     seed: int,
-    start: np.ndarray,
+    stand: np.ndarray,
     about: dict[str, str],
     by_travel: bool = True,
 ) -> Plan:
@@ -107,12 +139,12 @@ def plan_of(
         Plausible size (infinite: by the residual of the calibration), tolerance and wanted width.
     seed : int
         Seed of the random order.
-    start : (k,) array
-        Reported joints the arm stands at, rad (mm where a joint slides).
+    stand : (k,) array
+        Reported joints where the arm stands, rad (mm where a joint slides).
     about : dict
         Robot, calibration, model, point and source of the candidates (:func:`about`).
     by_travel : bool
-        Order the first visit for little travel, else keep the random order.
+        Order the first visit for little travel, else in the random order.
 
     Returns
     -------
@@ -120,44 +152,76 @@ def plan_of(
     """
     order = np.random.default_rng(seed).permutation(len(points))
     to_base = compose(arm.origin("base"), invert(arm.origin("instrument")))
-    instruments = [device.placed(to_base, points.modelled_mm) for device in instruments]
+    used = tuple(device.placed(to_base, points.modelled_mm) for device in instruments)
     if not np.isfinite(limits.implausible_mm):
-        limits = replace(limits, implausible_mm=_plausible_mm(arm, instruments))
-    noise = instruments[0].in_base(to_base, points.modelled_mm)
+        # Beyond it a reading is more likely to be of another pose; 50 mm for a model never fitted.
+        noise = max(np.sqrt(np.linalg.eigvalsh(item.covariance_mm2)[-1]) for item in used)
+        left_mm = _unexplained_mm(arm)
+        usual_mm = 50.0 if math.isnan(left_mm) else max(5.0, 20.0 * left_mm)
+        limits = replace(limits, implausible_mm=float(f"{usual_mm + 10.0 * noise:.3g}"))
+    noise = used[0].in_base(to_base, points.modelled_mm)
     begun = assessor.begin(Candidates(noise[order]))
     route = order[: begun.first]
     if by_travel:
         unit, count = travel_unit(arm.robot), begun.reference_poses
-        places = points.joints[route] / unit
-        path = _short_path(places[:count], start / unit) if count else np.array([], dtype=int)
-        here = places[path[-1]] if count else start / unit
-        route = route[np.concatenate([path, count + _short_path(places[count:], here)])]
-    return Plan(
-        points, order, route, assessor, tuple(instruments), to_base,
-        arm.robot.dh.prismatic, limits, seed, about,
-    )  # fmt: skip
+        places, here = points.joints[route] / unit, stand / unit
+        first = _short_path(places[:count], here)
+        here = places[first[-1]] if count else here
+        route = route[np.concatenate([first, count + _short_path(places[count:], here)])]
+    slides = arm.robot.dh.prismatic
+    return Plan(points, order, route, assessor, used, to_base, slides, limits, seed, about)
+
+
+def _short_path(places: np.ndarray, start: np.ndarray) -> np.ndarray:
+    """Rows (n,) of places (n, k) in an order with little travel from ``start`` (k,)."""
+    if 0 < len(places) <= _ROUTED:
+        return shortest_path(distances(np.concatenate([start[None], places])))[1:] - 1
+    # Improving a path takes time with the cube of its length.
+    remaining, path, here = np.arange(len(places)), np.zeros(len(places), dtype=int), start
+    for place in range(len(places)):
+        nearest = int(np.argmin(np.abs(places[remaining] - here).max(axis=1)))
+        path[place] = remaining[nearest]
+        here, remaining = places[path[place]], np.delete(remaining, nearest)
+    return path
 
 
 def start(
     folder: Path | str,
     arm: Calibration,
     plan: Plan,
-    known: Noise | None = None,
     doubts: Sequence[Problem] = (),
+    known: Noise | None = None,
     sure: bool = True,
 ) -> Plan:
-    """Put a plan on disk with what speaks against it; returns the plan.
+    """Put a plan on disk with what speaks against it.
 
-    ``known``: noise of readings of the calibration; ``doubts``: further ones. Raises InputError
-    where there is one, unless ``sure``, and where the folder holds a campaign.
+    Parameters
+    ----------
+    folder : path
+        New folder.
+    arm : Calibration
+        Calibrated model whose errors are bounded.
+    plan : Plan
+        Plan to start.
+    doubts : sequence of Problem
+        Doubts about the noise of a test (:func:`kinacc.campaign.instrument.read_repeatability`).
+    known : Noise, optional
+        Noise of the readings of the calibration.
+    sure : bool
+        Overrule all doubts; the plan lists them.
+
+    Returns
+    -------
+    Plan
+        The plan with the overruled doubts.
+
+    Raises
+    ------
+    InputError
+        Where something speaks against the plan, unless ``sure``; where the folder has a campaign.
     """
-    point = plan.about["point"]
-    problems = [
-        *of_noise(plan.instruments, unexplained_mm(arm)),
-        *doubts,
-        *of_little_noise(plan.instruments, known),
-        *of_candidates(arm, plan.points, point),
-    ]
+    noise = noise_doubts(plan.instruments, _unexplained_mm(arm), known)
+    problems = [*noise, *doubts, *_candidate_doubts(arm, plan.points, plan.about["point"])]
     if not sure:
         refuse(problems, "The campaign was not begun")
     plan = replace(plan, overruled=tuple(f"{item.where}: {item.what}" for item in problems))
@@ -177,51 +241,94 @@ def about(arm: Calibration, point: str | None, source: str) -> dict[str, str]:
     }
 
 
-def unexplained_mm(arm: Calibration) -> float:
+def _unexplained_mm(arm: Calibration) -> float:
     """The rms position error that the calibration left, noise included; NaN where not known."""
-    return arm.residual.position_mm if arm.residual else np.nan
+    return arm.residual.position_mm if arm.residual else math.nan
 
 
-def _plausible_mm(arm: Calibration, instruments: Sequence[Instrument]) -> float:
-    """Size of an error beyond which a reading is more likely to be of another pose, mm.
+def noise_doubts(
+    instruments: Sequence[Instrument], left_mm: float = math.nan, known: Noise | None = None
+) -> list[Problem]:
+    """Return a problem for each instrument with improbable noise.
 
-    Twenty times what the calibration left unexplained, and ten standard deviations of the
-    noisiest instrument; at least 5 mm, and 50 mm for a model that was never fitted.
+    Parameters
+    ----------
+    instruments : sequence of Instrument
+        Instruments with the noise that is stated.
+    left_mm : float
+        Rms error that the calibration left: a noise above twice as much is improbable (above 1 mm
+        where it is NaN).
+    known : Noise, optional
+        Scatter of the calibration's readings at equal joints: less noise is improbable.
+
+    Returns
+    -------
+    list of Problem
     """
-    noise = max(np.sqrt(np.linalg.eigvalsh(item.covariance_mm2)[-1]) for item in instruments)
-    left_mm = unexplained_mm(arm)
-    usual_mm = 50.0 if not np.isfinite(left_mm) else max(5.0, 20.0 * left_mm)
-    return float(f"{usual_mm + 10.0 * noise:.3g}")
+    is_left = left_mm > 0.0
+    most_mm = _MUCH_NOISE * left_mm if is_left else _MUCH_NOISE_MM
+    than = f"than the {left_mm:.3g} mm that the calibration left" if is_left else "than trackers do"
+    large, small = [], []
+    for device in instruments:
+        where, size = f"noise of {device.name}", math.sqrt(np.trace(device.covariance_mm2))
+        if size > most_mm:
+            text = f"{device.noise}: the readings would scatter more {than}"
+            in_mm = 1e-3 * np.sqrt(np.diag(device.covariance_mm2)).max()
+            fix = f"are micrometres meant? Then it is {in_mm:g} mm. {_SURE}"
+            large.append(Problem(where, text, "millimetres", fix))
+        if known is None or known.freedom < _FEWEST_FREEDOM:
+            continue
+        if size / math.sqrt(3.0) < _LITTLE_NOISE * known.per_axis_mm:
+            text = (
+                f"{device.noise}: readings of the calibration at equal joints scatter by "
+                f"{known.per_axis_mm:.3g} mm per axis ({known.freedom} degrees of freedom)"
+            )
+            fix = f"include how the arm repeats a pose: {known.per_axis_mm:.2g} mm or more; {_SURE}"
+            small.append(Problem(where, text, fix=fix))
+    return large + small
 
 
-def _short_path(places: np.ndarray, start: np.ndarray) -> np.ndarray:
-    """Rows (n,) of places (n, k) in an order with little travel from ``start`` (k,)."""
-    whole = np.concatenate([start[None], places])
-    if len(places) <= _ROUTED:
-        return shortest_path(distances(whole))[1:] - 1
-    # Improving a path takes time with the cube of its length: go by nearest neighbour first.
-    remaining, path, here = list(range(len(places))), [], start
-    while remaining:
-        nearest = int(np.argmin(np.abs(places[remaining] - here).max(axis=1)))
-        path.append(remaining.pop(nearest))
-        here = places[path[-1]]
-    return np.array(path)
+def noise_of(results: Path) -> Noise | None:
+    """Return the noise of the readings in a results folder; None where it has no readings."""
+    paths = [results / f"{name}.parquet" for name in ("measurements", "robot")]
+    if not all(path.is_file() for path in paths):
+        return None
+    measured, described = map(store.read, paths)
+    arm = robots.of_text(str(described["description"][0]), "robot.parquet")
+    return of_measurements(measured, arm)
 
 
-def _outside(arm: Calibration, joints: np.ndarray, label: list[str]) -> list[Problem]:
-    robot = arm.robot
-    beyond = [
-        (fault.rows, f"joint {fault.joint} outside the limits of {robot.name}")
-        for fault in outside_limits(robot, joints, 1e-9)
-    ]
-    if arm.model.domain is not None:
-        outside = arm.outside_range(robot.dh_joints(joints))
-        beyond += [
-            (rows, f"joint {joint} outside the range the data cover: no prediction")
-            for joint, column in enumerate(outside.T, 1)
-            if len(rows := np.flatnonzero(column))
-        ]
-    return [
-        Problem(f"candidates {first_few([label[row] for row in rows])}", text)
-        for rows, text in beyond
-    ]
+def noise_by_repeats(known: Noise | None) -> str:
+    """Return the scatter of repeated readings of a calibration; empty where there are too few."""
+    if known is None or known.freedom < _FEWEST_FREEDOM or not (known.std_mm > 0.0).all():
+        return ""
+    std_mm = ",".join(f"{std:.2g}" for std in known.std_mm)
+    return (
+        f"{known.readings} readings of the calibration at {known.configurations} configurations "
+        f"scatter by {std_mm} mm along x,y,z of the instrument: a lower limit of the noise"
+    )
+
+
+def far_from_data(arm: Calibration, points: Points, point: str | None) -> int:
+    """Return how many candidates lie where the calibration was not measured."""
+    if arm.known is None or math.isnan(_unexplained_mm(arm)):
+        return 0
+    return int(np.sum(~is_measured_there(arm, _at(arm, points), point)))
+
+
+def _candidate_doubts(arm: Calibration, points: Points, point: str | None) -> list[Problem]:
+    """A problem where more than a tenth of the candidates lie far from measured poses."""
+    far = far_from_data(arm, points, point)
+    if far <= _FAR_SHARE * len(points):
+        return []
+    largest_mm = float(np.max(position_std_mm(arm, _at(arm, points), point)))
+    message = (
+        f"{far} of {len(points)} lie outside the joint ranges of the calibration, or have a larger "
+        f"standard deviation than {LIKE_FITTED:.0%} of its poses (up to {largest_mm:.3g} mm)"
+    )
+    fix = "--region measured draws them between measured poses; --sure takes them as they are"
+    return [Problem("candidates", message, f"at most {_FAR_SHARE:.0%} of them", fix)]
+
+
+def _at(arm: Calibration, points: Points) -> JointState:
+    return JointState(arm.robot.dh_joints(points.joints), points.directions)

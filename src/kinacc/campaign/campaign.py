@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
@@ -15,13 +15,14 @@ from numpy.typing import ArrayLike
 from kinacc.assess.registry import RECOMMENDED
 from kinacc.campaign import begin
 from kinacc.campaign import folder as folders
-from kinacc.campaign.instrument import INSTRUMENT, Instrument, covariance_of
-from kinacc.campaign.plan import Limits, Plan, assessor_of, with_references
+from kinacc.campaign.instrument import INSTRUMENT, Frame, Instrument, covariance_of
+from kinacc.campaign.plan import Limits, Plan, assessor_of
 from kinacc.campaign.state import (
-    LEAVE_OUT,
-    STRIKE,
+    LeaveOut,
     Reading,
+    Readings,
     State,
+    Strike,
     error_mm,
     most_plausible_mm,
     problems_of,
@@ -68,13 +69,13 @@ class Recorded:
 class RowsOfFile:
     """Rows of a file, readings or what is wrong with them, each with its place in words.
 
-    ``digest`` of the file and its ``path`` from the folder of the campaign.
+    ``digest`` of the file and its ``path`` from the folder of the campaign; empty without a file.
     """
 
     rows: Sequence[Reading | Problem]
     places: Sequence[str]
-    digest: str
-    path: str
+    digest: str = ""
+    path: str = ""
 
 
 class CalibratedRobot(Protocol):
@@ -111,7 +112,7 @@ class Campaign:
 
     def __init__(self, folder: Path | str) -> None:
         self.folder = Path(folder)
-        self._load()
+        self.opened = folders.open_(self.folder)
 
     def __repr__(self) -> str:
         readings, candidates = self.status().readings, len(self.plan.points.label)
@@ -121,7 +122,7 @@ class Campaign:
     def start(
         cls, folder: Path | str, calibration: CalibratedRobot, candidates: ArrayLike,
         noise_mm: ArrayLike, budget: int = 200, *, point: str | None = None,
-        frame: str = INSTRUMENT, tolerance_mm: float | None = None, seed: int = 0,
+        frame: Frame = INSTRUMENT, tolerance_mm: float | None = None, seed: int = 0,
         assessor: str = RECOMMENDED, settings: Mapping[str, object] | None = None,
     ) -> Campaign:  # fmt: skip
         """Start a campaign in a folder.
@@ -156,27 +157,23 @@ class Campaign:
         InputError
             For candidates the model does not cover, a wrong noise, or a folder in use.
         """
-        arm, problems = calibration.model, list[Problem]()
+        arm, joints = calibration.model, np.asarray(candidates, dtype=float)
         text = ",".join(map(repr, np.asarray(noise_mm, dtype=float).ravel().tolist()))
-        covariance = covariance_of(text, "noise_mm", problems)
-        refuse(problems)
-        joints = np.asarray(candidates, dtype=float)
+        instrument = Instrument(INSTRUMENT, covariance_of(text, "noise_mm"), frame)
         labels = [str(number) for number in range(1, len(joints) + 1)]
         points = begin.points_of(arm, joints, labels, None, point)
-        settings = {"measurements": budget, **(settings or {})}
-        references = settings.get("references")
-        chosen = with_references(assessor_of(assessor, settings), len(points), references)
+        chosen = assessor_of(assessor, {"measurements": budget, **(settings or {})}, len(points))
         plan = begin.plan_of(
-            arm, points, chosen, [Instrument(INSTRUMENT, covariance, frame)],
-            Limits(np.deg2rad(0.02), np.inf, tolerance_mm), seed, np.zeros(joints.shape[1]),
-            begin.about(arm, point, "given as an array"),
+            arm, points, chosen, [instrument], Limits(tolerance_mm=tolerance_mm), seed,
+            np.zeros(joints.shape[1]), begin.about(arm, point, "given as an array"),
         )  # fmt: skip
         begin.start(folder, arm, plan)
         return cls(folder)
 
-    def _load(self) -> None:
-        self.opened = folders.open_(self.folder)
-        self.state: State = self.opened.state()
+    @property
+    def state(self) -> State:
+        """Readings as the assessor has them."""
+        return self.opened.state
 
     @property
     def plan(self) -> Plan:
@@ -186,7 +183,7 @@ class Campaign:
     def next_pose(self) -> NextPose | None:
         """Return the pose to measure next; None where no further reading is wanted."""
         folders.require_method(self.opened)
-        point, points = self.state.asked, self.plan.points
+        point, points = self.state.requested, self.plan.points
         if point is None:
             return None
         return NextPose(
@@ -195,7 +192,7 @@ class Campaign:
             None if points.directions is None else points.directions[point],
             self._expected_mm([point])[0],
             self.plan.instruments[0].frame,
-            sum(item.reading.point == point for item in self.state.told),
+            sum(item.reading.point == point for item in self.state.used),
         )
 
     def visit(self, every: bool = True) -> pd.DataFrame:
@@ -205,21 +202,21 @@ class Campaign:
         q1_deg, q1_rad (q1_mm where a joint slides) .., s1 .. (travel), expected_x_mm ...
         """
         folders.require_method(self.opened)
-        points, asked = self.plan.points, self.state.asked
-        wanted = self.state.ahead() if every and asked is not None else []
-        if asked is not None and asked not in wanted:
-            wanted = [asked, *wanted]
-        table = pd.DataFrame({"pose": [points.label[point] for point in wanted]})
-        for joint, values in enumerate(points.joints[wanted].T):
-            if self.plan.slides[joint]:
-                table[f"q{joint + 1}_mm"] = values
+        points, requested = self.plan.points, self.state.requested
+        rows = self.state.ahead() if every and requested is not None else []
+        if requested is not None and requested not in rows:
+            rows = [requested, *rows]
+        table = pd.DataFrame({"pose": [points.label[row] for row in rows]})
+        for joint, values in enumerate(points.joints[rows].T, start=1):
+            if self.plan.slides[joint - 1]:
+                table[f"q{joint}_mm"] = values
             else:
-                table[f"q{joint + 1}_deg"] = np.rad2deg(values)
-                table[f"q{joint + 1}_rad"] = values
+                table[f"q{joint}_deg"] = np.rad2deg(values)
+                table[f"q{joint}_rad"] = values
         if points.directions is not None:
-            for joint, values in enumerate(points.directions[wanted].T):
-                table[f"s{joint + 1}"] = values
-        table[[f"expected_{axis}_mm" for axis in "xyz"]] = self._expected_mm(wanted)
+            for joint, directions in enumerate(points.directions[rows].T, start=1):
+                table[f"s{joint}"] = directions
+        table[[f"expected_{axis}_mm" for axis in "xyz"]] = self._expected_mm(rows)
         return table
 
     def add_reading(
@@ -255,9 +252,10 @@ class Campaign:
             For a reading that is refused; nothing is written.
         """
         with folders.writing(self.folder) as opened:
-            state, plan = opened.state(), opened.plan
-            asked = state.asked if point is None else plan.points.number(point)
-            if asked is None:
+            plan, number = opened.plan, opened.state.requested
+            if point is not None:
+                number = plan.points.number(point)
+            if number is None:
                 message = (
                     "no further reading is needed" if point is None else f"{point!r} is unknown"
                 )
@@ -265,10 +263,10 @@ class Campaign:
             name = plan.instrument(instrument).name
             values = np.asarray(position_mm, dtype=float).reshape(-1)
             reported = None if joints is None else np.asarray(joints, dtype=float).reshape(-1)
-            reading = Reading(asked, values, name, reported, std_mm)
-            rows = RowsOfFile([reading], ["the reading"], "", "")
-            recorded = _record(opened, state, rows, accept_implausible, again, skip_bad=False)
-        self._load()
+            reading = Reading(number, values, name, reported, std_mm)
+            rows = RowsOfFile([reading], ["the reading"])
+            recorded = _record(opened, rows, accept_implausible, again, skip_bad=False)
+        self.opened = folders.open_(self.folder)
         return recorded
 
     def add_readings(
@@ -285,36 +283,37 @@ class Campaign:
         same file have no row any more.
         """
         with folders.writing(self.folder) as opened:
-            recorded = _record(opened, opened.state(), rows, accept_implausible, again, skip_bad)
-        self._load()
+            recorded = _record(opened, rows, accept_implausible, again, skip_bad)
+        self.opened = folders.open_(self.folder)
         return recorded
 
     def leave_out(self, point: str, reason: str) -> None:
         """Leave a point without readings out, for a reason that is not its error."""
         with folders.writing(self.folder) as opened:
-            state, number = opened.state(), opened.plan.points.number(point)
-            have = [e for e in (*state.told, *state.in_hand) if e.reading.point == number]
+            state, number = opened.state, opened.plan.points.number(point)
+            if number is None:
+                raise InputError(Problem(f"point {point}", "is no candidate"))
+            read = sum(item.reading.point == number for item in state.readings)
             problems = {
-                "is no candidate": number is None,
-                f"has {len(have)} readings: without it a large error could be hidden": bool(have),
+                f"has {read} readings: without it a large error could be hidden": read > 0,
                 "was left out before": number in state.left_out,
                 "is one of the last 2 candidates": len(state.rows) <= 2,
             }
             _refuse(f"point {point}", problems, reason)
-            opened.write({"kind": LEAVE_OUT, "point": number, "reason": reason.strip()})
-        self._load()
+            opened.write(LeaveOut(point=number, reason=reason.strip()))
+        self.opened = folders.open_(self.folder)
 
     def strike(self, number: int, reason: str) -> None:
         """Declare a reading void, for a reason that is not its size."""
         with folders.writing(self.folder) as opened:
-            state = opened.state()
+            state = opened.state
             problems = {
                 "was struck before": number in {item.number for item, _ in state.struck},
                 f"does not exist ({state.numbered} readings)": not 1 <= number <= state.numbered,
             }
             _refuse(f"reading {number}", problems, reason)
-            opened.write({"kind": STRIKE, "reading": number, "reason": reason.strip()})
-        self._load()
+            opened.write(Strike(reading=number, reason=reason.strip()))
+        self.opened = folders.open_(self.folder)
 
     def bounds(self, tolerance_mm: float | None = None) -> tuple[Bound, ...]:
         """Return the bounds on the largest error, the main one first."""
@@ -322,7 +321,7 @@ class Campaign:
 
     def status(self, tolerance_mm: float | None = None) -> CampaignStatus:
         """Return bounds, verdict, assumptions and remarks; ``tolerance_mm`` in place of its own."""
-        return status(self.opened, self.state, tolerance_mm)
+        return status(self.opened, tolerance_mm)
 
     def _expected_mm(self, points: list[int]) -> np.ndarray:
         """Modelled positions (n, 3) in the frame of the readings, which is one for all."""
@@ -337,29 +336,23 @@ _NOTHING = "Nothing was recorded"
 
 
 def _record(
-    opened: folders.Opened,
-    state: State,
-    file: RowsOfFile,
-    accept_implausible: bool,
-    again: bool,
-    skip_bad: bool,
+    opened: folders.Opened, file: RowsOfFile, accept_implausible: bool, again: bool, skip_bad: bool
 ) -> Recorded:
-    plan, is_file, path = opened.plan, bool(file.digest), file.path
-    recorded = [*state.told, *state.in_hand]
+    plan, state, is_file, path = opened.plan, opened.state, bool(file.digest), file.path
     imported = state.imports.get(path, set()) if is_file else set()
     # A row that equals a reading is known, each reading once; ``again``: of the same file alone.
-    waiting, earlier = defaultdict[tuple, list[int]](list), dict[tuple, str]()
-    for item in (*recorded, *(item for item, _ in state.struck)):
+    waiting, earlier = defaultdict[object, list[int]](list), dict[object, str]()
+    for item in (*state.readings, *(item for item, _ in state.struck)):
         if is_file and (item.number in imported or not again):
             waiting[item.reading.digits].append(item.number)
     if not is_file:
-        earlier = {item.reading.digits: f"reading {item.number}" for item in recorded}
-    sizes = [float(np.linalg.norm(item.error_mm)) for item in recorded]
-    if is_file:
-        rows = [row for row in file.rows if isinstance(row, Reading)]
-        with np.errstate(over="ignore", invalid="ignore"):
-            sizes += [float(np.linalg.norm(error_mm(plan, row))) for row in rows]
-    most_mm = most_plausible_mm(plan, sizes)
+        earlier = {item.reading.digits: f"reading {item.number}" for item in state.readings}
+    readings = [row for row in file.rows if isinstance(row, Reading)]
+    with np.errstate(over="ignore", invalid="ignore"):
+        sizes = [_size_mm(plan, row) for row in readings] if is_file else []
+    most_mm = most_plausible_mm(
+        plan, [*(float(np.linalg.norm(item.error_mm)) for item in state.readings), *sizes]
+    )
     good, known, problems = list[Reading](), list[int](), list[Problem]()
     for row, place in zip(file.rows, file.places, strict=True):
         if isinstance(row, Problem):
@@ -374,13 +367,12 @@ def _record(
                 wrong.append(Problem(place, f"point {label} was left out of the campaign"))
             if row.digits in earlier and not again:
                 message = f"equals {earlier[row.digits]} to the last digit"
-                wrong.append(
-                    Problem(place, message, fix="--again takes it as a reading of its own")
-                )
+                fix = "--again takes it as a reading of its own"
+                wrong.append(Problem(place, message, fix=fix))
             good += [] if wrong else [row]
             problems += wrong
         earlier.setdefault(row.digits, place)
-    missing = imported.intersection(item.number for item in recorded).difference(known)
+    missing = imported.intersection(item.number for item in state.readings).difference(known)
     if missing and not again:
         message = f"does not hold {_listed(missing)} any more, recorded from it before"
         fix = "bring the rows back, strike the readings, or give --again"
@@ -390,17 +382,21 @@ def _record(
         raise InputError(Problem(path, f"has no new row: {_listed(known)} recorded before"))
     if problems and not (skip_bad and good):
         raise InputError(problems, _NOTHING)
-    opened.write(folders.readings_entry(good, file.digest or None, path or None))
+    opened.write(Readings(readings=good, file=file.digest or None, path=path or None))
     return Recorded(
         tuple(range(state.numbered + 1, state.numbered + 1 + len(good))),
         tuple(plan.points.label[row.point] for row in good),
-        tuple(float(np.linalg.norm(error_mm(plan, row))) for row in good),
+        tuple(_size_mm(plan, row) for row in good),
         tuple(map(str, problems)),
         tuple(sorted(known)),
     )
 
 
-def _listed(numbers) -> str:
+def _size_mm(plan: Plan, reading: Reading) -> float:
+    return float(np.linalg.norm(error_mm(plan, reading)))
+
+
+def _listed(numbers: Iterable[int]) -> str:
     """Numbers of readings: ``readings 1, 2, 3``."""
     shown = ", ".join(map(str, sorted(numbers)))
     return f"reading{'s' if ',' in shown else ''} {shown}"

@@ -13,24 +13,27 @@ import fcntl
 import hashlib
 import json
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from functools import cached_property
+from itertools import accumulate
 from pathlib import Path
+from typing import Any
 
 from kinacc import __version__
+from kinacc.assess.adaptive import Campaign
 from kinacc.campaign import plan as plans
-from kinacc.campaign import state
 from kinacc.campaign.plan import Plan
-from kinacc.campaign.state import READINGS, Reading, State
+from kinacc.campaign.state import Entry, State, Taken, restore
 from kinacc.config import json_files
 from kinacc.errors import InputError, MachineError, Problem, refuse, refused
 from kinacc.tables.atomic import synchronise, taken, write_whole
 
 PLAN, JOURNAL, LOCK = "campaign.json", "readings.jsonl", "lock"
 _PATIENCE_S = 5.0
-_DIGITS = 16  # of a checksum
+_DIGITS = 16  # of a checksum and of a digest
 
 
 @dataclass(frozen=True)
@@ -41,7 +44,7 @@ class Journal:
     written to its end.
     """
 
-    entries: tuple[Mapping, ...]
+    entries: tuple[Mapping[str, Any], ...]
     seed: str
     lines: tuple[bytes, ...]
     cut_off: int
@@ -63,7 +66,7 @@ def read_journal(path: Path, seed: str) -> Journal:
         content = b""
     except OSError as error:
         raise _damaged(str(path), f"cannot be read: {error.strerror}") from None
-    entries: list[Mapping] = []
+    entries: list[Mapping[str, Any]] = []
     whole = content.splitlines(keepends=True)
     if whole and not whole[-1].endswith(b"\n"):
         whole.pop()
@@ -85,7 +88,7 @@ def read_journal(path: Path, seed: str) -> Journal:
     return Journal(tuple(entries), seed, lines, len(content) - sum(map(len, lines)))
 
 
-def append(path: Path, known: Journal, entry: Mapping) -> None:
+def append(path: Path, known: Journal, entry: Mapping[str, Any]) -> None:
     """Add an entry; when this returns, it is on disk. The caller holds the lock.
 
     Raises InputError where the disk does not take it.
@@ -130,7 +133,7 @@ def locked(folder: Path, patience_s: float = _PATIENCE_S) -> Iterator[None]:
         yield
 
 
-def _checksum(seed: str, number: int, entry: Mapping) -> str:
+def _checksum(seed: str, number: int, entry: Mapping[str, Any]) -> str:
     text = f"{seed} {number} {json.dumps(entry, sort_keys=True)}"
     return hashlib.sha256(text.encode()).hexdigest()[:_DIGITS]
 
@@ -155,20 +158,25 @@ class Opened:
     journal: Journal
     digest: str
 
-    def state(self, watch=None) -> State:
-        """Return its state; ``watch`` as in ``kinacc.campaign.state.restore``."""
-        where = str(self.folder / JOURNAL)
-        return state.restore(self.plan, self.journal.entries, watch, where)
+    @cached_property
+    def state(self) -> State:
+        """Readings of the journal as the assessor has them."""
+        return self.watched(None)
+
+    def watched(self, watch: Callable[[Campaign, Taken], None] | None) -> State:
+        """The state; ``watch`` as in :func:`kinacc.campaign.state.restore`."""
+        return restore(self.plan, self.journal.entries, watch, str(self.folder / JOURNAL))
 
     @property
     def recorded(self) -> tuple[str, ...]:
         """The times of its entries."""
         return tuple(str(entry["at"]) for entry in self.journal.entries if "at" in entry)
 
-    def write(self, entry: Mapping) -> None:
+    def write(self, entry: Entry) -> None:
         """Append an entry, with the time; on disk when this returns. Only while ``writing``."""
-        stamped = {**entry, "at": datetime.now(UTC).isoformat(timespec="seconds")}
-        append(self.folder / JOURNAL, self.journal, stamped)
+        content = entry.model_dump(exclude_none=True)
+        content["at"] = datetime.now(UTC).isoformat(timespec="seconds")
+        append(self.folder / JOURNAL, self.journal, content)
 
 
 def in_the_way(folder: Path | str) -> list[Problem]:
@@ -208,7 +216,7 @@ def open_(folder: Path | str) -> Opened:
         fix = "begin one: kinacc campaign start"
         raise InputError(Problem(str(path), "no such file: no campaign is there", fix=fix))
     text = json_files.bytes_of(path)
-    digest = plans.digest(text)
+    digest = hashlib.sha256(text).hexdigest()[:_DIGITS]
     begun = plans.from_json(text, str(path))
     return Opened(folder, begun, read_journal(folder / JOURNAL, digest), digest)
 
@@ -234,8 +242,9 @@ def require_method(opened: Opened) -> None:
 
 def marks_of(opened: Opened) -> dict[str, object]:
     """Return the provenance of the tables: plan and journal count as the configuration."""
-    made_of = plans.digest(f"{opened.digest} {opened.journal.sha256()}".encode())
-    return {"kinacc_version": __version__, "config_hash": made_of, "seed": opened.plan.seed}
+    content = f"{opened.digest} {opened.journal.sha256()}".encode()
+    config_hash = hashlib.sha256(content).hexdigest()[:_DIGITS]
+    return {"kinacc_version": __version__, "config_hash": config_hash, "seed": opened.plan.seed}
 
 
 def doubts(opened: Opened) -> list[str]:
@@ -267,29 +276,16 @@ def verify(opened: Opened, sha256: str | None = None, readings: int | None = Non
     ``readings``: their number; ``sha256``: of the journal up to them. Checksums of the lines are
     checked where a journal is opened.
     """
-    known = opened.journal
-    counts = [state.readings_in(known.entries[:end]) for end in range(len(known.entries) + 1)]
+    journal = opened.journal
+    counts = [0, *accumulate(len(entry.get("readings", ())) for entry in journal.entries)]
     ends = [end for end, count in enumerate(counts) if readings is None or count == readings]
-    problems = []
+    problems: tuple[str, ...] = ()
     if readings is not None and counts[-1] < readings:
-        problems.append(f"{counts[-1]} readings, {readings} reported")
-    elif sha256 is not None and sha256 not in map(known.sha256, ends):
-        problems.append("not the journal of that report: it was shortened or rewritten")
-    return Verification(
-        opened.digest, len(known.entries), counts[-1], known.sha256(), tuple(problems)
-    )
-
-
-def readings_entry(
-    readings: Sequence[Reading], file: str | None = None, path: str | None = None
-) -> dict:
-    """Return the entry of readings that are taken together.
-
-    ``file`` is the digest of their file, ``path`` where it lies from the campaign's folder.
-    """
-    entry: dict = {"kind": READINGS, "readings": [reading.as_entry() for reading in readings]}
-    entry |= {"file": file} if file is not None else {}
-    return entry | ({"path": path} if path is not None else {})
+        problems = (f"{counts[-1]} readings, {readings} reported",)
+    elif sha256 is not None and sha256 not in map(journal.sha256, ends):
+        problems = ("not the journal of that report: it was shortened or rewritten",)
+    count = len(journal.entries)
+    return Verification(opened.digest, count, counts[-1], journal.sha256(), problems)
 
 
 def of_results(results: Path) -> list[Path]:

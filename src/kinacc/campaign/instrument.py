@@ -1,43 +1,100 @@
-"""Instruments of a campaign: each with the covariance of one reading, in a stated frame."""
+"""Noise of one reading: instruments, laser trackers, and the noise of a repeatability test."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Annotated, Literal
 
 import numpy as np
+from pydantic import BaseModel, FiniteFloat, PlainSerializer, PlainValidator
 
 from kinacc.assess.adaptive import covariance_faults
-from kinacc.campaign import laser_tracker
-from kinacc.campaign.laser_tracker import LaserTracker
+from kinacc.assess.noise import ENOUGH, FEWEST
+from kinacc.config import json_files
 from kinacc.config.names import not_in_a_line
-from kinacc.errors import Problem, refuse
+from kinacc.errors import InputError, Problem, gathered, refuse
 from kinacc.geometry import Pose
 from kinacc.measurements.table import numbers_of
 
-BASE, INSTRUMENT = "base", "instrument"
-FRAMES = (BASE, INSTRUMENT)
+Frame = Literal["base", "instrument"]
+BASE: Frame = "base"
+INSTRUMENT: Frame = "instrument"
+LASER = "laser:"
+REPEATABILITY = "kinacc repeatability 1"  # format of the file of a test
 _FORMS = "1 standard deviation, 3 (x, y, z), or 9 numbers of a covariance in mm^2, row by row"
-_EVEN = np.eye(3)
+_LASER_FORM = (
+    f"{LASER}range_mm=..,range_um_per_m=..,angle_mm=..,angle_um_per_m=..,repeat_mm=.., standard "
+    "deviations (0 where a key is left out; 1 um/m is 1 urad)"
+)
 _ROUNDED = 1.0 / math.sqrt(12.0)  # standard deviation of what is rounded to steps of 1
 _LARGEST_STD_MM = 1e3
 _SMALLEST_STD_MM = 1e-9  # below the size of an atom; squares of less vanish
 
 
+def _finite(value: object) -> np.ndarray:
+    numbers = np.array(value, dtype=float)
+    if not np.isfinite(numbers).all():
+        raise ValueError("numbers that are not finite")
+    return numbers
+
+
+# Arrays in files of JSON.
+Numbers = Annotated[
+    np.ndarray, PlainValidator(_finite), PlainSerializer(lambda array: array.tolist())
+]
+
+
+@dataclass(frozen=True)
+class LaserTracker:
+    """Standard deviations of a tracker whose head is the origin of its frame.
+
+    ``range``: along the beam, ``angle``: in each of the two directions across it; a part in mm, and
+    one in um for each m of distance. ``repeat_mm``: how well the arm repeats a pose, per axis.
+    """
+
+    range_mm: float
+    range_um_per_m: float
+    angle_mm: float
+    angle_um_per_m: float
+    repeat_mm: float
+
+    def std_mm(self, distance_mm: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Standard deviations (m,) along the beam and across it, without that of the arm."""
+        along = self.range_mm + 1e-6 * self.range_um_per_m * distance_mm
+        across = self.angle_mm + 1e-6 * self.angle_um_per_m * distance_mm
+        return along, across
+
+    def covariance_mm2(self, from_head_mm: np.ndarray) -> np.ndarray:
+        """Covariances (m, 3, 3) of readings at ``from_head_mm`` (m, 3), in the axes of these."""
+        distance_mm = np.linalg.norm(from_head_mm, axis=1)
+        along, across = self.std_mm(distance_mm)
+        with np.errstate(invalid="ignore"):
+            beam = np.nan_to_num(from_head_mm / distance_mm[:, None])
+        outer = beam[:, :, None] * beam[:, None, :]
+        even = (across**2 + self.repeat_mm**2)[:, None, None] * np.eye(3)
+        return even + (along**2 - across**2)[:, None, None] * outer
+
+    def largest_mm(self, distance_mm: np.ndarray) -> float:
+        """Largest standard deviation in any direction at any of the distances (m,)."""
+        return float(np.hypot(np.max(self.std_mm(distance_mm)), self.repeat_mm))
+
+
 @dataclass(frozen=True)
 class Instrument:
-    """Covariance (3, 3) of one reading, mm^2, in the frame the instrument's readings are in.
+    """Covariance (3, 3) of one reading, mm^2, in the frame of the instrument's readings.
 
     ``frame``: ``base``, the robot's own base, or ``instrument``, that of the calibration. With
-    ``laser`` it hangs on the place, and ``covariance_mm2`` is the largest there is, in all
-    directions alike. ``resolution_mm``: step in which readings are written, whose rounding the
-    covariance holds; 0 where it is not stated.
+    ``laser`` it depends on the place, and ``covariance_mm2`` is the largest, equal in all
+    directions. ``resolution_mm``: step in which readings are written, whose rounding the
+    covariance includes; 0 where it is not stated.
     """
 
     name: str
-    covariance_mm2: np.ndarray
-    frame: str
+    covariance_mm2: Numbers
+    frame: Frame
     laser: LaserTracker | None = None
     resolution_mm: float = 0.0
 
@@ -46,109 +103,207 @@ class Instrument:
 
         ``to_base`` takes the instrument's frame there.
         """
-        turn = to_base.rotation
+        covariance = np.tile(self.covariance_mm2, (len(at_mm), 1, 1))
         if self.laser is not None:
-            local = self.laser.covariance_mm2(from_head_mm(to_base, at_mm))
-            turned = turn @ floored(local, self.resolution_mm) @ turn.T
-            return 0.5 * (turned + np.swapaxes(turned, 1, 2))
-        even = self.covariance_mm2[0, 0] * np.eye(3)
-        if self.frame == BASE or np.array_equal(self.covariance_mm2, even):
-            covariance = self.covariance_mm2  # turning equal noise would only add rounding
-        else:
-            turned = turn @ self.covariance_mm2 @ turn.T
-            covariance = 0.5 * (turned + turned.T)
-        return np.tile(covariance, (len(at_mm), 1, 1))
+            from_head_mm = (at_mm - to_base.position_mm) @ to_base.rotation
+            covariance = floored(self.laser.covariance_mm2(from_head_mm), self.resolution_mm)
+        elif self.frame == BASE or _is_even(self.covariance_mm2):
+            return covariance  # turning equal noise would only add rounding
+        turned = to_base.rotation @ covariance @ to_base.rotation.T
+        return 0.5 * (turned + np.swapaxes(turned, 1, 2))
 
     def placed(self, to_base: Pose, at_mm: np.ndarray) -> Instrument:
         """The instrument with the largest covariance that it has at places (m, 3) in the base."""
         if self.laser is None:
             return self
-        largest = self.laser.largest_mm(from_head_mm(to_base, at_mm))
-        return replace(self, covariance_mm2=floored(largest**2 * np.eye(3), self.resolution_mm))
+        distance_mm = np.linalg.norm(at_mm - to_base.position_mm, axis=1)
+        covariance = self.laser.largest_mm(distance_mm) ** 2 * np.eye(3)
+        return replace(self, covariance_mm2=floored(covariance, self.resolution_mm))
 
-    def of_reading(self, covariance_mm2: np.ndarray) -> Instrument:
-        """The same instrument with the covariance (3, 3) that a reading brings itself."""
-        covariance = floored(covariance_mm2, self.resolution_mm)
+    def of_reading(self, std: str) -> Instrument:
+        """The same instrument with the noise of one reading: 1, 3 or 9 numbers as text."""
+        covariance = floored(covariance_of(std, "reading"), self.resolution_mm)
         return replace(self, covariance_mm2=covariance, laser=None)
+
+    @property
+    def noise(self) -> str:
+        """The noise in few words."""
+        std, laser = np.sqrt(np.diag(self.covariance_mm2)), self.laser
+        uncorrelated = np.array_equal(self.covariance_mm2, np.diag(np.diag(self.covariance_mm2)))
+        if laser is not None:
+            text = (
+                f"{std[0]:.3g} mm per axis at the farthest candidate, less nearer "
+                f"({laser.range_mm:g} mm + {laser.range_um_per_m:g} um/m along the beam, "
+                f"{laser.angle_mm:g} mm + {laser.angle_um_per_m:g} um/m across it, "
+                f"{laser.repeat_mm:g} mm of the arm)"
+            )
+        elif uncorrelated:
+            axes = std[:1] if np.all(std == std[0]) else std
+            text = f"{', '.join(f'{axis:g}' for axis in axes)} mm per axis"
+        else:
+            text = f"{', '.join(f'{axis:.3g}' for axis in std)} mm, correlated"
+        steps = f", read in steps of {self.resolution_mm:g} mm" if self.resolution_mm else ""
+        return text + steps
+
+
+def _is_even(covariance_mm2: np.ndarray) -> bool:
+    return np.array_equal(covariance_mm2, covariance_mm2[0, 0] * np.eye(3))
 
 
 def floored(covariance_mm2: np.ndarray, resolution_mm: float) -> np.ndarray:
     """Covariances (..., 3, 3) with no variance of an axis below that of rounding to steps."""
     lacking = (_ROUNDED * resolution_mm) ** 2 - np.diagonal(covariance_mm2, axis1=-2, axis2=-1)
-    if (lacking <= 0.0).all():
-        return covariance_mm2
     return covariance_mm2 + np.maximum(lacking, 0.0)[..., None] * np.eye(3)
 
 
-def from_head_mm(to_base: Pose, at_mm: np.ndarray) -> np.ndarray:
-    """Places (m, 3) of the base in the instrument's frame, whose origin is a tracker's head."""
-    return (at_mm - to_base.position_mm) @ to_base.rotation
-
-
 def instruments(
-    texts: Iterable[str], frame: str, resolution_mm: float = 0.0
+    texts: Iterable[str], frame: Frame, resolution_mm: float = 0.0
 ) -> tuple[Instrument, ...]:
-    """Instruments of arguments such as ``tracker=0.03`` or ``camera=0.1,0.1,0.3``.
+    """Return the instruments of arguments.
 
-    ``tracker=laser:..`` is read by :func:`kinacc.campaign.laser_tracker.of_text`. Raises
-    InputError naming everything that is wrong with any of them.
+    Parameters
+    ----------
+    texts : iterable of str
+        ``tracker=0.03``, ``camera=0.1,0.1,0.3``, nine numbers of a covariance in mm^2, or
+        ``tracker=laser:range_mm=..,repeat_mm=..`` (:class:`LaserTracker`).
+    frame : {"base", "instrument"}
+        Frame of readings and covariances.
+    resolution_mm : float
+        Step in which readings are written.
+
+    Returns
+    -------
+    tuple of Instrument
+
+    Raises
+    ------
+    InputError
+        Naming everything that is wrong with any of them.
     """
     devices: dict[str, Instrument] = {}
     problems: list[Problem] = []
     for text in texts:
-        name, equals, numbers = text.partition("=")
-        name = name.strip()
-        if not equals or not name:
-            problems.append(Problem("--instrument", repr(text), f"NAME={_FORMS}"))
-            continue
-        if name in devices:
-            problems.append(Problem(f"instrument {name}", "is given twice"))
-        problems += not_in_a_line("--instrument", name)
-        where, laser = f"noise of {name}", None
-        if numbers.strip().startswith(laser_tracker.PREFIX):
-            laser = laser_tracker.of_text(numbers.strip(), where, problems)
-            if laser is not None and frame == BASE:
-                message = "a laser tracker's noise hangs on where it stands"
-                problems.append(Problem(where, message, "--frame instrument"))
-            covariance = None if laser is None else laser.largest_mm(np.zeros((1, 3))) ** 2 * _EVEN
-        else:
-            covariance = covariance_of(numbers, where, problems)
-        if covariance is not None:
-            total = floored(covariance, resolution_mm)
-            devices[name] = Instrument(name, total, frame, laser, resolution_mm)
+        with gathered(problems):
+            device = _instrument(text, frame, resolution_mm)
+            if device.name in devices:
+                raise InputError(Problem(f"instrument {device.name}", "is given twice"))
+            devices[device.name] = device
     refuse(problems, "These instruments cannot be used")
     return tuple(devices.values())
 
 
-def covariance_of(text: str, where: str, problems: list[Problem]) -> np.ndarray | None:
-    """Covariance (3, 3) of a text with 1, 3 or 9 numbers; None with what is wrong noted."""
+def _instrument(text: str, frame: Frame, resolution_mm: float) -> Instrument:
+    name, equals, noise = (part.strip() for part in text.partition("="))
+    if not equals or not name:
+        raise InputError(Problem("--instrument", repr(text), f"NAME={_FORMS}"))
+    refuse(not_in_a_line("--instrument", name))
+    where, laser = f"noise of {name}", None
+    if not noise.startswith(LASER):
+        covariance = covariance_of(noise, where)
+    elif frame == BASE:
+        message = "a laser tracker's noise depends on where it stands"
+        raise InputError(Problem(where, message, "--frame instrument"))
+    else:
+        laser = _laser(noise, where)
+        covariance = laser.largest_mm(np.zeros(1)) ** 2 * np.eye(3)
+    return Instrument(name, floored(covariance, resolution_mm), frame, laser, resolution_mm)
+
+
+def covariance_of(text: str, where: str) -> np.ndarray:
+    """Return the covariance (3, 3) of a text with 1, 3 or 9 numbers.
+
+    Raises InputError naming ``where`` for other texts, and for numbers that are no noise.
+    """
     values = numbers_of(text)
     if values.size == 9:
         covariance = values.reshape(3, 3)
-        faults = covariance_faults(covariance[None])
-        fault = faults[0][1] if faults else ""
         allowed = "symmetric, positive definite, in mm^2"
-    elif values.size in (1, 3):
-        covariance = np.diag(np.broadcast_to(values, 3) ** 2)
-        usable = (values >= _SMALLEST_STD_MM) & (values <= _LARGEST_STD_MM)
-        fault = "" if usable.all() else f"standard deviation {text.strip()} mm"
+        refuse(Problem(where, fault, allowed) for _, fault in covariance_faults(covariance[None]))
+        return covariance
+    if values.size not in (1, 3):
+        raise InputError(Problem(where, repr(text), _FORMS))
+    if not ((values >= _SMALLEST_STD_MM) & (values <= _LARGEST_STD_MM)).all():
         allowed = f"at least {_SMALLEST_STD_MM:g} mm, at most {_LARGEST_STD_MM:g} mm"
-    else:
-        covariance, fault, allowed = None, repr(text), _FORMS
-    if fault:
-        problems.append(Problem(where, fault, allowed))
-    return None if fault else covariance
+        raise InputError(Problem(where, f"standard deviation {text.strip()} mm", allowed))
+    return np.diag(np.broadcast_to(values, 3) ** 2)
 
 
-def noise(device: Instrument) -> str:
-    """The noise of an instrument in few words."""
-    steps = f", read in steps of {device.resolution_mm:g} mm" if device.resolution_mm else ""
-    std = np.sqrt(np.diag(device.covariance_mm2))
-    if device.laser is not None:
-        most = f"{std[0]:.3g} mm per axis at the farthest candidate, less nearer"
-        return f"{most} ({device.laser.in_words()}){steps}"
-    if np.array_equal(device.covariance_mm2, np.diag(np.diag(device.covariance_mm2))):
-        same = np.all(std == std[0])
-        axes = f"{std[0]:g} mm" if same else f"{std[0]:g}, {std[1]:g}, {std[2]:g} mm"
-        return f"{axes} per axis{steps}"
-    return f"{std[0]:.3g}, {std[1]:.3g}, {std[2]:.3g} mm, correlated{steps}"
+def _laser(text: str, where: str) -> LaserTracker:
+    """The tracker of a text that begins with ``laser:``."""
+    known = [item.name for item in fields(LaserTracker)]
+    parts = [part.partition("=")[::2] for part in text.removeprefix(LASER).split(",")]
+    values = {name.strip(): numbers_of(value) for name, value in parts}
+    wrong = [
+        name
+        for name, number in values.items()
+        if name not in known or number.size != 1 or not 0 <= number[0] < 1e3
+    ]
+    wrong += ["repeat_mm"] if "repeat_mm" not in values else []
+    wrong += ["a key twice"] if len(values) < len(parts) else []
+    if not wrong:
+        tracker = LaserTracker(**{name: float(values.get(name, [0.0])[0]) for name in known})
+        if np.min(tracker.std_mm(np.array([1e3]))) > _SMALLEST_STD_MM:
+            return tracker
+        wrong = ["range and angle must be above 0"]
+    raise InputError(Problem(where, f"{text!r} ({', '.join(wrong)})", _LASER_FORM))
+
+
+_Row = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
+
+
+class _Noise(BaseModel):
+    covariance_mm2: tuple[_Row, _Row, _Row]
+    freedom: FiniteFloat
+
+
+class _Test(BaseModel):
+    """File of ``kinacc repeatability``; ``poses_differ``: that some poses scatter more."""
+
+    format: Literal["kinacc repeatability 1"]
+    file: str
+    noise: _Noise | None
+    poses_differ: str | None
+
+
+def read_repeatability(path: str | Path) -> tuple[np.ndarray, int, list[Problem]]:
+    """Return the noise of a file that ``kinacc repeatability -o`` wrote.
+
+    Parameters
+    ----------
+    path : path
+        JSON file.
+
+    Returns
+    -------
+    covariance_mm2 : (3, 3) array
+        In mm^2, in the frame of the readings of the test.
+    freedom : int
+        Degrees of freedom.
+    doubts : list of Problem
+        Why a campaign should not take one noise for all poses; empty where nothing shows it.
+
+    Raises
+    ------
+    InputError
+        Where the file holds no noise, or too few degrees of freedom.
+    """
+    where, fix = f"--repeatability {path}", "write it with kinacc repeatability FILE -o noise.json"
+    try:
+        content = json_files.values_of(json_files.bytes_of(path), str(path))
+        test = _Test.model_validate(content)
+    except OSError:
+        raise InputError(Problem(where, "no such file", fix=fix)) from None
+    except (RecursionError, ValueError):
+        message = "is no answer of kinacc repeatability"
+        raise InputError(Problem(where, message, fix=fix)) from None
+    if test.noise is None:
+        raise InputError(Problem(where, "has no noise: no pose was visited again", fix=fix))
+    covariance, freedom = np.array(test.noise.covariance_mm2), int(test.noise.freedom)
+    problems = [Problem(where, fault, fix=fix) for _, fault in covariance_faults(covariance[None])]
+    if freedom < FEWEST:
+        allowed = f"at least {FEWEST}; {ENOUGH} are wanted"
+        problems.append(Problem(where, f"{freedom} degrees of freedom", allowed, fix))
+    refuse(problems)
+    sure = "state the largest with --noise-mm; --sure takes that of all poses together"
+    differ = Problem(f"--repeatability, {test.file}", test.poses_differ or "", fix=sure)
+    return covariance, freedom, [differ] if test.poses_differ else []

@@ -1,12 +1,13 @@
-"""The campaigns of one calibration and their bounds on its largest error."""
+"""Campaigns of a calibration: the newest one, and the bounds of finished ones in its history."""
 
 from __future__ import annotations
 
 import shlex
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -15,23 +16,26 @@ from kinacc.campaign.folder import JOURNAL, PLAN
 from kinacc.campaign.plan import Plan
 from kinacc.campaign.status import CampaignStatus, status
 from kinacc.deployment import folder as results
+from kinacc.deployment.history import history as compared
+from kinacc.deployment.history import session_of
 from kinacc.errors import InputError
 from kinacc.kinematics import robot
 from kinacc.kinematics.model import JointState
+from kinacc.tables import store
 from kinacc.tables.columns import Columns
 
 _SAME_MM = 1e-6  # modelled positions that differ by less are of one model
 
 
 @dataclass(frozen=True)
-class Sought:
-    """The status of the campaign of a calibration, if there is one, and what hides others."""
+class Newest:
+    """The status of the newest campaign of a calibration, None without one; remarks on others."""
 
     status: CampaignStatus | None
     remarks: tuple[str, ...] = ()
 
 
-def newest(name: str, tables: Mapping[str, Columns], places: Iterable[Path]) -> Sought:
+def newest(name: str, tables: Mapping[str, Columns], places: Iterable[Path]) -> Newest:
     """Return the campaign of the calibration ``name`` among the folders ``places``, the newest.
 
     ``tables`` are those of its results folder, ``places`` those of :func:`folder.of_results`. A
@@ -46,41 +50,60 @@ def newest(name: str, tables: Mapping[str, Columns], places: Iterable[Path]) -> 
             if not _is_of(opened.plan, tables):
                 remarks.append(f"campaign {place} was begun with another calibration of {name}")
                 continue
-            summary = status(opened, opened.state())
+            summary = status(opened)
         except InputError:
             command = shlex.join(["kinacc", "campaign", "status", str(place)])
             remarks.append(f"campaign {place} cannot be read: {command}")
             continue
         if others := [str(path) for path in ordered[number:]]:
             remarks.append(f"there are older campaigns: {', '.join(others)}")
-        return Sought(summary, tuple(remarks))
-    return Sought(None, tuple(remarks))
+        return Newest(summary, tuple(remarks))
+    return Newest(None, tuple(remarks))
 
 
-def finished(tables: Mapping[str, Columns], model: str, places: Iterable[Path]) -> float:
-    """Return the upper bound of the last finished campaign on a calibration.
+def history(inputs: Mapping[str, Any], settings: Mapping[str, Any]) -> Columns:
+    """Return table ``history``: calibrations of a series against one another, a row each by date.
 
     Parameters
     ----------
-    tables : mapping
-        Tables of the results folder.
-    model : str
-        Model that the campaign is about.
-    places : iterable of path
-        Folders of campaigns (:func:`kinacc.campaign.folder.of_results`).
-
-    Returns
-    -------
-    float
-        Upper bound in mm, by the times of the journals the last; NaN where there is none.
+    inputs : mapping
+        ``<line>/<table>``: tables of the calibration of each line of the series; files of
+        campaigns.
+    settings : mapping
+        Settings of the data set.
     """
+    allowed_mm = settings["tolerance"]["mm"]
+    campaigns = [value.parent for role, value in sorted(inputs.items()) if "/campaign_" in role]
+    sessions = []
+    for line in settings["series"]:
+        start = f"{line['name']}/"
+        tables = {
+            role.removeprefix(start): value
+            for role, value in inputs.items()
+            if role.startswith(start) and not isinstance(value, Path)
+        }
+        session = session_of(tables, line["name"], line["date"], line["base"], line["tool"])
+        sessions.append(
+            replace(
+                session,
+                digest=store.digest_of("measurements", tables["measurements"]),
+                bound_mm=_finished_mm(tables, session.calibration.choice, campaigns),
+                tolerance_mm=np.nan if allowed_mm is None else allowed_mm,
+            )
+        )
+    weight = settings["calibration"]["rotation_weight_mm_per_rad"]
+    return compared(sessions, weight, settings["seed"])
+
+
+def _finished_mm(tables: Mapping[str, Columns], model: str, places: Iterable[Path]) -> float:
+    """Upper bound of the campaign on a model that was finished last; NaN where there is none."""
     ended = []
     for place in places:
         with suppress(InputError):
             opened = folder.open_(place)
             if opened.plan.about["model"] != model or not _is_of(opened.plan, tables):
                 continue
-            summary = status(opened, opened.state())
+            summary = status(opened)
             bound = summary.of_all
             if summary.next_point is None and np.isfinite(bound.upper_mm) and not bound.excepted:
                 ended.append((summary.recorded, bound.upper_mm))

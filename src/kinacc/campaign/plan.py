@@ -2,29 +2,28 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
+import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import MISSING, dataclass, fields
 from functools import cached_property
+from typing import Annotated, Any, Literal, get_type_hints
 
 import numpy as np
-from pydantic import ValidationError
+from pydantic import BaseModel, ConfigDict, Field, NonNegativeInt, ValidationError, create_model
 
 from kinacc.assess.adaptive import AdaptiveAssessor, Candidates
 from kinacc.assess.registry import ADAPTIVE
-from kinacc.assess.statement import CANDIDATES, TARGETS
-from kinacc.campaign.instrument import FRAMES, Instrument
-from kinacc.campaign.laser_tracker import LaserTracker
+from kinacc.campaign.instrument import Instrument, Numbers
 from kinacc.config import json_files
 from kinacc.config.load import problems_of
 from kinacc.config.settings import Study
 from kinacc.errors import InputError, Problem, refuse
 from kinacc.geometry import Pose
 
-FORMAT = 1
 METHOD = 2  # of the bounds: raised where the same readings give other bounds
-_ABOUT = ("robot", "calibration", "model", "point")
+# Settings that earlier plans state, with the defaults they had.
+_FORMER = {"correct_drift": False, "assume": "nothing", "isolation": 1.25, "crowd": 0.05}
 
 
 @dataclass(frozen=True)
@@ -63,14 +62,16 @@ class Points:
 class Limits:
     """What a reading must keep to be taken, and what the campaign is for (None: not stated).
 
-    ``width_mm`` is wanted of the bounds on ``target``.
+    ``joint_rad``: largest distance of reported joints from those of the pose; ``implausible_mm``:
+    error beyond which a reading is refused, infinite where the plan is to derive it. ``width_mm``
+    is wanted of the bounds on ``target``.
     """
 
-    joint_rad: float
-    implausible_mm: float
+    joint_rad: float = float(np.deg2rad(0.02))
+    implausible_mm: float = math.inf
     tolerance_mm: float | None = None
     width_mm: float | None = None
-    target: str = CANDIDATES
+    target: Literal["measured", "candidates", "region"] = "candidates"
 
 
 @dataclass(frozen=True)
@@ -123,7 +124,7 @@ class Plan:
         as the route has them, for all of them are visited before anything is decided.
         """
         order = np.array([point for point in self.order if point not in left_out], dtype=int)
-        first = fixed_visit(self.assessor, self.candidates(order))
+        first = self.assessor.begin(self.candidates(order)).first
         place = np.full(len(self.points), len(self.points))
         place[self.route] = np.arange(len(self.route))
         head = order[:first]
@@ -134,171 +135,174 @@ class Plan:
         return Candidates(self.covariance_mm2[rows])
 
 
-def fixed_visit(assessor: AdaptiveAssessor, candidates: Candidates) -> int:
-    """Number of points that are visited whatever is read: rows 0, 1, .. in order."""
-    return assessor.begin(candidates).first
-
-
-def assessor_of(name: str, settings: Mapping[str, object]) -> AdaptiveAssessor:
-    """An assessor by name with its settings. Raises InputError for unknown names and settings.
-
-    What it shares with the configuration's ``study`` is held to the schema and defaults to it.
-    """
-    if name not in ADAPTIVE:
-        raise InputError(Problem("--assessor", f"{name!r} is not there", ", ".join(ADAPTIVE)))
-    known = {field.name: field for field in fields(ADAPTIVE[name])}
-    # A campaign's budget is its own: it may be larger than that of a simulation.
-    free = {*known} - {"measurements"}
-    shared = free & {*Study.model_fields}
-    asked = {key: value for key, value in settings.items() if key in shared}
-    problems: list[Problem] = []
-    try:
-        Study.model_validate(asked)
-    except ValidationError as error:
-        problems += problems_of(error, lambda path: f"setting {path[0]} of {name}")
-    for key, value in settings.items():
-        where = f"setting {key} of {name}"
-        if key not in known:
-            problems.append(Problem(where, "is not there", ", ".join(known)))
-        elif key not in shared and not _is_like(value, known[key].default):
-            allowed = {str: "a word", bool: "true or false"}.get(type(known[key].default))
-            problems.append(Problem(where, f"{value!r}"[:60], allowed or "a number"))
-    refuse(problems)
-    defaults = {key: getattr(Study(), key) for key in shared}
-    return ADAPTIVE[name](**{**defaults, **settings})
-
-
 # Found in 98 % of campaigns with a drift of three standard deviations, for a tenth of the width.
 _REFERENCES, _LEAST_BUDGET, _LEAST_READINGS = 20, 1.4, 100
 
 
-def with_references(
-    assessor: AdaptiveAssessor, points: int, references: int | None = None
+def assessor_of(
+    name: str, settings: Mapping[str, object], points: float = math.inf
 ) -> AdaptiveAssessor:
-    """Return the assessor with 20 reference readings where the budget has them.
+    """Return an assessor.
 
-    ``references``: None where their number is not given; ``points``: number of candidates.
+    Parameters
+    ----------
+    name : str
+        Name of an adaptive assessor.
+    settings : mapping
+        Its settings; ``measurements`` is the budget. What it shares with ``study`` of the
+        configuration has the limits and the default that it has there.
+    points : int, optional
+        Number of candidates: 20 ``references`` are the default where the budget has them.
+
+    Returns
+    -------
+    AdaptiveAssessor
+
+    Raises
+    ------
+    InputError
+        For unknown names and settings, and for values of another type.
     """
-    enough = assessor.measurements >= max(_LEAST_BUDGET * points, _LEAST_READINGS)
-    if references is not None or not enough or not hasattr(assessor, "references"):
-        return assessor
-    return replace(assessor, references=_REFERENCES)
+    if name not in ADAPTIVE:
+        raise InputError(Problem("--assessor", f"{name!r} is not there", ", ".join(ADAPTIVE)))
+    kinds, stated = get_type_hints(ADAPTIVE[name]), {}
+    for item in fields(ADAPTIVE[name]):
+        default = ... if item.default is MISSING else item.default
+        # A campaign's budget is its own: it may be larger than that of a simulation.
+        shared = Study.model_fields if item.name != "measurements" else {}
+        stated[item.name] = (kinds[item.name], shared.get(item.name, default))
+    unknown = [key for key in settings if key not in stated]
+    allowed = ", ".join(stated)
+    refuse(Problem(f"setting {key} of {name}", "is not there", allowed) for key in unknown)
+    model = create_model(name, __config__=ConfigDict(strict=True), **stated)
+    try:
+        values = model.model_validate(settings).model_dump()
+    except ValidationError as error:
+        raise InputError(problems_of(error, lambda path: f"setting {path[0]} of {name}")) from None
+    enough = values["measurements"] >= max(_LEAST_BUDGET * points, _LEAST_READINGS)
+    if "references" in values and "references" not in settings and enough:
+        values["references"] = _REFERENCES
+    return ADAPTIVE[name](**values)
 
 
-def _is_like(value: object, default: object) -> bool:
-    """Whether a value is of the kind of a setting's default; a number where that tells none."""
-    if isinstance(default, (str, bool)):
-        return type(value) is type(default)
-    number = isinstance(value, (int, float)) and not isinstance(value, bool)
-    return number or value is default
+class _Point(BaseModel):
+    label: str
+    joints: Numbers
+    directions: Numbers | None
+    modelled_mm: Numbers
+    slope: Numbers
+
+
+class _Pose(BaseModel):
+    rotation: Numbers
+    position_mm: Numbers
+
+
+class _Assessor(BaseModel):
+    name: str
+    settings: dict[str, Any]
+
+
+class _Arm(BaseModel):
+    prismatic: list[bool]
+
+
+class _File(BaseModel):
+    """File of a plan."""
+
+    format: Literal[1] = 1
+    method: int = 1
+    about: dict[str, str]
+    assessor: _Assessor
+    instruments: Annotated[tuple[Instrument, ...], Field(min_length=1)]
+    to_base: _Pose
+    arm: _Arm
+    limits: Limits
+    seed: NonNegativeInt
+    order: list[int]
+    route: list[int]
+    overruled: tuple[str, ...] = ()
+    points: Annotated[list[_Point], Field(min_length=1)]
 
 
 def to_json(plan: Plan) -> bytes:
     """Return the plan as text; ``from_json`` gives back equal numbers."""
-    points, directions = plan.points, plan.points.directions
-    content = {
-        "format": FORMAT,
-        "method": plan.method,
-        "about": dict(plan.about),
-        "assessor": {"name": plan.assessor.name, "settings": asdict(plan.assessor)},
-        "instruments": list(map(asdict, plan.instruments)),
-        "to_base": {
-            "rotation": plan.to_base.rotation,
-            "position_mm": plan.to_base.position_mm,
-        },
-        "arm": {"prismatic": plan.slides},
-        "limits": asdict(plan.limits),
-        "seed": plan.seed,
-        "order": plan.order,
-        "route": plan.route,
-        "overruled": plan.overruled,
-        "points": [
-            {
-                "label": label,
-                "joints": points.joints[i],
-                "directions": None if directions is None else directions[i],
-                "modelled_mm": points.modelled_mm[i],
-                "slope": points.slope[i],
-            }
-            for i, label in enumerate(points.label)
+    points, names = plan.points, [*_Point.model_fields]
+    columns = [getattr(points, name) for name in names]
+    columns = [[None] * len(points) if column is None else column for column in columns]
+    file = _File.model_construct(
+        method=plan.method,
+        about=dict(plan.about),
+        assessor=_Assessor(name=plan.assessor.name, settings=vars(plan.assessor)),
+        instruments=plan.instruments,
+        to_base=_Pose.model_construct(**plan.to_base._asdict()),
+        arm=_Arm(prismatic=plan.slides.tolist()),
+        limits=plan.limits,
+        seed=plan.seed,
+        order=plan.order.tolist(),
+        route=plan.route.tolist(),
+        overruled=plan.overruled,
+        points=[
+            _Point.model_construct(**dict(zip(names, row, strict=True)))
+            for row in zip(*columns, strict=True)
         ],
-    }
-    return (json.dumps(content, default=lambda array: array.tolist()) + "\n").encode()
+    )
+    return (json.dumps(file.model_dump()) + "\n").encode()
 
 
 def from_json(text: bytes, where: str) -> Plan:
     """Return the plan written by ``to_json``. Raises InputError where it cannot be read."""
     try:
-        return _plan(json_files.values_of(text, where))
-    except (AttributeError, LookupError, RecursionError, TypeError, ValueError) as error:
+        return _plan(_File.model_validate(json_files.values_of(text, where)))
+    except (RecursionError, TypeError, ValueError) as error:
         message = f"is no campaign: {' '.join(str(error).split())[:200]}"
         raise InputError(Problem(where, message, fix="bring it back from a copy")) from None
 
 
-def _plan(file: Mapping) -> Plan:
-    rows, about = file["points"], file["about"]
-    count, joints = len(rows), len(rows[0]["joints"])
-
-    def array(value: object, *shape: int) -> np.ndarray:
-        numbers = np.array(value, dtype=float)
-        if numbers.shape != shape or not np.isfinite(numbers).all():
-            raise ValueError(f"{numbers.shape} numbers where {shape} are expected")
-        return numbers
-
-    turned = rows[0]["directions"] is not None
-    directions = array([row["directions"] for row in rows], count, joints) if turned else None
+def _plan(file: _File) -> Plan:
+    rows, turned = file.points, [row.directions is not None for row in file.points]
     points = Points(
-        tuple(row["label"] for row in rows),
-        array([row["joints"] for row in rows], count, joints),
-        None if directions is None else directions.astype(np.int8),
-        array([row["modelled_mm"] for row in rows], count, 3),
-        array([row["slope"] for row in rows], count, 3, joints),
+        tuple(row.label for row in rows),
+        np.array([row.joints for row in rows]),
+        np.array([row.directions for row in rows], dtype=np.int8) if all(turned) else None,
+        np.array([row.modelled_mm for row in rows]),
+        np.array([row.slope for row in rows]),
     )
-    instruments = tuple(
-        Instrument(
-            item["name"],
-            array(item["covariance_mm2"], 3, 3),
-            {name: name for name in FRAMES}[item["frame"]],
-            LaserTracker(**item["laser"]) if item.get("laser") else None,
-            float(item.get("resolution_mm", 0.0)),
-        )
-        for item in file["instruments"]
-    )
-    limits = Limits(**file["limits"])
-    array([limits.joint_rad, limits.implausible_mm], 2)
+    to_base = Pose(file.to_base.rotation, file.to_base.position_mm)
+    slides, (count, joints) = np.array(file.arm.prismatic), points.joints.shape
+    shapes = [
+        (points.modelled_mm, (count, 3)),
+        (points.slope, (count, 3, joints)),
+        (slides, (joints,)),
+        (to_base.rotation, (3, 3)),
+        (to_base.position_mm, (3,)),
+        *((device.covariance_mm2, (3, 3)) for device in file.instruments),
+    ]
     valid = {
-        "format": file["format"] == FORMAT,
-        "instruments": len(instruments) > 0,
-        "order": sorted(file["order"]) == list(range(count)),
-        "route": {*file["route"]} <= {*file["order"]},
-        "seed": isinstance(file["seed"], int) and file["seed"] >= 0,
-        "about": {*_ABOUT} <= {*about},
-        "target": limits.target in TARGETS,
-        "texts": all(isinstance(text, str) for text in (*points.label, *about.values())),
+        "shape": all(array.shape == shape for array, shape in shapes),
+        "directions": all(turned) or not any(turned),
+        "order": sorted(file.order) == list(range(count)),
+        "route": {*file.route} <= {*file.order},
+        "about": {"robot", "calibration", "model", "point"} <= {*file.about},
     }
     if wrong := [name for name, holds in valid.items() if not holds]:
         raise ValueError(f"{', '.join(wrong)} does not fit the rest")
-    to_base = file["to_base"]
-    return Plan(
-        points, np.array(file["order"]), np.array(file["route"]),
-        _recorded_assessor(**file["assessor"]), instruments,
-        Pose(array(to_base["rotation"], 3, 3), array(to_base["position_mm"], 3)),
-        array(file["arm"]["prismatic"], joints).astype(bool), limits, file["seed"], about,
-        tuple(file.get("overruled", ())), file.get("method", 1),
-    )  # fmt: skip
-
-
-# Settings that earlier plans state, with the defaults they had.
-_FORMER = {"correct_drift": False, "assume": "nothing", "isolation": 1.25, "crowd": 0.05}
-
-
-def _recorded_assessor(name: str, settings: Mapping[str, object]) -> AdaptiveAssessor:
+    settings = file.assessor.settings
     used = [key for key, value in _FORMER.items() if settings.get(key, value) != value]
     fix = "begin a new campaign; readings can be recorded in it again"
     refuse(Problem(f"setting {key}", "is gone from kinacc", fix=fix) for key in used)
-    return assessor_of(name, {k: value for k, value in settings.items() if k not in _FORMER})
-
-
-def digest(text: bytes) -> str:
-    """Short content hash of a plan's file."""
-    return hashlib.sha256(text).hexdigest()[:16]
+    known = {key: value for key, value in settings.items() if key not in _FORMER}
+    return Plan(
+        points,
+        np.array(file.order),
+        np.array(file.route),
+        assessor_of(file.assessor.name, known),
+        file.instruments,
+        to_base,
+        slides,
+        file.limits,
+        file.seed,
+        file.about,
+        file.overruled,
+        file.method,
+    )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +15,7 @@ from kinacc.assess.population import binomial_interval
 from kinacc.assess.simulate import carry_on, noisy, truth_mm
 from kinacc.assess.statement import ACCEPT, CANDIDATES, REJECT, UNDECIDED, decide
 from kinacc.errors import InputError, Problem, refuse
+from kinacc.progress import Progress
 from kinacc.study.fields import ErrorField
 
 
@@ -76,7 +77,7 @@ def plan_budget(
     aim: Aim,
     repetitions: int = 30,
     seed: int = 0,
-    progress: Callable | None = None,
+    progress: Progress | None = None,
 ) -> BudgetPlan:
     """Simulate campaigns of assessors, one for each budget, on every kind of errors.
 
@@ -107,8 +108,7 @@ def plan_budget(
         Where a field has too few errors, or an assessor states no bound on the target.
     """
     runs = simulate(fields, candidates, covariance_mm2, assessors, repetitions, seed, aim, progress)
-    groups = runs.groupby(["errors", "budget"], sort=False)
-    rows = pd.DataFrame([_row(str(key[0]), int(key[1]), group, aim) for key, group in groups])
+    rows = counted(runs, aim)
     return BudgetPlan(
         assessors[0].name,
         candidates,
@@ -129,7 +129,7 @@ def simulate(
     repetitions: int,
     seed: int,
     aim: Aim,
-    progress: Callable | None = None,
+    progress: Progress | None = None,
 ) -> pd.DataFrame:
     """Return one row for each simulated campaign; see :func:`plan_budget`."""
     refuse(
@@ -163,24 +163,20 @@ def simulate(
                 raise InputError(Problem("--assessor", message, fix="choose another, or --target"))
             statement, arm_mm = stated[0], getattr(assessor, "arm_mm", None)
             limits = limits_of(statement, visited, size_mm, sigma_mm, assessor.measurements)
-            width_mm = math.nan if statement.excepted else statement.upper_mm - statement.lower_mm
-            tolerance_mm = aim.tolerance_mm
+            arm_mm = sigma_mm if arm_mm is None else arm_mm
+            allowed_mm = aim.tolerance_mm
+            verdict = decide(statement, allowed_mm).verdict if allowed_mm else UNDECIDED
             runs.append(
                 {
                     "errors": field.name,
                     "budget": assessor.measurements,
                     "repetition": repetition,
                     "readings": readings,
-                    "true_mm": truth_mm(
-                        statement, size_mm, visited, sigma_mm if arm_mm is None else arm_mm
-                    ),
+                    "true_mm": truth_mm(statement, size_mm, visited, arm_mm),
                     "excepted": statement.excepted,
                     "lower_mm": statement.lower_mm,
                     "upper_mm": statement.upper_mm,
-                    "width_mm": math.inf if math.isnan(width_mm) else max(width_mm, 0.0),
-                    "verdict": decide(statement, tolerance_mm).verdict
-                    if tolerance_mm
-                    else UNDECIDED,
+                    "verdict": verdict,
                     "attainable_mm": limits.attainable_mm,
                     "proven_mm": limits.proven_mm,
                 }
@@ -188,48 +184,42 @@ def simulate(
     return pd.DataFrame(runs)
 
 
+def counted(runs: pd.DataFrame, aim: Aim) -> pd.DataFrame:
+    """Return the rows of a :class:`BudgetPlan` for simulated campaigns (:func:`simulate`)."""
+    width_mm, excess_mm = runs["upper_mm"] - runs["lower_mm"], runs["upper_mm"] - runs["true_mm"]
+    width_mm = width_mm.where(runs["excepted"] == 0).clip(lower=0.0).fillna(math.inf)
+    stated = runs["upper_mm"].notna()
+    within = stated & (width_mm <= (aim.width_mm or math.inf))
+    accept, reject = runs["verdict"] == ACCEPT, runs["verdict"] == REJECT
+    decided = accept | reject
+    reached = within if aim.tolerance_mm is None else decided
+    groups = runs.assign(
+        width_mm=width_mm, excess_mm=excess_mm, stated=stated, holding=excess_mm >= 0.0,
+        within=within, accept=accept, reject=reject, undecided=~decided,
+        reached=reached if aim.width_mm is None else reached & within,
+    ).groupby(["errors", "budget"], sort=False)  # fmt: skip
+    means = ["readings", "true_mm", "excess_mm", "attainable_mm", "proven_mm", "within"]
+    rows = groups[[*means, "accept", "reject", "undecided", "stated"]].mean()
+    rows["excepted"] = groups["excepted"].max()
+    for name, share in (("q05", 0.05), ("median", 0.5), ("q95", 0.95)):
+        # Of order, without interpolation: some widths are infinite.
+        rows[f"width_{name}_mm"] = groups["width_mm"].agg(np.quantile, share, method="inverted_cdf")
+    counts = groups[["holding", "stated", "reached"]].sum()
+    rows[["holding", "judged", "reached"]] = counts.to_numpy()
+    limits = [
+        binomial_interval(*pair) for pair in zip(rows["holding"], rows["judged"], strict=True)
+    ]
+    rows[["holds_low", "holds_high"]] = limits
+    shown = zip(rows["reached"], groups.size(), strict=True)
+    rows["reached_low"] = [binomial_interval(*pair)[0] for pair in shown]
+    return rows.reset_index()
+
+
 def smallest_budget(budget: pd.Series, share: pd.Series, aim: Aim) -> int | None:
     """Return the smallest budget from which on all errors have the wanted share; None if none.
 
     ``budget`` and ``share``: of campaigns that reach the aim, a value for each row.
     """
-    enough = None
     worst = share.groupby(budget).min().sort_index(ascending=False)
-    for level, lowest in worst.items() if aim.is_set else ():
-        if lowest < aim.power:
-            break
-        enough = int(level)
-    return enough
-
-
-def _row(errors: str, budget: int, runs: pd.DataFrame, aim: Aim) -> dict:
-    count, stated = len(runs), runs[runs["upper_mm"].notna()]
-    above_mm = stated["upper_mm"] - stated["true_mm"]
-    holding, judged = int((above_mm >= 0.0).sum()), len(stated)
-    within = int((stated["width_mm"] <= (aim.width_mm or math.inf)).sum())
-    accept, reject = (float((runs["verdict"] == verdict).mean()) for verdict in (ACCEPT, REJECT))
-    reached = within if aim.width_mm is not None or aim.tolerance_mm is None else count
-    if aim.tolerance_mm is not None:
-        reached = min(reached, round(count * (accept + reject)))
-    # Of order, without interpolation: some widths are infinite.
-    widths = np.quantile(runs["width_mm"], (0.05, 0.5, 0.95), method="inverted_cdf").tolist()
-    limits = binomial_interval(holding, judged) if judged else (math.nan, math.nan)
-    return {
-        "errors": errors,
-        "budget": budget,
-        **runs[["readings", "true_mm"]].mean(),
-        "excepted": int(runs["excepted"].max()),
-        **dict(zip(("width_q05_mm", "width_median_mm", "width_q95_mm"), widths, strict=True)),
-        "excess_mm": float(above_mm.mean()),
-        **stated[["attainable_mm", "proven_mm"]].mean(),
-        "stated": judged / count,
-        "holding": holding,
-        "judged": judged,
-        **dict(zip(("holds_low", "holds_high"), limits, strict=True)),
-        "within": within / count,
-        "undecided": 1.0 - (accept + reject),
-        "reached": reached,
-        "reached_low": binomial_interval(reached, count)[0],
-        "accept": accept,
-        "reject": reject,
-    }
+    enough = worst[(worst >= aim.power).cummin()]
+    return int(enough.index[-1]) if aim.is_set and len(enough) else None

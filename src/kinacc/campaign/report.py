@@ -8,7 +8,7 @@ import numpy as np
 
 from kinacc.assess.adaptive import Campaign
 from kinacc.campaign.folder import Opened
-from kinacc.campaign.state import State, covariance_mm2, sayable
+from kinacc.campaign.state import State, Taken, covariance_mm2, sayable
 from kinacc.campaign.status import reason
 from kinacc.tables.columns import Columns
 from kinacc.tables.contract import columns_of
@@ -16,8 +16,8 @@ from kinacc.tables.contract import columns_of
 _MOMENTS = 150  # of a campaign at which bounds are stated, at most
 
 
-def tables(opened: Opened) -> tuple[State, dict[str, Columns]]:
-    """Return the state of a campaign, and its tables.
+def tables(opened: Opened) -> dict[str, Columns]:
+    """Return the tables of a campaign.
 
     Parameters
     ----------
@@ -26,45 +26,36 @@ def tables(opened: Opened) -> tuple[State, dict[str, Columns]]:
 
     Returns
     -------
-    state : State
-        Its readings as the assessor has them.
-    tables : dict
+    dict
         Columns of campaign_points, campaign_readings and campaign_bounds, in mm.
     """
-    total = len(opened.state().told)
+    total = len(opened.state.used)
     pause = max(-(-total // _MOMENTS), 1)
-    rows: list[tuple] = []
+    rows: list[tuple[object, ...]] = []
 
-    def watch(campaign: Campaign, _) -> None:
+    def watch(campaign: Campaign, _: Taken) -> None:
         count = campaign.ledger.taken
         if count % pause == 0 or count == total:
             rows.extend(_bounds(opened, campaign))
 
-    state = opened.state(watch)
-    return state, {
+    opened.watched(watch)
+    state = opened.state
+    return {
         "campaign_points": _points(state),
         "campaign_readings": _readings(state),
         "campaign_bounds": columns_of("campaign_bounds", rows or _bounds(opened, state.campaign)),
     }
 
 
-def _bounds(opened: Opened, campaign: Campaign) -> list[tuple]:
+def _bounds(opened: Opened, campaign: Campaign) -> list[tuple[object, ...]]:
     taken, visited = campaign.ledger.taken, len(campaign.ledger.visited)
     return [
         (
-            *(
-                taken,
-                visited,
-                statement.target,
-                statement.share,
-                statement.value_mm,
-                statement.lower_mm,
-                statement.upper_mm,
-            ),
-            *(statement.excepted, statement.confidence),
-            *(reason(code) or None for code in (statement.assumption, statement.withheld)),
+            *(taken, visited, item.target, item.share, item.value_mm, item.lower_mm),
+            *(item.upper_mm, item.excepted, item.confidence),
+            *(reason(code) or None for code in (item.assumption, item.withheld)),
         )
-        for statement in sayable(opened.plan, campaign)
+        for item in sayable(opened.plan, campaign)
     ]
 
 
@@ -97,9 +88,9 @@ def _points(state: State) -> Columns:
 
 def _readings(state: State) -> Columns:
     plan = state.plan
-    used = {item.number: place for place, item in enumerate(state.told, start=1)}
+    used = {item.number: place for place, item in enumerate(state.used, start=1)}
     void = {item.number: why for item, why in state.struck}
-    every = (*state.told, *state.in_hand, *(item for item, _ in state.struck))
+    every = (*state.readings, *(item for item, _ in state.struck))
     rows = [
         (
             item.number,
@@ -113,6 +104,6 @@ def _readings(state: State) -> Columns:
             math.sqrt(float(np.trace(covariance_mm2(plan, item.reading))) / 3.0),
             void.get(item.number),
         )
-        for item in sorted(every, key=lambda known: known.number)
+        for item in sorted(every, key=lambda item: item.number)
     ]
     return columns_of("campaign_readings", rows)

@@ -10,22 +10,31 @@ from __future__ import annotations
 import math
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
-from datetime import datetime
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal
 
 import numpy as np
+from pydantic import (
+    AwareDatetime,
+    BaseModel,
+    Field,
+    NonNegativeInt,
+    PositiveInt,
+    TypeAdapter,
+)
 from scipy.special import chdtrc
 
 from kinacc.assess.adaptive import Campaign, Ledger
 from kinacc.assess.noise import Contrasts, contrasts, false_scatter, scatter_alarm
 from kinacc.assess.statement import MEASURED, Reason, Statement
-from kinacc.campaign.instrument import INSTRUMENT, covariance_of
+from kinacc.campaign.instrument import INSTRUMENT, Numbers, covariance_of
 from kinacc.campaign.plan import Plan
-from kinacc.errors import InputError, Problem
+from kinacc.errors import InputError, Problem, gathered
 
 _FARTHEST_MM = 1e6  # no instrument measures an arm from a kilometre away
 _USUAL_READINGS = 10  # that show which size is usual
 _UNUSUAL, _FEWEST_SIGMAS = 6.0, 10.0  # times the median size, and standard deviations
+SUSPICIOUS = 1e-3  # probability of readings that the stated noise does not explain
 
 
 @dataclass(frozen=True)
@@ -38,42 +47,52 @@ class Reading:
     """
 
     point: int
-    position_mm: np.ndarray
+    position_mm: Numbers
     instrument: str
-    joints: np.ndarray | None = None
+    joints: Numbers | None = None
     std: str | None = None
 
     @property
-    def digits(self) -> tuple:
+    def digits(self) -> tuple[object, ...]:
         """Point, instrument and position to the last digit."""
         return self.point, self.instrument, *self.position_mm.tolist()
 
-    def as_entry(self) -> dict:
-        """Return the reading in plain numbers."""
-        entry = {
-            "point": self.point,
-            "position_mm": [float(value) for value in self.position_mm],
-            "instrument": self.instrument,
-        }
-        if self.joints is not None:
-            entry["joints"] = [float(value) for value in self.joints]
-        return entry | ({"std": self.std} if self.std is not None else {})
 
-    @classmethod
-    def of_entry(cls, entry: Mapping, plan: Plan) -> Reading:
-        """Return the reading that ``as_entry`` wrote; ValueError where it is none of the plan."""
-        joints = entry.get("joints")
-        reading = cls(
-            int(entry["point"]),
-            np.array(entry["position_mm"], dtype=float),
-            entry["instrument"],
-            None if joints is None else np.array(joints, dtype=float),
-            entry.get("std"),
-        )
-        if not 0 <= reading.point < len(plan.points) or faults_of(plan, reading, ""):
-            raise ValueError(f"no reading of this campaign: {entry}")
-        plan.instrument(reading.instrument)
-        return reading
+class Readings(BaseModel):
+    """Entry of the journal: readings that are taken together.
+
+    ``file`` is the digest of their file, ``path`` its place from the campaign's folder; ``was``:
+    numbers of earlier readings that came from it.
+    """
+
+    kind: Literal["readings"] = "readings"
+    readings: list[Reading]
+    file: str | None = None
+    path: str | None = None
+    was: list[int] | None = None
+    at: AwareDatetime | None = None
+
+
+class LeaveOut(BaseModel):
+    """Entry of the journal: a point that is not measured."""
+
+    kind: Literal["leave_out"] = "leave_out"
+    point: NonNegativeInt
+    reason: str
+    at: AwareDatetime | None = None
+
+
+class Strike(BaseModel):
+    """Entry of the journal: a reading that is void."""
+
+    kind: Literal["strike"] = "strike"
+    reading: PositiveInt
+    reason: str
+    at: AwareDatetime | None = None
+
+
+Entry = Readings | LeaveOut | Strike
+_ENTRY: TypeAdapter[Entry] = TypeAdapter(Annotated[Entry, Field(discriminator="kind")])
 
 
 def error_mm(plan: Plan, reading: Reading) -> np.ndarray:
@@ -87,14 +106,15 @@ def error_mm(plan: Plan, reading: Reading) -> np.ndarray:
 def covariance_mm2(plan: Plan, reading: Reading) -> np.ndarray:
     """Return the covariance (3, 3) of the reading in the robot's base."""
     unplanned = unplanned_mm2(plan, reading)
-    return plan.covariance_mm2[reading.point] if unplanned is None else unplanned
+    planned: np.ndarray = plan.covariance_mm2[reading.point]
+    return planned if unplanned is None else unplanned
 
 
 def unplanned_mm2(plan: Plan, reading: Reading) -> np.ndarray | None:
     """Return the covariance (3, 3) in the robot's base; None where it is the planned one."""
     instrument = plan.instrument(reading.instrument)
     if reading.std is not None:
-        instrument = instrument.of_reading(covariance_of(reading.std, "reading", []))
+        instrument = instrument.of_reading(reading.std)
     elif instrument is plan.instruments[0]:
         return None
     return instrument.in_base(plan.to_base, plan.points.modelled_mm[[reading.point]])[0]
@@ -121,7 +141,8 @@ def faults_of(plan: Plan, reading: Reading, where: str) -> list[Problem]:
             allowed = f"{count} numbers within {_FARTHEST_MM:g}"
             problems.append(Problem(where, f"{name} ({text})", allowed))
     if reading.std is not None:
-        covariance_of(reading.std, f"{where}, standard deviation", problems)
+        with gathered(problems):
+            covariance_of(reading.std, f"{where}, standard deviation")
     return problems
 
 
@@ -175,16 +196,8 @@ def _tolerance(plan: Plan) -> np.ndarray:
     return plan.limits.joint_rad * np.where(plan.slides, 1e3, 1.0)
 
 
-SUSPICIOUS = 1e-3  # probability of readings that the stated noise does not explain
-READINGS, LEAVE_OUT, STRIKE = "readings", "leave_out", "strike"
-_UNREADABLE = (
-    *(ArithmeticError, AttributeError, InputError, LookupError, RecursionError, TypeError),
-    ValueError,
-)
-
-
 @dataclass(frozen=True)
-class Told:
+class Taken:
     """A reading: its number in the journal (from 1) and its error (3,)."""
 
     number: int
@@ -196,8 +209,8 @@ class Told:
 class State:
     """A campaign with its readings.
 
-    ``rows`` are points in the order in which the assessor numbers them. ``asked`` is the point it
-    requests next, None for none. ``told`` are the readings it used, ``in_hand`` those it has not
+    ``rows`` are points in the order in which the assessor numbers them. ``requested`` is the point
+    it requests next, None for none. ``used`` are the readings it used, ``waiting`` those it has not
     requested, ``struck`` those declared void, with the reason. ``imports``: numbers of readings by
     the path of their file, from the folder of the campaign.
     """
@@ -205,22 +218,22 @@ class State:
     plan: Plan
     campaign: Campaign
     rows: np.ndarray
-    told: list[Told]
-    in_hand: list[Told]
-    asked: int | None
+    used: list[Taken]
+    waiting: list[Taken]
+    requested: int | None
     left_out: Mapping[int, str]
-    struck: list[tuple[Told, str]] = field(default_factory=list)
-    imports: Mapping[str | None, set[int]] = field(default_factory=dict)
+    struck: list[tuple[Taken, str]]
+    imports: Mapping[str | None, set[int]]
 
     @property
-    def taken(self) -> int:
-        """Number of readings taken, without those struck."""
-        return len(self.told) + len(self.in_hand)
+    def readings(self) -> list[Taken]:
+        """Readings taken, without those struck: the used ones first."""
+        return [*self.used, *self.waiting]
 
     @property
     def numbered(self) -> int:
         """Number of the last reading in the journal."""
-        return self.taken + len(self.struck)
+        return len(self.readings) + len(self.struck)
 
     def statements(self) -> tuple[Statement, ...]:
         """Return the statements that the readings support."""
@@ -228,7 +241,7 @@ class State:
 
     def ahead(self) -> list[int]:
         """Return points to be read whatever is read, in order, planned revisits in their places."""
-        have = Counter(item.reading.point for item in (*self.told, *self.in_hand))
+        have = Counter(item.reading.point for item in self.readings)
         wanted = []
         for point in self.rows[list(self.campaign.visit())].tolist():
             if have[point]:
@@ -263,79 +276,87 @@ def sayable(plan: Plan, campaign: Campaign) -> tuple[Statement, ...]:
 
 def restore(
     plan: Plan,
-    entries: Iterable[Mapping],
-    watch: Callable[[Campaign, Told], None] | None = None,
+    entries: Iterable[Mapping[str, Any]],
+    watch: Callable[[Campaign, Taken], None] | None = None,
     where: str = "journal",
 ) -> State:
-    """Return the state after the entries of a journal; ``watch`` sees every reading once used.
+    """Return the state after the entries of a journal; the assessor gets readings as it requests.
 
-    Raises InputError naming the line of an entry that cannot be read.
+    Parameters
+    ----------
+    plan : Plan
+        What the campaign fixes.
+    entries : iterable of mapping
+        Entries of its journal.
+    watch : callable, optional
+        Called with the assessor's campaign and every reading once it is used.
+    where : str
+        Name of the journal in problems.
+
+    Returns
+    -------
+    State
+
+    Raises
+    ------
+    InputError
+        Naming the line of an entry that cannot be read.
     """
+    waiting: dict[int, deque[Taken]] = {}
     readings: list[Reading] = []
     left_out: dict[int, str] = {}
     void: dict[int, str] = {}
     imports: dict[str | None, set[int]] = {}
-    for line, entry in enumerate(entries, start=1):
+    for line, content in enumerate(entries, start=1):
         try:
-            if "at" in entry and datetime.fromisoformat(entry["at"]).tzinfo is None:
-                raise ValueError("a time without a time zone")
-            if entry["kind"] == READINGS:
+            entry = _ENTRY.validate_python(content)
+            if isinstance(entry, Readings):
                 before = len(readings)
-                readings += [Reading.of_entry(item, plan) for item in entry["readings"]]
-                if entry.get("file"):
-                    numbers = {*range(before + 1, len(readings) + 1), *entry.get("was", ())}
-                    imports.setdefault(entry.get("path"), set()).update(numbers)
-                continue
-            known, place, most = {
-                LEAVE_OUT: (left_out, "point", range(len(plan.points))),
-                STRIKE: (void, "reading", range(1, len(readings) + 1)),
-            }[entry["kind"]]
-            if entry[place] not in most:
-                raise ValueError(f"{place} {entry[place]}")
-            known[int(entry[place])] = str(entry["reason"])
-        except _UNREADABLE as error:
-            message = f"is no entry of this campaign: {type(error).__name__}: {error}"
-            problem = Problem(
-                f"{where}, line {line}", message, fix="bring the file back from a copy"
-            )
-            raise InputError(problem) from None
-    return _replayed(plan, readings, left_out, void, imports, watch)
-
-
-def _replayed(plan, readings, left_out, void, imports, watch) -> State:
-    """The state of readings that the assessor gets in the order of its requests."""
+                readings += [_of_campaign(plan, reading) for reading in entry.readings]
+                if entry.file:
+                    numbers = {*range(before + 1, len(readings) + 1), *(entry.was or ())}
+                    imports.setdefault(entry.path, set()).update(numbers)
+            elif isinstance(entry, LeaveOut):
+                if entry.point >= len(plan.points):
+                    raise ValueError(f"point {entry.point}")
+                left_out[entry.point] = entry.reason
+            else:
+                if entry.reading > len(readings):
+                    raise ValueError(f"reading {entry.reading}")
+                void[entry.reading] = entry.reason
+        except (ArithmeticError, InputError, TypeError, ValueError) as error:
+            message = f"is no entry of this campaign: {' '.join(str(error).split())[:200]}"
+            fix = "bring the file back from a copy"
+            raise InputError(Problem(f"{where}, line {line}", message, fix=fix)) from None
     rows = plan.visiting(frozenset(left_out))
-    waiting: dict[int, deque[Told]] = {}
     struck = []
-    for number, item in enumerate(readings, start=1):
-        known = Told(number, item, error_mm(plan, item))
+    for number, reading in enumerate(readings, start=1):
+        item = Taken(number, reading, error_mm(plan, reading))
         if number in void:
-            struck.append((known, void[number]))
+            struck.append((item, void[number]))
         else:
-            waiting.setdefault(item.point, deque()).append(known)
+            waiting.setdefault(reading.point, deque()).append(item)
     campaign = plan.assessor.begin(plan.candidates(rows))
-    used: list[Told] = []
-    asked = None
+    used: list[Taken] = []
     # The assessor is asked before every reading, as it was then: some remember when they were.
-    while (row := campaign.next()) is not None:
-        asked = int(rows[row])
-        if not waiting.get(asked):
-            break
-        known = waiting[asked].popleft()
-        campaign.record(row, known.error_mm, unplanned_mm2(plan, known.reading))
-        used.append(known)
-        asked = None
+    while (row := campaign.next()) is not None and waiting.get(int(rows[row])):
+        item = waiting[int(rows[row])].popleft()
+        campaign.record(row, item.error_mm, unplanned_mm2(plan, item.reading))
+        used.append(item)
         if watch is not None:
-            watch(campaign, known)
-    in_hand = sorted(
-        (item for queue in waiting.values() for item in queue), key=lambda item: item.number
-    )
-    return State(plan, campaign, rows, used, in_hand, asked, left_out, struck, imports)
+            watch(campaign, item)
+    requested = None if row is None else int(rows[row])
+    rest = [item for queue in waiting.values() for item in queue]
+    rest.sort(key=lambda item: item.number)
+    return State(plan, campaign, rows, used, rest, requested, left_out, struck, imports)
 
 
-def readings_in(entries: Iterable[Mapping]) -> int:
-    """Return the number of readings in entries of a journal."""
-    return sum(len(entry["readings"]) for entry in entries if entry["kind"] == READINGS)
+def _of_campaign(plan: Plan, reading: Reading) -> Reading:
+    """The reading, where its numbers, point and instrument are of this campaign."""
+    if not 0 <= reading.point < len(plan.points) or faults_of(plan, reading, ""):
+        raise ValueError(f"no reading of this campaign: {reading}")
+    plan.instrument(reading.instrument)
+    return reading
 
 
 @dataclass(frozen=True)
@@ -380,7 +401,7 @@ def size_scatter(state: State) -> Scatter | None:
     Errors make readings larger than noise alone would, never smaller: ``too_small`` contradicts
     the stated noise, whatever the errors are.
     """
-    square, readings = 0.0, [*state.told, *state.in_hand]
+    square, readings = 0.0, state.readings
     for item in readings:
         covariance = covariance_mm2(state.plan, item.reading)
         square += float(item.error_mm @ np.linalg.solve(covariance, item.error_mm))
@@ -394,7 +415,7 @@ def deviations(state: State) -> dict[int, float]:
     as stated.
     """
     values = _within_blocks(state)
-    numbers = [item.number for item in (*state.told, *state.in_hand)]
+    numbers = [item.number for item in state.readings]
     sizes = np.sqrt(np.mean(values.values**2, axis=1)).tolist()
     return {numbers[place]: size for place, size in zip(values.places, sizes, strict=True)}
 
@@ -407,12 +428,12 @@ def _within_blocks(state: State) -> Contrasts:
     """Readings used by the blocks in which they were requested, those in hand by point."""
     ledger, blocks = Ledger(state.campaign.ledger.candidates), state.campaign.reading_blocks()
     row_of = {int(point): row for row, point in enumerate(state.rows)}
-    in_hand = [item for item in state.in_hand if item.reading.point in row_of]
-    for item in (*state.told, *in_hand):
+    waiting = [item for item in state.waiting if item.reading.point in row_of]
+    for item in (*state.used, *waiting):
         covariance = unplanned_mm2(state.plan, item.reading)
         ledger.record(row_of[item.reading.point], item.error_mm, covariance)
     beyond = max(blocks, default=0) + 1
-    every = [*blocks, *(beyond + row_of[item.reading.point] for item in in_hand)]
+    every = [*blocks, *(beyond + row_of[item.reading.point] for item in waiting)]
     values = contrasts(ledger, every)
     guarded = getattr(state.plan.assessor, "wrong_rate", 0.0) > 0.0
     return values.without_wrong_blocks(every) if guarded else values

@@ -5,30 +5,18 @@ from __future__ import annotations
 import math
 import shlex
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
 from kinacc.assess.attainable import NONE, WidthLimits, limits_of
-from kinacc.assess.limits import VISITS
 from kinacc.assess.noise import ESTIMATED, KNOWN
-from kinacc.assess.statement import (
-    CANDIDATES,
-    MEAN,
-    MEASURED,
-    REGION,
-    Decision,
-    Reason,
-    Statement,
-    decide,
-)
-from kinacc.campaign import instrument
+from kinacc.assess.statement import CANDIDATES, MEASURED, REGION, Reason, Statement, decide
 from kinacc.campaign.folder import Opened
 from kinacc.campaign.plan import Plan
 from kinacc.campaign.state import Scatter, State, scatter, size_scatter
 
 _CLEAR_OF_NOISE = 3.0  # standard deviations: larger bounds hold where the noise is smaller
-_VISIT = f"{VISITS:.0%}".replace("%", " %")
 
 
 @dataclass(frozen=True)
@@ -78,29 +66,6 @@ class Bound:
         named = "measured points" if self.target == MEASURED else "candidates"
         few = f"all but {self.excepted} of " if self.excepted else ""
         return f"{few}these {self.points} {named}" if self.points != 1 else "one measured point"
-
-    @property
-    def text(self) -> str:
-        """The bounds in a sentence or two."""
-        value = lower = ""
-        if np.isfinite(self.value_mm):
-            value = f"estimate {self.value_mm:.3f} mm"
-            if self.unmeasured:
-                few = f"{self.unmeasured} of {self.points} are not measured"
-                value += f", likely too low: {few}"
-        if np.isfinite(self.lower_mm):
-            lower = f"at least {self.lower_mm:.3f} mm"
-        sure = f"one-sided, {percent(self.confidence)} confidence"
-        visits = f" in {_VISIT} of future visits to the worst pose" if self.error_of != MEAN else ""
-        error = f"argest error at {self.about}{visits}"
-        if not np.isfinite(self.upper_mm):
-            parts = [self.withheld, lower and f"{lower} ({sure})", value]
-            return f"No upper bound on the l{error}: {'; '.join(filter(None, parts))}."
-        both = f", {lower}" if lower and not self.excepted else ""
-        text = f"L{error}: at most {self.upper_mm:.3f} mm{both} ({sure}{' each' if lower else ''})"
-        if lower and self.excepted:
-            text += f". Largest error of all {self.points}: {lower}"
-        return "; ".join(filter(None, [text, value])) + "."
 
 
 @dataclass(frozen=True)
@@ -156,48 +121,14 @@ class CampaignStatus:
         going = self.next_point is not None
         return shlex.join(["kinacc", "campaign", "next" if going else "report", self.folder])
 
-    @property
-    def headline(self) -> str:
-        """The verdict, or the main bound without a tolerance."""
-        main, size = self.bound, f"{self.bound.tolerance_mm or 0.0:g} mm"
-        if self.against:
-            stated = "BOUND IN DOUBT" if np.isfinite(main.upper_mm) else "NO BOUND"
-            return f"{stated}: {self.against[0]}."
-        if not (main.verdict and np.isfinite(main.upper_mm)):
-            return main.text
-        if main.verdict not in _DECIDED:
-            return f"UNDECIDED on {size}: {main.reason}."
-        side, name = _DECIDED[main.verdict]
-        mm, sure = getattr(main, f"{name}_mm"), f"{percent(main.confidence)} confidence"
-        error = f"largest error at {main.about} {side} {size}"
-        return f"{main.verdict.upper()}: {error} ({name} bound {mm:.3f} mm, {sure})."
 
-    @property
-    def progress(self) -> str:
-        """Readings taken, and the next point."""
-        waiting = self.readings - self.readings_used
-        ahead = f", {waiting} more taken ahead" if waiting else ""
-        spent = self.readings_used >= self.budget
-        end = "The budget is spent" if spent else "No further reading is needed"
-        return (
-            f"{self.readings_used} of {self.budget} readings{ahead}, at {self.points_measured} of "
-            f"{self.candidates} candidates. "
-            f"{end if self.next_point is None else f'Next point: {self.next_point}'}."
-        )
-
-
-_DECIDED = {"accept": ("within", "upper"), "reject": ("beyond", "lower")}
-
-
-def status(opened: Opened, state: State, tolerance_mm: float | None = None) -> CampaignStatus:
+def status(opened: Opened, tolerance_mm: float | None = None) -> CampaignStatus:
     """Return the status of a campaign: bounds, verdict, conditions, remarks and the next point.
 
     Parameters
     ----------
     opened : Opened
         The campaign as read (:func:`kinacc.campaign.folder.open_`).
-    state : State
-        Its readings as the assessor has them (``opened.state()``).
     tolerance_mm : float, optional
         Largest error allowed, in place of the campaign's own.
 
@@ -206,15 +137,14 @@ def status(opened: Opened, state: State, tolerance_mm: float | None = None) -> C
     CampaignStatus
         Bounds in mm, the main target first.
     """
-    plan, label = state.plan, state.plan.points.label
-    stated = state.statements()
+    plan, state, label = opened.plan, opened.state, opened.plan.points.label
+    stated, visited = state.statements(), len(state.campaign.ledger.visited)
     tolerance_mm = plan.limits.tolerance_mm if tolerance_mm is None else tolerance_mm
-    candidates = len(plan.points) - len(state.left_out)
-    visited = len(state.campaign.ledger.visited)
+    candidates = len(state.rows)
     near, repeats = size_scatter(state), scatter(state)
     checked = None if getattr(plan.assessor, "noise", KNOWN) == ESTIMATED else repeats
     overstated = near is not None and near.too_small
-    bounds = [_bound(item, state, candidates, tolerance_mm, overstated) for item in stated]
+    bounds = [_bound(item, state, tolerance_mm, overstated) for item in stated]
     bounds.sort(key=lambda item: (math.isnan(item.upper_mm), item.target != plan.limits.target))
     if visited == candidates and len({(b.lower_mm, b.value_mm, b.upper_mm) for b in bounds}) == 1:
         bounds = [item for item in bounds if item.target != MEASURED] or bounds
@@ -223,39 +153,43 @@ def status(opened: Opened, state: State, tolerance_mm: float | None = None) -> C
     against, notes = list(alarms.values()), []
     if alarms:
         against += [
-            f"reading {state.told[item.number - 1].number} at point "
+            f"reading {state.used[item.number - 1].number} at point "
             f"{label[state.rows[item.row]]} lies {item.deviations:.1f} standard deviations from "
             "the others there"
             for item in state.campaign.suspicious()
         ]
     else:
-        against += [_near(near)] if overstated and near else []
+        if near and near.too_small:
+            against.append(
+                f"readings lie {near.ratio:.2f} times as far from the predictions as the stated "
+                f"noise takes them ({near.freedom} degrees of freedom): noise overstated, or no "
+                "readings"
+            )
         against += [_scattered(checked)] if checked and checked.too_large else []
         against += [item.doubt for item in bounds if item.doubt]
     if checked and not checked.too_large and not overstated:
         notes.append(_scattered(checked))
     notes += [item.noise for item in bounds if item.noise]
-    names = ("robot", "calibration", "model", "point")
     return CampaignStatus(
         folder=str(opened.folder),
-        **{name: plan.about[name] for name in names},
+        **{name: plan.about[name] for name in ("robot", "calibration", "model", "point")},
         assessor=plan.assessor.name,
         budget=plan.assessor.measurements,
-        readings=state.taken,
-        readings_used=len(state.told),
+        readings=len(state.readings),
+        readings_used=len(state.used),
         last_reading=state.numbered,
         candidates=candidates,
         points_measured=visited,
         left_out={label[point]: why for point, why in state.left_out.items()},
         struck={item.number: why for item, why in state.struck},
-        next_point=None if state.asked is None else label[state.asked],
+        next_point=None if state.requested is None else label[state.requested],
         recorded=max(opened.recorded, default=""),
-        noise={device.name: instrument.noise(device) for device in plan.instruments},
+        noise={device.name: device.noise for device in plan.instruments},
         scatter=repeats,
         against=tuple(dict.fromkeys(against)),
         advice=tuple(ADVICE[code] for code in alarms),
         assumes=_assumes(plan, bounds[0]),
-        notes=tuple(dict.fromkeys([*notes, *_frame(state), *_not_counted(state)])),
+        notes=tuple(dict.fromkeys([*notes, *_findings(state)])),
         overruled=plan.overruled,
         bounds=tuple(bounds),
     )
@@ -266,14 +200,10 @@ def percent(share: float) -> str:
     return f"{100.0 * share:.4g} %"
 
 
-def _bound(
-    stated: Statement, state: State, candidates: int, tolerance_mm: float | None, overstated: bool
-) -> Bound:
-    visited, nan = len(state.campaign.ledger.visited), math.nan
-    judged = Decision("", nan, nan, nan, nan, Reason("between"))
-    if tolerance_mm is not None:
-        judged = decide(stated, tolerance_mm)
-    doubt = ""
+def _bound(stated: Statement, state: State, tolerance_mm: float | None, overstated: bool) -> Bound:
+    visited, candidates = len(state.campaign.ledger.visited), len(state.rows)
+    judged = None if tolerance_mm is None else decide(stated, tolerance_mm)
+    limits, doubt = _limits(stated, state), ""
     if stated.upper_mm < stated.lower_mm:
         doubt = "the bounds contradict each other"
     elif stated.value_mm > stated.upper_mm:
@@ -281,25 +211,35 @@ def _bound(
     if doubt:
         kind = "overstated" if overstated else "understated"
         doubt += f": noise {kind}, or one of the few campaigns that the confidence leaves out"
-    limits = limits_now(stated, state)
-    values = {
-        **vars(stated),
-        **vars(judged),
-        "points": visited if stated.target == MEASURED else candidates,
-        "unmeasured": candidates - visited if stated.target == CANDIDATES else 0,
-        **{name: reason(getattr(stated, name)) for name in ("withheld", "assumption", "noise")},
-        "doubt": doubt,
-        "tolerance_mm": tolerance_mm,
-        "reason": reason(judged.reason) if judged.verdict else "",
-        "attainable_mm": limits.attainable_mm,
-        "proven_mm": limits.proven_mm,
-        "attainable_lower_mm": limits.lower_mm,
-    }
-    return Bound(**{item.name: values[item.name] for item in fields(Bound)})
+    return Bound(
+        target=stated.target,
+        points=visited if stated.target == MEASURED else candidates,
+        share=stated.share,
+        value_mm=stated.value_mm,
+        lower_mm=stated.lower_mm,
+        upper_mm=stated.upper_mm,
+        confidence=stated.confidence,
+        excepted=stated.excepted,
+        unmeasured=candidates - visited if stated.target == CANDIDATES else 0,
+        error_of=stated.error_of,
+        withheld=reason(stated.withheld),
+        assumption=reason(stated.assumption),
+        noise=reason(stated.noise),
+        doubt=doubt,
+        tolerance_mm=tolerance_mm,
+        verdict=judged.verdict if judged else "",
+        reason=reason(judged.reason) if judged else "",
+        guard_band_mm=judged.guard_band_mm if judged else math.nan,
+        acceptance_limit_mm=judged.acceptance_limit_mm if judged else math.nan,
+        risk=judged.risk if judged else math.nan,
+        attainable_mm=limits.attainable_mm,
+        proven_mm=limits.proven_mm,
+        attainable_lower_mm=limits.lower_mm,
+    )
 
 
-def limits_now(stated: Statement, state: State) -> WidthLimits:
-    """Return how near a statement could come to the largest error; NaN where it has no bound.
+def _limits(stated: Statement, state: State) -> WidthLimits:
+    """How near the statement could come to the largest error; NaN where it has no bound.
 
     By the sizes of the mean readings, corrected for their noise; unread points have the median.
     """
@@ -316,12 +256,11 @@ def limits_now(stated: Statement, state: State) -> WidthLimits:
 
 def _assumes(plan: Plan, bound: Bound) -> str:
     """The conditions of the main bound; empty where none is stated."""
-    if not np.isfinite(bound.upper_mm):
+    if math.isnan(bound.upper_mm):
         return ""
     used, settings = plan.instruments, vars(plan.assessor)
-    stated = "; ".join(f"{device.name}: {instrument.noise(device)}" for device in used)
-    if len(used) == 1:
-        stated = instrument.noise(used[0])
+    stated = "; ".join(f"{device.name}: {device.noise}" for device in used)
+    stated = used[0].noise if len(used) == 1 else stated
     if settings.get("noise", KNOWN) != KNOWN:
         freedom = settings["noise_freedom"]
         source = f"a test with {freedom} degrees of freedom" if freedom else "repeated readings"
@@ -338,15 +277,7 @@ def _assumes(plan: Plan, bound: Bound) -> str:
         f"at most {allowance:g} mm of what no repeat shows" if allowance else "",
         "and a fixed base, tool and instrument",
     ]
-    text = ", ".join(filter(None, parts))
-    return f"Assumes independent normal readings with {text}."
-
-
-def _near(near: Scatter) -> str:
-    return (
-        f"readings lie {near.ratio:.2f} times as far from the predictions as the stated noise "
-        f"takes them ({near.freedom} degrees of freedom): noise overstated, or no readings"
-    )
+    return f"Assumes independent normal readings with {', '.join(filter(None, parts))}."
 
 
 def _scattered(repeats: Scatter) -> str:
@@ -359,9 +290,9 @@ def _scattered(repeats: Scatter) -> str:
     return f"{text}: noise overstated, bounds wider than needed" if repeats.too_small else text
 
 
-def _frame(state: State) -> Iterable[str]:
-    """What the reference poses show, and how large a drift may stay unseen."""
-    change = state.campaign.change()
+def _findings(state: State) -> Iterable[str]:
+    """What the reference poses show; points left out and readings struck."""
+    change, label = state.campaign.change(), state.plan.points.label
     if change is not None and change.is_found:
         yield reason(change.reason)
     elif change is not None:
@@ -369,10 +300,6 @@ def _frame(state: State) -> Iterable[str]:
             "the reference poses show no drift and no step (a drift of "
             f"{change.unseen_mm:.3f} mm would be found in half of the cases)"
         )
-
-
-def _not_counted(state: State) -> Iterable[str]:
-    label = state.plan.points.label
     for point, why in state.left_out.items():
         yield f"point {label[point]} was left out: {why}"
     for item, why in state.struck:

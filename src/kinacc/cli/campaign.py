@@ -2,27 +2,33 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
+import hashlib
+import os
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 import click
 import numpy as np
 import pandas as pd
 
+from kinacc.campaign import folder as folders
+from kinacc.campaign import report as reports
+from kinacc.campaign.campaign import Campaign, RowsOfFile
+from kinacc.campaign.state import Reading, point_at
+from kinacc.campaign.status import CampaignStatus
 from kinacc.cli import campaign_plan, campaign_start
 from kinacc.cli.choice import option, positive
 from kinacc.cli.group import InOrder
 from kinacc.cli.output import Output, answers, require_writable, write_table
 from kinacc.cli.process import AGAINST
-
-if TYPE_CHECKING:
-    from kinacc.campaign.campaign import Campaign, NextPose
-    from kinacc.campaign.status import CampaignStatus
-import hashlib
-import os
-from collections.abc import Mapping
+from kinacc.errors import InputError, Problem, refuse
+from kinacc.measurements.rows import POINTS, read_rows
+from kinacc.measurements.table import numbers_of
+from kinacc.report.campaign import campaign_page, markdown
+from kinacc.report.rendering import lines as texts
+from kinacc.tables.atomic import write_together
+from kinacc.tables.store import content_of, to_table
 
 
 @click.group("campaign", cls=InOrder)
@@ -34,9 +40,9 @@ def campaign() -> None:
     start    fix points, instruments, assessor and budget
     next     which joints to measure now
     record   take a reading, or a file of readings
-    status   what may be said so far, and what is still needed
+    status   bounds, verdict and the next point
     report   tables, picture and text
-    verify   whether the journal still holds what a report said
+    verify   compare the journal with a report
 
     \b
     Example:
@@ -51,7 +57,7 @@ def campaign() -> None:
 @click.argument("folder", type=click.Path())
 @option("--all", "every", is_flag=True, help="All poses that are measured whatever is read.")
 @answers("JSON of the poses.", table=True)
-def next_(folder, every, out) -> None:
+def next_(folder: str, every: bool, out: Output) -> None:
     """Print the pose to measure next: joints, and the expected position.
 
     \b
@@ -60,11 +66,16 @@ def next_(folder, every, out) -> None:
       kinacc campaign next check --all -o visit.csv
     """
     opened = _open(folder)
-    table, pose, progress = opened.visit(every), opened.next_pose(), opened.status().progress
-    shown, lines = table[[name for name in table if not name.endswith("_rad")]], [progress]
+    table, pose, summary = opened.visit(every), opened.next_pose(), opened.status()
+    shown = table[[name for name in table if not name.endswith("_rad")]]
+    lines = progress = texts("campaign_pose.txt", s=summary, pose=None)
     if pose is not None and not every and out.table is None:
-        shown, lines = shown.head(0), _pose_lines(opened, pose)
-    out.show({"rows": table, "progress": progress}, table, lines, shown)
+        travel = np.zeros(len(pose.joints), int) if pose.directions is None else pose.directions
+        columns = pose.joints, np.rad2deg(pose.joints), opened.plan.slides, travel
+        joints = zip(*columns, strict=True)
+        lines = texts("campaign_pose.txt", s=summary, pose=pose, joints=joints)
+        shown = shown.head(0)
+    out.show({"rows": table, "progress": progress[0]}, table, lines, shown)
 
 
 @campaign.command("leave-out")
@@ -72,7 +83,7 @@ def next_(folder, every, out) -> None:
 @click.argument("point")
 @option("--reason", required=True, help="Reason why it cannot be measured.")
 @answers("JSON of the status.")
-def leave_out(folder, point, reason, out) -> None:
+def leave_out(folder: str, point: str, reason: str, out: Output) -> None:
     """Leave out a POINT without readings that the instrument or the arm cannot reach.
 
     \b
@@ -89,7 +100,7 @@ def leave_out(folder, point, reason, out) -> None:
 @click.argument("number", type=click.IntRange(1))
 @option("--reason", required=True, help="What went wrong with it.")
 @answers("JSON of the status.")
-def strike(folder, number, reason, out) -> None:
+def strike(folder: str, number: int, reason: str, out: Output) -> None:
     """Declare reading NUMBER void, for a reason other than its size.
 
     It stays in the journal and in every report. Striking a reading for its size makes bounds wrong.
@@ -107,7 +118,7 @@ def strike(folder, number, reason, out) -> None:
 @click.argument("folder", type=click.Path())
 @option("--tolerance-mm", type=positive, help="Largest error allowed. [as started]")
 @answers("JSON of the status.", verbose=True)
-def status(folder, tolerance_mm, out) -> None:
+def status(folder: str, tolerance_mm: float | None, out: Output) -> None:
     """Show the current bounds, the verdict, and the next point.
 
     \b
@@ -125,7 +136,7 @@ def status(folder, tolerance_mm, out) -> None:
         help="Further form of the tables; repeatable.")  # fmt: skip
 @answers("JSON of the status.", page="Page for a browser: an .html file.",
          force=True)  # fmt: skip
-def report(folder, to, formats, out) -> None:
+def report(folder: str, to: str | None, formats: Sequence[str], out: Output) -> None:
     """Write tables, picture and text of a campaign.
 
     Files: campaign_points, _readings, _bounds (.parquet), campaign (.svg, .png), report.md.
@@ -138,7 +149,7 @@ def report(folder, to, formats, out) -> None:
     into = Path(to or opened.folder / "report")
     files = _write_report(opened, into, formats, out, out.force or to is None)
     result = opened.status()
-    lines = [result.headline, f"{into}: {', '.join(files)}", out.page or ""]
+    lines = [_lines(result)[0], f"{into}: {', '.join(files)}", out.page or ""]
     answer = {**vars(result), "report": str(into), "files": files, "page": out.page}
     out.show(answer, pd.DataFrame(), filter(None, lines))
 
@@ -148,7 +159,7 @@ def report(folder, to, formats, out) -> None:
 @option("--sha256", help="SHA-256 of the journal, as a report states it.")
 @option("--readings", type=click.IntRange(0), help="Number of readings, as a report states it.")
 @answers("JSON of the verification.")
-def verify(folder, sha256, readings, out) -> None:
+def verify(folder: str, sha256: str | None, readings: int | None, out: Output) -> None:
     """Check the journal in FOLDER: the checksum of each line, and the SHA-256 of a report.
 
     The exit code is 1 where the journal does not continue the one of the report.
@@ -157,8 +168,6 @@ def verify(folder, sha256, readings, out) -> None:
     Example:
       kinacc campaign verify check --readings 57 --sha256 5bd24b8a..
     """
-    from kinacc.campaign import folder as folders
-
     opened = folders.open_(folder)
     checked = folders.verify(opened, sha256, readings)
     verdict = f"FAIL: {'; '.join(checked.problems)}." if checked.problems else "PASS."
@@ -176,25 +185,19 @@ def _write_report(
     opened: Campaign, into: Path, formats: Sequence[str], out: Output, force: bool
 ) -> list[str]:
     """Write the report; the names of its files."""
-    from kinacc.campaign import report as reports
-    from kinacc.campaign.folder import marks_of
-    from kinacc.errors import InputError, Problem
     from kinacc.figures import campaign as drawing
     from kinacc.figures.save import render
-    from kinacc.report.campaign import campaign_page, markdown
-    from kinacc.tables.atomic import write_together
-    from kinacc.tables.store import content_of, to_table
 
-    if not opened.state.told:
+    if not opened.state.used:
         raise InputError(Problem(str(opened.folder), "no reading was requested and taken yet"))
-    state, tables = reports.tables(opened.opened)
-    metadata = marks_of(opened.opened)
+    plan, tables = opened.plan, reports.tables(opened.opened)
+    metadata = folders.marks_of(opened.opened)
     figure = drawing.draw(
         tables["campaign_points"],
         tables["campaign_bounds"],
-        len(state.plan.route),
-        state.plan.limits.tolerance_mm,
-        state.plan.about["calibration"],
+        len(plan.route),
+        plan.limits.tolerance_mm,
+        plan.about["calibration"],
     )
     contents = {
         f"{name}.parquet": content_of(to_table(name, table, metadata))
@@ -202,70 +205,31 @@ def _write_report(
     }
     pictures = render(figure, ("svg", "png"))
     contents |= {f"campaign.{kind}": content for kind, content in pictures.items()}
-    contents["report.md"] = markdown(opened.opened, state, tables, "campaign.svg").encode()
+    contents["report.md"] = markdown(opened.opened, tables, "campaign.svg").encode()
     sheets = {f"{name}.{kind}": name for kind in dict.fromkeys(formats) for name in tables}
     require_writable([into / name for name in (*contents, *sheets)], force)
     write_together({into / name: content for name, content in contents.items()})
     for path, name in sheets.items():
         write_table(pd.DataFrame(tables[name]), into / path)
     if out.page is not None:
-        out.write_page(campaign_page(opened.opened, state, tables))
+        out.write_page(campaign_page(opened.opened, tables))
     return [*contents, *sheets]
 
 
 def _show(summary: CampaignStatus, out: Output) -> None:
-    out.show(summary, pd.DataFrame(), status_lines(summary, out.verbose))
+    out.show(summary, pd.DataFrame(), _lines(summary, out.verbose))
 
 
-def status_lines(summary: CampaignStatus, verbose: bool = False) -> list[str]:
-    """Return the verdict, the bounds, their conditions, and the progress."""
-    bounds = [bound for bound in summary.bounds if math.isfinite(bound.upper_mm)]
-    texts = [
-        summary.headline,
-        *(bound.text for bound in bounds if not summary.against),
-        summary.assumes,
-        *(f"{text}." for text in summary.against[1:]),
-        *summary.advice,
-        summary.progress,
-        *(f"Note: {text}." for text in summary.notes),
-        *(f"Overruled at the start: {text}." for text in summary.overruled),
-    ]
-    if verbose:
-        texts += [f"Instrument {name}: {noise}." for name, noise in summary.noise.items()]
-        texts += [
-            f"Mean excess of the upper bound ({bound.about}): {bound.attainable_mm:.3f} mm with "
-            f"all errors known, no reliable bound below {bound.proven_mm:.3f} mm; now "
-            f"{bound.upper_mm - bound.value_mm:.3f} mm above the estimate."
-            for bound in bounds
-            if math.isfinite(bound.attainable_mm)
-        ]
-    return list(filter(None, dict.fromkeys(texts)))
-
-
-def _pose_lines(opened: Campaign, pose: NextPose) -> list[str]:
-    """The joints of a pose, and where the model expects the reading."""
-    lines = [
-        f"Point {pose.point}, reading {len(opened.state.told) + 1} of {opened.status().budget}"
-    ]
-    travel = np.zeros(len(pose.joints), int) if pose.directions is None else pose.directions
-    for joint, (value, slides) in enumerate(zip(pose.joints, opened.plan.slides, strict=True)):
-        turn = f"{math.degrees(value):12.4f} deg  {value:12.7f} rad"
-        arrival = ("", "  arriving up", "  arriving down")[travel[joint]]
-        lines.append(f"  q{joint + 1} {f'{value:12.4f} mm' if slides else turn}{arrival}")
-    x, y, z = pose.expected_mm
-    lines.append(f"Expected at {x:.3f}, {y:.3f}, {z:.3f} mm in the {pose.frame} frame.")
-    if pose.times_read:
-        lines.append(f"Read {pose.times_read} times before: leave the pose and come back to it.")
-    return lines
+def _lines(summary: CampaignStatus, verbose: bool = False) -> list[str]:
+    """The verdict, the bounds, their conditions, and the progress."""
+    lines = texts("campaign_status.txt", s=summary, verbose=verbose)
+    return list(dict.fromkeys(lines))  # the verdict may be the bound
 
 
 def _open(folder: str) -> Campaign:
     """The campaign; what is unusual about its files goes to the error stream."""
-    from kinacc.campaign.campaign import Campaign
-    from kinacc.campaign.folder import doubts
-
     opened = Campaign(folder)
-    for line in doubts(opened.opened):
+    for line in folders.doubts(opened.opened):
         click.echo(line, err=True)
     return opened
 
@@ -287,7 +251,7 @@ _OF_ONE = ("point", "joints_deg", "joints_rad", "std_mm")
 @option("--skip-bad", is_flag=True, help="Good rows of a file without the bad ones.")
 @option("--again", is_flag=True, help="Acceptance of readings that repeat or replace others.")
 @answers("JSON of the readings taken and the status.")
-def record(out, folder, file, **options) -> None:
+def record(out: Output, folder: str, file: str | None, **options: Any) -> None:
     """Record a reading, or all new readings of a CSV, Excel, Parquet or JSON FILE.
 
     FILE has x_mm, y_mm, z_mm (or _m) and a column pose or joints q1_deg ..; optional: instrument,
@@ -298,15 +262,12 @@ def record(out, folder, file, **options) -> None:
       kinacc campaign record check --position-mm "812.31,-40.02,655.90"
       kinacc campaign record check readings.csv
     """
-    from kinacc.campaign.campaign import Campaign
-    from kinacc.errors import InputError, Problem
-
     if (options["position_mm"] is None) == (file is None):
         message = "is given twice" if file else "is not given"
         raise InputError(Problem("the reading", message, "--position-mm, or a FILE"))
     campaign = Campaign(folder)
     flags = {name: options[name] for name in ("accept_implausible", "again")}
-    requested, plan = campaign.state.asked, campaign.plan
+    requested, plan = campaign.state.requested, campaign.plan
     if file is None:
         taken = campaign.add_reading(**_single(options, plan.slides), **flags)
         point = taken.points[0]
@@ -323,14 +284,11 @@ def record(out, folder, file, **options) -> None:
         click.echo(f"not taken: {problem}", err=True)
     summary = campaign.status()
     answer = {**vars(taken), "status": summary}
-    out.show(answer, pd.DataFrame(), [first, *status_lines(summary)])
+    out.show(answer, pd.DataFrame(), [first, *_lines(summary)])
 
 
-def _single(options: Mapping, slides: np.ndarray) -> dict[str, object]:
+def _single(options: Mapping[str, Any], slides: np.ndarray) -> dict[str, Any]:
     """Arguments of ``Campaign.add_reading``."""
-    from kinacc.errors import Problem, refuse
-    from kinacc.measurements.table import numbers_of
-
     sizes = {"position_mm": 3, "joints_deg": len(slides), "joints_rad": len(slides)}
     values = {name: numbers_of(options[name]) for name in sizes if options[name] is not None}
     refuse(
@@ -352,13 +310,8 @@ def _flag(name: str) -> str:
     return f"--{name.replace('_', '-')}"
 
 
-def _of_file(path: str, options: Mapping, campaign):
+def _of_file(path: str, options: Mapping[str, Any], campaign: Campaign) -> RowsOfFile:
     """The rows of a file as readings, or what is wrong with them."""
-    from kinacc.campaign.campaign import RowsOfFile
-    from kinacc.campaign.state import Reading, point_at
-    from kinacc.errors import Problem, refuse
-    from kinacc.measurements.rows import POINTS, read_rows
-
     plan = campaign.plan
     # A cell that is no number spoils its row, not the file: it is named row by row.
     read = read_rows(path, plan.slides, POINTS, spoilt=[])

@@ -6,26 +6,47 @@ import math
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 import click
 import numpy as np
 
+from kinacc.assess.adaptive import AdaptiveAssessor
+from kinacc.campaign.begin import noise_doubts, noise_of
+from kinacc.campaign.planning import Aim, plan_budget
 from kinacc.cli import choice
+from kinacc.cli.campaign_start import assessor_of, instruments_of
 from kinacc.cli.choice import option
-from kinacc.cli.output import answers
-
-if TYPE_CHECKING:
-    from kinacc.campaign.planning import Aim, BudgetPlan
-    from kinacc.study.fields import ErrorField
+from kinacc.cli.output import Output, answers
+from kinacc.config.error_models import PLAINEST
+from kinacc.deployment.folder import read_tables, recorded_model, targets_of
+from kinacc.deployment.record import default_point
+from kinacc.errors import InputError, Problem, refuse
+from kinacc.measurements.rows import open_table
+from kinacc.measurements.table import numbers
+from kinacc.progress import reporting
+from kinacc.report.rendering import lines
+from kinacc.study import fields
+from kinacc.study.fields import ErrorField
+from kinacc.tables import store
 
 DEFAULT_ERRORS = ("smooth", "workshop", "defect")
 SHARES = (0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0)  # of the candidates: budgets by default
 _MOST_READINGS = 50_000_000  # a gigabyte: any pose may be read again and again
-_SHOWN = (
-    *("errors", "budget", "true_mm", "excepted", "width_median_mm", "width_q95_mm"),
-    *("holding", "judged"),
-)
+# Columns on the screen, with their heads.
+_SHOWN = {
+    "errors": "Errors",
+    "budget": "Readings",
+    "true_mm": "Largest\nerror, mm",
+    "excepted": "Candidates\nleft out",
+    "width_median_mm": "Width, mm\nmedian",
+    "width_q95_mm": "Width, mm\n95 % below",
+    "holding": "Upper bounds\nthat hold",
+    "within": "Share with\nwidth wanted",
+    "accept": "Share\naccepted",
+    "reject": "Share\nrejected",
+    "undecided": "Share\nundecided",
+}
 
 
 @click.command("plan")
@@ -43,7 +64,7 @@ _SHOWN = (
 @option("--repetitions", default=30, type=click.IntRange(2, 100_000),
         help="Simulated campaigns per budget.")  # fmt: skip
 @answers(table=True, picture="Picture of width against budget: .svg, .png, .pdf.")
-def plan(out, **options) -> None:
+def plan(out: Output, **options: Any) -> None:
     """Simulate campaigns: the width of the bounds by budget, and the budget for a wanted width.
 
     --errors is a results folder (its held-out errors), a file with columns ex_mm, ey_mm, ez_mm, or
@@ -53,15 +74,12 @@ def plan(out, **options) -> None:
     Example:
       kinacc campaign plan --noise-mm 0.05 --candidates 200 --width-mm 0.3 --errors results/arm
     """
-    from kinacc.campaign.planning import Aim, plan_budget
-    from kinacc.progress import reporting
-
     aim = Aim(options["width_mm"], options["tolerance_mm"], options["power"], options["target"])
-    fields, points, covariance, assessors = _question(options)
-    repetitions, seed = options["repetitions"], options["seed"]
+    errors, covariance, assessors = _question(options)
+    points, repetitions, seed = (options[name] for name in ("candidates", "repetitions", "seed"))
     with reporting("campaign plan", bar=True) as progress:
         budgets = plan_budget(
-            fields, points, covariance, assessors, aim, repetitions, seed, progress
+            errors, points, covariance, assessors, aim, repetitions, seed, progress
         )
     if out.picture is not None:
         from kinacc.figures import campaign_plan
@@ -71,50 +89,53 @@ def plan(out, **options) -> None:
                 str(name),
                 group["budget"].to_numpy(float),
                 group[["width_q05_mm", "width_median_mm", "width_q95_mm"]].to_numpy(),
-                group["reached"].to_numpy() / budgets.repetitions,
+                group["reached"].to_numpy() / repetitions,
             )
             for name, group in budgets.rows.groupby("errors", sort=False)
         ]
-        power, budget = (
-            aim.power if aim.is_set else None,
-            budgets.budget_shown or budgets.budget,
-        )
+        power, budget = aim.power if aim.is_set else None, budgets.budget_shown or budgets.budget
         out.draw(campaign_plan.draw(curves, aim.width_mm, power, budget))
     table = budgets.rows.replace(math.inf, math.nan)
-    shown = [name for name in _SHOWN if name != "excepted" or table[name].any()]
-    shown += ["within"] if aim.width_mm is not None else []
-    shown += ["accept", "reject", "undecided"] if aim.tolerance_mm is not None else []
-    out.show(budgets, table, _lines(budgets, aim), table[shown])
+    absent = [] if table["excepted"].any() else ["excepted"]
+    absent += ["within"] if aim.width_mm is None else []
+    absent += ["accept", "reject", "undecided"] if aim.tolerance_mm is None else []
+    holding = [f"{row.holding} of {row.judged}" for row in table.itertuples()]
+    shown = table.assign(holding=holding)[[*_SHOWN]].drop(columns=absent).rename(columns=_SHOWN)
+    budget = budgets.budget_shown or budgets.budget or int(table["budget"].max())
+    worst = table[table["budget"] == budget].nsmallest(1, "reached")
+    judged = budgets.rows.dropna(subset="attainable_mm")
+    last = judged[judged["budget"] == judged["budget"].max()].nlargest(1, "excess_mm")
+    limited = next(last.itertuples(), None)
+    texts = lines(
+        "campaign_plan.txt", plan=budgets, aim=aim, worst=next(worst.itertuples()), limited=limited
+    )
+    out.show(budgets, table, texts, shown)
 
 
-def _question(options: Mapping) -> tuple:
-    """Fields, number of candidates, covariance and assessors of the options."""
-    from kinacc.campaign import doubts, known_noise
-    from kinacc.cli import campaign_options
-    from kinacc.errors import InputError, Problem, refuse
-    from kinacc.study import fields
-
+def _question(
+    options: Mapping[str, Any],
+) -> tuple[list[ErrorField], np.ndarray, list[AdaptiveAssessor]]:
+    """Errors, covariance and assessors of the options."""
     names, points = options["errors"] or DEFAULT_ERRORS, options["candidates"]
     folders = [Path(name) for name in names if name not in fields.FAMILIES and Path(name).is_dir()]
-    instruments, tested = campaign_options.instruments(options, folders)
+    instruments, freedom, doubts = instruments_of(options, folders)
     if not options["sure"]:
-        problems = [*doubts.of_noise(instruments), *known_noise.doubts(tested)]
-        for path in folders:
-            problems += doubts.of_little_noise(instruments, doubts.noise_of(path))
-        refuse(problems, "Nothing was simulated")
+        for known in (None, *map(noise_of, folders)):
+            doubts += noise_doubts(instruments, known=known)
+        refuse(dict.fromkeys(doubts), "Nothing was simulated")
     budgets = sorted({*(options["budget"] or [max(round(s * points), 2) for s in SHARES])})
     if points * budgets[-1] > _MOST_READINGS:
         message = f"{points} candidates with up to {budgets[-1]} readings each"
         allowed = f"a product of at most {_MOST_READINGS:,}"
         raise InputError(Problem("--candidates, --budget", message, allowed))
-    assessors = [campaign_options.assessor(options, budget, points, tested) for budget in budgets]
+    assessors = [assessor_of(options, budget, points, freedom) for budget in budgets]
     chosen = [errors_of(name, options["point"]) for name in names]
     if (largest_mm := options["largest_mm"]) is not None:
         chosen = [
             replace(field, error_mm=field.error_mm * (largest_mm / field.size_mm.max()))
             for field in chosen
         ]
-    return chosen, points, instruments[0].covariance_mm2, assessors
+    return chosen, instruments[0].covariance_mm2, assessors
 
 
 def errors_of(name: str, point: str | None = None) -> ErrorField:
@@ -122,11 +143,6 @@ def errors_of(name: str, point: str | None = None) -> ErrorField:
 
     ``point``: target of a results folder, by default the one that a campaign is about.
     """
-    from kinacc.errors import InputError, Problem, refuse
-    from kinacc.measurements.rows import open_table
-    from kinacc.measurements.table import numbers
-    from kinacc.study import fields
-
     path, columns = Path(name), ("ex_mm", "ey_mm", "ez_mm")
     if name in fields.FAMILIES:
         return replace(fields.synthetic(name, 0), name=name)
@@ -143,17 +159,10 @@ def errors_of(name: str, point: str | None = None) -> ErrorField:
     errors = errors[~np.isnan(errors).all(axis=1)]
     if not np.isfinite(errors).all() or not len(errors):
         raise InputError(Problem(name, "has no error, or one that is not complete"))
-    return fields.ErrorField(path.stem, errors)
+    return ErrorField(path.stem, errors)
 
 
 def _errors_of_folder(path: Path, point: str | None) -> ErrorField:
-    from kinacc.config.error_models import PLAINEST
-    from kinacc.deployment.folder import read_tables, recorded_model, targets_of
-    from kinacc.deployment.record import default_point
-    from kinacc.errors import InputError, Problem
-    from kinacc.study import fields
-    from kinacc.tables import store
-
     name, points = path.resolve().name, path / "assessment_points.parquet"
     needed = ("pose_errors", "measurements")
     if points.is_file() and not (path / "pose_errors.parquet").is_file():
@@ -173,47 +182,3 @@ def _errors_of_folder(path: Path, point: str | None) -> ErrorField:
         name, tables["pose_errors"], tables["measurements"], model,
         target if len(targets) > 1 else None,
     )  # fmt: skip
-
-
-def _lines(budgets: BudgetPlan, aim: Aim) -> list[str]:
-    """The budget, the simulation, and how near an upper bound can come."""
-    lines = [
-        _verdict(budgets, aim),
-        f"Simulated: {budgets.repetitions} campaigns a row with {budgets.assessor}, largest error "
-        f"of {budgets.target} among {budgets.candidates}, noise {max(budgets.noise_mm):.3g} mm.",
-    ]
-    judged = budgets.rows.dropna(subset="attainable_mm")
-    if len(judged):
-        last = judged[judged["budget"] == judged["budget"].max()]
-        lines.append(
-            "Mean excess of the upper bound with {budget} readings (errors: {errors}): "
-            "{excess_mm:.3g} mm. With all errors known beforehand: {attainable_mm:.3g} mm. Limit "
-            "of any reliable bound: {proven_mm:.3g} mm.".format(
-                **last.loc[last["excess_mm"].idxmax()]
-            )
-        )
-    return lines
-
-
-def _verdict(budgets: BudgetPlan, aim: Aim) -> str:
-    if not aim.is_set:
-        return "No budget named: give --width-mm or --tolerance-mm."
-    wanted = {
-        f"bounds at most {aim.width_mm} mm apart": aim.width_mm,
-        f"a decision on {aim.tolerance_mm} mm": aim.tolerance_mm,
-    }
-    goal = " and ".join(text for text, value in wanted.items() if value is not None)
-    budget = budgets.budget_shown or budgets.budget or int(budgets.rows["budget"].max())
-    of_budget = budgets.rows[budgets.rows["budget"] == budget]
-    worst = of_budget.loc[of_budget["reached"].idxmin()]
-    count = (
-        f"{worst['reached']} of {budgets.repetitions} simulated campaigns (errors: "
-        f"{worst['errors']}; at least {worst['reached_low']:.0%} with 97.5 % confidence)"
-    )
-    if budgets.budget is None:
-        return f"No budget up to {budget} gives {goal} in {aim.power:.0%} of campaigns: {count}."
-    if budgets.budget_shown is None:
-        repeat = "Show it with more --repetitions."
-        return f"{budget} readings may suffice for {goal}: {count}. {repeat}"
-    text = f"{budget} readings give {goal} in at least {aim.power:.0%} of campaigns: {count}."
-    return text if budgets.budget == budget else f"{text} {budgets.budget} may suffice."

@@ -2,23 +2,52 @@
 
 from __future__ import annotations
 
+import json
 import shlex
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import click
 import numpy as np
 import pandas as pd
 
-from kinacc.cli import choice
+from kinacc.assess.adaptive import AdaptiveAssessor
+from kinacc.assess.noise import ESTIMATED
+from kinacc.assess.registry import RECOMMENDED
+from kinacc.campaign import begin
+from kinacc.campaign import folder as folders
+from kinacc.campaign import plan as plans
+from kinacc.campaign.instrument import BASE, Instrument, floored, instruments, read_repeatability
+from kinacc.campaign.plan import Limits
+from kinacc.campaign.status import reason
+from kinacc.cli import choice, rows, spaces
 from kinacc.cli.choice import option
 from kinacc.cli.output import Output, answers
+from kinacc.deployment.applicability import is_measured_there
+from kinacc.deployment.planning import between, spread, tool_positions
+from kinacc.deployment.record import Calibration
+from kinacc.errors import InputError, Problem, refuse
+from kinacc.kinematics.inverse import limits as ends
+from kinacc.kinematics.model import JointState
+from kinacc.report.rendering import lines
+from kinacc.report.summarise import tolerance_of
+from kinacc.tables import store
 
 _SOURCES = {
     "measured": "drawn between neighbouring measured poses",
     "configured": "drawn evenly from the configured evaluation space",
     "fitted": "drawn evenly from the joints the calibration covers",
     "limits": "drawn evenly from the joint limits",
+}
+# Settings of assessors by the options that set them.
+_SETTINGS = {
+    "wrong_readings": "wrong_rate",
+    "references": "references",
+    "error": "error_of",
+    "arm_mm": "arm_mm",
+    "allowance_mm": "allowance_mm",
+    "confidence": "confidence",
 }
 _MOST_DRAWS = 64  # joint values drawn per candidate before the region is called too wide
 _MOST_CANDIDATES = 20_000
@@ -52,7 +81,7 @@ _MOST_CANDIDATES = 20_000
 @option("--visit", type=click.Choice(["travel", "random"]), default="travel",
         help="Order of the first visit.")  # fmt: skip
 @answers("JSON of the campaign.")
-def start(out: Output, **options) -> None:
+def start(out: Output, **options: Any) -> None:
     """Start a campaign in FOLDER. Nothing of this can be changed once there are readings.
 
     Noise: instrument, target and how the arm repeats a pose. A laser tracker has range_mm,
@@ -62,15 +91,9 @@ def start(out: Output, **options) -> None:
     Example:
       kinacc campaign start check --calibration results/ur10_d --noise-mm 0.05 --budget 200
     """
-    from kinacc.campaign import begin, doubts, folder, instrument, known_noise
-    from kinacc.campaign.plan import Limits
-    from kinacc.campaign.status import reason
-    from kinacc.cli import campaign_options, rows
-    from kinacc.errors import refuse
-
-    refuse(folder.in_the_way(options["folder"]), "The campaign was not begun")
+    refuse(folders.in_the_way(options["folder"]), "The campaign was not begun")
     results, point = Path(options["calibration"]), options["point"]
-    used, tested = campaign_options.instruments(options, [results])
+    used, freedom, doubts = instruments_of(options, [results])
     names = ("model", "robot", "config", "session")
     arm = choice.calibration_of(results, *(options[name] for name in names))
     joints, labels, directions, source = _candidates(options, arm)
@@ -83,50 +106,87 @@ def start(out: Output, **options) -> None:
         options["width_mm"],
         options["target"],
     )
+    assessor = assessor_of(options, options["budget"], len(points), freedom)
     plan = begin.plan_of(
-        arm, points, campaign_options.assessor(options, options["budget"], len(points), tested),
-        used, limits, options["seed"], stand, begin.about(arm, point, source),
-        by_travel=options["visit"] == "travel",
+        arm, points, assessor, used, limits, options["seed"], stand,
+        begin.about(arm, point, source), by_travel=options["visit"] == "travel",
     )  # fmt: skip
-    plan = begin.start(
-        options["folder"], arm, plan, doubts.noise_of(results), known_noise.doubts(tested),
-        options["sure"],
-    )  # fmt: skip
+    known = begin.noise_of(results)
+    plan = begin.start(options["folder"], arm, plan, doubts, known, options["sure"])
     answer = {
         "folder": options["folder"],
         **plan.about,
         "points": len(points),
         "first_visit": len(plan.route),
-        "assessor": plan.assessor.name,
-        "budget": plan.assessor.measurements,
-        "references": getattr(plan.assessor, "references", 0),
-        "noise": {device.name: instrument.noise(device) for device in plan.instruments},
-        "tolerance_mm": plan.limits.tolerance_mm,
+        "assessor": assessor.name,
+        "budget": assessor.measurements,
+        "references": getattr(assessor, "references", 0),
+        "noise": {device.name: device.noise for device in plan.instruments},
+        "tolerance_mm": limits.tolerance_mm,
         "implausible_mm": plan.limits.implausible_mm,
-        "far_from_data": int(np.sum(doubts.far_from_data(arm, points, point))),
-        "shortfall": reason(plan.assessor.shortfall(*points.joints.shape)),
+        "far_from_data": begin.far_from_data(arm, points, point),
+        "shortfall": reason(assessor.shortfall(*points.joints.shape)),
         "overruled": plan.overruled,
     }
-    noise = "; ".join(f"{name}: {text}" for name, text in answer["noise"].items())
-    lines = [
-        "Campaign {folder}: largest error of {point} ({model} model of {calibration}) at {points} "
-        "candidates, {candidates}; {tolerance}.",
-        "{budget} readings by {assessor}: {first_visit} points first, {references} readings at "
-        f"reference poses. Noise: {noise}.",
-        "Note: {shortfall}." if answer["shortfall"] else "",
-        *(f"Overruled: {text}." for text in plan.overruled),
-        f"Next: kinacc campaign next {shlex.quote(options['folder'])}",
-    ]
-    limit = plan.limits.tolerance_mm
-    shown = answer | {"tolerance": "no tolerance" if limit is None else f"tolerance {limit:g} mm"}
-    out.show(answer, pd.DataFrame(), [line.format(**shown) for line in lines if line])
+    command = f"kinacc campaign next {shlex.quote(options['folder'])}"
+    out.show(answer, pd.DataFrame(), lines("campaign_start.txt", **answer, next_command=command))
+
+
+def instruments_of(
+    options: Mapping[str, Any], results: Sequence[Path] = ()
+) -> tuple[tuple[Instrument, ...], int, list[Problem]]:
+    """Return the instruments of the options of ``start`` and ``plan``.
+
+    Also degrees of freedom (0 without ``--repeatability``) and doubts of the test of their noise.
+    Raises InputError without any noise, with the scatter of readings in the folders ``results``.
+    """
+    frame, resolution_mm = options.get("frame", BASE), options["resolution_mm"] or 0.0
+    unnamed = (options["covariance_mm2"], options["noise_mm"])
+    texts = [f"instrument={text}" for text in unnamed if text is not None]
+    texts += options.get("instrument", ())
+    if options["repeatability"] is not None:
+        if texts:
+            raise InputError(Problem("--repeatability", f"is given beside {', '.join(texts)}"))
+        covariance, freedom, doubts = read_repeatability(options["repeatability"])
+        covariance = floored(covariance, resolution_mm)
+        used = Instrument("instrument", covariance, frame, None, resolution_mm)
+        return (used,), freedom, doubts
+    if not texts:
+        scatter = [begin.noise_by_repeats(begin.noise_of(folder)) for folder in results]
+        fix = "\n    ".join(filter(None, [begin.WAYS_TO_NOISE, *scatter]))
+        raise InputError(Problem("noise", "is not given", fix=fix))
+    return instruments(texts, frame, resolution_mm), 0, []
+
+
+def assessor_of(
+    options: Mapping[str, Any], budget: int, points: int, freedom: int
+) -> AdaptiveAssessor:
+    """Return the assessor of the options of ``start`` and ``plan`` for so many candidates.
+
+    ``freedom``: degrees of freedom of the test of the noise, 0 without one. Raises InputError for
+    settings that the assessor does not have.
+    """
+    settings: dict[str, object] = {
+        name: options[option] for option, name in _SETTINGS.items() if options[option] is not None
+    }
+    settings["measurements"] = budget
+    if options["noise"] == "estimate" or freedom:
+        settings["noise"] = ESTIMATED
+    if freedom:
+        settings["noise_freedom"] = freedom
+    for text in options["settings"]:
+        key, equals, value = text.partition("=")
+        if not equals:
+            raise InputError(Problem("--set", repr(text), "NAME=VALUE"))
+        try:
+            settings[key.strip()] = json.loads(value)
+        except (ValueError, RecursionError):
+            settings[key.strip()] = value.strip()
+    return plans.assessor_of(options["assessor"] or RECOMMENDED, settings, points)
 
 
 def _tolerance_mm(tolerance_mm: float | None, results: Path) -> float | None:
     """The tolerance of the option, or that of the calibration's configuration if of a bound."""
-    from kinacc.report.summarise import tolerance_of
-    from kinacc.tables import store
-
     path = results / "summary.parquet"
     if tolerance_mm is not None or not path.is_file():
         return tolerance_mm
@@ -134,13 +194,10 @@ def _tolerance_mm(tolerance_mm: float | None, results: Path) -> float | None:
     return stated.mm if stated is not None and stated.of == "bound" else None
 
 
-def _candidates(options: Mapping, arm):
+def _candidates(
+    options: Mapping[str, Any], arm: Calibration
+) -> tuple[np.ndarray, list[str], np.ndarray | None, str]:
     """Joints (m, k), labels, directions (m, k) or None, and the source of the candidates."""
-    from kinacc.cli import rows
-    from kinacc.deployment.applicability import is_measured_there
-    from kinacc.errors import InputError, Problem
-    from kinacc.kinematics.model import JointState
-
     path = options["candidates"]
     if not path.lstrip("-").isdecimal():
         answered = choice.joint_answers(options)
@@ -168,13 +225,10 @@ def _candidates(options: Mapping, arm):
     raise InputError(Problem("candidates", message, f"{count}", "narrow the region"))
 
 
-def _region(options: Mapping, arm):
+def _region(
+    options: Mapping[str, Any], arm: Calibration
+) -> tuple[str, Callable[[int], np.ndarray]]:
     """The region's name, and a function that draws so many reported joints (at most n, k)."""
-    from kinacc.cli import spaces
-    from kinacc.deployment.planning import between, spread, tool_positions
-    from kinacc.errors import InputError, Problem, refuse
-    from kinacc.kinematics.inverse import limits
-
     robot, target, problems = arm.robot, arm.point(options["point"]), list[Problem]()
     box = spaces.joint_ranges(options["joints_deg"], robot, problems)
     space = spaces.ranges("--inside-mm", options["inside_mm"], 3, problems)
@@ -196,16 +250,16 @@ def _region(options: Mapping, arm):
         raise InputError(Problem("--region limits", message, "measured, fitted"))
     low, high = robot.q_min_rad, robot.q_max_rad
     if region not in ("measured", "limits") and arm.fitted_range_rad is not None:
-        low, high = limits.cut_to_range(robot, low, high, arm.fitted_range_rad)
+        low, high = ends.cut_to_range(robot, low, high, arm.fitted_range_rad)
     if box is not None:
         low, high = np.maximum(low, box[0]), np.minimum(high, box[1])
     if region != "measured":
         return region, lambda count: spread(robot, count, (low, high), inside, target)
 
     def draw(count: int) -> np.ndarray:
-        poses = limits.reported_joints(robot, arm.fitted.q_rad)
-        drawn = between(poses, limits.travel_unit(robot), count, options["seed"])
-        usable = limits.within(drawn, low, high)
+        poses = ends.reported_joints(robot, arm.fitted.q_rad)
+        drawn = between(poses, ends.travel_unit(robot), count, options["seed"])
+        usable = ends.within(drawn, low, high)
         if inside is not None:
             usable &= inside(tool_positions(robot, drawn, target))
         return drawn[usable]
@@ -213,11 +267,10 @@ def _region(options: Mapping, arm):
     return region, draw
 
 
-def _configured(options: Mapping, arm, wanted: bool):
+def _configured(
+    options: Mapping[str, Any], arm: Calibration, wanted: bool
+) -> spaces.Settings | None:
     """The space of the calibration's data set in the configuration; None where there is none."""
-    from kinacc.cli import spaces
-    from kinacc.errors import InputError
-
     try:
         if not wanted and not options["config"] and not Path(choice.CONFIG).is_file():
             return None

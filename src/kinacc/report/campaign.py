@@ -14,6 +14,7 @@ from kinacc.assess.statement import ACCEPT, REJECT
 from kinacc.campaign import folder
 from kinacc.campaign.folder import Opened
 from kinacc.campaign.instrument import INSTRUMENT
+from kinacc.campaign.plan import Plan
 from kinacc.campaign.state import State, deviations
 from kinacc.campaign.status import Bound, CampaignStatus, percent, status
 from kinacc.config.error_models import model_name
@@ -26,9 +27,9 @@ _VERDICTS = {ACCEPT: "MODEL WITHIN", REJECT: "MODEL BEYOND"}
 _LARGEST, _MOST_ROWS = 10, 300
 
 
-def section(opened: Opened, state: State, tables: Mapping[str, Columns]) -> Part:
+def section(opened: Opened, tables: Mapping[str, Columns]) -> Part:
     """Return a campaign as a section of a page, from the tables of ``campaign.report.tables``."""
-    summary, tolerance_mm = status(opened, state), state.plan.limits.tolerance_mm
+    summary, state, tolerance_mm = status(opened), opened.state, opened.plan.limits.tolerance_mm
     points = pd.DataFrame(dict(tables["campaign_points"])).dropna(subset="error_mm")
     readings = pd.DataFrame(dict(tables["campaign_readings"]))
     measured = points.sort_values("error_mm", ascending=False, kind="stable")
@@ -39,7 +40,8 @@ def section(opened: Opened, state: State, tables: Mapping[str, Columns]) -> Part
         figures["readings"] = drawing.readings(tables["campaign_readings"], tolerance_mm)
     values = {
         "status": summary,
-        "candidates": _population(summary, state),
+        "candidates": _population(summary, opened.plan),
+        "answers": lines("campaign_bounds.txt", s=summary),
         "bounds": [_row(bound) for bound in summary.bounds],
         "largest": measured[:_LARGEST],
         "every": measured[:_MOST_ROWS],
@@ -56,18 +58,18 @@ def section(opened: Opened, state: State, tables: Mapping[str, Columns]) -> Part
         ),
         "facts": [
             dict(zip(("topic", "fact"), line.split(": ", 1), strict=True))
-            for line in lines("campaign_facts.txt", **_facts(opened, state))
+            for line in lines("campaign_facts.txt", **_facts(opened))
         ],
     }
     return Part("campaign", values, figures=figures)
 
 
-def markdown(opened: Opened, state: State, tables: Mapping[str, Columns], picture: str) -> str:
+def markdown(opened: Opened, tables: Mapping[str, Columns], picture: str) -> str:
     """The report as Markdown, with the values of the page.
 
     Parameters
     ----------
-    opened, state, tables
+    opened, tables
         As for ``campaign_page``.
     picture
         Path of the picture of the bounds.
@@ -77,30 +79,29 @@ def markdown(opened: Opened, state: State, tables: Mapping[str, Columns], pictur
     str
         Markdown.
     """
-    values = section(opened, state, tables).rows()
+    values = section(opened, tables).rows()
     template = environment(is_page=False).get_template("campaign.md")
     return template.render({**values, "picture": picture})
 
 
-def campaign_page(opened: Opened, state: State, tables: Mapping[str, Columns]) -> Page:
+def campaign_page(opened: Opened, tables: Mapping[str, Columns]) -> Page:
     """The page of a campaign.
 
     Parameters
     ----------
     opened
         The campaign.
-    state, tables
-        Its state and tables, as ``campaign.report.tables`` returns them.
+    tables
+        Its tables, as ``campaign.report.tables`` returns them.
 
     Returns
     -------
     Page
         Bounds and verdict, then readings, points, assumptions and origin.
     """
-    summary = status(opened, state)
+    summary = status(opened)
     main = summary.bound
-    answers = [summary.headline, *(text for text in (main.text, summary.assumes) if text)]
-    answers.append("This is the error of the model at these poses; the robot is not changed.")
+    answers = lines("campaign_answers.txt", s=summary)
     columns = [["largest error at", "about"], ["at most", "upper_mm", ".3f"],
                ["estimate", "value_mm", ".3f"], ["at least", "lower_mm", ".3f"],
                ["confidence of each bound", "sure"]]  # fmt: skip
@@ -110,25 +111,25 @@ def campaign_page(opened: Opened, state: State, tables: Mapping[str, Columns]) -
     rows = [_row(bound) | withheld for bound in summary.bounds]
     first = FirstScreen(
         f"Largest error of the {model_name(summary.model)} model of {summary.robot}",
-        f"calibration {summary.calibration}, {summary.point}; {summary.progress}",
+        lines("campaign_progress.txt", s=summary)[0],
         _badge(summary),
         list(dict.fromkeys(answers)),
         [Table("The largest error, mm", rows, columns)],
         {
             "CHECK": [*folder.doubts(opened), *summary.against[1:], *summary.overruled],
             "NOTES": summary.notes,
-            "VALID": [f"for {_population(summary, state)}, not for other poses"],
+            "VALID": [f"for {_population(summary, opened.plan)}, not for other poses"],
             "NEXT": lines("campaign_next.txt", s=summary),
         },
     )
     marks = {name: str(value) for name, value in folder.marks_of(opened).items()}
-    return Page(first, [section(opened, state, tables)], marks)
+    return Page(first, [section(opened, tables)], marks)
 
 
 def _badge(summary: CampaignStatus) -> tuple[str, bool]:
     main = summary.bound
     if summary.against:
-        return summary.headline.partition(":")[0], True
+        return "BOUND IN DOUBT" if np.isfinite(main.upper_mm) else "NO BOUND", True
     if main.verdict in _VERDICTS:
         return f"{_VERDICTS[main.verdict]} {main.tolerance_mm:g} mm", main.verdict != ACCEPT
     if np.isnan(main.upper_mm):
@@ -139,7 +140,7 @@ def _badge(summary: CampaignStatus) -> tuple[str, bool]:
 def _row(bound: Bound) -> dict:
     """A bound as a row of a table."""
     sure = percent(bound.confidence) if np.isfinite(bound.confidence) else ""
-    return {**asdict(bound), "about": bound.about, "sure": sure, "text": bound.text}
+    return {**asdict(bound), "about": bound.about, "sure": sure}
 
 
 def _instruments(summary: CampaignStatus, state: State, readings: pd.DataFrame) -> pd.DataFrame:
@@ -162,9 +163,10 @@ def _instruments(summary: CampaignStatus, state: State, readings: pd.DataFrame) 
     return rows.assign(name=rows.index, noise=list(summary.noise.values()))
 
 
-def _facts(opened: Opened, state: State) -> dict[str, object]:
+def _facts(opened: Opened) -> dict[str, object]:
     """What was fixed and taken, as the template of facts takes it."""
-    sizes = np.array([np.linalg.norm(item.error_mm) for item in state.told])
+    state = opened.state
+    sizes = np.array([np.linalg.norm(item.error_mm) for item in state.used])
     return {
         "opened": opened,
         "state": state,
@@ -180,5 +182,5 @@ def _facts(opened: Opened, state: State) -> dict[str, object]:
     }
 
 
-def _population(summary: CampaignStatus, state: State) -> str:
-    return f"these {summary.candidates} candidates ({state.plan.about['candidates']})"
+def _population(summary: CampaignStatus, plan: Plan) -> str:
+    return f"these {summary.candidates} candidates ({plan.about['candidates']})"

@@ -50,7 +50,7 @@ def run(inputs: Mapping, settings: Mapping) -> Page:
     sections.append(fit_sections.selection(tables, terminal.selection(summary)))
     if summary.campaign is not None:
         opened = campaigns.open_(summary.campaign.folder)
-        sections.append(campaign.section(opened, *report.tables(opened)))
+        sections.append(campaign.section(opened, report.tables(opened)))
     sections += [make(tables, arm) for needed, make in _OF_THE_STUDY if needed in tables]
     return Page(first_screen(summary, settings.get("outdated", ())), sections)
 
