@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -66,16 +67,17 @@ class Recorded:
 
 
 @dataclass(frozen=True)
-class RowsOfFile:
-    """Rows of a file, readings or what is wrong with them, each with its place in words.
+class FileOfReadings:
+    """Rows of a file with their ``places`` in words, and ``problems`` of its other rows.
 
-    ``digest`` of the file and its ``path`` from the folder of the campaign; empty without a file.
+    ``digest`` of the file and its ``path`` from the folder of the campaign.
     """
 
-    rows: Sequence[Reading | Problem]
+    rows: Sequence[Reading]
     places: Sequence[str]
-    digest: str = ""
-    path: str = ""
+    problems: Sequence[Problem]
+    digest: str
+    path: str
 
 
 class CalibratedRobot(Protocol):
@@ -252,26 +254,29 @@ class Campaign:
             For a reading that is refused; nothing is written.
         """
         with folders.writing(self.folder) as opened:
-            plan, number = opened.plan, opened.state.requested
-            if point is not None:
-                number = plan.points.number(point)
+            plan, state = opened.plan, opened.state
+            number = state.requested if point is None else plan.points.number(point)
             if number is None:
-                message = (
-                    "no further reading is needed" if point is None else f"{point!r} is unknown"
-                )
+                message = "no further reading is needed"
+                message = message if point is None else f"{point!r} is unknown"
                 raise InputError(Problem("point", message, fix="name a candidate"), _NOTHING)
             name = plan.instrument(instrument).name
             values = np.asarray(position_mm, dtype=float).reshape(-1)
             reported = None if joints is None else np.asarray(joints, dtype=float).reshape(-1)
-            reading = Reading(number, values, name, reported, std_mm)
-            rows = RowsOfFile([reading], ["the reading"])
-            recorded = _record(opened, rows, accept_implausible, again, skip_bad=False)
+            reading, where = Reading(number, values, name, reported, std_mm), "the reading"
+            most_mm = math.inf if accept_implausible else most_plausible_mm(state)
+            problems = problems_of(state, reading, where, most_mm)
+            equal = [item for item in state.readings if item.reading.digits == reading.digits]
+            if equal and not again:
+                problems.append(_equal(where, f"reading {equal[0].number}"))
+            refuse(problems, _NOTHING)
+            recorded = _written(opened, Readings(readings=[reading]))
         self.opened = folders.open_(self.folder)
         return recorded
 
     def add_readings(
         self,
-        rows: RowsOfFile,
+        file: FileOfReadings,
         accept_implausible: bool = False,
         again: bool = False,
         skip_bad: bool = False,
@@ -283,7 +288,10 @@ class Campaign:
         same file have no row any more.
         """
         with folders.writing(self.folder) as opened:
-            recorded = _record(opened, rows, accept_implausible, again, skip_bad)
+            most_mm = math.inf
+            if not accept_implausible:
+                most_mm = most_plausible_mm(opened.state, file.rows)
+            recorded = _record(opened, file, most_mm, again, skip_bad)
         self.opened = folders.open_(self.folder)
         return recorded
 
@@ -336,64 +344,59 @@ _NOTHING = "Nothing was recorded"
 
 
 def _record(
-    opened: folders.Opened, file: RowsOfFile, accept_implausible: bool, again: bool, skip_bad: bool
+    opened: folders.Opened, file: FileOfReadings, most_mm: float, again: bool, skip_bad: bool
 ) -> Recorded:
-    plan, state, is_file, path = opened.plan, opened.state, bool(file.digest), file.path
-    imported = state.imports.get(path, set()) if is_file else set()
+    state, good, known, problems = opened.state, list[Reading](), list[int](), [*file.problems]
+    imported = state.imports.get(file.path, set())
     # A row that equals a reading is known, each reading once; ``again``: of the same file alone.
-    waiting, earlier = defaultdict[object, list[int]](list), dict[object, str]()
+    recorded, places = defaultdict[object, list[int]](list), dict[object, str]()
     for item in (*state.readings, *(item for item, _ in state.struck)):
-        if is_file and (item.number in imported or not again):
-            waiting[item.reading.digits].append(item.number)
-    if not is_file:
-        earlier = {item.reading.digits: f"reading {item.number}" for item in state.readings}
-    readings = [row for row in file.rows if isinstance(row, Reading)]
-    with np.errstate(over="ignore", invalid="ignore"):
-        sizes = [_size_mm(plan, row) for row in readings] if is_file else []
-    most_mm = most_plausible_mm(
-        plan, [*(float(np.linalg.norm(item.error_mm)) for item in state.readings), *sizes]
-    )
-    good, known, problems = list[Reading](), list[int](), list[Problem]()
+        if item.number in imported or not again:
+            recorded[item.reading.digits].append(item.number)
     for row, place in zip(file.rows, file.places, strict=True):
-        if isinstance(row, Problem):
-            problems.append(row)
-            continue
-        if waiting[row.digits]:
-            known.append(waiting[row.digits].pop(0))
-        else:
-            wrong = problems_of(plan, row, place, most_mm, accept_implausible)
-            if row.point in state.left_out:
-                label = plan.points.label[row.point]
-                wrong.append(Problem(place, f"point {label} was left out of the campaign"))
-            if row.digits in earlier and not again:
-                message = f"equals {earlier[row.digits]} to the last digit"
-                fix = "--again takes it as a reading of its own"
-                wrong.append(Problem(place, message, fix=fix))
-            good += [] if wrong else [row]
+        if numbers := recorded[row.digits]:
+            known.append(numbers.pop(0))
+        elif wrong := problems_of(state, row, place, most_mm):
             problems += wrong
-        earlier.setdefault(row.digits, place)
+        elif row.digits in places and not again:
+            problems.append(_equal(place, places[row.digits]))
+        else:
+            good.append(row)
+        places.setdefault(row.digits, place)
     missing = imported.intersection(item.number for item in state.readings).difference(known)
     if missing and not again:
         message = f"does not hold {_listed(missing)} any more, recorded from it before"
         fix = "bring the rows back, strike the readings, or give --again"
-        problems.append(Problem(path, message, fix=fix))
+        problems.append(Problem(file.path, message, fix=fix))
         skip_bad = False
     if not good and not problems:
-        raise InputError(Problem(path, f"has no new row: {_listed(known)} recorded before"))
+        raise InputError(Problem(file.path, f"has no new row: {_listed(known)} recorded before"))
     if problems and not (skip_bad and good):
         raise InputError(problems, _NOTHING)
-    opened.write(Readings(readings=good, file=file.digest or None, path=path or None))
+    entry = Readings(readings=good, file=file.digest, path=file.path)
+    return _written(opened, entry, tuple(map(str, problems)), tuple(sorted(known)))
+
+
+def _written(
+    opened: folders.Opened,
+    entry: Readings,
+    skipped: tuple[str, ...] = (),
+    known: tuple[int, ...] = (),
+) -> Recorded:
+    opened.write(entry)
+    plan, first = opened.plan, opened.state.numbered + 1
     return Recorded(
-        tuple(range(state.numbered + 1, state.numbered + 1 + len(good))),
-        tuple(plan.points.label[row.point] for row in good),
-        tuple(_size_mm(plan, row) for row in good),
-        tuple(map(str, problems)),
-        tuple(sorted(known)),
+        tuple(range(first, first + len(entry.readings))),
+        tuple(plan.points.label[row.point] for row in entry.readings),
+        tuple(float(np.linalg.norm(error_mm(plan, row))) for row in entry.readings),
+        skipped,
+        known,
     )
 
 
-def _size_mm(plan: Plan, reading: Reading) -> float:
-    return float(np.linalg.norm(error_mm(plan, reading)))
+def _equal(where: str, other: str) -> Problem:
+    fix = "--again takes it as a reading of its own"
+    return Problem(where, f"equals {other} to the last digit", fix=fix)
 
 
 def _listed(numbers: Iterable[int]) -> str:

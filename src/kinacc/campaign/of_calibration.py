@@ -87,7 +87,7 @@ def history(inputs: Mapping[str, Any], settings: Mapping[str, Any]) -> Columns:
             replace(
                 session,
                 digest=store.digest_of("measurements", tables["measurements"]),
-                bound_mm=_finished_mm(tables, session.calibration.choice, campaigns),
+                bound_mm=finished(tables, session.calibration.choice, campaigns),
                 tolerance_mm=np.nan if allowed_mm is None else allowed_mm,
             )
         )
@@ -95,8 +95,12 @@ def history(inputs: Mapping[str, Any], settings: Mapping[str, Any]) -> Columns:
     return compared(sessions, weight, settings["seed"])
 
 
-def _finished_mm(tables: Mapping[str, Columns], model: str, places: Iterable[Path]) -> float:
-    """Upper bound of the campaign on a model that was finished last; NaN where there is none."""
+def finished(tables: Mapping[str, Columns], model: str, places: Iterable[Path]) -> float:
+    """Return the upper bound (mm) of the campaign on a calibration that was finished last.
+
+    ``model``: the one that the campaign is about; ``places``: folders of campaigns. NaN where there
+    is no campaign, by the times of the journals.
+    """
     ended = []
     for place in places:
         with suppress(InputError):

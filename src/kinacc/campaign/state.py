@@ -146,51 +146,6 @@ def faults_of(plan: Plan, reading: Reading, where: str) -> list[Problem]:
     return problems
 
 
-def problems_of(
-    plan: Plan, reading: Reading, where: str, most_mm: float, accept_implausible: bool = False
-) -> list[Problem]:
-    """Return everything that is wrong with a reading; errors above ``most_mm`` are implausible."""
-    if problems := faults_of(plan, reading, where):
-        return problems
-    label = plan.points.label[reading.point]
-    if reading.joints is not None:
-        tolerance = _tolerance(plan)
-        off = np.abs(reading.joints - plan.points.joints[reading.point]) / tolerance
-        if off.max() > 1.0:
-            worst = int(np.argmax(off))
-            unit, factor = ("mm", 1.0) if plan.slides[worst] else ("deg", 180.0 / math.pi)
-            known = point_at(plan, reading.joints)
-            wanted = plan.points.joints[reading.point, worst] * factor
-            return [
-                Problem(
-                    where,
-                    f"joint {worst + 1} at {reading.joints[worst] * factor:.4f} {unit} is not that "
-                    f"of point {label}",
-                    f"{wanted:.4f} {unit} within {tolerance[worst] * factor:g} {unit}",
-                    "" if known is None else f"these joints are point {plan.points.label[known]}",
-                )
-            ]
-    size = float(np.linalg.norm(error_mm(plan, reading)))
-    if size <= most_mm or accept_implausible:
-        return []
-    fix = (
-        "check pose, target, unit and frame, and read again; --accept-implausible takes a reading "
-        "that stands (dropping it for its size makes the bound wrong)"
-    )
-    message = f"{size:.3f} mm from the model at point {label}"
-    return [Problem(where, message, f"at most {most_mm:.3g} mm", fix)]
-
-
-def most_plausible_mm(plan: Plan, sizes_mm: Sequence[float]) -> float:
-    """Return the largest error that is plausible after readings of ``sizes_mm``."""
-    usable = [size for size in sizes_mm if np.isfinite(size)]
-    if len(usable) < _USUAL_READINGS:
-        return plan.limits.implausible_mm
-    sigma = math.sqrt(np.trace(plan.covariance_mm2, axis1=1, axis2=2).max())
-    unusual = max(_UNUSUAL * float(np.median(usable)), _FEWEST_SIGMAS * sigma)
-    return min(plan.limits.implausible_mm, unusual)
-
-
 def _tolerance(plan: Plan) -> np.ndarray:
     # A sliding joint may be off by as many mm as a turning one moves a point one metre away.
     return plan.limits.joint_rad * np.where(plan.slides, 1e3, 1.0)
@@ -249,6 +204,50 @@ class State:
             else:
                 wanted.append(point)
         return wanted
+
+
+def problems_of(state: State, reading: Reading, where: str, most_mm: float) -> list[Problem]:
+    """Return everything that is wrong with a reading; errors above ``most_mm`` are implausible."""
+    plan = state.plan
+    if problems := faults_of(plan, reading, where):
+        return problems
+    label, points, tolerance = plan.points.label[reading.point], plan.points, _tolerance(plan)
+    if reading.point in state.left_out:
+        problems.append(Problem(where, f"point {label} was left out of the campaign"))
+    if reading.joints is not None:
+        off = np.abs(reading.joints - points.joints[reading.point]) / tolerance
+        if off.max() > 1.0:
+            worst, known = int(np.argmax(off)), point_at(plan, reading.joints)
+            unit, factor = ("mm", 1.0) if plan.slides[worst] else ("deg", 180.0 / math.pi)
+            found = f"joint {worst + 1} at {reading.joints[worst] * factor:.4f} {unit}"
+            wanted = f"{points.joints[reading.point, worst] * factor:.4f} {unit}"
+            allowed = f"{wanted} within {tolerance[worst] * factor:g} {unit}"
+            fix = "" if known is None else f"these joints are point {points.label[known]}"
+            message = f"{found} is not that of point {label}"
+            return [*problems, Problem(where, message, allowed, fix)]
+    size = float(np.linalg.norm(error_mm(plan, reading)))
+    if size > most_mm:
+        fix = (
+            "check pose, target, unit and frame, and read again; --accept-implausible takes a "
+            "reading that stands (dropping it for its size makes the bound wrong)"
+        )
+        message = f"{size:.3f} mm from the model at point {label}"
+        problems.append(Problem(where, message, f"at most {most_mm:.3g} mm", fix))
+    return problems
+
+
+def most_plausible_mm(state: State, rows: Sequence[Reading] = ()) -> float:
+    """Return the largest error that is plausible after the readings taken, and further ``rows``."""
+    plan = state.plan
+    with np.errstate(over="ignore", invalid="ignore"):
+        errors = [item.error_mm for item in state.readings] + [error_mm(plan, row) for row in rows]
+        sizes = np.linalg.norm(np.reshape(errors, (-1, 3)), axis=1)
+    sizes = sizes[np.isfinite(sizes)]
+    if len(sizes) < _USUAL_READINGS:
+        return plan.limits.implausible_mm
+    sigma = math.sqrt(np.trace(plan.covariance_mm2, axis1=1, axis2=2).max())
+    unusual = max(_UNUSUAL * float(np.median(sizes)), _FEWEST_SIGMAS * sigma)
+    return min(plan.limits.implausible_mm, unusual)
 
 
 def sayable(plan: Plan, campaign: Campaign) -> tuple[Statement, ...]:

@@ -14,7 +14,7 @@ import pandas as pd
 
 from kinacc.campaign import folder as folders
 from kinacc.campaign import report as reports
-from kinacc.campaign.campaign import Campaign, RowsOfFile
+from kinacc.campaign.campaign import Campaign, FileOfReadings
 from kinacc.campaign.state import Reading, point_at
 from kinacc.campaign.status import CampaignStatus
 from kinacc.cli import campaign_plan, campaign_start
@@ -310,8 +310,8 @@ def _flag(name: str) -> str:
     return f"--{name.replace('_', '-')}"
 
 
-def _of_file(path: str, options: Mapping[str, Any], campaign: Campaign) -> RowsOfFile:
-    """The rows of a file as readings, or what is wrong with them."""
+def _of_file(path: str, options: Mapping[str, Any], campaign: Campaign) -> FileOfReadings:
+    """The rows of a file as readings, and what is wrong with the others."""
     plan = campaign.plan
     # A cell that is no number spoils its row, not the file: it is named row by row.
     read = read_rows(path, plan.slides, POINTS, spoilt=[])
@@ -331,36 +331,33 @@ def _of_file(path: str, options: Mapping[str, Any], campaign: Campaign) -> RowsO
     ]
     if not pose and joints is None and not problems:
         problems.append(Problem(path, "has no column pose and no joints", "pose, q1_deg"))
-    if options["instrument"] not in (None, *known):
-        problems.append(Problem("--instrument", repr(options["instrument"]), ", ".join(known)))
+    usual = plan.instrument(options["instrument"]).name
     refuse(problems, "Nothing was recorded")
-    usual = options["instrument"] or known[0]
-    count = len(table.line)
-    names = [name.strip() for name in map(str, table.columns[pose.column])] if pose else []
-    devices = [usual] * count
+    names = table.texts(pose.column) if pose else [""] * len(table)
+    devices = [usual] * len(table)
     if "instrument" in table.columns:
-        gap, column = table.gaps("instrument"), table.columns["instrument"]
-        devices = [usual if gap[i] else str(column[i]).strip() for i in range(count)]
-    places = [f"{path}, {table.row_names.one(line)}" for line in table.line]
-    rows: list[Reading | Problem] = []
-    for i, (place, device) in enumerate(zip(places, devices, strict=True)):
+        cells = zip(table.gaps("instrument"), table.texts("instrument"), strict=True)
+        devices = [usual if is_empty else text for is_empty, text in cells]
+    rows, places = [], []
+    for i, line in enumerate(table.line):
+        place = f"{path}, {table.row_names.one(line)}"
         at_rad = joints[i] if joints is not None and np.isfinite(joints[i]).all() else None
-        if pose:
-            point, subject = plan.points.number(names[i]), f"{names[i]!r} is"
-        else:
-            point = None if at_rad is None else point_at(plan, at_rad)
-            subject = "its joints are"
+        point, subject = plan.points.number(names[i]), f"{names[i]!r} is"
+        if not pose:
+            point, subject = None if at_rad is None else point_at(plan, at_rad), "its joints are"
         if point is None:
-            rows.append(Problem(place, f"{subject} no candidate"))
-        elif device not in known:
-            rows.append(Problem(place, f"instrument {device!r} is unknown", ", ".join(known)))
+            problems.append(Problem(place, f"{subject} no candidate"))
+        elif devices[i] not in known:
+            text = f"instrument {devices[i]!r} is unknown"
+            problems.append(Problem(place, text, ", ".join(known)))
         else:
             std = read.std_mm
-            noise = None if std is None else ",".join(map(repr, map(float, std[i])))
-            rows.append(Reading(point, read.position_mm[i], device, at_rad, noise))
+            noise = None if std is None else ",".join(map(repr, std[i].tolist()))
+            rows.append(Reading(point, read.position_mm[i], devices[i], at_rad, noise))
+            places.append(place)
     digest = hashlib.sha256(Path(path).read_bytes()).hexdigest()[:16]
     relative = os.path.relpath(Path(path).resolve(), campaign.folder.resolve())
-    return RowsOfFile(rows, places, digest, Path(relative).as_posix())
+    return FileOfReadings(rows, places, problems, digest, Path(relative).as_posix())
 
 
 campaign.add_command(campaign_plan.plan)
