@@ -23,7 +23,6 @@ Frame = Literal["base", "instrument"]
 BASE: Frame = "base"
 INSTRUMENT: Frame = "instrument"
 LASER = "laser:"
-REPEATABILITY = "kinacc repeatability 1"  # format of the file of a test
 _FORMS = "1 standard deviation, 3 (x, y, z), or 9 numbers of a covariance in mm^2, row by row"
 _LASER_FORM = (
     f"{LASER}range_mm=..,range_um_per_m=..,angle_mm=..,angle_um_per_m=..,repeat_mm=.., standard "
