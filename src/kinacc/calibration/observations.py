@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Self
 
 import numpy as np
@@ -46,14 +46,14 @@ class Observations:
     repeat: np.ndarray
     fold: np.ndarray
     target_names: tuple[str, ...] = (TOOL,)
-    session: np.ndarray | None = None
+    session: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))
     session_names: tuple[str | None, ...] = (None,)
-    payload: np.ndarray | None = None
+    payload: np.ndarray = field(default_factory=lambda: np.zeros((0, 4)))
 
     def __post_init__(self) -> None:
-        if self.session is None:
+        if len(self.session) != len(self.q_rad):
             object.__setattr__(self, "session", np.zeros(len(self.q_rad), dtype=np.int64))
-        if self.payload is None:
+        if len(self.payload) != len(self.q_rad):
             object.__setattr__(self, "payload", np.full((len(self.q_rad), 4), np.nan))
 
     def __len__(self) -> int:
@@ -94,9 +94,9 @@ class Observations:
     def select(self, rows: np.ndarray | slice) -> Self:
         """The observations of ``rows`` (mask, indices or slice)."""
         columns = {
-            field.name: getattr(self, field.name)[rows]
-            for field in fields(self)
-            if not field.name.endswith("_names")
+            item.name: getattr(self, item.name)[rows]
+            for item in fields(self)
+            if not item.name.endswith("_names")
         }
         return replace(self, **columns)
 
@@ -187,5 +187,9 @@ def from_columns(columns: Mapping[str, np.ndarray], robot: Robot) -> Observation
         target_names=target_names,
         session=np.array([session_names.index(name) for name in sessions], dtype=np.int64),
         session_names=session_names,
-        payload=stack(*PAYLOAD_COLUMNS) if PAYLOAD_COLUMNS[0] in columns else None,
+        payload=(
+            stack(*PAYLOAD_COLUMNS)
+            if PAYLOAD_COLUMNS[0] in columns
+            else np.full((count, len(PAYLOAD_COLUMNS)), np.nan)
+        ),
     )

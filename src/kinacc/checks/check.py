@@ -10,21 +10,19 @@ from typing import Any
 import numpy as np
 
 from kinacc.calibration.noise import of_readings
+from kinacc.calibration.one_thread import one_thread
 from kinacc.checks import (
     coverage,
     digits,
     meanings,
     moved,
-    orientations,
     readings,
     robust_fit,
     rows,
     tails,
 )
-from kinacc.checks.findings import Finding, finding
-from kinacc.checks.meanings import Meaning
+from kinacc.checks.findings import Finding, Progress, Report, finding
 from kinacc.checks.readings import Readings
-from kinacc.checks.report import Progress, Report
 from kinacc.checks.robust_fit import Fitted
 from kinacc.errors import InputError, Problem
 from kinacc.kinematics import robot as robots
@@ -111,6 +109,7 @@ def examined(settings: Mapping[str, Any], dataset: str, progress: Progress) -> R
     return replace(report, suspicions=(*report.suspicions, *few), accepted=accepted)
 
 
+@one_thread
 def check(
     reading: MeasuredFile, layout: Layout, robot: Robot, dataset: str, path: str, progress: Progress
 ) -> Report:
@@ -123,18 +122,20 @@ def check(
     by_distances, renamed = moved.by_distances(every, distances)
     single, cell, away_mm = readings.merged(every)
     scatter = of_readings(every, robot.dh)
-    fitted, meaning, findings = _meant(single, layout, robot, progress)
+    fitted, findings = _meant(single, layout, robot, progress)
     kinds = {item.kind for item in findings}
     findings += by_distances
     if not any(kind.startswith("joint_") for kind in kinds):
         findings += _outside(every, robot)
     gross: list[int] = []
-    if "does_not_fit" not in kinds:
-        target = renamed.target[np.unique(cell, return_index=True)[1]]
-        observed = replace(fitted.readings, target=target, target_names=renamed.target_names)
-        fitted, jumps = moved.without_jumps(observed, robot.dh, progress)
-        findings += [*jumps, *_scattered(fitted), *digits.commanded(fitted, meaning)]
-        findings += [*rows.explained(fitted, meaning, layout), *_largest(fitted)]
+    if fits := "does_not_fit" not in kinds:
+        if renamed is not every:
+            target = renamed.target[np.unique(cell, return_index=True)[1]]
+            named = replace(fitted.readings, target=target, target_names=renamed.target_names)
+            fitted = robust_fit.fit(named, robot.dh)
+        fitted, jumps = moved.without_jumps(fitted, progress)
+        findings += [*jumps, *_scattered(fitted), *digits.commanded(fitted, robot)]
+        findings += [*rows.explained(fitted, robot, layout), *rows.largest(fitted)]
         gross = fitted.readings.lines(fitted.left_mm > _GROSS * fitted.trial.sigma_mm)
     off = np.flatnonzero(away_mm > tails.limit(away_mm, 3))
     if off.size:
@@ -143,8 +144,7 @@ def check(
             finding("outliers/repeats", every.line[off], count=off.size, largest_mm=largest)
         )
     findings += digits.copies(every, scatter.per_axis_mm)
-    fit = None if "does_not_fit" in kinds else fitted
-    facts = coverage.facts_of(every, robot, scatter, distances, fit)
+    facts = coverage.facts_of(every, robot, scatter, distances, fitted if fits else None)
     unread = dict.fromkeys((*reading.notes, *reading.left_out()))
     return Report(
         dataset,
@@ -159,55 +159,43 @@ def check(
             *(finding(LEFT_OUT, words=text) for text in unread),
             *coverage.thin(facts["joint_coverage"]),
         ),
-        *(() if fit is None else (fit.readings.line, fit.left_mm)),
+        *((fitted.readings.line, fitted.left_mm) if fits else ()),
     )
 
 
 def _meant(
     single: Readings, layout: Layout, robot: Robot, progress: Progress
-) -> tuple[Fitted, Meaning, list[Finding]]:
-    """The fit of the file as it is meant, its meaning, and findings of all rows."""
-    fitted = robust_fit.fit(meanings.as_written(robot.joint_map).applied(single), robot.dh)
-    meaning, changes = meanings.find(single, robot, fitted.trial, progress)
-    if changes:
-        fitted = robust_fit.fit(meaning.applied(single), robot.dh)
-    spread_mm = meanings.spread_mm(single.position_mm) * meaning.scale
+) -> tuple[Fitted, list[Finding]]:
+    """The fit of the file as it is meant, and findings of all rows."""
+    fitted = robust_fit.fit(single, robot.dh)
+    read, findings = meanings.find(single, robot, fitted.trial, progress)
+    if findings:
+        fitted = robust_fit.fit(read, robot.dh)
+    spread_mm = meanings.spread_mm(read.position_mm)
     if fitted.trial.sigma_mm > meanings.FAR * spread_mm:
-        return fitted, meaning, [*changes, _no_fit(single, fitted, robot, spread_mm)]
-    findings = [*changes, *_of_other_lengths(single, fitted, robot)]
-    observed, there = fitted.readings, fitted.readings.has_rotation
-    if not there.any():
-        return fitted, meaning, findings
-    flange = fitted.residuals.flange[there]
-    way, least, before = orientations.find(
-        single.turns[there], layout.orientation, flange, observed.target[there]
+        return fitted, [*findings, _no_fit(single, fitted, robot, spread_mm)]
+    findings += _of_other_lengths(single, fitted, robot)
+    if not read.has_rotation.any():
+        return fitted, findings
+    way, least, before = meanings.find_orientations(
+        read, layout.orientation, fitted.residuals.flange
     )
-    if before > meanings.BAD_RAD and (
-        turned := meanings.find_by_turns(single, robot, meaning, least)
-    ):
-        meaning, change = turned
-        return robust_fit.fit(meaning.applied(single), robot.dh), meaning, [*findings, change]
-    if way.change is not None:
-        findings.append(orientations.change_finding(way.change, single, there, before, least))
-    if way.change is not None or meaning.mirrored:
-        rotation = observed.rotation.copy()
-        rotation[there] = way.read(single.turns[there])
-        fitted = robust_fit.fit(replace(observed, rotation=rotation), robot.dh)
-    return fitted, meaning, findings
+    if before > meanings.BAD_RAD and (turned := meanings.find_by_turns(read, robot, least)):
+        return robust_fit.fit(turned[0], robot.dh), [*findings, turned[1]]
+    if way:
+        findings += meanings.of_turns(way, read, before, least)
+        fitted = robust_fit.fit(meanings.changed(read, way), robot.dh)
+    return fitted, findings
 
 
 def _scattered(fitted: Fitted) -> Iterator[Finding]:
     """Orientations that do not go with the joints, though every jump has frames of its own."""
     there = fitted.readings.has_rotation
     if there.any():
-        scatter = orientations.scatter(
-            fitted.residuals.flange[there],
-            fitted.readings.rotation[there],
-            fitted.readings.target[there],
-        )
-        if scatter > meanings.BAD_RAD:
+        part, flange = fitted.readings.select(there), fitted.residuals.flange[there]
+        if (scatter := meanings.scatter(flange, part)) > meanings.BAD_RAD:
             degrees = float(np.rad2deg(scatter))
-            yield finding("orientations", fitted.readings.lines(there), as_written_deg=degrees)
+            yield finding("orientations", part.lines(), as_written_deg=degrees)
 
 
 def _no_fit(single: Readings, fitted: Fitted, robot: Robot, spread_mm: float) -> Finding:
@@ -241,23 +229,6 @@ def _of_other_lengths(single: Readings, fitted: Fitted, robot: Robot) -> Iterato
             robot=robot.name,
             lengths=", ".join(lengths),
             largest_mm=float(apart.max()),
-        )
-
-
-def _largest(fitted: Fitted) -> Iterator[Finding]:
-    """Readings that are no outliers, and stand apart from the others all the same."""
-    good = np.flatnonzero(~fitted.bad)
-    number = np.unique(fitted.readings.pose[good], return_inverse=True)[1]
-    worst = np.zeros(number.max(initial=-1) + 1)
-    np.maximum.at(worst, number, fitted.left_mm[good])
-    if count := tails.detached(worst):
-        ordered = np.sort(worst)[::-1]
-        yield finding(
-            "largest_rows",
-            fitted.readings.lines(good[worst[number] >= ordered[count - 1]]),
-            count=count,
-            errors=", ".join(f"{value:.3g}" for value in ordered[:count]),
-            next=f"{ordered[count]:.3g}",
         )
 
 

@@ -6,12 +6,13 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from kinacc.calibration.noise import Noise
 from kinacc.calibration.observations import from_columns
 from kinacc.calibration.vec_estimator import VECEstimator
 from kinacc.checks.findings import Finding, finding
-from kinacc.checks.readings import Distance, Readings, thinned
+from kinacc.checks.readings import Distance, Readings
 from kinacc.checks.robust_fit import Fitted
 from kinacc.kinematics.robot import Robot
 from kinacc.measurements import folds
@@ -21,7 +22,6 @@ _WEAK = 0.1  # of a joint's range
 # Of the largest residual expected: larger jumps of the base were found in four files, two of them
 # measured; in one of these a jump of a third less stayed unfound.
 _SMALLEST_MOVE = 1.5
-_ENOUGH_ROWS = 10_000  # that show whether there are poses enough, in nearly every long file
 _PER_POSE = 6  # independent numbers of a rigid body, however many targets it carries
 
 
@@ -70,7 +70,7 @@ def facts_of(
     return facts
 
 
-def _counts(names: tuple[str, ...], number: np.ndarray) -> dict[str, str]:
+def _counts(names: tuple[str | None, ...], number: np.ndarray) -> dict[str | None, str]:
     return {name: f"{np.sum(number == i)} readings" for i, name in enumerate(names)}
 
 
@@ -125,21 +125,17 @@ def few_poses(columns: Columns, robot: Robot, calibration: Mapping[str, Any]) ->
     observed = from_columns(columns, robot)
     fit = VECEstimator.of(calibration, robot, observed)
     frames = int(fit.common.terms(observed).free.sum()) if fit.common.frames_estimated else 0
-    every = np.arange(len(observed))
-    for rows in (thinned(every, _ENOUGH_ROWS), every):
-        same = folds.configurations_of({name: columns[name][rows] for name in columns})
-        # A target adds three components to a pose, an orientation three; repeats add none.
-        label = np.stack([same, observed.target[rows]])
-        pairs, first = np.unique(label, axis=1, return_index=True)
-        turned = np.zeros(same.max() + 1)
-        np.maximum.at(turned, pairs[0], 3.0 * observed.has_rotation[rows][first])
-        components = np.minimum(3.0 * np.bincount(pairs[0]) + turned, _PER_POSE)
-        if components.sum() >= fit.required + frames:
-            return []
+    # A target adds three components to a pose, an orientation three; repeats add none.
+    seen = pd.DataFrame({"target": observed.target, "turned": observed.has_rotation})
+    poses = seen.groupby(folds.configurations_of(columns))
+    numbers = 3 * poses["target"].nunique() + 3 * poses["turned"].any()
+    count = int(numbers.clip(upper=_PER_POSE).sum())
+    if count >= fit.required + frames:
+        return []
     few = finding(
         "few_poses",
-        poses=len(components),
-        numbers=int(components.sum()),
+        poses=len(numbers),
+        numbers=count,
         coefficients=fit.size,
         order=fit.order,
         frames=f" and {frames} of base and targets" if frames else "",

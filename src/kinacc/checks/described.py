@@ -7,10 +7,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from kinacc.checks import check
-from kinacc.checks.findings import Finding
-from kinacc.checks.report import Progress, Report
-from kinacc.checks.which_robot import fitting
+import numpy as np
+
+from kinacc.calibration.one_thread import one_thread
+from kinacc.checks import check, meanings, readings, robust_fit
+from kinacc.checks.findings import Finding, Progress, Report
+from kinacc.checks.meanings import Meaning
 from kinacc.errors import InputError, Problem
 from kinacc.kinematics import robot as robots
 from kinacc.kinematics.robot import Robot
@@ -19,6 +21,12 @@ from kinacc.measurements.intake.guess import Guess
 from kinacc.measurements.intake.write import dataset_content, plain_name
 from kinacc.measurements.layout import Layout
 from kinacc.measurements.reader import MeasuredFile, read
+
+_ROWS = 240
+_TRIED = 4  # robots that base and target alone put first
+_SURE = 0.005  # of the points' spread: what an arm that is the one leaves, uncalibrated
+_NEXT = 0.2  # of what the next best leaves
+_SAME_ARM = 1e-6  # of the misfit: two names of one geometry
 
 
 def describe_files(
@@ -99,55 +107,81 @@ def corrected(
         reading = read(guess.section, robot, strict=False)
         layout = Layout.of(guess.section)
         report = check.check(reading, layout, robot, name, guess.section["path"], progress)
-        settings = _contradicted(guess, report)
         guess = replace(guess, notes=tuple(dict.fromkeys((*guess.notes, *reading.notes))))
-        if not settings:
+        before, guess = guess, _set_right(guess, report)
+        if guess is before:
             break
-        guess = _set_right(guess, settings)
     return guess, report, reading
-
-
-def _contradicted(guess: Guess, report: Report) -> dict[str, Any]:
-    """Settings that were assumed and that the readings contradict, as they should be."""
-    settings: dict[str, Any] = {}
-    for item in report.suspicions:
-        if item.kind == "left_handed" and "horizontal" in guess.assumed:
-            return {"horizontal": ""}
-        wanted = dict(item.values.get("setting", {}))
-        turn = dict(wanted.pop("orientation", {}))
-        about = "angle_unit" if "unit" in turn else "order" if "order" in turn else "orientation"
-        if turn and about in guess.assumed:
-            settings |= {"orientation": turn}
-            settings |= {"e": wanted["e"]} if "e" in wanted else {}
-        settings |= {k: v for k, v in wanted.items() if k in guess.assumed}
-    return settings
 
 
 def coupling_of(report: Report) -> Finding | None:
     """The coupling of two joints that alone explains the readings, where there is one."""
-    return next((item for item in report.suspicions if "joint_map" in item.values), None)
+    return next((item for item in report.suspicions if item.values.get("joint_map")), None)
 
 
-def _set_right(guess: Guess, settings: dict[str, Any]) -> Guess:
-    """The guess with settings that the readings show, in place of the assumed ones."""
-    settings = dict(settings)
-    shown = {key: value for key, value in settings.items() if key in guess.assumed}
-    if "horizontal" in settings:
-        ways = guess.section["directions"]
-        clockwise = ways["horizontal"] == "counterclockwise"
-        shown["horizontal"] = "clockwise" if clockwise else "counterclockwise"
-        settings = {"directions": ways | {"horizontal": shown["horizontal"]}}
+def _set_right(guess: Guess, report: Report) -> Guess:
+    """The guess with assumed settings that the readings contradict as they should be."""
+    settings: dict[str, Any] = {}
+    shown: dict[str, str] = {}
+    for item in report.suspicions:
+        setting = dict(item.values.get("setting", {}))
+        turn = setting.get("orientation", {})
+        about = next((key for key in ("unit", "order") if key in turn), next(iter(setting), ""))
+        about = "angle_unit" if about == "unit" else about
+        if item.kind == "left_handed" and "horizontal" in guess.assumed:
+            ways, (one, other) = guess.section["directions"], ("clockwise", "counterclockwise")
+            shown = {"horizontal": one if ways["horizontal"] == other else other}
+            settings = {"directions": ways | shown}
+            break
+        if about in guess.assumed:
+            shown[about] = " ".join(map(str, (turn or setting).values()))
+            settings |= setting | {"orientation": settings.get("orientation", {}) | turn}
     if in_order := settings.pop("e", None):
-        columns = dict(guess.section["columns"])
-        unit = guess.section["orientation"]["unit"]
+        columns, unit = dict(guess.section["columns"]), guess.section["orientation"]["unit"]
         angles = [columns.pop(name, f"{name}_{unit}") for name in in_order]
-        columns |= {f"e{number}": column for number, column in enumerate(angles, 1)}
-        settings["columns"] = columns
-    if "orientation" in settings:
-        turn = settings["orientation"]
-        key = "angle_unit" if "unit" in turn else "order" if "order" in turn else "orientation"
-        shown[key] = " ".join(map(str, turn.values()))
+        settings["columns"] = columns | {f"e{n}": column for n, column in enumerate(angles, 1)}
+    if not shown:
+        return guess
     assumed = {key: text for key, text in guess.assumed.items() if key not in shown}
     notes = [f"{key.replace('_', ' ')} {value}: found by trying it on the readings"
              for key, value in shown.items()]  # fmt: skip
     return replace(guess.but(settings), assumed=assumed, notes=(*guess.notes, *notes))
+
+
+@one_thread
+def fitting(guess: Guess, progress: Progress) -> list[str]:
+    """Fit the shipped robots to a file.
+
+    The arms are taken as described: corrected, an arm of similar build would fit as well.
+
+    Parameters
+    ----------
+    guess
+        What a measured file holds.
+    progress
+        Called on what is iterated and a label.
+
+    Returns
+    -------
+    list of str
+        Names of the robots that fit: one, or those of equal geometry; or none.
+    """
+    arms = [arm for arm in map(robots.load, robots.shipped()) if arm.dh.joints == guess.joints]
+    try:
+        every = readings.of_file(read(guess.section, arms[0], strict=False), arms[0])
+    except (InputError, IndexError):
+        return []
+    every = readings.merged(every)[0]
+    few = every.select(readings.thinned(np.arange(len(every)), _ROWS))
+    moved = [(arm, replace(few, q_rad=arm.dh_joints(few.q))) for arm in arms]
+    moved.sort(key=lambda pair: Meaning.of(pair[1], pair[0], ()).misfit)
+    spread_mm = max(meanings.spread_mm(few.position_mm), 1e-9)
+    misfits = []
+    for arm, observed in progress(moved[:_TRIED], "shipped robots tried"):
+        fitted = robust_fit.best(observed, robust_fit.start(observed, arm.dh), strengths=(0.0,))
+        misfits.append((fitted.sigma_mm / spread_mm, arm.name))
+    misfits.sort()
+    least = misfits[0][0]
+    same = [name for misfit, name in misfits if misfit <= (1.0 + _SAME_ARM) * least]
+    others = [misfit for misfit, _ in misfits[len(same) :]]
+    return [] if least > _SURE or (others and least > _NEXT * others[0]) else same

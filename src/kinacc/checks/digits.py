@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
+from decimal import Decimal
 
 import numpy as np
+import pandas as pd
 import scipy
 from numpy import ndarray
 
 from kinacc.checks import robust_fit, tails
 from kinacc.checks.findings import Finding, finding
-from kinacc.checks.meanings import Meaning
 from kinacc.checks.readings import Readings, grouped
 from kinacc.checks.robust_fit import Fitted
 from kinacc.errors import first_few
 from kinacc.kinematics import dh
 from kinacc.kinematics.dh import DHModel
+from kinacc.kinematics.robot import Robot
 
 _CHANCE = 0.01  # expected number of coincidences above which equal readings tell nothing
 _GRIDS_DEG = (1.0, 0.5, 0.1, 0.05, 0.01)
@@ -39,12 +41,12 @@ def copies(every: Readings, noise_mm: float) -> Iterator[Finding]:
     """
     if not _unlikely(every, noise_mm):
         return
-    line, reading, q = _by_line(every)
     names = every.row_names
-    twice = _earlier_equal(np.column_stack([q, reading]))
-    again = np.flatnonzero(twice >= 0)
+    line, reading, q = _by_line(every)
+    rows = pd.DataFrame(np.column_stack([q, reading]))
+    again = np.flatnonzero(rows.duplicated())
     if again.size:
-        first = int(line[twice[again[0]]])
+        first = int(line[np.argmax((rows == rows.iloc[again[0]]).all(axis=1))])
         row = names.one(first)
         yield finding(
             "duplicate_rows", line[again], count=again.size, row=row, first_copied_line=first
@@ -60,10 +62,10 @@ def copies(every: Readings, noise_mm: float) -> Iterator[Finding]:
 def unread(every: Readings) -> ndarray:
     """Line (n,) of an earlier row of other joints whose readings are equal in every digit, or 0."""
     line, reading, q = _by_line(every)
-    same = _earlier_equal(reading)
-    moved = (np.abs(q - q[same]) > 1e-6).any(axis=1)
-    earlier = np.where((same >= 0) & moved, line[same], 0)
-    return earlier[np.searchsorted(line, every.line)]
+    number = grouped(reading)
+    first = np.unique(number, return_index=True)[1][number]
+    is_other = (np.abs(q - q[first]) > 1e-6).any(axis=1)
+    return np.where(is_other, line[first], 0)[np.searchsorted(line, every.line)]
 
 
 def _by_line(every: Readings) -> tuple[ndarray, ndarray, ndarray]:
@@ -73,13 +75,6 @@ def _by_line(every: Readings) -> tuple[ndarray, ndarray, ndarray]:
     reading[inverse, every.target, :3] = every.position_mm
     reading[inverse, every.target, 3:] = np.nan_to_num(every.rotation.reshape(-1, 9), nan=np.inf)
     return line, reading.reshape(len(line), -1), every.q[first]
-
-
-def _earlier_equal(values: ndarray) -> ndarray:
-    """Index (n,) of the first equal row before each, -1 where there is none."""
-    number = grouped(values)
-    first = np.unique(number, return_index=True)[1][number]
-    return np.where(first < np.arange(len(values)), first, -1)
 
 
 def _unlikely(every: Readings, noise_mm: float) -> bool:
@@ -96,20 +91,20 @@ def _unlikely(every: Readings, noise_mm: float) -> bool:
     return max(pairs, 1.0) * per_axis**numbers < _CHANCE
 
 
-def commanded(fitted: Fitted, meaning: Meaning) -> Iterator[Finding]:
+def commanded(fitted: Fitted, robot: Robot) -> Iterator[Finding]:
     """Joints as commanded where those read back are wanted.
 
     By the commanded joints, where the file has them too, else by round numbers.
     """
-    observed, arm = fitted.readings, fitted.trial.arm
+    observed = fitted.readings
     both = np.isfinite(observed.commanded).all(axis=1)
     if not both.any():
-        yield from _round(fitted, np.rad2deg(observed.q[:, ~fitted.trial.nominal.prismatic]))
+        yield from _round(fitted, np.rad2deg(observed.q[:, ~robot.dh.prismatic]))
         return
-    read, sent = (
-        robust_fit.residuals(arm, replace(observed, q_rad=meaning.joints(joints))).position_mm
-        for joints in (observed.q, np.where(both[:, None], observed.commanded, observed.q))
-    )
+    joints = np.where(both[:, None], observed.commanded, observed.q)
+    at_commanded = replace(observed, q_rad=robot.dh_joints(joints))
+    sent = robust_fit.residuals(fitted.trial.arm, at_commanded).position_mm
+    read = fitted.residuals.position_mm
     apart = np.linalg.norm(sent - read, axis=1)
     # What is apart everywhere (a following error of a few um) is how the arm is.
     usual = tails.limit(apart[both], 3) if apart[both].any() else 0.0
@@ -166,31 +161,7 @@ def _on(q_deg: ndarray, grid: float) -> ndarray:
     return np.all(whole, axis=1)
 
 
-def smallest_step(cells: Sequence[Sequence[object]], unit: float, decimal: str) -> float:
-    """The step of numbers as written: the most digits that any cell has behind its mark.
-
-    Parameters
-    ----------
-    cells
-        Columns of cells.
-    unit
-        The unit of the file in the unit of the result.
-    decimal
-        The decimal mark.
-
-    Returns
-    -------
-    float
-        Zero where the file holds no texts, whose numbers are not rounded.
-    """
-    texts = [cell for column in cells for cell in column]
-    if not all(isinstance(cell, str) and "e" not in cell.lower() for cell in texts):
-        return 0.0
-    digits = (len(str(cell).strip().partition(decimal)[2]) for cell in texts)
-    return unit * 10.0 ** -max(digits, default=0)
-
-
-def step_between(cells: Sequence[object], unit: float, decimal: str) -> float:
+def step(cells: Iterable[object], unit: float, decimal: str) -> float:
     """The largest step of which all numbers of a column are whole multiples away from each other.
 
     Parameters
@@ -205,15 +176,15 @@ def step_between(cells: Sequence[object], unit: float, decimal: str) -> float:
     Returns
     -------
     float
-        Zero where all are equal, or a cell is no number.
+        The last digit where all are equal; zero where a cell is no number.
     """
     texts = [str(cell).strip().replace("\u2212", "-").replace(decimal, ".") for cell in cells]
-    digits = max((len(text.partition(".")[2]) for text in texts), default=0)
     try:
-        whole = [round(float(text) * 10.0**digits) for text in texts]
-    except (ValueError, OverflowError):
+        last = min(int(Decimal(text).as_tuple().exponent) for text in texts)
+        whole = [int(Decimal(text).scaleb(-last)) for text in texts]
+    except (ArithmeticError, ValueError):
         return 0.0
-    return unit * math.gcd(*(number - whole[0] for number in whole)) * 10.0**-digits
+    return unit * (math.gcd(*(number - whole[0] for number in whole)) or 1) * 10.0**last
 
 
 def cost(model: DHModel, q: ndarray, step: float) -> tuple[float, float]:

@@ -11,12 +11,10 @@ import scipy
 from numpy import ndarray
 
 from kinacc.checks import robust_fit, tails
-from kinacc.checks.findings import Finding, finding
+from kinacc.checks.findings import Finding, Progress, finding
 from kinacc.checks.readings import Distance, Readings
-from kinacc.checks.report import Progress
 from kinacc.checks.robust_fit import Fitted, Linear, fit
 from kinacc.geometry import Pose, compose, invert, log_so3
-from kinacc.kinematics.dh import DHModel
 
 _MOST_SPLITS = 8
 _TRIED = 3  # places tried for one split
@@ -31,37 +29,33 @@ _STEADY = 0.9  # of what jumps explain; of one jump, a steady motion explains 0.
 _EXCESS = 2.0  # times what chance, or a step along a joint, explains
 _FEWEST_ROWS = 4  # on either side of a change of a distance
 
-Place = tuple[int, str, int]  # a reading before which a frame may have moved: field, number in it
 Jump = tuple[str, ndarray]  # session (the base) or target, and the readings from there on
 
 
-def without_jumps(
-    observed: Readings, model: DHModel, progress: Progress
-) -> tuple[Fitted, list[Finding]]:
+def without_jumps(whole: Fitted, progress: Progress) -> tuple[Fitted, list[Finding]]:
     """The fit with every jump of base or target taken out, one after the other, and these."""
-    whole = fitted = fit(observed, model)
+    fitted = whole
     jumps: list[Jump] = []
     # Poses of equal joints are one: read often, they make no jump any surer.
-    few = len(np.unique(np.round(observed.q_rad, 6), axis=0)) < _FEW
+    few = len(np.unique(np.round(whole.readings.q_rad, 6), axis=0)) < _FEW
     for _ in progress(range(_MOST_SPLITS), "searches for a moved instrument or target"):
         best, least = None, _PLAIN if few else 1.0
-        for row, kind, number in _places(fitted):
-            frames = [(e, int(getattr(fitted.readings, e)[row])) for e in ("session", "target")]
-            for frame in dict.fromkeys([(kind, number), *frames]):
-                split = _parted(fitted, (row, *frame), model)
-                share = _share_left(fitted, split[0], split[1][1]) if split else np.inf
+        for row, likely in _places(fitted):
+            for kind in dict.fromkeys([likely, "session", "target"]):
+                split = _parted(fitted, row, kind)
+                share = _share_left(fitted, *split) if split else np.inf
                 if share < least:
                     best, least = split, share
             if least < _PLAIN:
                 break
         if best is None:
             break
-        fitted = best[0]
-        jumps.append(best[1])
+        fitted, jump = best
+        jumps.append(jump)
     return fitted, list(_findings(whole, fitted, jumps)) if jumps else []
 
 
-def _names(observed: Readings, kind: str) -> tuple[str, ...]:
+def _names(observed: Readings, kind: str) -> tuple[str | None, ...]:
     return observed.session_names if kind == "session" else observed.target_names
 
 
@@ -77,8 +71,8 @@ def _linearised(fitted: Fitted) -> tuple[Readings, ndarray, ndarray, Linear]:
     return few, design, linear.residual * root + design @ linear.step, linear
 
 
-def _places(fitted: Fitted) -> list[Place]:
-    """Readings before which base or target may have moved, likely places first.
+def _places(fitted: Fitted) -> list[tuple[int, str]]:
+    """Readings before which a base (session) or target may have moved, likely places first.
 
     A step is judged by how much of the residuals it explains (score test of further frames, under
     Huber's loss, with the parameters of the fit free). Residuals of real arms vary smoothly with
@@ -108,7 +102,7 @@ def _places(fitted: Fitted) -> list[Place]:
             reference = max(reference, steps_along[inside].max())
         if gains[place] > _EXCESS * reference:
             row = int(fitted.chosen[rows[place]])
-            places.append((gains[place] / reference, (row, kind, number)))
+            places.append((gains[place] / reference, (row, kind)))
     return [place for _, place in sorted(places, key=lambda pair: -pair[0])[:_TRIED]]
 
 
@@ -131,48 +125,50 @@ def _gains(
     return np.sum(step * score, axis=(1, 2)), step[..., 0], (across @ step)[..., 0]
 
 
-def _parted(fitted: Fitted, place: Place, model: DHModel) -> tuple[Fitted, Jump] | None:
-    """The fit without a jump near a place, and the jump; None if there is none.
+def _parted(fitted: Fitted, row: int, kind: str) -> tuple[Fitted, Jump] | None:
+    """The fit without a jump near a reading, and the jump; None if there is none.
 
     The jump is before the reading that parts the two frames best.
     """
-    (row, kind, number), new = place, len(_names(fitted.readings, place[1]))
-    observed, rows = _split(fitted.readings, row, kind, number)
-    again = fit(observed, model)
-    both = np.flatnonzero(np.isin(getattr(observed, kind), (number, new)))
-    costs = []
-    for frame in (number, new):
-        part = replace(observed.select(both), **{kind: np.full(len(both), frame)})  # type: ignore[arg-type]
-        remaining = np.linalg.norm(robust_fit.residuals(again.trial.arm, part).position_mm, axis=1)
+    old, new = int(getattr(fitted.readings, kind)[row]), len(_names(fitted.readings, kind))
+    observed, rows = _split(fitted.readings, row, kind)
+    again = fit(observed, fitted.trial.nominal)
+    both = np.flatnonzero(np.isin(getattr(observed, kind), (old, new)))
+    part, costs = observed.select(both), []
+    for frame in (old, new):
+        label: dict[str, Any] = {kind: np.full(len(both), frame)}
+        left = robust_fit.residuals(again.trial.arm, replace(part, **label)).position_mm
+        remaining = np.linalg.norm(left, axis=1)
         costs.append(np.append(0.0, np.minimum(remaining, _CAP * again.trial.sigma_mm)))
     first = int(np.argmin(np.cumsum(costs[0]) - np.cumsum(costs[1])))
-    if min(len(np.unique(observed.pose[side])) for side in np.split(both, [first])) < _FEWEST:
+    if (
+        min(len(np.unique(part.pose[side])) for side in (slice(first), slice(first, None)))
+        < _FEWEST
+    ):
         return None
     if both[first] != row:
-        observed, rows = _split(fitted.readings, both[first], kind, number)
-        again = fit(observed, model)
+        observed, rows = _split(fitted.readings, both[first], kind)
+        again = fit(observed, fitted.trial.nominal)
     return again, (kind, rows)
 
 
-def _split(observed: Readings, row: int, kind: str, number: int) -> tuple[Readings, ndarray]:
-    """Readings whose frame ``number`` is another one from ``row`` on, and those from there on."""
+def _split(observed: Readings, row: int, kind: str) -> tuple[Readings, ndarray]:
+    """Readings whose base or target is another one from ``row`` on, and those from there on."""
     label, names = getattr(observed, kind), _names(observed, kind)
-    rows = (np.arange(len(observed)) >= row) & (label == number)
+    rows = (np.arange(len(observed)) >= row) & (label == label[row])
     split: dict[str, Any] = {kind: np.where(rows, len(names), label)}
-    split[f"{kind}_names"] = (*names, names[number])
+    split[f"{kind}_names"] = (*names, names[label[row]])
     return replace(observed, **split), np.flatnonzero(rows)
 
 
-def _share_left(before: Fitted, after: Fitted, rows: ndarray) -> float:
+def _share_left(before: Fitted, after: Fitted, jump: Jump) -> float:
     """What a split leaves, over what it may leave at most to be believed: overall, or where it is.
 
     The fits' own lengths are compared, each cut at ten sigma so that gross errors do not decide.
     """
     lengths = [np.minimum(e.left_mm, _CAP * before.trial.sigma_mm) for e in (before, after)]
-    everywhere, there = (
-        float(np.mean(lengths[1][part]) / np.mean(lengths[0][part]))
-        for part in (slice(None), rows[:_NEAR])
-    )
+    parts = (slice(None), jump[1][:_NEAR])
+    everywhere, there = (float(lengths[1][part].mean() / lengths[0][part].mean()) for part in parts)
     return min(everywhere / _BETTER, max(there / _BETTER_THERE, everywhere))
 
 
@@ -244,7 +240,7 @@ def by_distances(every: Readings, distances: list[Distance]) -> tuple[list[Findi
     """
     moved, line, names = every, every.line, every.target_names
     moves = [(distance, *_move(distance.length_mm)) for distance in distances]
-    steps, findings = [move for move in moves if move[1]], []
+    steps, findings = [move for move in moves if move[2]], []
     while steps:
         # The target that most of the changed distances have in common.
         counts = np.zeros(len(names))
@@ -253,9 +249,9 @@ def by_distances(every: Readings, distances: list[Distance]) -> tuple[list[Findi
         target = int(np.argmax(counts))
         mine = [step for step in steps if target in (step[0].first, step[0].second)]
         steps = [step for step in steps if step not in mine]
-        is_there = line == line[mine[0][0].rows[mine[0][1], 0]]
-        first = int(np.flatnonzero(is_there & (every.target == target))[0])
-        moved, rows = _split(moved, first, "target", target)
+        distance, place, _ = mine[0]
+        first = int(distance.rows[place, int(distance.second == target)])
+        moved, rows = _split(moved, first, "target")
         changes = (f"{n:+.3g} mm to {names[d.first + d.second - target]}" for d, _, n in mine)
         findings.append(
             finding(
@@ -272,7 +268,7 @@ def by_distances(every: Readings, distances: list[Distance]) -> tuple[list[Findi
     off: list[int] = []
     largest = 0.0
     for distance, place, size in moves:
-        length = distance.length_mm - size * (np.arange(len(distance.rows)) >= (place or np.inf))
+        length = distance.length_mm - size * (np.arange(len(distance.rows)) >= place)
         away = np.abs(length - np.median(length))
         far = away > tails.limit(away, 1, len(away) * len(moves))
         off += line[distance.rows[far, 0]].tolist()
@@ -283,11 +279,11 @@ def by_distances(every: Readings, distances: list[Distance]) -> tuple[list[Findi
     return findings, moved
 
 
-def _move(length: ndarray) -> tuple[int | None, float]:
-    """Row at which a distance (n,) changes for good, and by how much; None where it does not."""
+def _move(length: ndarray) -> tuple[int, float]:
+    """Row at which a distance (n,) changes for good, and by how much; 0 where it does not."""
     count, place = len(length), np.arange(_FEWEST_ROWS, len(length) - _FEWEST_ROWS + 1)
     if count < 2 * _FEWEST_ROWS + 2:
-        return None, 0.0
+        return count, 0.0
     clipped = np.clip(length, *np.quantile(length, [0.02, 0.98]))
     before = np.cumsum(clipped)[place - 1]
     step = (clipped.sum() - before) / (count - place) - before / place
@@ -296,4 +292,4 @@ def _move(length: ndarray) -> tuple[int | None, float]:
     # A distance that only drifts is no move: it must leave what both sides scatter by far.
     rest = np.abs(length - np.repeat(middles, [row, count - row]))
     size = middles[1] - middles[0]
-    return (row, size) if abs(size) > tails.limit(rest, 1) else (None, 0.0)
+    return (row, size) if abs(size) > tails.limit(rest, 1) else (count, 0.0)

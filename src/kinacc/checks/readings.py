@@ -11,6 +11,7 @@ from numpy import ndarray
 
 from kinacc.calibration.observations import Observations, from_columns
 from kinacc.checks import tails
+from kinacc.geometry import project_so3
 from kinacc.kinematics.robot import Robot
 from kinacc.measurements.reader import MeasuredFile
 from kinacc.measurements.row_names import RowNames
@@ -20,7 +21,7 @@ _SAME_RAD = 1e-4  # joints of repeats differ by less
 _MEDIAN_1D = 0.6744897501960817  # median of |x| of a standard normal number
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Readings(Observations):
     """Observations in the order of the file, with what they were read from.
 
@@ -42,12 +43,12 @@ class Readings(Observations):
         How rows are called.
     """
 
-    q: ndarray = None
-    commanded: ndarray = None
-    turns: ndarray = None
-    earlier: ndarray = None
-    line: ndarray = None
-    drawn: ndarray = None
+    q: ndarray
+    commanded: ndarray
+    turns: ndarray
+    earlier: ndarray
+    line: ndarray
+    drawn: ndarray
     row_names: RowNames = field(default_factory=RowNames)
 
     def lines(self, rows: ndarray | slice = slice(None)) -> list[int]:
@@ -63,7 +64,7 @@ def of_file(reading: MeasuredFile, robot: Robot) -> Readings:
         **vars(from_columns(columns, robot)),
         q=q,
         commanded=np.full_like(q, np.nan) if reading.commanded is None else reading.commanded,
-        turns=reading.turns,
+        turns=np.asarray(reading.turns),
         earlier=np.zeros(len(line), dtype=np.int64),
         line=line,
         drawn=texts(np.split(line, np.arange(1, len(line)))),
@@ -93,7 +94,7 @@ def merged(every: Readings) -> tuple[Readings, ndarray, ndarray]:
     several = np.bincount(cell) > 1
     turned = several & np.isfinite(medians[:, 3])
     rotation = first.rotation.copy()
-    rotation[turned] = nearest_rotation(medians[turned, 3:].reshape(-1, 3, 3))
+    rotation[turned] = project_so3(medians[turned, 3:].reshape(-1, 3, 3))
     ends = np.cumsum(np.bincount(cell))[:-1]
     first = replace(
         first,
@@ -154,10 +155,3 @@ def thinned(rows: ndarray, most: int) -> ndarray:
     if len(rows) <= most:
         return rows
     return rows[np.linspace(0, len(rows) - 1, most).astype(int)]
-
-
-def nearest_rotation(matrix: ndarray) -> ndarray:
-    """Rotations nearest to ``matrix`` (..., 3, 3)."""
-    remaining, _, right = np.linalg.svd(matrix)
-    remaining[..., 2] *= np.sign(np.linalg.det(remaining @ right))[..., None]
-    return remaining @ right

@@ -173,18 +173,18 @@ def differ_by_pose(read: Repeated, resolution_mm: ndarray) -> tuple[float, ndarr
     square_mm2, pooled = scatter(values, group)
     if not pooled:
         return math.nan, np.full(read.pose.max() + 1, np.nan)
-    floor = np.diag(resolution_mm**2 / 12.0) + 1e-24 * np.eye(3)
-    root = np.linalg.cholesky(square_mm2 + floor)
+    rounding = np.diag(resolution_mm**2 / 12.0)
+    root = np.linalg.cholesky(square_mm2 + rounding + 1e-24 * np.eye(3))
     mean, count = means(values, group)
     white = np.linalg.solve(root, (values - mean[group]).T).T
     square = np.bincount(pose_of[group], np.sum(white**2, axis=1))
     freedom = 3.0 * np.bincount(pose_of, count - 1)
-    least = np.sum(np.linalg.solve(root, np.diag(resolution_mm / math.sqrt(12.0))) ** 2) / 3.0
     known = freedom > 0
-    nu, s2 = freedom[known], np.maximum(square[known] / freedom[known], max(least, 1e-12))
+    least = np.trace(np.linalg.solve(root, np.linalg.solve(root, rounding).T)) / 3.0
     variance = np.full(len(freedom), np.nan)
-    variance[known] = s2
-    if known.sum() < 2:
+    variance[known] = np.maximum(square[known] / freedom[known], max(least, 1e-12))
+    nu, s2 = freedom[known], variance[known]
+    if len(nu) < 2:
         return math.nan, np.sqrt(variance)
     middle = np.average(s2, weights=nu)
     statistic = nu.sum() * math.log(middle) - float(np.sum(nu * np.log(s2)))

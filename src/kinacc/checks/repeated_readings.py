@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
 
+from kinacc.checks import digits
 from kinacc.checks import repeatability as checks
-from kinacc.checks.digits import smallest_step, step_between
 from kinacc.checks.repeatability import Noise, Repeated
 from kinacc.errors import InputError, Problem, first_few, refuse
-from kinacc.measurements.layout import POSITION, Place, find, listed
+from kinacc.measurements.layout import POSITION, find, listed
 from kinacc.measurements.reader import stacked
 from kinacc.measurements.rows import open_table
 from kinacc.measurements.table import RawTable, numbers
@@ -67,7 +66,8 @@ class Repeatability:
     instrument_std_mm, one_side_std_mm, all_sides_std_mm
         Standard deviations (3,) of the instrument, and of the arm from one and from all sides.
     mean_distance_mm, rp_mm, between_sides_mm
-        ISO 9283: mean distance from the mean position, RP, and vAP, pooled over the poses.
+        By the formulas of ISO 9283: mean distance from the mean position, RP, and vAP, pooled over
+        the poses. RP is that of the standard from 30 visits of a pose on.
     poses_equal_probability, poses_differ
         Probability that poses differ as much by chance, and which scatters most, or None.
     resolution_mm
@@ -164,7 +164,8 @@ def read_repeats(path: str, rows_are: str | None) -> RepeatedFile:
     used = {axis.column for axis in axes}.union(*_NAMES.values(), _SINGLE, _HOURS, ["time"])
     unused = ", ".join(name for name in table.columns if name not in used)
     notes = (*notes, f"not used: {unused}") if unused else notes
-    return RepeatedFile(table, position, rows, _steps_mm(table, axes), notes)
+    steps = [digits.step(table.columns[a.column], a.factor, table.decimal) for a in axes]
+    return RepeatedFile(table, position, rows, np.array(steps), notes)
 
 
 def _hours(table: RawTable, name: str, problems: list[Problem]) -> np.ndarray:
@@ -180,14 +181,6 @@ def _hours(table: RawTable, name: str, problems: list[Problem]) -> np.ndarray:
     return np.asarray((times - times.min()) / pd.Timedelta(hours=1))
 
 
-def _steps_mm(table: RawTable, axes: Sequence[Place]) -> np.ndarray:
-    """Steps (3,) of the values of the axes; of equal values, that of the other axes or digits."""
-    cells = [(table.columns[axis.column], axis.factor) for axis in axes]
-    steps = np.array([step_between(values, unit, table.decimal) for values, unit in cells])
-    digits = max(smallest_step([values], unit, table.decimal) for values, unit in cells)
-    return np.where(steps > 0.0, steps, steps.max() or digits)
-
-
 def estimate(file: RepeatedFile) -> Repeatability:
     """Estimate noise and repeatability.
 
@@ -199,7 +192,7 @@ def estimate(file: RepeatedFile) -> Repeatability:
     Returns
     -------
     Repeatability
-        Noise of a reading, its parts, and ISO 9283's repeatability, mm.
+        Noise of a reading, its parts, and repeatability by ISO 9283's formulas, mm.
 
     Raises
     ------

@@ -15,12 +15,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pandas as pd
 from numpy import ndarray
+from scipy.spatial.transform import Rotation
 
 from kinacc.calibration.frames import FrameParameters, Frames
 from kinacc.calibration.hand_eye import base_from_targets, closed_form_start
 from kinacc.calibration.system import PoseSystem
 from kinacc.checks import tails
-from kinacc.checks.readings import Readings, nearest_rotation, thinned
+from kinacc.checks.readings import Readings, thinned
 from kinacc.geometry import Pose, compose, invert, log_so3
 from kinacc.kinematics import dh
 from kinacc.kinematics.dh import DHModel
@@ -141,12 +142,11 @@ def fit(observed: Readings, model: DHModel) -> Fitted:
 
 def residuals(arm: Arm, observed: Readings, flange: Pose | None = None) -> Residuals:
     """What ``arm`` leaves of the readings; ``flange`` (n) where the model's poses are known."""
-    flange = flange or dh.forward(arm.model, observed.q_rad)
-    base = Pose(*(item[observed.session] for item in arm.frames.bases))
-    flange = compose(base, flange)
-    predicted = compose(flange, Pose(*(item[observed.target] for item in arm.frames.targets)))
-    turn, there = np.full((len(observed), 3), np.nan), observed.has_rotation
-    turn[there] = log_so3(predicted.rotation[there] @ np.swapaxes(observed.rotation[there], 1, 2))
+    base, target = arm.frames.at_rows(observed)
+    flange = compose(base, flange or dh.forward(arm.model, observed.q_rad))
+    predicted = compose(flange, target)
+    # Where no orientation was measured, its rotation vector is NaN.
+    turn = log_so3(predicted.rotation @ np.swapaxes(observed.rotation, 1, 2))
     return Residuals(predicted.position_mm - observed.position_mm, turn, predicted, flange.rotation)
 
 
@@ -160,20 +160,22 @@ def sigma_of(vectors: ndarray) -> float:
 
 def best(observed: Readings, begin: Arm, strengths: tuple[float, ...] = STRENGTHS) -> Trial:
     """The fit whose strength predicts configurations left out best."""
-    chosen, least, cap, arm = None, np.inf, None, begin
     number = np.unique(observed.pose, return_inverse=True)[1]
+    better: list[tuple[float, Trial]] = []
+    cap, arm = 0.0, begin
     for strength in strengths:
         trial = reweighted(observed, arm, begin.model, strength, huber=True)
-        if chosen is not None and _far(trial.arm.model, begin.model):
+        if better and _far(trial.arm.model, begin.model):
             continue
         arm, cap = trial.arm, cap or _CAP * trial.sigma_mm
         length = np.minimum(np.linalg.norm(trial.left_out[:, :3], axis=1), cap)
         score = float(np.mean(np.bincount(number, length) / np.bincount(number)))
         # Stronger corrections must pay: noise alone moves the score by a per mille or so.
-        if score < 0.99 * least:
-            chosen, least = trial, score
-        elif score > 1.5 * least:
+        if not better or score < 0.99 * better[-1][0]:
+            better.append((score, trial))
+        elif score > 1.5 * better[-1][0]:
             break
+    chosen = better[-1][1]
     corrections = 5 * begin.model.joints if chosen.strength > 0.0 else 0
     frames = 6 * len(observed.session_names) + 3 * len(observed.target_names)
     if 3 * len(observed) < _READ_PER_PARAMETER * (frames + corrections):
@@ -234,18 +236,19 @@ class Linear:
         frames = FrameParameters.of(named, arm.frames, None)
         free = np.full(nominal.start.size, strength > 0.0)
         system = PoseSystem(named, nominal, free, frames, 1.0)
-        there = np.repeat([np.ones(len(observed), bool), observed.has_rotation], 3, axis=0).T
-        design, residual = np.zeros((len(observed), 6, system.size)), np.zeros((len(observed), 6))
-        blocks = [*system.blocks(np.concatenate([frames.begin, arm.model.start[free]]))]
-        residual[there], design[there] = (
-            np.concatenate(part) for part in zip(*blocks, strict=True)
-        )
-        vectors = np.where(there, residual, np.nan)
-        sigma_mm, sigma_rad = (sigma_of(vectors[:, part]) for part in _PARTS)
-        weights = np.zeros((len(observed), 6))
-        for part, sigma in zip(_PARTS, (sigma_mm, sigma_rad), strict=True):
-            if np.isfinite(sigma):
-                weights[:, part] = _weight(vectors[:, part], sigma, huber) / sigma**2
+        x = np.concatenate([frames.begin, arm.model.start[free]])
+        blocks = [
+            np.pad(columns, ((0, 0), (0, 6 - columns.shape[1]), (0, 0)))
+            for columns, _ in system.columns(x)
+        ]
+        both = np.ascontiguousarray(np.concatenate(blocks, axis=2).transpose(2, 1, 0))
+        design, residual = both[..., :-1], both[..., -1]
+        weights, sigmas = np.zeros((len(observed), 6)), []
+        for part, there in zip(_PARTS, (slice(None), observed.has_rotation), strict=True):
+            vectors = residual[there, part]
+            sigmas.append(sigma := sigma_of(vectors))
+            if len(vectors):
+                weights[there, part] = _weight(vectors, sigma, huber) / sigma**2
         lean = np.append(np.zeros(frames.size), (strength * _units(nominal))[free] ** -2.0)
         moved = np.append(np.zeros(frames.size), (arm.model.start - nominal.start)[free])
         flat = design.reshape(-1, system.size)
@@ -257,7 +260,7 @@ class Linear:
         both = np.outer(scale, scale)
         inverse = np.linalg.pinv(gram * both, rcond=1e-12, hermitian=True) * both
         step = -inverse @ (weighted.T @ residual.ravel() + lean * moved)
-        return cls(design, residual, weights, inverse, step, frames, sigma_mm, sigma_rad)
+        return cls(design, residual, weights, inverse, step, frames, *sigmas)
 
     def taken(self, arm: Arm) -> tuple[Arm, float]:
         """The arm after the step, and how far it moves: mm of lengths, mm at one metre of turns."""
@@ -309,13 +312,13 @@ def _units(model: DHModel) -> ndarray:
 
 
 def _weight(vectors: ndarray, sigma: float, huber: bool) -> ndarray:
-    """Weights (n, 1) of vectors (n, 3); 0 where not measured."""
-    length = np.linalg.norm(np.nan_to_num(vectors, nan=np.inf), axis=1)
+    """Weights (n, 1) of vectors (n, 3)."""
+    length = np.linalg.norm(vectors, axis=1)
     if huber:
         weight = HUBER * sigma / np.maximum(length, HUBER * sigma)
         # Where a quarter or more is that far off, the start is to blame and not the readings.
-        usual = np.quantile(length[np.isfinite(length)], 0.75) if np.isfinite(sigma) else 0.0
-        return np.where(length < max(_GROSS * sigma, 3.0 * usual), weight, 0.0)[:, None]
+        limit = max(_GROSS * sigma, 3.0 * np.quantile(length, 0.75))
+        return np.where(length < limit, weight, 0.0)[:, None]
     share = np.minimum(length / (BIWEIGHT * sigma), 1.0)
     return ((1.0 - share**2) ** 2)[:, None]
 
@@ -331,17 +334,17 @@ def start(
     largest = np.argmax(np.bincount(observed.session))
     part = observed.select(thinned(np.flatnonzero(observed.session == largest), _START_ROWS))
     flange = dh.forward(model, part.q_rad)
-    arm, least = None, np.inf
+    better: list[tuple[float, Arm]] = []
     for rows in _draws(part, draws, stretches):
         for _ in range(_REFINEMENTS):
-            place = Pose(*(item[rows] for item in flange))
-            trial = Arm(model, closed_form_start(part.select(rows), place))
+            trial = Arm(model, closed_form_start(part.select(rows), flange.select(rows)))
             misfit = np.linalg.norm(residuals(trial, part, flange).position_mm, axis=1)
             middle = float(np.quantile(misfit, _JUDGED))
-            if middle >= least:
+            if better and middle >= better[-1][0]:
                 break
-            arm, least = trial, middle
+            better.append((middle, trial))
             rows = np.argsort(misfit)[: max(int(_TRUSTED * len(misfit)), _DRAWN)]
+    least, arm = better[-1]
     frames = arm.frames
     if len(observed.target_names) > 1:
         _place_targets(arm, part, flange, least)
@@ -349,8 +352,7 @@ def start(
         part = observed.select(observed.session == session)
         flange, rows = dh.forward(model, part.q_rad), np.arange(len(part))
         for _ in range(_REFINEMENTS):
-            place = Pose(*(item[rows] for item in flange))
-            base = base_from_targets(part.select(rows), place, frames.targets)
+            base = base_from_targets(part.select(rows), flange.select(rows), frames.targets)
             frames.bases.rotation[session], frames.bases.position_mm[session] = base
             misfit = np.linalg.norm(residuals(arm, part, flange).position_mm, axis=1)
             rows = np.argsort(misfit)[: max(int(_TRUSTED * len(part)), min(len(part), 4))]
@@ -378,5 +380,5 @@ def _place_targets(arm: Arm, part: Readings, flange: Pose, usual_mm: float) -> N
         if np.median(misfit[rows]) > _ASTRAY * usual_mm:
             arm.frames.targets.position_mm[target] = np.median(there.position_mm[rows], axis=0)
             if (rows := rows & part.has_rotation).any():
-                turned = nearest_rotation(np.median(there.rotation[rows], axis=0))
-                arm.frames.targets.rotation[target] = turned
+                mean = Rotation.from_matrix(there.rotation[rows]).mean()
+                arm.frames.targets.rotation[target] = mean.as_matrix()

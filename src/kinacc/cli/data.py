@@ -14,7 +14,7 @@ import click
 
 from kinacc.checks.check import examined
 from kinacc.checks.contradictions import load
-from kinacc.checks.report import UNUSABLE, VERDICTS, Report, to_json
+from kinacc.checks.findings import UNUSABLE, VERDICTS, Report, to_json
 from kinacc.cli.choice import CONFIG, DATASET, REASON, option
 from kinacc.cli.output import Output, answers
 from kinacc.config.edit import with_added

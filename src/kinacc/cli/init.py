@@ -14,9 +14,8 @@ import pandas as pd
 from scipy.spatial.transform import Rotation
 
 from kinacc.checks import digits
-from kinacc.checks.described import corrected, coupling_of
-from kinacc.checks.report import Report
-from kinacc.checks.which_robot import fitting
+from kinacc.checks.described import corrected, coupling_of, fitting
+from kinacc.checks.findings import Report
 from kinacc.cli import choice
 from kinacc.cli.choice import option
 from kinacc.cli.init_questions import confirmed, guessed, unanswered
@@ -285,7 +284,7 @@ def _remarks_on(guess: Guess, report: Report, reading: MeasuredFile, arm: Robot)
     targets = guess.columns.targets.values()
     points = [cells[target[axis].column] for target in targets for axis in "xyz"]
     unit = 1.0 if guess.section["length_unit"] == "mm" else 1000.0
-    step = digits.smallest_step(points, unit, decimal)
+    step = min(digits.step(column, unit, decimal) for column in points)
     fit = report.facts.get("quick_fit")
     residual = fit["left_per_axis_mm"] if isinstance(fit, Mapping) else np.inf
     # Rounding alone leaves 0.3 of a step.
@@ -298,7 +297,7 @@ def _remarks_on(guess: Guess, report: Report, reading: MeasuredFile, arm: Robot)
         return
     unit = 1.0 if guess.section["joint_unit"] == "deg" else 180.0 / np.pi
     joints = [cells[name.column] for name in guess.columns.joints]
-    step = digits.smallest_step(joints, unit, decimal)
+    step = min(digits.step(column, unit, decimal) for column in joints)
     if step > 0.0:
         q = np.stack([reading.columns[f"q{i + 1}"] for i in range(guess.joints)], axis=1)
         reach_mm, rms_mm = digits.cost(arm.dh, arm.dh_joints(q), step)
