@@ -50,7 +50,6 @@ _STRETCHES = (2, 3, 5)
 _TRUSTED = 0.5  # share of the readings a refinement of the start trusts
 _JUDGED = 0.4  # share of the readings that must fit: the rest may be of another base
 _REFINEMENTS = 4
-_ASTRAY = 5.0  # times what the others leave: a target whose place was not found
 _START_ROWS = 600
 
 
@@ -344,10 +343,10 @@ def start(
                 break
             better.append((middle, trial))
             rows = np.argsort(misfit)[: max(int(_TRUSTED * len(misfit)), _DRAWN)]
-    least, arm = better[-1]
+    arm = better[-1][1]
     frames = arm.frames
     if len(observed.target_names) > 1:
-        _place_targets(arm, part, flange, least)
+        _place_targets(frames, part, flange)
     for session in np.unique(observed.session[observed.session != largest]):
         part = observed.select(observed.session == session)
         flange, rows = dh.forward(model, part.q_rad), np.arange(len(part))
@@ -370,15 +369,12 @@ def _draws(part: Readings, draws: int, stretches: tuple[int, ...]) -> Iterator[n
         yield np.flatnonzero(np.isin(part.pose, rng.choice(poses, _DRAWN, replace=False)))
 
 
-def _place_targets(arm: Arm, part: Readings, flange: Pose, usual_mm: float) -> None:
-    """Put targets that were in none of the readings chosen where their readings have them."""
-    misfit = np.linalg.norm(residuals(arm, part, flange).position_mm, axis=1)
-    base = Pose(*(item[part.session] for item in arm.frames.bases))
-    there = compose(invert(compose(base, flange)), Pose(part.rotation, part.position_mm))
+def _place_targets(frames: Frames, part: Readings, flange: Pose) -> None:
+    """Put targets where the readings have them: a part of those may have been none of theirs."""
+    there = compose(invert(compose(frames.at_rows(part)[0], flange)), part.measured)
     for target in np.unique(part.target):
         rows = part.target == target
-        if np.median(misfit[rows]) > _ASTRAY * usual_mm:
-            arm.frames.targets.position_mm[target] = np.median(there.position_mm[rows], axis=0)
-            if (rows := rows & part.has_rotation).any():
-                mean = Rotation.from_matrix(there.rotation[rows]).mean()
-                arm.frames.targets.rotation[target] = mean.as_matrix()
+        frames.targets.position_mm[target] = np.median(there.position_mm[rows], axis=0)
+        if (rows := rows & part.has_rotation).any():
+            mean = Rotation.from_matrix(there.rotation[rows]).mean()
+            frames.targets.rotation[target] = mean.as_matrix()
