@@ -243,7 +243,8 @@ class Linear:
         both = np.ascontiguousarray(np.concatenate(blocks, axis=2).transpose(2, 1, 0))
         design, residual = both[..., :-1], both[..., -1]
         weights, sigmas = np.zeros((len(observed), 6)), []
-        for part, there in zip(_PARTS, (slice(None), observed.has_rotation), strict=True):
+        every = np.ones(len(observed), dtype=bool)
+        for part, there in zip(_PARTS, (every, observed.has_rotation), strict=True):
             vectors = residual[there, part]
             sigmas.append(sigma := sigma_of(vectors))
             if len(vectors):
