@@ -63,9 +63,12 @@ def _length(probability: float, dimensions: int, freedom: float) -> float:
 
 def _freedom(ratio: float, dimensions: int) -> float:
     """Degrees of freedom at which the bulk quantile is ``ratio`` medians, within bounds."""
-    low, high = _LEAST_FREEDOM, _MOST_FREEDOM
-    for _ in range(40):
-        middle = 0.5 * (low + high)
-        results = _length(_BULK, dimensions, middle) / _length(0.5, dimensions, middle)
-        low, high = (middle, high) if results > ratio else (low, middle)
-    return 0.5 * (low + high)
+
+    def excess(freedom: float) -> float:
+        return _length(_BULK, dimensions, freedom) / _length(0.5, dimensions, freedom) - ratio
+
+    if excess(_MOST_FREEDOM) >= 0.0:
+        return _MOST_FREEDOM
+    if excess(_LEAST_FREEDOM) <= 0.0:
+        return _LEAST_FREEDOM
+    return float(scipy.optimize.brentq(excess, _LEAST_FREEDOM, _MOST_FREEDOM))
