@@ -98,7 +98,7 @@ class Arm:
             return 1.0
         alone = history_model.about(self.true.dh, known(), series, len(series), WEIGHT_MM_PER_RAD)
         cuts = history_model.halves(alone, np.repeat(series.q_rad, 6, axis=0), SETUP)
-        return history_model.understated([*cuts], self.rng)
+        return history_model.understated(cuts)
 
 
 # Names of DH parameters by the error they are: (of this joint or the next, place among ERRORS).
@@ -117,15 +117,14 @@ def year(arm: Arm) -> tuple[list[dict], np.ndarray, np.ndarray]:
     for month in range(1, MONTHS):
         series = arm.series()
         own = arm.understated(series)
-        found = history_model.moved(
-            arm.pair(force, series), history_model.misfit_factor(wide, own), arm.rng
-        )
-        chance_mm = found.chance_mm(LEVEL)
+        factor = history_model.misfit_factor(wide, own)
+        found = history_model.moved(arm.pair(force, series), factor)
+        probability, chance_mm = found.test(LEVEL)
         alarm = found.moved_mm > chance_mm
         decisions.append({
             "plans": arm.plans, "month": month + 1, "moved_mm": found.moved_mm,
-            "chance_mm": chance_mm, "probability": found.probability,
-            "factor": history_model.misfit_factor(wide, own), "alarm": int(alarm),
+            "chance_mm": chance_mm, "probability": probability,
+            "factor": factor, "alarm": int(alarm),
         })  # fmt: skip
         hits, sizes = _seen(found, chance_mm)
         seen += hits
@@ -144,8 +143,12 @@ def _seen(found: history_model.Moved, chance_mm: float) -> tuple[np.ndarray, np.
     along = found.along(units)
     size = np.linalg.norm(along, axis=0)
     unit = along / np.where(size > UNSEEN_MM, size, np.inf)
-    square = found.moved_mm**2 + 2.0 * np.outer(found.change @ unit, SIZES_MM) + SIZES_MM**2
-    return square > chance_mm**2, size
+    weighted = found.precision @ unit
+    statistic = found.change @ found.precision @ found.change
+    limit = statistic * (chance_mm / found.moved_mm) ** 2
+    linear, square = found.change @ weighted, np.sum(unit * weighted, axis=0)
+    changed = statistic + 2.0 * np.outer(linear, SIZES_MM) + np.outer(square, SIZES_MM**2)
+    return changed > limit, size
 
 
 def run(same: int, other: int, out: Path, cores: int) -> None:

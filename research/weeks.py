@@ -88,7 +88,7 @@ def verdict(seed: int, changed: bool, poses: int) -> str:
     worse = chance.change("mean", *samples, False, accepted.CONFIDENCE)
     if not worse.open and worse.least > 0.0:
         return "worse: held-out errors"
-    row = history([weeks, later], WEIGHT, seed=16, level=accepted.ARM_LEVEL)
+    row = history([weeks, later], WEIGHT, level=accepted.ARM_LEVEL)
     return {"holds": "same", "recalibrate": "worse: arm"}.get(row["verdict"][1], "undecided")
 
 

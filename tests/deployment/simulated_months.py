@@ -97,4 +97,4 @@ def year_of(
     for number in range(1, months + 1):
         knocked = np.broadcast_to(knock_rad if number == months else 0.0, 6)
         lines.append(session(month(year, number, other_poses, moved, knocked), number, moved))
-    return history(lines, WEIGHT_MM_PER_RAD, seed=year)
+    return history(lines, WEIGHT_MM_PER_RAD)

@@ -22,7 +22,7 @@ KNOCK_RAD = np.array([0.0, 0.0, 2e-3, 0.0, 0.0, 0.0])
 
 
 def history(*sessions):
-    return histories.history(sessions, 500.0, seed=0)
+    return histories.history(sessions, 500.0)
 
 
 def measured(number, knock_rad=0.0, other_poses=False):

@@ -195,7 +195,7 @@ rule history:
     conda:
         "../envs/kinacc.yaml"
     params:
-        **job("history.py", "seed series calibration", tolerance="mm"),
+        **job("history.py", "series calibration", tolerance="mm"),
     message:
         "{wildcards.dataset}: holding the calibrations of the series to one another"
     script:

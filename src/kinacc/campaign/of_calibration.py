@@ -92,7 +92,7 @@ def history(inputs: Mapping[str, Any], settings: Mapping[str, Any]) -> Columns:
             )
         )
     weight = settings["calibration"]["rotation_weight_mm_per_rad"]
-    return compared(sessions, weight, settings["seed"])
+    return compared(sessions, weight)
 
 
 def finished(tables: Mapping[str, Columns], model: str, places: Iterable[Path]) -> float:

@@ -8,7 +8,6 @@ that is no test of the arm but of the model, and nothing can be told.
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -44,7 +43,7 @@ from kinacc.tables.allowed import FIRST, HOLDS, OPEN, RECALIBRATE, SAME
 from kinacc.tables.columns import Columns
 from kinacc.tables.contract import ARTEFACTS, columns_of
 
-LEVEL = 0.05 / 12  # of a decision: monthly calibrations raise a false alarm in 1 year of 20
+LEVEL = 0.01 / 12  # of a decision: monthly calibrations raise a false alarm in 1 year of 100
 ENOUGH = 0.5  # of the readings, in the joint ranges of the series in force
 MOST = 1500  # configurations of a series: what more would add is small beside the misfit
 
@@ -91,13 +90,11 @@ def session_of(
 def history(
     sessions: Sequence[Session],
     rotation_weight_mm_per_rad: float,
-    seed: int,
     level: float = LEVEL,
 ) -> Columns:
     """The history of one robot: a verdict on every series, in the order of their dates.
 
-    A row is the same whatever comes after it: all chance follows from ``seed`` and the names of the
-    two series compared.
+    A row is the same whatever comes after it.
 
     Parameters
     ----------
@@ -105,8 +102,6 @@ def history(
         The series, in any order.
     rotation_weight_mm_per_rad
         Weight of an orientation.
-    seed
-        Of the random draws.
     level
         Share of decisions on an unchanged arm that may be false alarms.
 
@@ -115,7 +110,7 @@ def history(
     Columns
         The table ``history``: one row a session.
     """
-    comparison = _Comparison(rotation_weight_mm_per_rad, seed, level, {})
+    comparison = _Comparison(rotation_weight_mm_per_rad, level, {})
     rows: list[dict[str, Any]] = []
     force, setup = None, Setup(True, True)
     for session in sorted(sessions, key=lambda session: session.date):
@@ -145,7 +140,6 @@ class _Comparison:
     """How sessions are compared; ``known``: what halves of a series showed, by name and setup."""
 
     rotation_weight_mm_per_rad: float
-    seed: int
     level: float
     known: dict[tuple[str, Setup], float]
 
@@ -178,13 +172,14 @@ class _Comparison:
         if pair.has_other_poses:
             halves = [self.understated(item, setup) for item in (force, session)]
             misfit = history_model.misfit_factor(*halves)
-        movement = history_model.moved(pair, misfit, self._rng(force.name, session.name))
-        moved_mm, chance_mm = movement.moved_mm, movement.chance_mm(self.level)
+        movement = history_model.moved(pair, misfit)
+        moved_mm = movement.moved_mm
+        probability, chance_mm = movement.test(self.level)
         row = {
             "moved_mm": moved_mm,
             "chance_mm": chance_mm,
             "beyond_mm": max(0.0, moved_mm - chance_mm),
-            "probability": movement.probability,
+            "probability": probability,
         }
         inside = _share_inside(session.observations.q_rad, force.observations.q_rad, prismatic)
         if inside < ENOUGH:
@@ -210,8 +205,8 @@ class _Comparison:
             series = _thinned(session.observations)
             alone = self._about(session, series, len(series))
             q_rad = np.repeat(series.q_rad, 3 + 3 * series.has_rotation, axis=0)
-            cuts = [*history_model.halves(alone, q_rad, setup)]
-            self.known[key] = history_model.understated(cuts, self._rng(session.name))
+            cuts = history_model.halves(alone, q_rad, setup)
+            self.known[key] = history_model.understated(cuts)
         return self.known[key]
 
     def _about(self, session: Session, series: Observations, first: int) -> history_model.Pair:
@@ -245,10 +240,6 @@ class _Comparison:
                 position_mm = off[Comparison(MEASURED, kind).name].position_mm
                 sizes.append(np.linalg.norm(position_mm, axis=1))
         return np.concatenate(sizes)
-
-    def _rng(self, *names: str) -> np.random.Generator:
-        digest = hashlib.sha256("\n".join(names).encode()).digest()
-        return np.random.default_rng([self.seed, *digest])
 
 
 def _thinned(observations: Observations) -> Observations:

@@ -16,15 +16,14 @@ The null hypothesis: between two series nothing happened at the arm. That does n
 4. Visits repeat within limits, and the instrument has noise.
 
 The change is estimated together with all of these, by least squares under their variances. Smooth
-misfit and states are drawn from their variances. All else is drawn by resampling configurations
-(wild bootstrap: the share of every configuration in the change, from residuals of a fit without it,
-times a random factor), whatever it is made of; readings of one configuration go together, in both
-series.
+misfit and states have the covariance of their variances. All else, whatever it is made of, has that
+of the shares of configurations in the change, from residuals of a fit without each (a jackknife);
+readings of one configuration go together, in both series.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -42,7 +41,7 @@ from kinacc.measurements.folds import configurations
 
 ORDER = 8  # of the polynomials of the misfit; finer misfit differs between configurations
 CUTS = 2  # of one series into halves, across the widest directions of its joints
-DRAWS = 4000
+DRAWS = 100_000  # of the statistic by chance
 UNITS = (1.0, 1.0, 1.0, 1e-3, 1e-3, 1e-3)  # of joint errors: what counts as much as one mm
 _NARROW_RAD = 1e-3
 _SEEN = 1e-3  # of the best seen movement; what moves less is no direction of the arm
@@ -198,12 +197,12 @@ class Moved(NamedTuple):
 
     ``directions`` (d, 6k): joint errors (mm and rad) that move these by 1 mm rms each, after the
     best growth of all lengths, and base and tool where these were set up anew; ``change`` (d,) in
-    mm along them; ``chance`` (DRAWS, d): changes that an arm shows that did not change.
+    mm along them; ``covariance`` (d, d), mm^2: of the changes that an unchanged arm shows.
     """
 
     directions: np.ndarray
     change: np.ndarray
-    chance: np.ndarray
+    covariance: np.ndarray
 
     def along(self, constant: np.ndarray) -> np.ndarray:
         """What joint errors (6k, n) in mm and rad are in mm along the directions, (d, n)."""
@@ -216,33 +215,42 @@ class Moved(NamedTuple):
         return float(np.linalg.norm(self.change))
 
     @property
-    def probability(self) -> float:
-        """Of at least that movement where nothing changed."""
-        more = np.sum(np.linalg.norm(self.chance, axis=1) >= self.moved_mm)
-        return float((1 + more) / (1 + len(self.chance)))
+    def precision(self) -> np.ndarray:
+        """Inverse (d, d) of the covariance with its mean variance added to every direction."""
+        ridge = np.trace(self.covariance) / len(self.covariance) + _LEAST_MM**2
+        return np.linalg.inv(self.covariance + ridge * np.eye(len(self.covariance)))
 
-    def chance_mm(self, level: float) -> float:
-        """The movement that an arm that did not change exceeds in a share ``level`` of cases."""
-        return float(np.quantile(np.linalg.norm(self.chance, axis=1), 1.0 - level))
+    def test(self, level: float) -> tuple[float, float]:
+        """Probability of a change as large by chance, and the movement that chance shows.
 
-    def white(self) -> np.ndarray:
-        """Lower root (d, d) of the covariance of changes by chance."""
-        covariance = self.chance.T @ self.chance / len(self.chance)
-        covariance[np.diag_indices(len(covariance))] += 1e-12 * np.trace(covariance)
-        return scipy.linalg.cholesky(covariance, lower=True)
+        Tested is Hotelling's T^2 with ``precision``: along some directions chance is small, and a
+        change is not to be hidden by chance along others; but the smallest of the variances, from
+        the configurations of two series, are too small. The second number is the rms movement (mm)
+        in the direction of ``change`` that an arm that did not change exceeds in a share ``level``
+        of cases.
+
+        References
+        ----------
+        Chen, Paul, Prentice, Wang, A regularized Hotelling's T2 test for pathway analysis in
+        proteomic studies, JASA 106 (2011), 1345-1360.
+        """
+        weight = np.linalg.eigvals(self.precision @ self.covariance).real
+        normal = np.random.default_rng(0).standard_normal((DRAWS, len(weight)))
+        chance = normal**2 @ weight
+        statistic = float(self.change @ self.precision @ self.change)
+        probability = (1 + np.sum(chance >= statistic)) / (1 + DRAWS)
+        limit = np.quantile(chance, 1.0 - level) / max(statistic, np.finfo(float).tiny)
+        return float(probability), self.moved_mm * float(np.sqrt(limit))
 
 
-def understated(cuts: Sequence[Pair], rng: np.random.Generator) -> float:
+def understated(cuts: Iterable[Pair]) -> float:
     """Mean square movement between halves of one series, over that by chance: 1 if that is right.
 
     Nothing happens to an arm between halves of a series, but they lie apart in the joints: what
     they show beyond chance is misfit that poses of one part do not foretell of another.
     """
-    ratios = []
-    for item in cuts:
-        result = moved(item, 1.0, rng)
-        ratios.append(result.moved_mm**2 / np.mean(np.sum(result.chance**2, axis=1)))
-    return float(np.mean(ratios))
+    results = [moved(item, 1.0) for item in cuts]
+    return float(np.mean([item.moved_mm**2 / np.trace(item.covariance) for item in results]))
 
 
 def misfit_factor(first: float, second: float) -> float:
@@ -250,8 +258,8 @@ def misfit_factor(first: float, second: float) -> float:
     return float(np.sqrt(max(1.0, 0.5 * (first + second))))
 
 
-def moved(pair: Pair, misfit: float, rng: np.random.Generator) -> Moved:
-    """The movement between two series and what chance shows; all chance is of ``rng``.
+def moved(pair: Pair, misfit: float) -> Moved:
+    """The movement between two series and what chance shows.
 
     ``misfit``: factor on the deviations of the misfit that the series do not share, 1 or more.
     """
@@ -278,11 +286,7 @@ def moved(pair: Pair, misfit: float, rng: np.random.Generator) -> Moved:
     scores[~np.isin(np.unique(pair.cluster), both)] *= misfit
     # Between two series a state may differ by both their states.
     smooth = misfit**2 * blurred @ blurred.T + 2.0 * prior[warming] * np.eye(count)
-    values, vectors = np.linalg.eigh(smooth)
-    root = vectors * np.sqrt(np.maximum(values, 0.0))
-    chance = rng.standard_normal((DRAWS, len(scores))) @ scores
-    chance += rng.standard_normal((DRAWS, count)) @ root.T
-    return Moved(directions, result[changes], chance)
+    return Moved(directions, result[changes], scores.T @ scores + smooth)
 
 
 def _unit(columns: np.ndarray) -> np.ndarray:
@@ -342,7 +346,7 @@ def _inverse(matrix: np.ndarray) -> np.ndarray:
     """Inverse of a symmetric, positive definite matrix."""
     lower, _ = scipy.linalg.lapack.dpotrf(matrix, lower=1)
     half, _ = scipy.linalg.lapack.dpotri(lower, lower=1)
-    return np.tril(half) + np.tril(half, -1).T
+    return half + half.T - np.diag(half.diagonal())
 
 
 def _shares(
@@ -372,8 +376,9 @@ def joint_of(movement: Moved, prismatic: np.ndarray) -> int | None:
     Offsets first, as belts, encoders and collisions change these; then all DH parameters of a
     joint. Clear: it explains most beyond chance, and is it with the probability ``_CLEAR``.
     """
-    white = movement.white()
-    chance = float(np.sum(white**2))
+    chance = float(np.trace(movement.covariance))
+    floor = 1e-12 * chance * np.eye(len(movement.change))
+    white = scipy.linalg.cholesky(movement.covariance + floor, lower=True)
     observed = scipy.linalg.solve_triangular(white, movement.change, lower=True)
     slide, turn, along, about_ = (
         ERRORS.index(item) for item in ("delta_z", "eps_z", "delta_x", "eps_x")

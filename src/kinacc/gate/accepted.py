@@ -27,7 +27,6 @@ NOTE = "accepted.json"
 # Of 1 % false alarms 0.3 % are for held-out errors and 0.7 % for the arm: a new fit absorbs a
 # knocked joint, so that only the arm's test shows it.
 CONFIDENCE, ARM_LEVEL = 0.997, 0.007
-_SEED = 16
 _FAR = 3.0  # standard deviations beyond which a parameter counts as moved
 
 
@@ -144,7 +143,7 @@ def _arm(
         history.session_of(folder.read_tables(item, *names), name, name, MOVED, SAME)
         for name, item in (("1 accepted", before), ("2 now", now))
     ]
-    rows = history.history(sessions, rotation_weight_mm_per_rad, _SEED, ARM_LEVEL)
+    rows = history.history(sessions, rotation_weight_mm_per_rad, ARM_LEVEL)
     row = {name: values[1] for name, values in rows.items()}
     figures: dict[str, Any] = {name: float(row[name]) for name in ("moved_mm", "chance_mm")}
     says = f"moved by {figures['moved_mm']:.3f} mm, by chance up to {figures['chance_mm']:.3f} mm"
