@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from oracles.controllers import measured
-from oracles.controllers.arms import Arm
+from oracles.pendants.controllers import MAKERS
 from stages_by_hand import CALIBRATED, run_stage
 
+_FOLDER = TemporaryDirectory()  # of all tests of a run
 
-def calibrated(folder: Path, arm: Arm, poses: int = 90, order: int = 1) -> Path:
-    """The results folder of an arm that was measured and calibrated; its files beside it."""
-    config = measured.write(folder, arm, poses=poses, order=order)
+
+@cache
+def calibrated(maker: str, wave: float = 0.0, poses: int = 90, order: int = 1) -> Path:
+    """The results folder of a maker's arm that was measured and calibrated; its files beside it."""
+    folder = Path(_FOLDER.name) / f"{maker}_{wave}_{poses}_{order}"
+    folder.mkdir()
+    config = measured.write(folder, replace(MAKERS[maker], wave=wave), poses=poses, order=order)
     for stage in CALIBRATED:
         done = run_stage(stage, "--config", config, "--results", folder / "results")
         assert done.exit_code == 0, done.output

@@ -9,7 +9,7 @@ import pytest
 from command_line import call, small_study
 
 from kinacc.deployment.folder import calibration, read_tables, recorded_robot, selected_model
-from kinacc.deployment.permutation import Columns, compare, smallest_changes
+from kinacc.deployment.permutation import ErrorColumns, compare, smallest_changes
 from kinacc.deployment.predict import predict
 from kinacc.geometry import Pose, exp_so3
 from kinacc.tables import store
@@ -21,7 +21,7 @@ SAME, MOVED = (("--base", each, "--tool", each) for each in ("same", "moved"))
 def heavy_tailed(rng, count, fitted=0):
     """Errors of which some are huge, at configurations of one reading with two joints."""
     sizes = rng.lognormal(0.0, 1.0, (count, 1, 1)) * rng.normal(size=(count, 3, 1))
-    return Columns(np.concatenate([rng.normal(size=(count, 3, 2)), sizes], axis=2), fitted)
+    return ErrorColumns(np.concatenate([rng.normal(size=(count, 3, 2)), sizes], axis=2), fitted)
 
 
 def test_the_level_does_not_rest_on_how_errors_are_spread():
@@ -39,13 +39,13 @@ def test_changes_of_the_stated_sizes_are_found_in_four_of_five_cases():
     found = np.zeros((3, 40, 2))
     for seed in range(3):
         rng = np.random.default_rng(seed)
-        held_out = Columns(rng.normal(size=(80, 3, 3)), 0)
+        held_out = ErrorColumns(rng.normal(size=(80, 3, 3)), 0)
         factor, offsets = smallest_changes(held_out, 10)
         for row in found[seed]:
-            new = Columns(rng.normal(size=(10, 3, 3)), 0)
+            new = ErrorColumns(rng.normal(size=(10, 3, 3)), 0)
             off = new.columns.copy()
             off[..., -1] += offsets[1] * off[..., 1]
-            changed = (new.times(factor), Columns(off, 0))
+            changed = (new.times(factor), ErrorColumns(off, 0))
             row[:] = [compare(held_out, each).probability <= 0.01 for each in changed]
     assert (found.mean(axis=(0, 1)) > 0.75).all()
     assert factor < 2.5

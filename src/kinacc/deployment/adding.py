@@ -26,6 +26,8 @@ from kinacc.measurements.reader import read as read_measured
 from kinacc.tables.atomic import write_whole
 from kinacc.tables.columns import Columns
 
+Settings = Mapping[str, Any]
+
 
 @dataclass(frozen=True)
 class Added:
@@ -114,7 +116,7 @@ def _beside(config: str, path: str) -> str:
     return os.path.relpath(path, Path(config).absolute().parent).replace(os.sep, "/")
 
 
-def _day(option: str, date: str | None, path: str, settings: Mapping) -> str:
+def _day(option: str, date: str | None, path: str, settings: Settings) -> str:
     """A day as given, or of the times of the file."""
     days: list[str] = []
     if date is None:
@@ -127,7 +129,7 @@ def _day(option: str, date: str | None, path: str, settings: Mapping) -> str:
     return days[0]
 
 
-def _require_alike(path: str, known: Sequence[str], settings: Mapping, tool: str) -> None:
+def _require_alike(path: str, known: Sequence[str], settings: Settings, tool: str) -> None:
     """InputError for a file that is no new line: unreadable, known readings, other targets."""
     arm = robot.load(settings["robot"])
 

@@ -69,7 +69,7 @@ def is_measured_there(
         True (n,) where every joint is in its fitted range, and the position within ``limit_mm``.
         Without a covariance the ranges decide alone.
     """
-    inside = ~calibration.outside_range(at.q_rad).any(axis=1)
+    inside = np.all(~calibration.outside_range(at.q_rad), axis=1)
     most_mm = limit_mm(calibration, point)
     if np.isfinite(most_mm) and inside.any():
         rows = np.flatnonzero(inside)

@@ -7,6 +7,7 @@ and after the base and tool changes that bring them closest.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -137,18 +138,18 @@ def compare(
     test, parameters = (np.nan, 0, np.nan), None
     if parametric:
         scale = np.array([scale_of(name) for name in first.model.names])
-        values = [item.model.comparable / scale for item in both]
+        before_, after_ = (np.asarray(item.model.comparable) / scale for item in both)
         known = [_Knowledge.of(item, scale) for item in both]
-        test = _test(values[1] - values[0], known)
-        parameters = _parameters(first.model.names, *values, known)
+        test = _test(after_ - before_, known)
+        parameters = _parameters(first.model.names, before_, after_, known)
     before, after = (
         item.pose(JointState(item.robot.dh_joints(q_rad)), "base", FLANGE) for item in both
     )
     weights = np.array([1.0, 1.0, 1.0, *[rotation_weight_mm_per_rad] * 3])
     moved = [_difference(before, after), _aligned(before, after, weights)]
     scatter = _scatter(both, q_rad, before, weights)
-    nominal = (robots.forward(item.robot, q_rad) for item in both)
-    apart_mm = _rms(_aligned(*nominal, weights)[:, :3])
+    nominal = [robots.forward(item.robot, q_rad) for item in both]
+    apart_mm = _rms(_aligned(nominal[0], nominal[1], weights)[:, :3])
     length_mm = float(np.hypot(first.robot.dh.a_mm, first.robot.dh.d_mm).sum())
     enough = float(np.mean(measured)) >= _ENOUGH
     verdicts = {
@@ -177,8 +178,12 @@ def compare(
         len(covered),
         apart_mm,
         shared,
-        tuple(item.misfit.ratio if item.misfit else np.nan for item in both),
+        (_ratio(first), _ratio(second)),
     )
+
+
+def _ratio(calibration: Calibration) -> float:
+    return calibration.misfit.ratio if calibration.misfit else np.nan
 
 
 def require_alike(first: Calibration, second: Calibration) -> None:
@@ -286,7 +291,9 @@ def _aligned(before: Pose, after: Pose, weights: np.ndarray) -> np.ndarray:
     return _difference(before, after)
 
 
-def _scatter(both, q_rad: np.ndarray, pose: Pose, weights: np.ndarray) -> list[np.ndarray | None]:
+def _scatter(
+    both: Sequence[Calibration], q_rad: np.ndarray, pose: Pose, weights: np.ndarray
+) -> list[np.ndarray | None]:
     """Movement (n, 6, r) of the flange by one standard deviation of each direction of the fits.
 
     As fitted, and less what base and end frame absorb; None twice without covariances.

@@ -218,16 +218,8 @@ class _Goals:
         refined = np.where(hit, refined, PoseStatus.NOT_REACHED)
         apart = np.abs(reported - self.near[rows]) / limits.travel_unit(robot)
         status = np.where(hopeless, status, refined)
-        return pd.DataFrame(
-            {
-                "row": rows,
-                "status": status,
-                "off_mm": off,
-                "angle_rad": angle,
-                "movement": np.max(apart, axis=1),
-                **dict(enumerate(q_dh.T)),
-            }
-        )
+        table = pd.DataFrame(q_dh).assign(row=rows, status=status, off_mm=off, angle_rad=angle)
+        return table.assign(movement=np.max(apart, axis=1))
 
     def postures(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Starts (m, k) in every posture of the plain arm at goals ``rows``, and their goals."""
@@ -254,8 +246,9 @@ class _Goals:
         """
         robot = self.calibration.robot
         lower, upper = limits.dh_limits(robot)
-        if self.calibration.model.domain is not None:
-            low, high = self.calibration.fitted_range_rad
+        covered = self.calibration.fitted_range_rad
+        if self.calibration.model.domain is not None and covered is not None:
+            low, high = covered
             cut = np.maximum(lower, low), np.minimum(upper, high)
             lower, upper = np.where(cut[0] < cut[1], cut, (lower, upper))
         near = robot.dh_joints(self.near[rows])

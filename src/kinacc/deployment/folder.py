@@ -20,8 +20,9 @@ from kinacc.kinematics.dh import PARAMETERS, DHModel
 from kinacc.kinematics.robot import Robot
 from kinacc.tables import store
 from kinacc.tables.allowed import SUBSETS
+from kinacc.tables.columns import Columns
 
-Tables = Mapping[str, Mapping[str, np.ndarray]]
+Tables = Mapping[str, Columns]
 
 _NEEDED = (*(f"{kind}_model" for kind in ALWAYS), "frames")
 # Used where they are there.
@@ -37,7 +38,7 @@ def read_tables(
     *more: str,
     needed: Sequence[str] = _NEEDED,
     optional: Sequence[str] = _WANTED,
-) -> dict[str, dict[str, np.ndarray]]:
+) -> dict[str, Columns]:
     """The tables of a data set's results folder: columns (rows,) by table and name.
 
     Parameters
@@ -138,7 +139,7 @@ def _calibration(
     # A model with the base of the DH model: neither was fitted with it.
     same_base = all(np.array_equal(first, two) for first, two in zip(*bases, strict=True))
     anchored = created[choice].table is None and not same_base
-    fitted, turned = None, frozenset()
+    fitted, turned = None, frozenset[str]()
     if "measurements" in tables:
         measured = from_columns(tables["measurements"], robot)
         fitted = measured.at.select(np.asarray(tables["measurements"]["subset"]) == SUBSETS[0])
@@ -167,13 +168,13 @@ def _calibration(
     )
 
 
-def targets_of(frames: Mapping, model: str) -> list[str]:
+def targets_of(frames: Columns, model: str) -> list[str]:
     """Names of the targets that a model was fitted with, from the table ``frames``."""
     of_model = np.asarray(frames["model"]) == model
     return [str(item) for item in np.asarray(frames["frame"])[of_model] if item != "base"]
 
 
-def _session_number(frames: Mapping, model: str, session: str | None) -> int:
+def _session_number(frames: Columns, model: str, session: str | None) -> int:
     """Place of a session among the bases of a model; InputError for one that is not there."""
     if session is None or "session" not in frames:
         return 0
@@ -192,11 +193,12 @@ def selected_model(tables: Tables) -> str:
     """
     if recorded := recorded_model(tables):
         return recorded
-    rms = {kind: residual(tables, kind, "validation") for kind in ALWAYS}
-    if any(item is None for item in rms.values()):
+    held_out = {kind: residual(tables, kind, "validation") for kind in ALWAYS}
+    rms_mm = {kind: item.position_mm for kind, item in held_out.items() if item}
+    if len(rms_mm) < len(ALWAYS):
         message = "was not selected, and there are no held-out residuals to choose by"
         raise InputError(Problem("model", message, ", ".join(MODELS), "give --model"))
-    return min(rms, key=lambda kind: rms[kind].position_mm)
+    return min(rms_mm, key=rms_mm.__getitem__)
 
 
 def recorded_model(tables: Tables) -> str:

@@ -43,7 +43,7 @@ from kinacc.tables.allowed import FIRST, HOLDS, OPEN, RECALIBRATE, SAME
 from kinacc.tables.columns import Columns
 from kinacc.tables.contract import ARTEFACTS, columns_of
 
-LEVEL = 0.01 / 12  # of a decision: monthly calibrations raise a false alarm in 1 year of 100
+LEVEL = 0.005 / 12  # of a decision: monthly calibrations raise a false alarm in 1 year of 200
 ENOUGH = 0.5  # of the readings, in the joint ranges of the series in force
 MOST = 1500  # configurations of a series: what more would add is small beside the misfit
 
@@ -225,7 +225,7 @@ class _Comparison:
         """
         calibration, observed = force.calibration, session.observations
         kind, model = calibration.choice, calibration.model
-        observed = observed.select(covers(model, observed.q_rad).all(axis=1))
+        observed = observed.select(np.all(covers(model, observed.q_rad), axis=1))
         moved = [BASE] * (not setup.same_base or len(observed.session_names) > 1)
         moved += [TOOL] * (
             not setup.same_tool or not {*observed.target_names} <= {*calibration.targets}

@@ -25,7 +25,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy
@@ -175,7 +175,7 @@ def halves(series: Pair, q_rad: np.ndarray, setup: Setup) -> Iterator[Pair]:
 def joined(first: Observations, second: Observations, setup: Setup) -> Observations:
     """Both series as one; sessions and targets of the second are those of the first if the same."""
     names = ("q_rad", "s", "position_mm", "rotation", "repeat", "fold", "payload")
-    columns = {
+    columns: dict[str, Any] = {
         name: np.concatenate([getattr(first, name), getattr(second, name)]) for name in names
     }
     for name, same in (("session", setup.same_base), ("target", setup.same_tool)):

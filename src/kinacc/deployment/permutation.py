@@ -24,7 +24,7 @@ _LEAST_MM = 0.05  # rms: joints that move less by 1 mrad, base and tool fitted, 
 _COPIES, _STEPS, _TOO_LARGE = 8, 2, 20.0
 
 
-class Columns(NamedTuple):
+class ErrorColumns(NamedTuple):
     """Configurations of equally many readings: ``columns`` (n, r, p + k + 1), mm.
 
     The first p = ``fitted`` columns are motions of base and tool that are fitted, the next k the
@@ -39,7 +39,7 @@ class Columns(NamedTuple):
         """Products (n, q, q) of the columns."""
         return np.swapaxes(self.columns, 1, 2) @ self.columns
 
-    def times(self, factor: float) -> Columns:
+    def times(self, factor: float) -> ErrorColumns:
         """Errors multiplied by a factor."""
         size = self.columns.shape[2]
         return self._replace(columns=self.columns * np.append(np.ones(size - 1), factor))
@@ -69,7 +69,7 @@ class PermutationTest:
     offset: float
 
 
-def compare(held_out: Columns, new: Columns) -> PermutationTest:
+def compare(held_out: ErrorColumns, new: ErrorColumns) -> PermutationTest:
     """Test ``new`` configurations, with errors after the fit of what moved, against all."""
     observed = _statistics(new.products.mean(axis=0, keepdims=True), new)
     # The fit made the new errors smaller: this is undone before samples are drawn.
@@ -88,7 +88,7 @@ def compare(held_out: Columns, new: Columns) -> PermutationTest:
     )
 
 
-def smallest_changes(held_out: Columns, count: int) -> tuple[float, np.ndarray]:
+def smallest_changes(held_out: ErrorColumns, count: int) -> tuple[float, np.ndarray]:
     """Smallest changes detected in 80 % of samples of ``count`` configurations.
 
     A factor on all errors, and an offset (k,) of each joint in mrad or mm; inf where none is.
@@ -123,7 +123,7 @@ class _Statistics(NamedTuple):
     size: np.ndarray
 
 
-def _statistics(sums: np.ndarray, like: Columns) -> _Statistics:
+def _statistics(sums: np.ndarray, like: ErrorColumns) -> _Statistics:
     """Statistics of mean products (m, q, q) of samples, of configurations ``like`` these."""
     fitted = like.fitted
     rest = sums[:, fitted:, fitted:]

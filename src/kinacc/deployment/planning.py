@@ -210,9 +210,12 @@ def between(measured: np.ndarray, unit: np.ndarray, count: int, seed: int) -> np
         message = "all measured poses are at the same joints"
         raise InputError(Problem("region", message, "at least 2 different poses"))
     random = np.random.default_rng(seed)
-    near = cKDTree(different / unit).query(different / unit, min(_NEIGHBOURS + 1, len(different)))
+    _, near = cKDTree(different / unit).query(
+        different / unit, min(_NEIGHBOURS + 1, len(different))
+    )
+    near = np.asarray(near)
     start = random.integers(len(different), size=count)
-    end = near[1][start, random.integers(1, near[1].shape[1], size=count)]
+    end = near[start, random.integers(1, near.shape[1], size=count)]
     share = random.random((count, 1))
     return different[start] + share * (different[end] - different[start])
 
@@ -249,7 +252,7 @@ def _slopes(arm: Calibration, q_dh: np.ndarray, experiment: Experiment) -> np.nd
     """Movement (n, m, P) of what is measured at DH joints (n, k), per mm or mrad."""
     weight = np.array([1.0, 1.0, 1.0, *[experiment.rotation_weight_mm_per_rad] * 3])
     observed = 6 if experiment.orientation else 3
-    slopes = np.empty((len(q_dh), observed, len(arm.known.names)))
+    slopes = np.empty((len(q_dh), observed, len(arm.units)))
     for begin in range(0, len(q_dh), BLOCK):
         block = slice(begin, begin + BLOCK)
         part = sensitivity(arm, JointState(q_dh[block]), "instrument", TOOL)

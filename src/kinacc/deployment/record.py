@@ -167,8 +167,12 @@ class Calibration:
     @property
     def units(self) -> np.ndarray:
         """Unit (P,) in which displacements of the parameters are measured: mm, and one mrad."""
-        names = self.known.names if self.known else ()
-        return np.array([scale_of(name) for name in names])
+        return np.array([scale_of(name) for name in self.parameters])
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Names (P,) of the fitted parameters; none without a covariance."""
+        return self.known.names if self.known else ()
 
     def outside_range(self, q_rad: np.ndarray, slack: np.ndarray | float = 1e-9) -> np.ndarray:
         """True (n, k) where a DH joint lies outside what the data cover by more than ``slack``."""

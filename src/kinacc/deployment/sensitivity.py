@@ -34,9 +34,9 @@ def deviations(
         model, which other models follow along these. NaN without a covariance.
     """
     std, undetermined = np.full((len(at), 6), np.nan), np.full((len(at), 2), np.nan)
-    if calibration.known is None:
-        return std, undetermined
     plainest = calibration.plainest
+    if calibration.known is None or plainest.known is None:
+        return std, undetermined
     directions = (plainest.known.undetermined * plainest.units).T
     for first in range(0, len(at), BLOCK):
         block = slice(first, first + BLOCK)
@@ -53,15 +53,15 @@ def deviations(
 def sensitivity(
     calibration: Calibration, at: JointState, frame: str = "base", point: str | None = None
 ) -> np.ndarray:
-    """Jacobian (n, 6, P) of the pose in the parameters of ``calibration.known``.
+    """Jacobian (n, 6, P) of the pose in ``calibration.parameters``.
 
     Rows: position (mm) and small turn (rad) in ``frame``.
     """
     name = point or calibration.default_point
     target, origin = calibration.point(name), calibration.origin(frame)
     end = calibration.model.pose(at)
-    slopes = np.zeros((len(at), 6, len(calibration.known.names)))
-    place = {name: column for column, name in enumerate(calibration.known.names)}
+    slopes = np.zeros((len(at), 6, len(calibration.parameters)))
+    place = {name: column for column, name in enumerate(calibration.parameters)}
     chosen = [
         (place[parameter], number)
         for number, parameter in enumerate(calibration.model.names)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,6 +10,7 @@ import pandas as pd
 
 from kinacc.deployment.record import Calibration
 from kinacc.tables.allowed import SUBSETS
+from kinacc.tables.columns import Columns
 
 _COINCIDENCE = 0.01  # of the smaller table: fewer equal readings may be chance
 _DIGITS = 6  # of mm; angles have three more
@@ -32,7 +33,7 @@ class SharedReadings:
 NONE_SHARED = SharedReadings(0, 0, 0)
 
 
-def known_rows(table: Mapping, earlier: Mapping) -> np.ndarray:
+def known_rows(table: Columns, earlier: Columns) -> np.ndarray:
     """True (n,) for rows of a table ``measurements`` that an ``earlier`` one holds as well.
 
     Joints and position agree to the last digits; nowhere where so few do that it may be chance.
@@ -60,7 +61,7 @@ def known_readings(readings: Sequence[np.ndarray], earlier: Sequence[np.ndarray]
     return known & (known.sum() >= _COINCIDENCE * min(len(index), len(index_before)))
 
 
-def shared(first: Mapping | None, second: Mapping | None) -> SharedReadings:
+def shared(first: Columns | None, second: Columns | None) -> SharedReadings:
     """Readings in both of two tables ``measurements``, of those that are fitted to."""
     if first is None or second is None:
         return NONE_SHARED

@@ -23,7 +23,14 @@ from kinacc.calibration.tables import frames_of
 from kinacc.config.error_models import ERROR_MODELS, MEASURED, NOMINAL, Comparison
 from kinacc.deployment import folder
 from kinacc.deployment.applicability import is_measured_there
-from kinacc.deployment.permutation import LEVEL, Columns, PermutationTest, compare, smallest_changes
+from kinacc.deployment.folder import Tables
+from kinacc.deployment.permutation import (
+    LEVEL,
+    ErrorColumns,
+    PermutationTest,
+    compare,
+    smallest_changes,
+)
 from kinacc.deployment.record import Calibration
 from kinacc.deployment.shared_readings import known_rows
 from kinacc.errors import InputError, Problem
@@ -32,8 +39,8 @@ from kinacc.kinematics.model import ErrorModel
 from kinacc.kinematics.robot import Robot, carried
 from kinacc.kinematics.tables import models
 from kinacc.measurements.folds import configurations
+from kinacc.tables.columns import Columns
 
-Tables = Mapping[str, Mapping[str, np.ndarray]]
 BASE, TOOL = "base", "tool"
 PASS, FAIL, UNDECIDED = "pass", "fail", "undecided"
 SET_UP_MOVED = "the instrument or the tool was moved"
@@ -108,7 +115,7 @@ class Verification:
 def verify(
     tables: Tables,
     robot: Robot,
-    columns: Mapping[str, np.ndarray],
+    columns: Columns,
     moved: Sequence[str],
     rotation_weight_mm_per_rad: float,
 ) -> Verification:
@@ -151,8 +158,9 @@ def verify(
         and len(observed.session_names) > 1,
         "no reading near a measured pose": not len(rows),
     }
-    if any(obstacles.values()):
-        return replace(result, reason=next(text for text, holds in obstacles.items() if holds))
+    obstacle = next((text for text, holds in obstacles.items() if holds), "")
+    if obstacle or held_out is None:
+        return replace(result, reason=obstacle)
     new = observed.select(rows.ravel())
     new = replace(new, rotation=np.full_like(new.rotation, np.nan))
     of_sessions = _of_sessions(tables, robot, kind, new.session_names, moved)
@@ -225,7 +233,7 @@ def _held_out(
     robot: Robot,
     readings: Observations,
     moved: Sequence[str],
-) -> Columns | None:
+) -> ErrorColumns | None:
     """Held-out errors of configurations with the targets of ``readings``; None where none are."""
     if not {"pose_errors", "measurements"} <= set(tables):
         return None
@@ -257,7 +265,7 @@ def held_out_vectors(pose_errors: Mapping[str, np.ndarray], kind: str, count: in
 
 def _columns(
     model: ErrorModel, at: Observations, targets: Pose, moved: Sequence[str], off_mm: np.ndarray
-) -> Columns:
+) -> ErrorColumns:
     """Motions of what moved, offsets of the joints and errors ``off_mm`` (n, K, 3) in the base."""
     flange = model.pose(at.at)
     slopes = np.where(model.dh.prismatic, 1.0, ANGLE_UNIT_RAD) * model.joint_jacobian(at.at)
@@ -273,10 +281,10 @@ def _columns(
     fitted = sum(part.shape[2] for part in parts)
     slopes = np.repeat(slopes, kinds, axis=0)
     parts += [slopes[:, :3] - skew(arm) @ slopes[:, 3:], off_mm.reshape(-1, 3, 1)]
-    return Columns(np.concatenate(parts, axis=2).reshape(count, 3 * kinds, -1), fitted)
+    return ErrorColumns(np.concatenate(parts, axis=2).reshape(count, 3 * kinds, -1), fitted)
 
 
-def _level(of: Columns) -> Level:
+def _level(of: ErrorColumns) -> Level:
     sizes = np.linalg.norm(of.columns[..., -1].reshape(-1, 3), axis=1)
     quantile = float(np.quantile(sizes, LARGE_SHARE))
     return Level(len(sizes), len(of.columns), float(sizes.mean()), quantile)

@@ -3,7 +3,6 @@
 import json
 
 import numpy as np
-import pytest
 import yaml
 from command_line import call
 from lxml import etree
@@ -23,11 +22,6 @@ def exported(results, maker):
     return answer, groups, target
 
 
-@pytest.fixture(scope="module")
-def ur(tmp_path_factory):
-    return calibrated(tmp_path_factory.mktemp("ur"), ARMS["ur"])
-
-
 def ends(rows, q):
     """Positions at joints of a chain of rows theta, d, a, alpha, beta (mm)."""
     here = np.eye(4)
@@ -40,11 +34,13 @@ def ends(rows, q):
     return here
 
 
-def test_ur_staubli_and_ros_describe_the_same_arm(ur):
+def test_ur_staubli_and_ros_describe_the_same_arm():
     """Common normals hundreds of metres away, offsets with a turn about y, and joint origins."""
     arm, rng = ARMS["ur"], np.random.default_rng(3)
     nominal = np.array([[np.deg2rad(t), d, a, np.deg2rad(al), 0.0] for t, d, a, al in arm.rows])
-    by_ur, by_staubli, by_ros = (exported(ur, each) for each in ("ur", "staubli", "ros"))
+    by_ur, by_staubli, by_ros = (
+        exported(calibrated("ur"), each) for each in ("ur", "staubli", "ros")
+    )
     deltas = np.array([*by_ur[1]["DH deltas"].values()]).reshape(4, 6).T
     theta, a, d, alpha = deltas.T
     normals = nominal + np.stack([theta, 1e3 * d, 1e3 * a, alpha, 0.0 * d], axis=1)
@@ -77,10 +73,10 @@ def test_ur_staubli_and_ros_describe_the_same_arm(ur):
     assert by_ur[0]["errors"][0]["position_mm"] < 1.02 * by_ur[0]["errors"][1]["position_mm"]
 
 
-def test_a_table_or_joints_that_a_controller_does_not_have_are_refused(ur, tmp_path):
-    done = call("export", ur, "--for", "kuka", "--out", ur.parent / "twice")
+def test_a_table_or_joints_that_a_controller_does_not_have_are_refused(tmp_path):
+    ur, fanuc = calibrated("ur"), calibrated("fanuc")
+    done = call("export", ur, "--for", "kuka", "--out", tmp_path)
     assert done.exit_code == 0
-    assert call("export", ur, "--for", "kuka", "--out", ur.parent / "twice").exit_code == 2
-    fanuc = calibrated(tmp_path, ARMS["fanuc"], 40)
+    assert call("export", ur, "--for", "kuka", "--out", tmp_path).exit_code == 2
     for maker in ("ur", "staubli", "ros"):
         assert call("export", fanuc, "--for", maker, "--out", tmp_path).exit_code == 2

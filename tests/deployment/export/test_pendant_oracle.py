@@ -17,7 +17,7 @@ FACTOR, POSES = 1.2, 40
 def test_the_true_arm_misses_by_no_more_than_the_page_states(tmp_path, maker):
     """Goals in the frame of the instrument, drawn where the arm was measured."""
     arm = MAKERS[maker]
-    results = calibrated(tmp_path, arm)
+    results = calibrated(maker)
     done = call("export", results, "--for", maker, "--out", tmp_path, "--json")
     assert done.exit_code == 0, done.output
     answer, typed = json.loads(done.output), {}

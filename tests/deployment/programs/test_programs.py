@@ -276,6 +276,12 @@ def test_waypoints_of_polyscope_start_from_their_joints(tmp_path):
             [3],
         ),
         (
+            "weld.src",
+            "$TOOL=$NULLFRAME\nLIN {X 500,Y 0,Z 600,A 0,B 90,C 0,S 2,T TURN}\n"
+            "DECL POS XP={X 500,Y 0,Z 600,A 0,B 90,C 0,S STATUS,T 2}\nLIN XP\n",
+            [2, 4],
+        ),
+        (
             "weld.mod",
             "CONST robtarget p1:=[[500,0,600],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];\n"
             "PROC main()\nMoveL p1,v100,z10,tool0;\nIF p2_ok THEN\n p1:=p2;\nELSE\n MoveL "

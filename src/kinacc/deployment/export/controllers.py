@@ -16,6 +16,7 @@ from kinacc.deployment.programs.orientation import (
     QUATERNION,
     VECTOR,
     Convention,
+    Orientation,
 )
 from kinacc.errors import InputError, Problem
 from kinacc.geometry import IDENTITY, Pose, compose, rotation_x, rotation_y, rotation_z
@@ -67,7 +68,7 @@ def _zeros(names: str) -> Callable[[Robot, DHModel], Numbers]:
 
 
 def _frame(
-    names: str, orientation: str, length: str = "mm", angle: str = "deg"
+    names: str, orientation: Orientation, length: str = "mm", angle: str = "deg"
 ) -> Callable[[Pose], Numbers]:
     """Names, numbers and units of a frame."""
     convention = Convention(orientation, *(_UNITS[unit] for unit in (length, angle)))
@@ -124,7 +125,8 @@ def _ur(robot: Robot, model: DHModel) -> Numbers:
 def _ros(robot: Robot, model: DHModel) -> Numbers:
     """Origins of the joints, each in the link before it, d in front of the joint as UR has it."""
     names = _UR_LINKS if model.joints == len(_UR_LINKS) else robot.joint_names
-    numbers, before = {}, IDENTITY
+    numbers: Numbers = {}
+    before = IDENTITY
     for joint, name in enumerate(names):
         along = np.array([0.0, 0.0, model.d_mm[joint]])
         origin = compose(before, Pose(rotation_z(model.theta_offset_rad[joint]), along))

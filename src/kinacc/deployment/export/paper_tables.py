@@ -82,9 +82,10 @@ def _residuals(source: Source, comparison: str, name: str, caption: str) -> Pape
 
 def _parameters(source: Source) -> PaperTable:
     fitted = pd.DataFrame(dict(source.tables["dh_model"])).sort_values("joint", kind="stable")
-    reported = source.tables.get(f"{PLAINEST}_identified", {"parameter": [], "status": []})
-    pairs = zip(reported["parameter"], reported["status"], strict=True)
-    fixed = {str(parameter) for parameter, status in pairs if status == FIXED}
+    reported = pd.DataFrame(
+        source.tables.get(f"{PLAINEST}_identified", {}), columns=["parameter", "status"]
+    )
+    fixed = {*reported.loc[reported["status"] == FIXED, "parameter"]}
     shown = [item for item in PARAMETERS if item != "beta_rad" or (fitted[item] != 0.0).any()]
 
     def cell(joint: int, parameter: str, value: float, std: float) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -60,7 +61,7 @@ class Pendant:
 
 
 def fit_pendant(
-    tables: Tables, robot: Robot, settings: Mapping, controller: str, name: str = ""
+    tables: Tables, robot: Robot, settings: Mapping[str, Any], controller: str, name: str = ""
 ) -> Pendant:
     """The numbers for a controller (a key of ``CONTROLLERS``), fitted to measured poses.
 
@@ -176,7 +177,7 @@ def _numbers(maker: Controller, robot: Robot, fit: Fit, every: Observations) -> 
     result = {maker.group: maker.arm(robot, fit.model.dh)}
     for name, turn, place in zip(every.target_names, *fit.frames.targets, strict=True):
         result[f"TOOL {name}"] = maker.frame(compose(invert(robot.flange), Pose(turn, place)))
-    for name, turn, place in zip(every.session_names, *fit.frames.bases, strict=True):
+    for session, turn, place in zip(every.session_names, *fit.frames.bases, strict=True):
         base = compose(robot.base, invert(Pose(turn, place)))
-        result[f"BASE {name or ''}".strip()] = maker.frame(base)
+        result[f"BASE {session or ''}".strip()] = maker.frame(base)
     return result

@@ -27,7 +27,7 @@ class Source:
     """
 
     calibration: Calibration
-    tables: Mapping[str, Mapping[str, np.ndarray]]
+    tables: results.Tables
     provenance: Mapping[str, str] = field(default_factory=dict)
     urdf_file: Path | str | None = None
     links: tuple[str | None, str | None] = (None, None)

@@ -64,6 +64,7 @@ _SHOWN = [
 _POINT = "tool of the program"
 _TRACK = "an external axis is not at zero (--base-is-fixed: none moves the robot's base)"
 Ask = Callable[[str, str], np.ndarray]
+Options = Mapping[str, Mapping[str, np.ndarray]]
 
 
 @dataclass(frozen=True)
@@ -93,13 +94,13 @@ class CorrectedProgram:
             "calibration": self.calibration,
             "sha256": _digest(self.files.values()),
         }
-        contents = {out: self.files[first]}
+        contents: dict[str | Path, bytes] = {out: self.files[first]}
         contents |= {out.with_suffix(path.suffix): self.files[path] for path in others}
         contents[out.with_name(out.name + _RECORD)] = f"{json.dumps(facts, indent=1)}\n".encode()
         fix = "give --force to replace it"
         refuse(
             Problem(str(path), "is there already", fix=fix)
-            for path in contents
+            for path in map(Path, contents)
             if path.exists() and not force
         )
         write_together(contents)
@@ -258,9 +259,9 @@ def _starts(
         elif not start and len(item.places) != robot.dh.joints:
             start = f"has {len(item.places)} joints, not {robot.dh.joints}"
         elif not start:
-            start = item.numbers / item.scale * _unit(robot)
-            if not limits.within(start, robot.q_min_rad, robot.q_max_rad):
-                start = "its joints are beyond the limits"
+            q_rad = item.numbers / item.scale * _unit(robot)
+            inside = limits.within(q_rad, robot.q_min_rad, robot.q_max_rad)
+            start = q_rad if inside else "its joints are beyond the limits"
         if isinstance(start, str):
             reasons[number] = start
         else:
@@ -300,7 +301,7 @@ def _refuse_second_time(program: Program) -> None:
             raise InputError(Problem(str(path), f"was compensated before ({record.name})", fix=fix))
 
 
-def _in_use(program: Program, options: Mapping) -> Program:
+def _in_use(program: Program, options: Options) -> Program:
     """The program without poses that no move uses, unless a frame for all of them is given."""
     used: list[Position] = []
     lines = [*program.not_corrected]
@@ -315,7 +316,7 @@ def _in_use(program: Program, options: Mapping) -> Program:
 
 
 def _all_frames(
-    program: Program, convention: Convention, options: Mapping, ask: Ask | None
+    program: Program, convention: Convention, options: Options, ask: Ask | None
 ) -> Frames:
     """The program's frames and those a person gave; InputError naming those that are missing."""
     frames, problems = dict(program.frames), []

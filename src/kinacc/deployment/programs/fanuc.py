@@ -39,7 +39,7 @@ def read(sources: Sequence[Source], _: np.ndarray | None) -> Program:
     return Program(sources, [*filter(None, positions)], computed)
 
 
-def _position(source: Source, match: re.Match) -> Position | None:
+def _position(source: Source, match: re.Match[str]) -> Position | None:
     values = {value[1]: value for value in _VALUE.finditer(source.text, *match.span(2))}
     numbered, config = dict(_NUMBERED.findall(match[2])), _CONFIG.search(match[2])
     is_pose = "X" in values
@@ -61,7 +61,7 @@ def _position(source: Source, match: re.Match) -> Position | None:
     )
 
 
-def _stated(config: re.Match) -> tuple[str | None, ...]:
+def _stated(config: re.Match[str]) -> tuple[str | None, ...]:
     turns = zip((1, 4, 6), re.findall(r"-?\d+", config[4]), strict=False)
     return (*config.groups()[:3], *(f"J{axis} turn {int(turn)}" for axis, turn in turns))
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -77,10 +78,11 @@ def read(sources: Sequence[Source], _: np.ndarray | None) -> Program:
                     for number, parts in enumerate(aggregates[: 2 if motion[1] else 1])
                 }
                 target = re.split(r"\bWITH\b|\bC_\w+", re.sub(r"\{[^}]*\}", "", motion[3]))[0]
-                if motion[2] or ":" in target or None in inline.values():
+                written = {name: position for name, position in inline.items() if position}
+                if motion[2] or ":" in target or len(written) < len(inline):
                     computed.append(statement)
                     continue
-                positions |= inline
+                positions |= written
                 target = re.sub(r"\[.*?\]", "", target.upper())
                 names = {*re.findall(r"\$?\b[A-Z_]\w*", target)} - {"CA"}
                 moves.append((statement, names))
@@ -177,15 +179,21 @@ def _position(source: Source, parts: Parts) -> Position | None:
         return Position("", source, places, 4, 1.0)
     if not (places := _places(parts, _FRAME)):
         return None
+    status, turn = (_whole(parts[key][0]) if key in parts else 0 for key in "ST")
+    if status is None or turn is None:  # a variable
+        return None
     outer = [parts[key][0] for key in parts if re.fullmatch(r"E[1-6]", key)]
     moves = any(re.fullmatch(NUMBER, text) and float(text) for text in outer)
-    stated = _bits(*(_whole(parts[key][0]) for key in "ST")) if {*"ST"} <= set(parts) else ()
+    stated = _bits(status, turn) if {*"ST"} <= set(parts) else ()
     return Position("", source, places, 4, posture=stated, moves_outside=moves)
 
 
-def _whole(text: str) -> int:
-    """A status or turn: 6, 'B110' or 'H6'."""
-    return int(re.sub("^'[BH]|'", "", text.upper()), {"B": 2, "H": 16}.get(text[1:2].upper(), 10))
+def _whole(text: str) -> int | None:
+    """A status or turn: 6, 'B110' or 'H6'; None for a variable."""
+    base = {"'B": 2, "'H": 16}.get(text[:2].upper(), 10)
+    with suppress(ValueError):
+        return int(text if base == 10 else text[2:-1], base)
+    return None
 
 
 LANGUAGE = Language(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Final, Literal, NamedTuple
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -10,8 +10,12 @@ from scipy.spatial.transform import Rotation
 from kinacc.errors import InputError, Problem
 from kinacc.geometry import Pose
 
-KUKA, FIXED, INTRINSIC = "ZYX", "xyz", "XYZ"
-QUATERNION, VECTOR = "quaternion", "rotation vector"
+Orientation = Literal["ZYX", "xyz", "XYZ", "quaternion", "rotation vector"]
+KUKA: Final = "ZYX"
+FIXED: Final = "xyz"
+INTRINSIC: Final = "XYZ"
+QUATERNION: Final = "quaternion"
+VECTOR: Final = "rotation vector"
 _UNIT = 1e-3
 
 
@@ -23,7 +27,7 @@ class Convention(NamedTuple):
     ``angle_deg``: mm and degrees of the written units.
     """
 
-    orientation: str
+    orientation: Orientation
     length_mm: float = 1.0
     angle_deg: float = 1.0
 
@@ -50,13 +54,13 @@ class Convention(NamedTuple):
             ways = [quaternion, -quaternion]
         elif self.orientation == VECTOR:
             vector = rotation.as_rotvec(degrees=True)
-            turn = 360.0 * vector / max(np.linalg.norm(vector), 1e-12)
+            turn = 360.0 * vector / max(float(np.linalg.norm(vector)), 1e-12)
             ways = [vector, vector - turn, vector + turn]
         else:
             first = rotation.as_euler(self.orientation, degrees=True, suppress_warnings=True)
             second = first * [1.0, -1.0, 1.0] + 180.0
             ways = [way + 360.0 * np.rint((unit * near - way) / 360.0) for way in (first, second)]
-        best = min(ways, key=lambda way: np.linalg.norm(way - unit * near))
+        best = min(ways, key=lambda way: float(np.linalg.norm(way - unit * near)))
         return np.concatenate([pose.position_mm / self.length_mm, best / unit])
 
     def typed(self, numbers: np.ndarray) -> Pose:

@@ -38,13 +38,13 @@ def unmatched(
     return ", ".join(now for wanted, now, *near in parts if wanted not in (None, now, *near))
 
 
-def postures_of(robot: Robot, flange: Sequence[Pose]) -> Sequence[np.ndarray]:
+def postures_of(robot: Robot, flange: Sequence[Pose]) -> list[np.ndarray]:
     """Reported joints (m, k) of all postures at flange poses; NaN where not reached."""
     if not flange:
         return []
     stacked = Pose(*(np.stack(part) for part in zip(*flange, strict=True)))
     goal = compose(invert(robot.base), compose(stacked, invert(robot.flange)))
-    return limits.reported_joints(robot, solve(robot, robot.dh, goal).q_rad)
+    return [*limits.reported_joints(robot, solve(robot, robot.dh, goal).q_rad)]
 
 
 def choose(

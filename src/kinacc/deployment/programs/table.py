@@ -14,6 +14,7 @@ from kinacc.deployment.programs.orientation import (
     QUATERNION,
     VECTOR,
     Convention,
+    Orientation,
 )
 from kinacc.deployment.programs.record import (
     ROBOT,
@@ -25,7 +26,7 @@ from kinacc.deployment.programs.record import (
 from kinacc.errors import InputError, Problem
 
 _UNITS = {"rad": 180.0 / np.pi, "m": 1e3}  # deg and mm where not stated
-_KEYS = {
+_KEYS: dict[Orientation, str] = {
     QUATERNION: "x y z qw qx qy qz",
     VECTOR: "x y z rvx rvy rvz",
     INTRINSIC: "x y z rx ry rz",
@@ -49,7 +50,7 @@ def read(sources: Sequence[Source], _: np.ndarray | None) -> Program:
     convention = scale = None
     if keys := sorted(name for name in units if re.fullmatch(r"q[1-9]", name)):
         scale = np.array([1.0 / units[key] for key in keys])
-    elif kind := next((kind for kind in _KEYS if {*_KEYS[kind].split()} <= {*units}), ""):
+    elif kind := next((kind for kind in _KEYS if {*_KEYS[kind].split()} <= {*units}), None):
         keys = _KEYS[kind].split()
         convention = Convention(kind, units["x"], units[keys[-1]])
     else:

@@ -14,6 +14,7 @@ from kinacc.deployment.programs.record import (
     TOOL,
     Frames,
     Language,
+    Place,
     Position,
     Program,
     Source,
@@ -78,7 +79,12 @@ def read(sources: Sequence[Source], pulses: np.ndarray | None) -> Program:
 
 
 def _position(
-    source: Source, name: str, places: list, state: dict, pulses: np.ndarray | None, moves: bool
+    source: Source,
+    name: str,
+    places: list[Place],
+    state: dict[str, str],
+    pulses: np.ndarray | None,
+    moves: bool,
 ) -> Position:
     if state.get("unit") != "RECTAN":
         if pulses is None:

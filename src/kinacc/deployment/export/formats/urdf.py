@@ -9,6 +9,7 @@ import re
 from pathlib import Path
 
 import numpy as np
+from lxml import etree
 
 from kinacc.calibration.hand_eye import closed_form_start
 from kinacc.calibration.observations import full_poses
@@ -48,10 +49,8 @@ def generated(source: Source) -> str:
     Joints are those the controller reports, or with ``dh_joints`` those of the DH table. Raises
     InputError where the robot's reported joints are coupled.
     """
-    from lxml import etree
-
     calibration = source.calibration
-    robot, dh = calibration.robot, calibration.model
+    robot, dh = calibration.robot, source.dh
     names = robot.joint_names or tuple(f"joint_{i}" for i in range(1, dh.joints + 1))
     senses = np.ones(dh.joints) if source.dh_joints else _signs(robot)
     frames, end = origins(dh)
@@ -100,12 +99,10 @@ def corrected(source: Source) -> str:
     none). The file's nominal arm must be the robot of the calibration, up to where its base and tip
     links sit. Raises InputError where it is not, saying how far apart the two are.
     """
-    from lxml import etree
-
     calibration, path = source.calibration, Path(source.urdf_file or "")
     base, tip = _ends_in_file(calibration.robot, path, source.links)
     plain, _ = origins(calibration.robot.dh)
-    better, end = origins(calibration.model)
+    better, end = origins(source.dh)
     tree = etree.parse(str(path), etree.XMLParser(resolve_entities=False, no_network=True))
     elements = {item.get("name"): item for item in tree.getroot().findall("joint")}
     frame, before, here, gap = base, invert(base), IDENTITY, IDENTITY
@@ -165,9 +162,9 @@ def _ends_in_file(
     return options[0] if misfits[0] <= 1e-8 else options[int(np.argmin(misfits))]
 
 
-def _joint(root, name: str, kind: str, parent: str, child: str, origin: Pose):
-    from lxml import etree
-
+def _joint(
+    root: etree._Element, name: str, kind: str, parent: str, child: str, origin: Pose
+) -> etree._Element:
     joint = etree.SubElement(root, "joint", name=name, type=kind)
     _set_origin(joint, origin)
     etree.SubElement(joint, "parent", link=parent)
@@ -175,9 +172,7 @@ def _joint(root, name: str, kind: str, parent: str, child: str, origin: Pose):
     return joint
 
 
-def _set_origin(joint, origin: Pose) -> None:
-    from lxml import etree
-
+def _set_origin(joint: etree._Element, origin: Pose) -> None:
     element = joint.find("origin")
     if element is None:
         element = etree.Element("origin")
