@@ -8,8 +8,9 @@ import re
 from dataclasses import asdict
 from pathlib import Path
 
-from kinacc.errors import InputError, Problem, as_seen
+from kinacc.errors import InputError, Problem
 from kinacc.gate.outcome import CheckReport
+from kinacc.report.rendering import environment
 from kinacc.tables.atomic import write_whole
 
 _NOT_XML = re.compile(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
@@ -39,24 +40,8 @@ def as_metrics(report: CheckReport) -> str:
 
 def as_text(report: CheckReport, ending: str = ".txt") -> str:
     """The report by the template of an ending: a line for each outcome, a table, or JUnit XML."""
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
-    environment = Environment(
-        loader=PackageLoader("kinacc.gate"),
-        autoescape=ending == ".xml",
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        finalize=lambda value: _NOT_XML.sub("?", value) if isinstance(value, str) else value,
-    )
-    environment.filters["cell"] = _cell
-    text = environment.get_template(f"check{ending}").render(vars(report))
-    return as_seen(text) if ending == ".txt" else text
-
-
-def _cell(text: str) -> str:
-    selected = as_seen(text).replace("\n", " ").replace("\\", "\\\\")
-    return re.sub(r"([|`<>*_\[\]#])", r"\\\1", selected)
+    template = environment(ending == ".xml").get_template(f"check{ending}")
+    return _NOT_XML.sub("?", template.render(vars(report)))
 
 
 def write(report: CheckReport, path: Path) -> None:

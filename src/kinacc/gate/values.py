@@ -116,16 +116,17 @@ class Figure:
         return f"{size:.10g}" if self.unit == "1" else f"{size:.3f} {self.unit}"
 
 
-def sample(name: str, tables: RunTables, gate: Mapping[str, Any]) -> Sample:
-    """The errors behind a figure of errors."""
-    return tables.errors(tables.model(gate["model"]), gate["at"], name.split(".")[1])
+def sample(tables: RunTables, gate: Mapping[str, Any]) -> Sample:
+    """The errors behind a gate's figure of errors."""
+    return tables.errors(tables.model(gate["model"]), gate["at"], gate["value"].split(".")[1])
 
 
-def figure(name: str, tables: RunTables, gate: Mapping[str, Any]) -> Figure:
-    """The figure of a name. Raises Absent where its table is missing."""
+def figure(tables: RunTables, gate: Mapping[str, Any]) -> Figure:
+    """The figure of a gate. Raises Absent where its table is missing."""
+    name = gate["value"]
     (unit, meaning), (topic, _, word) = FIGURES[name], name.partition(".")
     if name.startswith(COMPARED):
-        return _of_errors(name, tables, gate, unit)
+        return _of_errors(tables, gate, unit)
     if topic == "bound":
         return _of_bound(tables, unit, word)
     if topic == "history":
@@ -161,9 +162,9 @@ def cell(tables: RunTables, gate: Mapping[str, Any]) -> Figure:
     return Figure(float(size), unit, called, open="no number" if np.isnan(size) else "")
 
 
-def _of_errors(name: str, tables: RunTables, gate: Mapping[str, Any], unit: str) -> Figure:
-    _, quantity, statistic = name.split(".")
-    sizes, model = sample(name, tables, gate).sizes, tables.model(gate["model"])
+def _of_errors(tables: RunTables, gate: Mapping[str, Any], unit: str) -> Figure:
+    _, quantity, statistic = gate["value"].split(".")
+    sizes, model = sample(tables, gate).sizes, tables.model(gate["model"])
     of, text = STATISTICS[statistic]
     called = f"{text} of the {quantity} errors {_AT[gate['at']]} ({model_name(model)} model)"
     about = {"model": model, "statistic": text, "at": gate["at"], "rows": len(sizes)}
