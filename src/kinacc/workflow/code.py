@@ -43,11 +43,6 @@ def config_hash(settings: Mapping[str, object]) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
-def file_digest(path: Path | str) -> str:
-    """SHA-256 of a file's bytes."""
-    return hashlib.sha256(Path(path).read_bytes()).hexdigest()
-
-
 def _placeless(settings: object, files: bool = False) -> object:
     if isinstance(settings, Mapping):
         return {

@@ -11,7 +11,7 @@ from typing import Any
 
 from kinacc.config.error_models import ERROR_MODELS, asked_for
 from kinacc.errors import Problem, refuse
-from kinacc.workflow.code import file_digest
+from kinacc.tables import sums
 
 RESULTS = "results"
 Settings = Mapping[str, Any]
@@ -173,7 +173,7 @@ def _in_use(config: Mapping[str, Any]) -> dict[str, Any]:
 
 def digests(files: Mapping[str, str]) -> dict[str, str]:
     """Digests of files by role, by which a rule knows their content and not their dates."""
-    return {role: file_digest(path) for role, path in files.items()}
+    return {role: sums.digest(Path(path).read_bytes()) for role, path in files.items()}
 
 
 def campaign_files(campaigns: Iterable[Path]) -> dict[str, str]:

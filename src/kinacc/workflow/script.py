@@ -13,12 +13,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import pyarrow as pa
+
 from kinacc import __version__
 from kinacc.errors import KinaccError, Problem, gathered, refuse, refused
 from kinacc.progress import reporting
 from kinacc.tables import store, sums
 from kinacc.tables.atomic import write_together
-from kinacc.tables.columns import Columns
 from kinacc.workflow.code import config_hash
 
 Progress = Callable[..., Iterable[Any]]
@@ -31,7 +32,6 @@ class Stage:
     ``read`` are the digests of its inputs by their name in the folder of the data set.
     """
 
-    name: str
     dataset: str
     inputs: dict[str, Any]
     settings: Mapping[str, Any]
@@ -90,15 +90,13 @@ def stage(snakemake: Any) -> Iterator[Stage]:
             with reporting(label) as progress:
                 yield _opened(snakemake, dataset, progress)
             return
-        except KinaccError as error:
-            tell(str(error), traceback.format_exc())
-        except OSError as error:
-            tell(str(refused(error)), traceback.format_exc())
-        except MemoryError as error:
-            tell(f"not enough memory: {error or 'ask for less'}", traceback.format_exc())
         except Exception as error:
-            tell(f"{type(error).__name__}: {error} (a fault of kinacc; see {log})",
-                 traceback.format_exc())  # fmt: skip
+            text = f"{type(error).__name__}: {error} (a fault of kinacc; see {log})"
+            if isinstance(error, (KinaccError, OSError)):
+                text = str(refused(error) if isinstance(error, OSError) else error)
+            elif isinstance(error, MemoryError):
+                text = f"not enough memory: {error or 'ask for less'}"
+            tell(text, traceback.format_exc())
     raise SystemExit(1)
 
 
@@ -106,19 +104,9 @@ def _opened(snakemake: Any, dataset: str, progress: Progress) -> Stage:
     sums_file = Path(snakemake.output.sums)
     folder = next(item for item in sums_file.parents if item.name == sums.FOLDER).parent
     inputs, read = _read(dict(snakemake.input.items()), folder)
+    settings, seed = snakemake.params.settings, snakemake.params.seed
     outputs = dict(snakemake.output.items())
-    params = snakemake.params
-    return Stage(
-        snakemake.rule,
-        dataset,
-        inputs,
-        params.settings,
-        params.seed,
-        outputs,
-        folder,
-        read,
-        progress,
-    )
+    return Stage(dataset, inputs, settings, seed, outputs, folder, read, progress)
 
 
 def _read(
@@ -142,16 +130,10 @@ def _read(
             parts = []
             for path, content in zip(listed, contents, strict=True):
                 sums.hold(path, content)
-                parts.append(store.columns_in(store.read_arrow(path, content)))
-            inputs[role] = parts[0] if isinstance(source, str) else _joined(parts)
+                parts.append(store.read_arrow(path, content))
+            inputs[role] = store.columns_in(pa.concat_tables(parts))
     refuse(problems)
     return inputs, read
-
-
-def _joined(parts: Sequence[Columns]) -> Columns:
-    import numpy as np
-
-    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
 def part_of(snakemake: Any) -> dict[str, int]:
