@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Collection
+from dataclasses import dataclass
 from typing import Annotated, Any, TypeVar
 
 from pydantic import (
@@ -11,10 +13,11 @@ from pydantic import (
     ConfigDict,
     Discriminator,
     Field,
+    GetCoreSchemaHandler,
     Tag,
     model_validator,
 )
-from pydantic_core import PydanticCustomError
+from pydantic_core import PydanticCustomError, core_schema
 
 from kinacc.errors import first_few
 
@@ -65,6 +68,18 @@ def _rising(values: list[float]) -> list[float]:
     if values != sorted(set(values)):
         raise refused(f"{values} is not rising", "put smaller numbers first, each once")
     return values
+
+
+@dataclass(frozen=True)
+class OneOf:
+    """What a text may be: one of these words, which stand elsewhere."""
+
+    words: Collection[str]
+
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> core_schema.CoreSchema:
+        return core_schema.literal_schema([*self.words])
 
 
 Text = Annotated[str, Field(min_length=1)]

@@ -10,14 +10,12 @@ from pydantic import (
     Discriminator,
     Field,
     Tag,
-    WithJsonSchema,
     computed_field,
     model_validator,
 )
 
-from kinacc.config.fields import Distinct, Section, Text, distinct, refused, setting
+from kinacc.config.fields import Distinct, OneOf, Section, Text, distinct, refused, setting
 from kinacc.config.names import not_in_a_line
-from kinacc.config.values import did_you_mean
 
 COMPARED = "residuals."  # figures of errors, pose by pose: chance can be told of these alone
 _STATISTICS = {
@@ -58,15 +56,6 @@ def _name(name: str) -> str:
     return name
 
 
-def _known(figure: str) -> str:
-    if figure not in FIGURES:
-        raise refused(f"{figure!r} is not known", did_you_mean(figure, FIGURES))
-    return figure
-
-
-Figure = Annotated[str, AfterValidator(_known), WithJsonSchema({"enum": [*FIGURES]})]
-
-
 class Gate(Section):
     """What gates of every kind have."""
 
@@ -96,7 +85,7 @@ class OfFigure(Gate):
     """What gates of a figure have; a limit is in the unit of the figure."""
 
     limits: ClassVar[tuple[str, ...]] = ("at_most", "at_least")
-    value: Figure = setting(..., "the figure")
+    value: Annotated[str, OneOf(FIGURES)] = setting(..., "the figure")
     model: Literal["selected", "dh", "vec", "compliance", "nominal"] = setting(
         "selected", "error model whose errors are meant"
     )

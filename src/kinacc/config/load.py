@@ -15,7 +15,7 @@ from kinacc.config import series
 from kinacc.config.reading import KeyPath, Place, dotted, paths_of, read
 from kinacc.config.schema import keys
 from kinacc.config.settings import ROBOTS, Configuration
-from kinacc.config.values import did_you_mean, shown
+from kinacc.config.values import did_you_mean, overlay, shown
 from kinacc.errors import InputError, Problem, gathered, refuse
 
 Contradictions = Callable[..., Iterable[Problem]]
@@ -113,31 +113,6 @@ def _by_line(problem: Problem) -> list[Any]:
     """Texts and numbers of a place in turn, by which line 9 comes before line 10."""
     parts = re.split(r"(\d+)", problem.where)
     return [int(part) if part.isdecimal() else part for part in parts]
-
-
-def overlay(
-    below: Mapping[str, Any], above: Mapping[str, Any], whole: Sequence[str] = ()
-) -> dict[str, Any]:
-    """Lay values over settings, section by section.
-
-    Parameters
-    ----------
-    below, above
-        Nested settings; a value of ``above`` replaces that of ``below``.
-    whole
-        Names of mappings that are replaced as other values are.
-
-    Returns
-    -------
-    dict
-        A copy; ``below`` and ``above`` stay as they are.
-    """
-    merged = dict(below)
-    for name, value in above.items():
-        old = merged.get(name)
-        both = isinstance(old, Mapping) and isinstance(value, Mapping) and name not in whole
-        merged[name] = overlay(old, value, whole) if both else value  # type: ignore[arg-type]
-    return merged
 
 
 def _relocated(value: Any, beside: str, folder: Path, key: Any = None) -> Any:

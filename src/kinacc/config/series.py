@@ -13,6 +13,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, Field
 
 from kinacc.config.fields import Section, Text, refused, setting
+from kinacc.config.values import overlay
 
 SAME, MOVED = "same", "moved"
 FLAGS = {
@@ -63,15 +64,18 @@ def expanded(name: str, full: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
     rest = {key: value for key, value in full.items() if key != "series"}
     if not full["series"]:
         return {name: rest}
-    measurements = rest["measurements"]
-    series: list[dict[str, Any]] = []
-    files: dict[str, dict[str, Any]] = {}
-    for line in full["series"]:
-        item, day = f"{name}-{line['date']}", str(line["date"])
-        flags = {flag: line[flag] if series else None for flag in FLAGS}
-        series.append({"name": item, "date": day, **flags})
-        file = {**measurements["file"], "path": line["path"]}
-        files[item] = {**rest, "measurements": {**measurements, "file": file}}
-    newest = {**files[series[-1]["name"]], "series": series}
-    lines = {item: {**subset, "line_of": name, "gates": []} for item, subset in files.items()}
-    return {name: newest} | lines
+    lines = {f"{name}-{line['date']}": line for line in full["series"]}
+    first, last = min(lines), max(lines)  # named by their dates
+    files = {
+        item: overlay(rest, {"measurements": {"file": {"path": line["path"]}}})
+        for item, line in lines.items()
+    }
+    series = [
+        {"name": item, "date": str(line["date"])}
+        | {flag: None if item == first else line[flag] for flag in FLAGS}
+        for item, line in lines.items()
+    ]
+    newest = {name: {**files[last], "series": series}}
+    return newest | {
+        item: {**settings, "line_of": name, "gates": []} for item, settings in files.items()
+    }

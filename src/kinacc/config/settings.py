@@ -7,12 +7,23 @@ are what is plausible in it, so that a value in another unit is caught. Defaults
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, Field, ValidationInfo, model_validator
 
-from kinacc.config.fields import Distinct, OrWord, Pair, Rising, Section, Text, refused, setting
+from kinacc.config.fields import (
+    Distinct,
+    OneOf,
+    OrWord,
+    Pair,
+    Rising,
+    Section,
+    Text,
+    refused,
+    setting,
+)
 from kinacc.config.gate_rules import Gates, require_limits
 from kinacc.config.measured import Measurements
 from kinacc.config.names import LONGEST
@@ -30,29 +41,9 @@ _THREE = Field(min_length=3, max_length=3)
 Vector = Annotated[list[Annotated[float, Field(ge=-10000, le=10000)]], _THREE]
 Angles = Annotated[list[Annotated[float, Field(ge=-360, le=360)]], _THREE]
 _RULES = "to free, fixed or {value_mm: .., prior_std_mm: ..}, with mm, mrad, rad or deg"
-Finding = Literal[
-    "joint_units",
-    "length_units",
-    "angle_units",
-    "left_handed",
-    "transposed_rotation",
-    "euler_convention",
-    "orientations",
-    "joint_sign",
-    "joint_coupling",
-    "joint_zero",
-    "joint_order",
-    "does_not_fit",
-    "base_jump",
-    "drift",
-    "target_moved",
-    "target_swapped",
-    "outside_limits",
-    "commanded_joints",
-    "duplicate_rows",
-    "repeated_reading",
-    "outliers",
-    "few_poses",
+_FINDINGS = Path(__file__).parents[1] / "checks" / "findings.yaml"
+Finding = Annotated[
+    str, OneOf(sorted({*re.findall(r"^\w+", _FINDINGS.read_text("utf-8"), re.MULTILINE)}))
 ]
 
 

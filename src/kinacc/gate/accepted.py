@@ -18,6 +18,7 @@ from kinacc.errors import FitError, InputError, Problem, first_few, refuse
 from kinacc.gate import chance
 from kinacc.gate.outcome import FAILED, PASSED, UNDECIDED, WARNED, Outcome
 from kinacc.gate.values import SELECTED, RunTables
+from kinacc.kinematics.dh import PARAMETERS
 from kinacc.tables import sums
 from kinacc.tables.allowed import MOVED, OPEN, RECALIBRATE, SAME
 from kinacc.tables.atomic import unfinished, write_whole
@@ -158,11 +159,10 @@ def _arm(
 
 def _moved_parameters(now: Path, before: Path) -> Iterator[str]:
     """DH parameters that moved by more than their uncertainty, given the model."""
-    new, old = (RunTables(item)["dh_model"] for item in (now, before))
-    for name in ("theta_offset_rad", "d_mm", "a_mm", "alpha_rad", "beta_rad"):
+    new, old = (RunTables(item)["dh_model"].set_index("joint") for item in (now, before))
+    for name in PARAMETERS:
         change = new[name] - old[name]
         std = np.hypot(new[f"std_{name}"], old[f"std_{name}"])  # NaN where undetermined
         unit, factor = ("mm", 1.0) if name.endswith("mm") else ("mrad", 1e3)
-        for row in np.flatnonzero(np.abs(change) > _FAR * std):
-            shown, joint = f"{factor * change[row]:+.3g} {unit}", int(new["joint"][row])
-            yield f"{name.rpartition('_')[0]} of joint {joint} by {shown}"
+        for joint, size in change[change.abs() > _FAR * std].items():
+            yield f"{name.rpartition('_')[0]} of joint {joint} by {factor * size:+.3g} {unit}"

@@ -19,16 +19,18 @@ _OF_A_LINE = re.compile(r"-\d{4}-\d{2}-\d{2}$")
 _FILES = 20  # beside results, looked through for a configuration
 
 
-def beside(results: Path, dataset: str) -> Iterator[tuple[Path, DataSets]]:
-    """Configurations beside the folder of all results that name a data set, and its data sets.
+def beside(folder: Path) -> Iterator[tuple[Path, DataSets]]:
+    """Configurations beside the folder of all results with the data set of a ``folder`` of them.
 
     That of a line of a series stands there by the name of the series.
     """
-    series = _OF_A_LINE.sub("", dataset)
-    for path in sorted((results / "..").glob("*.yaml"))[:_FILES]:
+    series = _OF_A_LINE.sub("", folder.name).encode()
+    for path in sorted((folder.parent / "..").glob("*.yaml"))[:_FILES]:
         with suppress(InputError, OSError):
-            if path.name == CONFIG or series.encode() in path.read_bytes():
-                yield path, _planned(str(path), path.stat().st_mtime_ns)
+            if path.name == CONFIG or series in path.read_bytes():
+                plan = _planned(str(path), path.stat().st_mtime_ns)
+                if folder.name in plan.settings:
+                    yield path, plan
 
 
 def calibration_settings(folder: Path, configs: Sequence[str] = ()) -> Mapping[str, Any]:
@@ -47,13 +49,9 @@ def calibration_settings(folder: Path, configs: Sequence[str] = ()) -> Mapping[s
         The defaults where no configuration names the data set.
     """
     folder = folder.resolve()
-    plans = (
-        [read_data_sets(configs)] if configs else dict(beside(folder.parent, folder.name)).values()
-    )
-    for plan in plans:
-        if folder.name in plan.settings:
-            return plan.settings[folder.name]["calibration"]
-    return defaults()["calibration"]
+    plans = [read_data_sets(configs)] if configs else [plan for _, plan in beside(folder)]
+    known = [plan.settings[folder.name] for plan in plans if folder.name in plan.settings]
+    return [*known, defaults()][0]["calibration"]
 
 
 @cache
@@ -69,11 +67,10 @@ def like_those_of(folder: Path, readings: Path) -> dict[str, Any]:
     """
     folder = folder.resolve()
     candidates: dict[str, dict[str, Any]] = {}
-    for path, plan in beside(folder.parent, folder.name):
-        if folder.name in plan.settings:
-            settings = _of_file(load([path])[folder.name], readings)
-            if settings is not None and settings not in candidates.values():
-                candidates[path.name] = settings
+    for path, _ in beside(folder):
+        settings = _of_file(load([path])[folder.name], readings)
+        if settings is not None and settings not in candidates.values():
+            candidates[path.name] = settings
     first = next(iter(candidates.values()), None)
     if (
         first is not None

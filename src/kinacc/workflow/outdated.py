@@ -60,10 +60,9 @@ def outdated_reason(folder: Path | str) -> str:
         changed = sums.changed_since(folder)
         of_results: list[str] = []
         others: list[str] = []
-        for path, data in beside(folder.parent, folder.name):
-            if folder.name in data.settings:
-                is_other = "summary.parquet" in made_with_other_settings(folder, data)
-                (others if is_other else of_results).append(os.path.relpath(path))
+        for path, data in beside(folder):
+            is_other = "summary.parquet" in made_with_other_settings(folder, data)
+            (others if is_other else of_results).append(os.path.relpath(path))
     except (InputError, OSError):
         return ""  # whoever reads the results reports what is wrong with them
     if changed:
