@@ -2,9 +2,10 @@
 
 
 def test_a_run_ends_with_what_the_calibrations_are_worth(project):
-    for name in ("mh180", "own"):
-        (project.folder / "results" / name / "summary.parquet").unlink()
-    text = project.snakemake()
+    summaries = [f"results/{name}/summary.parquet" for name in ("mh180", "own")]
+    for path in summaries:
+        (project.folder / path).unlink()
+    text = project.snakemake(*summaries)
     paper, own = text[text.index("\nmh180: ") :], text[text.index("\nown (") :]
     assert "Paper's claims" in paper
     assert "Model difference" in paper
