@@ -165,7 +165,8 @@ def assessor_of(
     """
     if name not in ADAPTIVE:
         raise InputError(Problem("--assessor", f"{name!r} is not there", ", ".join(ADAPTIVE)))
-    kinds, stated = get_type_hints(ADAPTIVE[name]), {}
+    kinds = get_type_hints(ADAPTIVE[name])
+    stated: dict[str, Any] = {}
     for item in fields(ADAPTIVE[name]):
         default = ... if item.default is MISSING else item.default
         # A campaign's budget is its own: it may be larger than that of a simulation.

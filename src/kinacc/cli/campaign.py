@@ -315,7 +315,10 @@ def _of_file(path: str, options: Mapping[str, Any], campaign: Campaign) -> FileO
     plan = campaign.plan
     # A cell that is no number spoils its row, not the file: it is named row by row.
     read = read_rows(path, plan.slides, POINTS, spoilt=[])
-    table, joints, pose = read.table, read.joints, read.columns.single.get("pose")
+    table, columns, joints, position_mm = read.table, read.columns, read.joints, read.position_mm
+    if table is None or columns is None or position_mm is None:
+        raise InputError(Problem(path, "holds no positions", "x_mm, y_mm, z_mm"))
+    pose = columns.single.get("pose")
     if pose:
         table = table.with_pose_names(pose.column)
     known = [instrument.name for instrument in plan.instruments]
@@ -353,7 +356,7 @@ def _of_file(path: str, options: Mapping[str, Any], campaign: Campaign) -> FileO
         else:
             std = read.std_mm
             noise = None if std is None else ",".join(map(repr, std[i].tolist()))
-            rows.append(Reading(point, read.position_mm[i], devices[i], at_rad, noise))
+            rows.append(Reading(point, position_mm[i], devices[i], at_rad, noise))
             places.append(place)
     digest = hashlib.sha256(Path(path).read_bytes()).hexdigest()[:16]
     relative = os.path.relpath(Path(path).resolve(), campaign.folder.resolve())

@@ -229,12 +229,13 @@ def _region(
     options: Mapping[str, Any], arm: Calibration
 ) -> tuple[str, Callable[[int], np.ndarray]]:
     """The region's name, and a function that draws so many reported joints (at most n, k)."""
-    robot, target, problems = arm.robot, arm.point(options["point"]), list[Problem]()
+    robot, fitted, problems = arm.robot, arm.fitted, list[Problem]()
+    target = arm.point(options["point"])
     box = spaces.joint_ranges(options["joints_deg"], robot, problems)
     space = spaces.ranges("--inside-mm", options["inside_mm"], 3, problems)
     refuse(problems)
     inside = None if space is None else spaces.inside_box(space)
-    usual = "measured" if arm.fitted is not None else "fitted"
+    usual = "measured" if fitted is not None else "fitted"
     region = options["region"] or ("fitted" if box is not None else None)
     if region in (None, "configured"):
         configured = _configured(options, arm, wanted=region is not None)
@@ -253,11 +254,11 @@ def _region(
         low, high = ends.cut_to_range(robot, low, high, arm.fitted_range_rad)
     if box is not None:
         low, high = np.maximum(low, box[0]), np.minimum(high, box[1])
-    if region != "measured":
+    if region != "measured" or fitted is None:
         return region, lambda count: spread(robot, count, (low, high), inside, target)
 
     def draw(count: int) -> np.ndarray:
-        poses = ends.reported_joints(robot, arm.fitted.q_rad)
+        poses = ends.reported_joints(robot, fitted.q_rad)
         drawn = between(poses, ends.travel_unit(robot), count, options["seed"])
         usable = ends.within(drawn, low, high)
         if inside is not None:
