@@ -4,12 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import BaseModel, FiniteFloat, PlainSerializer, PlainValidator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    FiniteFloat,
+    PlainSerializer,
+    PlainValidator,
+    TypeAdapter,
+    ValidationError,
+)
 
 from kinacc.assess.adaptive import covariance_faults
 from kinacc.assess.noise import ENOUGH, FEWEST
@@ -46,7 +55,10 @@ Numbers = Annotated[
 ]
 
 
-@dataclass(frozen=True)
+_Size = Annotated[float, Field(ge=0.0, lt=1e3)]
+
+
+@dataclass(frozen=True, kw_only=True)
 class LaserTracker:
     """Standard deviations of a tracker whose head is the origin of its frame.
 
@@ -54,11 +66,17 @@ class LaserTracker:
     one in um for each m of distance. ``repeat_mm``: how well the arm repeats a pose, per axis.
     """
 
-    range_mm: float
-    range_um_per_m: float
-    angle_mm: float
-    angle_um_per_m: float
-    repeat_mm: float
+    __pydantic_config__ = ConfigDict(extra="forbid")
+
+    range_mm: _Size = 0.0
+    range_um_per_m: _Size = 0.0
+    angle_mm: _Size = 0.0
+    angle_um_per_m: _Size = 0.0
+    repeat_mm: _Size
+
+    def __post_init__(self) -> None:
+        if np.min(self.std_mm(np.array([1e3]))) <= _SMALLEST_STD_MM:
+            raise ValueError("range and angle must be above 0")
 
     def std_mm(self, distance_mm: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Standard deviations (m,) along the beam and across it, without that of the arm."""
@@ -229,22 +247,16 @@ def covariance_of(text: str, where: str) -> np.ndarray:
 
 def _laser(text: str, where: str) -> LaserTracker:
     """The tracker of a text that begins with ``laser:``."""
-    known = [item.name for item in fields(LaserTracker)]
     parts = [part.partition("=")[::2] for part in text.removeprefix(LASER).split(",")]
-    values = {name.strip(): numbers_of(value) for name, value in parts}
-    wrong = [
-        name
-        for name, number in values.items()
-        if name not in known or number.size != 1 or not 0 <= number[0] < 1e3
-    ]
-    wrong += ["repeat_mm"] if "repeat_mm" not in values else []
-    wrong += ["a key twice"] if len(values) < len(parts) else []
-    if not wrong:
-        tracker = LaserTracker(**{name: float(values.get(name, [0.0])[0]) for name in known})
-        if np.min(tracker.std_mm(np.array([1e3]))) > _SMALLEST_STD_MM:
-            return tracker
-        wrong = ["range and angle must be above 0"]
-    raise InputError(Problem(where, f"{text!r} ({', '.join(wrong)})", _LASER_FORM))
+    values = {name.strip(): value.strip() for name, value in parts}
+    wrong = ["a key twice"] if len(values) < len(parts) else []
+    try:
+        tracker = TypeAdapter(LaserTracker).validate_python(values)
+    except ValidationError as error:
+        wrong += [" ".join(map(str, (*item["loc"], item["msg"]))) for item in error.errors()]
+    if wrong:
+        raise InputError(Problem(where, f"{text!r} ({'; '.join(wrong)})", _LASER_FORM))
+    return tracker
 
 
 _Row = tuple[FiniteFloat, FiniteFloat, FiniteFloat]

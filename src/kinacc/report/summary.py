@@ -9,15 +9,17 @@ from typing import Any
 
 import pandas as pd
 
-from kinacc.assess.statement import CANDIDATES, UNDECIDED, Statement
+from kinacc.assess.statement import ACCEPT, CANDIDATES, REJECT, UNDECIDED, Statement, decide
 from kinacc.calibration.summary import LARGE_SHARE, Tolerance
-from kinacc.campaign import tolerance
 from kinacc.campaign.status import CampaignStatus
+from kinacc.campaign.status import reason as reason_text
 from kinacc.config.error_models import MEASURED, NOMINAL, model_name
 from kinacc.report.rendering import size
 
 BOUND, HELD_OUT = "bound", "held-out"  # statistics that a verdict is by
 STATISTICS = {"mean": "mean", f"{LARGE_SHARE:.0%}": "quantile_99", "largest": "largest"}
+_CONFIGURED = "the configuration's"
+_FEWEST = round(1.0 / (1.0 - LARGE_SHARE))  # rows of which that share is less than all
 _TOLERANCE_OF = {BOUND: "bound", HELD_OUT: "quantile_99"}
 
 
@@ -185,9 +187,9 @@ class CalibrationSummary:
         bound = self.campaign.of_all if self.campaign else None
         source = ""
         if tolerance_mm is None and bound is not None and by == BOUND:
-            tolerance_mm, source = bound.tolerance_mm, tolerance.OF_CAMPAIGN
+            tolerance_mm, source = bound.tolerance_mm, "the campaign's"
         if tolerance_mm is None and self.tolerance and self.tolerance.of == _TOLERANCE_OF[by]:
-            tolerance_mm, source = self.tolerance.mm, tolerance.OF_CONFIGURATION
+            tolerance_mm, source = self.tolerance.mm, _CONFIGURED
         if tolerance_mm is None:
             return None
         if by == HELD_OUT:
@@ -195,10 +197,11 @@ class CalibrationSummary:
         if bound is None:
             reason = "no campaign bounds the largest error"
             return Verdict(UNDECIDED, reason, tolerance_mm, source)
+        if self.doubts:
+            return Verdict(UNDECIDED, "its bound cannot be relied on", tolerance_mm, source)
         limits = (bound.value_mm, bound.lower_mm, bound.upper_mm, bound.confidence)
-        statement = Statement(CANDIDATES, *limits, excepted=bound.excepted)
-        judged = tolerance.by_bound(tolerance_mm, statement, bool(self.doubts))
-        return Verdict(*judged, tolerance_mm, source)
+        decided = decide(Statement(CANDIDATES, *limits, excepted=bound.excepted), tolerance_mm)
+        return Verdict(decided.verdict, reason_text(decided.reason), tolerance_mm, source)
 
     def of_configuration(self) -> Verdict | None:
         """The verdict on the tolerance of the configuration, by the statistic it names."""
@@ -206,8 +209,20 @@ class CalibrationSummary:
             return None
         if self.tolerance.of == "bound":
             return self.verdict(BOUND, self.tolerance.mm)
-        return self._by_held_out(self.tolerance, tolerance.OF_CONFIGURATION)
+        return self._by_held_out(self.tolerance, _CONFIGURED)
 
     def _by_held_out(self, allowed: Tolerance, source: str) -> Verdict:
-        held_out = self.best._asdict() if self.is_held_out else {}
-        return Verdict(*tolerance.by_held_out(allowed, held_out), allowed.mm, source)
+        best, verdict = self.best, ACCEPT
+        reason = "99 % of the errors held out are within the tolerance"
+        if not self.is_held_out:
+            verdict, reason = UNDECIDED, "no error is held out"
+        elif allowed.of == "mean":
+            verdict = ACCEPT if best.mean <= allowed.mm else REJECT
+            reason = f"the mean error held out is {best.mean:.3f} mm"
+        elif best.quantile_99 > allowed.mm:
+            verdict = REJECT
+            reason = "more than 1 % of the errors held out are beyond the tolerance"
+        elif best.n < _FEWEST:
+            verdict = UNDECIDED
+            reason = f"{best.n:.0f} errors are held out, too few to tell of 1 % of them"
+        return Verdict(verdict, reason, allowed.mm, source)
