@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -70,7 +69,7 @@ def test_next_names_joints_with_units_and_writes_nothing(campaign, tmp_path):
 @pytest.mark.parametrize("frame", ["base", "instrument"])
 def test_readings_are_expected_in_the_frame_they_come_in(make_plan, tmp_path, frame):
     to_base = Pose(exp_so3(np.array([0.1, -0.2, 0.3])), np.array([500.0, -20.0, 30.0]))
-    campaigns.start(tmp_path / "c", replace(make_plan(frame=frame), to_base=to_base))
+    campaigns.start(tmp_path / "c", make_plan(frame=frame).model_copy(update={"to_base": to_base}))
     found = Campaign(tmp_path / "c")
     pose, visit = found.next_pose(), found.visit()
     assert pose.frame == frame

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from campaign_on_disk import entry_of
@@ -61,7 +59,7 @@ def test_part_of_a_visit_by_travel_says_nothing_of_the_region(make_plan, make_wo
         assert np.isnan(said.upper_mm)
         assert (said.withheld.code, said.withheld.numbers["left"]) == ("first_visit_by_travel", 1)
     assert not any("travel" in str(said.withheld) for said in restore(plan, entries).statements())
-    at_random = replace(plan, route=plan.order[: len(plan.route)])
+    at_random = plan.model_copy(update={"route": plan.order[: len(plan.route)]})
     begun = restore(at_random, entries_of(at_random, make_world(at_random))[:-1])
     assert not any("travel" in str(said.withheld) for said in begun.statements())
 

@@ -168,8 +168,11 @@ def plan_of(
         first = _short_path(places[:count], here)
         here = places[first[-1]] if count else here
         route = route[np.concatenate([first, count + _short_path(places[count:], here)])]
-    slides = arm.robot.dh.prismatic
-    return Plan(points, order, route, assessor, used, to_base, slides, limits, seed, about)
+    return Plan(
+        about=about, assessor=assessor, instruments=used, to_base=to_base, limits=limits,
+        arm={"prismatic": arm.robot.dh.prismatic.tolist()}, seed=seed, order=order, route=route,
+        points=points,
+    )  # fmt: skip
 
 
 def _short_path(places: np.ndarray, start: np.ndarray) -> np.ndarray:
@@ -224,7 +227,8 @@ def start(
     problems = [*noise, *doubts, *_candidate_doubts(arm, plan.points, plan.about["point"])]
     if not sure:
         refuse(problems, "The campaign was not begun")
-    plan = replace(plan, overruled=tuple(f"{item.where}: {item.what}" for item in problems))
+    overruled = tuple(f"{item.where}: {item.what}" for item in problems)
+    plan = plan.model_copy(update={"overruled": overruled})
     folders.start(folder, plan)
     return plan
 

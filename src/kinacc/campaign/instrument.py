@@ -42,7 +42,8 @@ _LARGEST_STD_MM = 1e3
 _SMALLEST_STD_MM = 1e-9  # below the size of an atom; squares of less vanish
 
 
-def _finite(value: object) -> np.ndarray:
+def finite(value: object) -> np.ndarray:
+    """Return numbers as an array; ValueError where one is not finite."""
     numbers = np.array(value, dtype=float)
     if not np.isfinite(numbers).all():
         raise ValueError("numbers that are not finite")
@@ -51,7 +52,7 @@ def _finite(value: object) -> np.ndarray:
 
 # Arrays in files of JSON.
 Numbers = Annotated[
-    np.ndarray, PlainValidator(_finite), PlainSerializer(lambda array: array.tolist())
+    np.ndarray, PlainValidator(finite), PlainSerializer(lambda array: array.tolist())
 ]
 
 

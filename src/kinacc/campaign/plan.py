@@ -7,14 +7,25 @@ import math
 from collections.abc import Mapping
 from dataclasses import MISSING, dataclass, fields
 from functools import cached_property
-from typing import Annotated, Any, Literal, get_type_hints
+from typing import Annotated, Any, Literal, Self, get_type_hints
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, NonNegativeInt, ValidationError, create_model
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    FiniteFloat,
+    NonNegativeInt,
+    PlainSerializer,
+    PlainValidator,
+    ValidationError,
+    create_model,
+    model_validator,
+)
 
 from kinacc.assess.adaptive import AdaptiveAssessor, Candidates
 from kinacc.assess.registry import ADAPTIVE
-from kinacc.campaign.instrument import Instrument, Numbers
+from kinacc.campaign.instrument import Instrument, finite
 from kinacc.config import json_files
 from kinacc.config.load import problems_of
 from kinacc.config.settings import Study
@@ -23,7 +34,14 @@ from kinacc.geometry import Pose
 
 METHOD = 2  # of the bounds: raised where the same readings give other bounds
 # Settings that earlier plans state, with the defaults they had.
-_FORMER = {"correct_drift": False, "assume": "nothing", "isolation": 1.25, "crowd": 0.05}
+_FORMER = {
+    "correct_drift": False,
+    "assume": "nothing",
+    "isolation": 1.25,
+    "crowd": 0.05,
+    "visited": 0.6,
+    "bound_mm": None,
+}
 
 
 @dataclass(frozen=True)
@@ -57,6 +75,29 @@ class Points:
             return self.modelled_mm[point]
         return self.modelled_mm[point] + self.slope[point] @ (joints - self.joints[point])
 
+    @classmethod
+    def of(cls, rows: Any) -> Points:
+        """The points of a list of mappings, as :meth:`rows` returns them."""
+        if isinstance(rows, Points):
+            return rows
+        columns = {item.name: [row[item.name] for row in rows] for item in fields(cls)}
+        arrays = {name: finite(columns[name]) for name in ("joints", "modelled_mm", "slope")}
+        directions = None
+        if columns["directions"][0] is not None:
+            directions = finite(columns["directions"]).astype(np.int8)
+        count, joints = arrays["joints"].shape
+        shapes = arrays["modelled_mm"].shape, arrays["slope"].shape
+        if shapes != ((count, 3), (count, 3, joints)):
+            raise ValueError(f"points of shapes {shapes}")
+        return cls(label=tuple(map(str.strip, columns["label"])), directions=directions, **arrays)
+
+    def rows(self) -> list[dict[str, Any]]:
+        """A mapping for each point."""
+        return [
+            {name: None if column is None else column[row] for name, column in vars(self).items()}
+            for row in range(len(self))
+        ]
+
 
 @dataclass(frozen=True)
 class Limits:
@@ -67,72 +108,11 @@ class Limits:
     is wanted of the bounds on ``target``.
     """
 
-    joint_rad: float = float(np.deg2rad(0.02))
-    implausible_mm: float = math.inf
+    joint_rad: FiniteFloat = float(np.deg2rad(0.02))
+    implausible_mm: FiniteFloat = math.inf
     tolerance_mm: float | None = None
     width_mm: float | None = None
     target: Literal["measured", "candidates", "region"] = "candidates"
-
-
-@dataclass(frozen=True)
-class Plan:
-    """A campaign before any reading.
-
-    ``order`` (m,) is the random order of the candidates; ``route`` the points of the first visit
-    in the order they are driven to. ``to_base`` takes the instrument's frame to the robot's base.
-    ``slides`` (k,): which joints slide. ``about`` names robot, calibration, model and point.
-    ``overruled``: what spoke against beginning it so, a sentence each. ``method``: of the bounds.
-    """
-
-    points: Points
-    order: np.ndarray
-    route: np.ndarray
-    assessor: AdaptiveAssessor
-    instruments: tuple[Instrument, ...]
-    to_base: Pose
-    slides: np.ndarray
-    limits: Limits
-    seed: int
-    about: Mapping[str, str]
-    overruled: tuple[str, ...] = ()
-    method: int = METHOD
-
-    @cached_property
-    def covariance_mm2(self) -> np.ndarray:
-        """Covariances (m, 3, 3) of a reading of the first instrument at each of the points, in the
-        robot's base."""
-        return self.instruments[0].in_base(self.to_base, self.points.modelled_mm)
-
-    @property
-    def by_travel(self) -> bool:
-        """Whether the first visit is made in order of travel."""
-        return not np.array_equal(self.route, self.order[: len(self.route)])
-
-    def instrument(self, name: str | None) -> Instrument:
-        """An instrument by name, the first where none is named. InputError for another name."""
-        if name is None:
-            return self.instruments[0]
-        devices = {device.name: device for device in self.instruments}
-        if name not in devices:
-            raise InputError(Problem("instrument", f"{name!r} is not there", ", ".join(devices)))
-        return devices[name]
-
-    def visiting(self, left_out: frozenset[int]) -> np.ndarray:
-        """Points in the order in which the assessor numbers them, without those left out.
-
-        The points of the first visit are the first of the random order; among themselves they come
-        as the route has them, for all of them are visited before anything is decided.
-        """
-        order = np.array([point for point in self.order if point not in left_out], dtype=int)
-        first = self.assessor.begin(self.candidates(order)).first
-        place = np.full(len(self.points), len(self.points))
-        place[self.route] = np.arange(len(self.route))
-        head = order[:first]
-        return np.concatenate([head[np.argsort(place[head], kind="stable")], order[first:]])
-
-    def candidates(self, rows: np.ndarray) -> Candidates:
-        """The candidates in the order of ``rows``, with the noise of the first instrument."""
-        return Candidates(self.covariance_mm2[rows])
 
 
 # Found in 98 % of campaigns with a drift of three standard deviations, for a tenth of the width.
@@ -186,124 +166,122 @@ def assessor_of(
     return ADAPTIVE[name](**values)
 
 
-class _Point(BaseModel):
-    label: str
-    joints: Numbers
-    directions: Numbers | None
-    modelled_mm: Numbers
-    slope: Numbers
+def _recorded(value: Any) -> AdaptiveAssessor:
+    """The assessor of a file, or one that is there already."""
+    if not isinstance(value, Mapping):
+        return value
+    settings = value["settings"]
+    used = [key for key, former in _FORMER.items() if settings.get(key, former) != former]
+    fix = "begin a new campaign; readings can be recorded in it again"
+    refuse(Problem(f"setting {key}", "is gone from kinacc", fix=fix) for key in used)
+    known = {key: setting for key, setting in settings.items() if key not in _FORMER}
+    return assessor_of(value["name"], known)
 
 
-class _Pose(BaseModel):
-    rotation: Numbers
-    position_mm: Numbers
+def _pose(value: Any) -> Pose:
+    pose = value if isinstance(value, Pose) else Pose(*map(finite, map(value.get, Pose._fields)))
+    if pose.rotation.shape != (3, 3) or pose.position_mm.shape != (3,):
+        raise ValueError("no pose")
+    return pose
 
 
-class _Assessor(BaseModel):
-    name: str
-    settings: dict[str, Any]
+class Plan(BaseModel):
+    """A campaign before any reading, as its file has it.
 
+    ``order`` (m,) is the random order of the candidates; ``route`` the points of the first visit
+    in the order they are driven to. ``to_base`` takes the instrument's frame to the robot's base.
+    ``arm``: which joints slide (prismatic). ``about`` names robot, calibration, model and point.
+    ``overruled``: doubts at the start that were overruled. ``method``: of the bounds.
+    """
 
-class _Arm(BaseModel):
-    prismatic: list[bool]
-
-
-class _File(BaseModel):
-    """File of a plan."""
+    model_config = ConfigDict(frozen=True)
 
     format: Literal[1] = 1
-    method: int = 1
+    method: int = METHOD
     about: dict[str, str]
-    assessor: _Assessor
+    assessor: Annotated[
+        AdaptiveAssessor,
+        PlainValidator(_recorded),
+        PlainSerializer(lambda assessor: {"name": assessor.name, "settings": vars(assessor)}),
+    ]
     instruments: Annotated[tuple[Instrument, ...], Field(min_length=1)]
-    to_base: _Pose
-    arm: _Arm
+    to_base: Annotated[Pose, PlainValidator(_pose), PlainSerializer(lambda pose: pose._asdict())]
+    arm: dict[str, list[bool]]
     limits: Limits
     seed: NonNegativeInt
-    order: list[int]
-    route: list[int]
+    order: Annotated[np.ndarray, PlainValidator(np.array)]
+    route: Annotated[np.ndarray, PlainValidator(np.array)]
     overruled: tuple[str, ...] = ()
-    points: Annotated[list[_Point], Field(min_length=1)]
+    points: Annotated[Points, PlainValidator(Points.of), PlainSerializer(Points.rows)]
+
+    @model_validator(mode="after")
+    def _fits(self) -> Self:
+        count, joints = self.points.joints.shape
+        valid = {
+            "instruments": all(item.covariance_mm2.shape == (3, 3) for item in self.instruments),
+            "arm": self.slides.shape == (joints,),
+            "order": sorted(self.order) == list(range(count)),
+            "route": {*self.route} <= {*self.order},
+        }
+        if wrong := [name for name, holds in valid.items() if not holds]:
+            raise ValueError(f"{', '.join(wrong)} does not fit the rest")
+        return self
+
+    @cached_property
+    def slides(self) -> np.ndarray:
+        """Which joints slide (k,)."""
+        return np.array(self.arm["prismatic"])
+
+    @cached_property
+    def covariance_mm2(self) -> np.ndarray:
+        """Covariances (m, 3, 3) of a reading of the first instrument at each of the points, in the
+        robot's base."""
+        return self.instruments[0].in_base(self.to_base, self.points.modelled_mm)
+
+    @property
+    def by_travel(self) -> bool:
+        """Whether the first visit is made in order of travel."""
+        return not np.array_equal(self.route, self.order[: len(self.route)])
+
+    def instrument(self, name: str | None) -> Instrument:
+        """An instrument by name, the first where none is named. InputError for another name."""
+        if name is None:
+            return self.instruments[0]
+        devices = {device.name: device for device in self.instruments}
+        if name not in devices:
+            raise InputError(Problem("instrument", f"{name!r} is not there", ", ".join(devices)))
+        return devices[name]
+
+    def visiting(self, left_out: frozenset[int]) -> np.ndarray:
+        """Points in the order in which the assessor numbers them, without those left out.
+
+        The points of the first visit are the first of the random order; among themselves they come
+        as the route has them, for all of them are visited before anything is decided.
+        """
+        order = np.array([point for point in self.order if point not in left_out], dtype=int)
+        first = self.assessor.begin(self.candidates(order)).first
+        place = np.full(len(self.points), len(self.points))
+        place[self.route] = np.arange(len(self.route))
+        head = order[:first]
+        return np.concatenate([head[np.argsort(place[head], kind="stable")], order[first:]])
+
+    def candidates(self, rows: np.ndarray) -> Candidates:
+        """The candidates in the order of ``rows``, with the noise of the first instrument."""
+        return Candidates(self.covariance_mm2[rows])
 
 
 def to_json(plan: Plan) -> bytes:
     """Return the plan as text; ``from_json`` gives back equal numbers."""
-    points, names = plan.points, [*_Point.model_fields]
-    columns = [getattr(points, name) for name in names]
-    columns = [[None] * len(points) if column is None else column for column in columns]
-    file = _File.model_construct(
-        method=plan.method,
-        about=dict(plan.about),
-        assessor=_Assessor(name=plan.assessor.name, settings=vars(plan.assessor)),
-        instruments=plan.instruments,
-        to_base=_Pose.model_construct(**plan.to_base._asdict()),
-        arm=_Arm(prismatic=plan.slides.tolist()),
-        limits=plan.limits,
-        seed=plan.seed,
-        order=plan.order.tolist(),
-        route=plan.route.tolist(),
-        overruled=plan.overruled,
-        points=[
-            _Point.model_construct(**dict(zip(names, row, strict=True)))
-            for row in zip(*columns, strict=True)
-        ],
-    )
-    return (json.dumps(file.model_dump()) + "\n").encode()
+    return (json.dumps(plan.model_dump(), default=lambda array: array.tolist()) + "\n").encode()
 
 
 def from_json(text: bytes, where: str) -> Plan:
     """Return the plan written by ``to_json``. Raises InputError where it cannot be read."""
     try:
-        return _plan(_File.model_validate(json_files.values_of(text, where)))
-    except (RecursionError, TypeError, ValueError) as error:
+        plan = Plan.model_validate({"method": 1, **json_files.values_of(text, where)})
+        if not {"robot", "calibration", "model", "point", "candidates"} <= {*plan.about}:
+            raise ValueError("about does not fit the rest")
+    except (AttributeError, LookupError, RecursionError, TypeError, ValueError) as error:
         message = f"is no campaign: {' '.join(str(error).split())[:200]}"
         raise InputError(Problem(where, message, fix="bring it back from a copy")) from None
-
-
-def _plan(file: _File) -> Plan:
-    rows, turned = file.points, [row.directions is not None for row in file.points]
-    points = Points(
-        tuple(row.label for row in rows),
-        np.array([row.joints for row in rows]),
-        np.array([row.directions for row in rows], dtype=np.int8) if all(turned) else None,
-        np.array([row.modelled_mm for row in rows]),
-        np.array([row.slope for row in rows]),
-    )
-    to_base = Pose(file.to_base.rotation, file.to_base.position_mm)
-    slides, (count, joints) = np.array(file.arm.prismatic), points.joints.shape
-    shapes = [
-        (points.modelled_mm, (count, 3)),
-        (points.slope, (count, 3, joints)),
-        (slides, (joints,)),
-        (to_base.rotation, (3, 3)),
-        (to_base.position_mm, (3,)),
-        *((device.covariance_mm2, (3, 3)) for device in file.instruments),
-    ]
-    valid = {
-        "shape": all(array.shape == shape for array, shape in shapes),
-        "directions": all(turned) or not any(turned),
-        "order": sorted(file.order) == list(range(count)),
-        "route": {*file.route} <= {*file.order},
-        "about": {"robot", "calibration", "model", "point"} <= {*file.about},
-    }
-    if wrong := [name for name, holds in valid.items() if not holds]:
-        raise ValueError(f"{', '.join(wrong)} does not fit the rest")
-    settings = file.assessor.settings
-    used = [key for key, value in _FORMER.items() if settings.get(key, value) != value]
-    fix = "begin a new campaign; readings can be recorded in it again"
-    refuse(Problem(f"setting {key}", "is gone from kinacc", fix=fix) for key in used)
-    known = {key: value for key, value in settings.items() if key not in _FORMER}
-    return Plan(
-        points,
-        np.array(file.order),
-        np.array(file.route),
-        assessor_of(file.assessor.name, known),
-        file.instruments,
-        to_base,
-        slides,
-        file.limits,
-        file.seed,
-        file.about,
-        file.overruled,
-        file.method,
-    )
+    return plan
