@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import shutil
+from functools import cache
+
 import numpy as np
 import pytest
 from command_line import call, small_study
@@ -72,15 +75,27 @@ def calibration(tmp_path_factory):
     return small_study(tmp_path_factory.mktemp("study"))
 
 
-@pytest.fixture
-def begun(calibration, tmp_path):
-    """Start a campaign with further options; its folder."""
+@pytest.fixture(scope="session")
+def started(calibration, tmp_path_factory):
+    """Start a campaign by its options, each once; its folder."""
 
-    def start(*more, points=20, budget=20):
-        folder = tmp_path / f"campaign {len(list(tmp_path.iterdir()))}"
+    @cache
+    def start(points, budget, *more):
+        folder = tmp_path_factory.mktemp("started") / "campaign"
         done = call("campaign", "start", folder, "--calibration", calibration, "--robot", "mh180",
                     "--model", "dh", "--candidates", points, "--budget", budget, *more)  # fmt: skip
         assert done.exit_code == 0, done.output
         return folder
 
     return start
+
+
+@pytest.fixture
+def begun(started, tmp_path):
+    """Copy a campaign that was started with further options; its folder."""
+
+    def copy(*more, points=20, budget=20):
+        folder = tmp_path / f"campaign {len(list(tmp_path.iterdir()))}"
+        return shutil.copytree(started(points, budget, *more), folder)
+
+    return copy

@@ -180,8 +180,6 @@ def test_a_reading_that_went_wrong_is_struck_but_stays_in_the_report(campaign):
         (("--noise-mm", "0.1", "--confidence", "2"), "at least 0.5 and below 1"),
         (("--noise-mm", "0.1", "--tolerance-mm", "-1"), "--tolerance-mm"),
         (("--noise-mm", "0.1", "--session", "noon"), "noon"),
-        (("--noise-mm", "0.1", "--assessor", "gamma_quantile", "--confidence", "0.9"),
-         "confidence"),
         (("--noise-mm", "0.1", "--model", "vec", "--region", "limits"), "--region limits"),
     ],
 )  # fmt: skip

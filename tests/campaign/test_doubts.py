@@ -42,10 +42,9 @@ def test_a_small_budget_is_told_how_many_candidates_its_bound_leaves_aside(start
 
 
 @pytest.fixture
-def visited(start, tmp_path):
+def visited(begun, tmp_path):
     """A campaign, and the rows of its first visit with small errors: pose, x, y, z in mm."""
-    assert start("--noise-mm", 0.05).exit_code == 0
-    folder = tmp_path / "check"
+    folder = begun("--noise-mm", 0.05, points=40, budget=40)
     rows = json.loads(call("campaign", "next", folder, "--all", "--json").stdout)["rows"]
     noise = np.random.default_rng(5).normal(size=(len(rows), 3)) * 0.25
     return folder, [

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import errno
+import multiprocessing
 import os
 import signal
-import subprocess
-import sys
 import time
 from pathlib import Path
 
@@ -82,31 +81,27 @@ def test_a_journal_of_an_earlier_version_goes_on(tmp_path):
     assert [each["number"] for each in known.entries] == [0, 1]
 
 
-WRITER = """
-import sys
-from pathlib import Path
-from kinacc.campaign import folder as journal
-folder = Path(sys.argv[1])
-number = 0
-while True:
-    with journal.locked(folder):
-        known = journal.read_journal(folder / "j", sys.argv[2])
-        journal.append(folder / "j", known, {"number": len(known.entries), "fill": "x" * 5000})
-    print(len(known.entries), flush=True)
-"""
+def write_on(folder, confirmed):
+    """Append entries for ever; the number of each that is confirmed goes to a pipe."""
+    while True:
+        with journal.locked(folder):
+            known = journal.read_journal(folder / "j", SEED)
+            journal.append(folder / "j", known, {"number": len(known.entries), "fill": "x" * 5000})
+        os.write(confirmed, f"{len(known.entries)}\n".encode())
 
 
 def test_nothing_confirmed_is_lost_when_the_writer_is_killed(tmp_path):
-    for wait in (0.02, 0.05, 0.11):
-        writer = subprocess.Popen(
-            [sys.executable, "-c", WRITER, str(tmp_path), SEED], stdout=subprocess.PIPE, text=True
-        )
-        first = writer.stdout.readline()
-        time.sleep(wait)
-        writer.send_signal(signal.SIGKILL)
-        confirmed = [first, *writer.stdout.read().splitlines()]
-        writer.wait()
-        last = max(int(line) for line in confirmed if line.strip())
+    for wait in (0.0, 0.01, 0.02, 0.05, 0.11):
+        out, into = os.pipe()
+        writer = multiprocessing.get_context("fork").Process(target=write_on, args=(tmp_path, into))
+        writer.start()
+        os.close(into)
+        with open(out) as confirmed:
+            first = confirmed.readline()
+            time.sleep(wait)
+            os.kill(writer.pid, signal.SIGKILL)
+            last = int([first, *confirmed][-1])
+        writer.join()
         known = journal.read_journal(tmp_path / "j", SEED)
         assert [each["number"] for each in known.entries][: last + 1] == list(range(last + 1))
 

@@ -13,7 +13,7 @@ from kinacc.campaign import begin, folder, report
 from kinacc.campaign.folder import Opened
 from kinacc.campaign.instrument import instruments
 from kinacc.campaign.plan import Limits, assessor_of
-from kinacc.campaign.state import Reading, Readings
+from kinacc.campaign.state import Reading, Readings, deviations
 from kinacc.deployment.planning import spread
 from kinacc.deployment.record import nominal
 from kinacc.figures.campaign import draw
@@ -24,11 +24,11 @@ from kinacc.report.campaign import campaign_page, markdown, section
 TRUE_MM = 0.2
 
 
-def measured(
+def opened(
     texts=("tracker=0.05",), points=12, budget=16, readings=99, noise_mm=0.05, tolerance_mm=None,
     extra=(), names=None, mean_mm=TRUE_MM, off_mm=lambda number: 0.0, **settings,
 ):  # fmt: skip
-    """A campaign of an arm whose errors are known, with its state and tables."""
+    """A campaign of an arm whose errors are known."""
     arm = nominal(robots.load("mh180"))
     found = begin.points_of(
         arm, spread(arm.robot, points), names or [f"p{i}" for i in range(points)]
@@ -50,7 +50,12 @@ def measured(
         at = Reading(int(rows[row]), plan.points.modelled_mm[rows[row]] + seen, used.name)
         entries.append(Readings(readings=[at]).model_dump(exclude_none=True))
     journal_ = folder.Journal((*entries, *extra), "cd", (), 0)
-    campaign = Opened(Path("check"), plan, journal_, "ab")
+    return Opened(Path("check"), plan, journal_, "ab")
+
+
+def measured(**change):
+    """A campaign with its state and tables."""
+    campaign = opened(**change)
     return SimpleNamespace(opened=campaign, state=campaign.state, tables=report.tables(campaign))
 
 
@@ -120,9 +125,8 @@ def test_reasons_and_names_of_strangers_are_text():
 
 def test_noise_as_stated_is_a_scatter_of_one_and_fourfold_noise_of_four():
     def rms(noise_mm):
-        campaign = measured(points=4, budget=120, noise_mm=noise_mm)
-        (row,) = section(*parts(campaign)).rows()["instruments"]
-        return row["scatter"]
+        sizes = deviations(opened(points=4, budget=120, noise_mm=noise_mm).state)
+        return np.sqrt(np.mean(np.square([*sizes.values()])))
 
     assert rms(0.05) == pytest.approx(1.0, abs=0.15)
     assert rms(0.2) == pytest.approx(4.0, abs=0.6)
