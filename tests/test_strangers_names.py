@@ -45,13 +45,13 @@ def test_no_cell_of_a_workbook_is_a_formula(tmp_path):
 
 
 def test_a_table_of_a_calibrated_arm_holds_no_formula():
-    from kinacc.deployment.export.formats import csv as format_csv
+    from kinacc.deployment.export.files import csv_text
     from kinacc.deployment.export.source import Source
     from kinacc.deployment.record import nominal
     from kinacc.kinematics import robot
 
     arm = replace(nominal(robot.load("mh180")), choice="dh", left_open=("=HYPERLINK(1)",))
-    text = format_csv.text(Source(arm, {}))
+    text = csv_text(Source(arm, {}))
     assert [row["undetermined"] for row in csv.DictReader(io.StringIO(text))][-1].startswith(
         "'=HYPERLINK(1)"
     )

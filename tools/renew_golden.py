@@ -18,7 +18,8 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "golden"))
 
 import cases
 
-from kinacc.deployment.export.files import contents, read_source
+from kinacc.deployment.export.files import contents
+from kinacc.deployment.export.source import read_source
 from kinacc.deployment.folder import recorded_robot
 from kinacc.tables.comparison import compare_folders
 

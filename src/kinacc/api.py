@@ -27,8 +27,8 @@ from kinacc.deployment import predict as predicting
 from kinacc.deployment import programs, shared_readings
 from kinacc.deployment import verify as verifying
 from kinacc.deployment.export import files as exports
-from kinacc.deployment.export import libraries
 from kinacc.deployment.export import pendant as pendants
+from kinacc.deployment.export import urdf
 from kinacc.deployment.export.controllers import CONTROLLERS
 from kinacc.deployment.export.source import Source
 from kinacc.deployment.record import Calibration as CalibratedModel
@@ -284,7 +284,7 @@ class Calibration:
 
         Joints are those that the controller reports; InputError where these are coupled.
         """
-        return libraries.to_pinocchio(Source(self.model, self.tables))
+        return urdf.to_pinocchio(Source(self.model, self.tables))
 
     def to_pybotics(self, point: str | None = None) -> Any:
         """The calibrated DH model as ``pybotics.robot.Robot`` (mm, rad).
@@ -299,7 +299,7 @@ class Calibration:
         pybotics.robot.Robot
             Its joints are those of the DH table: ``calibration.robot.dh_joints(q_rad)``.
         """
-        return libraries.to_pybotics(Source(self.model, self.tables), point)
+        return urdf.to_pybotics(Source(self.model, self.tables), point)
 
     def values_for(
         self, controller: str, settings: Mapping[str, Any] | None = None

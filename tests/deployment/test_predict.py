@@ -6,8 +6,8 @@ from small_arms import BASE, TOOL, calibrated, joints, truth
 
 from kinacc.calibration.frames import MOTIONS
 from kinacc.calibration.uncertainty import is_angle
+from kinacc.deployment.applicability import sensitivity
 from kinacc.deployment.predict import predict
-from kinacc.deployment.sensitivity import sensitivity
 from kinacc.geometry import Pose, compose, exp_so3, log_so3
 from kinacc.kinematics import dh, robot
 from kinacc.kinematics.model import JointState

@@ -6,7 +6,8 @@ import cases
 import numpy as np
 import pytest
 
-from kinacc.deployment.export.files import contents, read_source
+from kinacc.deployment.export.files import contents
+from kinacc.deployment.export.source import read_source
 from kinacc.deployment.folder import recorded_robot
 from kinacc.tables.comparison import compare_tables
 

@@ -66,7 +66,7 @@ ASSUMED = {
         kinacc export results/ur10_b --format yaml --out first
         kinacc export results/ur10_d --format yaml --out second
         python -c "
-        from kinacc.deployment.export.formats import urdf
+        from kinacc.deployment.export import urdf
         from kinacc.deployment.export.source import Source
         from kinacc.deployment.record import nominal
         from kinacc.kinematics import robot

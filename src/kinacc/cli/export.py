@@ -11,7 +11,7 @@ from kinacc.cli.choice import option
 from kinacc.cli.output import Output, answers
 from kinacc.config.error_models import ERROR_MODELS, PLAINEST
 from kinacc.deployment import folder as results
-from kinacc.deployment.export import files
+from kinacc.deployment.export import files, source
 from kinacc.deployment.export.controllers import CONTROLLERS
 from kinacc.deployment.export.pendant import fit_pendant
 from kinacc.errors import Problem, refuse
@@ -23,7 +23,7 @@ from kinacc.workflow.described import calibration_settings
 @click.command("export")
 @click.argument("folder", type=click.Path())
 @option("--out", "target", type=click.Path(), default=".", help="Folder.")
-@option("--format", "formats", multiple=True, type=click.Choice(files.FORMATS),
+@option("--format", "formats", multiple=True, type=click.Choice([*files.FORMATS]),
         help="Formats. [all]")  # fmt: skip
 @option("--for", "maker", type=click.Choice([*CONTROLLERS], case_sensitive=False),
         help="Controller whose values are written, as a page.")  # fmt: skip
@@ -82,10 +82,10 @@ def export(
     if maker is not None:
         _to_controller(folder, arm, target, maker, name, config, out)
         return
-    source = files.read_source(folder, arm, model, urdf, (base_link, tip_link), dh_joints)
-    paths = files.write(files.contents(source, wanted, name), target, out.force)
+    made = source.read_source(folder, arm, model, urdf, (base_link, tip_link), dh_joints)
+    paths = files.write(files.contents(made, wanted, name), target, out.force)
     out.show({"files": paths, **({"outdated": reason} if reason else {})}, lines=paths)
-    for item in files.notes(source):
+    for item in source.notes(made):
         click.echo(item, err=True)
 
 

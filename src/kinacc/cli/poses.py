@@ -17,7 +17,7 @@ from kinacc.cli.output import Output, answers
 from kinacc.cli.process import AGAINST
 from kinacc.deployment import predict as prediction
 from kinacc.deployment import programs
-from kinacc.deployment.applicability import is_measured_there
+from kinacc.deployment.applicability import deviations, is_measured_there
 from kinacc.deployment.compensate import (
     ROTATION_TOLERANCE_RAD,
     Compensation,
@@ -25,7 +25,6 @@ from kinacc.deployment.compensate import (
 )
 from kinacc.deployment.compensate import compensate as joints_for
 from kinacc.deployment.record import Calibration
-from kinacc.deployment.sensitivity import deviations
 from kinacc.errors import InputError, Problem, as_seen, first_few, refuse
 from kinacc.geometry import Pose, rotation_from_quaternion
 from kinacc.kinematics.model import JointState

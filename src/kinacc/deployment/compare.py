@@ -17,9 +17,8 @@ import pandas as pd
 import scipy
 
 from kinacc.calibration.uncertainty import scale_of, scaled_unit, unit_of
-from kinacc.deployment.applicability import measured_by_all
+from kinacc.deployment.applicability import measured_by_all, sensitivity
 from kinacc.deployment.record import FLANGE, Calibration
-from kinacc.deployment.sensitivity import sensitivity
 from kinacc.deployment.shared_readings import NONE_SHARED, SharedReadings, counted_once
 from kinacc.deployment.verify import covers
 from kinacc.errors import InputError, Problem

@@ -121,10 +121,10 @@ def compensate(
     tried = pd.concat([*tried, arm.judged(*arm.postures(more))], ignore_index=True)
     hit, status = tried["status"] != PoseStatus.NOT_REACHED, tried["status"]
     nearest = tried[hit].groupby("row")["movement"].min().reindex(every, fill_value=np.inf)
-    cost = np.minimum(tried["movement"], 99.0) + 1e3 * (status > PoseStatus.EXTRAPOLATED)
-    cost += 200.0 * ((status == PoseStatus.EXTRAPOLATED) & (not inputs))
-    tried["cost"] = cost.where(hit, 1e6 + np.minimum(tried["off_mm"], 1e8))
-    best = tried.sort_values("cost", kind="stable").drop_duplicates("row")
+    least = PoseStatus.EXTRAPOLATED if inputs else PoseStatus.CONVERGED
+    tried["class"] = np.select([~hit, status > PoseStatus.EXTRAPOLATED, status > least], [3, 2, 1])
+    tried["cost"] = tried["movement"].where(hit, tried["off_mm"])
+    best = tried.sort_values(["class", "cost"]).drop_duplicates("row")
     best = best.set_index("row").reindex(every)
     status = best["status"].fillna(PoseStatus.NOT_REACHED)
     farther = (status <= PoseStatus.EXTRAPOLATED) & (best["movement"] > nearest + SAME_RAD)
@@ -195,7 +195,6 @@ class _Goals:
         hopeless = beyond_limits | (
             calibration.outside_range(start, reach).any(axis=1) & is_bounded
         )
-        status = np.where(beyond_limits, PoseStatus.OUTSIDE_LIMITS, PoseStatus.OUTSIDE_RANGE)
         q_dh, worth = start.copy(), np.flatnonzero(~hopeless)
         off, angle = np.full((2, len(start)), np.nan)
         local = rows[worth]
@@ -210,14 +209,17 @@ class _Goals:
         turn_rad = FEW_AXES_TURN_RAD if self.has_few_axes else ROTATION_TOLERANCE_RAD
         hit = (off <= POSITION_TOLERANCE_MM) & (angle <= turn_rad)
         reported = limits.reported_joints(robot, q_dh)
+        inside = np.all(_within_each(calibration, reported), axis=1)
+        covered = np.all(~calibration.outside_range(q_dh), axis=1)
         beyond = PoseStatus.OUTSIDE_RANGE if is_bounded else PoseStatus.EXTRAPOLATED
-        covered = ~calibration.outside_range(q_dh).any(axis=1)
-        refined = np.where(covered, PoseStatus.CONVERGED, beyond)
-        inside = _within_each(calibration, reported).all(axis=1)
-        refined = np.where(inside, refined, PoseStatus.OUTSIDE_LIMITS)
-        refined = np.where(hit, refined, PoseStatus.NOT_REACHED)
+        refined = np.select(
+            [~hit, ~inside, covered],
+            [PoseStatus.NOT_REACHED, PoseStatus.OUTSIDE_LIMITS, PoseStatus.CONVERGED],
+            beyond,
+        )
+        stays = np.where(beyond_limits, PoseStatus.OUTSIDE_LIMITS, PoseStatus.OUTSIDE_RANGE)
+        status = np.where(hopeless, stays, refined)
         apart = np.abs(reported - self.near[rows]) / limits.travel_unit(robot)
-        status = np.where(hopeless, status, refined)
         table = pd.DataFrame(q_dh).assign(row=rows, status=status, off_mm=off, angle_rad=angle)
         return table.assign(movement=np.max(apart, axis=1))
 

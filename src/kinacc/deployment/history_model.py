@@ -378,28 +378,20 @@ def joint_of(movement: Moved, prismatic: np.ndarray) -> int | None:
     """
     chance = float(np.trace(movement.covariance))
     floor = 1e-12 * chance * np.eye(len(movement.change))
-    white = scipy.linalg.cholesky(movement.covariance + floor, lower=True)
-    observed = scipy.linalg.solve_triangular(white, movement.change, lower=True)
-    slide, turn, along, about_ = (
-        ERRORS.index(item) for item in ("delta_z", "eps_z", "delta_x", "eps_x")
-    )
+    whiten = np.linalg.inv(scipy.linalg.cholesky(movement.covariance + floor, lower=True))
+    slide, turn, along, about_ = map(ERRORS.index, ("delta_z", "eps_z", "delta_x", "eps_x"))
     count, size = len(prismatic), len(ERRORS)
     units = np.diag(np.tile(UNITS, count))
     for whole in (False, True):
-        explained, remaining = np.zeros(count), np.full(count, np.inf)
+        explained, remaining = np.zeros((2, count))
         for joint in range(count):
             link = [size + along, size + about_] if joint + 1 < count else []  # else the tool's
             local = [slide, turn, *link] if whole else [slide if prismatic[joint] else turn]
-            way = movement.along(units[:, [size * joint + item for item in local]])
-            way = way[:, np.linalg.norm(way, axis=0) > _UNSEEN_MM]
-            fit = np.linalg.lstsq(scipy.linalg.solve_triangular(white, way, lower=True), observed)[
-                0
-            ]
-            beside = movement.change - way @ fit
-            explained[joint] = observed @ scipy.linalg.solve_triangular(
-                white, way @ fit, lower=True
-            )
-            remaining[joint] = beside @ beside
+            ways = movement.along(units[:, [size * joint + item for item in local]])
+            ways = ways[:, np.linalg.norm(ways, axis=0) > _UNSEEN_MM]
+            fitted = ways @ np.linalg.lstsq(whiten @ ways, whiten @ movement.change)[0]
+            explained[joint] = (whiten @ movement.change) @ (whiten @ fitted)
+            remaining[joint] = np.sum((movement.change - fitted) ** 2)
         best = int(np.argmax(explained))
         most = remaining[best] - chance <= (1.0 - _MOST) * (movement.moved_mm**2 - chance)
         clear = np.sum(np.exp(0.5 * (explained - explained[best]))) <= 1.0 / _CLEAR

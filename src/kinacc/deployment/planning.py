@@ -15,8 +15,8 @@ from kinacc.calibration import frames
 from kinacc.calibration.identifiability import LeftOpen
 from kinacc.calibration.identified import STRUCTURAL, joints_anywhere
 from kinacc.calibration.uncertainty import Uncertainty
+from kinacc.deployment.applicability import BLOCK, sensitivity
 from kinacc.deployment.record import TOOL, Calibration, nominal
-from kinacc.deployment.sensitivity import BLOCK, sensitivity
 from kinacc.errors import InputError, Problem, refuse
 from kinacc.geometry import Pose, compose
 from kinacc.kinematics import dh

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from kinacc.deployment.applicability import is_measured_there
+from kinacc.deployment.applicability import deviations, is_measured_there
 from kinacc.deployment.record import Calibration
-from kinacc.deployment.sensitivity import deviations
 from kinacc.geometry import Pose, quaternion_from_rotation
 from kinacc.kinematics.model import JointState
 

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from kinacc.calibration.hand_eye import closed_form_start
 from kinacc.calibration.observations import full_poses
-from kinacc.deployment.export.formats import urdf
+from kinacc.deployment.export import urdf
 from kinacc.deployment.export.source import Source
 from kinacc.deployment.record import TOOL, nominal
 from kinacc.errors import InputError

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinacc.deployment.export.files import format_named, write
+from kinacc.deployment.export.files import FORMATS, write
 from kinacc.deployment.export.paper_tables import with_deviation
 from kinacc.deployment.export.source import Source
 from kinacc.deployment.record import TOOL, nominal
@@ -25,7 +25,7 @@ def bent(name, seed=0):
 
 
 def written(form, arm, **tables):
-    return format_named(form).text(Source(arm, tables))
+    return FORMATS[form].text(Source(arm, tables))
 
 
 def read_back(arm, tmp_path):

@@ -7,7 +7,7 @@ import pinocchio as pin
 import pytest
 from test_export_urdf import assert_same, bent, of, some_joints
 
-from kinacc.deployment.export import libraries
+from kinacc.deployment.export import urdf
 from kinacc.geometry import Pose
 from kinacc.kinematics import robot
 from kinacc.kinematics.model import JointState
@@ -37,7 +37,7 @@ def matrix(pose):
 def test_modified_dh_reaches_the_same_poses(name, size):
     arm = bent(robot.load(name), size=size)
     q_rad = arm.robot.dh_joints(some_joints(arm.robot))
-    base, parameters, end = libraries.modified_dh(of(arm), None)
+    base, parameters, end = urdf.modified_dh(of(arm), None)
     ends = []
     for row in q_rad:
         step = matrix(base)
@@ -55,7 +55,7 @@ def test_modified_dh_reaches_the_same_poses(name, size):
 def test_pybotics_reaches_the_same_poses(name):
     arm = bent(robot.load(name))
     q_rad = arm.robot.dh_joints(some_joints(arm.robot))
-    theirs = libraries.to_pybotics(of(arm), "flange")
+    theirs = urdf.to_pybotics(of(arm), "flange")
     ends = np.array([theirs.fk(row) for row in q_rad])
     assert_same(
         arm.pose(JointState(q_rad), "base", "flange"), Pose(ends[:, :3, :3], ends[:, :3, 3])
@@ -64,7 +64,7 @@ def test_pybotics_reaches_the_same_poses(name):
 
 def test_pinocchio_has_the_calibrated_arm():
     arm = bent(robot.load("irb120"))
-    model = libraries.to_pinocchio(of(arm))
+    model = urdf.to_pinocchio(of(arm))
     data = model.createData()
     for q in some_joints(arm.robot):
         pin.framesForwardKinematics(model, data, q)

@@ -2,34 +2,148 @@
 
 from __future__ import annotations
 
-import pkgutil
-from collections.abc import Mapping, Sequence
-from importlib import import_module
+import json
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
-from types import ModuleType
+from typing import NamedTuple
 
-from kinacc.calibration import identifiability
+import numpy as np
+import pandas as pd
+
+from kinacc.calibration.misfit import in_words
 from kinacc.config import names
-from kinacc.config.error_models import PLAINEST, model_name
-from kinacc.deployment import folder as results
-from kinacc.deployment.export import formats as _formats
-from kinacc.deployment.export.source import Source
+from kinacc.config.error_models import PLAINEST
+from kinacc.deployment.export import paper_tables, urdf
+from kinacc.deployment.export.source import CONVENTION, Source
+from kinacc.deployment.record import TOOL
 from kinacc.errors import Problem, refuse
-from kinacc.kinematics.robot import Robot
-from kinacc.tables import store
+from kinacc.geometry import Pose, compose, invert, quaternion_from_rotation
+from kinacc.kinematics.dh import PARAMETERS
+from kinacc.kinematics.robot import as_yaml
 from kinacc.tables.atomic import replacing
 
-FORMATS = tuple(module.name for module in pkgutil.iter_modules(_formats.__path__))
+_SLIDING = "T = Rz(theta_offset) Tz(q + d) Tx(a) Rx(alpha) Ry(beta) where a joint slides"
 
 
-def format_named(name: str) -> ModuleType:
-    """The module of a format."""
-    return import_module(f"{_formats.__name__}.{name}")
+def csv_text(source: Source) -> str:
+    """One row per joint, in degrees and mm, with what the poses leave open of a joint.
+
+    What is of no joint, as of base and tool, stands in the row of the last one.
+    """
+    joints = source.joints(source.dh)
+    for name in joints.columns[joints.columns.str.endswith("_rad")]:
+        joints[name] = np.rad2deg(joints[name])
+    joints.columns = joints.columns.str.replace("_rad", "_deg")
+    parameters = [name.replace("_rad", "_deg") for name in PARAMETERS]
+    groups = ([f"{group}{name}" for name in parameters] for group in ("", "std_", "nominal_"))
+    columns = [name for group in groups for name in group]
+    texts: list[list[str]] = [[] for _ in range(len(joints))]
+    for sentence in source.calibration.left_open or ():
+        for joint in {*map(int, re.findall(r"joint (\d+)", sentence))} or {len(joints)}:
+            texts[joint - 1].append(sentence)
+    texts[-1] += source.orientation_lines
+    note = names.in_csv(in_words([source.misfit]))
+    rows: list[list[object]] = [["joint", "type", *columns, "undetermined", "std_note"]]
+    for (_, row), about in zip(joints.iterrows(), texts, strict=True):
+        cells = ("" if np.isnan(x) else f"{x:.12g}" for x in row[columns])
+        rows.append([row["joint"], row["type"], *cells, names.in_csv("; ".join(about)), note])
+    return names.csv_text(rows)
+
+
+def json_text(source: Source) -> str:
+    """Everything a calibration says of an arm: parameters, deviations, frames, residuals.
+
+    Of a model that is no DH table, its own table beside the arm that it acts on.
+    """
+    arm, robot = source.calibration, source.calibration.robot
+    dh, remaining = arm.model.dh, arm.residual
+    content: dict[str, object] = {
+        "name": source.name,
+        "robot": robot.name,
+        "calibration": arm.name,
+        "convention": CONVENTION + (f"; {_SLIDING}" if dh.prismatic.any() else ""),
+        "units": {"length": "mm", "angle": "rad", "quaternion": "w, x, y, z"},
+        "joints": _with_null(source.joints(dh)).to_dict("records"),
+        "joint_map": robot.joint_map.tolist(),
+        "first_dh_frame_in_base": _frame(robot.base),
+        "flange_in_last_dh_frame": _frame(robot.flange),
+        "base_in_instrument": _frame(arm.base),
+        "targets_in_last_dh_frame": {name: _frame(pose) for name, pose in arm.targets.items()},
+        "orientation_of_targets": {name: arm.orientation_source(name) for name in arm.targets},
+        "residual": None,
+        "standard_deviations": source.misfit.as_facts(),
+        "undetermined": arm.left_open,
+        "provenance": source.provenance,
+    }
+    if remaining is not None:
+        turn = 1e3 * remaining.orientation_rad
+        content["residual"] = {
+            "subset": remaining.subset,
+            "position_rms_mm": remaining.position_mm,
+            "orientation_rms_mrad": turn if np.isfinite(turn) else None,
+        }
+    if arm.model.table is None:
+        table = pd.DataFrame(source.tables[f"{arm.choice}_model"])
+        content |= {
+            "error_model": arm.choice,
+            "error_model_table": _with_null(table).to_dict("list"),
+        }
+    return json.dumps(content, indent=1) + "\n"
+
+
+def _with_null(table: pd.DataFrame) -> pd.DataFrame:
+    return table.astype(object).where(table.notna(), None)
+
+
+def _frame(pose: Pose) -> dict[str, list[float]]:
+    quaternion = quaternion_from_rotation(pose.rotation)
+    return {"position_mm": pose.position_mm.tolist(), "quaternion_wxyz": quaternion.tolist()}
+
+
+def yaml_text(source: Source) -> str:
+    """A robot file that ``kinacc.kinematics.robot.load`` reads back to the same arm, bit by bit.
+
+    What the poses leave open stands in comments.
+    """
+    arm = source.calibration
+    robot, tool = arm.robot, arm.robot.tool
+    if TOOL in arm.targets:
+        tool = compose(invert(robot.flange), arm.targets[TOOL])
+    calibrated = replace(
+        robot, name=source.name, source=source.about, date="", dh=source.dh, tool=tool
+    )
+    heading = (
+        f"{robot.name} as calibrated by data set {arm.name} ({arm.choice} model).",
+        f"{CONVENTION}; angles in rad, lengths in mm.",
+        *source.orientation_lines,
+        *source.left_open_lines,
+    )
+    return as_yaml(calibrated, heading)
+
+
+class Format(NamedTuple):
+    """A format: its text, what its file names end in, and whether it carries any model."""
+
+    text: Callable[[Source], str]
+    ending: str
+    any_model: bool = False
+
+
+FORMATS = {
+    "csv": Format(csv_text, ".csv"),
+    "json": Format(json_text, ".json", True),
+    "latex": Format(paper_tables.latex, "_tables.tex"),
+    "markdown": Format(paper_tables.markdown, "_tables.md"),
+    "urdf": Format(urdf.text, ".urdf"),
+    "yaml": Format(yaml_text, ".yaml"),
+}
 
 
 def formats_of(model: str) -> tuple[str, ...]:
     """Formats that carry a model."""
-    return tuple(item for item in FORMATS if model == PLAINEST or format_named(item).ANY_MODEL)
+    return tuple(name for name, item in FORMATS.items() if model == PLAINEST or item.any_model)
 
 
 def contents(
@@ -50,37 +164,8 @@ def contents(
         if item not in able
     ]
     refuse(problems, "Nothing was written")
-    modules = [format_named(item) for item in dict.fromkeys(formats or able)]
-    return {f"{stem}{item.ENDING}": item.text(source) for item in modules}
-
-
-def read_source(
-    folder: Path | str,
-    robot: Robot,
-    model: str = PLAINEST,
-    urdf_file: Path | str | None = None,
-    links: tuple[str | None, str | None] = (None, None),
-    dh_joints: bool = False,
-) -> Source:
-    """What formats are made of, from a results folder; InputError where it cannot be used."""
-    tables = results.read_tables(folder)
-    arm = results.calibration(tables, robot, model, Path(folder).resolve().name)
-    path = Path(folder) / f"{model}_model.parquet"
-    known = store.read_metadata(path) if path.is_file() else {}
-    marks = {key: known[key] for key in store.PROVENANCE_KEYS if key in known}
-    return Source(arm, tables, marks, urdf_file, links, dh_joints)
-
-
-def notes(source: Source) -> list[str]:
-    """What the poses leave open, and the model that was selected instead of the one written."""
-    lines, identified = [], source.tables.get(f"{PLAINEST}_identified")
-    weak = identifiability.weak(identifiability.listed(identified)) if identified else []
-    if weak:
-        lines = [f"warning: valid for poses like the measured ones: {'; '.join(weak)}"]
-    selected = results.selected_model(source.tables)
-    if selected != source.calibration.choice:
-        lines.append(f"note: {model_name(selected)} was selected (--model {selected})")
-    return lines
+    chosen = [FORMATS[item] for item in dict.fromkeys(formats or able)]
+    return {f"{stem}{item.ending}": item.text(source) for item in chosen}
 
 
 def write(files: Mapping[str, str], target: Path | str, force: bool = False) -> list[str]:

@@ -1,7 +1,8 @@
-"""Tables I to III as a paper prints them, which Markdown and LaTeX share."""
+"""Tables I to III as a paper prints them, in Markdown and LaTeX."""
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +11,9 @@ import pandas as pd
 from kinacc.calibration.identifiability import FIXED
 from kinacc.calibration.misfit import in_words, misfit
 from kinacc.config.error_models import ERROR_MODELS, MEASURED, PLAINEST, Comparison, model_name
+from kinacc.config.names import in_markdown
 from kinacc.deployment.export.source import Source
+from kinacc.deployment.folder import recorded_model
 from kinacc.deployment.record import POSES
 from kinacc.errors import InputError, Problem
 from kinacc.kinematics.dh import PARAMETERS
@@ -19,6 +22,8 @@ _STATISTICS = {"mean": "mean", "max": "max", "rms": "rms", "gamma99": "99 % gamm
 _HEADS = dict(zip(PARAMETERS, ("theta - q [rad]", "d [mm]", "a [mm]", "alpha [rad]", "beta [rad]"),
                   strict=True))  # fmt: skip
 _MOST_DECIMALS = 6
+_TEX = {"\\": r"\textbackslash ", "^": r"\^{}", "~": r"\~{}", "±": r"$\pm$", "†": r"$^\dagger$"}
+_TEX |= {sign: f"\\{sign}" for sign in "&%_#${}"}
 
 
 @dataclass(frozen=True)
@@ -36,7 +41,7 @@ def paper_tables(source: Source) -> list[PaperTable]:
     if "residuals" not in source.tables:
         place = f"{source.calibration.name}: residuals.parquet"
         raise InputError(Problem(place, "no such file", "a finished run"))
-    name, selected = source.calibration.name, source.selected
+    name, selected = source.calibration.name, recorded_model(source.tables)
     measured = {
         model: _residuals(
             source,
@@ -110,3 +115,38 @@ def _parameters(source: Source) -> PaperTable:
         notes.append(f"Left open by the poses: {'; '.join(source.calibration.left_open)}.")
     caption = f"DH parameters, {source.calibration.name}"
     return PaperTable("dh_parameters", caption, cells, notes)
+
+
+def markdown(source: Source) -> str:
+    """The tables one after the other, as Markdown."""
+    parts = []
+    for table in paper_tables(source):
+        rule = ["---", *["---:"] * (table.cells.shape[1] - 1)]
+        rows = [[*table.cells], rule, *table.cells.to_numpy().tolist()]
+        lines = [
+            f"**{in_markdown(table.caption)}**",
+            "",
+            *(f"| {' | '.join(row)} |" for row in rows),
+        ]
+        parts.append("\n".join([*lines, "", *map(in_markdown, table.notes)]))
+    return "\n\n".join(parts) + "\n"
+
+
+def latex(source: Source) -> str:
+    """The tables one after the other, as LaTeX (package booktabs)."""
+    parts = []
+    for table in paper_tables(source):
+        cells = table.cells.map(_tex).rename(columns=_tex)
+        body = cells.to_latex(
+            index=False,
+            column_format=f"l{'r' * (cells.shape[1] - 1)}",
+            caption=_tex(table.caption),
+            label=f"tab:{table.name}",
+        )
+        notes = "".join(f"\\par\\smallskip\\footnotesize {_tex(note)}\n" for note in table.notes)
+        parts.append(body.replace(r"\end{table}", notes + r"\end{table}"))
+    return "\n".join(parts)
+
+
+def _tex(text: str) -> str:
+    return re.sub(r"[\\^~±†&%_#${}]", lambda sign: _TEX[sign[0]], text)

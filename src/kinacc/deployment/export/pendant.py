@@ -82,25 +82,19 @@ def fit_pendant(
         The controller cannot take this robot, or there are too few measurements.
     """
     maker = CONTROLLERS[controller]
-    if robot.dh.prismatic.any():
-        message = "has joints that slide: their zeros are lengths, which no export writes"
-        raise InputError(Problem(f"robot {robot.name}", message))
-    if maker.takes != ZEROS and not np.array_equal(robot.joint_map, np.eye(robot.dh.joints)):
-        message = (
-            f"reports joints with signs or couplings; {maker.name} counts those of its DH table"
-        )
-        raise InputError(Problem(f"robot {robot.name}", message, fix="use --format urdf"))
+    _require_fitting(robot, maker)
     every, train = delivered.observed(tables, robot)
+    used = every.select(train)
     estimator = DHEstimator.of(settings, robot, every)
-    terms, common = estimator.arm, estimator.common
-    free = terms.free & np.isin(PARAMETERS, maker.takes)
+    fitted = estimator.arm.free
+    free = fitted & np.isin(PARAMETERS, maker.takes)
 
     def fit(observations: Observations) -> ModelFit:
-        return common.fit(
+        return estimator.common.fit(
             observations,
-            terms.nominal,
+            estimator.arm.nominal,
             free=free,
-            std=terms.std,
+            std=estimator.arm.std,
             threshold=estimator.threshold,
             loss=estimator.loss,
             name=f"fit for {maker.name}",
@@ -110,66 +104,73 @@ def fit_pendant(
         result = fit(observations)
         return {PLAINEST: Fit(result.model, result.frames)}
 
-    used = every.select(train)
     # Joint 1 moves as the base does, the last joint as the tool: where these are fitted, it stays.
     ends = np.isin(np.arange(robot.dh.joints), (0, robot.dh.joints - 1))[:, None]
     free = free & ~(ends & np.isnan(fit(used).std))
-    result = refit(used)
-    if folds := [fold for fold in np.unique(every.fold) if fold >= 0]:
+    models = {NOMINAL: Fit(robot.dh, estimator.common.nominal_frames(used)), **refit(used)}
+    folds = np.unique(every.fold[every.fold >= 0])
+    if len(folds):
         errors = residuals.cross_validated(every, refit, folds, [PLAINEST])[0]
     else:
-        errors = residuals.errors(result, used)
-    nominal = Fit(robot.dh, common.nominal_frames(used))
-    old, new = (_numbers(maker, robot, model, every) for model in (nominal, result[PLAINEST]))
-    recorded = pd.DataFrame(tables["residuals"])
-    recorded = recorded[recorded["fold"].isna()]
-    subset = max(recorded["subset"])  # validation, where there is one
-    means = recorded[recorded["subset"] == subset].pivot(
-        index="comparison", columns="quantity", values="mean"
-    )
-    selected, off = selected_model(tables), errors[f"{PLAINEST}_vs_measured"]
-    means = means.reindex([f"{selected}_vs_measured", f"{NOMINAL}_vs_measured"])
-    mean_errors = pd.DataFrame(
-        {
-            "model": [
-                f"{maker.name} controller",
-                f"calibrated ({model_name(selected)})",
-                "nominal, base and tool fitted",
-            ],
-            **{
-                name: [part.mean if part else np.nan, *means.get(quantity, [np.nan] * 2)]
-                for name, quantity, part in (
-                    ("position_mm", "position", residuals.statistics(off.position_mm)),
-                    (
-                        "orientation_mrad",
-                        "orientation",
-                        residuals.statistics(1e3 * off.rotation_rad),
-                    ),
-                )
-            },
-            "points": int(np.isfinite(off.position_mm).all(axis=1).sum()),
-            "poses": POSES[subset],
-        }
-    )
+        errors = residuals.errors({PLAINEST: models[PLAINEST]}, used)
+    old, new = (_numbers(maker, robot, models[kind], every) for kind in (NOMINAL, PLAINEST))
     values = [
         (group, key, unit, *(round(float(x), 12) + 0.0 for x in (old[group][key][0], value)))
         for group, numbers in new.items()
         for key, (value, unit) in numbers.items()
     ]
-    taken, fitted = free.any(axis=0), terms.free.any(axis=0)
+    left_out = fitted.any(axis=0) & ~free.any(axis=0)
     return Pendant(
         maker.name,
         robot.name,
         name,
         pd.DataFrame(values, columns=["group", "name", "unit", "old", "new"]),
-        mean_errors,
-        tuple(np.array([item.rpartition("_")[0] for item in PARAMETERS])[fitted & ~taken]),
+        _mean_errors(tables, maker, errors[f"{PLAINEST}_vs_measured"]),
+        tuple(item.rpartition("_")[0] for item in np.array(PARAMETERS)[left_out]),
         tuple(listed(tables["dh_identified"])),
         maker.enter,
         maker.remark,
         maker.text(new[maker.group]),
         maker.ending,
     )
+
+
+def _require_fitting(robot: Robot, maker: Controller) -> None:
+    """InputError where the controller cannot take this robot."""
+    if robot.dh.prismatic.any():
+        message = "has joints that slide: their zeros are lengths, which no export writes"
+        raise InputError(Problem(f"robot {robot.name}", message))
+    if maker.takes != ZEROS and not np.array_equal(robot.joint_map, np.eye(robot.dh.joints)):
+        message = (
+            f"reports joints with signs or couplings; {maker.name} counts those of its DH table"
+        )
+        raise InputError(Problem(f"robot {robot.name}", message, fix="use --format urdf"))
+
+
+def _mean_errors(tables: Tables, maker: Controller, off: residuals.Errors) -> pd.DataFrame:
+    """Mean errors of the controller's model, the calibrated and the nominal one."""
+    recorded, selected = pd.DataFrame(tables["residuals"]), selected_model(tables)
+    recorded = recorded[recorded["fold"].isna()]
+    subset = max(recorded["subset"])  # validation, where there is one
+    means = recorded[recorded["subset"] == subset].pivot(
+        index="comparison", columns="quantity", values="mean"
+    )
+    means = means.reindex(
+        [f"{selected}_vs_measured", f"{NOMINAL}_vs_measured"], columns=["position", "orientation"]
+    )
+    sizes = [np.linalg.norm(part, axis=1) for part in (off.position_mm, 1e3 * off.rotation_rad)]
+    own = pd.DataFrame(sizes).mean(axis=1).to_numpy()
+    table = pd.DataFrame(np.vstack([own, means]), columns=means.columns)
+    return pd.DataFrame({
+        "model": [
+            f"{maker.name} controller", f"calibrated ({model_name(selected)})",
+            "nominal, base and tool fitted",
+        ],
+        "position_mm": table["position"],
+        "orientation_mrad": table["orientation"],
+        "points": int(np.isfinite(sizes[0]).sum()),
+        "poses": POSES[subset],
+    })  # fmt: skip
 
 
 def _numbers(maker: Controller, robot: Robot, fit: Fit, every: Observations) -> dict[str, Numbers]:

@@ -8,11 +8,16 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
+from kinacc.calibration import identifiability
 from kinacc.calibration.misfit import Misfit, misfit
+from kinacc.config.error_models import PLAINEST, model_name
 from kinacc.deployment import folder as results
 from kinacc.deployment.record import STATED, Calibration
 from kinacc.kinematics.dh import PARAMETERS, DHModel
+from kinacc.kinematics.robot import Robot
+from kinacc.tables import store
 
 CONVENTION = "T = Rz(q + theta_offset) Tz(d) Tx(a) Rx(alpha) Ry(beta) per joint"
 
@@ -53,25 +58,25 @@ class Source:
             raise TypeError(f"a {self.calibration.choice} model has no DH table: choose dh")
         return self.calibration.model.table
 
-    @cached_property
-    def std(self) -> np.ndarray:
-        """Standard deviations (k, 5), by joint, as ``dh.PARAMETERS``; NaN where there are none."""
-        columns = self.tables.get(f"{self.calibration.choice}_model", {})
-        if f"std_{PARAMETERS[0]}" not in columns:
-            return np.full((self.calibration.model.joints, len(PARAMETERS)), np.nan)
-        order = np.argsort(columns["joint"], kind="stable")
-        std = [np.asarray(columns[f"std_{name}"], dtype=float)[order] for name in PARAMETERS]
-        return np.stack(std, axis=1)
+    def joints(self, dh: DHModel) -> pd.DataFrame:
+        """A row a joint of a table: joint, type, and value, nominal value and std of parameters.
+
+        NaN where there is no standard deviation.
+        """
+        joint = np.arange(1, dh.joints + 1)
+        fitted = pd.DataFrame(self.tables.get(f"{self.calibration.choice}_model", {"joint": joint}))
+        fitted = fitted.drop_duplicates("joint").set_index("joint").reindex(joint)
+        table = {"joint": joint, "type": np.where(dh.prismatic, "prismatic", "revolute")}
+        for name in PARAMETERS:
+            table[name] = getattr(dh, name)
+            table[f"nominal_{name}"] = getattr(self.calibration.robot.dh, name)
+            table[f"std_{name}"] = fitted.get(f"std_{name}", pd.Series(np.nan, joint)).to_numpy()
+        return pd.DataFrame(table)
 
     @cached_property
     def misfit(self) -> Misfit:
         """What the standard deviations are worth."""
         return misfit(self.tables, self.calibration.robot, self.calibration.choice)
-
-    @property
-    def selected(self) -> str:
-        """The model that was selected; empty where that is not recorded."""
-        return results.recorded_model(self.tables)
 
     @property
     def orientation_lines(self) -> list[str]:
@@ -88,11 +93,30 @@ class Source:
         return ["Left open by the poses:", *(f"  {text}" for text in reported)] if reported else []
 
 
-def number(value: float) -> float | None:
-    """A number of JSON; None where it is not known."""
-    return float(value) if np.isfinite(value) else None
+def read_source(
+    folder: Path | str,
+    robot: Robot,
+    model: str = PLAINEST,
+    urdf_file: Path | str | None = None,
+    links: tuple[str | None, str | None] = (None, None),
+    dh_joints: bool = False,
+) -> Source:
+    """What formats are made of, from a results folder; InputError where it cannot be used."""
+    tables = results.read_tables(folder)
+    arm = results.calibration(tables, robot, model, Path(folder).resolve().name)
+    path = Path(folder) / f"{model}_model.parquet"
+    known = store.read_metadata(path) if path.is_file() else {}
+    marks = {key: known[key] for key in store.PROVENANCE_KEYS if key in known}
+    return Source(arm, tables, marks, urdf_file, links, dh_joints)
 
 
-def kind(model: DHModel, joint: int) -> str:
-    """How a joint moves."""
-    return "prismatic" if model.prismatic[joint] else "revolute"
+def notes(source: Source) -> list[str]:
+    """What the poses leave open, and the model that was selected instead of the one written."""
+    lines, identified = [], source.tables.get(f"{PLAINEST}_identified")
+    weak = identifiability.weak(identifiability.listed(identified)) if identified else []
+    if weak:
+        lines = [f"warning: valid for poses like the measured ones: {'; '.join(weak)}"]
+    selected = results.selected_model(source.tables)
+    if selected != source.calibration.choice:
+        lines.append(f"note: {model_name(selected)} was selected (--model {selected})")
+    return lines

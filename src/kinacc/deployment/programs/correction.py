@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -28,7 +29,6 @@ from kinacc.deployment.programs import (
     universal,
     yaskawa,
 )
-from kinacc.deployment.programs.frame_files import frames_of
 from kinacc.deployment.programs.orientation import Convention
 from kinacc.deployment.programs.record import (
     BASE,
@@ -39,6 +39,7 @@ from kinacc.deployment.programs.record import (
     Position,
     Program,
     Source,
+    frames_of_yaml,
     replaced,
 )
 from kinacc.deployment.record import FLANGE, MEASURED, Calibration
@@ -130,7 +131,9 @@ def read_program(
     frames = dict(KNOWN)
     for source in [*map(Source.read, map(Path, (*filter(None, named), *frame_files))), *sources]:
         is_yaml = source.path.suffix.lower() == ".yaml"
-        frames |= frames_of(source, language.convention) if is_yaml else language.frames(source)
+        frames |= (
+            frames_of_yaml(source, language.convention) if is_yaml else language.frames(source)
+        )
     program = language.read(sources, pulses_per_degree)
     if not program.positions:
         message = "is computed, incomplete or defined elsewhere"
@@ -177,43 +180,19 @@ def compensate_program(
         For a file that cannot be read, frames that are missing, a program compensated before.
     """
     language, program = read_program(path, frame_files, pulses_per_degree)
-    convention = program.convention or language.convention
     _refuse_second_time(program)
     options = {TOOL: tools or {}, BASE: bases or {}}
     program = _in_use(program, options)
-    frames = _all_frames(program, convention, options, ask)
-    positions, robot = program.positions, calibration.robot
-    tool, base = (
-        [frames.get((kind, getattr(item, kind) or ""), IDENTITY) for item in positions]
-        for kind in (TOOL, BASE)
-    )
-    flange = {
-        n: compose(compose(base[n], convention.pose(item.numbers, item.where)), invert(tool[n]))
-        for n, item in enumerate(positions)
-        if item.scale is None and not item.refused
-    }
-    starts, reasons = _starts(robot, language, positions, flange, near_rad, base_is_fixed)
-    makers = {item.name for item in LANGUAGES if robot.name.lower().startswith(item.robots)}
-    remarks = []
-    if language.robots and makers - {language.name}:
-        remarks = [f"{language.name}: robot {robot.name} has a controller of another maker."]
-    parts = [pd.DataFrame(columns=_SHOWN)]
-    for name in dict.fromkeys(positions[number].tool for number in starts):
-        group = [number for number in starts if positions[number].tool == name]
-        place, remark = _carried(calibration, tool[group[0]], point)
-        remarks += [f"Tool {name or ''}: {remark}"] if remark else []
-        q_rad = np.stack([starts[number] for number in group])
-        parts.append(_corrected(calibration, q_rad, place, tool[group[0]]).set_axis(group))
-    rows = pd.concat(parts[1:] or parts)
-    new: dict[Position, np.ndarray] = {}
-    for number, row in rows.iterrows():
-        item = positions[number]
-        if reason := _obstacle(robot, language, item, row, at_most_mm):
+    frames = _all_frames(program, program.convention or language.convention, options, ask)
+    work = _Correction(calibration, language, replace(program, frames=frames))
+    starts, reasons = work.starts(near_rad, base_is_fixed)
+    rows, remarks = work.outcomes(starts, point)
+    positions, new = program.positions, {}
+    for number, row in zip(rows.index, rows.itertuples(), strict=True):
+        if reason := work.obstacle(positions[number], row, at_most_mm):
             reasons[number] = reason
-        elif item.scale is not None:
-            new[item] = row["q_rad"] / _unit(robot) * item.scale
-        elif max(row["change_mm"], row["change_mrad"]) > _SAME:
-            new[item] = convention.numbers(compose(invert(base[number]), row["pose"]), item.numbers)
+        elif positions[number].scale is not None or max(row.change_mm, row.change_mrad) > _SAME:
+            new[positions[number]] = work.numbers(positions[number], row)
     table = pd.DataFrame({
         "position": [item.name for item in positions],
         "file": [item.where for item in positions],
@@ -234,53 +213,99 @@ def compensate_program(
     )
 
 
-def _starts(
-    robot: Robot,
-    language: Language,
-    positions: Sequence[Position],
-    flange: Mapping[int, Pose],
-    near_rad: np.ndarray | None,
-    base_is_fixed: bool,
-) -> tuple[dict[int, np.ndarray], dict[int, str]]:
-    """Reported joints (k,) of the nominal arm by number of the position, and why some have none.
+@dataclass(frozen=True)
+class _Correction:
+    """A program with all its frames, and the calibrated arm that it is corrected for."""
 
-    ``flange``: wanted poses of the flange by number, of positions that are no joints.
-    """
-    ways = dict(zip(flange, posture.postures_of(robot, [*flange.values()]), strict=True))
-    starts: dict[int, np.ndarray] = {}
-    reasons: dict[int, str] = {}
-    for number, item in enumerate(positions):
-        start: np.ndarray | str = item.refused
-        if number in ways and item.moves_outside and not base_is_fixed:
-            start = _TRACK
-        elif number in ways:
-            near = near_rad if item.near_rad is None else item.near_rad
-            start = posture.choose(robot, ways[number], language.posture, item.posture, near)
-        elif not start and len(item.places) != robot.dh.joints:
-            start = f"has {len(item.places)} joints, not {robot.dh.joints}"
-        elif not start:
-            q_rad = item.numbers / item.scale * _unit(robot)
-            inside = limits.within(q_rad, robot.q_min_rad, robot.q_max_rad)
-            start = q_rad if inside else "its joints are beyond the limits"
-        if isinstance(start, str):
-            reasons[number] = start
-        else:
-            near_rad = starts[number] = start
-    return starts, reasons
+    calibration: Calibration
+    language: Language
+    program: Program
 
+    @property
+    def robot(self) -> Robot:
+        return self.calibration.robot
 
-def _obstacle(
-    robot: Robot, language: Language, position: Position, row: pd.Series, at_most_mm: float
-) -> str:
-    """Why a position cannot be corrected as its ``row`` has it; empty where it can."""
-    if row["outcome"] > PoseStatus.EXTRAPOLATED:
-        return f"the calibrated arm: {PoseStatus(row['outcome']).name.lower().replace('_', ' ')}"
-    if row["change_mm"] > at_most_mm:
-        return f"would move by {row['change_mm']:.3g} mm (--at-most-mm)"
-    if not position.posture:
-        return ""
-    changed = posture.unmatched(robot, language.posture, position.posture, row["q_rad"])
-    return f"the posture would change: {changed}" if changed else ""
+    @property
+    def convention(self) -> Convention:
+        return self.program.convention or self.language.convention
+
+    def frame(self, kind: str, position: Position) -> Pose:
+        """Tool or base of a position."""
+        return self.program.frames.get((kind, getattr(position, kind) or ""), IDENTITY)
+
+    def flange(self, position: Position) -> Pose:
+        """Wanted pose of the flange, of a position that is no joints."""
+        place = self.convention.pose(position.numbers, position.where)
+        tool = invert(self.frame(TOOL, position))
+        return compose(compose(self.frame(BASE, position), place), tool)
+
+    def starts(
+        self, near_rad: np.ndarray | None, base_is_fixed: bool
+    ) -> tuple[dict[int, np.ndarray], dict[int, str]]:
+        """Reported joints (k,) of the nominal arm by number of the position; why some have none."""
+        robot, positions = self.robot, self.program.positions
+        poses = [n for n, item in enumerate(positions) if item.scale is None and not item.refused]
+        flange = [self.flange(positions[number]) for number in poses]
+        ways = dict(zip(poses, posture.postures_of(robot, flange), strict=True))
+        starts: dict[int, np.ndarray] = {}
+        reasons: dict[int, str] = {}
+        for number, item in enumerate(positions):
+            start: np.ndarray | str = item.refused
+            if number in ways and item.moves_outside and not base_is_fixed:
+                start = _TRACK
+            elif number in ways:
+                near = near_rad if item.near_rad is None else item.near_rad
+                start = posture.choose(
+                    robot, ways[number], self.language.posture, item.posture, near
+                )
+            elif not start and len(item.places) != robot.dh.joints:
+                start = f"has {len(item.places)} joints, not {robot.dh.joints}"
+            elif not start:
+                q_rad = item.numbers / item.scale * _unit(robot)
+                inside = limits.within(q_rad, robot.q_min_rad, robot.q_max_rad)
+                start = q_rad if inside else "its joints are beyond the limits"
+            if isinstance(start, str):
+                reasons[number] = start
+            else:
+                near_rad = starts[number] = start
+        return starts, reasons
+
+    def outcomes(
+        self, starts: Mapping[int, np.ndarray], point: str | None
+    ) -> tuple[pd.DataFrame, list[str]]:
+        """Rows of ``_corrected`` by number of the position, and remarks."""
+        robot, language, remarks = self.robot, self.language, []
+        makers = {item.name for item in LANGUAGES if robot.name.lower().startswith(item.robots)}
+        if language.robots and makers - {language.name}:
+            remarks = [f"{language.name}: robot {robot.name} has a controller of another maker."]
+        parts, positions = [pd.DataFrame(columns=_SHOWN)], self.program.positions
+        for name in dict.fromkeys(positions[number].tool for number in starts):
+            group = [number for number in starts if positions[number].tool == name]
+            tool = self.frame(TOOL, positions[group[0]])
+            place, remark = _carried(self.calibration, tool, point)
+            remarks += [f"Tool {name or ''}: {remark}"] if remark else []
+            q_rad = np.stack([starts[number] for number in group])
+            parts.append(_corrected(self.calibration, q_rad, place, tool).set_axis(group))
+        return pd.concat(parts[1:] or parts), remarks
+
+    def obstacle(self, position: Position, row: Any, at_most_mm: float) -> str:
+        """Why a position cannot be corrected as its ``row`` has it; empty where it can."""
+        if row.outcome > PoseStatus.EXTRAPOLATED:
+            status = PoseStatus(row.outcome).name.lower().replace("_", " ")
+            return f"the calibrated arm: {status}"
+        if row.change_mm > at_most_mm:
+            return f"would move by {row.change_mm:.3g} mm (--at-most-mm)"
+        if not position.posture:
+            return ""
+        changed = posture.unmatched(self.robot, self.language.posture, position.posture, row.q_rad)
+        return f"the posture would change: {changed}" if changed else ""
+
+    def numbers(self, position: Position, row: Any) -> np.ndarray:
+        """New numbers of a position."""
+        if position.scale is not None:
+            return row.q_rad / _unit(self.robot) * position.scale
+        place = compose(invert(self.frame(BASE, position)), row.pose)
+        return self.convention.numbers(place, position.numbers)
 
 
 def _unit(robot: Robot) -> np.ndarray:

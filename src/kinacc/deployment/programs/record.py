@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
+import yaml
 
 from kinacc.deployment.programs.orientation import Convention
 from kinacc.errors import InputError, Problem
@@ -182,3 +183,17 @@ def _written(old: str, value: float, least: int) -> str:
     text = text.lstrip("-") if float(text) == 0.0 else text
     text = re.sub(r"^([-+]?)0\.", r"\1.", text) if re.match(r"[-+]?\.", old) else text
     return text.replace(".", ",") if "," in old else text
+
+
+def frames_of_yaml(source: Source, convention: Convention) -> Frames:
+    """Frames of ``tools: {1: [six numbers]}``, ``bases: {1: [..]}``, in mm and degrees."""
+    try:
+        content = yaml.safe_load(source.text)
+        return {
+            (kind, str(number)): convention.typed(np.array(numbers, float))
+            for kind in (TOOL, BASE)
+            for number, numbers in content.get(f"{kind}s", {}).items()
+        }
+    except (yaml.YAMLError, AttributeError, TypeError, ValueError):
+        allowed = "tools: {1: [six numbers]}, bases: {1: [six numbers]}"
+        raise InputError(Problem(str(source.path), "is no file of frames", allowed)) from None

@@ -1,4 +1,6 @@
-"""A calibrated arm as URDF: written from its DH chain, or an existing file with origins corrected.
+"""A calibrated arm as URDF, and as a model of Pinocchio and pybotics where these are installed.
+
+A URDF is written from the DH chain, or is an existing file with origins corrected.
 
 URDF has metres and radians; ``rpy`` turns about the fixed x, y and z axes in that order.
 """
@@ -7,9 +9,11 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from lxml import etree
+from scipy.spatial.transform import Rotation
 
 from kinacc.calibration.hand_eye import closed_form_start
 from kinacc.calibration.observations import full_poses
@@ -33,9 +37,7 @@ from kinacc.kinematics.robot.urdf import MOVING, Joint, joints_between, load
 _M_PER_MM = 1e-3
 _SAME_ARM_MM = 1e-3  # how far a file's nominal arm may be from the robot's
 _PROBES = 24
-
-
-ENDING, ANY_MODEL = ".urdf", False
+_PARALLEL = 1e-12  # sine of the angle between two axes
 
 
 def text(source: Source) -> str:
@@ -229,3 +231,72 @@ def _signs(robot: Robot) -> np.ndarray:
         "export with the joints of the DH table instead (--dh-joints)",
     )
     raise InputError(problem)
+
+
+def to_pinocchio(source: Source) -> Any:
+    """A ``pinocchio.Model`` of the calibrated arm (m, rad), with frames ``flange`` and ``tool``.
+
+    Joints are those that the controller reports. Raises InputError where these are coupled.
+    """
+    import pinocchio
+
+    return pinocchio.buildModelFromXML(generated(source))
+
+
+def to_pybotics(source: Source, point: str | None) -> Any:
+    """A ``pybotics.robot.Robot`` of the calibrated arm (mm, rad) with ``point`` as its tool.
+
+    Joints are those of the DH table, ``robot.dh_joints(q_rad)``.
+    """
+    from pybotics.kinematic_chain import MDHKinematicChain
+    from pybotics.link import PrismaticMDHLink, RevoluteMDHLink
+    from pybotics.robot import Robot as Arm
+    from pybotics.tool import Tool
+
+    base, parameters, end = modified_dh(source, point)
+    slides = source.dh.prismatic
+    links = [
+        (PrismaticMDHLink if slide else RevoluteMDHLink)(*row)
+        for slide, row in zip(slides, parameters, strict=True)
+    ]
+    chain = MDHKinematicChain(links)
+    return Arm(chain, tool=Tool(_matrix(end)), world_frame=_matrix(base))
+
+
+def modified_dh(source: Source, point: str | None) -> tuple[Pose, np.ndarray, Pose]:
+    """The arm with modified DH parameters, after Craig: Rx(alpha) Tx(a) Rz(theta) Tz(d) a joint.
+
+    Returns
+    -------
+    Base of the first axis, rows alpha (rad), a (mm), theta (rad), d (mm) of all k joints, and the
+    pose of ``point`` in the last joint's frame.
+    """
+    calibration = source.calibration
+    (first, *between), end = origins(source.dh)
+    parameters = np.zeros((calibration.model.joints, 4))
+    for joint, step in enumerate(between, start=1):
+        around, alpha, theta = _about_z_x_z(step)
+        a, across, up = Rotation.from_euler("z", -around).apply(step.position_mm)
+        d = -across / np.sin(alpha) if abs(np.sin(alpha)) > _PARALLEL else 0.0
+        parameters[joint] = alpha, a, theta, d
+        parameters[joint - 1, 2:] += around, up - d * np.cos(alpha)
+    base = compose(calibration.robot.base, first)
+    return base, parameters, compose(end, calibration.point(point))
+
+
+def _about_z_x_z(step: Pose) -> tuple[float, float, float]:
+    """Angles about z, x and z from an axis to the next; parallel ones: first towards the next."""
+    turn = Rotation.from_matrix(step.rotation)
+    if np.hypot(*step.rotation[:2, 2]) > _PARALLEL:
+        return tuple(turn.as_euler("ZXZ"))
+    around = np.arctan2(step.position_mm[1], step.position_mm[0])
+    alpha = 0.0 if step.rotation[2, 2] > 0.0 else np.pi
+    rest = Rotation.from_euler("ZX", [around, alpha]).inv() * turn
+    return around, alpha, rest.as_rotvec()[2]
+
+
+def _matrix(pose: Pose) -> np.ndarray:
+    """A pose as (4, 4)."""
+    matrix = np.eye(4)
+    matrix[:3, :3], matrix[:3, 3] = pose.rotation, pose.position_mm
+    return matrix
