@@ -15,7 +15,7 @@ from kinacc.assess.adaptive import AdaptiveAssessor, Candidates
 from kinacc.calibration.noise import Noise, of_measurements
 from kinacc.campaign import folder as folders
 from kinacc.campaign.instrument import Instrument
-from kinacc.campaign.plan import Limits, Plan, Points
+from kinacc.campaign.plan import Arm, Limits, Plan, Points
 from kinacc.config.names import not_in_a_line
 from kinacc.deployment.applicability import LIKE_FITTED, is_measured_there, position_std_mm
 from kinacc.deployment.planning import distances, shortest_path
@@ -170,7 +170,7 @@ def plan_of(
         route = route[np.concatenate([first, count + _short_path(places[count:], here)])]
     return Plan(
         about=about, assessor=assessor, instruments=used, to_base=to_base, limits=limits,
-        arm={"prismatic": arm.robot.dh.prismatic.tolist()}, seed=seed, order=order, route=route,
+        arm=Arm(prismatic=arm.robot.dh.prismatic.tolist()), seed=seed, order=order, route=route,
         points=points,
     )  # fmt: skip
 

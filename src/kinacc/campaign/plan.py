@@ -185,12 +185,18 @@ def _pose(value: Any) -> Pose:
     return pose
 
 
+class Arm(BaseModel):
+    """Which joints slide; plans of earlier versions have more of the arm."""
+
+    prismatic: list[bool]
+
+
 class Plan(BaseModel):
     """A campaign before any reading, as its file has it.
 
     ``order`` (m,) is the random order of the candidates; ``route`` the points of the first visit
     in the order they are driven to. ``to_base`` takes the instrument's frame to the robot's base.
-    ``arm``: which joints slide (prismatic). ``about`` names robot, calibration, model and point.
+    ``about`` names robot, calibration, model and point.
     ``overruled``: doubts at the start that were overruled. ``method``: of the bounds.
     """
 
@@ -206,7 +212,7 @@ class Plan(BaseModel):
     ]
     instruments: Annotated[tuple[Instrument, ...], Field(min_length=1)]
     to_base: Annotated[Pose, PlainValidator(_pose), PlainSerializer(lambda pose: pose._asdict())]
-    arm: dict[str, list[bool]]
+    arm: Arm
     limits: Limits
     seed: NonNegativeInt
     order: Annotated[np.ndarray, PlainValidator(np.array)]
@@ -230,7 +236,7 @@ class Plan(BaseModel):
     @cached_property
     def slides(self) -> np.ndarray:
         """Which joints slide (k,)."""
-        return np.array(self.arm["prismatic"])
+        return np.array(self.arm.prismatic)
 
     @cached_property
     def covariance_mm2(self) -> np.ndarray:
