@@ -17,7 +17,7 @@ from dataclasses import replace
 import numpy as np
 
 from kinacc.calibration import fitting
-from kinacc.calibration.constraints import free_parameters, parallel_joints
+from kinacc.calibration.dh_estimator import free_parameters, parallel_joints
 from kinacc.calibration.frames import frame_terms, known
 from kinacc.calibration.observations import Observations, full_poses
 from kinacc.deployment.history import SAME, Session, history

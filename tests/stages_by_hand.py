@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 
-from kinacc.calibration import error_model, excluded_rows, residual_tables
+from kinacc.calibration import stages
 from kinacc.checks import check
 from kinacc.errors import KinaccError
 from kinacc.report import summarise
@@ -23,9 +23,9 @@ from kinacc.workflow.outdated import CALIBRATION
 STAGES = {
     "measurements": source.run,
     "data_check": check.run,
-    **{kind: partial(error_model.run, kind=kind) for kind in ("vec", "compliance", "dh")},
-    "residuals": residual_tables.run,
-    "excluded_rows": excluded_rows.run,
+    **{kind: partial(stages.fit_model, kind=kind) for kind in ("vec", "compliance", "dh")},
+    "residuals": stages.compare_models,
+    "excluded_rows": stages.excluded_rows,
     "summary": summarise.run,
     "accuracy_map": evaluation.mapped,
     "assessment_points": evaluation.points,

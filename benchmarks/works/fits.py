@@ -27,10 +27,10 @@ from harness import Contender, Work
 from scipy.optimize import least_squares
 
 from kinacc.calibration import fitting, vec_fit
-from kinacc.calibration.constraints import free_parameters
+from kinacc.calibration.dh_estimator import free_parameters
+from kinacc.calibration.fitting import PoseSystem
 from kinacc.calibration.frames import FrameParameters, known
 from kinacc.calibration.observations import Observations, full_poses
-from kinacc.calibration.system import PoseSystem
 from kinacc.geometry import Pose, compose, exp_so3
 from kinacc.kinematics import dh, robot, vec
 

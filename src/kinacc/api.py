@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 
 from kinacc import __version__
-from kinacc.calibration import error_model, residual_tables
+from kinacc.calibration import stages
 from kinacc.calibration.misfit import misfit
 from kinacc.checks import check, contradictions
 from kinacc.checks.described import describe_files
@@ -416,9 +416,9 @@ def calibrate(measurements: Measurements | str | Path) -> Calibration:
         tables |= _as_written(check.run({}, settings))
     kinds = [kind for kind in asked_for(settings["calibration"]) if kind != PLAINEST]
     for kind in (*kinds, PLAINEST):
-        tables |= _as_written(error_model.run(tables, settings, kind))
-    for stage in (residual_tables, summarise):
-        tables |= _as_written(stage.run(tables, settings))
+        tables |= _as_written(stages.fit_model(tables, settings, kind))
+    for stage in (stages.compare_models, summarise.run):
+        tables |= _as_written(stage(tables, settings))
     data = DataSets({measurements.name: settings}, 1, ())
     made_by = config_hash(data.chosen(measurements.name, *CALIBRATION))
     return _of_tables(measurements.name, tables, measurements.robot, None, made_by)

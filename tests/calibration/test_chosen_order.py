@@ -13,10 +13,10 @@ from measured_arms import measured_arm
 from scipy.stats import multivariate_normal
 from test_few_poses import settings
 
-from kinacc.calibration import evidence, models, vec_fit
+from kinacc.calibration import models, vec_fit
+from kinacc.calibration.fitting import PoseSystem
 from kinacc.calibration.frames import FrameParameters, known
 from kinacc.calibration.observations import full_poses
-from kinacc.calibration.system import PoseSystem
 from kinacc.calibration.vec_fit import Prior
 from kinacc.geometry import Pose, exp_so3
 from kinacc.kinematics import robot, vec
@@ -43,7 +43,7 @@ def observed(order, seed=0, prior=WAVY):
 
 def choose(seen, orders=(1, 2, 3, 4, 6), stated=None):
     empty = vec.without_errors(ARM.dh, LOW, HIGH, 1)
-    return evidence.choose(seen, empty, FIXED, WEIGHT, orders, stated).query("chosen").iloc[0]
+    return vec_fit.choose(seen, empty, FIXED, WEIGHT, orders, stated).query("chosen").iloc[0]
 
 
 @pytest.mark.parametrize("order", [2, 4])
@@ -68,7 +68,7 @@ def test_differences_of_evidence_are_those_of_the_marginal_likelihood():
     order, got = np.tile(np.arange(3), 36), []
     left, values, _ = np.linalg.svd(jacobian[:, order == 0])
     rest = left[:, int(np.sum(values > 1e-9 * values[0])) :]
-    linear = evidence._Linear(seen, empty, FIXED, WEIGHT)
+    linear = vec_fit._Linear(seen, empty, FIXED, WEIGHT)
     linear.root[:] = 1.0
     normal, _ = linear.above_constants(2, 2)
     for prior in (Prior(0.2, 0.2e-3, 0.7, 1e-4), Prior(0.5, 0.5e-3, 1.0, 1e-4)):
@@ -78,19 +78,19 @@ def test_differences_of_evidence_are_those_of_the_marginal_likelihood():
         variance = noise @ np.linalg.solve(shape, noise) / noise.size
         wanted = multivariate_normal(cov=variance * shape).logpdf(noise)
         at = np.log([prior.delta_mm / NOISE_MM, prior.decay])
-        value = evidence._negative(at, normal, noise.size, np.repeat([1, 2], 36))[0]
+        value = vec_fit._negative(at, normal, noise.size, np.repeat([1, 2], 36))[0]
         got.append(-value - wanted)
     assert got[0] == pytest.approx(got[1], abs=1e-3)
 
 
 def test_slopes_and_curvature_of_the_evidence_are_its_finite_differences():
     empty = vec.without_errors(ARM.dh, LOW, HIGH, 1)
-    normal, count = evidence._Linear(observed(3), empty, FIXED, WEIGHT).above_constants(3, 3)
+    normal, count = vec_fit._Linear(observed(3), empty, FIXED, WEIGHT).above_constants(3, 3)
     at, degree = np.array([1.5, -0.2]), np.repeat([1, 2, 3], 36)
-    _, slopes, curvature, _ = evidence._negative(at, normal, count, degree)
+    _, slopes, curvature, _ = vec_fit._negative(at, normal, count, degree)
     for i, step in enumerate(1e-4 * np.eye(2)):
         ahead, behind = (
-            evidence._negative(at + way * step, normal, count, degree) for way in (1, -1)
+            vec_fit._negative(at + way * step, normal, count, degree) for way in (1, -1)
         )
         assert slopes[i] == pytest.approx((ahead[0] - behind[0]) / 2e-4, rel=1e-5)
         np.testing.assert_allclose(curvature[i], (ahead[1] - behind[1]) / 2e-4, rtol=1e-5)
@@ -132,7 +132,7 @@ def test_one_reading_off_by_5_mm_does_not_change_the_order(row, axis):
         orders(arm, calibration, rows).query("chosen == 1")["order"].item()
         for rows in (seen, replace(seen, position_mm=place))
     )
-    assert abs(evidence.ORDERS.index(after) - evidence.ORDERS.index(before)) <= 1
+    assert abs(vec_fit.ORDERS.index(after) - vec_fit.ORDERS.index(before)) <= 1
 
 
 def test_the_search_ends_where_high_orders_gain_nothing():

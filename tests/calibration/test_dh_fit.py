@@ -7,7 +7,7 @@ import pytest
 from simulated import POINT, POSE, anywhere, far_off, fit, measure, predicted
 
 from kinacc.calibration import frames
-from kinacc.calibration.constraints import free_parameters
+from kinacc.calibration.dh_estimator import free_parameters
 from kinacc.geometry import compose, log_so3
 from kinacc.kinematics import dh, robot
 

@@ -9,7 +9,7 @@ import pytest
 import simulated
 
 from kinacc.calibration import models
-from kinacc.calibration.constraints import free_parameters, parallel_joints
+from kinacc.calibration.dh_estimator import free_parameters, parallel_joints
 from kinacc.calibration.residuals import errors
 from kinacc.config.schema import defaults
 from kinacc.kinematics import robot

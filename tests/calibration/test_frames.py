@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from simulated import POINT, POSE, anywhere, measure
 
-from kinacc.calibration.hand_eye import closed_form_start
+from kinacc.calibration.frames import closed_form_start
 from kinacc.calibration.observations import full_poses
 from kinacc.geometry import Pose, compose, exp_so3, log_so3
 from kinacc.kinematics import dh, robot

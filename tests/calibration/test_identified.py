@@ -7,7 +7,8 @@ import pandas as pd
 import pytest
 from simulated import POINT, POSE, THREE, disturbed, fit, joints, measure
 
-from kinacc.calibration import constraints, identified, uncertainty
+from kinacc.calibration import identifiability, uncertainty
+from kinacc.calibration.dh_estimator import free_parameters, parallel_joints
 from kinacc.calibration.frames import known
 from kinacc.calibration.identifiability import LeftOpen
 from kinacc.kinematics import robot
@@ -16,12 +17,12 @@ from kinacc.kinematics import robot
 def asked(name, kind=POSE, sessions=1):
     """Table ``dh_identified`` by parameter, of a fit to simulated poses."""
     arm, rng = robot.load(name), np.random.default_rng(0)
-    free = constraints.free_parameters(6, constraints.parallel_joints(arm.dh))
+    free = free_parameters(6, parallel_joints(arm.dh))
     true, q = disturbed(arm.dh, free, rng), joints(arm, 80, rng)
     data = measure(true, q, kind, rng, sessions=sessions)
     found = fit(data, arm.dh, free)
     known_of = uncertainty.of_fit(found)
-    return pd.DataFrame(identified.table(found, known_of, data)).set_index("parameter")
+    return pd.DataFrame(identifiability.identified(found, known_of, data)).set_index("parameter")
 
 
 def test_what_every_serial_arm_hides():

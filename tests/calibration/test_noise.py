@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from simulated import POINT, disturbed, joints, measure
 
-from kinacc.calibration.constraints import free_parameters
+from kinacc.calibration.dh_estimator import free_parameters
 from kinacc.calibration.noise import of_readings
 from kinacc.kinematics import robot
 

@@ -10,8 +10,9 @@ import pytest
 from simulated import POSE, disturbed, measure
 from test_few_poses import settings
 
-from kinacc.calibration import identified, uncertainty
-from kinacc.calibration.constraints import free_parameters
+from kinacc.calibration import uncertainty
+from kinacc.calibration.dh_estimator import free_parameters
+from kinacc.calibration.identifiability import identified
 from kinacc.calibration.models import estimators
 from kinacc.geometry import Pose
 from kinacc.kinematics import robot
@@ -63,5 +64,5 @@ def test_a_stated_length_of_the_tool_holds_every_model(std_mm):
         left_open = known.undetermined[:, known.names.index("t0.z_mm")]
         assert np.abs(left_open).max(initial=0.0) < 0.1, kind
     known = uncertainty.of_fit(found["dh"])
-    table = identified.table(found["dh"], known, pointing_one_way())
+    table = identified(found["dh"], known, pointing_one_way())
     assert dict(zip(table["parameter"], table["status"], strict=True))["t0.z_mm"] == "prior"

@@ -9,7 +9,7 @@ from oracles import kinematics as oracle
 
 from kinacc import geometry
 from kinacc.calibration import fitting, frames, vec_fit
-from kinacc.calibration.constraints import free_parameters
+from kinacc.calibration.dh_estimator import free_parameters
 from kinacc.calibration.observations import full_poses
 from kinacc.kinematics import dh, vec
 

@@ -12,8 +12,8 @@ from test_few_poses import settings
 import kinacc
 from kinacc.calibration import models
 from kinacc.calibration.own_model import register_error_model
-from kinacc.calibration.residual_tables import selection
 from kinacc.calibration.residuals import cross_validated
+from kinacc.calibration.stages import selection
 from kinacc.config import error_models
 from kinacc.kinematics import robot
 from kinacc.kinematics.dh import DHModel

@@ -7,7 +7,7 @@ import pytest
 from simulated import POINT, POSE, fit, measure
 
 from kinacc.calibration import fitting
-from kinacc.calibration.constraints import free_parameters
+from kinacc.calibration.dh_estimator import free_parameters
 from kinacc.geometry import Pose, exp_so3
 from kinacc.kinematics.dh import DHModel
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from simulated import POSE, THREE, anywhere, fit, measure
 
-from kinacc.calibration.constraints import free_parameters
+from kinacc.calibration.dh_estimator import free_parameters
 from kinacc.geometry import exp_so3
 from kinacc.kinematics import robot
 

@@ -9,8 +9,8 @@ import pytest
 import simulated
 
 from kinacc.calibration import fitting, vec_fit
+from kinacc.calibration.fitting import PoseSystem
 from kinacc.calibration.frames import FrameParameters, Frames
-from kinacc.calibration.system import PoseSystem
 from kinacc.geometry import log_so3
 from kinacc.kinematics import robot, vec
 

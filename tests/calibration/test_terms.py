@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 from simulated import POINT, POSE, THREE, disturbed, fit, joints, measure, predicted
 
-from kinacc.calibration import constraints, frames, robust
+from kinacc.calibration import dh_estimator, frames
+from kinacc.calibration.least_squares import HUBER, TUKEY
 from kinacc.config.parameter_rules import rules
 from kinacc.kinematics import robot
 
 ARM = robot.load("mh180")
-FREE = constraints.free_parameters(6)
+FREE = dh_estimator.free_parameters(6)
 
 
 def observed(kind=POSE, count=60, seed=0, sessions=1):
@@ -23,7 +24,7 @@ def observed(kind=POSE, count=60, seed=0, sessions=1):
 
 
 def fitted(observations, arm_rules=None, frame_rules=None, **settings):
-    arm = constraints.arm_terms(ARM.dh, FREE, rules(arm_rules or {}))
+    arm = dh_estimator.arm_terms(ARM.dh, FREE, rules(arm_rules or {}))
     count = len(observations.session_names), len(observations.target_names)
     stated = frames.known(ARM.base, robot.carried(ARM), *count)
     terms = frames.frame_terms(observations, stated, rules(frame_rules or {}))
@@ -77,7 +78,7 @@ def test_a_prior_determines_what_the_data_leave_open():
     assert found.solution.cost == pytest.approx(plain.solution.cost, rel=1e-3)
 
 
-@pytest.mark.parametrize("loss", [robust.HUBER, robust.TUKEY])
+@pytest.mark.parametrize("loss", [HUBER, TUKEY])
 def test_a_robust_loss_forgives_rows_far_off(loss):
     clean = observed(count=150, seed=4)
     position = clean.position_mm.copy()

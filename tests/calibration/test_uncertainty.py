@@ -7,7 +7,7 @@ import pytest
 from simulated import POSE, anywhere, fit, measure
 
 from kinacc.calibration import frames, tables, uncertainty
-from kinacc.calibration.constraints import free_parameters
+from kinacc.calibration.dh_estimator import free_parameters
 from kinacc.geometry import Pose, compose, exp_so3, log_so3
 from kinacc.kinematics import dh, robot
 

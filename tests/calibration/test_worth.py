@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from kinacc.calibration import model_comparison
-from kinacc.calibration.residuals import Errors
+from kinacc.calibration.residuals import Errors, select
 
 
 def selection(others, configuration, fold):
@@ -15,7 +14,7 @@ def selection(others, configuration, fold):
         name: Errors(np.asarray(vectors, dtype=float), np.full(np.shape(vectors), np.nan))
         for name, vectors in others.items()
     }
-    return model_comparison.select(held_out, configuration, fold).set_index("model")
+    return select(held_out, configuration, fold).set_index("model")
 
 
 def best(table):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from kinacc.calibration.constraints import arm_terms, free_parameters
+from kinacc.calibration.dh_estimator import arm_terms, free_parameters
 from kinacc.config import parameter_rules
 from kinacc.config.settings import Calibration, DhFit
 from kinacc.kinematics.robot import load

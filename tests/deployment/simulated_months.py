@@ -11,7 +11,7 @@ import numpy as np
 from oracles.kinematics import UR10, dh_link, rot_x, rot_y, rot_z, trans
 
 from kinacc.calibration import fitting
-from kinacc.calibration.constraints import free_parameters, parallel_joints
+from kinacc.calibration.dh_estimator import free_parameters, parallel_joints
 from kinacc.calibration.frames import frame_terms, known
 from kinacc.calibration.observations import Observations, full_poses
 from kinacc.deployment.history import Session, history

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from kinacc.calibration import fitting, tables, uncertainty, vec_fit
-from kinacc.calibration.constraints import free_parameters
+from kinacc.calibration.dh_estimator import free_parameters
 from kinacc.calibration.frames import Frames
 from kinacc.calibration.observations import Observations, full_poses
 from kinacc.calibration.vec_fit import Prior

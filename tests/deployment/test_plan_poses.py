@@ -9,7 +9,7 @@ import paper_settings as paper
 import pytest
 
 from kinacc.calibration import fitting
-from kinacc.calibration.constraints import free_parameters
+from kinacc.calibration.dh_estimator import free_parameters
 from kinacc.calibration.observations import full_poses
 from kinacc.deployment.planning import (
     choose,

@@ -23,10 +23,7 @@ import yaml  # noqa: E402
 from good_files import File, simulated  # noqa: E402
 from measurements.scoring import measured  # noqa: E402
 
-from kinacc.calibration import (  # noqa: E402
-    error_model,
-    residual_tables,
-)
+from kinacc.calibration import stages  # noqa: E402
 from kinacc.campaign import folder as campaigns  # noqa: E402
 from kinacc.cli.group import main  # noqa: E402
 from kinacc.report import summarise  # noqa: E402
@@ -49,12 +46,12 @@ MODELS = ("vec_model", "dh_model", "frames")
 # Stages by name: the function, and the golden tables it reads.
 STAGES: dict[str, tuple[Callable, tuple[str, ...]]] = {
     "measurements": (source.run, ()),
-    "fit_vec": (partial(error_model.run, kind="vec"), ("measurements",)),
+    "fit_vec": (partial(stages.fit_model, kind="vec"), ("measurements",)),
     "fit_dh": (
-        partial(error_model.run, kind="dh"),
+        partial(stages.fit_model, kind="dh"),
         ("measurements", "vec_model", "vec_frames"),
     ),
-    "residuals": (residual_tables.run, ("measurements", *MODELS, "vec_orders")),
+    "residuals": (stages.compare_models, ("measurements", *MODELS, "vec_orders")),
     "summary": (
         summarise.run,
         ("measurements", "robot", *MODELS, "dh_identified", "pose_errors", "model_selection",

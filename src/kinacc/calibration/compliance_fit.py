@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -37,7 +37,7 @@ class ComplianceEstimator(Estimator):
     fix: ClassVar[str] = MORE_POSES
 
     @classmethod
-    def of(cls, calibration: Mapping, arm: Robot, every: Observations) -> Self:
+    def of(cls, calibration: Mapping[str, Any], arm: Robot, every: Observations) -> Self:
         """By the ``calibration`` settings; what loads ``every`` row says which terms there are."""
         section = calibration["compliance"]
         gravity = np.array(section["gravity"], dtype=float)
@@ -63,7 +63,7 @@ class ComplianceEstimator(Estimator):
 
     @classmethod
     def contradictions(
-        cls, calibration: Mapping, arm: Robot
+        cls, calibration: Mapping[str, Any], arm: Robot
     ) -> Iterator[tuple[tuple[str, ...], str, str]]:
         """Joints the arm has not or that slide, links of another arm, no direction of gravity."""
         section, joints = calibration["compliance"], arm.dh.joints
@@ -107,7 +107,7 @@ class ComplianceEstimator(Estimator):
         return {"compliance_fit": tables.fit_columns("compliance_fit", fitted, known)}
 
 
-def _body(section: Mapping) -> np.ndarray:
+def _body(section: Mapping[str, Any]) -> np.ndarray:
     """Mass in kg and centre in mm (4,)."""
     return np.array([section["mass_kg"], *section["centre_mm"]], dtype=float)
 

@@ -11,8 +11,6 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from kinacc.calibration.noise import UNKNOWN, Noise, of_measurements
 from kinacc.config.error_models import model_name
 from kinacc.kinematics.robot import Robot
@@ -124,9 +122,11 @@ def over_noise(misfits: Sequence[Misfit]) -> str:
 
 
 def _held_out_mm(tables: Mapping[str, Columns], model: str) -> float:
-    table = tables.get("model_selection", {"model": [], "held_out_rms_mm": []})
+    if "model_selection" not in tables:
+        return math.nan
+    table = tables["model_selection"]
     rms = dict(zip(map(str, table["model"]), table["held_out_rms_mm"], strict=True))
-    return float(rms.get(model, np.nan)) / math.sqrt(3.0)
+    return float(rms.get(model, math.nan)) / math.sqrt(3.0)
 
 
 def _noise_of(tables: Mapping[str, Columns], robot: Robot) -> Noise:

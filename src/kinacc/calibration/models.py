@@ -22,6 +22,8 @@ from kinacc.kinematics.model import ErrorModel
 from kinacc.kinematics.robot import Robot, carried
 from kinacc.tables.columns import Columns
 
+Progress = Callable[..., Iterable[Any]]  # counts the items of an iterable, with a label
+
 
 class Fit(NamedTuple):
     """A model with the base and targets it was fitted with.
@@ -55,7 +57,7 @@ class Common:
     tool: Pose = IDENTITY
 
     @classmethod
-    def of(cls, calibration: Mapping, arm: Robot) -> Self:
+    def of(cls, calibration: Mapping[str, Any], arm: Robot) -> Self:
         """By the ``calibration`` settings."""
         return cls(
             arm.dh,
@@ -88,9 +90,10 @@ class Common:
     def fit(self, observations: Observations, nominal: ErrorModel, **settings: Any) -> ModelFit:
         """A model fitted to measurements, by ``settings`` of ``fitting.fit``."""
         frames, terms = self.frames(observations)
-        fixed = {"frames": frames, "frame_terms": terms}
-        fixed["rotation_weight_mm_per_rad"] = self.rotation_weight_mm_per_rad
-        return fitting.fit(observations, nominal, **fixed | settings)
+        weight = self.rotation_weight_mm_per_rad
+        known: dict[str, Any] = {"frames": frames, "frame_terms": terms}
+        known["rotation_weight_mm_per_rad"] = weight
+        return fitting.fit(observations, nominal, **known | settings)
 
     def nominal_frames(self, observations: Observations) -> Frames:
         """Base and targets of the nominal arm, fitted where they are not known. Raises FitError."""
@@ -111,13 +114,13 @@ class Estimator:
     fix: ClassVar[str]  # what to do where there are too few measurements
 
     @classmethod
-    def of(cls, calibration: Mapping, arm: Robot, every: Observations) -> Self:
+    def of(cls, calibration: Mapping[str, Any], arm: Robot, every: Observations) -> Self:
         """By the ``calibration`` settings; ``every``: all observations of the data set."""
         raise NotImplementedError
 
     @classmethod
     def contradictions(
-        cls, calibration: Mapping, arm: Robot
+        cls, calibration: Mapping[str, Any], arm: Robot
     ) -> Iterator[tuple[tuple[str, ...], str, str]]:
         """Keys of its section that cannot be for ``arm``, what is wrong, and what is allowed."""
         yield from ()
@@ -132,7 +135,7 @@ class Estimator:
         """Numbers that a fit needs beside those for base and targets."""
         return self.size
 
-    def choices(self, every: Observations, progress: Callable | None = None) -> dict[str, Columns]:
+    def choices(self, every: Observations, progress: Progress | None = None) -> dict[str, Columns]:
         """Tables that say how settings left open were chosen. Raises FitError."""
         return {}
 
@@ -144,12 +147,16 @@ class Estimator:
         """The model of ``observations``; ``others`` are fitted already. Raises FitError."""
         raise NotImplementedError
 
-    def tables(self, fitted: Any, known: Uncertainty, observations: Observations) -> dict:
+    def tables(
+        self, fitted: ModelFit, known: Uncertainty, observations: Observations
+    ) -> dict[str, Columns]:
         """Further tables about the fit."""
         return {}
 
 
-def estimators(calibration: Mapping, arm: Robot, every: Observations) -> dict[str, Estimator]:
+def estimators(
+    calibration: Mapping[str, Any], arm: Robot, every: Observations
+) -> dict[str, Estimator]:
     """The estimators that settings ask for.
 
     Parameters

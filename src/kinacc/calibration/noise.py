@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from kinacc.calibration.hand_eye import closed_form_start
+from kinacc.calibration.frames import closed_form_start
 from kinacc.calibration.observations import Observations, from_columns
 from kinacc.kinematics.dh import DHModel
 from kinacc.kinematics.robot import Robot

@@ -34,7 +34,8 @@ class Observations:
     session : numpy.ndarray
         Index into ``session_names``, shape (n,), each with a base of its own; one if not given.
     payload : numpy.ndarray
-        Mass in kg and centre in the last DH frame in mm, shape (n, 4); NaN where not stated.
+        Mass in kg and centre in the last DH frame in mm, shape (n, 4); NaN where not stated, all
+        if not given.
     """
 
     q_rad: np.ndarray
@@ -46,15 +47,16 @@ class Observations:
     repeat: np.ndarray
     fold: np.ndarray
     target_names: tuple[str, ...] = (TOOL,)
-    session: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))
+    session: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     session_names: tuple[str | None, ...] = (None,)
     payload: np.ndarray = field(default_factory=lambda: np.zeros((0, 4)))
 
     def __post_init__(self) -> None:
-        if len(self.session) != len(self.q_rad):
-            object.__setattr__(self, "session", np.zeros(len(self.q_rad), dtype=np.int64))
-        if len(self.payload) != len(self.q_rad):
-            object.__setattr__(self, "payload", np.full((len(self.q_rad), 4), np.nan))
+        count = len(self.q_rad)
+        if len(self.session) != count:
+            object.__setattr__(self, "session", np.zeros(count, dtype=np.int64))
+        if len(self.payload) != count:
+            object.__setattr__(self, "payload", np.full((count, 4), np.nan))
 
     def __len__(self) -> int:
         return len(self.q_rad)
@@ -94,9 +96,9 @@ class Observations:
     def select(self, rows: np.ndarray | slice) -> Self:
         """The observations of ``rows`` (mask, indices or slice)."""
         columns = {
-            item.name: getattr(self, item.name)[rows]
-            for item in fields(self)
-            if not item.name.endswith("_names")
+            column.name: getattr(self, column.name)[rows]
+            for column in fields(self)
+            if not column.name.endswith("_names")
         }
         return replace(self, **columns)
 
@@ -187,9 +189,5 @@ def from_columns(columns: Mapping[str, np.ndarray], robot: Robot) -> Observation
         target_names=target_names,
         session=np.array([session_names.index(name) for name in sessions], dtype=np.int64),
         session_names=session_names,
-        payload=(
-            stack(*PAYLOAD_COLUMNS)
-            if PAYLOAD_COLUMNS[0] in columns
-            else np.full((count, len(PAYLOAD_COLUMNS)), np.nan)
-        ),
+        payload=stack(*PAYLOAD_COLUMNS) if PAYLOAD_COLUMNS[0] in columns else np.zeros((0, 4)),
     )

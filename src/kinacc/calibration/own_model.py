@@ -38,7 +38,7 @@ def register_error_model(model: type[ErrorModel]) -> type[ErrorModel]:
         The class, so that this serves as a decorator.
     """
     own = type(f"{model.__name__}Estimator", (OwnEstimator,), {"kind": model.kind, "model": model})
-    error_models.register(model.kind, _with_table(model), own)
+    error_models.register(model.kind, model, own)
     of_dh = ARTEFACTS["dh_covariance"]
     for table in (
         replace(of_dh, name=f"{model.kind}_covariance"),
@@ -58,7 +58,7 @@ class OwnEstimator(Estimator):
     fix: ClassVar[str] = MORE_POSES
 
     @classmethod
-    def of(cls, calibration: Mapping, arm: Robot, every: Observations) -> Self:
+    def of(cls, calibration: Mapping[str, Any], arm: Robot, every: Observations) -> Self:
         """By the ``calibration`` settings."""
         return cls(Common.of(calibration, arm))
 
@@ -88,19 +88,3 @@ _COLUMNS = (
     Column("std", "float", "see unit", "its standard deviation", nullable=True),
     Column("unit", "text", "", "unit of value and standard deviation"),
 )
-
-
-def _with_table(model: type[ErrorModel]) -> type[ErrorModel]:
-    """The class with a table of its parameters, where it has none of its own."""
-    if model.to_columns is ErrorModel.to_columns:
-        model.to_columns = _columns
-    return model
-
-
-def _columns(self: ErrorModel, std: np.ndarray) -> dict[str, np.ndarray]:
-    return {
-        "parameter": np.array(self.names, dtype=object),
-        "value": self.start,
-        "std": std,
-        "unit": np.array(self.units, dtype=object),
-    }

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +11,7 @@ from kinacc.config.error_models import COMPARISONS, MEASURED, NOMINAL, Compariso
 from kinacc.kinematics import dh
 from kinacc.kinematics.robot import Robot
 from kinacc.tables.allowed import LEFT_OUT, SELECTABLE
+from kinacc.tables.columns import Columns
 
 LARGE_SHARE = 0.99  # of rows whose error is at most the quantile stated
 TABLES = ("measurements", "robot", "frames", "dh_identified", "pose_errors", "model_selection")
@@ -45,7 +45,7 @@ class Tolerance:
         return f"{self.mm:g} mm for the {TOLERANCE_OF[self.of]}"
 
 
-def selected(choice: Mapping) -> str:
+def selected(choice: Columns) -> str:
     """The selected model of a table.
 
     Parameters
@@ -61,7 +61,7 @@ def selected(choice: Mapping) -> str:
     return next(str(n) for n, yes in zip(choice["model"], choice["selected"], strict=True) if yes)
 
 
-def error_statistics(pose_errors: Mapping, configuration: np.ndarray) -> pd.DataFrame:
+def error_statistics(pose_errors: Columns, configuration: np.ndarray) -> pd.DataFrame:
     """Statistics of every comparison over the rows that all comparisons of an estimate share.
 
     Parameters
@@ -117,7 +117,7 @@ def error_statistics(pose_errors: Mapping, configuration: np.ndarray) -> pd.Data
     return table[names].reset_index(drop=True)
 
 
-def frames_are_fitted(frames: Mapping) -> bool:
+def frames_are_fitted(frames: Columns) -> bool:
     """Whether base and tool were fitted: then the models have different ones."""
     places = np.stack([frames[name] for name in ("x_mm", "y_mm", "z_mm", "qx", "qy", "qz")], axis=1)
     models = np.asarray(frames["model"])
@@ -125,7 +125,7 @@ def frames_are_fitted(frames: Mapping) -> bool:
     return not np.array_equal(places[models == NOMINAL], places[first])
 
 
-def left_out(data_check: Mapping | None) -> list[str]:
+def left_out(data_check: Columns | None) -> list[str]:
     """Parts of the measured file that are not used, from a ``data_check`` table."""
     if data_check is None:
         return []
@@ -133,7 +133,7 @@ def left_out(data_check: Mapping | None) -> list[str]:
     return [str(what) for kind, what in pairs if kind == LEFT_OUT]
 
 
-def excluded_errors(table: Mapping, model: str) -> list[tuple[int, str, float]]:
+def excluded_errors(table: Columns, model: str) -> list[tuple[int, str, float]]:
     """Line, reason and position error in mm of every excluded row; NaN where it has none."""
     size = np.linalg.norm([table[f"e{axis}_mm"] for axis in "xyz"], axis=0)
     rows = np.flatnonzero(table["comparison"] == Comparison(MEASURED, model).name)
@@ -141,19 +141,19 @@ def excluded_errors(table: Mapping, model: str) -> list[tuple[int, str, float]]:
     return [(int(table["line"][i]), str(table["reason"][i]), float(size[i])) for i in rows]
 
 
-def reported_joints(measurements: Mapping, joints: int) -> np.ndarray:
+def reported_joints(measurements: Columns, joints: int) -> np.ndarray:
     """Reported joints (n, joints) of the table ``measurements``, rad or mm."""
     numbers = range(1, joints + 1)
     return np.stack([np.asarray(measurements[f"q{n}"], dtype=float) for n in numbers], axis=1)
 
 
-def covered(measurements: Mapping, robot: Robot) -> tuple[np.ndarray, np.ndarray]:
+def covered(measurements: Columns, robot: Robot) -> tuple[np.ndarray, np.ndarray]:
     """Smallest and largest value (k,), (k,) of each reported joint."""
     joints = reported_joints(measurements, len(robot.q_min_rad))
     return joints.min(axis=0), joints.max(axis=0)
 
 
-def flange_spread_deg(measurements: Mapping, robot: Robot) -> float | None:
+def flange_spread_deg(measurements: Columns, robot: Robot) -> float | None:
     """Largest angle between the flange z axis and its mean, None where it is 5 deg or more."""
     joints = robot.dh_joints(reported_joints(measurements, len(robot.q_min_rad)))
     axis = dh.forward(robot.dh, joints).rotation[..., 2]

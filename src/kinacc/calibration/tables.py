@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
 from kinacc.calibration.fitting import ModelFit
 from kinacc.calibration.frames import Frames, stacked
-from kinacc.calibration.split import Spectrum
+from kinacc.calibration.least_squares import Spectrum
 from kinacc.calibration.uncertainty import Uncertainty, scaled_unit, unit_of
 from kinacc.geometry import quaternion_from_rotation
 from kinacc.kinematics.tables import frame
@@ -35,7 +36,7 @@ def frames_columns(
 
 
 def frames_of(
-    columns: Mapping,
+    columns: Columns,
     model: str,
     target_names: tuple[str, ...],
     session_names: tuple[str | None, ...] = (None,),
@@ -44,8 +45,8 @@ def frames_of(
 
     Parameters
     ----------
-    columns : mapping
-        Columns of ``frames``.
+    columns : Columns
+        The table ``frames``.
     model : str
         Kind of the model.
     target_names, session_names : tuple
@@ -75,7 +76,7 @@ def fit_columns(
     parameter.
     """
     solution, spectrum = fit.solution, gauge or fit.solution.spectrum
-    rows: list[tuple] = [
+    rows: list[tuple[Any, ...]] = [
         ("parameters", None, None, len(solution.x), "1"),
         ("residual_components", None, None, solution.count, "1"),
         ("degrees_of_freedom", None, None, solution.degrees_of_freedom, "1"),

@@ -10,16 +10,21 @@ the frame the motion is given in. DH parameters are ``j1.d_mm`` and the like, VE
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import compress
+from itertools import combinations_with_replacement, compress
 from typing import TYPE_CHECKING
 
 import numpy as np
+import scipy
+from scipy.sparse import csr_array
 
 from kinacc.calibration.frames import ANGLE_UNIT_RAD
-from kinacc.calibration.split import TOUCH_SQUARED
+from kinacc.calibration.observations import Observations
+from kinacc.measurements.folds import configurations
 
 if TYPE_CHECKING:
     from kinacc.calibration.fitting import ModelFit
+
+TOUCH_SQUARED = 1e-4  # a parameter is undetermined if a truncated direction holds 1 % of it
 
 
 @dataclass(frozen=True)
@@ -68,8 +73,8 @@ def of_fit(fit: ModelFit) -> Uncertainty:
 
 def named_directions(fit: ModelFit, directions: np.ndarray) -> np.ndarray:
     """Directions (m, P) of a fit's own coordinates, in units of its scale, as of its names."""
-    units = [scale_of(name) for name in compress(fit.model.names, fit.free.ravel())]
-    units = np.concatenate([fit.parameters.scale, units])
+    scales = [scale_of(name) for name in compress(fit.model.names, fit.free.ravel())]
+    units = np.concatenate([fit.parameters.scale, scales])
     return (directions * fit.solution.scale) @ _change(fit).T / units
 
 
@@ -158,3 +163,90 @@ def _unit(name: str) -> tuple[str, float]:
     if ".eps_" in name:
         return _UNITS["_rad"]
     return next((unit for end, unit in _UNITS.items() if name.endswith(end)), ("mm", 1.0))
+
+
+WORST_CONDITION = 1e6  # of the equations for variances: beyond it they cannot be told apart
+LEAST_FREEDOM = 1e-12  # in residuals
+
+
+def shared_errors(observations: Observations) -> list[csr_array]:
+    """Sums (labels, components) over the residuals that share one error, for each kind of error.
+
+    Kinds of one reading come first; those of configurations are there where any is read again.
+    """
+    configuration = configurations(observations.pose, observations.q_rad)
+    both = np.stack([configuration, observations.target])
+    of_target = np.unique(both, axis=1, return_inverse=True)[1].ravel()
+    levels = [np.arange(len(observations))]
+    if of_target.max() + 1 < len(observations):
+        levels.append(of_target)
+        if configuration.max() < of_target.max():
+            levels.append(configuration)
+    measured = np.stack([np.ones(len(observations), bool), observations.has_rotation], axis=1)
+    row, axis = np.nonzero(np.repeat(measured, 3, axis=1))
+    return [
+        csr_array((np.ones(len(part)), (6 * level[row[part]] + axis[part], part)),
+                  (6 * (level.max() + 1), len(row)))
+        for level in levels
+        for part in (np.flatnonzero(axis < 3), np.flatnonzero(axis >= 3))
+        if part.size
+    ]  # fmt: skip
+
+
+def covariance_along(
+    residual: np.ndarray,
+    jacobian: np.ndarray,
+    errors: list[csr_array],
+    fitted: np.ndarray,
+    reported: np.ndarray,
+    pooled: float,
+) -> np.ndarray:
+    """Covariance (r, r) of coordinates along directions: a sandwich of the variances of all errors.
+
+    Parameters
+    ----------
+    residual, jacobian : numpy.ndarray
+        Of the fit, shapes (m,) and (m, P).
+    errors : list of scipy.sparse.csr_array
+        See ``shared_errors``.
+    fitted, reported : numpy.ndarray
+        Roots (P, q) and (P, r) of ``Split`` by which the parameters were fitted, and along which
+        the covariance is wanted.
+    pooled : float
+        Variance of the rows of priors.
+    """
+    if not pooled > 0.0:
+        return pooled * np.eye(reported.shape[1])
+    variances = _variances(residual, jacobian @ fitted, errors, pooled)
+    along = jacobian @ reported
+    total = pooled * (np.eye(along.shape[1]) - along.T @ along)
+    for variance, sums in zip(variances, errors, strict=False):
+        added = sums @ along
+        total += variance * (added.T @ added)
+    return total
+
+
+def _variances(
+    residual: np.ndarray, along: np.ndarray, errors: list[csr_array], pooled: float
+) -> np.ndarray:
+    """Variances of the first of ``errors``, as many as can be told apart; none is negative.
+
+    ``along`` (m, r): the Jacobian along a root. With H = along along' the expected square sum of
+    (I - H) e added up by Za is the sum over kinds b of variance_b |Za (I - H) Zb'|^2.
+    """
+    count = len(errors)
+    added, expected = [sums @ along for sums in errors], np.zeros((count, count))
+    grams = [part.T @ part for part in added]
+    for a, b in combinations_with_replacement(range(count), 2):
+        common = (errors[a] @ errors[b].T).tocoo()
+        crossed = np.sum(added[a][common.row] * added[b][common.col], axis=1)
+        both = common.data @ (common.data - 2.0 * crossed) + np.sum(grams[a] * grams[b])
+        expected[a, b] = expected[b, a] = both
+    prior = np.eye(along.shape[1]) - along.T @ along
+    squares = np.array([np.sum((sums @ residual) ** 2) for sums in errors])
+    squares -= pooled * np.array([np.sum(gram * prior) for gram in grams])
+    unit = np.sqrt(np.maximum(np.diag(expected), LEAST_FREEDOM))
+    scaled, wanted = expected / np.outer(unit, unit), squares / (pooled * unit)
+    while count > 1 and np.linalg.cond(scaled[:count, :count]) > WORST_CONDITION:
+        count -= 1
+    return pooled * scipy.optimize.nnls(scaled[:count, :count], wanted[:count])[0] / unit[:count]

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 import pandas as pd
 
-from kinacc.calibration import evidence, tables, vec_fit
+from kinacc.calibration import tables, vec_fit
 from kinacc.calibration.fitting import ModelFit, placed
 from kinacc.calibration.frames import FrameParameters, Frames, FrameTerms
-from kinacc.calibration.models import Common, Estimator, Fit
+from kinacc.calibration.models import Common, Estimator, Fit, Progress
 from kinacc.calibration.observations import Observations
 from kinacc.calibration.uncertainty import Uncertainty
 from kinacc.calibration.vec_fit import Prior
@@ -39,7 +39,7 @@ class VECEstimator(Estimator):
     prior : Prior
         Of a fit.
     orders : tuple of int
-        To choose from, by evidence.
+        To choose from, by vec_fit.
     prior_stated : bool
         Only the order is chosen.
     travel_direction : bool
@@ -58,14 +58,14 @@ class VECEstimator(Estimator):
     fix: ClassVar[str] = vec_fit.VEC_FIX
 
     @classmethod
-    def of(cls, calibration: Mapping, arm: Robot, every: Observations) -> Self:
+    def of(cls, calibration: Mapping[str, Any], arm: Robot, every: Observations) -> Self:
         """By the ``calibration`` settings."""
         section = calibration["vec"]
         angle_rad = 1e-3 * float(section["prior_std_mrad"])
         stated = Prior(
             float(section["prior_std_mm"]), angle_rad, float(section["prior_decay"]), angle_rad
         )
-        orders = [order for order in evidence.ORDERS if order <= int(section["order_highest"])]
+        orders = [order for order in vec_fit.ORDERS if order <= int(section["order_highest"])]
         return cls(
             Common.of(calibration, arm),
             _joint_range_rad(section, arm, every.q_rad),
@@ -88,19 +88,18 @@ class VECEstimator(Estimator):
 
     @property
     def open(self) -> bool:
-        """Whether order or prior are left to the evidence."""
+        """Whether order or prior are left to the vec_fit."""
         return len(self.orders) > 1 or not self.prior_stated
 
-    def choices(self, every: Observations, progress: Callable | None = None) -> dict[str, Columns]:
+    def choices(self, every: Observations, progress: Progress | None = None) -> dict[str, Columns]:
         """``vec_orders``: orders and priors tried with each fold unseen and with all seen."""
         parts: list[pd.DataFrame] = []
         folds = [None, *(int(fold) for fold in np.unique(every.fold) if fold >= 0)]
         if not self.open:
-            unjudged = evidence.table_of([(self.order, self.prior, np.nan, None)])
+            unjudged = vec_fit.table_of([(self.order, self.prior, np.nan, None)])
             parts.append(unjudged.assign(fold=np.nan))
-        elif progress:
-            folds = progress(folds, "shares of the poses held out")
-        for fold in folds if self.open else ():
+        counted = progress(folds, "shares of the poses held out") if progress else folds
+        for fold in counted if self.open else ():
             training = every if fold is None else every.select(every.fold != fold)
             parts.append(self._choice(training, parts[0] if parts else None).assign(fold=fold))
         table = pd.concat([part.astype({"fold": float, "chosen": int}) for part in parts])
@@ -116,7 +115,7 @@ class VECEstimator(Estimator):
         prior = self.prior
         if not self.prior_stated:
             std_mm, decay = float(row["prior_std_mm"]), float(row["prior_decay"])
-            prior = evidence.prior_of(std_mm, decay, self.prior.offset_rad)
+            prior = vec_fit.prior_of(std_mm, decay, self.prior.offset_rad)
         return replace(self, order=int(row["order"]), prior=prior)
 
     def fit(self, observations: Observations, others: Mapping[str, Fit]) -> ModelFit:
@@ -139,7 +138,7 @@ class VECEstimator(Estimator):
         """How the fit went, and what the poses tell of the coefficients without a prior."""
         gauge = vec_fit.gauge(
             self._wanted(observations),
-            fitted.model,
+            self._empty(self.order),
             fitted.frames,
             self.common.rotation_weight_mm_per_rad,
         )
@@ -151,14 +150,14 @@ class VECEstimator(Estimator):
         parameters = FrameParameters.none(frames)
         if terms is not None:
             parameters = placed(training, arm, terms, weight, start=frames)
-        most = evidence.highest_order(training, arm.joints, parameters.size)
+        most = vec_fit.highest_order(training, arm.joints, parameters.size)
         orders = [order for order in self.orders if order <= most]
         if not orders:  # too few residuals to judge by
-            usual = evidence.prior_of(evidence.USUAL_STD, 1.0, self.prior.offset_rad)
-            return evidence.table_of([(self.orders[0], usual, np.nan, None)])
+            usual = vec_fit.prior_of(vec_fit.USUAL_STD, 1.0, self.prior.offset_rad)
+            return vec_fit.table_of([(self.orders[0], usual, np.nan, None)])
         stated = self.prior if self.prior_stated else None
         observations = self._wanted(training)
-        return evidence.choose(
+        return vec_fit.choose(
             observations, self._empty(1), parameters, weight, orders, stated, near
         )
 
@@ -179,7 +178,7 @@ class VECEstimator(Estimator):
 
 
 def _joint_range_rad(
-    section: Mapping, arm: Robot, q_rad: np.ndarray
+    section: Mapping[str, Any], arm: Robot, q_rad: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Range (k,), (k,) of the DH joints; those of the data are ``q_rad`` (n, k)."""
     wanted = section["joint_range"]

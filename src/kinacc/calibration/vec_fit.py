@@ -1,19 +1,29 @@
-"""VEC coefficients, base and targets fitted to poses under a Gaussian prior."""
+"""VEC coefficients, base and targets under a Gaussian prior; its order and width by evidence.
+
+Errors are small, so poses are linear in the coefficients. Coefficients above order 0 have a
+zero-mean Gaussian prior whose width and fall from one order to the next maximise the likelihood of
+the data with base, targets, constants and direction offsets integrated out (restricted maximum
+likelihood; Harville, J. Am. Stat. Assoc. 72, 1977). The order is the lowest whose evidence comes
+near the best.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
+import pandas as pd
+import scipy
+from scipy.linalg import blas, lapack
 
 from kinacc.calibration import fitting
-from kinacc.calibration.fitting import ModelFit
+from kinacc.calibration.fitting import ModelFit, PoseSystem, distinct, once, scales
 from kinacc.calibration.frames import FrameParameters, Frames, FrameTerms
+from kinacc.calibration.least_squares import Spectrum, one_thread, singular_values
 from kinacc.calibration.observations import Observations
-from kinacc.calibration.one_thread import one_thread
-from kinacc.calibration.split import Spectrum, singular_values
-from kinacc.calibration.system import PoseSystem
+from kinacc.kinematics import vec
 from kinacc.kinematics.vec import ERRORS, VECModel
 
 VEC_FIX = "measure more poses, or lower calibration.vec.order"
@@ -165,3 +175,224 @@ def _with_centred_offsets(fit: ModelFit, observations: Observations, std: np.nda
     vector[free], fitted_std[free] = solution.x[frames:], deviation[frames:]
     model = fit.model.with_parameters(vector)
     return replace(fit, model=model, std=fitted_std, prior_std=std, solution=solution)
+
+
+ORDERS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 28, 40)
+USUAL_STD = 0.1  # mm and mrad
+CONSTANT_STD = 3.0  # mm and mrad, of order 0 beside a chosen prior: all but free
+ENOUGH = 2.0  # log evidence below the best that a lower order may have
+PATIENCE = 2  # orders without a gain after which no higher one is tried
+FALLS = (0.3, 1.0)  # from each order to the next, least and most
+WIDTHS = (1e-4, 1e4)  # of the prior over the noise, mm and mrad
+FAR = 4.0  # medians of the error; a reading farther off than that counts less
+_SCREENINGS = 3
+_STATED_STEPS = 6  # until the noise under a stated prior has settled
+_GAUGE_RIDGE = 1e-9  # holds constants no pose shows, as a share of those it does
+_STEPS, _LONGEST, _FLAT = 30, 2.0, 1e-6  # of the search for a prior
+_GAIN = 0.005  # of log evidence, that a further step or order must have
+_FIRST = 12  # normal equations reach up to this order at first
+
+
+def highest_order(observations: Observations, joints: int, frames: int) -> int:
+    """The highest order with no more parameters than residuals, below 0 where there is none."""
+    return (distinct(observations).components - frames) // (6 * joints) - 1
+
+
+def prior_of(std_mm: float, decay: float, offset_rad: float) -> Prior:
+    """The prior of a chosen width and fall."""
+    constant = CONSTANT_STD, 1e-3 * CONSTANT_STD
+    return Prior(std_mm, 1e-3 * std_mm, decay, offset_rad, *constant)
+
+
+@one_thread
+def choose(
+    observations: Observations,
+    empty: VECModel,
+    parameters: FrameParameters,
+    rotation_weight_mm_per_rad: float,
+    orders: Sequence[int],
+    stated: Prior | None = None,
+    near: pd.DataFrame | None = None,
+) -> pd.DataFrame:
+    """Choose order and prior of a VEC model of some observations.
+
+    Parameters
+    ----------
+    observations : Observations
+        Measured points and poses.
+    empty : VECModel
+        The model at any order.
+    parameters : FrameParameters
+        Base and targets as a fit has them.
+    rotation_weight_mm_per_rad : float
+        Position error that weighs as much as one radian.
+    orders : sequence of int
+        Orders to try, rising.
+    stated : Prior, optional
+        A prior that is not chosen, for which only the order is.
+    near : pandas.DataFrame, optional
+        The result for nearly the same rows, from whose priors the search starts.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Orders tried: ``order``, ``prior_std_mm``, ``prior_std_mrad`` and ``prior_decay`` that suit
+        it best, ``log_evidence``, ``log_evidence_less`` (than the best), ``chosen``, and
+        ``start`` (2,), the logs of the width of the prior over the noise and of the decay.
+    """
+    near = pd.DataFrame(columns=["order", "start"]) if near is None else near
+    starts = dict(zip(near["order"], near["start"], strict=True))
+    linear = _Linear(observations, empty, parameters, rotation_weight_mm_per_rad)
+    rows: list[tuple[Any, ...]] = []
+    at = np.log([1.0, 0.8])
+    for order in orders:
+        normal, count = linear.above_constants(order, max(orders))
+        degree = np.repeat(np.arange(1, order + 1), linear.motions)
+        if stated is None:
+            at = starts.get(order, at)
+            least, at, noise = _best(normal, count, degree, at)
+            prior = prior_of(float(np.exp(at[0])) * noise, float(np.exp(at[1])), 0.0)
+        else:
+            prior, noise = stated, 0.1
+            for _ in range(_STATED_STEPS):
+                at = np.log([stated.delta_mm / noise, stated.decay])
+                least, _, _, noise = _negative(at, normal, count, degree)
+        rows.append((order, prior, -least, at))
+        reached = np.array([row[2] for row in rows])
+        if len(rows) > PATIENCE + int(np.argmax(reached > reached.max() - _GAIN)):
+            break
+    return table_of(rows)
+
+
+def table_of(rows: Sequence[tuple[Any, ...]]) -> pd.DataFrame:
+    """The table of ``choose`` from order, prior, log evidence and start of each trial."""
+    table = pd.DataFrame(rows, columns=["order", "prior", "log_evidence", "start"])
+    for name, size in (("delta_mm", "prior_std_mm"), ("decay", "prior_decay")):
+        table[size] = [getattr(prior, name) for prior in table["prior"]]
+    table["prior_std_mrad"] = [1e3 * prior.eps_rad for prior in table["prior"]]
+    table["log_evidence_less"] = table["log_evidence"] - table["log_evidence"].max()
+    table["chosen"] = table.index == int(np.argmax(table["log_evidence_less"] >= -ENOUGH))
+    return table
+
+
+class _Linear:
+    """Normal equations of a VEC model about no errors, unknowns sorted by Chebyshev order."""
+
+    def __init__(
+        self,
+        observations: Observations,
+        empty: VECModel,
+        parameters: FrameParameters,
+        weight: float,
+    ) -> None:
+        self.observations, self.empty = observations, empty
+        self.parameters, self.weight = parameters, weight
+        self.motions = 6 * empty.joints
+        self.root = once(observations)
+        self.built, self.gram = -1, np.zeros((0, 0))
+        # A reading that no arm with constant errors comes near bends high orders most.
+        for _ in range(_SCREENINGS):
+            system, start, scale = self._system(0)
+            normal = system.normal(start) * np.outer(scale, scale)
+            step = -np.linalg.solve(_steady(normal[:-1, :-1]), normal[:-1, -1])
+            to = scale * np.append(step, 1.0)
+            parts = [np.tensordot(to, part[:, :3], 1) for part, _ in system.columns(start)]
+            squared = np.sum(np.concatenate(parts, axis=1) ** 2, axis=0) / self.root**2
+            far = max(FAR**2 * float(np.median(squared)), np.finfo(float).tiny)
+            self.root = once(observations) * np.sqrt(far / np.maximum(squared, far))
+
+    def _system(self, order: int) -> tuple[PoseSystem, np.ndarray, np.ndarray]:
+        """The system, where it is linearised, and the scale of ``[J | r]``."""
+        empty = vec.without_errors(self.empty.dh, self.empty.q_min_rad, self.empty.q_max_rad, order)
+        free, frames = informed(self.observations, empty), self.parameters
+        system = PoseSystem(self.observations, empty, free, frames, self.weight, self.root)
+        start = np.concatenate([frames.begin, np.zeros(free.sum())])
+        return system, start, np.concatenate([frames.scale * frames.free, scales(empty)[free], [1]])
+
+    def above_constants(self, order: int, highest: int) -> tuple[np.ndarray, float]:
+        """Gram matrix of ``[r | J]`` above order 0 up to ``order``, and the count of residuals.
+
+        Base, targets, constants and offsets are projected out, and taken off the count.
+        """
+        if order > self.built:
+            self.built = min(max(order, _FIRST), highest) if order <= _FIRST else highest
+            system, start, scale = self._system(self.built)
+            degree = np.zeros(len(scale))
+            series = self.parameters.size + np.arange(self.motions * (self.built + 1))
+            degree[series] = np.tile(np.arange(self.built + 1), self.motions)
+            degree[-1] = 0.5  # the residual follows what every order has
+            place, flat = np.argsort(degree, kind="stable"), int(np.sum(degree == 0.0))
+            normal = (system.normal(start) * np.outer(scale, scale))[np.ix_(place, place)]
+            factor = np.linalg.cholesky(_steady(normal[:flat, :flat]))
+            sides = scipy.linalg.solve_triangular(factor, normal[:flat, flat:], lower=True)
+            self.gram = normal[flat:, flat:] - sides.T @ sides
+            self.count = system.weight - flat
+        size = 1 + self.motions * order
+        return self.gram[:size, :size], self.count
+
+
+def _steady(normal: np.ndarray) -> np.ndarray:
+    """A normal matrix that is definite where no pose shows a constant."""
+    diagonal = np.diag(normal)
+    return normal + np.diag(_GAUGE_RIDGE * np.maximum(diagonal, diagonal.mean()))
+
+
+def _best(
+    normal: np.ndarray, count: float, degree: np.ndarray, start: np.ndarray
+) -> tuple[float, np.ndarray, float]:
+    """Least negative log evidence, logs of width over noise and of fall there, and the noise.
+
+    By Newton steps within bounds; where the evidence is not concave, as if it were.
+    """
+    low, high = np.log([WIDTHS, FALLS]).T
+    at, step, least, noise = start, np.zeros(2), np.inf, np.nan
+    for _ in range(_STEPS):
+        value, slopes, curvature, deviation = _negative(at + step, normal, count, degree)
+        if value > least + _GAIN:
+            step = step / 4.0
+            continue
+        at, least, noise = at + step, value, deviation
+        (of_width, mixed), (_, of_fall) = curvature
+        of_width = max(abs(of_width), _FLAT)
+        fall = mixed / of_width * slopes[0] - slopes[1]
+        fall /= max(abs(of_fall - mixed**2 / of_width), _FLAT)
+        fall = np.clip(at[1] + fall, low[1], high[1]) - at[1]
+        step = np.array([-(slopes[0] + mixed * fall) / of_width, fall])
+        step *= min(1.0, _LONGEST / max(np.abs(step).max(), _FLAT))
+        step[0] = np.clip(at[0] + step[0], low[0], high[0]) - at[0]
+        gain = -slopes @ step
+        if gain < _GAIN:
+            break
+    return float(least - gain / 2.0), at + step, noise
+
+
+def _negative(
+    at: np.ndarray, normal: np.ndarray, count: float, degree: np.ndarray
+) -> tuple[float, np.ndarray, np.ndarray, float]:
+    """Negative log evidence, slopes (2,), curvature (2, 2), and the noise profiled out.
+
+    ``at``: logs of the width of the prior over the noise, and of the fall. With scaled J'J = M and
+    J'r = g, B = (1 + M)^-1: 2 E = count log(r'r - g'B g) - log det B. By the log of each standard
+    deviation, dB = -B D (1 - B) - (1 - B) D B and d(B g) = 2 B D B g - D B g.
+    """
+    change = np.stack([np.ones(len(degree)), degree - 1.0])
+    std = np.exp(at @ change)
+    gradient = std * normal[0, 1:]
+    matrix = normal[1:, 1:] * std
+    matrix *= std[:, None]
+    matrix[np.diag_indices_from(matrix)] += 1.0
+    factor, _ = lapack.dpotrf(matrix.T, clean=0, overwrite_a=1)
+    step = lapack.dpotrs(factor, gradient)[0]
+    misfit = max(normal[0, 0] - gradient @ step, np.finfo(float).tiny)
+    value = 0.5 * count * np.log(misfit) + np.sum(np.log(np.diag(factor)))
+    inverse, _ = lapack.dpotri(factor, overwrite_c=1)
+    diagonal, ratio = np.diag(inverse).copy(), count / misfit
+    squares = change @ step**2
+    slopes = change @ (1.0 - diagonal) - ratio * squares
+    moved = change * step
+    half = moved @ blas.dtrmm(1.0, inverse, moved.T) * (2.0 * ratio)
+    half += change @ blas.dtrmm(1.0, np.square(inverse, out=inverse), change.T)
+    of_each = diagonal * (1.0 + diagonal) + ratio * step**2 * (1.0 + 2.0 * diagonal)
+    curvature = (change * of_each) @ change.T - half - half.T
+    curvature -= ratio / misfit * np.outer(squares, squares)
+    return float(value), slopes, 2.0 * curvature, np.sqrt(misfit / count)

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from kinacc.calibration.least_squares import one_thread
 from kinacc.calibration.noise import of_readings
-from kinacc.calibration.one_thread import one_thread
 from kinacc.checks import (
     coverage,
     digits,

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from kinacc.calibration.one_thread import one_thread
+from kinacc.calibration.least_squares import one_thread
 from kinacc.checks import check, meanings, readings, robust_fit
 from kinacc.checks.findings import Finding, Progress, Report
 from kinacc.checks.meanings import Meaning

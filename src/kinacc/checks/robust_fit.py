@@ -17,9 +17,8 @@ import pandas as pd
 from numpy import ndarray
 from scipy.spatial.transform import Rotation
 
-from kinacc.calibration.frames import FrameParameters, Frames
-from kinacc.calibration.hand_eye import base_from_targets, closed_form_start
-from kinacc.calibration.system import PoseSystem
+from kinacc.calibration.fitting import PoseSystem
+from kinacc.calibration.frames import FrameParameters, Frames, base_from_targets, closed_form_start
 from kinacc.checks import tails
 from kinacc.checks.readings import Readings, thinned
 from kinacc.geometry import Pose, compose, invert, log_so3

@@ -31,9 +31,9 @@ import numpy as np
 import scipy
 
 from kinacc.calibration import vec_fit
+from kinacc.calibration.fitting import PoseSystem
 from kinacc.calibration.frames import FrameParameters, Frames
 from kinacc.calibration.observations import Observations
-from kinacc.calibration.system import PoseSystem
 from kinacc.kinematics import vec
 from kinacc.kinematics.dh import DHModel
 from kinacc.kinematics.vec import ERRORS

@@ -12,8 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kinacc.calibration import frames
-from kinacc.calibration.identifiability import LeftOpen
-from kinacc.calibration.identified import STRUCTURAL, joints_anywhere
+from kinacc.calibration.identifiability import STRUCTURAL, LeftOpen, joints_anywhere
 from kinacc.calibration.uncertainty import Uncertainty
 from kinacc.deployment.applicability import BLOCK, sensitivity
 from kinacc.deployment.record import TOOL, Calibration, nominal

@@ -238,9 +238,10 @@ class ErrorModel:
         Returns
         -------
         dict of numpy.ndarray
-            Columns by name.
+            Columns by name; of a model of one's own ``parameter``, ``value``, ``std``, ``unit``.
         """
-        raise NotImplementedError
+        names, units = (np.array(texts, dtype=object) for texts in (self.names, self.units))
+        return {"parameter": names, "value": self.start, "std": std, "unit": units}
 
     @classmethod
     def from_columns(

@@ -19,7 +19,7 @@ from kinacc.calibration.identifiability import (
     weak,
 )
 from kinacc.calibration.misfit import in_words, misfit, misfits
-from kinacc.calibration.model_comparison import STANDARD_ERRORS
+from kinacc.calibration.residuals import STANDARD_ERRORS
 from kinacc.calibration.uncertainty import is_angle
 from kinacc.config.error_models import MEASURED, NOMINAL, PLAINEST, Comparison, model_name
 from kinacc.deployment.folder import uncertainty

@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from kinacc.calibration import error_model, residual_tables
+from kinacc.calibration import stages
 from kinacc.config.error_models import ALWAYS
 from kinacc.config.records import Settings
 from kinacc.study import evaluation, histories, monte_carlo
@@ -16,8 +16,8 @@ from kinacc.tables.columns import Columns, Tables
 
 RUNS: dict[str, Callable[..., dict[str, Columns]]] = {
     "measurements": source.run,
-    **{kind: partial(error_model.run, kind=kind) for kind in ALWAYS},
-    "residuals": residual_tables.run,
+    **{kind: partial(stages.fit_model, kind=kind) for kind in ALWAYS},
+    "residuals": stages.compare_models,
     "accuracy_map": evaluation.mapped,
     "assessment_points": evaluation.points,
     "study_chunk": monte_carlo.simulated,

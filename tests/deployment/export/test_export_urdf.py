@@ -7,7 +7,7 @@ import pinocchio as pin
 import pytest
 from scipy.spatial.transform import Rotation
 
-from kinacc.calibration.hand_eye import closed_form_start
+from kinacc.calibration.frames import closed_form_start
 from kinacc.calibration.observations import full_poses
 from kinacc.deployment.export import urdf
 from kinacc.deployment.export.source import Source

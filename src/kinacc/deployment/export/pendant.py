@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from kinacc.calibration import delivered, residuals
+from kinacc.calibration import residuals, stages
 from kinacc.calibration.dh_estimator import DHEstimator
 from kinacc.calibration.fitting import ModelFit
 from kinacc.calibration.identifiability import listed
@@ -83,7 +83,7 @@ def fit_pendant(
     """
     maker = CONTROLLERS[controller]
     _require_fitting(robot, maker)
-    every, train = delivered.observed(tables, robot)
+    every, train = stages.observed(tables, robot)
     used = every.select(train)
     estimator = DHEstimator.of(settings, robot, every)
     fitted = estimator.arm.free

@@ -15,7 +15,7 @@ import numpy as np
 from lxml import etree
 from scipy.spatial.transform import Rotation
 
-from kinacc.calibration.hand_eye import closed_form_start
+from kinacc.calibration.frames import closed_form_start
 from kinacc.calibration.observations import full_poses
 from kinacc.deployment.export.source import Source
 from kinacc.deployment.record import TOOL

@@ -3,20 +3,224 @@
 Normal equations are scaled so that displacements count in mm and mrad. Parameters with a prior lean
 on it as much as the residual variance says, which is estimated along. Directions that neither data
 nor a prior determine stay nominal: singular values below a share of the largest are left out, first
-among base and targets, then among the model's parameters with base and targets projected out.
+among base and targets, then among the model's parameters with base and targets projected out. A
+robust loss leans less on rows far off, with a scale taken from the data.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
+import scipy
+import scipy.linalg
+from threadpoolctl import ThreadpoolController
 
-from kinacc.calibration import robust, variances
-from kinacc.calibration.robust import Weights
-from kinacc.calibration.split import TOUCH_SQUARED, Spectrum, Split, singular_values
-from kinacc.calibration.system import PoseSystem
+from kinacc.calibration.observations import Observations
+from kinacc.calibration.uncertainty import TOUCH_SQUARED, covariance_along, shared_errors
 from kinacc.errors import FitError
+
+if TYPE_CHECKING:
+    from kinacc.calibration.fitting import PoseSystem
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+_THREADS = ThreadpoolController()
+MOVES_SQUARED = 0.25  # what moves a known frame by half as much as itself is known too
+
+
+def one_thread(function: Function) -> Function:
+    """One BLAS thread while ``function`` runs: matrices are small, more threads only wait."""
+    wrapped: Function = _THREADS.wrap(limits=1, user_api="blas")(function)
+    return wrapped
+
+
+@dataclass(frozen=True)
+class Spectrum:
+    """What data can tell of a block of parameters.
+
+    ``values``: singular values of the Jacobian in units of ``scale``, falling, after the frame
+    columns are projected out. ``rank`` of them exceed ``threshold`` times the largest; ``gap`` is
+    the ratio across that cut, inf at full rank.
+    """
+
+    values: np.ndarray
+    threshold: float
+    rank: int
+    gap: float
+
+    @classmethod
+    def of(cls, values: np.ndarray, threshold: float, most: int | None = None) -> Spectrum:
+        """Spectrum of falling ``values``; no rank above ``most``."""
+        rank = int(np.sum(values > threshold * values[0])) if values.size else 0
+        rank = rank if most is None else min(rank, most)
+        past = values[rank] if rank < values.size else 0.0
+        gap = float(values[rank - 1] / past) if rank and past > 0.0 else float("inf")
+        return cls(values, threshold, rank, gap)
+
+
+@dataclass(frozen=True)
+class Split:
+    """Scaled parameters (P,) cut into directions that are determined and those that are not.
+
+    ``root`` (P, r): its product with its transpose inverts the normal matrix and the prior's on the
+    determined directions. ``lost`` (P, l): the others, base and targets following those of the
+    model, of which ``anchor`` (P, l) is the part that stays nominal. ``effective``: number of
+    parameters that the data, not a prior, decide.
+    """
+
+    root: np.ndarray
+    lost: np.ndarray
+    anchor: np.ndarray
+    effective: float
+    spectrum: Spectrum | None = None
+    ranks: tuple[int, int] | None = None
+
+    @classmethod
+    def held(cls, gram: np.ndarray, weight: np.ndarray, name: str) -> Split:
+        """Everything is determined, by priors where data do not."""
+        normal = gram[:-1, :-1].copy()
+        normal[np.diag_indices_from(normal)] += weight**2
+        factor, failed = scipy.linalg.lapack.dpotrf(normal, lower=1)
+        if failed:
+            raise FitError(
+                f"{name}: the normal matrix of {len(normal)} parameters is not positive definite; "
+                "give every undetermined direction a prior"
+            )
+        root = scipy.linalg.lapack.dtrtri(factor, lower=1, overwrite_c=1)[0].T
+        nothing = np.zeros((len(normal), 0))
+        by_prior = float(weight**2 @ np.sum(root**2, axis=1))
+        return cls(root, nothing, nothing, len(normal) - by_prior)
+
+    @classmethod
+    def of(
+        cls,
+        gram: np.ndarray,
+        frames: int,
+        weight: np.ndarray,
+        thresholds: tuple[float, float],
+        most: tuple[int, int] | None = None,
+        reported: bool = False,
+    ) -> Split:
+        """Cut by ``thresholds`` of the first ``frames`` parameters and of the others.
+
+        ``weight`` (P,): residual over prior standard deviation of parameters, 0 for none. A
+        direction that a prior speaks of is determined; ``reported``: in the report of a fit, also
+        one that moves a frame with a prior.
+        """
+        normal, arm = gram[:-1, :-1].copy(), slice(frames, None)
+        normal[np.diag_indices(frames)] += weight[:frames] ** 2
+        placed = np.eye(frames)[weight[:frames] > 0.0]
+        base = normal[:frames, :frames]
+        known = [(placed, TOUCH_SQUARED)] if reported else []
+        directions, lost_base, base_spectrum = _cut(base, thresholds[0], most and most[0], known)
+        root_base = _root(directions, base)
+        follow = np.eye(len(normal))
+        follow[:frames, arm] = -root_base @ (root_base.T @ normal[:frames, arm])
+        rest = normal[arm, arm] + normal[arm, :frames] @ follow[:frames, arm]
+        known = [(np.eye(len(rest))[weight[arm] > 0.0], TOUCH_SQUARED)]
+        known += [(placed @ follow[:frames, arm], MOVES_SQUARED)] if reported else []
+        directions, lost_arm, spectrum = _cut(rest, thresholds[1], most and most[1], known)
+        root_arm = _root(directions, rest + np.diag(weight[arm] ** 2))
+        root = follow @ scipy.linalg.block_diag(root_base, root_arm)
+        anchor = scipy.linalg.block_diag(lost_base, lost_arm)
+        effective = float(np.sum(root * (gram[:-1, :-1] @ root)))
+        return cls(
+            root, follow @ anchor, anchor, effective, spectrum, (base_spectrum.rank, spectrum.rank)
+        )
+
+    def step(
+        self, gradient: np.ndarray, displacement: np.ndarray, weight_sq: np.ndarray
+    ) -> np.ndarray:
+        """Least squares in the determined directions, back to nominal in the others."""
+        down = self.root @ (self.root.T @ (gradient + weight_sq * displacement))
+        return -down - self.lost @ (self.anchor.T @ displacement)
+
+
+def _cut(
+    normal: np.ndarray,
+    threshold: float,
+    most: int | None,
+    known: Sequence[tuple[np.ndarray, float]],
+) -> tuple[np.ndarray, np.ndarray, Spectrum]:
+    """Orthonormal directions (P, r) kept, (P, l) lost, and the spectrum by which they are cut.
+
+    ``known``: derivatives of what is known otherwise; a lost direction is kept where its squared
+    change exceeds the number beside.
+    """
+    values, vectors = np.linalg.eigh(normal)
+    spectrum = Spectrum.of(np.sqrt(np.maximum(values[::-1], 0.0)), threshold, most)
+    directions, lost = np.split(vectors[:, ::-1], [spectrum.rank], axis=1)
+    for derivative, least in known:
+        if len(derivative) and lost.size:
+            _, change, turn = np.linalg.svd(derivative @ lost)
+            back, lost = np.split(lost @ turn.T, [int(np.sum(change**2 > least))], axis=1)
+            directions = np.concatenate([directions, back], axis=1)
+    return directions, lost, spectrum
+
+
+def _root(directions: np.ndarray, normal: np.ndarray) -> np.ndarray:
+    """Matrix (P, r) whose product with its transpose inverts ``normal`` on the directions."""
+    return directions @ np.linalg.inv(np.linalg.cholesky(directions.T @ normal @ directions)).T
+
+
+def singular_values(jacobians: Iterable[np.ndarray], frames: int = 0) -> np.ndarray:
+    """Singular values of a Jacobian (m, P) in blocks of rows, its first columns projected out.
+
+    By orthogonal reduction they keep their digits below 1e-7 of the largest, unlike through the
+    normal equations.
+    """
+    parts: list[np.ndarray] = []
+    for jacobian in jacobians:
+        rows = np.concatenate([*parts, jacobian])
+        (factor,) = scipy.linalg.qr(rows, mode="r", check_finite=False)
+        parts = [factor[: factor.shape[1]]]
+    return np.linalg.svd(parts[0][frames:, frames:], compute_uv=False)
+
+
+SQUARES, HUBER, TUKEY = "squares", "huber", "tukey"
+# Share of rows of Gaussian noise alone that lies beyond the bend: of one component those are the
+# usual 1.345 and 4.685 standard deviations (95 % efficiency).
+_BEYOND = {HUBER: 0.17863, TUKEY: 2.7995e-6}
+
+
+@dataclass(frozen=True)
+class Weights:
+    """``row`` (n,) weights of the rows; ``scale_mm`` per component."""
+
+    row: np.ndarray
+    scale_mm: float
+
+
+def row_weights(
+    loss: str, residual: np.ndarray, observations: Observations, scale_mm: float | None = None
+) -> Weights:
+    """Weights of ``loss`` at whitened residuals (m,), one weight per row (target of a pose).
+
+    A row's d components (3, or 6 with its orientation) are judged together by their length u. The
+    scale is the median over rows of u divided by its value for unit Gaussian noise, the root of
+    the median of chi-square with d degrees of freedom: half the rows may be off. Huber's weight is
+    1 up to the bend and bend / u beyond, Tukey's (1 - (u / bend)^2)^2 and 0 beyond (Holland and
+    Welsch, Communications in Statistics 6, 1977), with the bend where the same share of Gaussian
+    noise lies beyond as for one component. ``scale_mm``: a scale held from before.
+    """
+    components = np.where(observations.has_rotation, 6, 3)
+    row = np.repeat(np.arange(len(observations)), components)
+    length = np.sqrt(np.bincount(row, residual**2, minlength=len(observations)))
+    scale = scale_mm
+    if scale is None:
+        scale = float(np.median(length / np.sqrt(scipy.special.chdtri(components, 0.5))))
+    bend = np.sqrt(scipy.special.chdtri(components, _BEYOND[loss])) * max(
+        scale, np.finfo(float).tiny
+    )
+    share = length / bend
+    if loss == HUBER:
+        weight = 1.0 / np.maximum(share, 1.0)
+    else:
+        weight = np.maximum(1.0 - share**2, 0.0) ** 2
+    return Weights(weight, scale)
+
 
 STEP_TOLERANCE = 1e-6  # mm and mrad
 MAX_ITERATIONS = 200
@@ -53,7 +257,7 @@ class Solution:
     std: np.ndarray
     covariance: np.ndarray
     cost: float
-    count: int
+    count: float
     degrees_of_freedom: float
     variance: float
     iterations: int
@@ -87,17 +291,17 @@ class Task:
 def minimise_robust(task: Task, loss: str) -> tuple[Solution, Weights | None]:
     """The fit of ``task`` under a ``loss`` and, where that is not squares, the rows' weights.
 
-    A robust loss is minimised by reweighted squares (see ``robust``); ``variance`` is then that of
-    its scale. Raises FitError where the passes do not settle.
+    A robust loss is minimised by reweighted squares (see ``row_weights``); ``variance`` is then
+    that of its scale. Raises FitError where the passes do not settle.
     """
     solution = _Descent(task).run()
-    if loss == robust.SQUARES:
+    if loss == SQUARES:
         return solution, None
     weights, observations = None, task.system.observations
     for number in range(MAX_PASSES):
         before = solution.x
         scale = weights.scale_mm if weights and number >= SCALE_PASSES else None
-        weights = robust.weights(loss, task.system.residual(before), observations, scale)
+        weights = row_weights(loss, task.system.residual(before), observations, scale)
         weighted = replace(task, system=task.system.weighted(np.sqrt(weights.row)), start=before)
         solution = _Descent(weighted).run()
         moved = float(np.max(np.abs(solution.x - before) / task.scale, initial=0.0))
@@ -247,8 +451,8 @@ class _Descent:
             values = singular_values([jacobian], self.frames)
             spectrum = Spectrum.of(values, self.task.threshold, fitted.spectrum.rank)
             if freedom > 0:
-                along = variances.covariance_along(
-                    residual, jacobian, variances.shared_errors(system.observations),
+                along = covariance_along(
+                    residual, jacobian, shared_errors(system.observations),
                     fitted.root, reported.root, variance,
                 )  # fmt: skip
         covariance = np.zeros((active.size, active.size))

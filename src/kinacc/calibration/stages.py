@@ -1,0 +1,279 @@
+"""Stages of a calibration: fit a model, compare models with measurements, excluded rows."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import astuple
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from kinacc.calibration import residuals, tables, uncertainty
+from kinacc.calibration.fitting import require_enough
+from kinacc.calibration.models import Fit, Progress, estimators, fit_all
+from kinacc.calibration.observations import Observations, from_columns
+from kinacc.calibration.residuals import Errors, errors, statistics
+from kinacc.config.error_models import (
+    ERROR_MODELS,
+    ESTIMATORS,
+    MEASURED,
+    NOMINAL,
+    PLAINEST,
+    Comparison,
+    comparisons,
+)
+from kinacc.kinematics import robot
+from kinacc.kinematics import tables as models
+from kinacc.kinematics.robot import Robot
+from kinacc.measurements import folds
+from kinacc.measurements.reader import excluded_lines, read_excluded
+from kinacc.measurements.row_names import RowNames
+from kinacc.tables.columns import Columns
+from kinacc.tables.contract import columns_of
+
+_OFF = ("ex_mm", "ey_mm", "ez_mm", "rx_mrad", "ry_mrad", "rz_mrad")
+
+
+def fit_model(
+    inputs: Mapping[str, Columns],
+    settings: Mapping[str, Any],
+    kind: str,
+    progress: Progress | None = None,
+) -> dict[str, Columns]:
+    """Fit the model of one kind to the training rows.
+
+    The plainest kind, which is fitted last, gathers the ``frames`` of all models.
+
+    Parameters
+    ----------
+    inputs : mapping
+        Tables ``measurements`` and those of models fitted before.
+    settings : mapping
+        Sections ``robot`` and ``calibration`` of the configuration.
+    kind : str
+        ``vec``, ``dh``, ``compliance`` or a registered one.
+    progress : callable, optional
+        Wraps an iterable to show how far a choice is, with a label.
+
+    Returns
+    -------
+    dict
+        ``<kind>_model``, its covariance, its frames and the further tables of its estimator.
+
+    Raises
+    ------
+    FitError
+        The fit does not converge.
+    InputError
+        There are fewer residuals than parameters, or a rule is about a frame that is not there.
+    """
+    arm = robot.load(settings["robot"])
+    every, train = observed(inputs, arm)
+    estimator = estimators(settings["calibration"], arm, every)[kind]
+    choices = estimator.choices(every, progress)
+    held_out = np.unique(every.fold[~train])
+    estimator = estimator.chosen(choices, int(held_out[0]) if len(held_out) else None)
+    observations = every.select(train)
+    fitted = estimator.fit(observations, delivered_fits(inputs, arm, every))
+    names, frames = f"{kind}_frames", {kind: fitted.frames}
+    if kind == PLAINEST:
+        names = "frames"
+        frames[NOMINAL] = estimator.common.nominal_frames(observations)
+    columns = tables.frames_columns(frames, every.target_names, every.session_names)
+    if kind == PLAINEST:
+        kinds = [f"{other}_frames" for other in reversed(ESTIMATORS)]
+        parts = [*(inputs[name] for name in kinds if name in inputs), columns]
+        columns = {name: np.concatenate([part[name] for part in parts]) for name in columns}
+    known = uncertainty.of_fit(fitted)
+    return {
+        f"{kind}_model": fitted.model.to_columns(fitted.std.ravel()),
+        names: columns,
+        f"{kind}_covariance": tables.covariance_columns(known),
+        **estimator.tables(fitted, known, observations),
+        **choices,
+    }
+
+
+def compare_models(
+    inputs: Mapping[str, Columns],
+    settings: Mapping[str, Any],
+    progress: Progress | None = None,
+) -> dict[str, Columns]:
+    """Errors of every comparison, in sample and held out, and the model selected by them.
+
+    Train rows are of the delivered models at the rows they were fitted to. Validation rows are of
+    rows held out: pooled over all folds, each fold refitted without its rows, and fold by fold.
+
+    Parameters
+    ----------
+    inputs : mapping
+        Tables ``measurements``, of models and of frames, and ``vec_orders``.
+    settings : mapping
+        Sections ``robot`` and ``calibration`` of the configuration.
+    progress : callable, optional
+        Wraps an iterable to show how far the folds are, with a label.
+
+    Returns
+    -------
+    dict
+        ``residuals``, ``pose_errors``, ``joint_bias``, ``model_selection``, ``worst_rows``; mm,
+        mrad.
+
+    Raises
+    ------
+    FitError
+        A fit without a fold does not converge.
+    """
+    arm, measurements = robot.load(settings["robot"]), inputs["measurements"]
+    every, train = observed(inputs, arm)
+    delivered = delivered_fits(inputs, arm, every)
+    kinds = estimators(settings["calibration"], arm, every)
+
+    def refit(observations: Observations, fold: int) -> dict[str, Fit]:
+        if np.array_equal(every.fold != fold, train):
+            return delivered
+        chosen = [e.chosen(inputs, fold) for kind, e in kinds.items() if kind in delivered]
+        return fit_all(observations, chosen)
+
+    numbers = [int(fold) for fold in np.unique(every.fold) if fold >= 0]
+    counted = progress(numbers, "shares of the poses held out") if progress else numbers
+    held_out, trained = residuals.cross_validated(every, refit, counted, delivered)
+    rows: list[tuple[Any, ...]] = []
+    parts = []
+    for name, fitted in errors(delivered, every.select(train)).items():
+        out = held_out[name]
+        rows += _statistics(name, "train", np.nan, fitted)
+        for fold in numbers:
+            rows += _statistics(name, "train", fold, trained[fold][name])
+        rows += _statistics(name, "validation", np.nan, out)
+        for fold in numbers:
+            rows += _statistics(name, "validation", fold, out.select(every.fold == fold))
+        parts.append(_error_rows(measurements, name, "train", np.flatnonzero(train), fitted))
+        there = np.flatnonzero(np.isfinite(out.position_mm[:, 0]))
+        parts.append(_error_rows(measurements, name, "cross_validated", there, out.select(there)))
+    pose_errors = pd.concat(parts, ignore_index=True)
+    frames = {
+        "pose_errors": pose_errors,
+        "model_selection": selection(every, held_out),
+        "worst_rows": residuals.worst(pose_errors, np.asarray(measurements["row"], float)),
+    }
+    return {
+        "residuals": columns_of("residuals", rows),
+        "joint_bias": columns_of("joint_bias", residuals.bias(pose_errors, every.q_rad)),
+        **{name: {c: table[c].to_numpy() for c in table} for name, table in frames.items()},
+    }
+
+
+def excluded_rows(inputs: Mapping[str, Columns], settings: Mapping[str, Any]) -> dict[str, Columns]:
+    """Errors of the delivered models at the rows left out, which no fit has used.
+
+    Parameters
+    ----------
+    inputs : mapping
+        Tables ``measurements``, of models and of frames.
+    settings : mapping
+        Sections ``robot`` and ``measurements`` of the configuration.
+
+    Returns
+    -------
+    dict
+        ``excluded_rows``: the reason of every row and its errors in mm and mrad in the robot base,
+        null where a row cannot be read or where no other row has its target and session.
+    """
+    arm, section = robot.load(settings["robot"]), settings["measurements"]["file"]
+    reasons, used = excluded_lines(section), inputs["measurements"]
+    every = from_columns(used, arm)
+    fits = delivered_fits(inputs, arm, every)
+    reading, _ = read_excluded(section, arm)
+    off = {comparison.name: np.zeros((0, 6)) for comparison in comparisons(fits)}
+    places = pd.DataFrame({"line": [], "target": [], "session": []})
+    if reading is not None:
+        columns, placed = reading.columns, np.ones(len(reading.columns["pose"]), dtype=bool)
+        for name in ("target", "session"):  # only those of other rows have frames
+            placed &= np.isin(columns[name].astype(str), np.asarray(used[name]).astype(str))
+        rows = {name: np.asarray(values)[placed] for name, values in columns.items()}
+        # Behind the rows that were used: these number targets and sessions.
+        names = [name for name in rows if name in used]
+        joined = {name: np.concatenate([np.asarray(used[name]), rows[name]]) for name in names}
+        observations = from_columns(joined, arm).select(slice(len(every), None))
+        off = {name: found.components for name, found in errors(fits, observations).items()}
+        places = pd.DataFrame({name: rows[name] for name in ("target", "session")})
+        places.insert(0, "line", rows["row"].astype(int))
+    stated = pd.DataFrame({"line": sorted(reasons)})
+    parts = []
+    for comparison, components in off.items():
+        known = pd.concat([places, pd.DataFrame(components, columns=_OFF)], axis=1)
+        part = stated.merge(known, "left", on="line")
+        part.insert(3, "reason", part["line"].map(reasons))
+        part.insert(0, "comparison", comparison)
+        parts.append(part)
+    table = pd.concat(parts).astype(object)
+    table = table.where(table.notna(), None)
+    columns = columns_of("excluded_rows", table.to_dict("records"))
+    row_names = RowNames() if reading is None else reading.row_names
+    return {"excluded_rows": columns | row_names.columns(columns["line"])}
+
+
+def observed(inputs: Mapping[str, Columns], robot: Robot) -> tuple[Observations, np.ndarray]:
+    """All observations of ``measurements`` and the mask (n,) of the rows that train."""
+    columns = inputs["measurements"]
+    return from_columns(columns, robot), np.asarray(columns["subset"]) == "train"
+
+
+def delivered_fits(
+    inputs: Mapping[str, Columns], robot: Robot, every: Observations
+) -> dict[str, Fit]:
+    """The models ``inputs`` have with their frames, for targets and sessions of ``every``."""
+    names, fits = (every.target_names, every.session_names), {}
+    for kind, model in models.models(inputs, robot.dh).items():
+        frames = inputs.get("frames", inputs.get(f"{kind}_frames"))
+        if frames is not None:
+            fits[kind] = Fit(model, tables.frames_of(frames, kind, *names))
+    return fits
+
+
+def require_enough_rows(
+    inputs: Mapping[str, Columns], robot: Robot, calibration: Mapping[str, Any]
+) -> None:
+    """Raise InputError where the training rows have fewer residuals than a fit has parameters.
+
+    The fits ask themselves as well; asked beforehand, nothing is remade from data that cannot do.
+    """
+    every, train = observed(inputs, robot)
+    training = every.select(train)
+    for estimator in estimators(calibration, robot, every).values():
+        frames, common = 0, estimator.common
+        if common.frames_estimated and len(training):
+            frames = int(common.terms(training).free.sum())
+        require_enough(training, estimator.required + frames, estimator.name, estimator.fix)
+
+
+def selection(every: Observations, held_out: Mapping[str, Errors]) -> pd.DataFrame:
+    """``model_selection`` from errors ``held_out`` of every row, by name of the comparison."""
+    names = {kind: Comparison(MEASURED, kind).name for kind in ERROR_MODELS}
+    of_kinds = {kind: held_out[name] for kind, name in names.items() if name in held_out}
+    configuration = folds.configurations(every.pose, every.q_rad)
+    return residuals.select(of_kinds, configuration, every.fold)
+
+
+def _statistics(name: str, subset: str, fold: float, off: Errors) -> Iterator[tuple[Any, ...]]:
+    """Rows of ``residuals``."""
+    for quantity, unit, vectors in (
+        ("position", "mm", off.position_mm),
+        ("orientation", "mrad", 1e3 * off.rotation_rad),
+    ):
+        figures = statistics(vectors)
+        if figures is not None:
+            yield (name, subset, fold, quantity, unit, *astuple(figures))
+
+
+def _error_rows(
+    measurements: Columns, comparison: str, estimate: str, rows: np.ndarray, off: Errors
+) -> pd.DataFrame:
+    """``pose_errors`` of the ``rows`` of measurements that the errors are of."""
+    table = pd.DataFrame({"comparison": comparison, "estimate": estimate, "row": rows})
+    for name in ("pose", "target", "repeat", "subset", "fold"):
+        table[name] = np.asarray(measurements[name])[rows]
+    table[list(_OFF)] = off.components
+    return table
