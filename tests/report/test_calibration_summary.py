@@ -181,3 +181,21 @@ def test_the_stage_writes_the_figures_of_the_record(study):
 )
 def test_three_significant_digits_without_an_exponent(value, text):
     assert size(value) == text
+
+
+def test_reading_noise_that_a_file_states_is_taken_out_of_the_rms(study, tmp_path):
+    tables = folder.read_tables(study, needed=TABLES)
+    known = summarise.summarise(study, tables, campaigns=())
+    assert math.isnan(known.rms_without_noise_mm)
+    rows = len(tables["measurements"]["pose"])
+    for std_mm, wanted in ((0.1, math.sqrt(known.best.rms**2 - 0.03)), (9.0, 0.0)):
+        stated = {f"std_{axis}_mm": np.full(rows, std_mm) for axis in "xyz"}
+        changed = {**tables, "measurements": {**tables["measurements"], **stated}}
+        found = summarise.summarise(study, changed, campaigns=())
+        assert found.rms_without_noise_mm == pytest.approx(wanted, rel=1e-9)
+
+
+def test_a_line_of_a_series_has_the_day_of_its_measurement(study, tmp_path):
+    line = shutil.copytree(study, tmp_path / "arm-2026-03-01")
+    assert summarise.summarise(line).measured == "2026-03-01"
+    assert summarise.summarise(study).measured == ""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from kinacc.calibration.least_squares import one_thread
-from kinacc.checks import check, meanings, readings, robust_fit
+from kinacc.checks import check, digits, meanings, readings, robust_fit
 from kinacc.checks.findings import Finding, Progress, Report
 from kinacc.checks.meanings import Meaning
 from kinacc.errors import InputError, Problem
@@ -27,6 +27,9 @@ _TRIED = 4  # robots that base and target alone put first
 _SURE = 0.005  # of the points' spread: what an arm that is the one leaves, uncalibrated
 _NEXT = 0.2  # of what the next best leaves
 _SAME_ARM = 1e-6  # of the misfit: two names of one geometry
+_CALCULATED_MM = 0.002  # closer to an arm than any instrument measures
+_FINE_MM = 0.01  # coarser steps would hide what instruments measure
+_ROUNDED_MM = 0.02  # rms; less is nothing beside what instruments measure with
 
 
 def describe_files(
@@ -185,3 +188,49 @@ def fitting(guess: Guess, progress: Progress) -> list[str]:
     same = [name for misfit, name in misfits if misfit <= (1.0 + _SAME_ARM) * least]
     others = [misfit for misfit, _ in misfits[len(same) :]]
     return [] if least > _SURE or (others and least > _NEXT * others[0]) else same
+
+
+def remarks_on(guess: Guess, report: Report, reading: MeasuredFile, arm: Robot) -> Iterator[str]:
+    """Limits of readings that contradict nothing: points that were calculated, rounded joints.
+
+    Parameters
+    ----------
+    guess, reading
+        The description of a file, and its readings.
+    report
+        The check of the readings.
+    arm
+        The robot that was measured.
+
+    Yields
+    ------
+    str
+        A remark each, with lengths in mm.
+    """
+    cells, decimal = guess.table.columns, guess.table.decimal
+    targets = guess.columns.targets.values()
+    points = [cells[target[axis].column] for target in targets for axis in "xyz"]
+    unit = 1.0 if guess.section["length_unit"] == "mm" else 1000.0
+    step = min(digits.step(column, unit, decimal) for column in points)
+    fit = report.facts.get("quick_fit")
+    residual = fit["left_per_axis_mm"] if isinstance(fit, Mapping) else np.inf
+    # Rounding alone leaves 0.3 of a step.
+    if residual <= max(_CALCULATED_MM, 0.4 * min(step, _FINE_MM)):
+        yield (
+            f"the points follow the joints to {residual:.1g} mm, closer than instruments measure:"
+            " were they calculated by the controller or a simulation?"
+        )
+    if guess.section.get("pulses_per_deg") or arm.dh.prismatic.any():
+        return
+    unit = 1.0 if guess.section["joint_unit"] == "deg" else 180.0 / np.pi
+    joints = [cells[name.column] for name in guess.columns.joints]
+    step = min(digits.step(column, unit, decimal) for column in joints)
+    if step > 0.0:
+        q = np.stack([reading.columns[f"q{i + 1}"] for i in range(guess.joints)], axis=1)
+        reach_mm, rms_mm = digits.cost(arm.dh, arm.dh_joints(q), step)
+        if rms_mm >= _ROUNDED_MM:
+            yield (
+                f"joints are written in steps of {step:.2g} deg: "
+                f"{reach_mm * np.deg2rad(step):.2g} mm at {reach_mm / 1000.0:.2g} m from an axis, "
+                f"{rms_mm:.2g} mm rms in all; export more digits"
+            )

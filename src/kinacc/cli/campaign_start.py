@@ -58,7 +58,7 @@ _MOST_CANDIDATES = 20_000
 @option("--calibration", required=True, type=click.Path(), help="Results folder of the arm.")
 @choice.SELECTED
 @choice.ROBOT
-@choice.NAMING
+@choice.CONFIGS
 @choice.SESSION
 @choice.POINT
 @option("--candidates", default="200", help="File of joints, or number of joints to draw.")
@@ -94,7 +94,7 @@ def start(out: Output, **options: Any) -> None:
     refuse(folders.in_the_way(options["folder"]), "The campaign was not begun")
     results, point = Path(options["calibration"]), options["point"]
     used, freedom, doubts = instruments_of(options, [results])
-    names = ("model", "robot", "config", "session")
+    names = ("model", "robot", "session")
     arm = choice.calibration_of(results, *(options[name] for name in names))
     joints, labels, directions, source = _candidates(options, arm)
     points = begin.points_of(arm, joints, labels, directions, point)

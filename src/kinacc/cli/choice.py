@@ -18,7 +18,6 @@ from kinacc.errors import InputError, Problem
 from kinacc.kinematics import robot as robots
 from kinacc.kinematics.robot import Robot
 from kinacc.tables.allowed import SELECTABLE
-from kinacc.workflow.data_sets import read_data_sets
 from kinacc.workflow.outdated import outdated_reason
 
 CONFIG = "config.yaml"
@@ -51,7 +50,6 @@ def share(text: str) -> float:
 
 
 ROBOT = option("--robot", help="Robot of the results: a shipped name or a file. [as recorded]")
-NAMING = option("--config", multiple=True, help="Configuration file with the robot; repeatable.")
 SELECTED = option(
     "--model",
     type=MODEL,
@@ -80,8 +78,8 @@ def together(*options: Decorator) -> Decorator:
     return decorate
 
 
-# Which calibration: its folder, the model, and the robot or the configuration naming it.
-calibration_options = together(click.argument("folder", type=click.Path()), SELECTED, NAMING, ROBOT)
+# Which calibration: its folder, the model, and the robot.
+calibration_options = together(click.argument("folder", type=click.Path()), SELECTED, ROBOT)
 # Which point in which frame.
 point_options = together(
     option(
@@ -207,24 +205,17 @@ def joint_answers(options: Mapping[str, Any]) -> dict[str, Any]:
     return {name: options[name] for name in _JOINT_ANSWERS if options.get(name)}
 
 
-def robot_of(folder: str | Path, robot: str | None, config: tuple[str, ...]) -> Robot:
-    """The robot a results folder belongs to: as given, as it says itself, or as configured.
+def robot_of(folder: str | Path, robot: str | None) -> Robot:
+    """The robot of a results folder: as given, or as recorded.
 
-    Raises InputError for a robot given that is not the one the results were made with.
+    Raises InputError for a robot that is not the one the results were made with.
     """
     recorded = results.recorded_robot(folder)
-    if robot is None and not config and recorded is not None:
-        return recorded
     if robot is None:
-        if not config and not Path(CONFIG).is_file():
-            message = f"is not given, and there is no {CONFIG} here"
+        if recorded is None:
+            message = f"is not given, and {folder} has no robot.parquet"
             raise InputError(Problem("--robot", message, "a shipped name, a robot file"))
-        datasets = read_data_sets(config or (CONFIG,)).settings
-        name = Path(folder).resolve().name
-        if name not in datasets:
-            message = f"data set {name} is not in the configuration"
-            raise InputError(Problem(str(folder), message, ", ".join(datasets), "give --robot"))
-        robot = datasets[name]["robot"]
+        return recorded
     arm = robots.load(robot)
     if recorded is not None:
         results.require_same_robot(recorded, arm, str(folder))
@@ -232,15 +223,11 @@ def robot_of(folder: str | Path, robot: str | None, config: tuple[str, ...]) -> 
 
 
 def calibration_of(
-    folder: str | Path,
-    model: str | None,
-    robot: str | None,
-    config: tuple[str, ...],
-    session: str | None = None,
+    folder: str | Path, model: str | None, robot: str | None, session: str | None = None
 ) -> Calibration:
     """The calibration of a results folder."""
     tables = results.read_tables(folder)
-    arm = robot_of(folder, robot, config)
+    arm = robot_of(folder, robot)
     calibration = results.calibration(tables, arm, model, Path(folder).resolve().name, session)
     return replace(calibration, outdated=print_outdated(folder))
 

@@ -37,7 +37,6 @@ from kinacc.tables.columns import Columns
         help="Largest number of poses.")  # fmt: skip
 @option("--model", type=choice.MODEL, default="dh", help="Error model.")
 @choice.ROBOT
-@choice.NAMING
 @answers(table=True, picture="Picture: .svg, .png or .pdf.", page="Page: .html.", verbose=True)
 def compare(
     first: str,
@@ -46,7 +45,6 @@ def compare(
     count: int,
     model: str,
     robot: str | None,
-    config: tuple[str, ...],
     out: Output,
 ) -> None:
     """Compare two calibrations of one arm: whether it changed, and how far its poses moved.
@@ -59,7 +57,7 @@ def compare(
       kinacc compare results/ur10_b results/ur10_d --page moved.html
     """
     with reporting("compare", bar=True):
-        both = [_calibration(place, model, robot, config) for place in (first, second)]
+        both = [_calibration(place, model, robot) for place in (first, second)]
         comparison.require_alike(*both)
         files = [Path(place) / "measurements.parquet" for place in (first, second)]
         tables = [store.read(file) if file.is_file() else None for file in files]
@@ -79,11 +77,11 @@ def compare(
     out.show(result, table, lines(result), table if out.verbose else result.shifts)
 
 
-def _calibration(place: str, model: str, robot: str | None, config: tuple[str, ...]) -> Calibration:
+def _calibration(place: str, model: str, robot: str | None) -> Calibration:
     """The calibration of a results folder, or the robot of a file."""
     path = Path(place)
     if path.is_dir():
-        calibration = choice.calibration_of(path, model, robot, config)
+        calibration = choice.calibration_of(path, model, robot)
         left = misfit(read_tables(path), calibration.robot, calibration.choice)
         return replace(calibration, name=place, misfit=left)
     if path.is_file() or place in robots.shipped():

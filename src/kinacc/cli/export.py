@@ -35,7 +35,8 @@ from kinacc.workflow.described import calibration_settings
 @option("--tip-link", help="Link of that file where the arm ends. [the only one it can]")
 @option("--dh-joints", is_flag=True, help="URDF in the joints of the DH table.")
 @choice.ROBOT
-@choice.NAMING
+@option("--config", multiple=True,
+        help="Configuration file for --for; repeatable. [those beside the results]")  # fmt: skip
 @answers(force=True)
 def export(
     folder: str,
@@ -77,7 +78,7 @@ def export(
     if urdf is not None and "urdf" not in wanted:
         problems.append(Problem("--urdf", f"{urdf} is not wanted", "with --format urdf"))
     refuse(problems, "Nothing was written")
-    arm = choice.robot_of(folder, robot, config)
+    arm = choice.robot_of(folder, robot)
     reason = choice.print_outdated(folder)
     if maker is not None:
         _to_controller(folder, arm, target, maker, name, config, out)

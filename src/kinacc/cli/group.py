@@ -8,7 +8,6 @@ import signal
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict
-from difflib import get_close_matches
 from importlib import import_module
 from typing import NoReturn
 
@@ -54,30 +53,15 @@ _MODULES = {name: item[0] for names in SECTIONS.values() for name, item in names
 
 
 class InOrder(click.Group):
-    """A group that lists its commands in the order of the work, and names the nearest one."""
+    """A group that lists its commands in the order of the work."""
 
     def list_commands(self, context: click.Context) -> list[str]:
         """Names in the order of the work."""
         return list(self.commands)
 
-    def resolve_command(
-        self, context: click.Context, args: list[str]
-    ) -> tuple[str | None, click.Command | None, list[str]]:
-        """The command of a word; for another word, the nearest one."""
-        names = self.list_commands(context)
-        if args[0] in names or args[0].startswith("-"):
-            return super().resolve_command(context, args)
-        near = get_close_matches(args[0].lower(), names, 1)
-        fix = f"Did you mean {near[0]}?" if near else f"There are: {', '.join(names)}."
-        raise click.UsageError(f"{args[0]!r} is no command. {fix}", context)
-
 
 class Commands(InOrder):
     """All commands, loaded when they are called; bad input ends in a list of problems."""
-
-    def list_commands(self, context: click.Context) -> list[str]:
-        """Names in the order of the work."""
-        return [*_MODULES]
 
     def get_command(self, context: click.Context, name: str) -> click.Command | None:
         """The command ``a-name``: ``a_name`` of its module."""
@@ -165,7 +149,11 @@ def _listening(signals: list[int]) -> Iterator[None]:
             signal.signal(number, handler)
 
 
-@click.group(cls=Commands, context_settings={"help_option_names": list(_HELP)})
+@click.group(
+    cls=Commands,
+    commands={name: click.Command(name) for name in _MODULES},  # their names, before any is loaded
+    context_settings={"help_option_names": list(_HELP)},
+)
 @click.version_option(__version__, prog_name="kinacc")
 def main() -> None:
     """Calibrate a robot's kinematic model, state its error, and bound the largest one.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -13,8 +13,7 @@ import numpy as np
 import pandas as pd
 from scipy.spatial.transform import Rotation
 
-from kinacc.checks import digits
-from kinacc.checks.described import corrected, coupling_of, fitting
+from kinacc.checks.described import corrected, coupling_of, fitting, remarks_on
 from kinacc.checks.findings import Report
 from kinacc.cli import choice
 from kinacc.cli.choice import option
@@ -23,7 +22,6 @@ from kinacc.cli.output import Output, answers, require_writable
 from kinacc.config.names import LONGEST
 from kinacc.errors import InputError, Problem
 from kinacc.kinematics import robot as robots
-from kinacc.kinematics.robot import Robot
 from kinacc.measurements.intake import write
 from kinacc.measurements.intake.groups import listed
 from kinacc.measurements.intake.guess import Guess
@@ -36,9 +34,6 @@ from kinacc.tables.atomic import replacing
 _FILE = "measurements.file"
 _FOLDS_UNKNOWN = 60
 _FIRST_POSES = 3
-_CALCULATED_MM = 0.002  # closer to an arm than any instrument measures
-_FINE_MM = 0.01  # coarser steps would hide what instruments measure
-_ROUNDED_MM = 0.02  # rms; less is nothing beside what instruments measure with
 _QUATERNION = ["qx", "qy", "qz", "qw"]
 
 
@@ -151,7 +146,7 @@ def init(measurement_files: tuple[str, ...], out: Output, **options: Any) -> Non
                 arm = replace(arm, joint_map=np.array(matrix, dtype=float))
                 guess = replace(guess, notes=(*guess.notes, note))
                 guess, report, reading = corrected(guess, arm, name, progress)
-        remarks = list(_remarks_on(guess, report, reading, arm))
+        remarks = list(remarks_on(guess, report, reading, arm))
     poses = _first_poses(reading, arm.dh.prismatic)
     if not out.as_json:
         click.echo("First poses as understood (joints in deg, positions in mm, rotation vectors):")
@@ -177,19 +172,9 @@ def init(measurement_files: tuple[str, ...], out: Output, **options: Any) -> Non
         poses,
         [shlex.join(["kinacc", command, str(dataset)]) for command in ("check-data", "calibrate")],
     )
-    columns = guess.columns
+    unread, how = _unread(result.unused_columns), _how(report)
     lines = rendering.lines(
-        "description.txt",
-        d=result,
-        joints=listed([name.column for name in columns.joints]),
-        targets={
-            name: listed([target[axis].column for axis in "xyz"])
-            for name, target in columns.targets.items()
-        },
-        single={quantity: name.column for quantity, name in columns.single.items()},
-        commanded=listed([name.column for name in columns.commanded]),
-        how=_how(report),
-        unread=_unread(result.unused_columns),
+        "description.txt", d=result, columns=guess.columns, listed=listed, how=how, unread=unread
     )
     out.show(result, lines=lines)
 
@@ -276,34 +261,3 @@ def _unread(unused: Mapping[str, str]) -> list[tuple[str, str]]:
         (why, ", ".join(name for name in unused if unused[name] == why))
         for why in dict.fromkeys(unused.values())
     ]
-
-
-def _remarks_on(guess: Guess, report: Report, reading: MeasuredFile, arm: Robot) -> Iterator[str]:
-    """What limits the use of the readings."""
-    cells, decimal = guess.table.columns, guess.table.decimal
-    targets = guess.columns.targets.values()
-    points = [cells[target[axis].column] for target in targets for axis in "xyz"]
-    unit = 1.0 if guess.section["length_unit"] == "mm" else 1000.0
-    step = min(digits.step(column, unit, decimal) for column in points)
-    fit = report.facts.get("quick_fit")
-    residual = fit["left_per_axis_mm"] if isinstance(fit, Mapping) else np.inf
-    # Rounding alone leaves 0.3 of a step.
-    if residual <= max(_CALCULATED_MM, 0.4 * min(step, _FINE_MM)):
-        yield (
-            f"the points follow the joints to {residual:.1g} mm, closer than instruments measure:"
-            " were they calculated by the controller or a simulation?"
-        )
-    if guess.section.get("pulses_per_deg") or arm.dh.prismatic.any():
-        return
-    unit = 1.0 if guess.section["joint_unit"] == "deg" else 180.0 / np.pi
-    joints = [cells[name.column] for name in guess.columns.joints]
-    step = min(digits.step(column, unit, decimal) for column in joints)
-    if step > 0.0:
-        q = np.stack([reading.columns[f"q{i + 1}"] for i in range(guess.joints)], axis=1)
-        reach_mm, rms_mm = digits.cost(arm.dh, arm.dh_joints(q), step)
-        if rms_mm >= _ROUNDED_MM:
-            yield (
-                f"joints are written in steps of {step:.2g} deg: "
-                f"{reach_mm * np.deg2rad(step):.2g} mm at {reach_mm / 1000.0:.2g} m from an axis, "
-                f"{rms_mm:.2g} mm rms in all; export more digits"
-            )

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import io
 import json
-import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, fields, is_dataclass
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, fields
 from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import click
 import numpy as np
 import pandas as pd
+from pydantic_core import to_jsonable_python
 
 from kinacc.config.names import in_csv
 from kinacc.errors import Problem, as_seen, refuse
@@ -65,7 +65,7 @@ class Output:
         if self.table is not None:
             write_table(table, self.table, answer)
         if self.as_json:
-            click.echo(json.dumps(plain(answer), indent=1, default=str))
+            click.echo(json.dumps(plain(answer), indent=1))
             return
         for line in lines:
             click.echo(as_seen(line))
@@ -148,19 +148,15 @@ def write_table(table: pd.DataFrame, path: Path | str, answer: object = None) ->
     write_whole(path, content.getvalue())
 
 
-def plain(value: Any) -> Any:
+def plain(value: object) -> Any:
     """What JSON holds, of results however nested; None for a number that is not finite."""
-    if is_dataclass(value):
-        value = {item.name: getattr(value, item.name) for item in fields(value)}
-    elif isinstance(value, pd.DataFrame):
-        value = value.to_dict("records")
-    elif isinstance(value, (np.ndarray, np.generic)):
-        value = value.tolist()
-    if isinstance(value, Mapping):
-        return {key: plain(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [plain(item) for item in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+    return to_jsonable_python(value, inf_nan_mode="null", fallback=_plain)
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, pd.DataFrame):
+        return value.to_dict("records")
+    return value.tolist() if isinstance(value, (np.ndarray, np.generic)) else str(value)
 
 
 def require_writable(

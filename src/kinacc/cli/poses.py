@@ -57,7 +57,6 @@ _STATUS = {
 def predict(
     folder: str,
     model: str | None,
-    config: tuple[str, ...],
     robot: str | None,
     joints: str | None,
     joints_deg: tuple[str, ...],
@@ -82,7 +81,7 @@ def predict(
     Example:
       kinacc predict results/mh180 --joints-deg "10,-20,30,0,45,0"
     """
-    calibration = choice.calibration_of(folder, model, robot, config, session)
+    calibration = choice.calibration_of(folder, model, robot, session)
     arm = calibration.robot
     inputs, q = rows.joints_of(arm, joints, joints_deg, joints_rad, choice.joint_answers(file))
     with reporting("predict", bar=True):
@@ -92,9 +91,8 @@ def predict(
     facts = calibration.facts(frame, point)
     shown = table if out.verbose else table[["row", *_SHOWN]]
     out.show(facts | {"rows": table}, table, [_TITLE.format(**facts)], shown)
-    rows.print_unused(inputs, calibration)
-    rows.warn_unlike(table["status"] != "ok")
-    rows.warn_undetermined(table["undetermined_mm"], frame)
+    unlike = (table["status"] != "ok").to_numpy()
+    rows.print_remarks(inputs, calibration, unlike, result.undetermined[:, 0], frame)
     rows.end_where_missing(result.pose.position_mm, "a pose")
 
 
@@ -119,7 +117,6 @@ def predict(
 def compensate(
     folder: str,
     model: str | None,
-    config: tuple[str, ...],
     robot: str | None,
     poses: str | None,
     texts: tuple[str, ...],
@@ -149,7 +146,7 @@ def compensate(
         raise InputError(Problem("--frame", "programs are in the robot's own base", "base"))
     if program is None:
         out = replace(out, table=target)
-    calibration = choice.calibration_of(folder, model, robot, config, session)
+    calibration = choice.calibration_of(folder, model, robot, session)
     near = None
     if near_deg is not None:
         near = rows.of_arguments((near_deg,), "deg", calibration.robot, "--near-deg")[0]
@@ -172,9 +169,8 @@ def compensate(
     facts = calibration.facts(frame, point)
     shown = table.drop(columns=[*prediction.pose_columns(wanted)])
     out.show(facts | {"rows": table}, table, ["Joints of " + _TITLE.format(**facts)], shown)
-    rows.print_unused(inputs, calibration)
-    rows.warn_unlike(unlike)
-    rows.warn_undetermined(deviations(calibration, state, frame, point)[1][:, 0], frame)
+    moved_mm = deviations(calibration, state, frame, point)[1][:, 0]
+    rows.print_remarks(inputs, calibration, unlike, moved_mm, frame)
     rows.end_where_missing(result.q_rad, "joints")
 
 

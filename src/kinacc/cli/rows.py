@@ -114,27 +114,25 @@ def require_within_limits(
     refuse(problems, f"{title} outside the robot's limits")
 
 
-def print_unused(rows: Rows, calibration: Calibration) -> None:
-    """Name the columns of a file that were not used, on the error stream."""
+def print_remarks(
+    rows: Rows, calibration: Calibration, unlike: np.ndarray, moved_mm: np.ndarray, frame: str
+) -> None:
+    """Name unused columns and count doubtful rows on the error stream.
+
+    ``unlike`` (n,): rows unlike measured poses. ``moved_mm`` (n,): movement of poses in the robot's
+    base by a mm or mrad of undetermined parameters.
+    """
     if rows.unused:
         click.echo(f"not used: {', '.join(rows.unused)}", err=True)
     if rows.payload is not None and not calibration.model.knows_loads:
         model = f"the {calibration.choice} model was fitted without loads that change"
         click.echo(f"not used: payload; {model}", err=True)
-
-
-def warn_unlike(unlike: np.ndarray) -> None:
-    """Count the rows (n,) unlike measured poses on the error stream."""
     if np.any(unlike):
         click.echo(
             f"warning: {np.sum(unlike)} of {len(unlike)} poses are not near measured poses "
             "(status); their errors may be larger",
             err=True,
         )
-
-
-def warn_undetermined(moved_mm: np.ndarray, frame: str) -> None:
-    """Warn where undetermined parameters move poses (n,) in the robot's base, mm per mm or mrad."""
     largest = np.nan_to_num(moved_mm).max(initial=0.0)
     if frame == "base" and largest > _MUCH_MOVED_MM:
         click.echo(

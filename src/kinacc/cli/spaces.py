@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from kinacc.calibration.dh_estimator import hayati_joints
 from kinacc.cli.choice import CONFIG
 from kinacc.config import schema
 from kinacc.errors import InputError, Problem
 from kinacc.kinematics import region
 from kinacc.kinematics import robot as robots
+from kinacc.study.evaluation import cylinder, joint_box
+from kinacc.workflow.data_sets import read_data_sets
 
 Ends = tuple[np.ndarray, np.ndarray]
 Inside = Callable[[np.ndarray], np.ndarray]
@@ -42,38 +44,25 @@ def without_dataset() -> Settings:
 
 def settings_of(dataset: str, config: Sequence[str]) -> Settings:
     """The settings of a configured data set. Raises InputError."""
-    from kinacc.calibration.dh_estimator import hayati_joints
-    from kinacc.workflow.data_sets import read_data_sets
-
     datasets = read_data_sets(config or (CONFIG,)).settings
     if dataset not in datasets:
         what = f"{dataset!r} is not in the configuration"
         raise InputError(Problem("--dataset", what, ", ".join(datasets)))
     settings = datasets[dataset]
     robot, calibration = robots.load(settings["robot"]), settings["calibration"]
-    box, inside = _configured(settings["evaluation"], robot)
-    return Settings(
+    evaluation = settings["evaluation"]
+    known = Settings(
         settings["robot"],
         calibration["base_and_tool"] == "estimated",
         float(calibration["rotation_weight_mm_per_rad"]),
         tuple(hayati_joints(calibration["dh"], robot)),
-        box,
-        inside,
     )
-
-
-def _configured(
-    evaluation: Mapping[str, Any], robot: robots.Robot
-) -> tuple[Ends | None, Inside | None]:
-    """Joint box and test of positions of a data set's evaluation space."""
-    from kinacc.study.evaluation import cylinder, joint_box
-
     if evaluation["space"] == "joint_box":
-        return joint_box(evaluation, robot), None
+        return replace(known, box=joint_box(evaluation, robot))
     if evaluation["space"] == "cylinder":
         space = cylinder(evaluation)
-        return None, lambda position_mm: np.asarray(region.contains(space, position_mm))
-    return None, None
+        return replace(known, inside=lambda at_mm: np.asarray(region.contains(space, at_mm)))
+    return known
 
 
 def inside_box(space: Ends) -> Inside:

@@ -52,7 +52,7 @@ def verify(
     moved = [name for name, how in (("base", base), ("tool", tool)) if how == "moved"]
     name, config = _settings(readings, folder, dataset)
     tables = results.read_tables(folder, "pose_errors")
-    arm = choice.robot_of(folder, config["robot"], ())
+    arm = choice.robot_of(folder, config["robot"])
     weight = float(config["calibration"]["rotation_weight_mm_per_rad"])
     with reporting("verify", bar=True), warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
