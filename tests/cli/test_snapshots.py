@@ -99,8 +99,8 @@ def prepare() -> None:
     path.write_text(path.read_text().replace("order: auto", "order: 1"))
     later = path.read_text().replace("  arm:", "  later:").replace("arm.csv", "new.csv")
     Path("new.yaml").write_text(later)
-    for config in ("arm.yaml", "new.yaml"):
-        for stage in STAGES:
+    for config, stages in (("arm.yaml", STAGES), ("new.yaml", STAGES[:1] + STAGES[2:])):
+        for stage in stages:
             done = run_stage(stage, "--config", config)
             assert done.exit_code == 0, done.output
 

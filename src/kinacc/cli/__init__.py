@@ -1,4 +1,4 @@
-"""The command line: one module a command, loaded only when it is called."""
+"""The command line: a module a topic, loaded only when one of its commands is called."""
 
 from kinacc.cli.process import main
 
