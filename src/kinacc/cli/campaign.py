@@ -56,7 +56,7 @@ def campaign() -> None:
 @campaign.command("next")
 @click.argument("folder", type=click.Path())
 @option("--all", "every", is_flag=True, help="All poses that are measured whatever is read.")
-@answers("JSON of the poses.", table=True)
+@answers(table=True)
 def next_(folder: str, every: bool, out: Output) -> None:
     """Print the pose to measure next: joints, and the expected position.
 
@@ -82,7 +82,7 @@ def next_(folder: str, every: bool, out: Output) -> None:
 @click.argument("folder", type=click.Path())
 @click.argument("point")
 @option("--reason", required=True, help="Reason why it cannot be measured.")
-@answers("JSON of the status.")
+@answers()
 def leave_out(folder: str, point: str, reason: str, out: Output) -> None:
     """Leave out a POINT without readings that the instrument or the arm cannot reach.
 
@@ -99,7 +99,7 @@ def leave_out(folder: str, point: str, reason: str, out: Output) -> None:
 @click.argument("folder", type=click.Path())
 @click.argument("number", type=click.IntRange(1))
 @option("--reason", required=True, help="What went wrong with it.")
-@answers("JSON of the status.")
+@answers()
 def strike(folder: str, number: int, reason: str, out: Output) -> None:
     """Declare reading NUMBER void, for a reason other than its size.
 
@@ -117,7 +117,7 @@ def strike(folder: str, number: int, reason: str, out: Output) -> None:
 @campaign.command("status")
 @click.argument("folder", type=click.Path())
 @option("--tolerance-mm", type=positive, help="Largest error allowed. [as started]")
-@answers("JSON of the status.", verbose=True)
+@answers(verbose=True)
 def status(folder: str, tolerance_mm: float | None, out: Output) -> None:
     """Show the current bounds, the verdict, and the next point.
 
@@ -134,7 +134,7 @@ def status(folder: str, tolerance_mm: float | None, out: Output) -> None:
         help="Folder. [report in the campaign's]")  # fmt: skip
 @option("--table", "formats", multiple=True, type=click.Choice(["csv", "xlsx"]),
         help="Further form of the tables; repeatable.")  # fmt: skip
-@answers("JSON of the status.", page="Page for a browser: an .html file.",
+@answers(page="Page for a browser: an .html file.",
          force=True)  # fmt: skip
 def report(folder: str, to: str | None, formats: Sequence[str], out: Output) -> None:
     """Write tables, picture and text of a campaign.
@@ -158,7 +158,7 @@ def report(folder: str, to: str | None, formats: Sequence[str], out: Output) -> 
 @click.argument("folder", type=click.Path())
 @option("--sha256", help="SHA-256 of the journal, as a report states it.")
 @option("--readings", type=click.IntRange(0), help="Number of readings, as a report states it.")
-@answers("JSON of the verification.")
+@answers()
 def verify(folder: str, sha256: str | None, readings: int | None, out: Output) -> None:
     """Check the journal in FOLDER: the checksum of each line, and the SHA-256 of a report.
 
@@ -250,7 +250,7 @@ _OF_ONE = ("point", "joints_deg", "joints_rad", "std_mm")
 @option("--accept-implausible", is_flag=True, help="Acceptance of an error of any size.")
 @option("--skip-bad", is_flag=True, help="Good rows of a file without the bad ones.")
 @option("--again", is_flag=True, help="Acceptance of readings that repeat or replace others.")
-@answers("JSON of the readings taken and the status.")
+@answers()
 def record(out: Output, folder: str, file: str | None, **options: Any) -> None:
     """Record a reading, or all new readings of a CSV, Excel, Parquet or JSON FILE.
 

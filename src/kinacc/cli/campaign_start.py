@@ -80,7 +80,7 @@ _MOST_CANDIDATES = 20_000
 @choice.FROM_DEG
 @option("--visit", type=click.Choice(["travel", "random"]), default="travel",
         help="Order of the first visit.")  # fmt: skip
-@answers("JSON of the campaign.")
+@answers()
 def start(out: Output, **options: Any) -> None:
     """Start a campaign in FOLDER. Nothing of this can be changed once there are readings.
 

@@ -90,7 +90,6 @@ class Output:
 
 
 def answers(
-    as_json: str = "Answer as JSON.",
     table: bool = False,
     picture: str = "",
     page: str = "",
@@ -99,7 +98,7 @@ def answers(
 ) -> Callable[[Command], Command]:
     """Options of a command's answer, handed over as ``out``; its files can be written then.
 
-    ``as_json``, ``picture`` and ``page`` are helps of options; ``table`` is for --out; ``force``
+    ``picture`` and ``page`` are helps of options; ``table`` is for --out; ``force``
     for a command that writes other files.
     """
     file = click.Path()
@@ -107,7 +106,7 @@ def answers(
         (table, ("--out", "-o", "table"), "Table as .csv, .xlsx, .json or .parquet.", file),
         (picture, ("--picture",), picture, file),
         (page, ("--page",), page, file),
-        (True, ("--json", "as_json"), as_json, None),
+        (True, ("--json", "as_json"), "Answer as JSON.", None),
         (verbose, ("--verbose",), "Every row and detail.", None),
         (table or picture or page or force, ("--force",), "Replacement of existing files.", None),
     )
