@@ -222,10 +222,10 @@ def evaluate_assessors(
     if twice := sorted({name for name in names if names.count(name) > 1}):
         problems.append(Problem("assessors", f"{', '.join(twice)} occurs twice", "a name each"))
     refuse(problems)
-    chosen: list[Any] = [
-        dataclasses.replace(each, measurements=budget) if hasattr(each, "measurements") else each
-        for each in assessors
-    ]
+    chosen: list[Any] = list(assessors)
+    for place, each in enumerate(chosen):
+        if "measurements" in getattr(each, "__dataclass_fields__", ()):
+            chosen[place] = dataclasses.replace(each, measurements=budget)
     visits = Visits(budget, "sequence")
     rows = simulate(error_mm, levels.tolist(), range(repetitions), visits, seed, chosen)
     truth, stated = true_accuracy_mm(np.linalg.norm(error_mm, axis=1)), rows["upper_mm"].notna()
