@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import os
-import resource
-import subprocess
-import sys
 import zipfile
 from pathlib import Path
 
+import limited_command
 import numpy as np
 import openpyxl
 import pyarrow as pa
@@ -29,22 +27,18 @@ LAUGHS = "a0: &a0 [1, 1, 1, 1, 1, 1, 1, 1, 1, 1]\n" + "".join(
 def refused(folder: Path, *words: object) -> str:
     """What a command says of a file it does not take, in seconds and 3 GB; never a traceback."""
 
-    def limits() -> None:
-        resource.setrlimit(resource.RLIMIT_AS, (_BYTES, _BYTES))
-
-    done = subprocess.run(
-        [sys.executable, "-m", "kinacc", *map(str, words)],
-        cwd=folder,
-        env={**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"},
-        capture_output=True,
-        text=True,
-        timeout=_SECONDS,
-        preexec_fn=limits,
+    log = folder / "standard error"
+    command = limited_command.FORKED.Process(
+        target=limited_command.run, args=([*map(str, words)], folder, log, _SECONDS, _BYTES)
     )
-    assert done.returncode == 2, (done.returncode, done.stderr[-1000:])
-    assert "Traceback" not in done.stderr
-    assert len(done.stderr) < 20_000
-    return done.stderr
+    command.start()
+    command.join(20 * _SECONDS)  # of a machine that has other work
+    command.kill()
+    printed = log.read_text(encoding="utf-8")
+    assert command.exitcode == 2, (command.exitcode, printed[-1000:])
+    assert "Traceback" not in printed
+    assert len(printed) < 20_000
+    return printed
 
 
 def data_set(folder: Path, file: str) -> Path:

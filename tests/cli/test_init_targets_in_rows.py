@@ -1,12 +1,12 @@
 """Files with a row for every target of a pose, where no column calls the targets so."""
 
 import numpy as np
-from tracked_arm import described, refused, table, tracked, written
+from tracked_arm import looked, refused, table, tracked, written
 
 from kinacc.kinematics import robot
 from kinacc.measurements.reader import read
 
-IT = tracked(poses=20)
+IT = tracked()
 COUNT = len(IT.q)
 NAMES = [f"P{row + 1}" for row in range(COUNT)]
 Q = [f"q{i}_deg" for i in range(1, 7)]
@@ -28,7 +28,7 @@ def grouped(*points, labels="ABC"):
 
 def test_groups_of_points_are_the_targets_where_they_keep_their_distances(tmp_path):
     points = grouped(IT.point, IT.point + IT.turn.apply([150.0, 20.0, 0.0]), LOWER)
-    section, _ = described(written(tmp_path, joints_csv=JOINTS, tracker_csv=points))
+    section, _ = looked(written(tmp_path, joints_csv=JOINTS, tracker_csv=points))
     assert section["columns"]["target"] == "Group"
     assert targets(section) == {"SMR_A": COUNT, "SMR_B": COUNT, "SMR_C": COUNT}
 
@@ -54,11 +54,11 @@ def in_one_nest(radius, **more):
 
 def test_a_reflector_of_another_radius_is_a_target_of_its_own(tmp_path):
     text = in_one_nest([19.05] * 12 + [6.35] * (COUNT - 12))
-    section, _ = described(written(tmp_path, cell_csv=text))
+    section, _ = looked(written(tmp_path, cell_csv=text))
     assert targets(section) == {"19.05": 12, "6.35": COUNT - 12}
 
 
 def test_radii_that_were_measured_scatter_and_are_one_reflector(tmp_path):
     radius = np.linspace(19.04, 19.06, COUNT)
-    section, _ = described(written(tmp_path, cell_csv=in_one_nest(radius)))
+    section, _ = looked(written(tmp_path, cell_csv=in_one_nest(radius)))
     assert targets(section) == {"tool": COUNT}

@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-from tracked_arm import assert_read, call, described, refused, table, tracked, written
+from tracked_arm import assert_read, call, looked, refused, table, tracked, written
 
 from kinacc.checks.contradictions import load
 from kinacc.kinematics import robot
 from kinacc.measurements.reader import read
 
-IT = tracked(poses=20)
+IT = tracked()
 COUNT = len(IT.q)
 ORDER = np.random.default_rng(7).permutation(COUNT)
 Q = [f"q{i}_deg" for i in range(1, 7)]
@@ -29,7 +29,7 @@ def test_a_name_joins_whatever_the_order(there, here, tmp_path):
     joints = table(["Name", *Q], named(there, range(COUNT)), IT.q)
     points = table(["Point", *XYZ], named(here, ORDER), IT.point[ORDER], mark=";")
     files = written(tmp_path, joints_csv=joints, tracker_csv=points)
-    section, _ = described(files)
+    section, _ = looked(files)
     assert_read(section, IT, ORDER)
     assert section["path"].endswith("tracker.csv")
     assert read(section, robot.load("ur10")).columns["row"].tolist() == list(range(2, COUNT + 2))
@@ -40,7 +40,7 @@ def test_what_stays_unmatched_is_printed_with_its_lines(tmp_path):
     joints = table(["Name", *Q], named("P{}", rows[3:]), IT.q[3:])
     points = table(["Name", *XYZ], named("P{}", rows[:-2]), IT.point[:-2])
     files = written(tmp_path, joints_csv=joints, tracker_csv=points)
-    section, _ = described(files)
+    section, _ = looked(files)
     assert_read(section, IT, rows[3:-2])
     assert "lines 2, 3, 4" in "\n".join(read(section, robot.load("ur10")).notes)
 
@@ -48,7 +48,7 @@ def test_what_stays_unmatched_is_printed_with_its_lines(tmp_path):
 def test_as_many_rows_without_a_key_are_asked_about(tmp_path):
     files = written(tmp_path, joints_csv=table(Q, IT.q), tracker_csv=table(XYZ, IT.point))
     assert "--join order" in refused(files)
-    section, _ = described(files, "--join", "order")
+    section, _ = looked(files, join="order")
     assert_read(section, IT)
     cell = tmp_path / "asked"
     done = call("init", *files, "--robot", "ur10", "--out", cell, "--name", "m", input="order\n")
@@ -101,11 +101,11 @@ def test_time_stamps_join_with_the_offset_of_the_clocks(tmp_path):
     reading = START_S + np.random.default_rng(5).uniform(2.0, 6.0, COUNT)
     joints = table(["timestamp", *Q], time, q)
     points = table(["Time", *XYZ], clock(reading), IT.point)
-    section, told = described(written(tmp_path, joints_csv=joints, tracker_csv=points))
+    section, notes = looked(written(tmp_path, joints_csv=joints, tracker_csv=points))
     assert_read(section, IT)
     assert section["joints"]["by"] == "time"
     assert section["joints"]["clock_offset_s"] == pytest.approx(137.4, abs=1.0)
-    assert len(told["notes"]) == 1
+    assert len(notes) == 1
 
 
 def test_a_point_taken_while_the_arm_moved_is_left_out_and_said(tmp_path):
@@ -114,9 +114,9 @@ def test_a_point_taken_while_the_arm_moved_is_left_out_and_said(tmp_path):
     reading[6] = START_S[6] + 10.0
     joints = table(["timestamp", *Q], time, q)
     points = table(["Time", *XYZ], reading, IT.point)
-    section, told = described(written(tmp_path, joints_csv=joints, tracker_csv=points))
+    section, notes = looked(written(tmp_path, joints_csv=joints, tracker_csv=points))
     assert_read(section, IT, np.delete(np.arange(COUNT), 6))
-    assert "the arm was moving: line 8" in " ".join(told["notes"])
+    assert "the arm was moving: line 8" in " ".join(notes)
 
 
 def test_regular_times_leave_the_offset_open(tmp_path):
@@ -125,5 +125,5 @@ def test_regular_times_leave_the_offset_open(tmp_path):
     points = table(["time", *XYZ], time + 3.0, IT.point)
     files = written(tmp_path, joints_csv=joints, tracker_csv=points)
     assert "--clock-offset" in refused(files)
-    section, _ = described(files, "--clock-offset", "-3")
+    section, _ = looked(files, clock_offset="-3")
     assert_read(section, IT)

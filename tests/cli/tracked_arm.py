@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 from kinacc.checks.contradictions import load
 from kinacc.cli.group import main
 from kinacc.kinematics import robot
+from kinacc.measurements.intake import guess as guesses
 from kinacc.measurements.reader import read
 
 
@@ -72,6 +73,12 @@ def described(paths, *options, robot="ur10"):
     done = call("init", *paths, *words)
     assert done.exit_code == 0, done.output
     return load((cell / "m.yaml",))["m"]["measurements"]["file"], json.loads(done.stdout)
+
+
+def looked(paths, **answers):
+    """What a run would read of the files, before the robot is tried on it, and notes."""
+    guess = guesses.look(paths, answers)
+    return guess.section, guess.notes
 
 
 def refused(paths, *options, robot="ur10"):

@@ -24,7 +24,7 @@ from kinacc.measurements.rows import read_rows
 ARM = robot.load("ur10")
 GIGABYTE = 1 << 30
 fuzzed = settings(
-    max_examples=1000,
+    max_examples=250,  # a minute in all
     deadline=timedelta(seconds=5),
     suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
 )
@@ -89,13 +89,13 @@ def little_memory() -> Iterator[None]:
     resource.setrlimit(resource.RLIMIT_AS, before)
 
 
-def look(*paths: Path) -> None:
+def look(path: Path) -> None:
     """All readers of measured files; what is wrong with one is an InputError."""
     for reader in (
-        lambda: read(guess.look(paths if len(paths) > 1 else paths[0]).section, ARM, strict=False),
-        lambda: read({"path": str(paths[0])}, ARM),
+        lambda: read(guess.look(path).section, ARM, strict=False),
+        lambda: read({"path": str(path)}, ARM),
         *(
-            lambda need=need: read_rows(paths[0], ARM.dh.prismatic, need)
+            lambda need=need: read_rows(path, ARM.dh.prismatic, need)
             for need in ("joints", "points", "poses")
         ),
     ):
@@ -127,7 +127,8 @@ def test_two_files(one: str, other: str, tmp_path: Path) -> None:
     paths = tmp_path / "joints.csv", tmp_path / "points.csv"
     for path, text in zip(paths, (one, other), strict=True):
         path.write_text(text, encoding="utf-8", errors="ignore")
-    look(*paths)
+    with suppress(InputError):
+        read(guess.look(paths).section, ARM, strict=False)
 
 
 @fuzzed
