@@ -5,7 +5,6 @@ import pandas as pd
 import pytest
 from tracked_arm import (
     assert_read,
-    assert_turned,
     call,
     described,
     table,
@@ -43,18 +42,6 @@ def test_headers_of_a_language_are_read(language, tmp_path):
     section, told = described(files)
     assert_read(section, IT)
     assert told["unused_columns"] == dict.fromkeys(axes(nominal), "nominal")
-
-
-@pytest.mark.parametrize(
-    ("joint", "letters", "convention"),
-    [("J{}", "WPR", "xyz"), ("A{}", "ABC", "ZYX"), ("JT{}", "OAT", "ZYZ")],
-)
-def test_angles_of_fanuc_kuka_and_kawasaki(joint, letters, convention, tmp_path):
-    names = [*joints(joint), *"XYZ", *letters]
-    text = table(names, IT.q, IT.point, IT.turn.as_euler(convention, degrees=True))
-    section, _ = described(written(tmp_path, m_csv=text))
-    assert section["orientation"]["convention"] == convention
-    assert_turned(assert_read(section, IT), IT)
 
 
 def test_rounded_joints_are_said_to_cost_what_they_do(tmp_path):

@@ -52,6 +52,7 @@ def test_joints_of_a_program_in_any_form(case, tmp_path):
 CONVENTIONS = {
     "KUKA": (["A", "B", "C"], "ZYX"),
     "FANUC": (["W", "P", "R"], "xyz"),
+    "Kawasaki": (["O", "A", "T"], "ZYZ"),
     "roll, pitch, yaw": (["Roll [deg]", "Pitch [deg]", "Yaw [deg]"], "xyz"),
     "ours": (["rx_deg", "ry_deg", "rz_deg"], "XYZ"),
     "about X, Y, Z": (["Rx [deg]", "Ry [deg]", "Rz [deg]"], "XYZ"),

@@ -24,25 +24,12 @@ from written_tables import (
 )
 
 from kinacc.errors import InputError
-from kinacc.measurements.files import load
-from kinacc.measurements.intake import text
 
 TABLE = [[*JOINTS, *XYZ], *np.hstack([Q_DEG, POINT_MM]).tolist()]
 
 
-def test_a_workbook_with_a_title_is_read_from_the_sheet_that_holds_a_table(tmp_path):
-    rows = [[f"{value:.3f}".replace(".", ",") for value in row] for row in TABLE[1:]]
-    sheets = {"Cover": [["Survey of cell 3"]], "Data": [["Survey of cell 3"], [], TABLE[0], *rows]}
-    path = workbook(tmp_path, sheets)
-    assert looked(path).section["sheet"] == "Data"
-    assert_is_truth(reading(path))
-    assert reading(path).columns["row"][0] == 4
-
-
-def test_two_sheets_with_tables_are_asked_about(tmp_path):
-    other = [TABLE[0], *[[value + 1.0 for value in row] for row in TABLE[1:]]]
-    path = workbook(tmp_path, {"before": TABLE, "after": other})
-    assert "--sheet before or --sheet after" in undecided(path)
+def test_a_sheet_that_is_not_there_is_answered_with_those_that_are(tmp_path):
+    path = workbook(tmp_path, {"before": TABLE, "after": TABLE})
     assert_is_truth(reading(path, sheet="before"), atol=1e-9)
     with pytest.raises(InputError, match="before, after"):
         looked(path, sheet="between")
@@ -54,18 +41,6 @@ def test_what_is_no_workbook_is_refused_with_what_to_do(name, tmp_path):
     path.write_bytes(b"\xd0\xcf\x11\xe0 not a zip")
     with pytest.raises(InputError, match=r"\.xlsx or (export it as )?CSV"):
         looked(path)
-
-
-@pytest.mark.parametrize("mark", [", ", "\t", ";"])
-def test_a_list_of_points_without_names_is_collection_group_point(mark, tmp_path):
-    head = "// Exported from the instrument\n// Working Frame: CELL::BASE\n// Units: Millimeters\n"
-    rows = [["CELL", "Poses", f"P{n}", *(f"{v:.4f}" for v in POINT_MM[n])] for n in (1, 2, 10)]
-    path = file(tmp_path, head + lines(rows, None, mark))
-    found = text.look(path)
-    assert found.written.names == ["Collection", "Group", "Point", "X_mm", "Y_mm", "Z_mm"]
-    table = load(path, found.written)
-    np.testing.assert_allclose([float(c) for c in table.columns["X_mm"]], POINT_MM[[1, 2, 10], 0])
-    assert found.stated["length"] == "mm"
 
 
 @pytest.mark.parametrize("name", ["U{}", "U({})", "U{} (k=2) [mm]", "Unc. {} [mm] (k = 2)"])

@@ -81,10 +81,6 @@ class Name:
     spelled: tuple[str, ...] = ()
     coverage: int = 0
 
-    def without(self, place: int) -> tuple[str, ...]:
-        """The terms but the one at ``place``."""
-        return self.terms[:place] + self.terms[place + 1 :]
-
 
 def name_of(column: str, unit: str = "") -> Name:
     """The name taken apart; ``unit`` is that of a line of units."""

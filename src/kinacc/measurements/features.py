@@ -6,6 +6,7 @@ Columns Nominal, Measured, Dev under a column of axes become Nominal X, Nominal 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 import pandas as pd
@@ -72,29 +73,28 @@ def by_feature(table: RawTable) -> RawTable:
         allowed = "a column of names, one of X, Y, Z, and columns such as Nominal, Measured, Dev"
         fix = "set measurements.file.layout: table"
         raise InputError(Problem(table.path, message, allowed, fix))
+    feature, values = report.feature, [*report.values]
     cells = table.columns.mask(table.columns.map(table.is_gap), None)
-    cells[report.feature] = cells[report.feature].ffill()
-    axes = np.array([axis_of(cell) for cell in table.columns[report.axis]], dtype=object)
-    group, axes_so_far, last = np.full(len(table), -1), set[str](), None
-    for row in np.flatnonzero(axes):
-        if cells[report.feature][row] != last or axes[row] in axes_so_far:
-            axes_so_far, last = set(), cells[report.feature][row]
-        group[row] = group.max() + (not axes_so_far)
-        axes_so_far.add(axes[row])
-    read = cells[group >= 0].groupby(group[group >= 0])
-    first = np.flatnonzero(group >= 0)[~pd.Series(group[group >= 0]).duplicated()]
-    columns = {report.feature: cells[report.feature][first]}
-    units = dict(table.units)
-    for value in report.values:
-        for axis in AXES:
-            rows = dict(zip(group[axes == axis], table.columns[value][axes == axis], strict=True))
-            columns[f"{value} {axis}"] = [rows.get(number) for number in range(len(first))]
-            units[f"{value} {axis}"] = units.get(value, "")
-    for name in cells.columns.difference([report.feature, report.axis, *report.values], sort=False):
-        if (read[name].nunique() < 2).all():  # of the feature, and not of an axis
-            columns[name] = read[name].first()
+    cells[feature] = cells[feature].ffill()
+    axes = table.columns[report.axis].map(axis_of)
+    rows, others = cells[axes != ""], table.columns[report.axis][axes == ""]
+    begins, known = list[bool](), set[tuple[str, str]]()
+    for row in zip(rows[feature], axes[rows.index], strict=True):
+        begins.append(row in known or row[0] not in {name for name, _ in known})
+        known = {row} if begins[-1] else known | {row}
+    group = np.cumsum(begins) - 1
+    of_axes = rows[values].groupby([group, axes[rows.index].to_numpy()]).first().unstack()
+    columns, units = {feature: rows[feature][begins]}, dict(table.units)
+    for value, axis in product(values, AXES):
+        columns[f"{value} {axis}"] = of_axes[value, axis]
+        units[f"{value} {axis}"] = units.get(value, "")
+    for name in cells.columns.difference([feature, report.axis, *values], sort=False):
+        of_feature = rows[name].groupby(group)
+        if (of_feature.nunique() < 2).all():  # and not of an axis
+            columns[name] = of_feature.first()
     notes = table.notes
-    if others := table.columns[report.axis][axes == ""].tolist():
+    if len(others):
         kinds = first_few([*dict.fromkeys(map(str, others))])
         notes += (f"{len(others)} rows of other quantities than X, Y, Z, not read ({kinds})",)
-    return replace(table, columns=frame(columns), line=table.line[first], units=units, notes=notes)
+    line = table.line[rows.index[begins]]
+    return replace(table, columns=frame(columns), line=line, units=units, notes=notes)
