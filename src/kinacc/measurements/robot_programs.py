@@ -97,8 +97,7 @@ def _of_fanuc(text: str) -> list[Position]:
     positions = []
     for match in _FANUC.finditer(text):
         first_group = re.split(r"GP[2-9]\s*:", match[2])[0]
-        joints = {int(number): float(value) for number, value in _FANUC_JOINT.findall(first_group)}
-        row = [joints[number] for number in sorted(joints)]
+        row = [float(value) for _, value in sorted(_FANUC_JOINT.findall(first_group))]
         positions.append((f"P[{match[1]}]", match.start(1), row))
     return positions
 

@@ -6,9 +6,10 @@ Where the names allow several readings, they are a question.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 
@@ -93,35 +94,30 @@ def names_in(table: RawTable) -> list[Name]:
 
 
 def of_table(
-    table: RawTable,
-    take: Sequence[str] = (),
-    turned: bool = True,
-    sigma: str = "",
-    wanted: bool = False,
+    table: RawTable, answers: Mapping[str, Any] | None = None, wanted: bool = False
 ) -> NamedColumns:
     """The meaning of the columns of a table; see ``recognise``."""
-    return recognise(names_in(table), lambda n: table.values(n.column), take, turned, sigma, wanted)
+    return recognise(names_in(table), lambda n: table.values(n.column), answers, wanted)
 
 
 def recognise(
     names: Sequence[Name],
     values: Values | None = None,
-    take: Sequence[str] = (),
-    turned: bool = True,
-    sigma: str = "",
+    answers: Mapping[str, Any] | None = None,
     wanted: bool = False,
 ) -> NamedColumns:
     """The meaning of columns of these names; no joints or no targets where there are none.
 
-    ``values`` gives a column's numbers (n,), NaN where it has none. ``take``: columns whose groups
-    are read whatever their names mean. ``turned``: orientations are read. ``sigma``: how many
-    standard deviations an uncertainty is, as answered; "none" for none that is read. ``wanted``:
-    nominal poses are read, not measured ones.
+    ``values`` gives a column's numbers (n,), NaN where it has none. ``answers`` by option: ``take``
+    (columns whose groups are read whatever their names mean), ``orientation`` ("none" is not read),
+    ``sigma`` (how many standard deviations an uncertainty is; "none" for none that is read).
+    ``wanted``: nominal poses are read, not measured ones.
     """
-    choice = _Choice([n for n in names if not _payload_of(n)], values, {*take}, sigma, wanted)
+    answers = answers or {}
+    choice = _Choice([n for n in names if not _payload_of(n)], values, answers, wanted)
     joints = choice.joints()
     points = choice.points(joints)
-    turns = choice.turns(points) if turned else {}
+    turns = choice.turns(points) if answers.get("orientation") != "none" else {}
     spreads = choice.spreads(points, turns)
     targets = {
         point.target: point.columns
@@ -150,14 +146,19 @@ class _Choice:
     """Selection among the groups of a file; ``questions`` grow."""
 
     def __init__(
-        self, names: Sequence[Name], values: Values | None, take: set[str], sigma: str, wanted: bool
+        self,
+        names: Sequence[Name],
+        values: Values | None,
+        answers: Mapping[str, Any],
+        wanted: bool,
     ) -> None:
-        self.values, self.take, self.sigma = values, take, sigma
+        self.values, self.sigma = values, answers.get("sigma", "")
+        self.take = {*answers.get("take", ())}
         self.every = all_groups(names, values)
         self.groups = [g for g in self.every if g.kind != POSE and not g.wrong_units]
         if wanted:
             nominal = [*self._of(POINT, NOMINAL, OPEN), *self._of(TURN, NOMINAL, OPEN)]
-            self.take = take | {group.names[0] for group in nominal}
+            self.take |= {group.names[0] for group in nominal}
         # Whether a column by itself is a deviation: error, 3D deviation.
         grouped = {column for group in self.every for column in group.names}
         self.off = any(role(n.terms) == DEVIATION and n.unit not in ANGLE
@@ -193,15 +194,15 @@ class _Choice:
         if taken := self._taken(JOINTS):
             return taken[0]
         every = self._of(JOINTS, REPORTED, PLAIN, OPEN, NOMINAL)
-        strong = {name: [g for g in every if g.role == name and not g.weak]
-                  for name in (REPORTED, PLAIN, OPEN, NOMINAL)}  # fmt: skip
-        if len(certain := self._distinct(strong[REPORTED])) == 1:
+        reported, plain, unclear, nominal = (
+            self._distinct([group for group in every if group.role == name and not group.weak])
+            for name in (REPORTED, PLAIN, OPEN, NOMINAL)
+        )
+        certain = reported or ([] if unclear else plain)
+        if len(certain) == 1:
             return certain[0]
-        plain = self._distinct(strong[PLAIN])
-        if not certain and len(plain) == 1 and not strong[OPEN]:
-            return plain[0]
-        best = certain or (plain and [*plain, *strong[OPEN]])
-        best = best or [*strong[OPEN], *(g for g in every if g.weak)] or strong[NOMINAL]
+        best = reported or (plain and [*plain, *unclear])
+        best = best or [*unclear, *(group for group in every if group.weak)] or nominal
         return self._ask(f"{ABOUT_JOINTS} as they were read back", best) if best else None
 
     def commanded(self, joints: Group | None) -> Group | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -132,7 +132,6 @@ def described(looked: Looked, answers: Mapping[str, Any], need: str) -> Guess:
         columns = targets_in_rows.with_targets(table, columns, q_rad, point_mm)
         if targets_in_rows.counts_readings(table, columns, q_rad):
             section["repeats_in_names"] = True
-    units = {"joint": joint_unit, "length": length_unit, "angle": angle_unit}
     section |= {
         "no_reading": sorted(guesser.void),
         "sigma": guesser.sigma(),
@@ -140,9 +139,8 @@ def described(looked: Looked, answers: Mapping[str, Any], need: str) -> Guess:
         "length_unit": length_unit,
         "orientation": guesser.orientation(angle_unit),
         "targets": list(columns.targets),
-        "columns": dict(_mapping(columns, units, looked.path, guesser.problems)),
+        "columns": _mapping(columns, (joint_unit, length_unit, angle_unit)),
     }
-    refuse(guesser.problems, f"{looked.path} cannot be described")
     section |= {"pulses_per_deg": per_deg} if per_deg else {}
     section |= {"joints": looked.joints} if looked.joints else {}
     notes = dict.fromkeys((*looked.notes, *table.notes))
@@ -212,7 +210,7 @@ class _Guesser:
             return []
         if answer is None:
             most = np.nanmax(np.abs(self.stacked(joints)), initial=0.0)
-            if _is_pulse(joints[0]) or (not joints[0].unit and most >= _MOST_DEG):
+            if joints[0].unit.lower() in PULSES or (not joints[0].unit and most >= _MOST_DEG):
                 about = f"{listed([name.column for name in joints])} are pulses of the motors"
                 meant = {",".join("ABCDEFG"[: len(joints)]): "pulses of each joint in a degree"}
                 raise Undecided(self.table.path, [Choice("--pulses-per-deg", about, meant)])
@@ -327,30 +325,21 @@ class _Guesser:
         return max(numbers, default=1)
 
 
-def _is_pulse(name: Name) -> bool:
-    """Whether a column holds pulses of a motor, which need their number in a degree."""
-    return name.unit.lower() in PULSES
+def _mapping(columns: NamedColumns, units: Collection[str]) -> dict[str, str]:
+    """The file's name by ours, of every column that is read, but those that our own name tells.
 
-
-def _mapping(
-    columns: NamedColumns, units: Mapping[str, str], path: str, problems: list[Problem]
-) -> Iterator[tuple[str, str]]:
-    """Our names and the file's, of every column that is read; ``units`` of joint, length, angle."""
-    names = [(f"q{n}{suffix}", name, "length" if name.unit in LENGTH else "joint")
+    ``units`` are those of the settings, which a column that is mapped must have.
+    """
+    names = {f"q{n}{suffix}": name
              for suffix, row in (("", columns.joints), ("_cmd", columns.commanded))
-             for n, name in enumerate(row, 1)]  # fmt: skip
+             for n, name in enumerate(row, 1)}  # fmt: skip
     for target, parts in columns.targets.items():
-        for quantity, name in parts.items():
-            turned = quantity.removeprefix("std_").startswith("r")
-            kind = "" if quantity[0] == "q" else "angle" if turned else "length"
-            names.append((quantity if target == TOOL else f"{target}_{quantity}", name, kind))
-    for quantity, name in columns.single.items():
-        names.append((quantity, name, "length" if quantity.startswith("payload_") else ""))
-    for ours, name, kind in names:
-        unit = units.get(kind, "")
-        if name.unit in ("", unit) or not unit or _is_pulse(name):
-            yield ours, name.column
-        elif name.column != f"{ours}_{name.unit}":  # our own name states its unit
-            message = f"is in {name.unit}, others of its kind are in {unit}"
-            fix = "export all of them in one unit"
-            problems.append(Problem(f"{path}: column {name.column}", message, unit, fix))
+        prefix = "" if target == TOOL else f"{target}_"
+        names |= {f"{prefix}{quantity}": name for quantity, name in parts.items()}
+    return {
+        ours: name.column
+        for ours, name in (names | columns.single).items()
+        if name.unit not in {**ANGLE, **LENGTH}
+        or name.unit in units
+        or name.column != f"{ours}_{name.unit}"
+    }

@@ -50,9 +50,7 @@ def look(
         2 * paths if sheets else paths, sheets or [""] * len(paths), strict=True
     ):
         looked = text.look(name, {**answers, "sheet": sheet} if sheet else answers)
-        take = [column for column in answers.get("take", ()) if column in looked.table.columns]
-        turned, sigma = answers.get("orientation") != "none", answers.get("sigma", "")
-        meaning = columns.of_table(looked.table, take, turned, sigma, wanted)
+        meaning = columns.of_table(looked.table, answers, wanted)
         files.append(replace(looked, columns=meaning))
     return files[0] if len(files) == 1 else _together(files, answers)
 
