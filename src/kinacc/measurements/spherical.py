@@ -6,15 +6,17 @@ Counterclockwise ones, as of trackers in the mathematical sense, count from x to
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from kinacc.config.measured import Directions
-from kinacc.errors import Problem, refuse
+from kinacc.errors import InputError, Problem, refuse
 from kinacc.measurements.column_names import MEASURED, PLAIN, REPORTED, WORDS, Name, name_of, role
+from kinacc.measurements.intake.choices import Choice, Undecided
 from kinacc.measurements.layout import LENGTH
 from kinacc.measurements.table import RawTable, frame, numbers
 
@@ -42,17 +44,6 @@ class Reading:
         """Units its angles state."""
         return {self.horizontal.unit, self.vertical.unit} - {""}
 
-    @property
-    def vertical_from(self) -> str:
-        """What the vertical angle is counted from by its name, empty for nothing."""
-        terms = {*self.vertical.terms}
-        return next((zero for zero in ("horizon", "zenith") if terms & _WORDS[zero]), "")
-
-    @property
-    def is_geodetic(self) -> bool:
-        """Whether the name of the horizontal angle is that of a theodolite."""
-        return bool({*self.horizontal.terms} & _WORDS["theodolite"])
-
 
 def readings_of(names: Sequence[Name]) -> list[Reading]:
     """Spherical readings among columns; none where one names x, y and z, or a part is missing."""
@@ -72,6 +63,49 @@ def readings_of(names: Sequence[Name]) -> list[Reading]:
         for rest, columns in parts.items()
         if len(columns) == 3 and role(rest) in (PLAIN, MEASURED, REPORTED)
     ]
+
+
+def directions_of(
+    table: RawTable, readings: Sequence[Reading], stated: str, answers: Mapping[str, Any]
+) -> Directions:
+    """How the angles of readings are counted; ``stated``: their unit, above the rows.
+
+    Raises Undecided where it is open, InputError where they state units that are not read.
+    """
+    first, units = readings[0], set[str]().union(*(reading.angle_units for reading in readings))
+    lengths = {reading.distance.unit for reading in readings} - {"", *LENGTH}
+    if wrong := sorted(units - {*PER_UNIT} | lengths):
+        where = f"{table.path}: columns {', '.join(n for r in readings for n in r.names)}"
+        allowed = ", ".join((*PER_UNIT, *LENGTH))
+        raise InputError(Problem(where, f"are in {' and '.join(wrong)}", allowed))
+    horizontal, vertical, _ = first.names
+    if re.search(r"\bgra(d|de|ds|des)\b", f"{horizontal} {vertical}".lower()):
+        units = set()  # grad is gon in one language and degrees in another
+    unit = answers.get("direction_unit") or (units.pop() if len(units) == 1 else stated)
+    choices = []
+    if unit not in PER_UNIT:
+        turn = table.values(horizontal)[0]
+        meant = {u: f"{turn:g} is {np.rad2deg(turn * PER_UNIT[u]):.4g} degrees" for u in PER_UNIT}
+        about = f"{horizontal} and {vertical} state no unit of angles"
+        choices.append(Choice("--direction-unit", about, meant))
+    values = np.concatenate([table.values(reading.vertical.column) for reading in readings])
+    quarter = 0.5 * np.pi / PER_UNIT.get(unit, PER_UNIT["deg"])
+    low, high, terms = np.nanmin(values), np.nanmax(values), {*first.vertical.terms}
+    zero = answers.get("vertical")
+    zero = zero or next((name for name in ("horizon", "zenith") if terms & _WORDS[name]), "")
+    if not zero and low > 0.0 and high > 1.002 * quarter:
+        zero = "zenith"
+    elif not zero and low < 0.0 and max(-low, high) <= quarter:
+        zero = "horizon"
+    if not zero:
+        meant = {"zenith": "counted from straight up", "horizon": "up from level"}
+        about = f"{vertical} may be counted from the zenith or from the horizon"
+        choices.append(Choice("--vertical", about, meant))
+    if choices:
+        raise Undecided(table.path, choices)
+    is_geodetic = {*first.horizontal.terms} & _WORDS["theodolite"]
+    turning = answers.get("horizontal") or ("clockwise" if is_geodetic else "counterclockwise")
+    return Directions.model_construct(unit=unit, vertical=zero, horizontal=turning)
 
 
 def cartesian(table: RawTable, directions: Directions) -> RawTable:

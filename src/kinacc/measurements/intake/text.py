@@ -11,9 +11,6 @@ from io import StringIO
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from kinacc.config.measured import Directions
 from kinacc.errors import InputError, Problem, first_few
 from kinacc.measurements import robot_programs
 from kinacc.measurements.column_names import name_of
@@ -36,8 +33,8 @@ from kinacc.measurements.intake import decimals, heads
 from kinacc.measurements.intake.choices import Choice, Undecided
 from kinacc.measurements.intake.columns import NamedColumns, names_in
 from kinacc.measurements.intake.heads import Head
-from kinacc.measurements.layout import FEATURES, LENGTH, SPHERICAL, Layout
-from kinacc.measurements.spherical import PER_UNIT, Reading, readings_of
+from kinacc.measurements.layout import FEATURES, SPHERICAL, Layout
+from kinacc.measurements.spherical import directions_of, readings_of
 from kinacc.measurements.table import RawTable
 
 DELIMITERS = (";", "\t", ",", BLANKS)
@@ -103,7 +100,7 @@ def look(path: str | Path, answers: Mapping[str, Any] | None = None) -> Looked:
         written = written.but(layout=FEATURES)
         notes.append(f"a row per feature and axis: {len(table)} rows")
     elif readings := readings_of(names_in(table)):
-        ways = _directions(table, readings, stated.get("angle", ""), answers)
+        ways = directions_of(table, readings, stated.get("angle", ""), answers)
         written = written.but(layout=SPHERICAL, directions=ways)
         notes.append(f"{readings[0].vertical.column} is counted from the {ways.vertical}")
         if "horizontal" not in answers:
@@ -255,46 +252,3 @@ def _point_names(rows: Sequence[Cells], stated: Mapping[str, str]) -> list[str]:
         return []
     unit = f"_{stated['length']}" if "length" in stated else ""
     return [*(*GROUPS, POINT)[3 - before :], *(f"{axis}{unit}" for axis in "XYZ")]
-
-
-def _directions(
-    table: RawTable, readings: Sequence[Reading], stated: str, answers: Mapping[str, Any]
-) -> Directions:
-    """How the angles of spherical readings are counted; ``stated``: their unit, above the rows.
-
-    Raises Undecided where it is open, InputError where they state units that are not read.
-    """
-    for reading in readings:
-        wrong = (reading.angle_units - {*PER_UNIT}) | ({reading.distance.unit} - {"", *LENGTH})
-        if wrong:
-            where = f"{table.path}: columns {', '.join(reading.names)}"
-            allowed = ", ".join((*PER_UNIT, *LENGTH))
-            raise InputError(Problem(where, f"are in {' and '.join(sorted(wrong))}", allowed))
-    first = readings[0]
-    vertical = np.concatenate([table.values(reading.vertical.column) for reading in readings])
-    units = {unit for reading in readings for unit in reading.angle_units}
-    if re.search(r"\bgra(d|de|ds|des)\b", " ".join(first.names).lower()):
-        units = set()  # grad is gon in one language and degrees in another
-    unit = answers.get("direction_unit") or (units.pop() if len(units) == 1 else stated)
-    choices = []
-    if unit not in PER_UNIT:
-        turn = table.values(first.horizontal.column)[0]
-        meant = {u: f"{turn:g} is {np.rad2deg(turn * PER_UNIT[u]):.4g} degrees" for u in PER_UNIT}
-        about = f"{first.horizontal.column} and {first.vertical.column} state no unit of angles"
-        choices.append(Choice("--direction-unit", about, meant))
-    quarter = 0.5 * np.pi / PER_UNIT.get(unit, PER_UNIT["deg"])
-    zero, low, high = first.vertical_from, np.nanmin(vertical), np.nanmax(vertical)
-    if not zero and low > 0.0 and high > 1.002 * quarter:
-        zero = "zenith"
-    elif not zero and low < 0.0 and max(-low, high) <= quarter:
-        zero = "horizon"
-    zero = answers.get("vertical") or zero
-    if not zero:
-        meant = {"zenith": "counted from straight up", "horizon": "up from level"}
-        about = f"{first.vertical.column} may be counted from the zenith or from the horizon"
-        choices.append(Choice("--vertical", about, meant))
-    if choices:
-        raise Undecided(table.path, choices)
-    turning = answers.get("horizontal")
-    turning = turning or ("clockwise" if first.is_geodetic else "counterclockwise")
-    return Directions.model_construct(unit=unit, vertical=zero, horizontal=turning)
