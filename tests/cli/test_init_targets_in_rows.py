@@ -20,36 +20,18 @@ def targets(section):
     return {name: np.sum(found["target"] == name) for name in dict.fromkeys(found["target"])}
 
 
-def grouped(*points, labels="ABC"):
-    """Names of groups and points, and the points (n * COUNT, 3) one group behind the other."""
-    groups = [f"SMR_{label}" for label in labels[: len(points)] for _ in range(COUNT)]
-    return table(["Group", "Point", *XYZ], groups, NAMES * len(points), np.vstack(points))
-
-
-def test_groups_of_points_are_the_targets_where_they_keep_their_distances(tmp_path):
-    points = grouped(IT.point, IT.point + IT.turn.apply([150.0, 20.0, 0.0]), LOWER)
-    section, _ = looked(written(tmp_path, joints_csv=JOINTS, tracker_csv=points))
-    assert section["columns"]["target"] == "Group"
-    assert targets(section) == {"SMR_A": COUNT, "SMR_B": COUNT, "SMR_C": COUNT}
-
-
 def test_groups_from_two_places_of_the_tracker_are_no_targets(tmp_path):
     x, y, z = IT.point.T
-    points = grouped(IT.point, np.stack([-y + 900.0, x, z], axis=1))
+    groups = ["SMR_A"] * COUNT + ["SMR_B"] * COUNT
+    point = np.vstack([IT.point, np.stack([-y + 900.0, x, z], axis=1)])
+    points = table(["Group", "Point", *XYZ], groups, NAMES * 2, point)
     said = refused(written(tmp_path, joints_csv=JOINTS, tracker_csv=points))
     assert "over 5 mm apart" in said
 
 
-def in_one_nest(radius, **more):
-    columns = [np.array(each) for each in more.values()]
+def in_one_nest(radius):
     point = np.where(np.array(radius)[:, None] > 10.0, IT.point, LOWER)
-    return table(
-        [*Q, "Reflector radius [mm]", *more, *XYZ],
-        IT.q,
-        [f"{r:g}" for r in radius],
-        *columns,
-        point,
-    )
+    return table([*Q, "Reflector radius [mm]", *XYZ], IT.q, [f"{r:g}" for r in radius], point)
 
 
 def test_a_reflector_of_another_radius_is_a_target_of_its_own(tmp_path):

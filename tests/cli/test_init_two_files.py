@@ -96,27 +96,16 @@ def clock(seconds):
     ]
 
 
-def test_time_stamps_join_with_the_offset_of_the_clocks(tmp_path):
-    time, q = dense_log(offset_s=137.4)
-    reading = START_S + np.random.default_rng(5).uniform(2.0, 6.0, COUNT)
-    joints = table(["timestamp", *Q], time, q)
-    points = table(["Time", *XYZ], clock(reading), IT.point)
-    section, notes = looked(written(tmp_path, joints_csv=joints, tracker_csv=points))
-    assert_read(section, IT)
-    assert section["joints"]["by"] == "time"
-    assert section["joints"]["clock_offset_s"] == pytest.approx(137.4, abs=1.0)
-    assert len(notes) == 1
-
-
 def test_a_point_taken_while_the_arm_moved_is_left_out_and_said(tmp_path):
     time, q = dense_log(offset_s=-20.0)
     reading = START_S + np.random.default_rng(5).uniform(2.0, 6.0, COUNT)
     reading[6] = START_S[6] + 10.0
     joints = table(["timestamp", *Q], time, q)
-    points = table(["Time", *XYZ], reading, IT.point)
+    points = table(["Time", *XYZ], clock(reading), IT.point)
     section, notes = looked(written(tmp_path, joints_csv=joints, tracker_csv=points))
     assert_read(section, IT, np.delete(np.arange(COUNT), 6))
     assert "the arm was moving: line 8" in " ".join(notes)
+    assert section["joints"]["clock_offset_s"] == pytest.approx(-20.0, abs=1.0)
 
 
 def test_regular_times_leave_the_offset_open(tmp_path):
