@@ -42,7 +42,7 @@ def test_what_stays_unmatched_is_printed_with_its_lines(tmp_path):
     files = written(tmp_path, joints_csv=joints, tracker_csv=points)
     section, _ = looked(files)
     assert_read(section, IT, rows[3:-2])
-    assert "lines 2, 3, 4" in "\n".join(read(section, robot.load("ur10")).notes)
+    assert "lines 2-4" in "\n".join(read(section, robot.load("ur10")).notes)
 
 
 def test_as_many_rows_without_a_key_are_asked_about(tmp_path):

@@ -165,7 +165,7 @@ FAULTS = {
     ),
     "a direction": (
         lambda good: good | {"s4": np.full(12, 2)},
-        "column s4, lines 2, 3, 4, 5, 6 and 7 more: 2; allowed: -1, 0 or 1",
+        "column s4, lines 2-13: 2; allowed: -1, 0 or 1",
     ),
     "a pose twice": (
         lambda good: good | {"pose": 0 * ROWS, "repeat": np.minimum(ROWS, 10)},

@@ -120,7 +120,7 @@ def test_statistics_and_remarks_between_the_rows_are_told_with_their_lines(tmp_p
     found = reading(file(tmp_path, lines(rows, mark=";")))
     assert_is_truth(found)
     told = " ".join(found.left_out())
-    assert "lines 6, 10, 11, 20, 21 and 1 more: not read" in told
+    assert "lines 6, 10-11, 20-22: not read" in told
     assert found.columns["row"].tolist()[4] == 7
 
 
@@ -132,7 +132,7 @@ def test_a_row_without_a_reading_is_kept_out_and_counted(nothing, tmp_path):
     rows[11][7] = nothing
     found = reading(file(tmp_path, lines(rows, mark=";")))
     assert_is_truth(found, ~np.isin(np.arange(ROWS), (2, 7, 8, 11)))
-    assert "4 rows hold no reading: lines 4, 9, 10, 13" in found.left_out()
+    assert "4 rows hold no reading: lines 4, 9-10, 13" in found.left_out()
 
 
 @pytest.mark.parametrize(("text", "value"), [("-9999", -9999.0), ("9E9", 9e9), ("0.000", 0.0)])

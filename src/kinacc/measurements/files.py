@@ -67,7 +67,11 @@ def load(path: str | Path, layout: Layout | None = None, source: str | None = No
         with opened(path, layout.encoding) as stream:
             rows = _limited(rows_of_lines(stream, layout.delimiter, str(path)), str(path))
             table = tabled(str(path), rows, layout)
-    table = robot_programs.expanded(table)
+    return reshaped(robot_programs.expanded(table), layout)
+
+
+def reshaped(table: RawTable, layout: Layout) -> RawTable:
+    """A row per reading with x, y and z, of rows per axis or of two angles and a distance."""
     if layout.layout == FEATURES:
         return by_feature(table)
     return cartesian(table, layout.directions) if layout.layout == SPHERICAL else table

@@ -14,6 +14,7 @@ import pandas as pd
 from kinacc.errors import Problem, refuse
 from kinacc.measurements.column_names import WORDS
 from kinacc.measurements.layout import Layout
+from kinacc.measurements.row_names import RowNames
 from kinacc.measurements.table import RawTable, frame
 
 Cells = Sequence[Any]
@@ -108,8 +109,8 @@ def tabled(path: str, rows: Iterable[Row], layout: Layout, sheet: bool = False) 
         under = [cell for place, cell in enumerate(under) if place in places]
         readings = [(n, [c for place, c in enumerate(row) if place in places or place >= width])
                     for n, row in readings]  # fmt: skip
-    refuse(_problems(path, names, readings, line, "row" if sheet else "line"),
-           f"{path} cannot be read")  # fmt: skip
+    word = "row" if sheet else "line"
+    refuse(_problems(path, names, readings, line, word), f"{path} cannot be read")
     cells = frame(dict(zip(names, zip(*(c for _, c in readings), strict=True), strict=True)))
     units = {n: str(u) for n, u in zip(names, under, strict=False) if u is not None}
     table = RawTable(
@@ -120,12 +121,12 @@ def tabled(path: str, rows: Iterable[Row], layout: Layout, sheet: bool = False) 
         layout.thousands,
         units | _units_behind(cells, units),
         not_rows=tuple(number for number, _ in aside),
-        row_kind="row" if sheet else "line",
+        row_names=RowNames(word=word),
     )
     if not aside:
         return table
     labels = dict.fromkeys(str(filled(row)[0]).strip()[:30] for _, row in aside)
-    lines = table.row_names.few(table.not_rows)
+    lines = table.row_names.spans(table.not_rows)
     return replace(table, notes=(f"{lines}: not read ({', '.join([*labels][:3])})",))
 
 

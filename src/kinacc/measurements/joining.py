@@ -69,7 +69,7 @@ def joined(points: RawTable, joints: RawTable, how: JointsFile) -> RawTable:
         columns=pd.concat([table.columns, beside.rename(columns=names)], axis=1),
         units={**{names[n]: u for n, u in joints.units.items()}, **points.units},
         notes=(*points.notes, *joints.notes, *filter(None, notes)),
-        points_file=Path(points.path).name,
+        row_names=replace(points.row_names, file=Path(points.path).name),
         key=key_of_points or None,
     )
 

@@ -120,7 +120,7 @@ def convert(table: RawTable, layout: Layout, robot: Robot, strict: bool = True) 
     if not columns.targets and not problems:
         problems.append(Problem(table.path, "no target is asked for", "measurements.file.targets"))
     refuse(problems, title)
-    if "pose" in columns.single and not table.pose_name:
+    if "pose" in columns.single and not table.row_names.pose:
         table = table.with_pose_names(columns.single["pose"].column)
     q_rad = stacked(table, columns.joints, problems)
     commanded = stacked(table, columns.commanded, problems) if columns.commanded else None

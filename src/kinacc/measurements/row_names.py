@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -54,14 +54,9 @@ class RowNames:
         """``14 (P12_1)``, behind a word that says what it is."""
         return self._run(int(line), int(line))
 
-    def few(self, lines: Sequence[int], shown: int = 5) -> str:
-        """``lines 4 (P2), 7 (P5) and 3 more``, in the order given."""
-        numbers = ", ".join(self.number(line) for line in lines[:shown])
-        return self._named(numbers + and_more(len(lines) - shown), len(lines))
-
     def spans(self, lines: Iterable[int]) -> str:
-        """``lines 2-9 (P1 to P8), 12 (P11) and 17 more``; ``lines`` come in order."""
-        numbers = np.array(list(lines), dtype=np.int64)
+        """``lines 2-9 (P1 to P8), 12 (P11) and 17 more``."""
+        numbers = np.unique(np.array(list(lines), dtype=np.int64))
         if not numbers.size:
             return f"no {self.word}"
         runs = np.split(numbers, np.flatnonzero(np.diff(numbers) > 1) + 1)

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -16,6 +15,7 @@ from kinacc.errors import InputError, Problem, refuse
 from kinacc.geometry import Pose
 from kinacc.measurements import faults
 from kinacc.measurements.intake import pairs
+from kinacc.measurements.intake.choices import Answers
 from kinacc.measurements.intake.guess import described
 from kinacc.measurements.layout import (
     JOINTS,
@@ -82,7 +82,7 @@ def read_rows(
     path: str | Path,
     prismatic: np.ndarray,
     need: str = JOINTS,
-    answers: Mapping[str, Any] | None = None,
+    answers: Answers | None = None,
     spoilt: list[Problem] | None = None,
 ) -> Rows:
     """Rows of a file that must hold ``need``: joints, points or poses.
@@ -157,7 +157,7 @@ def _label(table: RawTable, columns: FileColumns) -> str | None:
 
 
 def open_table(
-    path: str | Path, need: str = POINTS, answers: Mapping[str, Any] | None = None
+    path: str | Path, need: str = POINTS, answers: Answers | None = None
 ) -> tuple[RawTable, Layout, tuple[str, ...]]:
     """A file of ``need``, the meaning of its columns, and notes on how it was understood."""
     answers = {key: value for key, value in (answers or {}).items() if value}

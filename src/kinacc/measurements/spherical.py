@@ -7,7 +7,7 @@ Counterclockwise ones, as of trackers in the mathematical sense, count from x to
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -16,7 +16,7 @@ import numpy as np
 from kinacc.config.measured import Directions
 from kinacc.errors import InputError, Problem, refuse
 from kinacc.measurements.column_names import MEASURED, PLAIN, REPORTED, WORDS, Name, name_of, role
-from kinacc.measurements.intake.choices import Choice, Undecided
+from kinacc.measurements.intake.choices import Answers, Choice, Undecided
 from kinacc.measurements.layout import LENGTH
 from kinacc.measurements.table import RawTable, frame, numbers
 
@@ -66,7 +66,7 @@ def readings_of(names: Sequence[Name]) -> list[Reading]:
 
 
 def directions_of(
-    table: RawTable, readings: Sequence[Reading], stated: str, answers: Mapping[str, Any]
+    table: RawTable, readings: Sequence[Reading], stated: str, answers: Answers
 ) -> Directions:
     """How the angles of readings are counted; ``stated``: their unit, above the rows.
 

@@ -30,9 +30,8 @@ class RawTable:
     ``path`` names the file, with the sheet where it has several. ``line`` (n,) is the line of the
     file a row stands on, its row in a sheet or its number from 1 in a Parquet file. ``units`` are
     those stated under the names or behind the numbers, by column. ``notes`` name what of the file
-    is no row, ``not_rows`` are its lines. ``row_kind``: line, or row in a sheet. ``pose_name`` are
-    names of poses by line. Where joints stand in another file, ``points_file`` is that of the
-    lines, and ``key`` its column by which joints belong to a point.
+    is no row, ``not_rows`` are its lines, ``row_names`` what its rows are called. ``key``: where
+    joints stand in another file, the column by which they belong to a point.
     """
 
     path: str
@@ -43,9 +42,7 @@ class RawTable:
     units: Mapping[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     not_rows: tuple[int, ...] = ()
-    row_kind: str = "line"
-    pose_name: Mapping[int, str] = field(default_factory=dict)
-    points_file: str = ""
+    row_names: RowNames = field(default_factory=RowNames)
     key: str | None = None
 
     def __len__(self) -> int:
@@ -82,21 +79,16 @@ class RawTable:
         columns = self.columns.iloc[rows].reset_index(drop=True)
         return replace(self, columns=columns, line=self.line[rows])
 
-    @property
-    def row_names(self) -> RowNames:
-        """Names of its rows; a sheet has rows and no lines."""
-        return RowNames(self.pose_name, self.points_file, self.row_kind)
-
     def rows_in_words(self, rows: np.ndarray) -> str:
-        """Lines of the rows at indices ``rows``, the first few by number."""
-        return self.row_names.few(self.line[rows], _SHOWN)
+        """Lines of the rows at indices ``rows``."""
+        return self.row_names.spans(self.line[rows])
 
     def with_pose_names(self, column: str) -> RawTable:
         """The table, with the names of poses in ``column``; mere numbers are none."""
         cells, values = self.columns[column], self.values(column)
         parts = zip(self.line.tolist(), cells, values, strict=True)
         named = {n: str(c).strip() for n, c, v in parts if v != v and not self.is_gap(c)}
-        return replace(self, pose_name=named)
+        return replace(self, row_names=replace(self.row_names, pose=named))
 
     def where(self, column: str, rows: np.ndarray | None = None) -> str:
         """The place of a column, or of several, at the rows of these indices, for a problem."""

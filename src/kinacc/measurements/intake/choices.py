@@ -5,10 +5,12 @@ from __future__ import annotations
 import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from kinacc.errors import InputError, Problem
 
 TAKE = "--take"
+Answers = Mapping[str, Any]  # to choices, by their keys
 
 
 @dataclass(frozen=True)

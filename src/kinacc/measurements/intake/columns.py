@@ -6,10 +6,9 @@ Where the names allow several readings, they are a question.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations
-from typing import Any
 
 import numpy as np
 
@@ -28,7 +27,7 @@ from kinacc.measurements.column_names import (
     name_of,
     role,
 )
-from kinacc.measurements.intake.choices import TAKE, Choice
+from kinacc.measurements.intake.choices import TAKE, Answers, Choice
 from kinacc.measurements.intake.groups import (
     JOINTS,
     POINT,
@@ -93,9 +92,7 @@ def names_in(table: RawTable) -> list[Name]:
     return [name_of(column, table.units.get(column, "")) for column in table.columns]
 
 
-def of_table(
-    table: RawTable, answers: Mapping[str, Any] | None = None, wanted: bool = False
-) -> NamedColumns:
+def of_table(table: RawTable, answers: Answers | None = None, wanted: bool = False) -> NamedColumns:
     """The meaning of the columns of a table; see ``recognise``."""
     return recognise(names_in(table), lambda n: table.values(n.column), answers, wanted)
 
@@ -103,7 +100,7 @@ def of_table(
 def recognise(
     names: Sequence[Name],
     values: Values | None = None,
-    answers: Mapping[str, Any] | None = None,
+    answers: Answers | None = None,
     wanted: bool = False,
 ) -> NamedColumns:
     """The meaning of columns of these names; no joints or no targets where there are none.
@@ -149,7 +146,7 @@ class _Choice:
         self,
         names: Sequence[Name],
         values: Values | None,
-        answers: Mapping[str, Any],
+        answers: Answers,
         wanted: bool,
     ) -> None:
         self.values, self.sigma = values, answers.get("sigma", "")

@@ -14,7 +14,7 @@ from kinacc.errors import InputError, Problem, refuse
 from kinacc.measurements.column_names import NOMINAL, Name
 from kinacc.measurements.faults import BEYOND, is_no_coordinate, none_read
 from kinacc.measurements.intake import pairs, targets_in_rows
-from kinacc.measurements.intake.choices import TAKE, Choice, Undecided
+from kinacc.measurements.intake.choices import TAKE, Answers, Choice, Undecided
 from kinacc.measurements.intake.columns import ABOUT_JOINTS, NamedColumns
 from kinacc.measurements.intake.groups import JOINTS, POINT, POSE, PULSES, listed
 from kinacc.measurements.intake.text import Looked
@@ -89,7 +89,7 @@ class Guess:
 
 def look(
     path: str | Path | Sequence[str | Path],
-    answers: Mapping[str, Any] | None = None,
+    answers: Answers | None = None,
     need: str = MEASUREMENTS,
 ) -> Guess:
     """The best guess at a file.
@@ -104,7 +104,7 @@ def look(
     return described(pairs.look(path, answers, need == POSES), answers, need)
 
 
-def described(looked: Looked, answers: Mapping[str, Any], need: str) -> Guess:
+def described(looked: Looked, answers: Answers, need: str) -> Guess:
     """The best guess at a file whose table is known, as ``look``."""
     table, columns = looked.table, _needed(looked.columns, need)
     questions = list(columns.questions)
@@ -192,7 +192,7 @@ class _Guesser:
     ``void``: numbers in place of a reading.
     """
 
-    def __init__(self, looked: Looked, columns: NamedColumns, answers: Mapping[str, Any]) -> None:
+    def __init__(self, looked: Looked, columns: NamedColumns, answers: Answers) -> None:
         self.looked, self.table, self.columns, self.answers = looked, looked.table, columns, answers
         self.first = next(iter(columns.targets.values()), {})
         self.assumed, self.problems = dict(looked.assumed), list[Problem]()

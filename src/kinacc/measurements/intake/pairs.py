@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -15,7 +14,7 @@ from kinacc.errors import InputError, Problem, gathered, refuse
 from kinacc.measurements.column_names import OTHER, WORDS, name_of
 from kinacc.measurements.files import EXCEL
 from kinacc.measurements.intake import columns, text
-from kinacc.measurements.intake.choices import Choice, Undecided
+from kinacc.measurements.intake.choices import Answers, Choice, Undecided
 from kinacc.measurements.intake.groups import Group
 from kinacc.measurements.intake.text import Looked
 from kinacc.measurements.joining import (
@@ -35,9 +34,7 @@ _FEWEST_NAMES = 0.05  # of the rows: targets of a pose stand in rows of their ow
 _SHARE = 0.5  # of the points: fewer in common are no key
 
 
-def look(
-    path: str | Path | Sequence[str | Path], answers: Mapping[str, Any], wanted: bool = False
-) -> Looked:
+def look(path: str | Path | Sequence[str | Path], answers: Answers, wanted: bool = False) -> Looked:
     """One view of a file, of two files, or of two sheets of a workbook, with their columns.
 
     ``wanted``: nominal poses are read. Raises InputError where the files cannot be joined,
@@ -55,7 +52,7 @@ def look(
     return files[0] if len(files) == 1 else _together(files, answers)
 
 
-def _sheets(path: Path, answers: Mapping[str, Any]) -> list[str]:
+def _sheets(path: Path, answers: Answers) -> list[str]:
     """The sheets of a workbook that holds joints on one and points on another, else none."""
     if path.suffix.lower() in EXCEL and "sheet" not in answers and path.is_file():
         sheets = {sheet: columns.recognise([*map(name_of, names)])
@@ -67,7 +64,7 @@ def _sheets(path: Path, answers: Mapping[str, Any]) -> list[str]:
     return []
 
 
-def _together(files: Sequence[Looked], answers: Mapping[str, Any]) -> Looked:
+def _together(files: Sequence[Looked], answers: Answers) -> Looked:
     holding = [file for file in files if file.columns.joints]
     if len(holding) == 2:  # a controller's log may hold points too, a tracker's file no joints
         holding = [file for file in files if not file.columns.targets]
@@ -102,9 +99,7 @@ def _together(files: Sequence[Looked], answers: Mapping[str, Any]) -> Looked:
     return replace(points, table=table, columns=meaning, joints=section, notes=notes)
 
 
-def _join(
-    joints: Looked, points: Looked, answers: Mapping[str, Any]
-) -> tuple[JointsFile, tuple[str, ...]]:
+def _join(joints: Looked, points: Looked, answers: Answers) -> tuple[JointsFile, tuple[str, ...]]:
     """How the rows belong together, as answered or as the files leave no doubt."""
     answer = answers.get("join")
     if answer == ORDER:
@@ -181,7 +176,7 @@ def _times(file: Looked) -> str:
 
 
 def _by_clock(
-    joints: Looked, points: Looked, key: str, key_of_points: str, answers: Mapping[str, Any]
+    joints: Looked, points: Looked, key: str, key_of_points: str, answers: Answers
 ) -> tuple[JointsFile, tuple[str, ...]]:
     problems: list[Problem] = []
     there = seconds(joints.table, key, problems)

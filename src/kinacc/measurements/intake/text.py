@@ -26,11 +26,12 @@ from kinacc.measurements.files import (
     opened,
     refuse_large,
     refuse_other_files,
+    reshaped,
     rows_of_lines,
 )
 from kinacc.measurements.grid import Cells, Row, filled
 from kinacc.measurements.intake import decimals, heads
-from kinacc.measurements.intake.choices import Choice, Undecided
+from kinacc.measurements.intake.choices import Answers, Choice, Undecided
 from kinacc.measurements.intake.columns import NamedColumns, names_in
 from kinacc.measurements.intake.heads import Head
 from kinacc.measurements.layout import FEATURES, SPHERICAL, Layout
@@ -64,7 +65,7 @@ class Looked:
     joints: dict[str, Any] | None = None
 
 
-def look(path: str | Path, answers: Mapping[str, Any] | None = None) -> Looked:
+def look(path: str | Path, answers: Answers | None = None) -> Looked:
     """How the file at ``path`` is written, and its table.
 
     ``answers`` to the choices of an :class:`Undecided`, by key. Raises that where the file can be
@@ -106,12 +107,10 @@ def look(path: str | Path, answers: Mapping[str, Any] | None = None) -> Looked:
         if "horizontal" not in answers:
             name = readings[0].horizontal.column
             assumed["horizontal"] = f"{name} counts {ways.horizontal}, seen from above"
-    if written.layout != "table":
-        table = load(path, written)
-    return Looked(str(path), written, table, tuple(notes), assumed, stated)
+    return Looked(str(path), written, reshaped(table, written), tuple(notes), assumed, stated)
 
 
-def _text(path: Path, answers: Mapping[str, Any]) -> _Written:
+def _text(path: Path, answers: Answers) -> _Written:
     refuse_large(path)
     encoding = answers.get("encoding") or encoding_of(path)
     with opened(path, encoding) as stream:
@@ -158,7 +157,7 @@ def encoding_of(path: Path) -> str:
     return next(iter(decodes), "latin-1")
 
 
-def _workbook(path: Path, answers: Mapping[str, Any]) -> _Written:
+def _workbook(path: Path, answers: Answers) -> _Written:
     sheets, tables = _tables_of(path, answers.get("sheet"))
     if not tables:
         message = "no sheet has rows of numbers under names"
@@ -213,7 +212,7 @@ def _names_of(
     head: Head,
     rows: Sequence[Row],
     stated: Mapping[str, str],
-    answers: Mapping[str, Any],
+    answers: Answers,
 ) -> dict[str, Any]:
     """The lines around the names; or the names, where the file has no line of them."""
     cells = [cells for _, cells in rows[head.first :] if len(cells) == head.width]
