@@ -21,15 +21,14 @@ import pandas as pd
 from kinacc.assess.adaptive import Campaign, Candidates
 from kinacc.assess.attainable import NONE, limits_of
 from kinacc.assess.registry import ADAPTIVE, ASSESSORS, RECOMMENDED
-from kinacc.assess.simulate import assess_world, carry_on, truth_mm
 from kinacc.assess.statement import CANDIDATES, REGION, Reason, Statement
-from kinacc.assess.world import World, drawn_world, key_of
+from kinacc.assess.world import World, assess_world, carry_on, drawn_world, key_of, truth_mm
 from kinacc.config.records import of_section
-from kinacc.study.fields import FAMILIES, ErrorField, of_measurements, of_points, synthetic
+from kinacc.study.fields import ErrorField, of_measurements, of_points, synthetic
 from kinacc.tables import store
 from research import verdicts
 from research.conditions import CONDITIONS, STATED, Course
-from research.made_up_fields import MADE_UP, made_up
+from research.made_up_fields import ARMS, MADE_UP, made_up
 
 NM_PER_MM = 1_000_000
 CONTESTANTS = tuple(ASSESSORS)
@@ -133,7 +132,7 @@ class Contest:
 def contested(folders: Sequence[str | Path], size: Size) -> list[ErrorField]:
     """Every field: of results folders of kinacc, of synthetic families, and those made up."""
     found: list[ErrorField] = [field_of(Path(each)) for each in folders]
-    found += [synthetic(each, draw) for each in FAMILIES for draw in size.draws]
+    found += [synthetic(each, draw, ARMS[each]) for each in ARMS for draw in size.draws]
     return found + [made_up(name) for name in size.made_up]
 
 
@@ -144,7 +143,7 @@ def field_of(folder: Path) -> ErrorField:
         return store.read(folder / f"{name}.parquet")
 
     if (folder / "data_check.parquet").is_file():  # of measured files alone
-        return of_measurements(folder.name, table("pose_errors"), table("measurements"))
+        return of_measurements(folder.name, table("pose_errors"))
     return of_points(folder.name, table("assessment_points"))
 
 

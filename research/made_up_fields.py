@@ -1,20 +1,22 @@
-"""Made-up error fields: sizes drawn from what bounds find hard, directions at random, no arm.
+"""Error fields for judging, fixed before any assessor met them.
 
-They are for judging and were fixed before any assessor met them.
+Made up: sizes drawn from what bounds find hard, directions at random, no arm. And families of
+synthetic arms beside those that ``kinacc campaign plan`` knows.
 """
 
 from __future__ import annotations
 
 import zlib
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kinacc.study.fields import POINTS, ErrorField
+from kinacc.study.fields import FAMILIES, POINTS, ErrorField, Family, only
+from kinacc.synthetic.physical import PhysicalRobot
 
-KIND = "made_up"
 _SEED = 1707
+_RARE_SHARE, _RARE_MM = 0.01, (1.2, 1.9)
 
 
 @dataclass(frozen=True)
@@ -71,4 +73,26 @@ def made_up(name: str) -> ErrorField:
     size = what.sizes_mm(rng, POINTS)
     turn = rng.normal(size=(POINTS, 3))
     error_mm = size[:, None] * turn / np.linalg.norm(turn, axis=1)[:, None]
-    return ErrorField(name, error_mm, kind=KIND, meaning=what.meaning, kept=what.kept)
+    return ErrorField(name, error_mm, what.kept)
+
+
+def _small(arm: PhysicalRobot) -> PhysicalRobot:
+    return replace(only()(arm), smooth=replace(arm.smooth, amplitude=0.35 * arm.smooth.amplitude))
+
+
+def _with_rare(
+    error_mm: np.ndarray, q_rad: np.ndarray, arm: PhysicalRobot, rng: np.random.Generator
+) -> np.ndarray:
+    """Single poses far off, for no reason a model could know."""
+    size = np.where(rng.random(len(q_rad)) < _RARE_SHARE, rng.uniform(*_RARE_MM, len(q_rad)), 0.0)
+    turn = rng.normal(size=(len(q_rad), 3))
+    return error_mm + size[:, None] * turn / np.linalg.norm(turn, axis=1)[:, None]
+
+
+ARMS = {
+    **FAMILIES,
+    "gravity": Family(only(compliance=4.0)),
+    "ripple": Family(only(ripple_rad=1.0)),
+    "thermal": Family(only(drift=3.0)),
+    "rare": Family(_small, _with_rare),
+}

@@ -7,16 +7,14 @@ import math
 import numpy as np
 import paper_settings as paper
 import pytest
-from scipy.stats import gamma
+from scipy.stats import chi2, gamma
 
 from kinacc.assess.adaptive import Candidates, Ledger
 from kinacc.assess.gamma_quantile import GammaQuantile
 from kinacc.assess.invalidation_adaptive import InvalidationCalibrated, ModelInvalidationFull
-from kinacc.assess.model_invalidation import mahalanobis_excess, point_probability
 from kinacc.assess.region_share import RegionShare
 from kinacc.assess.registry import ADAPTIVE
 from kinacc.assess.search_and_confirm import SearchAndConfirm
-from kinacc.assess.simulate import conduct
 from kinacc.assess.single_shot import SingleShot
 from kinacc.assess.statement import (
     ACCEPT,
@@ -30,7 +28,7 @@ from kinacc.assess.statement import (
     Statement,
     decide,
 )
-from kinacc.assess.world import drawn_world, key_of
+from kinacc.assess.world import conduct, drawn_world, key_of
 from kinacc.errors import InputError
 
 BOUNDING = [SingleShot, InvalidationCalibrated, SearchAndConfirm]
@@ -150,12 +148,12 @@ def least(draws: int) -> float:
 def test_the_bound_on_the_measured_points_holds(cls, shape):
     # One large error is the hardest for the upper limit: no other point's noise comes to its aid.
     errors = {
-        "one": np.vstack([[[1.0, 0.0, 0.0]], 1e-3 * directions(24)]),
-        "equal": directions(25),
-        "spread": field(25),
+        "one": np.vstack([[[1.0, 0.0, 0.0]], 1e-3 * directions(11)]),
+        "equal": directions(12),
+        "spread": field(12),
     }[shape]
     draws = 400
-    upper, lower = coverage(paper.assessor(cls, measurements=40), errors, 0.2, draws)
+    upper, lower = coverage(paper.assessor(cls, measurements=20), errors, 0.2, draws)
     assert upper >= least(draws)
     assert lower >= least(draws)
 
@@ -170,7 +168,7 @@ def test_gamma_quantile_is_that_of_the_best_fit():
     assert not said.withheld
 
 
-@pytest.mark.parametrize("sigma", [0.001, 0.1, 0.5])
+@pytest.mark.parametrize("sigma", [0.001, 0.5])
 def test_the_share_of_the_region_keeps_its_confidence(sigma):
     rng = np.random.default_rng(4)
     pool = rng.normal(size=(4000, 3)) * rng.uniform(0.1, 0.5, (4000, 1))
@@ -193,9 +191,9 @@ def test_full_invalidation_states_what_the_papers_states_where_noise_is_equal():
     }
 
     def rejection(bound_mm: float) -> float:
-        """Eqs. 18 to 20 of the paper, as its own algorithm has them."""
-        excess = [mahalanobis_excess(size_mm[row], bound_mm, 0.1, reads[row], "r") for row in reads]
-        return 1.0 - math.prod(1.0 - point_probability(each, "squared") for each in excess)
+        """Eqs. 18 to 20 of the paper."""
+        beyond = [max(size_mm[row] - bound_mm, 0.0) * reads[row] ** 0.5 / 0.1 for row in reads]
+        return 1.0 - math.prod(chi2.sf(each**2, 3) for each in beyond)
 
     said_mm = full.statements()[0].value_mm
     assert max(reads.values()) > 1

@@ -21,7 +21,7 @@ from kinacc.assess.noise import (
     tails_alarm,
 )
 from kinacc.assess.search_and_confirm import SearchAndConfirm
-from kinacc.assess.simulate import carry_on
+from kinacc.assess.world import carry_on
 
 POINTS, NOISE_MM = 40, 0.1
 

@@ -14,8 +14,7 @@ import pytest
 
 from kinacc.assess.adaptive import Candidates
 from kinacc.assess.search_and_confirm import SearchAndConfirm
-from kinacc.assess.simulate import conduct
-from kinacc.assess.world import drawn_world
+from kinacc.assess.world import conduct, drawn_world
 
 ERROR, SIGMA_MM = 0.05, 0.1
 

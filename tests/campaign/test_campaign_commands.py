@@ -9,7 +9,7 @@ import pytest
 from campaign_on_disk import SIGMA_MM, Arm, files_of, recorded, refused, standing
 from command_line import call
 
-from kinacc.assess.simulate import conduct
+from kinacc.assess.world import conduct
 from kinacc.campaign import folder as campaigns
 from kinacc.campaign import plan as plans
 from kinacc.campaign.campaign import Campaign

@@ -11,8 +11,8 @@ from command_line import call
 from measured_worlds import measured_world
 from stages_by_hand import run_stage
 
-from kinacc.assess.simulate import conduct
 from kinacc.assess.single_shot import SingleShot
+from kinacc.assess.world import conduct
 from kinacc.campaign import folder as campaigns
 from kinacc.tables import store
 

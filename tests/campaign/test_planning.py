@@ -12,10 +12,9 @@ from command_line import call
 
 from kinacc.assess.attainable import width_limits
 from kinacc.assess.search_and_confirm import SearchAndConfirm
-from kinacc.assess.simulate import conduct
 from kinacc.assess.single_shot import SingleShot
 from kinacc.assess.statement import MEASURED
-from kinacc.assess.world import drawn_world, key_of
+from kinacc.assess.world import conduct, drawn_world, key_of
 from kinacc.campaign.planning import Aim, counted, plan_budget, simulate, smallest_budget
 from kinacc.errors import InputError
 from kinacc.study.fields import ErrorField
@@ -135,7 +134,7 @@ def test_the_command_answers_with_table_picture_and_budget(errors_file, tmp_path
         (("--noise-mm", "0"), "noise"),
         ((), "--noise-mm"),
         (("--covariance-mm2", "1,2,0,2,1,0,0,0,1"), "not positive definite"),
-        (("--noise-mm", "0.1", "--errors", "nowhere"), "smooth, gravity"),
+        (("--noise-mm", "0.1", "--errors", "nowhere"), "smooth, workshop"),
         (("--noise-mm", "0.1", "--width-mm", "-1"), "--width-mm"),
         (("--noise-mm", "0.1", "--largest-mm", "nan"), "--largest-mm"),
     ],

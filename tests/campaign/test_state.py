@@ -8,7 +8,7 @@ from campaign_on_disk import entry_of
 from command_line import call
 
 from kinacc.assess.registry import ADAPTIVE
-from kinacc.assess.simulate import conduct
+from kinacc.assess.world import conduct
 from kinacc.campaign import folder
 from kinacc.campaign.plan import from_json, to_json
 from kinacc.campaign.state import Reading, Readings, restore

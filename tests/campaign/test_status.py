@@ -13,7 +13,7 @@ from campaign_on_disk import entry_of
 
 import kinacc
 from kinacc.assess.attainable import width_limits
-from kinacc.assess.simulate import carry_on
+from kinacc.assess.world import carry_on
 from kinacc.campaign import folder
 from kinacc.campaign.folder import Opened
 from kinacc.campaign.plan import Limits

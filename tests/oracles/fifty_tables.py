@@ -5,25 +5,21 @@ Rows are dictionaries, as ``tables.rows`` gives them. Everything runs within ``w
 
 from __future__ import annotations
 
-from collections import defaultdict
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 
-import mpmath
 import numpy as np
 
 from . import fifty_digits as fd
-from .fifty_digits import Matrix, dec, exact, mp, size
+from .fifty_digits import Matrix, exact
 from .kinematics import ERROR_NAMES
 from .tables import Row, dh_table, joints
-from .worlds import philox_words
 
 WEIGHT = Decimal(500)
 UNIT_RAD = Decimal("0.001")  # a mrad counts as much as a mm
 CLOSE = Decimal("1e-22")  # of the last step, mm and mrad: nothing in a float of 53 bits
 FREE = ("theta", "d", "a", "alpha")
-GRID_PER_MM = 1000
 
 
 # --- models and errors ----------------------------------------------------------------------------
@@ -71,20 +67,6 @@ class Arm:
 
 def measured(row: Row) -> Matrix:
     return fd.pose_frame(row["x_mm"], row["y_mm"], row["z_mm"], [row[f"q{c}"] for c in "wxyz"])
-
-
-def pose_error(arm: Arm, row: Row, comparison: str) -> tuple[Matrix, Matrix]:
-    """Reference minus model in the model's own base, mm, and the turn from it in mrad."""
-    model, reference = comparison.split("_vs_")
-    q, target = exact(joints(row)), row["target"]
-    back = fd.undone(arm.frames[model, "base"])
-    if reference == "measured":
-        seen = back @ measured(row)
-    else:
-        seen = back @ arm.frames[reference, "base"] @ arm.tool(reference, q, target)
-    at = arm.tool(model, q, target)
-    turn = fd.rotation_vector(seen[:3, :3] @ at[:3, :3].T)
-    return seen[:3, 3] - at[:3, 3], 1000 * turn
 
 
 # --- fits -----------------------------------------------------------------------------------------
@@ -239,167 +221,3 @@ def with_tool(at: Matrix) -> Matrix:
 def motion_of(step: Matrix) -> Matrix:
     """A small motion from scaled coordinates: shift in mm, then turn in mrad."""
     return fd.frame(fd.turned_by(step[3:] * UNIT_RAD), step[:3])
-
-
-# --- statistics -----------------------------------------------------------------------------------
-
-
-def statistics(values: Sequence[Decimal]) -> dict[str, Decimal]:
-    """Mean, max, rms and the 99 % quantile of a gamma fitted by maximum likelihood."""
-    mean = sum(values) / len(values)
-    rms = (sum(v * v for v in values) / len(values)).sqrt()
-    return {"mean": mean, "max": max(values), "rms": rms, "gamma99": gamma_quantile(values, 0.99)}
-
-
-def gamma_quantile(values: Sequence[Decimal], probability: float) -> Decimal:
-    """Quantile of the gamma, location 0, of greatest likelihood: log k - psi(k) = log mean(x) -
-    mean(log x)."""
-    mean = mp(sum(values) / len(values))
-    gap = mpmath.log(mean) - mpmath.fsum(mpmath.log(mp(v)) for v in values) / len(values)
-    shape = mpmath.findroot(lambda k: mpmath.log(k) - mpmath.digamma(k) - gap, 1 / (2 * gap))
-    point = shape + 3 * mpmath.sqrt(shape)
-    while True:
-        miss = mpmath.gammainc(shape, 0, point, regularized=True) - mpmath.mpf(probability)
-        slope = mpmath.exp((shape - 1) * mpmath.log(point) - point - mpmath.loggamma(shape))
-        step = miss / slope
-        point -= min(max(step, -point / 2), point / 2)
-        if abs(step) < mpmath.mpf(10) ** -45 * point:
-            return dec(point * mean / shape)
-
-
-# --- assessors (eqs. 9 to 24) ---------------------------------------------------------------------
-
-
-class World:
-    """The readings of one simulation, from the words of its random stream (see ``worlds``)."""
-
-    def __init__(self, error: Matrix, noise_mm: float, repetition: int, seed: int) -> None:
-        entropy = [seed, round(noise_mm * 1e6), repetition]
-        self._key = [int(x) for x in np.random.SeedSequence(entropy).generate_state(2, np.uint64)]
-        self._error, self.noise = error, exact(noise_mm)
-        self._known: dict[tuple[int, int], Matrix] = {}
-
-    def __call__(self, point: int, visit: int) -> Matrix:
-        if (point, visit) not in self._known:
-            words = [word >> 11 for word in philox_words(self._key, visit - 1, point)]
-            a, b, c, d = (mpmath.mpf(word) for word in words)
-            whole = mpmath.mpf(2) ** 53
-            sizes = [mpmath.sqrt(-2 * mpmath.log((each + 1) / whole)) for each in (a, c)]
-            turns = [2 * mpmath.pi * each / whole for each in (b, d)]
-            drawn = (mpmath.cos(turns[0]), mpmath.sin(turns[0]), mpmath.cos(turns[1]))
-            at = np.array(
-                [dec(sizes[i] * z) for i, z in zip((0, 0, 1), drawn, strict=True)], dtype=object
-            )
-            self._known[point, visit] = self._error[point] + self.noise * at
-        return self._known[point, visit]
-
-
-def outlier_rejection(sizes: Sequence[Decimal]) -> Decimal:
-    """The largest that is not above mean + 1.96 standard deviations."""
-    mean = sum(sizes) / len(sizes)
-    deviation = (sum((s - mean) ** 2 for s in sizes) / len(sizes)).sqrt()
-    return max(s for s in sizes if s <= mean + Decimal("1.96") * deviation)
-
-
-def chi_square(square: Decimal) -> Decimal:
-    """Distribution of the squared distance in three dimensions (eq. 18)."""
-    at = mp(square)
-    root = mpmath.sqrt(at / 2)
-    return dec(mpmath.erf(root) - 2 * root / mpmath.sqrt(mpmath.pi) * mpmath.exp(-at / 2))
-
-
-def invalidation(world: World, points: int, eta: Decimal, budget: int, alpha: Decimal) -> Decimal:
-    """The probability after one pass at one bound, which is rejected where it is above alpha."""
-    sums: dict[int, Matrix] = {}
-    counts: dict[int, int] = defaultdict(int)
-    distance: dict[int, Decimal] = {}
-    chances: dict[int, Decimal] = {}
-    probability = Decimal(0)
-    for _ in range(budget):
-        if probability > alpha:
-            point = max(distance, key=distance.__getitem__)
-        elif len(counts) < points:
-            point = len(counts)
-        else:
-            break
-        counts[point] += 1
-        sums[point] = sums.get(point, fd.zeros(3)) + world(point, counts[point])
-        beyond = max(size(sums[point] / counts[point]) - eta, Decimal(0))
-        distance[point] = beyond * Decimal(counts[point]).sqrt() / world.noise
-        chances[point] = 1 - chi_square(distance[point] ** 2) if beyond else Decimal(1)
-        probability = 1 - _product(chances.values())
-    return probability
-
-
-def _product(values) -> Decimal:
-    found = Decimal(1)
-    for value in values:
-        found *= value
-    return found
-
-
-def bound_from_above(rejects: Callable[[Decimal], bool], top: Decimal) -> int:
-    """The grid step just above the highest bound that is rejected, of all from ``top`` down."""
-    number = int(top * GRID_PER_MM) + 1
-    while number >= 0 and not rejects(Decimal(number) / GRID_PER_MM):
-        number -= 1
-    return number + 1
-
-
-# --- ellipsoids and limits ------------------------------------------------------------------------
-
-
-def nearest_in_ball(mean: Matrix, covariance: Matrix, radius: Decimal) -> tuple[Matrix, Decimal]:
-    """The point of the ball with the least Mahalanobis distance (mm), and that distance.
-
-    Stationary: (I + t S) x = y with |x| = radius, t by bisection."""
-    inverse = fd.inverse(covariance)
-    if size(mean) <= radius:
-        return mean, Decimal(0)
-
-    def at(t: Decimal) -> Matrix:
-        # (I + t S)^-1 = S^-1 (S^-1 + t I)^-1
-        return inverse @ (fd.inverse(inverse + t * fd.eye(3)) @ mean)
-
-    low, high = Decimal(0), Decimal(1)
-    while size(at(high)) > radius:
-        low, high = high, 2 * high
-    for _ in range(190):
-        middle = (low + high) / 2
-        low, high = (middle, high) if size(at(middle)) > radius else (low, middle)
-    x = at(high)
-    return x, ((mean - x) @ inverse @ (mean - x)).sqrt()
-
-
-def reading_below(x: mpmath.mpf, a: mpmath.mpf) -> mpmath.mpf:
-    """Probability that a reading of unit noise at a point of size a has at most size x: the density
-    of a Gaussian about a over the ball of x."""
-    near, far = (x - a) / mpmath.sqrt(2), (x + a) / mpmath.sqrt(2)
-    bulge = (mpmath.exp(-(near**2)) - mpmath.exp(-(far**2))) / (a * mpmath.sqrt(2 * mpmath.pi))
-    return (mpmath.erf(near) + mpmath.erf(far)) / 2 - bulge
-
-
-def size_at(x: float, probability: float, near: float) -> Decimal:
-    """The size at which a reading of at most x has this probability, looked for from ``near``."""
-    wanted = mpmath.mpf(probability)
-    return dec(root(lambda a: reading_below(mpmath.mpf(x), a) - wanted, near))
-
-
-def binomial_end(hits: int, trials: int, tail: float, near: float) -> Decimal:
-    """The probability at which ``hits`` or more of ``trials`` have the probability ``tail``."""
-    wanted = mpmath.mpf(tail)
-
-    def excess(p: mpmath.mpf) -> mpmath.mpf:
-        terms = (
-            mpmath.binomial(trials, k) * p**k * (1 - p) ** (trials - k)
-            for k in range(hits, trials + 1)
-        )
-        return mpmath.fsum(terms) - wanted
-
-    return dec(root(excess, near))
-
-
-def root(function: Callable[[mpmath.mpf], mpmath.mpf], near: float) -> mpmath.mpf:
-    """Where a function is zero, by secants."""
-    beside = mpmath.mpf(near) * (1 + mpmath.mpf(10) ** -6)
-    return mpmath.findroot(function, (mpmath.mpf(near), beside), solver="secant")

@@ -7,22 +7,15 @@ from dataclasses import replace
 import numpy as np
 from two_models import two_models
 
-from kinacc.geometry import Pose, rotation_y
-from kinacc.kinematics import dh, region, robot, vec
+from kinacc.kinematics import region, robot, vec
 from kinacc.study import accuracy_map as maps
+from kinacc.synthetic.draw import TABLE_II
 
 ARM = robot.load("mh180")
 SPACE = region.Cylinder(1200.0, 900.0, 0.0, 500.0, 0.0, np.pi / 3)
 DOWN = region.reference_rotation(np.deg2rad([180.0, 0.0, 0.0]))
 NINE = region.orientations(np.pi / 4, "signs_and_zero")
 WANTED = maps.PosesWanted(SPACE, DOWN, NINE, "dh")
-TABLE_II = dh.DHModel(
-    [0.001, -1.568, 0.001, -3.142, -3.141, 0.002],
-    [-1.157, -0.898, 0.066, -1226.154, -0.104, -224.698],
-    [323.453, 1151.356, 299.501, 0.029, 0.026, 0.028],
-    [-1.573, 3.140, -1.571, -1.571, -1.571, 3.142],
-    np.zeros(6),
-)
 RANGE = np.deg2rad([-20, -40, -90, -190, -130, -190]), np.deg2rad([80, 70, 30, 190, 130, 190])
 
 
@@ -32,10 +25,6 @@ def wavy(fitted=RANGE) -> vec.VECModel:
     scale = np.array([0.05] * 3 + [1e-4] * 3)[:, None]
     offsets = np.full((6, 2), [-5e-5, 5e-5])
     return replace(empty, coefficients=noise * scale, direction_offsets_rad=offsets)
-
-
-TOOL = Pose(rotation_y(np.array(0.2)), np.array([20.0, -10.0, 150.0]))
-OTHER_TOOL = Pose(rotation_y(np.array(0.2003)), np.array([20.1, -10.0, 150.1]))
 
 
 def test_unreachable_cells_are_marked_and_the_others_not_touched():

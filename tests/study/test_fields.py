@@ -7,13 +7,12 @@ import numpy as np
 from kinacc.study.fields import of_measurements, synthetic
 
 
-def test_a_defect_and_rare_poses_make_a_heavier_tail_than_smooth_errors():
+def test_a_defect_makes_a_heavier_tail_than_smooth_errors():
     def tail(name):
         size = np.linalg.norm(synthetic(name, 0).error_mm, axis=1)
         return size.max() / np.median(size)
 
     assert tail("defect") > 1.2 * tail("smooth")
-    assert tail("rare") > 3.0 * tail("smooth")
 
 
 def test_measured_fields_average_the_readings_of_a_pose_and_leave_out_what_was_fitted():
@@ -27,7 +26,5 @@ def test_measured_fields_average_the_readings_of_a_pose_and_leave_out_what_was_f
         "ey_mm": np.zeros(5),
         "ez_mm": np.zeros(5),
     }
-    measurements = {"pose": np.array([9, 8, 7, 7]), "q1": np.array([0.9, 0.8, 0.7, 0.71])}
-    made = of_measurements("arm", errors, measurements)
+    made = of_measurements("arm", errors)
     assert made.error_mm[:, 0].tolist() == [2.0, 5.0]
-    assert made.q_rad[:, 0].tolist() == [0.7, 0.8]

@@ -10,13 +10,11 @@ import paper_settings as paper
 import pytest
 
 from kinacc.config.records import of_section
-from kinacc.errors import InputError
 from kinacc.study import monte_carlo
 from kinacc.study.monte_carlo import (
     StudySettings,
     assessors,
     default_reading,
-    part_of,
     readings,
     simulate,
     summary,
@@ -80,12 +78,3 @@ def test_a_simulation_does_not_know_its_neighbours(rows):
     assert equal(alone, rows[(rows["noise_mm"] == 0.3) & (rows["repetition"] == 2)])
     other = simulated(ERROR, [0.3], [2], 4)
     assert not np.array_equal(other["assessed_mm"], alone["assessed_mm"])
-
-
-def test_parts_share_out_every_repetition_once():
-    for of in (1, 3, 7):
-        shared = [r for number in range(1, of + 1) for r in part_of(10, number, of)]
-        assert sorted(shared) == list(range(10))
-    for number, of in ((0, 3), (4, 3)):
-        with pytest.raises(InputError):
-            part_of(10, number, of)

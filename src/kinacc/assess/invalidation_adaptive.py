@@ -55,11 +55,9 @@ class ModelInvalidationFull(AdaptiveAssessor):
 class ChallengeCampaign(Campaign):
     """New points first, then the worst point at the bound under test."""
 
-    settings: ModelInvalidationFull | InvalidationCalibrated
+    settings: ModelInvalidationFull
 
-    def __init__(
-        self, settings: ModelInvalidationFull | InvalidationCalibrated, candidates: Candidates
-    ) -> None:
+    def __init__(self, settings: ModelInvalidationFull, candidates: Candidates) -> None:
         super().__init__(settings, candidates)
         budget, points = settings.measurements, candidates.points
         self.first = max(math.ceil(FIRST_SHARE * min(budget, points)), 1)
@@ -103,7 +101,7 @@ class ChallengeCampaign(Campaign):
 
 
 @dataclass(frozen=True)
-class InvalidationCalibrated(AdaptiveAssessor):
+class InvalidationCalibrated(ModelInvalidationFull):
     """Visit points, challenge the worst of them, bound the largest error with a stated error rate.
 
     Eqs. 15-24 decide what is measured and give the value. Their threshold ``alpha`` is no error
@@ -118,13 +116,7 @@ class InvalidationCalibrated(AdaptiveAssessor):
     work the paper names. Assumes normal readings of known covariance.
     """
 
-    measurements: int
-    alpha: float = field(kw_only=True)
-    confidence: float = CONFIDENCE
     name: ClassVar[str] = "invalidation_calibrated"
-
-    def __post_init__(self) -> None:
-        check_settings(self)
 
     def begin(self, candidates: Candidates) -> CalibratedCampaign:
         """Return a new campaign."""

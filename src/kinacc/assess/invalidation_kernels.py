@@ -2,8 +2,7 @@
 
 All compiled code is in this one file: numba's cache is aware of changes in the file of the function
 called, not in files that function's helpers come from. The first part draws the readings, on which
-see :mod:`kinacc.assess.world`. The plain twin of a run at one bound is
-:func:`kinacc.assess.model_invalidation.ModelInvalidation.history`.
+see :mod:`kinacc.assess.world`.
 
 How a scan is exact without a run at every bound. For a fixed history the rejection probability
 falls as the bound grows, and the point to measure again is the largest of functions linear in
@@ -117,13 +116,14 @@ def _follow(world: Arrays, near: float, far: float, alpha: float, squared: bool,
     """Run two bounds side by side while they take the same path.
 
     Returns whether they do to the end, and of that run whether it rejects, its measurements, points
-    visited and the rejection probability at the first bound.
+    visited, the rejection probability at the first bound, and the rows in the order measured.
     """
     known, sigma, sizes = world[1], world[2], world[7]
     points, budget, ends = sigma.size, roots.size - 1, 1 if near == far else 2
     reads, score, miss = np.zeros(points, np.int64), np.empty((points, 2)), np.ones((points, 2))
     # A row whose mean lies within both bounds has p-hat 0 and is never measured again.
     active, count, visited, steps = np.empty(points, np.int64), 0, 0, 0
+    path = np.empty(budget, np.int64)
     while True:
         row, rejected, probability = -1, False, 0.0
         for end in range(ends):
@@ -136,15 +136,15 @@ def _follow(world: Arrays, near: float, far: float, alpha: float, squared: bool,
             if end == 0:
                 row, rejected, probability = worst, exceeds, 1.0 - survival
             elif exceeds != rejected or (rejected and worst != row and steps < budget):
-                return False, rejected, steps, visited, probability
+                return False, rejected, steps, visited, probability, path[:steps]
         if steps == budget or (not rejected and visited == points):
-            return True, rejected, steps, visited, probability
+            return True, rejected, steps, visited, probability, path[:steps]
         if not rejected:
             row, visited = visited, visited + 1
         v = reads[row]
         if v >= known[row]:
             extend(world, row, v)
-        reads[row], steps = v + 1, steps + 1
+        path[steps], reads[row], steps = row, v + 1, steps + 1
         for end in range(ends):
             bound = far if end else near
             score[row, end] = (sizes[row, v] - bound) * (roots[v + 1] / sigma[row])
@@ -160,13 +160,13 @@ def scan(world: Arrays, bounds: Any, wanted: bool, alpha: float, squared: bool, 
 
     wanted: whether it is to be rejected. roots: weight of a point with noise 1 after 0, 1, .. up to
     all readings. Returns the place of that bound (n where none is), and of the last run followed
-    whether it rejected, its measurements, points visited and rejection probability.
+    whether it rejected, its measurements, points visited, rejection probability and rows in order.
     """
     near, depth, ends = 0, 1, np.empty(bounds.size, np.int64)
     ends[0] = bounds.size - 1
     while True:
         far = ends[depth - 1]
-        alike, rejected, steps, visited, probability = _follow(
+        alike, rejected, steps, visited, probability, path = _follow(
             world, bounds[near], bounds[far], alpha, squared, roots
         )
         if not alike:
@@ -175,4 +175,4 @@ def scan(world: Arrays, bounds: Any, wanted: bool, alpha: float, squared: bool, 
         place = near if rejected == wanted else bounds.size
         near, depth = far + 1, depth - 1
         if rejected == wanted or depth == 0:
-            return place, rejected, steps, visited, probability
+            return place, rejected, steps, visited, probability, path

@@ -31,7 +31,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from scipy.optimize import brentq
-from scipy.special import bdtrc, chdtri, chndtrix, ndtr, ndtri, stdtrit
+from scipy.special import chdtri, chndtrix, ndtr, ndtri, stdtrit
 
 if TYPE_CHECKING:
     from kinacc.assess.adaptive import Ledger
@@ -76,18 +76,13 @@ def lower_limit_mm(mean_mm: np.ndarray, noise: Noise, error: float) -> float:
     Where noise is unequal, the smallest size in the ellipsoid that holds the true error with the
     confidence asked for: an error of any size outside is rejected whatever its direction.
     """
-    size = float(np.linalg.norm(mean_mm))
     if isinstance(noise, float):
-        return noise * size_at(size / noise, 1.0 - error)
-    deviations = math.sqrt(float(chdtri(3, error)))
-    distances = BallDistances(np.asarray(mean_mm)[None], noise[None])
-    if distances.beyond(0.0)[0] <= deviations:
+        return noise * size_at(float(np.linalg.norm(mean_mm)) / noise, 1.0 - error)
+    deviations, (variance, axes) = math.sqrt(float(chdtri(3, error))), np.linalg.eigh(noise)
+    y = axes.T @ mean_mm
+    if np.sum(y * y / variance) <= deviations**2:
         return 0.0
-
-    def outside(low: float) -> float:
-        return float(distances.beyond(low)[0]) - deviations
-
-    return float(brentq(outside, 0.0, size, xtol=1e-12 * size))
+    return _size_at_boundary(y, variance, deviations, variance, 0.0)
 
 
 def reading_below(x: np.ndarray | float, a: np.ndarray | float) -> np.ndarray:
@@ -145,15 +140,26 @@ def largest_size(mean_mm: np.ndarray, covariance_mm2: np.ndarray, deviations: fl
     top, y = float(variance[-1]), axes.T @ mean_mm
     # Off the plane across the widest axis by a billionth, where the farthest point is not unique.
     y[-1] = math.copysign(max(abs(y.item(2)), 1e-9 * math.sqrt(top)), y.item(2))
-    # x_i = t y_i / (t - s_i), for the t above the largest variance that meets the boundary.
-    weight, below = variance * y * y, top - variance
+    return _size_at_boundary(y, variance, deviations, top - variance, top)
+
+
+def _size_at_boundary(
+    y: np.ndarray, variance: np.ndarray, deviations: float, offset: np.ndarray, start: float
+) -> float:
+    """Size of the point of an ellipsoid about y (3,) that is nearest to the origin, or farthest.
+
+    x_i = t y_i / (t + s_i) or t y_i / (t - s_i), for the t, above the largest variance s_i, that
+    meets the boundary: t is ``start`` and a gap, the denominator the gap and an ``offset``.
+    """
+    weight = variance * y * y
 
     def excess(gap: float) -> float:
-        return float(np.sum(weight / (gap + below) ** 2)) - deviations * deviations
+        return float(np.sum(weight / (gap + offset) ** 2)) - deviations * deviations
 
-    low, high = math.sqrt(weight.item(2)) / deviations, math.sqrt(weight.sum()) / deviations
-    gap = brentq(excess, 0.999999 * low, 1.000001 * high, xtol=1e-14 * low, rtol=1e-14)
-    return float(np.linalg.norm((top + gap) * y / (gap + below)))
+    low = max(float((np.sqrt(weight) / deviations - offset).max()), 0.0)
+    high = math.sqrt(weight.sum()) / deviations
+    gap = brentq(excess, 0.999999 * low, 1.000001 * high, xtol=1e-16 * high, rtol=1e-14)
+    return float(np.linalg.norm((start + gap) * y / (gap + offset)))
 
 
 class BallDistances:
@@ -239,12 +245,6 @@ def guarded_lower_mm(
     if wanted <= -clip * len(along_mm):
         return 0.0
     return max(-float(sizes_at(-along_mm[None], sigma_mm[None], clip, wanted)[0]), 0.0)
-
-
-def at_most_wrong(readings: int, rate: float, error: float) -> int:
-    """Smallest number that the wrong ones of so many readings exceed but for ``error``."""
-    numbers = np.arange(readings + 1)
-    return int(np.argmax(bdtrc(numbers, readings, rate) <= error))
 
 
 def sizes_at(along: np.ndarray, sigma: np.ndarray, clip: float, wanted: float) -> np.ndarray:
@@ -405,20 +405,22 @@ class Looks:
         """
         if boundary is self.boundary and (factor == self.factor).all():
             return self.upper_mm
-        limits = [
-            [self._upper_mm(point, look, boundary, scale) for look in range(len(self._seen[point]))]
-            for point, scale in enumerate(factor.tolist())
-        ]
-        return np.array([min(of_point, default=math.inf) for of_point in limits])
+        limits = np.full(len(factor), math.inf)
+        for point, seen in enumerate(self._seen):
+            for look in range(len(seen)):
+                limit = self._upper_mm(point, look, boundary, factor.item(point))
+                limits[point] = min(limits[point], limit)
+        return limits
 
     def lower_limits_mm(self, factor: np.ndarray) -> np.ndarray:
         """Lower limits (m,), noise (m,) times as planned; 0 where a point was not looked at."""
-        largest = np.zeros(len(self._seen))
-        for point, scale in enumerate(factor.tolist()):
-            for look, error in zip(self._seen[point], self.lower_errors, strict=False):
+        limits = np.zeros(len(factor))
+        for point, seen in enumerate(self._seen):
+            scale = factor.item(point)
+            for look, error in zip(seen, self.lower_errors, strict=False):
                 noise = look.noise * (scale if isinstance(look.noise, float) else scale**2)
-                largest[point] = max(largest[point], lower_limit_mm(look.mean_mm, noise, error))
-        return largest
+                limits[point] = max(limits[point], lower_limit_mm(look.mean_mm, noise, error))
+        return limits
 
     def largest_lower_mm(self, factor: np.ndarray) -> float:
         """Lower bound on the largest error of the visited points, from single ones.
@@ -456,20 +458,16 @@ class LowerAverage:
             counts = tuple(sorted({max(math.ceil(share * wanted), 1) for share in _STAGES}))
             z = boundary(counts, error, freedom, 0.0, _LATE, rate).z.tolist()
             self._stages = dict(zip(counts, z, strict=True))
-        self._rows: list[int] = []
-        self._along_mm: list[float] = []
-        self._noise_mm: list[float] = []
+        self._counted: list[tuple[int, float, float]] = []
 
     def record(self, row: int, along_mm: float, noise_mm: float) -> None:
         """Take what a reading at a row is along its direction, and the noise of that."""
-        self._rows.append(row)
-        self._along_mm.append(along_mm)
-        self._noise_mm.append(noise_mm)
+        self._counted.append((row, along_mm, noise_mm))
 
     @property
     def at_stage(self) -> bool:
         """Whether the readings that counted are those of a stage."""
-        return len(self._rows) in self._stages
+        return len(self._counted) in self._stages
 
     @property
     def has_spoken(self) -> bool:
@@ -478,25 +476,25 @@ class LowerAverage:
         Never the larger of it and of single points: the farthest of many single readings is what a
         heavy tail brings.
         """
-        return bool(self._stages) and len(self._rows) >= min(self._stages)
+        return bool(self._stages) and len(self._counted) >= min(self._stages)
 
     @property
     def missing(self) -> int:
         """Readings that have still to count."""
-        return self.wanted - len(self._rows)
+        return self.wanted - len(self._counted)
 
     def bound_mm(self, factor: np.ndarray) -> float:
         """The largest bound of the stages reached, 0 before; noise (m,) times as planned."""
-        along, noise = np.array(self._along_mm), np.array(self._noise_mm)
-        scale, bounds = factor[self._rows], [0.0] if self._rate else []
+        bounds = [0.0] if self._rate or not self.has_spoken else []
         for count, z in self._stages.items():
-            if count > len(along):
+            if count > len(self._counted):
                 break
+            rows, along, noise = (
+                np.array(column) for column in zip(*self._counted[:count], strict=True)
+            )
             if self._rate:
-                stated = scale[:count] * noise[:count]
-                bounds.append(guarded_lower_mm(along[:count], stated, z, self._rate))
+                bounds.append(guarded_lower_mm(along, factor[rows] * noise, z, self._rate))
                 continue
-            weight = 1.0 / noise[:count]
-            off = z * math.sqrt(float(np.sum(scale[:count] ** 2)))
-            bounds.append((float(along[:count] @ weight) - off) / float(weight.sum()))
-        return max(bounds, default=0.0)
+            off = z * math.sqrt(float(np.sum(factor[rows] ** 2)))
+            bounds.append((float(np.sum(along / noise)) - off) / float(np.sum(1.0 / noise)))
+        return max(bounds)

@@ -15,6 +15,8 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
+import pandas as pd
+from scipy.special import chdtrc
 
 from kinacc.assess.world import Assessment, Assessor, World
 from kinacc.errors import InputError, Problem
@@ -32,16 +34,6 @@ class Run(NamedTuple):
     rejected: bool
     measurements: int
     points_visited: int
-    rejection_probability: float
-
-
-class Step(NamedTuple):
-    """One measurement of a run; magnitudes in mm, ``repeat`` counts from 1 at each point."""
-
-    row: int
-    repeat: int
-    measured_mm: float
-    averaged_mm: float
     rejection_probability: float
 
 
@@ -96,39 +88,32 @@ class ModelInvalidation(Assessor):
         """One sequential run at the bound eta."""
         return Run(*self._scan(world, np.array([float(eta_mm)]), True)[1:5])
 
-    def history(self, world: World, eta_mm: float) -> list[Step]:
+    def history(self, world: World, eta_mm: float) -> pd.DataFrame:
         """Every measurement of one run at the bound eta, in order (Figs. 5 and 6).
 
-        In plain Python, step by step; the compiled kernel is held to it.
+        Columns row, repeat (from 1 at each point), measured_mm and averaged_mm (magnitudes of the
+        reading and of the mean of the point's readings so far), rejection_probability. With equal
+        noise in the three axes the candidate of eq. 21 is the nearest point of the ball in every
+        metric, so the distance of eq. 20 is (|e| - eta) / (standard deviation of the average).
         """
-        self._check_visits(world)
-        sums: dict[int, np.ndarray] = {}  # the points visited, in visiting order
-        counts: dict[int, int] = {}
-        scores: dict[int, float] = {}
-        misses: dict[int, float] = {}
-        steps: list[Step] = []
-        rejection = 0.0
-        while len(steps) < self.measurements:
-            if rejection > self.alpha:
-                # p-hat grows with the distance but reaches 1 in floating point: compare distances.
-                # max() returns the first of equals, the point visited first.
-                row = max(scores, key=scores.__getitem__)
-            elif len(sums) < world.points:
-                row = len(sums)
-                sums[row], counts[row] = np.zeros(3), 0
-            else:
-                break
-            reading = world.reading_mm(row, counts[row])
-            sums[row] = sums[row] + reading
-            counts[row] += 1
-            average_mm = _magnitude(sums[row] / counts[row])
-            scores[row] = mahalanobis_excess(
-                average_mm, eta_mm, world.sigma_mm[row], counts[row], self.covariance
-            )
-            misses[row] = 1.0 - point_probability(scores[row], self.distance)
-            rejection = 1.0 - math.prod(misses.values())
-            steps.append(Step(row, counts[row], _magnitude(reading), average_mm, rejection))
-        return steps
+        row = self._scan(world, np.array([float(eta_mm)]), True)[5]
+        repeat = pd.Series(row).groupby(row).cumcount().to_numpy() + 1
+        averaged_mm = world.sizes_mm[row, repeat - 1]
+        root = repeat ** _POWERS[self.covariance] / world.sigma_mm[row]
+        distance = np.maximum((averaged_mm - eta_mm) * root, 0.0)
+        missed = chdtrc(3.0, distance**2 if self.distance == "squared" else distance)  # eq. 18
+        newest = np.ones((len(row), world.points))  # of every point, after each measurement
+        for step, point in enumerate(row):
+            newest[step:, point] = missed[step]
+        return pd.DataFrame(
+            {
+                "row": row,
+                "repeat": repeat,
+                "measured_mm": np.linalg.norm(world.readings_mm[row, repeat - 1], axis=1),
+                "averaged_mm": averaged_mm,
+                "rejection_probability": 1.0 - newest.prod(axis=1),
+            }
+        )
 
     def _scan(self, world: World, bounds_mm: np.ndarray, wanted: bool) -> tuple[Any, ...]:
         """The scan of :func:`kinacc.assess.invalidation_kernels.scan` with these settings."""
@@ -149,28 +134,3 @@ class ModelInvalidation(Assessor):
                     "give more repeats or a smaller budget",
                 )
             )
-
-
-def mahalanobis_excess(
-    average_mm: float, eta_mm: float, sigma_mm: float, count: int, covariance: str
-) -> float:
-    """Mahalanobis distance of an averaged measurement beyond the bound, negative inside it.
-
-    average_mm: its magnitude; sigma_mm: noise of one reading per axis; count: readings averaged.
-    With equal noise in the three axes the candidate of eq. 21 is the nearest point of the ball in
-    every metric, so the distance of eq. 20 is (|e| - eta) / (standard deviation of the average).
-    """
-    return (average_mm - eta_mm) * count ** _POWERS[covariance] / float(sigma_mm)
-
-
-def point_probability(distance_outside: float, distance: str) -> float:
-    """p-hat of one point (eq. 18) from its Mahalanobis distance to the candidate error (1)."""
-    if distance_outside <= 0.0:
-        return 0.0
-    from scipy.special import chdtr
-
-    return float(chdtr(3.0, distance_outside**2 if distance == "squared" else distance_outside))
-
-
-def _magnitude(vector: np.ndarray) -> float:
-    return math.sqrt(sum(float(x) ** 2 for x in vector))

@@ -8,8 +8,6 @@ It gives values, not guarantees: it can raise an upper bound, never lower one.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 _FREEDOM = 10  # a bump is a chi density with so many degrees: 23 % standard deviation
@@ -20,21 +18,10 @@ _NO_SIZE = 1e-12  # of the noise: what readings below it count as
 _PSEUDO = 0.2  # points' worth of mass spread over the bumps before any reading
 
 
-class LargestSize(NamedTuple):
-    """Distribution of the largest size on a grid of sizes (mm): distribution functions (n,)."""
-
-    size_mm: np.ndarray
-    measured: np.ndarray
-    everywhere: np.ndarray
-
-    def quantile_mm(self, probability: float, measured_only: bool = False) -> float:
-        """Size the largest is at most with this probability."""
-        known = self.measured if measured_only else self.everywhere
-        return float(np.interp(probability, known, self.size_mm))
-
-
-def largest_size(sizes_mm: np.ndarray, noise_mm: np.ndarray, unmeasured: int) -> LargestSize:
-    """Posterior of the largest true size, among measured points and among all.
+def likely_largest_mm(
+    sizes_mm: np.ndarray, noise_mm: np.ndarray, unmeasured: int
+) -> tuple[float, float]:
+    """Posterior median of the largest true size, among measured points and among all, mm.
 
     sizes_mm: (n,) sizes of mean readings; noise_mm: (n,) their standard deviations per axis;
     unmeasured: number of points without a reading, taken as drawn from the same population.
@@ -42,7 +29,7 @@ def largest_size(sizes_mm: np.ndarray, noise_mm: np.ndarray, unmeasured: int) ->
     """
     top = float(sizes_mm.max())
     if top == 0.0:
-        return LargestSize(np.zeros(1), np.ones(1), np.ones(1))
+        return 0.0, 0.0
     scale = top * np.exp(np.arange(np.log(_SMALLEST), np.log(_LARGEST), _STEP))
     # Sizes, fine up to a little above the largest reading and wider beyond.
     wide = np.geomspace(1.2 * top, 4.0 * top, 61)[1:]
@@ -61,10 +48,9 @@ def largest_size(sizes_mm: np.ndarray, noise_mm: np.ndarray, unmeasured: int) ->
     prior = weight @ bumps
     posterior = np.cumsum(likelihood * prior, axis=1)
     measured = np.exp(np.log(np.maximum(posterior / posterior[:, -1:], 1e-300)).sum(axis=0))
-    both = np.array([measured, measured * np.cumsum(prior) ** unmeasured])
-    # Strictly increasing to 1, for interpolation.
-    both = np.maximum.accumulate(both / both[:, -1:], axis=1) + 1e-15 * np.arange(size.size)
-    return LargestSize(size, *both)
+    both = measured, measured * np.cumsum(prior) ** unmeasured
+    among_measured, among_all = (float(np.interp(0.5, known / known[-1], size)) for known in both)
+    return among_measured, among_all
 
 
 def reading_densities(x: np.ndarray, noise: np.ndarray, true: np.ndarray) -> np.ndarray:

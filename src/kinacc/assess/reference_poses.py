@@ -156,14 +156,13 @@ def find_change(plan: Schedule, readings: Readings, freedom: float = math.inf) -
     is the number of degrees of freedom of an earlier test that found the factor 1 (0: no test).
     None before the first stage.
     """
-    change = None
+    change, is_found = None, False
     for count, error in stages(plan):
-        if count > len(readings.place) or freedom + 3.0 * (count - plan.poses) <= _LEAST_FREEDOM:
-            continue
-        before, change = change, _at_stage(plan, readings.head(count), error, freedom)
-        if before is not None and before.is_found:
-            change = replace(change, is_found=True)
-    return change
+        degrees = freedom + 3.0 * (count - plan.poses)
+        if count <= len(readings.place) and degrees > _LEAST_FREEDOM:
+            change = _at_stage(plan, readings.head(count), error, freedom)
+            is_found = is_found or change.is_found
+    return replace(change, is_found=is_found) if change else None
 
 
 def _at_stage(plan: Schedule, readings: Readings, error: float, freedom: float) -> Change:
@@ -173,23 +172,22 @@ def _at_stage(plan: Schedule, readings: Readings, error: float, freedom: float) 
     inverse = np.linalg.inv(root)
     # A reading's covariance is at most the mean one over its weight: less weight than due at most.
     weight = 1.0 / np.linalg.eigvalsh(inverse @ covariances @ inverse.T)[:, -1]
-    belongs = (row[:, None] == np.unique(row)).astype(float)
+    poses = (row[:, None] == np.unique(row)) * np.sqrt(weight)[:, None]
+    poses = poses / np.linalg.norm(poses, axis=0)
 
     def centred(values: np.ndarray) -> np.ndarray:
-        """Values (.., n) without the weighted mean of their pose."""
-        means = (values * weight) @ belongs / (weight @ belongs)
-        return values - means @ belongs.T
+        """Values (.., n) by the roots of their weights, without the weighted mean of their pose."""
+        values = values * np.sqrt(weight)
+        return values - (values @ poses) @ poses.T
 
     gaps = np.arange(plan.poses, count - plan.poses + 1)
     shapes = np.vstack([place / plan.measurements, np.arange(count) >= gaps[:, None]])
-    shapes = centred(shapes)
-    length = np.sqrt(np.sum(shapes**2 * weight, axis=1))
+    shapes, whitened = centred(shapes), centred(inverse @ vectors.T)  # (shapes, n), (3, n)
+    length = np.linalg.norm(shapes, axis=1)
     usable = length > 1e-9
     gaps, shapes, length = np.append(0, gaps)[usable], shapes[usable], length[usable]
-    whitened = inverse @ vectors.T  # (3, n)
-    along = (shapes * weight / length[:, None]) @ whitened.T  # (shapes, 3)
-    square = np.sum(along**2, axis=1)
-    within = float(np.sum(centred(whitened) ** 2 * weight))
+    along = shapes / length[:, None] @ whitened.T  # (shapes, 3)
+    square, within = np.sum(along**2, axis=1), float(np.sum(whitened**2))
     degrees = 3.0 * (count - plan.poses)
     factor, stands_out = 1.0, True
     if math.isfinite(freedom):

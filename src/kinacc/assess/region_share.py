@@ -7,10 +7,12 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
+from scipy.special import bdtr, bdtrc, chdtri, ndtr
 
 from kinacc.assess.adaptive import Ledger, OnceAssessor, check_settings
 from kinacc.assess.statement import CONFIDENCE, REGION, Reason, Statement
 
+_DEVIATIONS = 1.0  # added to a reading for its upper limit
 _LIFTED = 0.01  # probability that noise alone lifts a reading by more than is taken off it
 
 
@@ -18,8 +20,8 @@ _LIFTED = 0.01  # probability that noise alone lifts a reading by more than is t
 class RegionShare(OnceAssessor):
     """Read random points once; order statistics bound the size that ``share`` does not exceed.
 
-    Upper bound: a reading plus ``deviations`` standard deviations is at least the true size with
-    probability Phi(deviations), for the reading's component along the true error is normal. So at
+    Upper bound: a reading plus one standard deviation is at least the true size with probability
+    84 %, for the reading's component along the true error is normal. So at
     each of the largest (1 - share) of the errors it is at least the quantile wanted with that
     probability, and the number of points where it is, is binomial at least. The bound is the
     largest of these sums but so many that fewer are met with the error allowed. Lower bound: the
@@ -33,24 +35,17 @@ class RegionShare(OnceAssessor):
 
     measurements: int
     share: float = 0.9
-    deviations: float = 1.0
     confidence: float = CONFIDENCE
     name: ClassVar[str] = "region_share"
 
     def __post_init__(self) -> None:
-        check_settings(
-            self,
-            ("share", 0.0 < self.share < 1.0, "above 0 and below 1"),
-            ("deviations", self.deviations >= 0.0, "0 or more"),
-        )
+        check_settings(self, ("share", 0.0 < self.share < 1.0, "above 0 and below 1"))
 
     def state(self, ledger: Ledger) -> tuple[Statement, ...]:
         """The bounds, or how many points they need."""
-        from scipy.special import bdtr, bdtrc, chdtri, ndtr
-
         error, sizes = 1.0 - self.confidence, ledger.sizes_mm()
         count, ranks = len(sizes), np.arange(1, len(sizes) + 1)
-        met = (1.0 - self.share) * float(ndtr(self.deviations))
+        met = (1.0 - self.share) * float(ndtr(_DEVIATIONS))
         # The last k such that fewer than k of so many points are met with the error allowed.
         upper = int(np.sum(bdtr(ranks - 1, count, met) <= error))
         if upper == 0:
@@ -60,7 +55,7 @@ class RegionShare(OnceAssessor):
         passing = (1.0 - self.share) + self.share * _LIFTED
         lower = int(np.sum(bdtrc(ranks - 1, count, passing) > error))  # before the first such k
         spread = np.sqrt(np.linalg.eigvalsh(ledger.spread_mm2[ledger.visited])[:, -1])
-        raised = np.sort(sizes + self.deviations * spread)[::-1]
+        raised = np.sort(sizes + _DEVIATIONS * spread)[::-1]
         lowered = np.sort(sizes - math.sqrt(float(chdtri(3, _LIFTED))) * spread)[::-1]
         statement = Statement(
             REGION,

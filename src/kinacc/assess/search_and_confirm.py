@@ -27,7 +27,7 @@ from kinacc.assess.noise import (
     factor_limit,
     suspicious_readings,
 )
-from kinacc.assess.population import excepted, hardly_missed, largest_size
+from kinacc.assess.population import excepted, hardly_missed, likely_largest_mm
 from kinacc.assess.reference_poses import Change, find_change, planned_readings, poses_of, schedule
 from kinacc.assess.statement import (
     CANDIDATES,
@@ -274,10 +274,9 @@ class SearchAndConfirmCampaign(Campaign):
             early = Reason("first_visit", {"left": open_points})
             return Statement(MEASURED, withheld=early), Statement(CANDIDATES, withheld=early)
         sizes, noise_mm = ledger.sizes_mm(), ledger.noise_mm[ledger.visited]
-        posterior = largest_size(sizes, noise_mm, points - visited)
-        value_mm = posterior.quantile_mm(0.5, measured_only=True)
+        value_mm, value_of_all_mm = likely_largest_mm(sizes, noise_mm, points - visited)
         measured = Statement(MEASURED, value_mm, error_of=settings.error_of)
-        everywhere = replace(measured, target=CANDIDATES, value_mm=posterior.quantile_mm(0.5))
+        everywhere = replace(measured, target=CANDIDATES, value_mm=value_of_all_mm)
         if missing := self.noise.missing():
             return replace(measured, withheld=missing), replace(everywhere, withheld=missing)
         noise = self.noise.taken(self.allowed)

@@ -1,4 +1,4 @@
-"""Worlds, every reading one simulation could take, and assessors that look back at one.
+"""Worlds, every reading one simulation could take, and assessments and campaigns on them.
 
 A reading is a function of its address alone: a counter-based generator (Philox 4x64, 10 rounds, as
 in numpy) is asked at counter (v, j, 0, 0) for reading v at point j of the simulation that the key
@@ -13,15 +13,17 @@ module with a frozen dataclass that inherits :class:`Assessor`, and a line in
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from itertools import product
-from typing import ClassVar, NamedTuple, Protocol, TypeVar
+import math
+from collections.abc import Callable, Mapping
+from typing import Any, ClassVar, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from kinacc.assess.adaptive import AdaptiveAssessor, Campaign, Candidates
 from kinacc.assess.invalidation_kernels import extend, extend_all
-from kinacc.config.records import of_section
+from kinacc.assess.limits import visit_mm
+from kinacc.assess.statement import CANDIDATES, MEASURED, REGION, VISIT, Statement
 from kinacc.errors import InputError, Problem
 
 
@@ -153,11 +155,68 @@ class Assessor(Protocol):
         ...
 
 
-A = TypeVar("A", bound=Assessor)
+Reading = Callable[[int, int], np.ndarray]  # (row, how often it was read before): (3,), mm
 
 
-def every_reading(cls: type[A], settings: Mapping[str, object]) -> Iterator[A]:
-    """An assessor under every combination of its switches, other settings as given."""
-    for values in product(*cls.switches.values()):
-        switched = dict(zip(cls.switches, values, strict=True))
-        yield of_section(cls, {**settings, **switched})
+def carry_on(campaign: Campaign, reading_mm: Reading, limit: int | None = None) -> int:
+    """Read as the campaign asks until it wants no more, or ``limit`` readings; their number."""
+    ledger = campaign.ledger
+    while (limit is None or ledger.taken < limit) and (row := campaign.next()) is not None:
+        campaign.record(row, reading_mm(row, ledger.count.item(row)))
+    return ledger.taken
+
+
+def conduct(assessor: AdaptiveAssessor, world: World, limit: int | None = None) -> Campaign:
+    """Run a campaign to its end, or ``limit`` readings, on the readings of a world."""
+    campaign = assessor.begin(Candidates.with_equal_noise(world.sigma_mm))
+    carry_on(campaign, world.reading_mm, limit)
+    return campaign
+
+
+def assess_world(assessor: Any, world: World, budget: int) -> tuple[Assessment, float]:
+    """One assessment of a world, whichever the interface, and what its upper bound is held to, mm.
+
+    An assessor that looks back has ``assess``; one that chooses as it goes has ``begin`` and is
+    stopped after ``budget`` readings. Its statement on all candidates counts, else its first.
+    """
+    size = np.sqrt(np.sum(world.error_mm**2, axis=1))
+    if hasattr(assessor, "assess"):
+        return assessor.assess(world), float(size.max())
+    campaign = conduct(assessor, world, budget)
+    stated, visited = campaign.statements(), campaign.ledger.visited
+    statement = next((item for item in stated if item.target == CANDIDATES), stated[0])
+    bounds = statement.lower_mm, statement.upper_mm
+    assessment = Assessment(statement.value_mm, campaign.ledger.taken, len(visited), *bounds)
+    if statement.target == REGION:
+        return assessment, float(np.quantile(size, statement.share, method="inverted_cdf"))
+    return assessment, truth_mm(statement, size, visited)
+
+
+def noisy(errors_mm: np.ndarray, noise_root: np.ndarray, visits: int, *entropy: int) -> Reading:
+    """Readings of errors (m, 3), up to ``visits`` a row: the same whatever else is read.
+
+    ``noise_root``, (3, 3) or one for each row (m, 3, 3): its product with its transpose is the
+    covariance of a reading.
+    """
+    root = np.broadcast_to(noise_root, (len(errors_mm), 3, 3))
+    deviates = drawn_world(np.zeros((len(errors_mm), 3)), 1.0, key_of(*entropy), max(visits, 1))
+    return lambda row, visit: errors_mm[row] + root[row] @ deviates.reading_mm(row, visit)
+
+
+def truth_mm(
+    statement: Statement,
+    size_mm: np.ndarray,
+    visited: list[int] | None,
+    arm_mm: float | np.ndarray = 0.0,
+) -> float:
+    """What an upper bound is held to, of sizes (m,) of all candidates; NaN where these do not tell.
+
+    ``arm_mm``: standard deviation of a visit per axis, of each candidate or of all.
+    """
+    if statement.error_of == VISIT:
+        size_mm = visit_mm(size_mm, arm_mm)
+    if statement.target == CANDIDATES:
+        return float(np.sort(size_mm)[-1 - statement.excepted])
+    if statement.target == MEASURED and visited:
+        return float(size_mm[visited].max())
+    return math.nan

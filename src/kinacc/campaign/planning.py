@@ -12,8 +12,8 @@ import pandas as pd
 from kinacc.assess.adaptive import AdaptiveAssessor, Candidates
 from kinacc.assess.attainable import limits_of
 from kinacc.assess.population import binomial_interval
-from kinacc.assess.simulate import carry_on, noisy, truth_mm
 from kinacc.assess.statement import ACCEPT, CANDIDATES, REJECT, UNDECIDED, decide
+from kinacc.assess.world import carry_on, noisy, truth_mm
 from kinacc.errors import InputError, Problem, refuse
 from kinacc.progress import Progress
 from kinacc.study.fields import ErrorField

@@ -68,7 +68,7 @@ def plan(out: Output, **options: Any) -> None:
     """Simulate campaigns: the width of the bounds by budget, and the budget for a wanted width.
 
     --errors is a results folder (its held-out errors), a file with columns ex_mm, ey_mm, ez_mm, or
-    a family of synthetic arms: smooth, gravity, ripple, thermal, workshop, defect, rare.
+    a family of synthetic arms: smooth, workshop, defect.
 
     \b
     Example:
@@ -178,7 +178,5 @@ def _errors_of_folder(path: Path, point: str | None) -> ErrorField:
     if len(targets) > 1:
         known = ", ".join(targets)
         click.echo(f"{path}: errors of {target} ({known}); --point names another", err=True)
-    return fields.of_measurements(
-        name, tables["pose_errors"], tables["measurements"], model,
-        target if len(targets) > 1 else None,
-    )  # fmt: skip
+    only = target if len(targets) > 1 else None
+    return fields.of_measurements(name, tables["pose_errors"], model, only)

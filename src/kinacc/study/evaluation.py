@@ -14,7 +14,7 @@ from kinacc.kinematics.inverse import limits
 from kinacc.kinematics.region import Cylinder
 from kinacc.kinematics.robot import Robot
 from kinacc.study import operating_points
-from kinacc.study.accuracy_map import Equipped, Models, PosesWanted, accuracy_map
+from kinacc.study.accuracy_map import Equipped, Models, PosesWanted, accuracy_map, errors_at
 from kinacc.tables.columns import Columns, Tables
 
 
@@ -30,15 +30,9 @@ def joint_box(evaluation: Settings, arm: Robot) -> tuple[np.ndarray, np.ndarray]
 def cylinder(evaluation: Settings) -> Cylinder:
     """The cylinder of the ``evaluation`` settings."""
     section = evaluation["cylinder"]
-    first, last = np.deg2rad(section["angle_deg"])
-    return Cylinder(
-        float(section["inner_radius_mm"]),
-        float(section["radial_span_mm"]),
-        float(section["bottom_mm"]),
-        float(section["height_mm"]),
-        float(first),
-        float(last),
-    )
+    lengths = ("inner_radius_mm", "radial_span_mm", "bottom_mm", "height_mm")
+    angles_rad = np.deg2rad(section["angle_deg"]).tolist()
+    return Cylinder(*(float(section[name]) for name in lengths), *angles_rad)
 
 
 def poses_wanted(evaluation: Settings) -> PosesWanted:
@@ -72,19 +66,13 @@ def equipped(inputs: Tables, evaluation: Settings, arm: Robot) -> Models:
     return Models(by_name, np.full(arm.dh.joints, direction) if direction else None)
 
 
-def mapped(inputs: Tables, settings: Settings) -> dict[str, dict[str, np.ndarray]]:
-    """``accuracy_map`` from ``vec_model`` and ``dh_model`` (and ``frames``, if given).
-
-    ``settings["cells"]``: numbers of the only cells mapped (default: all).
-    """
+def mapped(inputs: Tables, settings: Settings) -> dict[str, Columns]:
+    """``accuracy_map`` from ``vec_model`` and ``dh_model`` (and ``frames``, if given)."""
     slices_deg = np.array(settings["map"]["slices_deg"], dtype=float)
     wanted = poses_wanted(settings["evaluation"])
     cells = region.grid(wanted.cylinder, np.deg2rad(slices_deg), settings["map"]["grid_mm"])
     # The slice as configured: degrees that went through radians and back are not the same number.
     slice_deg = np.repeat(slices_deg, len(cells.radius_mm) // len(slices_deg))
-    if "cells" in settings:
-        slice_deg = slice_deg[settings["cells"]]
-        cells = region.Cells(*(axis[settings["cells"]] for axis in cells))
     arm = robot.load(settings["robot"])
     models = equipped(inputs, settings["evaluation"], arm)
     result = accuracy_map(arm, models, cells, wanted)._asdict()
@@ -113,11 +101,11 @@ def points(inputs: Tables, settings: Settings) -> dict[str, Columns]:
     else:
         wrist = section.get("wrist")
         q_rad = operating_points.in_space(arm, models, poses_wanted(section), *drawn, wrist)
-    chosen = operating_points.with_errors(models, q_rad)
+    travel = np.zeros(q_rad.shape[1]) if models.travel is None else models.travel
     columns: Columns = {"point": np.arange(len(q_rad))}
-    columns |= _numbered("q", limits.reported_joints(arm, chosen.q_rad))
-    columns |= _numbered("s", chosen.travel)
-    return {"assessment_points": columns | _error_columns(chosen.error_mm)}
+    columns |= _numbered("q", limits.reported_joints(arm, q_rad))
+    columns |= _numbered("s", np.broadcast_to(travel.astype(np.int8), q_rad.shape))
+    return {"assessment_points": columns | _error_columns(errors_at(models, q_rad)[:, :3])}
 
 
 def _numbered(letter: str, values: np.ndarray) -> Columns:

@@ -1,7 +1,7 @@
 """Error fields: true errors of many poses, synthetic and measured.
 
-A field holds configurations with the deterministic error of the model at each. Simulated campaigns
-draw their candidates from it at random.
+A field holds the deterministic error of the model at each of many configurations. Simulated
+campaigns draw their candidates from it at random.
 """
 
 from __future__ import annotations
@@ -9,10 +9,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
-from kinacc.assess.world import error_vectors
+from kinacc.assess.world import checked_errors, error_vectors
 from kinacc.config.error_models import MEASURED, PLAINEST, Comparison, model_name
 from kinacc.errors import InputError, Problem
 from kinacc.kinematics import dh
@@ -30,36 +31,21 @@ POINTS = 1000
 _TRUNCATION = 1e-6  # DH directions that the calibration poses do not see are left alone
 _DEFECT_SHARE = 0.02
 _DEFECT_RAD = 6e-4  # jump of joint 2 where its teeth are worn: about 1 mm at the flange
-_RARE_SHARE, _RARE_MM = 0.01, (1.2, 1.9)
 
 
 @dataclass(frozen=True)
 class ErrorField:
     """True errors ``error_mm`` (n, 3) of a model, robot base frame.
 
-    Where the joints are known: ``q_rad`` (n, k) as reported. ``kind`` is
-    ``paper``, ``synthetic``, ``made_up`` or ``measured``, empty for errors of a file. The first
-    ``kept`` configurations are among any candidates drawn.
+    The first ``kept`` configurations are among any candidates drawn.
     """
 
     name: str
     error_mm: np.ndarray
-    q_rad: np.ndarray | None = None
-    kind: str = ""
-    meaning: str = ""
     kept: int = 0
 
     def __post_init__(self) -> None:
-        count = len(self.error_mm)
-        joints = self.q_rad is None or (self.q_rad.ndim == 2 and len(self.q_rad) == count)
-        if self.error_mm.shape != (count, 3) or not count or not joints:
-            shapes = f"errors {self.error_mm.shape}, joints {getattr(self.q_rad, 'shape', ())}"
-            raise InputError(
-                Problem(f"field {self.name}", shapes, "(n, 3) and (n, k), n at least 1")
-            )
-        if not np.all(np.isfinite(self.error_mm)):
-            message = "holds errors that are not finite"
-            raise InputError(Problem(f"field {self.name}", message, "numbers in mm"))
+        checked_errors(self.error_mm)
 
     @property
     def points(self) -> int:
@@ -82,16 +68,11 @@ class ErrorField:
 
 def of_points(name: str, points: Columns) -> ErrorField:
     """The paper's field: ``assessment_points`` of a modelled space."""
-    meaning = "errors of the DH model at the operating points of the study"
-    return ErrorField(name, error_vectors(points), _stacked(points, "q"), "paper", meaning)
+    return ErrorField(name, error_vectors(points))
 
 
 def of_measurements(
-    name: str,
-    errors: Columns,
-    measurements: Columns,
-    model: str = PLAINEST,
-    target: str | None = None,
+    name: str, errors: Columns, model: str = PLAINEST, target: str | None = None
 ) -> ErrorField:
     """Return held-out errors of a model at measured configurations, readings averaged.
 
@@ -101,8 +82,8 @@ def of_measurements(
     ----------
     name : str
         Name of the field.
-    errors, measurements : mapping
-        Columns of the tables ``pose_errors`` and ``measurements``.
+    errors : mapping
+        Columns of the table ``pose_errors``.
     model : str
         Model whose errors are taken.
     target : str, optional
@@ -126,13 +107,10 @@ def of_measurements(
     if not wanted.any():
         message = f"pose_errors holds no held-out errors of the {model_name(model)} model"
         raise InputError(Problem(f"field {name}", message, fix="set measurements.folds"))
-    rows, error_mm = measured_errors(errors, wanted)
-    meaning = f"held-out errors of the {model_name(model)} model at measured configurations"
-    meaning += f", target {target}" if target else ""
-    return ErrorField(name, error_mm, _stacked(measurements, "q")[rows], "measured", meaning)
+    return ErrorField(name, measured_errors(errors, wanted)[1])
 
 
-def synthetic(name: str, draw: int) -> ErrorField:
+def synthetic(name: str, draw: int, family: Family | None = None) -> ErrorField:
     """Return errors of the DH model of a synthetic arm at poses that were not fitted.
 
     The calibration has no noise: the errors are deterministic. DH parameters and base are fitted
@@ -141,39 +119,37 @@ def synthetic(name: str, draw: int) -> ErrorField:
     Parameters
     ----------
     name : str
-        One of :data:`FAMILIES`.
+        One of :data:`FAMILIES`, unless a ``family`` is passed.
     draw : int
         Number of the accepted draw of the arm.
+    family : Family, optional
+        How the field differs from the draw.
 
     Returns
     -------
     ErrorField
-        Errors in mm, robot base frame, with joints in rad.
+        Errors in mm, robot base frame.
     """
-    accepted = accepted_draw(draw)
-    arm = physical_robot(accepted.seed, accepted.scales, accepted.geometry)
-    change = FAMILIES[name]
-    nominal = robots.load("mh180")
-    q_rad = plan.configurations(nominal, CALIBRATION_POSES + POINTS)
-    arm = change.arm(arm)
-    true_mm = pose(arm, _quiet_visits(q_rad)).position_mm
-    error_mm = true_mm - dh.forward(arm.dh, q_rad).position_mm
+    accepted, family = accepted_draw(draw), family or FAMILIES[name]
+    arm = family.arm(physical_robot(accepted.seed, accepted.scales, accepted.geometry))
+    q_rad = plan.configurations(robots.load("mh180"), CALIBRATION_POSES + POINTS)
+    # Visits without chance: in the plan's order and time.
+    times = plan.time_h(len(q_rad))
+    visits = Visits(q_rad, plan.directions(q_rad), times, np.zeros(q_rad.shape))
+    error_mm = pose(arm, visits).position_mm - dh.forward(arm.dh, q_rad).position_mm
     rng = np.random.default_rng([accepted.seed, 4])
-    error_mm = change.after(error_mm, q_rad, arm, rng)
-    beyond_mm, q_rad = _beyond_dh(arm, q_rad, error_mm), q_rad[CALIBRATION_POSES:]
-    return ErrorField(f"{name}_{draw}", beyond_mm, q_rad, "synthetic", change.meaning)
+    error_mm = family.after(error_mm, q_rad, arm, rng)
+    return ErrorField(f"{name}_{draw}", _beyond_dh(arm, q_rad, error_mm))
 
 
-@dataclass(frozen=True)
-class Family:
-    """How a synthetic field differs from the accepted draw; ``meaning`` in words."""
+class Family(NamedTuple):
+    """How a synthetic field differs from the accepted draw."""
 
-    meaning: str
     arm: Callable[[PhysicalRobot], PhysicalRobot]
     after: Callable[..., np.ndarray] = lambda error_mm, *_: error_mm
 
 
-def _only(**factors: float) -> Callable[[PhysicalRobot], PhysicalRobot]:
+def only(**factors: float) -> Callable[[PhysicalRobot], PhysicalRobot]:
     """The arm with the effects named times their factors, the other effects beyond a VEC none."""
 
     def change(arm: PhysicalRobot) -> PhysicalRobot:
@@ -182,10 +158,6 @@ def _only(**factors: float) -> Callable[[PhysicalRobot], PhysicalRobot]:
         return replace(arm, beyond=replace(arm.beyond, **parts_of))
 
     return change
-
-
-def _small(arm: PhysicalRobot) -> PhysicalRobot:
-    return replace(_only()(arm), smooth=replace(arm.smooth, amplitude=0.35 * arm.smooth.amplitude))
 
 
 def _with_defect(
@@ -200,37 +172,14 @@ def _with_defect(
     return error_mm + np.where(worn[:, None], lever * _DEFECT_RAD, 0.0)
 
 
-def _with_rare(
-    error_mm: np.ndarray, q_rad: np.ndarray, arm: PhysicalRobot, rng: np.random.Generator
-) -> np.ndarray:
-    """Single poses far off, for no reason a model could know."""
-    size = np.where(rng.random(len(q_rad)) < _RARE_SHARE, rng.uniform(*_RARE_MM, len(q_rad)), 0.0)
-    turn = rng.normal(size=(len(q_rad), 3))
-    return error_mm + size[:, None] * turn / np.linalg.norm(turn, axis=1)[:, None]
-
-
-FAMILIES: dict[str, Family] = {
-    "smooth": Family("errors that depend smoothly on single joints", _only()),
-    "gravity": Family("compliance under gravity, four times as large", _only(compliance=4.0)),
-    "ripple": Family("ripple of the gears alone, on smooth errors", _only(ripple_rad=1.0)),
-    "thermal": Family("warming up, three times as large", _only(drift=3.0)),
-    "workshop": Family(
-        "all effects of the physical arm",
-        _only(compliance=1.0, ripple_rad=1.0, backlash_rad=1.0, drift=1.0),
-    ),
-    "defect": Family(
-        "a worn spot of joint 2 that moves 2 % of the poses",
-        _only(compliance=1.0, ripple_rad=0.3),
-        _with_defect,
-    ),
-    "rare": Family("small smooth errors and 1 % of single poses far off", _small, _with_rare),
+FAMILIES = {
+    # errors that depend smoothly on single joints
+    "smooth": Family(only()),
+    # all effects of the physical arm
+    "workshop": Family(only(compliance=1.0, ripple_rad=1.0, backlash_rad=1.0, drift=1.0)),
+    # a worn spot of joint 2 that moves 2 % of the poses
+    "defect": Family(only(compliance=1.0, ripple_rad=0.3), _with_defect),
 }
-
-
-def _quiet_visits(q_rad: np.ndarray) -> Visits:
-    """Visits without chance: in the plan's order and time."""
-    count = len(q_rad)
-    return Visits(q_rad, plan.directions(q_rad), plan.time_h(count), np.zeros(q_rad.shape))
 
 
 def _beyond_dh(arm: PhysicalRobot, q_rad: np.ndarray, error_mm: np.ndarray) -> np.ndarray:
@@ -248,8 +197,3 @@ def _beyond_dh(arm: PhysicalRobot, q_rad: np.ndarray, error_mm: np.ndarray) -> n
     wanted = error_mm[:CALIBRATION_POSES].ravel()
     solved, *_ = np.linalg.lstsq(known, wanted, rcond=_TRUNCATION)
     return (error_mm - matrix @ solved)[CALIBRATION_POSES:]
-
-
-def _stacked(columns: Columns, letter: str) -> np.ndarray:
-    names = [name for name in columns if name[:1] == letter and name[1:].isdigit()]
-    return np.stack([np.asarray(columns[name], dtype=float) for name in names], axis=1)

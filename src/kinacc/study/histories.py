@@ -91,7 +91,7 @@ def histories(
     settled = {name: getattr(assessor, name) for name in ("alpha", "distance", "covariance")}
     for example in examples(errors, settings, visits, assessor, seed, progress):
         world = world_of(errors, settings.noise_mm, example.simulation, visits, seed)
-        steps = pd.DataFrame(assessor.history(world, example.eta_mm))
+        steps = assessor.history(world, example.eta_mm)
         rows = world.point[steps.pop("row")]
         columns = {**example._asdict(), **settled, "noise_mm": settings.noise_mm}
         columns |= {"iteration": np.arange(len(steps)) + 1, "rule_met": int(example.rule_met)}
@@ -119,8 +119,8 @@ def examples(
     def shows_fig5(world: World, eta: float) -> bool:
         if assessor.run(world, larger).rejected:
             return False
-        last = assessor.history(world, eta)[-1]
-        return last.repeat > 1 and bool(world.point[last.row] == worst)
+        last = assessor.history(world, eta).iloc[-1]
+        return bool(last["repeat"] > 1 and world.point[int(last["row"])] == worst)
 
     def shows_fig6(world: World, eta: float) -> bool:
         outcome = assessor.run(world, eta)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 
 import numpy as np
@@ -26,20 +26,14 @@ RUNS: dict[str, Callable[..., dict[str, Columns]]] = {
 }
 
 
-def run(
-    names: Sequence[str],
-    config: Settings,
-    tables: Tables,
-    extra: Mapping[str, Settings] | None = None,
-) -> dict[str, Columns]:
+def run(names: Sequence[str], config: Settings, tables: Tables) -> dict[str, Columns]:
     """``tables`` and all that the stages ``names``, in this order, make of them.
 
-    ``config`` is the complete configuration of one data set; ``extra`` are settings by stage that
-    no configuration has.
+    ``config`` is the complete configuration of one data set.
     """
     results = dict(tables)
     for name in names:
-        results |= RUNS[name](results, {**config, **(extra or {}).get(name, {})})
+        results |= RUNS[name](results, config)
     return results
 
 

@@ -13,6 +13,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -20,18 +21,17 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from kinacc.assess.registry import PAPER as ASSESSORS
-from kinacc.assess.simulate import assess_world
 from kinacc.assess.world import (
     Assessor,
     World,
+    assess_world,
     checked_errors,
     drawn_world,
     error_vectors,
-    every_reading,
     key_of,
 )
 from kinacc.config.records import Settings, of_section
-from kinacc.errors import InputError, Problem, refuse
+from kinacc.errors import Problem, refuse
 from kinacc.progress import SILENT, Progress
 from kinacc.tables.columns import Columns, Tables
 from kinacc.tables.contract import ARTEFACTS, columns_of
@@ -65,18 +65,19 @@ class StudySettings(Visits):
 def assessors(section: Settings, all_readings: bool = True) -> list[Assessor]:
     """The paper's assessors by the configuration's ``study``, in the order of the paper.
 
-    Each under every reading of the paper (see :mod:`kinacc.assess`), or only the one configured.
+    Each under every combination of its switches, the readings of the paper, or only the one
+    configured.
     """
-    if all_readings:
-        return [assessor for cls in ASSESSORS.values() for assessor in every_reading(cls, section)]
-    return [of_section(cls, section) for cls in ASSESSORS.values()]
-
-
-def part_of(repetitions: int, number: int, of: int) -> range:
-    """Repetitions of part ``number`` (1-based) of ``of``: every of-th, so that parts take alike."""
-    if not 1 <= number <= of:
-        raise InputError(Problem("part", f"{number} of {of}", "1 up to the number of parts"))
-    return range(number - 1, repetitions, of)
+    return [
+        of_section(cls, {**section, **dict(zip(cls.switches, values, strict=True))})
+        for cls in ASSESSORS.values()
+        for values in product(
+            *(
+                choices if all_readings else (section[name],)
+                for name, choices in cls.switches.items()
+            )
+        )
+    ]
 
 
 def world_of(
@@ -228,7 +229,7 @@ def evaluate_assessors(
             chosen[place] = dataclasses.replace(each, measurements=budget)
     visits = Visits(budget, "sequence")
     rows = simulate(error_mm, levels.tolist(), range(repetitions), visits, seed, chosen)
-    truth, stated = true_accuracy_mm(np.linalg.norm(error_mm, axis=1)), rows["upper_mm"].notna()
+    truth, stated = float(np.linalg.norm(error_mm, axis=1).max()), rows["upper_mm"].notna()
     rows["coverage"] = (rows["upper_mm"] >= rows["bounded_mm"]).where(stated).astype(float)
     rows["lower_coverage"] = (rows["lower_mm"] <= truth).where(stated).astype(float)
     rows["width_mm"] = rows["upper_mm"] - rows["lower_mm"]
@@ -293,16 +294,6 @@ def _columns(artefact: str, table: pd.DataFrame) -> Columns:
     return columns_of(artefact, cells.where(cells.notna(), None).to_dict("records"))
 
 
-def true_accuracy_mm(true_error_mm: ArrayLike) -> float:
-    """True accuracy of a set of points (eq. 7): the largest magnitude of their true errors."""
-    values = np.asarray(true_error_mm, dtype=np.float64)
-    if values.size == 0 or not np.all(np.isfinite(values)):
-        raise InputError(
-            Problem("true_error_mm", "no values, or values that are not finite", "numbers in mm")
-        )
-    return float(values.max())
-
-
 def simulated(
     inputs: Tables,
     settings: Settings,
@@ -310,15 +301,16 @@ def simulated(
 ) -> dict[str, Columns]:
     """Return ``study_chunk`` for ``settings["part"]`` (default: all repetitions).
 
-    ``settings["all_readings"]`` false: the reading that ``study`` names alone;
-    ``settings["only"]``: the repetitions simulated.
+    ``settings["all_readings"]`` false: the reading that ``study`` names alone.
     """
     study = of_section(StudySettings, settings["study"])
     part = settings.get("part") or {"number": 1, "of": 1}
+    # Every of-th, so that parts take alike.
+    repetitions = range(part["number"] - 1, study.repetitions, part["of"])
     rows = simulate(
         error_vectors(inputs["assessment_points"]),
         study.noise_mm,
-        settings.get("only") or part_of(study.repetitions, part["number"], part["of"]),
+        repetitions,
         study,
         settings["seed"],
         assessors(settings["study"], settings.get("all_readings", True)),
@@ -329,7 +321,7 @@ def simulated(
 
 def summed_up(inputs: Tables, settings: Settings) -> dict[str, Columns]:
     """Return ``study``, ``study_summary`` and ``readings``."""
-    true_mm = true_accuracy_mm(inputs["assessment_points"]["true_error_mm"])
+    true_mm = float(np.max(inputs["assessment_points"]["true_error_mm"]))
     rows = ordered(pd.DataFrame(dict(inputs["study_chunk"])))
     default = default_reading(rows, settings["study"])
     return {

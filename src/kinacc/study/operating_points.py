@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -14,26 +13,11 @@ from kinacc.kinematics import inverse, region
 from kinacc.kinematics.inverse import Status, limits
 from kinacc.kinematics.region import Cylinder
 from kinacc.kinematics.robot import Robot
-from kinacc.study.accuracy_map import Models, PosesWanted, errors_at, joints_of
+from kinacc.study.accuracy_map import Models, PosesWanted, joints_of
 from kinacc.tables.columns import Columns
 
 _ALL = (None, "both")  # wrists: what is said where none is chosen
 _DRAWS_PER_POINT = 500  # draws spent per wanted point before the space is called out of reach
-
-
-class OperatingPoints(NamedTuple):
-    """Points in visiting order: DH joint angles (n, k), travel directions (n, k), errors (n, 3)."""
-
-    q_rad: np.ndarray
-    travel: np.ndarray
-    error_mm: np.ndarray
-
-
-def with_errors(models: Models, q_rad: np.ndarray) -> OperatingPoints:
-    """The points at joints (n, k), their error of the tool (``errors_at``) in the robot base."""
-    travel = np.zeros(q_rad.shape[1]) if models.travel is None else models.travel
-    directions = np.broadcast_to(np.asarray(travel, dtype=np.int8), q_rad.shape)
-    return OperatingPoints(q_rad, directions, errors_at(models, q_rad)[:, :3])
 
 
 def in_space(
@@ -75,7 +59,7 @@ def _drawn(
 ) -> np.ndarray:
     """The first ``count`` of the joints that ``solve`` finds, with their status, for draws."""
     blocks, counts, block = [], np.zeros(len(Status), dtype=int), max(count, 256)
-    for first in range(1, _DRAWS_PER_POINT * block, block):
+    for first in range(1, _DRAWS_PER_POINT * count + 1, block):
         q_rad, status = solve(region.points(sequence, block, dimensions, first))
         counts += np.bincount(status, minlength=len(Status))
         blocks.append(q_rad[status == Status.FOUND])
