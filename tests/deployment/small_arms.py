@@ -55,13 +55,13 @@ def measured_at(
 
 
 @cache
-def results(name: str, count: int = 80, seed: int = 3) -> dict:
+def results(name: str, count: int, seed: int, with_vec: bool) -> dict:
     """Tables of a results folder, as far as a calibration needs them."""
-    return results_of(name, measured(name, count, seed=seed))
+    return results_of(name, measured(name, count, seed=seed), with_vec)
 
 
-def results_of(name: str, seen: Observations) -> dict:
-    """The tables of what was seen of an arm."""
+def results_of(name: str, seen: Observations, with_vec: bool = False) -> dict:
+    """The tables of what was seen of an arm; without a fit the VEC model has no errors."""
     arm = robot.load(name)
     nominal = fitting.fit_frames(seen, arm.dh, rotation_weight_mm_per_rad=WEIGHT)
     dh_found = fitting.fit(
@@ -72,30 +72,38 @@ def results_of(name: str, seen: Observations) -> dict:
         threshold=1e-3,
     )
     low, high = seen.q_rad.min(axis=0) - 0.02, seen.q_rad.max(axis=0) + 0.02
-    vec_found = vec_fit.fit(
-        seen,
-        vec.without_errors(arm.dh, low, high, 2),
-        prior=Prior(1.0, 1e-3, 0.7, 1e-3),
-        rotation_weight_mm_per_rad=WEIGHT,
-        frames=nominal,
-        frames_free=True,
-    )
-    of = {"vec": vec_found.frames, "dh": dh_found.frames, "nominal": nominal}
+    plain = vec.without_errors(arm.dh, low, high, 2)
+    of = {"vec": nominal, "dh": dh_found.frames, "nominal": nominal}
+    models = {"dh": dh_found.model, "vec": plain}
+    tables_of_vec = {"vec_model": plain.to_columns(np.full_like(plain.start, np.nan))}
+    if with_vec:
+        vec_found = vec_fit.fit(
+            seen,
+            plain,
+            prior=Prior(1.0, 1e-3, 0.7, 1e-3),
+            rotation_weight_mm_per_rad=WEIGHT,
+            frames=nominal,
+            frames_free=True,
+        )
+        of["vec"], models["vec"] = vec_found.frames, vec_found.model
+        tables_of_vec = {
+            "vec_model": vec_found.model.to_columns(vec_found.std),
+            "vec_covariance": tables.covariance_columns(uncertainty.of_fit(vec_found)),
+        }
     known = uncertainty.of_fit(dh_found)
     return {
-        "vec_model": vec_found.model.to_columns(vec_found.std),
+        **tables_of_vec,
         "dh_model": dh_found.model.to_columns(dh_found.std.ravel()),
         "frames": tables.frames_columns(of, ("tool",)),
         "dh_fit": tables.fit_columns("dh_fit", dh_found, known),
         "dh_covariance": tables.covariance_columns(known),
-        "vec_covariance": tables.covariance_columns(uncertainty.of_fit(vec_found)),
-        "residuals": _residuals(seen, of, dh=dh_found.model, vec=vec_found.model),
+        "residuals": _residuals(seen, of, **models),
     }
 
 
 def calibrated(name: str, model: str = "dh", count: int = 80, seed: int = 3):
     """The calibration of a simulated arm by one model."""
-    return calibration(results(name, count, seed), robot.load(name), model, name)
+    return calibration(results(name, count, seed, model == "vec"), robot.load(name), model, name)
 
 
 def _residuals(seen: Observations, of: dict[str, Frames], **models) -> dict:
