@@ -65,7 +65,7 @@ def test_predictions_are_as_far_off_as_they_say():
     q_rad = joints("mh180", 12, seed=21)
     wanted = compose(BASE, compose(dh.forward(truth("mh180"), q_rad), TOOL)).position_mm
     scores = []
-    for seed in range(100, 140):
+    for seed in (*range(200, 220), *range(300, 320)):  # as those that are compared: fitted once
         found = predict(calibrated("mh180", "dh", 60, seed), q_rad, None, "instrument")
         scores.append((found.pose.position_mm - wanted) / found.std[:, :3])
     assert np.mean(np.square(scores)) == pytest.approx(1.0, abs=0.25)
