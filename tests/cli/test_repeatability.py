@@ -72,7 +72,7 @@ def test_instrument_visits_and_sides_are_separated_as_by_the_analysis_of_varianc
 
 def test_a_campaign_of_readings_like_these_has_the_noise_told_of_them(tmp_path):
     """Over many files, unbalanced as people measure: unbiased, with limits that hold in 95 %."""
-    from kinacc.checks.repeatability import Repeated, limits, noise_of, parts
+    from kinacc.checks.repeatability import AXES, limits, noise_of, parts
 
     rng = np.random.default_rng(2)
     truth, held, sizes = 0.02**2 + 0.05**2 + 0.03**2, 0, []
@@ -82,7 +82,8 @@ def test_a_campaign_of_readings_like_these_has_the_noise_told_of_them(tmp_path):
         shift = rng.normal(size=(30, 3)) * 0.03
         off = rng.normal(size=(visit[-1] + 1, 3)) * 0.05
         at = shift[side] + off[visit] + rng.normal(size=(120, 3)) * 0.02
-        found = noise_of(parts(Repeated(at, side // 2, side, visit)), np.zeros(3))
+        read = pd.DataFrame({"pose": side // 2, "side": side, "visit": visit})
+        found = noise_of(parts(read.join(pd.DataFrame(at, columns=AXES))), np.zeros(3))
         size = np.trace(found.covariance_mm2) / 3.0
         sizes.append(size)
         low, high = limits(np.sqrt([size]), found.freedom)

@@ -150,7 +150,6 @@ def check(
         dataset,
         path,
         facts,
-        coverage.remarks_of(every, scatter, distances),
         tuple(
             replace(item.held_to(gross), row_names=reading.row_names)
             for item in _once(findings, facts["rows"])

@@ -59,6 +59,9 @@ def facts_of(
             }
             for item in distances
         ]
+        if noise.freedom:
+            between_mm = float(np.median([item.std_mm for item in distances])) / np.sqrt(2.0)
+            facts["noise"]["between_targets_mm"] = between_mm
     if fitted is not None:
         facts["quick_fit"] = {
             "left_per_axis_mm": fitted.trial.sigma_mm,
@@ -88,22 +91,6 @@ def _covered(q: np.ndarray, robot: Robot, joint: int) -> dict[str, object]:
         "unit": "mm" if slides else "deg",
         "share": (high - low) / (most - least),
     }
-
-
-def remarks_of(every: Readings, noise: Noise, distances: list[Distance]) -> tuple[str, ...]:
-    """What else to know about the file, in words."""
-    remarks = []
-    if len(every.target_names) > 1:
-        remarks.append("targets of one pose share the arm's error and are no independent samples")
-    if noise.freedom and distances:
-        between = float(np.median([item.std_mm for item in distances])) / np.sqrt(2.0)
-        if between < 0.5 * noise.per_axis_mm:
-            remarks.append(
-                f"repeats scatter by {noise.per_axis_mm:.3g} mm per axis, targets against each "
-                f"other by only {between:.3g} mm: the scatter is the arm's or the set-up's, not "
-                "the instrument's"
-            )
-    return tuple(remarks)
 
 
 def thin(coverage: list[dict[str, Any]]) -> list[Finding]:

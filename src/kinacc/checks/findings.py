@@ -100,8 +100,6 @@ class Report:
     ----------
     facts
         What is in the file, by name; units stand in the names.
-    remarks
-        Sentences on what the file holds.
     suspicions, notes
         Findings; notes are on what is not used and where the data are thin.
     line, left_mm
@@ -114,7 +112,6 @@ class Report:
     dataset: str
     path: str
     facts: Mapping[str, Any]
-    remarks: tuple[str, ...]
     suspicions: tuple[Finding, ...]
     notes: tuple[Finding, ...] = ()
     line: np.ndarray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
@@ -139,7 +136,7 @@ class Report:
             "path": self.path,
             "verdict": VERDICTS[self.code],
             "facts": self.facts,
-            "remarks": [*self.remarks, *(item.what for item in self.notes)],
+            "remarks": [item.what for item in self.notes],
             "suspicions": [
                 {
                     **{key: vars(item)[key] for key in keys},

@@ -70,7 +70,7 @@ class Meaning:
         """The meaning of a few readings under changes that are ``made`` one after the other."""
         read = changed(few, made)
         positions = replace(read, rotation=np.full_like(read.rotation, np.nan))
-        begin = robust_fit.start(positions, robot.dh, draws=0, stretches=())
+        begin = robust_fit.start(positions, robot.dh, stretches=())
         left = robust_fit.residuals(begin, positions)
         length = np.linalg.norm(left.position_mm, axis=1)
         misfit = float(np.quantile(length, _MAJORITY)) / max(spread_mm(read.position_mm), 1e-12)
@@ -273,15 +273,14 @@ def _rounds(here: Meaning, robot: Robot, tried: dict[bytes, Meaning]) -> Iterato
     signs = changes.joint_signs(robot)
     several = chain.from_iterable(combinations(signs, n) for n in range(2, len(signs) + 1))
     yield [(*root, *some) for some in several for root in roots]
-    for _ in range(2):
-        front: list[Meaning] = []
-        for item in sorted(tried.values(), key=lambda item: item.misfit):
-            mirrored = any(change.finding.kind == "left_handed" for change in item.changes)
-            # Meanings that cannot be told apart count once.
-            apart = all(item.misfit > 1.02 * second.misfit for second in front)
-            if apart and not mirrored and len(front) < _FRONT:
-                front.append(item)
-        yield [(*item.changes, change) for item in front for change in single]
+    front: list[Meaning] = []
+    for item in sorted(tried.values(), key=lambda item: item.misfit):
+        mirrored = any(change.finding.kind == "left_handed" for change in item.changes)
+        # Meanings that cannot be told apart count once.
+        apart = all(item.misfit > 1.02 * second.misfit for second in front)
+        if apart and not mirrored and len(front) < _FRONT:
+            front.append(item)
+    yield [(*item.changes, change) for item in front for change in single]
 
 
 def _units(here: Meaning, robot: Robot) -> Iterator[Changes]:

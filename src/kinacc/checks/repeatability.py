@@ -17,27 +17,15 @@ from numpy import ndarray
 from scipy.spatial.distance import pdist
 from scipy.special import chdtrc, gammaincinv
 
-from kinacc.calibration.noise import means, scatter
-
+AXES = ["x_mm", "y_mm", "z_mm"]
+# A side is of one pose, and a visit is of one side.
+POSE, SIDE, VISIT = ["pose"], ["pose", "side"], ["pose", "side", "visit"]
 # Levels at which axes, and poses, are taken to differ. Axes that are wrongly averaged make bounds
 # too small along one: at this level 5 % become 6.0 at worst of 40 degrees of freedom, 6.5 of 20.
 EQUAL, UNEQUAL = 0.2, 0.01
 _FAR = 6.0  # medians from the middle of a pose's readings
 _FEWEST_VISITS = 3  # whose distances from their middle can differ
 _FEWEST = 5  # degrees of freedom that a covariance is told from an equal one by
-
-
-@dataclass(frozen=True)
-class Repeated:
-    """The n readings: ``position_mm`` (n, 3), and numbers (n,) from 0 of pose, side and visit.
-
-    A side is of one pose, and a visit is of one side: no number is that of two.
-    """
-
-    position_mm: ndarray
-    pose: ndarray
-    side: ndarray
-    visit: ndarray
 
 
 @dataclass(frozen=True)
@@ -75,13 +63,13 @@ class Noise:
         return np.sqrt(np.diag(self.covariance_mm2))
 
 
-def parts(read: Repeated) -> Parts:
+def parts(read: pd.DataFrame) -> Parts:
     """Covariances of instrument, visits and sides, and of a reading from any side.
 
     Parameters
     ----------
     read
-        Readings with their poses, sides and visits.
+        Readings: labels ``pose``, ``side`` and ``visit``, and ``AXES`` in mm.
 
     Returns
     -------
@@ -89,28 +77,24 @@ def parts(read: Repeated) -> Parts:
         By the analysis of variance of unweighted means; degrees of freedom by Welch and
         Satterthwaite.
     """
-    visit_mm, readings, side_of = _visits(read)
-    side_mm, visits = means(visit_mm, side_of)
-    pose_of = _larger(read.side, read.pose)
-    (within, observed), (between, returned), (across, sides) = levels = [
-        scatter(read.position_mm, read.visit),
-        scatter(visit_mm, side_of),
-        scatter(side_mm, pose_of),
-    ]
+    within, observed = _scatter(read, VISIT)
+    visits = read.groupby(VISIT, sort=False)[AXES].mean()
+    between, returned = _scatter(visits, SIDE)
+    across, sides = _scatter(visits.groupby(SIDE, sort=False).mean(), POSE)
     # What part of the variance of a level below is in the mean square of each level.
-    of_visit = _share(1.0 / readings, side_of, returned)
-    of_side = _share(1.0 / visits, pose_of, sides)
-    deeper = means(1.0 / readings[:, None], side_of)[0][:, 0] / visits
-    of_side_below = _share(deeper, pose_of, sides)
+    per_visit = 1.0 / read.groupby(VISIT, sort=False).size()
+    per_side = 1.0 / per_visit.groupby(SIDE, sort=False).size()
+    of_side_below = _share(per_visit.groupby(SIDE, sort=False).mean() * per_side, POSE, sides)
+    of_visit, of_side = _share(per_visit, SIDE, returned), _share(per_side, POSE, sides)
     unknown = np.full((3, 3), np.nan)
     instrument = within if observed else unknown
     if not returned:
         return Parts(instrument, unknown, unknown, unknown, 0.0)
     arm = _no_less_than_zero(between - of_visit * within)
     side = _no_less_than_zero(across - of_side * arm - of_side_below * within)
-    shares = (1.0 - of_visit + of_side * of_visit - of_side_below, 1.0 - of_side, 1.0)
-    terms = np.array([c * np.trace(square) for c, (square, _) in zip(shares, levels, strict=True)])
-    degrees = np.array([freedom for _, freedom in levels])
+    shares = np.array([1.0 - of_visit + of_side * of_visit - of_side_below, 1.0 - of_side, 1.0])
+    terms = shares * [np.trace(square) for square in (within, between, across)]
+    degrees = np.array([observed, returned, sides])
     terms, degrees = terms[degrees > 0], degrees[degrees > 0]
     spread = np.sum(terms**2 / degrees)
     freedom = terms.sum() ** 2 / spread if spread > 0.0 else returned
@@ -159,64 +143,59 @@ def differ_by_axis(covariance_mm2: ndarray, freedom: float) -> float:
     return float(chdtrc(5, -(freedom - 23.0 / 18.0) * shape))
 
 
-def differ_by_pose(read: Repeated, resolution_mm: ndarray) -> tuple[float, ndarray]:
-    """Probability that poses scatter so differently by chance (Bartlett), and their scatter (p,).
+def differ_by_pose(read: pd.DataFrame, resolution_mm: ndarray) -> tuple[float, pd.Series]:
+    """Probability that poses scatter so differently by chance (Bartlett), and their scatter.
 
     Of the visits of every pose from one side, over that of all poses; NaN where a pose tells
     nothing. Where there is none, of the readings of one visit. Less than the rounding of
     ``resolution_mm`` (3,) counts as that.
     """
-    values, _, group = _visits(read)
-    pose_of = _larger(read.side, read.pose)
-    if not scatter(values, group)[1]:
-        values, group, pose_of = read.position_mm, read.visit, _larger(read.visit, read.pose)
-    square_mm2, pooled = scatter(values, group)
+    values, keys = read.groupby(VISIT, sort=False)[AXES].mean(), SIDE
+    if not _scatter(values, keys)[1]:
+        values, keys = read.set_index(VISIT)[AXES], VISIT
+    square_mm2, pooled = _scatter(values, keys)
+    poses = values.groupby(POSE, sort=False)
+    unknown = poses.size() * math.nan
     if not pooled:
-        return math.nan, np.full(read.pose.max() + 1, np.nan)
+        return math.nan, unknown
     rounding = np.diag(resolution_mm**2 / 12.0)
     root = np.linalg.cholesky(square_mm2 + rounding + 1e-24 * np.eye(3))
-    mean, count = means(values, group)
-    white = np.linalg.solve(root, (values - mean[group]).T).T
-    square = np.bincount(pose_of[group], np.sum(white**2, axis=1))
-    freedom = 3.0 * np.bincount(pose_of, count - 1)
-    known = freedom > 0
+    groups = values.groupby(keys, sort=False)
+    white = np.linalg.solve(root, (values - groups.transform("mean")).T).T
+    square = pd.Series(np.sum(white**2, axis=1), values.index).groupby(POSE, sort=False).sum()
+    freedom = 3.0 * (groups.size() - 1).groupby(POSE, sort=False).sum()
     least = np.trace(np.linalg.solve(root, np.linalg.solve(root, rounding).T)) / 3.0
-    variance = np.full(len(freedom), np.nan)
-    variance[known] = np.maximum(square[known] / freedom[known], max(least, 1e-12))
-    nu, s2 = freedom[known], variance[known]
+    s2 = (square / freedom.where(freedom > 0)).clip(lower=max(least, 1e-12)).dropna()
+    nu = freedom[s2.index]
+    middle = np.average(s2, weights=nu) if len(nu) > 1 else 1.0
+    ratio = unknown.fillna(s2 / middle) ** 0.5
     if len(nu) < 2:
-        return math.nan, np.sqrt(variance)
-    middle = np.average(s2, weights=nu)
+        return math.nan, ratio
     statistic = nu.sum() * math.log(middle) - float(np.sum(nu * np.log(s2)))
     correction = 1.0 + (np.sum(1.0 / nu) - 1.0 / nu.sum()) / (3.0 * (len(nu) - 1))
-    return float(chdtrc(len(nu) - 1, statistic / correction)), np.sqrt(variance / middle)
+    return float(chdtrc(len(nu) - 1, statistic / correction)), ratio
 
 
-def by_side(read: Repeated) -> pd.DataFrame:
-    """Every pose from every side: ``visits``, ``readings``, and ISO 9283's repeatability of visits.
+def by_side(read: pd.DataFrame) -> pd.DataFrame:
+    """Every pose from every side: ``visits``, ``readings``, repeatability by ISO 9283's formula.
 
     ``mean_distance_mm`` of the visits from their middle, pose repeatability ``rp_mm`` (that mean
     and three standard deviations of the distances) and ``std_x_mm`` and so on. NaN for a single
     visit, RP also for two, which are equally far from their middle.
     """
-    visit_mm, readings, side_of = _visits(read)
-    axes = ["std_x_mm", "std_y_mm", "std_z_mm"]
-    visits = pd.DataFrame(visit_mm, columns=axes)
-    middle = visits.groupby(side_of).transform("mean")
-    visits["distance"] = np.linalg.norm(visits - middle, axis=1)
-    group = visits.groupby(side_of)
-    count, mean, std = group.size(), group["distance"].mean(), group["distance"].std()
+    visits = read.groupby(VISIT, sort=False)[AXES].mean()
+    groups = visits.groupby(SIDE, sort=False)
+    apart = pd.Series(np.linalg.norm(visits - groups.transform("mean"), axis=1), visits.index)
+    distance, count = apart.groupby(SIDE, sort=False), groups.size()
     table = pd.DataFrame(
         {
-            "pose": _larger(read.side, read.pose),
-            "side": count.index,
             "visits": count,
-            "readings": np.bincount(side_of, readings).astype(int),
-            "mean_distance_mm": mean.where(count > 1),
-            "rp_mm": (mean + 3.0 * std).where(count >= _FEWEST_VISITS),
+            "readings": read.groupby(SIDE, sort=False).size(),
+            "mean_distance_mm": distance.mean().where(count > 1),
+            "rp_mm": (distance.mean() + 3.0 * distance.std()).where(count >= _FEWEST_VISITS),
         }
     )
-    return table.join(group[axes].std())
+    return table.join(groups.std().add_prefix("std_")).reset_index()
 
 
 def pooled_rp(sides: pd.DataFrame) -> tuple[float, float]:
@@ -234,22 +213,21 @@ def pooled_rp(sides: pd.DataFrame) -> tuple[float, float]:
     return float(mean), float(mean + 3.0 * pooled)
 
 
-def between_sides_mm(read: Repeated) -> float:
+def between_sides_mm(read: pd.DataFrame) -> float:
     """ISO 9283's vAP: largest distance of a pose's middle from one side to that from another."""
-    visit_mm, _, side_of = _visits(read)
-    sides = pd.DataFrame(means(visit_mm, side_of)[0]).groupby(_larger(read.side, read.pose))
-    apart = [pdist(side_mm).max() for _, side_mm in sides if len(side_mm) > 1]
-    return float(max(apart, default=math.nan))
+    visits = read.groupby(VISIT, sort=False)[AXES].mean()
+    poses = visits.groupby(SIDE, sort=False).mean().groupby(POSE, sort=False)
+    return float(max((pdist(s).max() for _, s in poses if len(s) > 1), default=math.nan))
 
 
-def far_off(read: Repeated) -> ndarray:
+def far_off(read: pd.DataFrame) -> ndarray:
     """Readings, by index, that lie much farther from the others of their pose than most do.
 
     More than six times the median distance from the median position of the pose from that side.
     """
-    by_side = pd.DataFrame(read.position_mm).groupby(read.side)
-    length = np.linalg.norm(read.position_mm - by_side.transform("median"), axis=1)
-    several = np.bincount(read.side)[read.side] > 2
+    sides = read.groupby(SIDE)[AXES]
+    length = np.linalg.norm(read[AXES] - sides.transform("median"), axis=1)
+    several = sides.transform("size").to_numpy() > 2
     if not several.any():
         return np.zeros(0, dtype=int)
     limit = _FAR * max(float(np.median(length[several])), 1e-12)
@@ -275,19 +253,18 @@ def limits(std_mm: ndarray, freedom: float) -> tuple[ndarray, ndarray]:
     return std_mm * low, std_mm * high
 
 
-def _visits(read: Repeated) -> tuple[ndarray, ndarray, ndarray]:
-    """Mean (v, 3) of every visit, its number of readings (v,) and its side (v,)."""
-    return *means(read.position_mm, read.visit), _larger(read.visit, read.side)
+def _scatter(values: pd.DataFrame, keys: list[str]) -> tuple[ndarray, int]:
+    """Mean square (3, 3) of positions about the means of their groups; degrees of freedom."""
+    groups = values.groupby(keys, sort=False)[AXES]
+    centred = (values[AXES] - groups.transform("mean")).to_numpy()
+    freedom = len(values) - groups.ngroups
+    return centred.T @ centred / max(freedom, 1), freedom
 
 
-def _larger(group: ndarray, larger: ndarray) -> ndarray:
-    """The pose or side (g,), of ``larger`` (n,), that every group (n,) of readings is of."""
-    return larger[np.unique(group, return_index=True)[1]]
-
-
-def _share(part: ndarray, group: ndarray, freedom: int) -> float:
-    """Mean of what each member (n,) of a group brings to the mean square of its level."""
-    return float(np.sum(part * (1.0 - 1.0 / np.bincount(group)[group])) / max(freedom, 1))
+def _share(part: pd.Series, keys: list[str], freedom: int) -> float:
+    """Mean of what each member of a group brings to the mean square of its level."""
+    size = part.groupby(keys, sort=False).transform("size")
+    return float((part * (1.0 - 1.0 / size)).sum()) / max(freedom, 1)
 
 
 def _no_less_than_zero(covariance: ndarray) -> ndarray:

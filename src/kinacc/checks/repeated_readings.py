@@ -10,7 +10,7 @@ import pandas as pd
 
 from kinacc.checks import digits
 from kinacc.checks import repeatability as checks
-from kinacc.checks.repeatability import Noise, Repeated
+from kinacc.checks.repeatability import Noise
 from kinacc.errors import InputError, Problem, first_few, refuse
 from kinacc.measurements.layout import POSITION, find, listed
 from kinacc.measurements.reader import stacked
@@ -33,10 +33,8 @@ class RepeatedFile:
     ----------
     table
         The file.
-    position_mm
-        Positions (n, 3).
     rows
-        ``pose``, ``side``, ``visit`` and ``hours`` of each reading.
+        ``pose``, ``side``, ``visit``, ``hours`` and ``x_mm``, ``y_mm``, ``z_mm`` of each reading.
     resolution_mm
         Steps (3,) of the values.
     notes
@@ -44,7 +42,6 @@ class RepeatedFile:
     """
 
     table: RawTable
-    position_mm: np.ndarray
     rows: pd.DataFrame
     resolution_mm: np.ndarray
     notes: tuple[str, ...]
@@ -165,7 +162,8 @@ def read_repeats(path: str, rows_are: str | None) -> RepeatedFile:
     unused = ", ".join(name for name in table.columns if name not in used)
     notes = (*notes, f"not used: {unused}") if unused else notes
     steps = [digits.step(table.columns[a.column], a.factor, table.decimal) for a in axes]
-    return RepeatedFile(table, position, rows, np.array(steps), notes)
+    rows[checks.AXES] = position
+    return RepeatedFile(table, rows, np.array(steps), notes)
 
 
 def _hours(table: RawTable, name: str, problems: list[Problem]) -> np.ndarray:
@@ -200,11 +198,7 @@ def estimate(file: RepeatedFile) -> Repeatability:
         Where readings of a pose are equal to the last digit.
     """
     table, rows = file.table, file.rows
-    keys = ["pose", "side", "visit"]
-    groups = [rows.groupby(keys[:n], sort=False).ngroup().to_numpy() for n in (1, 2, 3)]
-    read = Repeated(file.position_mm, *groups)
-    poses = rows["pose"].unique()
-    parts = checks.parts(read)
+    parts = checks.parts(rows)
     noise = checks.noise_of(parts, file.resolution_mm)
     std, low, high = [np.full(3, np.nan)] * 3
     if noise is not None:
@@ -212,23 +206,21 @@ def estimate(file: RepeatedFile) -> Repeatability:
         low, high = checks.limits(std, noise.freedom)
         if not (std > _LEAST_MM).all():
             raise InputError(Problem(table.path, "readings of a pose are equal to the last digit"))
-    by_pose, ratio = checks.differ_by_pose(read, file.resolution_mm)
-    result = checks.by_side(read)
+    by_pose, ratio = checks.differ_by_pose(rows, file.resolution_mm)
+    result = checks.by_side(rows)
     mean_mm, rp_mm = checks.pooled_rp(result)
     differ = None
     if by_pose < checks.UNEQUAL:
-        worst = int(np.nanargmax(ratio))
-        differ = f"Poses scatter differently (p = {by_pose:.2g}): pose {poses[worst]} "
-        differ += f"{ratio[worst]:.2f} times as much as all."
+        differ = f"Poses scatter differently (p = {by_pose:.2g}): pose {ratio.idxmax()} "
+        differ += f"{ratio.max():.2f} times as much as all."
     spans = rows.groupby("pose")["hours"].agg(["size", np.ptp])
-    result["pose"] = poses[result["pose"]]
-    result["side"] = rows.drop_duplicates(keys[:2])["side"].replace("", None).to_numpy()
-    far = checks.far_off(read)
+    result["side"] = result["side"].replace("", None)
+    far = checks.far_off(rows)
     return Repeatability(
         format=FORMAT,
         file=table.path,
-        poses=len(poses),
-        visits=int(read.visit.max()) + 1,
+        poses=rows["pose"].nunique(),
+        visits=int(result["visits"].sum()),
         readings=len(rows),
         noise=noise,
         std_mm=std,
@@ -239,7 +231,7 @@ def estimate(file: RepeatedFile) -> Repeatability:
         all_sides_std_mm=np.sqrt(np.diag(parts.visits + parts.sides)),
         mean_distance_mm=mean_mm,
         rp_mm=rp_mm,
-        between_sides_mm=checks.between_sides_mm(read),
+        between_sides_mm=checks.between_sides_mm(rows),
         poses_equal_probability=by_pose,
         poses_differ=differ,
         resolution_mm=file.resolution_mm,

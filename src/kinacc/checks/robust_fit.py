@@ -9,7 +9,6 @@ reading with its configuration left out; the fits of the calibration do neither.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -43,9 +42,8 @@ _FITTED_ROWS = 900
 _IS_ANGLE = np.array([True, False, False, True, True])  # of dh.PARAMETERS
 _PARTS = slice(0, 3), slice(3, 6)  # positions, turns
 
-_DRAWS = 24  # with a third of the readings wrong, 8 of 24 draws of two are free of them, or more
-_DRAWN = 12  # configurations per draw
-_STRETCHES = (2, 3, 5)
+_STRETCHES = (2, 3, 5)  # parts that the file is cut into, of which one may be of one base
+_FEWEST = 12  # configurations to start from
 _TRUSTED = 0.5  # share of the readings a refinement of the start trusts
 _JUDGED = 0.4  # share of the readings that must fit: the rest may be of another base
 _REFINEMENTS = 4
@@ -322,19 +320,19 @@ def _weight(vectors: ndarray, sigma: float, huber: bool) -> ndarray:
     return ((1.0 - share**2) ** 2)[:, None]
 
 
-def start(
-    observed: Readings, model: DHModel, draws: int = _DRAWS, stretches: tuple[int, ...] = _STRETCHES
-) -> Arm:
+def start(observed: Readings, model: DHModel, stretches: tuple[int, ...] = _STRETCHES) -> Arm:
     """Bases and targets to start from, though part of the readings may be wrong.
 
-    Of closed forms on all readings of the largest session, on stretches of it and on random draws,
-    the one that fits the better two fifths best.
+    Of closed forms on all readings of the largest session and on stretches of it, each refined on
+    the better half, the one that fits the better two fifths best.
     """
     largest = np.argmax(np.bincount(observed.session))
     part = observed.select(thinned(np.flatnonzero(observed.session == largest), _START_ROWS))
-    flange = dh.forward(model, part.q_rad)
+    flange, every = dh.forward(model, part.q_rad), np.arange(len(part))
+    pieces = [piece for count in stretches for piece in np.array_split(every, count)]
+    long = [piece for piece in pieces if len(np.unique(part.pose[piece])) >= _FEWEST]
     better: list[tuple[float, Arm]] = []
-    for rows in _draws(part, draws, stretches):
+    for rows in (every, *long):
         for _ in range(_REFINEMENTS):
             trial = Arm(model, closed_form_start(part.select(rows), flange.select(rows)))
             misfit = np.linalg.norm(residuals(trial, part, flange).position_mm, axis=1)
@@ -342,7 +340,7 @@ def start(
             if better and middle >= better[-1][0]:
                 break
             better.append((middle, trial))
-            rows = np.argsort(misfit)[: max(int(_TRUSTED * len(misfit)), _DRAWN)]
+            rows = np.argsort(misfit)[: max(int(_TRUSTED * len(misfit)), _FEWEST)]
     arm = better[-1][1]
     frames = arm.frames
     if len(observed.target_names) > 1:
@@ -356,17 +354,6 @@ def start(
             misfit = np.linalg.norm(residuals(arm, part, flange).position_mm, axis=1)
             rows = np.argsort(misfit)[: max(int(_TRUSTED * len(part)), min(len(part), 4))]
     return arm
-
-
-def _draws(part: Readings, draws: int, stretches: tuple[int, ...]) -> Iterator[ndarray]:
-    """All readings, stretches of the file, and random configurations."""
-    every, poses = np.arange(len(part)), np.unique(part.pose)
-    yield every
-    pieces = (piece for parts in stretches for piece in np.array_split(every, parts))
-    yield from (piece for piece in pieces if len(np.unique(part.pose[piece])) >= _DRAWN)
-    rng = np.random.default_rng(0)
-    for _ in range(draws if len(poses) > _DRAWN else 0):
-        yield np.flatnonzero(np.isin(part.pose, rng.choice(poses, _DRAWN, replace=False)))
 
 
 def _place_targets(frames: Frames, part: Readings, flange: Pose) -> None:
