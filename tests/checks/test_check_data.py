@@ -2,16 +2,16 @@
 
 import json
 
+import numpy as np
 import pytest
 from command_line import call
 from good_files import simulated
 
 
 @pytest.fixture
-def configuration(tmp_path):
-    """Writes a measured file of an arm as described, with a change of its columns."""
-    good = simulated("irb120", poses=80, noise_mm=0.0, off=0.0)
-    return lambda **columns: good.but(**columns).write(tmp_path)
+def good():
+    """A measured file of an arm as described."""
+    return simulated("irb120", poses=80, noise_mm=0.0, off=0.0)
 
 
 def report(config, code):
@@ -20,36 +20,31 @@ def report(config, code):
     return json.loads(done.stdout)
 
 
-def slipped(rows=(4, 11)):
-    good = simulated("irb120", poses=80, noise_mm=0.0, off=0.0).columns["x_mm"].to_numpy(copy=True)
-    good[list(rows)] += 30.0
-    return good
-
-
-def test_a_good_file_is_described_and_passes(configuration):
-    done = call("check-data", configuration())
+def test_a_good_file_is_described_and_passes(good, tmp_path):
+    done = call("check-data", good.write(tmp_path))
     assert done.exit_code == 0, done.output
     for words in ("poses: 80", "limits -165 to 165", "nothing suspicious"):
         assert words in done.output
 
 
-def test_suspicions_name_their_lines_and_end_with_1(configuration):
-    config = configuration(x_mm=slipped())
-    assert "lines 6, 13" in call("check-data", config).output
+def test_suspicions_name_their_lines_and_end_with_1_and_are_drawn_once(good, tmp_path):
+    by_mm = np.where(np.isin(np.arange(80), (4, 11)), 30.0, 0.0)
+    config = good.but(x_mm=good.columns["x_mm"] + by_mm).write(tmp_path)
     told = report(config, 1)
     assert told["verdict"] == "suspicions"
     assert told["datasets"][0]["suspicions"][0]["lines"] == [6, 13]
     assert told["datasets"][0]["facts"]["poses"] == 80
-
-
-def test_the_picture_is_drawn_once(configuration, tmp_path):
-    words = ("check-data", configuration(x_mm=slipped()), "--picture", tmp_path / "checked.svg")
-    assert [call(*words, *more).exit_code for more in ((), (), ("--force",))] == [1, 2, 1]
+    words = ("check-data", config, "--picture", tmp_path / "checked.svg")
+    done = call(*words)
+    assert done.exit_code == 1
+    assert "lines 6, 13" in done.output
+    assert call(*words).exit_code == 2
+    assert call(*words, "--force").exit_code == 1
     assert (tmp_path / "checked.svg").read_bytes().startswith(b"<?xml")
 
 
-def test_what_cannot_be_used_ends_with_2(configuration, tmp_path):
-    config = configuration()
+def test_what_cannot_be_used_ends_with_2(good, tmp_path):
+    config = good.write(tmp_path)
     table = (tmp_path / "file.csv").read_text().splitlines(keepends=True)
     (tmp_path / "file.csv").write_text("".join(table[:4]))
     assert report(config, 2)["verdict"] == "unusable"
