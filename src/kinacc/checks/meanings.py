@@ -70,7 +70,7 @@ class Meaning:
         """The meaning of a few readings under changes that are ``made`` one after the other."""
         read = changed(few, made)
         positions = replace(read, rotation=np.full_like(read.rotation, np.nan))
-        begin = robust_fit.start(positions, robot.dh, stretches=())
+        begin = robust_fit.start(positions, robot.dh, is_clean=True)
         left = robust_fit.residuals(begin, positions)
         length = np.linalg.norm(left.position_mm, axis=1)
         misfit = float(np.quantile(length, _MAJORITY)) / max(spread_mm(read.position_mm), 1e-12)

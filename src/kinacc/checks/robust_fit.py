@@ -43,7 +43,7 @@ _IS_ANGLE = np.array([True, False, False, True, True])  # of dh.PARAMETERS
 _PARTS = slice(0, 3), slice(3, 6)  # positions, turns
 
 _STRETCHES = (2, 3, 5)  # parts that the file is cut into, of which one may be of one base
-_FEWEST = 12  # configurations to start from
+_DRAWS, _DRAWN = 24, 12  # random draws, and configurations in each
 _TRUSTED = 0.5  # share of the readings a refinement of the start trusts
 _JUDGED = 0.4  # share of the readings that must fit: the rest may be of another base
 _REFINEMENTS = 4
@@ -320,19 +320,23 @@ def _weight(vectors: ndarray, sigma: float, huber: bool) -> ndarray:
     return ((1.0 - share**2) ** 2)[:, None]
 
 
-def start(observed: Readings, model: DHModel, stretches: tuple[int, ...] = _STRETCHES) -> Arm:
+def start(observed: Readings, model: DHModel, is_clean: bool = False) -> Arm:
     """Bases and targets to start from, though part of the readings may be wrong.
 
-    Of closed forms on all readings of the largest session and on stretches of it, each refined on
-    the better half, the one that fits the better two fifths best.
+    Of closed forms on all readings of the largest session and, unless it ``is_clean``, on stretches
+    of it and on random draws, the one that fits the better two fifths best.
     """
     largest = np.argmax(np.bincount(observed.session))
     part = observed.select(thinned(np.flatnonzero(observed.session == largest), _START_ROWS))
     flange, every = dh.forward(model, part.q_rad), np.arange(len(part))
-    pieces = [piece for count in stretches for piece in np.array_split(every, count)]
-    long = [piece for piece in pieces if len(np.unique(part.pose[piece])) >= _FEWEST]
+    poses, rng, pieces = np.unique(part.pose), np.random.default_rng(0), [every]
+    if not is_clean and len(poses) > _DRAWN:
+        stretches = [piece for count in _STRETCHES for piece in np.array_split(every, count)]
+        pieces += [piece for piece in stretches if len(np.unique(part.pose[piece])) >= _DRAWN]
+        draws = [rng.choice(poses, _DRAWN, replace=False) for _ in range(_DRAWS)]
+        pieces += [np.flatnonzero(np.isin(part.pose, draw)) for draw in draws]
     better: list[tuple[float, Arm]] = []
-    for rows in (every, *long):
+    for rows in pieces:
         for _ in range(_REFINEMENTS):
             trial = Arm(model, closed_form_start(part.select(rows), flange.select(rows)))
             misfit = np.linalg.norm(residuals(trial, part, flange).position_mm, axis=1)
@@ -340,7 +344,7 @@ def start(observed: Readings, model: DHModel, stretches: tuple[int, ...] = _STRE
             if better and middle >= better[-1][0]:
                 break
             better.append((middle, trial))
-            rows = np.argsort(misfit)[: max(int(_TRUSTED * len(misfit)), _FEWEST)]
+            rows = np.argsort(misfit)[: max(int(_TRUSTED * len(misfit)), _DRAWN)]
     arm = better[-1][1]
     frames = arm.frames
     if len(observed.target_names) > 1:
