@@ -24,9 +24,8 @@ def arm():
     return closed_form.recognise(robot.load("mh180").dh)
 
 
-@pytest.mark.parametrize("seed", [1, 3])
-def test_closed_form_finds_all_that_brute_force_finds(arm, seed):
-    rng = np.random.default_rng(seed)
+def test_closed_form_finds_all_that_brute_force_finds(arm):
+    rng = np.random.default_rng(1)
     target = oracle.dh_forward(oracle.MH180, rng.uniform(LOW, HIGH))
     solutions, reached = arm.solve(as_pose(target))
     found = brute.all_solutions(

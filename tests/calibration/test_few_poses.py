@@ -14,7 +14,7 @@ from kinacc.calibration.residuals import errors
 from kinacc.config.schema import defaults
 from kinacc.kinematics import robot
 
-SIZES, SUBSETS = (6, 8, 12, 16, 20, 30), 20
+SIZES, SUBSETS = (6, 8, 12, 20, 30), 12
 
 
 def settings():

@@ -23,6 +23,7 @@ TABLE_II = dh.DHModel(  # of the paper, q5 offset read as -3.141
     [-1.573, 3.140, -1.571, -1.571, -1.571, 3.142],
     np.zeros(6),
 )
+COUNTS = {"nominal": 50, "calibrated": 100, "vec": 60}
 SEARCHED = [
     arms.OFFSET_WRIST,
     arms.GENERAL,
@@ -74,8 +75,7 @@ def test_closed_forms_return_to_the_pose_and_name_branches_by_posture(model):
 @pytest.mark.parametrize("kind", ["nominal", "calibrated", "vec"])
 @pytest.mark.parametrize("arm", [MH180, UR10, IIWA, *SEARCHED], ids=lambda arm: arm.name)
 def test_what_is_found_is_verified_and_own_postures_are_among_it(arm, kind):
-    count = (6 if arm.dh.joints == 7 else 200) // (2 if kind == "vec" else 1)
-    q = arms.joints_within(arm, count)
+    q = arms.joints_within(arm, 3 if arm.dh.joints == 7 else COUNTS[kind])
     made = {"nominal": arm.dh, "calibrated": arms.calibrated(arm), "vec": wavy(arm, q)}
     model = made[kind]
     pose = model.pose(JointState(q))
@@ -83,7 +83,7 @@ def test_what_is_found_is_verified_and_own_postures_are_among_it(arm, kind):
     assert solved.branches == inverse.branches_of(arm)
     assert len(set(solved.branches)) == len(solved.branches)
     arms.assert_verified(model, pose, solved)
-    assert arms.share_missed(arm, q, solved) <= 0.005
+    assert arms.share_missed(arm, q, solved) == 0.0
     inside = solved.status == Status.FOUND
     assert limits.within_limits(arm, solved.q_rad[inside]).all()
     outside = solved.status == Status.OUTSIDE_LIMITS
@@ -94,8 +94,8 @@ def test_what_is_found_is_verified_and_own_postures_are_among_it(arm, kind):
 @pytest.mark.parametrize("where", ["wrist", "elbow"])
 def test_few_branches_are_dropped_near_singular_postures(where):
     model = TABLE_II
-    q = np.random.default_rng(7).uniform(MH180.q_min_rad, MH180.q_max_rad, (2000, 6))
-    aside = np.random.default_rng(8).uniform(-0.02, 0.02, 2000)
+    q = np.random.default_rng(7).uniform(MH180.q_min_rad, MH180.q_max_rad, (1000, 6))
+    aside = np.random.default_rng(8).uniform(-0.02, 0.02, 1000)
     q[:, 4 if where == "wrist" else 2] = aside + (0 if where == "wrist" else np.arctan2(1225, 300))
     pose = dh.forward(model, q)
     solved = inverse.solve(MH180, model, pose)
@@ -106,7 +106,7 @@ def test_few_branches_are_dropped_near_singular_postures(where):
 
 @pytest.mark.parametrize("arm", [UR10, arms.OFFSET_WRIST, arms.GENERAL], ids=lambda arm: arm.name)
 def test_a_dense_multistart_finds_nothing_more(arm):
-    q = arms.joints_within(arm, 6, seed=3)
+    q = arms.joints_within(arm, 4, seed=3)
     pose = dh.forward(arm.dh, q)
     solved = inverse.solve(arm, arm.dh, pose)
     for row in range(len(q)):
