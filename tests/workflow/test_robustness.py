@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import warnings
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ import pytest
 from kinacc.config.schema import defaults
 from kinacc.errors import InputError
 from kinacc.study import in_memory, robustness
-from kinacc.study.claims.evaluate import evaluate
+from kinacc.study.claims.evaluate import evaluate, table_of
 
 
 @pytest.fixture(scope="module")
@@ -60,3 +61,12 @@ def test_parts_make_the_same_table(config, rows, parts):
 def test_more_draws_than_were_accepted_is_refused(config):
     with pytest.raises(InputError, match=r"robustness\.draws"):
         robustness.run({}, {**config, "robustness": {"draws": 5000}})
+
+
+def test_claims_on_other_settings_than_the_papers_say_so():
+    settings = {"robot": "mh180", **defaults()}
+    with warnings.catch_warnings(action="error"):
+        table_of({}, settings)
+    settings["study"]["alpha"] = 0.5
+    with pytest.warns(UserWarning, match="other settings: study.alpha 0.5 here"):
+        table_of({}, settings)
