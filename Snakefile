@@ -17,12 +17,11 @@ from pathlib import Path
 
 from snakemake.exceptions import WorkflowError
 
-from kinacc.campaign.folder import of_results as campaigns_of
+from kinacc.campaign.beside_results import of_results as campaigns_of
 from kinacc.errors import InputError
 from kinacc.workflow import running
 from kinacc.workflow.code import code_digest
-from kinacc.workflow.data_sets import RESULTS, campaign_files, digests, read_data_sets
-from kinacc.workflow.outdated import CALIBRATION
+from kinacc.workflow.data_sets import CALIBRATION, RESULTS, campaign_files, digests, read_data_sets
 from kinacc.workflow.start import job_environment
 
 HERE = str(workflow.current_basedir)

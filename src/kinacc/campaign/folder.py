@@ -14,7 +14,7 @@ import hashlib
 import json
 import os
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import cached_property
@@ -25,13 +25,14 @@ from typing import Any
 from kinacc import __version__
 from kinacc.assess.adaptive import Campaign
 from kinacc.campaign import plan as plans
+from kinacc.campaign.beside_results import JOURNAL, PLAN
 from kinacc.campaign.plan import Plan
 from kinacc.campaign.state import Entry, State, Taken, restore
 from kinacc.config import json_files
 from kinacc.errors import InputError, MachineError, Problem, refuse, refused
 from kinacc.tables.atomic import synchronise, taken, write_whole
 
-PLAN, JOURNAL, LOCK = "campaign.json", "readings.jsonl", "lock"
+LOCK = "lock"
 _PATIENCE_S = 5.0
 _DIGITS = 16  # of a checksum and of a digest
 
@@ -286,22 +287,3 @@ def verify(opened: Opened, sha256: str | None = None, readings: int | None = Non
         problems = ("not the journal of that report: it was shortened or rewritten",)
     count = len(journal.entries)
     return Verification(opened.digest, count, counts[-1], journal.sha256(), problems)
-
-
-def of_results(results: Path) -> list[Path]:
-    """Folders of campaigns on the calibration in a results folder, by the name they have of it.
-
-    They are searched beside it, beside all results, and in the working folder; each is named as a
-    person there would.
-    """
-    within, name = results.absolute().parent, results.resolve().name
-    near = {within.resolve(): results.parent, within.parent.resolve(): results.parent / ".."}
-    campaigns = []
-    for place in (near | {Path.cwd(): Path()}).values():
-        for path in sorted(place.glob(f"*/{PLAN}")):
-            # What cannot be read is no campaign, or one that cannot state whose it is.
-            with suppress(InputError, OSError, ValueError, LookupError, TypeError, RecursionError):
-                content = json_files.values_of(json_files.bytes_of(path), str(path))
-                if content["about"]["calibration"] == name:
-                    campaigns.append(path.parent)
-    return campaigns

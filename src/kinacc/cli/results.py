@@ -14,7 +14,7 @@ import pandas as pd
 import pyarrow as pa
 
 from kinacc import __version__
-from kinacc.campaign.folder import of_results
+from kinacc.campaign.beside_results import of_results
 from kinacc.checks.contradictions import load
 from kinacc.cli.choice import CONFIG, CONFIGS, REASON, option, positive, print_outdated
 from kinacc.cli.output import Output, answers, plain

@@ -179,7 +179,7 @@ def _of_errors(tables: RunTables, gate: Mapping[str, Any], unit: str) -> Figure:
 
 def _of_bound(tables: RunTables, unit: str, word: str) -> Figure:
     from kinacc.campaign import of_calibration
-    from kinacc.campaign.folder import of_results
+    from kinacc.campaign.beside_results import of_results
     from kinacc.deployment import folder
 
     known = folder.read_tables(tables.folder, "robot")

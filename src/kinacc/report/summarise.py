@@ -17,7 +17,7 @@ from kinacc.calibration import identifiability, misfit
 from kinacc.calibration import summary as figures
 from kinacc.calibration.summary import Tolerance
 from kinacc.campaign import of_calibration
-from kinacc.campaign.folder import PLAN, of_results
+from kinacc.campaign.beside_results import PLAN, of_results
 from kinacc.config.error_models import ERROR_MODELS, MEASURED, PLAINEST
 from kinacc.deployment import applicability
 from kinacc.deployment import folder as results

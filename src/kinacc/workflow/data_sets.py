@@ -14,6 +14,8 @@ from kinacc.errors import Problem, refuse
 from kinacc.tables import sums
 
 RESULTS = "results"
+# What a calibration depends on, and what the rule `summary` hands to its script.
+CALIBRATION = ("seed", "robot", "measurements", "calibration", "tolerance")
 Settings = Mapping[str, Any]
 
 
@@ -178,7 +180,7 @@ def digests(files: Mapping[str, str]) -> dict[str, str]:
 
 def campaign_files(campaigns: Iterable[Path]) -> dict[str, str]:
     """Files of campaigns on the calibration of a data set, by role."""
-    from kinacc.campaign.folder import JOURNAL, PLAN
+    from kinacc.campaign.beside_results import JOURNAL, PLAN
 
     files = {}
     for number, campaign in enumerate(campaigns, 1):

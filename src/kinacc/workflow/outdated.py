@@ -9,11 +9,9 @@ from pathlib import Path
 from kinacc.errors import InputError, first_few
 from kinacc.tables import store, sums
 from kinacc.workflow.code import config_hash
-from kinacc.workflow.data_sets import DataSets
+from kinacc.workflow.data_sets import CALIBRATION, DataSets
 from kinacc.workflow.described import beside
 
-# What a calibration depends on, and what the rule `summary` hands to its script.
-CALIBRATION = ("seed", "robot", "measurements", "calibration", "tolerance")
 # Tables of rules that depend on whole sections of the settings, with these.
 _MADE_WITH = {
     "summary": CALIBRATION,
