@@ -63,16 +63,18 @@ def measured(count=150):
     return full_poses(q, Pose(np.full((count, 3, 3), np.nan), place))
 
 
-def fitted(seen, joints):
+def fitted(seen, joints, gravity=(0.0, 0.0, -1.0)):
     settings = copy.deepcopy(defaults()["calibration"])
     settings["dh"]["fit_to"] = "measurements"
     links = [{"mass_kg": m, "centre_mm": list(c)} for m, c in zip(MASSES, CENTRES, strict=True)]
-    settings["compliance"] |= {"joints": joints, "links": links}
+    settings["compliance"] |= {"joints": joints, "links": links, "gravity": gravity}
     return models.estimators(settings, ARM, seen)["compliance"].fit(seen, {})
 
 
-def test_stated_masses_give_the_compliance_of_each_joint():
-    found = fitted(measured(), [2, 3])
+@pytest.mark.parametrize("gravity", [(0.0, 0.0, -1.0), (0.0, 0.0, -9.81)])
+def test_stated_masses_give_the_compliance_of_each_joint(gravity):
+    """Only the direction of gravity counts."""
+    found = fitted(measured(), [2, 3], gravity)
     std = found.std[-2:]
     assert np.all(np.abs(found.model.compliance_rad_per_nm[1:3] - SOFT[1:3]) < 4.0 * std)
     assert np.all(std < 0.1 * SOFT[1:3])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from simulated import POINT, POSE, anywhere, measure
 
-from kinacc.calibration.frames import closed_form_start
+from kinacc.calibration.frames import base_from_targets, closed_form_start
 from kinacc.calibration.observations import full_poses
 from kinacc.geometry import Pose, compose, exp_so3, log_so3
 from kinacc.kinematics import dh, robot
@@ -49,6 +49,14 @@ def test_start_survives_a_tool_that_turns_about_one_axis_only():
     assert_close(compose(start.base, compose(flange, start.tool)), seen)
     # Along the axis of the turns the tool cannot be told from the base: it is left at zero.
     assert abs(start.tool.position_mm[2]) < 1e-6
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_orientations_place_a_base_where_points_are_too_few(count):
+    """Two points lie on a line: only the measured orientations tell the turn about it."""
+    seen, flange, bases, tools = exact(POSE, count)
+    base = base_from_targets(seen, flange, tools)
+    assert_close(Pose(base.rotation[None], base.position_mm[None]), bases)
 
 
 @pytest.mark.parametrize("short", [0, 1])
