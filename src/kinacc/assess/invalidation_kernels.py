@@ -7,7 +7,7 @@ see :mod:`kinacc.assess.world`.
 How a scan is exact without a run at every bound. For a fixed history the rejection probability
 falls as the bound grows, and the point to measure again is the largest of functions linear in
 the bound. So if both decisions agree at the two ends of an interval of bounds, every bound inside
-takes the same path. Where they do not, the interval is cut in half.
+takes the same path. Where they do not, the interval is cut in half; the next is wider by half.
 """
 
 from __future__ import annotations
@@ -120,38 +120,39 @@ def _follow(world: Arrays, near: float, far: float, alpha: float, squared: bool,
     """
     known, sigma, sizes = world[1], world[2], world[7]
     points, budget, ends = sigma.size, roots.size - 1, 1 if near == far else 2
-    reads, score, miss = np.zeros(points, np.int64), np.empty((points, 2)), np.ones((points, 2))
-    # A row whose mean lies within both bounds has p-hat 0 and is never measured again.
-    active, count, visited, steps = np.empty(points, np.int64), 0, 0, 0
-    path = np.empty(budget, np.int64)
-    while True:
-        row, rejected, probability = -1, False, 0.0
-        for end in range(ends):
-            survival, worst, largest = 1.0, -1, -np.inf
-            for i in active[:count]:
-                survival *= miss[i, end]
-                if score[i, end] > largest:  # the first of equals
-                    worst, largest = i, score[i, end]
-            exceeds = 1.0 - survival > alpha
-            if end == 0:
-                row, rejected, probability = worst, exceeds, 1.0 - survival
-            elif exceeds != rejected or (rejected and worst != row and steps < budget):
-                return False, rejected, steps, visited, probability, path[:steps]
-        if steps == budget or (not rejected and visited == points):
-            return True, rejected, steps, visited, probability, path[:steps]
-        if not rejected:
-            row, visited = visited, visited + 1
+    reads, score, miss = np.zeros(points, np.int64), np.empty((2, points)), np.ones((2, points))
+    active, path = np.empty(points, np.int64), np.empty(budget, np.int64)
+    count, visited, steps, worst, rejected, probability = 0, 0, 0, -1, False, 0.0
+    while steps < budget and (rejected or visited < points):
+        row = worst if rejected else visited
         v = reads[row]
         if v >= known[row]:
             extend(world, row, v)
         path[steps], reads[row], steps = row, v + 1, steps + 1
+        if not rejected:
+            visited += 1
+            if sizes[row, v] <= min(near, far):
+                continue  # p-hat is 0, now and later: nothing changes
+            active[count], count = row, count + 1
         for end in range(ends):
             bound = far if end else near
-            score[row, end] = (sizes[row, v] - bound) * (roots[v + 1] / sigma[row])
-            distance = max(score[row, end], 0.0)
-            miss[row, end] = 1.0 - chi2_3(distance * distance if squared else distance)
-        if not rejected and sizes[row, v] > min(near, far):
-            active[count], count = row, count + 1
+            score[end, row] = (sizes[row, v] - bound) * (roots[v + 1] / sigma[row])
+            distance = max(score[end, row], 0.0)
+            miss[end, row] = 1.0 - chi2_3(distance * distance if squared else distance)
+        for end in range(ends):
+            survival, place, largest = 1.0, -1, -np.inf
+            for i in active[:count]:
+                survival *= miss[end, i]
+            exceeds = 1.0 - survival > alpha
+            if exceeds and steps < budget:
+                for i in active[:count]:
+                    if score[end, i] > largest:  # the first of equals
+                        place, largest = i, score[end, i]
+            if end == 0:
+                worst, rejected, probability = place, exceeds, 1.0 - survival
+            elif exceeds != rejected or place != worst:
+                return False, rejected, steps, visited, probability, path[:steps]
+    return True, rejected, steps, visited, probability, path[:steps]
 
 
 @compiled
@@ -162,17 +163,17 @@ def scan(world: Arrays, bounds: Any, wanted: bool, alpha: float, squared: bool, 
     all readings. Returns the place of that bound (n where none is), and of the last run followed
     whether it rejected, its measurements, points visited, rejection probability and rows in order.
     """
-    near, depth, ends = 0, 1, np.empty(bounds.size, np.int64)
-    ends[0] = bounds.size - 1
+    near, width = 0, bounds.size
     while True:
-        far = ends[depth - 1]
+        far = min(near + width, bounds.size) - 1
+        far = far if far - near >= 3 else near  # few are run one by one
         alike, rejected, steps, visited, probability, path = _follow(
             world, bounds[near], bounds[far], alpha, squared, roots
         )
         if not alike:
-            ends[depth], depth = (near + far) // 2, depth + 1
+            width = (far - near + 1) // 2
             continue
         place = near if rejected == wanted else bounds.size
-        near, depth = far + 1, depth - 1
-        if rejected == wanted or depth == 0:
+        near, width = far + 1, max(3 * width // 2, 1 + width)
+        if rejected == wanted or near == bounds.size:
             return place, rejected, steps, visited, probability, path
