@@ -7,11 +7,26 @@ import json
 import numpy as np
 from command_line import call
 
+from kinacc.assess.simulate import carry_on
 from kinacc.assess.world import drawn_world, key_of
 from kinacc.campaign import folder as campaigns
 from kinacc.campaign.state import Reading, Readings
 
 SIGMA_MM = 0.05
+
+
+def readings_of(plan, read, left_out=frozenset(), limit=None):
+    """Readings in the order of the assessor's requests; ``read(row, visit)`` has their errors."""
+    rows, readings = plan.visiting(left_out), []
+
+    def noted(row, visit):
+        error, point = read(row, visit), int(rows[row])
+        position = plan.points.modelled_mm[point] + error
+        readings.append(Reading(point, position, plan.instruments[0].name))
+        return error
+
+    carry_on(plan.assessor.begin(plan.candidates(rows)), noted, limit=limit)
+    return readings
 
 
 def entry_of(readings):

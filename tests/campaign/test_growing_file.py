@@ -8,21 +8,17 @@ import numpy as np
 import pytest
 from command_line import call
 
+from kinacc.campaign.campaign import Campaign
+
 HEAD = "pose,x_mm,y_mm,z_mm"
 
 
 class Day:
     """A campaign at the arm and the file its readings are added to."""
 
-    def __init__(self, folder, calibration):
-        self.folder = folder / "a check"
-        self.file = folder / "readings.csv"
-        done = call("campaign", "start", self.folder, "--calibration", calibration, "--model", "dh",
-                    "--candidates", 12, "--budget", 40, "--instrument", "tracker=0.05",
-                    "--instrument", "camera=0.1", "--frame", "base")  # fmt: skip
-        assert done.exit_code == 0, done.output
-        shown = call("campaign", "next", self.folder, "--all", "--json").stdout
-        self.visit = json.loads(shown)["rows"]
+    def __init__(self, folder, file):
+        self.folder, self.file = folder, file
+        self.visit = Campaign(folder).visit().to_dict("records")
         self.rng = np.random.default_rng(3)
 
     def row(self, place):
@@ -31,48 +27,44 @@ class Day:
         seen = [point[f"expected_{axis}_mm"] + self.rng.normal(0.1, 0.05) for axis in "xyz"]
         return ",".join([point["pose"], *(f"{each:.4f}" for each in seen)])
 
-    def record(self, rows, *words, head=HEAD, file=None):
+    def record(self, rows, *words):
         """Write the rows and record the file."""
-        file = file or self.file
-        file.parent.mkdir(exist_ok=True)
-        file.write_text("\n".join([head, *rows]) + "\n")
-        return call("campaign", "record", self.folder, file, *words)
+        self.file.write_text("\n".join([HEAD, *rows]) + "\n")
+        return call("campaign", "record", self.folder, self.file, *words)
 
-    def takes(self, rows, new, *words, **more):
+    def takes(self, rows, new, *words):
         """Record rows of which so many are new."""
         before = self.taken()
-        done = self.record(rows, *words, **more)
+        done = self.record(rows, *words)
         assert done.exit_code == 0, done.output
         assert f"Recorded {new} readings" in done.output
         assert self.taken() == before + new
         return done.output
 
-    def refuses(self, rows, *words, **more):
+    def refuses(self, rows, *words):
         """The message of rows of which none may be taken."""
         journal = self.folder / "readings.jsonl"
         before = journal.read_bytes()
-        done = self.record(rows, *words, **more)
+        done = self.record(rows, *words)
         assert done.exit_code == 2, done.output
         assert journal.read_bytes() == before
         return done.output
 
     def taken(self):
-        status = call("campaign", "status", self.folder, "--json")
-        return json.loads(status.stdout)["readings"]
+        return len(Campaign(self.folder).state.readings)
 
     def positions(self):
-        lines = (self.folder / "readings.jsonl").read_text().splitlines()
-        entries = [json.loads(line)["entry"] for line in lines]
-        return [tuple(each["position_mm"]) for entry in entries for each in entry["readings"]]
+        return [tuple(item.reading.position_mm) for item in Campaign(self.folder).state.readings]
 
     def strike(self, number):
-        done = call("campaign", "strike", self.folder, number, "--reason", "not seated")
-        assert done.exit_code == 0, done.output
+        Campaign(self.folder).strike(number, "not seated")
 
 
 @pytest.fixture
-def day(tmp_path, calibration):
-    return Day(tmp_path, calibration)
+def day(tmp_path, begun):
+    devices = ("--instrument", "tracker=0.05", "--instrument", "camera=0.1")
+    folder = begun(*devices, "--frame", "base", points=12, budget=40)
+    return Day(folder, tmp_path / "readings.csv")
 
 
 def other(row, axis=2, by=0.02):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from campaign_on_disk import entry_of
+from campaign_on_disk import entry_of, readings_of
 from command_line import call
 
 from kinacc.assess.registry import ADAPTIVE
@@ -14,20 +14,10 @@ from kinacc.campaign.plan import from_json, to_json
 from kinacc.campaign.state import Reading, Readings, restore
 
 
-def reading_of(plan, world, state):
-    """What is read next: the world's own next reading of the point that is asked for."""
-    row = int(np.flatnonzero(state.rows == state.requested)[0])
-    visit = sum(each.reading.point == state.requested for each in state.used)
-    position = plan.points.modelled_mm[state.requested] + world.reading_mm(row, visit)
-    return Reading(state.requested, position, plan.instruments[0].name)
-
-
-def entries_of(plan, world):
-    """The journal of a whole campaign, one reading at a time."""
-    entries = []
-    while (state := restore(plan, entries)).requested is not None:
-        entries.append(entry_of([reading_of(plan, world, state)]))
-    return entries
+def entries_of(plan, world, left_out=frozenset(), limit=None):
+    """The journal of a campaign, one reading at a time."""
+    readings = readings_of(plan, world.reading_mm, left_out, limit)
+    return [entry_of([reading]) for reading in readings]
 
 
 def assert_same(said, wanted):
@@ -89,23 +79,20 @@ def test_a_point_left_out_is_never_asked_for_and_the_visit_stays_random(make_pla
     assert gone not in rows
     assert set(rows[:first]) == set(kept[:first])
     np.testing.assert_array_equal(rows[first:], kept[first:])
-    entries = [{"kind": "leave_out", "point": gone, "reason": "hidden"}]
-    asked = set()
-    world = make_world(plan, frozenset([gone]))
-    while (state := restore(plan, entries)).requested is not None:
-        asked.add(state.requested)
-        entries.append(entry_of([reading_of(plan, world, state)]))
-    assert gone not in asked
+    left_out = frozenset([gone])
+    entries = [
+        {"kind": "leave_out", "point": gone, "reason": "hidden"},
+        *entries_of(plan, make_world(plan, left_out), left_out),
+    ]
+    assert restore(plan, entries[:5]).requested == entries[5]["readings"][0]["point"]
+    state = restore(plan, entries)
+    assert gone not in {item.reading.point for item in state.used}
     assert len(state.used) == 60
 
 
 def test_another_instrument_counts_with_its_own_covariance(make_plan, make_world):
     plan = make_plan(texts=("tracker=0.05", "camera=0.5"))
-    world = make_world(plan)
-    entries = []
-    for _ in range(24):
-        state = restore(plan, entries)
-        entries.append(entry_of([reading_of(plan, world, state)]))
+    entries = entries_of(plan, make_world(plan), limit=24)
     by_tracker = restore(plan, entries)
     entries[10]["readings"][0]["instrument"] = "camera"
     with_camera = restore(plan, entries)

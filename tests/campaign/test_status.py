@@ -5,19 +5,18 @@ from __future__ import annotations
 import json
 import math
 import re
+from itertools import count
 from pathlib import Path
 
 import numpy as np
 import pytest
-from campaign_on_disk import entry_of
+from campaign_on_disk import entry_of, readings_of
 
 import kinacc
 from kinacc.assess.attainable import width_limits
-from kinacc.assess.world import carry_on
 from kinacc.campaign import folder
 from kinacc.campaign.folder import Opened
 from kinacc.campaign.plan import Limits
-from kinacc.campaign.state import Reading
 from kinacc.campaign.status import ADVICE, REASONS, status
 from kinacc.cli.output import plain
 from kinacc.report.rendering import lines
@@ -30,16 +29,13 @@ def measured(make_plan, make_world):
     def make(readings=999, points=40, budget=120, tolerance_mm=None, off_mm=None, **settings):
         limits = Limits(np.deg2rad(0.02), 10.0, tolerance_mm)
         plan = make_plan(points=points, budget=budget, limits=limits, **settings)
-        world, rows, taken = make_world(plan), plan.visiting(frozenset()), []
+        world, taken = make_world(plan), count()
 
         def read(row, visit):
-            error = world.reading_mm(row, visit) + (off_mm(len(taken)) if off_mm else 0.0)
-            point = int(rows[row])
-            taken.append(Reading(point, plan.points.modelled_mm[point] + error, "tracker"))
-            return error
+            off = off_mm(next(taken)) if off_mm else 0.0
+            return world.reading_mm(row, visit) + off
 
-        carry_on(plan.assessor.begin(plan.candidates(rows)), read, limit=readings)
-        entries = (entry_of(taken),)
+        entries = (entry_of(readings_of(plan, read, limit=readings)),)
         opened = Opened(Path("check"), plan, folder.Journal(entries, "ab", (), 0), "ab")
         return status(opened), plan
 
