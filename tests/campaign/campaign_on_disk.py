@@ -7,8 +7,7 @@ import json
 import numpy as np
 from command_line import call
 
-from kinacc.assess.simulate import carry_on
-from kinacc.assess.world import drawn_world, key_of
+from kinacc.assess.world import carry_on, drawn_world, key_of
 from kinacc.campaign import folder as campaigns
 from kinacc.campaign.state import Reading, Readings
 

@@ -131,9 +131,7 @@ def test_the_command_answers_with_table_picture_and_budget(errors_file, tmp_path
 @pytest.mark.parametrize(
     ("words", "place"),
     [
-        (("--noise-mm", "0"), "noise"),
         ((), "--noise-mm"),
-        (("--covariance-mm2", "1,2,0,2,1,0,0,0,1"), "not positive definite"),
         (("--noise-mm", "0.1", "--errors", "nowhere"), "smooth, workshop"),
         (("--noise-mm", "0.1", "--width-mm", "-1"), "--width-mm"),
         (("--noise-mm", "0.1", "--largest-mm", "nan"), "--largest-mm"),

@@ -28,7 +28,7 @@ CONFIDENCE = 0.95  # of each bound, where no other is asked for
 
 @dataclass(frozen=True)
 class Reason:
-    """Why a bound is stated or not: a code and its numbers; ``campaign.reasons`` has the texts."""
+    """Why a bound is stated or not: a code and its numbers; ``campaign.status`` has the texts."""
 
     code: str
     numbers: Mapping[str, float] = field(default_factory=dict)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
@@ -253,7 +254,7 @@ class Campaign:
         InputError
             For a reading that is refused; nothing is written.
         """
-        with folders.writing(self.folder) as opened:
+        with self._writing() as opened:
             plan, state = opened.plan, opened.state
             number = state.requested if point is None else plan.points.number(point)
             if number is None:
@@ -270,9 +271,7 @@ class Campaign:
             if equal and not again:
                 problems.append(_equal(where, f"reading {equal[0].number}"))
             refuse(problems, _NOTHING)
-            recorded = _written(opened, Readings(readings=[reading]))
-        self.opened = folders.open_(self.folder)
-        return recorded
+            return _written(opened, Readings(readings=[reading]))
 
     def add_readings(
         self,
@@ -287,40 +286,42 @@ class Campaign:
         rows. Raises InputError where a row is wrong, where none is new, and where readings of the
         same file have no row any more.
         """
-        with folders.writing(self.folder) as opened:
-            most_mm = math.inf
-            if not accept_implausible:
-                most_mm = most_plausible_mm(opened.state, file.rows)
-            recorded = _record(opened, file, most_mm, again, skip_bad)
-        self.opened = folders.open_(self.folder)
-        return recorded
+        with self._writing() as opened:
+            plausible_mm = most_plausible_mm(opened.state, file.rows)
+            most_mm = math.inf if accept_implausible else plausible_mm
+            return _record(opened, file, most_mm, again, skip_bad)
 
     def leave_out(self, point: str, reason: str) -> None:
         """Leave a point without readings out, for a reason that is not its error."""
-        with folders.writing(self.folder) as opened:
+        with self._writing() as opened:
             state, number = opened.state, opened.plan.points.number(point)
             if number is None:
                 raise InputError(Problem(f"point {point}", "is no candidate"))
-            read = sum(item.reading.point == number for item in state.readings)
-            problems = {
-                f"has {read} readings: without it a large error could be hidden": read > 0,
-                "was left out before": number in state.left_out,
-                "is one of the last 2 candidates": len(state.rows) <= 2,
-            }
-            _refuse(f"point {point}", problems, reason)
+            read, message = sum(item.reading.point == number for item in state.readings), ""
+            if read:
+                message = f"has {read} readings: without it a large error could be hidden"
+            elif number in state.left_out:
+                message = "was left out before"
+            elif len(state.rows) <= 2:
+                message = "is one of the last 2 candidates"
+            _refuse(f"point {point}", message, reason)
             opened.write(LeaveOut(point=number, reason=reason.strip()))
-        self.opened = folders.open_(self.folder)
 
     def strike(self, number: int, reason: str) -> None:
         """Declare a reading void, for a reason that is not its size."""
-        with folders.writing(self.folder) as opened:
-            state = opened.state
-            problems = {
-                "was struck before": number in {item.number for item, _ in state.struck},
-                f"does not exist ({state.numbered} readings)": not 1 <= number <= state.numbered,
-            }
-            _refuse(f"reading {number}", problems, reason)
+        with self._writing() as opened:
+            state, message = opened.state, ""
+            if number in {item.number for item, _ in state.struck}:
+                message = "was struck before"
+            elif not 1 <= number <= state.numbered:
+                message = f"does not exist ({state.numbered} readings)"
+            _refuse(f"reading {number}", message, reason)
             opened.write(Strike(reading=number, reason=reason.strip()))
+
+    @contextmanager
+    def _writing(self) -> Iterator[folders.Opened]:
+        with folders.writing(self.folder) as opened:
+            yield opened
         self.opened = folders.open_(self.folder)
 
     def bounds(self, tolerance_mm: float | None = None) -> tuple[Bound, ...]:
@@ -405,8 +406,7 @@ def _listed(numbers: Iterable[int]) -> str:
     return f"reading{'s' if ',' in shown else ''} {shown}"
 
 
-def _refuse(where: str, problems: Mapping[str, bool], reason: str) -> None:
-    faults = [Problem(where, message) for message, is_so in problems.items() if is_so]
-    if not reason.strip():
-        faults.append(Problem("--reason", "is empty"))
-    refuse(faults, "Nothing was changed")
+def _refuse(where: str, message: str, reason: str) -> None:
+    problems = [Problem(where, message)] if message else []
+    problems += [] if reason.strip() else [Problem("--reason", "is empty")]
+    refuse(problems, "Nothing was changed")

@@ -303,10 +303,9 @@ def read_repeatability(path: str | Path) -> tuple[np.ndarray, int, list[Problem]
     try:
         content = json_files.values_of(json_files.bytes_of(path), str(path))
         test = _Test.model_validate(content)
-    except OSError:
-        raise InputError(Problem(where, "no such file", fix=fix)) from None
-    except (RecursionError, ValueError):
-        message = "is no answer of kinacc repeatability"
+    except (OSError, RecursionError, ValueError) as error:
+        is_absent = isinstance(error, OSError)
+        message = "no such file" if is_absent else "is no answer of kinacc repeatability"
         raise InputError(Problem(where, message, fix=fix)) from None
     if test.noise is None:
         raise InputError(Problem(where, "has no noise: no pose was visited again", fix=fix))
