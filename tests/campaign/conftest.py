@@ -40,7 +40,7 @@ def make_plan(arm):
         limits = limits or Limits(np.deg2rad(0.02), 10.0)
         about = {"robot": "mh180", "calibration": "none", "model": "nominal", "point": "tool",
                  "candidates": "drawn"}  # fmt: skip
-        return begin.plan_of(arm, found, chosen, used, limits, seed, np.zeros(6), about)
+        return begin.plan_of(arm, found, chosen, used, limits, about, seed)
 
     return make
 

@@ -63,8 +63,6 @@ def test_readings_as_the_calibration_predicts_them_have_no_error(anchored):
         ADAPTIVE["single_shot"](measurements=6),
         instruments(["tracker=0.05"], "instrument"),
         Limits(3e-4, 5.0),
-        0,
-        np.zeros(6),
         {},
     )
     seen = arm.pose(JointState(joints @ arm.robot.joint_map.T), frame="instrument").position_mm

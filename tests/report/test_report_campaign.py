@@ -38,7 +38,7 @@ def opened(
              "candidates": "drawn", "kinacc_version": "0"}  # fmt: skip
     plan = begin.plan_of(
         arm, found, assessor_of("search_and_confirm", {"measurements": budget, **settings}),
-        instruments(texts, "base"), limits, 3, np.zeros(6), about,
+        instruments(texts, "base"), limits, about, 3,
     )  # fmt: skip
     rng, true = np.random.default_rng(4), np.random.default_rng(5).normal(0.0, mean_mm, (points, 3))
     rows = plan.visiting(frozenset())

@@ -118,9 +118,9 @@ def plan_of(
     assessor: AdaptiveAssessor,
     instruments: Sequence[Instrument],
     limits: Limits,
-    seed: int,
-    stand: np.ndarray,
     about: dict[str, str],
+    seed: int = 0,
+    stand: np.ndarray | None = None,
     by_travel: bool = True,
 ) -> Plan:
     """Return the plan of a campaign; the order of the candidates follows from ``seed`` alone.
@@ -137,12 +137,12 @@ def plan_of(
         The first is planned with.
     limits : Limits
         Plausible size (infinite: by the residual of the calibration), tolerance and wanted width.
-    seed : int
-        Seed of the random order.
-    stand : (k,) array
-        Reported joints where the arm stands, rad (mm where a joint slides).
     about : dict
         Robot, calibration, model, point and source of the candidates (:func:`about`).
+    seed : int
+        Seed of the random order.
+    stand : (k,) array, optional
+        Reported joints where the arm stands, rad (mm where a joint slides); zero by default.
     by_travel : bool
         Order the first visit for little travel, else in the random order.
 
@@ -164,6 +164,7 @@ def plan_of(
     route = order[: begun.first]
     if by_travel:
         unit, count = travel_unit(arm.robot), begun.reference_poses
+        stand = np.zeros(len(unit)) if stand is None else stand
         places, here = points.joints[route] / unit, stand / unit
         first = _short_path(places[:count], here)
         here = places[first[-1]] if count else here
@@ -196,7 +197,7 @@ def start(
     known: Noise | None = None,
     sure: bool = True,
 ) -> Plan:
-    """Put a plan on disk with what speaks against it.
+    """Put a plan on disk with what speaks against it: the one way to start, here and in commands.
 
     Parameters
     ----------
@@ -205,7 +206,7 @@ def start(
     arm : Calibration
         Calibrated model whose errors are bounded.
     plan : Plan
-        Plan to start.
+        Plan to start (:func:`plan_of`).
     doubts : sequence of Problem
         Doubts about the noise of a test (:func:`kinacc.campaign.instrument.read_repeatability`).
     known : Noise, optional

@@ -166,10 +166,9 @@ class Campaign:
         labels = [str(number) for number in range(1, len(joints) + 1)]
         points = begin.points_of(arm, joints, labels, None, point)
         chosen = assessor_of(assessor, {"measurements": budget, **(settings or {})}, len(points))
-        plan = begin.plan_of(
-            arm, points, chosen, [instrument], Limits(tolerance_mm=tolerance_mm), seed,
-            np.zeros(joints.shape[1]), begin.about(arm, point, "given as an array"),
-        )  # fmt: skip
+        about = begin.about(arm, point, "given as an array")
+        limits = Limits(tolerance_mm=tolerance_mm)
+        plan = begin.plan_of(arm, points, chosen, [instrument], limits, about, seed)
         begin.start(folder, arm, plan)
         return cls(folder)
 

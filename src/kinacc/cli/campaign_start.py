@@ -107,10 +107,10 @@ def start(out: Output, **options: Any) -> None:
         options["target"],
     )
     assessor = assessor_of(options, options["budget"], len(points), freedom)
+    about, by_travel = begin.about(arm, point, source), options["visit"] == "travel"
     plan = begin.plan_of(
-        arm, points, assessor, used, limits, options["seed"], stand,
-        begin.about(arm, point, source), by_travel=options["visit"] == "travel",
-    )  # fmt: skip
+        arm, points, assessor, used, limits, about, options["seed"], stand, by_travel
+    )
     known = begin.noise_of(results)
     plan = begin.start(options["folder"], arm, plan, doubts, known, options["sure"])
     answer = {
