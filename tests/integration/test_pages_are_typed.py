@@ -79,7 +79,7 @@ IN_FULL = bool(os.environ.get("KINACC_PAGES_IN_FULL"))
 # Few poses of a series that a page calibrates only to show how, among them a repeated reading. With
 # 103 order 12 is the highest for all of them, and can still be fitted where a fold is left out.
 THINNED = {"series_B.csv": (*range(1, 1500, 15), 2, 3, 533, 534)}
-# The two series with models that are fitted in seconds.
+# The paper's arm as it is, and the two series with models that are fitted in seconds.
 SHORT = "".join(
     f"  {name}: {{measurements: {{folds: 2}}, calibration: {{vec: {{order: 2}}}}}}\n"
     for name in ("ur10_b", "ur10_d")
@@ -111,19 +111,16 @@ def reader(shell, tmp_path_factory) -> Path:
 
 
 @pytest.fixture(scope="session")
-def calibrated(shell, finished, tmp_path_factory) -> Path:
-    """A clone with results of the paper's arm (the small study) and of two short series."""
+def calibrated(shell, tmp_path_factory) -> Path:
+    """A clone with results of the paper's arm and of two short series."""
 
     def calibrate(folder: Path) -> None:
         clone = cloned(folder / "clone")
         (clone / "short.yaml").write_text(f"datasets:\n{SHORT}")
-        words = "kinacc calibrate examples/ur10.yaml"
-        words += " config.yaml" if IN_FULL else " short.yaml"
+        words = "kinacc calibrate config.yaml examples/ur10.yaml"
+        words += "" if IN_FULL else " short.yaml"
         code, printed, _ = shell(words, clone, HOME=str(folder))
         assert code == 0, printed
-        if not IN_FULL:
-            of_paper = finished.folder / "results" / "mh180"
-            shutil.copytree(of_paper, clone / "results" / "mh180")
 
     return shared_work.once(tmp_path_factory, "calibrated", calibrate)
 
