@@ -108,7 +108,7 @@ def test_a_reading_at_slightly_other_joints_is_held_to_the_model_there(begun, ca
     plan = campaigns.open_(folder).plan
     point = int(plan.route[0])
     joints = plan.points.joints[point] + np.deg2rad([0.03, -0.02, 0.04, 0.01, -0.05, 0.02]) * 0.99
-    arm = choice.calibration_of(calibration, "dh", "mh180", ())
+    arm = choice.calibration_of(calibration, "dh", "mh180")
     there = arm.pose(JointState(joints[None] @ arm.robot.joint_map.T)).position_mm[0]
     assert np.linalg.norm(there - plan.points.modelled_mm[point]) > 0.5
     done = call("campaign", "record", folder, "--joints-rad", written(joints),

@@ -40,6 +40,7 @@ _FORMER = {
     "isolation": 1.25,
     "crowd": 0.05,
     "visited": 0.6,
+    "deviations": 1.0,
     "bound_mm": None,
 }
 
