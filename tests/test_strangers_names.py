@@ -10,7 +10,6 @@ import xml.etree.ElementTree as ET
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import openpyxl
 import pandas as pd
 import pyarrow as pa
@@ -20,7 +19,7 @@ from command_line import call
 
 from kinacc.cli.output import write_table
 from kinacc.errors import InputError, Problem
-from kinacc.figures import campaign_plan
+from kinacc.figures.campaign import draw_budgets
 from kinacc.figures.save import render
 from kinacc.report.terminal import print_table
 
@@ -59,8 +58,9 @@ def test_a_table_of_a_calibrated_arm_holds_no_formula():
 
 @pytest.mark.parametrize("name", ["$\\frac$", "$x$", "_left out", "a--><script>1</script>"])
 def test_a_file_of_errors_of_any_name_is_drawn_under_it(name):
-    curve = campaign_plan.Curve(name, np.array([1.0, 2.0]), np.ones((2, 3)), np.ones(2))
-    figure = campaign_plan.draw([curve], None, None, None)
+    widths = dict.fromkeys(("width_q05_mm", "width_median_mm", "width_q95_mm"), 1.0)
+    rows = pd.DataFrame({"errors": name, "budget": [1, 2], "share": 1.0} | widths)
+    figure = draw_budgets(rows, None, None, None)
     picture = render(figure, ["svg"])["svg"]
     assert not any("script" in each.tag for each in ET.fromstring(picture).iter())
     assert name in html.unescape(picture.decode()).replace("- -", "--")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +10,7 @@ from matplotlib.text import Text
 
 from kinacc.config.schema import defaults
 from kinacc.figures import save
+from kinacc.figures.paper import draw_figure
 from kinacc.tables import store
 
 RESULTS = Path(__file__).parents[1] / "golden" / "results" / "mh180"
@@ -36,10 +36,7 @@ def settings(dataset=None, source="synthetic", **evaluation) -> dict:
 def figures(dataset: str | None = None, **changed) -> dict[str, Figure]:
     """Each figure as its stage draws it."""
     tables = golden() | changed
-    return {
-        name: import_module(f"kinacc.figures.{name}").run(tables, settings(dataset))
-        for name in NAMES
-    }
+    return {name: draw_figure(name, tables, settings(dataset)) for name in NAMES}
 
 
 def words(figure: Figure) -> list[Text]:

@@ -8,7 +8,7 @@ from figure_words import figures, golden, problems, said, words
 from scipy.special import gammainc
 
 from kinacc.errors import InputError
-from kinacc.figures import fig1, fig2, fig3, fig4, iterations, style
+from kinacc.figures import fig1, fig2, fig3, paper, style
 from kinacc.kinematics import robot
 
 LONG_NAME = "laser tracker campaign of the second machining cell, $spring$_{a}, series B " * 3
@@ -82,11 +82,11 @@ def test_fig3_draws_unusual_maps(tables, rows, reached):
 
 def test_fig4_bars_reach_from_the_smallest_to_the_largest_beside_the_truth(tables):
     table = tables["study_summary"]
-    figure = fig4.draw(table)
+    implied = np.median(table["mean_mm"] - table["bias_mm"])
+    figure = paper.draw_noise(table, implied)
     mine = table["assessor"] == "maximum"
     ends = np.array([path.vertices[:, 1] for path in figure.axes[0].collections[0].get_paths()])
     assert ends == pytest.approx(np.stack([table["min_mm"], table["max_mm"]], axis=1)[mine])
-    implied = np.median(table["mean_mm"] - table["bias_mm"])
     assert f"True accuracy {implied:.3f} mm" in said(figure)
 
 
@@ -103,7 +103,7 @@ def test_history_states_outcome_largest_error_and_a_rule_that_was_not_met(
     table = example(tables, rows, rule_met=met, rule=rule)
     table["rejection_probability"][-1] = probability
     largest = table["true_mm"].max()
-    figure = iterations.draw(table, example="rejected", true_accuracy_mm=largest)
+    figure = paper.draw_iterations(table, "rejected", largest)
     assert problems(figure) == []
     text = said(figure)
     # alpha itself does not reject (eq. 22)
@@ -111,7 +111,7 @@ def test_history_states_outcome_largest_error_and_a_rule_that_was_not_met(
     k = table["iteration"][np.argmax(table["true_mm"])]
     assert f"first measured at k = {k} (dotted)" in text
     assert (rule in text) != met
-    away = iterations.draw(table, example="rejected", true_accuracy_mm=largest + 0.01)
+    away = paper.draw_iterations(table, "rejected", largest + 0.01)
     assert "largest true error not measured" in said(away)
     with pytest.raises(InputError, match="found: rejected"):
-        iterations.draw(table, example="elsewhere")
+        paper.draw_iterations(table, "elsewhere", largest)

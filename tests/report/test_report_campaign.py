@@ -16,7 +16,7 @@ from kinacc.campaign.plan import Limits, assessor_of
 from kinacc.campaign.state import Reading, Readings, deviations
 from kinacc.deployment.planning import spread
 from kinacc.deployment.record import nominal
-from kinacc.figures.campaign import draw
+from kinacc.figures.campaign import draw_bounds
 from kinacc.kinematics import robot as robots
 from kinacc.report import page
 from kinacc.report.campaign import campaign_page, markdown, section
@@ -98,7 +98,7 @@ def test_picture_and_conformity_have_the_number_of_excepted_candidates():
     )
     about = found.tables["campaign_bounds"]
     assert (np.asarray(about["excepted"]) > 0).any()
-    drawn = draw(found.tables["campaign_points"], about, len(found.state.plan.route))
+    drawn = draw_bounds(found.tables["campaign_points"], about, len(found.state.plan.route))
     labels = [each.get_text() for each in drawn.findobj(matplotlib.text.Text)]
     assert "bounds, all but 3 candidates" in labels
     assert "all but 3 of these 60 candidates: **undecided**" in markdown(*parts(found), "picture")

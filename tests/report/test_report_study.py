@@ -14,7 +14,7 @@ from parsed import read
 
 from kinacc.kinematics import robot
 from kinacc.report import study_sections
-from kinacc.report.history_lines import sentence
+from kinacc.report.rendering import history_sentence
 from kinacc.study.claims import all_claims
 
 ARM = robot.load("mh180")
@@ -81,7 +81,8 @@ def test_every_line_of_a_history_has_its_verdict():
         ("holds", "–"), ("recalibrate", "4"), ("cannot be told", "–"),
     ]  # fmt: skip
     assert shown.marked == {4: "too few poses"}
-    assert sentence(history(4, changed=3)).startswith("recalibrate: 0.30 mm beyond chance, joint 4")
+    text = history_sentence(pd.DataFrame(history(4, changed=3)))
+    assert text.startswith("recalibrate: 0.30 mm beyond chance, joint 4")
 
 
 def claims(**verdicts: str) -> dict:

@@ -31,7 +31,7 @@ def test_after_a_run_there_is_nothing_to_do_and_touching_files_changes_nothing(p
 @pytest.mark.parametrize(
     ("files", "made"),
     [
-        (["src/kinacc/figures/fig4.py"], SHOWN),
+        (["src/kinacc/figures/paper.py"], SHOWN),
         (["src/kinacc/kinematics/dh.py"], TABLES | SHOWN),
         # Commands are no part of any table or picture.
         (

@@ -1,5 +1,5 @@
 # Functions that rules call for their inputs and parameters.
-FIGURES = ("fig1", "fig2", "fig4", "fig5", "fig6")  # each drawn by kinacc.figures.<name>
+FIGURES = ("fig1", "fig2", "fig4", "fig5", "fig6")  # drawn by kinacc.figures.paper
 
 
 def job(script, sections="", shown=False, measured=False, **keys):

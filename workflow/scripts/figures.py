@@ -1,8 +1,7 @@
-"""Draw the figures that the outputs of the rule name, each by the module of its name."""
-
-from importlib import import_module
+"""Draw the figures that the outputs of the rule name."""
 
 from kinacc.figures import save
+from kinacc.figures.paper import draw_figure
 from kinacc.workflow.script import stage
 
 with stage(snakemake) as job:
@@ -12,7 +11,7 @@ with stage(snakemake) as job:
         formats.setdefault(name, []).append(kind)
     drawn = {}
     for name, kinds in formats.items():
-        figure = import_module(f"kinacc.figures.{name}").run(job.inputs, settings)
+        figure = draw_figure(name, job.inputs, settings)
         pictures = save.render(figure, kinds)
         drawn |= {f"{name}_{kind}": content for kind, content in pictures.items()}
     job.write_files(drawn)

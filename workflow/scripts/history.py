@@ -10,6 +10,6 @@ with stage(snakemake) as job:
     start = "history_over_time_"
     formats = [each.removeprefix(start) for each in job.outputs if each.startswith(start)]
     table = store.to_table("history", made, job.marks())
-    figure = history_over_time.run({"history": store.columns_in(table)}, {"dataset": job.dataset})
+    figure = history_over_time.draw(store.columns_in(table), dataset=job.dataset)
     pictures = {f"{start}{kind}": each for kind, each in save.render(figure, formats).items()}
     job.write_files({"history": store.content_of(table), **pictures})

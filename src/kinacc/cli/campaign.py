@@ -185,14 +185,14 @@ def _write_report(
     opened: Campaign, into: Path, formats: Sequence[str], out: Output, force: bool
 ) -> list[str]:
     """Write the report; the names of its files."""
-    from kinacc.figures import campaign as drawing
+    from kinacc.figures.campaign import draw_bounds
     from kinacc.figures.save import render
 
     if not opened.state.used:
         raise InputError(Problem(str(opened.folder), "no reading was requested and taken yet"))
     plan, tables = opened.plan, reports.tables(opened.opened)
     metadata = folders.marks_of(opened.opened)
-    figure = drawing.draw(
+    figure = draw_bounds(
         tables["campaign_points"],
         tables["campaign_bounds"],
         len(plan.route),

@@ -82,19 +82,11 @@ def plan(out: Output, **options: Any) -> None:
             errors, points, covariance, assessors, aim, repetitions, seed, progress
         )
     if out.picture is not None:
-        from kinacc.figures import campaign_plan
+        from kinacc.figures.campaign import draw_budgets
 
-        curves = [
-            campaign_plan.Curve(
-                str(name),
-                group["budget"].to_numpy(float),
-                group[["width_q05_mm", "width_median_mm", "width_q95_mm"]].to_numpy(),
-                group["reached"].to_numpy() / repetitions,
-            )
-            for name, group in budgets.rows.groupby("errors", sort=False)
-        ]
+        rows = budgets.rows.assign(share=budgets.rows["reached"] / repetitions)
         power, budget = aim.power if aim.is_set else None, budgets.budget_shown or budgets.budget
-        out.draw(campaign_plan.draw(curves, aim.width_mm, power, budget))
+        out.draw(draw_budgets(rows, aim.width_mm, power, budget))
     table = budgets.rows.replace(math.inf, math.nan)
     absent = [] if table["excepted"].any() else ["excepted"]
     absent += ["within"] if aim.width_mm is None else []

@@ -68,9 +68,9 @@ def compare(
         weight = schema.key("calibration.rotation_weight_mm_per_rad")["default"]
         result = comparison.compare(both[0], both[1], q_rad, weight, shared(*tables))
     if out.picture is not None:
-        from kinacc.figures.comparison import draw
+        from kinacc.figures.calibration import draw_comparison
 
-        out.draw(draw(result))
+        out.draw(draw_comparison(result))
     if out.page is not None:
         out.write_page(comparison_page(result, both[0], q_rad))
     table = result.shifts if result.parameters is None else result.parameters

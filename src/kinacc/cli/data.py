@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+import pandas as pd
 
 from kinacc.checks.check import examined
 from kinacc.checks.contradictions import load
@@ -126,11 +127,12 @@ def _sections(files: Sequence[str], wanted: Sequence[str]) -> dict[str, dict[str
 
 
 def _drawn(report: Report) -> Figure:
-    from kinacc.figures.checked_data import draw
+    from kinacc.figures.calibration import draw_check
 
     suspects = {item.kind: item.lines for item in report.suspicions}
     limit_mm = report.facts.get("quick_fit", {}).get("most_expected_mm", float("nan"))
-    return draw(report.facts["joint_coverage"], report.line, report.left_mm, limit_mm, suspects)
+    joints = pd.DataFrame(report.facts["joint_coverage"])
+    return draw_check(joints, report.line, report.left_mm, limit_mm, suspects)
 
 
 @click.command("exclude")

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from kinacc import __version__
 from kinacc.cli import choice
 from kinacc.cli.choice import option
 from kinacc.cli.output import Output, answers
@@ -16,7 +17,7 @@ from kinacc.deployment.export.controllers import CONTROLLERS
 from kinacc.deployment.export.pendant import fit_pendant
 from kinacc.errors import Problem, refuse
 from kinacc.kinematics.robot import Robot
-from kinacc.report.pendant import pendant_page
+from kinacc.report.rendering import environment
 from kinacc.workflow.described import calibration_settings
 
 
@@ -104,7 +105,8 @@ def _to_controller(
     settings = calibration_settings(Path(folder), config)
     result = fit_pendant(results.read_tables(folder), arm, settings, maker, data_set)
     stem = f"{name or data_set}_{maker}"
-    contents = {f"{stem}.html": pendant_page(result)}
+    page = environment().get_template("pendant.html")
+    contents = {f"{stem}.html": page.render(found=result, version=__version__)}
     if result.ending:
         contents[f"{stem}{result.ending}"] = result.text + "\n"
     paths = files.write(contents, target, out.force)

@@ -82,9 +82,9 @@ def plan_poses(
             label = np.arange(1, number + 1)
         plan = planning.plan_poses(arm, joints, experiment, count, start)
     if out.picture is not None:
-        from kinacc.figures import planned_poses
+        from kinacc.figures.campaign import draw_observability
 
-        out.draw(planned_poses.draw(plan.index, arm.name))
+        out.draw(draw_observability(plan.index, arm.name))
     table = pd.DataFrame({
         "order": np.arange(1, count + 1),
         **rows.joint_columns(arm.dh.prismatic, joints[plan.chosen]),

@@ -268,9 +268,9 @@ def _correct(
         _asked if sys.stdin.isatty() else None,
     )
     if out.picture:
-        from kinacc.figures.program import draw
+        from kinacc.figures.calibration import draw_program
 
-        out.draw(draw(answer.table))
+        out.draw(draw_program(answer.table))
     change = answer.table.get("change_mm", answer.table["status"] == "")
     change = change[answer.table["status"] == "corrected"]
     missed = f", {len(answer.not_corrected)} statements not" if answer.not_corrected else ""

@@ -1,8 +1,7 @@
-"""A measuring campaign: every measured point with its limits, and the bounds as they grew."""
+"""Pictures of campaigns and of plans: bounds as they grow, readings, budgets, chosen poses."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from itertools import cycle
 
 import numpy as np
@@ -11,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from kinacc.figures import style
+from kinacc.tables.columns import Columns
 
 _TARGETS = {
     "measured": ("measured points", style.BLUE, "-"),
@@ -19,9 +19,9 @@ _TARGETS = {
 }
 
 
-def draw(
-    points: Mapping,
-    bounds: Mapping,
+def draw_bounds(
+    points: Columns,
+    bounds: Columns,
     first_visit: int,
     tolerance_mm: float | None = None,
     name: str | None = None,
@@ -45,16 +45,16 @@ def draw(
         if tolerance_mm is not None:
             left.axhline(tolerance_mm, **style.LIMIT)
             right.axhline(tolerance_mm, **style.LIMIT, label="tolerance")
-        _sizes(left, pd.DataFrame(dict(points)))
-        _growth(right, pd.DataFrame(dict(bounds)), first_visit)
+        _sizes(left, pd.DataFrame(points))
+        _growth(right, pd.DataFrame(bounds), first_visit)
         left.set_ylim(bottom=0.0)
         style.name_dataset(figure, name)
     return figure
 
 
-def readings(table: Mapping, tolerance_mm: float | None = None) -> Figure:
+def draw_readings(table: Columns, tolerance_mm: float | None = None) -> Figure:
     """Draw ``campaign_readings`` in the order taken, by instrument."""
-    rows = pd.DataFrame(dict(table))
+    rows = pd.DataFrame(table)
     rows["instrument"] = rows["instrument"].astype(str).map(style.literal)
     rows.loc[rows["struck"].astype(bool), "instrument"] = "struck"
     with style.house():
@@ -103,3 +103,76 @@ def _growth(ax: Axes, bounds: pd.DataFrame, first_visit: int) -> None:
     ax.axvline(first_visit, color=style.FAINT, lw=0.8, zorder=0)
     ax.set(xlabel="Readings")
     style.legend_above(ax)
+
+
+def draw_budgets(
+    rows: pd.DataFrame, wanted_mm: float | None, power: float | None, enough: int | None
+) -> Figure:
+    """Draw the distance between the bounds, and the share of campaigns that reach the aim.
+
+    Parameters
+    ----------
+    rows
+        By ``errors`` and ``budget``: quantiles of the width, ``width_q05_mm``, ``width_median_mm``
+        and ``width_q95_mm``, infinite where no bound is stated, and ``share`` that reach the aim.
+    wanted_mm, power
+        Width and share that are wanted.
+    enough
+        The smallest budget that does.
+
+    Notes
+    -----
+    Bands reach from the narrow to the wide campaigns; to the top where more than 5 % state no
+    bound.
+    """
+    names = ["width_q05_mm", "width_median_mm", "width_q95_mm"]
+    widths = rows[names].to_numpy(dtype=float)
+    top = 1.08 * max(widths[np.isfinite(widths)].max(initial=0.0), wanted_mm or 0.0) or 1.0
+    share = "Share with a bound" if power is None else "Share that reach the aim"
+    with style.house():
+        figure = style.new_figure(style.DOUBLE_COLUMN_IN, 3.0)
+        left, right = figure.subplots(1, 2, sharex=True)
+        groups = rows.groupby("errors", sort=False)
+        for (name, group), (colour, marker) in zip(groups, cycle(style.SERIES), strict=False):
+            low, middle, high = group[names].to_numpy(dtype=float).T
+            high = np.where(np.isfinite(high), high, top)
+            left.fill_between(group["budget"], low, high, where=np.isfinite(low), color=colour,
+                              alpha=0.15, lw=0.5)  # fmt: skip
+            middle = np.where(np.isfinite(middle), middle, np.nan)
+            look = {"color": colour, "marker": marker, "ms": 3}
+            left.plot(group["budget"], middle, label=style.literal(str(name)), **look)
+            right.plot(group["budget"], group["share"], **look)
+        if wanted_mm is not None:
+            left.axhline(wanted_mm, **style.LIMIT, label=f"wanted ({wanted_mm:g} mm)")
+        if power is not None:
+            right.axhline(power, **style.LIMIT, label=f"wanted ({power:.0%})")
+        if enough is not None:
+            left.axvline(enough, color=style.MUTED, lw=0.8, ls=":")
+            right.axvline(enough, color=style.MUTED, lw=0.8, ls=":", label=f"{enough} readings")
+        left.set(ylim=(0.0, top), xlabel="Readings allowed", ylabel="Upper minus lower bound, mm")
+        right.set(ylim=(0.0, 1.04), xlabel="Readings allowed", ylabel=share)
+        title = "median, 5 to 95 % of campaigns; to the top where some state no bound"
+        figure.legend(loc="outside lower center", ncols=4, title=title,
+                      title_fontsize=style.SMALL_PT)  # fmt: skip
+    return figure
+
+
+def draw_observability(index: np.ndarray, robot: str) -> Figure:
+    """Draw the observability index against the number of poses.
+
+    Parameters
+    ----------
+    index
+        O1 (n,) after each added pose, the last one after all swaps, mm or mrad.
+    robot
+        Name above the figure.
+    """
+    with style.house():
+        figure = style.new_figure(style.SINGLE_COLUMN_IN, 2.6)
+        ax = figure.subplots()
+        ax.plot(np.arange(1, len(index) + 1), index, color=style.BLUE, marker="o", ms=3)
+        ax.set(
+            xlabel="Poses", ylabel="O1 (mm or mrad)", ylim=(0.0, 1.18 * float(index.max()) or 1.0)
+        )
+        style.name_dataset(figure, robot)
+    return figure

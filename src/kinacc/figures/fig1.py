@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -39,11 +38,6 @@ def judge(measured_mm: float, eta_mm: float, sigma_mm: float) -> Case:
     candidate = float(np.clip(measured_mm, -eta_mm, eta_mm))
     distance = abs(measured_mm - candidate) / sigma_mm
     return Case(candidate, distance, math.erfc(distance / math.sqrt(2)))
-
-
-def run(inputs: Mapping, settings: Mapping) -> Figure:
-    """Return the figure, which needs no table and is the same for every data set."""
-    return draw()
 
 
 def draw() -> Figure:

@@ -13,13 +13,14 @@ from kinacc.errors import InputError, Problem
 from kinacc.figures import style
 from kinacc.kinematics import dh, tables
 from kinacc.kinematics import robot as robots
+from kinacc.tables.columns import Tables
 
 VIEW_DEG = (24.0, -58.0)  # elevation, azimuth
 LINK, JOINT = "#f2a93b", "#5b6470"
 _HALF_JOINT = 0.03  # of the reach
 
 
-def run(inputs: Mapping, settings: Mapping) -> Figure:
+def run(inputs: Tables, settings: Mapping[str, Any]) -> Figure:
     """Return the figure of the ``dh_model`` among the ``assessment_points``.
 
     The tool centre point is the fitted one, or else the configured one.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from textwrap import fill
 from typing import Any
 
@@ -15,6 +14,7 @@ from matplotlib.ticker import MaxNLocator
 
 from kinacc.errors import InputError, Problem
 from kinacc.figures import style
+from kinacc.tables.columns import Columns
 
 PLACE = ["slice_deg", "radius_mm", "height_mm"]
 ROWS = (("position_max_mm", "Position", "mm"), ("orientation_max_mrad", "Orientation", "mrad"))
@@ -29,19 +29,14 @@ _HATCHED: dict[str, Any] = {
 }
 
 
-def run(inputs: Mapping, settings: Mapping) -> Figure:
-    """Return the figure of the ``accuracy_map``."""
-    return draw(inputs["accuracy_map"], dataset=settings.get("dataset"))
-
-
-def draw(accuracy_map: Mapping, *, dataset: str | None = None) -> Figure:
+def draw(accuracy_map: Columns, *, dataset: str | None = None) -> Figure:
     """Draw ``accuracy_map``: a column per slice, position above orientation.
 
     One colour scale per row; unreachable cells are hatched, and those reached in some but not all
     orientations and branches dotted; the largest value of each slice is ringed and stated.
     Raises InputError where there is no row.
     """
-    cells = pd.DataFrame(dict(accuracy_map))
+    cells = pd.DataFrame(accuracy_map)
     if cells.empty:
         raise InputError(Problem("accuracy_map", "the table has no row", "at least one"))
     cells[PLACE] = cells[PLACE].round(3)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
@@ -12,6 +10,7 @@ from matplotlib.figure import Figure
 
 from kinacc.figures import style
 from kinacc.tables.allowed import FIRST, HOLDS, OPEN, RECALIBRATE
+from kinacc.tables.columns import Columns
 
 _CALIBRATIONS = (
     ("held_out", style.BLUE, "o", "calibrated on this line, held out"),
@@ -27,12 +26,7 @@ VERDICTS = {
 _LEAST_SPAN_C = 1.0  # either way: less is no change worth a look
 
 
-def run(inputs: Mapping, settings: Mapping) -> Figure:
-    """Of the table ``history`` of the data set."""
-    return draw(inputs["history"], dataset=settings["dataset"])
-
-
-def draw(history: Mapping, *, dataset: str | None = None) -> Figure:
+def draw(history: Columns, *, dataset: str | None = None) -> Figure:
     """Draw ``history``, one row a line by date.
 
     Above: position errors of the calibration made of each line at its held-out poses, and of the
@@ -40,7 +34,7 @@ def draw(history: Mapping, *, dataset: str | None = None) -> Figure:
     the calibration in force, beside what chance moves, marked by the verdict. Last the temperature,
     where it is stated.
     """
-    lines = pd.DataFrame(dict(history))
+    lines = pd.DataFrame(history)
     lines.index = pd.Index(lines["date"].to_numpy("datetime64[D]").astype(float))
     warm = lines["temperature_c"].dropna()
     heights = [1.25, 1.0, 0.4][: 3 if len(warm) else 2]
@@ -58,9 +52,10 @@ def draw(history: Mapping, *, dataset: str | None = None) -> Figure:
             for day in lines.index[lines["verdict"] == RECALIBRATE]:
                 panel.axvline(day, color=style.VERMILION, lw=0.7, ls=":", zorder=0.5)
             panel.grid(axis="x", visible=False)
-        locator = AutoDateLocator(minticks=3, maxticks=9)
+        locator = AutoDateLocator(minticks=3, maxticks=9)  # type: ignore[no-untyped-call]
         panels[-1].xaxis.set_major_locator(locator)
-        panels[-1].xaxis.set_major_formatter(ConciseDateFormatter(locator, show_offset=False))
+        form = ConciseDateFormatter(locator, show_offset=False)  # type: ignore[no-untyped-call]
+        panels[-1].xaxis.set_major_formatter(form)
         panels[-1].set_xlabel(f"{lines['date'].iloc[0]} to {lines['date'].iloc[-1]}")
         style.name_dataset(figure, dataset)
     return figure

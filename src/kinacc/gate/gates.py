@@ -15,8 +15,7 @@ from kinacc.errors import InputError
 from kinacc.gate import chance
 from kinacc.gate.outcome import FAILED, PASSED, UNDECIDED, WARNED, Outcome
 from kinacc.gate.values import RunTables, cell, figure, sample
-from kinacc.report.history_lines import sentence
-from kinacc.report.rendering import lines
+from kinacc.report.rendering import history_sentence, lines
 from kinacc.tables import sums
 from kinacc.tables.allowed import FINDING_LEVELS, FIRST, HOLDS, LEFT_OUT, RECALIBRATE
 
@@ -214,5 +213,4 @@ def _history(gate: Gate, tables: RunTables) -> Found:
     verdicts = {FIRST: PASSED, HOLDS: PASSED, RECALIBRATE: FAILED}
     verdict = verdicts.get(str(last["verdict"]), UNDECIDED)
     fix = "" if verdict == UNDECIDED else "calibrate the arm anew, or find out what moved"
-    says = sentence({name: table[name].to_numpy() for name in table})
-    return Found(verdict, fix, figures, says=f"{last['series']}: {says}")
+    return Found(verdict, fix, figures, says=f"{last['series']}: {history_sentence(table)}")

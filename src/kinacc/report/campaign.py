@@ -18,7 +18,7 @@ from kinacc.campaign.plan import Plan
 from kinacc.campaign.state import State, deviations
 from kinacc.campaign.status import Bound, CampaignStatus, percent, status
 from kinacc.config.error_models import model_name
-from kinacc.figures import campaign as drawing
+from kinacc.figures.campaign import draw_bounds, draw_readings
 from kinacc.report.page import FirstScreen, Page, Part, Table
 from kinacc.report.rendering import environment, lines
 from kinacc.tables.columns import Columns
@@ -36,8 +36,8 @@ def section(opened: Opened, tables: Mapping[str, Columns]) -> Part:
     figures = {}
     if len(readings):
         growth = tables["campaign_points"], tables["campaign_bounds"], len(state.plan.route)
-        figures["bounds"] = drawing.draw(*growth, tolerance_mm, summary.calibration)
-        figures["readings"] = drawing.readings(tables["campaign_readings"], tolerance_mm)
+        figures["bounds"] = draw_bounds(*growth, tolerance_mm, summary.calibration)
+        figures["readings"] = draw_readings(tables["campaign_readings"], tolerance_mm)
     values = {
         "status": summary,
         "candidates": _population(summary, opened.plan),
@@ -137,7 +137,7 @@ def _badge(summary: CampaignStatus) -> tuple[str, bool]:
     return ("tolerance: none set", False) if main.tolerance_mm is None else ("UNDECIDED", True)
 
 
-def _row(bound: Bound) -> dict:
+def _row(bound: Bound) -> dict[str, object]:
     """A bound as a row of a table."""
     sure = percent(bound.confidence) if np.isfinite(bound.confidence) else ""
     return {**asdict(bound), "about": bound.about, "sure": sure}

@@ -144,7 +144,7 @@ def _select(title: str, options: Sequence[str], code: str, **values: object) -> 
     return select
 
 
-def _small(table: pd.DataFrame) -> dict[str, np.ndarray | list]:
+def _small(table: pd.DataFrame) -> dict[str, np.ndarray | list[str]]:
     """Columns for the browser: numbers in single precision."""
     return {
         str(name): values.to_numpy(np.float32)
@@ -154,7 +154,9 @@ def _small(table: pd.DataFrame) -> dict[str, np.ndarray | list]:
     }
 
 
-def _figure(x_label: str, y_label: str, tips: Sequence[tuple[str, str]], height=300, **more):
+def _figure(
+    x_label: str, y_label: str, tips: Sequence[tuple[str, str]], height: int = 300, **more: Any
+) -> Any:
     plot = bokeh_figure(
         height=height,
         sizing_mode="stretch_width",

@@ -8,7 +8,7 @@ from kinacc.config.error_models import model_name
 from kinacc.deployment import compare
 from kinacc.deployment.compare import Difference
 from kinacc.deployment.record import Calibration
-from kinacc.figures import comparison
+from kinacc.figures.calibration import draw_comparison
 from kinacc.report import rendering
 from kinacc.report.page import FirstScreen, Page, Part, Table
 
@@ -59,7 +59,7 @@ def comparison_page(difference: Difference, first: Calibration, q_rad: np.ndarra
     worst = worst.sort_values("arm_moved_mm", ascending=False, kind="stable").head(_WORST)
     columns = ["moved_mm", "turned_mrad", "arm_moved_mm", "arm_turned_mrad"]
     quantiles = poses[columns].quantile([*_QUANTILES.values()]).assign(share=[*_QUANTILES])
-    picture = {"comparison": comparison.draw(difference)}
+    picture = {"comparison": draw_comparison(difference)}
     count = len(poses)
     parts = [
         Part("moved", {"poses": count, "quantiles": quantiles}, picture),

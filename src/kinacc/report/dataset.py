@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -33,7 +34,7 @@ _OF_THE_STUDY = (
 )
 
 
-def run(inputs: Mapping, settings: Mapping) -> Page:
+def run(inputs: Mapping[str, Any], settings: Mapping[str, Any]) -> Page:
     """The page on the tables that are there, and on the campaign of their calibration.
 
     ``settings``: ``dataset``; ``folder`` where the results are not in their usual place,

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 import pandas as pd
 
@@ -23,7 +21,7 @@ from kinacc.calibration.residuals import STANDARD_ERRORS
 from kinacc.calibration.uncertainty import is_angle
 from kinacc.config.error_models import MEASURED, NOMINAL, PLAINEST, Comparison, model_name
 from kinacc.deployment.folder import uncertainty
-from kinacc.figures import checked_data, joint_errors
+from kinacc.figures.calibration import draw_coverage, draw_joint_errors
 from kinacc.kinematics.dh import PARAMETERS, DHModel
 from kinacc.kinematics.robot import Robot
 from kinacc.kinematics.vec import VECModel
@@ -31,7 +29,7 @@ from kinacc.measurements.row_names import RowNames
 from kinacc.report import charts, summarise
 from kinacc.report.page import Part
 from kinacc.tables.allowed import ERRORS, SUBSETS
-from kinacc.tables.columns import Columns
+from kinacc.tables.columns import Columns, Tables
 
 _WORST = 10
 _MOST_POINTS = 12_000  # drawn one by one; of more rows every n-th is, and all of the largest
@@ -42,7 +40,6 @@ _STATUSES = {
     UNDETERMINED: "undetermined",
     FIXED: "fixed",
 }
-Tables = Mapping[str, Columns]
 
 
 def residuals(tables: Tables, robot: Robot) -> Part:
@@ -127,8 +124,7 @@ def data(tables: Tables, robot: Robot) -> Part:
         "stated": (len(std), std.median().tolist()) if len(std) else None,
         "joints": joints,
     }
-    figure = checked_data.coverage(joints.to_dict("records"))
-    return Part("data", values, figures={"coverage": figure})
+    return Part("data", values, figures={"coverage": draw_coverage(joints)})
 
 
 def identifiability(tables: Tables, robot: Robot) -> Part:
@@ -163,7 +159,7 @@ def identifiability(tables: Tables, robot: Robot) -> Part:
     return Part("identifiability", values)
 
 
-def _rank(fit: Columns | None) -> dict | None:
+def _rank(fit: Columns | None) -> dict[str, object] | None:
     """Number of fitted directions, the limit, and singular values over the largest."""
     if fit is None:
         return None
@@ -182,7 +178,7 @@ def parameters(tables: Tables, robot: Robot) -> Part:
     """DH parameters against nominal, and what the VEC model adds to them."""
     model = VECModel.from_columns(tables["vec_model"], robot.dh.prismatic)
     joints, errors, std = vec_errors(tables, model, robot)
-    largest: list[dict] = [{"joint": f"joint {n + 1}"} for n in range(model.joints)]
+    largest: list[dict[str, str]] = [{"joint": f"joint {n + 1}"} for n in range(model.joints)]
     for joint, error in np.ndindex(errors.shape[:2]):
         place = (joint, error, int(np.argmax(np.abs(errors[joint, error]))))
         spread = f" ± {std[place]:.3f}" if np.isfinite(std[place]) else ""
@@ -201,7 +197,7 @@ def parameters(tables: Tables, robot: Robot) -> Part:
         "offsets": offsets[offsets["direction"] != 0],
     }
     units = ["mm" if slides else "deg" for slides in np.asarray(robot.dh.prismatic)]
-    figure = joint_errors.draw(joints, errors, std, units)
+    figure = draw_joint_errors(joints, errors, std, units)
     return Part("parameters", values, figures={"errors": figure})
 
 

@@ -7,7 +7,7 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
@@ -29,7 +29,7 @@ class Table:
     """
 
     caption: str
-    rows: Sequence[Mapping]
+    rows: Sequence[Mapping[Any, object]]
     columns: Sequence[Sequence[str]]
     folded: bool = False
 

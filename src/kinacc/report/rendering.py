@@ -1,4 +1,4 @@
-"""Jinja templates of pages and texts, and how these write numbers."""
+"""Jinja templates of pages and texts, how these write numbers, and a history in one sentence."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from functools import cache
 from importlib.resources import files
 
+import pandas as pd
 from jinja2 import Environment, FunctionLoader, StrictUndefined
 
 from kinacc.config.error_models import model_name
@@ -69,3 +70,22 @@ def lines(template: str, **values: object) -> list[str]:
     """Lines of a text template that are not empty."""
     text = environment(is_page=False).get_template(template).render(values)
     return [line for line in text.splitlines() if line.strip()]
+
+
+def history_sentence(history: pd.DataFrame) -> str:
+    """What the last row of ``history.parquet`` states of the calibration in force.
+
+    Parameters
+    ----------
+    history
+        The table.
+
+    Returns
+    -------
+    str
+        The verdict with its evidence (mm), without a full stop.
+    """
+    line = history.iloc[-1]
+    dates = dict(zip(history["series"], history["date"], strict=True))
+    day = dates.get(line["in_force"], line["in_force"])
+    return lines("history.txt", row=line, day=day)[0]

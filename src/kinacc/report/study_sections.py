@@ -9,14 +9,14 @@ import numpy as np
 import pandas as pd
 
 from kinacc.config.error_models import model_name
-from kinacc.figures import fig4, history_over_time, iterations
-from kinacc.figures.truth import FOOTNOTE, OF_MODELS
+from kinacc.figures import history_over_time
+from kinacc.figures.paper import FOOTNOTE, OF_MODELS, draw_iterations, draw_noise
 from kinacc.kinematics.robot import Robot
 from kinacc.report import charts
-from kinacc.report.history_lines import sentence
 from kinacc.report.page import Part
+from kinacc.report.rendering import history_sentence
 from kinacc.tables.allowed import VERDICTS
-from kinacc.tables.columns import Columns
+from kinacc.tables.columns import Tables
 
 _LARGEST = 10
 _DIFFERS = VERDICTS[1]
@@ -27,14 +27,13 @@ _EXAMPLES = {
     "rejected_larger_eta": "the same readings, a slightly larger bound",
     "not_rejected": "Fig. 6: the bound is not rejected",
 }
-Tables = Mapping[str, Columns]
 
 
 def history(tables: Tables, robot: Robot) -> Part:
     """The history of the robot, one row a data set of its series."""
     rows = pd.DataFrame(dict(tables["history"]))
     rows["called"], rows["remark"] = rows["model"].map(model_name), rows["reason"].fillna("")
-    values = {"rows": rows, "sentence": sentence(tables["history"])}
+    values = {"rows": rows, "sentence": history_sentence(rows)}
     figure = history_over_time.draw(tables["history"])
     return Part("history", values, figures={"history": figure})
 
@@ -126,7 +125,7 @@ def study(tables: Tables, robot: Robot) -> Part:
         "truth": held_to,
         "rows": rows.assign(label=rows["assessor"].str.replace("_", " ")),
     }
-    figure = fig4.draw(summary, true_accuracy_mm=held_to.largest_mm, taken_as_true=held_to.footnote)
+    figure = draw_noise(summary, held_to.largest_mm, held_to.footnote)
     return Part("study", values, figures={"noise": figure})
 
 
@@ -147,12 +146,9 @@ def histories(tables: Tables, robot: Robot) -> Part:
         remark=("the nearest there is: " + final["rule"]).where(final["rule_met"] == 0, ""),
     )
     figures = {
-        called[name]: iterations.draw(
-            table, example=name, true_accuracy_mm=held_to.largest_mm,
-            taken_as_true=held_to.footnote,
-        )
+        called[name]: draw_iterations(table, name, held_to.largest_mm, held_to.footnote)
         for name in final.index
-    }  # fmt: skip
+    }
     values = {
         "truth": held_to,
         "outcomes": outcomes,
@@ -180,7 +176,9 @@ def paper_tables(tables: Tables, robot: Robot) -> Part:
     return Part("paper-tables", values)
 
 
-def _row(first: object, known: pd.DataFrame, pattern: str, names: Mapping[str, str]) -> dict:
+def _row(
+    first: object, known: pd.DataFrame, pattern: str, names: Mapping[str, str]
+) -> dict[str, object]:
     """Pairs of the paper's number and the one here; the remark names those that differ."""
     row: dict[str, object] = {"of": first}
     differing = []

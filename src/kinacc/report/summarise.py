@@ -26,11 +26,11 @@ from kinacc.kinematics import robot
 from kinacc.kinematics.robot import Robot
 from kinacc.measurements.folds import configurations_of
 from kinacc.measurements.row_names import RowNames
-from kinacc.report.history_lines import sentence
+from kinacc.report.rendering import history_sentence
 from kinacc.report.summary import CalibrationSummary
 from kinacc.tables import store, sums
 from kinacc.tables.allowed import FINDING_LEVELS, LEFT_OUT, SUBSETS, VERDICTS
-from kinacc.tables.columns import Columns
+from kinacc.tables.columns import Columns, Tables
 from kinacc.tables.contract import columns_of
 
 OPTIONAL = (
@@ -48,7 +48,6 @@ ON_PAGE = (
 _ESTIMATES = {"cross_validated": "held_out", "train": "training"}
 _STATISTICS = ("n", "mean", "quantile_99", "largest")
 _DAY_OF_A_LINE = re.compile(r"-(\d{4}-\d{2}-\d{2})$")
-Tables = Mapping[str, Columns]
 
 
 def summarise(
@@ -127,7 +126,7 @@ def summarise(
         tolerance=tolerance_of(tables),
         claims=_claims(tables["claims"]) if synthetic and "claims" in tables else None,
         other_errors=_other_errors(tables),
-        history=sentence(tables["history"]) if "history" in tables else "",
+        history=history_sentence(pd.DataFrame(tables["history"])) if "history" in tables else "",
         outdated=outdated,
         next_steps=_next_steps(
             str(folder), results.calibration(tables, arm).choice, assessed.status
@@ -204,7 +203,7 @@ def summarise_all(folders: Sequence[Path]) -> list[CalibrationSummary | Problem]
     return summaries
 
 
-def run(inputs: Tables, settings: Mapping) -> dict[str, Columns]:
+def run(inputs: Tables, settings: Mapping[str, Any]) -> dict[str, Columns]:
     """The stage ``summary``: figures of a calibration, one a row."""
     arm = robot.of_text(str(inputs["robot"]["description"][0]), "robot.parquet")
     calibration = results.calibration(inputs, arm)
@@ -247,7 +246,7 @@ def run(inputs: Tables, settings: Mapping) -> dict[str, Columns]:
     return {"summary": columns_of("summary", rows)}
 
 
-def _error_rows(errors: pd.DataFrame) -> Iterable[tuple]:
+def _error_rows(errors: pd.DataFrame) -> Iterable[tuple[Any, ...]]:
     """Errors by model, and differences of models; orientations where they are held out."""
     for row in errors.to_dict("records"):
         topic, item = f"{row['estimate']}_error", row["model"]
@@ -262,7 +261,7 @@ def _error_rows(errors: pd.DataFrame) -> Iterable[tuple]:
             yield topic, item, name, float(row[name]), "1" if name == "n" else row["unit"], None
 
 
-def _selection_rows(selection: pd.DataFrame) -> Iterable[tuple]:
+def _selection_rows(selection: pd.DataFrame) -> Iterable[tuple[Any, ...]]:
     units = {"selected": "1", "held_out_rms_mm": "mm", "gain_mm2": "mm^2",
              "gain_std_error_mm2": "mm^2"}  # fmt: skip
     for row in selection.to_dict("records"):

@@ -1,9 +1,10 @@
-"""The iteration history of one simulation of model invalidation, as in Figs. 5 and 6."""
+"""Figs. 1 to 6 as the workflow draws them, and those of the study: noise and iterations."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from textwrap import fill
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -11,32 +12,99 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from kinacc.errors import InputError, Problem
-from kinacc.figures import style, truth
+from kinacc.figures import fig1, fig2, fig3, style
+from kinacc.tables.columns import Columns, Tables
+
+FOOTNOTE = "* measured minus modelled: contains the instrument's noise"
+OF_MODELS = "* taken as true by the study: VEC minus DH of a measured arm"
 
 
-def run(inputs: Mapping, settings: Mapping, example: str) -> Figure:
-    """Return the figure of an example of the ``histories``, with the truth of all points."""
-    return draw(inputs["histories"], example=example, **truth.known(inputs, settings))
+_EXAMPLES = {"fig5": "rejected", "fig6": "not_rejected"}
+_UM_PER_MM = 1000.0
 
 
-def draw(
-    histories: Mapping,
-    *,
-    example: str,
-    true_accuracy_mm: float | None = None,
+def draw_figure(name: str, inputs: Tables, settings: Mapping[str, Any]) -> Figure:
+    """Draw ``fig1`` to ``fig6`` of the tables of a data set.
+
+    The true accuracy (eq. 7) is the largest true error of ``assessment_points``. Of a measured arm
+    it is only taken as true, as a footnote says.
+    """
+    dataset = settings.get("dataset")
+    if name == "fig1":  # the same for every data set
+        return fig1.draw()
+    if name == "fig2":
+        return fig2.run(inputs, settings)
+    if name == "fig3":
+        return fig3.draw(inputs["accuracy_map"], dataset=dataset)
+    at_measured = settings["evaluation"]["space"] == "measured"
+    of_measured = settings["measurements"]["source"] != "synthetic"
+    taken_as_true = FOOTNOTE if at_measured else OF_MODELS if of_measured else None
+    truth = pd.Series(inputs["assessment_points"]["true_error_mm"]).max(), taken_as_true, dataset
+    if name == "fig4":
+        return draw_noise(inputs["study_summary"], *truth)
+    return draw_iterations(inputs["histories"], _EXAMPLES[name], *truth)
+
+
+def draw_noise(
+    summary: Columns,
+    true_accuracy_mm: float,
     taken_as_true: str | None = None,
     dataset: str | None = None,
 ) -> Figure:
-    """Draw one example of ``histories``.
+    """Fig. 4: assessed accuracy against noise, one line per assessor, with the true accuracy.
+
+    Means of ``study_summary`` joined by lines, bars from the smallest to the largest.
+    ``true_accuracy_mm``: NaN where unknown.
+    ``taken_as_true``: footnote where the truth is not known; what the study took for it.
+    """
+    table = pd.DataFrame(summary).sort_values("noise_mm", kind="stable")
+    table["noise_um"] = table["noise_mm"] * _UM_PER_MM
+    looks = style.assessor_style(table["assessor"])
+    levels = np.unique(table["noise_um"])
+    step = float(np.diff(levels).min()) if levels.size > 1 else 50.0
+    few, many = table["repetitions"].min(), table["repetitions"].max()
+    span = f"{many:.0f}" if few == many else f"{few:.0f} to {many:.0f}"
+    with style.house():
+        figure = style.new_figure(style.SINGLE_COLUMN_IN, 3.1)
+        ax = figure.subplots()
+        for index, (name, (label, colour, marker)) in enumerate(looks.items()):
+            rows = table[(table["assessor"] == name) & table["mean_mm"].notna()]
+            ends = rows["mean_mm"] - rows["min_mm"], rows["max_mm"] - rows["mean_mm"]
+            shift = (index - (len(looks) - 1) / 2) * 0.14 * step
+            ax.errorbar(rows["noise_um"] + shift, rows["mean_mm"], np.clip(ends, 0, None),
+                        color=colour, marker=marker, label=label)  # fmt: skip
+        label = "“True” accuracy*" if taken_as_true else "True accuracy"
+        if np.isfinite(true_accuracy_mm):
+            label = f"{label} {true_accuracy_mm:.3f} mm"
+            ax.axhline(true_accuracy_mm, **style.TRUTH, zorder=1, label=label)
+        ax.set(xlabel="Noise, standard deviation per axis (µm)", ylabel="Assessed accuracy (mm)")
+        ax.set_xticks(levels[:: max(-(-levels.size // 8), 1)])
+        ax.grid(axis="x", visible=False)
+        ax.set_title(f"Mean, smallest and largest of {span} simulations", loc="left",
+                     color=style.MUTED, fontsize=style.SMALL_PT)  # fmt: skip
+        figure.legend(loc="outside lower center", ncols=2, title=taken_as_true,
+                      title_fontsize=style.SMALL_PT)  # fmt: skip
+        style.name_dataset(figure, dataset)
+    return figure
+
+
+def draw_iterations(
+    histories: Columns,
+    example: str,
+    true_accuracy_mm: float,
+    taken_as_true: str | None = None,
+    dataset: str | None = None,
+) -> Figure:
+    """Figs. 5 and 6: the iteration history of one example of ``histories``.
 
     Above: magnitude of first readings, of the averages after resampling, of the true errors, with
     the bound eta and the true accuracy (largest true error of all operating points, visited or
-    not); a dotted line where the largest is first measured. Below: rejection
+    not; NaN where unknown); a dotted line where the largest is first measured. Below: rejection
     probability and its threshold alpha.
     ``taken_as_true``: footnote where the truth is not known; what the study took for it.
     Raises InputError where there is no row.
     """
-    table = pd.DataFrame(dict(histories))
+    table = pd.DataFrame(histories)
     steps = table[table["example"] == example].sort_values("iteration", kind="stable")
     if steps.empty:
         present = ", ".join(sorted(set(table["example"]))) or "none"
@@ -59,7 +127,7 @@ def draw(
         _dots(bottom, steps, column, True, style.ORANGE, "_after resampling, as above")
         bottom.axhline(alpha, color=style.INK, lw=0.9, zorder=1.5)
         bottom.text(1.01, alpha, "α", transform=bottom.get_yaxis_transform(), va="center")
-        if true_accuracy_mm is not None:
+        if np.isfinite(true_accuracy_mm):
             label = f"{true.format('accuracy')} {true_accuracy_mm:.3f} mm"
             top.axhline(true_accuracy_mm, **style.TRUTH, label=label)
             reached = steps["iteration"][np.isclose(steps["true_mm"], true_accuracy_mm, 0, 1e-9)]
