@@ -130,6 +130,18 @@ def test_bounds_hold_as_stated_where_some_readings_go_wrong(wrong, rate, tied):
     assert max(too_low, too_high) <= most
 
 
+@pytest.mark.parametrize("rate", [0.001, 0.01, 0.05])
+def test_more_readings_are_hardly_ever_wrong_than_are_counted_on(rate):
+    campaign = SearchAndConfirm(BUDGET, wrong_rate=rate).begin(
+        Candidates(np.tile(0.01 * np.eye(3), (POINTS, 1, 1)))
+    )
+    chances = [math.comb(BUDGET, k) * rate**k * (1.0 - rate) ** (BUDGET - k)
+               for k in range(BUDGET + 1)]  # fmt: skip
+    counted_on = campaign.looks.wrong
+    assert sum(chances[counted_on + 1 :]) <= 0.5 * campaign.single_error
+    assert sum(chances[counted_on:]) > 0.5 * campaign.single_error
+
+
 @pytest.mark.parametrize("guard", [{}, {"wrong_rate": RATE}], ids=["plain", "guarded"])
 def test_a_target_that_slipped_once_is_named_and_without_a_guard_no_bound_is_stated(guard):
     campaign = run(4, slipped(90), **guard)
