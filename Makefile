@@ -3,7 +3,7 @@
 # make public-robots  every measured arm in examples/data calibrated blind, and the page about it
 # make check       lint, types and the fast tests, in under a minute; for while one works
 # make test        everything a change has to pass
-# make test-all    also runs on a Slurm, pages in a browser and research; with Debian's slurm-wlm, chromium
+# make test-all    also every page as typed, the site, runs on a Slurm, browser, research; with Debian's slurm-wlm, chromium
 #                  and chromium-driver
 # make size        AST nodes and lines of every room, words of the docs, beside their budgets
 # make bench       times beside other libraries, and the page about them: ten minutes

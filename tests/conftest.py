@@ -77,8 +77,19 @@ SLOW = (
     "workflow/test_robustness.py",
 )
 _SLOW = tuple(TESTS / name for name in SLOW)
-# For a night (`make test-all`): runs on a cluster, pages in a browser, research.
-NIGHT = tuple(TESTS / name for name in ("report/test_in_a_browser.py", "research", "slurm"))
+# For a night (`make test-all`): runs on a cluster, pages in a browser, research, the site, and the
+# whole measured series, whose stages are golden by themselves.
+NIGHT = tuple(
+    TESTS / name
+    for name in (
+        "benchmarks",
+        "integration/test_real_arm.py",
+        "integration/test_site.py",
+        "report/test_in_a_browser.py",
+        "research",
+        "slurm",
+    )
+)
 
 settings.register_profile("repeatable", derandomize=True, deadline=None, database=None)
 settings.load_profile("repeatable")

@@ -163,6 +163,7 @@ def test_the_readme_leads_from_a_tracker_file_to_models_and_what_they_are_worth(
     assert not (results / "study.parquet").exists()
 
 
+@pytest.mark.night
 @pytest.mark.parametrize("page", [page for page in PAGES if page != README], ids=name_of)
 def test_a_page_does_what_it_says(page, shell, calibrated, request, tmp_path):
     home, clone, name = tmp_path / "a home", tmp_path / "clone", name_of(page)
