@@ -167,7 +167,9 @@ def verify(
     frames = frames_at(of_sessions, new, moved, rotation_weight_mm_per_rad)
     off_mm = errors({kind: Fit(model, frames)}, new)[Comparison(MEASURED, kind).name].position_mm
     poses = new.select(slice(None, None, rows.shape[1]))
-    fresh = _columns(model, poses, frames.targets, moved, off_mm.reshape(*rows.shape, 3))
+    fresh = error_columns(
+        model, robot, poses, frames.targets, moved, off_mm.reshape(*rows.shape, 3)
+    )
     result = replace(result, here=_level(fresh))
     if fresh.columns[..., -1].size <= fresh.rank:
         return replace(result, reason="base and tool explain all that these poses show")
@@ -247,7 +249,7 @@ def _held_out(
     if not len(rows):
         return None
     targets = frames_of(tables["frames"], kind, names, measured.session_names).targets
-    return _columns(model, measured.select(rows[:, 0]), targets, moved, vectors[rows])
+    return error_columns(model, robot, measured.select(rows[:, 0]), targets, moved, vectors[rows])
 
 
 def held_out_vectors(pose_errors: Mapping[str, np.ndarray], kind: str, count: int) -> np.ndarray:
@@ -263,12 +265,21 @@ def held_out_vectors(pose_errors: Mapping[str, np.ndarray], kind: str, count: in
     return vectors
 
 
-def _columns(
-    model: ErrorModel, at: Observations, targets: Pose, moved: Sequence[str], off_mm: np.ndarray
+def error_columns(
+    model: ErrorModel,
+    robot: Robot,
+    at: Observations,
+    targets: Pose,
+    moved: Sequence[str],
+    off_mm: np.ndarray,
 ) -> ErrorColumns:
-    """Motions of what moved, offsets of the joints and errors ``off_mm`` (n, K, 3) in the base."""
+    """Motions of what moved, offsets of reported joints, errors ``off_mm`` (n, K, 3) in the base.
+
+    A joint stands at the reported position plus its offset.
+    """
     flange = model.pose(at.at)
-    slopes = np.where(model.dh.prismatic, 1.0, ANGLE_UNIT_RAD) * model.joint_jacobian(at.at)
+    units = np.where(model.dh.prismatic, 1.0, ANGLE_UNIT_RAD)
+    slopes = model.joint_jacobian(at.at) @ robot.joint_map * units
     count, kinds, parts = *off_mm.shape[:2], []
     turned = np.repeat(flange.rotation, kinds, axis=0)
     arm = (turned @ np.tile(targets.position_mm, (count, 1))[..., None])[..., 0]
