@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from kinacc.calibration import residuals, stages
+from kinacc.calibration import residuals, stages, uncertainty
 from kinacc.calibration.dh_estimator import DHEstimator
 from kinacc.calibration.fitting import ModelFit
-from kinacc.calibration.identifiability import listed
+from kinacc.calibration.identifiability import identified, listed
 from kinacc.calibration.models import Fit
 from kinacc.calibration.observations import Observations
 from kinacc.config.error_models import NOMINAL, PLAINEST, model_name
@@ -107,7 +107,11 @@ def fit_pendant(
     # Joint 1 moves as the base does, the last joint as the tool: where these are fitted, it stays.
     ends = np.isin(np.arange(robot.dh.joints), (0, robot.dh.joints - 1))[:, None]
     free = free & ~(ends & np.isnan(fit(used).std))
-    models = {NOMINAL: Fit(robot.dh, estimator.common.nominal_frames(used)), **refit(used)}
+    final = fit(used)
+    models = {
+        NOMINAL: Fit(robot.dh, estimator.common.nominal_frames(used)),
+        PLAINEST: Fit(final.model, final.frames),
+    }
     folds = np.unique(every.fold[every.fold >= 0])
     if len(folds):
         errors = residuals.cross_validated(every, refit, folds, [PLAINEST])[0]
@@ -127,7 +131,7 @@ def fit_pendant(
         pd.DataFrame(values, columns=["group", "name", "unit", "old", "new"]),
         _mean_errors(tables, maker, errors[f"{PLAINEST}_vs_measured"]),
         tuple(item.rpartition("_")[0] for item in np.array(PARAMETERS)[left_out]),
-        tuple(listed(tables["dh_identified"])),
+        tuple(listed(identified(final, uncertainty.of_fit(final), used))),
         maker.enter,
         maker.remark,
         maker.text(new[maker.group]),

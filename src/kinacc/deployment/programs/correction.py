@@ -294,7 +294,7 @@ class _Correction:
             status = PoseStatus(row.outcome).name.lower().replace("_", " ")
             return f"the calibrated arm: {status}"
         if row.change_mm > at_most_mm:
-            return f"would move by {row.change_mm:.3g} mm (--at-most-mm)"
+            return f"would move by {row.change_mm:.3g} mm (--at-most-mm; is --tool right?)"
         if not position.posture:
             return ""
         changed = posture.unmatched(self.robot, self.language.posture, position.posture, row.q_rad)
