@@ -124,7 +124,7 @@ def test_names_that_look_like_code_are_shown_and_never_run(chromium, folder, tmp
     name = " ".join(HOSTILE)
     made = dataset.run(tables, {"dataset": name, "folder": name})
     page_file = tmp_path / "hostile.html"
-    page_file.write_text(html(made, {"seed": name}, {name: "0" * 64}), encoding="utf-8")
+    page_file.write_text(html(made, {"seed": name}), encoding="utf-8")
     with chromium.opened(page_file) as page:
         found = page.run("""
             return {text: document.body.innerText, ran: window.ran ?? null,

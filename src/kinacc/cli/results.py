@@ -13,7 +13,6 @@ import click
 import pandas as pd
 import pyarrow as pa
 
-from kinacc import __version__
 from kinacc.campaign.beside_results import of_results
 from kinacc.checks.contradictions import load
 from kinacc.cli.choice import CONFIG, CONFIGS, REASON, option, positive, print_outdated
@@ -135,7 +134,7 @@ def written(folder: str, out: str | None = None, without: Collection[str] = ()) 
     }
     path = Path(out or place / _PAGE)
     page = pages.run({**shown, **campaigns}, settings)
-    write_whole(path, html(page, {"kinacc_version": __version__}).encode())
+    write_whole(path, html(page).encode())
     return path
 
 

@@ -83,8 +83,13 @@ def draw(accuracy_map: Columns, *, dataset: str | None = None) -> Figure:
 
 def _edges(levels: np.ndarray) -> np.ndarray:
     """Edges of cells about grid values."""
-    half = 0.5 * (np.diff(levels).min() if levels.size > 1 else DEFAULT_CELL_MM)
+    half = 0.5 * cell_size(levels)
     return np.append(levels - half, levels[-1] + half)
+
+
+def cell_size(levels: np.ndarray) -> float:
+    """Distance of neighbouring grid values in mm; that of a usual map for a single one."""
+    return float(np.diff(levels).min()) if levels.size > 1 else DEFAULT_CELL_MM
 
 
 def colour_range(values: np.ndarray) -> tuple[float, float]:

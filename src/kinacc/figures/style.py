@@ -66,10 +66,10 @@ def assessor_style(names: Iterable[str]) -> dict[str, tuple[str, str, str]]:
     return looks
 
 
-def darker(colour: str, factor: float = 0.75) -> str:
+def darker(colour: str) -> str:
     """Return the colour darkened for text, which needs more contrast than a line."""
     channels = (int(colour[i : i + 2], 16) for i in (1, 3, 5))
-    return "#" + "".join(f"{round(c * factor):02x}" for c in channels)
+    return "#" + "".join(f"{round(0.75 * c):02x}" for c in channels)
 
 
 def shortened(name: str, limit: int) -> str:
@@ -92,11 +92,11 @@ def name_dataset(figure: Figure, dataset: str | None) -> None:
         )  # fmt: skip
 
 
-def legend_above(axes: Axes, columns: int = 2, title: str | None = None, **look: Any) -> None:
+def legend_above(axes: Axes, columns: int = 2, title: str | None = None) -> None:
     """Place a legend above the axes, where it covers nothing; none where nothing is labelled."""
     handles, labels = axes.get_legend_handles_labels()
     axes.legend(
         handles, labels,
         loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=columns, title=title,
-        title_fontsize=SMALL_PT, alignment="left", **look,
+        title_fontsize=SMALL_PT, alignment="left",
     )  # fmt: skip

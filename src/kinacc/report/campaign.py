@@ -30,8 +30,8 @@ _LARGEST, _MOST_ROWS = 10, 300
 def section(opened: Opened, tables: Mapping[str, Columns]) -> Part:
     """Return a campaign as a section of a page, from the tables of ``campaign.report.tables``."""
     summary, state, tolerance_mm = status(opened), opened.state, opened.plan.limits.tolerance_mm
-    points = pd.DataFrame(dict(tables["campaign_points"])).dropna(subset="error_mm")
-    readings = pd.DataFrame(dict(tables["campaign_readings"]))
+    points = pd.DataFrame(tables["campaign_points"]).dropna(subset="error_mm")
+    readings = pd.DataFrame(tables["campaign_readings"])
     measured = points.sort_values("error_mm", ascending=False, kind="stable")
     figures = {}
     if len(readings):

@@ -33,6 +33,7 @@ from kinacc.tables.columns import Columns, Tables
 
 _WORST = 10
 _MOST_POINTS = 12_000  # drawn one by one; of more rows every n-th is, and all of the largest
+_PLACES = 121  # of a joint, at which errors are drawn
 _CLOSE = 0.95  # |correlation| of two parameters that make up for each other
 _STATUSES = {
     IDENTIFIED: "determined by the poses",
@@ -79,7 +80,7 @@ def residuals(tables: Tables, robot: Robot) -> Part:
 
 def _position_errors(tables: Tables, estimate: str) -> pd.DataFrame:
     """Position errors in mm by row and model, at rows that every model was tried on."""
-    table = pd.DataFrame(dict(tables["pose_errors"]))
+    table = pd.DataFrame(tables["pose_errors"])
     table["mm"] = np.linalg.norm(table[["ex_mm", "ey_mm", "ez_mm"]], axis=1)
     table = table[table["estimate"] == estimate]
     table = table.pivot(index="row", columns="comparison", values="mm")
@@ -103,7 +104,7 @@ def _row_names(measurements: Columns) -> list[str]:
 
 def data(tables: Tables, robot: Robot) -> Part:
     """The measured file and the findings of its check."""
-    measurements, check = pd.DataFrame(dict(tables["measurements"])), tables.get("data_check")
+    measurements, check = pd.DataFrame(tables["measurements"]), tables.get("data_check")
     std = measurements[[f"std_{axis}_mm" for axis in "xyz"]].astype(float).dropna()
     joints = summarise.joint_ranges(tables["measurements"], robot)
     values = {
@@ -129,10 +130,10 @@ def data(tables: Tables, robot: Robot) -> Part:
 
 def identifiability(tables: Tables, robot: Robot) -> Part:
     """Parameters that the poses do not determine, and those known only together."""
-    table = pd.DataFrame(dict(tables["dh_identified"]))
+    table = pd.DataFrame(tables["dh_identified"])
     sentences = listed(tables["dh_identified"])
     poorly_determined = weak(sentences)
-    pairs = pd.DataFrame(dict(tables["dh_covariance"]))
+    pairs = pd.DataFrame(tables["dh_covariance"])
     pairs = pairs[pairs["parameter"] != pairs["other"]].dropna(subset="correlation")
     pairs = pairs.sort_values("correlation", key=abs, ascending=False, kind="stable")
     table["unit"] = np.where(table["parameter"].map(is_angle), "mrad", "mm")
@@ -183,7 +184,7 @@ def parameters(tables: Tables, robot: Robot) -> Part:
         place = (joint, error, int(np.argmax(np.abs(errors[joint, error]))))
         spread = f" ± {std[place]:.3f}" if np.isfinite(std[place]) else ""
         largest[joint][ERRORS[error]] = f"{errors[place]:+.3f}{spread}"
-    offsets = pd.DataFrame(dict(tables["vec_model"]))
+    offsets = pd.DataFrame(tables["vec_model"])
     values = {
         "fitted": int(np.sum(np.asarray(tables["measurements"]["subset"]) == SUBSETS[0])),
         "selected": model_name(summary.selected(tables["model_selection"])),
@@ -226,16 +227,16 @@ def dh_parameters(model: Columns, identified: Columns, robot: Robot) -> pd.DataF
 
 
 def vec_errors(
-    tables: Tables, model: VECModel, robot: Robot, count: int = 121
+    tables: Tables, model: VECModel, robot: Robot
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Errors of every joint that no DH table and no neighbouring joint can take over.
 
     Returns
     -------
-    Positions (k, count) in deg or mm, errors (k, 6, count) in mm and mrad, and their standard
+    Positions (k, m) in deg or mm, errors (k, 6, m) in mm and mrad, and their standard
     deviations, NaN where the covariance is unknown.
     """
-    places = np.linspace(-1.0, 1.0, count)
+    places = np.linspace(-1.0, 1.0, _PLACES)
     low, high = model.domain
     joints = 0.5 * (low + high)[:, None] + 0.5 * (high - low)[:, None] * places
     prismatic = np.asarray(robot.dh.prismatic)
@@ -244,7 +245,7 @@ def vec_errors(
     covariance = pd.DataFrame()
     if known is not None:
         covariance = pd.DataFrame(known.covariance, index=known.names, columns=known.names)
-    values = np.empty((model.joints, len(ERRORS), count))
+    values = np.empty((model.joints, len(ERRORS), _PLACES))
     std = np.full(values.shape, np.nan)
     for joint, error in np.ndindex(values.shape[:2]):
         scale = 1.0 if ERRORS[error].startswith("delta") else 1e3
@@ -273,7 +274,7 @@ def _shared(error: str, joint: np.ndarray, slides: bool) -> np.ndarray:
 
 def selection(tables: Tables, why: str) -> Part:
     """``model_selection`` and ``vec_orders``; ``why`` one model is selected."""
-    models = pd.DataFrame(dict(tables["model_selection"]))
+    models = pd.DataFrame(tables["model_selection"])
     gains = models[["gain_mm2", "gain_std_error_mm2"]].where(models["model"] != PLAINEST)
     models[["gain", "error"]] = gains.where(gains["gain_mm2"].notna())
     models["times"] = models["gain"] / models["error"].where(models["error"] > 0.0)
@@ -282,7 +283,7 @@ def selection(tables: Tables, why: str) -> Part:
     models["name"] = models["model"].map(model_name)
     models["remark"] = np.where(models["selected"] == 1, "selected", "")
     columns = ("fold", "order", "log_evidence", "chosen", "prior_std_mm")
-    tried = pd.DataFrame(dict(tables.get("vec_orders", dict.fromkeys(columns, ()))))
+    tried = pd.DataFrame(tables.get("vec_orders", dict.fromkeys(columns, ())))
     chosen = tried[tried["chosen"] == 1]
     tried = tried[tried["fold"].isna() & tried["log_evidence"].notna()]
     values = {

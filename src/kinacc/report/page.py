@@ -81,9 +81,7 @@ class Page:
     marks: Mapping[str, str] = field(default_factory=dict)
 
 
-def html(
-    page: Page, marks: Mapping[str, object] | None = None, read: Mapping[str, str] | None = None
-) -> str:
+def html(page: Page, marks: Mapping[str, object] | None = None) -> str:
     """The page as one file.
 
     Parameters
@@ -92,8 +90,6 @@ def html(
         First screen and sections.
     marks
         Provenance by name, beside that of the page.
-    read
-        SHA-256 by name of the files that were read for it.
 
     Returns
     -------
@@ -117,7 +113,6 @@ def html(
         page=page,
         sections=sections,
         marks={"kinacc_version": __version__, **page.marks, **(marks or {})},
-        read=read or {},
         style=text_of("page.css"),
         script=text_of("page.js"),
         library=_library() if charts else "",

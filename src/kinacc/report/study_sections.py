@@ -10,6 +10,7 @@ import pandas as pd
 
 from kinacc.config.error_models import model_name
 from kinacc.figures import history_over_time
+from kinacc.figures.fig3 import cell_size
 from kinacc.figures.paper import FOOTNOTE, OF_MODELS, draw_iterations, draw_noise
 from kinacc.kinematics.robot import Robot
 from kinacc.report import charts
@@ -31,7 +32,7 @@ _EXAMPLES = {
 
 def history(tables: Tables, robot: Robot) -> Part:
     """The history of the robot, one row a data set of its series."""
-    rows = pd.DataFrame(dict(tables["history"]))
+    rows = pd.DataFrame(tables["history"])
     rows["called"], rows["remark"] = rows["model"].map(model_name), rows["reason"].fillna("")
     values = {"rows": rows, "sentence": history_sentence(rows)}
     figure = history_over_time.draw(tables["history"])
@@ -40,7 +41,7 @@ def history(tables: Tables, robot: Robot) -> Part:
 
 def accuracy_map(tables: Tables, robot: Robot) -> Part:
     """The cells of ``accuracy_map``."""
-    table = pd.DataFrame(dict(tables["accuracy_map"]))
+    table = pd.DataFrame(tables["accuracy_map"])
     slides = np.asarray(robot.dh.prismatic)
     names = [f"q{joint}" for joint in range(1, len(slides) + 1)]
     degrees = table[names].to_numpy() * np.where(slides, 1.0, 180.0 / np.pi)
@@ -70,14 +71,8 @@ def accuracy_map(tables: Tables, robot: Robot) -> Part:
         "slides": bool(slides.any()),
         "largest": largest[:_LARGEST],
     }
-    size = (_step(cells["radius"]), _step(cells["height"]))
+    size = [cell_size(np.unique(cells[name].round(3))) for name in ("radius", "height")]
     return Part("map", values, charts={"map": charts.accuracy_map(cells, *size)})
-
-
-def _step(values: pd.Series, alone_mm: float = 25.0) -> float:
-    """Distance of neighbouring grid values."""
-    levels = np.unique(np.round(values, 3))
-    return float(np.diff(levels).min()) if len(levels) > 1 else alone_mm
 
 
 @dataclass(frozen=True)
@@ -96,8 +91,8 @@ class Truth:
 
 def truth(tables: Tables) -> Truth:
     """The error that the study holds assessors to, of ``assessment_points``."""
-    points = pd.DataFrame(dict(tables["assessment_points"]))
-    measurements = pd.DataFrame(dict(tables["measurements"]))
+    points = pd.DataFrame(tables["assessment_points"])
+    measurements = pd.DataFrame(tables["measurements"])
     largest = float(points["true_error_mm"].max())
     joints = [name for name in points if name[:1] == "q" and name[1:].isdigit()]
     measured = pd.MultiIndex.from_frame(measurements[joints])
@@ -112,9 +107,9 @@ def truth(tables: Tables) -> Truth:
 def study(tables: Tables, robot: Robot) -> Part:
     """``study_summary`` and ``study``, held to ``truth``."""
     summary, held_to = tables["study_summary"], truth(tables)
-    rows = pd.DataFrame(dict(summary))
+    rows = pd.DataFrame(summary)
     if "study" in tables:
-        runs = pd.DataFrame(dict(tables["study"]))
+        runs = pd.DataFrame(tables["study"])
         runs["small"] = runs["assessed_mm"] < held_to.largest_mm
         small = runs.groupby(["assessor", "noise_mm"])["small"].agg(["sum", "count"])
         texts = small["sum"].astype(str) + " of " + small["count"].astype(str)
@@ -132,7 +127,7 @@ def study(tables: Tables, robot: Robot) -> Part:
 def histories(tables: Tables, robot: Robot) -> Part:
     """``histories`` reading by reading: the simulations of Figs. 5 and 6."""
     table, held_to = tables["histories"], truth(tables)
-    steps = pd.DataFrame(dict(table)).sort_values("iteration", kind="stable")
+    steps = pd.DataFrame(table).sort_values("iteration", kind="stable")
     final = steps.groupby("example").tail(1).set_index("example")
     final = final.loc[sorted(final.index, key=lambda name: [*_EXAMPLES, name].index(name))]
     beyond = final["rejection_probability"] > final["alpha"]
@@ -160,7 +155,7 @@ def histories(tables: Tables, robot: Robot) -> Part:
 
 def paper_tables(tables: Tables, robot: Robot) -> Part:
     """Tables I to III, as ``claims`` holds them beside the paper's."""
-    known = pd.DataFrame(dict(tables["claims"])).set_index("claim")
+    known = pd.DataFrame(tables["claims"]).set_index("claim")
     values: dict[str, object] = {
         table: [
             _row(f"{quantity}, {unit}", known, f"{table}_{quantity}_{{}}", _STATISTICS)
@@ -191,7 +186,7 @@ def _row(
 
 def claims(tables: Tables, robot: Robot) -> Part:
     """Every row of ``claims``, those that differ first."""
-    table = pd.DataFrame(dict(tables["claims"]))
+    table = pd.DataFrame(tables["claims"])
     chose = table["used_to_choose"].astype(bool)
     counts = table["verdict"][~chose].value_counts().reindex(VERDICTS, fill_value=0).to_dict()
     return Part("claims", {"claims": table, "counts": counts, "chose": int(chose.sum())})

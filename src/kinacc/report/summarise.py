@@ -275,7 +275,7 @@ def _selection_rows(selection: pd.DataFrame) -> Iterable[tuple[Any, ...]]:
 
 def _selection(tables: Tables) -> pd.DataFrame:
     names = ["model", "selected", "held_out_rms_mm", "gain_mm2", "gain_std_error_mm2"]
-    choice = pd.DataFrame(dict(tables["model_selection"]))[names].astype({"selected": bool})
+    choice = pd.DataFrame(tables["model_selection"])[names].astype({"selected": bool})
     rows = [row | _orders(tables, row["model"]) for row in choice.to_dict("records")]
     return pd.DataFrame(rows, dtype=object)
 
@@ -285,7 +285,7 @@ def _orders(tables: Tables, model: str) -> dict[str, int | None]:
     order = tables.get(f"{model}_model", {}).get("order")
     low = high = tried = None
     if order is not None and (orders := tables.get(f"{model}_orders")) is not None:
-        table = pd.DataFrame(dict(orders))
+        table = pd.DataFrame(orders)
         chosen = table["order"][table["fold"].notna() & (table["chosen"] == 1)]
         if len(chosen):
             low, high = int(chosen.min()), int(chosen.max())
@@ -314,9 +314,8 @@ def joint_ranges(measurements: Columns, arm: Robot) -> pd.DataFrame:
 
 def findings(check: Columns | None) -> pd.DataFrame:
     """Findings of the data check, the gravest first."""
-    names = {"finding": "finding", "level": "level", "rows": "rows", "what": "text",
-             "lines": "lines", "fix": "fix", "accepted": "accepted"}  # fmt: skip
-    table = pd.DataFrame({names[name]: (check or {}).get(name, ()) for name in names}).fillna("")
+    names = ["finding", "level", "rows", "what", "lines", "fix", "accepted"]
+    table = pd.DataFrame(check or {}, columns=names).rename(columns={"what": "text"}).fillna("")
     table = table[table["finding"] != LEFT_OUT]
     table["is_open"] = (table["level"] != FINDING_LEVELS[-1]) & (table["accepted"] == "")
     return table.sort_values(
@@ -339,13 +338,12 @@ def compliance(model: Columns | None) -> pd.DataFrame:
     """Joints that bend, of a table ``compliance_model``: coefficients and standard deviations."""
     values = ["compliance_rad_per_nm", "lever_coefficient_rad_per_mm"]
     columns = ["joint", *values, *(f"std_{name}" for name in values)]
-    table = pd.DataFrame({name: (model or {}).get(name, ()) for name in columns})
-    return table.dropna(how="all", subset=columns[1:])
+    return pd.DataFrame(model or {}, columns=columns).dropna(how="all", subset=columns[1:])
 
 
 def _fact(tables: Tables, topic: str, column: str = "value") -> Any:
     """What the table ``summary`` states on a topic, None where nothing."""
-    known = pd.DataFrame(dict(tables.get("summary", {"topic": ()})))
+    known = pd.DataFrame(tables.get("summary", {"topic": ()}))
     rows = known[known["topic"] == topic]
     return rows[column].iloc[0] if len(rows) else None
 
@@ -368,7 +366,7 @@ def tolerance_of(tables: Tables) -> Tolerance | None:
 
 
 def _claims(claims: Columns) -> dict[str, Any]:
-    table = pd.DataFrame(dict(claims))
+    table = pd.DataFrame(claims)
     table = table[~table["used_to_choose"].astype(bool)]  # these chose a reading: no evidence
     counts = {name: int((table["verdict"] == name).sum()) for name in VERDICTS}
     agree, differ, open_ = counts.values()
