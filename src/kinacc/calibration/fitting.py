@@ -441,26 +441,28 @@ def placed(
             measured = orientations_measured(observations)[:, None, None]
             turned = np.where(measured, start.targets.rotation, terms.stated.targets.rotation)
             start = replace(start, targets=Pose(turned, start.targets.position_mm))
-    found = FrameParameters.of(observations, start, terms)
+    coordinates = FrameParameters.of(observations, start, terms)
     still = np.zeros(len(arm.start), dtype=bool)
-    system = PoseSystem(observations, arm, still, found, rotation_weight_mm_per_rad)
-    keep = np.flatnonzero(found.free)
-    gram = system.normal(found.begin)[:-1, :-1] * np.outer(found.scale, found.scale)
+    system = PoseSystem(observations, arm, still, coordinates, rotation_weight_mm_per_rad)
+    keep = np.flatnonzero(coordinates.free)
+    gram = system.normal(coordinates.begin)[:-1, :-1] * np.outer(
+        coordinates.scale, coordinates.scale
+    )
     values, vectors = np.linalg.eigh(gram[np.ix_(keep, keep)])
     hidden = vectors[:, values <= SHOWN**2 * max(values[-1:], default=0.0)].T
-    hidden = _without_known(hidden, np.isfinite(found.std[keep]))
+    hidden = _without_known(hidden, np.isfinite(coordinates.std[keep]))
     if not len(hidden):
-        return found
-    of_base = np.arange(found.size) < len(MOTIONS) * start.sessions
-    held = keep[_pivots(hidden, (~of_base & ~found.angle)[keep])]
-    free, begin = found.free.copy(), found.begin.copy()
+        return coordinates
+    of_base = np.arange(coordinates.size) < len(MOTIONS) * start.sessions
+    held = keep[_pivots(hidden, (~of_base & ~coordinates.angle)[keep])]
+    free, begin = coordinates.free.copy(), coordinates.begin.copy()
     free[held] = False
     if terms is not None:
-        placed = held[~of_base[held] & ~found.angle[held]]
+        placed = held[~of_base[held] & ~coordinates.angle[held]]
         begin[placed] = terms.value[placed]
-    motions = np.zeros((len(hidden), found.size))
+    motions = np.zeros((len(hidden), coordinates.size))
     motions[:, keep] = hidden
-    return replace(found, free=free, begin=begin, hidden=motions)
+    return replace(coordinates, free=free, begin=begin, hidden=motions)
 
 
 def _without_known(hidden: np.ndarray, known: np.ndarray) -> np.ndarray:

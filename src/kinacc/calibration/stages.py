@@ -197,7 +197,7 @@ def excluded_rows(inputs: Mapping[str, Columns], settings: Mapping[str, Any]) ->
         names = [name for name in rows if name in used]
         joined = {name: np.concatenate([np.asarray(used[name]), rows[name]]) for name in names}
         observations = from_columns(joined, arm).select(slice(len(every), None))
-        off = {name: found.components for name, found in errors(fits, observations).items()}
+        off = {name: item.components for name, item in errors(fits, observations).items()}
         places = pd.DataFrame({name: rows[name] for name in ("target", "session")})
         places.insert(0, "line", rows["row"].astype(int))
     stated = pd.DataFrame({"line": sorted(reasons)})

@@ -219,11 +219,11 @@ def problems_of(state: State, reading: Reading, where: str, most_mm: float) -> l
         if off.max() > 1.0:
             worst, known = int(np.argmax(off)), point_at(plan, reading.joints)
             unit, factor = ("mm", 1.0) if plan.slides[worst] else ("deg", 180.0 / math.pi)
-            found = f"joint {worst + 1} at {reading.joints[worst] * factor:.4f} {unit}"
+            measured = f"joint {worst + 1} at {reading.joints[worst] * factor:.4f} {unit}"
             wanted = f"{points.joints[reading.point, worst] * factor:.4f} {unit}"
             allowed = f"{wanted} within {tolerance[worst] * factor:g} {unit}"
             fix = "" if known is None else f"these joints are point {points.label[known]}"
-            message = f"{found} is not that of point {label}"
+            message = f"{measured} is not that of point {label}"
             return [*problems, Problem(where, message, allowed, fix)]
     size = float(np.linalg.norm(error_mm(plan, reading)))
     if size > most_mm:

@@ -66,15 +66,15 @@ class Meaning:
     misfit: float
 
     @classmethod
-    def of(cls, few: Readings, robot: Robot, made: Changes) -> Meaning:
-        """The meaning of a few readings under changes that are ``made`` one after the other."""
-        read = changed(few, made)
+    def of(cls, few: Readings, robot: Robot, applied: Changes) -> Meaning:
+        """The meaning of a few readings under changes that are ``applied`` one after the other."""
+        read = changed(few, applied)
         positions = replace(read, rotation=np.full_like(read.rotation, np.nan))
         begin = robust_fit.start(positions, robot.dh, is_clean=True)
         left = robust_fit.residuals(begin, positions)
         length = np.linalg.norm(left.position_mm, axis=1)
         misfit = float(np.quantile(length, _MAJORITY)) / max(spread_mm(read.position_mm), 1e-12)
-        return cls(made, read, left, misfit)
+        return cls(applied, read, left, misfit)
 
     @property
     def scatter_rad(self) -> float:
@@ -82,9 +82,9 @@ class Meaning:
         return scatter(self.residuals.flange, self.read)
 
 
-def changed(read: Readings, made: Iterable[Change]) -> Readings:
+def changed(read: Readings, applied: Iterable[Change]) -> Readings:
     """The readings after changes, one after the other."""
-    for change in made:
+    for change in applied:
         read = change.of(read)
     return read
 
@@ -113,14 +113,14 @@ def find(
     many = part.select(thinned(np.arange(len(part)), _FITTED_ROWS))
     likely = [item.changes for item in close[:_FITTED]]
     fitted = [
-        (*_fitted(many, robot, made), made)
-        for made in progress(likely, "likely ways to read the columns fitted")
+        (*_fitted(many, robot, applied), applied)
+        for applied in progress(likely, "likely ways to read the columns fitted")
     ]
     least = min(share for share, _, _ in fitted)
     if least >= _BETTER * _fitted(many, robot, ())[0] or least > FAR:
         return read, []
-    (_, found_mm, made), *others = (item for item in fitted if item[0] < _AS_GOOD * least)
-    texts = {change.finding.what for change in made}
+    (_, found_mm, applied), *others = (item for item in fitted if item[0] < _AS_GOOD * least)
+    texts = {change.finding.what for change in applied}
     rivals: dict[str, None] = {}
     for _, _, rival in others:
         parts = [change.finding.what for change in rival]
@@ -130,13 +130,13 @@ def find(
     numbers = {"as_written_mm": written.sigma_mm, "found_mm": found_mm}
     detail = " ({as_written_mm:.3g} mm per axis as written, {found_mm:.3g} mm so{equal})"
     findings = []
-    for change in made:
+    for change in applied:
         values = {**numbers, "equal": equal and f"; as well explained by: {equal}"}
         # Of a coupling that alone explains the readings, a robot file can be written.
-        if "joint_map" in change.finding.values and (equal or len(made) > 1):
+        if "joint_map" in change.finding.values and (equal or len(applied) > 1):
             values["joint_map"] = None
         findings.append(change.finding.of_lines(read.lines(), detail, **values))
-    return changed(read, made), findings
+    return changed(read, applied), findings
 
 
 def find_by_turns(
@@ -182,14 +182,16 @@ def find_orientations(
     return (), here, here
 
 
-def of_turns(made: Changes, read: Readings, before_rad: float, least_rad: float) -> list[Finding]:
+def of_turns(
+    applied: Changes, read: Readings, before_rad: float, least_rad: float
+) -> list[Finding]:
     """Findings of changes that bring orientations together, by their scatters."""
     detail = " (seen from the flange they scatter by {as_written_deg:.3g} deg as written, by "
     detail += "{found_deg:.3g} deg so)"
     degrees = np.rad2deg([before_rad, least_rad]).tolist()
     values = dict(zip(("as_written_deg", "found_deg"), degrees, strict=True))
     lines = read.lines(read.has_rotation)
-    return [change.finding.of_lines(lines, detail, **values) for change in made]
+    return [change.finding.of_lines(lines, detail, **values) for change in applied]
 
 
 def scatter(flange: ndarray, read: Readings) -> float:
@@ -234,9 +236,9 @@ def _simplicity(meaning: Meaning) -> tuple[int, int, float]:
     return len(kinds), sum(kinds), meaning.misfit
 
 
-def _fitted(read: Readings, robot: Robot, made: Changes) -> tuple[float, float]:
+def _fitted(read: Readings, robot: Robot, applied: Changes) -> tuple[float, float]:
     """What the corrected arm leaves: a share of the points' spread, and mm per axis."""
-    meant = changed(read, made)
+    meant = changed(read, applied)
     sigma_mm = robust_fit.best(meant, robust_fit.start(meant, robot.dh)).sigma_mm
     return sigma_mm / spread_mm(meant.position_mm), sigma_mm
 
@@ -249,10 +251,10 @@ def _searched(here: Meaning, robot: Robot, good: bool, progress: Progress) -> li
     tried = {_numbers(here.read): here}
     single = [(change,) for change in changes.joint_changes(robot)]
     for rivals in [single] if good else _rounds(here, robot, tried):
-        for made in progress(rivals, _TRIED):
+        for applied in progress(rivals, _TRIED):
             # A meaning that comes again keeps the fewest changes.
-            if (numbers := _numbers(changed(here.read, made))) not in tried:
-                tried[numbers] = Meaning.of(here.read, robot, made)
+            if (numbers := _numbers(changed(here.read, applied))) not in tried:
+                tried[numbers] = Meaning.of(here.read, robot, applied)
         if not good and min(item.misfit for item in tried.values()) < _SURE:
             break
     return [*tried.values()]
@@ -266,7 +268,7 @@ def _numbers(read: Readings) -> bytes:
 def _rounds(here: Meaning, robot: Robot, tried: dict[bytes, Meaning]) -> Iterator[list[Changes]]:
     """Meanings by the number of their changes; ``tried`` has those of the rounds before."""
     units = [*_units(here, robot)]
-    yield [*units, *((*made, changes.left_handed()) for made in units)]
+    yield [*units, *((*applied, changes.left_handed()) for applied in units)]
     roots = (units or [()])[:3]
     single = [*changes.joint_changes(robot)]
     yield [(*root, change) for root in roots for change in single]
@@ -285,11 +287,11 @@ def _rounds(here: Meaning, robot: Robot, tried: dict[bytes, Meaning]) -> Iterato
 
 def _units(here: Meaning, robot: Robot) -> Iterator[Changes]:
     """Units of joints within two turns, and of positions that spread as those of this arm may."""
-    for made in ((), *((change,) for change in changes.joint_units(robot))):
-        read = changed(here.read, made)
+    for applied in ((), *((change,) for change in changes.joint_units(robot))):
+        read = changed(here.read, applied)
         largest = np.abs(read.q[:, ~robot.dh.prismatic]).max(initial=0.0)
         reach_mm = max(spread_mm(dh.forward(robot.dh, read.q_rad).position_mm), 1e-12)
         for more in ((), *((change,) for change in changes.length_units())):
             share = spread_mm(changed(read, more).position_mm) / reach_mm
-            if (largest <= _MOST_TURNS_RAD or not made) and 1.0 / _WITHIN < share < _WITHIN:
-                yield (*made, *more)
+            if (largest <= _MOST_TURNS_RAD or not applied) and 1.0 / _WITHIN < share < _WITHIN:
+                yield (*applied, *more)

@@ -84,10 +84,10 @@ def export(
     if maker is not None:
         _to_controller(folder, arm, target, maker, name, config, out)
         return
-    made = source.read_source(folder, arm, model, urdf, (base_link, tip_link), dh_joints)
-    paths = files.write(files.contents(made, wanted, name), target, out.force)
+    content = source.read_source(folder, arm, model, urdf, (base_link, tip_link), dh_joints)
+    paths = files.write(files.contents(content, wanted, name), target, out.force)
     out.show({"files": paths, **({"outdated": reason} if reason else {})}, lines=paths)
-    for item in source.notes(made):
+    for item in source.notes(content):
         click.echo(item, err=True)
 
 

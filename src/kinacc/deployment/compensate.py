@@ -18,7 +18,6 @@ import pandas as pd
 from kinacc.deployment.record import Calibration
 from kinacc.errors import InputError, Problem
 from kinacc.geometry import IDENTITY, Pose, compose, invert, log_so3
-from kinacc.kinematics import dh
 from kinacc.kinematics.inverse import few_axes, limits, newton, solve
 from kinacc.kinematics.model import ErrorModel, JointState
 from kinacc.kinematics.region import points
@@ -145,13 +144,6 @@ def compensate(
         outside & (status != PoseStatus.NOT_REACHED)[:, None],
         q_rad - near if inputs else np.full(q_rad.shape, np.nan),
     )
-
-
-def programmed(calibration: Calibration, q_rad: np.ndarray, point: str | None = None) -> Pose:
-    """Where the nominal arm would put ``point`` in its base at reported joints (n, k)."""
-    robot = calibration.robot
-    end = dh.forward(robot.dh, robot.dh_joints(np.atleast_2d(q_rad)))
-    return compose(robot.base, compose(end, calibration.programmed_point(point)))
 
 
 @dataclass(frozen=True)

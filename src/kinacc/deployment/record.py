@@ -109,16 +109,9 @@ class Calibration:
 
     def point(self, name: str | None) -> Pose:
         """A target by name, or the flange, in the last DH frame. InputError for another name."""
-        return self._among(self.targets, name)
-
-    def programmed_point(self, name: str | None) -> Pose:
-        """A target as programs of the nominal arm mean it, in the last DH frame."""
-        return self._among(self.anchor.targets if self.anchor else self.targets, name)
-
-    def _among(self, targets: Mapping[str, Pose], name: str | None) -> Pose:
         name = name or self.default_point
-        if name in targets:
-            return targets[name]
+        if name in self.targets:
+            return self.targets[name]
         if name == FLANGE:
             return self.robot.flange
         known = ", ".join([*self.targets, FLANGE])

@@ -54,26 +54,26 @@ def of_gate(
     kind = _kind(gate)
     try:
         if kind in ("value", "table"):
-            found = _value(gate, tables, tolerance_mm)
+            result = _value(gate, tables, tolerance_mm)
         elif kind == "change":
-            found = _change(gate, tables, accepted)
+            result = _change(gate, tables, accepted)
         elif kind == "campaign":
-            found = _campaign(gate, tables, tolerance_mm)
+            result = _campaign(gate, tables, tolerance_mm)
         else:
             of = {"claims": _claims, "suspicions": _suspicions, "history": _history}
-            found = of[kind](gate, tables)
-        says = found.says or "".join(lines("gate.txt", kind=kind, gate=gate, **found.facts))
+            result = of[kind](gate, tables)
+        says = result.says or "".join(lines("gate.txt", kind=kind, gate=gate, **result.facts))
     except InputError as error:
         first = error.problems[0]
-        found, says = Found(FAILED, first.fix), f"{first.where} {first.what}"
-    verdict, fix = found.verdict, found.fix
+        result, says = Found(FAILED, first.fix), f"{first.where} {first.what}"
+    verdict, fix = result.verdict, result.fix
     if verdict == UNDECIDED:
         verdict = _MEANT[gate["undecided"]]
         fix = fix or "measure more poses, or set undecided: warn"
     if verdict == FAILED:
         verdict = _MEANT[gate["on_fail"]]
     fix = "" if verdict == PASSED else fix
-    return Outcome(tables.folder.name, gate["name"], kind, verdict, says, fix, found.figures)
+    return Outcome(tables.folder.name, gate["name"], kind, verdict, says, fix, result.figures)
 
 
 def _kind(gate: Gate) -> str:

@@ -37,20 +37,20 @@ def models(tables: Mapping[str, Columns], nominal: DHModel) -> dict[str, ErrorMo
     InputError
         For a table that lacks rows of a model, or has some twice.
     """
-    made: dict[str, ErrorModel] = {}
+    models: dict[str, ErrorModel] = {}
     for kind in MODELS:
         if f"{kind}_model" not in tables:
             continue
         if kind in OWN:
             value = np.asarray(tables[f"{kind}_model"]["value"], dtype=float)
-            made[kind] = OWN[kind](nominal).with_parameters(value)
+            models[kind] = OWN[kind](nominal).with_parameters(value)
             continue
         try:
-            made[kind] = of_kind(kind).from_columns(tables[f"{kind}_model"], nominal.prismatic)
+            models[kind] = of_kind(kind).from_columns(tables[f"{kind}_model"], nominal.prismatic)
         except (LookupError, TypeError, ValueError) as error:
             what = f"holds no whole model: {error}"
             raise InputError(Problem(f"table {kind}_model", what)) from None
-    return {**made, NOMINAL: nominal}
+    return {**models, NOMINAL: nominal}
 
 
 def of_kind(kind: str) -> type[ErrorModel]:

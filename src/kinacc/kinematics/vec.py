@@ -295,8 +295,8 @@ def walk(model: VECModel, q_rad: np.ndarray, s: np.ndarray | None = None) -> _ch
         Frames of n poses in the first DH frame, mm.
     """
     q_rad = np.atleast_2d(np.asarray(q_rad, dtype=float))
-    made = errors(model, q_rad, s).transpose(1, 2, 0)
-    return _chain.Walk(model.dh, q_rad, np.ascontiguousarray(made))
+    values = errors(model, q_rad, s).transpose(1, 2, 0)
+    return _chain.Walk(model.dh, q_rad, np.ascontiguousarray(values))
 
 
 def _polynomials(model: VECModel, q_rad: np.ndarray, coefficients: np.ndarray) -> np.ndarray:

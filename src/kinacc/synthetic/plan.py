@@ -33,14 +33,14 @@ def configurations(robot: Robot, poses: int, attitude: Attitude = DOWN) -> np.nd
     """
     rng = np.random.default_rng(_PLAN_SEED)
     form = closed_form.SixAxes(robot.dh, parallel=False)
-    found = np.empty((0, 6))
-    while len(found) < poses:
+    chosen_rad = np.empty((0, 6))
+    while len(chosen_rad) < poses:
         q_rad, reached = form.solve(_poses(rng, attitude))
         rows, branch = np.arange(_BLOCK), rng.integers(0, BRANCHES, _BLOCK)
         chosen, good = q_rad[rows, branch], reached[rows, branch]
         good &= np.all((chosen >= robot.q_min_rad) & (chosen <= robot.q_max_rad), axis=1)
-        found = np.vstack([found, chosen[good]])
-    return found[:poses]
+        chosen_rad = np.vstack([chosen_rad, chosen[good]])
+    return chosen_rad[:poses]
 
 
 def directions(q_rad: np.ndarray) -> np.ndarray:

@@ -70,6 +70,8 @@ def outdated_reason(folder: Path | str) -> str:
         return ""
     again = shlex.join(["kinacc", "calibrate", others[0]])
     if of_results:
-        made = f"made with the settings of {of_results[0]}; {others[0]} has other settings for"
-        return f"{made} {folder.name}; to use these run {again}"
+        origin = f"made with the settings of {of_results[0]}"
+        return (
+            f"{origin}; {others[0]} has other settings for {folder.name}; to use these run {again}"
+        )
     return f"settings in {others[0]} changed since the calibration; run {again}"

@@ -94,8 +94,8 @@ def _table(columns: bytes) -> Table:
 
     steps = np.diag(1e-5 * unit)
     slopes = np.stack([(features(joints + h) - features(joints - h)) / 2e-5 for h in steps], axis=2)
-    found = features(joints)
-    return Table(model, inner, joints, found, slopes, unit, reach_mm, cKDTree(found))
+    at_joints = features(joints)
+    return Table(model, inner, joints, at_joints, slopes, unit, reach_mm, cKDTree(at_joints))
 
 
 def search(

@@ -34,9 +34,9 @@ def shaped_as_number(cell: str) -> bool:
 def _first(text: str, mark: str, *shapes: str, other: str = ".") -> str:
     """The first line of a text of one of these shapes, empty for none."""
     shape = "|".join(shapes).replace("m", _BETWEEN[mark]).replace("o", _BETWEEN[other])
-    found = re.search(_BETWEEN[mark], text)
-    found = found and re.search(rf"^[+\-−]?(?:{shape})$", text, re.MULTILINE)
-    return found[0].strip() if found else ""
+    match = re.search(_BETWEEN[mark], text)
+    match = match and re.search(rf"^[+\-−]?(?:{shape})$", text, re.MULTILINE)
+    return match[0].strip() if match else ""
 
 
 def marks_of(
