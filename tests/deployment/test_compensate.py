@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from small_arms import calibrated, joints
 
-from kinacc.deployment.compensate import PoseStatus, compensate, programmed
+from kinacc.deployment.compensate import PoseStatus, compensate
 from kinacc.deployment.predict import predict
 from kinacc.deployment.record import nominal
 from kinacc.geometry import Pose, compose, invert, log_so3
@@ -66,13 +66,10 @@ def test_a_vec_model_gives_no_joints_outside_its_range():
     assert np.isnan(found.q_rad).all()
 
 
-def test_a_program_and_the_base_mean_the_same_under_dh_and_vec():
+def test_the_base_is_the_same_under_dh_and_vec():
     """Base and tool of a VEC fit may drift against each other where no measured pose shows it."""
     arms = [calibrated("mh180", model) for model in ("dh", "vec")]
     q_rad = joints("mh180", 5)
-    one, other = (programmed(arm, q_rad) for arm in arms)
-    np.testing.assert_array_equal(other.position_mm, one.position_mm)
-    np.testing.assert_array_equal(other.rotation, one.rotation)
     own = compose(invert(arms[0].base), arms[1].pose(JointState(q_rad), "instrument"))
     seen = arms[1].pose(JointState(q_rad), "base")
     np.testing.assert_allclose(seen.position_mm, own.position_mm, rtol=0, atol=1e-9)

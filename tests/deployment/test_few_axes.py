@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinacc.deployment.compensate import FEW_AXES_TURN_RAD, PoseStatus, compensate, programmed
+from kinacc.deployment.compensate import FEW_AXES_TURN_RAD, PoseStatus, compensate
 from kinacc.deployment.record import nominal
 from kinacc.geometry import Pose, log_so3, rotation_x, skew
 from kinacc.kinematics import dh, robot
@@ -50,7 +50,7 @@ def program(name, count=12):
 def test_the_point_is_exact_and_no_joint_turns_it_nearer(name):
     plain, arm = real_arm(name)
     q = program(name)
-    wanted = programmed(plain, q)
+    wanted = plain.pose(JointState(q))
     found = compensate(arm, wanted, q)
     assert (found.status == PoseStatus.CONVERGED).all()
     there = arm.pose(JointState(found.q_rad))
@@ -78,7 +78,7 @@ def test_the_point_is_exact_and_no_joint_turns_it_nearer(name):
 def test_another_orientation_than_the_arm_takes_is_not_reached():
     plain, arm = real_arm("scara")
     q = program("scara", 2)
-    wanted = programmed(plain, q)
+    wanted = plain.pose(JointState(q))
     tipped = Pose(wanted.rotation @ rotation_x(0.3), wanted.position_mm)
     found = compensate(arm, tipped, q)
     assert (found.status == PoseStatus.NOT_REACHED).all()
