@@ -229,7 +229,7 @@ def uncertainty(tables: Tables, choice: str) -> Uncertainty | None:
         return None
     names = ["parameter", "other", "covariance"]
     table = pd.DataFrame({name: tables[f"{choice}_covariance"][name] for name in names})
-    parameters = list(dict.fromkeys(table["parameter"]))
+    parameters = table["parameter"].unique()
     half = table.pivot(index="parameter", columns="other", values="covariance")
     half = half.reindex(index=parameters, columns=parameters)
     covariance = half.fillna(half.T).fillna(0.0).to_numpy()
