@@ -250,7 +250,7 @@ def check_results(
         results, datasets = results.resolve().parent, (*datasets, results.resolve().name)
     configs = config
     if not config and Path(CONFIG).is_file():  # beside another workflow it may be that workflow's
-        is_own = re.search("^datasets:", Path(CONFIG).read_text("utf-8"), re.MULTILINE)
+        is_own = re.search("^datasets:", Path(CONFIG).read_text("utf-8", "replace"), re.MULTILINE)
         configs = (CONFIG,) if is_own else ()
     report = check.check_results(results, load(configs) if configs else {}, against, datasets)
     for path in files:
