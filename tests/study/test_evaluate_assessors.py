@@ -82,6 +82,24 @@ def test_honest_bounds_cover_and_bounds_shrunk_by_a_fifth_are_shown_to_fail():
     assert honest["width_mm"] > shrunk["width_mm"] > 0.0
 
 
+class BelowOne(LargestReading):
+    """A bound of 1 mm on the points that it measured."""
+
+    name = "below_one"
+
+    def begin(self, candidates):
+        campaign = LargestCampaign(self, candidates)
+        campaign.statements = lambda: [Statement("measured", value_mm=0.5, upper_mm=1.0)]
+        return campaign
+
+
+@pytest.mark.parametrize(("budget", "coverage"), [(2, 1.0), (3, 0.0)])
+def test_a_bound_on_measured_points_is_held_to_these_alone(budget, coverage):
+    errors_mm = np.diag([0.1, 0.2, 5.0])
+    (row,) = evaluate_assessors(errors_mm, [BelowOne()], 0.01, budget, 4, 1).to_dict("records")
+    assert row["coverage"] == coverage
+
+
 @pytest.mark.parametrize(
     ("noise", "budget", "repetitions", "where"),
     [(0.0, 40, 3, "noise_mm"), (0.1, 0, 3, "budget"), (0.1, 40, 0, "repetitions")],
