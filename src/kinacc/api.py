@@ -18,8 +18,8 @@ from kinacc.checks import check, contradictions
 from kinacc.checks.described import describe_files
 from kinacc.config import schema
 from kinacc.config.error_models import PLAINEST, asked_for
-from kinacc.config.load import overlay
 from kinacc.config.schema import defaults
+from kinacc.config.values import overlay
 from kinacc.deployment import compare as comparing
 from kinacc.deployment import compensate as compensating
 from kinacc.deployment import folder as results
@@ -43,8 +43,7 @@ from kinacc.tables import store, sums
 from kinacc.tables.atomic import write_together
 from kinacc.tables.columns import Columns
 from kinacc.workflow.code import config_hash
-from kinacc.workflow.data_sets import DataSets, data_sets, read_data_sets
-from kinacc.workflow.outdated import CALIBRATION
+from kinacc.workflow.data_sets import CALIBRATION, DataSets, data_sets, read_data_sets
 
 Setup = Literal["same", "moved"]
 _MARKS = {"kinacc_version": __version__, "config_hash": config_hash({}), "seed": "0"}

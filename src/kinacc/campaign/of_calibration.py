@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from kinacc.campaign import folder
-from kinacc.campaign.folder import JOURNAL, PLAN
+from kinacc.campaign.beside_results import JOURNAL, PLAN
 from kinacc.campaign.plan import Plan
 from kinacc.campaign.status import CampaignStatus, status
 from kinacc.deployment import folder as results

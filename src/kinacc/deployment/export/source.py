@@ -18,6 +18,7 @@ from kinacc.deployment.record import STATED, Calibration
 from kinacc.kinematics.dh import PARAMETERS, DHModel
 from kinacc.kinematics.robot import Robot
 from kinacc.tables import store
+from kinacc.tables.contract import PROVENANCE_KEYS
 
 CONVENTION = "T = Rz(q + theta_offset) Tz(d) Tx(a) Rx(alpha) Ry(beta) per joint"
 
@@ -106,7 +107,7 @@ def read_source(
     arm = results.calibration(tables, robot, model, Path(folder).resolve().name)
     path = Path(folder) / f"{model}_model.parquet"
     known = store.read_metadata(path) if path.is_file() else {}
-    marks = {key: known[key] for key in store.PROVENANCE_KEYS if key in known}
+    marks = {key: known[key] for key in PROVENANCE_KEYS if key in known}
     return Source(arm, tables, marks, urdf_file, links, dh_joints)
 
 
