@@ -56,7 +56,6 @@ SLOW = (
     "deployment/test_verify.py",
     "deployment/test_compensate.py",
     "deployment/test_history.py",
-    "deployment/test_poses_unlike_the_measured.py",
     "deployment/test_predict.py",
     "figures/test_figure_files.py",
     "figures/test_figures.py",

@@ -1,8 +1,8 @@
 """A UR10 measured month after month, simulated one 4x4 matrix at a time, apart from kinacc's arm.
 
 Errors of its table, gears that err once and twice a turn, an arm that lengthens as it warms up
-(each for another time; by WARMER_K months are of another temperature too, which readings do not
-tell), joints that come back by so much, a laser tracker that stands elsewhere where asked for.
+(each for another time), joints that come back by so much, a laser tracker that stands elsewhere
+where asked for.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from kinacc.tables.columns import Columns
 
 WEIGHT_MM_PER_RAD = 500.0
 POSES = 50
-GROWTH_PER_K, WARMER_K, WARMS_BY_K = 1.2e-5, 0.0, 4.0  # aluminium; months apart, and within one
+GROWTH_PER_K, WARMS_BY_K = 1.2e-5, 4.0  # aluminium
 GEARS_RAD, BACK_RAD, NOISE_MM = 1e-4, 1e-5, 0.03
 
 
@@ -42,9 +42,7 @@ def month(
     if moved:
         base = trans(*chance.normal(0.0, 400.0, 3)) @ base @ rot_z(chance.uniform(-1, 1))
     tool = trans(15.0, -30.0, 120.0) @ rot_y(0.4)
-    warm_k = chance.normal(0.0, WARMER_K) + WARMS_BY_K * (
-        1.0 - np.exp(-np.linspace(0.0, chance.uniform(0.5, 3.0), POSES))
-    )
+    warm_k = WARMS_BY_K * (1.0 - np.exp(-np.linspace(0.0, chance.uniform(0.5, 3.0), POSES)))
     poses = []
     for q, above_k in zip(q_rad, warm_k, strict=True):
         gears = GEARS_RAD * (np.sin(q + phase[0]) + np.sin(2 * q + phase[1]))
@@ -66,7 +64,6 @@ def month(
 def session(seen: Observations, number: int, moved: bool) -> Session:
     """A line of the series with a DH calibration of its own."""
     arm = robots.load("ur10")
-    seen = full_poses(seen.q_rad, Pose(seen.rotation, seen.position_mm))
     fit = fitting.fit(
         seen,
         arm.dh,
@@ -79,10 +76,9 @@ def session(seen: Observations, number: int, moved: bool) -> Session:
     calibration = Calibration(str(number), arm, "dh", model, frames.base, {"tool": frames.tool})
     at = compose(frames.base, compose(model.pose(seen.at), frames.tool))
     sizes = np.linalg.norm(seen.position_mm - at.position_mm, axis=1)
-    nothing = (np.nan, np.nan, np.nan)
     base = MOVED if moved else SAME
     date = f"2026-{number:02}-01"
-    return Session(f"ur-{date}", date, "", base, SAME, calibration, seen, sizes, *nothing)
+    return Session(f"ur-{date}", date, "", base, SAME, calibration, seen, sizes)
 
 
 def year_of(

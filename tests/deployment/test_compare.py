@@ -4,14 +4,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from small_arms import calibrated, joints, measured, results_of
+from small_arms import BASE, TOOL, calibrated, joints, measured, results_of, truth
 
 from kinacc.config import schema
 from kinacc.deployment import compare as comparison
 from kinacc.deployment.folder import calibration
+from kinacc.deployment.predict import predict
 from kinacc.deployment.record import nominal
 from kinacc.deployment.shared_readings import NONE_SHARED, SharedReadings
-from kinacc.kinematics import robot
+from kinacc.geometry import compose
+from kinacc.kinematics import dh, robot
 
 
 def compare(first, second, q_rad, shared=NONE_SHARED):
@@ -41,6 +43,17 @@ def test_repeated_calibrations_of_one_arm_differ_by_chance_alone(name):
     assert np.mean(ratio) == pytest.approx(1.0, abs=0.25)
     squares = sum(each.shifts[["rms_mm", "chance_mm"]] ** 2 for each in found)
     np.testing.assert_allclose(squares["rms_mm"] / squares["chance_mm"], 1.0, atol=0.6)
+
+
+def test_predictions_are_as_far_off_as_they_say():
+    """Forty calibrations of one arm: errors over standard deviations have unit variance."""
+    q_rad = joints("mh180", 12, seed=21)
+    wanted = compose(BASE, compose(dh.forward(truth("mh180"), q_rad), TOOL)).position_mm
+    scores = []
+    for seed in (*range(200, 220), *range(300, 320)):  # those that are compared above
+        found = predict(calibrated("mh180", "dh", 60, seed), q_rad, None, "instrument")
+        scores.append((found.pose.position_mm - wanted) / found.std[:, :3])
+    assert np.mean(np.square(scores)) == pytest.approx(1.0, abs=0.25)
 
 
 @pytest.mark.parametrize(("first", "second", "common"), [(60, 60, 30), (50, 90, 50)])

@@ -56,11 +56,9 @@ def test_a_tracker_that_was_moved_and_is_said_to_stand_still_is_seen():
 
 def test_the_history_is_the_same_in_whatever_order_lines_were_added():
     one, two, three = (session(measured(n, other_poses=n == 3), n, False) for n in (1, 2, 3))
-    forward, backward = history(one, two, three), history(three, one, two)
-    shorter = history(one, two)
-    for name, column in forward.items():
-        np.testing.assert_array_equal(column, backward[name])
-        np.testing.assert_array_equal(column[:2], shorter[name])
+    whole, backward = history(one, two, three), history(two, one)
+    for name, column in whole.items():
+        np.testing.assert_array_equal(column[:2], backward[name])
 
 
 def test_readings_of_the_line_in_force_are_not_compared_with_themselves():

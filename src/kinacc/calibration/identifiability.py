@@ -28,6 +28,7 @@ from kinacc.tables.contract import columns_of
 
 IDENTIFIED, PRIOR, UNDETERMINED, FIXED = "identified", "prior", "undetermined", "fixed"
 UNIDENTIFIABLE = ": no pose separates these"
+UNSEEN = ": no pose determines it"  # of one parameter alone
 POORLY_DETERMINED = ": poorly determined by these poses"
 LEAST = 0.02  # of the largest part of a direction; smaller parts are not listed
 _RANK = 1e-6
@@ -98,7 +99,8 @@ class LeftOpen:
                 for i in first
             ]
             more = [f"{len(parts) - _MOST_NAMES} more"] if len(parts) > _MOST_NAMES else []
-            ending = UNIDENTIFIABLE if structural else POORLY_DETERMINED
+            hidden = UNIDENTIFIABLE if len(parts) > 1 else UNSEEN
+            ending = hidden if structural else POORLY_DETERMINED
             lines.append(", ".join(shown + more) + ending)
         return tuple(lines)
 

@@ -284,8 +284,8 @@ def _correct(
     if answer.refused:
         raise SystemExit(AGAINST)
     if not options["dry_run"] and target is not None:
-        answer.write(target, out.force)
-        click.echo(f"Written: {target}", err=out.as_json)
+        written = answer.write(target, out.force)
+        click.echo(f"Written: {', '.join(written)}", err=out.as_json)
 
 
 def _warnings(answer: programs.CorrectedProgram) -> Iterator[str]:

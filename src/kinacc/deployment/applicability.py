@@ -19,12 +19,11 @@ those that the covariance does by 1.0 to 1.6 times.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
+import pandas as pd
 
 from kinacc.calibration.frames import MOTIONS
-from kinacc.deployment.record import FLANGE, Calibration
+from kinacc.deployment.record import Calibration
 from kinacc.geometry import compose, skew
 from kinacc.kinematics.model import JointState
 from kinacc.kinematics.region import points
@@ -80,52 +79,40 @@ def sensitivity(
 
     Rows: position (mm) and small turn (rad) in ``frame``.
     """
-    name = point or calibration.default_point
+    name, names = point or calibration.default_point, list(calibration.parameters)
     target, origin = calibration.point(name), calibration.origin(frame)
     end = calibration.model.pose(at)
-    slopes = np.zeros((len(at), 6, len(calibration.parameters)))
-    place = {name: column for column, name in enumerate(calibration.parameters)}
-    chosen = [
-        (place[parameter], number)
-        for number, parameter in enumerate(calibration.model.names)
-        if parameter in place
-    ]
-    columns, numbers = np.array(chosen, dtype=int).reshape(-1, 2).T
-    slopes[:, :, columns] = calibration.model.linearised(at)[1][:, :, numbers]
+    slopes = np.zeros((len(at), 6, len(names)))
+    numbers = pd.Index(calibration.model.names).get_indexer(names)
+    of_arm = numbers >= 0
+    slopes[:, :, of_arm] = calibration.model.linearised(at)[1][:, :, numbers[of_arm]]
     # A turn of the last frame moves the point: w x arm = -[arm] w.
     lever_mm = (end.rotation @ target.position_mm[:, None])[..., 0]
     slopes[:, :3] -= skew(lever_mm) @ slopes[:, 3:]
-    if name != FLANGE:
-        _fill(slopes, place, name, end.rotation, np.zeros_like(lever_mm))
     slopes[:, :3] = origin.rotation @ slopes[:, :3]
     slopes[:, 3:] = origin.rotation @ slopes[:, 3:]
+    moved = {name: frame_motions(origin.rotation @ end.rotation, np.zeros_like(lever_mm))}
     if frame == "instrument" or calibration.anchor is not None:
         # Motions of the base are about the instrument's axes, as in ``frame``.
         turn = origin.rotation @ calibration.base.rotation.T
         arm_mm = compose(origin, compose(end, target)).position_mm - origin.position_mm
-        turned = np.broadcast_to(turn, end.rotation.shape)
-        _fill(slopes, place, calibration.base_name, turned, arm_mm)
+        moved[calibration.base_name] = frame_motions(turn, arm_mm)
+    for item, motions in moved.items():
+        for motion, column in zip(MOTIONS, np.moveaxis(motions, 2, 0), strict=True):
+            if f"{item}.{motion}" in names:
+                slopes[:, :, names.index(f"{item}.{motion}")] = column
     return slopes
 
 
-def _fill(
-    slopes: np.ndarray,
-    place: dict[str, int],
-    name: str,
-    turned: np.ndarray,
-    lever_mm: np.ndarray,
-) -> None:
-    """Columns of the motions of a frame: shifts along axes of ``turned`` (n, 3, 3), and turns."""
-    for number, motion in enumerate(MOTIONS):
-        column = place.get(f"{name}.{motion}")
-        if column is None:
-            continue
-        axis = turned[:, :, number % 3]
-        if number < 3:
-            slopes[:, :3, column] = axis
-        else:
-            slopes[:, :3, column] = np.cross(axis, lever_mm)
-            slopes[:, 3:, column] = axis
+def frame_motions(axes: np.ndarray, lever_mm: np.ndarray) -> np.ndarray:
+    """Movement (n, 6, 6) of points by shifts (mm) along ``axes`` (n, 3, 3) and turns about them.
+
+    ``lever_mm`` (n, 3): from the origin of the frame that moves to the points.
+    """
+    motions = np.zeros((len(lever_mm), 6, 6))
+    motions[:, :3, :3] = motions[:, 3:, 3:] = axes
+    motions[:, :3, 3:] = -skew(lever_mm) @ axes
+    return motions
 
 
 def position_std_mm(
@@ -172,14 +159,6 @@ def is_measured_there(
         rows = np.flatnonzero(inside)
         inside[rows] = position_std_mm(calibration, at.select(rows), point) <= most_mm
     return inside
-
-
-def measured_by_all(calibrations: Sequence[Calibration], q_rad: np.ndarray) -> np.ndarray:
-    """True (n,) where every calibration was measured, over reported joints (n, k)."""
-    result = [
-        is_measured_there(item, JointState(item.robot.dh_joints(q_rad))) for item in calibrations
-    ]
-    return np.all(result, axis=0)
 
 
 def share_of_box(calibration: Calibration, low: np.ndarray, high: np.ndarray) -> float:

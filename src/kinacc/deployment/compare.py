@@ -17,13 +17,14 @@ import pandas as pd
 import scipy
 
 from kinacc.calibration.uncertainty import scale_of, scaled_unit, unit_of
-from kinacc.deployment.applicability import measured_by_all, sensitivity
+from kinacc.deployment.applicability import frame_motions, is_measured_there, sensitivity
 from kinacc.deployment.record import FLANGE, Calibration
 from kinacc.deployment.shared_readings import NONE_SHARED, SharedReadings, counted_once
 from kinacc.deployment.verify import covers
 from kinacc.errors import InputError, Problem
-from kinacc.geometry import Pose, compose, exp_so3, log_so3, skew
+from kinacc.geometry import Pose, compose, exp_so3
 from kinacc.kinematics import robot as robots
+from kinacc.kinematics.inverse.newton import pose_error
 from kinacc.kinematics.model import JointState
 
 OTHER_ROBOT, SAME_READINGS = "different robots", "same readings"
@@ -129,9 +130,11 @@ def compare(
             Problem(f"{first.name}, {second.name}", message, f"{_FEWEST} or more", fix)
         )
     q_rad = q_rad[covered]
+    states = [JointState(item.robot.dh_joints(q_rad)) for item in both]
+    pairs = zip(both, states, strict=True)
+    measured = np.all([is_measured_there(item, at) for item, at in pairs], axis=0)
     names = (Path(first.name).name, Path(second.name).name)
     names = names if names[0] != names[1] else (first.name, second.name)
-    measured = measured_by_all(both, q_rad)
     first, second = both = counted_once(first, second, shared)
     parametric = first.model.comparable is not None and second.model.comparable is not None
     test, parameters = (np.nan, 0, np.nan), None
@@ -141,12 +144,10 @@ def compare(
         known = [_Knowledge.of(item, scale) for item in both]
         test = _test(after_ - before_, known)
         parameters = _parameters(first.model.names, before_, after_, known)
-    before, after = (
-        item.pose(JointState(item.robot.dh_joints(q_rad)), "base", FLANGE) for item in both
-    )
+    before, after = (item.pose(at, "base", FLANGE) for item, at in zip(both, states, strict=True))
     weights = np.array([1.0, 1.0, 1.0, *[rotation_weight_mm_per_rad] * 3])
-    moved = [_difference(before, after), _aligned(before, after, weights)]
-    scatter = _scatter(both, q_rad, before, weights)
+    moved = [pose_error(after, before), _aligned(before, after, weights)]
+    scatter = _scatter(both, states, before, weights)
     nominal = [robots.forward(item.robot, q_rad) for item in both]
     apart_mm = _rms(_aligned(nominal[0], nominal[1], weights)[:, :3])
     length_mm = float(np.hypot(first.robot.dh.a_mm, first.robot.dh.d_mm).sum())
@@ -262,44 +263,33 @@ def _test(difference: np.ndarray, known: list[_Knowledge]) -> tuple[float, int, 
     return statistic, directions, probability
 
 
-def _difference(before: Pose, after: Pose) -> np.ndarray:
-    """Movement (n, 6): position in mm and turn in rad, in the base."""
-    turn = log_so3(after.rotation @ np.swapaxes(before.rotation, 1, 2))
-    return np.concatenate([after.position_mm - before.position_mm, turn], axis=1)
-
-
 def _frame_slopes(pose: Pose, weights: np.ndarray) -> np.ndarray:
     """Weighted movement (6n, 12) of poses by small motions of the base (6) and of the end frame."""
-    slopes = np.zeros((len(pose.position_mm), 6, 12))
-    slopes[:, :3, :3] = np.eye(3)
-    slopes[:, :3, 3:6] = -skew(pose.position_mm)
-    slopes[:, 3:, 3:6] = np.eye(3)
-    slopes[:, :3, 6:9] = slopes[:, 3:, 9:12] = pose.rotation
+    of_base = frame_motions(np.eye(3), pose.position_mm)
+    of_end = frame_motions(pose.rotation, np.zeros_like(pose.position_mm))
+    slopes = np.concatenate([of_base, of_end], axis=2)
     return (slopes * weights[:, None]).reshape(-1, 12)
 
 
 def _aligned(before: Pose, after: Pose, weights: np.ndarray) -> np.ndarray:
     """Movement (n, 6) that no change of base and end frame explains, least squares."""
     for _ in range(_STEPS):
-        remaining = (_difference(before, after) * weights).ravel()
+        remaining = (pose_error(after, before) * weights).ravel()
         step = np.linalg.lstsq(_frame_slopes(after, weights), -remaining, rcond=1e-9)[0]
         base, end = Pose(exp_so3(step[3:6]), step[:3]), Pose(exp_so3(step[9:12]), step[6:9])
         after = compose(base, compose(after, end))
-        if np.abs(step * np.tile([1.0, 1.0, 1.0, 1e3, 1e3, 1e3], 2)).max() < 1e-10:
-            break
-    return _difference(before, after)
+    return pose_error(after, before)
 
 
 def _scatter(
-    both: Sequence[Calibration], q_rad: np.ndarray, pose: Pose, weights: np.ndarray
-) -> list[np.ndarray | None]:
+    both: Sequence[Calibration], states: Sequence[JointState], pose: Pose, weights: np.ndarray
+) -> list[np.ndarray]:
     """Movement (n, 6, r) of the flange by one standard deviation of each direction of the fits.
 
-    As fitted, and less what base and end frame absorb; None twice without covariances.
+    As fitted, and less what base and end frame absorb; NaN without covariances.
     """
     if any(item.known is None for item in both):
-        return [None, None]
-    states = [JointState(item.robot.dh_joints(q_rad)) for item in both]
+        return [np.full((len(pose.position_mm), 6, 1), np.nan)] * 2
     moved = np.concatenate(
         [
             sensitivity(item, state, "base", FLANGE) @ item.root
@@ -314,20 +304,17 @@ def _scatter(
     return [moved, apart]
 
 
-def _shift(frames: str, moved: np.ndarray, scatter: np.ndarray | None) -> dict[str, object]:
-    chance = [np.nan, np.nan]
-    if scatter is not None:
-        halves = scatter[:, :3], scatter[:, 3:]
-        chance = [float(np.sqrt(np.sum(half**2) / len(moved))) for half in halves]
+def _shift(frames: str, moved: np.ndarray, scatter: np.ndarray) -> dict[str, object]:
     return {
         "frames": frames,
         "rms_mm": _rms(moved[:, :3]),
-        "chance_mm": chance[0],
+        "chance_mm": _rms(scatter[:, :3]),
         "largest_mm": float(np.linalg.norm(moved[:, :3], axis=1).max()),
         "rms_mrad": 1e3 * _rms(moved[:, 3:]),
-        "chance_mrad": 1e3 * chance[1],
+        "chance_mrad": 1e3 * _rms(scatter[:, 3:]),
     }
 
 
-def _rms(vectors: np.ndarray) -> float:
-    return float(np.sqrt(np.mean(np.sum(vectors**2, axis=1))))
+def _rms(moved: np.ndarray) -> float:
+    """Root of the mean over poses (n, ...) of summed squares."""
+    return float(np.sqrt(np.sum(moved**2) / len(moved)))

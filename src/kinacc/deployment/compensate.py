@@ -221,8 +221,7 @@ class _Goals:
         plain, count = calibration.model.dh, _FEW_STARTS if self.has_few_axes else _STARTS
         if not self.has_few_axes:
             with suppress(InputError):
-                part = Pose(self.goal.rotation[rows], self.goal.position_mm[rows])
-                result = solve(robot, plain, part).q_rad
+                result = solve(robot, plain, self.goal.select(rows)).q_rad
                 there = np.isfinite(result).all(axis=2)
                 local = np.broadcast_to(rows[:, None], there.shape)[there]
                 return self._turned(result[there], local), local
@@ -269,7 +268,7 @@ class _Goals:
         self, model: ErrorModel, start: np.ndarray, rows: np.ndarray, like: JointState | None
     ) -> np.ndarray:
         """Joints (m, k) refined from ``start`` onto the goals ``rows`` (m,), reached or not."""
-        wanted = Pose(self.wanted.rotation[rows], self.wanted.position_mm[rows])
+        wanted = self.wanted.select(rows)
         if self.has_few_axes:
             return few_axes.refine(model, wanted, self.carried, start, like)
         return newton.refine(model, wanted, start, like).q_rad
@@ -279,8 +278,7 @@ class _Goals:
     ) -> tuple[np.ndarray, np.ndarray]:
         """What is left, (m,) mm and (m,) rad, at DH joints (m, k) of goals ``rows``."""
         end = compose(model.pose(self.like.select(rows).moved(q_dh)), self.carried)
-        wanted = Pose(self.wanted.rotation[rows], self.wanted.position_mm[rows])
-        off, angle = distance(end, wanted)
+        off, angle = distance(end, self.wanted.select(rows))
         return np.nan_to_num(off, nan=np.inf), np.nan_to_num(angle, nan=np.inf)
 
 

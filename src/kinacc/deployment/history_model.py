@@ -278,7 +278,7 @@ def moved(pair: Pair, misfit: float) -> Moved:
     split = free.shape[1]
     gram[np.diag_indices(split)] += _FIRM * gram[:split, :split].diagonal().max()
     noise, prior = _variances(gram, observed, pair, split, group)
-    inverse = _inverse(gram + np.diag(np.append(np.zeros(split), noise / prior[group])))
+    inverse = np.linalg.inv(gram + np.diag(np.append(np.zeros(split), noise / prior[group])))
     result, changes = inverse @ observed, slice(split - count, split)
     scores = _shares(pair, columns, result, inverse, changes)
     blurred = (inverse[changes] @ gram[:, split:]) * np.sqrt(prior[group])
@@ -325,7 +325,7 @@ def _variances(
     prior, noise = np.full(group.max() + 1, _START_MM**2), 0.3 * square / remaining
     for _ in range(_ROUNDS):
         held = noise / prior[group]
-        spread = _inverse(inner + np.diag(held))
+        spread = np.linalg.inv(inner + np.diag(held))
         result = spread @ right
         informed = 1.0 - held * spread.diagonal()
         unexplained = square - 2.0 * result @ right + result @ inner @ result
@@ -342,32 +342,19 @@ def _variances(
     return noise, prior
 
 
-def _inverse(matrix: np.ndarray) -> np.ndarray:
-    """Inverse of a symmetric, positive definite matrix."""
-    lower, _ = scipy.linalg.lapack.dpotrf(matrix, lower=1)
-    half, _ = scipy.linalg.lapack.dpotri(lower, lower=1)
-    return half + half.T - np.diag(half.diagonal())
-
-
 def _shares(
     pair: Pair, columns: np.ndarray, solution: np.ndarray, inverse: np.ndarray, changes: slice
 ) -> np.ndarray:
     """Share (c, d) of every configuration in the change, by residuals of a fit without it."""
     remaining, pull = pair.residual - columns @ solution, columns @ inverse
-    order = np.argsort(pair.cluster, kind="stable")
-    label, begin, size = np.unique(pair.cluster[order], return_index=True, return_counts=True)
-    shares = np.empty((len(label), changes.stop - changes.start))
-    for item in np.unique(size):
-        ours = np.flatnonzero(size == item)
-        rows = order[begin[ours, None] + np.arange(item)]
-        local = np.eye(item) - pull[rows] @ columns[rows].transpose(0, 2, 1)
-        values, vectors = np.linalg.eigh(local)
+    shares = []
+    for label in np.unique(pair.cluster):
+        rows = np.flatnonzero(pair.cluster == label)
+        values, vectors = np.linalg.eigh(np.eye(len(rows)) - pull[rows] @ columns[rows].T)
         # A direction that one configuration alone decides has no residual, with or without it.
-        factor = 1.0 / np.where(values > _FIRM, values, 1.0)
-        along = np.einsum("cij,ci->cj", vectors, remaining[rows]) * factor
-        away = np.einsum("cij,cj->ci", vectors, along)
-        shares[ours] = np.einsum("cid,ci->cd", pull[rows][:, :, changes], away)
-    return shares
+        along = vectors.T @ remaining[rows] / np.where(values > _FIRM, values, 1.0)
+        shares.append(vectors @ along @ pull[rows, changes])
+    return np.array(shares)
 
 
 def joint_of(movement: Moved, prismatic: np.ndarray) -> int | None:

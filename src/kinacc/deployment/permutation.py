@@ -144,7 +144,7 @@ def _samples(products: np.ndarray, size: int) -> np.ndarray:
         weight = rng.multinomial(size, np.full(total, 1.0 / total), _DRAWS).astype(float)
     else:
         weight = np.zeros((_DRAWS, total))
-        chosen = np.argsort(rng.random((_DRAWS, total)), axis=1)[:, :size]
+        chosen = np.argpartition(rng.random((_DRAWS, total)), size - 1, axis=1)[:, :size]
         np.put_along_axis(weight, chosen, 1.0, axis=1)
     return (weight @ products.reshape(total, -1)).reshape(_DRAWS, *products.shape[1:]) / size
 

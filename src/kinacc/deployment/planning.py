@@ -85,7 +85,7 @@ class PosePlan:
     moves_rad
         (N,) largest movement of a joint on the way to each pose.
     index
-        (N,) observability index O1 after each added pose, the last one after all ``swaps``: the
+        (N,) observability index O1 after each added pose, the last one after all swaps: the
         geometric mean of the singular values over the root of the number of poses (Borm and Menq,
         Int. J. Robotics Research 10, 1991).
     candidate_travel_rad
@@ -97,7 +97,6 @@ class PosePlan:
     chosen: np.ndarray
     moves_rad: np.ndarray
     index: np.ndarray
-    swaps: int
     candidate_travel_rad: float
     parameters: int
     determined: int
@@ -130,7 +129,7 @@ def plan_poses(
     shown = information(robot, q_rad, experiment)
     if shown.rank == 0:
         raise InputError(Problem("candidates", "determine no parameter"))
-    chosen, index, swaps = choose(shown.rows, count)
+    chosen, index = choose(shown.rows, count)
     chosen = np.sort(chosen)
     distance = distances(np.concatenate([start_rad[None], q_rad[chosen]]) / travel_unit(robot))
     path = shortest_path(distance)
@@ -138,7 +137,6 @@ def plan_poses(
         chosen[path[1:] - 1],
         distance[path[:-1], path[1:]],
         index,
-        swaps,
         float(np.trace(distance, offset=1)),
         len(shown.names),
         shown.rank,
@@ -259,8 +257,8 @@ def _slopes(arm: Calibration, q_dh: np.ndarray, experiment: Experiment) -> np.nd
     return slopes
 
 
-def choose(rows: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray, int]:
-    """A D-optimal set by exchange (Fedorov 1972): candidates (count,), O1 (count,), swaps.
+def choose(rows: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """A D-optimal set by exchange (Fedorov 1972): candidates (count,), and O1 (count,).
 
     Of candidates with ``rows`` (n, m, r) the best one is added until there are ``count``; then
     each is swapped for the best in its place, until a round finds nothing better. Of equals the
@@ -279,18 +277,17 @@ def choose(rows: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray, int]:
     for number in range(count):
         chosen.append(_best_addition(rows, chosen, floor))
         index[number] = observability(rows[chosen])
-    swaps = 0
     for _ in range(_MOST_SWEEPS):
-        before = swaps
+        before = index[-1]
         for place in range(count):
             others = chosen[:place] + chosen[place + 1 :]
             changed = [*others[:place], _best_addition(rows, others, floor), *others[place:]]
             value = observability(rows[changed])
             if value > index[-1] * (1.0 + _TIE):
-                chosen, index[-1], swaps = changed, value, swaps + 1
-        if swaps == before:
+                chosen, index[-1] = changed, value
+        if index[-1] == before:
             break
-    return np.array(chosen), index, swaps
+    return np.array(chosen), index
 
 
 def observability(rows: np.ndarray) -> float:

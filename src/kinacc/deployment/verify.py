@@ -22,7 +22,7 @@ from kinacc.calibration.summary import LARGE_SHARE
 from kinacc.calibration.tables import frames_of
 from kinacc.config.error_models import ERROR_MODELS, MEASURED, NOMINAL, Comparison
 from kinacc.deployment import folder
-from kinacc.deployment.applicability import is_measured_there
+from kinacc.deployment.applicability import frame_motions, is_measured_there
 from kinacc.deployment.folder import Tables
 from kinacc.deployment.permutation import (
     LEVEL,
@@ -285,7 +285,8 @@ def error_columns(
     arm = (turned @ np.tile(targets.position_mm, (count, 1))[..., None])[..., 0]
     if BASE in moved:
         place = np.repeat(flange.position_mm, kinds, axis=0) + arm
-        parts += [np.broadcast_to(np.eye(3), turned.shape), -ANGLE_UNIT_RAD * skew(place)]
+        scale = np.repeat([1.0, ANGLE_UNIT_RAD], 3)
+        parts.append(frame_motions(np.eye(3), place)[:, :3] * scale)
     if TOOL in moved:
         shifts = np.einsum("nij,nk->nikj", turned, np.tile(np.eye(kinds), (count, 1)))
         parts.append(shifts.reshape(len(shifts), 3, -1))

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from kinacc.errors import and_more, refused
+from kinacc.errors import Problem, and_more, refuse, refused
 
 _ENDING = ".partial"
 
@@ -112,6 +112,20 @@ def write_together(contents: Mapping[Path | str, bytes], on_disk: bool = False) 
             except OSError as error:
                 error.filename = str(part)  # which the system does not name for a full disk
                 raise
+
+
+def write_new(contents: Mapping[Path | str, bytes], force: bool) -> list[str]:
+    """Write files together; InputError naming those already there, unless ``force``."""
+    refuse(
+        [
+            Problem(str(path), "is there already", fix="give --force to replace it")
+            for path in contents
+            if Path(path).exists() and not force
+        ],
+        "Nothing was written",
+    )
+    write_together(contents)
+    return [*map(str, contents)]
 
 
 def synchronise(path: Path) -> None:

@@ -2,13 +2,15 @@
 
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from kinacc.deployment.export.files import FORMATS, write
+from kinacc.deployment.export.files import FORMATS, contents, write
 from kinacc.deployment.export.paper_tables import with_deviation
-from kinacc.deployment.export.source import Source
+from kinacc.deployment.export.source import Source, notes, read_source
+from kinacc.deployment.folder import recorded_robot
 from kinacc.deployment.record import TOOL, nominal
 from kinacc.errors import InputError
 from kinacc.geometry import Pose, compose, exp_so3, rotation_from_quaternion, rotation_x, rotation_z
@@ -58,6 +60,19 @@ def test_a_robot_file_is_read_back_bit_by_bit(name, tmp_path):
 )
 def test_values_carry_two_digits_of_their_deviation(value, std, text):
     assert with_deviation(value, std) == text
+
+
+def test_tables_of_a_paper_show_the_selected_model_deviations_and_what_is_left_open():
+    """Of a UR10 whose flange pointed one way; the other formats are golden."""
+    folder = Path(__file__).parents[2] / "golden" / "results" / "ur10_d"
+    source = read_source(folder, recorded_robot(folder))
+    markdown, latex = contents(source, ("markdown", "latex")).values()
+    for text, signs in ((markdown, "± †"), (latex, r"$\pm$ $^\dagger$")):
+        assert "VEC model (selected) against measurements" in text[:200]
+        assert all(part in text for part in ("held-out poses", "tool z", *signs.split()))
+    weak, selected = notes(source)
+    assert "tool z" in weak
+    assert "VEC was selected" in selected
 
 
 def test_nothing_is_written_over_or_in_part(tmp_path):

@@ -5,6 +5,7 @@ import importlib.util
 import numpy as np
 import pinocchio as pin
 import pytest
+from oracles.kinematics import rot_x, rot_z, trans
 from test_export_urdf import assert_same, bent, of, some_joints
 
 from kinacc.deployment.export import urdf
@@ -13,17 +14,6 @@ from kinacc.kinematics import robot
 from kinacc.kinematics.model import JointState
 
 ARMS = robot.shipped()
-
-
-def craig(alpha, a, theta, d):
-    """Rx(alpha) Tx(a) Rz(theta) Tz(d), written out."""
-    ca, sa, ct, st = np.cos(alpha), np.sin(alpha), np.cos(theta), np.sin(theta)
-    return np.array([
-        [ct, -st, 0, a],
-        [st * ca, ct * ca, -sa, -sa * d],
-        [st * sa, ct * sa, ca, ca * d],
-        [0, 0, 0, 1],
-    ])  # fmt: skip
 
 
 def matrix(pose):
@@ -44,7 +34,8 @@ def test_modified_dh_reaches_the_same_poses(name, size):
         for (alpha, a, theta, d), q, slides in zip(
             parameters, row, arm.model.prismatic, strict=True
         ):
-            step = step @ craig(alpha, a, theta + q * (not slides), d + q * slides)
+            step = step @ rot_x(alpha) @ trans(a, 0, 0) @ rot_z(theta + q * (not slides))
+            step = step @ trans(0, 0, d + q * slides)
         ends.append(step @ matrix(end))
     ends = np.array(ends)
     assert_same(arm.pose(JointState(q_rad)), Pose(ends[:, :3, :3], ends[:, :3, 3]))

@@ -42,22 +42,21 @@ ANGLES = np.rad2deg(Rotation.from_matrix(TOOL.rotation).as_euler("xyz"))
 LEFT = {"weld.src": 1, "weld.mod": 1, "weld.ls": 1, "weld.script": 1}
 
 
-def corrected(name, model="dh", folder=EXAMPLES, **options):
+def corrected(name, folder=EXAMPLES, **options):
     pulses = PULSES if name.endswith("JBI") else None
     if name == "joints.csv":
         options = {"tools": {"": np.array([30.0, -20.0, 150.0, *ANGLES])}, **options}
-    arm = calibrated(ARMS[name], model)
-    return arm, compensate_program(arm, folder / name, pulses_per_degree=pulses, **options)
+    arm = calibrated(ARMS[name])
+    return compensate_program(arm, folder / name, pulses_per_degree=pulses, **options)
 
 
 def without_numbers(content: bytes) -> str:
     return re.sub(NUMBER, "#", content.decode("latin-1"))
 
 
-@pytest.mark.parametrize("model", ["dh", "vec"])
 @pytest.mark.parametrize("name", ARMS)
-def test_every_example_is_corrected_and_only_its_numbers_change(name, model):
-    _, found = corrected(name, model)
+def test_every_example_is_corrected_and_only_its_numbers_change(name):
+    found = corrected(name)
     assert not found.refused
     assert (found.table["status"] == "corrected").all()
     assert len(found.not_corrected) == LEFT.get(name, 0)
@@ -81,7 +80,7 @@ def test_frames_that_are_missing_are_asked_for(tmp_path):
 
 
 def test_a_program_is_corrected_once_and_files_are_kept(tmp_path):
-    _, found = corrected("weld.src")
+    found = corrected("weld.src")
     out = tmp_path / "weld_cal.src"
     found.write(out)
     assert sorted(each.name for each in tmp_path.iterdir()) == [
@@ -154,11 +153,11 @@ def test_a_turn_that_the_correction_would_change_is_refused(tmp_path):
     path = _kuka(tmp_path, *lines)
     found = compensate_program(calibrated(KR6, "dh"), path)
     assert found.refused
-    assert all("T bit" in each.what for each in found.refused)
+    assert all("A4 " in each.what for each in found.refused)
 
 
 def test_changes_beyond_a_limit_are_refused():
-    _, found = corrected("weld.mod", at_most_mm=0.1)
+    found = corrected("weld.mod", at_most_mm=0.1)
     assert any("--at-most-mm" in each.what for each in found.refused)
 
 
@@ -228,8 +227,16 @@ def test_columns_and_turns_are_read_where_and_as_they_are_written(tmp_path):
     assert position.numbers.tolist() == [1, 2, 3, 4, 5, 6]
     frame = "{X 1,Y 2,Z 3,A 0,B 0,C 0,S 'B010',T 'H1B'}"
     (position,) = _read(tmp_path, "own.src", f"LIN {frame}").positions
-    bits = [part for part in position.posture if part.endswith("1")]
-    assert bits == ["S bit 1 1", "T bit 0 1", "T bit 1 1", "T bit 3 1", "T bit 4 1"]
+    set_bits = [part for part in position.posture if part.endswith(("up", "negative"))]
+    assert set_bits == ["elbow up", *(f"A{axis} negative" for axis in (1, 2, 4, 5))]
+
+
+def test_positions_are_in_the_order_of_the_moves(tmp_path):
+    """Where none states a posture each starts from the one before."""
+    place = "{X 500,Y 0,Z 600,A 0,B 90,C 0}"
+    data = {"own.dat": f"DECL POS XP2={place}\nDECL POS XP1={place}\n"}
+    program = _read(tmp_path, "own.src", f"PTP {HOME}\nLIN XP1\nCIRC XP2, {place}", **data)
+    assert [each.name for each in program.positions] == ["line 1", "XP1", "XP2", "line 3"]
 
 
 def test_poses_that_no_move_uses_are_left_alone(tmp_path):
@@ -237,7 +244,7 @@ def test_poses_that_no_move_uses_are_left_alone(tmp_path):
     stale = "CONST robtarget stale:=[[500,0,600],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];"
     text = text.replace("CONST robtarget", f"{stale}\n  CONST robtarget", 1)
     (tmp_path / "weld.mod").write_text(text)
-    _, found = corrected("weld.mod", folder=tmp_path)
+    found = corrected("weld.mod", folder=tmp_path)
     assert not found.refused
     assert "stale" in found.not_corrected[-1]
     assert stale.encode() in found.files[tmp_path / "weld.mod"]

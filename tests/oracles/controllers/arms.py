@@ -7,9 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import yaml
-from scipy.optimize import least_squares
+from scipy.optimize import root
 from scipy.spatial.transform import Rotation
 
+from oracles.kinematics import dh_frames
+
+DEG = np.pi / 180.0
 ROBOTS = Path(__file__).parents[3] / "src" / "kinacc" / "kinematics" / "robots"
 
 
@@ -20,11 +23,6 @@ def frame(x=0.0, y=0.0, z=0.0, turn=None) -> np.ndarray:
     if turn is not None:
         found[:3, :3] = turn.as_matrix()
     return found
-
-
-def about(axis: str, angle: float) -> np.ndarray:
-    """A turn about x, y or z."""
-    return frame(turn=Rotation.from_euler(axis, angle))
 
 
 @dataclass(frozen=True)
@@ -47,17 +45,19 @@ class Arm:
     errors: np.ndarray
     wave: float = 0.0
 
+    @property
+    def table(self) -> np.ndarray:
+        """Rows (6, 5) theta, d, a, alpha and beta of the arm as described, rad and mm."""
+        return np.pad(np.array(self.rows) * [DEG, 1.0, 1.0, DEG], ((0, 0), (0, 1)))
+
+    def frames(self, shown: np.ndarray, true: bool = False) -> list[np.ndarray]:
+        """The base frame and the frame after each joint, at joints shown on the pendant (6,)."""
+        q = self.matrix @ shown
+        return dh_frames(self.table + true * self.errors, q + true * self.wave * np.sin(2.0 * q))
+
     def pose(self, shown: np.ndarray, true: bool = False) -> np.ndarray:
-        """The flange in the base at joints shown on the pendant (6,)."""
-        here = np.eye(4)
-        error = self.errors if true else np.zeros((6, 5))
-        for row, more, q in zip(self.rows, error, self.matrix @ shown, strict=True):
-            theta, alpha = np.deg2rad(row[0]), np.deg2rad(row[3])
-            q = q + true * self.wave * np.sin(2.0 * q)
-            here = here @ about("z", q + theta + more[0])
-            here = here @ frame(row[2] + more[2], 0.0, 0.0) @ frame(0.0, 0.0, row[1] + more[1])
-            here = here @ about("x", alpha + more[3]) @ about("y", more[4])
-        return here @ self.behind
+        """The flange in the base."""
+        return self.frames(shown, true)[-1] @ self.behind
 
     @property
     def behind(self) -> np.ndarray:
@@ -72,7 +72,7 @@ class Arm:
             turn = Rotation.from_matrix(apart[:3, :3]).as_rotvec()
             return np.concatenate([apart[:3, 3] / 1000.0, turn])
 
-        found = least_squares(off, near, xtol=1e-15, ftol=1e-15, gtol=1e-15)
+        found = root(off, near, tol=1e-14)
         assert np.abs(found.fun).max() < 1e-9, f"{self.name}: out of reach"
         return found.x
 

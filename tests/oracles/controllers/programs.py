@@ -140,16 +140,9 @@ class Program:
 
 def posture(arm: Arm, shown: np.ndarray) -> tuple[bool, bool]:
     """Whether the wrist is behind axis 1, and the elbow above the line from shoulder to wrist."""
-    dh = arm.matrix @ shown
-    here, places = np.eye(4), []
-    for (theta, d, a, alpha), q in zip(arm.rows, dh, strict=True):
-        places.append(here[:3, 3].copy())
-        turn = Rotation.from_euler("ZX", [q + np.deg2rad(theta), np.deg2rad(alpha)])
-        step = frame(turn=turn)
-        angle = q + np.deg2rad(theta)
-        step[:3, 3] = a * np.cos(angle), a * np.sin(angle), d
-        here = here @ step
-    ahead = np.array([np.cos(dh[0]), np.sin(dh[0]), 0.0])
+    turn = (arm.matrix @ shown)[0]
+    ahead = np.array([np.cos(turn), np.sin(turn), 0.0])
+    places = [here[:3, 3] for here in arm.frames(shown)]
     flat = [np.array([p @ ahead, p[2]]) for p in places]
     upper, fore = flat[2] - flat[1], flat[4] - flat[2]
     return bool(flat[4][0] < 0.0), bool(upper[1] * fore[0] - upper[0] * fore[1] > 0.0)

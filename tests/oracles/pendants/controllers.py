@@ -13,7 +13,8 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from oracles.controllers.arms import ARMS, Arm, errors, frame
+from oracles.controllers.arms import ARMS, DEG, Arm, errors, frame
+from oracles.kinematics import rot_x, rot_y, rot_z, trans
 
 TURNS = {  # of the numbers of a frame behind x, y, z
     "kuka": lambda v: Rotation.from_euler("ZYX", v, degrees=True),
@@ -41,11 +42,9 @@ class _Shifted(Arm):
 
     def pose(self, shown: np.ndarray, true: bool = False) -> np.ndarray:
         here = np.eye(4)
-        for (theta, d, a, alpha), more, q in zip(self.rows, self.errors, shown, strict=True):
-            here = here @ frame(turn=Rotation.from_euler("z", q + np.deg2rad(theta) + more[0]))
-            here = here @ frame(a + more[2], more[3], d + more[1])
-            turn = Rotation.from_euler("XY", [np.deg2rad(alpha) + more[4], more[5]])
-            here = here @ frame(turn=turn)
+        table = np.insert(self.table, 3, 0.0, axis=1) + self.errors
+        for (theta, d, a, b, alpha, beta), q in zip(table, shown, strict=True):
+            here = here @ rot_z(q + theta) @ trans(a, b, d) @ rot_x(alpha) @ rot_y(beta)
         return here
 
 
@@ -62,11 +61,8 @@ def joints_for(
     """Joints (6,) of the arm as first mastered when its controller is sent to ``goal`` in BASE."""
     tool, base = (as_frame(maker, typed[group]) for group in ("TOOL tool", "BASE"))
     flange = base @ goal @ np.linalg.inv(tool)
-    if maker == "ur":
-        rows = _mounting(file.with_suffix(".conf"))
-        return _Shifted(**{**vars(arm), "errors": rows}).joints(flange, near)
-    if maker == "staubli":
-        rows = _array(file.with_suffix(".cfx"))
+    if maker in ("ur", "staubli"):
+        rows = _mounting(file) if maker == "ur" else _array(file)
         return _Shifted(**{**vars(arm), "errors": rows}).joints(flange, near)
     # Every axis was driven to minus the value and mastered there as 0.
     zeros = np.deg2rad([*typed["joint zeros"].values()])
@@ -74,23 +70,17 @@ def joints_for(
 
 
 def _mounting(file: Path) -> np.ndarray:
-    lines = dict(line.split(" = ") for line in file.read_text().splitlines() if " = " in line)
+    lines = file.with_suffix(".conf").read_text().splitlines()
+    values = dict(line.split(" = ") for line in lines if " = " in line)
     rows = np.zeros((6, 6))
     for column, (name, unit) in {
         0: ("delta_theta", 1.0), 1: ("delta_d", 1e3), 2: ("delta_a", 1e3), 4: ("delta_alpha", 1.0),
     }.items():  # fmt: skip
-        rows[:, column] = unit * np.array(json.loads(lines[name]))
+        rows[:, column] = unit * np.array(json.loads(values[name]))
     return rows
 
 
 def _array(file: Path) -> np.ndarray:
-    names = {
-        "theta": np.pi / 180,
-        "d": 1,
-        "a": 1,
-        "b": 1,
-        "alpha": np.pi / 180,
-        "beta": np.pi / 180,
-    }
-    every = ET.parse(file).getroot()
+    names = {"theta": DEG, "d": 1, "a": 1, "b": 1, "alpha": DEG, "beta": DEG}
+    every = ET.parse(file.with_suffix(".cfx")).getroot()
     return np.array([[unit * float(row.get(key)) for key, unit in names.items()] for row in every])

@@ -19,7 +19,7 @@ from kinacc.deployment.programs.orientation import (
     Orientation,
 )
 from kinacc.errors import InputError, Problem
-from kinacc.geometry import IDENTITY, Pose, compose, rotation_x, rotation_y, rotation_z
+from kinacc.geometry import IDENTITY, Pose, compose, invert, rotation_x, rotation_y, rotation_z
 from kinacc.kinematics import dh
 from kinacc.kinematics.dh import PARAMETERS, DHModel
 from kinacc.kinematics.inverse.limits import reported_joints
@@ -109,10 +109,7 @@ def _ur(robot: Robot, model: DHModel) -> Numbers:
         message = "has no DH table of UR arms (alpha 90, 0, 0, 90, -90, 0 deg)"
         fix = "use the table that UR publishes"
         raise InputError(Problem(f"robot {robot.name}", message, fix=fix))
-    frames = dh.chain(model, np.zeros((1, model.joints)))
-    axes = Axes(frames.position_mm[0, :-1], frames.rotation[0, :-1, :, 2])
-    end = Pose(frames.rotation[0, -1], frames.position_mm[0, -1])
-    _, standard, _ = chain_of(axes, end, nominal.prismatic, _PARALLEL)
+    _, standard = standard_chain(model)
     turns = standard.theta_offset_rad - nominal.theta_offset_rad
     return _by_joint({
         "delta_theta": ((turns + np.pi) % (2.0 * np.pi) - np.pi, "rad"),
@@ -120,6 +117,22 @@ def _ur(robot: Robot, model: DHModel) -> Numbers:
         "delta_d": (1e-3 * (standard.d_mm - nominal.d_mm), "m"),
         "delta_alpha": (standard.alpha_rad - nominal.alpha_rad, "rad"),
     })  # fmt: skip
+
+
+def standard_chain(model: DHModel) -> tuple[Pose, DHModel]:
+    """The first frame, and the arm by common normals of its axes: a beta in the last row alone."""
+    frames = dh.chain(model, np.zeros((1, model.joints)))
+    axes = Axes(frames.position_mm[0, :-1], frames.rotation[0, :-1, :, 2])
+    *_, last, end = map(Pose, frames.rotation[0], frames.position_mm[0])
+    first, chain, _ = chain_of(axes, end, model.prismatic, _PARALLEL)
+    # The last row stays, but begins elsewhere on its axis.
+    starts = compose(first, dh.chain(chain, np.zeros((1, model.joints))))
+    moved = compose(invert(Pose(starts.rotation[0, -2], starts.position_mm[0, -2])), last)
+    rows = {name: np.append(getattr(chain, name)[:-1], getattr(model, name)[-1])
+            for name in PARAMETERS}  # fmt: skip
+    rows["theta_offset_rad"][-1] += np.arctan2(moved.rotation[1, 0], moved.rotation[0, 0])
+    rows["d_mm"][-1] += moved.position_mm[2]
+    return first, DHModel(**rows, prismatic=model.prismatic)
 
 
 def _ros(robot: Robot, model: DHModel) -> Numbers:

@@ -22,7 +22,7 @@ from kinacc.errors import Problem, refuse
 from kinacc.geometry import Pose, compose, invert, quaternion_from_rotation
 from kinacc.kinematics.dh import PARAMETERS
 from kinacc.kinematics.robot import as_yaml
-from kinacc.tables.atomic import replacing
+from kinacc.tables.atomic import write_new
 
 _SLIDING = "T = Rz(theta_offset) Tz(q + d) Tx(a) Rx(alpha) Ry(beta) where a joint slides"
 
@@ -170,16 +170,4 @@ def contents(
 
 def write(files: Mapping[str, str], target: Path | str, force: bool = False) -> list[str]:
     """Write files into a folder, all or none; InputError for those already there."""
-    paths = [Path(target) / name for name in files]
-    refuse(
-        [
-            Problem(str(path), "is there already", fix="give --force to replace it")
-            for path in paths
-            if path.exists() and not force
-        ],
-        "Nothing was written",
-    )
-    with replacing(paths) as temporary:
-        for part, text in zip(temporary, files.values(), strict=True):
-            part.write_text(text, encoding="utf-8")
-    return [str(path) for path in paths]
+    return write_new({Path(target) / name: text.encode() for name, text in files.items()}, force)

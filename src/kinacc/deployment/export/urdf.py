@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 from lxml import etree
-from scipy.spatial.transform import Rotation
 
 from kinacc.calibration.frames import closed_form_start
 from kinacc.calibration.observations import full_poses
+from kinacc.deployment.export.controllers import standard_chain
 from kinacc.deployment.export.source import Source
 from kinacc.deployment.record import TOOL
 from kinacc.errors import InputError, Problem
@@ -37,7 +37,6 @@ from kinacc.kinematics.robot.urdf import MOVING, Joint, joints_between, load
 _M_PER_MM = 1e-3
 _SAME_ARM_MM = 1e-3  # how far a file's nominal arm may be from the robot's
 _PROBES = 24
-_PARALLEL = 1e-12  # sine of the angle between two axes
 
 
 def text(source: Source) -> str:
@@ -272,27 +271,14 @@ def modified_dh(source: Source, point: str | None) -> tuple[Pose, np.ndarray, Po
     pose of ``point`` in the last joint's frame.
     """
     calibration = source.calibration
-    (first, *between), end = origins(source.dh)
-    parameters = np.zeros((calibration.model.joints, 4))
-    for joint, step in enumerate(between, start=1):
-        around, alpha, theta = _about_z_x_z(step)
-        a, across, up = Rotation.from_euler("z", -around).apply(step.position_mm)
-        d = -across / np.sin(alpha) if abs(np.sin(alpha)) > _PARALLEL else 0.0
-        parameters[joint] = alpha, a, theta, d
-        parameters[joint - 1, 2:] += around, up - d * np.cos(alpha)
+    first, chain = standard_chain(source.dh)
+    # Rz Tz Tx Rx a joint, cut in front of Tx: what follows a joint goes with the next one.
+    before = np.pad(np.stack([chain.alpha_rad, chain.a_mm], axis=1), ((1, 0), (0, 0)))
+    parameters = np.column_stack([before[:-1], chain.theta_offset_rad, chain.d_mm])
+    tilt = rotation_x(chain.alpha_rad[-1]) @ rotation_y(chain.beta_rad[-1])
+    end = Pose(tilt, np.array([chain.a_mm[-1], 0.0, 0.0]))
     base = compose(calibration.robot.base, first)
     return base, parameters, compose(end, calibration.point(point))
-
-
-def _about_z_x_z(step: Pose) -> tuple[float, float, float]:
-    """Angles about z, x and z from an axis to the next; parallel ones: first towards the next."""
-    turn = Rotation.from_matrix(step.rotation)
-    if np.hypot(*step.rotation[:2, 2]) > _PARALLEL:
-        return tuple(turn.as_euler("ZXZ"))
-    around = np.arctan2(step.position_mm[1], step.position_mm[0])
-    alpha = 0.0 if step.rotation[2, 2] > 0.0 else np.pi
-    rest = Rotation.from_euler("ZX", [around, alpha]).inv() * turn
-    return around, alpha, rest.as_rotvec()[2]
 
 
 def _matrix(pose: Pose) -> np.ndarray:

@@ -162,5 +162,4 @@ LANGUAGE = Language(
     read,
     frames_of,
     posture,
-    robots=("irb",),
 )

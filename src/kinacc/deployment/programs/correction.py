@@ -47,8 +47,8 @@ from kinacc.errors import InputError, Problem, refuse
 from kinacc.geometry import IDENTITY, Pose, compose, invert
 from kinacc.kinematics import dh
 from kinacc.kinematics.inverse import limits
-from kinacc.kinematics.robot import Robot
-from kinacc.tables.atomic import write_together
+from kinacc.kinematics.robot import Robot, forward
+from kinacc.tables.atomic import write_new
 
 LANGUAGES: tuple[Language, ...] = tuple(
     module.LANGUAGE for module in (kuka, abb, fanuc, universal, yaskawa, table)
@@ -86,7 +86,7 @@ class CorrectedProgram:
     remarks: tuple[str, ...]
     files: Mapping[Path, bytes]
 
-    def write(self, out: Path | str, force: bool = False) -> None:
+    def write(self, out: Path | str, force: bool = False) -> list[str]:
         """Write the program; InputError for positions refused, or files that are there."""
         refuse(self.refused, "Positions cannot be corrected; nothing was written")
         out, (first, *others) = Path(out), self.files
@@ -98,13 +98,7 @@ class CorrectedProgram:
         contents: dict[str | Path, bytes] = {out: self.files[first]}
         contents |= {out.with_suffix(path.suffix): self.files[path] for path in others}
         contents[out.with_name(out.name + _RECORD)] = f"{json.dumps(facts, indent=1)}\n".encode()
-        fix = "give --force to replace it"
-        refuse(
-            Problem(str(path), "is there already", fix=fix)
-            for path in map(Path, contents)
-            if path.exists() and not force
-        )
-        write_together(contents)
+        return write_new(contents, force)
 
 
 def read_program(
@@ -274,10 +268,7 @@ class _Correction:
         self, starts: Mapping[int, np.ndarray], point: str | None
     ) -> tuple[pd.DataFrame, list[str]]:
         """Rows of ``_corrected`` by number of the position, and remarks."""
-        robot, language, remarks = self.robot, self.language, []
-        makers = {item.name for item in LANGUAGES if robot.name.lower().startswith(item.robots)}
-        if language.robots and makers - {language.name}:
-            remarks = [f"{language.name}: robot {robot.name} has a controller of another maker."]
+        remarks: list[str] = []
         parts, positions = [pd.DataFrame(columns=_SHOWN)], self.program.positions
         for name in dict.fromkeys(positions[number].tool for number in starts):
             group = [number for number in starts if positions[number].tool == name]
@@ -298,7 +289,7 @@ class _Correction:
         if not position.posture:
             return ""
         changed = posture.unmatched(self.robot, self.language.posture, position.posture, row.q_rad)
-        return f"the posture would change: {changed}" if changed else ""
+        return f"the posture would change to {changed}" if changed else ""
 
     def numbers(self, position: Position, row: Any) -> np.ndarray:
         """New numbers of a position."""
@@ -396,10 +387,10 @@ def _corrected(
         anchor = replace(anchor, targets={**anchor.targets, _POINT: place})
     targets = {**calibration.targets, _POINT: carried}
     arm = replace(calibration, targets=targets, anchor=anchor)
-    wanted = _nominal(robot, start, tool)
+    wanted = compose(forward(robot, start), tool)
     result = inverse.compensate(arm, wanted, start, point=_POINT)
     q_rad = np.where(np.isfinite(result.q_rad), result.q_rad, start)
-    new = _nominal(robot, q_rad, tool)
+    new = compose(forward(robot, q_rad), tool)
     shift_mm, turn_rad = inverse.distance(new, wanted)
     known = predict(arm, q_rad, point=_POINT)
     slopes = dh.joint_jacobian(robot.dh, robot.dh_joints(q_rad))
@@ -418,9 +409,3 @@ def _corrected(
             "is_near_singular": np.linalg.svd(slopes, compute_uv=False)[:, -1] < _SINGULAR,
         }
     )
-
-
-def _nominal(robot: Robot, q_rad: np.ndarray, tool: Pose) -> Pose:
-    """Poses (n, ...) of the tool that the nominal arm takes at reported joints (n, k)."""
-    end = compose(robot.base, dh.forward(robot.dh, robot.dh_joints(q_rad)))
-    return compose(compose(end, robot.flange), tool)

@@ -80,5 +80,4 @@ LANGUAGE = Language(
     read,
     posture=posture,
     frame_files=("frames.yaml",),
-    robots=("fanuc",),
 )

@@ -45,6 +45,12 @@ _SET = re.compile(
 _CHANGED = re.compile(r"\b(TOOL|BASE)_DATA\s*\[\s*(\d+)\s*\]\s*(?:\.\w+\s*=|=\s*[^\s{])", re.I)
 _MOVED = re.compile(r"\$(?:TOOL|BASE)(?:\.\w+\s*=|\s*=[^{]*:)", re.I)
 _COMPONENT = re.compile(r"\s*\w+(?:\[\w+\])?\.(?:[XYZABC]|A[1-6])\s*=", re.I)
+_SIGNS = ("positive", "negative")
+_SIDES = (
+    ("basic area", "overhead area"),
+    ("elbow down", "elbow up"),
+    ("wrist positive", "wrist negative"),
+)
 _UNUSED: Use = (None, None, "")
 Parts = dict[str, tuple[str, Place]]
 
@@ -84,7 +90,7 @@ def read(sources: Sequence[Source], _: np.ndarray | None) -> Program:
                     continue
                 positions |= written
                 target = re.sub(r"\[.*?\]", "", target.upper())
-                names = {*re.findall(r"\$?\b[A-Z_]\w*", target)} - {"CA"}
+                names = [name for name in re.findall(r"\$?\b[A-Z_]\w*", target) if name != "CA"]
                 moves.append((statement, names))
                 in_line = (data[word] for word in re.findall(r"\w+", text.upper()) if word in data)
                 way = next(in_line, use)
@@ -103,32 +109,29 @@ def read(sources: Sequence[Source], _: np.ndarray | None) -> Program:
                     else:
                         positions[name] = position
     defined = {name.split("[")[0] for name in positions}
-    result = []
-    for name, position in positions.items():
+    result, order = [], {name: number for number, name in enumerate(uses)}  # of the moves
+    for name in sorted(positions, key=lambda item: order.get(item.split("[")[0], len(order))):
         ways = {
             (tool, base, CHANGED if {(TOOL, tool), (BASE, base)} & changed else reason)
             for tool, base, reason in uses.get(name.split("[")[0])
             or [data.get(f"F{name[1:]}", _UNUSED)]
         }
-        result.append(in_use(replace(position, name=name), ways))
+        result.append(in_use(replace(positions[name], name=name), ways))
     computed += [statement for statement, names in moves if not defined.issuperset(names)]
     return Program(sources, result, computed)
 
 
 def posture(sides: Sequence[bool], q_deg: np.ndarray) -> tuple[str, ...]:
-    """Status bits 0 to 2 and turn bits of the six axes."""
+    """Status and turn: bits 0 to 2, and of the six axes, in words."""
     is_ahead, is_above, _ = sides
     bent_back = -180.0 <= q_deg[4] < 0.0 or q_deg[4] >= 180.0
     status = (not is_ahead) + 2 * is_above + 4 * bent_back
-    return _bits(status, sum(int(angle < 0.0) << axis for axis, angle in enumerate(q_deg)))
+    return _stated(status, sum(int(angle < 0.0) << axis for axis, angle in enumerate(q_deg)))
 
 
-def _bits(status: int, turn: int) -> tuple[str, ...]:
-    return tuple(
-        f"{name} bit {bit} {number >> bit & 1}"
-        for name, number, count in (("S", status, 3), ("T", turn, 6))
-        for bit in range(count)
-    )
+def _stated(status: int, turn: int) -> tuple[str, ...]:
+    sides = (pair[status >> bit & 1] for bit, pair in enumerate(_SIDES))
+    return *sides, *(f"A{axis + 1} {_SIGNS[turn >> axis & 1]}" for axis in range(6))
 
 
 def _lines(text: str) -> Iterator[tuple[int, str]]:
@@ -184,7 +187,7 @@ def _position(source: Source, parts: Parts) -> Position | None:
         return None
     outer = [parts[key][0] for key in parts if re.fullmatch(r"E[1-6]", key)]
     moves = any(re.fullmatch(NUMBER, text) and float(text) for text in outer)
-    stated = _bits(status, turn) if {*"ST"} <= set(parts) else ()
+    stated = _stated(status, turn) if {*"ST"} <= set(parts) else ()
     return Position("", source, places, 4, posture=stated, moves_outside=moves)
 
 
@@ -205,5 +208,4 @@ LANGUAGE = Language(
     posture,
     (".src", ".dat"),
     ("$config.dat",),
-    robots=("kr", "iiwa"),
 )

@@ -136,7 +136,7 @@ class Language:
     bases that a file holds. ``partners``: endings of files written together with the program;
     ``frame_files``: names, in lower case, of files with frames beside it. ``posture``: what the
     controller calls the posture, from the sides (front, elbow up, wrist of joint 5 positive) and
-    the joints in degrees. ``robots``: how names of shipped robots begin that have this controller.
+    the joints in degrees.
     """
 
     name: str
@@ -147,7 +147,6 @@ class Language:
     posture: Callable[[Sequence[bool], np.ndarray], tuple[str, ...]] = lambda sides, q_deg: ()
     partners: tuple[str, ...] = ()
     frame_files: tuple[str, ...] = ()
-    robots: tuple[str, ...] = ()
 
 
 def blanked(text: str, *patterns: str) -> str:

@@ -66,7 +66,7 @@ def read(sources: Sequence[Source], _: np.ndarray | None) -> Program:
                 if argument and argument[1] and argument[4] in named:
                     near[span] = source.values(source.numbers(*named[argument[4]][-1]))
     positions = []
-    for span in sorted(uses):
+    for span in uses:  # in the order of the moves
         scale = None if text[span[0]] == "p" else np.pi / 180.0
         name, places = names.get(span, source.line(span[0])), source.numbers(*span)
         position = Position(name, source, places, 6, scale, near_rad=near.get(span))
@@ -74,4 +74,4 @@ def read(sources: Sequence[Source], _: np.ndarray | None) -> Program:
     return Program(sources, positions, computed, frames=frames)
 
 
-LANGUAGE = Language("URScript", (".script", ".urscript"), CONVENTION, read, robots=("ur",))
+LANGUAGE = Language("URScript", (".script", ".urscript"), CONVENTION, read)

@@ -127,5 +127,4 @@ LANGUAGE = Language(
     posture,
     (),
     ("tool.cnd", "uframe.cnd"),
-    robots=("gp", "mh"),
 )

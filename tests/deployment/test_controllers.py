@@ -1,0 +1,156 @@
+"""Programs and values for controllers, on controllers that share no code with kinacc."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+import yaml
+from command_line import call
+from lxml import etree
+from oracles.controllers import judge, measured, programs
+from oracles.controllers.arms import ARMS, frame
+from oracles.kinematics import dh_forward, rot_x, rot_y, rot_z, trans
+from oracles.pendants.controllers import MAKERS, joints_for
+from scipy.spatial.transform import Rotation
+from simulated_cells import calibrated
+
+from kinacc.deployment.export.controllers import CONTROLLERS
+from kinacc.errors import InputError
+from kinacc.kinematics import robot
+
+BASE = frame(150.0, -200.0, 120.0, Rotation.from_rotvec([0.05, -0.1, 0.4]))
+FACTOR, POSES = 1.2, 40
+
+
+def options(program, folder):
+    """What the command cannot read from the program."""
+    near = ",".join(f"{each:.3f}" for each in np.rad2deg(program.points[0].shown))
+    frames = [
+        ",".join(f"{each:.9f}" for each in program.convention.of_pose(pose))
+        for pose in (program.tool, program.base)
+    ]
+    if program.maker == "table":
+        joints = program.points[0].of_joints
+        fixed = programs.CONVENTIONS["fanuc"].of_pose(program.tool)
+        tool = ",".join(f"{each:.9f}" for each in fixed) if joints else frames[0]
+        return ["--near-deg", near, "--tool", tool]
+    if program.maker == "ur":
+        return ["--near-deg", near]
+    if program.maker == "fanuc":
+        file = folder / "frames.yaml"
+        file.write_text(f"tools: {{1: [{frames[0]}]}}\nbases: {{1: [{frames[1]}]}}\n")
+        return ["--frames", file]
+    if program.maker == "yaskawa":
+        pulses = ",".join(map(str, programs.PULSES))
+        return ["--tool", frames[0], "--base", frames[1], "--pulses-per-degree", pulses]
+    return []
+
+
+def judged(folder, results, language, arm):
+    """The model chosen; the true arm misses by no more than held-out errors allow."""
+    taught = arm.draw(np.random.default_rng(5), programs.POINTS, 0.7)
+    program = programs.WRITERS[language](arm, taught, measured.TOOL, BASE)
+    assert len(program.points) == programs.POINTS
+    path = program.write(folder, "weld")
+    before = path.read_bytes()
+    out = path.with_name(f"weld_cal{path.suffix}")
+    done = call("compensate", results, "--program", path, "-o", out, *options(program, folder))
+    assert done.exit_code == 0, done.output
+    assert all(f"weld_cal{ending}" in done.output for ending in program.files)
+    assert path.read_bytes() == before
+    frames = pd.read_parquet(results / "frames.parquet")
+    row = frames[(frames["model"] == "dh") & (frames["frame"] == "base")].iloc[0]
+    turn = Rotation.from_quat(row[["qw", "qx", "qy", "qz"]].astype(float), scalar_first=True)
+    base = frame(*row[["x_mm", "y_mm", "z_mm"]].astype(float), turn)
+    as_written = judge.misses(program, [float(each) for each in program.numbers], base)
+    corrected = judge.misses(program, program.read(folder, "weld_cal"), base)
+    residuals = pd.read_parquet(results / "residuals.parquet")
+    chosen = pd.read_parquet(results / "model_selection.parquet").query("selected == 1")["model"]
+    pooled = residuals[residuals["fold"].isna() & (residuals["subset"] == "validation")]
+    held = pooled[pooled["comparison"] == f"{chosen.iloc[0]}_vs_measured"]
+    allowed = FACTOR * held.set_index("quantity")["mean"]
+    assert as_written[:, 0].mean() > 1.0
+    assert corrected[:, 0].mean() <= allowed["position"]
+    assert corrected[:, 1].mean() <= allowed["orientation"]
+    return chosen.iloc[0]
+
+
+@pytest.mark.parametrize("language", programs.WRITERS)
+def test_the_true_arm_goes_where_the_program_means(tmp_path, language):
+    maker = language.split()[0].replace("csv", "abb")
+    judged(tmp_path, calibrated(maker), language, ARMS[maker])
+
+
+def test_an_arm_whose_axes_run_unevenly_goes_there_by_its_vec_model(tmp_path):
+    arm = replace(ARMS["kuka"], wave=1e-3)
+    assert judged(tmp_path, calibrated("kuka", 1e-3, 200, 4), "kuka", arm) == "vec"
+
+
+@pytest.mark.parametrize("maker", MAKERS)
+def test_values_typed_into_a_controller_err_by_no_more_than_the_page_states(tmp_path, maker):
+    """Goals in the frame of the instrument, drawn where the arm was measured."""
+    arm, typed = MAKERS[maker], {}
+    done = call("export", calibrated(maker), "--for", maker, "--out", tmp_path, "--json")
+    assert done.exit_code == 0, done.output
+    answer = json.loads(done.output)
+    for each in answer["values"]:
+        digits = {"ur": 9, "abb": 9 if each["name"][0] == "q" else 4}.get(maker, 4)
+        typed.setdefault(each["group"], {})[each["name"]] = round(each["new"], digits)
+    misses = []
+    for near in arm.draw(np.random.default_rng(6), POSES):
+        goal = measured.BASE @ arm.pose(near) @ measured.TOOL
+        shown = joints_for(maker, arm, typed, tmp_path / f"arm_{maker}", goal, near)
+        there = measured.seen(arm, shown)
+        turn = Rotation.from_matrix(goal[:3, :3].T @ there[:3, :3]).magnitude()
+        misses.append((np.linalg.norm(goal[:3, 3] - there[:3, 3]), 1e3 * turn))
+    mean, (stated, best, _) = np.mean(misses, axis=0), answer["errors"]
+    assert mean[0] <= FACTOR * stated["position_mm"]
+    assert mean[1] <= FACTOR * stated["orientation_mrad"]
+    if maker in ("ur", "staubli"):  # which take all that was fitted
+        assert stated["position_mm"] < 1.02 * best["position_mm"]
+
+
+def test_ur_staubli_and_ros_describe_the_same_arm():
+    """Common normals hundreds of metres away, offsets with a turn about y, and joint origins."""
+    arm, rng = robot.load("ur10"), np.random.default_rng(3)
+    off = rng.normal(0.0, [2e-3, 0.5, 0.5, 1e-3, 1e-3], (6, 5))
+    off[5, 4] = 0.0  # which a UR controller cannot take
+    model = arm.dh.with_parameters(arm.dh.start + off.ravel())
+    numbers = {maker: CONTROLLERS[maker].arm(arm, model) for maker in ("ur", "staubli", "ros")}
+    texts = {maker: CONTROLLERS[maker].text(values) for maker, values in numbers.items()}
+    conf = dict(line.split(" = ") for line in texts["ur"].split("\n")[1:])
+    theta, a, d, alpha = (
+        np.array(json.loads(conf[f"delta_{name}"])) for name in ("theta", "a", "d", "alpha")
+    )
+    assert np.abs(d).max() > 1.0
+    nominal = ARMS["ur"].table
+    normals = nominal + np.stack([theta, 1e3 * d, 1e3 * a, alpha, 0.0 * d], axis=1)
+    offsets = [dict(each.attrib) for each in etree.fromstring(texts["staubli"])]
+    assert [each.pop("index") for each in offsets] == list("012345")
+    names = ("theta", "d", "a", "alpha", "beta")
+    rows = np.array([[float(each[name]) for name in names] for each in offsets])
+    rows[:, [0, 3, 4]] = np.deg2rad(rows[:, [0, 3, 4]])
+    links = yaml.safe_load(texts["ros"])["kinematics"]
+    assert {"shoulder", "upper_arm", "wrist_3"} < set(links)
+    del links["hash"]
+    for q in rng.uniform(-3.0, 3.0, (5, 6)):
+        expected, here = dh_forward(nominal + off, q), np.eye(4)
+        np.testing.assert_allclose(dh_forward(normals, q), expected, rtol=0, atol=1e-5)
+        np.testing.assert_allclose(dh_forward(nominal + rows, q), expected, rtol=0, atol=1e-5)
+        for angle, link in zip(q, links.values(), strict=True):
+            here = here @ trans(*(1e3 * link[axis] for axis in "xyz")) @ rot_z(link["yaw"])
+            here = here @ rot_y(link["pitch"]) @ rot_x(link["roll"]) @ rot_z(angle)
+        last = trans(nominal[5, 2] + off[5, 2], 0, 0) @ rot_x(nominal[5, 3] + off[5, 3])
+        here = here @ last @ rot_y(off[5, 4])
+        np.testing.assert_allclose(here, expected, rtol=0, atol=1e-5)
+
+
+def test_a_table_or_joints_that_a_controller_does_not_have_are_refused(tmp_path):
+    for maker in ("ur", "staubli", "ros"):
+        done = call("export", calibrated("fanuc"), "--for", maker, "--out", tmp_path)
+        assert done.exit_code == 2
+    arm = robot.load("irb120")
+    with pytest.raises(InputError, match="no DH table of UR arms"):
+        CONTROLLERS["ur"].arm(arm, arm.dh)
