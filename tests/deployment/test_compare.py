@@ -34,7 +34,7 @@ def test_repeated_calibrations_of_one_arm_differ_by_chance_alone(name):
     q_rad = joints(name, 60)
     found = [
         compare(calibrated(name, "dh", 60, 200 + i), calibrated(name, "dh", 60, 300 + i), q_rad)
-        for i in range(20)
+        for i in range(14)
     ]
     chances = np.array([each.probability for each in found])
     assert chances.min() > 1e-3
@@ -46,11 +46,11 @@ def test_repeated_calibrations_of_one_arm_differ_by_chance_alone(name):
 
 
 def test_predictions_are_as_far_off_as_they_say():
-    """Forty calibrations of one arm: errors over standard deviations have unit variance."""
+    """Calibrations of one arm: errors over standard deviations have unit variance."""
     q_rad = joints("mh180", 12, seed=21)
     wanted = compose(BASE, compose(dh.forward(truth("mh180"), q_rad), TOOL)).position_mm
     scores = []
-    for seed in (*range(200, 220), *range(300, 320)):  # those that are compared above
+    for seed in (*range(200, 214), *range(300, 314)):  # those that are compared above
         found = predict(calibrated("mh180", "dh", 60, seed), q_rad, None, "instrument")
         scores.append((found.pose.position_mm - wanted) / found.std[:, :3])
     assert np.mean(np.square(scores)) == pytest.approx(1.0, abs=0.25)
@@ -60,7 +60,7 @@ def test_predictions_are_as_far_off_as_they_say():
 def test_readings_in_both_calibrations_are_counted_once(first, second, common):
     q_rad, arm = joints("mh180", 60), robot.load("mh180")
     found, apart = [], []
-    for seed in range(500, 512):
+    for seed in range(500, 509):
         seen = measured("mh180", first + second - common, seed=seed)
         one, other = (
             calibration(results_of("mh180", seen.select(rows)), arm, "dh", "mh180")

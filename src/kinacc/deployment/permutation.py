@@ -16,6 +16,8 @@ from typing import NamedTuple
 import numpy as np
 import scipy
 
+from kinacc.calibration.least_squares import one_thread
+
 LEVEL = 0.01  # weekly checks of an unchanged arm fail once in two years
 POWER = 0.8
 _DRAWS = 4000
@@ -69,6 +71,7 @@ class PermutationTest:
     offset: float
 
 
+@one_thread
 def compare(held_out: ErrorColumns, new: ErrorColumns) -> PermutationTest:
     """Test ``new`` configurations, with errors after the fit of what moved, against all."""
     observed = _statistics(new.products.mean(axis=0, keepdims=True), new)
@@ -88,6 +91,7 @@ def compare(held_out: ErrorColumns, new: ErrorColumns) -> PermutationTest:
     )
 
 
+@one_thread
 def smallest_changes(held_out: ErrorColumns, count: int) -> tuple[float, np.ndarray]:
     """Smallest changes detected in 80 % of samples of ``count`` configurations.
 
