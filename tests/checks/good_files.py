@@ -12,7 +12,6 @@ from kinacc.checks.check import check
 from kinacc.checks.contradictions import load
 from kinacc.kinematics import robot as robots
 from kinacc.kinematics.robot import forward
-from kinacc.measurements.layout import Layout
 from kinacc.measurements.reader import read
 
 MEASURED = {name: f"ur10_tmac/series_{name[-1].upper()}.csv" for name in
@@ -55,10 +54,7 @@ class File:
         """What check-data finds in it."""
         settings = load((self.write(folder),))["file"]
         arm, section = robots.load(settings["robot"]), settings["measurements"]["file"]
-        reading = read(section, arm, strict=False)
-        return check(
-            reading, Layout.of(section), arm, "file", section["path"], lambda each, _: each
-        )
+        return check(read(section, arm, strict=False), section, arm, "file")
 
 
 def measured(name: str) -> File:

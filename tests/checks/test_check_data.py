@@ -30,16 +30,15 @@ def test_a_good_file_is_described_and_passes(good, tmp_path):
 def test_suspicions_name_their_lines_and_end_with_1_and_are_drawn_once(good, tmp_path):
     by_mm = np.where(np.isin(np.arange(80), (4, 11)), 30.0, 0.0)
     config = good.but(x_mm=good.columns["x_mm"] + by_mm).write(tmp_path)
-    told = report(config, 1)
+    words = ("check-data", config, "--picture", tmp_path / "checked.svg")
+    done = call(*words, "--json")
+    assert done.exit_code == 1, done.output
+    told = json.loads(done.stdout)
     assert told["verdict"] == "suspicions"
     assert told["datasets"][0]["suspicions"][0]["lines"] == [6, 13]
+    assert told["datasets"][0]["suspicions"][0]["where"] == "lines 6, 13"
     assert told["datasets"][0]["facts"]["poses"] == 80
-    words = ("check-data", config, "--picture", tmp_path / "checked.svg")
-    done = call(*words)
-    assert done.exit_code == 1
-    assert "lines 6, 13" in done.output
     assert call(*words).exit_code == 2
-    assert call(*words, "--force").exit_code == 1
     assert (tmp_path / "checked.svg").read_bytes().startswith(b"<?xml")
 
 

@@ -25,6 +25,8 @@ def good(name):
     """A good file: measured (every fourth pose of a series will do), or of a simulated arm."""
     if name == "arm":
         return simulated("irb120", poses=80, turned=True)
+    if name == "three":
+        return simulated("mh180", poses=60, targets=("mA", "mB", "mC"), noise_mm=0.01)
     return measured("fanuc") if name == "fanuc" else measured("ur10_d").rows(slice(0, 632, 4))
 
 
@@ -35,9 +37,8 @@ def lines(rows):
 
 def only(report, kind, rows, unsure=0):
     """The one finding there is, of the kind and rows wanted, but for ``unsure`` of them."""
-    told = [f"{each.kind}: {each.what} ({each.where})" for each in report.suspicions]
-    assert [each.kind for each in report.suspicions] == [kind], told
-    assert len(set(report.suspicions[0].lines) ^ lines(rows)) <= unsure, told
+    assert [each.kind for each in report.suspicions] == [kind], report.suspicions
+    assert len(set(report.suspicions[0].lines) ^ lines(rows)) <= unsure, report.suspicions
     return report.suspicions[0]
 
 
@@ -102,24 +103,26 @@ def from_150(file):
     return np.arange(150, len(file))
 
 
+def third_joint_reversed(file, rows):
+    return plants.scaled(file, ["q3_deg"], -1.0, rows)
+
+
 # Faults in all rows of a simulated arm are golden (tests/golden/faults), with their sizes.
 FAULTS = [
-    ("joint_units", joints_in_radians, "fanuc", EVERY),
     ("joint_units", joints_in_radians, "fanuc", SOME),
-    ("length_units", metres, "fanuc", EVERY),
-    *(("length_units", metres, name, SOME) for name in ("fanuc", "arm")),
+    ("length_units", metres, "arm", SOME),
+    ("joint_sign", third_joint_reversed, "arm", SOME),
     ("left_handed", positions_mirrored, "arm", SOME),
     ("left_handed", frames_mirrored, "arm", EVERY),
     ("transposed_rotation", plants.transposed, "arm", SOME),
     ("angle_units", angles_in_radians, "arm", SOME),
     ("euler_convention", convention, "ur10", EVERY),
     ("joint_coupling", plants.coupled, "fanuc", EVERY),
-    *(("outliers", slips, name, SOME) for name in ("fanuc", "ur10")),
+    ("outliers", slips, "ur10", SOME),
     ("base_jump", base_moved, "ur10", LATE),
     ("base_jump", far_base_moved, "fanuc", from_150),
-    ("drift", drifting, "ur10", EVERY),
-    ("target_swapped", targets_exchanged, "fanuc", SOME),
-    *(("commanded_joints", commanded, name, twelve) for name in ("arm", "ur10")),
+    ("target_swapped", targets_exchanged, "three", SOME),
+    ("commanded_joints", commanded, "ur10", twelve),
     ("commanded_joints", commanded, "fanuc", EVERY),
 ]
 
@@ -130,41 +133,37 @@ def test_a_planted_fault_is_named_with_its_rows(kind, fault, name, which, tmp_pa
     only(fault(file, which(file)).check(tmp_path), kind, which(file))
 
 
-JOINTS = [("arm", 1), ("arm", 3), ("arm", 5), ("ur10", 4), ("ur10", 5), ("ur10", 6), ("fanuc", 2)]
+def test_a_drift_has_its_size(tmp_path):
+    file = good("ur10")
+    found = only(drifting(file, EVERY(file)).check(tmp_path), "drift", EVERY(file))
+    assert 0.75 < np.linalg.norm(found.values["drift_mm"]) < 2.25
 
 
-@pytest.mark.parametrize(("name", "joint"), JOINTS)
+@pytest.mark.parametrize(("name", "joint"), [("arm", 1), ("arm", 3), ("ur10", 5), ("fanuc", 2)])
 def test_a_joint_that_counts_the_other_way_is_named(name, joint, tmp_path):
     file = good(name)
     bad = plants.scaled(file, [f"q{joint}_deg"], -1.0, EVERY(file))
     assert only(bad.check(tmp_path), "joint_sign", EVERY(file)).values["joint"] == joint
 
 
-def test_a_joint_with_the_wrong_sign_in_some_rows(tmp_path):
-    file = good("arm")
-    bad = plants.scaled(file, ["q3_deg"], -1.0, SOME(file))
-    only(bad.check(tmp_path), "joint_sign", SOME(file))
+def test_positions_mirrored_beside_good_orientations_are_mended_alone(tmp_path):
+    bad = plants.mirrored(good("arm"), "x", EVERY(good("arm")))
+    found = only(bad.check(tmp_path), "left_handed", EVERY(bad))
+    assert found.fix.startswith("negate x of the positions;")
 
 
-def test_rows_that_are_there_twice(tmp_path):
-    bad, rows = plants.copied(good("ur10"), SOME(good("ur10")))
-    only(bad.check(tmp_path), "duplicate_rows", rows)
-
-
-@pytest.mark.parametrize(("name", "by_mm"), [("arm", (0.3, -0.3, 0.3)), ("ur10", (1.0, -0.5, 0.5))])
-def test_a_tool_that_moved(name, by_mm, tmp_path):
-    file = good(name)
+def test_a_tool_that_moved(tmp_path):
+    file, by_mm = good("ur10"), (1.0, -0.5, 0.5)
     bad = plants.on_the_flange(file, plants.rotations(file), by_mm, LATE(file))
     # Errors of a real arm as large as the move can hide in which of two rows it began.
-    found = only(bad.check(tmp_path), "target_moved", LATE(file), unsure=name == "ur10")
+    found = only(bad.check(tmp_path), "target_moved", LATE(file), unsure=1)
     assert np.linalg.norm(found.values["shift_mm"]) == pytest.approx(np.linalg.norm(by_mm), rel=0.2)
 
 
-@pytest.mark.parametrize("name", ["fanuc", "simulated"])
+@pytest.mark.parametrize("name", ["fanuc", "three"])
 def test_one_of_three_targets_that_moved(name, tmp_path):
-    three = ("mA", "mB", "mC")
-    file = good("fanuc") if name == "fanuc" else simulated("mh180", targets=three, noise_mm=0.01)
-    flange = plants.triad(file, three)
+    file = good(name)
+    flange = plants.triad(file, ("mA", "mB", "mC"))
     bad = plants.on_the_flange(file, flange, (0.3, 0.3, 0.0), LATE(file), "mB_")
     found = only(bad.check(tmp_path), "target_moved", LATE(file))
     assert found.values["target"] == "mB"
@@ -196,6 +195,7 @@ def test_a_robot_of_the_same_build_and_other_lengths(measured_on, said, tmp_path
     found = only(file.check(tmp_path), "does_not_fit", EVERY(file))
     assert found.values["largest_mm"] > 10.0
     assert found.level == "stops"
+    assert measured_on in found.fix
 
 
 @pytest.mark.parametrize("name", ["ur10_a", "ur10_c", "ur10_d", "fanuc"])
@@ -214,12 +214,9 @@ def test_a_measured_file_whose_largest_error_hangs_on_three_rows(tmp_path):
 @pytest.mark.parametrize(
     ("robot", "kind"),
     [
-        ("ur10", {"poses": 100}),
         ("tx2_90l", {"poses": 100, "noise_mm": 0.3}),
-        ("mh180", {"poses": 60, "targets": ("a", "b", "c"), "noise_mm": 0.01}),
         ("fanuc_r2000ic_165f", {"poses": 40, "targets": ("a", "b", "c"), "repeats": 2}),
         ("iiwa14", {"poses": 15, "turned": True, "repeats": 3}),
-        ("iiwa14", {"poses": 20, "turned": True}),
         ("meca500", {"poses": 10}),
         ("irb120", {"poses": 60, "noise_mm": 0.02, "share": 0.2}),
     ],
@@ -229,7 +226,7 @@ def test_simulated_files_raise_no_suspicion(robot, kind, tmp_path):
     assert simulated(robot, **kind).check(tmp_path).suspicions == ()
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_readings_without_noise_of_the_arm_as_described_raise_no_suspicion(seed, tmp_path):
     q = np.round(np.random.default_rng(seed).uniform(-1.0, 1.0, (40, 6)), 6)
     point = forward(robots.load("irb120"), q).position_mm

@@ -2,6 +2,7 @@
 
 import shlex
 import shutil
+from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
@@ -26,29 +27,29 @@ def described(tmp_path_factory):
     names = [*(f"q{i}_deg" for i in range(1, 7)), "x_mm", "y_mm", "z_mm"]
     (folder / "seen.csv").write_text(table(names, arm.q, arm.point))
     call("init", folder / "seen.csv", "--robot", "ur10", "--yes", "--out", folder)
-    return folder
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        return folder, next_commands(call("check-data", "seen.yaml", code=1))
 
 
 @pytest.fixture
 def two_slips(described, tmp_path, monkeypatch):
-    """A copy of the file and its description."""
-    monkeypatch.chdir(shutil.copytree(described, tmp_path / "cell"))
-    return tmp_path / "cell"
+    """Commands after the check, in a copy of the file and its description."""
+    monkeypatch.chdir(shutil.copytree(described[0], tmp_path / "cell"))
+    return described[1]
 
 
 def next_commands(printed):
-    return [
-        shlex.split(line) for line in printed.split("next:")[1].splitlines()[1:] if line.strip()
-    ]
+    return [shlex.split(line) for line in printed.split("next:")[1].splitlines()[1:]]
 
 
 def test_the_command_after_outliers_excludes_their_rows_and_keeps_the_rest_of_the_file(two_slips):
-    before = (two_slips / "seen.yaml").read_text()
-    (words, accepting) = next_commands(call("check-data", "seen.yaml", code=1))
+    before = Path("seen.yaml").read_text()
+    (words, accepting) = two_slips
     assert words[1:3] == ["exclude", "seen.yaml"]
     assert accepting[1:] == ["check-data", "seen.yaml", "--accept", "outliers", "--reason", ".."]
     call(*words[1:])
-    after = (two_slips / "seen.yaml").read_text()
+    after = Path("seen.yaml").read_text()
     section = load(["seen.yaml"])["seen"]["measurements"]["file"]
     assert section["exclude"] == [{"lines": [6, 7], "reason": ".."}]
     kept = [line for line in after.splitlines() if line in before.splitlines()]
@@ -58,7 +59,7 @@ def test_the_command_after_outliers_excludes_their_rows_and_keeps_the_rest_of_th
 
 
 def test_the_command_that_goes_on_all_the_same_accepts_the_finding(two_slips):
-    *_, words = next_commands(call("check-data", "seen.yaml", code=1))
+    *_, words = two_slips
     call(*[word.replace("..", "the arm jumps there") for word in words[1:]], code=1)
     accepted = load(["seen.yaml"])["seen"]["data_check"]["accept"]
     assert accepted == {"outliers": "the arm jumps there"}
@@ -66,8 +67,8 @@ def test_the_command_that_goes_on_all_the_same_accepts_the_finding(two_slips):
 
 def test_lines_that_are_excluded_already_or_none_leave_the_file_as_it_is(two_slips):
     call("exclude", "seen.yaml", "--lines", "6", "--reason", "first")
-    before = (two_slips / "seen.yaml").read_bytes()
+    before = Path("seen.yaml").read_bytes()
     for lines in ("6", "9999", "abc", "", "5-3"):
         words = ("exclude", "seen.yaml", "--lines", lines, "--reason", "x")
         assert "Traceback" not in call(*words, code=2)
-        assert (two_slips / "seen.yaml").read_bytes() == before
+        assert Path("seen.yaml").read_bytes() == before

@@ -23,20 +23,10 @@ def golden() -> dict[str, dict]:
     return {name: store.read(RESULTS / f"{name}.parquet") for name in ROLES}
 
 
-def settings(dataset=None, source="synthetic", **evaluation) -> dict:
-    known = defaults()
-    return {
-        "dataset": dataset,
-        "robot": "mh180",
-        "evaluation": known["evaluation"] | evaluation,
-        "measurements": known["measurements"] | {"source": source},
-    }
-
-
-def figures(dataset: str | None = None, **changed) -> dict[str, Figure]:
+def figures(dataset: str | None = None, names=NAMES) -> dict[str, Figure]:
     """Each figure as its stage draws it."""
-    tables = golden() | changed
-    return {name: draw_figure(name, tables, settings(dataset)) for name in NAMES}
+    tables, settings = golden(), defaults() | {"dataset": dataset, "robot": "mh180"}
+    return {name: draw_figure(name, tables, settings) for name in names}
 
 
 def words(figure: Figure) -> list[Text]:

@@ -16,10 +16,15 @@ from figure_words import figures
 from kinacc.errors import InputError
 from kinacc.figures import fig1, save
 
+EACH_WAY = ("fig3", "fig4")  # a map of pixels; assessors, which come as a set
+
 
 @pytest.fixture(scope="module")
 def rendered():
-    return {name: save.render(figure, save.FORMATS) for name, figure in figures("mh180").items()}
+    return {
+        name: save.render(figure, save.FORMATS if name in EACH_WAY else ("svg",))
+        for name, figure in figures("mh180").items()
+    }
 
 
 def test_another_process_with_other_settings_gives_the_same_bytes(rendered, tmp_path):
@@ -27,7 +32,8 @@ def test_another_process_with_other_settings_gives_the_same_bytes(rendered, tmp_
         "import sys, hashlib; sys.path[:0] = sys.argv[1:]\n"
         "from figure_words import figures\n"
         "from kinacc.figures import save\n"
-        "for name, figure in figures('mh180').items():\n"
+        f"drawn = figures('mh180', names={EACH_WAY})\n"
+        "for name, figure in drawn.items():\n"
         "    for kind, content in save.render(figure, save.FORMATS).items():\n"
         "        print(name, kind, hashlib.sha256(content).hexdigest())\n"
         "assert 'matplotlib.pyplot' not in sys.modules\n"
@@ -41,8 +47,8 @@ def test_another_process_with_other_settings_gives_the_same_bytes(rendered, tmp_
     )  # fmt: skip
     here = {
         (name, kind, hashlib.sha256(content).hexdigest())
-        for name, files in rendered.items()
-        for kind, content in files.items()
+        for name in EACH_WAY
+        for kind, content in rendered[name].items()
     }
     assert {tuple(line.split()) for line in done.stdout.splitlines()} == here
 
@@ -54,7 +60,7 @@ def test_files_carry_no_date_no_version_and_no_picture_but_the_maps(rendered):
             assert not re.search(rb"CreationDate|<dc:date>|tIME|Producer", content)
         assert (b"<image" in files["svg"]) == (name == "fig3")
         assert len(files["svg"]) < 500_000
-        assert len(files["pdf"]) < 250_000
+        assert len(files.get("pdf", "")) < 250_000
 
 
 def test_write_leaves_all_or_nothing(tmp_path):

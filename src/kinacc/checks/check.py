@@ -19,17 +19,20 @@ from kinacc.checks import (
     readings,
     robust_fit,
     rows,
+    shipped,
     tails,
 )
 from kinacc.checks.findings import Finding, Progress, Report, finding
 from kinacc.checks.readings import Readings
 from kinacc.checks.robust_fit import Fitted
+from kinacc.config.measured import Orientation
 from kinacc.errors import InputError, Problem
 from kinacc.kinematics import robot as robots
 from kinacc.kinematics.robot import Robot, outside_limits
 from kinacc.measurements.faults import LIMIT_SLACK
 from kinacc.measurements.layout import Layout
 from kinacc.measurements.reader import MeasuredFile, read
+from kinacc.progress import SILENT
 from kinacc.tables.allowed import LEFT_OUT
 from kinacc.tables.columns import Columns
 from kinacc.tables.contract import columns_of
@@ -42,13 +45,13 @@ _GROSS = 20.0  # robust spreads per axis: further off is no reading of this arm
 
 
 def run(
-    inputs: Mapping[str, Columns], settings: Mapping[str, Any], progress: Progress | None = None
+    inputs: Mapping[str, Columns], settings: Mapping[str, Any], progress: Progress = SILENT
 ) -> dict[str, Columns]:
     """``data_check``: every finding with its level and, where it was accepted, the reason.
 
     Raises InputError where findings stop the workflow, one problem each.
     """
-    report = examined(settings, "", progress or (lambda items, label: items))
+    report = examined(settings, "", progress)
     if report.stopping:
         title = f"{report.path} is not ready to be fitted"
         raise InputError(
@@ -103,7 +106,7 @@ def examined(settings: Mapping[str, Any], dataset: str, progress: Progress) -> R
     """
     arm, section = robots.load(settings["robot"]), settings["measurements"]["file"]
     reading = read(section, arm, strict=False)
-    report = check(reading, Layout.of(section), arm, dataset, section["path"], progress)
+    report = check(reading, section, arm, dataset, progress)
     few = coverage.few_poses(reading.columns, arm, settings["calibration"])
     accepted = dict(settings["data_check"]["accept"])
     return replace(report, suspicions=(*report.suspicions, *few), accepted=accepted)
@@ -111,18 +114,23 @@ def examined(settings: Mapping[str, Any], dataset: str, progress: Progress) -> R
 
 @one_thread
 def check(
-    reading: MeasuredFile, layout: Layout, robot: Robot, dataset: str, path: str, progress: Progress
+    reading: MeasuredFile,
+    section: Mapping[str, Any],
+    robot: Robot,
+    dataset: str,
+    progress: Progress = SILENT,
 ) -> Report:
-    """Report on what was read from ``path``. Raises InputError for too few poses."""
+    """Report on what was read as in ``section``. Raises InputError for too few poses."""
+    stated = Layout.of(section).orientation
     every = readings.of_file(reading, robot)
     if (count := len(np.unique(every.pose))) < _FEWEST_POSES:
-        raise InputError(Problem(path, f"{count} poses", f"at least {_FEWEST_POSES}"))
+        raise InputError(Problem(section["path"], f"{count} poses", f"at least {_FEWEST_POSES}"))
     every = replace(every, earlier=digits.unread(every))
     distances = readings.distances(every)
     by_distances, renamed = moved.by_distances(every, distances)
     single, cell, away_mm = readings.merged(every)
     scatter = of_readings(every, robot.dh)
-    fitted, findings = _meant(single, layout, robot, progress)
+    fitted, findings = _meant(single, stated, robot, progress)
     kinds = {item.kind for item in findings}
     findings += by_distances
     if not any(kind.startswith("joint_") for kind in kinds):
@@ -135,7 +143,7 @@ def check(
             fitted = robust_fit.fit(named, robot.dh)
         fitted, jumps = moved.without_jumps(fitted, progress)
         findings += [*jumps, *_scattered(fitted), *digits.commanded(fitted, robot)]
-        findings += [*rows.explained(fitted, robot, layout), *rows.largest(fitted)]
+        findings += [*rows.explained(fitted, robot, stated), *rows.largest(fitted)]
         gross = fitted.readings.lines(fitted.left_mm > _GROSS * fitted.trial.sigma_mm)
     off = np.flatnonzero(away_mm > tails.limit(away_mm, 3))
     if off.size:
@@ -148,7 +156,7 @@ def check(
     unread = dict.fromkeys((*reading.notes, *reading.left_out()))
     return Report(
         dataset,
-        path,
+        section["path"],
         facts,
         tuple(
             replace(item.held_to(gross), row_names=reading.row_names)
@@ -163,7 +171,7 @@ def check(
 
 
 def _meant(
-    single: Readings, layout: Layout, robot: Robot, progress: Progress
+    single: Readings, stated: Orientation, robot: Robot, progress: Progress
 ) -> tuple[Fitted, list[Finding]]:
     """The fit of the file as it is meant, and findings of all rows."""
     fitted = robust_fit.fit(single, robot.dh)
@@ -172,16 +180,17 @@ def _meant(
         fitted = robust_fit.fit(read, robot.dh)
     spread_mm = meanings.spread_mm(read.position_mm)
     if fitted.trial.sigma_mm > meanings.FAR * spread_mm:
-        return fitted, [*findings, _no_fit(single, fitted, robot, spread_mm)]
-    findings += _of_other_lengths(single, fitted, robot)
+        return fitted, [*findings, _no_fit(single, fitted, robot, spread_mm, progress)]
+    findings += _of_other_lengths(single, fitted, robot, progress)
     if not read.has_rotation.any():
         return fitted, findings
-    way, least, before = meanings.find_orientations(
-        read, layout.orientation, fitted.residuals.flange
-    )
+    way, least, before = meanings.find_orientations(read, stated, fitted.residuals.flange)
     if before > meanings.BAD_RAD and (turned := meanings.find_by_turns(read, robot, least)):
         return robust_fit.fit(turned[0], robot.dh), [*findings, turned[1]]
     if way:
+        if axis := way[0].finding.values.get("axis"):  # right-handed beside mirrored positions
+            fix = f"negate {axis} of the positions; the orientations are right-handed"
+            findings = [replace(e, fix=fix) if e.kind == "left_handed" else e for e in findings]
         findings += meanings.of_turns(way, read, before, least)
         fitted = robust_fit.fit(meanings.changed(read, way), robot.dh)
     return fitted, findings
@@ -197,7 +206,14 @@ def _scattered(fitted: Fitted) -> Iterator[Finding]:
             yield finding("orientations", part.lines(), as_written_deg=degrees)
 
 
-def _no_fit(single: Readings, fitted: Fitted, robot: Robot, spread_mm: float) -> Finding:
+def _shipped(single: Readings, robot: Robot, progress: Progress) -> str:
+    names = [name for name in shipped.fitting(single, progress) if name != robot.name]
+    return f". Shipped robots that fit: {', '.join(names)}" if names else ""
+
+
+def _no_fit(
+    single: Readings, fitted: Fitted, robot: Robot, spread_mm: float, progress: Progress
+) -> Finding:
     whole_mm = float(np.sum(np.abs([robot.dh.a_mm, robot.dh.d_mm])))
     unit = (
         f". The points spread over {spread_mm:.3g} mm, links and offsets of {robot.name} add up "
@@ -209,10 +225,13 @@ def _no_fit(single: Readings, fitted: Fitted, robot: Robot, spread_mm: float) ->
         robot=robot.name,
         sigma_mm=fitted.trial.sigma_mm,
         more="" if _REACH[0] * whole_mm < spread_mm < _REACH[1] * whole_mm else unit,
+        shipped=_shipped(single, robot, progress),
     )
 
 
-def _of_other_lengths(single: Readings, fitted: Fitted, robot: Robot) -> Iterator[Finding]:
+def _of_other_lengths(
+    single: Readings, fitted: Fitted, robot: Robot, progress: Progress
+) -> Iterator[Finding]:
     """An arm that fits with other lengths alone is another one of the same build."""
     new, old = (np.stack([arm.a_mm, arm.d_mm]) for arm in (fitted.trial.arm.model, robot.dh))
     apart = np.abs(new - old)
@@ -228,6 +247,7 @@ def _of_other_lengths(single: Readings, fitted: Fitted, robot: Robot) -> Iterato
             robot=robot.name,
             lengths=", ".join(lengths),
             largest_mm=float(apart.max()),
+            shipped=_shipped(single, robot, progress),
         )
 
 

@@ -12,7 +12,7 @@ from kinacc.calibration.noise import Noise
 from kinacc.calibration.observations import from_columns
 from kinacc.calibration.vec_estimator import VECEstimator
 from kinacc.checks.findings import Finding, finding
-from kinacc.checks.readings import Distance, Readings, thinned
+from kinacc.checks.readings import Distance, Readings
 from kinacc.checks.robust_fit import Fitted
 from kinacc.kinematics.robot import Robot
 from kinacc.measurements import folds
@@ -22,7 +22,6 @@ _WEAK = 0.1  # of a joint's range
 # Of the largest residual expected: larger jumps of the base were found in four files, two of them
 # measured; in one of these a jump of a third less stayed unfound.
 _SMALLEST_MOVE = 1.5
-_ENOUGH_ROWS = 10_000  # that show whether there are poses enough, in nearly every long file
 _PER_POSE = 6  # independent numbers of a rigid body, however many targets it carries
 
 
@@ -114,15 +113,12 @@ def few_poses(columns: Columns, robot: Robot, calibration: Mapping[str, Any]) ->
     fit = VECEstimator.of(calibration, robot, observed)
     frames = int(fit.common.terms(observed).free.sum()) if fit.common.frames_estimated else 0
     seen = pd.DataFrame({"target": observed.target, "turned": observed.has_rotation})
-    every = np.arange(len(observed))
-    for rows in (thinned(every, _ENOUGH_ROWS), every):
-        same = folds.configurations(observed.pose[rows], observed.q_rad[rows])
-        poses = seen.iloc[rows].groupby(same)
-        # A target adds three components to a pose, an orientation three; repeats add none.
-        numbers = 3 * poses["target"].nunique() + 3 * poses["turned"].any()
-        count = int(numbers.clip(upper=_PER_POSE).sum())
-        if count >= fit.required + frames:
-            return []
+    poses = seen.groupby(folds.configurations(observed.pose, observed.q_rad))
+    # A target adds three components to a pose, an orientation three; repeats add none.
+    numbers = 3 * poses["target"].nunique() + 3 * poses["turned"].any()
+    count = int(numbers.clip(upper=_PER_POSE).sum())
+    if count >= fit.required + frames:
+        return []
     few = finding(
         "few_poses",
         poses=len(numbers),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -10,23 +10,17 @@ from typing import Any
 import numpy as np
 
 from kinacc.calibration.least_squares import one_thread
-from kinacc.checks import check, digits, meanings, readings, robust_fit
+from kinacc.checks import check, digits, readings, shipped
 from kinacc.checks.findings import Finding, Progress, Report
-from kinacc.checks.meanings import Meaning
 from kinacc.errors import InputError, Problem
 from kinacc.kinematics import robot as robots
 from kinacc.kinematics.robot import Robot
 from kinacc.measurements.intake import guess as guesses
 from kinacc.measurements.intake.guess import Guess
-from kinacc.measurements.intake.write import dataset_content, plain_name
-from kinacc.measurements.layout import Layout
+from kinacc.measurements.intake.write import dataset_content, plain_name, template_text
 from kinacc.measurements.reader import MeasuredFile, read
+from kinacc.progress import SILENT
 
-_ROWS = 240
-_TRIED = 4  # robots that base and target alone put first
-_SURE = 0.005  # of the points' spread: what an arm that is the one leaves, uncalibrated
-_NEXT = 0.2  # of what the next best leaves
-_SAME_ARM = 1e-6  # of the misfit: two names of one geometry
 _CALCULATED_MM = 0.002  # closer to an arm than any instrument measures
 _FINE_MM = 0.01  # coarser steps would hide what instruments measure
 _ROUNDED_MM = 0.02  # rms; less is nothing beside what instruments measure with
@@ -58,19 +52,15 @@ def describe_files(
         Listing the questions that the files leave open with their answers, or what is wrong.
     """
     guess = guesses.look(list(files), answers)
-
-    def silent(items: Iterable[Any], _: str) -> Iterable[Any]:
-        return items
-
     if robot is None:
-        if not (fit := fitting(guess, silent)):
+        if not (fit := fitting(guess, SILENT)):
             fix = "give robot: a name in docs/robots.md, a robot file or a URDF file"
             raise InputError(
                 Problem(guess.table.path, "no shipped robot fits the readings", fix=fix)
             )
         robot = fit[0]
     name = plain_name(guess.table.path)
-    guess, report, _ = corrected(guess, robots.load(robot), name, silent)
+    guess, report, _ = corrected(guess, robots.load(robot), name, SILENT)
     if (coupling := coupling_of(report)) is not None:
         fix = "kinacc init writes the robot file with this joint_map"
         raise InputError(Problem(f"robot {robot}", coupling.what, fix=fix))
@@ -108,8 +98,7 @@ def corrected(
         raise InputError(Problem("--robot", message))
     for _ in range(3):
         reading = read(guess.section, robot, strict=False)
-        layout = Layout.of(guess.section)
-        report = check.check(reading, layout, robot, name, guess.section["path"], progress)
+        report = check.check(reading, guess.section, robot, name, progress)
         guess = replace(guess, notes=tuple(dict.fromkeys((*guess.notes, *reading.notes))))
         before, guess = guess, _set_right(guess, report)
         if guess is before:
@@ -155,8 +144,6 @@ def _set_right(guess: Guess, report: Report) -> Guess:
 def fitting(guess: Guess, progress: Progress) -> list[str]:
     """Fit the shipped robots to a file.
 
-    The arms are taken as described: corrected, an arm of similar build would fit as well.
-
     Parameters
     ----------
     guess
@@ -169,25 +156,12 @@ def fitting(guess: Guess, progress: Progress) -> list[str]:
     list of str
         Names of the robots that fit: one, or those of equal geometry; or none.
     """
-    arms = [arm for arm in map(robots.load, robots.shipped()) if arm.dh.joints == guess.joints]
+    arm = robots.of_text(template_text("any", guess.joints), "any.yaml")
     try:
-        every = readings.of_file(read(guess.section, arms[0], strict=False), arms[0])
-    except (InputError, IndexError):
+        every = readings.of_file(read(guess.section, arm, strict=False), arm)
+    except InputError:
         return []
-    every = readings.merged(every)[0]
-    few = every.select(readings.thinned(np.arange(len(every)), _ROWS))
-    moved = [(arm, replace(few, q_rad=arm.dh_joints(few.q))) for arm in arms]
-    moved.sort(key=lambda pair: Meaning.of(pair[1], pair[0], ()).misfit)
-    spread_mm = max(meanings.spread_mm(few.position_mm), 1e-9)
-    misfits = []
-    for arm, observed in progress(moved[:_TRIED], "shipped robots tried"):
-        fitted = robust_fit.best(observed, robust_fit.start(observed, arm.dh), strengths=(0.0,))
-        misfits.append((fitted.sigma_mm / spread_mm, arm.name))
-    misfits.sort()
-    least = misfits[0][0]
-    same = [name for misfit, name in misfits if misfit <= (1.0 + _SAME_ARM) * least]
-    others = [misfit for misfit, _ in misfits[len(same) :]]
-    return [] if least > _SURE or (others and least > _NEXT * others[0]) else same
+    return shipped.fitting(readings.merged(every)[0], progress)
 
 
 def remarks_on(guess: Guess, report: Report, reading: MeasuredFile, arm: Robot) -> Iterator[str]:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from importlib.resources import files
 from typing import Any
@@ -22,8 +21,7 @@ _OF_ROWS = {"outside_limits", "target_swapped", "duplicate_rows", "repeated_read
 _WARN = _OF_ROWS | {"commanded_joints"}  # they stop a workflow where a reading is far off
 _NOTES = {"thin_coverage", LEFT_OUT}
 _NEVER_STOP = _NOTES | {"largest_rows"}
-CLEAN, SUSPICIOUS, UNUSABLE = 0, 1, 2
-VERDICTS = ("clean", "suspicions", "unusable")
+VERDICTS = ("clean", "suspicions", "unusable")  # by exit code
 Progress = Callable[[Iterable[Any], str], Iterable[Any]]
 
 
@@ -123,18 +121,13 @@ class Report:
         """The findings that stop a workflow, unless they are accepted."""
         return tuple(e for e in self.suspicions if e.level == STOPS and e.kind not in self.accepted)
 
-    @property
-    def code(self) -> int:
-        """0 clean, 1 with suspicions."""
-        return SUSPICIOUS if self.suspicions else CLEAN
-
     def as_dict(self) -> dict[str, object]:
         """For JSON: every finding with all its lines."""
         keys = ("kind", "level", "what", "fix", "lines")
         return {
             "dataset": self.dataset,
             "path": self.path,
-            "verdict": VERDICTS[self.code],
+            "verdict": VERDICTS[bool(self.suspicions)],
             "facts": self.facts,
             "remarks": [item.what for item in self.notes],
             "suspicions": [
@@ -147,18 +140,3 @@ class Report:
                 for item in self.suspicions
             ],
         }
-
-    def as_text(self) -> str:
-        """For people, by the template ``report.txt``."""
-        from jinja2 import Environment
-
-        text = (files("kinacc.checks") / "report.txt").read_text("utf-8")
-        template = Environment(trim_blocks=True, lstrip_blocks=True).from_string(text)
-        return template.render(report=self)
-
-
-def to_json(reports: Sequence[Mapping[str, Any]]) -> str:
-    """All data sets in one object, with the worst verdict; numbers that are not finite are null."""
-    verdict = max((item["verdict"] for item in reports), key=VERDICTS.index, default=VERDICTS[0])
-    text = json.dumps({"verdict": verdict, "datasets": reports}, default=np.ndarray.tolist)
-    return json.dumps(json.loads(text, parse_constant=lambda name: None), indent=1)

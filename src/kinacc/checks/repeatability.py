@@ -17,6 +17,8 @@ from numpy import ndarray
 from scipy.spatial.distance import pdist
 from scipy.special import chdtrc, gammaincinv
 
+from kinacc.calibration.noise import means, scatter
+
 AXES = ["x_mm", "y_mm", "z_mm"]
 # A side is of one pose, and a visit is of one side.
 POSE, SIDE, VISIT = ["pose"], ["pose", "side"], ["pose", "side", "visit"]
@@ -77,15 +79,17 @@ def parts(read: pd.DataFrame) -> Parts:
         By the analysis of variance of unweighted means; degrees of freedom by Welch and
         Satterthwaite.
     """
-    within, observed = _scatter(read, VISIT)
-    visits = read.groupby(VISIT, sort=False)[AXES].mean()
-    between, returned = _scatter(visits, SIDE)
-    across, sides = _scatter(visits.groupby(SIDE, sort=False).mean(), POSE)
+    visit_of, side_of, pose_of = _nested(read)
+    position = read[AXES].to_numpy()
+    within, observed = scatter(position, visit_of)
+    visits, per_visit = means(position, visit_of)
+    between, returned = scatter(visits, side_of)
+    middles, per_side = means(visits, side_of)
+    across, sides = scatter(middles, pose_of)
     # What part of the variance of a level below is in the mean square of each level.
-    per_visit = 1.0 / read.groupby(VISIT, sort=False).size()
-    per_side = 1.0 / per_visit.groupby(SIDE, sort=False).size()
-    of_side_below = _share(per_visit.groupby(SIDE, sort=False).mean() * per_side, POSE, sides)
-    of_visit, of_side = _share(per_visit, SIDE, returned), _share(per_side, POSE, sides)
+    below = means(1.0 / per_visit[:, None], side_of)[0][:, 0] / per_side
+    of_visit = _share(1.0 / per_visit, side_of, returned)
+    of_side, of_side_below = (_share(part, pose_of, sides) for part in (1.0 / per_side, below))
     unknown = np.full((3, 3), np.nan)
     instrument = within if observed else unknown
     if not returned:
@@ -151,16 +155,15 @@ def differ_by_pose(read: pd.DataFrame, resolution_mm: ndarray) -> tuple[float, p
     ``resolution_mm`` (3,) counts as that.
     """
     values, keys = read.groupby(VISIT, sort=False)[AXES].mean(), SIDE
-    if not _scatter(values, keys)[1]:
+    if len(values) == values.groupby(keys).ngroups:
         values, keys = read.set_index(VISIT)[AXES], VISIT
-    square_mm2, pooled = _scatter(values, keys)
-    poses = values.groupby(POSE, sort=False)
+    groups, poses = (values.groupby(names, sort=False) for names in (keys, POSE))
+    square_mm2, pooled = scatter(values.to_numpy(), groups.ngroup().to_numpy())
     unknown = poses.size() * math.nan
     if not pooled:
         return math.nan, unknown
     rounding = np.diag(resolution_mm**2 / 12.0)
     root = np.linalg.cholesky(square_mm2 + rounding + 1e-24 * np.eye(3))
-    groups = values.groupby(keys, sort=False)
     white = np.linalg.solve(root, (values - groups.transform("mean")).T).T
     square = pd.Series(np.sum(white**2, axis=1), values.index).groupby(POSE, sort=False).sum()
     freedom = 3.0 * (groups.size() - 1).groupby(POSE, sort=False).sum()
@@ -253,17 +256,18 @@ def limits(std_mm: ndarray, freedom: float) -> tuple[ndarray, ndarray]:
     return std_mm * low, std_mm * high
 
 
-def _scatter(values: pd.DataFrame, keys: list[str]) -> tuple[ndarray, int]:
-    """Mean square (3, 3) of positions about the means of their groups; degrees of freedom."""
-    groups = values.groupby(keys, sort=False)[AXES]
-    centred = (values[AXES] - groups.transform("mean")).to_numpy()
-    freedom = len(values) - groups.ngroups
-    return centred.T @ centred / max(freedom, 1), freedom
+def _nested(read: pd.DataFrame) -> list[ndarray]:
+    """Numbers of the visit of every reading, of the side of every visit, the pose of every side."""
+    numbers = []
+    for keys in (VISIT, SIDE, POSE):
+        numbers.append(read.groupby(keys, sort=False).ngroup().to_numpy())
+        read = read.drop_duplicates(keys)
+    return numbers
 
 
-def _share(part: pd.Series, keys: list[str], freedom: int) -> float:
-    """Mean of what each member of a group brings to the mean square of its level."""
-    size = part.groupby(keys, sort=False).transform("size")
+def _share(part: ndarray, group: ndarray, freedom: int) -> float:
+    """Mean of what each member (n,) of a ``group`` brings to the mean square of its level."""
+    size = np.bincount(group)[group]
     return float((part * (1.0 - 1.0 / size)).sum()) / max(freedom, 1)
 
 

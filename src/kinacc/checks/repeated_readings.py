@@ -15,14 +15,15 @@ from kinacc.errors import InputError, Problem, first_few, refuse
 from kinacc.measurements.layout import POSITION, find, listed
 from kinacc.measurements.reader import stacked
 from kinacc.measurements.rows import open_table
-from kinacc.measurements.table import RawTable, numbers
+from kinacc.measurements.table import RawTable
+from kinacc.measurements.times import seconds
 
 FORMAT = "kinacc repeatability 1"
 _LEAST_MM = 1e-6  # no instrument scatters less
 _NAMES = {"pose": ("pose",), "side": ("side", "direction"), "visit": ("visit", "approach")}
 _EMPTY = ("", "nan", "None")  # + and - are names of sides
 _SINGLE = ("target", "session", "instrument")
-_HOURS = {"time_s": 1.0 / 3600.0, "time_min": 1.0 / 60.0, "time_h": 1.0}
+_HOURS = {"time": 1.0 / 3600.0, "time_s": 1.0 / 3600.0, "time_min": 1.0 / 60.0, "time_h": 1.0}
 
 
 @dataclass(frozen=True)
@@ -144,8 +145,10 @@ def read_repeats(path: str, rows_are: str | None) -> RepeatedFile:
         if len(kinds := {*table.texts(name)}) > 1:
             message, fix = f"holds several: {first_few(sorted(kinds))}", "one file for each"
             problems.append(Problem(table.where(name), message, "one", fix))
-    if timed := [name for name in (*_HOURS, "time") if name in table.columns]:
-        rows["hours"] = _hours(table, timed[0], problems)
+    if timed := [name for name in _HOURS if name in table.columns]:
+        rows["hours"] = seconds(table, timed[0], problems) * _HOURS[timed[0]]
+        if (gaps := np.flatnonzero(rows["hours"].isna())).size:
+            problems.append(Problem(table.where(timed[0], gaps), "no time"))
     if "pose" in rows and not columns["visit"]:
         again = np.flatnonzero(rows["pose"] == rows["pose"].shift())
         if rows_are is None and again.size:
@@ -158,25 +161,12 @@ def read_repeats(path: str, rows_are: str | None) -> RepeatedFile:
     if not problems and rows["pose"].is_unique:
         problems.append(Problem(path, "no pose has more than one reading"))
     refuse(problems, f"{path} cannot be used")
-    used = {axis.column for axis in axes}.union(*_NAMES.values(), _SINGLE, _HOURS, ["time"])
+    used = {axis.column for axis in axes}.union(*_NAMES.values(), _SINGLE, _HOURS)
     unused = ", ".join(name for name in table.columns if name not in used)
     notes = (*notes, f"not used: {unused}") if unused else notes
     steps = [digits.step(table.columns[a.column], a.factor, table.decimal) for a in axes]
     rows[checks.AXES] = position
     return RepeatedFile(table, rows, np.array(steps), notes)
-
-
-def _hours(table: RawTable, name: str, problems: list[Problem]) -> np.ndarray:
-    """Hours (n,) of the readings by a column of times."""
-    if name in _HOURS:
-        return np.asarray(numbers(table, name, problems)) * _HOURS[name]
-    texts = pd.Series(table.texts(name)).str.replace(r"^(\d):", r"0\1:", regex=True)
-    texts = texts.where(~texts.str.match(r"\d\d:"), "2000-01-01T" + texts)
-    times = pd.to_datetime(texts, format="ISO8601", utc=True, errors="coerce")
-    if (bad := np.flatnonzero(times.isna())).size:
-        message, allowed = f"no time: {texts[bad[0]]!r}", "2026-05-04T13:20:05 or 13:20:05"
-        problems.append(Problem(table.where(name, bad), message, allowed))
-    return np.asarray((times - times.min()) / pd.Timedelta(hours=1))
 
 
 def estimate(file: RepeatedFile) -> Repeatability:

@@ -12,15 +12,15 @@ from kinacc.checks.changes import Change
 from kinacc.checks.findings import Finding, finding
 from kinacc.checks.readings import Readings
 from kinacc.checks.robust_fit import Fitted
+from kinacc.config.measured import Orientation
 from kinacc.kinematics.robot import Robot
-from kinacc.measurements.layout import Layout
 
 
-def explained(fitted: Fitted, robot: Robot, layout: Layout) -> Iterator[Finding]:
+def explained(fitted: Fitted, robot: Robot, stated: Orientation) -> Iterator[Finding]:
     """Findings of all bad readings, one per kind of explanation; the rest are outliers."""
     bad = open_rows = np.flatnonzero(fitted.bad)
     observed, lines = fitted.readings.select(bad), fitted.readings.lines
-    for change in _explanations(fitted, observed, robot, layout) if bad.size else ():
+    for change in _explanations(fitted, observed, robot, stated) if bad.size else ():
         remaining = robust_fit.residuals(fitted.trial.arm, change.of(observed))
         near = np.linalg.norm(remaining.position_mm, axis=1) <= fitted.limit_mm
         near &= ~(np.linalg.norm(remaining.turn_rad, axis=1) > fitted.limit_rad)
@@ -49,7 +49,7 @@ def explained(fitted: Fitted, robot: Robot, layout: Layout) -> Iterator[Finding]
 
 
 def _explanations(
-    fitted: Fitted, observed: Readings, robot: Robot, layout: Layout
+    fitted: Fitted, observed: Readings, robot: Robot, stated: Orientation
 ) -> Iterator[Change]:
     """Every known fault of the readings ``observed``."""
     yield from changes.joint_units(robot)
@@ -58,7 +58,7 @@ def _explanations(
         finding("commanded_joints/better"),
         lambda read: replace(read, q_rad=robot.dh_joints(read.commanded)),
     )
-    yield from changes.orientations(layout.orientation) if observed.has_rotation.any() else ()
+    yield from changes.orientations(stated) if observed.has_rotation.any() else ()
     yield from changes.wrong_axes()
     yield from (_swapped(fitted.readings, n) for n in np.unique(fitted.readings.target))
     yield from changes.joint_signs(robot)

@@ -15,9 +15,10 @@ import pandas as pd
 
 from kinacc.checks.check import examined
 from kinacc.checks.contradictions import load
-from kinacc.checks.findings import UNUSABLE, VERDICTS, Report, to_json
+from kinacc.checks.findings import VERDICTS, Report
 from kinacc.cli.choice import CONFIG, DATASET, REASON, option
 from kinacc.cli.output import Output, answers
+from kinacc.cli.process import AGAINST, DONE, UNUSABLE
 from kinacc.config.edit import with_added
 from kinacc.config.series import MOVED, SAME
 from kinacc.deployment import adding
@@ -25,6 +26,7 @@ from kinacc.errors import InputError, Problem, first_few, refuse
 from kinacc.kinematics import robot
 from kinacc.measurements.reader import excluded_lines, read
 from kinacc.progress import reporting
+from kinacc.report.rendering import environment
 from kinacc.tables.atomic import write_whole
 
 if TYPE_CHECKING:
@@ -64,7 +66,7 @@ def check_data(
     if out.picture is not None and len(sections) > 1:
         message = "draws one data set, and there are several"
         raise InputError(Problem("--picture", message, ", ".join(sections), "give --dataset"))
-    code = 0
+    code = DONE
     reports: list[Mapping[str, Any]] = []
     following: list[str] = []
     for name, settings in sections.items():
@@ -77,18 +79,18 @@ def check_data(
             problems = [asdict(problem) for problem in error.problems]
             facts = {"dataset": name, "path": path, "verdict": VERDICTS[code]}
             reports.append({**facts, "problems": problems})
-            text = f"{error}\n"
+            text = str(error)
         else:
-            code = max(code, report.code)
+            code = max(code, AGAINST if report.suspicions else DONE)
             reports.append(report.as_dict())
             following += [line for item in report.stopping for line in item.commands(files[0])]
-            text = report.as_text() + "\n"
+            text = environment(is_page=False).get_template("data_check.txt").render(report=report)
             if out.picture is not None:
                 out.draw(_drawn(report))
         if not out.as_json:
-            click.echo(text, err="problems" in reports[-1])
+            click.echo(f"{text}\n", err="problems" in reports[-1])
     if out.as_json:
-        click.echo(to_json(reports))
+        out.show({"verdict": VERDICTS[code], "datasets": reports})
     elif code < UNUSABLE:
         lines = following or [shlex.join(["kinacc", "calibrate", *files])]
         first = "next: correct what is named above and check again, or" if following else "next:"

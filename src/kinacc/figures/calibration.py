@@ -14,7 +14,6 @@ from kinacc.deployment.compare import ROUNDING, Difference
 from kinacc.figures import style
 
 _DOTS = 20000  # more readings than this are not drawn one by one
-_KINDS = ((style.VERMILION, "^"), (style.BLUE, "s"), (style.GREEN, "D"), (style.PURPLE, "v"))
 
 
 def draw_check(
@@ -73,7 +72,7 @@ def _residuals(
     step = max(len(line) // _DOTS, 1)
     shown = np.maximum(left_mm, max(0.1 * float(np.quantile(left_mm, 0.01)), 1e-7))
     axes.plot(line[::step], shown[::step], ".", ms=2.5, color=style.MUTED, label="readings")
-    for (kind, lines), (colour, marker) in zip(suspects.items(), cycle(_KINDS), strict=False):
+    for (kind, lines), (colour, marker) in zip(suspects.items(), cycle(style.SERIES), strict=False):
         rows = np.isin(line, [*lines])
         axes.plot(line[rows], shown[rows], marker, mfc="none", mec=colour,
                   label=kind.replace("_", " "))  # fmt: skip
@@ -171,9 +170,7 @@ def _shifts(ax: Axes, difference: Difference) -> None:
     ax.set(xlabel="Change of flange position (mm)", ylabel="Share of poses", ylim=(0.0, 1.02))
     ax.set_xlim(left=0.0)
     dotted = difference.shifts["chance_mm"].notna().any()
-    ax.legend(
-        title="dotted: rms expected by chance" if dotted else None, title_fontsize=style.SMALL_PT
-    )
+    ax.legend(title="dotted: rms expected by chance" if dotted else None)
 
 
 def draw_program(table: pd.DataFrame) -> Figure:

@@ -152,8 +152,7 @@ def draw_budgets(
         left.set(ylim=(0.0, top), xlabel="Readings allowed", ylabel="Upper minus lower bound, mm")
         right.set(ylim=(0.0, 1.04), xlabel="Readings allowed", ylabel=share)
         title = "median, 5 to 95 % of campaigns; to the top where some state no bound"
-        figure.legend(loc="outside lower center", ncols=4, title=title,
-                      title_fontsize=style.SMALL_PT)  # fmt: skip
+        figure.legend(loc="outside lower center", ncols=4, title=title)
     return figure
 
 

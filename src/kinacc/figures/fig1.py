@@ -51,7 +51,7 @@ def draw() -> Figure:
         axes = figure.subplots(2, 1, sharex=True)
         for ax, (title, measured) in zip(axes, MEASURED_MM.items(), strict=True):
             _case(ax, measured)
-            ax.set_title(title, loc="left")
+            ax.set_title(title)
         axes[1].set_xlabel("Error (mm)")
         handles = axes[0].get_legend_handles_labels()
         figure.legend(*handles, loc="outside lower center", ncols=1, alignment="left")
@@ -76,7 +76,7 @@ def _case(ax: Axes, measured_mm: float) -> None:
         (measured_mm, "ẽ", style.INK),
     ):
         ax.vlines(place, 0, peak, color=colour, lw=0.8)
-        ax.text(place, 1.03 * peak, text, ha="center", color=style.darker(colour))
+        ax.text(place, 1.03 * peak, text, ha="center", color=colour)
     ax.plot(measured_mm, 0.0, "o", color=style.INK, ms=3.5, clip_on=False)
     ax.text(0.985, 0.85, f"Pₖ = {probability:.2f}", transform=ax.transAxes, ha="right")
     ax.set(ylim=(0, peak * 1.28), xlim=_RANGE_MM, ylabel="Density (1/mm)")

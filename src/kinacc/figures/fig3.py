@@ -59,7 +59,7 @@ def draw(accuracy_map: Columns, *, dataset: str | None = None) -> Figure:
                     *edges, np.ma.masked_invalid(grid), vmin=low, vmax=high, rasterized=True
                 )
                 title = _marks(ax, of_slice, column, unit)
-                ax.set_title(title if row else f"{angle:g}°\n{title}", fontsize=style.SMALL_PT)
+                ax.set_title(title if row else f"{angle:g}°\n{title}", loc="center")
             bar = figure.colorbar(
                 mesh, ax=[*panels[row]], ticks=MaxNLocator(4), fraction=0.08 / slices.size
             )
@@ -69,7 +69,7 @@ def draw(accuracy_map: Columns, *, dataset: str | None = None) -> Figure:
             ax.locator_params(nbins=3)
             ax.grid(False)
         panels[1, (slices.size - 1) // 2].set_xlabel("Radius (mm)")
-        figure.supylabel("Height (mm)", fontsize=style.TEXT_PT)
+        figure.supylabel("Height (mm)")
         name = style.shortened(dataset or "", int(15 * width))
         head = HEAD if wide else fill(HEAD, 40)
         figure.suptitle(f"{name}\n{head}" if name else head, parse_math=False)

@@ -80,10 +80,8 @@ def draw_noise(
         ax.set(xlabel="Noise, standard deviation per axis (µm)", ylabel="Assessed accuracy (mm)")
         ax.set_xticks(levels[:: max(-(-levels.size // 8), 1)])
         ax.grid(axis="x", visible=False)
-        ax.set_title(f"Mean, smallest and largest of {span} simulations", loc="left",
-                     color=style.MUTED, fontsize=style.SMALL_PT)  # fmt: skip
-        figure.legend(loc="outside lower center", ncols=2, title=taken_as_true,
-                      title_fontsize=style.SMALL_PT)  # fmt: skip
+        ax.set_title(f"Mean, smallest and largest of {span} simulations", color=style.MUTED)
+        figure.legend(loc="outside lower center", ncols=2, title=taken_as_true)
         style.name_dataset(figure, dataset)
     return figure
 
@@ -137,14 +135,13 @@ def draw_iterations(
             title += f"\nlargest {true.format('error')} {place or 'not measured'}"
         if "rule_met" in steps and not steps["rule_met"].iloc[0]:
             title += "\n" + fill(f"shown: {steps['rule'].iloc[0]}", 56)
-        top.set_title(title, loc="left", fontsize=style.SMALL_PT)
+        top.set_title(title)
         top.set(ylim=(0.0, None), ylabel="Error magnitude (mm)")
         bottom.set(xlabel="Iteration k", ylim=(-0.03, 1.03), ylabel="Rejection probability")
         bottom.locator_params("x", integer=True, nbins=6)
         for ax in axes:
             ax.grid(axis="x", visible=False)
-        figure.legend(loc="outside lower center", ncols=2, markerscale=1.6, title=taken_as_true,
-                      title_fontsize=style.SMALL_PT)  # fmt: skip
+        figure.legend(loc="outside lower center", ncols=2, markerscale=1.6, title=taken_as_true)
         figure.align_ylabels()
         style.name_dataset(figure, dataset)
     return figure

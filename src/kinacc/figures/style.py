@@ -19,7 +19,6 @@ from matplotlib.figure import Figure
 SINGLE_COLUMN_IN = 3.5
 DOUBLE_COLUMN_IN = 7.16
 SMALL_PT = 7.0
-TEXT_PT = 8.0
 
 INK = "#222222"
 MUTED = "#5f5f5f"
@@ -66,12 +65,6 @@ def assessor_style(names: Iterable[str]) -> dict[str, tuple[str, str, str]]:
     return looks
 
 
-def darker(colour: str) -> str:
-    """Return the colour darkened for text, which needs more contrast than a line."""
-    channels = (int(colour[i : i + 2], 16) for i in (1, 3, 5))
-    return "#" + "".join(f"{round(0.75 * c):02x}" for c in channels)
-
-
 def shortened(name: str, limit: int) -> str:
     """Return a name of at most ``limit`` characters, cut in the middle so both ends stay."""
     head = (limit - 1) // 2
@@ -94,9 +87,7 @@ def name_dataset(figure: Figure, dataset: str | None) -> None:
 
 def legend_above(axes: Axes, columns: int = 2, title: str | None = None) -> None:
     """Place a legend above the axes, where it covers nothing; none where nothing is labelled."""
-    handles, labels = axes.get_legend_handles_labels()
     axes.legend(
-        handles, labels,
-        loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=columns, title=title,
-        title_fontsize=SMALL_PT, alignment="left",
+        *axes.get_legend_handles_labels(), loc="lower left", bbox_to_anchor=(0.0, 1.0),
+        ncols=columns, title=title, alignment="left",
     )  # fmt: skip

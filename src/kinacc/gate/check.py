@@ -115,13 +115,15 @@ def _files(
 
 def _problems(folder: Path) -> Iterator[Problem]:
     if not (folder / sums.FOLDER).is_dir():
-        yield Problem(str(folder), f"has no {sums.FOLDER}", fix="run the workflow")
+        yield Problem(str(folder), f"has no {sums.FOLDER}", fix="kinacc calibrate FILE.yaml")
         return
     remaining = sums.stated(folder)
     yield from sums.changed(folder)
-    for name in _NEEDED:
-        if f"{name}.parquet" not in remaining:
-            yield Problem(str(folder / f"{name}.parquet"), "missing", fix="run the workflow")
+    if missing := [name for name in _NEEDED if f"{name}.parquet" not in remaining]:
+        made = sorted(path.stem for path in (folder / sums.FOLDER).glob("*.sha256"))
+        message = f"calibration not finished: no {first_few(missing, 2)}; stages done: "
+        fix = "kinacc calibrate FILE.yaml goes on, or prints why it stops"
+        yield Problem(str(folder), message + (", ".join(made) or "none"), fix=fix)
     for path in sorted(folder.rglob("*.parquet")):
         relative = path.relative_to(folder)
         artefact = ARTEFACTS.get(relative.stem if len(relative.parts) == 1 else relative.parts[0])

@@ -51,18 +51,16 @@ def of_gate(
     gate: Gate, tables: RunTables, tolerance_mm: float | None, accepted: RunTables | None
 ) -> Outcome:
     """The outcome of one gate by the ``tables`` of a data set; a missing table is a failure."""
-    kind = _kind(gate)
+    kind, of_limits = _kind(gate), {"value": _value, "table": _value, "campaign": _campaign}
     try:
-        if kind in ("value", "table"):
-            result = _value(gate, tables, tolerance_mm)
-        elif kind == "change":
+        if kind == "change":
             result = _change(gate, tables, accepted)
-        elif kind == "campaign":
-            result = _campaign(gate, tables, tolerance_mm)
+        elif kind in of_limits:
+            result = of_limits[kind](gate, tables, tolerance_mm)
         else:
             of = {"claims": _claims, "suspicions": _suspicions, "history": _history}
             result = of[kind](gate, tables)
-        says = result.says or "".join(lines("gate.txt", kind=kind, gate=gate, **result.facts))
+        says = "".join(lines("gate.txt", kind=kind, gate=gate, **result.facts))
     except InputError as error:
         first = error.problems[0]
         result, says = Found(FAILED, first.fix), f"{first.where} {first.what}"
@@ -88,7 +86,6 @@ class Found:
     fix: str = ""
     figures: Mapping[str, Any] = field(default_factory=dict)
     facts: Mapping[str, Any] = field(default_factory=dict)
-    says: str = ""
 
 
 def _value(gate: Gate, tables: RunTables, tolerance_mm: float | None) -> Found:
@@ -213,4 +210,5 @@ def _history(gate: Gate, tables: RunTables) -> Found:
     verdicts = {FIRST: PASSED, HOLDS: PASSED, RECALIBRATE: FAILED}
     verdict = verdicts.get(str(last["verdict"]), UNDECIDED)
     fix = "" if verdict == UNDECIDED else "calibrate the arm anew, or find out what moved"
-    return Found(verdict, fix, figures, says=f"{last['series']}: {history_sentence(table)}")
+    facts = {"says": f"{last['series']}: {history_sentence(table)}"}
+    return Found(verdict, fix, figures, facts)

@@ -28,17 +28,13 @@ class Outcome:
 
 @dataclass(frozen=True)
 class CheckReport:
-    """All outcomes of a check of results, as its JSON has them.
+    """All outcomes of a check of results; ``against`` is the accepted run, empty without one."""
 
-    ``against`` is the accepted run, empty without one; ``passed``: nothing failed.
-    """
-
-    schema_version: int = field(init=False, default=1)
-    passed: bool = field(init=False)
     results: str
     against: str
     outcomes: tuple[Outcome, ...]
 
-    def __post_init__(self) -> None:
-        failed = any(item.verdict == FAILED for item in self.outcomes)
-        object.__setattr__(self, "passed", not failed)
+    @property
+    def passed(self) -> bool:
+        """Whether nothing failed."""
+        return all(item.verdict != FAILED for item in self.outcomes)

@@ -5,8 +5,9 @@ from __future__ import annotations
 import json
 import math
 import re
-from dataclasses import asdict
 from pathlib import Path
+
+from pydantic_core import to_jsonable_python
 
 from kinacc.errors import InputError, Problem
 from kinacc.gate.outcome import CheckReport
@@ -19,12 +20,8 @@ _TEXTS = (".xml", ".md", ".txt")  # each by its template
 
 def as_json(report: CheckReport) -> str:
     """The report as it is; numbers that are not finite are null."""
-    results = asdict(report)
-    for item in results["outcomes"]:
-        for name, value in item["figures"].items():
-            if isinstance(value, float) and not math.isfinite(value):
-                item["figures"][name] = None
-    return json.dumps(results, indent=1, allow_nan=False) + "\n"
+    values = {"schema_version": 1, "passed": report.passed, **vars(report)}
+    return json.dumps(to_jsonable_python(values, inf_nan_mode="null"), indent=1) + "\n"
 
 
 def as_metrics(report: CheckReport) -> str:
@@ -41,17 +38,15 @@ def as_metrics(report: CheckReport) -> str:
 def as_text(report: CheckReport, ending: str = ".txt") -> str:
     """The report by the template of an ending: a line for each outcome, a table, or JUnit XML."""
     template = environment(ending == ".xml").get_template(f"check{ending}")
-    return _NOT_XML.sub("?", template.render(vars(report)))
+    return _NOT_XML.sub("?", template.render(vars(report), passed=report.passed))
 
 
 def write(report: CheckReport, path: Path) -> None:
     """Write a report by the ending of the file; InputError for an ending that is none of these."""
-    if path.name.endswith("metrics.json"):
-        text = as_metrics(report)
-    elif path.suffix == ".json":
-        text = as_json(report)
-    elif path.suffix in _TEXTS:
+    if path.suffix in _TEXTS:
         text = as_text(report, path.suffix)
+    elif path.suffix == ".json":
+        text = (as_metrics if path.name.endswith("metrics.json") else as_json)(report)
     else:
         allowed = f"metrics.json, .json, {', '.join(_TEXTS)}"
         raise InputError(Problem(str(path), f"ends in {path.suffix!r}", allowed))
