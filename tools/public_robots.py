@@ -224,7 +224,7 @@ def picture(table: pd.DataFrame) -> Figure:
         def note(x: float, y: float, label: str, colour: str, side: str = "left") -> None:
             axes.annotate(
                 label, (x, y), (6 if side == "left" else -6, 0), textcoords="offset points",
-                ha=side, va="center", fontsize=style.SMALL_PT, color=style.darker(colour),
+                ha=side, va="center", fontsize=style.SMALL_PT, color=colour,
             )  # fmt: skip
 
         for place, (of, _, _, covers) in enumerate(shown):
