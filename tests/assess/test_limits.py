@@ -12,7 +12,6 @@ from scipy.special import chndtr, ndtri
 from scipy.stats import chi2, ncx2
 
 from kinacc.assess.limits import (
-    BallDistances,
     largest_size,
     lower_limit_mm,
     reading_below,
@@ -78,27 +77,6 @@ def test_the_largest_size_is_that_of_the_farthest_point(mean, variances, deviati
     starts = np.random.default_rng(2).normal(size=(12, 3))
     searched = max(-minimize(size, start, tol=1e-14).fun for start in starts)
     assert largest_size(mean, covariance, deviations) == pytest.approx(searched, rel=1e-6)
-
-
-@pytest.mark.parametrize(("mean", "variances"), CASES)
-@pytest.mark.parametrize("share", [0.2, 0.9, 1.1])
-def test_the_distance_to_a_ball_is_that_of_its_nearest_point(mean, variances, share):
-    reading, covariance = np.array(mean), turned(variances, 3)
-    radius, weight = share * np.linalg.norm(reading), np.linalg.inv(covariance)
-    distances = BallDistances(np.stack([reading, 2 * reading]), np.stack([covariance] * 2))
-    found, farther = distances.beyond(radius)
-    assert farther > found
-    if share > 1.0:
-        assert found == 0.0
-        return
-
-    def distance(u):
-        gap = reading - radius * u / np.linalg.norm(u)
-        return np.sqrt(gap @ weight @ gap)
-
-    starts = [reading, *np.random.default_rng(4).normal(size=(12, 3))]
-    nearest = min(minimize(distance, start, tol=1e-12).fun for start in starts)
-    assert found == pytest.approx(nearest, rel=1e-6)
 
 
 def test_what_95_percent_of_visits_keep_is_noncentral_chi_and_far_off_normal():

@@ -63,7 +63,7 @@ def test_the_limit_is_the_largest_over_all_directions(count, even):
 
 def test_the_lower_limit_holds_whatever_wrong_readings_say():
     rng = np.random.default_rng(2)
-    z = boundary((40,), 0.05, late=None, rate=0.05).z[0]
+    z = boundary((40,), 0.05, rate=0.05).z[0]
     above = 0
     for _ in range(2000):
         # All at the point with the largest error, 3 mm: nothing is given away.

@@ -177,7 +177,7 @@ def test_a_reading_that_went_wrong_is_struck_but_stays_in_the_report(campaign):
         (("--noise-mm", "0.1", "--budget", "0"), "--budget"),
         (("--noise-mm", "0.1", "--assessor", "guess"), "search_and_confirm"),
         (("--noise-mm", "0.1", "--set", "repeats=3"), "setting repeats"),
-        (("--noise-mm", "0.1", "--confidence", "2"), "at least 0.5 and below 1"),
+        (("--noise-mm", "0.1", "--confidence", "2"), "should be less than 1"),
         (("--noise-mm", "0.1", "--tolerance-mm", "-1"), "--tolerance-mm"),
         (("--noise-mm", "0.1", "--session", "noon"), "noon"),
         (("--noise-mm", "0.1", "--model", "vec", "--region", "limits"), "--region limits"),

@@ -115,8 +115,6 @@ def test_an_entry_that_says_nothing_is_refused_with_its_line(begun, entry):
         (("--set", "measurements=true"), "setting measurements"),
         (("--set", "noise_margin=" + "[" * 5000), "setting noise_margin"),
         (("--set", "noise_margin=wide"), "setting noise_margin"),
-        (("--assessor", "invalidation_calibrated", "--set", "alpha=1"), "setting alpha"),
-        (("--assessor", "invalidation_calibrated", "--set", "alpha=null"), "setting alpha"),
         (("--noise-mm", "1e-320"), "at least 1e-09 mm"),
         (("--largest-mm", "1e308"), "1e308; allowed: above 0, to 1e+06"),
     ],

@@ -40,9 +40,8 @@ def test_a_campaign_on_disk_ends_as_in_memory(make_plan, make_world, name):
     assert_same(state.statements(), wanted.statements())
 
 
-@pytest.mark.parametrize("name", ["region_share", "gamma_quantile"])
-def test_part_of_a_visit_by_travel_says_nothing_of_the_region(make_plan, make_world, name):
-    plan = make_plan(name, points=60, budget=60)
+def test_part_of_a_visit_by_travel_says_nothing_of_the_region(make_plan, make_world):
+    plan = make_plan("region_share", points=60, budget=60)
     entries = entries_of(plan, make_world(plan))
     assert plan.by_travel
     for said in restore(plan, entries[:-1]).statements():

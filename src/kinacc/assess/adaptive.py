@@ -3,32 +3,33 @@
 A campaign is one run of an assessor over candidate points. It is told readings one by one, names
 the next point or says that it is done, and states at any moment what the readings so far allow.
 Equal readings in equal order lead to equal answers, so a campaign is restored by telling it its
-readings again. To add an assessor: a module with a frozen dataclass of its settings that inherits
-:class:`AdaptiveAssessor`, and a line in :mod:`kinacc.assess.registry`.
+readings again. To add an assessor: a module with a frozen pydantic dataclass of its settings that
+inherits :class:`AdaptiveAssessor`, and a line in :mod:`kinacc.assess.registry`.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, ClassVar, Protocol
+from typing import TYPE_CHECKING, Annotated, ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
+from pydantic import ConfigDict, Field
 
 from kinacc.assess.limits import Noise, lower_limit_mm, upper_limit_mm
-from kinacc.assess.statement import CANDIDATES, Reason, Statement, Suspicious
+from kinacc.assess.statement import Reason, Statement, Suspicious
 from kinacc.errors import Problem, refuse
 
 if TYPE_CHECKING:
     from kinacc.assess.reference_poses import Change
 
 _SYMMETRY = 1e-9  # largest asymmetry of a covariance, and spread that counts as equal noise
+STRICT = ConfigDict(strict=True, allow_inf_nan=False)  # of settings of assessors
+Confidence = Annotated[float, Field(ge=0.5, lt=1.0)]
 
 
-@dataclass(frozen=True)
 class Candidates:
     """The m points an assessor may measure, rows in random order.
 
@@ -36,13 +37,10 @@ class Candidates:
     all. covariance_mm2: (m, 3, 3) of one reading at each point, robot base frame.
     """
 
-    covariance_mm2: np.ndarray
-
-    def __post_init__(self) -> None:
-        covariance = np.array(self.covariance_mm2, dtype=float)
-        problems = _check_covariances(covariance, "covariance of point")
+    def __init__(self, covariance_mm2: ArrayLike) -> None:
+        self.covariance_mm2 = np.array(covariance_mm2, dtype=float)
+        problems = _check_covariances(self.covariance_mm2, "covariance of point")
         refuse(problems, "these candidates cannot be assessed")
-        object.__setattr__(self, "covariance_mm2", covariance)
 
     @classmethod
     def with_equal_noise(cls, sigma_mm: np.ndarray) -> Candidates:
@@ -80,8 +78,8 @@ class AdaptiveAssessor(Protocol):
         """A new campaign without readings."""
         ...
 
-    def shortfall(self, points: int, joints: int) -> Reason | None:
-        """What the budget is too small for, on an arm of so many joints; None if nothing."""
+    def shortfall(self, points: int) -> Reason | None:
+        """What the budget is too small for with so many candidates; None if nothing."""
         return None
 
 
@@ -241,9 +239,6 @@ class Campaign:
         return self.ledger.limits_mm(error / max(len(self.ledger.visited), 1), error)
 
 
-FIRST_SHARE = 0.6  # of the budget or the candidates, visited before anything is said
-
-
 class OnceAssessor(AdaptiveAssessor, Protocol):
     """Reads each of the first points once and makes its statements from the ledger."""
 
@@ -274,15 +269,6 @@ class OnceCampaign(Campaign):
         return self.settings.state(self.ledger)
 
 
-def about_all_if_all_measured(statement: Statement, ledger: Ledger) -> tuple[Statement, ...]:
-    """A statement on the measured points, and the same on all candidates where they are all."""
-    points, visited = ledger.candidates.points, len(ledger.visited)
-    if visited == points:
-        return statement, replace(statement, target=CANDIDATES)
-    withheld = Reason("unmeasured", {"left": points - visited, "points": points})
-    return statement, Statement(CANDIDATES, value_mm=statement.value_mm, withheld=withheld)
-
-
 def covariance_faults(covariance_mm2: np.ndarray) -> list[tuple[int, str]]:
     """Rows of covariances (n, 3, 3) that are none, each with what is wrong."""
     if covariance_mm2.shape[1:] != (3, 3) or not len(covariance_mm2):
@@ -301,22 +287,3 @@ def _check_covariances(covariance_mm2: np.ndarray, name: str) -> list[Problem]:
     allowed = "symmetric, positive definite, in mm^2"
     faults = covariance_faults(covariance_mm2)
     return [Problem(f"{name} {row}", fault, allowed) for row, fault in faults]
-
-
-def check_settings(settings: AdaptiveAssessor, *stated: tuple[str, bool, str]) -> None:
-    """Raise InputError unless budget, confidence and all (name, holds, allowed) are right."""
-    budget, confidence = settings.measurements, settings.confidence
-    whole = isinstance(budget, (int, np.integer)) and budget >= 1
-    every = (
-        ("measurements", whole, "a whole number, at least 1"),
-        ("confidence", 0.5 <= confidence < 1.0, "at least 0.5 and below 1"),
-        *stated,
-    )
-    refuse(
-        [
-            Problem(name, f"{getattr(settings, name)!r}", allowed)
-            for name, holds, allowed in every
-            if not holds
-        ],
-        f"{settings.name} cannot work with these settings",
-    )

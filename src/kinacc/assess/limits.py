@@ -162,38 +162,6 @@ def _size_at_boundary(
     return float(np.linalg.norm((start + gap) * y / (gap + offset)))
 
 
-class BallDistances:
-    """Mahalanobis distances from readings to the nearest points of balls of any radius.
-
-    means_mm: (n, 3); covariances_mm2: (n, 3, 3). The nearest point replaces the candidate of
-    eq. 21, which it is only where the covariance is a multiple of the identity. To minimise
-    (x - y)' S^-1 (x - y) over |x| <= radius is a convex problem: x = (I + t S)^-1 y with t >= 0
-    where |x| meets the radius. Newton's method on 1/|x| - 1/radius, which is concave in t, climbs
-    to the root from t = 0 without overshooting.
-    """
-
-    def __init__(self, means_mm: np.ndarray, covariances_mm2: np.ndarray) -> None:
-        self._variance, axes = np.linalg.eigh(covariances_mm2)
-        self._y = np.einsum("nji,nj->ni", axes, means_mm)
-        self.size_mm = np.linalg.norm(self._y, axis=1)
-
-    def beyond(self, radius_mm: float) -> np.ndarray:
-        """Return the distances (n,) to the ball of this radius; 0 inside."""
-        y, variance, t = self._y, self._variance, np.zeros(len(self._y))
-        if radius_mm <= 0.0:
-            return np.sqrt(np.sum(y * y / variance, axis=1))
-        for _ in range(100):
-            spread = 1.0 + t[:, None] * variance
-            square = np.sum((y / spread) ** 2, axis=1)
-            slope = np.sum((y / spread) ** 2 * variance / spread, axis=1)
-            step = square / np.maximum(slope, 1e-300) * (np.sqrt(square) - radius_mm) / radius_mm
-            t += np.maximum(step, 0.0)
-            if np.all(step <= 1e-13 * t):
-                break
-        # y - x = t S x, so the squared distance is t^2 x' S x.
-        return t * np.sqrt(np.sum((y / (1.0 + t[:, None] * variance)) ** 2 * variance, axis=1))
-
-
 @lru_cache
 def clip_of(rate: float) -> float:
     """Score beyond which readings count no more: the one by which a wrong reading harms least."""
@@ -298,13 +266,13 @@ def boundary(
     error: float,
     freedom: float = math.inf,
     early: float = EARLY,
-    late: float | None = LATE,
+    late: float = LATE,
     rate: float = 0.0,
 ) -> Boundary:
     """Return the boundary that a walk crosses with probability ``error`` in all.
 
     The part ``early`` of the error is spent at once and the rest with the share of readings taken,
-    raised to ``late`` (None: equal z at all looks). This gives the shape of z; its scale is
+    raised to ``late``. This gives the shape of z; its scale is
     simulated. With ``freedom`` the mean is held to ``z s / sqrt(k)``, s being one standard
     deviation estimated from so many degrees of freedom, common to all looks. With ``rate`` the
     boundary is one of clipped scores, some of them wrong;
@@ -315,12 +283,8 @@ def boundary(
     Pocock, Biometrika 64 (1977) 191-199; Lan and DeMets, Biometrika 70 (1983) 659-663.
     """
     readings = np.array(counts)
-    if late is None:
-        shares = np.full(len(readings), error / len(readings))
-    else:
-        shares = np.diff(
-            error * (early + (1.0 - early) * (readings / readings[-1]) ** late), prepend=0.0
-        )
+    spent = error * (early + (1.0 - early) * (readings / readings[-1]) ** late)
+    shares = np.diff(spent, prepend=0.0)
     alone = -(ndtri(shares) if math.isinf(freedom) else stdtrit(freedom, shares))
     if rate:
         alone = alone + rate * clip_of(rate) * np.sqrt(readings)

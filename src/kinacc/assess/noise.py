@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 from scipy.special import betaincinv, chdtri, fdtri, gammaln
@@ -21,7 +21,8 @@ from kinacc.assess.statement import VISIT, Reason, Suspicious
 if TYPE_CHECKING:
     from kinacc.assess.search_and_confirm import SearchAndConfirm
 
-KNOWN, ESTIMATED = "known", "estimated"
+KNOWN: Final = "known"
+ESTIMATED: Final = "estimated"
 ENOUGH = 60  # degrees of freedom that are asked for: 20 triples
 FEWEST = 30  # degrees of freedom below which no factor is estimated
 MOST = 120  # degrees of freedom beyond which a factor is as good as known, or checked

@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
+from pydantic import Field, PositiveInt
+from pydantic.dataclasses import dataclass
 from scipy.special import bdtr, bdtrc, chdtri, ndtr
 
-from kinacc.assess.adaptive import Ledger, OnceAssessor, check_settings
+from kinacc.assess.adaptive import STRICT, Confidence, Ledger, OnceAssessor
 from kinacc.assess.statement import CONFIDENCE, REGION, Reason, Statement
 
 _DEVIATIONS = 1.0  # added to a reading for its upper limit
 _LIFTED = 0.01  # probability that noise alone lifts a reading by more than is taken off it
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, config=STRICT)
 class RegionShare(OnceAssessor):
     """Read random points once; order statistics bound the size that ``share`` does not exceed.
 
@@ -33,13 +34,10 @@ class RegionShare(OnceAssessor):
     few for any order statistic.
     """
 
-    measurements: int
-    share: float = 0.9
-    confidence: float = CONFIDENCE
+    measurements: PositiveInt
+    share: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.9
+    confidence: Confidence = CONFIDENCE
     name: ClassVar[str] = "region_share"
-
-    def __post_init__(self) -> None:
-        check_settings(self, ("share", 0.0 < self.share < 1.0, "above 0 and below 1"))
 
     def state(self, ledger: Ledger) -> tuple[Statement, ...]:
         """The bounds, or how many points they need."""

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from kinacc.assess.gamma_quantile import GammaQuantile
-from kinacc.assess.invalidation_adaptive import InvalidationCalibrated, ModelInvalidationFull
 from kinacc.assess.maximum import Maximum
 from kinacc.assess.model_invalidation import ModelInvalidation
 from kinacc.assess.outlier_rejection import OutlierRejection
@@ -18,15 +16,7 @@ PAPER: dict[str, type[Assessor]] = {
 }
 # These choose as they go (kinacc.assess.adaptive).
 ADAPTIVE: dict[str, type] = {
-    each.name: each
-    for each in (
-        GammaQuantile,
-        RegionShare,
-        SingleShot,
-        ModelInvalidationFull,
-        InvalidationCalibrated,
-        SearchAndConfirm,
-    )
+    each.name: each for each in (RegionShare, SingleShot, SearchAndConfirm)
 }
 ASSESSORS: dict[str, type] = PAPER | ADAPTIVE
 RECOMMENDED = SearchAndConfirm.name

@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from dataclasses import replace
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
+from pydantic import Field, NonNegativeFloat, NonNegativeInt, PositiveInt
+from pydantic.dataclasses import dataclass
 from scipy.special import bdtrc
 
-from kinacc.assess.adaptive import (
-    FIRST_SHARE,
-    AdaptiveAssessor,
-    Campaign,
-    Candidates,
-    check_settings,
-)
+from kinacc.assess.adaptive import STRICT, AdaptiveAssessor, Campaign, Candidates, Confidence
 from kinacc.assess.limits import EARLY, SHARE, Boundary, Looks, LowerAverage, boundary, look_counts
 from kinacc.assess.noise import (
     ENOUGH,
@@ -39,13 +35,15 @@ from kinacc.assess.statement import (
     Statement,
     Suspicious,
 )
+from kinacc.errors import Problem, refuse
 
 VISITED = 0.9  # of the budget, where it is smaller than the number of candidates
+FIRST_SHARE = 0.6  # of the first visit, made before anything is stated
 MARGIN = 1.2  # how much larger than stated noise may be that nothing can check
 MOST_WRONG = 0.1  # of the readings: with more, clipped scores tell hardly anything
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, config=STRICT)
 class SearchAndConfirm(AdaptiveAssessor):
     """Visit all candidates if the budget has readings for them; then confirm the likely largest.
 
@@ -76,38 +74,34 @@ class SearchAndConfirm(AdaptiveAssessor):
     the median of the posterior of :mod:`kinacc.assess.population`.
     """
 
-    measurements: int
-    confidence: float = CONFIDENCE
-    noise: str = KNOWN
-    noise_freedom: int = 0
-    noise_margin: float = MARGIN
-    wrong_rate: float = 0.0
-    references: int = 0
-    error_of: str = MEAN
-    arm_mm: float | None = None
-    allowance_mm: float = 0.0
+    measurements: PositiveInt
+    confidence: Confidence = CONFIDENCE
+    noise: Literal["known", "estimated"] = KNOWN
+    noise_freedom: NonNegativeInt = 0
+    noise_margin: Annotated[float, Field(ge=1.0, le=10.0)] = MARGIN
+    wrong_rate: Annotated[float, Field(ge=0.0, le=MOST_WRONG)] = 0.0
+    references: NonNegativeInt = 0
+    error_of: Literal["mean", "visit"] = MEAN
+    arm_mm: NonNegativeFloat | None = None
+    allowance_mm: NonNegativeFloat = 0.0
     name: ClassVar[str] = "search_and_confirm"
 
     def __post_init__(self) -> None:
-        known, arm, freedom = self.noise == KNOWN, self.arm_mm, self.noise_freedom
+        known, freedom = self.noise == KNOWN, self.noise_freedom
         tested = f"0 without a test before, or at least {FEWEST}; {ENOUGH} are asked for"
         guarded = "0 where the campaign estimates the noise, by readings that may be wrong"
-        references = isinstance(self.references, (int, np.integer)) and self.references >= 0
-        least = self.references + 2 * poses_of(self.references) if references else 0
-        check_settings(
-            self,
-            ("noise", self.noise in (KNOWN, ESTIMATED), f"{KNOWN}, {ESTIMATED}"),
-            ("error_of", self.error_of in (MEAN, VISIT), f"{MEAN}, {VISIT}"),
-            ("noise_margin", 1.0 <= self.noise_margin <= 10.0, "from 1 to 10"),
-            ("allowance_mm", 0.0 <= self.allowance_mm < math.inf, "0 or above, in mm"),
+        least = self.references + 2 * poses_of(self.references)
+        conditions = (
             ("noise_freedom", not (known and freedom), f"0 where noise is {KNOWN}"),
             ("noise_freedom", known or freedom == 0 or freedom >= FEWEST, tested),
-            ("arm_mm", arm is None or self.error_of == VISIT, f"null: error_of is not {VISIT}"),
-            ("arm_mm", arm is None or 0.0 <= arm < math.inf, "0 or above, in mm"),
-            ("wrong_rate", 0.0 <= self.wrong_rate <= MOST_WRONG, f"from 0 to {MOST_WRONG}"),
+            ("arm_mm", self.arm_mm is None or self.error_of == VISIT, f"null where error_of is {MEAN}"),
             ("wrong_rate", known or freedom > 0 or not self.wrong_rate, guarded),
-            ("references", references, "a whole number, 0 or more"),
             ("references", least <= self.measurements, f"fewer: they take {least} readings"),
+        )
+        refuse(
+            Problem(f"setting {name} of {self.name}", f"{getattr(self, name)!r}", allowed)
+            for name, holds, allowed in conditions
+            if not holds
         )
 
     def enough_for_all(self, points: int) -> int:
@@ -123,7 +117,7 @@ class SearchAndConfirm(AdaptiveAssessor):
             return enough
         return max(math.ceil(VISITED * budget), 1)
 
-    def shortfall(self, points: int, joints: int) -> Reason | None:
+    def shortfall(self, points: int) -> Reason | None:
         """What a larger budget would be good for with so many candidates; None if nothing."""
         enough = self.enough_for_all(points) + self.references
         if self.measurements >= enough:

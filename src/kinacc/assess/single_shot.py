@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import ClassVar
 
-from kinacc.assess.adaptive import (
-    Ledger,
-    OnceAssessor,
-    about_all_if_all_measured,
-    check_settings,
-)
-from kinacc.assess.statement import CONFIDENCE, MEASURED, Reason, Statement
+from pydantic import PositiveInt
+from pydantic.dataclasses import dataclass
+
+from kinacc.assess.adaptive import STRICT, Confidence, Ledger, OnceAssessor
+from kinacc.assess.statement import CANDIDATES, CONFIDENCE, MEASURED, Reason, Statement
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, config=STRICT)
 class SingleShot(OnceAssessor):
     """Measure each point once, up to ``measurements`` points.
 
@@ -26,19 +24,17 @@ class SingleShot(OnceAssessor):
     speaks of the points measured; where these are all candidates, of all candidates.
     """
 
-    measurements: int
-    confidence: float = CONFIDENCE
+    measurements: PositiveInt
+    confidence: Confidence = CONFIDENCE
     name: ClassVar[str] = "single_shot"
-
-    def __post_init__(self) -> None:
-        check_settings(self)
 
     def state(self, ledger: Ledger) -> tuple[Statement, ...]:
         """The bound, with the largest reading as the value."""
         if not ledger.visited:
             return (Statement(MEASURED, withheld=Reason("nothing_measured")),)
-        error, points = 1.0 - self.confidence, min(self.measurements, ledger.candidates.points)
-        lower, upper = zip(*ledger.limits_mm(error / points, error).values(), strict=True)
+        error, points = 1.0 - self.confidence, ledger.candidates.points
+        first = min(self.measurements, points)
+        lower, upper = zip(*ledger.limits_mm(error / first, error).values(), strict=True)
         statement = Statement(
             MEASURED,
             value_mm=float(ledger.sizes_mm().max()),
@@ -46,4 +42,8 @@ class SingleShot(OnceAssessor):
             upper_mm=max(upper),
             confidence=self.confidence,
         )
-        return about_all_if_all_measured(statement, ledger)
+        everywhere = replace(statement, target=CANDIDATES)
+        if left := points - len(ledger.visited):
+            withheld = Reason("unmeasured", {"left": left, "points": points})
+            everywhere = Statement(CANDIDATES, value_mm=statement.value_mm, withheld=withheld)
+        return statement, everywhere

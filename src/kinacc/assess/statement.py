@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -21,8 +21,8 @@ from kinacc.errors import InputError, Problem
 MEASURED = "measured"
 CANDIDATES = "candidates"
 REGION = "region"
-TARGETS = (MEASURED, CANDIDATES, REGION)
-MEAN, VISIT = "mean", "visit"  # what of a pose's error is meant
+MEAN: Final = "mean"  # what of a pose's error is meant
+VISIT: Final = "visit"
 CONFIDENCE = 0.95  # of each bound, where no other is asked for
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import MISSING, dataclass, fields
+from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import Annotated, Any, Literal, Self, get_type_hints
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import (
@@ -19,7 +19,6 @@ from pydantic import (
     PlainSerializer,
     PlainValidator,
     ValidationError,
-    create_model,
     model_validator,
 )
 
@@ -28,7 +27,6 @@ from kinacc.assess.registry import ADAPTIVE
 from kinacc.campaign.instrument import Instrument, finite
 from kinacc.config import json_files
 from kinacc.config.load import problems_of
-from kinacc.config.settings import Study
 from kinacc.errors import InputError, Problem, refuse
 from kinacc.geometry import Pose
 
@@ -39,9 +37,7 @@ _FORMER = {
     "assume": "nothing",
     "isolation": 1.25,
     "crowd": 0.05,
-    "visited": 0.6,
     "deviations": 1.0,
-    "bound_mm": None,
 }
 
 
@@ -130,8 +126,7 @@ def assessor_of(
     name : str
         Name of an adaptive assessor.
     settings : mapping
-        Its settings; ``measurements`` is the budget. What it shares with ``study`` of the
-        configuration has the limits and the default that it has there.
+        Its settings; ``measurements`` is the budget.
     points : int, optional
         Number of candidates: 20 ``references`` are the default where the budget has them.
 
@@ -146,25 +141,21 @@ def assessor_of(
     """
     if name not in ADAPTIVE:
         raise InputError(Problem("--assessor", f"{name!r} is not there", ", ".join(ADAPTIVE)))
-    kinds = get_type_hints(ADAPTIVE[name])
-    stated: dict[str, Any] = {}
-    for item in fields(ADAPTIVE[name]):
-        default = ... if item.default is MISSING else item.default
-        # A campaign's budget is its own: it may be larger than that of a simulation.
-        shared = Study.model_fields if item.name != "measurements" else {}
-        stated[item.name] = (kinds[item.name], shared.get(item.name, default))
-    unknown = [key for key in settings if key not in stated]
-    allowed = ", ".join(stated)
-    refuse(Problem(f"setting {key} of {name}", "is not there", allowed) for key in unknown)
-    model = create_model(name, __config__=ConfigDict(strict=True), **stated)
+    kind = ADAPTIVE[name]
+    allowed = [item.name for item in fields(kind)]
+    refuse(
+        Problem(f"setting {key} of {name}", "is not there", ", ".join(allowed))
+        for key in settings
+        if key not in allowed
+    )
     try:
-        values = model.model_validate(settings).model_dump()
+        assessor: AdaptiveAssessor = kind(**settings)
     except ValidationError as error:
         raise InputError(problems_of(error, lambda path: f"setting {path[0]} of {name}")) from None
-    enough = values["measurements"] >= max(_LEAST_BUDGET * points, _LEAST_READINGS)
-    if "references" in values and "references" not in settings and enough:
-        values["references"] = _REFERENCES
-    return ADAPTIVE[name](**values)
+    enough = assessor.measurements >= max(_LEAST_BUDGET * points, _LEAST_READINGS)
+    if enough and "references" in allowed and "references" not in settings:
+        return kind(**settings, references=_REFERENCES)
+    return assessor
 
 
 def _recorded(value: Any) -> AdaptiveAssessor:

@@ -319,9 +319,6 @@ REASONS = {
     "predictions recorded?",
     "unmeasured": "{left} of {points} candidates are not measured",
     "few_points": "{read} points read; {share:.0%} of the region needs {needed}",
-    "few_sizes": "{read} points read; a distribution needs at least {needed} of different size",
-    "much_noise": "noise makes up {part:.0%} of the mean square of the readings",
-    "not_gamma": "the largest reading does not fit a gamma distribution",
     "drift": "the reference poses show a drift of {size:.3f} mm over the campaign "
     "({x:+.3f}, {y:+.3f}, {z:+.3f}; standard deviation {deviation:.3f} mm)",
     "step": "the reference poses show a step of {size:.3f} mm between readings {after} and "

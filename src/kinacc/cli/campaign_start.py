@@ -125,7 +125,7 @@ def start(out: Output, **options: Any) -> None:
         "tolerance_mm": limits.tolerance_mm,
         "implausible_mm": plan.limits.implausible_mm,
         "far_from_data": begin.far_from_data(arm, points, point),
-        "shortfall": reason(assessor.shortfall(*points.joints.shape)),
+        "shortfall": reason(assessor.shortfall(len(points))),
         "overruled": plan.overruled,
     }
     command = f"kinacc campaign next {shlex.quote(options['folder'])}"

@@ -226,7 +226,7 @@ def evaluate_assessors(
     chosen: list[Any] = list(assessors)
     for place, each in enumerate(chosen):
         if "measurements" in getattr(each, "__dataclass_fields__", ()):
-            chosen[place] = dataclasses.replace(each, measurements=budget)
+            chosen[place] = dataclasses.replace(each, measurements=int(budget))
     visits = Visits(budget, "sequence")
     rows = simulate(error_mm, levels.tolist(), range(repetitions), visits, seed, chosen)
     truth, stated = float(np.linalg.norm(error_mm, axis=1).max()), rows["upper_mm"].notna()
