@@ -5,122 +5,72 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from kinacc.study.claims import all_claims, evaluate
+from kinacc.study.claims.claim import verdict
 from kinacc.study.histories import KEPT, LARGER, REJECTED
 from kinacc.synthetic.draw import TABLE_II
 
 NOISE_MM = np.arange(0.05, 0.301, 0.05)
 TRUTH_MM = 0.9
-
-
-def summary(**curves: tuple[np.ndarray, np.ndarray, np.ndarray]) -> dict[str, np.ndarray]:
-    """study_summary from (mean, min, max) per assessor."""
-    names, rows = [], []
-    for name, (mean, low, high) in curves.items():
-        names += [name] * NOISE_MM.size
-        rows.append(np.column_stack([NOISE_MM, mean, low, high, mean - TRUTH_MM]))
-    table = np.concatenate(rows)
-    columns = ("noise_mm", "mean_mm", "min_mm", "max_mm", "bias_mm")
-    return {"assessor": np.array(names, dtype=object)} | dict(zip(columns, table.T, strict=True))
-
-
-def as_in_the_paper() -> dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    maximum = TRUTH_MM + 2.0 * NOISE_MM
-    outlier = TRUTH_MM - 0.2 + 1.2 * NOISE_MM
-    invalidation = TRUTH_MM + 0.02 - 0.05 * NOISE_MM
-    return {
-        "maximum": (maximum, maximum - 0.5 * NOISE_MM, maximum + 1.5 * NOISE_MM),
-        "outlier_rejection": (outlier, outlier - 0.5 * NOISE_MM, outlier + 0.5 * NOISE_MM),
-        "model_invalidation": (
-            invalidation,
-            invalidation - 0.8 * NOISE_MM,
-            invalidation + 0.8 * NOISE_MM,
-        ),
-    }
-
-
-def row(tables, claim: str, **options) -> dict[str, object]:
-    columns = evaluate(tables, paper_arm=True, **options)
-    place = list(columns["claim"]).index(claim)
-    return {name: values[place] for name, values in columns.items()}
-
-
-STUDY_CLAIMS = [claim.id for claim in all_claims() if claim.evidence == "study_summary"]
-
-
-@pytest.mark.parametrize("claim", STUDY_CLAIMS)
-def test_study_sentence_agrees_where_the_curves_are_the_papers(claim):
-    assert row({"study_summary": summary(**as_in_the_paper())}, claim)["verdict"] == "agrees"
-
-
-def flipped(assessor: str, change) -> dict[str, np.ndarray]:
-    curves = as_in_the_paper()
-    curves[assessor] = change(*curves[assessor])
-    return summary(**curves)
-
-
-SLOPE = 4.0 * NOISE_MM - 4.0 * NOISE_MM.mean()
-BREAKING = {
-    "all_affected_by_noise": (
-        "model_invalidation",
-        lambda mean, low, high: (mean + 1.5 * NOISE_MM, low, high),
-    ),
-    "maximum_overestimates": ("maximum", lambda m, lo, hi: (m - 0.2, lo - 0.2, hi - 0.2)),
-    "maximum_much_larger": ("maximum", lambda m, lo, hi: (m - 0.3, lo - 0.3, hi - 0.3)),
-    "maximum_grows_with_noise": ("maximum", lambda m, lo, hi: (m[::-1], lo, hi)),
-    "maximum_skewed_upward": ("maximum", lambda m, lo, hi: (m, m - (hi - m), m + (m - lo))),
-    "outlier_rejection_grows_with_noise": (
-        "outlier_rejection",
-        lambda m, lo, hi: (m[::-1], lo, hi),
-    ),
-    "outlier_rejection_below_at_low_noise": (
-        "outlier_rejection",
-        lambda m, lo, hi: (m + 0.2, lo, hi),
-    ),
-    "outlier_rejection_above_at_high_noise": (
-        "outlier_rejection",
-        lambda m, lo, hi: (m - 0.4, lo, hi),
-    ),
-    "outlier_rejection_smaller_spread": (
-        "outlier_rejection",
-        lambda m, lo, hi: (m, m - 9 * NOISE_MM, m + 9 * NOISE_MM),
-    ),
-    "outlier_rejection_more_even": (
-        "outlier_rejection",
-        lambda m, lo, hi: (m, m - 0.01 * NOISE_MM, hi),
-    ),
-    "outlier_rejection_equally_bad": (
-        "outlier_rejection",
-        lambda m, lo, hi: (np.full(6, TRUTH_MM), lo, hi),
-    ),
-    "model_invalidation_varies_least": (
-        "model_invalidation",
-        lambda m, lo, hi: (m + SLOPE, lo, hi),
-    ),
-    "model_invalidation_even_spread": (
-        "model_invalidation",
-        lambda m, lo, hi: (m, lo, m + 2.0 * (hi - m)),
-    ),
-    "model_invalidation_larger_spread": (
-        "model_invalidation",
-        lambda m, lo, hi: (m, m - 0.1 * NOISE_MM, m + 0.1 * NOISE_MM),
-    ),
-    "model_invalidation_performs_well": (
-        "model_invalidation",
-        lambda m, lo, hi: (m - 0.5, lo, hi),
-    ),
-    "model_invalidation_less_sensitive": (
-        "model_invalidation",
-        lambda m, lo, hi: (m + SLOPE, lo, hi),
-    ),
+CLAIMS = {claim.id: claim for claim in all_claims()}
+# As in the paper, by assessor: the mean, and how far the smallest and the largest are from it.
+CURVES = {
+    "maximum": (TRUTH_MM + 2.0 * NOISE_MM, -0.5 * NOISE_MM, 1.5 * NOISE_MM),
+    "outlier_rejection": (TRUTH_MM - 0.2 + 1.2 * NOISE_MM, -0.5 * NOISE_MM, 0.5 * NOISE_MM),
+    "model_invalidation": (TRUTH_MM + 0.02 - 0.05 * NOISE_MM, -0.8 * NOISE_MM, 0.8 * NOISE_MM),
 }
 
 
-@pytest.mark.parametrize("claim", STUDY_CLAIMS)
-def test_study_sentence_differs_where_its_curve_breaks_it(claim):
-    assert row({"study_summary": flipped(*BREAKING[claim])}, claim)["verdict"] == "differs"
+def judged(tables, claim: str) -> str:
+    return verdict(CLAIMS[claim], float(CLAIMS[claim].compute(tables)))
+
+
+def summary(changed: str = "", *changes) -> dict[str, pd.DataFrame]:
+    """The paper's study_summary, where mean, min and max of one assessor are changed by so much."""
+    parts = []
+    for name, (mean, low, high) in CURVES.items():
+        curves = zip((mean, mean + low, mean + high), changes or (0, 0, 0), strict=True)
+        lines = [line + change if name == changed else line for line, change in curves]
+        columns = dict(zip(("mean_mm", "min_mm", "max_mm"), lines, strict=True))
+        parts.append(pd.DataFrame({"assessor": name, "noise_mm": NOISE_MM, **columns}))
+    table = pd.concat(parts)
+    return {"study_summary": table.assign(bias_mm=table["mean_mm"] - TRUTH_MM)}
+
+
+SLOPE, FALLING = 4.0 * (NOISE_MM - NOISE_MM.mean()), NOISE_MM[::-1] - NOISE_MM
+BREAKING = {
+    "all_affected_by_noise": ("model_invalidation", 1.5 * NOISE_MM, 0, 0),
+    "maximum_overestimates": ("maximum", -0.2, -0.2, -0.2),
+    "maximum_much_larger": ("maximum", -0.3, -0.3, -0.3),
+    "maximum_grows_with_noise": ("maximum", 2.0 * FALLING, 0, 0),
+    "maximum_skewed_upward": ("maximum", 0, -NOISE_MM, -NOISE_MM),
+    "outlier_rejection_grows_with_noise": ("outlier_rejection", 1.2 * FALLING, 0, 0),
+    "outlier_rejection_below_at_low_noise": ("outlier_rejection", 0.2, 0, 0),
+    "outlier_rejection_above_at_high_noise": ("outlier_rejection", -0.4, 0, 0),
+    "outlier_rejection_smaller_spread": ("outlier_rejection", 0, -8.5 * NOISE_MM, 8.5 * NOISE_MM),
+    "outlier_rejection_more_even": ("outlier_rejection", 0, 0.49 * NOISE_MM, 0),
+    "outlier_rejection_equally_bad": ("outlier_rejection", 0.2 - 1.2 * NOISE_MM, 0, 0),
+    "model_invalidation_varies_least": ("model_invalidation", SLOPE, 0, 0),
+    "model_invalidation_even_spread": ("model_invalidation", 0, 0, 0.8 * NOISE_MM),
+    "model_invalidation_larger_spread": (
+        "model_invalidation", 0, 0.7 * NOISE_MM, -0.7 * NOISE_MM
+    ),
+    "model_invalidation_performs_well": ("model_invalidation", -0.5, 0, 0),
+    "model_invalidation_less_sensitive": ("model_invalidation", SLOPE, 0, 0),
+}  # fmt: skip
+
+
+def of_evidence(name: str) -> list[str]:
+    return [claim.id for claim in CLAIMS.values() if claim.evidence == name]
+
+
+@pytest.mark.parametrize("claim", of_evidence("study_summary"))
+def test_a_study_sentence_agrees_on_the_papers_curves_and_differs_where_one_breaks_it(claim):
+    assert judged(summary(), claim) == "agrees"
+    assert judged(summary(*BREAKING[claim]), claim) == "differs"
 
 
 def test_few_points_near_the_limit_counts_points():
@@ -128,10 +78,10 @@ def test_few_points_near_the_limit_counts_points():
     errors[:9] = 0.89
     errors[0] = 0.9
     few = {"assessment_points": {"true_error_mm": errors}}
-    assert row(few, "few_points_near_limit")["reproduced"] == pytest.approx(9 / 200)
-    assert row(few, "few_points_near_limit")["verdict"] == "agrees"
+    assert CLAIMS["few_points_near_limit"].compute(few) == pytest.approx(9 / 200)
+    assert judged(few, "few_points_near_limit") == "agrees"
     errors[:11] = 0.89
-    assert row(few, "few_points_near_limit")["verdict"] == "differs"
+    assert judged(few, "few_points_near_limit") == "differs"
 
 
 def dh_model() -> dict[str, np.ndarray]:
@@ -144,18 +94,18 @@ def dh_model() -> dict[str, np.ndarray]:
 def test_table_2_angles_are_compared_modulo_a_turn():
     table = dh_model()
     table["theta_offset_rad"] = table["theta_offset_rad"] + 2.0 * math.pi
-    assert row({"dh_model": table}, "table2_theta_offset_4")["verdict"] == "agrees"
+    assert judged({"dh_model": table}, "table2_theta_offset_4") == "agrees"
     table["theta_offset_rad"][3] += 0.0031
-    assert row({"dh_model": table}, "table2_theta_offset_4")["verdict"] == "differs"
+    assert judged({"dh_model": table}, "table2_theta_offset_4") == "differs"
 
 
 def test_antiparallel_lengths_are_judged_by_their_difference_alone():
     table = dh_model()
     table["d_mm"] = table["d_mm"] + np.array([0, 100.0, 100.0, 0, 0, 0])
-    assert row({"dh_model": table}, "table2_d_2")["verdict"] == "not comparable"
-    assert row({"dh_model": table}, "table2_d_2_minus_d_3")["verdict"] == "agrees"
+    assert judged({"dh_model": table}, "table2_d_2") == "not comparable"
+    assert judged({"dh_model": table}, "table2_d_2_minus_d_3") == "agrees"
     table["d_mm"][1] += 1.01
-    assert row({"dh_model": table}, "table2_d_2_minus_d_3")["verdict"] == "differs"
+    assert judged({"dh_model": table}, "table2_d_2_minus_d_3") == "differs"
 
 
 def history(example: str, true_mm, probability, eta_mm: float, repeat=None, point=None):
@@ -177,7 +127,6 @@ def joined(*parts):
     return {"histories": {k: np.concatenate([p[k] for p in parts]) for k in parts[0]}}
 
 
-HISTORY_CLAIMS = [claim.id for claim in all_claims() if claim.evidence == "histories"]
 GOOD_HISTORIES = joined(
     history(REJECTED, [0.1, 0.2, 0.9, 0.9], [0.1, 0.5, 0.7, 0.8], 0.8, [1, 1, 1, 2], [0, 1, 2, 2]),
     history(LARGER, [0.1, 0.2, 0.9], [0.1, 0.5, 0.6], 0.85),
@@ -197,16 +146,16 @@ BAD_HISTORIES = joined(
 )
 
 
-@pytest.mark.parametrize("claim", HISTORY_CLAIMS)
+@pytest.mark.parametrize("claim", of_evidence("histories"))
 def test_history_sentence_agrees_and_differs(claim):
-    assert row(GOOD_HISTORIES, claim)["verdict"] == "agrees"
+    assert judged(GOOD_HISTORIES, claim) == "agrees"
     if claim == "fig5_few_true_errors_above":  # its bound must lie below the errors it counts
         bad = joined(history(REJECTED, [0.85, 0.85, 0.9], [0.1, 0.1, 0.7], 0.8))
     elif claim == "fig5_approaches_alpha":
         bad = joined(history(REJECTED, [0.1] * 60, [0.1] * 50 + [0.6] * 10, 0.8))
     else:
         bad = BAD_HISTORIES
-    assert row(bad, claim)["verdict"] == "differs"
+    assert judged(bad, claim) == "differs"
 
 
 ANGLES_DEG = (0.0, 15.0, 30.0, 45.0, 60.0)
@@ -264,12 +213,12 @@ def test_map_sentences_agree_on_maps_like_the_papers():
         "map_position_less_predictable_inside",
         "map_discontinuities_at_wrist_changes",
     ):
-        assert row(tables, claim)["verdict"] == "agrees", claim
+        assert judged(tables, claim) == "agrees", claim
     near = accuracy_map(OUTER, EDGE, in_stripe)
-    assert row(near, "map_orientation_near_discontinuities")["verdict"] == "agrees"
+    assert judged(near, "map_orientation_near_discontinuities") == "agrees"
     unpredictable = accuracy_map([(0.3 + 0.1 * i, 0.5) for i in range(5)], SPREAD, nowhere)
-    assert row(unpredictable, "map_orientation_less_predictable")["verdict"] == "agrees"
-    assert row(unpredictable, "map_largest_changes_location")["verdict"] == "agrees"
+    assert judged(unpredictable, "map_orientation_less_predictable") == "agrees"
+    assert judged(unpredictable, "map_largest_changes_location") == "agrees"
 
 
 def test_map_sentences_differ_on_maps_unlike_the_papers():
@@ -280,21 +229,16 @@ def test_map_sentences_differ_on_maps_unlike_the_papers():
         "map_position_outer_reaches",
         "map_discontinuities_at_wrist_changes",
     ):
-        assert row(never, claim)["verdict"] == "differs", claim
+        assert judged(never, claim) == "differs", claim
     inner = [(0.9, 0.1), (0.5, 0.5), (0.5, 0.5), (0.5, 0.5), (0.9, 0.9)]
-    assert (
-        row(accuracy_map(inner, same, in_stripe), "map_position_less_predictable_inside")["verdict"]
-        == "differs"
-    )
-    assert (
-        row(accuracy_map(inner, same, in_stripe), "map_orientation_less_predictable")["verdict"]
-        == "differs"
-    )
+    outwards = accuracy_map(inner, same, in_stripe)
+    assert judged(outwards, "map_position_less_predictable_inside") == "differs"
+    assert judged(outwards, "map_orientation_less_predictable") == "differs"
     far = accuracy_map(OUTER, [(1.0, 0.8)] * 5, in_stripe)
-    assert row(far, "map_orientation_near_discontinuities")["verdict"] == "differs"
+    assert judged(far, "map_orientation_near_discontinuities") == "differs"
     plane = far["accuracy_map"]["radius_mm"] * 1e-3
     far["accuracy_map"]["position_max_mm"] = plane
-    assert row(far, "map_nonlinear")["verdict"] == "differs"
+    assert judged(far, "map_nonlinear") == "differs"
 
 
 def test_missing_evidence_is_not_comparable_and_never_a_crash():
