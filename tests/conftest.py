@@ -64,7 +64,6 @@ SLOW = (
     "report/test_in_a_browser.py",
     "report/test_calibration_summary.py",
     "research",
-    "study/test_accuracy_map.py",
     "study/test_accuracy_map_oracle.py",
     "test_hostile_files.py",
     "test_inverse_oracle.py",

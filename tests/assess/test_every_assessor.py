@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import paper_settings as paper
 import pytest
+from simulated import away
 
 from kinacc.assess.adaptive import Candidates, Ledger
 from kinacc.assess.region_share import RegionShare
@@ -17,7 +17,6 @@ from kinacc.assess.statement import (
     ACCEPT,
     CANDIDATES,
     MEASURED,
-    REGION,
     REJECT,
     UNDECIDED,
     Reason,
@@ -28,33 +27,19 @@ from kinacc.assess.world import conduct, drawn_world, key_of
 from kinacc.errors import InputError
 
 BOUNDING = [SingleShot, SearchAndConfirm]
-LIVE = [paper.assessor(name, measurements=40) for name in ADAPTIVE]
+LIVE = [kind(40) for kind in ADAPTIVE.values()]
 
 
-def directions(points: int, seed: int = 5) -> np.ndarray:
-    """Unit vectors."""
-    vectors = np.random.default_rng(seed).normal(size=(points, 3))
-    return vectors / np.linalg.norm(vectors, axis=1)[:, None]
-
-
-def field(points: int, seed: int = 5) -> np.ndarray:
+def field(points: int) -> np.ndarray:
     """Errors of 0.2 to 1 mm, larger ones rarer."""
-    size = 1.0 - 0.8 * np.random.default_rng(seed).uniform(size=points) ** 0.5
-    return directions(points, seed) * size[:, None]
-
-
-def world(points: int = 30, sigma: float = 0.1, seed: int = 1, visits: int = 200):
-    return drawn_world(field(points), sigma, key_of(seed), visits)
-
-
-def some_candidates(points: int = 30) -> Candidates:
-    return Candidates.with_equal_noise(np.full(points, 0.1))
+    rng = np.random.default_rng(5)
+    return away(rng, 1.0 - 0.8 * rng.uniform(size=points) ** 0.5)
 
 
 @pytest.mark.parametrize("assessor", LIVE, ids=lambda each: each.name)
 @pytest.mark.parametrize("points", [1, 2, 15, 60])
 def test_every_assessor_keeps_its_budget_and_says_something_at_the_end(assessor, points):
-    campaign = conduct(assessor, world(points))
+    campaign = conduct(assessor, drawn_world(field(points), 0.1, key_of(1), 40))
     said = campaign.statements()
     assert said[0].value_mm > 0.0 or said[0].withheld
     assert not said[0].withheld or type(assessor) not in BOUNDING
@@ -79,7 +64,7 @@ def test_every_assessor_keeps_its_budget_and_says_something_at_the_end(assessor,
     ],
 )
 def test_a_reading_that_cannot_be_used_changes_nothing(wrong):
-    campaign = SearchAndConfirm(40).begin(some_candidates())
+    campaign = SearchAndConfirm(40).begin(Candidates.with_equal_noise(np.full(30, 0.1)))
     with pytest.raises(InputError):
         campaign.record(*wrong)
     assert (campaign.ledger.taken, campaign.next()) == (0, 0)
@@ -116,41 +101,22 @@ def test_unequal_noise_is_weighted_as_least_squares_would():
     assert ledger.noise(1) == pytest.approx(total)
 
 
-def coverage(assessor, errors, sigma, draws, target=MEASURED):
-    """Share of campaigns whose upper bound, and lower bound, hold."""
-    size = np.linalg.norm(errors, axis=1)
-    upper = lower = said_any = 0
-    for draw in range(draws):
-        order = np.random.default_rng([draw, 3]).permutation(len(errors))
-        readings = drawn_world(errors[order], sigma, key_of(4, draw), assessor.measurements)
-        campaign = conduct(assessor, readings)
-        said = next(each for each in campaign.statements() if each.target == target)
-        truth = size[order][campaign.ledger.visited].max() if target == MEASURED else size.max()
-        if not said.withheld:
-            said_any += 1
-            upper += said.upper_mm >= truth
-            lower += said.lower_mm <= truth
-    return upper / said_any, lower / said_any
+# Share of 400 bounds that 95 % confidence may fall to by chance in a test of many.
+LEAST, DRAWS = 0.95 - 3.5 * math.sqrt(0.05 * 0.95 / 400), 400
 
 
-def least(draws: int) -> float:
-    """Share of bounds that 95 % confidence may fall to by chance in a test of many."""
-    return 0.95 - 3.5 * math.sqrt(0.05 * 0.95 / draws)
-
-
-@pytest.mark.parametrize("cls", BOUNDING)
 @pytest.mark.parametrize("shape", ["one", "equal", "spread"])
-def test_the_bound_on_the_measured_points_holds(cls, shape):
+def test_the_bound_on_the_measured_points_holds(shape):
     # One large error is the hardest for the upper limit: no other point's noise comes to its aid.
-    errors = {
-        "one": np.vstack([[[1.0, 0.0, 0.0]], 1e-3 * directions(11)]),
-        "equal": directions(12),
-        "spread": field(12),
-    }[shape]
-    draws = 400
-    upper, lower = coverage(paper.assessor(cls, measurements=20), errors, 0.2, draws)
-    assert upper >= least(draws)
-    assert lower >= least(draws)
+    sizes = {"one": np.r_[1.0, np.full(11, 1e-3)], "equal": np.ones(12)}
+    errors = field(12) if shape == "spread" else away(np.random.default_rng(5), sizes[shape])
+    largest, held = np.linalg.norm(errors, axis=1).max(), np.zeros(2)
+    for draw in range(DRAWS):
+        order = np.random.default_rng([draw, 3]).permutation(12)
+        readings = drawn_world(errors[order], 0.2, key_of(4, draw), 20)
+        said = conduct(SearchAndConfirm(20), readings).statements()[0]
+        held += said.upper_mm >= largest, said.lower_mm <= largest
+    assert held.min() >= DRAWS * LEAST
 
 
 @pytest.mark.parametrize("sigma", [0.001, 0.5])
@@ -159,11 +125,11 @@ def test_the_share_of_the_region_keeps_its_confidence(sigma):
     pool = rng.normal(size=(4000, 3)) * rng.uniform(0.1, 0.5, (4000, 1))
     truth = np.quantile(np.linalg.norm(pool, axis=1), 0.9)
     held = np.zeros(2)
-    for draw in range(400):
+    for draw in range(DRAWS):
         errors = pool[rng.integers(0, 4000, 80)]
         (said,) = conduct(RegionShare(80), drawn_world(errors, sigma, key_of(draw), 1)).statements()
         held += said.upper_mm >= truth, said.lower_mm <= truth
-    assert held.min() >= 400 * (0.95 - 3.5 * math.sqrt(0.05 * 0.95 / 400))
+    assert held.min() >= DRAWS * LEAST
 
 
 @pytest.mark.parametrize(

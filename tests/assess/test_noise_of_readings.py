@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 from scipy.stats import binom, chi2, kstest, norm, t
+from simulated import conducted
 
 from kinacc.assess.adaptive import Candidates, Ledger
 from kinacc.assess.limits import visit_mm
@@ -20,10 +21,6 @@ from kinacc.assess.noise import (
     scatter_alarm,
     tails_alarm,
 )
-from kinacc.assess.search_and_confirm import SearchAndConfirm
-from kinacc.assess.world import carry_on
-
-POINTS, NOISE_MM = 40, 0.1
 
 
 def equal(points, sigma_mm=0.1):
@@ -169,32 +166,18 @@ def test_heavy_tails_are_said_by_100_triples(joint, least):
     assert all(each.numbers["farthest"] > 3.2 for each in found if each)
 
 
-LONE = np.array([[1.0, 0.0, 0.0]] + [[0.1, 0.0, 0.0]] * (POINTS - 1))
-
-
-def carried_on(seed, measurements=70, times=1.0, stated_mm=NOISE_MM, limit=None, **settings):
-    """A campaign on candidates one of which is far off; noise ``times`` 0.1 mm."""
-    rng = np.random.default_rng(seed)
-    errors = rng.permutation(LONE)
-    candidates = Candidates.with_equal_noise(np.full(POINTS, stated_mm))
-    campaign = SearchAndConfirm(measurements, **settings).begin(candidates)
-    noise_mm = times * NOISE_MM
-    carry_on(campaign, lambda row, _: errors[row] + noise_mm * rng.normal(size=3), limit=limit)
-    return campaign
-
-
-def said(seed, measurements=70, **given):
-    """What such a campaign states on all candidates."""
-    return carried_on(seed, measurements, **given).statements()[1]
-
-
 @pytest.mark.parametrize("noise", ["known", "estimated"])
 def test_a_bound_on_a_future_visit_is_that_on_the_mean_and_the_arms_own_scatter(noise):
-    of_mean = said(4, 90, noise=noise)
-    visit = said(4, 90, noise=noise, error_of="visit", arm_mm=0.05)
+    lone = np.r_[1.0, np.full(39, 0.1)][:, None] * np.eye(3)[0]
+
+    def stated(**settings):
+        rng = np.random.default_rng(4)
+        settings = {"noise": noise, **settings}
+        return conducted(rng, rng.permutation(lone), 90, noise_mm=0.1, **settings).statements()[1]
+
+    of_mean, visit = stated(), stated(error_of="visit", arm_mm=0.05)
     assert visit.error_of == "visit"
     for name in ("lower_mm", "value_mm", "upper_mm"):
         assert getattr(visit, name) == pytest.approx(visit_mm(getattr(of_mean, name), 0.05))
-    wide = said(4, 90, noise=noise, error_of="visit")
-    assert wide.upper_mm > visit.upper_mm
-    assert wide.upper_mm > visit_mm(of_mean.upper_mm, 0.9 * NOISE_MM)
+    wide = stated(error_of="visit")
+    assert wide.upper_mm > max(visit.upper_mm, visit_mm(of_mean.upper_mm, 0.09))

@@ -17,9 +17,7 @@ from oracles.worlds import philox_words
 from kinacc.assess.invalidation_kernels import chi2_3, philox
 from kinacc.assess.model_invalidation import ModelInvalidation
 from kinacc.assess.world import drawn_world, key_of
-from kinacc.study import monte_carlo
 
-PAPER = monte_carlo.ASSESSORS
 kinds = st.sampled_from(["plain", "own_noise", "tied", "zeros"])
 words = st.integers(0, 2**64 - 1)
 

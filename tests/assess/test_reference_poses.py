@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from simulated import away, conducted
 
-from kinacc.assess.adaptive import Candidates
 from kinacc.assess.reference_poses import (
     FALSE_ALARMS,
     Readings,
@@ -15,7 +15,6 @@ from kinacc.assess.reference_poses import (
     schedule,
     stages,
 )
-from kinacc.assess.search_and_confirm import SearchAndConfirm
 from kinacc.assess.statement import CANDIDATES
 
 SLANTED = np.array([[4.0, 1.0, 0.5], [1.0, 2.0, 0.3], [0.5, 0.3, 1.0]]) * 1e-2
@@ -26,8 +25,7 @@ def read(plan, rng, change_mm=lambda time: 0.0, covariance=None, errors=5.0):
     place = np.array(sorted(plan.row_at))
     row = np.array([plan.row_at[each] for each in place])
     covariance = np.eye(3) if covariance is None else covariance
-    way = rng.normal(size=3)
-    way /= np.linalg.norm(way)
+    (way,) = away(rng, np.ones(1))
     vectors = (rng.normal(size=(plan.poses, 3)) * errors)[row]
     vectors = (
         vectors + np.array([change_mm(time) for time in place / plan.measurements])[..., None] * way
@@ -97,37 +95,6 @@ def test_a_drift_or_step_of_three_deviations_is_said(change, freedom):
     assert np.mean(said) >= 0.95
 
 
-POINTS, BUDGET = 40, 110
-
-
-def errors(rng):
-    """One pose far out of 40, noise 1 mm."""
-    way = rng.normal(size=(POINTS, 3))
-    way /= np.linalg.norm(way, axis=1)[:, None]
-    size = np.abs(rng.normal(size=POINTS))
-    size[rng.integers(POINTS)] = 12.0
-    return way * size[:, None]
-
-
-def run(rng, errors_mm, change_mm=lambda time: 0.0 * time, **settings):
-    """A campaign of 110 readings, its change along a random direction; rows in the order read."""
-    campaign = SearchAndConfirm(BUDGET, **settings).begin(
-        Candidates(np.tile(np.eye(3), (POINTS, 1, 1)))
-    )
-    way = rng.normal(size=3)
-    way /= np.linalg.norm(way)
-    rows = []
-    while (row := campaign.next()) is not None:
-        seen = errors_mm[row] + rng.normal(size=3)
-        campaign.record(row, seen + change_mm(len(rows) / BUDGET) * way)
-        rows.append(row)
-    return campaign, rows
-
-
-def said(campaign):
-    return next(each for each in campaign.statements() if each.target == CANDIDATES)
-
-
 @pytest.mark.parametrize(
     ("change", "code", "size"),
     [(lambda time: 8.0 * time, "drift", 8.0), (lambda time: 9.0 * (time > 0.55), "step", 9.0)],
@@ -135,12 +102,15 @@ def said(campaign):
 )
 def test_a_campaign_that_drifted_or_was_moved_states_no_bounds_and_says_why(change, code, size):
     rng = np.random.default_rng(2)
-    campaign, _ = run(rng, errors(rng), change, references=20)
-    answer = said(campaign)
+    errors, (way,) = away(rng, np.r_[12.0, np.abs(rng.normal(size=39))]), away(rng, np.ones(1))
+    campaign = conducted(
+        rng, errors, 110, lambda number, _: change((number - 1) / 110) * way, references=20
+    )
+    (answer,) = (each for each in campaign.statements() if each.target == CANDIDATES)
     assert answer.withheld.code == code
     assert math.isnan(answer.upper_mm)
     assert math.isnan(answer.lower_mm)
     assert answer.value_mm > 0.0
     numbers = answer.withheld.numbers
     assert abs(numbers["size"] - size) < 3.0 * numbers["deviation"]
-    assert code == "drift" or numbers["after"] <= 0.55 * BUDGET < numbers["before"]
+    assert code == "drift" or numbers["after"] <= 61 < numbers["before"]

@@ -11,6 +11,8 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from scipy.stats import chi2
+from simulated import away, conducted
 
 from kinacc.assess.adaptive import Candidates
 from kinacc.assess.search_and_confirm import SearchAndConfirm
@@ -35,8 +37,7 @@ class Recorded:
 def campaign(points, budget, noise_mm, **settings):
     """A campaign to its end and its readings; errors up to 1 mm, noise different by point."""
     rng = np.random.default_rng([points, budget])
-    error = rng.normal(size=(points, 3))
-    error *= (rng.uniform(0.0, 1.0, points) / np.linalg.norm(error, axis=1))[:, None]
+    error = away(rng, rng.uniform(0.0, 1.0, points))
     sigma = rng.uniform(0.8, 1.2, points) * noise_mm
     key = np.array([points, budget], np.uint64)
     recorded = Recorded(drawn_world(error, sigma, key, budget, rng.permutation(points)))
@@ -101,18 +102,9 @@ def test_where_fewer_are_read_than_there_are_the_bound_is_of_all_but_the_fewest(
     assert everywhere.upper_mm == pytest.approx(wanted, rel=1e-9)
 
 
-def directions(points: int, seed: int = 5) -> np.ndarray:
-    """Unit vectors."""
-    vectors = np.random.default_rng(seed).normal(size=(points, 3))
-    return vectors / np.linalg.norm(vectors, axis=1)[:, None]
-
-
 def test_a_point_whose_readings_differ_in_noise_keeps_its_bound():
-    errors, chance, draws = (
-        directions(4) * np.array([1.0, 0.01, 0.01, 0.01])[:, None],
-        np.random.default_rng(6),
-        400,
-    )
+    chance, draws = np.random.default_rng(6), 400
+    errors = away(chance, np.array([1.0, 0.01, 0.01, 0.01]))
     too_small = too_large = 0
     for _ in range(draws):
         campaign = SearchAndConfirm(16, noise_margin=1.0).begin(
@@ -128,3 +120,12 @@ def test_a_point_whose_readings_differ_in_noise_keeps_its_bound():
     most = 0.05 * draws + 3.5 * math.sqrt(0.05 * 0.95 * draws)
     assert 0 < too_small <= most
     assert too_large <= most
+
+
+def test_points_read_again_for_being_large_scatter_within_blocks_as_stated():
+    rng, square, freedom = np.random.default_rng(7), 0.0, 0
+    for _ in range(60):
+        values = conducted(rng, away(rng, np.full(20, 4.0)), 100).noise.contrasts
+        square, freedom = square + values.squares.sum(), freedom + values.freedom
+    assert freedom >= 60 * 36
+    assert 0.005 < chi2.cdf(square, freedom) < 0.995

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import numpy as np
 import pytest
 from scipy.integrate import quad
 from scipy.optimize import brentq, minimize
 from scipy.stats import norm
+from simulated import away, conducted
 
 from kinacc.assess.adaptive import Candidates
 from kinacc.assess.limits import (
@@ -73,50 +75,29 @@ def test_the_lower_limit_holds_whatever_wrong_readings_say():
     assert 0.03 < above / 2000 < 0.05 + 3.0 * math.sqrt(0.05 * 0.95 / 2000)
 
 
-def run(seed, wrong, measurements=BUDGET, tied=6, tested=1.0, **settings):
-    """A campaign whose largest error is 6; ``wrong(number, rng, error)``: a shift (3,) or None.
+def run(seed, wrong, tied=6, **settings):
+    """A campaign of 60 points, ``tied`` of them with the largest error, 6; noise 1.
 
-    ``tied`` points have that error. ``tested``: what the noise, 1, is taken for.
+    ``wrong(rng, number, error)``: what is added to a reading.
     """
     rng = np.random.default_rng(seed)
-    way = rng.normal(size=(POINTS, 3))
-    way /= np.linalg.norm(way, axis=1)[:, None]
-    sizes = np.r_[np.full(tied, LARGEST), rng.uniform(0, 2, POINTS - tied)]
-    error, number = rng.permutation(way * sizes[:, None]), 0
-    even = np.tile(tested**2 * np.eye(3), (POINTS, 1, 1))
-    campaign = SearchAndConfirm(measurements, **settings).begin(Candidates(even))
-    while (row := campaign.next()) is not None:
-        number += 1
-        shift = wrong(number, rng, error[row])
-        campaign.record(row, error[row] + rng.normal(size=3) + (0.0 if shift is None else shift))
-    return campaign
-
-
-def at_random(rate):
-    def shift(number, rng, error):
-        way = rng.normal(size=3)
-        return 10.0 * way / np.linalg.norm(way) if rng.random() < rate else None
-
-    return shift
+    errors = away(rng, np.r_[np.full(tied, LARGEST), rng.uniform(0, 2, POINTS - tied)])
+    return conducted(rng, rng.permutation(errors), BUDGET, partial(wrong, rng), **settings)
 
 
 def along(rate, size):
     """Large errors look smaller, the worst for the upper bound, or larger, for the lower one."""
-
-    def shift(number, rng, error):
-        return size * error / np.linalg.norm(error) if rng.random() < rate else None
-
-    return shift
+    return lambda rng, _, error: size * (rng.random() < rate) * error / np.linalg.norm(error)
 
 
 def slipped(*numbers):
-    return lambda number, *_: np.array([0.0, 0.0, 14.0]) if number in numbers else None
+    return lambda _, number, error: np.array([0.0, 0.0, 14.0]) * (number in numbers)
 
 
 @pytest.mark.parametrize(
     ("wrong", "rate", "tied"),
-    [(at_random(0.02), 0.02, 6), (along(0.1, -10.0), 0.1, 1), (along(0.02, 10.0), 0.02, 6)],
-    ids=["at random", "inwards", "outwards"],
+    [(along(0.1, -10.0), 0.1, 1), (along(0.02, 10.0), 0.02, 6)],
+    ids=["inwards", "outwards"],
 )
 def test_bounds_hold_as_stated_where_some_readings_go_wrong(wrong, rate, tied):
     campaigns, too_low, too_high = 12, 0, 0
@@ -130,7 +111,7 @@ def test_bounds_hold_as_stated_where_some_readings_go_wrong(wrong, rate, tied):
     assert max(too_low, too_high) <= most
 
 
-@pytest.mark.parametrize("rate", [0.001, 0.01, 0.05])
+@pytest.mark.parametrize("rate", [0.001, 0.05])
 def test_more_readings_are_hardly_ever_wrong_than_are_counted_on(rate):
     campaign = SearchAndConfirm(BUDGET, wrong_rate=rate).begin(
         Candidates(np.tile(0.01 * np.eye(3), (POINTS, 1, 1)))

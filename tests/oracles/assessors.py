@@ -2,7 +2,7 @@
 
 A world is a function ``reading(j, v)`` that gives the v-th measured error vector (v = 1, 2, ...) at
 operating point j, whatever led there. Lengths are in millimetres; ``sigma`` is the standard
-deviation per axis, one entry per operating point: a number, or one number per axis (eq. 10).
+deviation per axis, one number for each operating point.
 """
 
 from __future__ import annotations
@@ -10,9 +10,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 
 import numpy as np
-from scipy import optimize, stats
+from scipy import stats
 
 Reading = Callable[[int, int], Sequence[float]]
 GRID_PER_MM = 1000
@@ -29,11 +30,11 @@ def maximum(magnitudes: Sequence[float]) -> float:
     return max(magnitudes)
 
 
-def outlier_limit(magnitudes: Sequence[float], rule: str, ddof: int = 0) -> float:
-    """The c of eq. 14. ``ddof`` and the factor 1.96 belong to the normal rule."""
+def outlier_limit(magnitudes: Sequence[float], rule: str) -> float:
+    """The c of eq. 14."""
     values = np.asarray(magnitudes, float)
     if rule == "normal":
-        return float(values.mean() + 1.96 * values.std(ddof=ddof))
+        return float(values.mean() + 1.96 * values.std())
     if rule == "gamma":
         shape, _, scale = gamma_fit(values)
         return float(stats.gamma.ppf(0.99, shape, scale=scale))
@@ -43,8 +44,8 @@ def outlier_limit(magnitudes: Sequence[float], rule: str, ddof: int = 0) -> floa
     raise ValueError(rule)
 
 
-def outlier_rejection(magnitudes: Sequence[float], rule: str, ddof: int = 0) -> float:
-    limit = outlier_limit(magnitudes, rule, ddof)
+def outlier_rejection(magnitudes: Sequence[float], rule: str) -> float:
+    limit = outlier_limit(magnitudes, rule)
     return max(value for value in magnitudes if not value > limit)
 
 
@@ -81,45 +82,22 @@ class Run:
     steps: list[Step] = field(default_factory=list)
 
 
-def nearest_in_ball(mean: Sequence[float], variances: Sequence[float], eta: float) -> list[float]:
-    """Point of the ball |x| <= eta at the smallest Mahalanobis distance from ``mean`` (eq. 21 where
-    the variances are equal). Stationarity: x_i = mean_i / (1 + t v_i) with t >= 0, |x| = eta."""
+def distance_outside(mean: Sequence[float], sigma: float, eta: float) -> float:
+    """Eq. 20 with the candidate of eq. 21 in place of the unknown error, ``sigma`` of the mean."""
     size = norm(mean)
     if size <= eta:
-        return list(mean)
-    if eta == 0:
-        return [0.0] * len(mean)
-    if len(set(variances)) == 1:
-        return [x / size * eta for x in mean]
-
-    def excess(t: float) -> float:
-        return norm([x / (1 + t * v) for x, v in zip(mean, variances, strict=True)]) - eta
-
-    high = 1.0 / min(variances)
-    while excess(high) > 0:
-        high *= 2
-    t = optimize.brentq(excess, 0.0, high, xtol=1e-300, rtol=1e-15, maxiter=500)
-    return [x / (1 + t * v) for x, v in zip(mean, variances, strict=True)]
-
-
-def distance_outside(mean: Sequence[float], variances: Sequence[float], eta: float) -> float:
-    """Eq. 20 with the candidate of eq. 21 in place of the unknown error."""
-    if norm(mean) <= eta:
         return 0.0
-    candidate = nearest_in_ball(mean, variances, eta)
-    return math.sqrt(
-        math.fsum((x - c) ** 2 / v for x, c, v in zip(mean, candidate, variances, strict=True))
-    )
+    candidate = [x / size * eta for x in mean]
+    return norm([x - c for x, c in zip(mean, candidate, strict=True)]) / sigma
 
 
 def invalidation_run(
     reading: Reading,
     order: Sequence[int],
-    sigma: Sequence[float | Sequence[float]],
+    sigma: Sequence[float],
     eta: float,
     budget: int,
     switches: Switches = Switches(),
-    axes: int = 3,
 ) -> Run:
     """One pass of the algorithm for one bound: which points it measures and whether it rejects."""
     sums: dict[int, list[float]] = {}
@@ -134,7 +112,7 @@ def invalidation_run(
             point = max(distances, key=lambda j: distances[j])
         elif unexplored:
             point = unexplored.pop(0)
-            sums[point], counts[point] = [0.0] * axes, 0
+            sums[point], counts[point] = [0.0] * 3, 0
         else:
             break
         counts[point] += 1
@@ -142,10 +120,9 @@ def invalidation_run(
         sums[point] = [a + b for a, b in zip(sums[point], value, strict=True)]
         mean = [x / counts[point] for x in sums[point]]
         shrink = {"r": counts[point], "sqrt_r": math.sqrt(counts[point])}[switches.covariance]
-        variances = [s * s / shrink for s in per_axis(sigma[point], axes)]
-        distances[point] = distance_outside(mean, variances, eta)
+        distances[point] = distance_outside(mean, sigma[point] / math.sqrt(shrink), eta)
         probability = 1.0 - math.prod(
-            1.0 - point_probability(d, axes, switches.distance) for d in distances.values()
+            1.0 - point_probability(d, switches.distance) for d in distances.values()
         )
         run.steps.append(
             Step(iteration, point, counts[point], norm(value), norm(mean), probability)
@@ -156,22 +133,10 @@ def invalidation_run(
     return run
 
 
-def per_axis(sigma: float | Sequence[float], axes: int) -> list[float]:
-    return [float(sigma)] * axes if np.isscalar(sigma) else [float(x) for x in sigma]
-
-
-_cache: dict[tuple[float, int, str], float] = {}
-
-
-def point_probability(distance: float, axes: int, kind: str) -> float:
+@cache
+def point_probability(distance: float, kind: str) -> float:
     """Eq. 18: chi-square CDF of the squared distance, or of the distance as printed."""
-    if distance == 0.0:
-        return 0.0
-    key = (distance, axes, kind)
-    if key not in _cache:
-        argument = {"squared": distance**2, "as_printed": distance}[kind]
-        _cache[key] = float(stats.chi2.cdf(argument, axes))
-    return _cache[key]
+    return float(stats.chi2.cdf({"squared": distance**2, "as_printed": distance}[kind], 3))
 
 
 def decisions(rejects: Callable[[float], bool], top: float) -> list[bool]:

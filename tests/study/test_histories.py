@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import paper_settings as paper
-import pytest
 
 from kinacc.assess.model_invalidation import ModelInvalidation
 from kinacc.config.records import of_section
@@ -35,17 +34,11 @@ def field() -> np.ndarray:
 
 
 ERROR = field()
-SIZES = np.linalg.norm(ERROR, axis=1)
 
 
 def of(table: dict, example: str) -> dict:
     keep = table["example"] == example
     return {name: column[keep] for name, column in table.items()}
-
-
-@pytest.fixture(scope="module")
-def table() -> dict:
-    return histories(ERROR, settings(), STUDY, ASSESSOR, SEED, point=np.arange(200) + 1000)
 
 
 def test_where_no_simulation_obeys_the_rule_the_nearest_is_shown_and_says_so():

@@ -1,4 +1,4 @@
-"""Operating points: where they lie, in which order, and what is refused."""
+"""Operating points, where they lie and what is refused; the map beyond the fitted range."""
 
 from __future__ import annotations
 
@@ -6,15 +6,32 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_accuracy_map import ARM, RANGE, SPACE, TABLE_II, WANTED, wavy
 from two_models import two_models
 
 from kinacc.errors import InputError
+from kinacc.kinematics import region, robot, vec
 from kinacc.kinematics.inverse import limits
+from kinacc.study import accuracy_map as maps
 from kinacc.study import operating_points
+from kinacc.synthetic.draw import TABLE_II
 
-TRUE = wavy()
-MODELS = two_models(TRUE, TABLE_II)
+ARM = robot.load("mh180")
+SPACE = region.Cylinder(1200.0, 900.0, 0.0, 500.0, 0.0, np.pi / 3)
+DOWN = region.reference_rotation(np.deg2rad([180.0, 0.0, 0.0]))
+NINE = region.orientations(np.pi / 4, "signs_and_zero")
+WANTED = maps.PosesWanted(SPACE, DOWN, NINE, "dh")
+RANGE = np.deg2rad([-20, -40, -90, -190, -130, -190]), np.deg2rad([80, 70, 30, 190, 130, 190])
+
+
+def wavy(fitted=RANGE) -> vec.VECModel:
+    empty = vec.without_errors(TABLE_II, *fitted, 5)
+    noise = np.random.default_rng(3).normal(size=empty.coefficients.shape)
+    scale = np.array([0.05] * 3 + [1e-4] * 3)[:, None]
+    offsets = np.full((6, 2), [-5e-5, 5e-5])
+    return replace(empty, coefficients=noise * scale, direction_offsets_rad=offsets)
+
+
+MODELS = two_models(wavy(), TABLE_II)
 
 
 def test_points_of_one_wrist_have_joint_5_on_one_side():
@@ -59,3 +76,13 @@ def test_rows_are_spread_over_the_measured_ones_each_once():
     assert len(set(rows.tolist())) == 200
     assert np.diff(np.sort(rows)).max() <= 8
     assert np.array_equal(rows[:50], operating_points.spread_rows(632, 50))
+
+
+def test_poses_beyond_the_fitted_range_are_counted_and_left_out():
+    lower, upper = (np.array(bound) for bound in RANGE)
+    upper[4] = np.deg2rad(10.0)  # leaves only one wrist
+    cells = region.grid(SPACE, np.array([0.2]), 300.0)
+    found = maps.accuracy_map(ARM, two_models(wavy((lower, upper)), TABLE_II), cells, WANTED)
+    assert (found.solutions == 9).all()
+    assert (found.extrapolating == 9).all()
+    assert all(name.endswith("front-up-flip") for name in found.worst_branch)

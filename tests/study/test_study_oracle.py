@@ -121,29 +121,6 @@ def test_summary_and_readings_are_plain_statistics_of_the_rows(rows):
                 assert table["rmse_mm"][i] == pytest.approx(rmse, rel=1e-12)
 
 
-def test_a_full_size_simulation_stands_just_above_its_highest_rejected_bound():
-    rng = np.random.default_rng(6)
-    error = rng.normal(size=(200, 3)) * 0.23
-    error *= 0.906 / np.linalg.norm(error, axis=1).max()
-    table = simulated(error, (0.3,), [1], paper.study(), seed=7)
-    reading = worlds.simulation(error.tolist(), 0.3, 1, 7)
-    top = max(oracle.norm(reading(j, 1)) for j in range(200))
-    for i in range(len(table["assessed_mm"])):
-        if text(table, "search", i) != "from_above":
-            continue
-        switches = oracle.Switches(text(table, "distance", i), text(table, "covariance", i))
-
-        def rejects(k, switches=switches):
-            run = oracle.invalidation_run(reading, range(200), [0.3] * 200, k / 1000, 200, switches)
-            return run.rejected
-
-        k = round(table["assessed_mm"][i] * 1000)
-        assert table["assessed_mm"][i] == pytest.approx(k / 1000, abs=1e-12)
-        assert rejects(k - 1)
-        above = [k, k + 1, k + 2, *range(k + 3, math.ceil(top * 1000), 17)]
-        assert not any(rejects(bound) for bound in above)
-
-
 HISTORY_RATIOS = {
     "rejected": 0.834 / 0.906,
     "rejected_larger_eta": 0.844 / 0.906,

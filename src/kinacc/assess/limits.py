@@ -402,8 +402,7 @@ class Looks:
             return guarded_upper_mm(readings, factor**2 * covariances, z, self.rate)
         if not isinstance(noise, float):
             return largest_size(mean, noise, factor * z)
-        x, y, z_mm = mean.tolist()
-        return math.sqrt(x * x + y * y + z_mm * z_mm) + factor * z * noise
+        return math.hypot(*mean.tolist()) + factor * z * noise
 
 
 class LowerAverage:

@@ -124,14 +124,13 @@ def factor_limit(freedom: float, above: float) -> float:
 class NoiseTaken(NamedTuple):
     """Factor on the standard deviations planned, for bounds.
 
-    ``value``, from ``freedom`` degrees, infinite where it is no estimate; ``by_point`` (m,): of
-    candidates that were read so often that they have a factor of their own, the larger of it and
-    ``value``; elsewhere ``value``. ``least`` and ``most``: what the noise itself is not below and
-    not above; ``reason``: how all this was had, None where the noise is as stated.
+    ``value``, of all; ``by_point`` (m,): of candidates that were read so often that they have a
+    factor of their own, the larger of it and ``value``; elsewhere ``value``. ``least`` and
+    ``most``: what the noise itself is not below and not above; ``reason``: how all this was had,
+    None where the noise is as stated.
     """
 
     value: float
-    freedom: float
     by_point: np.ndarray
     least: float
     most: float
@@ -196,25 +195,25 @@ class CampaignNoise:
 
     def taken(self, error: float) -> NoiseTaken:
         """The noise for bounds that may err with this probability; not where it is ``missing``."""
-        part, factors = _NOISE_PART * error, np.ones(self.ledger.candidates.points)
+        part, points = _NOISE_PART * error, self.ledger.candidates.points
         if self.is_known:
             value, reason = self._stated_or_shown()
-            return NoiseTaken(value, math.inf, value * factors, 1.0, value, reason)
+            return NoiseTaken(value, np.full(points, value), 1.0, value, reason)
         if self.is_bounded:
             rows = np.array(self.ledger.visited[: self.first])
             first = np.array([self.ledger.readings_of(row, 1)[0][0] for row in rows])
             value = largest_factor(self.ledger.candidates, rows, first, part)
             reason = Reason("noise_bounded", {"factor": value})
-            return NoiseTaken(value, math.inf, value * factors, 0.0, value, reason)
+            return NoiseTaken(value, np.full(points, value), 0.0, value, reason)
         freedom = self.settings.noise_freedom or self.estimating
         least, most = factor_limit(freedom, part), factor_limit(freedom, 1.0 - part)
         if self._guarded:
             reason = Reason("noise_limited", {"factor": most, "freedom": freedom})
-            return NoiseTaken(most, math.inf, most * factors, least, most, reason)
-        value, factors = estimated_factor(self.contrasts, self.estimating, len(factors))
+            return NoiseTaken(most, np.full(points, most), least, most, reason)
+        value, factors = estimated_factor(self.contrasts, self.estimating, points)
         code = "noise_estimated" if self.estimating else "noise_tested"
         reason = Reason(code, {"factor": value, "freedom": freedom})
-        return NoiseTaken(value, freedom, factors, value * least, value * most, reason)
+        return NoiseTaken(value, factors, value * least, value * most, reason)
 
     def alarms(self) -> tuple[Reason, ...]:
         """What readings of the same block say against the noise stated, and against normal ones."""

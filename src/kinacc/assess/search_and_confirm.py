@@ -16,7 +16,6 @@ from kinacc.assess.adaptive import STRICT, AdaptiveAssessor, Campaign, Candidate
 from kinacc.assess.limits import EARLY, SHARE, Boundary, Looks, LowerAverage, boundary, look_counts
 from kinacc.assess.noise import (
     ENOUGH,
-    ESTIMATED,
     FEWEST,
     KNOWN,
     CampaignNoise,
@@ -94,7 +93,11 @@ class SearchAndConfirm(AdaptiveAssessor):
         conditions = (
             ("noise_freedom", not (known and freedom), f"0 where noise is {KNOWN}"),
             ("noise_freedom", known or freedom == 0 or freedom >= FEWEST, tested),
-            ("arm_mm", self.arm_mm is None or self.error_of == VISIT, f"null where error_of is {MEAN}"),
+            (
+                "arm_mm",
+                self.arm_mm is None or self.error_of == VISIT,
+                "null: only of visits",
+            ),
             ("wrong_rate", known or freedom > 0 or not self.wrong_rate, guarded),
             ("references", least <= self.measurements, f"fewer: they take {least} readings"),
         )
@@ -338,8 +341,8 @@ class SearchAndConfirmCampaign(Campaign):
 
     def _single_factor(self) -> np.ndarray:
         """Factors (m,) on the noise that lower limits of single points rest on."""
-        noise = self.noise.taken(self.allowed)
-        return noise.by_point * factor_limit(noise.freedom, 1.0 - 0.5 * self.single_error)
+        limit = factor_limit(self.noise.freedom, 1.0 - 0.5 * self.single_error)
+        return self.noise.taken(self.allowed).by_point * limit
 
     def _upper_mm(self, error: float, value_mm: float) -> float:
         """The largest upper limit of the visited points for an allowed error."""

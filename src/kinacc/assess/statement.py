@@ -97,7 +97,7 @@ class Decision:
     guard_band_mm: float
     acceptance_limit_mm: float
     risk: float
-    reason: Reason
+    reason: Reason | None = None
 
 
 def decide(statement: Statement, tolerance_mm: float) -> Decision:

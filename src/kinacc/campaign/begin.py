@@ -273,14 +273,14 @@ def noise_doubts(
     is_left = left_mm > 0.0
     most_mm = _MUCH_NOISE * left_mm if is_left else _MUCH_NOISE_MM
     than = f"than the {left_mm:.3g} mm that the calibration left" if is_left else "than trackers do"
-    large, small = [], []
+    problems = []
     for device in instruments:
         where, size = f"noise of {device.name}", math.sqrt(np.trace(device.covariance_mm2))
         if size > most_mm:
             text = f"{device.noise}: the readings would scatter more {than}"
             in_mm = 1e-3 * np.sqrt(np.diag(device.covariance_mm2)).max()
             fix = f"are micrometres meant? Then it is {in_mm:g} mm. {_SURE}"
-            large.append(Problem(where, text, "millimetres", fix))
+            problems.append(Problem(where, text, "millimetres", fix))
         if known is None or known.freedom < _FEWEST_FREEDOM:
             continue
         if size / math.sqrt(3.0) < _LITTLE_NOISE * known.per_axis_mm:
@@ -289,8 +289,8 @@ def noise_doubts(
                 f"{known.per_axis_mm:.3g} mm per axis ({known.freedom} degrees of freedom)"
             )
             fix = f"include how the arm repeats a pose: {known.per_axis_mm:.2g} mm or more; {_SURE}"
-            small.append(Problem(where, text, fix=fix))
-    return large + small
+            problems.append(Problem(where, text, fix=fix))
+    return problems
 
 
 def noise_of(results: Path) -> Noise | None:

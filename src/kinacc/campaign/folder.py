@@ -27,7 +27,7 @@ from kinacc.assess.adaptive import Campaign
 from kinacc.campaign import plan as plans
 from kinacc.campaign.beside_results import JOURNAL, PLAN
 from kinacc.campaign.plan import Plan
-from kinacc.campaign.state import Entry, State, Taken, restore
+from kinacc.campaign.state import Entry, State, restore
 from kinacc.config import json_files
 from kinacc.errors import InputError, MachineError, Problem, refuse, refused
 from kinacc.tables.atomic import synchronise, taken, write_whole
@@ -164,7 +164,7 @@ class Opened:
         """Readings of the journal as the assessor has them."""
         return self.watched(None)
 
-    def watched(self, watch: Callable[[Campaign, Taken], None] | None) -> State:
+    def watched(self, watch: Callable[[Campaign], None] | None) -> State:
         """The state; ``watch`` as in :func:`kinacc.campaign.state.restore`."""
         return restore(self.plan, self.journal.entries, watch, str(self.folder / JOURNAL))
 

@@ -101,14 +101,13 @@ class Limits:
     """What a reading must keep to be taken, and what the campaign is for (None: not stated).
 
     ``joint_rad``: largest distance of reported joints from those of the pose; ``implausible_mm``:
-    error beyond which a reading is refused, infinite where the plan is to derive it. ``width_mm``
-    is wanted of the bounds on ``target``.
+    error beyond which a reading is refused, infinite where the plan is to derive it. ``target``:
+    of the bound that is shown first.
     """
 
     joint_rad: FiniteFloat = float(np.deg2rad(0.02))
     implausible_mm: FiniteFloat = math.inf
     tolerance_mm: float | None = None
-    width_mm: float | None = None
     target: Literal["measured", "candidates", "region"] = "candidates"
 
 

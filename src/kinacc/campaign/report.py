@@ -8,7 +8,7 @@ import numpy as np
 
 from kinacc.assess.adaptive import Campaign
 from kinacc.campaign.folder import Opened
-from kinacc.campaign.state import State, Taken, covariance_mm2, sayable
+from kinacc.campaign.state import State, covariance_mm2, sayable
 from kinacc.campaign.status import reason
 from kinacc.tables.columns import Columns
 from kinacc.tables.contract import columns_of
@@ -33,7 +33,7 @@ def tables(opened: Opened) -> dict[str, Columns]:
     pause = max(-(-total // _MOMENTS), 1)
     rows: list[tuple[object, ...]] = []
 
-    def watch(campaign: Campaign, _: Taken) -> None:
+    def watch(campaign: Campaign) -> None:
         count = campaign.ledger.taken
         if count % pause == 0 or count == total:
             rows.extend(_bounds(opened, campaign))

@@ -8,9 +8,10 @@ in hand, so measuring ahead, or importing a whole file, does not bias anything.
 from __future__ import annotations
 
 import math
-from collections import Counter, deque
+from collections import Counter, defaultdict, deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -61,15 +62,13 @@ class Reading:
 class Readings(BaseModel):
     """Entry of the journal: readings that are taken together.
 
-    ``file`` is the digest of their file, ``path`` its place from the campaign's folder; ``was``:
-    numbers of earlier readings that came from it.
+    ``file`` is the digest of their file, ``path`` its place from the campaign's folder.
     """
 
     kind: Literal["readings"] = "readings"
     readings: list[Reading]
     file: str | None = None
     path: str | None = None
-    was: list[int] | None = None
     at: AwareDatetime | None = None
 
 
@@ -106,8 +105,7 @@ def error_mm(plan: Plan, reading: Reading) -> np.ndarray:
 def covariance_mm2(plan: Plan, reading: Reading) -> np.ndarray:
     """Return the covariance (3, 3) of the reading in the robot's base."""
     unplanned = unplanned_mm2(plan, reading)
-    planned: np.ndarray = plan.covariance_mm2[reading.point]
-    return planned if unplanned is None else unplanned
+    return plan.covariance_mm2[reading.point] if unplanned is None else unplanned
 
 
 def unplanned_mm2(plan: Plan, reading: Reading) -> np.ndarray | None:
@@ -276,7 +274,7 @@ def sayable(plan: Plan, campaign: Campaign) -> tuple[Statement, ...]:
 def restore(
     plan: Plan,
     entries: Iterable[Mapping[str, Any]],
-    watch: Callable[[Campaign, Taken], None] | None = None,
+    watch: Callable[[Campaign], None] | None = None,
     where: str = "journal",
 ) -> State:
     """Return the state after the entries of a journal; the assessor gets readings as it requests.
@@ -288,7 +286,7 @@ def restore(
     entries : iterable of mapping
         Entries of its journal.
     watch : callable, optional
-        Called with the assessor's campaign and every reading once it is used.
+        Called with the assessor's campaign after every reading.
     where : str
         Name of the journal in problems.
 
@@ -301,11 +299,10 @@ def restore(
     InputError
         Naming the line of an entry that cannot be read.
     """
-    waiting: dict[int, deque[Taken]] = {}
     readings: list[Reading] = []
     left_out: dict[int, str] = {}
     void: dict[int, str] = {}
-    imports: dict[str | None, set[int]] = {}
+    imports = defaultdict[str | None, set[int]](set)
     for line, content in enumerate(entries, start=1):
         try:
             entry = _ENTRY.validate_python(content)
@@ -313,8 +310,7 @@ def restore(
                 before = len(readings)
                 readings += [_of_campaign(plan, reading) for reading in entry.readings]
                 if entry.file:
-                    numbers = {*range(before + 1, len(readings) + 1), *(entry.was or ())}
-                    imports.setdefault(entry.path, set()).update(numbers)
+                    imports[entry.path].update(range(before + 1, len(readings) + 1))
             elif isinstance(entry, LeaveOut):
                 if entry.point >= len(plan.points):
                     raise ValueError(f"point {entry.point}")
@@ -328,25 +324,22 @@ def restore(
             fix = "bring the file back from a copy"
             raise InputError(Problem(f"{where}, line {line}", message, fix=fix)) from None
     rows = plan.visiting(frozenset(left_out))
-    struck = []
-    for number, reading in enumerate(readings, start=1):
-        item = Taken(number, reading, error_mm(plan, reading))
-        if number in void:
-            struck.append((item, void[number]))
-        else:
-            waiting.setdefault(reading.point, deque()).append(item)
+    taken = [Taken(number, row, error_mm(plan, row)) for number, row in enumerate(readings, 1)]
+    struck = [(item, void[item.number]) for item in taken if item.number in void]
+    waiting = defaultdict[int, deque[Taken]](deque)
+    for item in taken:
+        if item.number not in void:
+            waiting[item.reading.point].append(item)
     campaign = plan.assessor.begin(plan.candidates(rows))
     used: list[Taken] = []
     # The assessor is asked before every reading, as it was then: some remember when they were.
-    while (row := campaign.next()) is not None and waiting.get(int(rows[row])):
-        item = waiting[int(rows[row])].popleft()
+    while (row := campaign.next()) is not None and (queue := waiting[int(rows[row])]):
+        used.append(item := queue.popleft())
         campaign.record(row, item.error_mm, unplanned_mm2(plan, item.reading))
-        used.append(item)
         if watch is not None:
-            watch(campaign, item)
+            watch(campaign)
     requested = None if row is None else int(rows[row])
-    rest = [item for queue in waiting.values() for item in queue]
-    rest.sort(key=lambda item: item.number)
+    rest = sorted(chain(*waiting.values()), key=lambda item: item.number)
     return State(plan, campaign, rows, used, rest, requested, left_out, struck, imports)
 
 

@@ -11,12 +11,26 @@ import numpy as np
 
 from kinacc.assess.attainable import NONE, WidthLimits, limits_of
 from kinacc.assess.noise import ESTIMATED, KNOWN
-from kinacc.assess.statement import CANDIDATES, MEASURED, REGION, Reason, Statement, decide
+from kinacc.assess.statement import (
+    CANDIDATES,
+    MEASURED,
+    REGION,
+    Decision,
+    Reason,
+    Statement,
+    decide,
+)
 from kinacc.campaign.folder import Opened
 from kinacc.campaign.plan import Plan
 from kinacc.campaign.state import Scatter, State, scatter, size_scatter
 
 _CLEAR_OF_NOISE = 3.0  # standard deviations: larger bounds hold where the noise is smaller
+_UNJUDGED = Decision("", math.nan, math.nan, math.nan, math.nan)
+# What a bound has of a statement as it is.
+_STATED = (
+    *("target", "share", "value_mm", "lower_mm", "upper_mm"),
+    *("confidence", "excepted", "error_of"),
+)
 
 
 @dataclass(frozen=True)
@@ -202,7 +216,7 @@ def percent(share: float) -> str:
 
 def _bound(stated: Statement, state: State, tolerance_mm: float | None, overstated: bool) -> Bound:
     visited, candidates = len(state.campaign.ledger.visited), len(state.rows)
-    judged = None if tolerance_mm is None else decide(stated, tolerance_mm)
+    judged = _UNJUDGED if tolerance_mm is None else decide(stated, tolerance_mm)
     limits, doubt = _limits(stated, state), ""
     if stated.upper_mm < stated.lower_mm:
         doubt = "the bounds contradict each other"
@@ -212,26 +226,19 @@ def _bound(stated: Statement, state: State, tolerance_mm: float | None, overstat
         kind = "overstated" if overstated else "understated"
         doubt += f": noise {kind}, or one of the few campaigns that the confidence leaves out"
     return Bound(
-        target=stated.target,
+        **{name: getattr(stated, name) for name in _STATED},
         points=visited if stated.target == MEASURED else candidates,
-        share=stated.share,
-        value_mm=stated.value_mm,
-        lower_mm=stated.lower_mm,
-        upper_mm=stated.upper_mm,
-        confidence=stated.confidence,
-        excepted=stated.excepted,
         unmeasured=candidates - visited if stated.target == CANDIDATES else 0,
-        error_of=stated.error_of,
         withheld=reason(stated.withheld),
         assumption=reason(stated.assumption),
         noise=reason(stated.noise),
         doubt=doubt,
         tolerance_mm=tolerance_mm,
-        verdict=judged.verdict if judged else "",
-        reason=reason(judged.reason) if judged else "",
-        guard_band_mm=judged.guard_band_mm if judged else math.nan,
-        acceptance_limit_mm=judged.acceptance_limit_mm if judged else math.nan,
-        risk=judged.risk if judged else math.nan,
+        verdict=judged.verdict,
+        reason=reason(judged.reason),
+        guard_band_mm=judged.guard_band_mm,
+        acceptance_limit_mm=judged.acceptance_limit_mm,
+        risk=judged.risk,
         attainable_mm=limits.attainable_mm,
         proven_mm=limits.proven_mm,
         attainable_lower_mm=limits.lower_mm,

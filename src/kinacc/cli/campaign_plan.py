@@ -55,6 +55,7 @@ _SHOWN = {
 @choice.campaign_options
 @option("--budget", multiple=True, type=click.IntRange(1, 1_000_000),
         help="Readings in all; repeatable. [1/4 to 3 times the candidates]")  # fmt: skip
+@option("--width-mm", type=choice.positive, help="Wanted distance of upper from lower bound.")
 @option("--power", default=0.8, type=click.FloatRange(0.0, 1.0),
         help="Share of campaigns that reach the aim.")  # fmt: skip
 @option("--errors", multiple=True,

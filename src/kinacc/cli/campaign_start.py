@@ -103,7 +103,6 @@ def start(out: Output, **options: Any) -> None:
         np.deg2rad(options["joint_tolerance_deg"]),
         options["implausible_mm"] or np.inf,
         _tolerance_mm(options["tolerance_mm"], results),
-        options["width_mm"],
         options["target"],
     )
     assessor = assessor_of(options, options["budget"], len(points), freedom)

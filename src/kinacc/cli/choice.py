@@ -188,7 +188,6 @@ campaign_options = together(
     option("--set", "settings", multiple=True, help="Setting of the assessor: NAME=VALUE."),
     option("--confidence", type=float, help=f"How surely each bound is to hold. [{CONFIDENCE}]"),
     option("--tolerance-mm", type=positive, help="Largest error the arm is allowed to have."),
-    option("--width-mm", type=positive, help="Wanted distance of upper from lower bound."),
     option(
         "--target",
         type=click.Choice(["candidates", "measured"]),

@@ -39,6 +39,7 @@ from kinacc.tables.contract import ARTEFACTS, columns_of
 NM_PER_MM = 1_000_000
 SWITCHES = tuple(switch for cls in ASSESSORS.values() for switch in cls.switches)
 KEYS = ["assessor", "noise_mm"]
+ORDER = ("noise_mm", "repetition", "assessor", *SWITCHES)
 _SHUFFLE = 1  # keeps the key of the order apart from the key of the readings
 
 
@@ -238,12 +239,10 @@ def evaluate_assessors(
     return statistics(rows, KEYS, truth).join(bounds, on=KEYS)
 
 
-def ordered(rows: pd.DataFrame) -> pd.DataFrame:
-    """Rows by noise, repetition, assessor (as in the paper) and switches (alphabetically)."""
-    keys = ["noise_mm", "repetition", "assessor", *SWITCHES]
+def ordered(rows: pd.DataFrame, keys: Sequence[str] = ORDER) -> pd.DataFrame:
+    """Rows by the keys, assessors as in the paper, switches alphabetically."""
     rank = rows["assessor"].map(list(ASSESSORS).index)
-    order = rows[keys].assign(assessor=rank).fillna(dict.fromkeys(SWITCHES, "")).sort_values(keys)
-    return rows.loc[order.index]
+    return rows.loc[rows.assign(assessor=rank).sort_values([*keys]).index]
 
 
 def default_reading(rows: pd.DataFrame, section: Settings) -> pd.DataFrame:
@@ -270,21 +269,14 @@ def statistics(rows: pd.DataFrame, keys: Sequence[str], true_mm: float) -> pd.Da
 
 def summary(study: pd.DataFrame, true_mm: float) -> Columns:
     """Columns of ``study_summary``: each assessor and noise against the true accuracy (mm)."""
-    return _by_assessor("study_summary", study, KEYS, true_mm)
+    return _columns("study_summary", ordered(statistics(study, KEYS, true_mm), KEYS))
 
 
 def readings(rows: pd.DataFrame, true_mm: float) -> Columns:
     """Columns of ``readings``: every reading of the assessors that have more than one."""
     switched = [name for name, cls in ASSESSORS.items() if cls.switches]
-    rows = rows[rows["assessor"].isin(switched)]
-    return _by_assessor("readings", rows, ["assessor", *SWITCHES, "noise_mm"], true_mm)
-
-
-def _by_assessor(artefact: str, rows: pd.DataFrame, keys: list[str], true_mm: float) -> Columns:
-    """Columns of an artefact, by assessor as in the paper, then by the other keys."""
-    table = statistics(rows, keys, true_mm)
-    rank = table["assessor"].map(list(ASSESSORS).index)
-    return _columns(artefact, table.assign(rank=rank).sort_values(["rank", *keys[1:]]))
+    rows, keys = rows[rows["assessor"].isin(switched)], ["assessor", *SWITCHES, "noise_mm"]
+    return _columns("readings", ordered(statistics(rows, keys, true_mm), keys))
 
 
 def _columns(artefact: str, table: pd.DataFrame) -> Columns:
