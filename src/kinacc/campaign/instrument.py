@@ -125,8 +125,8 @@ class Instrument:
         if self.laser is not None:
             from_head_mm = (at_mm - to_base.position_mm) @ to_base.rotation
             covariance = floored(self.laser.covariance_mm2(from_head_mm), self.resolution_mm)
-        elif self.frame == BASE or _is_even(self.covariance_mm2):
-            return covariance  # turning equal noise would only add rounding
+        elif self.frame == BASE:
+            return covariance
         turned = to_base.rotation @ covariance @ to_base.rotation.T
         return 0.5 * (turned + np.swapaxes(turned, 1, 2))
 
@@ -162,10 +162,6 @@ class Instrument:
             text = f"{', '.join(f'{axis:.3g}' for axis in std)} mm, correlated"
         steps = f", read in steps of {self.resolution_mm:g} mm" if self.resolution_mm else ""
         return text + steps
-
-
-def _is_even(covariance_mm2: np.ndarray) -> bool:
-    return np.array_equal(covariance_mm2, covariance_mm2[0, 0] * np.eye(3))
 
 
 def floored(covariance_mm2: np.ndarray, resolution_mm: float) -> np.ndarray:
