@@ -89,7 +89,7 @@ def test_chi_square_equals_scipy(x):
     assert chi2_3(x) == pytest.approx(expected, rel=1e-13, abs=1e-300)
 
 
-@settings(max_examples=150)
+@settings(max_examples=80)
 @given(
     seed=st.integers(0, 2**32 - 1),
     m=st.sampled_from([1, 2, 5, 30, 120]),
@@ -144,7 +144,7 @@ def check(world, distance: str, covariance: str, **more) -> np.ndarray:
     return flags
 
 
-@settings(max_examples=60)
+@settings(max_examples=30)
 @given(
     seed=st.integers(0, 2**32),
     points=st.sampled_from([1, 2, 7, 40]),

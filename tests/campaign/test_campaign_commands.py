@@ -257,13 +257,11 @@ def test_a_report_holds_its_contract_and_the_numbers_of_status(begun):
     last = bounds["readings"] == bounds["readings"].max()
     upper = bounds["upper_mm"][last & (bounds["target"] == main["target"])]
     assert upper[0] == pytest.approx(main["upper_mm"])
-    before = {path.name: path.read_bytes() for path in made.iterdir()}
-    assert call("campaign", "report", folder).exit_code == 0
-    assert {path.name: path.read_bytes() for path in made.iterdir()} == before
     # tables of two states of a campaign do not pass as one report
+    before = (made / "campaign_points.parquet").read_bytes()
     recorded(folder, arm, 1)
     call("campaign", "report", folder)
-    (made / "campaign_points.parquet").write_bytes(before["campaign_points.parquet"])
+    (made / "campaign_points.parquet").write_bytes(before)
     done = call("check-results", made)
     assert done.exit_code == 1
     assert "different states" in done.output

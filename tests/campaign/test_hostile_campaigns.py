@@ -81,8 +81,8 @@ GOOD = {"point": 0, "position_mm": [0.0, 0.0, 0.0], "instrument": "instrument"}
     "wrong",
     [
         {"point": 99}, {"point": "x"}, {"position_mm": [1.0, 2.0]}, {"position_mm": None},
-        {"position_mm": [1e308, 0.0, 0.0]}, {"instrument": "other"}, {"joints": [1]}, {"joints": {}},
-        {"std": "x"}, {"point": 10**400},
+        {"position_mm": [1e308, 0.0, 0.0]}, {"instrument": "other"}, {"joints": [1]},
+        {"joints": {}}, {"std": "x"}, {"point": 10**400},
     ],
     ids=str,
 )  # fmt: skip

@@ -112,9 +112,8 @@ def readings_at(plan, positions_mm):
     return Readings(readings=repeated)
 
 
-@pytest.mark.parametrize("name", ["search_and_confirm", "single_shot"])
-def test_predictions_recorded_as_readings_bound_nothing(make_plan, name, tmp_path):
-    plan = make_plan(name, points=12, budget=14)
+def test_predictions_recorded_as_readings_bound_nothing(make_plan, tmp_path):
+    plan = make_plan(points=12, budget=14)
     path = tmp_path / "check"
     folder.start(path, plan)
     with folder.writing(path) as opened:

@@ -180,7 +180,7 @@ def campaign_course() -> dict:
     course = []
     opened = campaigns.open_(GOLDEN / "campaign")
 
-    def watch(campaign, reading) -> None:
+    def watch(campaign) -> None:
         said = [
             {
                 "target": each.target,
@@ -190,9 +190,11 @@ def campaign_course() -> dict:
             }
             for each in campaign.statements()
         ]
-        course.append({"reading": reading.number, "point": reading.reading.point, "said": said})
+        course.append({"said": said})
 
     state = opened.watched(watch)
+    for each, item in zip(course, state.used, strict=True):
+        each |= {"reading": item.number, "point": item.reading.point}
     limits = {str(row): list(each) for row, each in state.campaign.point_limits().items()}
     return {"course": course, "limits_mm": limits, "struck": [e.number for e, _ in state.struck]}
 
