@@ -64,7 +64,7 @@ test: lint
 	$(PYTEST) -m "not night"
 
 test-all: lint $(CLUSTER)
-	$(PYTEST)
+	$(PYTEST) --hypothesis-profile=night
 
 # Needs no package: the standard library counts.
 size:

@@ -90,6 +90,7 @@ NIGHT = tuple(
 )
 
 settings.register_profile("repeatable", derandomize=True, deadline=None, database=None)
+settings.register_profile("night", settings.get_profile("repeatable"), max_examples=1000)
 settings.load_profile("repeatable")
 
 

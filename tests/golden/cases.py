@@ -6,26 +6,23 @@ Shared by the tests beside it and by ``tools/renew_golden.py``, which makes the 
 from __future__ import annotations
 
 import json
-import shutil
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from pathlib import Path
 
 import numpy as np
-from click.testing import CliRunner
 
 TESTS = Path(__file__).parents[1]
 sys.path[:0] = [str(TESTS), *(str(TESTS / name) for name in ("checks", "cli", "campaign"))]
 
 import plants  # noqa: E402
-import yaml  # noqa: E402
+from command_line import call  # noqa: E402
 from good_files import File, simulated  # noqa: E402
-from measurements.scoring import measured  # noqa: E402
+from measurements.scoring import fault, measured, understood  # noqa: E402
 
 from kinacc.calibration import stages  # noqa: E402
 from kinacc.campaign import folder as campaigns  # noqa: E402
-from kinacc.cli.group import main  # noqa: E402
 from kinacc.report import summarise  # noqa: E402
 from kinacc.study import (  # noqa: E402
     evaluation,
@@ -159,20 +156,8 @@ def _is_number(value: object) -> bool:
 
 def understanding(name: str, folder: Path) -> dict:
     """What ``init`` makes of a foreign file: the data set it describes, or why it does not."""
-    measured_ = measured(name)
-    files = [Path(shutil.copy(path, folder)) for path in measured_.files]
-    words = ["init", *files, "--robot", measured_.robot, "--yes", "--json"]
-    done = call(*words, "--out", folder, "--name", "n")
-    if done.exit_code:
-        return {"exit_code": done.exit_code}
-    described = yaml.safe_load((folder / "n.yaml").read_text())["datasets"]["n"]
-    read = read_data_sets([folder / "n.yaml"])
-    columns = source.run({}, read.settings["n"])["measurements"]
-    kept = [key for key in columns if key[0] in "qxyz" and columns[key].dtype.kind == "f"]
-    rows = {key: [round(float(each), 9) for each in columns[key][:3]] for key in kept}
-    rows = {key: values for key, values in rows.items() if not np.isnan(values).any()}
-    file = {k: v for k, v in described["measurements"]["file"].items() if "path" not in k}
-    return {"exit_code": 0, "rows": len(columns["pose"]), "first": rows, "file": file}
+    fault(measured(name), folder)
+    return understood(folder)
 
 
 def campaign_course() -> dict:
@@ -197,8 +182,3 @@ def campaign_course() -> dict:
         each |= {"reading": item.number, "point": item.reading.point}
     limits = {str(row): list(each) for row, each in state.campaign.point_limits().items()}
     return {"course": course, "limits_mm": limits, "struck": [e.number for e, _ in state.struck]}
-
-
-def call(*words: object):
-    """A command of kinacc."""
-    return CliRunner().invoke(main, [str(each) for each in words])

@@ -24,7 +24,6 @@ from kinacc.measurements.rows import read_rows
 ARM = robot.load("ur10")
 GIGABYTE = 1 << 30
 fuzzed = settings(
-    max_examples=1000,  # a minute of CPU in all
     deadline=timedelta(seconds=5),
     suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
 )

@@ -23,43 +23,17 @@ from written_tables import (
 
 from kinacc.errors import InputError
 
-GERMAN = [*(f"Achse {i} [°]" for i in range(1, 7)), *(f"{axis} gemessen [mm]" for axis in "XYZ")]
-
-
-def test_signs_of_windows_are_read_and_the_characters_named(tmp_path):
-    names = [*GERMAN[:6], "X – gemessen", "Y – gemessen", "Z – gemessen"]
-    path = file(tmp_path, lines(cells(), names, ";"), encoding="cp1252")
-    found = looked(path)
-    assert found.section["encoding"] == "latin-1"
-    assert list(found.table.columns) == names
-    assert "read as latin-1" in found.notes
-    assert_is_truth(reading(path))
-
-
 WRITTEN = {
-    "several blanks": lines(cells(), NO_UNITS, "   "),
     "blanks and names with units": lines(cells(), mark="   "),
     "decimal commas between blanks": lines(
         cells(decimal=","), NO_UNITS, "  "
     ),
-    "English thousands between tabs": lines(cells(thousands=","), mark="\t"),
     "French thousands": lines(cells(decimal=",", thousands="\u202f"), mark=";"),
-    "blanks between thousands": lines(cells(thousands=" "), mark=";"),
-    "title and blank lines above": "Tracker survey, cell 3\nDate: 2024-03-01; operator 7\n\n"
-    + lines(cells(), mark=";"),
     "a rule under the names": lines(
         [["---"] * 9, *cells()], NO_UNITS, "\t"
     ),
-    "a mark at the end of every row": lines(cells(), mark=";").replace("\n", ";\n"),
     "a mark at the end of the rows alone": lines([[*row, ""] for row in cells()], mark=";"),
-    "names in two lines": lines(
-        [NO_UNITS, *cells()],
-        ["Joints", *[""] * 5, "Measured", "", ""],
-        ";",
-    ),
     "names behind a hash": "# " + lines(cells(), (*(f"q{i}_deg" for i in range(1, 7)), *"XYZ")),
-    "names behind a hash, blanks": "# "
-    + lines(cells(), (*(f"q{i}_deg" for i in range(1, 7)), *"XYZ"), " "),
     "units in the cells": lines(
         [
             [*(f"{c} °" for c in row[:6]), *(f"{c} mm" for c in row[6:])]
@@ -71,7 +45,6 @@ WRITTEN = {
     "a column of row numbers without a name": lines(
         [[number, *row] for number, row in enumerate(cells())], ["", *JOINTS, *XYZ]
     ),
-    "Windows line ends": lines(cells(), mark=";").replace("\n", "\r\n"),
 }  # fmt: skip
 
 
@@ -124,19 +97,9 @@ def test_statistics_and_remarks_between_the_rows_are_told_with_their_lines(tmp_p
     assert found.columns["row"].tolist()[4] == 7
 
 
-@pytest.mark.parametrize("nothing", ["", "---", "#N/A", "k.A."])
-def test_a_row_without_a_reading_is_kept_out_and_counted(nothing, tmp_path):
-    rows = cells(decimal=",")
-    for row in (2, 7, 8):
-        rows[row][6:] = [nothing] * 3
-    rows[11][7] = nothing
-    found = reading(file(tmp_path, lines(rows, mark=";")))
-    assert_is_truth(found, ~np.isin(np.arange(ROWS), (2, 7, 8, 11)))
-    assert "4 rows hold no reading: lines 4, 9-10, 13" in found.left_out()
-
-
-@pytest.mark.parametrize(("text", "value"), [("-9999", -9999.0), ("9E9", 9e9), ("0.000", 0.0)])
-@pytest.mark.parametrize("unit", [1.0, 1e-3], ids=["mm", "m"])
+@pytest.mark.parametrize(
+    ("text", "value", "unit"), [("-9999", -9999.0, 1.0), ("9E9", 9e9, 1e-3), ("0.000", 0.0, 1e-3)]
+)
 def test_numbers_that_stand_for_no_reading_are_found_and_told(text, value, unit, tmp_path):
     away = np.round(np.add(POINT_MM, (4000, 0, 0)) * unit, 6)
     rows = [[*row[:6], *map(str, p)] for row, p in zip(cells(), away, strict=True)]

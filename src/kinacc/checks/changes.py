@@ -11,10 +11,10 @@ from numpy import ndarray
 
 from kinacc.checks.findings import Finding, finding
 from kinacc.checks.readings import Readings
-from kinacc.config.measured import Orientation
+from kinacc.config.measured import ANGLES, CONVENTIONS, Orientation
 from kinacc.kinematics.robot import Robot
-from kinacc.measurements.layout import ANGLES, in_order_of
-from kinacc.measurements.orientation import CONVENTIONS, rotations
+from kinacc.measurements.layout import in_order_of
+from kinacc.measurements.orientation import rotations
 
 # Units of angles: what they are, what the file says, its setting, and the factor.
 _ANGLE_UNITS = (

@@ -11,8 +11,9 @@ import pandas as pd
 from kinacc.checks import digits
 from kinacc.checks import repeatability as checks
 from kinacc.checks.repeatability import Noise
+from kinacc.config.measured import POSITION
 from kinacc.errors import InputError, Problem, first_few, refuse
-from kinacc.measurements.layout import POSITION, find, listed
+from kinacc.measurements.layout import find, listed
 from kinacc.measurements.reader import stacked
 from kinacc.measurements.rows import open_table
 from kinacc.measurements.table import RawTable

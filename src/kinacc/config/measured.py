@@ -6,57 +6,22 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
-from kinacc.config.fields import Distinct, Section, Text, distinct, refused, setting
+from kinacc.config.fields import Distinct, OneOf, Section, Text, distinct, refused, setting
 from kinacc.config.values import did_you_mean, shown
 
 # Names that a column of a measured file has for kinacc; those of POINT may have a target in front.
-ROW = [
-    "pose",
-    "target",
-    "repeat",
-    "session",
-    "temperature",
-    "payload",
-    "payload_x",
-    "payload_y",
-    "payload_z",
-]
-ROW += [f"q{joint}" for joint in range(1, 8)]
-ROW += [f"q{joint}_cmd" for joint in range(1, 8)]
-ROW += [f"s{joint}" for joint in range(1, 8)]
-POINT = [
-    "x",
-    "y",
-    "z",
-    "qw",
-    "qx",
-    "qy",
-    "qz",
-    "quat1",
-    "quat2",
-    "quat3",
-    "quat4",
-    "rx",
-    "ry",
-    "rz",
-    "e1",
-    "e2",
-    "e3",
-]
-POINT += [
-    "std_x",
-    "std_y",
-    "std_z",
-    "std_rx",
-    "std_ry",
-    "std_rz",
-    "cov_xx",
-    "cov_xy",
-    "cov_xz",
-    "cov_yy",
-    "cov_yz",
-    "cov_zz",
-]
+PAYLOAD = ("payload", "payload_x", "payload_y", "payload_z")
+POSITION = ("x", "y", "z")
+QUATERNION, QUATERNION_IN_ORDER = ("qw", "qx", "qy", "qz"), ("quat1", "quat2", "quat3", "quat4")
+ANGLES, ANGLES_IN_ORDER = ("rx", "ry", "rz"), ("e1", "e2", "e3")
+STD, STD_TURN = ("std_x", "std_y", "std_z"), ("std_rx", "std_ry", "std_rz")
+COVARIANCE = ("cov_xx", "cov_xy", "cov_xz", "cov_yy", "cov_yz", "cov_zz")
+_JOINTS = (name.format(joint) for name in ("q{}", "q{}_cmd", "s{}") for joint in range(1, 8))
+ROW = ("pose", "target", "repeat", "session", "temperature", *PAYLOAD, *_JOINTS)
+POINT = (*POSITION, *QUATERNION, *QUATERNION_IN_ORDER, *ANGLES, *ANGLES_IN_ORDER)
+POINT = (*POINT, *STD, *STD_TURN, *COVARIANCE)
+_ORDERS = ("XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX", "XYX", "XZX", "YXY", "YZY", "ZXZ", "ZYZ")
+CONVENTIONS = (*_ORDERS, *map(str.lower, _ORDERS))  # of Euler angles: intrinsic, extrinsic
 _NAMES = f"{', '.join(ROW)}; of a target, or of one named before it (mA_x), {', '.join(POINT)}"
 
 
@@ -101,32 +66,6 @@ Columns = Annotated[
 Names = Annotated[list[Text], Field(min_length=1, max_length=10000), Distinct]
 Thousands = Literal[".", ",", " ", "'"]
 Encoding = Literal["utf-8", "utf-16-le", "utf-16-be", "latin-1", "cp932"]
-Convention = Literal[
-    "XYZ",
-    "XZY",
-    "YXZ",
-    "YZX",
-    "ZXY",
-    "ZYX",
-    "xyz",
-    "xzy",
-    "yxz",
-    "yzx",
-    "zxy",
-    "zyx",
-    "XYX",
-    "XZX",
-    "YXY",
-    "YZY",
-    "ZXZ",
-    "ZYZ",
-    "xyx",
-    "xzx",
-    "yxy",
-    "yzy",
-    "zxz",
-    "zyz",
-]
 
 
 class Excluded(Section):
@@ -175,7 +114,7 @@ class Orientation(Section):
         "euler",
         "none for position only",
     )
-    convention: Convention = setting(
+    convention: Annotated[str, OneOf(CONVENTIONS)] = setting(
         "XYZ",
         "Euler sequence of the angles about the axes rx, ry, rz, or e1, e2, e3 in order; "
         "capitals intrinsic, small letters extrinsic",

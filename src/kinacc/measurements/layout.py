@@ -21,7 +21,16 @@ import numpy as np
 
 from kinacc.config.fields import Section
 from kinacc.config.measured import (
+    ANGLES,
+    ANGLES_IN_ORDER,
+    COVARIANCE,
+    PAYLOAD,
     POINT,
+    POSITION,
+    QUATERNION,
+    QUATERNION_IN_ORDER,
+    STD,
+    STD_TURN,
     Directions,
     JointsFile,
     MeasuredFile,
@@ -45,15 +54,6 @@ _CELSIUS = ({"c": 1.0, "C": 1.0}, "C", "")
 _SINGLE = {"temperature": _CELSIUS, "temp": _CELSIUS, "payload": ({"kg": 1.0}, "kg", "")}
 
 JOINTS = "joints"
-POSITION = ("x", "y", "z")
-PAYLOAD = ("payload", "payload_x", "payload_y", "payload_z")
-STD = ("std_x", "std_y", "std_z")
-STD_TURN = ("std_rx", "std_ry", "std_rz")
-COVARIANCE = ("cov_xx", "cov_xy", "cov_xz", "cov_yy", "cov_yz", "cov_zz")
-QUATERNION = ("qw", "qx", "qy", "qz")
-QUATERNION_IN_ORDER = ("quat1", "quat2", "quat3", "quat4")
-ANGLES = ("rx", "ry", "rz")
-ANGLES_IN_ORDER = ("e1", "e2", "e3")
 _TURNS = (*ANGLES, *ANGLES_IN_ORDER, *STD_TURN)
 # The longest quantity counts: mA_std_x is no x of a target named mA_std.
 _OF_TARGET = re.compile(rf"(?:(.*?)_)??({'|'.join(POINT)})", re.DOTALL)

@@ -8,14 +8,6 @@ from scipy.spatial.transform import Rotation
 from kinacc.config.measured import Orientation
 from kinacc.geometry import exp_so3, rotation_from_quaternion
 
-CONVENTIONS = tuple(
-    order if intrinsic else order.lower()
-    for intrinsic in (True, False)
-    for order in (
-        *("XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX"),
-        *("XYX", "XZX", "YXY", "YZY", "ZXZ", "ZYZ"),
-    )
-)
 _STEP_RAD = 1e-5
 
 

@@ -10,21 +10,20 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from kinacc.config.measured import JointsFile
+from kinacc.config.measured import QUATERNION, STD, JointsFile
 from kinacc.errors import InputError, Problem, gathered, refuse
 from kinacc.kinematics.model import PAYLOAD_COLUMNS
 from kinacc.kinematics.robot import Robot
 from kinacc.measurements import faults
 from kinacc.measurements.files import load
 from kinacc.measurements.joining import AGAIN, joined
-from kinacc.measurements.layout import STD, TABLE, FileColumns, Layout, Place, Target, find
+from kinacc.measurements.layout import TABLE, FileColumns, Layout, Place, Target, find
 from kinacc.measurements.orientation import quaternions, rotation_std
 from kinacc.measurements.row_names import RowNames
 from kinacc.measurements.table import RawTable, numbers
 from kinacc.tables.columns import Columns
 
 POSITION = ("x_mm", "y_mm", "z_mm")
-QUATERNION = ("qw", "qx", "qy", "qz")
 UNCERTAINTY = (
     *(f"{name}_mm" for name in STD),
     *("corr_xy", "corr_xz", "corr_yz"),

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from kinacc.config.measured import Orientation
+from kinacc.config.measured import POSITION, Orientation
 from kinacc.config.names import of_csv
 from kinacc.errors import InputError, Problem, refuse
 from kinacc.geometry import Pose
@@ -19,7 +19,6 @@ from kinacc.measurements.intake.choices import Answers
 from kinacc.measurements.intake.guess import described
 from kinacc.measurements.layout import (
     JOINTS,
-    POSITION,
     TOOL,
     FileColumns,
     Layout,

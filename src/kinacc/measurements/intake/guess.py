@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from kinacc.config.measured import CONVENTIONS
 from kinacc.errors import InputError, Problem, refuse
 from kinacc.measurements.column_names import NOMINAL, Name
 from kinacc.measurements.faults import BEYOND, is_no_coordinate, none_read
@@ -19,7 +20,6 @@ from kinacc.measurements.intake.columns import ABOUT_JOINTS, NamedColumns
 from kinacc.measurements.intake.groups import JOINTS, POINT, POSE, PULSES, listed
 from kinacc.measurements.intake.text import Looked
 from kinacc.measurements.layout import ANGLE, LENGTH, TOOL, Layout, find
-from kinacc.measurements.orientation import CONVENTIONS
 from kinacc.measurements.table import RawTable, numbers_of
 
 MEASUREMENTS, POINTS, POSES = "measurements", "points", "poses"
