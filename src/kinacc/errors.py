@@ -79,6 +79,11 @@ class InputError(KinaccError):
         return "\n".join([head, *lines])
 
 
+def input_error(where: str, what: str, allowed: str = "", fix: str = "") -> InputError:
+    """The error of one :class:`Problem`."""
+    return InputError(Problem(where, what, allowed, fix))
+
+
 class MachineError(InputError):
     """The machine did not do what was asked of it: a disk that is full, a file that is closed."""
 

@@ -10,7 +10,7 @@ from typing import Any
 import yaml
 
 from kinacc.config.reading import value_of
-from kinacc.errors import InputError, Problem
+from kinacc.errors import input_error
 
 Path = Sequence[str]
 
@@ -56,7 +56,7 @@ def with_added(text: str, path: Path, value: Any, name: str, emptied: Path = ())
         pass
     message = f"cannot be changed safely at {'.'.join(path)}"
     instead = f", in place of {'.'.join(emptied)}" if emptied else ""
-    raise InputError(Problem(name, message, fix=f"add by hand{instead}: {flow(value)}"))
+    raise input_error(name, message, fix=f"add by hand{instead}: {flow(value)}")
 
 
 def flow(value: Any) -> str:

@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from kinacc.errors import InputError, Problem
+from kinacc.errors import input_error
 
 _MOST_BYTES, _MOST_VALUES = 100_000_000, 5_000_000  # a second or two, and 500 MB
 
@@ -20,7 +20,7 @@ def bytes_of(path: Path | str) -> bytes:
         content = stream.read(_MOST_BYTES + 1)
     if len(content) > _MOST_BYTES:
         allowed = f"at most {_MOST_BYTES // 1_000_000} MB"
-        raise InputError(Problem(str(path), "is too large", allowed))
+        raise input_error(str(path), "is too large", allowed)
     return content
 
 
@@ -32,5 +32,5 @@ def values_of(content: bytes, name: str) -> Any:
     values = sum(map(content.count, (b",", b"[", b"{")))  # at least as many as there are
     if values > _MOST_VALUES:
         allowed = f"at most {_MOST_VALUES:,}"
-        raise InputError(Problem(name, "holds too many values", allowed))
+        raise input_error(name, "holds too many values", allowed)
     return json.loads(content)

@@ -16,7 +16,7 @@ from kinacc.config.reading import KeyPath, Place, dotted, paths_of, read
 from kinacc.config.schema import keys
 from kinacc.config.settings import ROBOTS, Configuration
 from kinacc.config.values import did_you_mean, overlay, shown
-from kinacc.errors import InputError, Problem, gathered, refuse
+from kinacc.errors import InputError, Problem, gathered, input_error, refuse
 
 Contradictions = Callable[..., Iterable[Problem]]
 COMMAND_LINE = "command line"
@@ -86,7 +86,7 @@ def load(
         contents.append(dict(overrides))
         places |= dict.fromkeys(paths_of(overrides), source)
     if not contents:
-        raise InputError(Problem("configuration", "no file given", fix="give config.yaml"))
+        raise input_error("configuration", "no file given", fix="give config.yaml")
     merged = reduce(overlay, contents)
     shared = {key: value for key, value in merged.items() if key != "datasets"}
     datasets = merged.get("datasets")

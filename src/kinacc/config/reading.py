@@ -12,7 +12,7 @@ from typing import Any
 
 import yaml
 
-from kinacc.errors import InputError, Problem, refused
+from kinacc.errors import InputError, Problem, input_error, refused
 
 KeyPath = tuple[Any, ...]
 Place = Callable[[KeyPath], str]
@@ -81,18 +81,18 @@ def _text(name: str) -> str:
             content = stream.read(_MOST_BYTES + 1)
         if Path(name).suffix.lower() in _TABLES:
             fix = f"{shlex.join(['kinacc', 'init', name])} writes a YAML file: give that"
-            raise InputError(Problem(name, "holds readings", "a .yaml file", fix))
+            raise input_error(name, "holds readings", "a .yaml file", fix)
         if len(content) > _MOST_BYTES:
             allowed = f"at most {_MOST_BYTES // 1000} kB"
-            raise InputError(Problem(name, "is too large for a description", allowed))
+            raise input_error(name, "is too large for a description", allowed)
         return content.decode("utf-8-sig")
     except OSError as error:
         raise refused(error, name) from None
     except UnicodeDecodeError as error:
         message = f"is not text in UTF-8 (byte {error.start})"
-        raise InputError(Problem(name, message, "a YAML file")) from None
+        raise input_error(name, message, "a YAML file") from None
     except ValueError as error:  # a name that no file can have
-        raise InputError(Problem(name, f"cannot be read: {error}", "a YAML file")) from None
+        raise input_error(name, f"cannot be read: {error}", "a YAML file") from None
 
 
 def parsed(text: str, name: str) -> tuple[Document, list[Problem]]:
@@ -105,7 +105,7 @@ def parsed(text: str, name: str) -> tuple[Document, list[Problem]]:
     data = value_of(text, name, lines, problems)
     if not isinstance(data, dict):
         message = "is empty" if data is None else "holds no keys"
-        raise InputError(Problem(name, message, "a mapping such as seed: 1"))
+        raise input_error(name, message, "a mapping such as seed: 1")
     return Document(name, data, lines), problems
 
 
@@ -127,7 +127,7 @@ def value_of(
         count += 1
         if count > _MOST_VALUES or len(path) > _DEEPEST:  # aliases may stand for themselves
             message = "its aliases (*name) stand for too many values, or for themselves"
-            raise InputError(Problem(name, message, f"at most {_MOST_VALUES} values"))
+            raise input_error(name, message, f"at most {_MOST_VALUES} values")
         if isinstance(node, yaml.ScalarNode):
             return _scalar(node)
         if isinstance(node, yaml.SequenceNode):
@@ -152,14 +152,14 @@ def value_of(
             depth -= isinstance(event, yaml.CollectionEndEvent)
             if depth > _DEEPEST or number > 2 * _MOST_VALUES:
                 allowed = f"at most {_DEEPEST} levels and {_MOST_VALUES} values"
-                raise InputError(Problem(name, "holds too much", allowed))
+                raise input_error(name, "holds too much", allowed)
         node = yaml.compose(text, Loader=_LOADER)
     except (yaml.YAMLError, ValueError) as error:
         mark = getattr(error, "problem_mark", None)
         reason = getattr(error, "problem", None) or str(error).splitlines()[0]
         fix = "indent with blanks, not tabs" if "\\t" in reason else ""
         where = f"{name}:{mark.line + 1}" if mark else name
-        raise InputError(Problem(where, f"is not YAML: {reason}", fix=fix)) from None
+        raise input_error(where, f"is not YAML: {reason}", fix=fix) from None
     return None if node is None else plain(node, ())
 
 

@@ -51,18 +51,6 @@ def quaternion_problems(
     return of_rows(table, places, bad, message, f"length 1 within {_UNIT_QUATERNION:g}")
 
 
-def covariance_problems(
-    table: RawTable, covariance: np.ndarray, places: Sequence[Place]
-) -> list[Problem]:
-    """Matrices (n, 3, 3) that are no covariances."""
-    eigenvalues = np.linalg.eigvalsh(np.nan_to_num(covariance))
-    bad = np.isfinite(covariance).all(axis=(1, 2))
-    bad &= eigenvalues[:, 0] < -1e-9 * np.abs(eigenvalues[:, 2])
-    bad |= (np.einsum("nii->ni", covariance) <= 0.0).any(axis=1)
-    allowed = "a matrix without negative variances"
-    return of_rows(table, places, bad, "is no covariance", allowed)
-
-
 def limit_problems(
     table: RawTable, q_rad: np.ndarray, robot: Robot, places: Sequence[Place]
 ) -> Iterator[Problem]:

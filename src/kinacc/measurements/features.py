@@ -5,13 +5,13 @@ Columns Nominal, Measured, Dev under a column of axes become Nominal X, Nominal 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
 import pandas as pd
 
-from kinacc.errors import InputError, Problem, first_few
+from kinacc.errors import first_few, input_error
 from kinacc.measurements.column_names import (
     DEVIATION,
     MEASURED,
@@ -26,15 +26,6 @@ from kinacc.measurements.table import RawTable, frame
 AXES = "XYZ"
 
 
-@dataclass(frozen=True)
-class Report:
-    """Columns of such a report: of feature names, of axes, and of ``values`` of each axis."""
-
-    feature: str
-    axis: str
-    values: tuple[str, ...]
-
-
 def axis_of(cell: object) -> str:
     """X, Y or Z, empty where a cell is none of them."""
     if not isinstance(cell, str) or len(cell) > 40:
@@ -43,8 +34,8 @@ def axis_of(cell: object) -> str:
     return terms.pop().upper() if len(terms) == 1 and terms <= {*"xyz"} else ""
 
 
-def report_of(table: RawTable) -> Report | None:
-    """The columns of a report of features and axes; None where the table is no such report."""
+def report_of(table: RawTable) -> tuple[str, str, list[str]] | None:
+    """Columns of a report: of feature names, of axes, and of values of each axis; None for none."""
     kinds = {name: dict.fromkeys(table.columns[name]) for name in table.columns}
     axes = [name for name, cells in kinds.items()
             if len(cells) < 60 and {*map(axis_of, cells)} >= {*AXES}]  # fmt: skip
@@ -59,7 +50,7 @@ def report_of(table: RawTable) -> Report | None:
     names = [name for name in cells if name not in values and pd.notna(cells[name][0])
              and 2 * cells[name].nunique() <= len(table) + 1]  # fmt: skip
     measured = any(roles[name] in (MEASURED, REPORTED) for name in values)
-    return Report(names[0], axes[0], tuple(values)) if names and measured else None
+    return (names[0], axes[0], values) if names and measured else None
 
 
 def by_feature(table: RawTable) -> RawTable:
@@ -72,12 +63,12 @@ def by_feature(table: RawTable) -> RawTable:
         message = "is no report with a row per feature and axis"
         allowed = "a column of names, one of X, Y, Z, and columns such as Nominal, Measured, Dev"
         fix = "set measurements.file.layout: table"
-        raise InputError(Problem(table.path, message, allowed, fix))
-    feature, values = report.feature, [*report.values]
+        raise input_error(table.path, message, allowed, fix)
+    feature, axis_column, values = report
     cells = table.columns.mask(table.columns.map(table.is_gap), None)
     cells[feature] = cells[feature].ffill()
-    axes = table.columns[report.axis].map(axis_of)
-    rows, others = cells[axes != ""], table.columns[report.axis][axes == ""]
+    axes = table.columns[axis_column].map(axis_of)
+    rows, others = cells[axes != ""], table.columns[axis_column][axes == ""]
     begins, known = list[bool](), set[tuple[str, str]]()
     for row in zip(rows[feature], axes[rows.index], strict=True):
         begins.append(row in known or row[0] not in {name for name, _ in known})
@@ -88,7 +79,7 @@ def by_feature(table: RawTable) -> RawTable:
     for value, axis in product(values, AXES):
         columns[f"{value} {axis}"] = of_axes[value, axis]
         units[f"{value} {axis}"] = units.get(value, "")
-    for name in cells.columns.difference([feature, report.axis, *values], sort=False):
+    for name in cells.columns.difference([feature, axis_column, *values], sort=False):
         of_feature = rows[name].groupby(group)
         if (of_feature.nunique() < 2).all():  # and not of an axis
             columns[name] = of_feature.first()

@@ -19,7 +19,7 @@ import pandas as pd
 import pyarrow as pa
 
 from kinacc.config import json_files
-from kinacc.errors import InputError, Problem
+from kinacc.errors import InputError, input_error
 from kinacc.measurements import robot_programs
 from kinacc.measurements.features import by_feature
 from kinacc.measurements.grid import Row, tabled
@@ -60,7 +60,7 @@ def load(path: str | Path, layout: Layout | None = None, source: str | None = No
             sheet = layout.sheet or book.sheets[0]
             if sheet not in book.sheets:
                 where = f"{path}: measurements.file.sheet"
-                raise InputError(Problem(where, f"no sheet {sheet!r}", ", ".join(book.sheets)))
+                raise input_error(where, f"no sheet {sheet!r}", ", ".join(book.sheets))
             table = tabled(f"{path}, sheet {sheet!r}", book.rows(sheet), layout, sheet=True)
     else:
         refuse_large(path)
@@ -89,10 +89,10 @@ def refuse_other_files(path: Path, source: str | None = None) -> None:
     """Raise InputError where there is no file, or one that is none of those that are read."""
     if not path.is_file():
         origin = f"the data comes from: {source}" if source else "check measurements.file.path"
-        raise InputError(Problem(str(path), "no such file", _KINDS, origin))
+        raise input_error(str(path), "no such file", _KINDS, origin)
     if kind := _OTHERS.get(path.suffix.lower()):
         fix = "save it as .xlsx or export it as CSV"
-        raise InputError(Problem(str(path), f"is {kind}, which is not read", _KINDS, fix))
+        raise input_error(str(path), f"is {kind}, which is not read", _KINDS, fix)
 
 
 def opened(path: Path, encoding: str) -> TextIO:
@@ -104,7 +104,7 @@ def opened(path: Path, encoding: str) -> TextIO:
 def _refuse_too_much(path: str, amount: str) -> None:
     allowed = f"at most {MOST_ROWS} rows, {MOST_COLUMNS} columns, {MOST_CELLS} cells, 500 MB"
     fix = "give the rows and columns of the measurements alone"
-    raise InputError(Problem(path, amount, allowed, fix))
+    raise input_error(path, amount, allowed, fix)
 
 
 def _refuse_shape(path: str, rows: int, columns: int, cells: int) -> None:
@@ -139,7 +139,7 @@ def rows_of_lines(lines: Iterable[str], delimiter: str, path: str) -> Iterator[R
     except csv.Error as error:
         where = f"{path}: line {reader.line_num}"
         allowed = "cells of at most 131072 characters, each quotation mark with its second"
-        raise InputError(Problem(where, f"cannot be read: {error}", allowed)) from None
+        raise input_error(where, f"cannot be read: {error}", allowed) from None
 
 
 def _limited(rows: Iterable[Row], path: str) -> Iterator[Row]:
@@ -171,7 +171,7 @@ class Workbook:
         sheets = self._file.book.worksheets
         self.sheets = [sheet.title for sheet in sheets if sheet.sheet_state == "visible"]
         if not self.sheets:
-            raise InputError(Problem(self.path, "has no sheet with cells", "a sheet with a table"))
+            raise input_error(self.path, "has no sheet with cells", "a sheet with a table")
 
     def __enter__(self) -> Workbook:
         return self
@@ -200,7 +200,7 @@ class Workbook:
             if file.read(4) == b"\xd0\xcf\x11\xe0":
                 reason = "it is locked by a password, or of the old Excel format under a new name"
         message = f"cannot be read as a workbook: {reason}"
-        return InputError(Problem(self.path, message, "an .xlsx file", "save it as .xlsx or CSV"))
+        return input_error(self.path, message, "an .xlsx file", "save it as .xlsx or CSV")
 
 
 def _cell(value: object) -> object:
@@ -220,9 +220,9 @@ def _of_parquet(path: Path) -> RawTable:
     _refuse_shape(where, rows, table.num_columns, rows * table.num_columns)
     names = table.column_names
     if doubled := sorted({name for name in names if names.count(name) > 1}):
-        raise InputError(Problem(where, f"column names given twice: {', '.join(doubled)}"))
+        raise input_error(where, f"column names given twice: {', '.join(doubled)}")
     if not rows:
-        raise InputError(Problem(where, "the table has no rows", "at least one row"))
+        raise input_error(where, "the table has no rows", "at least one row")
     columns, units = {}, {}
     for field, column in zip(table.schema, table.columns, strict=True):
         cells = [f"<{field.type}>"] * rows
@@ -246,5 +246,5 @@ def _of_json(path: Path) -> RawTable:
         columns = {name: [row.get(name) for row in rows] for name in rows[0]}
     except (ValueError, KeyError, IndexError, TypeError, AttributeError, RecursionError):
         allowed = "a table of rows, as commands write with -o NAME.json"
-        raise InputError(Problem(str(path), "holds no rows", allowed)) from None
+        raise input_error(str(path), "holds no rows", allowed) from None
     return RawTable(str(path), frame(columns), np.arange(1, len(rows) + 1))

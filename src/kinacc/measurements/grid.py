@@ -97,8 +97,8 @@ def tabled(path: str, rows: Iterable[Row], layout: Layout, sheet: bool = False) 
     names = header_cells(head, max((len(cells) for _, cells in readings[:4]), default=0))
     width = len(names)
     readings = [(n, c if len(c) <= width or filled(c[width:]) else c[:width]) for n, c in readings]
-    again = [row for row in readings if row[1][0] == names[0] and [*map(str, row[1])] == names]
-    readings = [row for row in readings if row not in again] if again else readings
+    again = [row for row in readings if row[1] == names]
+    readings = [row for row in readings if row[1] != names]
     while len(readings) > 1 and _is_text(readings[-1][1], width):
         again.append(readings.pop())
     aside = sorted([*aside, *again], key=lambda row: row[0])

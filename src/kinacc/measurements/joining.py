@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from kinacc.config.measured import JointsFile
-from kinacc.errors import InputError, Problem, first_few, refuse
+from kinacc.errors import Problem, first_few, input_error, refuse
 from kinacc.measurements.intake import columns
 from kinacc.measurements.table import RawTable
 from kinacc.measurements.times import STILL_RAD, seconds
@@ -38,7 +38,7 @@ def joined(points: RawTable, joints: RawTable, how: JointsFile) -> RawTable:
     )
     if how.by == ORDER and len(points) != len(joints):
         message = f"{len(points)} rows, and {len(joints)} rows of joints in {joints.path}"
-        raise InputError(Problem(points.path, message, "as many of both to join them by order"))
+        raise input_error(points.path, message, "as many of both to join them by order")
     moving = np.zeros(len(points), dtype=bool)
     if how.by == NAME:
         row = rows_by_name(points, joints, key, key_of_points)
@@ -49,7 +49,7 @@ def joined(points: RawTable, joints: RawTable, how: JointsFile) -> RawTable:
     there = np.flatnonzero(row >= 0)
     if not there.size:
         message = f"no row belongs to any of {joints.path}, joined by {how.by}"
-        raise InputError(Problem(points.path, message, fix="correct measurements.file.joints"))
+        raise input_error(points.path, message, fix="correct measurements.file.joints")
     notes = [_left_out(points, (row < 0) & ~moving, key_of_points, joints)]
     if how.by == NAME:
         notes.append(_left_out(joints, ~np.isin(np.arange(len(joints)), row), key, points))
@@ -104,7 +104,7 @@ def rows_by_name(points: RawTable, joints: RawTable, key: str, key_of_points: st
     doubled = np.flatnonzero(names.duplicated(keep=False) & (names != "") & apart)
     if doubled.size:
         message = "a name stands for several rows of joints"
-        raise InputError(Problem(joints.where(key, doubled), message, "a name for every pose"))
+        raise input_error(joints.where(key, doubled), message, "a name for every pose")
     first = names[~names.duplicated() & (names != "")]
     return pd.Series(first.index, index=first).reindex(here).fillna(-1).to_numpy(int)
 

@@ -2,7 +2,7 @@
 
 A quantity of a row is ``q1``, ``q1_cmd`` (as commanded), ``s1``, ``pose``, ``repeat``, ``target``,
 ``session``, ``temperature``, ``payload`` or ``payload_x``. A quantity of a target is ``x``, ``rx``,
-``qw``, ``std_x``, ``cov_xy`` and the like, alone or behind the target's name (``mA_x``). A column
+``qw``, ``std_x`` and the like, alone or behind the target's name (``mA_x``). A column
 of the file carries the unit in its name (``q1_deg``, ``mA_x_mm``), or is mapped to our name and
 then has the layout's unit. A name that says another unit than the layout is refused, and a point
 that its name calls nominal, a deviation or an uncertainty is read only where ``targets`` or
@@ -23,14 +23,12 @@ from kinacc.config.fields import Section
 from kinacc.config.measured import (
     ANGLES,
     ANGLES_IN_ORDER,
-    COVARIANCE,
     PAYLOAD,
     POINT,
     POSITION,
     QUATERNION,
     QUATERNION_IN_ORDER,
     STD,
-    STD_TURN,
     Directions,
     JointsFile,
     MeasuredFile,
@@ -49,12 +47,10 @@ ANGLE = {"deg": np.pi / 180.0, "rad": 1.0}
 LENGTH = {"mm": 1.0, "m": 1000.0, "cm": 10.0, "inch": 25.4}
 # By so much may a quantity given in two units differ: rounding to the digits commands show.
 _ROUNDED_RAD, _ROUNDED_MM = 1e-6, 1e-3
-_AREA = {f"{unit}2": factor**2 for unit, factor in LENGTH.items()}
 _CELSIUS = ({"c": 1.0, "C": 1.0}, "C", "")
 _SINGLE = {"temperature": _CELSIUS, "temp": _CELSIUS, "payload": ({"kg": 1.0}, "kg", "")}
 
 JOINTS = "joints"
-_TURNS = (*ANGLES, *ANGLES_IN_ORDER, *STD_TURN)
 # The longest quantity counts: mA_std_x is no x of a target named mA_std.
 _OF_TARGET = re.compile(rf"(?:(.*?)_)??({'|'.join(POINT)})", re.DOTALL)
 _NAMES = ("pose", "repeat", "target", "session")
@@ -95,16 +91,13 @@ class Place:
 class Target:
     """Columns of a target: position always, the rest where the file has it (else empty).
 
-    ``turn`` are the orientation's columns in the order its kind is read in; ``std``, ``std_turn``
-    and ``covariance`` as ``STD``, ``STD_TURN`` and ``COVARIANCE``.
+    ``turn`` are the orientation's columns in the order its kind is read in; ``std`` as ``STD``.
     """
 
     name: str
     position: tuple[Place, ...]
     turn: tuple[Place, ...] = ()
     std: tuple[Place, ...] = ()
-    std_turn: tuple[Place, ...] = ()
-    covariance: tuple[Place, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -198,10 +191,8 @@ class _Finder:
             return LENGTH, layout.length_unit, "length_unit"
         if re.fullmatch(r"q\d(?:_cmd)?", quantity):
             return ANGLE, layout.joint_unit, "" if layout.pulses_per_deg else "joint_unit"
-        if part in _TURNS:
+        if part in (*ANGLES, *ANGLES_IN_ORDER):
             return ANGLE, layout.orientation.unit, "orientation.unit"
-        if part in COVARIANCE:
-            return _AREA, f"{layout.length_unit}2", ""
         return _SINGLE.get(quantity, ({"": 1.0}, "", ""))
 
     def place(self, name: str) -> Place | None:
@@ -286,15 +277,9 @@ class _Finder:
         """Columns of a target; ``alone`` it must have an orientation, where there is a kind."""
         is_plain = "x" in self.layout.columns or not self.place(f"{TOOL}_x")
         prefix = "" if name == TOOL and is_plain else f"{name}_"
-        position, std, std_turn, covariance = (
-            self.group([f"{prefix}{part}" for part in group], group is POSITION and required)
-            for group in (POSITION, STD, STD_TURN, COVARIANCE)
-        )
-        if std and covariance:
-            names = ", ".join(place.column for place in (*std, *covariance))
-            self.problem(names, "standard deviations and a covariance", "one of them")
-        turn = self._turn(prefix, alone and required)
-        return Target(name, position, turn, std, std_turn, covariance)
+        position = self.group([f"{prefix}{part}" for part in POSITION], required)
+        std = self.group([f"{prefix}{part}" for part in STD])
+        return Target(name, position, self._turn(prefix, alone and required), std)
 
     def _turn(self, prefix: str, alone: bool) -> tuple[Place, ...]:
         turn = self.layout.orientation

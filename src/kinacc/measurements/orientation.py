@@ -1,4 +1,4 @@
-"""Measured orientations of every kind as quaternions, and what their angles' noise means."""
+"""Measured orientations of every kind as rotations and quaternions."""
 
 from __future__ import annotations
 
@@ -7,8 +7,6 @@ from scipy.spatial.transform import Rotation
 
 from kinacc.config.measured import Orientation
 from kinacc.geometry import exp_so3, rotation_from_quaternion
-
-_STEP_RAD = 1e-5
 
 
 def quaternions(turns: np.ndarray, orientation: Orientation) -> np.ndarray:
@@ -40,18 +38,3 @@ def rotations(turns: np.ndarray, orientation: Orientation) -> np.ndarray:
 def euler(angles_rad: np.ndarray, convention: str) -> np.ndarray:
     """Rotations (n, 3, 3) of angles (n, 3); capitals intrinsic, small letters extrinsic."""
     return Rotation.from_euler(convention, angles_rad).as_matrix().reshape(-1, 3, 3)
-
-
-def rotation_std(turns: np.ndarray, std: np.ndarray, orientation: Orientation) -> np.ndarray:
-    """Standard deviations (n, 3) of the rotation vector w of ``exp(w) R``, instrument's frame.
-
-    ``std`` (n, 3): of its angles or rotation vector components, taken as independent. By central
-    differences, to 1e-9 of their size.
-    """
-    variance = np.zeros((len(turns), 3))
-    for part, step in enumerate(_STEP_RAD * np.eye(3)):
-        ahead, behind = (Rotation.from_matrix(rotations(turns + sign * step, orientation))
-                         for sign in (1.0, -1.0))  # fmt: skip
-        slope = (ahead * behind.inv()).as_rotvec() / (2.0 * _STEP_RAD)
-        variance += (slope * std[:, part, None]) ** 2
-    return np.sqrt(variance)

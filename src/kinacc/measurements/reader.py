@@ -10,25 +10,21 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from kinacc.config.measured import QUATERNION, STD, JointsFile
-from kinacc.errors import InputError, Problem, gathered, refuse
+from kinacc.config.measured import QUATERNION, JointsFile
+from kinacc.errors import Problem, gathered, input_error, refuse
 from kinacc.kinematics.model import PAYLOAD_COLUMNS
 from kinacc.kinematics.robot import Robot
 from kinacc.measurements import faults
 from kinacc.measurements.files import load
 from kinacc.measurements.joining import AGAIN, joined
 from kinacc.measurements.layout import TABLE, FileColumns, Layout, Place, Target, find
-from kinacc.measurements.orientation import quaternions, rotation_std
+from kinacc.measurements.orientation import quaternions
 from kinacc.measurements.row_names import RowNames
 from kinacc.measurements.table import RawTable, numbers
 from kinacc.tables.columns import Columns
 
 POSITION = ("x_mm", "y_mm", "z_mm")
-UNCERTAINTY = (
-    *(f"{name}_mm" for name in STD),
-    *("corr_xy", "corr_xz", "corr_yz"),
-    *("std_rx_rad", "std_ry_rad", "std_rz_rad"),
-)
+UNCERTAINTY = ("std_x_mm", "std_y_mm", "std_z_mm")
 _LARGEST_WHOLE = 2.0**53  # beyond, neighbours are the same number
 _MOST_WITHOUT_JOINTS = 0.2  # of the points; beyond, joints may stand for the rows below them
 
@@ -101,9 +97,9 @@ def _loaded(section: Mapping[str, Any]) -> RawTable:
     if absent:
         message = f"line{'s' * (len(absent) > 1)} {', '.join(map(str, absent))} hold no reading"
         allowed = f"lines {table.line[0]} to {table.line[-1]} of {table.path}"
-        raise InputError(Problem(where, message, allowed))
+        raise input_error(where, message, allowed)
     if len(excluded) == len(table):
-        raise InputError(Problem(where, f"every row of {table.path} is excluded", "some of them"))
+        raise input_error(where, f"every row of {table.path} is excluded", "some of them")
     joints = section.get("joints") or {}
     if not joints.get("path"):
         return table
@@ -209,40 +205,22 @@ def _target(
     part = {"there": ~gaps.all(axis=1) & ~void, "void": void, "target": target.name}
     part |= dict(zip(POSITION, position.T, strict=True))
     part |= dict(zip(QUATERNION, quaternions(turn, layout.orientation).T, strict=True))
-    part |= _uncertainty(table, target, turn, layout, problems)
+    part |= _uncertainty(table, target, layout, problems)
     return part | {f"turn {number}": values for number, values in enumerate(turn.T)}
 
 
 def _uncertainty(
-    table: RawTable, target: Target, turn: np.ndarray, layout: Layout, problems: list[Problem]
+    table: RawTable, target: Target, layout: Layout, problems: list[Problem]
 ) -> dict[str, np.ndarray]:
-    """Standard deviations and correlations (n,) of a target, NaN where the file has none."""
-
-    def spread(places: Sequence[Place]) -> np.ndarray:
-        std = stacked(table, places, problems) / layout.sigma
-        for place, values in zip(places, std.T, strict=True):
-            message = f"standard deviation {np.nanmin(values, initial=0.0) / place.factor:g}"
-            problems.extend(faults.of_rows(table, [place], values < 0.0, message, "0 or above"))
-        return np.where(std > 0.0, std, np.nan)  # a zero states nothing
-
-    values = np.full((9, len(table)), np.nan)
+    """Standard deviations (n,) of a target, NaN where the file has none."""
+    std = np.full((len(table), 3), np.nan)
     if target.std:
-        values[:3] = spread(target.std).T
-    if target.covariance:
-        elements = stacked(table, target.covariance, problems)
-        matrix = elements[:, [0, 1, 2, 1, 3, 4, 2, 4, 5]].reshape(-1, 3, 3)
-        problems += faults.covariance_problems(table, matrix, target.covariance)
-        with np.errstate(invalid="ignore"):
-            values[:3] = np.sqrt(elements[:, [0, 3, 5]]).T
-            values[3:6] = elements[:, [1, 2, 4]].T / values[[0, 0, 1]] / values[[1, 2, 2]]
-    if target.std_turn and target.turn and layout.orientation.kind != "quaternion":
-        std = spread(target.std_turn)
-        axes = layout.orientation.convention.lower()
-        if layout.orientation.kind == "euler" and len({*axes}) == 3:
-            std = std[:, ["xyz".index(axis) for axis in axes]]
-        there = np.isfinite(turn).all(axis=1) & np.isfinite(std).all(axis=1)
-        values[6:, there] = rotation_std(turn[there], std[there], layout.orientation).T
-    return dict(zip(UNCERTAINTY, values, strict=True))
+        std = stacked(table, target.std, problems) / layout.sigma
+    for place, values in zip(target.std, std.T, strict=False):
+        message = f"standard deviation {np.nanmin(values, initial=0.0) / place.factor:g}"
+        problems += faults.of_rows(table, [place], values < 0.0, message, "0 or above")
+    std = np.where(std > 0.0, std, np.nan)  # a zero states nothing
+    return dict(zip(UNCERTAINTY, std.T, strict=True))
 
 
 def _shared(

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from kinacc.errors import InputError, Problem, first_few
+from kinacc.errors import first_few, input_error
 from kinacc.measurements.table import RawTable, frame
 
 _SUFFIXES = (".mod", ".sys", ".prg", ".dat", ".src", ".ls", ".jbi", ".txt", "")
@@ -61,7 +61,7 @@ def read(path: Path) -> RawTable | None:
         allowed = "joint positions: jointtarget, E6AXIS, J1 .. J6 of P[n], pulses of a job"
         fix = "record the joints at each pose, or give the points alone with a file of joints"
         message = f"holds {len(cartesian)} {_TARGETS}"
-        raise InputError(Problem(str(path), message, allowed, fix))
+        raise input_error(str(path), message, allowed, fix)
     names = _NAMES.get(maker, [f"J{number} [deg]" for number in range(1, 8)])
     notes = [_HORIZONTAL] if maker is _of_fanuc else []
     notes += [f"{path}: {first_few(cartesian)}: {_TARGETS}"] if cartesian else []
@@ -70,7 +70,7 @@ def read(path: Path) -> RawTable | None:
     odd = (widths != widths.min()) | (widths < 4) | (widths > 7)
     if odd.any():
         where = f"{path}: lines {first_few([*lines[odd]])}"
-        raise InputError(Problem(where, "another number of joints", "4 to 7, the same in all"))
+        raise input_error(where, "another number of joints", "4 to 7, the same in all")
     columns = {"name": [name for name, _, _ in rows]}
     columns |= {names[n]: [repr(joints[n]) for _, _, joints in rows] for n in range(widths[0])}
     return RawTable(str(path), frame(columns), lines, notes=tuple(notes))

@@ -11,7 +11,7 @@ import numpy as np
 
 from kinacc.config.measured import POSITION, Orientation
 from kinacc.config.names import of_csv
-from kinacc.errors import InputError, Problem, refuse
+from kinacc.errors import Problem, input_error, refuse
 from kinacc.geometry import Pose
 from kinacc.measurements import faults
 from kinacc.measurements.intake import pairs
@@ -178,7 +178,7 @@ def _plain_layout(table: RawTable, need: str) -> Layout:
              if names & {name, f"{name}_deg", f"{name}_rad"}]  # fmt: skip
     if len(kinds) > 1:
         message = "is given in more than one form"
-        raise InputError(Problem(f"{table.path}: orientation", message, "one form"))
+        raise input_error(f"{table.path}: orientation", message, "one form")
     kind = next(iter(kinds), "none")
     unit = "rad" if "rvx_rad" in table.columns else "deg"
     vector = {f"r{axis}": f"rv{axis}_{unit}" for axis in "xyz"}

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from kinacc.config.measured import Directions
-from kinacc.errors import InputError, Problem, refuse
+from kinacc.errors import Problem, input_error, refuse
 from kinacc.measurements.column_names import MEASURED, PLAIN, REPORTED, WORDS, Name, name_of, role
 from kinacc.measurements.intake.choices import Answers, Choice, Undecided
 from kinacc.measurements.layout import LENGTH
@@ -77,7 +77,7 @@ def directions_of(
     if wrong := sorted(units - {*PER_UNIT} | lengths):
         where = f"{table.path}: columns {', '.join(n for r in readings for n in r.names)}"
         allowed = ", ".join((*PER_UNIT, *LENGTH))
-        raise InputError(Problem(where, f"are in {' and '.join(wrong)}", allowed))
+        raise input_error(where, f"are in {' and '.join(wrong)}", allowed)
     horizontal, vertical, _ = first.names
     if re.search(r"\bgra(d|de|ds|des)\b", f"{horizontal} {vertical}".lower()):
         units = set()  # grad is gon in one language and degrees in another

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from kinacc.errors import InputError, Problem
+from kinacc.errors import input_error
 from kinacc.tables import store
 from kinacc.tables.columns import (
     BY_POSES,
@@ -74,7 +74,7 @@ def compare_folders(before: Path, now: Path) -> Iterator[Difference]:
     """
     paths = sorted(before.rglob("*.parquet"))
     if not paths:
-        raise InputError(Problem(str(before), "holds no table", "a folder of results"))
+        raise input_error(str(before), "holds no table", "a folder of results")
     for path in paths:
         name = path.relative_to(before)
         if (now / name).is_file():

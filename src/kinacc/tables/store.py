@@ -15,7 +15,7 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from kinacc.errors import InputError, Problem, first_few, refuse
+from kinacc.errors import InputError, Problem, first_few, input_error, refuse
 from kinacc.tables import sums
 from kinacc.tables.atomic import write_whole
 from kinacc.tables.columns import (
@@ -210,7 +210,7 @@ def read(path: Path | str, any_type: bool = False) -> Columns:
         return columns_in(read_arrow(path, any_type=any_type))
     except (OverflowError, ValueError) as error:  # a day that no calendar has
         message = f"not a readable Parquet file: {error}"
-        raise InputError(Problem(str(path), message, fix=remake(path))) from None
+        raise input_error(str(path), message, fix=remake(path)) from None
 
 
 def columns_in(table: pa.Table) -> Columns:
@@ -254,7 +254,7 @@ def read_arrow(path: Path | str, content: bytes | None = None, any_type: bool = 
             held += max(batch.nbytes, 8 * batch.num_rows * len(schema))
             if held > _MOST_BYTES:
                 message = f"holds more than {_MOST_BYTES // 1_000_000} MB"
-                raise InputError(Problem(str(path), message, "a smaller table"))
+                raise input_error(str(path), message, "a smaller table")
         return pa.Table.from_batches(batches, schema)
 
 
@@ -284,20 +284,18 @@ def _opened(path: Path | str, content: bytes | None = None) -> Iterator[pq.Parqu
     """A Parquet file; what is wrong with it, within the block too, becomes an InputError."""
     try:
         if content is None and os.path.exists(path) and not os.path.isfile(path):
-            raise InputError(
-                Problem(str(path), "is no file", "a Parquet file")
-            )  # a pipe has no end
+            raise input_error(str(path), "is no file", "a Parquet file")  # a pipe has no end
         source = path if content is None else pa.BufferReader(content)
         with pq.ParquetFile(source, page_checksum_verification=True) as file:
             yield file
     except InputError as error:
         raise InputError([replace(item, fix=remake(path)) for item in error.problems]) from None
     except FileNotFoundError:
-        raise InputError(Problem(str(path), "no such file", fix=remake(path))) from None
+        raise input_error(str(path), "no such file", fix=remake(path)) from None
     except (pa.ArrowException, OSError, ValueError, OverflowError) as error:
         reason = (str(error) or type(error).__name__).splitlines()[0]
         message = f"not a readable Parquet file: {reason}"
-        raise InputError(Problem(str(path), message, fix=remake(path))) from None
+        raise input_error(str(path), message, fix=remake(path)) from None
 
 
 def rows(mask: np.ndarray) -> str:

@@ -115,7 +115,7 @@ def recognise(
     joints = choice.joints()
     points = choice.points(joints)
     turns = choice.turns(points) if answers.get("orientation") != "none" else {}
-    spreads = choice.spreads(points, turns)
+    spreads = choice.spreads(points)
     targets = {
         point.target: point.columns
         | (turns[point.target].columns if point.target in turns else {})
@@ -286,33 +286,28 @@ class _Choice:
         about = f"the names do not tell the orientation measured with {point.target}"
         return self._ask(about, rest, without=True)
 
-    def spreads(
-        self, points: Sequence[Group], turns: dict[str, Group]
-    ) -> dict[str, dict[str, Name]]:
-        """Standard deviations by target, in the unit of the values that they belong to."""
+    def spreads(self, points: Sequence[Group]) -> dict[str, dict[str, Name]]:
+        """Standard deviations by target, in the unit of the point that they belong to."""
         spreads: dict[str, dict[str, Name]] = {}
         unclear: list[Group] = []
         for group in sorted(self._of(UNCERTAINTY), key=lambda g: g.weak):
             point = next((p for p in points if p.target == group.target), None)
             point = point or (points[0] if len(points) == 1 and group.target == TOOL else None)
-            values = turns.get(point.target) if point and "std_rx" in group.columns else point
             terms = {term for name in group.columns.values() for term in name.terms}
             not_meant = self.sigma == "none" or not terms & WORDS["uncertainties"]
             if (
                 point is None
-                or values is None
                 or (group.weak and not_meant)
-                or values.turn[0] == "quaternion"
-                or values.role in _NOT_MEASURED
-                or group.units != values.units
-                or {*group.columns} & {*spreads.get(point.target, {})}
+                or point.role in _NOT_MEASURED
+                or group.units != point.units
+                or point.target in spreads
             ):
                 continue
             covered = self.sigma or all(n.coverage for n in group.columns.values())
             if group.weak and not covered:
                 unclear.append(group)
             else:
-                spreads.setdefault(point.target, {}).update(group.columns)
+                spreads[point.target] = group.columns
         if unclear:
             names = ", ".join(group.text for group in unclear)
             meant = {"1": "one standard deviation", "2": "two", "none": "not read"}

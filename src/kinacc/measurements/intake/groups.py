@@ -109,12 +109,10 @@ def all_groups(names: Sequence[Name], values: Values | None = None) -> list[Grou
         for terms, _, columns in _alike(names, "|".join(letters)):
             # Single letters are angles beside x, y, z alone.
             if len(columns) == 3 and (len(letters[0]) > 1 or terms in points):
-                spread = role(terms) == SPREAD
-                turned = {f"{'std_' * spread}r{axis}": columns[letter]
+                turned = {f"r{axis}": columns[letter]
                           for axis, letter in zip("xyz", letters, strict=True)}  # fmt: skip
-                target, kind = _target(columns[letters[0]], terms), UNCERTAINTY if spread else TURN
-                turn = ("euler", convention)
-                groups.append(Group(kind, role(terms), target, turned, turn, True))
+                target, turn = _target(columns[letters[0]], terms), ("euler", convention)
+                groups.append(Group(TURN, role(terms), target, turned, turn))
     for name in names:
         if WORDS["radius"] & {*name.terms}:  # open where the points may be no centres
             known = OPEN if WORDS["not_corrected"] & {*name.terms} else OTHER
@@ -229,9 +227,9 @@ def _by_axis(names: Sequence[Name]) -> Iterator[Group]:
                 yield Group(TURN, known, target, columns, ("quaternion", "XYZ"))
             continue
         is_turn = is_turn or (bool(units) and units <= {*ANGLE})
-        before = "std_" * (known == SPREAD) + "r" * is_turn
+        kind = TURN if is_turn else UNCERTAINTY if known == SPREAD else POINT
+        before = {TURN: "r", UNCERTAINTY: "std_", POINT: ""}[kind]
         columns = {f"{before}{axis}": axes[axis] for axis in "xyz"}
-        kind = UNCERTAINTY if known == SPREAD else TURN if is_turn else POINT
         turn = "rotation_vector" if vector else "euler" if kind == TURN else "none"
         # One standard deviation is no interval, and no multiple of it.
         sigma = about & WORDS["one_sigma"] or {"standard", "deviation"} <= about

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from kinacc.config.measured import CONVENTIONS
-from kinacc.errors import InputError, Problem, refuse
+from kinacc.errors import Problem, input_error, refuse
 from kinacc.measurements.column_names import NOMINAL, Name
 from kinacc.measurements.faults import BEYOND, is_no_coordinate, none_read
 from kinacc.measurements.intake import pairs, targets_in_rows
@@ -218,7 +218,7 @@ class _Guesser:
         per_deg = numbers_of(answer)
         if len(per_deg) != len(joints) or not per_deg.all():
             allowed = f"{len(joints)} numbers parted by commas, none 0"
-            raise InputError(Problem("--pulses-per-deg", repr(answer), allowed))
+            raise input_error("--pulses-per-deg", repr(answer), allowed)
         return per_deg.tolist()
 
     def no_reading(self) -> None:
@@ -230,7 +230,7 @@ class _Guesser:
         self.void = {*numbers_of(answer).tolist()}
         if answer.strip(" ,") and not self.void:
             allowed = "a number such as 9999.999, or none"
-            raise InputError(Problem("--no-reading", f"{answer!r} is no number", allowed))
+            raise input_error("--no-reading", f"{answer!r} is no number", allowed)
         for name, target in self.columns.targets.items():
             columns = [self.table.values(target[axis].column) for axis in "xyz"]
             points = np.stack(columns, axis=1)
@@ -299,7 +299,7 @@ class _Guesser:
         if (answer := self.answers.get("orientation")) is not None:
             if answer not in _ORIENTATIONS:
                 allowed = ", ".join(_ORIENTATIONS)
-                raise InputError(Problem("--orientation", repr(answer), allowed))
+                raise input_error("--orientation", repr(answer), allowed)
             return section | _ORIENTATIONS[answer]
         if kind == "euler":
             text = f"the orientations are Euler angles of convention {convention}"
@@ -321,7 +321,7 @@ class _Guesser:
             message = f"not all of {columns} are so many standard deviations"
             where = f"--sigma {answer}" if answer else self.looked.path
             fix = "give --sigma none, which reads none of them"
-            raise InputError(Problem(where, message, "one number for all of them", fix))
+            raise input_error(where, message, "one number for all of them", fix)
         return max(numbers, default=1)
 
 

@@ -10,12 +10,11 @@ from pathlib import Path
 import numpy as np
 
 from kinacc.config.measured import JointsFile, Written
-from kinacc.errors import InputError, Problem, gathered, refuse
-from kinacc.measurements.column_names import OTHER, WORDS, name_of
+from kinacc.errors import Problem, gathered, input_error, refuse
+from kinacc.measurements.column_names import WORDS, Name, name_of
 from kinacc.measurements.files import EXCEL
 from kinacc.measurements.intake import columns, text
 from kinacc.measurements.intake.choices import Answers, Choice, Undecided
-from kinacc.measurements.intake.groups import Group
 from kinacc.measurements.intake.text import Looked
 from kinacc.measurements.joining import (
     NAME,
@@ -42,11 +41,10 @@ def look(path: str | Path | Sequence[str | Path], answers: Answers, wanted: bool
     """
     paths = [path] if isinstance(path, (str, Path)) else [*path]
     sheets = _sheets(Path(paths[0]), answers) if len(paths) == 1 else []
+    sources = [(paths[0], {**answers, "sheet": sheet}) for sheet in sheets]
     files = []
-    for name, sheet in zip(
-        2 * paths if sheets else paths, sheets or [""] * len(paths), strict=True
-    ):
-        looked = text.look(name, {**answers, "sheet": sheet} if sheet else answers)
+    for name, stated in sources or [(name, answers) for name in paths]:
+        looked = text.look(name, stated)
         meaning = columns.of_table(looked.table, answers, wanted)
         files.append(replace(looked, columns=meaning))
     return files[0] if len(files) == 1 else _together(files, answers)
@@ -73,23 +71,21 @@ def _together(files: Sequence[Looked], answers: Answers) -> Looked:
         paths = " and ".join(file.table.path for file in files)
         message = "joints are not in one of them, and measured points in the other"
         fix = "name the columns q1_deg .. and x_mm, y_mm, z_mm"
-        raise InputError(Problem(paths, message, fix=fix))
+        raise input_error(paths, message, fix=fix)
     joints, points = holding[0], others[0]
     how, notes = _join(joints, points, answers)
-    names = {n.column: replace(n, column=beside_name(n.column, points.table))
-             for n in columns.names_in(joints.table)}  # fmt: skip
-    read = (*joints.columns.joints, *joints.columns.commanded)
-    used = {*(name.column for name in read), how.key}
-    spare = [Group("", OTHER, "", {c: name}) for c, name in names.items() if c not in used]
+
+    def beside(name: Name) -> Name:
+        return replace(name, column=beside_name(name.column, points.table))
+
     questions = [q for file in (joints, points) for q in file.columns.questions
                  if q.about.startswith(columns.ABOUT_JOINTS) == (file is joints)]  # fmt: skip
-    pose = {"pose": names[how.key]} if how.by == NAME and how.key else {}
+    pose = {"pose": beside(name_of(how.key))} if how.by == NAME and how.key else {}
     meaning = replace(
         points.columns,
-        joints=tuple(names[name.column] for name in joints.columns.joints),
-        commanded=tuple(names[name.column] for name in joints.columns.commanded),
+        joints=tuple(map(beside, joints.columns.joints)),
+        commanded=tuple(map(beside, joints.columns.commanded)),
         single=points.columns.single | pose,
-        aside=(*points.columns.aside, *spare),
         questions=tuple(questions),
     )
     written = joints.written.model_dump(include={*Written.model_fields})
@@ -119,7 +115,7 @@ def _join(joints: Looked, points: Looked, answers: Answers) -> tuple[JointsFile,
         raise _undecided(joints, points, [])
     message = f"its {len(points.table)} points belong to unknown rows of {joints.table.path}"
     fix = "add a column with the names of poses, or with times, to both; --join A=B names them"
-    raise InputError(Problem(points.table.path, message, fix=fix))
+    raise input_error(points.table.path, message, fix=fix)
 
 
 def _by_name(key: str, key_of_points: str) -> JointsFile:
@@ -198,7 +194,7 @@ def _by_clock(
     try:
         offset_s = float(answer)
     except ValueError:
-        raise InputError(Problem("--clock-offset", repr(answer), "seconds")) from None
+        raise input_error("--clock-offset", repr(answer), "seconds") from None
     how = JointsFile.model_construct(
         by="time", key=key, key_of_points=key_of_points, clock_offset_s=offset_s, within_s=within
     )

@@ -8,7 +8,7 @@ from itertools import combinations
 import numpy as np
 import pandas as pd
 
-from kinacc.errors import InputError, Problem
+from kinacc.errors import input_error
 from kinacc.measurements.column_names import WORDS, name_of
 from kinacc.measurements.intake.columns import NamedColumns
 from kinacc.measurements.intake.groups import RADIUS, keeps_distance
@@ -50,7 +50,7 @@ def with_targets(
             wrong = _are_apart(point_mm, of_radius) or len({*size}) > _MOST_TARGETS
         if wrong:
             message = "the radius of the reflectors changes, so that their centres lie elsewhere"
-            raise InputError(Problem(table.where(radius), message, _ALLOWED))
+            raise input_error(table.where(radius), message, _ALLOWED)
         return columns if target else _with_target(columns, radius)
     if target or not _are_apart(point_mm, pose):
         return columns
@@ -62,7 +62,7 @@ def with_targets(
     if len(ways) != 1:
         known = f"{' and '.join(ways.values())} may name" if ways else "no column names"
         message = f"rows of equal joints lie over {_APART_MM:g} mm apart, and {known} their target"
-        raise InputError(Problem(table.path, message, _ALLOWED, "a column session names set-ups"))
+        raise input_error(table.path, message, _ALLOWED, "a column session names set-ups")
     return _with_target(columns, *ways.values())
 
 

@@ -11,7 +11,7 @@ from io import StringIO
 from pathlib import Path
 from typing import Any
 
-from kinacc.errors import InputError, Problem, first_few
+from kinacc.errors import first_few, input_error
 from kinacc.measurements import robot_programs
 from kinacc.measurements.column_names import name_of
 from kinacc.measurements.features import report_of
@@ -133,7 +133,7 @@ def _text(path: Path, answers: Answers) -> _Written:
             and (head := heads.head_of(split[d], d)) is not None and head.width > 1}  # fmt: skip
     if not tops:
         message = "no line of column names above rows of numbers was found"
-        raise InputError(Problem(str(path), message, "columns parted by ; , tab or blanks"))
+        raise input_error(str(path), message, "columns parted by ; , tab or blanks")
     best = max(tops, key=lambda d: (tops[d].line > 0, scores[d], -DELIMITERS.index(d)))
     notes = [f"read as {encoding}"] if encoding != "utf-8" else []
     return Layout().but(delimiter=best, encoding=encoding), tops[best], split[best], notes
@@ -161,7 +161,7 @@ def _workbook(path: Path, answers: Answers) -> _Written:
     sheets, tables = _tables_of(path, answers.get("sheet"))
     if not tables:
         message = "no sheet has rows of numbers under names"
-        raise InputError(Problem(str(path), message, "a sheet with columns of joints and points"))
+        raise input_error(str(path), message, "a sheet with columns of joints and points")
     # Those that may be meant have several columns and rows, those of points x, y, z.
     large = [
         name
@@ -198,7 +198,7 @@ def _tables_of(
     tables: dict[str, tuple[Head, list[Row]]] = {}
     with Workbook(path) as book:
         if wanted is not None and wanted not in book.sheets:
-            raise InputError(Problem(f"--sheet {wanted}", "is not there", ", ".join(book.sheets)))
+            raise input_error(f"--sheet {wanted}", "is not there", ", ".join(book.sheets))
         for sheet in [wanted] if wanted else book.sheets:
             rows = book.rows(sheet, _LINES)
             head = heads.head_of(rows, "", sheet=True)
@@ -221,7 +221,7 @@ def _names_of(
         names = [name.strip() for name in answer.split(",")]
         if len(names) != head.width:
             message = f"{len(names)} names for {head.width} columns"
-            raise InputError(Problem(f"--names {answer}", message, f"{head.width} names"))
+            raise input_error(f"--names {answer}", message, f"{head.width} names")
     elif head.line:
         names = [*head.names] if head.names else None
         skipped = head.line if names else head.line - 1
@@ -234,9 +234,9 @@ def _names_of(
         if len(row) > 3 and len(filled(row)) == len(row) and not heads.numbers_in(row):
             message = f"{len(row)} names above rows of {head.width} cells"
             fix = "export decimal commas with ; or tab between the columns"
-            raise InputError(Problem(f"{path}: line {line}", message, "as many names", fix))
+            raise input_error(f"{path}: line {line}", message, "as many names", fix)
     fix = f"write a line of names above the numbers, or give --names with {head.width} names"
-    raise InputError(Problem(str(path), "the columns have no names", "one line of names", fix))
+    raise input_error(str(path), "the columns have no names", "one line of names", fix)
 
 
 def _point_names(rows: Sequence[Cells], stated: Mapping[str, str]) -> list[str]:
