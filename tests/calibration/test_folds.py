@@ -53,7 +53,7 @@ def test_a_label_of_one_fold_alone_must_train():
     fold = np.array([0, 0, 1, 1, 1, 1, 1, 1, 1])
     label = np.array(["a", "a", "a", "a", "a", "b", "b", "b", "b"])
     same = np.array([0, 1, 2, 3, 4, 5, 6, 7, 4])  # the last is the fifth visited again
-    found = folds.always_trained(fold, {"session": np.zeros(9), "target": label}, same)
-    assert [(group.kind, group.value) for group in found] == [("target", "a"), ("target", "b")]
-    np.testing.assert_array_equal(found[0].rows, [1, 1, 1, 1, 1, 0, 0, 0, 1])
-    np.testing.assert_array_equal(found[1].rows, [0, 0, 0, 0, 1, 1, 1, 1, 1])
+    found = [*folds.always_trained(fold, {"session": np.zeros(9), "target": label}, same)]
+    assert [names for *names, _ in found] == [["target", "a"], ["target", "b"]]
+    np.testing.assert_array_equal(found[0][2], [1, 1, 1, 1, 1, 0, 0, 0, 1])
+    np.testing.assert_array_equal(found[1][2], [0, 0, 0, 0, 1, 1, 1, 1, 1])

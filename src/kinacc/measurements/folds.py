@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
-from typing import Any, NamedTuple
+from collections.abc import Iterator, Mapping
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -36,30 +36,11 @@ def configurations(
     joints (n, k) agree within ``tolerance_rad`` in every joint, full turns apart (revisits). The
     relation is closed under chaining: no two configurations hold rows within the tolerance.
     """
-    return configurations_among(np.arange(len(pose)), pose, neighbours(q_rad, tolerance_rad))
-
-
-def neighbours(q_rad: np.ndarray, tolerance_rad: float = SAME_CONFIGURATION_RAD) -> np.ndarray:
-    """Pairs (m, 2) of rows whose joints (n, k) agree within ``tolerance_rad``, full turns apart."""
-    box: np.ndarray | None = None
-    if np.abs(q_rad).max(initial=0.0) >= np.pi - tolerance_rad:
-        box = np.full(q_rad.shape[1], 2.0 * np.pi)
-        q_rad = np.mod(q_rad, box) % box
-    tree = cKDTree(q_rad, boxsize=box)  # three times as fast where no two are full turns apart
-    return tree.query_pairs(tolerance_rad, p=np.inf, output_type="ndarray")
-
-
-def configurations_among(rows: np.ndarray, pose: np.ndarray, pairs: np.ndarray) -> np.ndarray:
-    """Configuration number (r,) of ``rows`` (r,) as if there were no others; ``pose`` (n,) of all.
-
-    ``pairs``: the ``neighbours`` of all rows, found once for many selections of them.
-    """
-    place = np.full(len(pose), -1)
-    place[rows] = np.arange(count := len(rows))
-    pairs = place[pairs].reshape(-1, 2)
-    _, first, rank = np.unique(pose[rows], return_index=True, return_inverse=True)
-    same_pose = np.stack([np.arange(count), first[rank]], axis=1)
-    links = np.concatenate([pairs[(pairs >= 0).all(axis=1)], same_pose])
+    turn, count = np.full(q_rad.shape[1], 2.0 * np.pi), len(pose)
+    tree = cKDTree(np.mod(q_rad, turn) % turn, boxsize=turn)
+    pairs = tree.query_pairs(tolerance_rad, p=np.inf, output_type="ndarray")
+    _, first, rank = np.unique(pose, return_index=True, return_inverse=True)
+    links = np.concatenate([pairs, np.stack([np.arange(count), first[rank]], axis=1)])
     joined = coo_array((np.ones(len(links)), links.T), shape=(count, count))
     return pd.factorize(connected_components(joined, directed=False)[1])[0]
 
@@ -94,32 +75,21 @@ def blocks(configuration: np.ndarray, folds: int) -> np.ndarray:
     return fold_of[number]
 
 
-class Trained(NamedTuple):
-    """Rows (n,) that must train for a session or a target (``kind``) ``value`` to be placed."""
-
-    kind: str
-    value: str
-    rows: np.ndarray
-
-
 def always_trained(
     fold: np.ndarray, labels: Mapping[str, np.ndarray], configuration: np.ndarray
-) -> list[Trained]:
-    """Rows of ``labels`` (by kind, each (n,)) that no fold (n,) may hold out.
+) -> Iterator[tuple[str, str, np.ndarray]]:
+    """Kind and value of labels (by kind, each (n,)) that no fold (n,) may hold out, and rows (n,).
 
     A fold that leaves fewer than ``LEAST_ROWS`` rows of a session or target leaves nothing to place
     it by: all rows of its configurations (n,) train. Where all rows have one label it is not asked.
     """
-    trained = []
     for kind, label in labels.items():
-        names, number = np.unique([str(name) for name in label], return_inverse=True)
-        table = pd.crosstab(number, fold)
+        table = pd.crosstab(pd.Series(label).astype(str), fold)
         # Too few rows outside one of its folds.
         scarce = (table.gt(0) & table.rsub(table.sum(axis=1), axis=0).lt(LEAST_ROWS)).any(axis=1)
-        for index in table.index[scarce] if len(names) > 1 else ():
-            rows = np.isin(configuration, configuration[number == index])
-            trained.append(Trained(kind, str(names[index]), rows))
-    return trained
+        for name in table.index[scarce] if len(table) > 1 else ():
+            of_label = configuration[np.asarray(label).astype(str) == name]
+            yield kind, name, np.isin(configuration, of_label)
 
 
 def split(columns: Columns, settings: Mapping[str, Any]) -> Columns:
@@ -130,17 +100,14 @@ def split(columns: Columns, settings: Mapping[str, Any]) -> Columns:
     that names these); the rows of the validation fold are the validation subset.
     """
     section = settings["measurements"]
-    count = len(columns["pose"])
+    count, folds = len(columns["pose"]), section["folds"]
     fold = np.full(count, np.nan)
-    if section["folds"] is not None:
-        same = configurations_of(columns)
-        if section["fold_by"] == TIME_BLOCK:
-            fold = blocks(same, int(section["folds"])).astype(float)
-        else:
-            fold = assign(same, int(section["folds"]), int(settings["seed"])).astype(float)
-        kinds = columns.keys() & {"session", "target"}
-        labels = {kind: columns[kind] for kind in sorted(kinds)}
-        for kind, value, rows in always_trained(fold, labels, same):
+    if folds is not None:
+        same, in_time = configurations_of(columns), section["fold_by"] == TIME_BLOCK
+        number = blocks(same, folds) if in_time else assign(same, folds, settings["seed"])
+        fold = number.astype(float)
+        labels = {kind: columns[kind] for kind in sorted({*columns} & {"session", "target"})}
+        for kind, value, rows in [*always_trained(fold, labels, same)]:
             fold[rows] = np.nan
             warnings.warn(
                 f"{kind} {value} has fewer than {LEAST_ROWS} rows outside one of its folds: "

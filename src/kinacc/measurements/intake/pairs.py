@@ -43,7 +43,7 @@ def look(path: str | Path | Sequence[str | Path], answers: Answers, wanted: bool
     sheets = _sheets(Path(paths[0]), answers) if len(paths) == 1 else []
     sources = [(paths[0], {**answers, "sheet": sheet}) for sheet in sheets]
     files = []
-    for name, stated in sources or [(name, answers) for name in paths]:
+    for name, stated in sources or [(name, {**answers}) for name in paths]:
         looked = text.look(name, stated)
         meaning = columns.of_table(looked.table, answers, wanted)
         files.append(replace(looked, columns=meaning))
