@@ -174,7 +174,9 @@ def estimators(
         Estimators by kind, in the order of fitting.
     """
     return {
-        kind: error_models.loaded(error_models.ESTIMATORS[kind]).of(calibration, arm, every)
+        kind: error_models.loaded(error_models.ERROR_MODELS[kind].estimator).of(
+            calibration, arm, every
+        )
         for kind in error_models.asked_for(calibration)
     }
 

@@ -16,7 +16,6 @@ from kinacc.calibration.observations import Observations, from_columns
 from kinacc.calibration.residuals import Errors, errors, statistics
 from kinacc.config.error_models import (
     ERROR_MODELS,
-    ESTIMATORS,
     MEASURED,
     NOMINAL,
     PLAINEST,
@@ -82,7 +81,7 @@ def fit_model(
         frames[NOMINAL] = estimator.common.nominal_frames(observations)
     columns = tables.frames_columns(frames, every.target_names, every.session_names)
     if kind == PLAINEST:
-        kinds = [f"{other}_frames" for other in reversed(ESTIMATORS)]
+        kinds = [f"{other}_frames" for other in reversed(ERROR_MODELS)]
         parts = [*(inputs[name] for name in kinds if name in inputs), columns]
         columns = {name: np.concatenate([part[name] for part in parts]) for name in columns}
     known = uncertainty.of_fit(fitted)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from kinacc.config import load as configuration
-from kinacc.config.error_models import ALWAYS, ESTIMATORS, asked_for, loaded
+from kinacc.config.error_models import ALWAYS, ERROR_MODELS, asked_for, loaded
 from kinacc.config.parameter_rules import rules, strangers
 from kinacc.config.settings import ROBOTS
 from kinacc.errors import InputError, Problem
@@ -97,7 +97,9 @@ def _arm(full: Mapping[str, Any], folder: Path) -> Found:
         yield ("calibration", "dh", "hayati_joints"), message, f"1 to {joints}"
     for kind in asked_for(calibration):
         if kind not in ALWAYS:
-            for keys, *text in loaded(ESTIMATORS[kind]).contradictions(calibration, arm):
+            for keys, *text in loaded(ERROR_MODELS[kind].estimator).contradictions(
+                calibration, arm
+            ):
                 yield ("calibration", kind, *keys), *text
     for rule, *text in strangers(rules(calibration["dh"]["parameters"]), joints):
         yield ("calibration", "dh", "parameters", rule.name), *text

@@ -44,8 +44,6 @@ ERROR_MODELS = {
         "kinacc.calibration.vec_estimator:VECEstimator",
     ),
 }
-MODELS = {kind: item.model for kind, item in ERROR_MODELS.items()}
-ESTIMATORS = {kind: item.estimator for kind, item in ERROR_MODELS.items()}
 PLAINEST = next(iter(ERROR_MODELS))
 FITTED = tuple(reversed(ERROR_MODELS))  # in this order
 ALWAYS = tuple(kind for kind in FITTED if not ERROR_MODELS[kind].asked_by)
@@ -74,7 +72,6 @@ def register(kind: str, model: type, estimator: type) -> None:
     """Fit a ``model`` of one's own in this process as those of the list are."""
     OWN[kind] = model
     ERROR_MODELS[kind] = Kind(model, estimator)
-    MODELS[kind], ESTIMATORS[kind] = model, estimator
 
 
 def comparisons(models: Collection[str]) -> tuple[Comparison, ...]:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 import pandas as pd
 
-from kinacc.config.error_models import MODELS, NOMINAL, OWN, loaded
+from kinacc.config.error_models import ERROR_MODELS, NOMINAL, OWN, loaded
 from kinacc.errors import InputError, Problem
 from kinacc.geometry import Pose, rotation_from_quaternion
 from kinacc.kinematics.dh import DHModel
@@ -38,7 +38,7 @@ def models(tables: Mapping[str, Columns], nominal: DHModel) -> dict[str, ErrorMo
         For a table that lacks rows of a model, or has some twice.
     """
     models: dict[str, ErrorModel] = {}
-    for kind in MODELS:
+    for kind in ERROR_MODELS:
         if f"{kind}_model" not in tables:
             continue
         if kind in OWN:
@@ -55,7 +55,7 @@ def models(tables: Mapping[str, Columns], nominal: DHModel) -> dict[str, ErrorMo
 
 def of_kind(kind: str) -> type[ErrorModel]:
     """Class of the models of a kind, such as ``dh`` or ``vec``."""
-    return loaded(MODELS[kind])
+    return loaded(ERROR_MODELS[kind].model)
 
 
 def frame(columns: Columns, model: str, name: str, session: str | None = None) -> Pose:

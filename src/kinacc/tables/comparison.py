@@ -7,7 +7,6 @@ Counts, codes, verdicts and words are compared exactly, numbers within the toler
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -33,28 +32,7 @@ _KEY_DIGITS = 9
 _ROUNDING = ("last_step", "gap", "undetermined_direction")
 
 
-@dataclass(frozen=True)
-class Difference:
-    """One column that differs, or (``column`` empty) rows or a file that only one side has.
-
-    ``rows`` is their number and ``row`` the first by its key; ``largest`` is the largest
-    difference of numbers in ``unit``.
-    """
-
-    table: str
-    column: str
-    what: str
-    rows: int = 0
-    row: str = ""
-    largest: float | None = None
-    unit: str = ""
-
-    def __str__(self) -> str:
-        place = f"{self.table}, column {self.column}" if self.column else self.table
-        return f"{place}: {self.what}"
-
-
-def compare_folders(before: Path, now: Path) -> Iterator[Difference]:
+def compare_folders(before: Path, now: Path) -> Iterator[str]:
     """Compare all tables below two folders.
 
     Parameters
@@ -64,8 +42,8 @@ def compare_folders(before: Path, now: Path) -> Iterator[Difference]:
 
     Yields
     ------
-    Difference
-        Of every column that differs by more than its tolerance, see :func:`compare_tables`.
+    str
+        A line on every column that differs by more than its tolerance, see :func:`compare_tables`.
 
     Raises
     ------
@@ -80,10 +58,10 @@ def compare_folders(before: Path, now: Path) -> Iterator[Difference]:
         if (now / name).is_file():
             yield from compare_tables(path, now / name)
         else:
-            yield Difference(str(name), "", "missing")
+            yield f"{name}: missing"
 
 
-def compare_tables(before: Path, now: Path) -> Iterator[Difference]:
+def compare_tables(before: Path, now: Path) -> Iterator[str]:
     """Compare two tables of one artefact.
 
     Parameters
@@ -93,8 +71,9 @@ def compare_tables(before: Path, now: Path) -> Iterator[Difference]:
 
     Yields
     ------
-    Difference
-        Of columns and rows that one lacks, and of every column that differs.
+    str
+        A line on columns and rows that one of them lacks, and on every column that differs: how
+        many rows, the first by its key, and the largest difference of numbers.
 
     Raises
     ------
@@ -105,7 +84,7 @@ def compare_tables(before: Path, now: Path) -> Iterator[Difference]:
     artefact = ARTEFACTS.get(name)
     old, new = map(store.read_table, (before, now))
     for column in old.columns.symmetric_difference(new.columns):
-        yield Difference(name, str(column), "missing" if column in old else "new")
+        yield f"{name}, column {column}: {'missing' if column in old else 'new'}"
     columns = artefact.for_joints(joint_count(artefact, old.columns)) if artefact else ()
     known = {item.name: item for item in columns}
     key = [item for item in (artefact.key if artefact else ()) if item in old and item in new]
@@ -113,27 +92,25 @@ def compare_tables(before: Path, now: Path) -> Iterator[Difference]:
     for word, single, second in (("missing", old, new), ("new", new, old)):
         only = single.index.difference(second.index)
         if len(only):
-            yield Difference(name, "", f"{len(only)} rows {word}, first {_row(key, only[0])}")
+            yield f"{name}: {len(only)} rows {word}, first {_row(key, only[0])}"
     common = old.index.intersection(new.index)
     old, new = old.loc[common], new.loc[common]
     for column in old.columns.intersection(new.columns).difference(key, sort=False):
-        single, second, largest, text = old[column], new[column], None, ""
+        single, second, text = old[column], new[column], ""
         differs = (single.isna() != second.isna()).to_numpy()
         both = (single.notna() & second.notna()).to_numpy()
-        unit = known[column].unit if column in known else ""
         if single.dtype.kind in "fiu" and second.dtype.kind in "fiu":
             apart = np.abs(second.to_numpy(float) - single.to_numpy(float))
             beyond = both & ~(apart <= _tolerance(known.get(column), old))
-            largest = float(np.max(apart[beyond], initial=0.0))
-            text = f", at most {largest:.3g} {unit}"
+            unit = known[column].unit if column in known else ""
+            text = f", at most {np.max(apart[beyond], initial=0.0):.3g} {unit}"
         else:
             beyond = both & (single.to_numpy(object) != second.to_numpy(object))
         rows = np.flatnonzero(differs | beyond)
         if rows.size:
-            row = _row(key, common[rows[0]])
             pair = f"{single.iloc[rows[0]]!r} -> {second.iloc[rows[0]]!r}"
-            text = f"{rows.size} rows differ, first {row}: {pair}{text}"
-            yield Difference(name, str(column), text, rows.size, row, largest, unit)
+            first = f"first {_row(key, common[rows[0]])}: {pair}{text}"
+            yield f"{name}, column {column}: {rows.size} rows differ, {first}"
 
 
 def _by_key(table: pd.DataFrame, key: list[str], name: str) -> pd.DataFrame:

@@ -61,19 +61,15 @@ def columns_of(artefact: str, rows: Iterable[Mapping[str, Any] | Sequence[Any]])
     dict
         Arrays (n,) by column; whole numbers that may be null are floats. Empty without rows.
     """
-    supplied: list[Any] = list(rows)
-    contract = ARTEFACTS[artefact]
+    contract, kinds = ARTEFACTS[artefact], {"int": np.int64, "int8": np.int8, "bool": np.bool_}
     names = [column.name for column in contract.columns]
-    if supplied and isinstance(supplied[0], Mapping):
-        names = list(supplied[0])
-        supplied = [[row[name] for name in names] for row in supplied]
+    records = [row if isinstance(row, Mapping) else dict(zip(names, row, strict=True))
+               for row in rows]  # fmt: skip
+    names = [*records[0]] if records else names
     known = {column.name: column for column in contract.for_joints(joint_count(contract, names))}
-    kinds = {"float": np.float64, "int": np.int64, "int8": np.int8, "bool": np.bool_}
     columns: Columns = {}
-    for place, name in enumerate(names):
-        kind, cells = known[name].kind, [row[place] for row in supplied]
-        is_real = known[name].nullable
-        columns[name] = (
-            texts(cells) if kind == "text" else np.array(cells, kinds["float" if is_real else kind])
-        )
+    for name in names:
+        cells, column = [record[name] for record in records], known[name]
+        kind = np.float64 if column.nullable else kinds.get(column.kind, np.float64)
+        columns[name] = texts(cells) if column.kind == "text" else np.array(cells, kind)
     return columns

@@ -87,25 +87,24 @@ class Guess:
         return {name: why.get(name, "") for name in read.unused(self.table)}
 
 
-def look(
-    path: str | Path | Sequence[str | Path],
-    answers: Answers | None = None,
-    need: str = MEASUREMENTS,
-) -> Guess:
-    """The best guess at a file.
+def look(path: str | Path | Sequence[str | Path], answers: Answers | None = None) -> Guess:
+    """The best guess at a file, or at two with joints and points of the same poses.
 
-    Two paths are joints and points of the same poses, as are two sheets of a workbook. ``answers``
-    to choices by key, ``take`` (columns that are read whatever their names mean) and units among
-    them. ``need``: measurements (joints and points), or joints, points (measured) or poses (wanted)
-    alone. Raises Undecided where a choice is open, InputError where the needed columns are missing,
-    where units contradict each other, and where ``take`` names columns that cannot be read.
+    As :func:`described`.
     """
     answers = answers or {}
-    return described(pairs.look(path, answers, need == POSES), answers, need)
+    return described(pairs.look(path, answers), answers)
 
 
-def described(looked: Looked, answers: Answers, need: str) -> Guess:
-    """The best guess at a file whose table is known, as ``look``."""
+def described(looked: Looked, answers: Answers, need: str = MEASUREMENTS) -> Guess:
+    """The best guess at a file whose table is known.
+
+    ``answers`` to choices by key, ``take`` (columns that are read whatever their names mean) and
+    units among them. ``need``: measurements (joints and points), or joints, points (measured) or
+    poses (wanted) alone. Raises Undecided where a choice is open, InputError where the needed
+    columns are missing, where units contradict each other, and where ``take`` names columns that
+    cannot be read.
+    """
     table, columns = looked.table, _needed(looked.columns, need)
     questions = list(columns.questions)
     if need in (POINTS, POSES) and len(columns.targets) > 1 and not questions:
@@ -232,8 +231,7 @@ class _Guesser:
             allowed = "a number such as 9999.999, or none"
             raise input_error("--no-reading", f"{answer!r} is no number", allowed)
         for name, target in self.columns.targets.items():
-            columns = [self.table.values(target[axis].column) for axis in "xyz"]
-            points = np.stack(columns, axis=1)
+            points = self.stacked([target[axis] for axis in "xyz"])
             alike = points[(points == points[:, :1]).all(axis=1), 0]
             large = np.unique(points[np.abs(points) >= 999.0])
             numbers = {*alike.tolist(), *filter(is_no_coordinate, large.tolist())}
@@ -241,7 +239,7 @@ class _Guesser:
             others = points[~unread & np.isfinite(points).all(axis=1)]
             centre = np.median(others, axis=0) if len(others) else np.zeros(3)
             extent = np.max(np.linalg.norm(others - centre, axis=1), initial=0.0)
-            for number in sorted(numbers - self.void):
+            for number in sorted(numbers):
                 rows = none_read(points, number)
                 far = np.linalg.norm(number - centre) > _FAR * extent and len(others) > 2
                 if abs(number) >= BEYOND or (far and (points[rows] == number).all()):
