@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import json
 import re
-from dataclasses import dataclass
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -47,45 +47,31 @@ FOREIGN = Path(__file__).parent / "foreign"
 FILES = sorted(path.name for path in FOREIGN.iterdir())
 
 
-@dataclass(frozen=True)
-class Measured:
+# What a truth leaves out.
+USUAL = {"rotations": None, "std_mm": None, "questions": (), "any_frame": False, "readable": True}
+USUAL |= {"says": ""}
+
+
+def measured(name: str) -> SimpleNamespace:
     """A measured file, or two, of ``foreign/``, and what a reader has to find: a row per reading.
 
     `joints_rad` (n, k) as the robot reports them; `points_mm` per target (n, 3), nan without a
     reading; `rotations` (n, 3, 3) of the first target; `std_mm` per target (n, 3) where stated.
-    `questions`: what the file leaves open. `must_ask`: the same, where neither the file nor the
-    numbers can answer. `any_frame`: the reader chooses the axes (angles and distance). `says`: what
-    the answer has to mention. Where `readable` is False the file may be refused.
+    `questions`: what the file leaves open. `any_frame`: the reader chooses the axes (angles and
+    distance). `says`: what the answer has to mention. A file that is not `readable` may be refused.
     """
-
-    files: tuple[Path, ...]
-    robot: str
-    joints_rad: np.ndarray
-    points_mm: dict[str, np.ndarray]
-    rotations: np.ndarray | None = None
-    std_mm: dict[str, np.ndarray] | None = None
-    questions: tuple[str, ...] = ()
-    must_ask: tuple[str, ...] = ()
-    any_frame: bool = False
-    readable: bool = True
-    says: str = ""
-
-
-def measured(name: str) -> Measured:
-    """A file as a maker of instruments, robots or tables writes it, and its truth."""
     folder = FOREIGN / name
-    truth = json.loads((folder / "truth.json").read_text(encoding="utf-8"))
-    for key in {"joints_rad", "rotations"} & {*truth}:
-        truth[key] = np.array(truth[key], dtype=float)
-    for key in {"points_mm", "std_mm"} & {*truth}:
-        truth[key] = {target: np.array(rows, float) for target, rows in truth[key].items()}
-    truth["files"] = tuple(folder / path for path in truth["files"])
+    truth = USUAL | json.loads((folder / "truth.json").read_text(encoding="utf-8"))
+    for key in ("points_mm", "std_mm"):
+        truth[key] = {target: np.array(rows, float) for target, rows in (truth[key] or {}).items()}
+    truth["joints_rad"] = np.array(truth["joints_rad"], dtype=float)
+    truth["files"] = [folder / path for path in truth["files"]]
     if (folder / truth["robot"]).is_file():
         truth["robot"] = str(folder / truth["robot"])
-    return Measured(**truth)
+    return SimpleNamespace(**truth)
 
 
-def fault(measured: Measured, folder: Path) -> str:
+def fault(measured: SimpleNamespace, folder: Path) -> str:
     """What is wrong with the answer of init and run; nothing where the file is read right, asked
     about what it leaves open, or refused where that may be."""
     words = ["--robot", measured.robot, "--yes", "--json", "--out", folder, "--name", "n"]
@@ -108,7 +94,7 @@ def fault(measured: Measured, folder: Path) -> str:
     return f"exit code {described.exit_code}: {said} {described.exception!r}"
 
 
-def difference(measured: Measured, results: Path) -> str:
+def difference(measured: SimpleNamespace, results: Path) -> str:
     """What is wrong with the readings as they arrived, or nothing."""
     found = pd.read_parquet(results / "measurements.parquet")
     parts = []
@@ -176,12 +162,12 @@ def _same_groups(true: pd.Series, found: pd.Series) -> bool:
     return len(pairs) == true.nunique() == found.nunique()
 
 
-def _rotations_right(measured: Measured, true: pd.DataFrame, found: pd.DataFrame) -> bool:
+def _rotations_right(measured: SimpleNamespace, true: pd.DataFrame, found: pd.DataFrame) -> bool:
     quaternions = found[["qx", "qy", "qz", "qw"]].to_numpy(float)
     if measured.rotations is None or np.isnan(quaternions).any():
         return measured.rotations is None and bool(np.isnan(quaternions).all())
     seen = Rotation.from_quat(quaternions).as_matrix()
-    return np.allclose(seen, measured.rotations[true["reading"]], atol=RELATIVE)
+    return np.allclose(seen, np.array(measured.rotations)[true["reading"]], atol=RELATIVE)
 
 
 def _reach_mm(found: pd.DataFrame, joints: list[str], results: Path) -> float:
