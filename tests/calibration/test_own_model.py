@@ -57,16 +57,11 @@ class Ripple(ErrorModel):
 
 @pytest.fixture
 def registered():
-    before = [dict(each) for each in (error_models.ERROR_MODELS, error_models.MODELS)]
-    estimators, artefacts = dict(error_models.ESTIMATORS), dict(ARTEFACTS)
+    before = dict(error_models.ERROR_MODELS), dict(ARTEFACTS)
     register_error_model(Ripple)
     yield
     error_models.OWN.clear()
-    for now, then in zip(
-        (error_models.ERROR_MODELS, error_models.MODELS, error_models.ESTIMATORS, ARTEFACTS),
-        (*before, estimators, artefacts),
-        strict=True,
-    ):
+    for now, then in zip((error_models.ERROR_MODELS, ARTEFACTS), before, strict=True):
         now.clear()
         now.update(then)
 
