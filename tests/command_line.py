@@ -10,9 +10,9 @@ from stages_by_hand import run_stage
 from kinacc.cli.group import main
 
 
-def call(*words: object) -> Result:
+def call(*words: object, **more: object) -> Result:
     """Run a command as a person would."""
-    return CliRunner().invoke(main, [str(word) for word in words])
+    return CliRunner().invoke(main, [str(word) for word in words], **more)
 
 
 def small_study(base: Path) -> Path:

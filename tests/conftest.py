@@ -48,7 +48,6 @@ SLOW = (
     "cli/test_init.py",
     "cli/test_init_readings.py",
     "cli/test_init_robots.py",
-    "cli/test_next_commands.py",
     "cli/test_rows_as_the_user_calls_them.py",
     "cli/test_the_same_readings_compared.py",
     "deployment/test_applicability.py",

@@ -1,21 +1,17 @@
 """init as a person calls it: two files that check-data and the workflow take at once."""
 
 import json
+import shlex
 
 import numpy as np
 import pandas as pd
 import pytest
 import shared_data
-from click.testing import CliRunner
+from command_line import call
 from scipy.spatial.transform import Rotation
 
 from kinacc.checks.contradictions import load
-from kinacc.cli.group import main
 from kinacc.kinematics import robot
-
-
-def call(*words, **more):
-    return CliRunner().invoke(main, [str(word) for word in words], **more)
 
 
 @pytest.fixture
@@ -26,36 +22,35 @@ def foreign(tmp_path):
     turn = Rotation.from_matrix(pose.rotation).as_euler("xyz", degrees=True)
     rows = np.column_stack([q, np.round(pose.position_mm, 4), np.round(turn, 5)])
     names = [*(f"axis {i}" for i in range(1, 7)), *"XYZ", "Rx", "Ry", "Rz"]
-    path = tmp_path / "Messung 3.csv"
+    path = tmp_path / "day 1 (it's late).csv"
     pd.DataFrame(rows, columns=names).to_csv(path, sep=";", decimal=",", index=False)
     return path
 
 
-def test_a_foreign_file_is_described_and_passes_the_check(foreign, tmp_path):
-    done = call("init", foreign, "--out", tmp_path / "cell", "--yes")
+def test_a_foreign_file_is_described_and_the_check_that_is_printed_passes(foreign, tmp_path):
+    words = ("--out", tmp_path / "my cell", "--name", "own", "--yes", "--json")
+    done = call("init", foreign, *words)
     assert done.exit_code == 0, done.output
-    dataset = tmp_path / "cell" / "Messung_3.yaml"
-    assert f"kinacc check-data {dataset}" in done.output
-    assert f"#     kinacc check-data {dataset}\n" in dataset.read_text(encoding="utf-8")
-    settings = load((dataset,))["Messung_3"]
+    dataset = tmp_path / "my cell" / "own.yaml"
+    check, _ = json.loads(done.stdout)["next"]
+    assert f"#     {check}\n" in dataset.read_text(encoding="utf-8")
+    settings = load((dataset,))["own"]
     file = settings["measurements"]["file"]
     assert (file["delimiter"], file["decimal"], file["joint_unit"]) == (";", ",", "rad")
     # XYZ was assumed; trying finds the same rotations by either of their two names.
     assert file["orientation"]["convention"] in ("ZYX", "xyz")
     assert robot.load(settings["robot"]).name == "irb120"
-    checked = call("check-data", dataset)
+    checked = call(*shlex.split(check)[1:])
     assert checked.exit_code == 0, checked.output
 
 
 def test_nothing_is_overwritten_unless_forced(foreign, tmp_path):
-    words = ("init", foreign, "--out", tmp_path, "--robot", "irb120", "--name", "a")
-    assert call(*words, "--yes").exit_code == 0
+    words = ("--robot", "irb120", "--name", "a", "--joint-unit", "rad", "--orientation", "ZYX")
     dataset = tmp_path / "a.yaml"
     dataset.write_text("mine\n")
-    refused = call(*words, "--yes")
-    assert refused.exit_code == 2
+    assert call("init", foreign, "--out", tmp_path, *words, "--yes").exit_code == 2
     assert dataset.read_text() == "mine\n"
-    assert call(*words, "--yes", "--force").exit_code == 0
+    assert call("init", foreign, "--out", tmp_path, *words, "--yes", "--force").exit_code == 0
     assert "datasets:" in dataset.read_text()
 
 
@@ -63,7 +58,8 @@ def test_what_it_cannot_know_is_asked(foreign, tmp_path):
     # joint unit, length unit, angle unit, orientation, robot
     done = call("init", foreign, "--out", tmp_path, input="rad\nmm\ndeg\nZYX\nirb120\n")
     assert done.exit_code == 0, done.output
-    file = load((tmp_path / "Messung_3.yaml",))["Messung_3"]["measurements"]["file"]
+    (settings,) = load((next(tmp_path.glob("day*.yaml")),)).values()
+    file = settings["measurements"]["file"]
     assert file["orientation"]["convention"] == "ZYX"
 
 

@@ -4,7 +4,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from tracked_arm import assert_read, assert_turned, call, described, looked, refused, table, tracked
+from command_line import call
+from tracked_arm import assert_read, assert_turned, described, looked, refused, table, tracked
 
 from kinacc.checks.contradictions import load
 from kinacc.config.schema import defaults
@@ -200,6 +201,9 @@ def test_two_readings_are_asked_about_and_never_taken_in_silence(case, file):
 def test_an_answer_and_an_option_decide_alike(file, tmp_path):
     path = file(*ASKED["a target beside a point"])
     words = ("init", path, "--robot", "ur10", "--force")
+    for nobody in ((), ("--json",)):
+        assert call(*words, "--out", tmp_path / "c", *nobody).exit_code == 2
+    assert not (tmp_path / "c").exists()
     asked = call(*words, "--out", tmp_path / "a", input="1\n")
     stated = call(*words, "--out", tmp_path / "b", "--yes", "--take", "x_mm")
     for done, folder in ((asked, "a"), (stated, "b")):

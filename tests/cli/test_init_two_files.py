@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from tracked_arm import assert_read, call, looked, refused, table, tracked, written
+from command_line import call
+from tracked_arm import assert_read, looked, refused, table, tracked, written
 
 from kinacc.checks.contradictions import load
 from kinacc.kinematics import robot

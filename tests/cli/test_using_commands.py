@@ -1,6 +1,8 @@
 """The commands that use a calibration, as a person calls them: answers, files, mistakes."""
 
 import json
+import re
+import shlex
 from pathlib import Path
 
 import pytest
@@ -62,3 +64,14 @@ def test_results_say_which_robot_they_were_made_with(study, tmp_path, monkeypatc
         assert "--robot" in call(*words).output
     finally:
         (tmp_path / "robot.parquet").rename(study / "robot.parquet")
+
+
+def test_what_campaign_start_names_next_runs_as_printed(study, tmp_path):
+    folder = tmp_path / "my arm's check"
+    done = call("campaign", "start", folder, "--calibration", study, "--model", "dh",
+                "--candidates", 5, "--budget", 5, "--noise-mm", 0.05)  # fmt: skip
+    assert done.exit_code == 0, done.output
+    line = re.search(r"^Next: kinacc (.*)$", done.output, re.MULTILINE)[1]
+    shown = call(*shlex.split(line))
+    assert shown.exit_code == 0, line
+    assert "reading 1 of 5" in shown.output

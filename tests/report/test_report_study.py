@@ -24,7 +24,7 @@ UNREACHED, LARGEST = 5, 9
 @pytest.mark.parametrize("measured", [False, True])
 def test_errors_of_measured_poses_are_only_taken_as_true(measured):
     tables = {**made_up.points(measured), **made_up.study()}
-    found = read(study_sections.study(tables, ARM))
+    found = read(study_sections.study(tables))
     assert "0.500 mm" in found.shows
     assert ("known exactly" in found.population) != measured
     assert ("true largest error" in found.captions[0]) != measured
@@ -36,7 +36,7 @@ def test_errors_of_measured_poses_are_only_taken_as_true(measured):
 @pytest.mark.parametrize("met", [0, 1])
 def test_results_of_every_bound_stand_in_a_table(met):
     tables = {**made_up.points(), **made_up.histories(rule_met=np.full(10, met))}
-    outcomes = read(study_sections.histories(tables, ARM)).tables[0]
+    outcomes = read(study_sections.histories(tables)).tables[0]
     assert [row[1:] for row in outcomes.rows] == [
         ("7", "0.400", "0.6", "0.900", "rejected", "3", "2"),
         ("7", "0.600", "0.6", "0.500", "not rejected", "3", "2"),
@@ -76,7 +76,7 @@ def test_the_largest_cell_of_the_map_has_its_joints_and_unreached_cells_are_coun
 
 def test_every_line_of_a_history_has_its_verdict():
     table = history(6, changed=3, open_=4)
-    (shown,) = read(study_sections.history({"history": table}, ARM)).tables
+    (shown,) = read(study_sections.history({"history": table})).tables
     assert [row[1:3] for row in shown.rows[2:5]] == [
         ("holds", "–"), ("recalibrate", "4"), ("cannot be told", "–"),
     ]  # fmt: skip
@@ -97,7 +97,7 @@ def claims(**verdicts: str) -> dict:
 def test_every_number_of_the_papers_tables_stands_beside_the_one_here():
     verdicts = {"table1_position_max": "differs", "table2_a_3": "differs",
                 "table2_d_2": "not comparable", "table2_d_3": "not comparable"}  # fmt: skip
-    one, two, three = read(study_sections.paper_tables(claims(**verdicts), ARM)).tables
+    one, two, three = read(study_sections.paper_tables(claims(**verdicts))).tables
     assert one.rows[0] == (*("position, mm", "0.705", "0.805", "1.635", "1.735", "1.731", "1.831"),)
     assert three.rows[1][:3] == ("orientation, mrad", "1.336", "1.436")
     assert two.rows[3] == (
@@ -108,9 +108,7 @@ def test_every_number_of_the_papers_tables_stands_beside_the_one_here():
 
 
 def test_claims_that_differ_come_first_and_are_open():
-    section = study_sections.claims(
-        claims(fig5_rejected="differs", table2_d_2="not comparable"), ARM
-    )
+    section = study_sections.claims(claims(fig5_rejected="differs", table2_d_2="not comparable"))
     found = read(section)
     differ, uncompared, agree, chose = found.tables
     assert [row[5] for row in differ.rows] == ["fig5_rejected"]

@@ -228,20 +228,14 @@ def _region(
     options: Mapping[str, Any], arm: Calibration
 ) -> tuple[str, Callable[[int], np.ndarray]]:
     """The region's name, and a function that draws so many reported joints (at most n, k)."""
-    robot, fitted, problems = arm.robot, arm.fitted, list[Problem]()
-    target = arm.point(options["point"])
-    box = spaces.joint_ranges(options["joints_deg"], robot, problems)
-    space = spaces.ranges("--inside-mm", options["inside_mm"], 3, problems)
-    refuse(problems)
-    inside = None if space is None else spaces.inside_box(space)
+    robot, fitted, target = arm.robot, arm.fitted, arm.point(options["point"])
+    box, inside = spaces.of_options(options, robot)
     usual = "measured" if fitted is not None else "fitted"
     region = options["region"] or ("fitted" if box is not None else None)
     if region in (None, "configured"):
         configured = _configured(options, arm, wanted=region is not None)
-        region = usual if configured is None else "configured"
-        if configured is not None:
-            box = configured.box if box is None else box
-            inside = inside or configured.inside
+        region = usual if configured == (None, None) else "configured"
+        box, inside = box or configured[0], inside or configured[1]
     if region == "measured" and usual != region:
         message = "the results do not hold the poses that were fitted"
         raise InputError(Problem("--region measured", message, "fitted, limits, configured"))
@@ -267,16 +261,13 @@ def _region(
     return region, draw
 
 
-def _configured(
-    options: Mapping[str, Any], arm: Calibration, wanted: bool
-) -> spaces.Settings | None:
-    """The space of the calibration's data set in the configuration; None where there is none."""
+def _configured(options: Mapping[str, Any], arm: Calibration, wanted: bool) -> spaces.Space:
+    """The space of the calibration's data set in the configuration."""
+    if not wanted and not options["config"] and not Path(choice.CONFIG).is_file():
+        return None, None
     try:
-        if not wanted and not options["config"] and not Path(choice.CONFIG).is_file():
-            return None
-        settings = spaces.settings_of(arm.name, options["config"])
+        return spaces.configured(spaces.settings_of(arm.name, options["config"]), arm.robot)
     except InputError:
         if wanted:
             raise
-        return None
-    return None if settings.inside is None and settings.box is None else settings
+        return None, None

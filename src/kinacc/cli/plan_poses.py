@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import click
 import numpy as np
 import pandas as pd
 
+from kinacc.calibration.dh_estimator import hayati_joints
 from kinacc.cli import choice, rows, spaces
 from kinacc.cli.choice import option
 from kinacc.cli.output import Output, answers
@@ -19,6 +21,7 @@ from kinacc.kinematics import robot as robots
 from kinacc.kinematics.robot import Robot
 from kinacc.measurements.table import numbers_of
 from kinacc.progress import reporting
+from kinacc.report.rendering import lines
 
 _MOST_CANDIDATES = 100_000
 _TRUNCATION = "calibration.dh.truncation"
@@ -61,12 +64,16 @@ def plan_poses(
     Example:
       kinacc plan-poses ur10 --hayati 2,3 --poses 50 -o plan.csv --picture index.svg
     """
-    settings = spaces.settings_of(dataset, config) if dataset else spaces.without_dataset()
-    name = robot or settings.robot
+    settings = spaces.settings_of(dataset, config) if dataset else None
+    name = robot or (settings and settings["robot"])
     if name is None:
         raise InputError(Problem("ROBOT", "is not given", "a shipped name, a robot file"))
     arm = robots.load(name)
-    experiment, box, inside = _experiment(arm, settings, options)
+    experiment = _experiment(arm, settings, options)
+    box, inside = spaces.of_options(options, arm)
+    if settings is not None:
+        usual = spaces.configured(settings, arm)
+        box, inside = box or usual[0], inside or usual[1]
     start = rows.stand_of(arm, from_deg)
     with reporting("plan-poses", bar=True):
         if not candidates.isdecimal():
@@ -91,8 +98,6 @@ def plan_poses(
         "move_deg": np.rad2deg(plan.moves_rad),
         "candidate": label[plan.chosen],
     })  # fmt: skip
-    travel_deg = np.rad2deg(plan.moves_rad.sum())
-    candidate_travel_deg = np.rad2deg(plan.candidate_travel_rad)
     facts = {
         "robot": arm.name,
         "index_o1": plan.index[-1],
@@ -101,27 +106,21 @@ def plan_poses(
         "parameters": plan.parameters,
         "determined_directions": plan.determined,
         "undetermined": plan.undetermined,
-        "travel_deg": travel_deg,
-        "candidate_travel_deg": candidate_travel_deg,
+        "travel_deg": np.rad2deg(plan.moves_rad.sum()),
+        "candidate_travel_deg": np.rad2deg(plan.candidate_travel_rad),
         "rows": table,
     }
-    out.show(facts, table, [
-        f"{arm.name}: {count} of {len(joints)} poses, O1 = {plan.index[-1]:.4g} (geometric mean of "
-        "the singular values over the root of the number of poses).",
-        f"Travel: {travel_deg:.0f} deg ({candidate_travel_deg:.0f} deg in the order of the "
-        "candidates), by the joint that moves most.",
-        f"Determined: {plan.determined} of {plan.parameters} parameters."
-        + (" Undetermined:" if plan.undetermined else ""),
-        *(f"  - {text}" for text in plan.undetermined),
-    ])  # fmt: skip
+    out.show(facts, table, lines("plan_poses.txt", **facts))
 
 
 def _experiment(
-    arm: Robot, settings: spaces.Settings, options: dict[str, Any]
-) -> tuple[planning.Experiment, spaces.Ends | None, spaces.Inside | None]:
-    """What is measured and fitted, the joint box and the test of tool positions."""
+    arm: Robot, settings: Mapping[str, Any] | None, options: Mapping[str, Any]
+) -> planning.Experiment:
+    """What is measured and fitted; without ``settings`` base and tool are unknown."""
     problems: list[Problem] = []
-    tool, hayati = robots.carried(arm), settings.hayati_joints
+    calibration = (settings or schema.defaults())["calibration"]
+    is_unknown = settings is None or calibration["base_and_tool"] == "estimated"
+    tool, hayati = robots.carried(arm), tuple(hayati_joints(calibration["dh"], arm))
     if options["tool_mm"] is not None:
         offset = numbers_of(options["tool_mm"])
         if len(offset) != 3:
@@ -133,15 +132,12 @@ def _experiment(
         if not hayati or not set(hayati) <= set(range(1, arm.dh.joints + 1)):
             allowed = f"joints 1 to {arm.dh.joints}, 2,3"
             problems.append(Problem("--hayati", repr(options["hayati"]), allowed))
-    box = spaces.joint_ranges(options["joints_deg"], arm, problems) or settings.box
-    space = spaces.ranges("--inside-mm", options["inside_mm"], 3, problems)
     refuse(problems)
-    experiment = planning.Experiment(
+    return planning.Experiment(
         tool,
         orientation=not options["position_only"],
-        frames_estimated=settings.frames_estimated and not options["frames_known"],
+        frames_estimated=is_unknown and not options["frames_known"],
         hayati_joints=hayati,
-        rotation_weight_mm_per_rad=settings.rotation_weight_mm_per_rad,
+        rotation_weight_mm_per_rad=float(calibration["rotation_weight_mm_per_rad"]),
         threshold=options["threshold"],
     )
-    return experiment, box, settings.inside if space is None else spaces.inside_box(space)

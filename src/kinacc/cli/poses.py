@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -25,12 +25,13 @@ from kinacc.deployment.compensate import (
 )
 from kinacc.deployment.compensate import compensate as joints_for
 from kinacc.deployment.record import Calibration
-from kinacc.errors import InputError, Problem, as_seen, first_few, refuse
+from kinacc.errors import InputError, Problem, first_few, refuse
 from kinacc.geometry import Pose, rotation_from_quaternion
 from kinacc.kinematics.model import JointState
 from kinacc.measurements.rows import Rows
 from kinacc.measurements.table import numbers_of
 from kinacc.progress import reporting
+from kinacc.report.rendering import lines
 
 _SHOWN = ("x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz", "std_position_mm",
           "std_orientation_mrad", "unexplained_mm", "undetermined_mm", "status")  # fmt: skip
@@ -271,35 +272,16 @@ def _correct(
         from kinacc.figures.calibration import draw_program
 
         out.draw(draw_program(answer.table))
-    change = answer.table.get("change_mm", answer.table["status"] == "")
-    change = change[answer.table["status"] == "corrected"]
-    missed = f", {len(answer.not_corrected)} statements not" if answer.not_corrected else ""
-    line = f"{answer.language}: {len(change)} of {len(answer.table)} positions corrected{missed}"
-    if len(change):
-        line += f"; change: mean {change.mean():.3g} mm, largest {change.max():.3g} mm"
     facts = {name: value for name, value in vars(answer).items() if name != "files"}
-    out.show(facts, answer.table, [line])
-    for text in () if out.as_json else _warnings(answer):
-        click.echo(as_seen(text), err=True)
+    out.show(facts, answer.table, lines("program.txt", p=answer))
+    warnings = lines("program_warnings.txt", p=answer, first_few=first_few)
+    for text in () if out.as_json else warnings:
+        click.echo(text, err=True)
     if answer.refused:
         raise SystemExit(AGAINST)
     if not options["dry_run"] and target is not None:
         written = answer.write(target, out.force)
         click.echo(f"Written: {', '.join(written)}", err=out.as_json)
-
-
-def _warnings(answer: programs.CorrectedProgram) -> Iterator[str]:
-    table = answer.table.reindex(columns=["position", "is_measured_there", "is_near_singular"])
-    for warned, text in (
-        (table["is_measured_there"].eq(False), "outside the measured region"),
-        (table["is_near_singular"].eq(True), "near a singular posture"),
-    ):
-        if warned.any():
-            yield f"{warned.sum()} positions {text}: {first_few(list(table['position'][warned]))}"
-    yield from answer.remarks
-    reason = "computed by the program, incomplete or defined elsewhere"
-    yield from (f"Not corrected, {reason}: {line}" for line in answer.not_corrected)
-    yield from (f"Refused: {problem}" for problem in answer.refused)
 
 
 def _frames(texts: Sequence[str]) -> dict[str, np.ndarray]:

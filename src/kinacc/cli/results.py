@@ -57,14 +57,8 @@ def summary(folders: tuple[Path, ...], tolerance_mm: float | None, by: str, out:
       kinacc summary results --tolerance-mm 0.5 -o robots.xlsx
     """
     places = summaries.data_set_folders(folders or (Path(RESULTS),))
-    result: Sequence[CalibrationSummary | Problem]
-    if len(places) == 1:
-        try:
-            result = [summaries.summarise(places[0], outdated=print_outdated(places[0]))]
-        except InputError as error:
-            result = [summaries.of_folder(places[0], error)]
-    else:
-        result = summaries.summarise_all(places)
+    reason = print_outdated(places[0]) if len(places) == 1 else ""
+    result = summaries.summarise_all(places, reason)
     known = [item for item in result if not isinstance(item, Problem)]
     verdicts = [item.verdict(by, tolerance_mm) for item in known]
     if by == HELD_OUT and not any(verdicts):

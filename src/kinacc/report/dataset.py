@@ -10,22 +10,12 @@ import numpy as np
 
 from kinacc.campaign import folder as campaigns
 from kinacc.campaign import report
-from kinacc.kinematics import robot
 from kinacc.report import campaign, fit_sections, study_sections, terminal
 from kinacc.report.page import FirstScreen, Page, Table
 from kinacc.report.rendering import counted
-from kinacc.report.summarise import summarise
+from kinacc.report.summarise import robot_of, summarise
 from kinacc.report.summary import CalibrationSummary
 
-# In the order of the page: the table that a section needs, and how it is made.
-_OF_THE_FIT = (
-    ("history", study_sections.history),
-    ("pose_errors", fit_sections.residuals),
-    ("accuracy_map", study_sections.accuracy_map),
-    ("measurements", fit_sections.data),
-    ("dh_covariance", fit_sections.identifiability),
-    ("dh_model", fit_sections.parameters),
-)
 _OF_THE_STUDY = (
     ("study_summary", study_sections.study),
     ("histories", study_sections.histories),
@@ -40,19 +30,25 @@ def run(inputs: Mapping[str, Any], settings: Mapping[str, Any]) -> Page:
     ``settings``: ``dataset``; ``folder`` where the results are not in their usual place,
     ``outdated`` tables that are left out, and ``reason``, why all results are outdated.
     """
-    name = settings["dataset"]
     files = {role: path for role, path in inputs.items() if isinstance(path, Path)}
     tables = {role: table for role, table in inputs.items() if role not in files}
     places = [path.parent for role, path in files.items() if role.startswith("campaign_")]
-    place = Path(settings.get("folder", f"results/{name}"))
+    place = Path(settings.get("folder", f"results/{settings['dataset']}"))
     summary = summarise(place, tables, places, settings.get("reason", ""))
-    arm = robot.of_text(str(tables["robot"]["description"][0]), "robot.parquet")
-    sections = [make(tables, arm) for needed, make in _OF_THE_FIT if needed in tables]
-    sections.append(fit_sections.selection(tables, terminal.selection(summary)))
+    arm = robot_of(tables)
+    sections = [study_sections.history(tables)] if "history" in tables else []
+    sections.append(fit_sections.residuals(tables, summary))
+    if "accuracy_map" in tables:
+        sections.append(study_sections.accuracy_map(tables, arm))
+    sections.append(fit_sections.data(tables, arm, summary))
+    if "dh_covariance" in tables:
+        sections.append(fit_sections.identifiability(tables, arm, summary))
+    sections.append(fit_sections.parameters(tables, arm, summary))
+    sections.append(fit_sections.selection(tables, summary))
     if summary.campaign is not None:
         opened = campaigns.open_(summary.campaign.folder)
         sections.append(campaign.section(opened, report.tables(opened)))
-    sections += [make(tables, arm) for needed, make in _OF_THE_STUDY if needed in tables]
+    sections += [make(tables) for needed, make in _OF_THE_STUDY if needed in tables]
     return Page(first_screen(summary, settings.get("outdated", ())), sections)
 
 

@@ -5,16 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from kinacc.calibration import noise, summary
+from kinacc.calibration import noise
+from kinacc.calibration import summary as figures
 from kinacc.calibration.identifiability import (
     FIXED,
     IDENTIFIED,
-    POORLY_DETERMINED,
     PRIOR,
     UNDETERMINED,
-    listed,
     parameter_name,
-    weak,
 )
 from kinacc.calibration.misfit import in_words, misfit, misfits
 from kinacc.calibration.residuals import STANDARD_ERRORS
@@ -26,9 +24,10 @@ from kinacc.kinematics.dh import PARAMETERS, DHModel
 from kinacc.kinematics.robot import Robot
 from kinacc.kinematics.vec import VECModel
 from kinacc.measurements.row_names import RowNames
-from kinacc.report import charts, summarise
+from kinacc.report import charts, terminal
 from kinacc.report.page import Part
-from kinacc.tables.allowed import ERRORS, SUBSETS
+from kinacc.report.summary import CalibrationSummary
+from kinacc.tables.allowed import ERRORS
 from kinacc.tables.columns import Columns, Tables
 
 _WORST = 10
@@ -43,36 +42,41 @@ _STATUSES = {
 }
 
 
-def residuals(tables: Tables, robot: Robot) -> Part:
+def residuals(tables: Tables, summary: CalibrationSummary) -> Part:
     """Position errors of every row before and after calibration."""
-    measurements, best = tables["measurements"], summary.selected(tables["model_selection"])
-    is_held_out = bool((np.asarray(tables["pose_errors"]["estimate"]) == "cross_validated").any())
-    errors = _position_errors(tables, "cross_validated" if is_held_out else "train")
-    large_mm = float(errors[best].quantile(summary.LARGE_SHARE))
+    best = summary.selected
+    errors = _position_errors(tables, "cross_validated" if summary.is_held_out else "train")
+    large_mm = float(errors[best].quantile(figures.LARGE_SHARE))
     labels = {model: model_name(model) for model in errors}
     labels[best] += ", selected"
-    rows = errors.assign(order=errors.index, name=np.array(_row_names(measurements))[errors.index])
-    joints = []
-    for n, slides in enumerate(np.asarray(robot.dh.prismatic), start=1):
-        joints.append(f"J{n}, {'mm' if slides else 'deg'}")
-        joint = np.asarray(measurements[f"q{n}"], dtype=float)[errors.index]
-        rows[joints[-1]] = joint if slides else np.rad2deg(joint)
-    for axis in "xyz":
-        rows[axis] = np.asarray(measurements[f"{axis}_mm"], dtype=float)[errors.index]
+    measured, names = (
+        pd.DataFrame(tables["measurements"]),
+        RowNames.of_columns(tables["measurements"]),
+    )
+    measured = measured.rename(columns={f"{axis}_mm": axis for axis in "xyz"})
+    measured["name"] = [
+        f"pose {pose}" if np.isnan(line) else names.one(int(line))
+        for line, pose in zip(measured["row"].astype(float), measured["pose"], strict=True)
+    ]
+    if summary.targets > 1:
+        measured["name"] += ", " + measured["target"].astype(str)
+    joints = [f"J{n}, {unit}" for n, unit in enumerate(summary.joint_ranges["unit"], start=1)]
+    for n, name in enumerate(joints, start=1):
+        scale = 180.0 / np.pi if name.endswith("deg") else 1.0
+        measured[name] = scale * measured[f"q{n}"].astype(float)
+    rows = errors.join(measured[["name", *joints, *"xyz"]]).assign(order=errors.index)
     worst = rows.sort_values(best, ascending=False, kind="stable")[:_WORST]
-    step = -(-len(rows) // _MOST_POINTS)
-    drawn = rows.loc[np.union1d(rows.index[::step], worst.index)]
+    drawn = rows.loc[np.union1d(rows.index[:: -(-len(rows) // _MOST_POINTS)], worst.index)]
+    shown = {model: labels[model] for model in (NOMINAL, best)}
     values = {
+        "s": summary,
         "count": len(errors),
-        "held_out": is_held_out,
-        "selected": model_name(best),
-        "share": summary.LARGE_SHARE,
+        "share": figures.LARGE_SHARE,
         "large_mm": large_mm,
         "labels": labels,
         "sizes": errors.agg(["mean", "max"]).T.assign(model=labels),
         "worst": worst,
     }
-    shown = {model: labels[model] for model in (NOMINAL, best)}
     return Part(
         "residuals", values, charts={"rows": charts.residuals(drawn, shown, joints, large_mm)}
     )
@@ -89,50 +93,25 @@ def _position_errors(tables: Tables, estimate: str) -> pd.DataFrame:
     return table[list(names)].rename(columns=names).dropna()
 
 
-def _row_names(measurements: Columns) -> list[str]:
-    """Name of every row: its line in the file, else its pose."""
-    names = RowNames.of_columns(measurements)
-    targets = np.asarray(measurements["target"]).astype(str)
-    several = len(set(targets)) > 1
-    pairs = zip(measurements["row"], measurements["pose"], targets, strict=True)
-    return [
-        (names.one(int(line)) if line == line else f"pose {pose}")
-        + (f", {target}" if several else "")
-        for line, pose, target in pairs
-    ]
-
-
-def data(tables: Tables, robot: Robot) -> Part:
+def data(tables: Tables, robot: Robot, summary: CalibrationSummary) -> Part:
     """The measured file and the findings of its check."""
-    measurements, check = pd.DataFrame(tables["measurements"]), tables.get("data_check")
+    measurements = pd.DataFrame(tables["measurements"])
     std = measurements[[f"std_{axis}_mm" for axis in "xyz"]].astype(float).dropna()
-    joints = summarise.joint_ranges(tables["measurements"], robot)
     values = {
-        "arm": robot,
-        "measured": bool(measurements["row"].notna().any()),
-        "checked": check is not None,
-        "findings": summarise.findings(check),
-        "excluded": summarise.excluded(tables),
-        "selected": model_name(summary.selected(tables["model_selection"])),
-        "left_out": summary.left_out(check),
-        "readings": len(measurements),
-        "poses": measurements["pose"].nunique(),
-        "fitted": int((measurements["subset"] == SUBSETS[0]).sum()),
+        "s": summary,
+        "source": robot.source,
         "turned": int(measurements["qw"].notna().sum()),
         "targets": measurements["target"].astype(str).value_counts().to_dict(),
         "sessions": measurements["session"].fillna("").value_counts().to_dict(),
         "noise": noise.of_measurements(tables["measurements"], robot),
         "stated": (len(std), std.median().tolist()) if len(std) else None,
-        "joints": joints,
     }
-    return Part("data", values, figures={"coverage": draw_coverage(joints)})
+    return Part("data", values, figures={"coverage": draw_coverage(summary.joint_ranges)})
 
 
-def identifiability(tables: Tables, robot: Robot) -> Part:
+def identifiability(tables: Tables, robot: Robot, summary: CalibrationSummary) -> Part:
     """Parameters that the poses do not determine, and those known only together."""
     table = pd.DataFrame(tables["dh_identified"])
-    sentences = listed(tables["dh_identified"])
-    poorly_determined = weak(sentences)
     pairs = pd.DataFrame(tables["dh_covariance"])
     pairs = pairs[pairs["parameter"] != pairs["other"]].dropna(subset="correlation")
     pairs = pairs.sort_values("correlation", key=abs, ascending=False, kind="stable")
@@ -141,15 +120,10 @@ def identifiability(tables: Tables, robot: Robot) -> Part:
     table["called"] = table["parameter"].map(parameter_name)
     for column in ("parameter", "other"):
         pairs[column] = pairs[column].map(parameter_name)
+    counts = table["status"].map(_STATUSES).value_counts()
     values = {
-        "counts": {
-            text: int((table["status"] == status).sum()) for status, text in _STATUSES.items()
-        },
-        "weak": poorly_determined,
-        "always": [text for text in sentences if not text.endswith(POORLY_DETERMINED)],
-        "spread_deg": summary.flange_spread_deg(tables["measurements"], robot)
-        if poorly_determined
-        else None,
+        "s": summary,
+        "counts": counts.reindex(_STATUSES.values(), fill_value=0).to_dict(),
         "rank": _rank(tables.get("dh_fit")),
         "close": int((pairs["correlation"].abs() >= _CLOSE).sum()),
         "limit": _CLOSE,
@@ -175,7 +149,7 @@ def _rank(fit: Columns | None) -> dict[str, object] | None:
     }
 
 
-def parameters(tables: Tables, robot: Robot) -> Part:
+def parameters(tables: Tables, robot: Robot, summary: CalibrationSummary) -> Part:
     """DH parameters against nominal, and what the VEC model adds to them."""
     model = VECModel.from_columns(tables["vec_model"], robot.dh.prismatic)
     joints, errors, std = vec_errors(tables, model, robot)
@@ -186,19 +160,15 @@ def parameters(tables: Tables, robot: Robot) -> Part:
         largest[joint][ERRORS[error]] = f"{errors[place]:+.3f}{spread}"
     offsets = pd.DataFrame(tables["vec_model"])
     values = {
-        "fitted": int(np.sum(np.asarray(tables["measurements"]["subset"]) == SUBSETS[0])),
-        "selected": model_name(summary.selected(tables["model_selection"])),
+        "s": summary,
         "deviations": in_words(misfits(tables, robot)),
         "parameters": dh_parameters(tables["dh_model"], tables["dh_identified"], robot),
-        "bending": summarise.compliance(tables.get("compliance_model")),
         "order": model.order,
         "banded": bool(np.isfinite(std).any()),
-        "errors": {name: "mm" if name.startswith("delta") else "mrad" for name in ERRORS},
         "largest": largest,
         "offsets": offsets[offsets["direction"] != 0],
     }
-    units = ["mm" if slides else "deg" for slides in np.asarray(robot.dh.prismatic)]
-    figure = draw_joint_errors(joints, errors, std, units)
+    figure = draw_joint_errors(joints, errors, std, [*summary.joint_ranges["unit"]])
     return Part("parameters", values, figures={"errors": figure})
 
 
@@ -210,17 +180,17 @@ def dh_parameters(model: Columns, identified: Columns, robot: Robot) -> pd.DataF
     fitted = DHModel.from_columns(model, robot.dh.prismatic)
     order = np.argsort(model["joint"], kind="stable")
     std = np.stack([np.asarray(model[f"std_{name}"])[order] for name in PARAMETERS], axis=1)
-    table = pd.DataFrame({"name": fitted.names, "std": std.ravel()})
+    table = pd.DataFrame({"name": fitted.names, "nominal": robot.dh.start})
+    table["calibrated"], table["std"] = fitted.start, std.ravel()
     status = dict(zip(identified["parameter"], identified["status"], strict=True))
     table["status"] = table["name"].map(status).fillna(FIXED)
     table["called"] = table["name"].map(parameter_name)
+    is_zero = (table[["nominal", "calibrated"]] == 0.0).all(axis=1)
+    unused = table["name"].str.endswith("beta_rad") & (table["status"] == FIXED) & is_zero
     angle = table["name"].map(is_angle)
-    for column, of in (("nominal", robot.dh), ("calibrated", fitted)):
-        table[column] = of.start
-    table["difference"] = (table["calibrated"] - table["nominal"]) * np.where(angle, 1e3, 1.0)
-    table["std"] *= np.where(angle, 1e3, 1.0)
-    unused = table["name"].str.endswith("beta_rad") & (table["status"] == FIXED)
-    unused &= (table[["nominal", "calibrated"]] == 0.0).all(axis=1)
+    scale = np.where(angle, 1e3, 1.0)
+    table["difference"] = (table["calibrated"] - table["nominal"]) * scale
+    table["std"] *= scale
     table.loc[angle, ["nominal", "calibrated"]] *= 180.0 / np.pi
     table["of"], table["unit"] = np.where(angle, "deg", "mm"), np.where(angle, "mrad", "mm")
     return table[~unused]
@@ -272,30 +242,26 @@ def _shared(error: str, joint: np.ndarray, slides: bool) -> np.ndarray:
     return np.stack([constant, *turning], axis=1)
 
 
-def selection(tables: Tables, why: str) -> Part:
-    """``model_selection`` and ``vec_orders``; ``why`` one model is selected."""
+def selection(tables: Tables, summary: CalibrationSummary) -> Part:
+    """``model_selection`` and ``vec_orders``."""
     models = pd.DataFrame(tables["model_selection"])
-    gains = models[["gain_mm2", "gain_std_error_mm2"]].where(models["model"] != PLAINEST)
-    models[["gain", "error"]] = gains.where(gains["gain_mm2"].notna())
-    models["times"] = models["gain"] / models["error"].where(models["error"] > 0.0)
-    orders = [tables.get(f"{model}_model", {}).get("order") for model in models["model"]]
-    models["order"] = [np.nan if order is None else np.max(order) for order in orders]
+    gains = ["gain_mm2", "gain_std_error_mm2"]
+    models.loc[models["model"] == PLAINEST, gains] = np.nan
+    models["times"] = models["gain_mm2"] / models["gain_std_error_mm2"].replace(0.0, np.nan)
+    models["order"] = summary.selection["order"].astype(float)
     models["name"] = models["model"].map(model_name)
     models["remark"] = np.where(models["selected"] == 1, "selected", "")
     columns = ("fold", "order", "log_evidence", "chosen", "prior_std_mm")
     tried = pd.DataFrame(tables.get("vec_orders", dict.fromkeys(columns, ())))
-    chosen = tried[tried["chosen"] == 1]
-    tried = tried[tried["fold"].isna() & tried["log_evidence"].notna()]
+    tried["remark"] = np.where(tried["chosen"] == 1, "← chosen", "")
+    compared = tried[tried["fold"].isna() & tried["log_evidence"].notna()]
     values = {
         "configurations": models["configurations"].fillna(0.0).max(),
-        "why": why,
+        "why": terminal.selection(summary),
         "standard_errors": STANDARD_ERRORS,
         "plainest": model_name(PLAINEST),
         "models": models,
-        "stated": not chosen["log_evidence"].notna().any(),
-        "tried": tried.assign(remark=np.where(tried["chosen"] == 1, "← chosen", "")).sort_values(
-            "order", kind="stable"
-        ),
-        "chosen": chosen,
+        "tried": compared.sort_values("order", kind="stable"),
+        "chosen": tried[tried["chosen"] == 1].drop(columns="remark"),
     }
     return Part("selection", values)

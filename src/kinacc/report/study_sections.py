@@ -30,7 +30,7 @@ _EXAMPLES = {
 }
 
 
-def history(tables: Tables, robot: Robot) -> Part:
+def history(tables: Tables) -> Part:
     """The history of the robot, one row a data set of its series."""
     rows = pd.DataFrame(tables["history"])
     rows["called"], rows["remark"] = rows["model"].map(model_name), rows["reason"].fillna("")
@@ -104,7 +104,7 @@ def truth(tables: Tables) -> Truth:
     return Truth(largest, "VEC minus DH of the synthetic arm: known exactly", None)
 
 
-def study(tables: Tables, robot: Robot) -> Part:
+def study(tables: Tables) -> Part:
     """``study_summary`` and ``study``, held to ``truth``."""
     summary, held_to = tables["study_summary"], truth(tables)
     rows = pd.DataFrame(summary)
@@ -124,7 +124,7 @@ def study(tables: Tables, robot: Robot) -> Part:
     return Part("study", values, figures={"noise": figure})
 
 
-def histories(tables: Tables, robot: Robot) -> Part:
+def histories(tables: Tables) -> Part:
     """``histories`` reading by reading: the simulations of Figs. 5 and 6."""
     table, held_to = tables["histories"], truth(tables)
     steps = pd.DataFrame(table).sort_values("iteration", kind="stable")
@@ -153,7 +153,7 @@ def histories(tables: Tables, robot: Robot) -> Part:
     return Part("histories", values, figures=figures)
 
 
-def paper_tables(tables: Tables, robot: Robot) -> Part:
+def paper_tables(tables: Tables) -> Part:
     """Tables I to III, as ``claims`` holds them beside the paper's."""
     known = pd.DataFrame(tables["claims"]).set_index("claim")
     values: dict[str, object] = {
@@ -184,7 +184,7 @@ def _row(
     return row | {"remark": f"{', '.join(differing)} differs" if differing else ""}
 
 
-def claims(tables: Tables, robot: Robot) -> Part:
+def claims(tables: Tables) -> Part:
     """Every row of ``claims``, those that differ first."""
     table = pd.DataFrame(tables["claims"])
     chose = table["used_to_choose"].astype(bool)

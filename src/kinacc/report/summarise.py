@@ -77,7 +77,7 @@ def summarise(
     folder = Path(folder)
     if tables is None:
         tables = results.read_tables(folder, needed=figures.TABLES, optional=OPTIONAL)
-    arm = robot.of_text(str(tables["robot"]["description"][0]), "robot.parquet")
+    arm, selected = robot_of(tables), figures.selected(tables["model_selection"])
     name = folder.resolve().name
     places = of_results(folder) if campaigns is None else campaigns
     assessed = of_calibration.newest(name, tables, places)
@@ -105,7 +105,7 @@ def summarise(
         fitted=int(np.sum(np.asarray(measurements["subset"]) == SUBSETS[0])),
         frames_fitted=figures.frames_are_fitted(tables["frames"]),
         full_pose=bool(turned.any()),
-        selected=figures.selected(tables["model_selection"]),
+        selected=selected,
         errors=errors,
         selection=_selection(tables),
         joint_ranges=joint_ranges(measurements, arm),
@@ -128,10 +128,13 @@ def summarise(
         other_errors=_other_errors(tables),
         history=history_sentence(pd.DataFrame(tables["history"])) if "history" in tables else "",
         outdated=outdated,
-        next_steps=_next_steps(
-            str(folder), results.calibration(tables, arm).choice, assessed.status
-        ),
+        next_steps=_next_steps(str(folder), selected, assessed.status),
     )
+
+
+def robot_of(tables: Tables) -> Robot:
+    """The robot that the table ``robot`` describes."""
+    return robot.of_text(str(tables["robot"]["description"][0]), "robot.parquet")
 
 
 def data_set_folders(folders: Iterable[Path]) -> list[Path]:
@@ -169,21 +172,17 @@ def data_set_folders(folders: Iterable[Path]) -> list[Path]:
     return list(dict.fromkeys(places))
 
 
-def of_folder(folder: Path, error: InputError) -> Problem:
-    """The first problem of ``error`` as one of ``folder``."""
-    problem = error.problems[0]
-    if problem.where == str(folder / "summary.parquet"):
-        return problem
-    return replace(problem, where=str(folder), what=f"{problem.where}: {problem.what}")
-
-
-def summarise_all(folders: Sequence[Path]) -> list[CalibrationSummary | Problem]:
+def summarise_all(
+    folders: Sequence[Path], outdated: str = ""
+) -> list[CalibrationSummary | Problem]:
     """The summary of every results folder, or why it has none.
 
     Parameters
     ----------
     folders
         Results folders of data sets.
+    outdated
+        Why their tables are outdated, see ``summarise``.
 
     Returns
     -------
@@ -192,20 +191,24 @@ def summarise_all(folders: Sequence[Path]) -> list[CalibrationSummary | Problem]
     """
     summaries: list[CalibrationSummary | Problem] = []
     for folder in folders:
+        path = folder / "summary.parquet"
         try:
-            path = folder / "summary.parquet"
             if path.is_file() and path.name in sums.outdated(folder):
                 what = "was made from other tables than those now beside it"
                 raise InputError(Problem(str(path), what, fix=store.remake(path)))
-            summaries.append(summarise(folder))
+            summaries.append(summarise(folder, outdated=outdated))
         except InputError as error:
-            summaries.append(of_folder(folder, error))
+            problem = error.problems[0]
+            if problem.where != str(path):
+                what = f"{problem.where}: {problem.what}"
+                problem = replace(problem, where=str(folder), what=what)
+            summaries.append(problem)
     return summaries
 
 
 def run(inputs: Tables, settings: Mapping[str, Any]) -> dict[str, Columns]:
     """The stage ``summary``: figures of a calibration, one a row."""
-    arm = robot.of_text(str(inputs["robot"]["description"][0]), "robot.parquet")
+    arm = robot_of(inputs)
     calibration = results.calibration(inputs, arm)
     share = applicability.share_of_box(calibration, *figures.covered(inputs["measurements"], arm))
     known = summarise(Path("results"), inputs, campaigns=())
@@ -283,19 +286,14 @@ def _selection(tables: Tables) -> pd.DataFrame:
 def _orders(tables: Tables, model: str) -> dict[str, int | None]:
     """The order of a model, those chosen in folds, and the highest where several were tried."""
     order = tables.get(f"{model}_model", {}).get("order")
-    low = high = tried = None
-    if order is not None and (orders := tables.get(f"{model}_orders")) is not None:
-        table = pd.DataFrame(orders)
-        chosen = table["order"][table["fold"].notna() & (table["chosen"] == 1)]
-        if len(chosen):
-            low, high = int(chosen.min()), int(chosen.max())
-        if table["order"].nunique() > 1:
-            tried = int(table["order"].max())
+    none = dict.fromkeys(("order", "fold", "chosen"), ())
+    table = pd.DataFrame(tables.get(f"{model}_orders", none))
+    in_folds = table["order"][table["fold"].notna() & (table["chosen"] == 1)]
     return {
         "order": None if order is None else int(np.max(order)),
-        "low_order_held_out": low,
-        "high_order_held_out": high,
-        "highest_order_tried": tried,
+        "low_order_held_out": int(in_folds.min()) if len(in_folds) else None,
+        "high_order_held_out": int(in_folds.max()) if len(in_folds) else None,
+        "highest_order_tried": int(table["order"].max()) if table["order"].nunique() > 1 else None,
     }
 
 

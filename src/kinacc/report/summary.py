@@ -18,7 +18,6 @@ from kinacc.report.rendering import size
 
 BOUND, HELD_OUT = "bound", "held-out"  # statistics that a verdict is by
 STATISTICS = {"mean": "mean", f"{LARGE_SHARE:.0%}": "quantile_99", "largest": "largest"}
-_CONFIGURED = "the configuration's"
 _FEWEST = round(1.0 / (1.0 - LARGE_SHARE))  # rows of which that share is less than all
 _TOLERANCE_OF = {BOUND: "bound", HELD_OUT: "quantile_99"}
 
@@ -184,45 +183,44 @@ class CalibrationSummary:
         Without ``tolerance_mm`` the campaign's tolerance counts, then that of the configuration
         where it is about the same statistic; None where there is none.
         """
-        bound = self.campaign.of_all if self.campaign else None
-        source = ""
-        if tolerance_mm is None and bound is not None and by == BOUND:
-            tolerance_mm, source = bound.tolerance_mm, "the campaign's"
-        if tolerance_mm is None and self.tolerance and self.tolerance.of == _TOLERANCE_OF[by]:
-            tolerance_mm, source = self.tolerance.mm, _CONFIGURED
-        if tolerance_mm is None:
-            return None
-        if by == HELD_OUT:
-            return self._by_held_out(Tolerance(tolerance_mm, _TOLERANCE_OF[by]), source)
-        if bound is None:
-            reason = "no campaign bounds the largest error"
-            return Verdict(UNDECIDED, reason, tolerance_mm, source)
-        if self.doubts:
-            return Verdict(UNDECIDED, "its bound cannot be relied on", tolerance_mm, source)
-        limits = (bound.value_mm, bound.lower_mm, bound.upper_mm, bound.confidence)
-        decided = decide(Statement(CANDIDATES, *limits, excepted=bound.excepted), tolerance_mm)
-        return Verdict(decided.verdict, reason_text(decided.reason), tolerance_mm, source)
+        statistic = _TOLERANCE_OF[by]
+        if tolerance_mm is not None:
+            return self._judged(Tolerance(tolerance_mm, statistic))
+        bound = self.campaign.of_all if self.campaign and by == BOUND else None
+        if bound is not None and bound.tolerance_mm is not None:
+            return self._judged(Tolerance(bound.tolerance_mm, statistic), "the campaign's")
+        return (
+            self.of_configuration() if self.tolerance and self.tolerance.of == statistic else None
+        )
 
     def of_configuration(self) -> Verdict | None:
         """The verdict on the tolerance of the configuration, by the statistic it names."""
-        if self.tolerance is None:
-            return None
-        if self.tolerance.of == "bound":
-            return self.verdict(BOUND, self.tolerance.mm)
-        return self._by_held_out(self.tolerance, _CONFIGURED)
+        return self._judged(self.tolerance, "the configuration's") if self.tolerance else None
 
-    def _by_held_out(self, allowed: Tolerance, source: str) -> Verdict:
-        best, verdict = self.best, ACCEPT
-        reason = "99 % of the errors held out are within the tolerance"
-        if not self.is_held_out:
-            verdict, reason = UNDECIDED, "no error is held out"
-        elif allowed.of == "mean":
-            verdict = ACCEPT if best.mean <= allowed.mm else REJECT
-            reason = f"the mean error held out is {best.mean:.3f} mm"
-        elif best.quantile_99 > allowed.mm:
-            verdict = REJECT
-            reason = "more than 1 % of the errors held out are beyond the tolerance"
-        elif best.n < _FEWEST:
-            verdict = UNDECIDED
-            reason = f"{best.n:.0f} errors are held out, too few to tell of 1 % of them"
+    def _judged(self, allowed: Tolerance, source: str = "") -> Verdict:
+        """Whether the statistic of a tolerance is within it."""
+        verdict, reason = (self._by_bound if allowed.of == "bound" else self._by_held_out)(allowed)
         return Verdict(verdict, reason, allowed.mm, source)
+
+    def _by_bound(self, allowed: Tolerance) -> tuple[str, str]:
+        bound = self.campaign.of_all if self.campaign else None
+        if bound is None:
+            return UNDECIDED, "no campaign bounds the largest error"
+        if self.doubts:
+            return UNDECIDED, "its bound cannot be relied on"
+        limits = (bound.value_mm, bound.lower_mm, bound.upper_mm, bound.confidence)
+        decided = decide(Statement(CANDIDATES, *limits, excepted=bound.excepted), allowed.mm)
+        return decided.verdict, reason_text(decided.reason)
+
+    def _by_held_out(self, allowed: Tolerance) -> tuple[str, str]:
+        best = self.best
+        if not self.is_held_out:
+            return UNDECIDED, "no error is held out"
+        if allowed.of == "mean":
+            verdict = ACCEPT if best.mean <= allowed.mm else REJECT
+            return verdict, f"the mean error held out is {best.mean:.3f} mm"
+        if best.quantile_99 > allowed.mm:
+            return REJECT, "more than 1 % of the errors held out are beyond the tolerance"
+        if best.n < _FEWEST:
+            return UNDECIDED, f"{best.n:.0f} errors are held out, too few to tell of 1 % of them"
+        return ACCEPT, "99 % of the errors held out are within the tolerance"
