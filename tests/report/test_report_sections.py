@@ -216,17 +216,10 @@ def test_names_in_a_users_file_are_text_on_the_page(tables):
 
 
 def test_a_page_on_thirty_thousand_rows_can_still_be_mailed(tables):
-    rows, known = 30_000, summarise(RESULTS, tables, campaigns=())
-    rng = np.random.default_rng(0)
-    frame = pd.DataFrame(tables["measurements"]).iloc[np.zeros(rows, int)].reset_index(drop=True)
-    frame = frame.assign(**{f"q{n}": rng.uniform(-1.0, 1.0, rows) for n in range(1, 7)})
-    tables["measurements"] = dict(frame)
-    errors = rng.normal(size=(3 * rows, 3))
-    models = [f"{model}_vs_measured" for model in ("nominal", "dh", "vec")]
-    tables["pose_errors"] = {
-        "comparison": np.repeat(models, rows).astype(object),
-        "estimate": np.full(3 * rows, "cross_validated", object),
-        "row": np.tile(np.arange(rows), 3),
-        **{f"e{axis}_mm": errors[:, i] for i, axis in enumerate("xyz")},
-    }
+    known = summarise(RESULTS, tables, campaigns=())
+    measured, errors = (pd.DataFrame(tables[name]) for name in ("measurements", "pose_errors"))
+    times = 30_000 // len(measured) + 1
+    many = [errors.assign(row=errors["row"] + i * len(measured)) for i in range(times)]
+    tables["measurements"] = dict(pd.concat([measured] * times, ignore_index=True))
+    tables["pose_errors"] = dict(pd.concat(many, ignore_index=True))
     assert len(as_page(fit_sections.residuals(tables, known)).encode()) < 4_000_000

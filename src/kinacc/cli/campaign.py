@@ -151,7 +151,7 @@ def report(folder: str, to: str | None, formats: Sequence[str], out: Output) -> 
     result = opened.status()
     lines = [_lines(result)[0], f"{into}: {', '.join(files)}", out.page or ""]
     answer = {**vars(result), "report": str(into), "files": files, "page": out.page}
-    out.show(answer, pd.DataFrame(), filter(None, lines))
+    out.show(answer, lines=filter(None, lines))
 
 
 @campaign.command("verify")
@@ -172,11 +172,8 @@ def verify(folder: str, sha256: str | None, readings: int | None, out: Output) -
     checked = folders.verify(opened, sha256, readings)
     verdict = f"FAIL: {'; '.join(checked.problems)}." if checked.problems else "PASS."
     text = f"{checked.entries} entries are whole, {checked.readings} readings"
-    out.show(
-        checked,
-        pd.DataFrame(),
-        [verdict, f"{opened.folder}: {text}, SHA-256 {checked.sha256}", *folders.doubts(opened)],
-    )
+    lines = [verdict, f"{opened.folder}: {text}, SHA-256 {checked.sha256}"]
+    out.show(checked, lines=[*lines, *folders.doubts(opened)])
     if checked.problems:
         raise SystemExit(AGAINST)
 
@@ -217,7 +214,7 @@ def _write_report(
 
 
 def _show(summary: CampaignStatus, out: Output) -> None:
-    out.show(summary, pd.DataFrame(), _lines(summary, out.verbose))
+    out.show(summary, lines=_lines(summary, out.verbose))
 
 
 def _lines(summary: CampaignStatus, verbose: bool = False) -> list[str]:
@@ -267,24 +264,18 @@ def record(out: Output, folder: str, file: str | None, **options: Any) -> None:
         raise InputError(Problem("the reading", message, "--position-mm, or a FILE"))
     campaign = Campaign(folder)
     flags = {name: options[name] for name in ("accept_implausible", "again")}
-    requested, plan = campaign.state.requested, campaign.plan
+    plan, number = campaign.plan, campaign.state.requested
+    requested = None if number is None else plan.points.label[number]
     if file is None:
         taken = campaign.add_reading(**_single(options, plan.slides), **flags)
-        point = taken.points[0]
-        first = f"Recorded reading {taken.numbers[0]} at point {point}: {taken.error_mm[0]:.3f} mm"
-        first += " from the model."
-        if requested is not None and point != (following := plan.points.label[requested]):
-            first += f" It is used when its point is requested; {following} is next."
     else:
         rows = _of_file(file, options, campaign)
         taken = campaign.add_readings(rows, **flags, skip_bad=options["skip_bad"])
-        known = f"; {len(taken.known)} rows were recorded before" if taken.known else ""
-        first = f"Recorded {len(taken.numbers)} readings of {file}{known}."
     for problem in taken.skipped:
         click.echo(f"not taken: {problem}", err=True)
     summary = campaign.status()
-    answer = {**vars(taken), "status": summary}
-    out.show(answer, pd.DataFrame(), [first, *_lines(summary)])
+    first = texts("recorded.txt", taken=taken, file=file, requested=requested)
+    out.show({**vars(taken), "status": summary}, lines=[*first, *_lines(summary)])
 
 
 def _single(options: Mapping[str, Any], slides: np.ndarray) -> dict[str, Any]:

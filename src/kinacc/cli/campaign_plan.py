@@ -16,11 +16,9 @@ from kinacc.campaign.begin import noise_doubts, noise_of
 from kinacc.campaign.planning import Aim, plan_budget
 from kinacc.cli import choice
 from kinacc.cli.campaign_start import assessor_of, instruments_of
-from kinacc.cli.choice import option
+from kinacc.cli.choice import calibration_of, option
 from kinacc.cli.output import Output, answers
-from kinacc.config.error_models import PLAINEST
-from kinacc.deployment.folder import read_tables, recorded_model, targets_of
-from kinacc.deployment.record import default_point
+from kinacc.deployment.folder import read_tables
 from kinacc.errors import InputError, Problem, refuse
 from kinacc.measurements.rows import open_table
 from kinacc.measurements.table import numbers
@@ -157,19 +155,13 @@ def errors_of(name: str, point: str | None = None) -> ErrorField:
 
 def _errors_of_folder(path: Path, point: str | None) -> ErrorField:
     name, points = path.resolve().name, path / "assessment_points.parquet"
-    needed = ("pose_errors", "measurements")
     if points.is_file() and not (path / "pose_errors.parquet").is_file():
         return fields.of_points(name, store.read(points))
-    tables = read_tables(path, needed=needed, optional=("model_selection", "frames"))
-    model = recorded_model(tables) or PLAINEST
-    targets = list(dict.fromkeys(np.asarray(tables["measurements"]["target"]).astype(str)))
-    if "frames" in tables:
-        targets = [target for target in targets_of(tables["frames"], model) if target in targets]
-    target = point or default_point(targets)
-    if target not in targets:
-        raise InputError(Problem("--point", f"{target!r} is no target", ", ".join(targets)))
-    if len(targets) > 1:
-        known = ", ".join(targets)
-        click.echo(f"{path}: errors of {target} ({known}); --point names another", err=True)
-    only = target if len(targets) > 1 else None
-    return fields.of_measurements(name, tables["pose_errors"], model, only)
+    tables, arm = read_tables(path, needed=("pose_errors",), optional=()), calibration_of(path)
+    target, targets = point or arm.default_point, ", ".join(arm.targets)
+    if target not in arm.targets:
+        raise InputError(Problem("--point", f"{target!r} is no target", targets))
+    if len(arm.targets) == 1:
+        return fields.of_measurements(name, tables["pose_errors"], arm.choice, None)
+    click.echo(f"{path}: errors of {target} ({targets}); --point names another", err=True)
+    return fields.of_measurements(name, tables["pose_errors"], arm.choice, target)

@@ -10,7 +10,6 @@ from typing import Any
 
 import click
 import numpy as np
-import pandas as pd
 
 from kinacc.assess.adaptive import AdaptiveAssessor
 from kinacc.assess.noise import ESTIMATED
@@ -128,7 +127,7 @@ def start(out: Output, **options: Any) -> None:
         "overruled": plan.overruled,
     }
     command = f"kinacc campaign next {shlex.quote(options['folder'])}"
-    out.show(answer, pd.DataFrame(), lines("campaign_start.txt", **answer, next_command=command))
+    out.show(answer, lines=lines("campaign_start.txt", **answer, next_command=command))
 
 
 def instruments_of(

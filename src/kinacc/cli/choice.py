@@ -21,7 +21,6 @@ from kinacc.tables.allowed import SELECTABLE
 from kinacc.workflow.outdated import outdated_reason
 
 CONFIG = "config.yaml"
-_FILE = "measurements.file"
 Command = Callable[..., Any]
 Decorator = Callable[[Command], Command]
 option = partial(click.option, show_default=True)
@@ -35,6 +34,11 @@ def values_of(path: str) -> click.ParamType[Any]:
         return click.Choice(key["enum"])
     ends = key["exclusiveMinimum"], key["exclusiveMaximum"]
     return click.FloatRange(*ends, min_open=True, max_open=True)
+
+
+def setting(name: str, key: str, text: str) -> Decorator:
+    """An option with the values of a key of ``measurements.file``."""
+    return option(name, type=values_of(f"measurements.file.{key}"), help=text)
 
 
 def positive(text: str) -> float:
@@ -93,9 +97,9 @@ point_options = together(
 )
 # How a measured file is written, where the file itself leaves it open.
 _text = (
-    option("--encoding", type=values_of(f"{_FILE}.encoding"), help="Characters of a text file."),
+    setting("--encoding", "encoding", "Characters of a text file."),
     option("--sheet", help="Sheet of an Excel workbook."),
-    option("--decimal", type=values_of(f"{_FILE}.decimal"), help="Decimal mark."),
+    setting("--decimal", "decimal", "Decimal mark."),
     option(
         "--thousands",
         type=click.Choice([".", ",", " ", "'", "none"]),
@@ -106,7 +110,7 @@ _text = (
 _joints = (
     option("--take", multiple=True, metavar="COLUMN",
            help="Column to read, with those that go with it; repeatable."),
-    option("--joint-unit", type=values_of(f"{_FILE}.joint_unit"), help="Unit of the joints."),
+    setting("--joint-unit", "joint_unit", "Unit of the joints."),
     option("--pulses-per-deg", metavar="A,B,..", help="Pulses of each joint in a degree."),
 )  # fmt: skip
 file_options = together(
@@ -122,20 +126,14 @@ file_options = together(
         type=click.Choice(["1", "2", "3", "none"]),
         help="Standard deviations in an uncertainty of the file; none leaves it out.",
     ),
-    option(
+    setting(
         "--direction-unit",
-        type=values_of(f"{_FILE}.directions.unit"),
-        help="Unit of an instrument's horizontal and vertical angles.",
+        "directions.unit",
+        "Unit of an instrument's horizontal and vertical angles.",
     ),
-    option(
-        "--vertical",
-        type=values_of(f"{_FILE}.directions.vertical"),
-        help="Zero of vertical angles.",
-    ),
-    option(
-        "--horizontal",
-        type=values_of(f"{_FILE}.directions.horizontal"),
-        help="Sense of horizontal angles, seen from above.",
+    setting("--vertical", "directions.vertical", "Zero of vertical angles."),
+    setting(
+        "--horizontal", "directions.horizontal", "Sense of horizontal angles, seen from above."
     ),
 )
 
@@ -222,7 +220,10 @@ def robot_of(folder: str | Path, robot: str | None) -> Robot:
 
 
 def calibration_of(
-    folder: str | Path, model: str | None, robot: str | None, session: str | None = None
+    folder: str | Path,
+    model: str | None = None,
+    robot: str | None = None,
+    session: str | None = None,
 ) -> Calibration:
     """The calibration of a results folder."""
     tables = results.read_tables(folder)

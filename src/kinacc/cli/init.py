@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from kinacc.checks.described import corrected, coupling_of, fitting, remarks_on
 from kinacc.checks.findings import Report
-from kinacc.cli import choice
+from kinacc.cli import choice, rows
 from kinacc.cli.choice import option
 from kinacc.cli.init_questions import confirmed, guessed, unanswered
 from kinacc.cli.output import Output, answers, require_writable
@@ -29,9 +29,8 @@ from kinacc.measurements.reader import MeasuredFile, read
 from kinacc.progress import reporting
 from kinacc.report import rendering
 from kinacc.report.terminal import print_table
-from kinacc.tables.atomic import replacing
+from kinacc.tables.atomic import write_together
 
-_FILE = "measurements.file"
 _FOLDS_UNKNOWN = 60
 _FIRST_POSES = 3
 _QUATERNION = ["qx", "qy", "qz", "qw"]
@@ -88,10 +87,8 @@ class Description:
 @option("--robot", help="A shipped name, a robot file or a URDF file. [found by fitting]")
 @option("--out", "folder", default=".", help="Folder to write to.")
 @option("--name", help="Name of the data set. [as the file]")
-@option("--length-unit", type=choice.values_of(f"{_FILE}.length_unit"),
-        help="Unit of the positions.")  # fmt: skip
-@option("--angle-unit", type=choice.values_of(f"{_FILE}.orientation.unit"),
-        help="Unit of orientations.")  # fmt: skip
+@choice.setting("--length-unit", "length_unit", "Unit of the positions.")
+@choice.setting("--angle-unit", "orientation.unit", "Unit of orientations.")
 @option("--orientation",
         help="quaternion (scalar first), quaternion_xyzw, rotation_vector, none, or an Euler "
         "convention such as XYZ.")  # fmt: skip
@@ -122,9 +119,7 @@ def init(measurement_files: tuple[str, ...], out: Output, **options: Any) -> Non
         raise InputError(Problem("--name", name, f"at most {LONGEST} letters, digits, _ and -"))
     dataset = Path(options["folder"], f"{name}.yaml")
     robot_file = dataset.with_name(f"{name}.robot.yaml")
-    known = Path(options["robot"] or "")
-    stays = known.suffix in (".yaml", ".yml") and known.is_file()
-    require_writable([dataset] if stays else [dataset, robot_file], out.force)
+    require_writable([dataset], out.force)
     if ask and (changed := confirmed(guess, options["robot"])):
         guess = guessed(measurement_files, stated | changed, ask)
     robot, chosen = _robot(guess, options["robot"], ask)
@@ -154,9 +149,8 @@ def init(measurement_files: tuple[str, ...], out: Output, **options: Any) -> Non
     texts[dataset] = _dataset(
         dataset, name, robot if robot and text is None else str(robot_file), guess, report, chosen
     )
-    with replacing(list(texts)) as parts:
-        for part, content in zip(parts, texts.values(), strict=True):
-            part.write_text(content, encoding="utf-8")
+    require_writable(texts, out.force)
+    write_together({path: content.encode() for path, content in texts.items()})
     result = Description(
         [str(path) for path in texts],
         robot,
@@ -183,22 +177,16 @@ def _first_poses(reading: MeasuredFile, prismatic: np.ndarray) -> pd.DataFrame:
     """A row for each target of the first poses, as it was read first, in deg and mm."""
     table = pd.DataFrame(reading.columns)
     table = table[table["pose"].isin(table["pose"].unique()[:_FIRST_POSES])]
-    table["readings"] = table.groupby(["pose", "target"])["pose"].transform("size")
-    table = table.drop_duplicates(["pose", "target"])
-    first = pd.DataFrame({"where": [reading.row_names.one(int(line)) for line in table["row"]]})
-    for joint, slides in enumerate(prismatic, 1):
-        values = table[f"q{joint}"].to_numpy(float)
-        first[f"q{joint}_{'mm' if slides else 'deg'}"] = values if slides else np.rad2deg(values)
-    for name in ("target", "x_mm", "y_mm", "z_mm"):
-        first[name] = table[name].to_numpy()
-    quaternion = table[_QUATERNION].to_numpy(float)
-    turned = np.isfinite(quaternion).all(axis=1)
-    vector = np.full((len(table), 3), np.nan)
-    if turned.any():
-        vector[turned] = Rotation.from_quat(quaternion[turned]).as_rotvec(degrees=True)
-    first[["rvx_deg", "rvy_deg", "rvz_deg"]] = vector
-    first["readings"] = table["readings"].to_numpy()
-    return first
+    counts = table.groupby(["pose", "target"], sort=False).size()
+    table = table.drop_duplicates(["pose", "target"]).reset_index(drop=True)
+    joints = table[[f"q{joint}" for joint in range(1, len(prismatic) + 1)]].to_numpy(float)
+    where = [reading.row_names.one(int(line)) for line in table["row"]]
+    first = pd.DataFrame({"where": where, **rows.joint_columns(prismatic, joints)})
+    first = first.join(table[["target", "x_mm", "y_mm", "z_mm"]])
+    turned = table[_QUATERNION].astype(float).dropna()
+    vector = Rotation.from_quat(turned).as_rotvec(degrees=True) if len(turned) else None
+    vectors = pd.DataFrame(vector, turned.index, ["rvx_deg", "rvy_deg", "rvz_deg"], dtype=float)
+    return first.join(vectors).assign(readings=counts.to_numpy())
 
 
 def _robot(guess: Guess, stated: str | None, ask: bool) -> tuple[str | None, str]:
