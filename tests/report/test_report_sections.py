@@ -132,16 +132,18 @@ def test_what_other_poses_would_show_stands_first(tables):
         j2__a_mm=("prior", 0.5, "known beforehand to 0.5 mm"),
         j3__alpha_rad=("identified", 0.0002, None),
         tool__z_mm=("undetermined", np.nan, f"tool z +1 mm{POORLY_DETERMINED}"),
+        base__x_mm=("undetermined", np.nan, ""),
     )
     found = section(fit_sections.identifiability, tables)
     first, second = table(found, "What cannot be told apart").rows
     assert first[0] == "tool z +1 mm"
     assert second == (ALWAYS, "no pose of such an arm does: no fault")
-    assert "2 undetermined" in read(found).population
+    assert "3 undetermined" in read(found).population
     rows = {row[0]: row[1:] for row in table(found, "Status of").rows}
     assert rows["a of joint 2"] == ("prior", "0.5 mm", "known beforehand to 0.5 mm")
     assert rows["alpha of joint 3"] == ("identified", "0.2 mrad", "–")
     assert rows["tool z"][:2] == ("undetermined", "–")
+    assert rows["base x"][2].endswith("1.2")  # its share of undetermined directions
 
 
 def test_the_closest_pair_comes_first_and_the_rank_has_its_limit(tables):

@@ -65,7 +65,7 @@ def plan_poses(
       kinacc plan-poses ur10 --hayati 2,3 --poses 50 -o plan.csv --picture index.svg
     """
     settings = spaces.settings_of(dataset, config) if dataset else None
-    name = robot or (settings and settings["robot"])
+    name = robot or (settings["robot"] if settings else None)
     if name is None:
         raise InputError(Problem("ROBOT", "is not given", "a shipped name, a robot file"))
     arm = robots.load(name)

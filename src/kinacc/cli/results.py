@@ -108,26 +108,19 @@ def report(folder: str, path: str | None, out: Output) -> None:
     out.show({"page": str(page), "bytes": size}, lines=[line])
 
 
-def written(folder: str, out: str | None = None, without: Collection[str] = ()) -> Path:
+def written(folder: str, out: str | None = None) -> Path:
     """Write the page of a results folder, and return where it is.
 
-    ``without``: tables to leave out. Raises InputError naming all tables missing.
+    Raises InputError naming all tables missing.
     """
-    place = Path(folder)
-    reason = print_outdated(folder)
-    on_page = summaries.PAGE_TABLES
-    old = {Path(name).stem for name in sums.outdated(place)} - {Path(_PAGE).stem, *on_page}
-    tables = read_tables(place, needed=on_page, optional=summaries.ON_PAGE)
-    shown = {name: table for name, table in tables.items() if name not in {*without, *old}}
-    campaigns = {role: Path(path) for role, path in campaign_files(of_results(place)).items()}
-    settings = {
-        "dataset": place.resolve().name,
-        "folder": folder,
-        "outdated": sorted(old),
-        "reason": reason,
-    }
+    place, reason, needed = Path(folder), print_outdated(folder), summaries.PAGE_TABLES
+    old = {Path(name).stem for name in sums.outdated(place)} - {Path(_PAGE).stem, *needed}
+    optional = [name for name in summaries.ON_PAGE if name not in old]
+    tables: dict[str, Any] = dict(read_tables(place, needed=needed, optional=optional))
+    tables |= {role: Path(path) for role, path in campaign_files(of_results(place)).items()}
+    settings = {"folder": folder, "outdated": sorted(old), "reason": reason}
+    page = pages.run(tables, {"dataset": place.resolve().name, **settings})
     path = Path(out or place / _PAGE)
-    page = pages.run({**shown, **campaigns}, settings)
     write_whole(path, html(page).encode())
     return path
 

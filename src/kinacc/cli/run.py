@@ -19,11 +19,6 @@ from kinacc.workflow.data_sets import RESULTS, read_data_sets
 from kinacc.workflow.running import held
 from kinacc.workflow.start import SNAKEFILE, run_workflow
 
-# Made by a study, perhaps of an earlier calibration.
-_STUDIED = (
-    *("accuracy_map", "assessment_points", "study", "study_summary", "readings", "histories"),
-    "claims",
-)
 _options = together(
     option("--cores", "-c", type=click.IntRange(1), help="Processor cores. [all]"),
     option("--json", "as_json", is_flag=True, help="Answer as JSON."),
@@ -50,8 +45,8 @@ def calibrate(arguments: tuple[str, ...], cores: int | None, as_json: bool) -> N
     if as_json:
         click.echo(json.dumps(as_plain(summarise_all(folders)), indent=2))
         return
-    pages = [written(str(folder), without=_STUDIED) for folder in folders if len(folders) <= FEW]
-    print_summaries(folders, without=_STUDIED)
+    pages = [written(str(folder)) for folder in folders if len(folders) <= FEW]
+    print_summaries(folders)
     if pages:
         click.echo(f"Page: {', '.join(map(str, pages))}")
     click.echo(f"Accuracy map, study and claims: {shlex.join(['kinacc', 'study', *configs])}")

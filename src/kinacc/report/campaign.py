@@ -145,22 +145,25 @@ def _row(bound: Bound) -> dict[str, object]:
 
 def _instruments(summary: CampaignStatus, state: State, readings: pd.DataFrame) -> pd.DataFrame:
     """Readings by instrument, and the scatter of repeats over the stated noise."""
-    table = readings[["instrument"]].assign(
-        repeat=readings["reading"].map(deviations(state)).astype(float),
-        struck=readings["struck"].notna(),
-        used=readings["used"].notna(),
-        size=readings["error_mm"].where(readings["used"].notna()),
-    )
-    table["waiting"] = ~table["struck"] & ~table["used"]
-    table["square"] = table["repeat"] ** 2
-    groups = table.groupby("instrument")
-    rows = groups[["used", "waiting", "struck"]].sum()
-    rows["mean"], rows["largest"] = groups["size"].mean(), groups["size"].max()
-    rows["repeats"], rows["scatter"] = groups["repeat"].count(), np.sqrt(groups["square"].mean())
-    rows = rows.reindex(list(summary.noise))
-    counts = ["used", "waiting", "struck", "repeats"]
-    rows[counts] = rows[counts].fillna(0).astype(int)
-    return rows.assign(name=rows.index, noise=list(summary.noise.values()))
+    scatter, rows = deviations(state), []
+    for name, noise in summary.noise.items():
+        taken = readings[readings["instrument"] == name]
+        used, struck = taken["used"].notna(), taken["struck"].notna()
+        repeats = taken["reading"].map(scatter).dropna().astype(float)
+        rows.append(
+            {
+                "name": name,
+                "noise": noise,
+                "used": int(used.sum()),
+                "waiting": int((~used & ~struck).sum()),
+                "struck": int(struck.sum()),
+                "mean": taken["error_mm"][used].mean(),
+                "largest": taken["error_mm"][used].max(),
+                "repeats": len(repeats),
+                "scatter": np.sqrt(np.mean(repeats**2)),
+            }
+        )
+    return pd.DataFrame(rows)
 
 
 def _facts(opened: Opened) -> dict[str, object]:

@@ -63,7 +63,8 @@ def summarise(
     folder
         Results folder of a data set.
     tables
-        Its tables, read from ``folder`` where they are not given.
+        Its tables; where they are not given, those in ``folder`` but for the ones of a study or a
+        history that were made from other tables than those now there.
     campaigns
         Folders of campaigns on it, sought where they are not given.
     outdated
@@ -76,7 +77,9 @@ def summarise(
     """
     folder = Path(folder)
     if tables is None:
-        tables = results.read_tables(folder, needed=figures.TABLES, optional=OPTIONAL)
+        old = {Path(name).stem for name in sums.outdated(folder)} - {"summary", "data_check"}
+        optional = [name for name in OPTIONAL if name not in old]
+        tables = results.read_tables(folder, needed=figures.TABLES, optional=optional)
     arm, selected = robot_of(tables), figures.selected(tables["model_selection"])
     name = folder.resolve().name
     places = of_results(folder) if campaigns is None else campaigns

@@ -12,12 +12,11 @@ from rich.console import Console
 from rich.table import Table
 
 from kinacc.assess.statement import UNDECIDED
-from kinacc.calibration.summary import LARGE_SHARE, TABLES
+from kinacc.calibration.summary import LARGE_SHARE
 from kinacc.config.error_models import PLAINEST, model_name
-from kinacc.deployment.folder import read_tables
 from kinacc.errors import Problem, as_seen, first_few
 from kinacc.report.rendering import counted, lines, size
-from kinacc.report.summarise import OPTIONAL, summarise, summarise_all
+from kinacc.report.summarise import summarise, summarise_all
 from kinacc.report.summary import BOUND, STATISTICS, CalibrationSummary
 
 FEW = 4  # data sets whose summaries are printed one after another
@@ -66,24 +65,14 @@ def print_summary(
         console.print(f"  {command}", soft_wrap=True)
 
 
-def print_summaries(folders: Sequence[Path], without: Sequence[str] = ()) -> None:
-    """Print half a page each for a few results folders, a table for many.
-
-    Parameters
-    ----------
-    folders
-        Results folders of data sets.
-    without
-        Names of tables of an earlier run, to leave out.
-    """
+def print_summaries(folders: Sequence[Path]) -> None:
+    """Print half a page each for a few results folders of data sets, a table for many."""
     if len(folders) > FEW:
         print_fleet(fleet_table(summarise_all(folders), BOUND), BOUND)
         return
     for folder in folders:
-        tables = read_tables(folder, needed=TABLES, optional=OPTIONAL)
-        shown = {name: table for name, table in tables.items() if name not in without}
         print()
-        print_summary(summarise(folder, shown))
+        print_summary(summarise(folder))
 
 
 def headline(
