@@ -8,12 +8,12 @@ import os
 import re
 import shutil
 import subprocess
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 import shared_work
+from preloaded import python
 
 ROOT = Path(__file__).resolve().parents[1]
 CONFIGS = ("config.yaml", "small.yaml")
@@ -56,13 +56,13 @@ class Project:
         **env: str,
     ) -> str:
         """What ``snakemake`` prints; fails the test unless it ends as expected."""
-        command = [sys.executable, "-m", "snakemake", "--cores", str(cores), "--nocolor", *options]
+        command = [python(), "-m", "snakemake", "--cores", str(cores), "--nocolor", *options]
         return self.run([*command, "--configfile", *configs, "--", *targets], ok, **env)
 
     def kinacc(self, *words: str, ok: bool = True, configs: tuple[str, ...] = CONFIGS) -> str:
         """What ``kinacc`` prints when given the same configuration."""
         options = [word for name in configs for word in ("--config", name)]
-        return self.run([sys.executable, "-m", "kinacc.cli.group", *words, *options], ok)
+        return self.run([python(), "-m", "kinacc", *words, *options], ok)
 
     def run(self, command: list[str], ok: bool = True, **environment: str) -> str:
         """Output and errors of a command started in the project's folder."""

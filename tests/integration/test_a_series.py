@@ -8,12 +8,14 @@ from __future__ import annotations
 
 import re
 import shutil
+import sys
 from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
 import pytest
 from command_line import call
+from preloaded import python
 from shared_work import once
 
 from kinacc.tables.store import digest_of, read
@@ -63,9 +65,10 @@ def two_lines(tmp_path_factory):
             names, *rows = (MEASURED / f"series_{series}.csv").read_text().splitlines()
             text = "\n".join([names, *rows[first : first + count]])
             (folder / f"{name}.csv").write_text(f"{text}\n")
+        configured(folder, ["march", "june"])
         with pytest.MonkeyPatch.context() as patch:
             patch.chdir(folder)
-            configured(folder, ["march", "june"])
+            patch.setattr(sys, "executable", python())  # of the workflow that is started
             done = call("calibrate", "tracker.yaml", "--cores", "2")
             assert done.exit_code == 0, done.output
 
@@ -77,6 +80,7 @@ def arm(two_lines, tmp_path, monkeypatch):
     """A copy of that folder, called from."""
     shutil.copytree(two_lines, tmp_path / "arm")
     monkeypatch.chdir(tmp_path / "arm")
+    monkeypatch.setattr(sys, "executable", python())
     return tmp_path / "arm"
 
 

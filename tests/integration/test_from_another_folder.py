@@ -5,11 +5,11 @@ from __future__ import annotations
 import os
 import shutil
 import subprocess
-import sys
 import sysconfig
 import venv
 from pathlib import Path
 
+import preloaded
 import pytest
 
 
@@ -24,8 +24,10 @@ def cell(project, tmp_path) -> Path:
 
 def started(project, folder: Path, command: list[str], ok: bool = True) -> str:
     """Output of a command started in a folder, with the project's code."""
-    tools = Path(sys.executable).parent
-    settings = {"PATH": f"{tools}:{os.environ['PATH']}", "PYTHONPATH": str(project.folder / "src")}
+    settings = {
+        "PATH": f"{preloaded.commands()}:{os.environ['PATH']}",
+        "PYTHONPATH": str(project.folder / "src"),
+    }
     done = subprocess.run(
         command, cwd=folder, env=os.environ | settings, capture_output=True, text=True, check=False
     )

@@ -12,13 +12,11 @@ import json
 import os
 import shutil
 import textwrap
-from collections.abc import Iterator
 from pathlib import Path
 
 import page_blocks
 import pytest
 import shared_work
-import typed_commands
 from page_blocks import TYPED, blocks
 from typed_commands import ROOT, Shell
 
@@ -78,24 +76,16 @@ ASSUMED = {
 IN_FULL = bool(os.environ.get("KINACC_PAGES_IN_FULL"))
 # Few poses of a series that a page calibrates only to show how, among them a repeated reading. With
 # 103 order 12 is the highest for all of them, and can still be fitted where a fold is left out.
-THINNED = {"series_B.csv": (*range(1, 1500, 15), 2, 3, 533, 534)}
+THINNED = {
+    "series_B.csv": (*range(1, 1500, 15), 2, 3, 533, 534),
+    "series_D.csv": range(1, 620, 6),
+}
 # The paper's arm as it is, and the two series with models that are fitted in seconds.
 SHORT = "".join(
     f"  {name}: {{measurements: {{folds: 2}}, calibration: {{vec: {{order: 2}}}}}}\n"
     for name in ("ur10_b", "ur10_d")
 )
 PARTS = ("config.yaml", "Snakefile", "workflow", "profiles", "src", "docs", "tools", "config")
-
-
-@pytest.fixture(scope="session")
-def shell(tmp_path_factory) -> Iterator[Shell]:
-    """A shell in which kinacc is installed from a wheel."""
-    site = shared_work.once(tmp_path_factory, "wheel", typed_commands.installed) / "site"
-    shell, server = typed_commands.started(tmp_path_factory.mktemp("bin"), site)
-    yield shell
-    server.terminate()
-    server.wait()
-    server.stdout.close()
 
 
 @pytest.fixture(scope="session")

@@ -93,8 +93,3 @@ def test_a_table_that_was_deleted_is_made_anew(project):
     project.snakemake()
     assert project.digests() == before
     assert project.to_do() == set()
-
-
-def test_lint_finds_nothing(project):
-    text = project.snakemake(options=("--lint",))
-    assert "Congratulations" in text, text
