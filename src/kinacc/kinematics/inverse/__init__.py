@@ -26,13 +26,12 @@ __all__ = [
 ]
 
 # An arm a little different from the nominal one may have postures the nominal one just misses.
-_NEAR_MISS_MM, _BEND_RAD = 30.0, 0.05
+_NEAR_MISS_MM = 30.0
 _GRID_RAD = np.deg2rad(30.0)
 _GRID_POINTS = 9  # of a first joint that slides
 _AT_LIMIT_RAD = 1e-9
 _WEAK_MM, _ASIDE_RAD = 60.0, (-0.25, -0.08, 0.08, 0.25)  # beside nearly singular postures
-# Postures of one name: of sixteen in all five were the most seen; two with spherical joints.
-_PER_NAME, _PER_NAME_SPHERICAL = 8, 2
+_PER_NAME = 8  # postures of one name: of sixteen in all five were the most seen
 
 
 class Status(IntEnum):
@@ -90,15 +89,13 @@ def grid_of(robot: Robot) -> np.ndarray:
     return steps[(steps >= low - _AT_LIMIT_RAD) & (steps <= high + _AT_LIMIT_RAD)]
 
 
-def branches_of(robot: Robot, grid_rad: np.ndarray | None = None) -> tuple[str, ...]:
+def branches_of(robot: Robot) -> tuple[str, ...]:
     """Names of all branches ``solve`` gives for an arm, in its order.
 
     Parameters
     ----------
     robot : Robot
         The arm.
-    grid_rad : numpy.ndarray, optional
-        Values of DH joint 1 of a seven-axis arm; ``grid_of`` when not given.
 
     Returns
     -------
@@ -109,13 +106,12 @@ def branches_of(robot: Robot, grid_rad: np.ndarray | None = None) -> tuple[str, 
         return BRANCHES
     numbered = tuple(
         name if number == 0 else f"{name} ({number + 1})"
-        for number in range(_per_name(robot.dh))
+        for number in range(_PER_NAME)
         for name in postures.names_of(robot.dh)
     )
     if robot.dh.joints < 7:
         return numbered
-    grid = grid_of(robot) if grid_rad is None else grid_rad
-    slides = robot.dh.prismatic[0]
+    slides, grid = robot.dh.prismatic[0], grid_of(robot)
     heads = [f"{value:.6g}mm" if slides else f"{np.rad2deg(value):.6g}deg" for value in grid]
     return tuple(f"q1={head} {name}" for head in heads for name in numbered)
 
@@ -147,7 +143,6 @@ def solve(
     branches: tuple[str, ...] | None = None,
     travel: np.ndarray | None = None,
     fitted_range_rad: tuple[np.ndarray, np.ndarray] | None = None,
-    grid_rad: np.ndarray | None = None,
 ) -> Solutions:
     """Joints at which a model puts the last DH frame at wanted poses, per branch.
 
@@ -176,9 +171,6 @@ def solve(
     fitted_range_rad : tuple of numpy.ndarray, optional
         Ends (k,), (k,) of the DH joints of the fit. Solutions within the limits but outside this
         range are OUTSIDE_RANGE.
-    grid_rad : numpy.ndarray, optional
-        Values of DH joint 1 at which the freedom of a seven-axis arm is sampled; ``grid_of`` when
-        not given.
 
     Returns
     -------
@@ -190,8 +182,7 @@ def solve(
     InputError
         For a branch that the arm does not have.
     """
-    grid = grid_of(robot) if grid_rad is None else grid_rad
-    known = branches_of(robot, grid)
+    known = branches_of(robot)
     names = known if branches is None else tuple(branches)
     for name in names:
         if name not in known:
@@ -204,7 +195,7 @@ def solve(
     if form is not None:
         q_rad, status = _by_closed_form(onto, form, pose, columns)
     else:
-        starts: list[float | None] = [None] if robot.dh.joints < 7 else list(grid)
+        starts: list[float | None] = [None] if robot.dh.joints < 7 else list(grid_of(robot))
         parts = [_searched(onto, pose, value) for value in starts]
         q_rad, expected = (
             np.concatenate(part, axis=1)[:, columns] for part in zip(*parts, strict=True)
@@ -264,21 +255,12 @@ def _searched(onto: _Onto, pose: Pose, first: float | None) -> tuple[np.ndarray,
     Joint 1 stands at ``first`` where that is given.
     """
     dh, fixed = onto.robot.dh, int(first is not None)
-    seven = closed_form.recognise_seven(dh)
-    if seven is not None and first is not None:
-        starts, error = seven.solve(pose, first, _NEAR_MISS_MM, _BEND_RAD)
-        rows, slots = np.nonzero(np.isfinite(error))
-        start, error = starts[rows, slots], error[rows, slots]
-    else:
-        low, high = limits.dh_limits(onto.robot)  # coupled joints, without limits, make a turn
-        low, high = (
-            np.where(np.isfinite(low), low, -np.pi),
-            np.where(np.isfinite(high), high, np.pi),
-        )
-        before = _dh.forward(dh.part(slice(fixed)), np.full((1, fixed), first, dtype=float))
-        tail = slice(fixed, None)
-        table = postures.table_of(dh.part(tail), low[tail], high[tail])
-        rows, start, error = postures.search(table, compose(invert(before), pose), _NEAR_MISS_MM)
+    # Coupled joints, which have no limits of their own, make a turn.
+    low, high = np.nan_to_num(limits.dh_limits(onto.robot), neginf=-np.pi, posinf=np.pi)
+    before = _dh.forward(dh.part(slice(fixed)), np.full((1, fixed), first, dtype=float))
+    tail = slice(fixed, None)
+    table = postures.table_of(dh.part(tail), low[tail], high[tail])
+    rows, start, error = postures.search(table, compose(invert(before), pose), _NEAR_MISS_MM)
     if first is not None:
         start = np.insert(start, 0, first, axis=1)
     q_rad, converged = onto.converge(pose.select(rows), start, fixed)
@@ -310,17 +292,13 @@ def _beside(dh: _dh.DHModel, q_rad: np.ndarray, first: int) -> tuple[np.ndarray,
 
 def _placed(dh: _dh.DHModel, count: int, rows: np.ndarray, q_rad: np.ndarray) -> np.ndarray:
     """Joints (m, k) of poses ``rows`` (m,) put into their branches: (count, b, k), NaN if empty."""
-    names, most = len(postures.names_of(dh)), _per_name(dh)
-    placed = np.full((count, most * names, dh.joints), np.nan)
+    names = len(postures.names_of(dh))
+    placed = np.full((count, _PER_NAME * names, dh.joints), np.nan)
     classes = postures.classes_of(dh, q_rad)
     order = np.lexsort([*q_rad.T[::-1], q_rad[:, 2], classes, rows])
     rows, classes, q_rad = rows[order], classes[order], q_rad[order]
     group = rows * names + classes
     number = np.arange(len(group)) - np.searchsorted(group, group, side="left")
-    fits = number < most
+    fits = number < _PER_NAME
     placed[rows[fits], number[fits] * names + classes[fits]] = q_rad[fits]
     return placed
-
-
-def _per_name(dh: _dh.DHModel) -> int:
-    return _PER_NAME if closed_form.recognise_seven(dh) is None else _PER_NAME_SPHERICAL

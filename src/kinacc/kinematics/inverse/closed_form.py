@@ -1,4 +1,4 @@
-"""Closed-form inverses: six axes with a spherical wrist or parallel axes 2 to 4, and seven axes.
+"""Closed-form inverses of six axes with a spherical wrist or parallel axes 2 to 4.
 
 Derived from the arm's own DH table (lengths, offsets and signs are not assumed), for all eight
 branches. Shoulder: ``front`` when the wrist centre (of parallel axes: the point where axes 5 and 6
@@ -6,9 +6,6 @@ meet) is on the side of axis 1 joint 1 faces. Elbow: ``up`` when axis 3 lies abo
 axis 2 to the wrist centre (axis 4) of an arm reaching the way it faces (mirrored for ``back``).
 Wrist: ``noflip`` when joint 5 is on the positive side of the angle at which the wrist is aligned
 (axes 4 and 6 parallel), ``flip`` on the negative side.
-
-Seven axes: 1 to 3 meet in the shoulder, 3 to 5 in the elbow, 5 to 7 in the wrist, neighbours at
-right angles (LBR iiwa and its kin); joint 1 is given.
 """
 
 from __future__ import annotations
@@ -167,106 +164,10 @@ def recognise(dh: DHModel) -> SixAxes | None:
     return SixAxes(dh, False) if wrist <= _TOLERANCE < forearm else None
 
 
-@dataclass(frozen=True)
-class SevenAxes:
-    """An arm of seven axes with spherical shoulder and wrist.
-
-    Attributes
-    ----------
-    dh : DHModel
-        The arm.
-    """
-
-    dh: DHModel
-
-    def solve(
-        self, pose: Pose, q1_rad: float, margin_mm: float = 0.0, least_bend_rad: float = 0.0
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Joints 2 to 7 of flange poses where joint 1 is known.
-
-        Parameters
-        ----------
-        pose : Pose
-            Poses (n, ...) of the last DH frame in the first one, mm.
-        q1_rad : float
-            DH joint 1.
-        margin_mm : float
-            Wrists up to this far out of reach get the nearest posture.
-        least_bend_rad : float
-            Least distance from stretched, folded and aligned postures, which a refinement onto a
-            slightly different arm cannot leave.
-
-        Returns
-        -------
-        q_rad : numpy.ndarray
-            DH joints 2 to 7 in (-pi, pi], shape (n, 8, 6).
-        missed_mm : numpy.ndarray
-            Distance of the wrist from reach, shape (n, 8): 0 for solutions, infinite beyond
-            ``margin_mm``.
-        """
-        dh, s = self.dh, np.sign(np.sin(self.dh.alpha_rad))
-        rotation, point = before_last(dh, pose)
-        first = _across(q1_rad + dh.theta_offset_rad[0], dh.alpha_rad[0])
-        w = (point - [0.0, 0.0, dh.d_mm[0]]) @ first
-        upper, fore = dh.d_mm[2], dh.d_mm[4]
-        distance = np.linalg.norm(w, axis=1)
-        longest, shortest = abs(upper) + abs(fore), abs(abs(upper) - abs(fore))
-        beyond = np.maximum(distance - longest, shortest - distance)[:, None, None, None]
-        cosine = (upper**2 + fore**2 - distance**2) / (2.0 * upper * fore * s[2] * s[3])
-        straightest = np.cos(least_bend_rad)
-        wx, wy, wz = w.T[:, :, None, None]
-        theta_4 = np.arccos(np.clip(cosine, -straightest, straightest))[:, None, None] * _SIDES
-        x = fore * s[3] * np.sin(theta_4)
-        z = upper - fore * s[2] * s[3] * np.cos(theta_4)
-        sine_3 = s[1] * wz / np.where(x == 0.0, 1.0, x)
-        sine_3 = np.clip(sine_3, -straightest, straightest)
-        cosine_3 = np.sqrt(1.0 - sine_3**2) * _SIDES[:, None]
-        theta_3 = np.arctan2(sine_3, cosine_3)
-        theta_2 = np.arctan2(wy, wx) - np.arctan2(-s[1] * z, x * cosine_3)
-        arm = first
-        for theta, alpha in zip((theta_2, theta_3, theta_4), dh.alpha_rad[1:4], strict=True):
-            arm = arm @ _across(theta, alpha)
-        left = np.swapaxes(arm, -1, -2) @ rotation[:, None, None]
-        least = np.sin(least_bend_rad)
-        last = _wrist(left[:, :, :, None], s[4:6], _SIDES, dh.theta_offset_rad[4], least)
-        shape = len(w), 2, 2, 2
-        theta = [part[..., None] for part in (theta_2, theta_3, theta_4)]
-        theta = np.stack([np.broadcast_to(each, shape) for each in (*theta, *last)], axis=-1)
-        # Rounding may put a stretched arm a hair out of reach; what it costs is checked later.
-        aside = (np.abs(wz) - np.abs(x))[..., None]
-        missed = np.broadcast_to(np.maximum(np.maximum(beyond, aside), 0.0), shape).reshape(-1, 8)
-        missed = np.where(missed < 1e-9, 0.0, np.where(missed > margin_mm, np.inf, missed))
-        return _one_turn(theta - dh.theta_offset_rad[1:]).reshape(-1, 8, 6), missed
-
-
-def recognise_seven(dh: DHModel) -> SevenAxes | None:
-    """Closed form of an arm of seven axes.
-
-    Parameters
-    ----------
-    dh : DHModel
-        The arm.
-
-    Returns
-    -------
-    SevenAxes or None
-        None where it does not apply.
-    """
-    if dh.joints != 7 or dh.prismatic.any():
-        return None
-    zero = *np.cos(dh.alpha_rad[:6]), *dh.a_mm[:6], *dh.d_mm[[1, 3, 5]], *dh.beta_rad[:6]
-    meeting = np.abs(zero).max() <= _TOLERANCE < np.abs(dh.d_mm[[2, 4]]).min()
-    return SevenAxes(dh) if meeting else None
-
-
 def before_last(dh: DHModel, pose: Pose) -> Pose:
     """Frames (n, ...) on the last axis, behind its joint at d = 0, of flange poses (n, ...)."""
     turn = rotation_x(dh.alpha_rad[-1]) @ rotation_y(dh.beta_rad[-1])
     return compose(pose, invert(Pose(turn, np.array([dh.a_mm[-1], 0.0, dh.d_mm[-1]]))))
-
-
-def _across(theta_rad: np.ndarray | float, alpha_rad: float) -> np.ndarray:
-    return rotation_z(theta_rad) @ rotation_x(alpha_rad)
 
 
 def _triangle(
@@ -293,7 +194,7 @@ def _triangle(
 
 def _wrist(
     rotation: np.ndarray,
-    signs: tuple[float, float] | np.ndarray,
+    signs: tuple[float, float],
     side: np.ndarray,
     free_rad: float,
     least_sine: float = 0.0,
