@@ -76,9 +76,9 @@ def test_stated_masses_give_the_compliance_of_each_joint(gravity):
     """Only the direction of gravity counts."""
     found = fitted(measured(), [2, 3], gravity)
     std = found.std[-2:]
-    assert np.all(np.abs(found.model.compliance_rad_per_nm[1:3] - SOFT[1:3]) < 4.0 * std)
+    assert np.all(np.abs(found.model.coefficients[1:3, 0] - SOFT[1:3]) < 4.0 * std)
     assert np.all(std < 0.1 * SOFT[1:3])
-    assert np.isnan(found.model.lever_coefficient_rad_per_mm).all()
+    assert np.isnan(found.model.coefficients[:, 1]).all()
     assert np.sqrt(found.solution.variance) == pytest.approx(NOISE_MM, rel=0.15)
 
 
@@ -88,7 +88,7 @@ def test_a_joint_that_gravity_does_not_turn_is_undetermined_and_stays_stiff():
     known_of = uncertainty.of_fit(found)
     place = known_of.names.index("j1.compliance_rad_per_nm")
     assert not known_of.determined[place]
-    assert found.model.compliance_rad_per_nm[0] == pytest.approx(0.0, abs=1e-12)
+    assert found.model.coefficients[0, 0] == pytest.approx(0.0, abs=1e-12)
     assert np.isnan(found.model.to_columns(found.std)["std_compliance_rad_per_nm"][0])
     columns = tables.fit_columns("compliance_fit", found, known_of)
     assert "j1.compliance_rad_per_nm" in set(columns["parameter"])

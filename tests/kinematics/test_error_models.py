@@ -49,8 +49,12 @@ def compliance_example(arm=ARM.dh):
     links = np.hstack([rng.uniform(5.0, 300.0, (6, 1)), rng.uniform(-300.0, 300.0, (6, 3))])
     return compliance.ComplianceModel(
         dh_example(arm),
-        np.array([1e-6, 2e-6, 3e-6, nothing, nothing, 2e-5]),
-        np.array([nothing, 1e-6, nothing, 2e-6, nothing, nothing]),
+        np.column_stack(
+            [
+                [1e-6, 2e-6, 3e-6, nothing, nothing, 2e-5],
+                [nothing, 1e-6, nothing, 2e-6, nothing, nothing],
+            ]
+        ),
         np.array([0.6, 0.0, -0.8]),
         links,
         np.array([30.0, 10.0, -20.0, 150.0]),

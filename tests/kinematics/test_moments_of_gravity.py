@@ -30,8 +30,7 @@ def test_the_moment_of_every_joint_is_the_slope_of_the_work():
     gravity = rng.normal(size=3)
     model = ComplianceModel(
         robot.load("ur10").dh,
-        np.zeros(6),
-        np.full(6, np.nan),
+        np.zeros((6, 2)),
         gravity / np.linalg.norm(gravity),
         np.column_stack([rng.uniform(1, 9, 6), rng.normal(0, 90, (6, 3))]),
         np.array([4.0, 20.0, -30.0, 80.0]),

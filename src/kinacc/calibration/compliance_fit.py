@@ -10,7 +10,7 @@ import numpy as np
 
 from kinacc.calibration import tables
 from kinacc.calibration.dh_estimator import DHEstimator
-from kinacc.calibration.fitting import MORE_POSES, ModelFit, scales
+from kinacc.calibration.fitting import ModelFit, scales
 from kinacc.calibration.frames import ANGLE_UNIT_RAD
 from kinacc.calibration.models import Common, Estimator, Fit
 from kinacc.calibration.observations import Observations
@@ -33,8 +33,6 @@ class ComplianceEstimator(Estimator):
     stiff: ComplianceModel
 
     kind: ClassVar[str] = "compliance"
-    name: ClassVar[str] = "compliance fit"
-    fix: ClassVar[str] = MORE_POSES
 
     @classmethod
     def of(cls, calibration: Mapping[str, Any], arm: Robot, every: Observations) -> Self:
@@ -52,12 +50,7 @@ class ComplianceEstimator(Estimator):
         if section["links"] or _load_changes(every, payload):
             coefficients[bent, 0] = 0.0
         model = ComplianceModel(
-            arm.dh,
-            coefficients[:, 0],
-            coefficients[:, 1],
-            gravity / np.linalg.norm(gravity),
-            links,
-            payload,
+            arm.dh, coefficients, gravity / np.linalg.norm(gravity), links, payload
         )
         return cls(Common.of(calibration, arm), DHEstimator.of(calibration, arm, every), model)
 
@@ -79,11 +72,6 @@ class ComplianceEstimator(Estimator):
         if not np.any(section["gravity"]):
             yield ("gravity",), "has no direction", "a vector of any length above 0"
 
-    @property
-    def size(self) -> int:
-        """Number of free parameters."""
-        return self.dh.size + int(np.isfinite(self.stiff.coefficients).sum())
-
     def fit(self, observations: Observations, others: Mapping[str, Fit]) -> ModelFit:
         """The bent arm closest to the measurements, whatever the DH model follows."""
         arm = self.dh.arm
@@ -97,7 +85,7 @@ class ComplianceEstimator(Estimator):
             scale=_scales(nominal, observations),
             threshold=self.dh.threshold,
             loss=self.dh.loss,
-            name=self.name,
+            name="compliance fit",
         )
 
     def tables(

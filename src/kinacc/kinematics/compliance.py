@@ -37,10 +37,9 @@ class ComplianceModel(ErrorModel):
     ----------
     dh : DHModel
         The arm of k joints.
-    compliance_rad_per_nm : numpy.ndarray
-        Turn per gravity moment of known masses, shape (k,), rad/(N m).
-    lever_coefficient_rad_per_mm : numpy.ndarray
-        Turn per lever of a unit weight at the last origin, shape (k,), rad/mm.
+    coefficients : numpy.ndarray
+        As ``COEFFICIENTS``, shape (k, 2): turn per gravity moment of known masses, rad/(N m), and
+        per lever of a unit weight at the last origin, rad/mm.
     gravity : numpy.ndarray
         Direction of gravity in the first DH frame, unit length, shape (3,).
     links : numpy.ndarray
@@ -50,8 +49,7 @@ class ComplianceModel(ErrorModel):
     """
 
     dh: DHModel
-    compliance_rad_per_nm: np.ndarray
-    lever_coefficient_rad_per_mm: np.ndarray
+    coefficients: np.ndarray
     gravity: np.ndarray
     links: np.ndarray
     payload: np.ndarray
@@ -61,12 +59,7 @@ class ComplianceModel(ErrorModel):
     @property
     def knows_loads(self) -> bool:
         """Whether a compliance was fitted; a lever's coefficient holds for the load measured."""
-        return bool(np.isfinite(self.compliance_rad_per_nm).any())
-
-    @property
-    def coefficients(self) -> np.ndarray:
-        """Both kinds of coefficients (k, 2) as ``COEFFICIENTS``, NaN where there is none."""
-        return np.stack([self.compliance_rad_per_nm, self.lever_coefficient_rad_per_mm], axis=1)
+        return bool(np.isfinite(self.coefficients[:, 0]).any())
 
     @property
     def comparable(self) -> np.ndarray:
@@ -89,25 +82,18 @@ class ComplianceModel(ErrorModel):
     @property
     def start(self) -> np.ndarray:
         """Parameters (P,): of the DH arm, then joint by joint the coefficients there are."""
-        coefficients = self.coefficients
-        return np.concatenate([self.dh.start, coefficients[np.isfinite(coefficients)]])
+        return np.append(self.dh.start, self.coefficients[np.isfinite(self.coefficients)])
 
     @property
     def prior_std(self) -> np.ndarray:
         """Those of the DH arm (P,); nothing is known of coefficients."""
-        coefficients = np.full(int(np.isfinite(self.coefficients).sum()), np.inf)
-        return np.concatenate([self.dh.prior_std, coefficients])
+        return np.append(self.dh.prior_std, np.full(len(self.names) - len(self.dh.names), np.inf))
 
     def with_parameters(self, x: np.ndarray) -> Self:
         """The model with parameters (P,), ordered as ``start``."""
-        coefficients, split = self.coefficients, len(self.dh.names)
+        coefficients, split = self.coefficients.copy(), len(self.dh.names)
         coefficients[np.isfinite(coefficients)] = x[split:]
-        return replace(
-            self,
-            dh=self.dh.with_parameters(x[:split]),
-            compliance_rad_per_nm=coefficients[:, 0],
-            lever_coefficient_rad_per_mm=coefficients[:, 1],
-        )
+        return replace(self, dh=self.dh.with_parameters(x[:split]), coefficients=coefficients)
 
     def pose(self, state: JointState) -> Pose:
         """Poses (n, ...) of the bent arm."""
@@ -129,12 +115,8 @@ class ComplianceModel(ErrorModel):
             about the axes of the unbent arm.
         """
         walk = _chain.Walk(self.dh, state.q_rad)
-        usual = np.broadcast_to(self.payload, (len(state), 4))
-        payload = (
-            usual
-            if state.payload is None
-            else np.where(np.isnan(state.payload), usual, state.payload)
-        )
+        payload = np.full((len(state), 4), np.nan) if state.payload is None else state.payload
+        payload = np.where(np.isnan(payload), self.payload, payload)
         links = np.nan_to_num(self.links)
         # Weights and their first moments (3, n) beyond a joint, from the last joint on.
         weight, first = payload[:, 0], payload[:, 0] * _place(walk.end, payload[:, 1:].T)
@@ -171,11 +153,9 @@ class ComplianceModel(ErrorModel):
         def of(names: tuple[str, ...]) -> np.ndarray:
             return np.stack([np.asarray(columns[name], float)[order] for name in names], axis=1)
 
-        coefficients = of(COEFFICIENTS)
         return cls(
             DHModel.from_columns(columns, prismatic),
-            coefficients[:, 0],
-            coefficients[:, 1],
+            of(COEFFICIENTS),
             of(_GRAVITY)[0],
             of(_LINK),
             of(PAYLOAD_COLUMNS)[0],
