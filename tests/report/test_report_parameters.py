@@ -94,7 +94,7 @@ def test_what_is_left_out_changes_no_pose_where_the_neighbour_takes_it_over(slid
     arm = robot(slides)
     if not slides:
         q = arm.q_max_rad * np.random.default_rng(1).uniform(-1, 1, (20, 4))
-        same = vec.forward(vec.VECModel.from_columns(model, arm.dh.prismatic), q)
+        same = vec.pose(vec.VECModel.from_columns(model, arm.dh.prismatic), q)
         assert same.position_mm == pytest.approx(forward(arm.dh, q).position_mm, abs=1e-4)
     found, _ = errors(model, slides)
     for error in ERRORS:

@@ -256,14 +256,6 @@ def errors(model: VECModel, q_rad: np.ndarray, s: np.ndarray | None = None) -> n
     return values
 
 
-def forward(model: VECModel, q_rad: np.ndarray, s: np.ndarray | None = None) -> Pose:
-    """Compute flange poses as eqs. 5-6 are printed: the rotation is not quite orthonormal.
-
-    Parameters and result are those of ``pose``.
-    """
-    return _chain.to_pose(walk(model, q_rad, s).end)
-
-
 def pose(model: VECModel, q_rad: np.ndarray, s: np.ndarray | None = None) -> Pose:
     """Compute flange poses (eqs. 5-6), the rotation projected to SO(3).
 

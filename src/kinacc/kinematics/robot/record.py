@@ -121,7 +121,8 @@ class Robot:
         >>> Robot.from_name("ur10").forward([0, 0, 0, 0, 0, 0]).position_mm
         array([[-1184.3  ,  -256.141,    11.6  ]])
         """
-        return forward(self, q_rad)
+        end = _dh.forward(self.dh, self.dh_joints(np.atleast_2d(q_rad)))
+        return compose(compose(self.base, end), self.flange)
 
     def dh_joints(self, reported: np.ndarray) -> np.ndarray:
         """Convert reported joints to DH joints; ``limits.reported_joints`` goes back.
@@ -169,28 +170,7 @@ class Robot:
         return centre - half, centre + half
 
 
-def forward(robot: Robot, q_rad: np.ndarray) -> Pose:
-    """Compute flange poses by the nominal model.
-
-    Parameters
-    ----------
-    robot : Robot
-        Arm of k joints.
-    q_rad : numpy.ndarray
-        Reported joints, shape (n, k) or (k,), rad (mm where a joint slides).
-
-    Returns
-    -------
-    Pose
-        Poses (n, ...) of the flange in the arm's base frame, mm.
-
-    Raises
-    ------
-    InputError
-        For joints of another shape.
-    """
-    end = _dh.forward(robot.dh, robot.dh_joints(np.atleast_2d(q_rad)))
-    return compose(compose(robot.base, end), robot.flange)
+forward = Robot.forward
 
 
 def in_own_units(robot: Robot, joints: np.ndarray) -> np.ndarray:

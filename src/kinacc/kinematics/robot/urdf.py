@@ -237,8 +237,7 @@ def _joint(element: etree._Element, path: Path, links: list[str]) -> Joint:
             values = np.array([float(word) for word in value.split()])
         except ValueError:
             values = np.array([])
-        odd = not value.isascii() or "_" in value  # Python takes more for a number than others do
-        if len(values) != count or odd or not (np.abs(values) <= most).all():
+        if len(values) != count or not (np.abs(values) <= most).all():
             allowed = f"{count} finite number{'s' if count > 1 else ''} of at most {most:g}"
             raise _refusal(path, where, f"{tag} {key}={value[:60]!r}", allowed)
         return values
