@@ -5,6 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
+import pytest
+from scipy import stats
 
 from kinacc.calibration import residuals
 from kinacc.calibration.frames import Frames
@@ -70,3 +73,19 @@ def test_every_row_is_judged_by_a_model_that_has_not_seen_its_fold():
     assert list(held_out) == [
         "vec_vs_measured", "dh_vs_vec", "dh_vs_measured", "nominal_vs_measured",
     ]  # fmt: skip
+
+
+def test_bias_is_the_mean_error_in_every_region_of_a_joint():
+    rng, angle = np.random.default_rng(1), np.linspace(-1.0, 2.0, 31)
+    vectors, region = rng.normal(size=(31, 3)), np.minimum(np.arange(31) // 5, 5)
+    table = pd.DataFrame(vectors, columns=["ex_mm", "ey_mm", "ez_mm"])
+    table = table.assign(comparison="dh_vs_measured", estimate="train", row=np.arange(31)[::-1])
+    found = list(residuals.bias(table, angle[::-1, None]))
+    assert [row[5] for row in found] == [5, 5, 5, 5, 5, 6]
+    for number, (*names, joint, low, high, _, x, y, z, sx, sy, sz, rms) in enumerate(found):
+        part = vectors[region == number]
+        assert (*names, joint) == ("dh_vs_measured", "train", 1)
+        assert (low, high) == pytest.approx((0.5 * number - 1.0, 0.5 * number - 0.5))
+        assert (x, y, z) == pytest.approx(part.mean(axis=0))
+        assert (sx, sy, sz) == pytest.approx(stats.sem(part))
+        assert rms == pytest.approx(np.linalg.norm(part) / np.sqrt(len(part)))

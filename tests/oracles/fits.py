@@ -1,38 +1,85 @@
-"""Least squares on kinematic models with numerical Jacobians, known base and tool.
+"""Least squares on kinematic models, with derivatives by complex steps: exact to rounding.
 
-A residual of one pose is the position difference in mm (model minus measurement, robot base) and
-the rotation vector of R_model R_measured' times a weight in mm/rad.
+Poses are products of 4x4 matrices, n at a time, at parameters that may be complex. A residual of
+one pose is the position difference in mm (model minus measurement, robot base) and the rotation
+vector of R_model R_measured' times a weight in mm/rad.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.polynomial import chebyshev
 
-from . import kinematics
-
-
-def residual(
-    forward: Callable[[int], np.ndarray], measured: Sequence[np.ndarray], weight: float
-) -> np.ndarray:
-    parts = []
-    for i, frame in enumerate(measured):
-        here = forward(i)
-        turn = kinematics.rotation_vector(here[:3, :3] @ frame[:3, :3].T)
-        parts.append(np.concatenate([here[:3, 3] - frame[:3, 3], weight * turn]))
-    return np.concatenate(parts)
+_STEP = 1e-30
 
 
-def slopes(
-    function: Callable[[np.ndarray], np.ndarray], x: np.ndarray, steps: np.ndarray
-) -> np.ndarray:
-    columns = []
-    for i, step in enumerate(steps):
-        shift = np.zeros_like(x)
-        shift[i] = step
-        columns.append((function(x + shift) - function(x - shift)) / (2 * step))
-    return np.array(columns).T
+def turn(axis: int, angle) -> np.ndarray:
+    """Rotations (n, 4, 4) about an axis."""
+    cosine, sine = np.cos(angle + 0j), np.sin(angle + 0j)
+    matrix = np.broadcast_to(np.eye(4, dtype=complex), (*np.shape(cosine), 4, 4)).copy()
+    second, third = (axis + 1) % 3, (axis + 2) % 3
+    matrix[..., second, second] = matrix[..., third, third] = cosine
+    matrix[..., third, second], matrix[..., second, third] = sine, -sine
+    return matrix
+
+
+def motion(change) -> np.ndarray:
+    """Eq. 6 as printed: displacements and small turns ``change`` (6, ...) as (..., 4, 4)."""
+    dx, dy, dz, ex, ey, ez = change
+    one, nothing = np.ones_like(ex), np.zeros_like(ex)
+    rows = [one, -ez, ey, dx], [ez, one, -ex, dy], [-ey, ex, one, dz], [nothing] * 3 + [one]
+    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
+
+
+def link(row: Sequence[complex], q: np.ndarray) -> np.ndarray:
+    """Eq. 4: Rz(q + theta) Tz(d) Tx(a) Rx(alpha) Ry(beta)."""
+    theta, d, a, alpha, beta = row
+    along = motion(np.array([a, 0, d, 0, 0, 0], dtype=complex))
+    return turn(2, q + theta) @ along @ turn(0, alpha) @ turn(1, beta)
+
+
+def dh_poses(table: np.ndarray, q: np.ndarray) -> np.ndarray:
+    """Eq. 3 at joints (n, k)."""
+    frame = np.eye(4)
+    for row, angle in zip(table, q.T, strict=True):
+        frame = frame @ link(row, angle)
+    return frame
+
+
+def vec_poses(table, series, low, high, offsets, q, s) -> np.ndarray:
+    """Eq. 5 at joints (n, k) and travel directions (n, k), the rotation by its polar factor."""
+    frame = np.eye(4)
+    for i, row in enumerate(table):
+        mapped = (2 * q[:, i] - low[i] - high[i]) / (high[i] - low[i])
+        errors = chebyshev.chebval(mapped, series[i].T + 0j)
+        errors[5] += offsets[i, 0] * (s[:, i] == -1) + offsets[i, 1] * (s[:, i] == 1)
+        frame = frame @ motion(errors) @ link(row, q[:, i])
+    rotation = frame[:, :3, :3]
+    for _ in range(8):
+        rotation = (rotation + np.swapaxes(np.linalg.inv(rotation), 1, 2)) / 2
+    frame[:, :3, :3] = rotation
+    return frame
+
+
+def residual(poses: np.ndarray, measured: np.ndarray, weight: float) -> np.ndarray:
+    """Residuals (6n,), pose by pose."""
+    turned = poses[:, :3, :3] @ np.swapaxes(measured[:, :3, :3], 1, 2)
+    skew = (turned - np.swapaxes(turned, 1, 2)) / 2
+    axis = np.stack([skew[:, 2, 1], skew[:, 0, 2], skew[:, 1, 0]], axis=1)
+    sine = np.sqrt(np.sum(axis**2, axis=1, keepdims=True))
+    vector = axis * np.arcsin(sine) / sine
+    return np.hstack([poses[:, :3, 3] - measured[:, :3, 3], weight * vector]).ravel()
+
+
+def linearised(
+    function: Callable[[np.ndarray], np.ndarray], x: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Values (m,) of a function at ``x`` (P,) and its Jacobian (m, P)."""
+    columns = [function(x + 1j * _STEP * unit).imag / _STEP for unit in np.eye(x.size)]
+    return function(x).real, np.array(columns).T
 
 
 def two_variances(r: np.ndarray, fitted: np.ndarray) -> np.ndarray:
@@ -46,32 +93,40 @@ def two_variances(r: np.ndarray, fitted: np.ndarray) -> np.ndarray:
     return np.where(turned, rotation, position)
 
 
-def truncated_fit(
-    function: Callable[[np.ndarray], np.ndarray],
-    nominal: np.ndarray,
-    unit: np.ndarray,
-    threshold: float,
-    start: np.ndarray | None = None,
-    iterations: int = 12,
-) -> dict[str, np.ndarray | int | float]:
-    """Smallest displacement from nominal, in units of ``unit``, that minimises the residual:
-    singular values below ``threshold`` times the largest are left out."""
-    x = (nominal if start is None else start).astype(float)
-    for _ in range(iterations):
-        r = function(x)
-        jacobian = slopes(function, x, unit * 0.1) * unit
-        left, values, right = np.linalg.svd(jacobian, full_matrices=False)
-        keep = values >= threshold * values[0]
-        wanted = jacobian @ ((x - nominal) / unit) - r
-        moved = nominal + unit * (right[keep].T @ ((left.T @ wanted)[keep] / values[keep]))
-        done = np.abs((moved - x) / unit).max() < 1e-9
-        x = moved
-        if done:
-            break
-    cost = float(function(x) @ function(x))
-    rank = int(keep.sum())
+@dataclass(frozen=True)
+class Truncated:
+    """A truncated fit judged at its end.
+
+    ``step`` (P,): what is left to the smallest displacement that minimises the residual;
+    ``lost`` (P,): share of each parameter in directions that are left out.
+    """
+
+    step: np.ndarray
+    values: np.ndarray
+    rank: int
+    cost: float
+    std: np.ndarray
+    lost: np.ndarray
+
+
+def truncated(
+    r: np.ndarray, jacobian: np.ndarray, displacement: np.ndarray, threshold: float
+) -> Truncated:
+    """Judge a fit of P parameters, ``displacement`` (P,) away from nominal, in their units.
+
+    Columns of ``jacobian`` beyond P are those of base and tool, which are projected out before
+    singular values below ``threshold`` times the largest are left out.
+    """
+    count = displacement.size
+    frames, _ = np.linalg.qr(jacobian[:, count:])
+    own = jacobian[:, :count] - frames @ (frames.T @ jacobian[:, :count])
+    left, values, right = np.linalg.svd(own, full_matrices=False)
+    keep = values >= threshold * values[0]
     solving = (right[keep].T / values[keep]) @ left.T[keep]
-    variance = two_variances(function(x), left[:, keep])
-    std = unit * np.sqrt((solving**2 * variance).sum(axis=1))
-    lost = (right[~keep] ** 2).sum(axis=0)  # share of each parameter in undetermined directions
-    return {"x": x, "rank": rank, "values": values, "cost": cost, "std": std, "lost": lost}
+    step = -solving @ r - right[~keep].T @ (right[~keep] @ displacement)
+    follow, *_ = np.linalg.lstsq(jacobian[:, count:], -r - jacobian[:, :count] @ step)
+    variance = two_variances(r, np.hstack([frames, left[:, keep]]))
+    std = np.sqrt((solving**2 * variance).sum(axis=1))
+    lost = (right[~keep] ** 2).sum(axis=0)
+    step = np.concatenate([step, follow])
+    return Truncated(step, values, int(keep.sum()), float(r @ r), std, lost)
