@@ -62,7 +62,7 @@ def session(seen: Observations, name: str) -> Session:
         terms = frame_terms(part, known(ARM.base, robots.carried(ARM)))
         terms = replace(terms, free=np.array(["base" in each for each in terms.names]))
         return fitting.fit(part, ARM.dh, free=free, rotation_weight_mm_per_rad=WEIGHT,
-                          threshold=1e-4, frame_terms=terms)  # fmt: skip
+                          threshold=1e-4, frames=terms)  # fmt: skip
 
     held_out_mm = np.zeros(len(seen))
     for fold in range(FOLDS):

@@ -84,9 +84,13 @@ def works(smoke: bool) -> list[Work]:
 
 def _fit(seen: Observations, free: np.ndarray, threshold: float):
     return fitting.fit(
-        seen, ARM.dh, free=free, frames=known(), rotation_weight_mm_per_rad=WEIGHT,
+        seen,
+        ARM.dh,
+        free=free,
+        frames=FrameParameters.none(known()),
+        rotation_weight_mm_per_rad=WEIGHT,
         threshold=threshold,
-    ).solution  # fmt: skip
+    ).solution
 
 
 def _cost(solution) -> tuple[float, int]:
@@ -105,9 +109,8 @@ def _vec_with_rank(count: int, order: int) -> Callable[[], tuple[float, int]]:
 
     def run() -> tuple[float, int]:
         found = vec_fit.fit(
-            seen, empty, prior=prior, rotation_weight_mm_per_rad=WEIGHT, frames=frames,
-            frames_free=True,
-        )  # fmt: skip
+            seen, empty, prior=prior, rotation_weight_mm_per_rad=WEIGHT, begin=frames
+        )
         gauge = vec_fit.gauge(seen, found.model, found.frames, WEIGHT)
         return found.solution.cost, gauge.rank
 

@@ -26,7 +26,8 @@ def test_poses_are_found_again_from_five_degrees_and_twenty_mm(name, hayati, mod
         q = rng.uniform(-REACH, REACH, (90, 6))
         kind = POINT if mode == POINT else POSE
         seen = measure(true, q, kind, rng, frames=(known.bases, known.targets))
-        found = fit(seen, arm.dh, free, frames=known if mode == "known" else None)
+        held = frames.FrameParameters.none(known) if mode == "known" else None
+        found = fit(seen, arm.dh, free, frames=held)
         assert np.sqrt(found.solution.variance) < 1.1 * 0.05
         new = rng.uniform(-1.0, 1.0, (50, 6))
         wanted = compose(known.base, compose(dh.forward(true, new), known.tool))

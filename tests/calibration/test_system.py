@@ -10,7 +10,7 @@ import simulated
 
 from kinacc.calibration import fitting, vec_fit
 from kinacc.calibration.fitting import PoseSystem
-from kinacc.calibration.frames import FrameParameters, Frames
+from kinacc.calibration.frames import FrameParameters, Frames, frame_terms
 from kinacc.geometry import log_so3
 from kinacc.kinematics import robot, vec
 
@@ -28,7 +28,7 @@ def system_of(name, kind, sessions=2, estimated=True, count=12):
         simulated.anywhere(rng, 900.0, sessions),
         simulated.anywhere(rng, 90.0, len(seen.target_names)),
     )
-    parameters = FrameParameters.of(seen, anchor, None)
+    parameters = frame_terms(seen, anchor)
     if not estimated:
         parameters = FrameParameters.none(anchor)
     if name == "dh":

@@ -28,7 +28,7 @@ def fitted(observations, arm_rules=None, frame_rules=None, **settings):
     count = len(observations.session_names), len(observations.target_names)
     stated = frames.known(ARM.base, robot.carried(ARM), *count)
     terms = frames.frame_terms(observations, stated, rules(frame_rules or {}))
-    return fit(observations, arm.nominal, arm.free, std=arm.std, frame_terms=terms, **settings)
+    return fit(observations, arm.nominal, arm.free, std=arm.std, frames=terms, **settings)
 
 
 @pytest.mark.parametrize("kind", [POINT, THREE, POSE])

@@ -43,8 +43,7 @@ def test_an_unknown_direction_is_the_mean_of_both():
         empty,
         prior=Prior(1.0, 1e-3, 1.0, 1e-3),
         rotation_weight_mm_per_rad=WEIGHT,
-        frames=frames.known(),
-        frames_free=False,
+        frames=frames.FrameParameters.none(frames.known()),
     ).model
     np.testing.assert_allclose(vec.pose(model, q, s).position_mm, seen.position_mm, atol=1e-3)
     np.testing.assert_allclose(model.direction_offsets_rad[:5].sum(axis=1), 0.0, atol=1e-12)

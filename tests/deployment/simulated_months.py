@@ -70,7 +70,7 @@ def session(seen: Observations, number: int, moved: bool) -> Session:
         free=free_parameters(arm.dh.joints, parallel_joints(arm.dh)),
         rotation_weight_mm_per_rad=WEIGHT_MM_PER_RAD,
         threshold=1e-4,
-        frame_terms=frame_terms(seen, known(arm.base, robots.carried(arm))),
+        frames=frame_terms(seen, known(arm.base, robots.carried(arm))),
     )
     model, frames = fit.model, fit.frames
     calibration = Calibration(str(number), arm, "dh", model, frames.base, {"tool": frames.tool})

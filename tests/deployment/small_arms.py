@@ -82,8 +82,7 @@ def results_of(name: str, seen: Observations, with_vec: bool = False) -> dict:
             plain,
             prior=Prior(1.0, 1e-3, 0.7, 1e-3),
             rotation_weight_mm_per_rad=WEIGHT,
-            frames=nominal,
-            frames_free=True,
+            begin=nominal,
         )
         of["vec"], models["vec"] = vec_found.frames, vec_found.model
         tables_of_vec = {

@@ -9,8 +9,8 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from kinacc.calibration import identifiability, tables
-from kinacc.calibration.fitting import MORE_POSES, ModelFit, distinct
-from kinacc.calibration.frames import Frames, component_names
+from kinacc.calibration.fitting import ModelFit, distinct
+from kinacc.calibration.frames import FrameParameters, Frames
 from kinacc.calibration.models import Common, Estimator, Fit
 from kinacc.calibration.observations import Observations, full_poses
 from kinacc.calibration.uncertainty import Uncertainty
@@ -153,8 +153,6 @@ class DHEstimator(Estimator):
     threshold: float
 
     kind: ClassVar[str] = "dh"
-    name: ClassVar[str] = "DH fit"
-    fix: ClassVar[str] = MORE_POSES
 
     @classmethod
     def of(cls, calibration: Mapping[str, Any], arm: Robot, every: Observations) -> Self:
@@ -177,16 +175,6 @@ class DHEstimator(Estimator):
         free = free_parameters(nominal.joints, self.hayati_joints, self.hayati_instead)
         return arm_terms(nominal, free, self.rules)
 
-    @property
-    def size(self) -> int:
-        """Number of free parameters."""
-        return int(self.arm.free.sum())
-
-    @property
-    def required(self) -> int:
-        """Numbers that a fit needs beside those for base and targets: of few, priors make up."""
-        return self.size if self.follows_vec else 0
-
     def fit(self, observations: Observations, others: Mapping[str, Fit]) -> ModelFit:
         """The DH model; base and targets are those of the VEC model where it follows that."""
         arm, settings = self.arm, {}
@@ -197,11 +185,11 @@ class DHEstimator(Estimator):
             one_base = replace(observations, session=np.zeros(len(observations), dtype=np.int64))
             poses = full_poses(observations.q_rad, frames.seen(followed.model, one_base))
             observations = poses.with_targets_of(observations)
-            settings = {"frames": frames, "frame_terms": None}
+            settings = {"frames": FrameParameters.none(frames)}
         else:
             count = distinct(observations).components
-            estimated = len(component_names(observations)) if self.common.frames_estimated else 0
-            held = count < FEW * (estimated + self.size)
+            estimated = self.common.frames(observations).size
+            held = count < FEW * (estimated + int(free.sum()))
             std = np.minimum(std, arm.nominal.prior_std.reshape(free.shape)) if held else std
             free = free & (count >= estimated + LEAST)
         fitted = self.common.fit(

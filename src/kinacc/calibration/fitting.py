@@ -13,8 +13,9 @@ from kinacc.calibration.frames import (
     MOTIONS,
     FrameParameters,
     Frames,
-    FrameTerms,
     closed_form_start,
+    component_names,
+    frame_terms,
     inverse_left_jacobians,
     left_jacobians,
     orientations_measured,
@@ -35,17 +36,6 @@ from kinacc.kinematics.model import ErrorModel
 from kinacc.measurements.folds import configurations
 
 BLOCK_ROWS = 1024
-
-
-def require_enough(observations: Observations, parameters: int, name: str, fix: str) -> None:
-    """Raise InputError where ``observations`` have fewer residuals than ``parameters`` to fit."""
-    if observations.components < max(parameters, 1):
-        what = (
-            f"{observations.components} residual components of {len(observations)} training rows "
-            f"for the {parameters} free parameters of the {name}"
-        )
-        allowed = "at least as many components as parameters"
-        raise InputError(Problem("measurements", what, allowed, fix))
 
 
 @dataclass(frozen=True)
@@ -210,7 +200,6 @@ SHOWN = 1e-3
 FRAME_PRIOR_UNITS = 10.0  # mm and mrad about the starting frames, where priors hold a model
 _PREFERRED = 10.0  # times the part of a motion that others have, to be what is held
 _TIE = 1e-6  # parts that are equal to this share
-MORE_POSES = "measure more poses"
 # With fewer residuals a parameter than the first, noise is at least the second.
 SURPLUS, LEAST_NOISE_MM = 2, 0.03
 
@@ -280,16 +269,14 @@ def fit(
     free: np.ndarray,
     rotation_weight_mm_per_rad: float,
     threshold: float = 0.0,
-    frames: Frames | None = None,
+    frames: FrameParameters | None = None,
     begin: Frames | None = None,
-    frame_terms: FrameTerms | None = None,
     std: np.ndarray | None = None,
     scale: np.ndarray | None = None,
     loss: str = SQUARES,
     held: bool = False,
     few: bool | None = None,
     name: str = "DH fit",
-    fix: str = MORE_POSES,
 ) -> ModelFit:
     """Fit the free parameters of a model, and base and targets, to observations.
 
@@ -307,9 +294,10 @@ def fit(
     threshold : float
         Directions of singular value below this share of the largest stay nominal, where no prior
         holds them.
-    frames : Frames, optional
-        Base and targets where they are known. Else both are estimated under ``frame_terms``, from
-        ``begin`` or a closed form.
+    frames : FrameParameters, optional
+        Base and targets: without components where they are known; all free if not given.
+    begin : Frames, optional
+        Where they start; by a closed form if not given.
     std : numpy.ndarray, optional
         Standard deviations of priors, of the shape of ``free`` in mm and rad, inf for none.
     scale : numpy.ndarray, optional
@@ -320,8 +308,8 @@ def fit(
         Priors hold every parameter and no direction is truncated.
     few : bool, optional
         Fewer residuals than parameters are enough; as ``held`` if not given.
-    name, fix : str
-        The fit, and what to do where there is too little data, in messages.
+    name : str
+        The fit in messages.
 
     Returns
     -------
@@ -338,15 +326,19 @@ def fit(
     weight, mask = rotation_weight_mm_per_rad, free.ravel()
     std = np.full(free.shape, np.inf) if std is None else np.where(free, std, np.inf)
     scale = scales(nominal) if scale is None else scale
-    few, size = held if few is None else few, int(mask.sum())
-    require_enough(observations, 0 if few else size, name, fix)
-    parameters = (
-        FrameParameters.none(frames)
-        if frames is not None
-        else placed(observations, nominal, frame_terms, weight, begin)
-    )
+    few = held if few is None else few
+    estimated = frames is None or frames.size > 0
+    needed = len(component_names(observations)) if estimated else 0
+    needed += 0 if few else int(mask.sum())
+    if observations.components < max(needed, 1):
+        what = (
+            f"{observations.components} residual components of {len(observations)} training rows "
+            f"for the {needed} free parameters of the {name}"
+        )
+        allowed = "at least as many components as parameters"
+        raise InputError(Problem("measurements", what, allowed, "measure more poses"))
+    parameters = placed(observations, nominal, frames, weight, begin)
     place = parameters.size
-    require_enough(observations, place + (0 if few else size), name, fix)
     system = PoseSystem(observations, nominal, mask, parameters, weight)
     frame_std, least_variance = parameters.std, 1e-8
     if held:
@@ -384,7 +376,7 @@ def fit_frames(
     model: ErrorModel,
     *,
     rotation_weight_mm_per_rad: float,
-    frame_terms: FrameTerms | None = None,
+    frames: FrameParameters | None = None,
 ) -> Frames:
     """Fit base and targets, the arm held at a model.
 
@@ -396,7 +388,7 @@ def fit_frames(
         The arm.
     rotation_weight_mm_per_rad : float
         Position error that weighs as much as one radian.
-    frame_terms : FrameTerms, optional
+    frames : FrameParameters, optional
         What is known of base and targets.
 
     Returns
@@ -416,7 +408,7 @@ def fit_frames(
         model,
         free=np.zeros(len(model.start), dtype=bool),
         rotation_weight_mm_per_rad=rotation_weight_mm_per_rad,
-        frame_terms=frame_terms,
+        frames=frames,
         name="fit of base and tool",
     ).frames
 
@@ -424,7 +416,7 @@ def fit_frames(
 def placed(
     observations: Observations,
     arm: ErrorModel,
-    terms: FrameTerms | None,
+    terms: FrameParameters | None,
     rotation_weight_mm_per_rad: float,
     start: Frames | None = None,
 ) -> FrameParameters:
@@ -433,15 +425,18 @@ def placed(
     Motions that poses of the arm show less than ``SHOWN`` of the best-seen one, and no prior holds,
     are held: as many places of targets as there are such motions stay where they are stated, and
     the others follow; where no target takes part, the base stays. So all models of the same poses
-    hold the same.
+    hold the same. Terms without components stay as they are.
     """
+    if terms is not None and not terms.size:
+        return terms
     if start is None:
         start = closed_form_start(observations, arm.pose(observations.at))
         if terms is not None:
             measured = orientations_measured(observations)[:, None, None]
-            turned = np.where(measured, start.targets.rotation, terms.stated.targets.rotation)
+            turned = np.where(measured, start.targets.rotation, terms.reference.targets.rotation)
             start = replace(start, targets=Pose(turned, start.targets.position_mm))
-    coordinates = FrameParameters.of(observations, start, terms)
+    terms = frame_terms(observations, start) if terms is None else terms
+    coordinates = terms.starting(start)
     still = np.zeros(len(arm.start), dtype=bool)
     system = PoseSystem(observations, arm, still, coordinates, rotation_weight_mm_per_rad)
     keep = np.flatnonzero(coordinates.free)
@@ -457,9 +452,8 @@ def placed(
     held = keep[_pivots(hidden, (~of_base & ~coordinates.angle)[keep])]
     free, begin = coordinates.free.copy(), coordinates.begin.copy()
     free[held] = False
-    if terms is not None:
-        placed = held[~of_base[held] & ~coordinates.angle[held]]
-        begin[placed] = terms.value[placed]
+    placed = held[~of_base[held] & ~coordinates.angle[held]]
+    begin[placed] = terms.begin[placed]
     motions = np.zeros((len(hidden), coordinates.size))
     motions[:, keep] = hidden
     return replace(coordinates, free=free, begin=begin, hidden=motions)

@@ -140,40 +140,24 @@ def stacked(poses: Sequence[Pose]) -> Pose:
     )
 
 
-@dataclass(frozen=True)
-class FrameTerms:
-    """What is known of the F components ``names`` of base and targets before a fit.
-
-    ``free`` (F,): estimated. ``value`` (F,) in mm and rad: where the others stay and what a prior
-    of standard deviation ``std`` (F,) expects; std inf where there is none. ``stated``: the frames
-    whose orientations the rotation vectors start from.
-    """
-
-    names: tuple[str, ...]
-    free: np.ndarray
-    value: np.ndarray
-    std: np.ndarray
-    stated: Frames
-
-
 def frame_terms(
     observations: Observations, stated: Frames, rules: Sequence[Rule] = ()
-) -> FrameTerms:
-    """Terms of base and targets, all free but for rules.
+) -> FrameParameters:
+    """Parameters of base and targets that begin at ``stated``, all free but for rules.
 
     Parameters
     ----------
     observations : Observations
         Measured points and poses.
     stated : Frames
-        Where a fixed frame is.
+        Where they begin and a fixed frame is.
     rules : sequence of Rule
         What the configuration fixes or knows of components.
 
     Returns
     -------
-    FrameTerms
-        Of the F components that can be estimated, in mm and rad.
+    FrameParameters
+        The F components that can be estimated, in mm and rad.
 
     Raises
     ------
@@ -204,7 +188,7 @@ def frame_terms(
             free[number] = rule.free
             value[number] = rule.value.get(unit, value[number])
             std[number] = rule.std.get(unit, np.inf)
-    return FrameTerms(names, free, value, std, stated)
+    return FrameParameters(names, stated, value, free, value, std, np.zeros((0, len(names))))
 
 
 def component_names(observations: Observations) -> tuple[str, ...]:
@@ -262,33 +246,24 @@ class FrameParameters:
         blank = np.zeros(0)
         return cls((), frames, blank, blank.astype(bool), blank, blank, np.zeros((0, 0)))
 
-    @classmethod
-    def of(
-        cls, observations: Observations, start: Frames, terms: FrameTerms | None
-    ) -> FrameParameters:
-        """Parameters that begin at ``start``, or where ``terms`` fix them.
+    def starting(self, start: Frames) -> FrameParameters:
+        """These from ``start``, or where they are fixed.
 
         Rotation vectors turn the stated orientation where one of their components is fixed or has a
         prior, or where no orientation was measured; else that of ``start``.
         """
-        names = component_names(observations)
-        size = len(names)
-        terms = terms or FrameTerms(
-            names, np.ones(size, bool), np.zeros(size), np.full(size, np.inf), start
-        )
-        begin, free, value, std = np.zeros(size), terms.free, terms.value, terms.std
-        parameters = cls(names, start, begin, free, value, std, np.zeros((0, size)))
-        here, turn, turning = start.joined, parameters.turn, parameters.turning
+        here, turn, turning = start.joined, self.turn, self.turning
+        known, begin = np.isfinite(self.std), np.zeros(self.size)
         stated = np.ones(len(here.position_mm), dtype=bool)
-        stated[turning] = (~free | np.isfinite(std))[turn].any(axis=1)
-        rotation = np.where(stated[:, None, None], terms.stated.joined.rotation, here.rotation)
+        stated[turning] = (~self.free | known)[turn].any(axis=1)
+        rotation = np.where(stated[:, None, None], self.reference.joined.rotation, here.rotation)
         apart = here.rotation[turning] @ np.swapaxes(rotation[turning], 1, 2)
-        begin[parameters.place] = here.position_mm
+        begin[self.place] = here.position_mm
         begin[turn] = log_so3(apart) * stated[turning][:, None]
-        begin[~free] = value[~free]
+        begin[~self.free] = self.begin[~self.free]
         reference = Frames.split(Pose(rotation, here.position_mm), start.sessions)
-        mean = np.where(np.isfinite(std), value, begin)
-        return replace(parameters, reference=reference, begin=begin, mean=mean)
+        mean = np.where(known, self.mean, begin)
+        return replace(self, reference=reference, begin=begin, mean=mean)
 
     @property
     def size(self) -> int:

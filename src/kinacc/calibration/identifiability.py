@@ -8,12 +8,13 @@ from itertools import compress
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import scipy
 
 from kinacc.calibration.fitting import ModelFit, PoseSystem
 from kinacc.calibration.frames import BASE, MOTIONS, Frames
 from kinacc.calibration.least_squares import MOVES_SQUARED, Split, one_thread
-from kinacc.calibration.observations import Observations, full_poses
+from kinacc.calibration.observations import Observations
 from kinacc.calibration.uncertainty import (
     TOUCH_SQUARED,
     Uncertainty,
@@ -21,7 +22,6 @@ from kinacc.calibration.uncertainty import (
     named_directions,
     unit_of,
 )
-from kinacc.geometry import Pose
 from kinacc.kinematics.dh import PARAMETERS, DHModel
 from kinacc.tables.columns import Columns
 from kinacc.tables.contract import columns_of
@@ -33,7 +33,7 @@ POORLY_DETERMINED = ": poorly determined by these poses"
 LEAST = 0.02  # of the largest part of a direction; smaller parts are not listed
 _RANK = 1e-6
 _SEPARATE = 0.5  # part of a unit direction beside the structural ones that is reported
-_MOST_NAMES, _MOST_SENTENCES = 6, 3
+_MOST_NAMES = 6
 _JOIN = "; "
 
 
@@ -78,11 +78,6 @@ class LeftOpen:
         directions = np.concatenate([*structural, *weak])
         count = sum(map(len, structural))
         return cls(directions, np.arange(len(directions)) < count, tuple(names), frames)
-
-    @property
-    def members(self) -> np.ndarray:
-        """True (m, P) for the parameters that take part in a direction."""
-        return np.abs(self.directions) >= LEAST
 
     @property
     def sentences(self) -> tuple[str, ...]:
@@ -133,10 +128,9 @@ def listed(table: Mapping[str, Iterable[Any]]) -> list[str]:
     list of str
         Parts in mm and mrad, the base's along the robot's own axes.
     """
-    rows = zip(table["status"], table["statement"], strict=True)
-    cells = (str(cell) for status, cell in rows if status == UNDETERMINED and cell)
-    texts = dict.fromkeys(text for cell in cells for text in cell.split(_JOIN))
-    return [text for text in texts if not text.endswith(" more")]
+    rows = pd.DataFrame({name: table[name] for name in ("status", "statement")})
+    cells = rows.loc[rows["status"] == UNDETERMINED, "statement"].dropna()
+    return cells.astype(str).str.split(_JOIN).explode().unique().tolist()
 
 
 def weak(sentences: Iterable[str]) -> list[str]:
@@ -157,17 +151,6 @@ def weak(sentences: Iterable[str]) -> list[str]:
         for text in sentences
         if text.endswith(POORLY_DETERMINED)
     ]
-
-
-def statements(left_open: LeftOpen) -> dict[str, str]:
-    """What poses leave open of each parameter that takes part, for ``dh_identified``."""
-    lines, texts_of = left_open.sentences, {}
-    for name, members in zip(left_open.names, left_open.members.T, strict=True):
-        texts = [lines[i] for i in np.flatnonzero(members)]
-        more = [f"{len(texts) - _MOST_SENTENCES} more"] if len(texts) > _MOST_SENTENCES else []
-        if texts:
-            texts_of[name] = _JOIN.join(texts[:_MOST_SENTENCES] + more)
-    return texts_of
 
 
 def parameter_name(name: str) -> str:
@@ -255,7 +238,9 @@ def identified(fit: ModelFit, known: Uncertainty, observations: Observations) ->
     estimated = np.concatenate([fit.parameters.free, free[free]])
     std = np.sqrt(np.maximum(np.diag(known.covariance), 0.0))
     part = np.linalg.norm(known.undetermined, axis=0)
-    why, rows = statements(left_open(fit, known, observations)), []
+    hidden, rows = left_open(fit, known, observations), []
+    sentences, members = hidden.sentences, np.abs(hidden.directions.T) >= LEAST
+    why = [_JOIN.join(compress(sentences, taking_part)) for taking_part in members]
     for i, name in enumerate(known.names):
         status = IDENTIFIED if estimated[i] else FIXED
         statement = None if estimated[i] else "fixed by calibration.frames"
@@ -263,7 +248,7 @@ def identified(fit: ModelFit, known: Uncertainty, observations: Observations) ->
             size, unit = (1e3, "mrad") if is_angle(name) else (1.0, "mm")
             status, statement = PRIOR, f"known beforehand to {size * prior[i]:g} {unit}"
         if part[i] ** 2 > (MOVES_SQUARED if status == PRIOR else TOUCH_SQUARED):
-            status, statement = UNDETERMINED, why.get(name)
+            status, statement = UNDETERMINED, why[i] or None
         deviation = std[i] if status in (IDENTIFIED, PRIOR) else None
         rows.append((name, status, deviation, unit_of(name), float(part[i]), statement))
     fixed = compress(fit.model.names, ~free)
@@ -271,49 +256,27 @@ def identified(fit: ModelFit, known: Uncertainty, observations: Observations) ->
     return columns_of("dh_identified", rows)
 
 
-def left_open(fit: ModelFit, known: Uncertainty, observations: Observations) -> LeftOpen:
-    """What the data cannot tell apart. ``observations``: what was fitted."""
-    hidden = named_directions(fit, unseen_anywhere(fit, observations, STRUCTURAL))
-    return LeftOpen.of(hidden, known.undetermined, known.names, fit.frames)
-
-
 @one_thread
-def unseen_anywhere(fit: ModelFit, observations: Observations, threshold: float) -> np.ndarray:
-    """Directions (m, P) of a fit's coordinates that no pose shows, whatever the joints.
+def left_open(fit: ModelFit, known: Uncertainty, observations: Observations) -> LeftOpen:
+    """What the data cannot tell apart: directions that no pose shows, whatever the joints.
 
-    ``observations`` say which targets were seen in which sessions, and how. Poses all over the
-    joints' turns (prismatic ones: a metre) are put where the model has them: without residuals what
-    cannot be seen is null to rounding.
+    ``observations`` were fitted: which targets were seen in which sessions, and how. Poses all over
+    the joints' turns (prismatic ones: a metre) are put where the model has them: without residuals
+    what cannot be seen is null to rounding.
     """
-    everywhere = _everywhere(fit, observations)
+    kinds = np.stack([observations.session, observations.target, observations.has_rotation])
+    kinds, q_rad = np.unique(kinds, axis=1, return_index=True)[1], joints_anywhere(fit.model.dh)
+    rows = observations.select(np.tile(kinds, len(q_rad)))
+    rows = replace(rows, q_rad=np.repeat(q_rad, len(kinds), axis=0))
+    predicted = fit.frames.seen(fit.model, rows)
+    rotation = np.where(rows.has_rotation[:, None, None], predicted.rotation, np.nan)
+    everywhere = replace(rows, position_mm=predicted.position_mm, rotation=rotation)
     system = PoseSystem(everywhere, fit.model, fit.free.ravel(), fit.parameters, UNSEEN_WEIGHT)
     scale = np.append(fit.solution.scale, 1.0)
     gram = system.normal(fit.solution.x) * np.outer(scale, scale)
-    nothing = np.zeros(system.size)
-    return Split.of(gram, system.frames.size, nothing, (threshold, threshold)).lost.T
-
-
-def _everywhere(fit: ModelFit, observations: Observations) -> Observations:
-    """Poses at joints of all kinds, by the model: every kind of row of ``observations`` in each."""
-    kinds = np.unique(
-        np.stack([observations.session, observations.target, observations.has_rotation], axis=1),
-        axis=0,
-    )
-    q_rad = joints_anywhere(fit.model.dh)
-    pose, kind = np.repeat(np.arange(len(q_rad)), len(kinds)), np.tile(kinds.T, len(q_rad))
-    session, target, turned = kind
-    nowhere = Pose(np.zeros((len(pose), 3, 3)), np.zeros((len(pose), 3)))
-    observed = replace(
-        full_poses(q_rad[pose], nowhere),
-        pose=pose,
-        target=target,
-        session=session,
-        target_names=observations.target_names,
-        session_names=observations.session_names,
-    )
-    predicted = fit.frames.seen(fit.model, observed)
-    rotation = np.where(turned.astype(bool)[:, None, None], predicted.rotation, np.nan)
-    return replace(observed, position_mm=predicted.position_mm, rotation=rotation)
+    thresholds = STRUCTURAL, STRUCTURAL
+    unseen = Split.of(gram, system.frames.size, np.zeros(system.size), thresholds).lost.T
+    return LeftOpen.of(named_directions(fit, unseen), known.undetermined, known.names, fit.frames)
 
 
 def joints_anywhere(model: DHModel) -> np.ndarray:

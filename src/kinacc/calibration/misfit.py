@@ -11,6 +11,8 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+import pandas as pd
+
 from kinacc.calibration.noise import UNKNOWN, Noise, of_measurements
 from kinacc.config.error_models import model_name
 from kinacc.kinematics.robot import Robot
@@ -71,63 +73,23 @@ def misfit(tables: Mapping[str, Columns], robot: Robot, model: str) -> Misfit:
     Misfit
         Held-out error and noise in mm, per axis.
     """
-    return Misfit(model, _held_out_mm(tables, model), _noise_of(tables, robot))
+    noise = of_measurements(tables["measurements"], robot) if "measurements" in tables else UNKNOWN
+    table = pd.DataFrame(tables.get("model_selection", {"model": [], "held_out_rms_mm": []}))
+    rms_mm = table.set_index("model")["held_out_rms_mm"].get(model, math.nan)
+    return Misfit(model, float(rms_mm) / math.sqrt(3.0), noise)
 
 
 def misfits(tables: Mapping[str, Columns], robot: Robot) -> list[Misfit]:
-    """Misfit of every model of the table ``model_selection``.
-
-    Parameters
-    ----------
-    tables, robot
-        See ``misfit``.
-
-    Returns
-    -------
-    list of Misfit
-        In the order of the table.
-    """
-    noise = _noise_of(tables, robot)
-    models = [str(model) for model in tables["model_selection"]["model"]]
-    return [Misfit(model, _held_out_mm(tables, model), noise) for model in models]
+    """Misfit of every model of the table ``model_selection``, in its order; see ``misfit``."""
+    return [misfit(tables, robot, str(model)) for model in tables["model_selection"]["model"]]
 
 
 def in_words(misfits: Sequence[Misfit]) -> str:
-    """What standard deviations of models of one calibration are worth, in words.
-
-    Parameters
-    ----------
-    misfits : sequence of Misfit
-        One or more.
-
-    Returns
-    -------
-    str
-        Held-out error over noise of each model.
-    """
-    return f"{GIVEN}; {over_noise(misfits)}"
-
-
-def over_noise(misfits: Sequence[Misfit]) -> str:
-    """Held-out errors of models over the noise of their readings, in words."""
-    noise = misfits[0].noise
-    if not noise.per_axis_mm > 0.0:
-        return "noise unknown (no configuration was read twice)"
-    ratios = (
-        f"{misfit.ratio:.3g}" if math.isfinite(misfit.ratio) else "unknown" for misfit in misfits
-    )
-    pairs = zip((model_name(misfit.model) for misfit in misfits), ratios, strict=True)
-    listed = ", ".join(map(" ".join, pairs))
-    return f"held-out error over noise ({noise.per_axis_mm:.3g} mm): {listed}"
-
-
-def _held_out_mm(tables: Mapping[str, Columns], model: str) -> float:
-    if "model_selection" not in tables:
-        return math.nan
-    table = tables["model_selection"]
-    rms = dict(zip(map(str, table["model"]), table["held_out_rms_mm"], strict=True))
-    return float(rms.get(model, math.nan)) / math.sqrt(3.0)
-
-
-def _noise_of(tables: Mapping[str, Columns], robot: Robot) -> Noise:
-    return of_measurements(tables["measurements"], robot) if "measurements" in tables else UNKNOWN
+    """What standard deviations of one or more models of one calibration are worth, in words."""
+    noise_mm, ratios = misfits[0].noise.per_axis_mm, []
+    if not noise_mm > 0.0:
+        return f"{GIVEN}; noise unknown (no configuration was read twice)"
+    for item in misfits:
+        ratio = f"{item.ratio:.3g}" if math.isfinite(item.ratio) else "unknown"
+        ratios.append(f"{model_name(item.model)} {ratio}")
+    return f"{GIVEN}; held-out error over noise ({noise_mm:.3g} mm): {', '.join(ratios)}"

@@ -6,11 +6,9 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple, Self
 
-import numpy as np
-
 from kinacc.calibration import fitting
 from kinacc.calibration.fitting import ModelFit
-from kinacc.calibration.frames import Frames, FrameTerms, frame_terms, known
+from kinacc.calibration.frames import FrameParameters, Frames, frame_terms, known
 from kinacc.calibration.observations import Observations
 from kinacc.calibration.uncertainty import Uncertainty
 from kinacc.config import error_models, parameter_rules
@@ -68,39 +66,28 @@ class Common:
             carried(arm),
         )
 
-    def stated(self, observations: Observations) -> Frames:
-        """Every base and every target where the robot's description has them."""
-        return known(
-            self.base,
-            self.tool,
-            sessions=len(observations.session_names),
-            targets=len(observations.target_names),
-        )
-
-    def terms(self, observations: Observations) -> FrameTerms:
-        """What the fits take for granted of base and targets, where these are estimated."""
-        return frame_terms(observations, self.stated(observations), self.frame_rules)
-
-    def frames(self, observations: Observations) -> tuple[Frames | None, FrameTerms | None]:
-        """Frames nobody estimates, or what the fits take for granted of those they estimate."""
-        if self.frames_estimated:
-            return None, self.terms(observations)
-        return self.stated(observations), None
+    def frames(self, observations: Observations) -> FrameParameters:
+        """Base and targets from where the robot's description has them; fixed if not estimated."""
+        counts = len(observations.session_names), len(observations.target_names)
+        stated = known(self.base, self.tool, *counts)
+        if not self.frames_estimated:
+            return FrameParameters.none(stated)
+        return frame_terms(observations, stated, self.frame_rules)
 
     def fit(self, observations: Observations, nominal: ErrorModel, **settings: Any) -> ModelFit:
         """A model fitted to measurements, by ``settings`` of ``fitting.fit``."""
-        frames, terms = self.frames(observations)
+        settings = {"frames": self.frames(observations)} | settings
         weight = self.rotation_weight_mm_per_rad
-        known: dict[str, Any] = {"frames": frames, "frame_terms": terms}
-        known["rotation_weight_mm_per_rad"] = weight
-        return fitting.fit(observations, nominal, **known | settings)
+        return fitting.fit(observations, nominal, rotation_weight_mm_per_rad=weight, **settings)
 
     def nominal_frames(self, observations: Observations) -> Frames:
         """Base and targets of the nominal arm, fitted where they are not known. Raises FitError."""
-        if not self.frames_estimated:
-            return self.stated(observations)
-        still = np.zeros(len(self.nominal.start), dtype=bool)
-        return self.fit(observations, self.nominal, free=still, name="fit of base and tool").frames
+        frames, weight = self.frames(observations), self.rotation_weight_mm_per_rad
+        if not frames.size:
+            return frames.reference
+        return fitting.fit_frames(
+            observations, self.nominal, rotation_weight_mm_per_rad=weight, frames=frames
+        )
 
 
 @dataclass(frozen=True)
@@ -110,8 +97,6 @@ class Estimator:
     common: Common
 
     kind: ClassVar[str]
-    name: ClassVar[str]  # of the fit, in messages
-    fix: ClassVar[str]  # what to do where there are too few measurements
 
     @classmethod
     def of(cls, calibration: Mapping[str, Any], arm: Robot, every: Observations) -> Self:
@@ -124,16 +109,6 @@ class Estimator:
     ) -> Iterator[tuple[tuple[str, ...], str, str]]:
         """Keys of its section that cannot be for ``arm``, what is wrong, and what is allowed."""
         yield from ()
-
-    @property
-    def size(self) -> int:
-        """Number of free parameters of a model."""
-        raise NotImplementedError
-
-    @property
-    def required(self) -> int:
-        """Numbers that a fit needs beside those for base and targets."""
-        return self.size
 
     def choices(self, every: Observations, progress: Progress | None = None) -> dict[str, Columns]:
         """Tables that say how settings left open were chosen. Raises FitError."""

@@ -86,61 +86,21 @@ def of_readings(observations: Observations, nominal: DHModel) -> Noise:
         by 2 % or less. Where it points one way they hide the tool, and the noise is overstated.
     """
     frames = closed_form_start(observations, nominal.pose(observations.at))
-    base, target = observations.session, observations.target
     error_mm = observations.position_mm - frames.seen(nominal, observations).position_mm
     same = configurations(observations.pose, observations.q_rad)
-    label = np.column_stack([same, base, target])
-    group = np.unique(label, axis=0, return_inverse=True)[1].ravel()
-    rows = np.flatnonzero(np.bincount(group)[group] > 1)
-    if not rows.size:
+    groups, axes = ["configuration", "session", "target"], ["x_mm", "y_mm", "z_mm"]
+    readings = pd.DataFrame(error_mm, columns=axes).assign(
+        configuration=same, session=observations.session, target=observations.target
+    )
+    readings = readings[readings.duplicated(groups, keep=False)]
+    if readings.empty:
         return UNKNOWN
-    repeated = pd.DataFrame(error_mm[rows])
-    medians = repeated.groupby(group[rows]).transform("median").to_numpy()
-    distance = np.linalg.norm(error_mm[rows] - medians, axis=1)
-    rows = rows[distance <= _GROSS * max(float(np.median(distance)), 1e-12)]
-    rows = rows[np.bincount(group)[group[rows]] > 1]
-    mean_square, freedom = scatter(error_mm[rows], pd.factorize(group[rows])[0])
-    std_mm = np.sqrt(np.diag(mean_square)) if freedom else np.full(3, np.nan)
-    return Noise(std_mm, freedom, len(rows), int(np.unique(same[rows]).size))
-
-
-def scatter(values: np.ndarray, group: np.ndarray) -> tuple[np.ndarray, int]:
-    """Mean square of values about the means of their groups.
-
-    Parameters
-    ----------
-    values : numpy.ndarray
-        Shape (n, k).
-    group : numpy.ndarray
-        Number of the group of each row, shape (n,), from 0 without gaps.
-
-    Returns
-    -------
-    mean_square : numpy.ndarray
-        Shape (k, k), in the square of the unit of ``values``.
-    freedom : int
-        Rows beyond the first of each group.
-    """
-    mean, count = means(values, group)
-    centred, freedom = values - mean[group], int(np.sum(count - 1))
-    return centred.T @ centred / max(freedom, 1), freedom
-
-
-def means(values: np.ndarray, group: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Mean of values in every group.
-
-    Parameters
-    ----------
-    values, group
-        See ``scatter``.
-
-    Returns
-    -------
-    mean : numpy.ndarray
-        Shape (g, k).
-    count : numpy.ndarray
-        Rows of each group, shape (g,).
-    """
-    count = np.bincount(group)
-    sums = [np.bincount(group, column) for column in values.T]
-    return np.stack(sums, axis=1) / count[:, None], count
+    medians = readings.groupby(groups)[axes].transform("median")
+    distance = np.linalg.norm(readings[axes] - medians, axis=1)
+    readings = readings[distance <= _GROSS * max(float(np.median(distance)), 1e-12)]
+    readings = readings[readings.duplicated(groups, keep=False)]
+    by_group = readings.groupby(groups)[axes]
+    freedom = len(readings) - by_group.ngroups
+    squares = ((readings[axes] - by_group.transform("mean")) ** 2).sum()
+    std_mm = np.sqrt(squares.to_numpy() / freedom) if freedom else np.full(3, np.nan)
+    return Noise(std_mm, freedom, len(readings), readings["configuration"].nunique())

@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from kinacc.calibration.fitting import MORE_POSES, ModelFit
+from kinacc.calibration.fitting import ModelFit
 from kinacc.calibration.models import Common, Estimator, Fit
 from kinacc.calibration.observations import Observations
 from kinacc.config import error_models
@@ -54,18 +54,11 @@ class OwnEstimator(Estimator):
     """How models of a registered class are fitted: to the measurements."""
 
     model: ClassVar[Any]
-    name: ClassVar[str] = "fit of an own model"
-    fix: ClassVar[str] = MORE_POSES
 
     @classmethod
     def of(cls, calibration: Mapping[str, Any], arm: Robot, every: Observations) -> Self:
         """By the ``calibration`` settings."""
         return cls(Common.of(calibration, arm))
-
-    @property
-    def size(self) -> int:
-        """Number of free parameters."""
-        return len(self.model(self.common.nominal).start)
 
     def fit(self, observations: Observations, others: Mapping[str, Fit]) -> ModelFit:
         """The model closest to the measurements."""
@@ -73,7 +66,7 @@ class OwnEstimator(Estimator):
         return self.common.fit(
             observations,
             nominal,
-            free=np.ones(self.size, dtype=bool),
+            free=np.ones(len(nominal.start), dtype=bool),
             std=nominal.prior_std,
             held=bool(np.isfinite(nominal.prior_std).all()),
             threshold=THRESHOLD,

@@ -10,7 +10,6 @@ import numpy as np
 import pandas as pd
 
 from kinacc.calibration import residuals, tables, uncertainty
-from kinacc.calibration.fitting import require_enough
 from kinacc.calibration.models import Fit, Progress, estimators, fit_all
 from kinacc.calibration.observations import Observations, from_columns
 from kinacc.calibration.residuals import Errors, errors, statistics
@@ -230,22 +229,6 @@ def delivered_fits(
         if frames is not None:
             fits[kind] = Fit(model, tables.frames_of(frames, kind, *names))
     return fits
-
-
-def require_enough_rows(
-    inputs: Mapping[str, Columns], robot: Robot, calibration: Mapping[str, Any]
-) -> None:
-    """Raise InputError where the training rows have fewer residuals than a fit has parameters.
-
-    The fits ask themselves as well; asked beforehand, nothing is remade from data that cannot do.
-    """
-    every, train = observed(inputs, robot)
-    training = every.select(train)
-    for estimator in estimators(calibration, robot, every).values():
-        frames, common = 0, estimator.common
-        if common.frames_estimated and len(training):
-            frames = int(common.terms(training).free.sum())
-        require_enough(training, estimator.required + frames, estimator.name, estimator.fix)
 
 
 def selection(every: Observations, held_out: Mapping[str, Errors]) -> pd.DataFrame:

@@ -11,7 +11,6 @@ import pandas as pd
 
 from kinacc.calibration import tables, vec_fit
 from kinacc.calibration.fitting import ModelFit, placed
-from kinacc.calibration.frames import FrameParameters, Frames, FrameTerms
 from kinacc.calibration.models import Common, Estimator, Fit, Progress
 from kinacc.calibration.observations import Observations
 from kinacc.calibration.uncertainty import Uncertainty
@@ -54,8 +53,6 @@ class VECEstimator(Estimator):
     travel_direction: bool
 
     kind: ClassVar[str] = "vec"
-    name: ClassVar[str] = "VEC fit"
-    fix: ClassVar[str] = vec_fit.VEC_FIX
 
     @classmethod
     def of(cls, calibration: Mapping[str, Any], arm: Robot, every: Observations) -> Self:
@@ -80,11 +77,6 @@ class VECEstimator(Estimator):
     def size(self) -> int:
         """Number of coefficients."""
         return 6 * self.common.nominal.joints * (self.order + 1)
-
-    @property
-    def required(self) -> int:
-        """Numbers that a fit needs beside those for base and targets."""
-        return 0 if self.open else self.size
 
     @property
     def open(self) -> bool:
@@ -120,15 +112,14 @@ class VECEstimator(Estimator):
 
     def fit(self, observations: Observations, others: Mapping[str, Fit]) -> ModelFit:
         """The VEC model on the nominal arm, base and targets starting where that has them."""
-        frames, terms = self._begin(observations, others)
+        begin = others[NOMINAL].frames if NOMINAL in others else None
         return vec_fit.fit(
             self._wanted(observations),
             self._empty(self.order),
             prior=self.prior,
             rotation_weight_mm_per_rad=self.common.rotation_weight_mm_per_rad,
-            frames=frames,
-            frames_free=terms is not None,
-            frame_terms=terms,
+            frames=self.common.frames(observations),
+            begin=begin or self.common.nominal_frames(observations),
             few=self.open,
         )
 
@@ -145,11 +136,9 @@ class VECEstimator(Estimator):
         return {"vec_fit": tables.fit_columns("vec_fit", fitted, known, gauge)}
 
     def _choice(self, training: Observations, near: pd.DataFrame | None) -> pd.DataFrame:
-        frames, terms = self._begin(training, {})
-        weight, arm = self.common.rotation_weight_mm_per_rad, self.common.nominal
-        parameters = FrameParameters.none(frames)
-        if terms is not None:
-            parameters = placed(training, arm, terms, weight, start=frames)
+        common, weight = self.common, self.common.rotation_weight_mm_per_rad
+        arm, frames = common.nominal, common.frames(training)
+        parameters = placed(training, arm, frames, weight, common.nominal_frames(training))
         most = vec_fit.highest_order(training, arm.joints, parameters.size)
         orders = [order for order in self.orders if order <= most]
         if not orders:  # too few residuals to judge by
@@ -160,15 +149,6 @@ class VECEstimator(Estimator):
         return vec_fit.choose(
             observations, self._empty(1), parameters, weight, orders, stated, near
         )
-
-    def _begin(
-        self, observations: Observations, others: Mapping[str, Fit]
-    ) -> tuple[Frames, FrameTerms | None]:
-        """Where base and targets start, and what is taken for granted of those estimated."""
-        stated, terms = self.common.frames(observations)
-        if stated is None and NOMINAL in others:
-            stated = others[NOMINAL].frames
-        return stated or self.common.nominal_frames(observations), terms
 
     def _empty(self, order: int) -> VECModel:
         return vec.without_errors(self.common.nominal, *self.joint_range_rad, order)

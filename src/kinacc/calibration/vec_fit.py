@@ -20,13 +20,12 @@ from scipy.linalg import blas, lapack
 
 from kinacc.calibration import fitting
 from kinacc.calibration.fitting import ModelFit, PoseSystem, distinct, once, scales
-from kinacc.calibration.frames import FrameParameters, Frames, FrameTerms
+from kinacc.calibration.frames import FrameParameters, Frames
 from kinacc.calibration.least_squares import Spectrum, one_thread, singular_values
 from kinacc.calibration.observations import Observations
 from kinacc.kinematics import vec
 from kinacc.kinematics.vec import ERRORS, VECModel
 
-VEC_FIX = "measure more poses, or lower calibration.vec.order"
 RANK_THRESHOLD = 1e-10  # far below every weak direction, far above rounding: exact gauges only
 
 
@@ -75,12 +74,11 @@ def fit(
     *,
     prior: Prior,
     rotation_weight_mm_per_rad: float,
-    frames: Frames,
-    frames_free: bool,
-    frame_terms: FrameTerms | None = None,
+    frames: FrameParameters | None = None,
+    begin: Frames | None = None,
     few: bool = False,
 ) -> ModelFit:
-    """Fit the coefficients of a VEC model under a prior, and base and targets where free.
+    """Fit the coefficients of a VEC model under a prior, and base and targets if not known.
 
     Direction offsets that no observation shows stay at zero, std NaN; the two of a joint that
     always travelled sum to zero, so that the model at an unknown direction is the mean of both.
@@ -95,10 +93,10 @@ def fit(
         Prior of the coefficients.
     rotation_weight_mm_per_rad : float
         Position error that weighs as much as one radian.
-    frames : Frames
-        Base and targets, or where they start if ``frames_free``.
-    frame_terms : FrameTerms, optional
-        What is known of base and targets where they are free.
+    frames : FrameParameters, optional
+        Base and targets: without components where they are known; all free if not given.
+    begin : Frames, optional
+        Where they start; by a closed form if not given.
     few : bool
         Fewer residuals than parameters are enough.
 
@@ -115,13 +113,11 @@ def fit(
         free=informed(observations, empty),
         std=prior.std(empty),
         rotation_weight_mm_per_rad=rotation_weight_mm_per_rad,
-        frames=None if frames_free else frames,
-        begin=frames,
-        frame_terms=frame_terms,
+        frames=frames,
+        begin=begin,
         held=True,
         few=few,
         name="VEC fit",
-        fix=VEC_FIX,
     )
     return _with_centred_offsets(fitted, observations, prior.std(empty))
 

@@ -111,13 +111,13 @@ def few_poses(columns: Columns, robot: Robot, calibration: Mapping[str, Any]) ->
     """Whether the VEC model has more coefficients than the poses give independent numbers."""
     observed = from_columns(columns, robot)
     fit = VECEstimator.of(calibration, robot, observed)
-    frames = int(fit.common.terms(observed).free.sum()) if fit.common.frames_estimated else 0
+    frames = int(fit.common.frames(observed).free.sum())
     seen = pd.DataFrame({"target": observed.target, "turned": observed.has_rotation})
     poses = seen.groupby(folds.configurations(observed.pose, observed.q_rad))
     # A target adds three components to a pose, an orientation three; repeats add none.
     numbers = 3 * poses["target"].nunique() + 3 * poses["turned"].any()
     count = int(numbers.clip(upper=_PER_POSE).sum())
-    if count >= fit.required + frames:
+    if count >= frames + (0 if fit.open else fit.size):
         return []
     few = finding(
         "few_poses",

@@ -17,7 +17,13 @@ from numpy import ndarray
 from scipy.spatial.transform import Rotation
 
 from kinacc.calibration.fitting import PoseSystem
-from kinacc.calibration.frames import FrameParameters, Frames, base_from_targets, closed_form_start
+from kinacc.calibration.frames import (
+    FrameParameters,
+    Frames,
+    base_from_targets,
+    closed_form_start,
+    frame_terms,
+)
 from kinacc.checks import tails
 from kinacc.checks.readings import Readings, thinned
 from kinacc.geometry import Pose, compose, invert, log_so3
@@ -229,7 +235,7 @@ class Linear:
         """The linearisation of an arm that leans on ``nominal``."""
         # A target that moved has two numbers and one name.
         named = replace(observed, target_names=tuple(map(str, range(len(observed.target_names)))))
-        frames = FrameParameters.of(named, arm.frames, None)
+        frames = frame_terms(named, arm.frames)
         free = np.full(nominal.start.size, strength > 0.0)
         system = PoseSystem(named, nominal, free, frames, 1.0)
         x = np.concatenate([frames.begin, arm.model.start[free]])

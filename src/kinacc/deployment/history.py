@@ -215,7 +215,7 @@ class _Comparison:
         counts = len(series.session_names), len(series.target_names)
         weight = self.rotation_weight_mm_per_rad
         terms = frame_terms(series, known(robot.base, carried(robot), *counts))
-        frames = fit_frames(series, model, rotation_weight_mm_per_rad=weight, frame_terms=terms)
+        frames = fit_frames(series, model, rotation_weight_mm_per_rad=weight, frames=terms)
         return history_model.about(model, frames, series, first, weight)
 
     def errors_mm(self, force: Session, session: Session, setup: Setup) -> np.ndarray:

@@ -32,7 +32,7 @@ import scipy
 
 from kinacc.calibration import vec_fit
 from kinacc.calibration.fitting import PoseSystem
-from kinacc.calibration.frames import FrameParameters, Frames
+from kinacc.calibration.frames import Frames, frame_terms
 from kinacc.calibration.observations import Observations
 from kinacc.kinematics import vec
 from kinacc.kinematics.dh import DHModel
@@ -109,7 +109,7 @@ def about(
     low, high = q_rad.min(axis=0) - _NARROW_RAD, q_rad.max(axis=0) + _NARROW_RAD
     empty = vec.without_errors(model, low, high, ORDER)
     free = vec_fit.informed(both, empty)
-    coords = FrameParameters.of(both, frames, None)
+    coords = frame_terms(both, frames)
     state = np.append(coords.begin, np.zeros(free.sum()))
     system = PoseSystem(both, empty, free, coords, rotation_weight_mm_per_rad)
     residual, jacobian = (

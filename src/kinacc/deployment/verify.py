@@ -342,9 +342,7 @@ def frames_at(
     of_base = np.arange(len(terms.names)) < len(MOTIONS) * len(calibrations)  # these stand first
     terms = replace(terms, free=np.where(of_base, BASE in moved, TOOL in moved))
     weight = rotation_weight_mm_per_rad
-    return fit_frames(
-        readings, calibration.model, rotation_weight_mm_per_rad=weight, frame_terms=terms
-    )
+    return fit_frames(readings, calibration.model, rotation_weight_mm_per_rad=weight, frames=terms)
 
 
 def covers(model: ErrorModel, q_rad: np.ndarray) -> np.ndarray:
