@@ -89,7 +89,7 @@ def test_shipped_robot_is_the_published_table(name, table):
 # --- DH, eqs. 1-4 ---------------------------------------------------------------------------------
 
 
-@settings(max_examples=40)
+@settings(max_examples=15)
 @given(table=dh_tables(5), q=floats(-2 * math.pi, 2 * math.pi, (2, 5)))
 def test_dh_chain_equals_the_plain_loop(table, q):
     frames = dh.chain(dh_model(table), q)
@@ -101,7 +101,7 @@ def test_dh_chain_equals_the_plain_loop(table, q):
             )
 
 
-@settings(max_examples=40)
+@settings(max_examples=15)
 @given(table=dh_tables(), q=floats(-2 * math.pi, 2 * math.pi, 6))
 def test_dh_joint_jacobian_equals_differences(table, q):
     analytic = dh.joint_jacobian(dh_model(table), q[None])[0]
@@ -110,7 +110,7 @@ def test_dh_joint_jacobian_equals_differences(table, q):
     np.testing.assert_allclose(analytic[3:], numeric[3:], rtol=0, atol=5e-11)
 
 
-@settings(max_examples=40)
+@settings(max_examples=15)
 @given(table=dh_tables(), q=floats(-2 * math.pi, 2 * math.pi, 6))
 def test_dh_parameter_jacobian_equals_differences(table, q):
     analytic = dh_model(table).linearised(JointState(q[None]))[1][0]
@@ -126,7 +126,7 @@ def test_dh_parameter_jacobian_equals_differences(table, q):
 # --- VEC, eqs. 5-6 --------------------------------------------------------------------------------
 
 
-@settings(max_examples=8)
+@settings(max_examples=4)
 @given(case=vec_cases())
 def test_vec_parameter_jacobian_equals_differences(case):
     table, series, low, high, offsets, q, s = case
@@ -149,7 +149,7 @@ def test_vec_parameter_jacobian_equals_differences(case):
     np.testing.assert_allclose(analytic[3:], numeric[3:], rtol=0, atol=2e-9)
 
 
-@settings(max_examples=60)
+@settings(max_examples=25)
 @given(case=vec_cases())
 def test_vec_forward_equals_the_plain_loop(case):
     *parameters, q, s = case

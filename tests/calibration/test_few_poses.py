@@ -46,8 +46,10 @@ def mean_errors(arm, train, test, *kinds):
     ]
 
 
-@pytest.mark.parametrize("name", ["mh180", "ur10", "irb120"])
-@pytest.mark.parametrize("offset_deg", [(0.2, 0.45), (0.0, 0.05)], ids=["turned", "small"])
+@pytest.mark.parametrize(
+    ("name", "offset_deg"),
+    [("mh180", (0.2, 0.45)), ("ur10", (0.2, 0.45)), ("irb120", (0.0, 0.05))],
+)
 def test_dh_from_few_positions_beats_the_nominal_arm(name, offset_deg):
     arm, seen = positions(name, offset_deg)
     test = seen.select(slice(100, None))
@@ -69,7 +71,7 @@ def test_very_few_positions_leave_the_arm_nominal():
     assert by_dh == pytest.approx(nominal, rel=1e-9)
 
 
-@pytest.mark.parametrize("size", [5, 8, 20])
+@pytest.mark.parametrize("size", [5, 20])
 def test_every_model_of_an_automatic_calibration_ends(size):
     arm, seen = positions("mh180", (0.0, 0.05))
     test = seen.select(slice(100, None))
