@@ -17,8 +17,6 @@ from numpy import ndarray
 from scipy.spatial.distance import pdist
 from scipy.special import chdtrc, gammaincinv
 
-from kinacc.calibration.noise import means, scatter
-
 AXES = ["x_mm", "y_mm", "z_mm"]
 # A side is of one pose, and a visit is of one side.
 POSE, SIDE, VISIT = ["pose"], ["pose", "side"], ["pose", "side", "visit"]
@@ -275,3 +273,45 @@ def _no_less_than_zero(covariance: ndarray) -> ndarray:
     """The nearest covariance (3, 3) of a difference of two, which need not be one."""
     size, axes = np.linalg.eigh(0.5 * (covariance + covariance.T))
     return (axes * np.maximum(size, 0.0)) @ axes.T
+
+
+def scatter(values: np.ndarray, group: np.ndarray) -> tuple[np.ndarray, int]:
+    """Mean square of values about the means of their groups.
+
+    Parameters
+    ----------
+    values : numpy.ndarray
+        Shape (n, k).
+    group : numpy.ndarray
+        Number of the group of each row, shape (n,), from 0 without gaps.
+
+    Returns
+    -------
+    mean_square : numpy.ndarray
+        Shape (k, k), in the square of the unit of ``values``.
+    freedom : int
+        Rows beyond the first of each group.
+    """
+    mean, count = means(values, group)
+    centred, freedom = values - mean[group], int(np.sum(count - 1))
+    return centred.T @ centred / max(freedom, 1), freedom
+
+
+def means(values: np.ndarray, group: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Mean of values in every group.
+
+    Parameters
+    ----------
+    values, group
+        See ``scatter``.
+
+    Returns
+    -------
+    mean : numpy.ndarray
+        Shape (g, k).
+    count : numpy.ndarray
+        Rows of each group, shape (g,).
+    """
+    count = np.bincount(group)
+    sums = [np.bincount(group, column) for column in values.T]
+    return np.stack(sums, axis=1) / count[:, None], count
