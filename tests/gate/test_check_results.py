@@ -182,6 +182,23 @@ def test_a_knocked_joint_makes_the_accepted_calibration_hold_no_more(made, tmp_p
     assert unchanged["arm"]["verdict"] == "passed"
 
 
+def test_a_parameter_moved_that_is_three_deviations_of_the_difference_off(made, tmp_path):
+    """Both runs are 1 mm uncertain of d of joint 3, their difference 1.41 mm: three are 4.24 mm."""
+    counts = []
+    for moved_mm in (4.2, 4.3):
+        folders = [tmp_path / f"{name} {moved_mm}" for name in ("first", "next")]
+        for folder in folders:
+            shutil.copytree(made[folder.name.split()[0]], folder)
+        before, now = (folder / "mh180" / "dh_model.parquet" for folder in folders)
+        d_mm = pq.read_table(before)["d_mm"].to_numpy()
+        column_set(now, "d_mm", d_mm + moved_mm * (np.arange(6) == 2))
+        for path in (before, now):
+            column_set(path, "std_d_mm", np.ones(6))
+        found = told(folders[1], "--against", folders[0])
+        counts.append(found["parameters"]["figures"]["moved"])
+    assert counts[1] == counts[0] + 1
+
+
 def test_a_run_is_accepted_for_a_reason_and_later_runs_are_compared_with_it(here):
     accept = ("check-results", "results", "--accept", "accepted")
     assert call(*accept).exit_code == 2

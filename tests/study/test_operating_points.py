@@ -9,6 +9,7 @@ import pytest
 from two_models import two_models
 
 from kinacc.errors import InputError
+from kinacc.geometry import Pose
 from kinacc.kinematics import region, robot, vec
 from kinacc.kinematics.inverse import limits
 from kinacc.study import accuracy_map as maps
@@ -54,6 +55,14 @@ def test_a_box_of_coupled_joints_is_in_reported_angles():
     assert limits.within(limits.reported_joints(arm, q), *box).all()
     assert limits.within(q, *RANGE).all()
     assert (q[:, 3] < 0).all()
+
+
+def test_a_region_of_joint_draws_is_in_the_base_frame_of_the_arm():
+    box = np.deg2rad([-10.0, 0, -30, 5, -10, -10]), np.deg2rad([60.0, 40, 0, 20, 10, 10])
+    lifted = replace(ARM, base=Pose(np.eye(3), np.array([0.0, 0.0, 2000.0])))
+    higher = replace(SPACE, bottom_mm=SPACE.bottom_mm + 2000.0)
+    q = operating_points.in_joints(ARM, MODELS, box, "sobol", 60, SPACE)
+    assert np.array_equal(operating_points.in_joints(lifted, MODELS, box, "sobol", 60, higher), q)
 
 
 def test_boxes_without_anything_to_assess_name_every_joint():
