@@ -9,25 +9,24 @@ from itertools import product
 import pytest
 from command_line import call
 
+from kinacc.campaign.campaign import Campaign
+
 KINDS = ("csv", "json", "parquet")
+STARTED = ("--model", "dh", "--noise-mm", 0.05, "--frame", "base", "--budget", 8, "--sure")
 
 
 @pytest.fixture(scope="module")
 def written(study, tmp_path_factory):
     """A file of every command that writes joints or poses, in every form, by command and kind."""
     base = tmp_path_factory.mktemp("written by others")
-    campaign = base / "check"
-    begin(study, campaign, "--candidates", 8)
-    record_all(campaign, base / "readings.csv")
-    assert call("campaign", "report", campaign).exit_code == 0
-    again = base / "again"
-    begin(study, again, "--candidates", 8)
-    made = {}
+    campaign, made = base / "check", {}
+    done = call("campaign", "start", campaign, "--calibration", study, *STARTED, "--candidates", 8)
+    assert done.exit_code == 0, done.output
     for kind in KINDS:
         commands = {
             "plan-poses": ("plan-poses", "mh180", "--poses", 8, "--candidates", 60, "--joints-deg",
                            "-30:30,-20:20,-20:20,-30:30,40:70,-30:30", "--hayati", "2"),
-            "campaign next": ("campaign", "next", again, "--all"),
+            "campaign next": ("campaign", "next", campaign, "--all"),
             "predict": ("predict", study, base / f"plan-poses.{kind}", "--model", "dh"),
             "compensate": ("compensate", study, base / f"predict.{kind}", "--model", "dh"),
         }  # fmt: skip
@@ -35,27 +34,13 @@ def written(study, tmp_path_factory):
             made[name, kind] = base / f"{name}.{kind}"
             done = call(*words, "-o", made[name, kind])
             assert done.exit_code == 0, (name, kind, done.output)
+    opened = Campaign(campaign)
+    while (pose := opened.next_pose()) is not None:
+        opened.add_reading(pose.expected_mm + 0.1)
+    assert call("campaign", "report", campaign).exit_code == 0
     made["campaign report", "parquet"] = campaign / "report" / "campaign_points.parquet"
     made["measurements", "parquet"] = study / "measurements.parquet"
     return made
-
-
-def begin(study, campaign, *words):
-    done = call("campaign", "start", campaign, "--calibration", study, "--model", "dh",
-                "--noise-mm", 0.05, "--frame", "base", "--budget", 8, "--sure", *words)  # fmt: skip
-    assert done.exit_code == 0, done.output
-
-
-def record_all(campaign, file):
-    """Measure the whole visit 0.1 mm off and record it."""
-    rows = json.loads(call("campaign", "next", campaign, "--all", "--json").stdout)["rows"]
-    with file.open("w", newline="") as stream:
-        out = csv.writer(stream)
-        out.writerow(["pose", "x_mm", "y_mm", "z_mm"])
-        for row in rows:
-            out.writerow([row["pose"], *(row[f"expected_{axis}_mm"] + 0.1 for axis in "xyz")])
-    done = call("campaign", "record", campaign, file)
-    assert done.exit_code == 0, done.output
 
 
 TABLES = (("campaign report", "parquet"), ("measurements", "parquet"))
@@ -75,8 +60,8 @@ def test_joints_that_a_command_wrote_are_read_by_the_others(study, written, tmp_
         "predict": ("predict", study, file, "--model", "dh"),
         "plan-poses --candidates": ("plan-poses", "mh180", "--candidates", file, "--poses", 7),
         "campaign start --candidates": (
-            "campaign", "start", tmp_path / "new", "--calibration", study, "--model", "dh",
-            "--noise-mm", 0.05, "--candidates", file, "--sure",
+            "campaign", "start", tmp_path / "new", "--calibration", study, *STARTED,
+            "--budget", 200, "--candidates", file,
         ),
         "compare --joints": ("compare", "mh180", study, "--joints", file),
     }[reads]  # fmt: skip

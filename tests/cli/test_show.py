@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 
 import numpy as np
 import pandas as pd
@@ -11,33 +12,19 @@ import pyarrow.parquet as pq
 import pytest
 from command_line import call
 
-from kinacc.tables import store
-from kinacc.tables.contract import ARTEFACTS, PROVENANCE_KEYS
+from kinacc.tables.contract import ARTEFACTS
 
-POSES = 60
+POSES = 80  # of the small study
 
 
 @pytest.fixture
-def folder(tmp_path):
+def folder(study, tmp_path):
     """A data set's folder with a table, one damaged and one of another program."""
-    rng, here = np.random.default_rng(1), tmp_path / "results" / "arm"
+    here = tmp_path / "results" / "arm"
     here.mkdir(parents=True)
-    columns = {
-        "pose": np.arange(POSES),
-        **{f"q{i + 1}": rng.uniform(-1, 1, POSES) for i in range(6)},
-        **{f"s{i + 1}": np.zeros(POSES, np.int8) for i in range(6)},
-        "target": ["\x1b[31mred"] * POSES,
-        **{f"{axis}_mm": rng.uniform(-900, 900, POSES) for axis in "xyz"},
-        **{f"q{part}": [None] * POSES for part in "wxyz"},
-        "repeat": np.zeros(POSES, int),
-        "subset": ["train"] * POSES,
-        "fold": [None] * POSES,
-        "row": np.arange(POSES) + 2,
-    }
-    provenance = dict.fromkeys(PROVENANCE_KEYS, "1")
-    store.write_table(here / "measurements.parquet", "measurements", columns, provenance)
+    shutil.copy(study / "measurements.parquet", here)
     (here / "vec_model.parquet").write_bytes(b"PAR1 and no more")
-    pq.write_table(pa.table({"a": [1, 2], "b": ["x", None]}), here / "own.parquet")
+    pq.write_table(pa.table({"a": [1, 2], "b": ["\x1b[31mred", None]}), here / "own.parquet")
     return here
 
 
@@ -50,14 +37,14 @@ def rows(*words):
 def test_folders_and_tables_are_listed(folder):
     assert rows(folder.parent) == [{"folder": "arm", "tables": 3}]
     found = {row["table"]: row["rows"] for row in rows(folder)}
-    assert found == {"measurements": "60", "own": "2", "vec_model": ""}
+    assert found == {"measurements": "80", "own": "2", "vec_model": ""}
 
 
 @pytest.mark.parametrize("name", ["measurements", "measurements.parquet"])
 def test_a_table_is_found_with_and_without_its_ending(folder, name):
     assert len(rows(folder, name)) == len(rows(folder / name)) == POSES
-    assert rows(folder, "own") == [{"a": 1, "b": "x"}, {"a": 2, "b": None}]
-    assert "\x1b" not in call("show", folder, name).output
+    assert rows(folder, "own") == [{"a": 1, "b": "\x1b[31mred"}, {"a": 2, "b": None}]
+    assert "\x1b" not in call("show", folder, "own").output
 
 
 @pytest.mark.parametrize("kind", ["csv", "excel", "parquet"])
@@ -72,7 +59,7 @@ def test_files_hold_all_rows_and_all_digits(folder, tmp_path, kind):
 def test_columns_are_described_with_unit_and_meaning(folder):
     known = {row["column"]: row for row in rows(folder, "measurements", "--describe")}
     assert known["q1"]["unit"] == "rad"
-    assert known["pose"]["holds"] == "0 to 59"
+    assert known["pose"]["holds"] == "0 to 79"
     assert {name for name, row in known.items() if row["key"]} == {*ARTEFACTS["measurements"].key}
     assert known["x_mm"]["meaning"]
 

@@ -70,10 +70,8 @@ def next_(folder: str, every: bool, out: Output) -> None:
     shown = table[[name for name in table if not name.endswith("_rad")]]
     lines = progress = texts("campaign_pose.txt", s=summary, pose=None)
     if pose is not None and not every and out.table is None:
-        travel = np.zeros(len(pose.joints), int) if pose.directions is None else pose.directions
-        columns = pose.joints, np.rad2deg(pose.joints), opened.plan.slides, travel
-        joints = zip(*columns, strict=True)
-        lines = texts("campaign_pose.txt", s=summary, pose=pose, joints=joints)
+        joints = {"degrees": np.rad2deg(pose.joints), "slides": opened.plan.slides}
+        lines = texts("campaign_pose.txt", s=summary, pose=pose, **joints)
         shown = shown.head(0)
     out.show({"rows": table, "progress": progress[0]}, table, lines, shown)
 

@@ -17,7 +17,7 @@ from kinacc.deployment.export.controllers import CONTROLLERS
 from kinacc.deployment.export.pendant import fit_pendant
 from kinacc.errors import Problem, refuse
 from kinacc.kinematics.robot import Robot
-from kinacc.report.rendering import environment
+from kinacc.report.rendering import environment, lines
 from kinacc.workflow.described import calibration_settings
 
 
@@ -110,7 +110,4 @@ def _to_controller(
     if result.ending:
         contents[f"{stem}{result.ending}"] = result.text + "\n"
     paths = files.write(contents, target, out.force)
-    first, *_ = errors = [*result.errors.itertuples()]
-    lines = [f"Mean position error at {first.points} {first.poses}:"]
-    lines += [f"  {item.model}: {item.position_mm:.3f} mm" for item in errors]
-    out.show({**vars(result), "files": paths}, lines=[*lines, *paths])
+    out.show(vars(result) | {"files": paths}, lines=lines("pendant.txt", r=result, files=paths))

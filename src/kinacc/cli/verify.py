@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 import warnings
 from collections.abc import Mapping
 from pathlib import Path
@@ -67,16 +66,14 @@ def verify(
         result = verification.verify(tables, arm, columns, moved, weight)
     for text in dict.fromkeys(str(warning.message) for warning in caught):
         click.echo(f"{name}: {text}", err=True)
-    again = ["kinacc", "verify", str(readings), "--calibration", folder]
-    again += ["--dataset", dataset] if dataset else []
+    asked = {"new": str(readings), "folder": folder, "dataset": dataset, "moved": moved}
     lines = rendering.lines(
         "verify.txt",
         v=result,
-        level=f"{100.0 * LEVEL:g} %",
-        units=["mm" if slides else "mrad" for slides in arm.dh.prismatic],
-        again="" if moved else shlex.join([*again, "--base", "moved", "--tool", "moved"]),
-        more=shlex.join(["kinacc", "show", folder, "measurements", "-o", "poses.csv"]),
+        level=LEVEL,
+        slides=arm.dh.prismatic,
         set_up_moved=verification.SET_UP_MOVED,
+        **asked,
     )
     shown = result.errors if out.verbose else result.errors.drop(columns=[*_DETAILS])
     out.show(result, result.errors, lines, shown)

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable
 from functools import cache
 from importlib.resources import files
+from shlex import quote
 
 import pandas as pd
 from jinja2 import Environment, FunctionLoader, StrictUndefined
@@ -58,7 +59,7 @@ def environment(is_page: bool = True) -> Environment:
         finalize=None if is_page else _in_line,
     )
     filters = {"cell": cell, "counted": counted, "few": few, "size": size}
-    templates.filters |= filters | {"md": in_markdown, "model": model_name}
+    templates.filters |= filters | {"md": in_markdown, "model": model_name, "quoted": quote}
     return templates
 
 
