@@ -2,36 +2,28 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import lxml.html
 
 from kinacc.report.page import FirstScreen, Page, html
 
 
-@dataclass(frozen=True)
-class Shown:
+class Shown(NamedTuple):
     """A table of a page: cells as text, ``marked`` remarks by row."""
 
     caption: str
-    heads: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
-    marked: dict[int, str] = field(default_factory=dict)
-    folded: bool = False
+    marked: dict[int, str]
+    folded: bool
 
 
-@dataclass(frozen=True)
-class Read:
-    """Words by their place, tables, paragraphs and captions of pictures of a section."""
+class Read(NamedTuple):
+    """The whole text, the tables, and the captions of pictures of a section."""
 
-    title: str
-    population: str
-    shows: str
-    judged: str
-    to_do: str
-    tables: tuple[Shown, ...]
-    paragraphs: tuple[str, ...]
-    captions: tuple[str, ...]
+    text: str
+    tables: list[Shown]
+    captions: list[str]
 
 
 def as_page(*sections) -> str:
@@ -42,31 +34,19 @@ def as_page(*sections) -> str:
 def read(section) -> Read:
     """The section as it stands on a page."""
     tree = lxml.html.document_fromstring(as_page(section).encode())
-    (own,) = tree.xpath(f'//section[@id="{section.key}"]')
-    words = [each.text_content() for each in own.xpath('./dl[@class="reading"]/dd')]
-    return Read(
-        own.xpath("./h2")[0].text_content(),
-        "".join(own.xpath('./p[@class="population"]/text()')),
-        *words,
-        tuple(map(_table, own.xpath(".//table"))),
-        tuple(each.text_content() for each in own.xpath("./p[not(@class)]")),
-        tuple(each.text_content() for each in own.xpath(".//figcaption")),
-    )
+    (found,) = tree.xpath(f'//section[@id="{section.key}"]')
+    captions = [each.text_content() for each in found.xpath(".//figcaption")]
+    return Read(found.text_content(), [_table(each) for each in found.xpath(".//table")], captions)
 
 
 def _table(table) -> Shown:
-    rows, marked = [], {}
-    for number, row in enumerate(table.xpath("./tbody/tr")):
-        cells = row.xpath("./*[not(contains(@class, 'remark'))]")
-        rows.append(tuple(each.text_content() for each in cells))
-        remark = "".join(each.text_content() for each in row.xpath("./td[@class='remark']"))
-        if remark:
-            marked[number] = remark
+    rows = table.xpath("./tbody/tr")
+    remarks = [row.xpath("string(./td[@class='remark'])") for row in rows]
+    cells = [row.xpath("./*[not(contains(@class, 'remark'))]") for row in rows]
     return Shown(
-        table.xpath("./caption")[0].text_content(),
-        tuple(each.text_content() for each in table.xpath("./thead/tr/th[not(span)]")),
-        tuple(rows),
-        marked,
+        table.xpath("string(./caption)"),
+        tuple(tuple(cell.text_content() for cell in row) for row in cells),
+        {number: remark for number, remark in enumerate(remarks) if remark},
         table.getparent().getparent().tag == "details",
     )
 
@@ -75,8 +55,3 @@ def table(section, caption: str) -> Shown:
     """The one table of a section whose caption begins so."""
     (found,) = (each for each in read(section).tables if each.caption.startswith(caption))
     return found
-
-
-def words(section) -> str:
-    """All paragraphs of a section."""
-    return "\n".join(read(section).paragraphs)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from types import SimpleNamespace
 
 import matplotlib.text
 import numpy as np
@@ -21,50 +20,35 @@ from kinacc.kinematics import robot as robots
 from kinacc.report import page
 from kinacc.report.campaign import campaign_page, markdown, section
 
-TRUE_MM = 0.2
-
 
 def opened(
-    texts=("tracker=0.05",), points=12, budget=16, readings=99, noise_mm=0.05, tolerance_mm=None,
-    extra=(), names=None, mean_mm=TRUE_MM, off_mm=lambda number: 0.0, **settings,
-):  # fmt: skip
+    points=12, budget=16, readings=99, noise_mm=0.05, tolerance_mm=None, extra=(), names=None
+):
     """A campaign of an arm whose errors are known."""
     arm = nominal(robots.load("mh180"))
-    found = begin.points_of(
-        arm, spread(arm.robot, points), names or [f"p{i}" for i in range(points)]
-    )
+    labels = names or [f"p{i}" for i in range(points)]
+    candidates = begin.points_of(arm, spread(arm.robot, points), labels)
     limits = Limits(np.deg2rad(0.02), 10.0, tolerance_mm)
-    about = {"robot": "mh180", "calibration": "cell 3", "model": "dh", "point": "tool",
-             "candidates": "drawn", "kinacc_version": "0"}  # fmt: skip
-    plan = begin.plan_of(
-        arm, found, assessor_of("search_and_confirm", {"measurements": budget, **settings}),
-        instruments(texts, "base"), limits, about, 3,
-    )  # fmt: skip
-    rng, true = np.random.default_rng(4), np.random.default_rng(5).normal(0.0, mean_mm, (points, 3))
+    about = begin.about(arm, None, "drawn") | {"calibration": "cell 3", "model": "dh"}
+    assessor = assessor_of("search_and_confirm", {"measurements": budget})
+    used = instruments(("tracker=0.05",), "base")
+    plan = begin.plan_of(arm, candidates, assessor, used, limits, about, 3)
+    rng, true = np.random.default_rng(4), np.random.default_rng(5).normal(0.0, 0.2, (points, 3))
     rows = plan.visiting(frozenset())
     asking, entries = plan.assessor.begin(plan.candidates(rows)), []
     while len(entries) < readings and (row := asking.next()) is not None:
-        seen = true[rows[row]] + rng.normal(0.0, noise_mm, 3) + off_mm(len(entries))
-        used = plan.instruments[len(entries) % len(plan.instruments)]
-        asking.record(row, seen, used.covariance_mm2)
-        at = Reading(int(rows[row]), plan.points.modelled_mm[rows[row]] + seen, used.name)
+        seen = true[rows[row]] + rng.normal(0.0, noise_mm, 3)
+        asking.record(row, seen, plan.instruments[0].covariance_mm2)
+        at = Reading(int(rows[row]), plan.points.modelled_mm[rows[row]] + seen, "tracker")
         entries.append(Readings(readings=[at]).model_dump(exclude_none=True))
-    journal_ = folder.Journal((*entries, *extra), "cd", (), 0)
-    return Opened(Path("check"), plan, journal_, "ab")
+    journal = folder.Journal((*entries, *extra), "cd", (), 0)
+    return Opened(Path("check"), plan, journal, "ab")
 
 
 def measured(**change):
-    """A campaign with its state and tables."""
+    """A campaign and its tables."""
     campaign = opened(**change)
-    return SimpleNamespace(opened=campaign, state=campaign.state, tables=report.tables(campaign))
-
-
-def parts(campaign):
-    return campaign.opened, campaign.tables
-
-
-def first_of(campaign):
-    return campaign_page(*parts(campaign)).first
+    return campaign, report.tables(campaign)
 
 
 @pytest.mark.parametrize(
@@ -80,8 +64,8 @@ def first_of(campaign):
     ids=str,
 )
 def test_the_badge_is_the_verdict(change, badge):
-    campaign = measured(**change)
-    first = first_of(campaign)
+    campaign, tables = measured(**change)
+    first = campaign_page(campaign, tables).first
     assert first.badge == badge
     if badge[0] == "NO BOUND":
         assert {row["sure"] for row in first.tables[0].rows} == {""}
@@ -90,37 +74,37 @@ def test_the_badge_is_the_verdict(change, badge):
 
 
 def test_picture_and_conformity_have_the_number_of_excepted_candidates():
-    found = measured(points=60, budget=40, tolerance_mm=2.0)
-    values = section(*parts(found)).rows()
+    campaign, tables = measured(points=60, budget=40, tolerance_mm=2.0)
+    values = section(campaign, tables).rows()
     assert len(values["every"]) == values["measured"] == 36
-    assert values["largest"][0]["error_mm"] == np.nanmax(
-        found.tables["campaign_points"]["error_mm"]
-    )
-    about = found.tables["campaign_bounds"]
+    points, about = tables["campaign_points"], tables["campaign_bounds"]
+    assert values["largest"][0]["error_mm"] == np.nanmax(points["error_mm"])
     assert (np.asarray(about["excepted"]) > 0).any()
-    drawn = draw_bounds(found.tables["campaign_points"], about, len(found.state.plan.route))
+    drawn = draw_bounds(points, about, len(campaign.plan.route))
     labels = [each.get_text() for each in drawn.findobj(matplotlib.text.Text)]
     assert "bounds, all but 3 candidates" in labels
-    assert "all but 3 of these 60 candidates: **undecided**" in markdown(*parts(found), "picture")
+    assert "all but 3 of these 60 candidates: **undecided**" in markdown(
+        campaign, tables, "picture"
+    )
 
 
 def test_reasons_and_names_of_strangers_are_text():
     reason, names = '<script>alert("x")</script>', [f'<b>"{i}' for i in range(12)]
-    unread = int(measured(readings=6).state.rows[-1])
+    unread = int(opened(readings=6).state.rows[-1])
     entries = (
         {"kind": "strike", "reading": 2, "reason": reason},
         {"kind": "leave_out", "point": unread, "reason": "behind a <b>"},
     )
-    campaign = measured(readings=6, extra=entries, names=names)
-    values = section(*parts(campaign)).rows()
+    campaign, tables = measured(readings=6, extra=entries, names=names)
+    values, shown = section(campaign, tables).rows(), campaign_page(campaign, tables)
     (struck,), (left_out,) = values["struck"], values["left_out"]
     assert (struck["reading"], struck["struck"]) == (2, reason)
     assert (left_out["point"], left_out["reason"]) == (names[unread], "behind a <b>")
-    text = page.html(campaign_page(*parts(campaign)))
+    text = page.html(shown)
     assert "<script>alert" not in text
     assert "&lt;script&gt;alert" in text
     assert '<b>"' not in text
-    assert "these 11 candidates" in first_of(campaign).notes["VALID"][0]
+    assert "these 11 candidates" in shown.first.notes["VALID"][0]
 
 
 def test_noise_as_stated_is_a_scatter_of_one_and_fourfold_noise_of_four():

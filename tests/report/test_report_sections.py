@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 import pytest
-from parsed import as_page, read, table, words
+from parsed import as_page, read, table
 
 from kinacc.calibration.identifiability import POORLY_DETERMINED
 from kinacc.kinematics import robot as robots
@@ -136,7 +136,7 @@ def test_what_other_poses_would_show_stands_first(tables):
     first, second = table(found, "What cannot be told apart").rows
     assert first[0] == "tool z +1 mm"
     assert second == (ALWAYS, "no pose of such an arm does: no fault")
-    assert "3 undetermined" in read(found).population
+    assert "3 undetermined" in read(found).text
     rows = {row[0]: row[1:] for row in table(found, "Status of").rows}
     assert rows["a of joint 2"] == ("prior", "0.5 mm", "known beforehand to 0.5 mm")
     assert rows["alpha of joint 3"] == ("identified", "0.2 mrad", "–")
@@ -161,7 +161,7 @@ def test_the_closest_pair_comes_first_and_the_rank_has_its_limit(tables):
         ("a of joint 1", "base x", "+0.250"),
     )
     for text in ("2 of 3 are fitted", "0.25 times", "0.0005 times", "the limit is 0.01"):
-        assert text in words(found)
+        assert text in read(found).text
 
 
 def test_the_selected_model_has_its_gain_in_standard_errors_and_the_orders_tried(tables):

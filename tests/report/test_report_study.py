@@ -25,8 +25,8 @@ UNREACHED, LARGEST = 5, 9
 def test_errors_of_measured_poses_are_only_taken_as_true(measured):
     tables = {**made_up.points(measured), **made_up.study()}
     found = read(study_sections.study(tables))
-    assert "0.500 mm" in found.shows
-    assert ("known exactly" in found.population) != measured
+    assert "0.500 mm" in found.text
+    assert ("known exactly" in found.text) != measured
     assert ("true largest error" in found.captions[0]) != measured
     rows = found.tables[0].rows
     assert rows[0] == (*("maximum", "0.05", "0.650", "0.400", "0.900", "+0.150", "1 of 4"),)
@@ -114,4 +114,4 @@ def test_claims_that_differ_come_first_and_are_open():
     assert [row[5] for row in differ.rows] == ["fig5_rejected"]
     assert [each.folded for each in (differ, uncompared, agree)] == [False, True, True]
     assert [len(each.rows) for each in (uncompared, agree, chose)] == [1, len(all_claims()) - 9, 7]
-    assert "63 agrees, 1 differs, 1 not comparable" in found.shows
+    assert "63 agrees, 1 differs, 1 not comparable" in found.text

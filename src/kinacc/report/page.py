@@ -25,13 +25,12 @@ _SCRIPTS = ("bokeh", "bokeh-widgets")
 class Table:
     """Rows as dicts, and columns as [head, key] of texts or [head, key, format] of numbers.
 
-    The text under ``remark`` of a row stands behind it; the reader opens ``folded`` tables.
+    The text under ``remark`` of a row stands behind it.
     """
 
     caption: str
     rows: Sequence[Mapping[Any, object]]
     columns: Sequence[Sequence[str]]
-    folded: bool = False
 
 
 @dataclass(frozen=True)

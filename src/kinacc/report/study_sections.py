@@ -22,6 +22,12 @@ from kinacc.tables.columns import Tables
 _LARGEST = 10
 _DIFFERS = VERDICTS[1]
 _STATISTICS = {"mean": "mean", "max": "largest", "gamma99": "99 % gamma"}
+_OF_CELLS = {
+    "radius_mm": "radius",
+    "height_mm": "height",
+    "position_max_mm": "position",
+    "orientation_max_mrad": "orientation",
+}
 _PARAMETERS = {"theta_offset": "theta", "d": "d", "a": "a", "alpha": "alpha"}
 _EXAMPLES = {
     "rejected": "Fig. 5: the bound is rejected",
@@ -43,24 +49,20 @@ def accuracy_map(tables: Tables, robot: Robot) -> Part:
     """The cells of ``accuracy_map``."""
     table = pd.DataFrame(tables["accuracy_map"])
     slides = np.asarray(robot.dh.prismatic)
-    names = [f"q{joint}" for joint in range(1, len(slides) + 1)]
-    degrees = table[names].to_numpy() * np.where(slides, 1.0, 180.0 / np.pi)
-    reached = (table["solutions"] > 0).to_numpy()
+    joints = table[[f"q{joint}" for joint in range(1, len(slides) + 1)]].to_numpy()
+    degrees = joints * np.where(slides, 1.0, 180.0 / np.pi)
     texts = [", ".join(f"{angle:.1f}" for angle in row) for row in degrees]
-    cells = pd.DataFrame(
-        {
-            "slice": table["slice_deg"].map("{:g} deg".format),
-            "radius": table["radius_mm"],
-            "height": table["height_mm"],
-            "position": table["position_max_mm"],
-            "orientation": table["orientation_max_mrad"],
-            "reached": 100.0 * table["solutions"] / table["wanted"],
-            "pose": table["worst_branch"].fillna(""),
-            "joints": np.where(reached, texts, ""),
-        }
+    reached = (table["solutions"] > 0).to_numpy()
+    cells = (
+        table[[*_OF_CELLS]]
+        .rename(columns=_OF_CELLS)
+        .assign(
+            slice=table["slice_deg"].map("{:g} deg".format),
+            reached=100.0 * table["solutions"] / table["wanted"],
+            pose=table["worst_branch"].fillna(""),
+            joints=np.where(reached, texts, ""),
+        )
     )
-    largest = cells.dropna(subset="position")
-    largest = largest.sort_values("position", ascending=False, kind="stable")
     values = {
         "cells": len(cells),
         "slices": list(cells["slice"].unique()),
@@ -69,7 +71,7 @@ def accuracy_map(tables: Tables, robot: Robot) -> Part:
         "unreached": int((~reached).sum()),
         "beyond": int((~reached & (table["extrapolating"] > 0)).sum()),
         "slides": bool(slides.any()),
-        "largest": largest[:_LARGEST],
+        "largest": cells.dropna(subset="position").nlargest(_LARGEST, "position"),
     }
     size = [cell_size(np.unique(cells[name].round(3))) for name in ("radius", "height")]
     return Part("map", values, charts={"map": charts.accuracy_map(cells, *size)})
