@@ -9,6 +9,7 @@ from small_arms import calibrated, joints
 from kinacc.deployment.compensate import PoseStatus, compensate
 from kinacc.deployment.predict import predict
 from kinacc.deployment.record import nominal
+from kinacc.errors import InputError
 from kinacc.geometry import Pose, compose, invert, log_so3
 from kinacc.kinematics import robot
 from kinacc.kinematics.model import JointState
@@ -72,6 +73,20 @@ def test_a_vec_model_gives_no_joints_outside_its_range():
     assert np.isnan(found.q_rad).all()
 
 
+def test_each_pose_is_reached_in_its_own_directions_of_travel():
+    arm, q_rad = calibrated("mh180", "vec"), joints("mh180", 6, seed=4)
+    offsets = np.array([name.endswith(("minus", "plus")) for name in arm.model.names])
+    errors = 1e-3 * np.random.default_rng(1).normal(size=offsets.sum())
+    vector = arm.model.start.copy()
+    vector[offsets] = errors
+    arm = replace(arm, model=arm.model.with_parameters(vector))
+    s = np.sign(np.random.default_rng(2).normal(size=q_rad.shape))
+    wanted = arm.pose(JointState(q_rad, s))
+    found = compensate(arm, wanted, q_rad + 0.03, s)
+    np.testing.assert_allclose(found.q_rad, q_rad, rtol=0, atol=1e-5)
+    assert np.abs(compensate(arm, wanted, q_rad + 0.03).q_rad - q_rad).max() > 1e-4
+
+
 def test_the_base_is_the_same_under_dh_and_vec():
     """Base and tool of a VEC fit may drift against each other where no measured pose shows it."""
     arms = [calibrated("mh180", model) for model in ("dh", "vec")]
@@ -85,6 +100,8 @@ def test_the_base_is_the_same_under_dh_and_vec():
 
 def test_a_pose_out_of_reach_has_no_joints():
     far = Pose(np.eye(3)[None], np.array([[9000.0, 0.0, 0.0]]))
+    with pytest.raises(InputError, match="no number in row 0"):
+        compensate(calibrated("mh180", "dh"), far._replace(position_mm=np.full((1, 3), np.nan)))
     found = compensate(calibrated("mh180", "dh"), far)
     assert found.status.tolist() == [PoseStatus.NOT_REACHED]
     assert np.isnan(found.q_rad).all()

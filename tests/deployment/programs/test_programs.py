@@ -74,9 +74,31 @@ def test_frames_that_are_missing_are_asked_for(tmp_path):
     with pytest.raises(InputError, match="--tool"):
         compensate_program(arm, tmp_path / "weld.ls")
     given = {"1": np.array([30.0, -20.0, 150.0, -29.0, 1.0, 41.0])}
-    base = {"": np.array([1200.0, -200.0, 300.0, 0.0, 0.0, 10.0])}
-    found = compensate_program(arm, tmp_path / "weld.ls", given, base)
-    assert len(found.table) == 5
+    base = np.array([1200.0, -200.0, 300.0, 0.0, 0.0, 10.0])
+    asked = []
+
+    def ask(*words):
+        asked.append(words)
+        return base
+
+    found = [
+        compensate_program(arm, tmp_path / "weld.ls", given, {"": base}),
+        compensate_program(arm, tmp_path / "weld.ls", given, ask=ask),
+    ]
+    assert found[0].files == found[1].files
+    assert asked == [("base", "1")]
+
+
+def test_files_without_positions_are_refused(tmp_path):
+    for name, text, message in (
+        ("own.txt", "", "no robot language"),
+        ("own.src", "LIN P1\nLIN P2", "own.src:2: LIN P2"),
+        ("own.csv", "q1_deg,speed\n1,2\nx,3", "own.csv:3: has no number"),
+        ("own.csv", "speed\n3", "names no columns of positions"),
+        ("own.mod", "\0", "no text of one byte"),
+    ):
+        with pytest.raises(InputError, match=message):
+            _read(tmp_path, name, text)
 
 
 def test_a_program_is_corrected_once_and_files_are_kept(tmp_path):

@@ -1,0 +1,63 @@
+"""Results folders: what is missing, damaged, or of another robot is named."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from small_arms import results
+
+from kinacc.deployment.folder import calibration, read_tables, require_same_robot, selected_model
+from kinacc.errors import InputError
+from kinacc.geometry import Pose, rotation_x
+from kinacc.kinematics import robot
+
+ARM = robot.load("mh180")
+TABLES = results("mh180", 80, 3, False)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"dh": replace(ARM.dh, d_mm=ARM.dh.d_mm + 1e-3)}, "d_mm of joint 1"),
+        ({"dh": replace(ARM.dh, prismatic=np.arange(6) == 2)}, "sliding joints"),
+        ({"joint_map": np.diag([1.0, 1, 1, 1, 1, -1])}, "joint_map or signs"),
+        ({"flange": Pose(rotation_x(0.1), np.zeros(3))}, "flange"),
+    ],
+)
+def test_another_robot_than_that_of_the_results_is_refused(change, message):
+    require_same_robot(ARM, replace(ARM, q_max_rad=2.0 * ARM.q_max_rad), "results")
+    with pytest.raises(InputError, match=f"another robot than mh180: .*{message}"):
+        require_same_robot(ARM, replace(ARM, **change), "results")
+    with pytest.raises(InputError, match="6 joints, not 7"):
+        require_same_robot(ARM, robot.load("iiwa14"), "results")
+
+
+def test_the_better_model_is_taken_where_none_was_selected():
+    assert selected_model(TABLES) == "dh"  # the VEC model has no errors here
+    with pytest.raises(InputError, match="give --model"):
+        selected_model({**TABLES, "residuals": {}})
+
+
+@pytest.mark.parametrize(
+    ("words", "changed", "message"),
+    [
+        (("compliance",), {}, "'compliance' is none of these results"),
+        (("dh",), {"frames": {"model": np.array(["dh"])}}, "tables cannot be used"),
+        (("dh", "", "b"), {"session": np.array(["a"] * 6)}, "'b' is not there; allowed: a"),
+    ],
+)
+def test_tables_that_hold_no_such_calibration_are_refused(words, changed, message):
+    frames = changed.get("frames", {**TABLES["frames"], **changed})
+    with pytest.raises(InputError, match=message):
+        calibration({**TABLES, "frames": frames}, ARM, *words)
+
+
+def test_all_files_that_are_missing_or_damaged_are_named(tmp_path):
+    with pytest.raises(InputError, match="no such folder"):
+        read_tables(tmp_path / "none")
+    (tmp_path / "frames.parquet").write_bytes(b"PAR1")
+    with pytest.raises(InputError) as refused:
+        read_tables(tmp_path)
+    assert [problem.where.rpartition("/")[2] for problem in refused.value.problems] == [
+        "vec_model.parquet", "dh_model.parquet", "frames.parquet"
+    ]  # fmt: skip
