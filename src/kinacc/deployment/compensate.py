@@ -110,7 +110,7 @@ def compensate(
     goal = compose(invert(origin), compose(wanted, invert(carried)))
     inputs = near_rad is not None
     near = np.broadcast_to(0.0 if near_rad is None else near_rad, (len(every), robot.dh.joints))
-    like = JointState(robot.dh_joints(near), None if s is None else np.asarray(s), payload)
+    like = JointState(robot.dh_joints(near), s, payload)
     arm = _Goals(calibration, goal, near, like, carried)
     more, tried = every, []
     if inputs:
@@ -258,9 +258,8 @@ class _Goals:
         if not kinds or model.table is not None:
             return self._onto(model, start, rows, None)
         # Directions and payloads differ by row, and a refinement takes one state.
-        refined = np.empty_like(start)
-        for _, group in pd.DataFrame(np.hstack(kinds)).groupby([*range(np.hstack(kinds).shape[1])]):
-            state = group.index.to_numpy()
+        refined, states = np.empty_like(start), pd.DataFrame(np.hstack(kinds))
+        for state in states.groupby([*states]).indices.values():
             refined[state] = self._onto(model, start[state], rows[state], like.select(state[:1]))
         return refined
 

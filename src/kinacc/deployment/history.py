@@ -21,7 +21,6 @@ from kinacc.calibration.least_squares import one_thread
 from kinacc.calibration.models import Fit
 from kinacc.calibration.observations import Observations, from_columns
 from kinacc.calibration.residuals import errors
-from kinacc.calibration.summary import LARGE_SHARE
 from kinacc.config.error_models import MEASURED, Comparison
 from kinacc.deployment import folder, history_model
 from kinacc.deployment.history_model import Setup, joined
@@ -30,10 +29,12 @@ from kinacc.deployment.shared_readings import known_readings
 from kinacc.deployment.verify import (
     BASE,
     LEAST_HELD_OUT,
+    STATISTICS,
     TOOL,
     covers,
     frames_at,
     held_out_vectors,
+    statistics,
 )
 from kinacc.errors import FitError, InputError
 from kinacc.kinematics import robot as robots
@@ -46,8 +47,6 @@ from kinacc.tables.contract import ARTEFACTS, columns_of
 LEVEL = 0.005 / 12  # of a decision: monthly calibrations raise a false alarm in 1 year of 200
 ENOUGH = 0.5  # of the readings, in the joint ranges of the series in force
 MOST = 1500  # configurations of a series: what more would add is small beside the misfit
-
-_SIZES = ("mean", "quantile_99", "largest")
 
 
 @dataclass(frozen=True)
@@ -260,9 +259,8 @@ def _share_inside(q_rad: np.ndarray, ranged_rad: np.ndarray, prismatic: np.ndarr
 
 def _sizes(kind: str, errors_mm: np.ndarray) -> dict[str, float]:
     """Mean, 99 % and largest of errors (n,), NaN of none."""
-    sizes = pd.Series(errors_mm, dtype=float)
-    values = sizes.mean(), sizes.quantile(LARGE_SHARE), sizes.max()
-    return dict(zip((f"{kind}_{name}_mm" for name in _SIZES), map(float, values), strict=True))
+    names = [f"{kind}_{name}_mm" for name in STATISTICS[:3]]
+    return dict(zip(names, statistics(errors_mm), strict=False))
 
 
 def _count(observations: Observations) -> int:

@@ -278,7 +278,7 @@ def moved(pair: Pair, misfit: float) -> Moved:
     split = free.shape[1]
     gram[np.diag_indices(split)] += _FIRM * gram[:split, :split].diagonal().max()
     noise, prior = _variances(gram, observed, pair, split, group)
-    inverse = np.linalg.inv(gram + np.diag(np.append(np.zeros(split), noise / prior[group])))
+    inverse = _inverse(gram + np.diag(np.append(np.zeros(split), noise / prior[group])))
     result, changes = inverse @ observed, slice(split - count, split)
     scores = _shares(pair, columns, result, inverse, changes)
     blurred = (inverse[changes] @ gram[:, split:]) * np.sqrt(prior[group])
@@ -325,7 +325,7 @@ def _variances(
     prior, noise = np.full(group.max() + 1, _START_MM**2), 0.3 * square / remaining
     for _ in range(_ROUNDS):
         held = noise / prior[group]
-        spread = np.linalg.inv(inner + np.diag(held))
+        spread = _inverse(inner + np.diag(held))
         result = spread @ right
         informed = 1.0 - held * spread.diagonal()
         unexplained = square - 2.0 * result @ right + result @ inner @ result
@@ -340,6 +340,13 @@ def _variances(
         if change < _SETTLED:
             break
     return noise, prior
+
+
+def _inverse(matrix: np.ndarray) -> np.ndarray:
+    """Inverse of a symmetric, positive definite matrix, twice as fast as that of any."""
+    lower, _ = scipy.linalg.lapack.dpotrf(matrix, lower=1)
+    half, _ = scipy.linalg.lapack.dpotri(lower, lower=1)
+    return half + np.tril(half, -1).T
 
 
 def _shares(

@@ -116,8 +116,7 @@ def predict(
     InputError
         For an unknown frame or point.
     """
-    q_rad = calibration.robot.dh_joints(np.atleast_2d(q_rad))
-    state = JointState(q_rad, None if s is None else np.asarray(s), payload)
+    state = JointState(calibration.robot.dh_joints(np.atleast_2d(q_rad)), s, payload)
     count, outside = len(state), calibration.outside_range(state.q_rad)
     rows = np.flatnonzero(~(outside.any(axis=1) & (calibration.model.domain is not None)))
     part, near = state.select(rows), np.zeros(count, dtype=bool)

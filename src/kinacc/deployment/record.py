@@ -33,11 +33,6 @@ class Residual:
     orientation_rad: float
     subset: str
 
-    @property
-    def poses(self) -> str:
-        """Which rows, in words."""
-        return POSES[self.subset]
-
 
 def default_point(targets: Iterable[str]) -> str:
     """The point meant where none is named: the tool where there is one, else the first target."""
@@ -85,9 +80,8 @@ class Calibration:
     def orientation_source(self, point: str | None = None) -> str:
         """``measured`` or ``stated`` (by the robot file), of a target by name or the flange."""
         name = point or self.default_point
-        if name == FLANGE:
-            return MEASURED if self.orientation_measured else STATED
-        return MEASURED if name in self.orientation_measured else STATED
+        known = self.orientation_measured
+        return MEASURED if name in known or (name == FLANGE and known) else STATED
 
     def facts(self, frame: str, point: str | None) -> dict[str, str]:
         """Name, robot, model, frame and point of an answer, and why it is outdated if it is."""

@@ -47,7 +47,7 @@ SET_UP_MOVED = "the instrument or the tool was moved"
 FEW_HELD_OUT = "too few held-out configurations"
 LEAST_HELD_OUT = 20  # configurations: fewer do not tell the size of errors
 DOUBLED = 2.0  # readings that would not show errors this many times as large decide nothing
-_STATISTICS = ("mean", "quantile_99", "largest", "rms")
+STATISTICS = ("mean", "quantile_99", "largest", "rms")
 _FAR_MM = 10.0
 _SLACK = 1e-9  # rad and mm beyond the fitted range: rounding
 
@@ -208,11 +208,9 @@ def model_errors(
         off = errors({kind: Fit(model, frames)}, part)[Comparison(MEASURED, kind).name]
         row: list[object] = [kind, len(part)]
         for vectors in (off.position_mm, 1e3 * off.rotation_rad):
-            sizes = pd.Series(np.linalg.norm(vectors, axis=1))  # NaN where nothing was measured
-            rms = np.sqrt((sizes**2).mean())
-            row += [sizes.mean(), sizes.quantile(LARGE_SHARE), sizes.max(), rms]
+            row += statistics(np.linalg.norm(vectors, axis=1))
         rows.append(row)
-    columns = [f"{name}_{unit}" for unit in ("mm", "mrad") for name in _STATISTICS]
+    columns = [f"{name}_{unit}" for unit in ("mm", "mrad") for name in STATISTICS]
     return pd.DataFrame(rows, columns=["model", "readings", *columns])
 
 
@@ -298,8 +296,14 @@ def error_columns(
 
 def _level(of: ErrorColumns) -> Level:
     sizes = np.linalg.norm(of.columns[..., -1].reshape(-1, 3), axis=1)
-    quantile = float(np.quantile(sizes, LARGE_SHARE))
-    return Level(len(sizes), len(of.columns), float(sizes.mean()), quantile)
+    return Level(len(sizes), len(of.columns), *statistics(sizes)[:2])
+
+
+def statistics(errors: np.ndarray) -> list[float]:
+    """``STATISTICS`` of errors (n,) that are no NaN; NaN of none."""
+    sizes = pd.Series(errors, dtype=float)
+    values = sizes.mean(), sizes.quantile(LARGE_SHARE), sizes.max(), np.sqrt((sizes**2).mean())
+    return [float(value) for value in values]
 
 
 def _of_sessions(
