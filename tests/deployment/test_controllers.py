@@ -10,7 +10,7 @@ import yaml
 from command_line import call
 from lxml import etree
 from oracles.controllers import judge, measured, programs
-from oracles.controllers.arms import ARMS, frame
+from oracles.controllers.arms import ARMS, DEG, frame
 from oracles.kinematics import dh_forward, rot_x, rot_y, rot_z, trans
 from oracles.pendants.controllers import MAKERS, joints_for
 from scipy.spatial.transform import Rotation
@@ -120,30 +120,27 @@ def test_ur_staubli_and_ros_describe_the_same_arm():
     model = arm.dh.with_parameters(arm.dh.start + off.ravel())
     numbers = {maker: CONTROLLERS[maker].arm(arm, model) for maker in ("ur", "staubli", "ros")}
     texts = {maker: CONTROLLERS[maker].text(values) for maker, values in numbers.items()}
-    conf = dict(line.split(" = ") for line in texts["ur"].split("\n")[1:])
-    theta, a, d, alpha = (
-        np.array(json.loads(conf[f"delta_{name}"])) for name in ("theta", "a", "d", "alpha")
-    )
-    assert np.abs(d).max() > 1.0
-    nominal = ARMS["ur"].table
-    normals = nominal + np.stack([theta, 1e3 * d, 1e3 * a, alpha, 0.0 * d], axis=1)
-    offsets = [dict(each.attrib) for each in etree.fromstring(texts["staubli"])]
-    assert [each.pop("index") for each in offsets] == list("012345")
-    names = ("theta", "d", "a", "alpha", "beta")
-    rows = np.array([[float(each[name]) for name in names] for each in offsets])
-    rows[:, [0, 3, 4]] = np.deg2rad(rows[:, [0, 3, 4]])
+    nominal, names = ARMS["ur"].table, ("theta", "d", "a", "alpha", "beta")
+    deltas = dict(line.split(" = ") for line in texts["ur"].split("\n")[1:])
+    deltas = {name: json.loads(deltas.get(f"delta_{name}", "[0, 0, 0, 0, 0, 0]")) for name in names}
+    normals = np.array([*deltas.values()]).T * [1.0, 1e3, 1e3, 1.0, 1.0]
+    assert np.abs(normals).max() > 1e3
+    rows = [
+        [float(each.get(name)) for name in names] for each in etree.fromstring(texts["staubli"])
+    ]
+    rows = rows * np.array([DEG, 1.0, 1.0, DEG, DEG])
     links = yaml.safe_load(texts["ros"])["kinematics"]
     assert {"shoulder", "upper_arm", "wrist_3"} < set(links)
     del links["hash"]
     for q in rng.uniform(-3.0, 3.0, (5, 6)):
         expected, here = dh_forward(nominal + off, q), np.eye(4)
-        np.testing.assert_allclose(dh_forward(normals, q), expected, rtol=0, atol=1e-5)
-        np.testing.assert_allclose(dh_forward(nominal + rows, q), expected, rtol=0, atol=1e-5)
+        for offsets in (normals, rows):
+            found = dh_forward(nominal + offsets, q)
+            np.testing.assert_allclose(found, expected, rtol=0, atol=1e-5)
         for angle, link in zip(q, links.values(), strict=True):
             here = here @ trans(*(1e3 * link[axis] for axis in "xyz")) @ rot_z(link["yaw"])
             here = here @ rot_y(link["pitch"]) @ rot_x(link["roll"]) @ rot_z(angle)
-        last = trans(nominal[5, 2] + off[5, 2], 0, 0) @ rot_x(nominal[5, 3] + off[5, 3])
-        here = here @ last @ rot_y(off[5, 4])
+        here = here @ trans(off[5, 2], 0, 0) @ rot_x(off[5, 3])  # behind the last joint
         np.testing.assert_allclose(here, expected, rtol=0, atol=1e-5)
 
 

@@ -117,11 +117,10 @@ def about(
     )
     row = np.repeat(np.arange(len(both)), 3 + 3 * both.has_rotation)
     of_frames, errors = np.split(jacobian, [coords.size], axis=1)
-    count = len(ERRORS) * model.joints * (ORDER + 1)
-    order, joint = np.arange(count) % (ORDER + 1), np.arange(count) // (len(ERRORS) * (ORDER + 1))
-    grows = np.append(order > 0, np.ones(errors.shape[1] - count, dtype=bool))
-    size = np.sqrt(np.mean(errors**2, axis=0)) * np.append(order, np.ones(len(grows) - count))
-    of_joint = np.append(joint, np.full(len(grows) - count, model.joints))
+    # Coefficients by joint, error and order; behind them offsets by travel direction.
+    joint, order = np.divmod(np.arange(errors.shape[1]), len(ERRORS) * (ORDER + 1))
+    order = np.where(joint < model.joints, order % (ORDER + 1), 1)
+    size = np.sqrt(np.mean(errors**2, axis=0)) * order
     longer = np.zeros((model.joints, len(ERRORS)))  # the last link's own length goes with the tool
     longer[:, ERRORS.index("delta_z")] = np.where(model.prismatic, 0.0, model.d_mm)
     longer[1:, ERRORS.index("delta_x")] = model.a_mm[:-1]
@@ -130,10 +129,10 @@ def about(
         frames=of_frames,
         is_base=np.arange(coords.size) < 6 * frames.sessions,
         own=~np.any(of_frames[row < first] != 0.0, axis=0),
-        constant=errors[:, ~grows],
+        constant=errors[:, order == 0],
         longer=1e-3 * longer.ravel(),
-        misfit=(errors / np.where(size > 0.0, size, 1.0))[:, grows],
-        joint=of_joint[grows].astype(int),
+        misfit=(errors / np.where(size > 0.0, size, 1.0))[:, order > 0],
+        joint=joint[order > 0],
         residual=-residual,
         second=row >= first,
         position=~both.is_rotation,

@@ -129,23 +129,22 @@ def _kuka(tmp_path, *lines):
 HOME = "{A1 20, A2 -80, A3 100, A4 10, A5 40, A6 5}"
 
 
-def _home(turn=2):
-    arm = robot.load(KR6)
-    q_rad = np.deg2rad([[20.0, -80.0, 100.0, 10.0, 40.0, 5.0]])
-    numbers = Convention(KUKA).numbers(
-        Pose(*(part[0] for part in robot.forward(arm, q_rad))), np.zeros(6)
-    )
-    values = ",".join(f"{key} {value:.4f}" for key, value in zip("XYZABC", numbers, strict=True))
-    return f"{{{values},S 2,T {turn}}}"
+def _pose(turn, a1=20.0, a4=10.0, more=""):
+    """The frame at these joints."""
+    q_rad = np.deg2rad([[a1, -80.0, 100.0, a4, 40.0, 5.0]])
+    pose = Pose(*(part[0] for part in robot.forward(robot.load(KR6), q_rad)))
+    values = zip("XYZABC", Convention(KUKA).numbers(pose, np.zeros(6)), strict=True)
+    text = ",".join(f"{key} {value:.6f}" for key, value in values)
+    return f"{{{text},S 2,T {turn}{more}}}"
 
 
 @pytest.mark.parametrize(
     ("line", "reason"),
     [
-        (f"LIN {_home(turn=10)}", "posture"),  # a turn that axis 4 does not have
+        (f"LIN {_pose(10)}", "posture"),  # a turn that axis 4 does not have
         ("LIN {X 9000,Y 0,Z 500,A 0,B 90,C 0,S 2,T 2}", "cannot reach"),
         ("$IPO_MODE=#TCP\nLIN {X 500,Y 0,Z 500,A 0,B 90,C 0,S 2,T 2}", "stands still"),
-        (f"LIN {_home()[:-1]},E1 0}}\nLIN {_home()[:-1]},E1 900}}", "external axis"),
+        (f"LIN {_pose(2, more=',E1 0')}\nLIN {_pose(2, more=',E1 900')}", "external axis"),
         ("PTP {A1 20, A2 -80, A3 100, A4 0.0001, A5 40, A6 400}", "limits"),
     ],
 )
@@ -163,17 +162,8 @@ def test_positions_that_cannot_be_corrected_are_named(tmp_path, line, reason):
 
 def test_a_turn_that_the_correction_would_change_is_refused(tmp_path):
     """Axis 4 within the correction of zero: its turn bit would change for some of these."""
-    arm, path = robot.load(KR6), tmp_path / "own.src"
-    lines = []
-    for a1 in range(-40, 50, 10):
-        q_rad = np.deg2rad([[a1, -80.0, 100.0, 1e-3, 40.0, 5.0]])
-        pose = Pose(*(part[0] for part in robot.forward(arm, q_rad)))
-        values = zip("XYZABC", Convention(KUKA).numbers(pose, np.zeros(6)), strict=True)
-        turn = 2 + (a1 < 0)
-        text = ",".join(f"{key} {value:.6f}" for key, value in values)
-        lines.append(f"LIN {{{text},S 2,T {turn}}}")
-    path = _kuka(tmp_path, *lines)
-    found = compensate_program(calibrated(KR6, "dh"), path)
+    lines = [f"LIN {_pose(2 + (a1 < 0), a1, 1e-3)}" for a1 in range(-40, 50, 10)]
+    found = compensate_program(calibrated(KR6, "dh"), _kuka(tmp_path, *lines))
     assert found.refused
     assert all("A4 " in each.what for each in found.refused)
 

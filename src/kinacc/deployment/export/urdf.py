@@ -8,10 +8,12 @@ URDF has metres and radians; ``rpy`` turns about the fixed x, y and z axes in th
 from __future__ import annotations
 
 import re
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from jinja2 import Template
 from lxml import etree
 
 from kinacc.calibration.frames import closed_form_start
@@ -54,42 +56,38 @@ def generated(source: Source) -> str:
     robot, dh = calibration.robot, source.dh
     names = robot.joint_names or tuple(f"joint_{i}" for i in range(1, dh.joints + 1))
     senses = np.ones(dh.joints) if source.dh_joints else _signs(robot)
-    frames, end = origins(dh)
-    frames[0] = compose(robot.base, frames[0])
-    root = etree.Element("robot", name=_name(source.name))
-    about = re.sub("-(?=-)", "- ", source.about)  # XML ends a comment at two of them
-    root.append(etree.Comment(f" {about}; effort and velocity are placeholders "))
-    for line in [*source.orientation_lines, *source.left_open_lines]:
-        root.append(etree.Comment(f" {line} "))
-    etree.SubElement(root, "link", name="base_link")
     low, high = robot.q_min_rad, robot.q_max_rad
     if source.dh_joints:
         low, high = robot.dh_box(low, high)
-    for i, origin in enumerate(frames):
-        etree.SubElement(root, "link", name=f"link_{i + 1}")
-        kind = "prismatic" if dh.prismatic[i] else "revolute"
-        parent = "base_link" if i == 0 else f"link_{i}"
-        joint = _joint(root, _name(names[i]), kind, parent, f"link_{i + 1}", origin)
-        etree.SubElement(joint, "axis", xyz=f"0 0 {int(senses[i])}")
-        scale = _M_PER_MM if dh.prismatic[i] else 1.0
-        etree.SubElement(
-            joint,
-            "limit",
-            lower=_digits(low[i] * scale),
-            upper=_digits(high[i] * scale),
-            effort="1",
-            velocity="1",
+    scale = np.where(dh.prismatic, _M_PER_MM, 1.0)
+    joints = [
+        {"name": _name(name), "kind": "prismatic" if slides else "revolute", "sense": int(sense),
+         "low": _digits(lower), "high": _digits(upper)}
+        for name, slides, sense, lower, upper in zip(
+            names, dh.prismatic, senses, low * scale, high * scale, strict=True
         )
-    last = f"link_{dh.joints}"
-    etree.SubElement(root, "link", name="flange")
-    flange = compose(end, robot.flange)
-    _joint(root, "flange_fixed", "fixed", last, "flange", flange)
+    ]  # fmt: skip
+    frames, end = origins(dh)
+    frames[0] = compose(robot.base, frames[0])
+    links = ["base_link", *(f"link_{i}" for i in range(1, dh.joints + 1)), "flange"]
+    frames.append(compose(end, robot.flange))
     if TOOL in calibration.targets:
-        etree.SubElement(root, "link", name="tool")
-        tool = compose(invert(robot.flange), calibration.targets[TOOL])
-        _joint(root, "tool_fixed", "fixed", "flange", "tool", tool)
-    etree.indent(root)
-    return f'<?xml version="1.0"?>\n{etree.tostring(root, encoding="unicode")}\n'
+        links.append("tool")
+        frames.append(compose(invert(robot.flange), calibration.targets[TOOL]))
+    joints += [{"name": f"{link}_fixed"} for link in links[dh.joints + 1 :]]
+    about = f"{source.about}; effort and velocity are placeholders"
+    lines = [about, *source.orientation_lines, *source.left_open_lines]
+    text = (files("kinacc.deployment.export") / "arm.urdf").read_text("utf-8")
+    options: dict[str, Any] = dict.fromkeys(
+        ("autoescape", "trim_blocks", "lstrip_blocks", "keep_trailing_newline"), True
+    )
+    return Template(
+        text, **options
+    ).render(
+        name=_name(source.name),
+        comments=[re.sub("-(?=-)", "- ", line) for line in lines],  # no comment holds two of them
+        joints=zip(joints, links, links[1:], map(_attributes, frames), strict=False),
+    )
 
 
 def corrected(source: Source) -> str:
@@ -130,7 +128,10 @@ def corrected(source: Source) -> str:
     else:
         link = f"{last}_calibrated"
         etree.SubElement(tree.getroot(), "link", name=link)
-        _joint(tree.getroot(), f"{link}_fixed", "fixed", last, link, rest)
+        joint_behind = etree.SubElement(tree.getroot(), "joint", name=f"{link}_fixed", type="fixed")
+        etree.SubElement(joint_behind, "parent", link=last)
+        etree.SubElement(joint_behind, "child", link=link)
+        _set_origin(joint_behind, rest)
     for place, line in enumerate(source.left_open_lines):
         tree.getroot().insert(place, etree.Comment(f" {line} "))
     return etree.tostring(tree, encoding="unicode") + "\n"
@@ -163,23 +164,17 @@ def _ends_in_file(
     return options[0] if misfits[0] <= 1e-8 else options[int(np.argmin(misfits))]
 
 
-def _joint(
-    root: etree._Element, name: str, kind: str, parent: str, child: str, origin: Pose
-) -> etree._Element:
-    joint = etree.SubElement(root, "joint", name=name, type=kind)
-    _set_origin(joint, origin)
-    etree.SubElement(joint, "parent", link=parent)
-    etree.SubElement(joint, "child", link=child)
-    return joint
-
-
 def _set_origin(joint: etree._Element, origin: Pose) -> None:
     element = joint.find("origin")
     if element is None:
         element = etree.Element("origin")
         joint.insert(0, element)
-    element.set("xyz", " ".join(_digits(value * _M_PER_MM) for value in origin.position_mm))
-    element.set("rpy", " ".join(_digits(value) for value in rpy(origin.rotation)))
+    element.attrib.update(_attributes(origin))
+
+
+def _attributes(origin: Pose) -> dict[str, str]:
+    values = {"xyz": origin.position_mm * _M_PER_MM, "rpy": rpy(origin.rotation)}
+    return {key: " ".join(map(_digits, part)) for key, part in values.items()}
 
 
 def rpy(rotation: np.ndarray) -> np.ndarray:
