@@ -33,22 +33,20 @@ def csv_text(source: Source) -> str:
     What is of no joint, as of base and tool, stands in the row of the last one.
     """
     joints = source.joints(source.dh)
-    for name in joints.columns[joints.columns.str.endswith("_rad")]:
-        joints[name] = np.rad2deg(joints[name])
-    joints.columns = joints.columns.str.replace("_rad", "_deg")
-    parameters = [name.replace("_rad", "_deg") for name in PARAMETERS]
-    groups = ([f"{group}{name}" for name in parameters] for group in ("", "std_", "nominal_"))
-    columns = [name for group in groups for name in group]
+    columns = [f"{group}{name}" for group in ("", "std_", "nominal_") for name in PARAMETERS]
+    values = joints[columns].to_numpy()
+    values = np.where(np.char.endswith(columns, "_rad"), np.rad2deg(values), values)
+    heads = [name.replace("_rad", "_deg") for name in columns]
     texts: list[list[str]] = [[] for _ in range(len(joints))]
     for sentence in source.calibration.left_open or ():
         for joint in {*map(int, re.findall(r"joint (\d+)", sentence))} or {len(joints)}:
             texts[joint - 1].append(sentence)
     texts[-1] += source.orientation_lines
     note = names.in_csv(in_words([source.misfit]))
-    rows: list[list[object]] = [["joint", "type", *columns, "undetermined", "std_note"]]
-    for (_, row), about in zip(joints.iterrows(), texts, strict=True):
-        cells = ("" if np.isnan(x) else f"{x:.12g}" for x in row[columns])
-        rows.append([row["joint"], row["type"], *cells, names.in_csv("; ".join(about)), note])
+    rows: list[list[object]] = [["joint", "type", *heads, "undetermined", "std_note"]]
+    for row, numbers, about in zip(joints.itertuples(), values, texts, strict=True):
+        cells = ("" if np.isnan(x) else f"{x:.12g}" for x in numbers)
+        rows.append([row.joint, row.type, *cells, names.in_csv("; ".join(about)), note])
     return names.csv_text(rows)
 
 
