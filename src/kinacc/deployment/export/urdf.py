@@ -169,7 +169,8 @@ def _set_origin(joint: etree._Element, origin: Pose) -> None:
     if element is None:
         element = etree.Element("origin")
         joint.insert(0, element)
-    element.attrib.update(_attributes(origin))
+    for key, numbers in _attributes(origin).items():
+        element.set(key, numbers)
 
 
 def _attributes(origin: Pose) -> dict[str, str]:
