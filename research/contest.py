@@ -287,9 +287,21 @@ def world_of(cell: Cell, repetition: int, visits: int, seed: int) -> World:
     """
     noise_nm = round(cell.noise_mm * NM_PER_MM)
     entropy = (seed, zlib.crc32(cell.field.name.encode()), cell.candidates, noise_nm, repetition)
-    chosen = cell.field.candidates(cell.candidates, entropy)
-    error_mm = cell.field.error_mm[chosen]
+    error_mm = cell.field.error_mm[candidates(cell.field, cell.candidates, entropy)]
     return drawn_world(error_mm, cell.noise_mm, key_of(*entropy), visits)
+
+
+def candidates(field: ErrorField, count: int, entropy: tuple[int, ...]) -> np.ndarray:
+    """Rows of ``count`` configurations drawn without replacement, in random order.
+
+    The first of a field that is made up, as many as it keeps, are among them.
+    """
+    rng = np.random.default_rng([*entropy, 0])
+    kept = MADE_UP[field.name].kept if field.name in MADE_UP else 0
+    if not kept:
+        return rng.permutation(field.points)[:count]
+    others = kept + rng.permutation(field.points - kept)
+    return rng.permutation(np.append(np.arange(kept), others)[:count])
 
 
 def _graded(found: Assessed, world: World, field: ErrorField, job: Job) -> list[dict]:

@@ -73,7 +73,7 @@ def made_up(name: str) -> ErrorField:
     size = what.sizes_mm(rng, POINTS)
     turn = rng.normal(size=(POINTS, 3))
     error_mm = size[:, None] * turn / np.linalg.norm(turn, axis=1)[:, None]
-    return ErrorField(name, error_mm, what.kept)
+    return ErrorField(name, error_mm)
 
 
 def _small(arm: PhysicalRobot) -> PhysicalRobot:

@@ -15,9 +15,12 @@ def away(rng, sizes):
     return way * (sizes / np.linalg.norm(way, axis=1))[:, None]
 
 
-def conducted(rng, errors_mm, measurements, shift=None, noise_mm=1.0, **settings):
-    """A campaign to its end; ``shift(number, error)`` is added to the reading of that number."""
-    candidates = Candidates.with_equal_noise(np.full(len(errors_mm), noise_mm))
+def conducted(rng, errors_mm, measurements, shift=None, noise_mm=1.0, stated=1.0, **settings):
+    """A campaign to its end; ``shift(number, error)`` is added to the reading of that number.
+
+    ``stated``: the noise stated over the true one.
+    """
+    candidates = Candidates.with_equal_noise(np.full(len(errors_mm), stated * noise_mm))
     campaign = SearchAndConfirm(measurements, **settings).begin(candidates)
 
     def reading_mm(row, _):

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 from scipy.stats import binom, chi2, kstest, norm, t
-from simulated import conducted
+from simulated import away, conducted
 
 from kinacc.assess.adaptive import Candidates, Ledger
 from kinacc.assess.limits import visit_mm
@@ -21,6 +21,8 @@ from kinacc.assess.noise import (
     scatter_alarm,
     tails_alarm,
 )
+from kinacc.assess.search_and_confirm import SearchAndConfirm
+from kinacc.assess.world import carry_on
 
 
 def equal(points, sigma_mm=0.1):
@@ -146,6 +148,12 @@ def test_scatter_as_stated_is_hardly_ever_an_alarm_at_any_time():
         scatter_alarm(of_normal(300, rng), false=BESIDE_REFERENCES) is not None for _ in range(8000)
     )
     assert binom.sf(rare - 1, 8000, BESIDE_REFERENCES) > 0.005
+    # A noise that a test of 60 degrees told is off by what these leave open.
+    off = np.sqrt(60.0 / rng.chisquare(60, 8000))
+    tested = sum(scatter_alarm(of_normal(300, rng, own), tested=60) is not None for own in off)
+    assert binom.sf(tested - 1, 8000, SCATTER) > 0.005
+    said = [scatter_alarm(of_normal(480, rng, 1.8), tested=60) is not None for _ in range(200)]
+    assert np.mean(said) >= 0.95
 
 
 def student_triples(rng, campaigns, joint):
@@ -181,3 +189,42 @@ def test_a_bound_on_a_future_visit_is_that_on_the_mean_and_the_arms_own_scatter(
         assert getattr(visit, name) == pytest.approx(visit_mm(getattr(of_mean, name), 0.05))
     wide = stated(error_of="visit")
     assert wide.upper_mm > max(visit.upper_mm, visit_mm(of_mean.upper_mm, 0.09))
+
+
+@pytest.mark.parametrize(
+    ("measurements", "settings", "code", "least", "most"),
+    [
+        # The noise is stated half as large as it is, but for a test that is right.
+        (60, {"stated": 0.5}, "noise_bounded", 2.0, 4.0),
+        (100, {"stated": 0.5}, "noise_estimated", 1.7, 2.4),
+        (60, {"noise_freedom": 60}, "noise_tested", 1.0, 1.0),
+        # The upper limit of a factor from 60 degrees of freedom, for a fifth of 5 %.
+        (60, {"noise_freedom": 60, "wrong_rate": 0.02}, "noise_limited",
+         *[math.sqrt(60.0 / chi2.ppf(0.01, 60))] * 2),
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("error_of", ["mean", "visit"])
+def test_a_noise_that_is_not_known_is_taken_from_where_it_can_be_had(
+    measurements, settings, code, least, most, error_of
+):
+    rng, settings = np.random.default_rng(5), {**settings, "noise": "estimated"}
+    errors = away(rng, np.r_[8.0, rng.uniform(0.0, 2.0, 39)])
+    campaign = conducted(rng, errors, measurements, error_of=error_of, **settings)
+    largest = 8.0 if error_of == "mean" else visit_mm(8.0, 1.0)
+    for stated in campaign.statements():
+        assert stated.noise.code == code
+        assert least - 1e-9 <= stated.noise.numbers["factor"] <= most + 1e-9
+        assert stated.lower_mm <= largest <= stated.upper_mm
+    lower, upper = np.max([*campaign.point_limits().values()], axis=0)
+    assert lower <= 8.0 <= upper
+    assert (lower > 0.0) != ("wrong_rate" in settings)  # any single reading may be wrong
+
+
+def test_a_noise_that_is_not_estimated_yet_withholds_bounds_and_limits():
+    rng = np.random.default_rng(5)
+    errors = away(rng, np.full(20, 4.0))
+    begun = SearchAndConfirm(100, noise="estimated").begin(equal(20))
+    carry_on(begun, lambda row, _: errors[row] + 0.1 * rng.normal(size=3), limit=30)
+    assert {stated.withheld.code for stated in begun.statements()} == {"noise_unknown"}
+    assert set(begun.point_limits().values()) == {(0.0, math.inf)}
+    assert begun.suspicious() == ()

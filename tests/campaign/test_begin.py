@@ -13,6 +13,7 @@ from kinacc.campaign.instrument import instruments
 from kinacc.campaign.plan import Limits
 from kinacc.deployment.planning import spread
 from kinacc.deployment.record import nominal
+from kinacc.errors import InputError
 from kinacc.geometry import Pose, compose, exp_so3
 from kinacc.kinematics import robot
 from kinacc.kinematics.model import JointState
@@ -68,3 +69,25 @@ def test_readings_as_the_calibration_predicts_them_have_no_error(anchored):
     seen = arm.pose(JointState(joints @ arm.robot.joint_map.T), frame="instrument").position_mm
     in_base = seen @ plan.to_base.rotation.T + plan.to_base.position_mm
     np.testing.assert_allclose(in_base, points.modelled_mm, atol=1e-9)
+
+
+def test_candidates_that_cannot_be_measured_against_the_model_are_named(arm):
+    joints = spread(arm.robot, 4)
+    with pytest.raises(InputError, match="all 3 are at the same joints"):
+        begin.points_of(arm, joints[[0, 0, 0]], ["a", "b", "c"])
+    joints[2, 1] += 9.0
+    with pytest.raises(InputError) as refused:
+        begin.points_of(arm, joints, ["a", "a", "far", "line\nfeed"])
+    where = [problem.where for problem in refused.value.problems]
+    assert where == ["candidates far", "candidates, pose", "candidates"]
+    assert "joint 2 outside the limits" in refused.value.problems[0].what
+
+
+def test_many_candidates_are_driven_to_in_an_order_with_less_travel(make_plan):
+    plan = make_plan(points=420, budget=500)
+
+    def travel(route):
+        return np.abs(np.diff(plan.points.joints[route], axis=0)).max(axis=1).sum()
+
+    assert sorted(plan.route) == sorted(plan.order)
+    assert travel(plan.route) < 0.6 * travel(plan.order)

@@ -137,6 +137,8 @@ def test_a_point_is_left_out_only_before_it_is_read(campaign):
     call("campaign", "record", folder, "--position-mm", arm.position(first))
     refused(folder, "leave-out", folder, first, "--reason", "hidden")
     assert call("campaign", "leave-out", folder, second, "--reason", "hidden").exit_code == 0
+    refused(folder, "leave-out", folder, second, "--reason", "again")
+    refused(folder, "leave-out", folder, "nowhere", "--reason", "hidden")
     found = standing(folder)
     assert found["left_out"] == {second: "hidden"}
     assert found["candidates"] == 19

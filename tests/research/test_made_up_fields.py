@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from research.contest import candidates
 from research.made_up_fields import made_up
 
 
@@ -13,7 +14,7 @@ from research.made_up_fields import made_up
 def test_the_far_poses_are_candidates_in_every_campaign(name, sizes_mm):
     field, places = made_up(name), []
     for repetition in range(30):
-        chosen = field.candidates(200, (5, repetition))
+        chosen = candidates(field, 200, (5, repetition))
         assert len(set(chosen.tolist())) == 200
         large = np.flatnonzero(field.size_mm[chosen] > 0.7)
         assert field.size_mm[chosen][large] == pytest.approx(sizes_mm)

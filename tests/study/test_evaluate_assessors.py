@@ -107,5 +107,8 @@ def test_a_bound_on_measured_points_is_held_to_these_alone(budget, coverage):
 def test_what_cannot_be_simulated_is_refused(noise, budget, repetitions, where):
     with pytest.raises(InputError, match=where):
         evaluate_assessors(ERRORS, [Maximum(1)], noise, budget, repetitions, 1)
+    for errors in (ERRORS[:, :2], ERRORS * np.nan):
+        with pytest.raises(InputError, match="true errors"):
+            evaluate_assessors(errors, [Maximum(1)], 0.1, 40, 3, 1)
     with pytest.raises(InputError, match="twice"):
         evaluate_assessors(ERRORS, [Maximum(1), Maximum(2)], 0.1, 40, 3, 1)

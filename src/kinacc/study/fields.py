@@ -35,14 +35,10 @@ _DEFECT_RAD = 6e-4  # jump of joint 2 where its teeth are worn: about 1 mm at th
 
 @dataclass(frozen=True)
 class ErrorField:
-    """True errors ``error_mm`` (n, 3) of a model, robot base frame.
-
-    The first ``kept`` configurations are among any candidates drawn.
-    """
+    """True errors ``error_mm`` (n, 3) of a model, robot base frame."""
 
     name: str
     error_mm: np.ndarray
-    kept: int = 0
 
     def __post_init__(self) -> None:
         checked_errors(self.error_mm)
@@ -56,14 +52,6 @@ class ErrorField:
     def size_mm(self) -> np.ndarray:
         """Sizes of the errors (n,)."""
         return np.linalg.norm(self.error_mm, axis=1)
-
-    def candidates(self, count: int, entropy: tuple[int, ...]) -> np.ndarray:
-        """Rows of ``count`` configurations drawn without replacement, in random order."""
-        rng = np.random.default_rng([*entropy, 0])
-        if not self.kept:
-            return rng.permutation(self.points)[:count]
-        others = self.kept + rng.permutation(self.points - self.kept)
-        return rng.permutation(np.append(np.arange(self.kept), others)[:count])
 
 
 def of_points(name: str, points: Columns) -> ErrorField:
