@@ -418,7 +418,7 @@ class LowerAverage:
         self.wanted, self._rate = wanted, rate
         self._stages: dict[int, float] = {}  # readings that count, and deviations taken off
         if wanted:
-            counts = tuple(sorted({max(math.ceil(share * wanted), 1) for share in _STAGES}))
+            counts = tuple(sorted({math.ceil(share * wanted) for share in _STAGES}))
             z = boundary(counts, error, freedom, 0.0, _LATE, rate).z.tolist()
             self._stages = dict(zip(counts, z, strict=True))
         self._counted: list[tuple[int, float, float]] = []

@@ -70,8 +70,6 @@ def schedule(measurements: int, points: int, references: int) -> Schedule:
     is spread evenly between: of 20 revisits 5, 10 and 5. Each revisit takes the next pose in turn.
     """
     poses = min(poses_of(references), points)
-    if not poses:
-        return Schedule(measurements, 0, {})
     start, end = references // 4, -(-references // 4)
     between = references - start - end
     low, high = poses + start, measurements - end
@@ -94,17 +92,12 @@ class Readings(NamedTuple):
     vector_mm: np.ndarray
     covariance_mm2: np.ndarray
 
-    def head(self, count: int) -> Readings:
-        """Return the first readings."""
-        return Readings(*(column[:count] for column in self))
-
 
 def planned_readings(plan: Schedule, ledger: Ledger) -> Readings:
     """Of the readings of a ledger, those planned of reference poses."""
-    place = [index for index in sorted(plan.row_at) if index < ledger.taken]
-    read = [ledger.readings[index] for index in place]
-    rows = np.array([row for row, _, _ in read], dtype=np.intp)
-    vectors = np.array([vector for _, vector, _ in read]).reshape(-1, 3)
+    place = [index for index in plan.row_at if index < ledger.taken]
+    rows = np.array([plan.row_at[index] for index in place], dtype=np.intp)
+    vectors = np.array([ledger.readings[index][1] for index in place]).reshape(-1, 3)
     return Readings(np.array(place), rows, vectors, ledger.covariances(place))
 
 
@@ -125,15 +118,11 @@ class Change:
     unseen_mm: float
 
     @property
-    def size_mm(self) -> float:
-        """Size of the change."""
-        return math.hypot(*self.change_mm)
-
-    @property
     def reason(self) -> Reason:
         """The finding as a reason for stating no bounds."""
         x, y, z = self.change_mm
-        numbers = {"size": self.size_mm, "x": x, "y": y, "z": z, "deviation": self.deviation_mm}
+        size, deviation = math.hypot(x, y, z), self.deviation_mm
+        numbers = {"size": size, "x": x, "y": y, "z": z, "deviation": deviation}
         if self.between is None:
             return Reason("drift", numbers)
         return Reason("step", numbers | {"after": self.between[0], "before": self.between[1]})
@@ -142,11 +131,9 @@ class Change:
 def stages(plan: Schedule) -> tuple[tuple[int, float], ...]:
     """Numbers of reference readings at which they are looked at, each with its false alarms."""
     total = len(plan.row_at)
-    earlier = [*range(_LEAST_ROUNDS * plan.poses, total, plan.poses)] if plan.poses else []
-    if not earlier:
-        return ((total, FALSE_ALARMS),) if plan.poses else ()
-    share = _EARLIER * FALSE_ALARMS / len(earlier)
-    return (*((count, share) for count in earlier), (total, (1.0 - _EARLIER) * FALSE_ALARMS))
+    earlier = range(_LEAST_ROUNDS * plan.poses, total, plan.poses)
+    share = _EARLIER * FALSE_ALARMS / max(len(earlier), 1)
+    return (*((count, share) for count in earlier), (total, FALSE_ALARMS - share * len(earlier)))
 
 
 def find_change(plan: Schedule, readings: Readings, freedom: float = math.inf) -> Change | None:
@@ -160,7 +147,8 @@ def find_change(plan: Schedule, readings: Readings, freedom: float = math.inf) -
     for count, error in stages(plan):
         degrees = freedom + 3.0 * (count - plan.poses)
         if count <= len(readings.place) and degrees > _LEAST_FREEDOM:
-            change = _at_stage(plan, readings.head(count), error, freedom)
+            first = Readings(*(column[:count] for column in readings))
+            change = _at_stage(plan, first, error, freedom)
             is_found = is_found or change.is_found
     return replace(change, is_found=is_found) if change else None
 
@@ -180,12 +168,11 @@ def _at_stage(plan: Schedule, readings: Readings, error: float, freedom: float) 
         values = values * np.sqrt(weight)
         return values - (values @ poses) @ poses.T
 
+    # Before and after each gap lies a reading of every pose.
     gaps = np.arange(plan.poses, count - plan.poses + 1)
     shapes = np.vstack([place / plan.measurements, np.arange(count) >= gaps[:, None]])
     shapes, whitened = centred(shapes), centred(inverse @ vectors.T)  # (shapes, n), (3, n)
     length = np.linalg.norm(shapes, axis=1)
-    usable = length > 1e-9
-    gaps, shapes, length = np.append(0, gaps)[usable], shapes[usable], length[usable]
     along = shapes / length[:, None] @ whitened.T  # (shapes, 3)
     square, within = np.sum(along**2, axis=1), float(np.sum(whitened**2))
     degrees = 3.0 * (count - plan.poses)
@@ -197,13 +184,13 @@ def _at_stage(plan: Schedule, readings: Readings, error: float, freedom: float) 
         # Noise larger than stated, or one reading that went wrong, is no change: that has to stand
         # out from the scatter of the readings as well.
         stands_out = bool(
-            np.any(square / within > _thresholds(len(gaps), _BESIDE * error, degrees))
+            np.any(square / within > _thresholds(len(shapes), _BESIDE * error, degrees))
         )
-    least = _thresholds(len(gaps), error, freedom)
+    least = _thresholds(len(shapes), error, freedom)
     best = _likelier(square, freedom)
     widest = factor * math.sqrt(float(np.linalg.eigvalsh(root @ root.T)[-1]))
     x, y, z = (root @ along[best] / length[best]).tolist()
-    before = int(gaps[best])
+    before = gaps[best - 1]
     return Change(
         between=(int(place[before - 1]) + 1, int(place[before]) + 1) if best else None,
         change_mm=(x, y, z),
@@ -215,8 +202,8 @@ def _at_stage(plan: Schedule, readings: Readings, error: float, freedom: float) 
 
 def _thresholds(shapes: int, error: float, freedom: float) -> np.ndarray:
     """Squares (shapes,) of which one is exceeded with probability ``error`` at most, no change."""
-    shares = np.full(shapes, error * (1.0 - _OF_DRIFT) / max(shapes - 1, 1))
-    shares[0] = error * (_OF_DRIFT if shapes > 1 else 1.0)
+    shares = np.full(shapes, error * (1.0 - _OF_DRIFT) / (shapes - 1))
+    shares[0] = error * _OF_DRIFT
     if math.isinf(freedom):
         return scipy.special.chdtri(3.0, shares)
     return 1.0 - scipy.special.betaincinv(0.5 * (freedom - 3.0), 1.5, shares)
@@ -229,7 +216,7 @@ def _likelier(square: np.ndarray, freedom: float) -> int:
     """
     likely = 0.5 * square if math.isinf(freedom) else -0.5 * freedom * np.log1p(-square)
     steps = likely[1:]
-    if not steps.size or likely[0] >= np.logaddexp.reduce(steps) - math.log(steps.size):
+    if likely[0] >= np.logaddexp.reduce(steps) - math.log(steps.size):
         return 0
     return 1 + int(np.argmax(steps))
 

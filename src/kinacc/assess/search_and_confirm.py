@@ -118,7 +118,7 @@ class SearchAndConfirm(AdaptiveAssessor):
             return points
         if budget >= enough:
             return enough
-        return max(math.ceil(VISITED * budget), 1)
+        return math.ceil(VISITED * budget)
 
     def shortfall(self, points: int) -> Reason | None:
         """What a larger budget would be good for with so many candidates; None if nothing."""
@@ -161,15 +161,15 @@ class SearchAndConfirmCampaign(Campaign):
         self.factor = self.noise.margin
         self.plan = schedule(settings.measurements, points, settings.references)
         self.reference_poses = self.plan.poses
-        self.extra = max(settings.measurements - self.first - settings.references, 0)
+        self.extra = settings.measurements - self.first - settings.references
         allowed = self.noise.mean_share * self.allowed
         self.counts = look_counts(self.extra)
-        wanted = math.floor(SHARE * self.extra) if self.extra > 1 else 0
+        wanted = math.floor(SHARE * self.extra)
         lower_error = (1.0 - _VISIT_PART) * allowed if wanted else 0.0
         # Where the noise is an estimate, half of the error of single points is for its limit.
         self.single_error = allowed - lower_error
         single = self.single_error * (1.0 if math.isinf(self.noise.freedom) else 0.5)
-        point_error, wrong = single / max(min(self.first, points), 1), 0
+        point_error, wrong = single / self.first, 0
         shares = np.diff(np.array(self.counts) / self.counts[-1], prepend=0.0)
         if len(shares) > 1:  # half for the first look
             shares = np.append(0.5, 0.5 * shares[1:] / shares[1:].sum())
@@ -192,7 +192,7 @@ class SearchAndConfirmCampaign(Campaign):
 
     def boundary_of(self, error: float, freedom: float = math.inf) -> Boundary:
         """The boundary of the looks of this campaign for an error of the upper limits."""
-        few = max(1.0 - self.extra / (_FEW * max(self.first, 1)), 0.0)
+        few = max(1.0 - self.extra / (_FEW * self.first), 0.0)
         early = EARLY + (_ONCE - EARLY) * few
         return boundary(self.counts, error, freedom, early, rate=self.settings.wrong_rate)
 
@@ -267,7 +267,7 @@ class SearchAndConfirmCampaign(Campaign):
         """On the measured points, and on all candidates."""
         ledger, settings = self.ledger, self.settings
         visited, points = len(ledger.visited), ledger.candidates.points
-        if (open_points := max(math.ceil(FIRST_SHARE * self.first), 1) - visited) > 0:
+        if (open_points := math.ceil(FIRST_SHARE * self.first) - visited) > 0:
             early = Reason("first_visit", {"left": open_points})
             return Statement(MEASURED, withheld=early), Statement(CANDIDATES, withheld=early)
         sizes, noise_mm = ledger.sizes_mm(), ledger.noise_mm[ledger.visited]
@@ -299,7 +299,7 @@ class SearchAndConfirmCampaign(Campaign):
 
     def change(self) -> Change | None:
         """What the reference poses show of a drift or step; None where too few are read."""
-        if self.ledger.taken < self.plan.poses or not self.plan.poses:
+        if not self.plan.poses:
             return None
         tested = math.inf if self.noise.is_known else self.settings.noise_freedom
         return find_change(self.plan, planned_readings(self.plan, self.ledger), tested)
