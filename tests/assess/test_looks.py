@@ -1,4 +1,4 @@
-"""The boundary of the looks and what rests on it: random walks, adversaries, few digits."""
+"""The boundary of the looks and what rests on it: random walks, and an adversary."""
 
 from __future__ import annotations
 
@@ -43,56 +43,6 @@ def test_walks_drawn_at_random_cross_the_boundary_as_often_as_is_allowed(extra, 
     share = crossed(looks.counts.tolist(), looks.z, rng, rate, scale)
     assert share == pytest.approx(ERROR, abs=3e-3 if rate else CLOSE + 5e-4)
     assert crossed(looks.counts.tolist(), 0.95 * looks.z, rng, rate, scale) > ERROR + CLOSE
-
-
-def share_false(size, z, counts, choose, campaigns, rng):
-    """Share of campaigns in which the largest of the limits |mean| + z_k / sqrt(k) is below.
-
-    size (m,): true sizes, noise 1. ``choose(sums, count, limits)``: the point (c,) that each
-    campaign reads up to its next look, -1 to stop. Own code: m points, their sums in three axes.
-    """
-    points, extra = len(size), counts[-1] - 1
-    errors = size[:, None] * np.eye(3)[0]
-    sums = errors + rng.normal(size=(campaigns, points, 3))
-    count = np.ones((campaigns, points), dtype=int)
-    limits = np.linalg.norm(sums, axis=2) + z[0]
-    left, rows = np.full(campaigns, extra), np.arange(campaigns)
-    while True:
-        point = choose(sums, count, limits)
-        place = np.searchsorted(counts, count[rows, point], side="right")
-        end = counts[np.minimum(place, len(counts) - 1)]
-        more = np.where(point >= 0, end - count[rows, point], 0)
-        more = np.where(more > left, 0, more)
-        if not more.any():
-            return np.mean(limits.max(axis=1) < size.max())
-        noise = np.sqrt(more)[:, None] * rng.normal(size=(campaigns, 3))
-        sums[rows, point] += more[:, None] * errors[point] + noise
-        count[rows, point] += more
-        left -= more
-        k = count[rows, point]
-        here = np.linalg.norm(sums[rows, point], axis=1) / k
-        here += z[np.searchsorted(counts, k)] / np.sqrt(k)
-        limits[rows, point] = np.minimum(limits[rows, point], here)
-
-
-ADVERSARIES = {
-    "smallest mean": lambda sums, count, limits: np.argmin(
-        np.linalg.norm(sums, axis=2) / count, axis=1
-    ),
-    "largest limit": lambda sums, count, limits: np.argmax(limits, axis=1),
-    "one point until it is too low": lambda sums, count, limits: np.where(
-        limits[:, 0] < 20.0, -1, 0
-    ),
-    "the largest while it is high": lambda sums, count, limits: np.where(limits[:, 0] < 20.0, 1, 0),
-}
-
-
-@pytest.mark.parametrize("choose", ADVERSARIES.values(), ids=ADVERSARIES)
-def test_no_choice_of_what_is_read_makes_the_upper_bound_false_more_often(choose):
-    looks, campaigns = boundary(look_counts(40), ERROR), 20_000
-    size, rng = np.array([20.0, 19.0, 1.0]), np.random.default_rng(1)
-    false = share_false(size, looks.z, looks.counts, choose, campaigns, rng)
-    assert false <= ERROR + 3.5 * np.sqrt(ERROR * 0.95 / campaigns)
 
 
 def lower_bounds(wanted, campaigns, rng, factor=1.0):

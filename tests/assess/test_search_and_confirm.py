@@ -21,27 +21,16 @@ from kinacc.assess.world import conduct, drawn_world
 ERROR, SIGMA_MM = 0.05, 0.1
 
 
-class Recorded:
-    """A world that writes down every reading it gives away: (row, reading) in order."""
-
-    def __init__(self, world):
-        self.points, self.sigma_mm = world.points, world.sigma_mm
-        self._world, self.given = world, []
-
-    def reading_mm(self, row, visit):
-        reading = self._world.reading_mm(row, visit)
-        self.given.append((row, np.array(reading)))
-        return reading
-
-
 def campaign(points, budget, noise_mm, **settings):
-    """A campaign to its end and its readings; errors up to 1 mm, noise different by point."""
+    """A campaign to its end, its readings and its noise by point; errors up to 1 mm."""
     rng = np.random.default_rng([points, budget])
     error = away(rng, rng.uniform(0.0, 1.0, points))
     sigma = rng.uniform(0.8, 1.2, points) * noise_mm
     key = np.array([points, budget], np.uint64)
-    recorded = Recorded(drawn_world(error, sigma, key, budget, rng.permutation(points)))
-    return conduct(SearchAndConfirm(measurements=budget, **settings), recorded), recorded
+    world = drawn_world(error, sigma, key, budget, rng.permutation(points))
+    said = conduct(SearchAndConfirm(measurements=budget, **settings), world)
+    given = [(row, np.array(reading)) for row, reading, _ in said.ledger.readings]
+    return said, given, world.sigma_mm
 
 
 def largest_limit(given, sigma, counts, z):
@@ -56,11 +45,11 @@ def largest_limit(given, sigma, counts, z):
     return max(found.values())
 
 
-def shown(said, world):
+def shown(said, given, sigma):
     """Noise over that stated by the pooled variance within blocks; 1 at least."""
     of_block = {}
-    for block, (row, reading) in zip(said.reading_blocks(), world.given, strict=True):
-        of_block.setdefault(block, []).append(reading / world.sigma_mm[row])
+    for block, (row, reading) in zip(said.reading_blocks(), given, strict=True):
+        of_block.setdefault(block, []).append(reading / sigma[row])
     freedom = sum(3 * (len(each) - 1) for each in of_block.values())
     square = sum(3 * len(each) * np.var(each, axis=0).mean() for each in of_block.values())
     return max(1.0, np.sqrt(square / freedom)) if freedom >= 30 else 1.0
@@ -79,12 +68,12 @@ def left_out(points, seen, error):
 
 @pytest.mark.parametrize(("points", "budget"), [(60, 90), (60, 300), (40, 200)])
 def test_the_upper_bound_follows_from_the_raw_readings(points, budget):
-    said, world = campaign(points, budget, 0.05, noise_margin=1.0)
+    said, given, sigma = campaign(points, budget, 0.05, noise_margin=1.0)
     looks = said.boundary_of(ERROR)
-    noise_mm = shown(said, world) * world.sigma_mm
-    wanted = largest_limit(world.given, noise_mm, looks.counts, looks.z)
+    noise_mm = shown(said, given, sigma) * sigma
+    wanted = largest_limit(given, noise_mm, looks.counts, looks.z)
     measured, everywhere = said.statements()
-    assert len(world.given) == budget
+    assert len(given) == budget
     assert measured.upper_mm == pytest.approx(max(wanted, measured.value_mm), rel=1e-9)
     assert everywhere.upper_mm == pytest.approx(measured.upper_mm, rel=1e-9)
     assert everywhere.excepted == 0
@@ -92,13 +81,13 @@ def test_the_upper_bound_follows_from_the_raw_readings(points, budget):
 
 @pytest.mark.parametrize(("points", "budget"), [(60, 30), (200, 50), (200, 150)])
 def test_where_fewer_are_read_than_there_are_the_bound_is_of_all_but_the_fewest(points, budget):
-    said, world = campaign(points, budget, 0.05, noise_margin=1.0)
+    said, given, sigma = campaign(points, budget, 0.05, noise_margin=1.0)
     everywhere = said.statements()[1]
-    seen = len({row for row, _ in world.given})
+    seen = len({row for row, _ in given})
     assert seen < points
     assert everywhere.excepted == left_out(points, seen, Fraction(1, 40))
     looks = said.boundary_of(ERROR / 2)
-    wanted = largest_limit(world.given, world.sigma_mm, looks.counts, looks.z)
+    wanted = largest_limit(given, sigma, looks.counts, looks.z)
     assert everywhere.upper_mm == pytest.approx(wanted, rel=1e-9)
 
 

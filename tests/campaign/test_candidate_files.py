@@ -48,16 +48,3 @@ def test_a_german_export_in_degrees_with_decimal_commas(start, joints, tmp_path)
     same(plan, joints)
     assert plan.points.label[:2] == ("P1", "P2")
     assert "decimal commas" in done.stderr
-
-
-def test_joints_without_a_unit_that_may_be_either_are_asked_about(start, joints, tmp_path):
-    file = tmp_path / "candidates.txt"
-    lines = [" ".join(f"{each:.9f}" for each in row) for row in joints]
-    file.write_text("\n".join(["q1 q2 q3 q4 q5 q6", *lines]) + "\n")
-    done, plan = start(file)
-    assert done.exit_code == 2
-    assert plan is None
-    assert "--joint-unit rad or --joint-unit deg" in done.output
-    done, plan = start(file, "--joint-unit", "rad")
-    assert done.exit_code == 0, done.output
-    same(plan, joints, 8)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.differentiate import jacobian
 
 from kinacc.campaign import folder as campaigns
 from kinacc.campaign.instrument import instruments
@@ -27,10 +28,7 @@ def of_spherical_readings(seen_mm):
     at = np.array([distance, np.arctan2(y, x), np.arcsin(z / distance)])
     across = 0.02 + 15e-6 * distance
     std = np.array([0.01 + 5e-6 * distance, across / np.hypot(x, y), across / distance])
-    step = 1e-4 * np.array([distance, 1.0, 1.0])
-    slope = np.stack(
-        [(cartesian(at + h) - cartesian(at - h)) / (2 * h.sum()) for h in np.diag(step)], axis=1
-    )
+    slope = jacobian(cartesian, at).df
     return slope @ np.diag(std**2) @ slope.T + 0.03**2 * np.eye(3)
 
 
