@@ -50,18 +50,9 @@ def ur10_d(tmp_path_factory):
     return results, file, len(held)
 
 
-def begun(ur10_d, folder, *more):
-    results, file, points = ur10_d
-    done = call("campaign", "start", folder, "--calibration", results, "--robot", "ur10", "--model",
-                "dh", "--candidates", file, "--noise-mm", SIGMA_MM, "--budget", points,
-                *more)  # fmt: skip
-    assert done.exit_code == 0, done.output
-    return campaigns.open_(folder).plan
-
-
-def start(ur10_d, folder, *more):
+def start(ur10_d, folder, *more, candidates=20):
     return call("campaign", "start", folder, "--calibration", ur10_d[0], "--model", "dh",
-                "--candidates", 20, "--noise-mm", 0.05, *more)  # fmt: skip
+                "--candidates", candidates, "--noise-mm", SIGMA_MM, *more)  # fmt: skip
 
 
 def test_a_box_of_joints_that_was_hardly_measured_is_asked_about(ur10_d, tmp_path):
@@ -96,25 +87,14 @@ def test_candidates_of_a_thin_series_are_drawn_where_it_was_measured(ur10_d, tmp
     assert wanted.min() - 0.01 < found.min() <= found.max() < wanted.max() + 0.01
 
 
-def same(folder, wanted):
-    """Compare the bounds of a status with statements; the bounds at equal points stand once."""
-    bounds = json.loads(call("campaign", "status", folder, "--json").stdout)["bounds"]
-    wanted = {each.target: each for each in wanted}
-    assert bounds
-    for each in bounds:
-        for name in ("value_mm", "lower_mm", "upper_mm"):
-            value = np.nan if each[name] is None else each[name]
-            np.testing.assert_allclose(value, getattr(wanted[each["target"]], name), atol=1e-7)
-    return bounds[0]
-
-
 def test_the_series_itself_imported_whole_says_what_it_says_in_memory(ur10_d, tmp_path):
-    folder = tmp_path / "campaign"
-    plan = begun(ur10_d, folder, "--assessor", "single_shot")
-    done = call("campaign", "record", folder, ur10_d[1])
-    assert done.exit_code == 0, done.output
+    folder, (_, file, points) = tmp_path / "campaign", ur10_d
+    more = ("--robot", "ur10", "--assessor", "single_shot", "--budget", points)
+    for done in (start(ur10_d, folder, *more, candidates=file),
+                 call("campaign", "record", folder, file)):  # fmt: skip
+        assert done.exit_code == 0, done.output
     state = campaigns.open_(folder).state
-    assert len(state.used) == len(plan.points)
+    assert len(state.used) == points
     errors = np.array([each.error_mm for each in state.used])
     # These are the held-out residuals of the calibration itself, in another frame.
     columns = store.read(ur10_d[0] / "residuals.parquet")
@@ -125,4 +105,8 @@ def test_the_series_itself_imported_whole_says_what_it_says_in_memory(ur10_d, tm
     assert np.sqrt(np.mean(sizes**2)) == pytest.approx(columns["rms"][row][0], rel=1e-6)
     wanted = conduct(SingleShot(measurements=len(errors)), measured_world(
         errors, np.zeros((len(errors), 0, 3)), SIGMA_MM))  # fmt: skip
-    same(folder, wanted.statements())
+    # Bounds at equal points stand once.
+    (bound,) = json.loads(call("campaign", "status", folder, "--json").stdout)["bounds"]
+    (stated,) = (each for each in wanted.statements() if each.target == bound["target"])
+    for name in ("value_mm", "lower_mm", "upper_mm"):
+        assert bound[name] == pytest.approx(getattr(stated, name), abs=1e-7)

@@ -15,7 +15,7 @@ from kinacc.assess.search_and_confirm import SearchAndConfirm
 from kinacc.assess.single_shot import SingleShot
 from kinacc.assess.statement import MEASURED
 from kinacc.assess.world import conduct, drawn_world, key_of
-from kinacc.campaign.planning import Aim, counted, plan_budget, simulate, smallest_budget
+from kinacc.campaign.planning import Aim, counted, simulate, smallest_budget
 from kinacc.errors import InputError
 from kinacc.study.fields import ErrorField
 
@@ -28,34 +28,26 @@ def field(count=100, seed=0):
 def test_a_simulated_campaign_is_one_run_in_memory(target):
     errors, sigma = field(), 0.05
     budgets = (SearchAndConfirm(measurements=30), SearchAndConfirm(measurements=50))
-    noise, aim = sigma**2 * np.eye(3), Aim(target=target)
-    found = simulate([errors], 40, noise, budgets, 3, 9, aim)
+    found = simulate([errors], 40, sigma**2 * np.eye(3), budgets, 3, 9, Aim(target=target))
     assert len(found) == 2 * 3
     for each in found.itertuples():
         chosen = np.random.default_rng([9, 0, each.repetition]).permutation(100)[:40]
         world = drawn_world(errors.error_mm[chosen], sigma, key_of(9, 0, each.repetition), 60)
         campaign = conduct(SearchAndConfirm(measurements=each.budget), world)
         wanted = next(s for s in campaign.statements() if s.target == target)
-        np.testing.assert_allclose(each.upper_mm, wanted.upper_mm, rtol=1e-9)
-        np.testing.assert_allclose(each.lower_mm, wanted.lower_mm, rtol=1e-9)
+        assert each.upper_mm == pytest.approx(wanted.upper_mm, rel=1e-9)
+        assert each.lower_mm == pytest.approx(wanted.lower_mm, rel=1e-9)
         assert each.readings == campaign.ledger.taken
         sizes = errors.size_mm[chosen]
         if target == MEASURED:
-            assert each.true_mm == sizes[campaign.ledger.visited].max()
-        else:
-            assert each.true_mm == np.sort(sizes)[-1 - each.excepted]
-
-
-def test_a_plan_has_the_excess_of_bounds_that_know_the_errors():
-    errors, noise = field(), 0.05**2 * np.eye(3)
-    budgets = (SearchAndConfirm(measurements=30), SearchAndConfirm(measurements=60))
-    few, enough = plan_budget([errors], 40, noise, budgets, Aim(), 2, 9).rows.itertuples()
-    chosen = [np.random.default_rng([9, 0, each]).permutation(100)[:40] for each in range(2)]
-    known = [width_limits(errors.size_mm[each], 0.05, 60, 0.05) for each in chosen]
-    assert enough.attainable_mm == pytest.approx(np.mean([each.attainable_mm for each in known]))
-    assert enough.proven_mm == pytest.approx(np.mean([each.proven_mm for each in known]))
-    assert math.isnan(few.attainable_mm)  # fewer readings than candidates
-    assert few.excepted > 0
+            sizes = sizes[np.sort(campaign.ledger.visited)]
+        assert each.true_mm == np.sort(sizes)[-1 - each.excepted]
+        # The excess of bounds that know the errors, where the bound is on all points.
+        known = width_limits(sizes, sigma, each.budget, 0.05)
+        assert (each.excepted > 0) == math.isnan(each.attainable_mm) == math.isnan(each.proven_mm)
+        if not each.excepted:
+            assert each.attainable_mm == pytest.approx(known.attainable_mm)
+            assert each.proven_mm == pytest.approx(known.proven_mm)
 
 
 def runs(*bounds):
