@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -69,10 +70,17 @@ def test_next_names_joints_with_units_and_writes_nothing(campaign, tmp_path):
 @pytest.mark.parametrize("frame", ["base", "instrument"])
 def test_readings_are_expected_in_the_frame_they_come_in(make_plan, tmp_path, frame):
     to_base = Pose(exp_so3(np.array([0.1, -0.2, 0.3])), np.array([500.0, -20.0, 30.0]))
-    campaigns.start(tmp_path / "c", make_plan(frame=frame).model_copy(update={"to_base": to_base}))
+    plan = make_plan(frame=frame)
+    directed = replace(plan.points, directions=np.sign(plan.points.joints).astype(np.int8))
+    campaigns.start(
+        tmp_path / "c", plan.model_copy(update={"to_base": to_base, "points": directed})
+    )
     found = Campaign(tmp_path / "c")
     pose, visit = found.next_pose(), found.visit()
     assert pose.frame == frame
+    assert visit[[f"s{joint}" for joint in range(1, 7)]].to_numpy()[0].tolist() == [
+        *pose.directions
+    ]
     expected = visit[["expected_x_mm", "expected_y_mm", "expected_z_mm"]].to_numpy()
     np.testing.assert_allclose(pose.expected_mm, expected[0])
     if frame == "instrument":

@@ -11,6 +11,7 @@ import pytest
 from command_line import call
 
 from kinacc.assess.attainable import width_limits
+from kinacc.assess.region_share import RegionShare
 from kinacc.assess.search_and_confirm import SearchAndConfirm
 from kinacc.assess.single_shot import SingleShot
 from kinacc.assess.statement import MEASURED
@@ -88,9 +89,11 @@ def test_the_budget_named_is_enough_on_all_errors_and_beyond():
     assert enough(a=[0.9, 0.9, 0.7]) is None
 
 
-def test_fewer_errors_than_candidates_are_refused():
+def test_fewer_errors_than_candidates_and_targets_without_a_statement_are_refused():
     with pytest.raises(InputError, match="only 100"):
         simulate([field()], 101, np.eye(3), [SingleShot(measurements=200)], 1, 0, Aim())
+    with pytest.raises(InputError, match="states nothing about candidates"):
+        simulate([field()], 40, np.eye(3), [RegionShare(measurements=40)], 1, 0, Aim())
 
 
 @pytest.fixture

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from campaign_on_disk import entry_of, readings_of
@@ -95,13 +97,18 @@ def test_another_instrument_counts_with_its_own_covariance(make_plan, make_world
     by_tracker = restore(plan, entries)
     entries[10]["readings"][0]["instrument"] = "camera"
     with_camera = restore(plan, entries)
+    entries[10]["readings"][0] |= {"instrument": "tracker", "std": "0.4"}
+    by_itself = restore(plan, entries)
     place = int(np.flatnonzero(by_tracker.rows == by_tracker.used[10].reading.point)[0])
     assert by_tracker.campaign.ledger.noise_mm[place] == pytest.approx(0.05)
     assert with_camera.campaign.ledger.noise_mm[place] == pytest.approx(0.5)
+    assert by_itself.campaign.ledger.noise_mm[place] == pytest.approx(0.4)
 
 
 def test_a_plan_comes_back_to_the_last_bit(make_plan):
     plan = make_plan(texts=("a=0.1,0.2,0.3", "b=0.01"), frame="instrument")
+    directed = replace(plan.points, directions=np.sign(plan.points.joints).astype(np.int8))
+    plan = plan.model_copy(update={"points": directed})
     assert to_json(from_json(to_json(plan), "here")) == to_json(plan)
 
 

@@ -105,3 +105,17 @@ def test_readings_against_an_assumption_withhold_the_bounds(measured, change, co
     assert all(math.isnan(each.upper_mm) for each in found.bounds)
     if code == "wrong_readings":
         assert "reading 71 at point" in found.against[1]
+
+
+def test_bounds_below_the_estimate_are_doubted_with_the_noise(measured):
+    found, _ = measured(assessor="single_shot", texts=("tracker=3",), tolerance_mm=5.0)
+    assert found.bound.verdict == "undecided"
+    assert "noise overstated" in found.bound.doubt
+    assert "times as far from the predictions as the stated noise" in found.against[0]
+
+
+def test_what_was_looked_for_and_not_found_is_noted_with_its_condition(measured):
+    found, _ = measured(references=20, noise="estimated", noise_freedom=60)
+    assert found.against == ()
+    assert "determined by a test with 60 degrees of freedom" in found.assumes
+    assert any("no drift and no step" in note for note in found.notes)

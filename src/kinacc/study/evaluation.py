@@ -99,8 +99,8 @@ def points(inputs: Tables, settings: Settings) -> dict[str, Columns]:
     elif section["points_in"] == "joints":
         q_rad = operating_points.in_joints(arm, models, limited, *drawn, cylinder(section))
     else:
-        wrist = section.get("wrist")
-        q_rad = operating_points.in_space(arm, models, poses_wanted(section), *drawn, wrist)
+        wanted, wrist = poses_wanted(section), section["wrist"]
+        q_rad = operating_points.in_space(arm, models, wanted, *drawn, wrist)
     travel = np.zeros(q_rad.shape[1]) if models.travel is None else models.travel
     columns: Columns = {"point": np.arange(len(q_rad))}
     columns |= _numbered("q", limits.reported_joints(arm, q_rad))

@@ -16,7 +16,6 @@ from kinacc.kinematics.robot import Robot
 from kinacc.study.accuracy_map import Models, PosesWanted, joints_of
 from kinacc.tables.columns import Columns
 
-_ALL = (None, "both")  # wrists: what is said where none is chosen
 _DRAWS_PER_POINT = 500  # draws spent per wanted point before the space is called out of reach
 
 
@@ -26,7 +25,7 @@ def in_space(
     wanted: PosesWanted,
     sequence: str,
     count: int,
-    wrist: str | None = None,
+    wrist: str = "both",
 ) -> np.ndarray:
     """Joints (count, k) of tool poses drawn from a quasi-random sequence, in drawing order.
 
@@ -75,10 +74,10 @@ def _drawn(
     raise InputError(Problem("evaluation.cylinder", message, f"{count} points", fix))
 
 
-def _branches(robot: Robot, wrist: str | None) -> np.ndarray:
+def _branches(robot: Robot, wrist: str) -> np.ndarray:
     """Numbers of the machining branches that have the ``wrist``."""
     names = inverse.machining_branches(robot)
-    chosen = [i for i, name in enumerate(names) if wrist in (*_ALL, name.rpartition("-")[2])]
+    chosen = [i for i, name in enumerate(names) if wrist in ("both", name.rpartition("-")[2])]
     if not chosen:
         message = f"{wrist}, but robot {robot.name} has no branch of that wrist"
         raise InputError(Problem("evaluation.wrist", message, "both"))
