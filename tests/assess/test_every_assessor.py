@@ -105,17 +105,18 @@ def test_unequal_noise_is_weighted_as_least_squares_would():
 LEAST, DRAWS = 0.95 - 3.5 * math.sqrt(0.05 * 0.95 / 400), 400
 
 
-@pytest.mark.parametrize("shape", ["one", "equal", "spread"])
-def test_the_bound_on_the_measured_points_holds(shape):
-    # One large error is the hardest for the upper limit: no other point's noise comes to its aid.
-    sizes = {"one": np.r_[1.0, np.full(11, 1e-3)], "equal": np.ones(12)}
-    errors = field(12) if shape == "spread" else away(np.random.default_rng(5), sizes[shape])
-    largest, held = np.linalg.norm(errors, axis=1).max(), np.zeros(2)
+@pytest.mark.parametrize(
+    "sizes", [np.r_[1.0, np.full(11, 1e-3)], np.ones(12)], ids=["one large", "all large"]
+)
+def test_the_bound_on_the_measured_points_holds(sizes):
+    # One large error is the hardest for the upper limit: no other point's noise comes to its aid;
+    # many are the hardest for the lower one.
+    errors, held = away(np.random.default_rng(5), sizes), np.zeros(2)
     for draw in range(DRAWS):
         order = np.random.default_rng([draw, 3]).permutation(12)
         readings = drawn_world(errors[order], 0.2, key_of(4, draw), 20)
         said = conduct(SearchAndConfirm(20), readings).statements()[0]
-        held += said.upper_mm >= largest, said.lower_mm <= largest
+        held += said.upper_mm >= 1.0, said.lower_mm <= 1.0
     assert held.min() >= DRAWS * LEAST
 
 

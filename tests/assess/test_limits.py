@@ -28,7 +28,7 @@ def test_size_of_a_reading_is_noncentral_chi(a):
     assert ours == pytest.approx(chndtr(x**2, 3, a**2).tolist(), abs=1e-9)
 
 
-@pytest.mark.parametrize("ratio", [1.0, 3.0, 30.0])
+@pytest.mark.parametrize("ratio", [1.0, 30.0])
 def test_limits_miss_as_seldom_as_they_say_whatever_the_direction(ratio):
     rng = np.random.default_rng(5)
     covariance = 0.01 * np.diag([1.0, 1.0 / ratio, 1.0 / ratio**2])

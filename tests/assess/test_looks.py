@@ -34,8 +34,8 @@ def crossed(counts, z, rng, rate=0.0, scale=1.0):
 
 @pytest.mark.parametrize(
     ("extra", "freedom", "rate"),
-    [(0, math.inf, 0.0), (7, math.inf, 0.0), (100, math.inf, 0.0), (40, 30, 0.0), (40, 60, 0.0),
-     (40, math.inf, 0.01), (40, math.inf, 0.05)],
+    [(0, math.inf, 0.0), (100, math.inf, 0.0), (40, 30, 0.0), (40, math.inf, 0.01),
+     (40, math.inf, 0.05)],
 )  # fmt: skip
 def test_walks_drawn_at_random_cross_the_boundary_as_often_as_is_allowed(extra, freedom, rate):
     looks, rng = boundary(look_counts(extra), ERROR, freedom, rate=rate), np.random.default_rng(1)
