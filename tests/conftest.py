@@ -19,59 +19,52 @@ TESTS = Path(__file__).resolve().parent
 sys.path[:0] = [str(TESTS), str(TESTS.parent / "tools")]
 sys.path.append(str(TESTS.parent / "benchmarks"))
 
-# Files and folders left out of `make check`; measured with `pytest --durations=0`. The first ones
-# take longest: `make test` hands them out first, so that no worker is left alone with one.
+# Files and folders left out of `make check`, which take two seconds of a processor or more, longest
+# first: `make test` hands them out in this order, so that no worker is left alone with a long one.
 SLOW = (
-    "integration/test_installed.py",
-    "integration/test_real_arm.py",
-    "integration",
-    "slurm",
-    "workflow/test_pipeline.py",
-    "gate/test_check_results.py",
-    "integration_oracle",
-    "measurements/test_files_as_they_come.py",
+    "integration/test_data_that_cannot_be_fitted.py",  # makes the run that others share
+    "golden",
     "checks/test_planted_faults.py",
-    "benchmarks",
-    "calibration/test_chosen_order.py",
-    "calibration/test_dh_fit.py",
-    "calibration/test_oracle_fits.py",
-    "calibration/test_reach.py",
-    "calibration/test_repeated_configurations.py",
-    "calibration/test_vec_fit.py",
-    "campaign/test_campaign_commands.py",
-    "campaign/test_growing_file.py",
-    "campaign/test_lost_readings.py",
-    "campaign/test_on_a_real_arm.py",
-    "campaign/test_planning.py",
-    "campaign/test_state.py",
-    "checks/test_check_data.py",
-    "cli/test_init.py",
-    "cli/test_init_readings.py",
-    "cli/test_init_robots.py",
-    "cli/test_rows_as_the_user_calls_them.py",
-    "cli/test_the_same_readings_compared.py",
-    "deployment/test_applicability.py",
-    "deployment/test_compare.py",
+    "measurements/test_fuzzed_files.py",
+    "measurements/test_files_as_they_come.py",
+    "integration",
+    "workflow/test_pipeline.py",
+    "kinematics/inverse/test_any_arm.py",
+    "test_hostile_files.py",
+    "assess/test_every_assessor.py",
+    "integration_oracle",
+    "cli/test_outdated_results.py",
+    "deployment/test_controllers.py",
+    "test_notebooks.py",
+    "gate",
     "deployment/test_verify.py",
-    "deployment/test_compensate.py",
-    "deployment/test_history.py",
-    "deployment/test_predict.py",
+    "cli/test_init.py",
     "figures/test_figure_files.py",
     "figures/test_figures.py",
-    "kinematics/inverse/test_any_arm.py",
-    "measurements/test_what_files_hold.py",
-    "report/test_in_a_browser.py",
-    "report/test_calibration_summary.py",
-    "research",
-    "study/test_accuracy_map_oracle.py",
-    "test_hostile_files.py",
-    "test_inverse_oracle.py",
-    "test_models_oracle.py",
-    "test_strangers_names.py",
-    "test_strangers_text.py",
-    "study/test_study_oracle.py",
-    "workflow/test_calibration_stages.py",
+    "cli/test_drift_and_jump.py",
+    "deployment/test_compare.py",
+    "cli/test_snapshots.py",
+    "cli/test_rows_as_the_user_calls_them.py",
+    "calibration/test_few_poses.py",
+    "assess/test_wrong_readings.py",
+    "cli/test_init_robots.py",
+    "cli/test_repeatability.py",
     "workflow/test_robustness.py",
+    "assess/test_paper_assessors.py",
+    "test_hostile_input.py",
+    "report/test_calibration_summary.py",
+    "deployment/test_history.py",
+    "cli/test_init_readings.py",
+    "calibration/test_oracle_fits.py",
+    "campaign/test_campaign_commands.py",
+    "test_models_oracle.py",
+    "checks/test_check_data.py",
+    "deployment/test_predict.py",
+    "workflow/test_calibration_stages.py",
+    "cli/test_the_same_readings_compared.py",
+    "calibration/test_repeated_configurations.py",
+    "calibration/test_chosen_order.py",
+    "study/test_study_oracle.py",
 )
 _SLOW = tuple(TESTS / name for name in SLOW)
 # For a night (`make test-all`): runs on a cluster, pages in a browser, research, the site, and the
@@ -95,28 +88,27 @@ settings.load_profile("repeatable")
 
 @cache
 def place(path: Path) -> int:
-    """Index in ``SLOW`` of what holds a file; the length of ``SLOW`` where it is quick."""
+    """Index in ``SLOW`` of what holds a file, its length for a quick one; -1 for the night's."""
+    if any(map(path.is_relative_to, NIGHT)):
+        return -1
     held = (number for number, slow in enumerate(_SLOW) if path.is_relative_to(slow))
     return next(held, len(SLOW))
 
 
 def pytest_ignore_collect(collection_path, config):
     """Do not even read files whose tests are left out."""
-    quick = config.option.markexpr == "not slow and not night"
-    if quick and place(collection_path) < len(SLOW):
-        return True
-    if "not night" in config.option.markexpr and any(map(collection_path.is_relative_to, NIGHT)):
-        return True
-    return None
+    number, asked = place(collection_path), config.option.markexpr
+    left_out = (number < 0 and "not night" in asked) or (number < len(SLOW) and "not slow" in asked)
+    return left_out or None
 
 
 def pytest_collection_modifyitems(items):
     """Mark the tests of slow files and of the night; longest first."""
     for item in items:
-        if place(item.path) < len(SLOW):
-            item.add_marker(pytest.mark.slow)
-        if any(map(item.path.is_relative_to, NIGHT)):
+        if place(item.path) < 0:
             item.add_marker(pytest.mark.night)
+        elif place(item.path) < len(SLOW):
+            item.add_marker(pytest.mark.slow)
     items.sort(key=lambda item: place(item.path))
 
 
