@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from simulated import away
+from simulated_campaigns import away
 
 from kinacc.assess.adaptive import Candidates, Ledger
 from kinacc.assess.region_share import RegionShare

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 from scipy.stats import binom, chi2, kstest, norm, t
-from simulated import away, conducted
+from simulated_campaigns import away, conducted
 
 from kinacc.assess.adaptive import Candidates, Ledger
 from kinacc.assess.limits import visit_mm

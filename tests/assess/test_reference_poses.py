@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from simulated import away, conducted
+from simulated_campaigns import away, conducted
 
 from kinacc.assess.reference_poses import (
     FALSE_ALARMS,

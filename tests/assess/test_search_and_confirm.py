@@ -12,7 +12,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from scipy.stats import chi2
-from simulated import away, conducted
+from simulated_campaigns import away, conducted
 
 from kinacc.assess.adaptive import Candidates
 from kinacc.assess.search_and_confirm import SearchAndConfirm

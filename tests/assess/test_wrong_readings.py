@@ -10,7 +10,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.optimize import brentq, minimize
 from scipy.stats import norm
-from simulated import away, conducted
+from simulated_campaigns import away, conducted
 
 from kinacc.assess.adaptive import Candidates
 from kinacc.assess.limits import (
