@@ -10,7 +10,7 @@ import numpy as np
 
 from kinacc.calibration import identifiability, tables
 from kinacc.calibration.fitting import ModelFit, distinct
-from kinacc.calibration.frames import FrameParameters, Frames
+from kinacc.calibration.frames import FrameParameters, Frames, ruled
 from kinacc.calibration.models import Common, Estimator, Fit
 from kinacc.calibration.observations import Observations, full_poses
 from kinacc.calibration.uncertainty import Uncertainty
@@ -107,17 +107,10 @@ def arm_terms(nominal: DHModel, free: np.ndarray, rules: Sequence[Rule] = ()) ->
     ArmTerms
         Mask, nominal values and standard deviations of priors, in mm and rad.
     """
-    values = nominal.start.reshape(free.shape).copy()
-    chosen, std = free.copy(), np.full(free.shape, np.inf)
-    for joint, column in np.ndindex(free.shape):
-        name = PARAMETERS[column]
-        rule = parameter_rules.rule_for(rules, name, joint=joint + 1)
-        if rule is None or (rule.parameter is None and not free[joint, column]):
-            continue
-        chosen[joint, column] = rule.free
-        values[joint, column] = rule.value.get(parameter_rules.unit(name), values[joint, column])
-        std[joint, column] = rule.std.get(parameter_rules.unit(name), np.inf)
-    return ArmTerms(nominal.with_parameters(values.ravel()), chosen, std)
+    about = [(name, joint, None) for joint in range(1, len(free) + 1) for name in PARAMETERS]
+    chosen, values, std = ruled(rules, about, free.ravel(), nominal.start)
+    shape = free.shape
+    return ArmTerms(nominal.with_parameters(values), chosen.reshape(shape), std.reshape(shape))
 
 
 _AUTO = "auto"

@@ -177,18 +177,32 @@ def frame_terms(
             )
         ]
     )
-    free, value = np.ones(len(names), dtype=bool), np.zeros(len(names))
-    std = np.full(len(names), np.inf)
-    lengths = [name.endswith("_mm") for name in names]
-    value[lengths] = stated.joined.position_mm.ravel()
-    for number, (frame, component) in enumerate(parts):
-        rule = parameter_rules.rule_for(rules, component, frame=frame)
-        if rule is not None:
-            unit = parameter_rules.unit(component)
-            free[number] = rule.free
-            value[number] = rule.value.get(unit, value[number])
-            std[number] = rule.std.get(unit, np.inf)
+    begin = np.zeros(len(names))
+    begin[[name.endswith("_mm") for name in names]] = stated.joined.position_mm.ravel()
+    about = [(component, None, frame) for frame, component in parts]
+    free, value, std = ruled(rules, about, np.ones(len(names), dtype=bool), begin)
     return FrameParameters(names, stated, value, free, value, std, np.zeros((0, len(names))))
+
+
+def ruled(
+    rules: Sequence[Rule],
+    parameters: Sequence[tuple[str, int | None, str | None]],
+    free: np.ndarray,
+    value: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """What rules make of P parameters, named with their joint or frame.
+
+    ``free`` (P,), ``value`` (P,) and standard deviations (P,) of priors, mm and rad, inf for none.
+    A rule without a parameter speaks of those free by default.
+    """
+    free, value, std = free.copy(), value.copy(), np.full(len(free), np.inf)
+    for i, (name, joint, frame) in enumerate(parameters):
+        rule = parameter_rules.rule_for(rules, name, joint, frame)
+        if rule is not None and (rule.parameter or free[i]):
+            unit = parameter_rules.unit(name)
+            free[i], value[i] = rule.free, rule.value.get(unit, value[i])
+            std[i] = rule.std.get(unit, np.inf)
+    return free, value, std
 
 
 def component_names(observations: Observations) -> tuple[str, ...]:

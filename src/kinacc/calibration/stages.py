@@ -181,31 +181,23 @@ def excluded_rows(inputs: Mapping[str, Columns], settings: Mapping[str, Any]) ->
     """
     arm, section = robot.load(settings["robot"]), settings["measurements"]["file"]
     reasons, used = excluded_lines(section), inputs["measurements"]
-    every = from_columns(used, arm)
-    fits = delivered_fits(inputs, arm, every)
     reading, _ = read_excluded(section, arm)
-    off = {comparison.name: np.zeros((0, 6)) for comparison in comparisons(fits)}
-    places = pd.DataFrame({"line": [], "target": [], "session": []})
-    if reading is not None:
-        columns, placed = reading.columns, np.ones(len(reading.columns["pose"]), dtype=bool)
-        for name in ("target", "session"):  # only those of other rows have frames
-            placed &= np.isin(columns[name].astype(str), np.asarray(used[name]).astype(str))
-        rows = {name: np.asarray(values)[placed] for name, values in columns.items()}
-        # Behind the rows that were used: these number targets and sessions.
-        names = [name for name in rows if name in used]
-        joined = {name: np.concatenate([np.asarray(used[name]), rows[name]]) for name in names}
-        observations = from_columns(joined, arm).select(slice(len(every), None))
-        off = {name: item.components for name, item in errors(fits, observations).items()}
-        places = pd.DataFrame({name: rows[name] for name in ("target", "session")})
-        places.insert(0, "line", rows["row"].astype(int))
+    rows = pd.DataFrame(dict(reading.columns)) if reading else pd.DataFrame(columns=list(used))
+    for name in ("target", "session"):  # only those of other rows have frames
+        rows = rows[rows[name].astype(str).isin({*map(str, used[name])})]
+    off: dict[str, Errors] = {}
+    if len(rows):
+        observations = from_columns({name: rows[name].to_numpy() for name in rows}, arm)
+        off = errors(delivered_fits(inputs, arm, observations), observations)
+    known = rows[["target", "session"]].assign(line=rows["row"].astype(int))
     stated = pd.DataFrame({"line": sorted(reasons)})
+    stated["reason"] = stated["line"].map(reasons)
     parts = []
-    for comparison, components in off.items():
-        known = pd.concat([places, pd.DataFrame(components, columns=_OFF)], axis=1)
-        part = stated.merge(known, "left", on="line")
-        part.insert(3, "reason", part["line"].map(reasons))
-        part.insert(0, "comparison", comparison)
-        parts.append(part)
+    for comparison in comparisons(models.models(inputs, arm.dh)):
+        item = off.get(comparison.name)
+        components = np.zeros((0, 6)) if item is None else item.components
+        known[list(_OFF)] = components
+        parts.append(stated.merge(known, "left", on="line").assign(comparison=comparison.name))
     table = pd.concat(parts).astype(object)
     table = table.where(table.notna(), None)
     columns = columns_of("excluded_rows", table.to_dict("records"))

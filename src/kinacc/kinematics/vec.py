@@ -133,25 +133,16 @@ class VECModel(ErrorModel):
 
         ``std`` (P,) as ``start``.
         """
-        joints, errors, terms = self.coefficients.shape
-        split = self.coefficients.size
-        joint, error, order = (part.ravel() for part in np.indices((joints, errors, terms)))
-        offset_std = std[split:].reshape(joints, 2)
-        more, which = np.nonzero(np.isfinite(offset_std))
-        joint = np.concatenate([joint, more])
-        error = np.concatenate([error, np.full(more.size, ERRORS.index("eps_z"))])
-        offsets = self.direction_offsets_rad[more, which]
-        columns = {
-            "joint": joint + 1,
-            "error": np.array(ERRORS, dtype=object)[error],
-            "direction": np.concatenate([np.zeros(split, int), _DIRECTIONS[which]]),
-            "order": np.concatenate([order, np.zeros(more.size, int)]),
-            "coefficient": np.concatenate([self.coefficients.ravel(), offsets]),
-            "std": np.concatenate([std[:split], offset_std[more, which]]),
-            "q_min_rad": self.q_min_rad[joint],
-            "q_max_rad": self.q_max_rad[joint],
-        }
-        return columns | {name: getattr(self.dh, name)[joint] for name in PARAMETERS}
+        joints, _, terms = self.coefficients.shape
+        joint = range(1, joints + 1)
+        series = pd.MultiIndex.from_product([joint, ERRORS, [0], range(terms)])
+        offsets = pd.MultiIndex.from_product([joint, ["eps_z"], _DIRECTIONS, [0]])
+        table = pd.DataFrame({"coefficient": self.start, "std": std}, series.append(offsets))
+        table = table.rename_axis(["joint", "error", "direction", "order"]).reset_index()
+        table = table[(table["direction"] == 0) | np.isfinite(table["std"])]
+        columns, place = {name: table[name].to_numpy() for name in table}, table["joint"] - 1
+        columns |= {name: getattr(self, name)[place] for name in ("q_min_rad", "q_max_rad")}
+        return columns | {name: getattr(self.dh, name)[place] for name in PARAMETERS}
 
     @classmethod
     def from_columns(
