@@ -55,9 +55,7 @@ SLOW = (
     "report/test_calibration_summary.py",
     "deployment/test_history.py",
     "cli/test_init_readings.py",
-    "calibration/test_oracle_fits.py",
     "campaign/test_campaign_commands.py",
-    "test_models_oracle.py",
     "checks/test_check_data.py",
     "deployment/test_predict.py",
     "workflow/test_calibration_stages.py",
@@ -73,6 +71,7 @@ NIGHT = tuple(
     TESTS / name
     for name in (
         "benchmarks",
+        "calibration/test_reach.py",
         "integration/test_real_arm.py",
         "integration/test_site.py",
         "report/test_in_a_browser.py",

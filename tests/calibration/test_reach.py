@@ -45,7 +45,6 @@ def test_fanuc_leaving_one_configuration_out():
     assert rms(groups.mean()) <= 0.22
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("name", "before_mm"), [("ur10_d", 0.1755), ("ur10_b", 0.12566)])
 def test_order_and_prior_by_evidence_are_no_worse_than_by_held_out_search(name, before_mm):
     """Means of the prior rule before (docs/public-robots.csv): search, ridge and block sums."""

@@ -1,4 +1,4 @@
-"""Forward kinematics one 4x4 matrix at a time (paper eqs. 1-6), and derivatives by differences.
+"""Forward kinematics one 4x4 matrix at a time (paper eqs. 1-6).
 
 A DH table is a sequence of rows (theta_offset_rad, d_mm, a_mm, alpha_rad, beta_rad).
 """
@@ -6,7 +6,7 @@ A DH table is a sequence of rows (theta_offset_rad, d_mm, a_mm, alpha_rad, beta_
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.polynomial import chebyshev
@@ -131,23 +131,3 @@ def pose_matrix(x: float, y: float, z: float, wxyz: Sequence[float]) -> np.ndarr
     result[:3, :3] = Rotation.from_quat([i, j, k, w]).as_matrix()
     result[:3, 3] = (x, y, z)
     return result
-
-
-def difference_jacobian(
-    pose: Callable[[np.ndarray], np.ndarray], at: np.ndarray, step: np.ndarray | float
-) -> np.ndarray:
-    """Central differences (6, n) of a 4x4-valued function: position rows, then the rotation vector
-    of R(x + h) R(x - h)^T, i.e. in the base frame. Richardson-extrapolated to fourth order."""
-    at = np.asarray(at, float)
-    steps = np.broadcast_to(np.asarray(step, float), at.shape)
-    columns = []
-    for i, h in enumerate(steps):
-        estimates = []
-        for scale in (1.0, 2.0):
-            shift = np.zeros_like(at)
-            shift[i] = h * scale
-            ahead, behind = pose(at + shift), pose(at - shift)
-            spin = rotation_vector(ahead[:3, :3] @ behind[:3, :3].T)
-            estimates.append(np.concatenate([ahead[:3, 3] - behind[:3, 3], spin]) / (2 * h * scale))
-        columns.append((4 * estimates[0] - estimates[1]) / 3)
-    return np.array(columns).T
