@@ -10,8 +10,8 @@ import pytest
 from scipy import stats
 
 from kinacc.calibration import residuals
+from kinacc.calibration.fitting import Fit
 from kinacc.calibration.frames import Frames
-from kinacc.calibration.models import Fit
 from kinacc.calibration.observations import full_poses
 from kinacc.geometry import Pose, compose, exp_so3
 from kinacc.kinematics import dh, robot, vec

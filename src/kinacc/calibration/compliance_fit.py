@@ -10,9 +10,9 @@ import numpy as np
 
 from kinacc.calibration import tables
 from kinacc.calibration.dh_estimator import DHEstimator
-from kinacc.calibration.fitting import ModelFit, scales
+from kinacc.calibration.fitting import Fit, ModelFit, scales
 from kinacc.calibration.frames import ANGLE_UNIT_RAD
-from kinacc.calibration.models import Common, Estimator, Fit
+from kinacc.calibration.models import Common, Estimator
 from kinacc.calibration.observations import Observations
 from kinacc.calibration.uncertainty import Uncertainty
 from kinacc.kinematics.compliance import ComplianceModel

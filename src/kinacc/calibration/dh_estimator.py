@@ -9,10 +9,10 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from kinacc.calibration import identifiability, tables
-from kinacc.calibration.fitting import ModelFit, distinct
+from kinacc.calibration.fitting import Fit, ModelFit, distinct
 from kinacc.calibration.frames import FrameParameters, Frames, ruled
-from kinacc.calibration.models import Common, Estimator, Fit
-from kinacc.calibration.observations import Observations, full_poses
+from kinacc.calibration.models import Common, Estimator
+from kinacc.calibration.observations import Observations
 from kinacc.calibration.uncertainty import Uncertainty
 from kinacc.config import parameter_rules
 from kinacc.config.parameter_rules import Rule
@@ -175,9 +175,10 @@ class DHEstimator(Estimator):
         followed = others["vec"] if self.follows_vec else None
         if followed:
             frames = Frames(IDENTITY, followed.frames.targets)
-            one_base = replace(observations, session=np.zeros(len(observations), dtype=np.int64))
-            poses = full_poses(observations.q_rad, frames.seen(followed.model, one_base))
-            observations = poses.with_targets_of(observations)
+            session = np.zeros(len(observations), dtype=np.int64)
+            observations = replace(observations, session=session, session_names=(None,))
+            at = frames.seen(followed.model, observations)
+            observations = replace(observations, position_mm=at.position_mm, rotation=at.rotation)
             settings = {"frames": FrameParameters.none(frames)}
         else:
             count = distinct(observations).components

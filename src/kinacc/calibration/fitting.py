@@ -205,15 +205,27 @@ SURPLUS, LEAST_NOISE_MM = 2, 0.03
 
 
 @dataclass(frozen=True)
-class ModelFit:
-    """A fitted model of P parameters, base and targets.
+class Fit:
+    """A model with the base and targets it was fitted with.
 
     Attributes
     ----------
     model : ErrorModel
-        The model.
+        The arm.
     frames : Frames
-        Base and targets.
+        Base in the instrument's frame, targets in the flange frame, mm.
+    """
+
+    model: ErrorModel
+    frames: Frames
+
+
+@dataclass(frozen=True)
+class ModelFit(Fit):
+    """A fitted model of P parameters, base and targets, and how it was fitted.
+
+    Attributes
+    ----------
     std : numpy.ndarray
         Standard deviations in the parameters' units, of the shape of ``free``; NaN where
         undetermined.
@@ -229,8 +241,6 @@ class ModelFit:
         Of the rows, where the loss had some.
     """
 
-    model: ErrorModel
-    frames: Frames
     std: np.ndarray
     free: np.ndarray
     prior_std: np.ndarray

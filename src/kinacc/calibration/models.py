@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, NamedTuple, Self
+from typing import Any, ClassVar, Self
 
 from kinacc.calibration import fitting
-from kinacc.calibration.fitting import ModelFit
+from kinacc.calibration.fitting import Fit, ModelFit
 from kinacc.calibration.frames import FrameParameters, Frames, frame_terms, known
 from kinacc.calibration.observations import Observations
 from kinacc.calibration.uncertainty import Uncertainty
@@ -21,21 +21,6 @@ from kinacc.kinematics.robot import Robot, carried
 from kinacc.tables.columns import Columns
 
 Progress = Callable[..., Iterable[Any]]  # counts the items of an iterable, with a label
-
-
-class Fit(NamedTuple):
-    """A model with the base and targets it was fitted with.
-
-    Attributes
-    ----------
-    model : ErrorModel
-        The arm.
-    frames : Frames
-        Base in the instrument's frame, targets in the flange frame, mm.
-    """
-
-    model: ErrorModel
-    frames: Frames
 
 
 @dataclass(frozen=True)
@@ -187,6 +172,5 @@ def fit_all(
         if not nominal:
             common = estimator.common
             nominal[NOMINAL] = Fit(common.nominal, common.nominal_frames(observations))
-        fitted = estimator.fit(observations, fits | nominal)
-        fits[estimator.kind] = Fit(fitted.model, fitted.frames)
+        fits[estimator.kind] = estimator.fit(observations, fits | nominal)
     return fits | nominal

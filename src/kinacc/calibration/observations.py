@@ -106,11 +106,6 @@ class Observations:
         """The same observations with every travel direction unknown."""
         return replace(self, s=np.zeros_like(self.s))
 
-    def with_targets_of(self, other: Observations) -> Observations:
-        """These measurements, of one session, labelled as those of ``other``, row by row."""
-        names = ("s", "pose", "target", "repeat", "fold", "target_names")
-        return replace(self, **{name: getattr(other, name) for name in names})
-
 
 def full_poses(
     q_rad: np.ndarray,

@@ -8,8 +8,8 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from kinacc.calibration.fitting import ModelFit
-from kinacc.calibration.models import Common, Estimator, Fit
+from kinacc.calibration.fitting import Fit, ModelFit
+from kinacc.calibration.models import Common, Estimator
 from kinacc.calibration.observations import Observations
 from kinacc.config import error_models
 from kinacc.kinematics.model import ErrorModel

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from kinacc.calibration.models import Fit
+from kinacc.calibration.fitting import Fit
 from kinacc.calibration.observations import Observations
 from kinacc.config.error_models import MEASURED, comparisons
 from kinacc.distributions import gamma99

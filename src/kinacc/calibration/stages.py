@@ -10,7 +10,8 @@ import numpy as np
 import pandas as pd
 
 from kinacc.calibration import residuals, tables, uncertainty
-from kinacc.calibration.models import Fit, Progress, estimators, fit_all
+from kinacc.calibration.fitting import Fit
+from kinacc.calibration.models import Progress, estimators, fit_all
 from kinacc.calibration.observations import Observations, from_columns
 from kinacc.calibration.residuals import Errors, errors, statistics
 from kinacc.config.error_models import (

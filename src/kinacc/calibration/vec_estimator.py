@@ -10,8 +10,8 @@ import numpy as np
 import pandas as pd
 
 from kinacc.calibration import tables, vec_fit
-from kinacc.calibration.fitting import ModelFit, placed
-from kinacc.calibration.models import Common, Estimator, Fit, Progress
+from kinacc.calibration.fitting import Fit, ModelFit, placed
+from kinacc.calibration.models import Common, Estimator, Progress
 from kinacc.calibration.observations import Observations
 from kinacc.calibration.uncertainty import Uncertainty
 from kinacc.calibration.vec_fit import Prior

@@ -15,10 +15,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from kinacc.calibration.fitting import fit_frames
+from kinacc.calibration.fitting import Fit, fit_frames
 from kinacc.calibration.frames import frame_terms, known
 from kinacc.calibration.least_squares import one_thread
-from kinacc.calibration.models import Fit
 from kinacc.calibration.observations import Observations, from_columns
 from kinacc.calibration.residuals import errors
 from kinacc.config.error_models import MEASURED, Comparison

@@ -13,9 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pandas as pd
 
-from kinacc.calibration.fitting import fit_frames
+from kinacc.calibration.fitting import Fit, fit_frames
 from kinacc.calibration.frames import ANGLE_UNIT_RAD, MOTIONS, Frames, frame_terms, stacked
-from kinacc.calibration.models import Fit
 from kinacc.calibration.observations import Observations, from_columns
 from kinacc.calibration.residuals import errors
 from kinacc.calibration.summary import LARGE_SHARE

@@ -11,9 +11,8 @@ import pandas as pd
 
 from kinacc.calibration import residuals, stages, uncertainty
 from kinacc.calibration.dh_estimator import DHEstimator
-from kinacc.calibration.fitting import ModelFit
+from kinacc.calibration.fitting import Fit, ModelFit
 from kinacc.calibration.identifiability import identified, listed
-from kinacc.calibration.models import Fit
 from kinacc.calibration.observations import Observations
 from kinacc.config.error_models import NOMINAL, PLAINEST, model_name
 from kinacc.deployment.export.controllers import CONTROLLERS, ZEROS, Controller, Numbers
@@ -101,16 +100,15 @@ def fit_pendant(
         )
 
     def refit(observations: Observations, _fold: int = -1) -> dict[str, Fit]:
-        result = fit(observations)
-        return {PLAINEST: Fit(result.model, result.frames)}
+        return {PLAINEST: fit(observations)}
 
     # Joint 1 moves as the base does, the last joint as the tool: where these are fitted, it stays.
     ends = np.isin(np.arange(robot.dh.joints), (0, robot.dh.joints - 1))[:, None]
     free = free & ~(ends & np.isnan(fit(used).std))
     final = fit(used)
-    models = {
+    models: dict[str, Fit] = {
         NOMINAL: Fit(robot.dh, estimator.common.nominal_frames(used)),
-        PLAINEST: Fit(final.model, final.frames),
+        PLAINEST: final,
     }
     folds = np.unique(every.fold[every.fold >= 0])
     if len(folds):
