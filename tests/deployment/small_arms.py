@@ -5,11 +5,9 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
-import pandas as pd
 
 from kinacc.calibration import fitting, tables, uncertainty, vec_fit
 from kinacc.calibration.dh_estimator import free_parameters
-from kinacc.calibration.frames import Frames
 from kinacc.calibration.observations import Observations, full_poses
 from kinacc.calibration.vec_fit import Prior
 from kinacc.deployment.folder import calibration
@@ -20,6 +18,13 @@ BASE = Pose(exp_so3(np.array([0.3, -1.1, 2.0])), np.array([2500.0, -900.0, 400.0
 TOOL = Pose(exp_so3(np.array([-0.4, 0.2, 0.7])), np.array([30.0, -20.0, 150.0]))
 WEIGHT = 500.0
 HAYATI = {"ur10": (2, 3)}
+RMS_MM = {"vec": 0.3, "dh": 0.05, "nominal": 1.0}
+RESIDUALS = {
+    "comparison": np.array([f"{model}_vs_measured" for model in RMS_MM]),
+    "rms": np.array([*RMS_MM.values()]),
+    "subset": np.full(3, "validation"), "quantity": np.full(3, "position"),
+    "fold": np.full(3, np.nan),
+}  # fmt: skip
 
 
 def truth(name: str, seed: int = 1) -> dh.DHModel:
@@ -74,7 +79,6 @@ def results_of(name: str, seen: Observations, with_vec: bool = False) -> dict:
     low, high = seen.q_rad.min(axis=0) - 0.02, seen.q_rad.max(axis=0) + 0.02
     plain = vec.without_errors(arm.dh, low, high, 2)
     of = {"vec": nominal, "dh": dh_found.frames, "nominal": nominal}
-    models = {"dh": dh_found.model, "vec": plain}
     tables_of_vec = {"vec_model": plain.to_columns(np.full_like(plain.start, np.nan))}
     if with_vec:
         vec_found = vec_fit.fit(
@@ -84,7 +88,7 @@ def results_of(name: str, seen: Observations, with_vec: bool = False) -> dict:
             rotation_weight_mm_per_rad=WEIGHT,
             begin=nominal,
         )
-        of["vec"], models["vec"] = vec_found.frames, vec_found.model
+        of["vec"] = vec_found.frames
         tables_of_vec = {
             "vec_model": vec_found.model.to_columns(vec_found.std),
             "vec_covariance": tables.covariance_columns(uncertainty.of_fit(vec_found)),
@@ -96,21 +100,10 @@ def results_of(name: str, seen: Observations, with_vec: bool = False) -> dict:
         "frames": tables.frames_columns(of, ("tool",)),
         "dh_fit": tables.fit_columns("dh_fit", dh_found, known),
         "dh_covariance": tables.covariance_columns(known),
-        "residuals": _residuals(seen, of, **models),
+        "residuals": RESIDUALS,
     }
 
 
 def calibrated(name: str, model: str = "dh", count: int = 80, seed: int = 3):
     """The calibration of a simulated arm by one model."""
     return calibration(results(name, count, seed, model == "vec"), robot.load(name), model, name)
-
-
-def _residuals(seen: Observations, of: dict[str, Frames], **models) -> dict:
-    rms = {}
-    for name, model in models.items():
-        pose = compose(of[name].base, compose(model.pose(seen.at), of[name].tool))
-        off_mm = np.linalg.norm(pose.position_mm - seen.position_mm, axis=1)
-        rms[f"{name}_vs_measured"] = float(np.sqrt(np.mean(off_mm**2)))
-    table = pd.DataFrame({"comparison": rms.keys(), "rms": rms.values()})
-    table = table.assign(subset="validation", fold=np.nan, quantity="position")
-    return {name: column.to_numpy() for name, column in table.items()}

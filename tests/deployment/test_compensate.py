@@ -24,7 +24,7 @@ def left(arm, q_rad, wanted, frame="base", point=None):
 
 
 @pytest.mark.parametrize("name", ["mh180", "ur10"])
-@pytest.mark.parametrize("model", ["dh", "vec", "nominal"])
+@pytest.mark.parametrize("model", ["dh", "vec"])
 def test_joints_come_back_from_their_own_poses(name, model):
     arm, q_rad = calibrated(name, model), joints(name, 30, seed=4)
     wanted = predict(arm, q_rad, None, "instrument").pose

@@ -78,27 +78,24 @@ def test_offsets_are_those_of_the_joints_as_reported():
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """Results of a small arm, and two files of its readings: as they were, and moved."""
+    """Results of a small arm, and its readings from elsewhere, without and with a target."""
     base = tmp_path_factory.mktemp("verify")
     found = small_study(base)
     table = store.read(found / "measurements.parquet")
     xyz = np.stack([table[f"{axis}_mm"] for axis in "xyz"], axis=1)
-    turned = ["qw", "qx", "qy", "qz"]
     q_rad = np.stack([table[f"q{i}"] for i in range(1, 7)], axis=1)
-    quaternion = np.stack([table[name] for name in turned], axis=1)
     elsewhere = np.hstack([q_rad, xyz @ ELSEWHERE.rotation.T + 2000.0])
-    written(base, "same", np.hstack([q_rad, xyz, quaternion]), turned, "quaternion")
     written(base, "moved", elsewhere)
     written(base, "other_target", elsewhere, target="ball_")
     return base, found
 
 
-def written(base, name, rows, more=(), kind="none", target=""):
-    header = [*(f"q{i}_rad" for i in range(1, 7)), *(f"{target}{x}_mm" for x in "xyz"), *more]
+def written(base, name, rows, target=""):
+    header = [*(f"q{i}_rad" for i in range(1, 7)), *(f"{target}{x}_mm" for x in "xyz")]
     np.savetxt(base / f"{name}.csv", rows, "%.17g", ",", header=",".join(header), comments="")
     (base / f"{name}.yaml").write_text(
         f"datasets: {{{name}: {{robot: mh180}}}}\nmeasurements: {{source: file, folds: 5, file:"
-        f" {{path: {name}.csv, joint_unit: rad, orientation: {{kind: {kind}}}}}}}\n"
+        f" {{path: {name}.csv, joint_unit: rad, orientation: {{kind: none}}}}}}\n"
     )
     return base / f"{name}.yaml"
 
@@ -124,10 +121,10 @@ def test_every_model_is_held_to_readings_of_another_set_up(folder):
     assert anew["test"] == answer["test"]
 
 
-def test_what_cannot_count_gives_no_verdict(folder):
+def test_what_cannot_count_gives_no_verdict(folder, later):
     base, found = folder
-    for name, known in (("moved", 0), ("same", 80)):
-        answer = answered(found, base / f"{name}.yaml")
+    for described, known in ((base / "moved.yaml", 0), (later(1.0, 0, known=80), 80)):
+        answer = answered(found, described)
         assert (answer["verdict"], answer["known"]) == ("undecided", known)
 
 

@@ -404,15 +404,6 @@ def table(arm: Arm, points: np.ndarray, tool: np.ndarray, base: np.ndarray) -> P
     return program
 
 
-def table_of_joints(arm: Arm, points: np.ndarray, tool: np.ndarray, base: np.ndarray) -> Program:
-    """CSV: joints."""
-    program = Program(arm, "table", tool, np.eye(4))
-    lines = ["speed," + ",".join(f"q{i}_deg" for i in range(1, 7))]
-    lines += [f"{250 + i},{','.join(program.add(q, True))}" for i, q in enumerate(points)]
-    program.files = {".csv": "\n".join(lines)}
-    return program
-
-
 WRITERS = {
     "kuka": kuka,
     "abb": abb,
@@ -420,5 +411,4 @@ WRITERS = {
     "ur": ur,
     "yaskawa": yaskawa,
     "csv": table,
-    "csv of joints": table_of_joints,
 }

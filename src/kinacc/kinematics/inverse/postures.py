@@ -121,7 +121,7 @@ def search(
     wanted = _features(table.dh, goal, table.reach_mm)
     parts = [
         _starts(table, wanted[begin : begin + _BLOCK], begin)
-        for begin in range(0, len(wanted), _BLOCK)
+        for begin in range(0, max(len(wanted), 1), _BLOCK)  # one block of none
     ]
     rows, start = (np.concatenate(column) for column in zip(*parts, strict=True))
     if table.inner.start == 1:
