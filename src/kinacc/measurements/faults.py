@@ -37,8 +37,7 @@ def of_rows(
 ) -> list[Problem]:
     """A problem with columns in the rows where ``bad`` (n,) is True; none where it nowhere is."""
     names = ", ".join(place.column for place in places)
-    rows = np.flatnonzero(bad)
-    return [Problem(table.where(names, rows), message, allowed)] if rows.size else []
+    return [Problem(table.where(names, bad), message, allowed)] if bad.any() else []
 
 
 def quaternion_problems(

@@ -46,8 +46,8 @@ def joined(points: RawTable, joints: RawTable, how: JointsFile) -> RawTable:
         row, moving = _rows_by_time(points, joints, how)
     else:
         row = np.arange(len(points))
-    there = np.flatnonzero(row >= 0)
-    if not there.size:
+    there = row >= 0
+    if not there.any():
         message = f"no row belongs to any of {joints.path}, joined by {how.by}"
         raise input_error(points.path, message, fix="correct measurements.file.joints")
     notes = [_left_out(points, (row < 0) & ~moving, key_of_points, joints)]
@@ -55,7 +55,7 @@ def joined(points: RawTable, joints: RawTable, how: JointsFile) -> RawTable:
         notes.append(_left_out(joints, ~np.isin(np.arange(len(joints)), row), key, points))
         points = points.with_pose_names(key_of_points)
     if moving.any():
-        lines = points.rows_in_words(np.flatnonzero(moving))
+        lines = points.rows_in_words(moving)
         notes.append(f"{points.path}: left out, the arm was moving: {lines}")
     beside = joints.columns.iloc[row[there]].reset_index(drop=True)
     if (joints.decimal, joints.thousands) != (points.decimal, points.thousands):
@@ -83,7 +83,7 @@ def _left_out(table: RawTable, rows: np.ndarray, key: str, partner: RawTable) ->
     """A note on the rows where ``rows`` (n,) is True, with their keys; empty for none."""
     if not rows.any():
         return ""
-    lines = table.rows_in_words(np.flatnonzero(rows))
+    lines = table.rows_in_words(rows)
     keys = f", {key} {first_few([*table.columns[key][rows]])}" if key else ""
     return f"{table.path}: left out, without a partner in {partner.path}: {lines}{keys}"
 
@@ -101,8 +101,8 @@ def rows_by_name(points: RawTable, joints: RawTable, key: str, key_of_points: st
     names = pd.Series(there)
     q = pd.DataFrame(joint_values(joints)).groupby(names)
     apart = (q.transform("max") - q.transform("min")).max(axis=1).fillna(np.inf) > STILL_RAD
-    doubled = np.flatnonzero(names.duplicated(keep=False) & (names != "") & apart)
-    if doubled.size:
+    doubled = (names.duplicated(keep=False) & (names != "") & apart).to_numpy()
+    if doubled.any():
         message = "a name stands for several rows of joints"
         raise input_error(joints.where(key, doubled), message, "a name for every pose")
     first = names[~names.duplicated() & (names != "")]

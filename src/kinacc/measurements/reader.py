@@ -61,9 +61,8 @@ def read(section: Mapping[str, Any], robot: Robot, strict: bool = True) -> Measu
     listing everything that is wrong with the file.
     """
     table = _loaded(section)
-    used = np.flatnonzero(~np.isin(table.line, list(excluded_lines(section))))
-    table = table if used.size == len(table) else table.select(used)
-    return convert(table, Layout.of(section), robot, strict)
+    used = ~np.isin(table.line, [*excluded_lines(section)])
+    return convert(table.select(used), Layout.of(section), robot, strict)
 
 
 def read_excluded(
@@ -75,13 +74,14 @@ def read_excluded(
     """
     table = _loaded(section)
     layout, readable, problems = Layout.of(section), [], list[Problem]()
-    for row in np.flatnonzero(np.isin(table.line, list(excluded_lines(section)))):
+    for line in table.line[np.isin(table.line, [*excluded_lines(section)])]:
         with gathered(problems):
-            convert(table.select(np.array([row])), layout, robot, strict=False)
-            readable.append(row)
+            convert(table.select(table.line == line), layout, robot, strict=False)
+            readable.append(line)
     if not readable:
         return None, problems
-    return convert(table.select(np.array(readable)), layout, robot, strict=False), problems
+    rows = np.isin(table.line, readable)
+    return convert(table.select(rows), layout, robot, strict=False), problems
 
 
 def excluded_lines(section: Mapping[str, Any]) -> dict[int, str]:
@@ -136,7 +136,7 @@ def convert(table: RawTable, layout: Layout, robot: Robot, strict: bool = True) 
     without.append((~posed, "no joints" if nothing[~posed].all() else "not all joints"))
     notes = (*table.notes, *(
         f"{rows.sum()} {'rows hold' if rows.sum() > 1 else 'row holds'} {quantity}: "
-        f"{table.rows_in_words(np.flatnonzero(rows))}" for rows, quantity in without if rows.any()
+        f"{table.rows_in_words(rows)}" for rows, quantity in without if rows.any()
     ))  # fmt: skip
     there &= posed
     if not there.any() and not problems:

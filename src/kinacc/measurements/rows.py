@@ -116,9 +116,9 @@ def read_rows(
         none = np.all([table.gaps(place.column) for place in measured], axis=0)
         none &= ~table.gaps("status")
         if none.any() and not none.all():
-            lines = table.rows_in_words(np.flatnonzero(none))
+            lines = table.rows_in_words(none)
             notes = (*notes, f"left out, without {need} by their status: {lines}")
-            table = table.select(np.flatnonzero(~none))
+            table = table.select(~none)
     cells = problems if spoilt is None else spoilt
 
     def values(places: Sequence[Place]) -> np.ndarray | None:

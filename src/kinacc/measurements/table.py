@@ -75,12 +75,12 @@ class RawTable:
         return bool(np.isfinite(self.values(name)).any())
 
     def select(self, rows: np.ndarray) -> RawTable:
-        """The table of the rows at indices ``rows``."""
+        """The table of some rows, by their indices or a mask."""
         columns = self.columns.iloc[rows].reset_index(drop=True)
         return replace(self, columns=columns, line=self.line[rows])
 
     def rows_in_words(self, rows: np.ndarray) -> str:
-        """Lines of the rows at indices ``rows``."""
+        """Lines of rows, by their indices or a mask."""
         return self.row_names.spans(self.line[rows])
 
     def with_pose_names(self, column: str) -> RawTable:
@@ -91,7 +91,7 @@ class RawTable:
         return replace(self, row_names=replace(self.row_names, pose=named))
 
     def where(self, column: str, rows: np.ndarray | None = None) -> str:
-        """The place of a column, or of several, at the rows of these indices, for a problem."""
+        """The place of a column, or of several, at rows (indices or a mask), for a problem."""
         lines = "" if rows is None else f", {self.rows_in_words(rows)}"
         return f"{self.path}: column{'s' * (', ' in column)} {column}{lines}"
 
@@ -109,10 +109,10 @@ def numbers(
     With ``gaps`` an empty cell is allowed and becomes NaN.
     """
     values = table.values(name)
-    bad = np.flatnonzero(~(np.abs(values) < _LARGEST_CELL))
-    if gaps and bad.size:
-        bad = bad[~table.gaps(name)[bad]]
-    if bad.size:
+    bad = ~(np.abs(values) < _LARGEST_CELL)
+    if gaps and bad.any():
+        bad &= ~table.gaps(name)
+    if bad.any():
         cells = table.columns[name][bad].tolist()
         shown = ", ".join(repr(cell)[:60] for cell in cells[:_SHOWN])
         comma = "," if table.decimal == "." else "."

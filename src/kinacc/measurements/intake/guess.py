@@ -248,7 +248,7 @@ class _Guesser:
                     before = "".join(f"{value:.10g}," for value in numbers_of(answer))
                     meant = {f"{before}{number:.10g}": "nothing was read there",
                              f"{before}none": "it was read so"}  # fmt: skip
-                    where = self.table.rows_in_words(np.flatnonzero(rows))
+                    where = self.table.rows_in_words(rows)
                     about = f"the point of {name} is {number:.10g} in x, y or z of {where}"
                     raise Undecided(self.table.path, [Choice("--no-reading", about, meant)])
 
