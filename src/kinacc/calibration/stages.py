@@ -182,7 +182,7 @@ def excluded_rows(inputs: Mapping[str, Columns], settings: Mapping[str, Any]) ->
     """
     arm, section = robot.load(settings["robot"]), settings["measurements"]["file"]
     reasons, used = excluded_lines(section), inputs["measurements"]
-    reading, _ = read_excluded(section, arm)
+    reading = read_excluded(section, arm)
     rows = pd.DataFrame(dict(reading.columns)) if reading else pd.DataFrame(columns=list(used))
     for name in ("target", "session"):  # only those of other rows have frames
         rows = rows[rows[name].astype(str).isin({*map(str, used[name])})]

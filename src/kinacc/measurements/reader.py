@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
@@ -11,7 +12,7 @@ import numpy as np
 import pandas as pd
 
 from kinacc.config.measured import QUATERNION, JointsFile
-from kinacc.errors import Problem, gathered, input_error, refuse
+from kinacc.errors import InputError, Problem, input_error, refuse
 from kinacc.kinematics.model import PAYLOAD_COLUMNS
 from kinacc.kinematics.robot import Robot
 from kinacc.measurements import faults
@@ -65,23 +66,19 @@ def read(section: Mapping[str, Any], robot: Robot, strict: bool = True) -> Measu
     return convert(table.select(used), Layout.of(section), robot, strict)
 
 
-def read_excluded(
-    section: Mapping[str, Any], robot: Robot
-) -> tuple[MeasuredFile | None, list[Problem]]:
-    """The rows that ``section`` excludes, as far as they can be read, and the problems of others.
+def read_excluded(section: Mapping[str, Any], robot: Robot) -> MeasuredFile | None:
+    """The rows that ``section`` excludes, as far as they can be read; None where no row can be.
 
-    None where no row can be. Raises InputError where the file itself cannot be read.
+    Raises InputError where the file itself cannot be read.
     """
     table = _loaded(section)
-    layout, readable, problems = Layout.of(section), [], list[Problem]()
+    layout, readable = Layout.of(section), []
     for line in table.line[np.isin(table.line, [*excluded_lines(section)])]:
-        with gathered(problems):
+        with suppress(InputError):
             convert(table.select(table.line == line), layout, robot, strict=False)
             readable.append(line)
-    if not readable:
-        return None, problems
     rows = np.isin(table.line, readable)
-    return convert(table.select(rows), layout, robot, strict=False), problems
+    return convert(table.select(rows), layout, robot, strict=False) if readable else None
 
 
 def excluded_lines(section: Mapping[str, Any]) -> dict[int, str]:
