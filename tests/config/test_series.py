@@ -93,7 +93,7 @@ def test_a_series_beside_what_is_of_one_file_is_a_contradiction(written):
     own = "calibration: {base_and_tool: estimated}"
     top = "measurements: {file: {path: march.csv, exclude: [{lines: 2, reason: bumped}]}}"
     found = complaints(written(series, own, top))
-    assert any("beside a series of files" in each for each in found)
+    assert any("of another file, beside a series" in each for each in found)
 
 
 def test_a_series_given_in_two_files_is_refused(written, tmp_path):

@@ -15,7 +15,7 @@ from kinacc.errors import input_error
 Path = Sequence[str]
 
 
-def with_added(text: str, path: Path, value: Any, name: str, emptied: Path = ()) -> str:
+def with_added(text: str, path: Path, value: Any, name: str) -> str:
     """The text with ``value`` joined to the list or mapping at a path of keys.
 
     Parameters
@@ -28,8 +28,6 @@ def with_added(text: str, path: Path, value: Any, name: str, emptied: Path = ())
         A list or mapping: its items come after those that are there.
     name
         Name of the file in messages.
-    emptied
-        Keys that lead to a value in place of which null is written.
 
     Raises
     ------
@@ -37,26 +35,19 @@ def with_added(text: str, path: Path, value: Any, name: str, emptied: Path = ())
         Where the text cannot be changed without changing more than that.
     """
     try:
-        wanted, changed = value_of(text, name), text
-        if emptied:
-            reduce(dict.__getitem__, emptied[:-1], wanted)[emptied[-1]] = None
-            section = _deepest(text, emptied)[0]
-            node = next(item for key, item in section.value if key.value == emptied[-1])
-            changed = text[: node.start_mark.index] + "null" + text[node.end_mark.index :]
-        parent = wanted
+        parent = wanted = value_of(text, name)
         for key in path[:-1]:
             parent[key] = parent.get(key) or {}
             parent = parent[key]
         old = parent.get(path[-1]) or type(value)()
         parent[path[-1]] = old | value if isinstance(value, Mapping) else old + value
-        changed = _joined(changed, wanted, path, value)
+        changed = _joined(text, wanted, path, value)
         if value_of(changed, name) == wanted:
             return changed
-    except (yaml.YAMLError, TypeError, AttributeError, LookupError, StopIteration):
+    except (yaml.YAMLError, TypeError, AttributeError, LookupError):
         pass
     message = f"cannot be changed safely at {'.'.join(path)}"
-    instead = f", in place of {'.'.join(emptied)}" if emptied else ""
-    raise input_error(name, message, fix=f"add by hand{instead}: {flow(value)}")
+    raise input_error(name, message, fix=f"add by hand: {flow(value)}")
 
 
 def flow(value: Any) -> str:

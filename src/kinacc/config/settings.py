@@ -463,8 +463,9 @@ class DataSet(Settings):
         if self.series and source == "synthetic":
             message = "synthetic, but a series is of measured files"
             raise refused(message, "write file", "measurements", "source")
-        if self.series and (file.path or file.exclude or file.joints.path):
-            message = "path, exclude or joints.path of one file, beside a series of files"
+        other = file.path not in (None, *(line.path for line in self.series))
+        if self.series and (other or file.exclude or file.joints.path):
+            message = "path, exclude or joints.path of another file, beside a series of files"
             raise refused(message, "write the file as a line of the series", "measurements", "file")
         return self
 

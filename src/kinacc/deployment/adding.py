@@ -13,7 +13,6 @@ from typing import Any
 
 from kinacc.checks.contradictions import load
 from kinacc.config.edit import flow, with_added
-from kinacc.config.reading import read
 from kinacc.config.series import MOVED
 from kinacc.deployment.shared_readings import known_rows
 from kinacc.errors import InputError, Problem, first_few
@@ -91,17 +90,13 @@ def add(
     new: list[dict[str, Any]] = [
         {"path": _beside(config, path), "date": day, "base": base, "tool": tool}
     ]
-    emptied: Sequence[str] = ()
     if not lines:
-        emptied = ("datasets", name, "measurements", "file", "path")
-        written = read(config)[0].data["datasets"][name].get("measurements") or {}
-        first = (written.get("file") or {}).get("path") or _beside(config, known[0])
-        new.insert(0, {"path": first, "date": last})
+        new.insert(0, {"path": _beside(config, known[0]), "date": last})
     for line in new:
         line["date"] = datetime.date.fromisoformat(line["date"])
     place = Path(os.path.realpath(config))
     text = place.read_bytes().decode("utf-8")  # as bytes: line ends stay
-    changed = with_added(text, ("datasets", name, "series"), new, config, emptied)
+    changed = with_added(text, ("datasets", name, "series"), new, config)
     mode = place.stat().st_mode
     write_whole(place, changed.encode("utf-8"), on_disk=True)
     place.chmod(mode & 0o7777)
