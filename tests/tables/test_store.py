@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from kinacc.errors import InputError
 from kinacc.tables import store
-from kinacc.tables.atomic import replacing
+from kinacc.tables.atomic import write_together
 from kinacc.tables.contract import PROVENANCE_KEYS
 
 PROVENANCE = {"kinacc_version": "0.1.0", "config_hash": "c", "seed": 7}
@@ -96,23 +96,14 @@ def test_every_column_that_does_not_fit_is_named_and_nothing_is_written(tmp_path
     assert len([*tmp_path.iterdir()]) == 1
 
 
-def test_a_failure_while_writing_leaves_nothing_and_two_writers_do_not_meet(tmp_path):
-    path = tmp_path / "fig1.svg"
-
-    def stopped_half_way():
-        with replacing([path, tmp_path / "fig1.pdf"]) as (half, _):
-            half.write_text("half")
-            raise RuntimeError("power cut")
-
-    with pytest.raises(RuntimeError, match="power cut"):
-        stopped_half_way()
+def test_a_failure_while_writing_leaves_nothing_of_any_file(tmp_path):
+    with pytest.raises(TypeError):
+        write_together({tmp_path / "fig1.svg": b"whole", tmp_path / "fig1.pdf": None})
     assert not list(tmp_path.iterdir())
-    with replacing([path]) as (slow,):
-        slow.write_text("slow")
-        with replacing([path]) as (quick,):
-            quick.write_text("quick")
-        assert path.read_text() == "quick"
-    assert path.read_text() == "slow"
+    (tmp_path / "fig1.svg").mkdir()
+    with pytest.raises(InputError, match=r"fig1\.svg: cannot be written: is a directory"):
+        write_together({tmp_path / "fig1.svg": b"whole"})
+    assert [*tmp_path.iterdir()] == [tmp_path / "fig1.svg"]
 
 
 @settings(max_examples=150, deadline=5000)

@@ -9,7 +9,6 @@ plan is noticed.
 
 from __future__ import annotations
 
-import fcntl
 import hashlib
 import json
 import os
@@ -122,7 +121,7 @@ def locked(folder: Path, patience_s: float = _PATIENCE_S) -> Iterator[None]:
         raise _not_written(folder / LOCK, error) from None
     with lock as file:
         try:
-            held = taken(file.fileno(), fcntl.LOCK_EX, patience_s)
+            held = taken(file.fileno(), patience_s)
         except OSError as error:
             message = f"the file system of this folder holds no locks: {error.strerror}"
             fix = "two writers could spoil the campaign: move its folder to a local disk"

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import errno
 import fcntl
 import os
 import time
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 
-from kinacc.errors import Problem, and_more, refuse, refused
+from kinacc.errors import Problem, refuse, refused
 
 _ENDING = ".partial"
 
@@ -24,17 +23,15 @@ def unfinished(path: Path | str) -> Path:
     return Path(path).with_name(f".{Path(path).name}.{by}{_ENDING}")
 
 
-def taken(handle: int, how: int, patience_s: float | None = None) -> bool:
-    """Take a lock of an open file.
+def taken(handle: int, patience_s: float) -> bool:
+    """Take the lock of an open file for one writer.
 
     Parameters
     ----------
     handle
         Descriptor of the file.
-    how
-        ``fcntl.LOCK_EX`` or ``LOCK_SH``.
     patience_s
-        Seconds to wait; None for as long as it takes.
+        Seconds to wait for another that has it.
 
     Returns
     -------
@@ -46,27 +43,29 @@ def taken(handle: int, how: int, patience_s: float | None = None) -> bool:
     OSError
         Where the file system of the file has no locks.
     """
-    until = None if patience_s is None else time.monotonic() + patience_s
+    until = time.monotonic() + patience_s
     while True:
         try:
-            fcntl.flock(handle, how if until is None else how | fcntl.LOCK_NB)
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
             return True
-        except OSError as error:
-            if error.errno not in (errno.EWOULDBLOCK, errno.EACCES):
-                raise
-            if until is not None and time.monotonic() > until:
+        except (BlockingIOError, PermissionError):
+            if time.monotonic() > until:
                 return False
         time.sleep(0.05)
 
 
-@contextmanager
-def replacing(paths: Sequence[Path | str], on_disk: bool = False) -> Iterator[list[Path]]:
-    """Temporary paths beside ``paths``; renamed to them on success, removed on any failure.
+def write_whole(path: Path | str, content: bytes, on_disk: bool = False) -> None:
+    """Write a file so that it appears whole or not at all; see ``write_together``."""
+    write_together({path: content}, on_disk)
+
+
+def write_together(contents: Mapping[Path | str, bytes], on_disk: bool = False) -> None:
+    """Write files so that all of them appear or none.
 
     Parameters
     ----------
-    paths
-        Files that appear together.
+    contents
+        What the files hold, by path; folders are made.
     on_disk
         Whether files have reached the disk when this returns, and not only the system.
 
@@ -75,43 +74,24 @@ def replacing(paths: Sequence[Path | str], on_disk: bool = False) -> Iterator[li
     MachineError
         Naming the file, where the system does not take one.
     """
-    targets = [Path(path) for path in paths]
-    temporary = [unfinished(path) for path in targets]
+    parts = {Path(path): unfinished(path) for path in contents}
+    target = Path()
     try:
-        for path in targets:
-            path.parent.mkdir(parents=True, exist_ok=True)
-        yield temporary
-        for source in temporary if on_disk else ():
-            synchronise(source)
-        for source, target in zip(temporary, targets, strict=True):
-            os.replace(source, target)
-        for folder in {target.parent for target in targets} if on_disk else ():
+        for (target, part), content in zip(parts.items(), contents.values(), strict=True):
+            target.parent.mkdir(parents=True, exist_ok=True)
+            part.write_bytes(content)
+            if on_disk:
+                synchronise(part)
+        for target, part in parts.items():
+            os.replace(part, target)
+        for folder in {path.parent for path in parts} if on_disk else ():
             synchronise(folder)
     except OSError as error:
-        by_name = dict(zip(map(str, temporary), targets, strict=True))
-        place = by_name.get(str(error.filename), error.filename)
-        where = place or f"{targets[0]}{and_more(len(targets) - 1)}"
-        raise refused(error, where, "cannot be written") from None
+        raise refused(error, target, "cannot be written") from None
     finally:
-        for source in temporary:
+        for part in parts.values():
             with suppress(OSError):
-                source.unlink(missing_ok=True)
-
-
-def write_whole(path: Path | str, content: bytes, on_disk: bool = False) -> None:
-    """Write a file so that it appears whole or not at all; see ``replacing``."""
-    write_together({path: content}, on_disk)
-
-
-def write_together(contents: Mapping[Path | str, bytes], on_disk: bool = False) -> None:
-    """Write files so that all of them appear or none; see ``replacing``."""
-    with replacing([*contents], on_disk) as temporary:
-        for content, part in zip(contents.values(), temporary, strict=True):
-            try:
-                part.write_bytes(content)
-            except OSError as error:
-                error.filename = str(part)  # which the system does not name for a full disk
-                raise
+                part.unlink(missing_ok=True)
 
 
 def write_new(contents: Mapping[Path | str, bytes], force: bool) -> list[str]:
