@@ -102,7 +102,7 @@ def directions_of(
         about = f"{vertical} may be counted from the zenith or from the horizon"
         choices.append(Choice("--vertical", about, meant))
     if choices:
-        raise Undecided(table.path, choices)
+        raise Undecided(table.path, *choices)
     is_geodetic = {*first.horizontal.terms} & _WORDS["theodolite"]
     turning = answers.get("horizontal") or ("clockwise" if is_geodetic else "counterclockwise")
     return Directions.model_construct(unit=unit, vertical=zero, horizontal=turning)

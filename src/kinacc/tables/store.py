@@ -201,14 +201,11 @@ def content_of(table: pa.Table) -> bytes:
     return written.getvalue().to_pybytes()
 
 
-def read(path: Path | str, any_type: bool = False) -> Columns:
-    """Columns of a table as arrays, see :func:`columns_in`. Raises InputError as `read_table`.
-
-    Columns of other types than numbers and text are object arrays where ``any_type`` allows them.
-    """
+def read(path: Path | str) -> Columns:
+    """Columns of a table as arrays, see :func:`columns_in`. Raises InputError as `read_table`."""
     try:
-        return columns_in(read_arrow(path, any_type=any_type))
-    except (OverflowError, ValueError) as error:  # a day that no calendar has
+        return columns_in(read_arrow(path))
+    except (OverflowError, ValueError) as error:  # bytes that are no text
         message = f"not a readable Parquet file: {error}"
         raise input_error(str(path), message, fix=remake(path)) from None
 
@@ -234,7 +231,8 @@ def _is_number(kind: pa.DataType) -> bool:
 def read_arrow(path: Path | str, content: bytes | None = None, any_type: bool = False) -> pa.Table:
     """The Arrow table in a file, or in its ``content`` where that has been read already.
 
-    Checksums of pages are held to the pages. ``any_type`` and errors as of :func:`read`.
+    Checksums of pages are held to the pages. Columns hold numbers or text, unless ``any_type``.
+    Errors as of :func:`read`.
     """
     with _opened(path, content) as file:
         schema, footer = file.schema_arrow, file.metadata

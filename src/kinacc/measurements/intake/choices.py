@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -36,8 +36,8 @@ class Choice:
 class Undecided(InputError):
     """The file can be read in more than one way; carries the ``choices``."""
 
-    def __init__(self, path: str, choices: Sequence[Choice]) -> None:
-        self.choices = tuple(choices)
+    def __init__(self, path: str, *choices: Choice) -> None:
+        self.choices = choices
         problems = []
         for choice in self.choices:
             meant = "; ".join(f"{value}: {text}" for value, text in choice.answers.items())

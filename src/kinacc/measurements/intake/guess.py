@@ -111,7 +111,7 @@ def described(looked: Looked, answers: Answers, need: str = MEASUREMENTS) -> Gue
         meant = {t["x"].column: name for name, t in columns.targets.items()}
         questions = [Choice(TAKE, f"several points: {', '.join(columns.targets)}", meant)]
     if questions:
-        raise Undecided(table.path, questions)
+        raise Undecided(table.path, *questions)
     refuse(_missing(looked, columns, answers.get("take", ()), need),
            f"{looked.path} cannot be described")  # fmt: skip
     guesser = _Guesser(looked, columns, answers)
@@ -121,7 +121,7 @@ def described(looked: Looked, answers: Answers, need: str = MEASUREMENTS) -> Gue
     joint_unit, length_unit, angle_unit = guesser.units(per_deg)
     if need != MEASUREMENTS and joint_unit == "rad" and "joint_unit" in guesser.assumed:
         meant = {"rad": "radians", "deg": "degrees, of an arm that hardly moves"}
-        raise Undecided(table.path, [Choice("--joint-unit", guesser.assumed["joint_unit"], meant)])
+        raise Undecided(table.path, Choice("--joint-unit", guesser.assumed["joint_unit"], meant))
     refuse(guesser.problems, f"{table.path} cannot be described")
     section: dict[str, Any] = {"path": looked.path, **looked.written.written()}
     if need == MEASUREMENTS:
@@ -212,7 +212,7 @@ class _Guesser:
             if joints[0].unit.lower() in PULSES or (not joints[0].unit and most >= _MOST_DEG):
                 about = f"{listed([name.column for name in joints])} are pulses of the motors"
                 meant = {",".join("ABCDEFG"[: len(joints)]): "pulses of each joint in a degree"}
-                raise Undecided(self.table.path, [Choice("--pulses-per-deg", about, meant)])
+                raise Undecided(self.table.path, Choice("--pulses-per-deg", about, meant))
             return []
         per_deg = numbers_of(answer)
         if len(per_deg) != len(joints) or not per_deg.all():
@@ -250,7 +250,7 @@ class _Guesser:
                              f"{before}none": "it was read so"}  # fmt: skip
                     where = self.table.rows_in_words(rows)
                     about = f"the point of {name} is {number:.10g} in x, y or z of {where}"
-                    raise Undecided(self.table.path, [Choice("--no-reading", about, meant)])
+                    raise Undecided(self.table.path, Choice("--no-reading", about, meant))
 
     def units(self, per_deg: list[float]) -> list[str]:
         """The units of joints, lengths and angles."""

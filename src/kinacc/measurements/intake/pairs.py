@@ -188,7 +188,7 @@ def _by_clock(
             about += f"{key_of_points}, at the standstills of the arm, by {key}"
             meant = {f"{way:.3f}": f"{way:.3f} s are added to times of points" for way in ways[:4]}
             meant = meant or {"0": "both clocks showed the same"}
-            raise Undecided(points.table.path, [Choice("--clock-offset", about, meant)])
+            raise Undecided(points.table.path, Choice("--clock-offset", about, meant))
         answer, where = ways[0], points.table.path
         notes.append(f"joined by time: {answer:g} s are added to {key_of_points} of {where}")
     try:
@@ -208,4 +208,4 @@ def _undecided(joints: Looked, points: Looked, ways: Sequence[tuple[str, str]]) 
     if count == others:
         answers[ORDER] = "the first row belongs to the first, and so on"
     about = f"nothing decides which of {others} rows of joints belong to {count} points"
-    return Undecided(points.table.path, [Choice("--join", about, answers)])
+    return Undecided(points.table.path, Choice("--join", about, answers))

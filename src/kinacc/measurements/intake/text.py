@@ -88,7 +88,7 @@ def look(path: str | Path, answers: Answers | None = None) -> Looked:
     table = load(path, written)
     decimal, thousands, choice = decimals.marks_of(table.columns, answers, written.delimiter)
     if choice:
-        raise Undecided(str(path), [choice])
+        raise Undecided(str(path), choice)
     written = written.but(decimal=decimal, thousands=thousands)
     table = replace(table, decimal=decimal, thousands=thousands)
     if head.line > 1 and head.names is None:
@@ -174,7 +174,7 @@ def _workbook(path: Path, answers: Answers) -> _Written:
     likely = points or large or [*tables]
     if len(likely) > 1:
         meant = {sheet: first_few(_names(*tables[sheet]), 12) for sheet in likely}
-        raise Undecided(str(path), [Choice("--sheet", "several sheets hold tables", meant)])
+        raise Undecided(str(path), Choice("--sheet", "several sheets hold tables", meant))
     sheet = likely[0]
     others = [name for name in sheets if name != sheet and "sheet" not in answers]
     notes = [f"sheet {sheet!r}" + (f"; not read: {first_few(others)}" if others else "")]
