@@ -147,8 +147,6 @@ def test_units_above_the_rows_count_where_the_names_have_none(tmp_path):
     path = file(tmp_path, "// Units: Meters\n" + lines(metres, names))
     assert looked(path).section["length_unit"] == "m"
     assert_is_truth(reading(path))
-    inches = looked(file(tmp_path, "// Units: Inches\n" + lines(cells(), names)))
-    assert inches.section["length_unit"] == "inch"
 
 
 def test_a_file_without_names_is_read_by_the_names_given(tmp_path):
