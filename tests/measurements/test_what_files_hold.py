@@ -6,6 +6,7 @@ import dataclasses
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from scipy.spatial.transform import Rotation
 
@@ -21,7 +22,6 @@ from kinacc.measurements.reader import UNCERTAINTY, read
 ROOT = Path(__file__).parents[2]
 ARM = robot.load("ur10")
 COUNT = 8
-MARKS = dict.fromkeys(("kinacc_version", "config_hash"), "x")
 
 
 @pytest.fixture
@@ -39,15 +39,10 @@ def points(prefix="", start=0.0):
 
 def reading(folder, table, arm=ARM, kind="none", orientation=(), **section):
     path = folder / "poses.csv"
-    rows = [",".join(map(str, row)) for row in zip(*table.values(), strict=True)]
-    path.write_text("\n".join([",".join(table), *rows]) + "\n")
+    pd.DataFrame(table).to_csv(path, index=False)
     given = defaults()["measurements"]["file"] | {"path": str(path)} | section
     given["orientation"] = given["orientation"] | {"kind": kind} | dict(orientation)
     return read(given, arm, strict=False)
-
-
-def words(*values):
-    return np.array(values, dtype=object)
 
 
 def refused(folder, columns, **given) -> str:
@@ -127,8 +122,8 @@ def test_a_stated_standard_deviation_of_zero_says_nothing(tmp_path, joints):
 
 
 def test_sessions_count_their_poses_anew(tmp_path, joints):
-    table = joints | points() | {"pose": words(*"badabada"), "temp_C": np.full(COUNT, 21.5)}
-    table["session"] = words(*["monday"] * 4 + ["tuesday"] * 4)
+    table = joints | points() | {"pose": [*"badabada"], "temp_C": np.full(COUNT, 21.5)}
+    table["session"] = ["monday"] * 4 + ["tuesday"] * 4
     columns = reading(tmp_path, table).columns
     np.testing.assert_array_equal(columns["pose"], [0, 1, 2, 1, 3, 4, 5, 4])
     np.testing.assert_array_equal(columns["repeat"], [0, 0, 0, 1, 0, 0, 0, 1])
@@ -192,7 +187,7 @@ def test_mass_and_centre_of_the_payload_of_every_row(tmp_path, joints):
 
 
 def test_a_mass_alone_hangs_at_the_last_frame_and_an_empty_cell_says_nothing(tmp_path, joints):
-    table = joints | points() | {"Last": words(5, 5, "", 5, 5, 5, 5, 5)}
+    table = joints | points() | {"Last": [5, 5, "", 5, 5, 5, 5, 5]}
     columns = reading(tmp_path, table, columns={"payload": "Last"}).columns
     assert columns["payload_z_mm"][0] == 0.0
     assert np.isnan([columns["payload_kg"][2], columns["payload_x_mm"][2]]).all()
