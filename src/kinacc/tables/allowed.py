@@ -7,19 +7,10 @@ from kinacc.config import error_models
 MODELS = (*error_models.FITTED, error_models.NOMINAL)
 SELECTABLE = tuple(error_models.ERROR_MODELS)
 SUBSETS = ("train", "validation")
-QUANTITIES = ("position", "orientation")
-UNITS_OF_RESIDUALS = ("mm", "mrad")
 COMPARISONS = tuple(item.name for item in error_models.COMPARISONS)
-ESTIMATES = ("train", "cross_validated")
 FINDING_LEVELS = ("stops", "warning", "note")
 LEFT_OUT = "left_out"  # the finding that something of a file is not used
 ERRORS = ("delta_x", "delta_y", "delta_z", "eps_x", "eps_y", "eps_z")
-ASSESSORS = ("maximum", "outlier_rejection", "model_invalidation")
-OUTLIER_RULES = ("normal", "gamma", "iqr")
-DISTANCES = ("squared", "as_printed")
-COVARIANCES = ("r", "sqrt_r")
-SEARCHES = ("from_above", "from_below", "bisection")
-EXAMPLES = ("rejected", "rejected_larger_eta", "not_rejected")
 VERDICTS = ("agrees", "differs", "not comparable")
 # What becomes of a calibration by the next line of a series, and of base and tool since the line.
 FIRST, HOLDS, RECALIBRATE, OPEN = "first", "holds", "recalibrate", "cannot be told"
