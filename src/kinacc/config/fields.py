@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass
 from typing import Annotated, Any, TypeVar
 
@@ -57,11 +57,15 @@ def refused(message: str, fix: str = "", *keys: str | int) -> PydanticCustomErro
     return PydanticCustomError("refused", "{what}", {"what": message, "fix": fix, "keys": keys})
 
 
-def distinct(items: list[Any]) -> list[Any]:
-    """The items. Raises where one stands there more than once."""
-    if repeated := [item for item, count in Counter(items).items() if count > 1]:
-        raise refused(f"names {first_few(repeated)} more than once")
-    return items
+def distinct(parts: Callable[[Any], Iterable[Any]]) -> AfterValidator:
+    """Validator of values, none of whose ``parts`` may stand there more than once."""
+
+    def check(value: Any) -> Any:
+        if repeated := [part for part, count in Counter(parts(value)).items() if count > 1]:
+            raise refused(f"names {first_few(repeated)} more than once")
+        return value
+
+    return AfterValidator(check)
 
 
 def _rising(values: list[float]) -> list[float]:
@@ -83,7 +87,7 @@ class OneOf:
 
 
 Text = Annotated[str, Field(min_length=1)]
-Distinct = AfterValidator(distinct)
+Distinct = distinct(iter)
 Rising = AfterValidator(_rising)
 Pair = Annotated[
     list[Annotated[float, Field(ge=-720, le=720)]],

@@ -213,11 +213,6 @@ def _kind(gate: Any) -> str | None:
     return f"[{kinds[0]}]" if len(kinds) == 1 or kinds == ["against", "value"] else None
 
 
-def _names_once(gates: list[Gate]) -> list[Gate]:
-    distinct([gate.name for gate in gates])
-    return gates
-
-
 Gates = Annotated[
     list[
         Annotated[
@@ -232,7 +227,7 @@ Gates = Annotated[
         ]
     ],
     Field(max_length=100),
-    AfterValidator(_names_once),
+    distinct(lambda gates: [gate.name for gate in gates]),
 ]
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import AfterValidator, BeforeValidator, Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from kinacc.config.fields import Distinct, OneOf, Section, Text, distinct, refused, setting
 from kinacc.config.values import did_you_mean, shown
@@ -46,20 +46,10 @@ def _listed(lines: Any) -> Any:
     return lines if isinstance(lines, list) else [lines]
 
 
-def _each_line_once(rows: list[Excluded]) -> list[Excluded]:
-    distinct([line for row in rows for line in row.lines])
-    return rows
-
-
-def _column_once(names: dict[str, str]) -> dict[str, str]:
-    distinct([*names.values()])
-    return names
-
-
 Columns = Annotated[
     dict[Annotated[str, BeforeValidator(_column)], Text],
     BeforeValidator(_ours_first),
-    AfterValidator(_column_once),
+    distinct(dict.values),
 ]
 Names = Annotated[list[Text], Field(min_length=1, max_length=10000), Distinct]
 Thousands = Literal[".", ",", " ", "'"]
@@ -76,6 +66,10 @@ class Excluded(Section):
         BeforeValidator(_listed),
     ] = setting(..., "lines of the file")
     reason: Text = setting(..., "why")
+
+
+def _lines(rows: list[Excluded]) -> list[int]:
+    return [line for row in rows for line in row.lines]
 
 
 class Synthetic(Section):
@@ -249,7 +243,7 @@ class MeasuredFile(Written):
         "one pose",
     )
     joints: JointsFile = JointsFile()
-    exclude: Annotated[list[Excluded], AfterValidator(_each_line_once)] = setting(
+    exclude: Annotated[list[Excluded], distinct(_lines)] = setting(
         [],
         "rows that no fit and no figure uses, by their lines in the file (row numbers of a "
         "Parquet file), each with the reason",
