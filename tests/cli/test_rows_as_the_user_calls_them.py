@@ -34,9 +34,10 @@ def two_files(tmp_path_factory):
     config = folder / "cell" / "m.yaml"
     quick = folder / "quick.yaml"
     quick.write_text(
-        "measurements: {folds: 4}\ndatasets: {m: {calibration: {vec: {order: 1}, dh: {fit_to: "
-        "measurements}}, evaluation: {space: measured}, data_check: {accept: {outliers: a test, "
-        "few_poses: a test}}, measurements: {file: {exclude: [{lines: [35], reason: bumped}]}}}}\n"
+        "calibration: {vec: {order: 1}, dh: {fit_to: measurements}}\n"
+        "datasets: {m: {evaluation: {space: measured}, data_check: {accept: {outliers: a test, "
+        "few_poses: a test}}, measurements: {folds: 3, "
+        "file: {exclude: [{lines: [35], reason: bumped}]}}}}\n"
     )
     return folder, (config, quick), said.output
 
