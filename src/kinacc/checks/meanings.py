@@ -96,11 +96,11 @@ def find(
 
     ``written`` is the fit of the readings as they stand.
     """
-    spread = spread_mm(read.position_mm)
-    if len(np.unique(read.pose)) < _FEWEST or spread == 0.0:
-        return read, []
     # One session: each has its own base, and a meaning holds for all of them.
     part = _largest_session(read, np.arange(len(read)))
+    spread = spread_mm(part.position_mm)
+    if len(np.unique(part.pose)) < _FEWEST or spread == 0.0:
+        return read, []
     few = part.select(thinned(np.arange(len(part)), _TRIED_ROWS))
     here = Meaning.of(few, robot, ())
     tried = _searched(here, robot, written.sigma_mm < _GOOD * spread, progress)
@@ -117,7 +117,7 @@ def find(
         for applied in progress(likely, "likely ways to read the columns fitted")
     ]
     least = min(share for share, _, _ in fitted)
-    if least >= _BETTER * _fitted(many, robot, ())[0] or least > FAR:
+    if least >= _BETTER * written.sigma_mm / spread or least > FAR:
         return read, []
     (_, found_mm, applied), *others = (item for item in fitted if item[0] < _AS_GOOD * least)
     texts = {change.finding.what for change in applied}

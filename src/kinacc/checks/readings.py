@@ -129,8 +129,13 @@ class Distance:
 
 def distances(every: Readings) -> list[Distance]:
     """Distances of all pairs of targets that were seen together often enough to compare."""
+    number = grouped(every.session, every.pose, every.repeat)
+    place = np.full((number.max() + 1, len(every.target_names)), -1)
+    place[number, every.target] = np.arange(len(every))
     results = []
-    for first, second, rows in _side_by_side(every):
+    for first, second in combinations(range(place.shape[1]), 2):
+        rows = place[:, [first, second]]
+        rows = rows[(rows >= 0).all(axis=1)]
         if len(rows) >= 3:
             rows = rows[np.argsort(every.line[rows[:, 0]], kind="stable")]
             ends = every.position_mm[rows]
@@ -139,15 +144,6 @@ def distances(every: Readings) -> list[Distance]:
             std = float(np.median(np.abs(length - middle))) / _MEDIAN_1D
             results.append(Distance(first, second, rows, length, middle, std))
     return results
-
-
-def _side_by_side(every: Readings) -> list[tuple[int, int, ndarray]]:
-    """Pairs of targets with the readings (m, 2) of them that were taken together."""
-    number = grouped(every.session, every.pose, every.repeat)
-    place = np.full((number.max() + 1, len(every.target_names)), -1)
-    place[number, every.target] = np.arange(len(every))
-    pairs = combinations(range(place.shape[1]), 2)
-    return [(*pair, rows[(rows >= 0).all(axis=1)]) for pair in pairs for rows in [place[:, pair]]]
 
 
 def thinned(rows: ndarray, most: int) -> ndarray:

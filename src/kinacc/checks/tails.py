@@ -64,11 +64,8 @@ def _length(probability: float, dimensions: int, freedom: float) -> float:
 def _freedom(ratio: float, dimensions: int) -> float:
     """Degrees of freedom at which the bulk quantile is ``ratio`` medians, within bounds."""
 
-    def excess(freedom: float) -> float:
-        return _length(_BULK, dimensions, freedom) / _length(0.5, dimensions, freedom) - ratio
+    def of(freedom: float) -> float:
+        return _length(_BULK, dimensions, freedom) / _length(0.5, dimensions, freedom)
 
-    if excess(_MOST_FREEDOM) >= 0.0:
-        return _MOST_FREEDOM
-    if excess(_LEAST_FREEDOM) <= 0.0:
-        return _LEAST_FREEDOM
-    return float(scipy.optimize.brentq(excess, _LEAST_FREEDOM, _MOST_FREEDOM))
+    ratio = float(np.clip(ratio, of(_MOST_FREEDOM), of(_LEAST_FREEDOM)))
+    return float(scipy.optimize.brentq(lambda f: of(f) - ratio, _LEAST_FREEDOM, _MOST_FREEDOM))

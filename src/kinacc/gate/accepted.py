@@ -14,7 +14,7 @@ import numpy as np
 
 from kinacc import __version__
 from kinacc.deployment import folder, history
-from kinacc.errors import FitError, InputError, Problem, first_few, refuse
+from kinacc.errors import FitError, InputError, Problem, first_few
 from kinacc.gate import chance
 from kinacc.gate.outcome import FAILED, PASSED, UNDECIDED, WARNED, Outcome
 from kinacc.gate.values import SELECTED, RunTables
@@ -28,6 +28,7 @@ NOTE = "accepted.json"
 # Of 1 % false alarms 0.3 % are for held-out errors and 0.7 % for the arm: a new fit absorbs a
 # knocked joint, so that only the arm's test shows it.
 CONFIDENCE, ARM_LEVEL = 0.997, 0.007
+_PICTURES = shutil.ignore_patterns("*.svg", "*.png", "*.pdf", "*.html")
 _FAR = 3.0  # standard deviations beyond which a parameter counts as moved
 
 
@@ -36,8 +37,8 @@ def accept(results: Path, folder: Path, datasets: Sequence[str], reason: str) ->
 
     Raises InputError without a reason, or where the folder holds something else.
     """
-    refuse([Problem("--reason", "is empty", "why this run is as it should be")]
-           if not reason.strip() else [])  # fmt: skip
+    if not reason.strip():
+        raise InputError(Problem("--reason", "is empty", "why this run is as it should be"))
     note, known = folder / NOTE, []
     if note.is_file():
         known = json.loads(note.read_text("utf-8"))
@@ -46,11 +47,7 @@ def accept(results: Path, folder: Path, datasets: Sequence[str], reason: str) ->
         raise InputError(Problem(str(folder), message, "a folder of its own"))
     for name in datasets:
         new, target = unfinished(folder / name), folder / name
-        for path in sorted((results / name).rglob("*")):
-            if path.suffix in (".parquet", ".sha256") or path.name == "SHA256SUMS":
-                place = new / path.relative_to(results / name)
-                place.parent.mkdir(parents=True, exist_ok=True)
-                shutil.copyfile(path, place)
+        shutil.copytree(results / name, new, ignore=_PICTURES)
         shutil.rmtree(target, ignore_errors=True)
         os.replace(new, target)
     known.append(
@@ -106,10 +103,7 @@ def compared(now: Path, before: Path, rotation_weight_mm_per_rad: float) -> Iter
 
 def _errors(now: Path, before: Path, _: float) -> tuple[str, str, dict[str, Any]]:
     """Whether the mean held-out position error is better, the same or worse than accepted."""
-    new, old = (
-        tables.errors(tables.model(SELECTED), "held_out", "position")
-        for tables in map(RunTables, (now, before))
-    )
+    new, old = (RunTables(item).errors(SELECTED, "held_out", "position") for item in (now, before))
     worse = chance.change("mean", new, old, False, CONFIDENCE)
     better = chance.change("mean", old, new, False, CONFIDENCE)
     word = "worse" if worse.least > 0.0 else "better" if better.least > 0.0 else "same"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -35,8 +34,7 @@ def check_file(path: Path, artefact: Artefact) -> list[Problem]:
         table = store.read_arrow(path)
         frame = table.to_pandas()
     except (InputError, UnicodeDecodeError, pa.ArrowException) as error:
-        results = getattr(error, "problems", [Problem(str(path), f"not readable: {error}")])
-        return [replace(problem, fix="") for problem in results]
+        return [*getattr(error, "problems", [Problem(str(path), f"not readable: {error}")])]
     problems = list(_structure(path, artefact, table.schema))
     if problems:
         return problems
@@ -89,10 +87,8 @@ def _values(where: str, column: Column, values: pd.Series) -> Iterator[Problem]:
     else:
         supplied = supplied.astype(float)
         slack = 1e-9 * max(abs(column.low or 0.0), abs(column.high or 0.0))
-        low, high = (
-            default if limit is None else limit
-            for limit, default in ((column.low, -np.inf), (column.high, np.inf))
-        )
+        low = -np.inf if column.low is None else column.low
+        high = np.inf if column.high is None else column.high
         good = np.isfinite(supplied) & supplied.between(low - slack, high + slack)
     if column.choices:
         good &= supplied.isin(column.choices)

@@ -38,14 +38,10 @@ _HISTORY = {
 }
 
 
-class Absent(InputError):
-    """A table that a gate needs is missing; its problem names the command that makes it."""
-
-
 class RunTables(dict[str, pd.DataFrame]):
     """Tables of one data set by artefact, read once.
 
-    Raises Absent for a table that is missing, InputError for a file that is no table.
+    Raises InputError for a table that is missing, naming the command that makes it.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -59,7 +55,7 @@ class RunTables(dict[str, pd.DataFrame]):
             fix = f"kinacc {'study' if studied else 'calibrate'} FILE.yaml makes it"
             if artefact == "history":
                 fix = "give the data set a series (docs/history.md) and calibrate it"
-            raise Absent(Problem(str(path), "missing", fix=fix))
+            raise InputError(Problem(str(path), "missing", fix=fix))
         self[artefact] = store.read_table(path)
         return self[artefact]
 
@@ -68,12 +64,12 @@ class RunTables(dict[str, pd.DataFrame]):
         return selected(self["model_selection"]) if named == SELECTED else named
 
     def errors(self, model: str, place: str, quantity: str) -> Sample:
-        """Sizes of a model's errors, mm or mrad, at the rows at which every model was tried.
+        """Sizes of errors of a model of a gate, mm or mrad, at rows at which every model was tried.
 
         ``place``: held_out, every row by a fit without it; validation, rows of the validation fold;
-        training, rows that were fitted. Raises Absent where there are none.
+        training, rows that were fitted. Raises InputError where there are none.
         """
-        table = self["pose_errors"]
+        model, table = self.model(model), self["pose_errors"]
         table = table[table["estimate"] == ("train" if place == "training" else "cross_validated")]
         if place == "validation":
             table = table[table["subset"] == "validation"]
@@ -87,7 +83,7 @@ class RunTables(dict[str, pd.DataFrame]):
         if not known.any():
             message = f"has no {quantity} errors of model {model} at rows {place.replace('_', ' ')}"
             fix = "name another model or other rows"
-            raise Absent(Problem("pose_errors.parquet", message, fix=fix))
+            raise InputError(Problem("pose_errors.parquet", message, fix=fix))
         rows = table["row"].to_numpy()[known]
         return Sample(sizes[known], configurations_of(self["measurements"])[rows])
 
@@ -118,17 +114,17 @@ class Figure:
 
 def sample(tables: RunTables, gate: Mapping[str, Any]) -> Sample:
     """The errors behind a gate's figure of errors."""
-    return tables.errors(tables.model(gate["model"]), gate["at"], gate["value"].split(".")[1])
+    return tables.errors(gate["model"], gate["at"], gate["value"].split(".")[1])
 
 
 def figure(tables: RunTables, gate: Mapping[str, Any]) -> Figure:
-    """The figure of a gate. Raises Absent where its table is missing."""
+    """The figure of a gate. Raises InputError where its table is missing."""
     name = gate["value"]
     (unit, meaning), (topic, _, word) = FIGURES[name], name.partition(".")
     if name.startswith(COMPARED):
         return _of_errors(tables, gate, unit)
     if topic == "bound":
-        return _of_bound(tables, unit, word)
+        return _of_bound(tables, unit)
     if topic == "history":
         size = float(tables["history"][_HISTORY[word]].iloc[-1])
         why = "the history has no earlier calibration in force" if np.isnan(size) else ""
@@ -140,7 +136,7 @@ def figure(tables: RunTables, gate: Mapping[str, Any]) -> Figure:
 def cell(tables: RunTables, gate: Mapping[str, Any]) -> Figure:
     """The number in the one row and column of a table that a gate names.
 
-    Raises Absent where the table is missing, InputError for another number of rows.
+    Raises InputError where the table is missing, or for another number of rows.
     """
     artefact, column = gate["table"], gate["column"]
     table, where = tables[artefact], f"{artefact}.parquet"
@@ -177,7 +173,7 @@ def _of_errors(tables: RunTables, gate: Mapping[str, Any], unit: str) -> Figure:
     return Figure(size, unit, called, about, why)
 
 
-def _of_bound(tables: RunTables, unit: str, word: str) -> Figure:
+def _of_bound(tables: RunTables, unit: str) -> Figure:
     from kinacc.campaign import of_calibration
     from kinacc.campaign.beside_results import of_results
     from kinacc.deployment import folder
@@ -189,11 +185,11 @@ def _of_bound(tables: RunTables, unit: str, word: str) -> Figure:
     if results is None:
         message = "; ".join(required.remarks) or "no campaign on this calibration"
         fix = f"kinacc campaign start FOLDER --calibration {tables.folder}"
-        raise Absent(Problem(str(tables.folder), message, fix=fix))
+        raise InputError(Problem(str(tables.folder), message, fix=fix))
     bound = results.of_all
     why = "" if np.isfinite(bound.upper_mm) else "its campaign has no upper bound so far"
     if bound.excepted:
         why = f"its upper bound leaves {bound.excepted} candidates out"
     about: dict[str, Any] = {"campaign": results.folder, "confidence": bound.confidence}
-    called = f"{word} bound on the largest error, by campaign {results.folder}"
+    called = f"upper bound on the largest error, by campaign {results.folder}"
     return Figure(bound.upper_mm, unit, called, about, why)
