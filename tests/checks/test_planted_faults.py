@@ -146,6 +146,14 @@ def test_a_joint_that_counts_the_other_way_is_named(name, joint, tmp_path):
     assert only(bad.check(tmp_path), "joint_sign", EVERY(file)).values["joint"] == joint
 
 
+def test_joints_in_radians_of_which_two_count_the_other_way_are_all_named(tmp_path):
+    file = good("arm").rows(slice(0, 40))
+    for names, factor in ((["q2_deg", "q3_deg"], -1.0), (plants.joints(file), np.pi / 180.0)):
+        file = plants.scaled(file, names, factor, EVERY(file))
+    found = [(each.kind, each.values.get("joint")) for each in file.check(tmp_path).suspicions]
+    assert sorted(found) == [("joint_sign", 2), ("joint_sign", 3), ("joint_units", None)]
+
+
 def test_positions_mirrored_beside_good_orientations_are_mended_alone(tmp_path):
     bad = plants.mirrored(good("arm"), "x", EVERY(good("arm")))
     found = only(bad.check(tmp_path), "left_handed", EVERY(bad))

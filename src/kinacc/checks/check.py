@@ -207,8 +207,9 @@ def _scattered(fitted: Fitted) -> Iterator[Finding]:
 
 
 def _shipped(single: Readings, robot: Robot, progress: Progress) -> str:
-    names = [name for name in shipped.fitting(single, progress) if name != robot.name]
-    return f". Shipped robots that fit: {', '.join(names)}" if names else ""
+    rivals = shipped.misfits(single, progress)
+    names = [name for share, name in rivals if share <= shipped.SURE and name != robot.name]
+    return f". Shipped robots that fit, best first: {', '.join(names)}" if names else ""
 
 
 def _no_fit(
@@ -267,7 +268,7 @@ def _outside(every: Readings, robot: Robot) -> Iterator[Finding]:
 def _once(findings: list[Finding], lines: int) -> list[Finding]:
     """Findings without those another makes needless.
 
-    Those of the same kind and of no other rows, and what merely shows (outliers, joints outside
+    Those of the same kind and joint and of no other rows, and what merely shows (outliers, joints outside
     their limits) in rows of which a fault is known that is not in all ``lines`` of the file.
     """
     faults = [e for e in findings if e.kind not in _SYMPTOMS and len(e.lines) < lines]
@@ -275,7 +276,9 @@ def _once(findings: list[Finding], lines: int) -> list[Finding]:
     needed: list[Finding] = []
     for item in findings:
         rows_ = set(item.lines)
-        rivals = [set(e.lines) for e in needed if e.kind == item.kind]
+        joint = item.values.get("joint")
+        same = [e for e in needed if (e.kind, e.values.get("joint")) == (item.kind, joint)]
+        rivals = [set(e.lines) for e in same]
         # A second jump concerns part of the rows of the first and is another one all the same.
         jump = item.kind in ("base_jump", "target_moved")
         needless = any(rows_ == rival if jump else rows_ <= rival for rival in rivals)

@@ -1,4 +1,4 @@
-"""Which of the shipped robots fits measured readings."""
+"""Which of the shipped robots fit measured readings."""
 
 from __future__ import annotations
 
@@ -14,29 +14,35 @@ from kinacc.kinematics import robot as robots
 
 _ROWS = 240
 _TRIED = 4  # robots that base and target alone put first
-_SURE = 0.005  # of the points' spread: what an arm that is the one leaves, uncalibrated
+SURE = 0.005  # of the points' spread: what an arm that is the one leaves, uncalibrated
 _NEXT = 0.2  # of what the next best leaves
 _SAME_ARM = 1e-6  # of the misfit: two names of one geometry
 
 
-def fitting(merged: Readings, progress: Progress) -> list[str]:
-    """Names of the shipped robots that fit: one, or those of equal geometry; or none.
+def misfits(merged: Readings, progress: Progress) -> list[tuple[float, str]]:
+    """What shipped robots leave, as a share of the points' spread, and their names, best first.
 
     The arms are taken as described: corrected, an arm of similar build would fit as well.
     """
     few = merged.select(thinned(np.arange(len(merged)), _ROWS))
+    spread = max(spread_mm(few.position_mm), 1e-9)
     arms = [arm for arm in map(robots.load, robots.shipped()) if arm.dh.joints == few.joints]
     rivals = [(arm, replace(few, q_rad=arm.dh_joints(few.q))) for arm in arms]
     rivals.sort(key=lambda pair: Meaning.of(pair[1], pair[0], ()).misfit)
-    misfits = []
+    shares = []
     for arm, observed in progress(rivals[:_TRIED], "shipped robots tried"):
         begin = robust_fit.start(observed, arm.dh)
-        sigma_mm = robust_fit.best(observed, begin, strengths=(0.0,)).sigma_mm
-        misfits.append((sigma_mm / max(spread_mm(few.position_mm), 1e-9), arm.name))
-    misfits.sort()
-    if not misfits or misfits[0][0] > _SURE:
+        fit = robust_fit.best(observed, begin, strengths=(0.0,))
+        shares.append((fit.sigma_mm / spread, arm.name))
+    return sorted(shares)
+
+
+def fitting(merged: Readings, progress: Progress) -> list[str]:
+    """Names of the shipped robots that fit: one, or those of equal geometry; or none."""
+    shares = misfits(merged, progress)
+    if not shares or shares[0][0] > SURE:
         return []
-    limit = (1.0 + _SAME_ARM) * misfits[0][0]
-    others = [misfit for misfit, _ in misfits if misfit > limit]
-    alone = not others or misfits[0][0] <= _NEXT * others[0]
-    return [name for misfit, name in misfits if misfit <= limit] if alone else []
+    limit = (1.0 + _SAME_ARM) * shares[0][0]
+    others = [share for share, _ in shares if share > limit]
+    alone = not others or shares[0][0] <= _NEXT * others[0]
+    return [name for share, name in shares if share <= limit] if alone else []
