@@ -268,8 +268,8 @@ def _outside(every: Readings, robot: Robot) -> Iterator[Finding]:
 def _once(findings: list[Finding], lines: int) -> list[Finding]:
     """Findings without those another makes needless.
 
-    Those of the same kind and joint and of no other rows, and what merely shows (outliers, joints outside
-    their limits) in rows of which a fault is known that is not in all ``lines`` of the file.
+    Those of the same kind and joint and of no other rows, and what merely shows (outliers, joints
+    outside their limits) in rows of which a fault is known that is not in all ``lines``.
     """
     faults = [e for e in findings if e.kind not in _SYMPTOMS and len(e.lines) < lines]
     named = {line for item in faults for line in item.lines}
