@@ -13,7 +13,7 @@ from kinacc.checks.findings import Finding, finding
 from kinacc.checks.readings import Readings
 from kinacc.config.measured import ANGLES, CONVENTIONS, Orientation
 from kinacc.kinematics.robot import Robot
-from kinacc.measurements.layout import in_order_of
+from kinacc.measurements.layout import LENGTH, in_order_of
 from kinacc.measurements.orientation import rotations
 
 # Units of angles: what they are, what the file says, its setting, and the factor.
@@ -21,12 +21,7 @@ _ANGLE_UNITS = (
     ("radians", "degrees", "rad", 180.0 / np.pi),
     ("degrees", "radians", "deg", np.pi / 180.0),
 )
-_LENGTH_UNITS = (
-    (finding("length_units", unit="metres", short="m", setting={"length_unit": "m"}), 1e3),
-    (finding("length_units/other", unit="centimetres"), 10.0),
-    (finding("length_units/other", unit="inches"), 25.4),
-    (finding("length_units/small", setting={"length_unit": "mm"}), 1e-3),
-)
+_LENGTH_UNITS = {"m": "metres", "cm": "centimetres", "inch": "inches"}
 _MIRRORS = dict(zip("xyz", 1.0 - 2.0 * np.eye(3), strict=True))
 
 
@@ -50,9 +45,13 @@ def joint_units(robot: Robot) -> Iterator[Change]:
         yield _joints(change, robot, np.diag(np.where(slides, factor, 1.0)))
 
 
-def length_units() -> list[Change]:
-    """Positions in another unit."""
-    return [_positions(change, factor) for change, factor in _LENGTH_UNITS]
+def length_units() -> Iterator[Change]:
+    """Positions in another unit than millimetres, or stated to be in metres."""
+    for short, unit in _LENGTH_UNITS.items():
+        setting = {"length_unit": short}
+        change = finding("length_units", unit=unit, short=short, setting=setting)
+        yield _positions(change, LENGTH[short])
+    yield _positions(finding("length_units/small", setting={"length_unit": "mm"}), 1e-3)
 
 
 def left_handed() -> Change:

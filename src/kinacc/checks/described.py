@@ -18,6 +18,7 @@ from kinacc.kinematics.robot import Robot
 from kinacc.measurements.intake import guess as guesses
 from kinacc.measurements.intake.guess import Guess
 from kinacc.measurements.intake.write import dataset_content, plain_name, template_text
+from kinacc.measurements.layout import ANGLE, LENGTH
 from kinacc.measurements.reader import MeasuredFile, read
 from kinacc.progress import SILENT
 
@@ -184,8 +185,8 @@ def remarks_on(guess: Guess, report: Report, reading: MeasuredFile, arm: Robot) 
     cells, decimal = guess.table.columns, guess.table.decimal
     targets = guess.columns.targets.values()
     points = [cells[target[axis].column] for target in targets for axis in "xyz"]
-    unit = 1.0 if guess.section["length_unit"] == "mm" else 1000.0
-    step = min(digits.step(column, unit, decimal) for column in points)
+    unit_mm = LENGTH[guess.section["length_unit"]]
+    step = min(digits.step(column, unit_mm, decimal) for column in points)
     fit = report.facts.get("quick_fit")
     residual = fit["left_per_axis_mm"] if isinstance(fit, Mapping) else np.inf
     # Rounding alone leaves 0.3 of a step.
@@ -196,9 +197,9 @@ def remarks_on(guess: Guess, report: Report, reading: MeasuredFile, arm: Robot) 
         )
     if guess.section.get("pulses_per_deg") or arm.dh.prismatic.any():
         return
-    unit = 1.0 if guess.section["joint_unit"] == "deg" else 180.0 / np.pi
+    unit_deg = np.rad2deg(ANGLE[guess.section["joint_unit"]])
     joints = [cells[name.column] for name in guess.columns.joints]
-    step = min(digits.step(column, unit, decimal) for column in joints)
+    step = min(digits.step(column, unit_deg, decimal) for column in joints)
     if step > 0.0:
         q = np.stack([reading.columns[f"q{i + 1}"] for i in range(guess.joints)], axis=1)
         reach_mm, rms_mm = digits.cost(arm.dh, arm.dh_joints(q), step)
