@@ -5,11 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.differentiate import jacobian
+from scipy.spatial.transform import Rotation
 
 from kinacc.campaign import folder as campaigns
 from kinacc.campaign.instrument import instruments
 from kinacc.campaign.plan import from_json, to_json
 from kinacc.errors import InputError
+from kinacc.geometry import Pose
 
 LASER = "laser:range_mm=0.01,range_um_per_m=5,angle_mm=0.02,angle_um_per_m=15,repeat_mm=0.03"
 
@@ -46,6 +48,14 @@ def test_a_laser_tracker_is_as_sure_of_each_candidate_as_its_range_and_angles_th
     order = plan.visiting(frozenset())
     told = plan.candidates(order).covariance_mm2
     np.testing.assert_array_equal(told, plan.covariance_mm2[order])
+
+
+def test_the_beam_of_a_tracker_that_is_turned_against_the_base_is_along_its_line_of_sight():
+    (tracker,) = instruments([f"tracker={LASER}"], "instrument")
+    turn, head = Rotation.random(rng=4).as_matrix(), np.array([2000.0, -500.0, 300.0])
+    at = np.random.default_rng(4).uniform(-800.0, 800.0, (5, 3))
+    wanted = [turn @ of_spherical_readings(turn.T @ (each - head)) @ turn.T for each in at]
+    np.testing.assert_allclose(tracker.in_base(Pose(turn, head), at), wanted, rtol=1e-5, atol=1e-9)
 
 
 def test_a_plan_with_a_laser_tracker_is_read_as_it_was_written(begun):

@@ -27,3 +27,17 @@ def test_joints_written_in_steps_cost_what_rounding_them_moves_the_flange():
     assert rms_mm == pytest.approx(np.sqrt(np.mean(np.sum(moved**2, axis=1))), rel=0.05)
     # The wrist reaches 580 mm, the flange 72 mm more.
     assert 600.0 < reach_mm < 720.0
+
+
+def test_a_drift_is_how_far_the_points_went_where_a_turn_of_the_base_carries_them(tmp_path):
+    file = simulated("ur10", poses=160, noise_mm=0.02)
+    names = ["x_mm", "y_mm", "z_mm"]
+    at = file.columns[names].to_numpy()
+    turn = np.array([0.3e-3, -0.4e-3, 0.5e-3])  # about the origin of the readings, some metres away
+    moved = at + np.linspace(0.0, 1.0, len(at))[:, None] * np.cross(turn, at)
+    columns = {name: moved[:, i] for i, name in enumerate(names)}
+    (found,) = file.but(**columns).check(tmp_path).suspicions
+    assert found.kind == "drift"
+    went = np.cross(turn, at.mean(axis=0))
+    assert np.linalg.norm(went) > 0.5
+    np.testing.assert_allclose(found.values["drift_mm"], went, atol=0.1)

@@ -102,6 +102,9 @@ def test_a_space_has_its_faces_and_may_cross_half_a_turn():
         assert region.contains(CYLINDER, at(*good))
     for bad in [(1199, 30, 0), (2101, 30, 0), (1500, -1, 0), (1500, 61, 0), (1500, 9, 501)]:
         assert not region.contains(CYLINDER, at(*bad))
+    raised = region.Cylinder(1200.0, 900.0, 700.0, 500.0, 0.0, math.radians(60))
+    for height, inside in [(699, False), (701, True), (1199, True), (1201, False)]:
+        assert region.contains(raised, at(1500, 30, height)) == inside
     across = region.Cylinder(100.0, 100.0, 0.0, 10.0, math.radians(170), math.radians(190))
     assert region.contains(across, at(150, -175, 5))
     assert not region.contains(across, at(150, 0, 5))
