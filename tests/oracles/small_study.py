@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -36,15 +35,7 @@ figures: {formats: [svg]}
 WORKING_RANGE_DEG = [(-12, 72), (-30, 54), (-74, 18), (-180, 180), (-122, 122), (-180, 180)]
 
 
-@dataclass(frozen=True)
-class Written:
-    """What the oracle wrote into the measurement file, row by row."""
-
-    q_rad: np.ndarray
-    frames: np.ndarray
-
-
-def write_measurements(path: Path) -> Written:
+def write_measurements(path: Path) -> None:
     """150 poses and ten revisits of an arm with errors like Table III's, 0.03 mm of noise."""
     rng = np.random.default_rng(2)
     low, high = np.radians(WORKING_RANGE_DEG).T
@@ -56,7 +47,6 @@ def write_measurements(path: Path) -> Written:
     q = rng.uniform(low, high, (150, 6))
     q = np.concatenate([q, q[::15]]).round(9)
     lines = ["q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,x_mm,y_mm,z_mm,rx_deg,ry_deg,rz_deg"]
-    frames = []
     degrees = np.degrees(q).round(10)
     for row in degrees:
         frame = kinematics.projected(
@@ -67,11 +57,7 @@ def write_measurements(path: Path) -> Written:
         position = (frame[:3, 3] + rng.normal(size=3) * 0.03).round(6)
         angles = Rotation.from_matrix(frame[:3, :3]).as_euler("XYZ", degrees=True).round(8)
         lines.append(",".join(repr(float(x)) for x in [*row, *position, *angles]))
-        frame[:3, :3] = Rotation.from_euler("XYZ", angles, degrees=True).as_matrix()
-        frame[:3, 3] = position
-        frames.append(frame)
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    return Written(np.radians(degrees), np.array(frames))
 
 
 def run_stages(config: Path, dataset: str, results: Path, names: tuple[str, ...] = ()) -> Path:
