@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ from kinacc.gate.outcome import FAILED, PASSED, WARNED, CheckReport, Outcome
 from kinacc.tables import store, sums
 from kinacc.tables.contract import ARTEFACTS
 from kinacc.workflow.data_sets import DataSets, data_sets
+from kinacc.workflow.described import beside
 from kinacc.workflow.outdated import made_with_other_settings
 
 _NEEDED = ("measurements", "robot", "vec_model", "dh_model", "frames", "residuals", "pose_errors")
@@ -106,8 +108,8 @@ def _files(
     folder: Path, problems: Sequence[Problem], says: str, count: int, fix: str = ""
 ) -> Outcome:
     if problems:
-        listed = [str(item) for item in problems[:_SHOWN]]
-        says = "\n".join([*listed, *filter(None, [and_more(len(problems) - _SHOWN).strip()])])
+        shown = "\n".join(map(str, problems[:_SHOWN]))
+        says = shown + and_more(len(problems) - _SHOWN).replace(" ", "\n", 1)
     figures = {"problems": len(problems)} if problems else {"files": count}
     verdict = FAILED if problems else PASSED
     return Outcome(folder.name, "files", "files", verdict, says, fix if problems else "", figures)
@@ -122,7 +124,8 @@ def _problems(folder: Path) -> Iterator[Problem]:
     if missing := [name for name in _NEEDED if f"{name}.parquet" not in remaining]:
         made = sorted(path.stem for path in (folder / sums.FOLDER).glob("*.sha256"))
         message = f"calibration not finished: no {first_few(missing, 2)}; stages done: "
-        fix = "kinacc calibrate FILE.yaml goes on, or prints why it stops"
+        config = next((os.path.relpath(path) for path, _ in beside(folder.resolve())), "FILE.yaml")
+        fix = f"kinacc calibrate {config} goes on, or prints why it stops"
         yield Problem(str(folder), message + (", ".join(made) or "none"), fix=fix)
     for path in sorted(folder.rglob("*.parquet")):
         relative = path.relative_to(folder)
