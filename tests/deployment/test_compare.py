@@ -29,6 +29,11 @@ def changed(arm, **by_name):
     return replace(arm, model=arm.model.with_parameters(vector))
 
 
+def sure_of_all(arm):
+    """The calibration without undetermined directions."""
+    return replace(arm, known=replace(arm.known, undetermined=arm.known.undetermined[:0]))
+
+
 @pytest.mark.parametrize("name", ["mh180", "ur10"])
 def test_repeated_calibrations_of_one_arm_differ_by_chance_alone(name):
     q_rad = joints(name, 60)
@@ -36,6 +41,7 @@ def test_repeated_calibrations_of_one_arm_differ_by_chance_alone(name):
         compare(calibrated(name, "dh", 60, 200 + i), calibrated(name, "dh", 60, 300 + i), q_rad)
         for i in range(14)
     ]
+    assert {each.verdict for each in found} == {comparison.UNPROVEN}
     chances = np.array([each.probability for each in found])
     assert chances.min() > 1e-3
     assert 0.25 < chances.mean() < 0.75
@@ -84,6 +90,7 @@ def test_a_planted_change_is_found_under_its_name(parameter, size):
     after = changed(calibrated("mh180", "dh", 60, 4), **{parameter: size})
     found = compare(before, after, joints("mh180", 60))
     assert found.probability < 1e-6
+    assert found.verdict == comparison.CHANGED
     largest = found.parameters.loc[found.parameters["sigmas"].abs().idxmax()]
     assert largest["name"] == parameter.replace("_", ".", 1).rpartition("_")[0]
     assert abs(largest["sigmas"]) > 5.0
@@ -93,13 +100,23 @@ def test_a_planted_change_is_found_under_its_name(parameter, size):
 def test_what_no_pose_shows_is_marked_and_counts_for_nothing():
     before = calibrated("mh180", "dh", 60, 3)
     after = changed(before, j2_d_mm=5.0, j3_d_mm=5.0)  # axes 2 and 3 are antiparallel
-    found = compare(before, after, joints("mh180", 60))
-    row = found.parameters.set_index("name").loc["j2.d"]
-    assert row["undetermined"] == "both"
-    assert np.isnan(row["sigmas"])
-    assert row["difference"] == pytest.approx(5.0)
-    assert found.probability > 0.9
-    assert found.shifts["rms_mm"][1] < 0.05
+    pairs = {"both": (before, after), "second": (sure_of_all(before), after),
+             "first": (before, sure_of_all(after))}  # fmt: skip
+    for which, pair in pairs.items():
+        found = compare(*pair, joints("mh180", 60))
+        row = found.parameters.set_index("name").loc["j2.d"]
+        assert row["undetermined"] == which
+        assert np.isnan(row["sigmas"])
+        assert row["difference"] == pytest.approx(5.0)
+        assert found.probability > 0.9
+        assert found.shifts["rms_mm"][1] < 0.05
+
+
+def test_what_base_and_tool_take_up_is_no_change_of_the_arm():
+    before = calibrated("mh180", "dh", 60, 3)
+    found = compare(before, changed(before, j1_d_mm=3.0, j6_d_mm=4.0), joints("mh180", 60))
+    assert found.shifts["rms_mm"][0] > 1.0
+    assert found.shifts["rms_mm"][1] < 1e-9
 
 
 def test_another_geometry_is_another_robot_and_a_calibration_is_not():

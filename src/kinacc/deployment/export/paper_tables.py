@@ -68,9 +68,7 @@ def with_deviation(value: float, std: float) -> str:
 
 
 def _residuals(source: Source, comparison: str, name: str, caption: str) -> PaperTable:
-    table = pd.DataFrame(
-        {key: np.asarray(column) for key, column in source.tables["residuals"].items()}
-    )
+    table = pd.DataFrame(dict(source.tables["residuals"]))
     table = table[table["fold"].astype(float).isna() & (table["comparison"] == comparison)]
     table = table.sort_values(
         "subset", key=lambda subset: subset.map([*POSES].index), kind="stable"
@@ -91,7 +89,7 @@ def _parameters(source: Source) -> PaperTable:
         source.tables.get(f"{PLAINEST}_identified", {}), columns=["parameter", "status"]
     )
     fixed = {*reported.loc[reported["status"] == FIXED, "parameter"]}
-    shown = [item for item in PARAMETERS if item != "beta_rad" or (fitted[item] != 0.0).any()]
+    shown = PARAMETERS if fitted["beta_rad"].any() else PARAMETERS[:-1]
 
     def cell(joint: int, parameter: str, value: float, std: float) -> str:
         nominal = float(getattr(source.calibration.robot.dh, parameter)[joint - 1])
