@@ -64,12 +64,11 @@ class Experiment:
 class Information:
     """Rows (n, m, r) that n candidate poses add to the normal equations of r directions.
 
-    The r = ``rank`` directions are those that the candidates determine of the parameters ``names``
-    (P,); the others are ``left_open``.
+    The r = ``rank`` directions are those that the candidates determine of the parameters; the
+    others are ``left_open``.
     """
 
     rows: np.ndarray
-    names: tuple[str, ...]
     rank: int
     left_open: LeftOpen
 
@@ -138,7 +137,7 @@ def plan_poses(
         distance[path[:-1], path[1:]],
         index,
         float(np.trace(distance, offset=1)),
-        len(shown.names),
+        len(shown.left_open.names),
         shown.rank,
         tuple(sorted(shown.left_open.sentences)),  # their order is rounding
     )
@@ -242,7 +241,7 @@ def information(robot: Robot, q_rad: np.ndarray, experiment: Experiment) -> Info
     _, everywhere, axes = np.linalg.svd(anywhere)
     hidden = axes[int(np.sum(everywhere > STRUCTURAL * everywhere[0])) :]
     left_open = LeftOpen.of(hidden if len(lost) else lost, lost, names, known)
-    return Information(slopes @ right[:rank].T, names, rank, left_open)
+    return Information(slopes @ right[:rank].T, rank, left_open)
 
 
 def _slopes(arm: Calibration, q_dh: np.ndarray, experiment: Experiment) -> np.ndarray:

@@ -61,12 +61,16 @@ def generated(source: Source) -> str:
         low, high = robot.dh_box(low, high)
     scale = np.where(dh.prismatic, _M_PER_MM, 1.0)
     joints = [
-        {"name": _name(name), "kind": "prismatic" if slides else "revolute", "sense": int(sense),
-         "low": _digits(lower), "high": _digits(upper)}
-        for name, slides, sense, lower, upper in zip(
-            names, dh.prismatic, senses, low * scale, high * scale, strict=True
+        {"name": _name(name), "kind": kind, "sense": int(sense), "low": lower, "high": upper}
+        for name, kind, sense, lower, upper in zip(
+            names,
+            np.where(dh.prismatic, "prismatic", "revolute"),
+            senses,
+            map(_digits, low * scale),
+            map(_digits, high * scale),
+            strict=True,
         )
-    ]  # fmt: skip
+    ]
     frames, end = origins(dh)
     frames[0] = compose(robot.base, frames[0])
     links = ["base_link", *(f"link_{i}" for i in range(1, dh.joints + 1)), "flange"]
@@ -77,13 +81,11 @@ def generated(source: Source) -> str:
     joints += [{"name": f"{link}_fixed"} for link in links[dh.joints + 1 :]]
     about = f"{source.about}; effort and velocity are placeholders"
     lines = [about, *source.orientation_lines, *source.left_open_lines]
-    text = (files("kinacc.deployment.export") / "arm.urdf").read_text("utf-8")
-    options: dict[str, Any] = dict.fromkeys(
-        ("autoescape", "trim_blocks", "lstrip_blocks", "keep_trailing_newline"), True
-    )
-    return Template(
-        text, **options
-    ).render(
+    template = Template(
+        (files("kinacc.deployment.export") / "arm.urdf").read_text("utf-8"),
+        autoescape=True, trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True,
+    )  # fmt: skip
+    return template.render(
         name=_name(source.name),
         comments=[re.sub("-(?=-)", "- ", line) for line in lines],  # no comment holds two of them
         joints=zip(joints, links, links[1:], map(_attributes, frames), strict=False),
