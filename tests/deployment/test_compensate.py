@@ -65,12 +65,12 @@ def test_a_vec_model_gives_no_joints_outside_its_range():
     arm = calibrated("mh180", "vec")
     by_dh = calibrated("mh180", "dh")
     q_rad = joints("mh180", 1)
-    q_rad[0, 0] = 2.9  # the arm turned away from all that was measured
-    wanted = predict(by_dh, q_rad).pose
-    found = compensate(arm, wanted, q_rad)
-    assert found.status[0] == PoseStatus.OUTSIDE_RANGE
-    assert found.offending[0, 0]
-    assert np.isnan(found.q_rad).all()
+    for turned in (arm.fitted_range_rad[1][0] + 0.05, 2.9):  # nearly there, and turned away
+        q_rad[0, 0] = turned
+        found = compensate(arm, predict(by_dh, q_rad).pose, q_rad)
+        assert found.status[0] == PoseStatus.OUTSIDE_RANGE
+        assert found.offending[0, 0]
+        assert np.isnan(found.q_rad).all()
 
 
 def test_each_pose_is_reached_in_its_own_directions_of_travel():

@@ -46,12 +46,28 @@ def test_a_knocked_joint_is_named_and_the_new_calibration_is_in_force_from_then_
     assert found["probability"][1] < LEVEL
 
 
-def test_a_tracker_that_was_moved_and_is_said_to_stand_still_is_seen():
-    seen = measured(2)
-    shifted = replace(seen, position_mm=seen.position_mm + np.array([0.0, 0.0, 1.5]))
-    found = history(session(measured(1), 1, False), session(shifted, 2, False))
-    assert found["verdict"][1] == "recalibrate"
-    assert found["moved_mm"][1] == pytest.approx(1.5, abs=0.3)
+def test_a_tracker_that_was_moved_is_seen_but_not_beside_as_large_a_drift():
+    """A series may be as a whole in any state that another one passes through."""
+    up = np.array([0.0, 0.0, 1.0])
+    for drift_mm, verdict in ((0.0, "recalibrate"), (0.4, "cannot be told")):
+        lines = []
+        for number, shift_mm in ((1, 0.0), (2, 0.3)):
+            seen = measured(number)
+            rises_mm = shift_mm + drift_mm * np.linspace(-1.0, 1.0, len(seen))
+            seen = replace(seen, position_mm=seen.position_mm + rises_mm[:, None] * up)
+            lines.append(session(seen, number, False))
+        found = history(*lines)
+        assert found["verdict"][1] == verdict
+        assert found["moved_mm"][1] == pytest.approx(0.3, abs=0.05)
+
+
+def test_misfit_that_differs_between_halves_widens_the_limit_at_other_poses(monkeypatch):
+    lines = [session(measured(n, other_poses=True), n, False) for n in (1, 2)]
+    usual = history(*lines)
+    monkeypatch.setattr(histories.history_model, "understated", lambda halves: 9.0)
+    wide = history(*lines)
+    assert wide["chance_mm"][1] == pytest.approx(3.0 * usual["chance_mm"][1], rel=0.15)
+    assert wide["moved_mm"][1] == usual["moved_mm"][1]
 
 
 def test_the_history_is_the_same_in_whatever_order_lines_were_added():
