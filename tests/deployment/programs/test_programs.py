@@ -22,7 +22,7 @@ from kinacc.deployment.programs.orientation import (
     VECTOR,
     Convention,
 )
-from kinacc.deployment.programs.record import NUMBER, Source, _written
+from kinacc.deployment.programs.record import CHANGED, NUMBER, STILL, Source, _written
 from kinacc.errors import InputError
 from kinacc.geometry import Pose, exp_so3
 from kinacc.kinematics import robot
@@ -218,10 +218,14 @@ def test_frames_that_a_program_changes_are_refused(tmp_path):
     target = "[[9,0,9],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]"
     program = _read(tmp_path, "own.mod", f"""
       PERS wobjdata w:=[FALSE,TRUE,"",[[1,0,8],[0,0,1,0]],[[0,0,0],[1,0,0,0]]];
+      PERS wobjdata part:=[TRUE,TRUE,"",[[1,0,8],[0,0,1,0]],[[0,0,0],[1,0,0,0]]];
+      PERS tooldata torch:=[FALSE,[[0,0,0],[1,0,0,0]],[1,[0,0,1],[1,0,0,0],0,0,0]];
       w.uframe.trans:=p;
       MoveL {target},v50,fine,tool0\\WObj:=w;
+      MoveL {target},v50,fine,tool0\\WObj:=part;
+      MoveL {target},v50,fine,torch;
       MoveL {target},v50,fine,tool0;""")  # fmt: skip
-    assert [bool(each.refused) for each in program.positions] == [True, False]
+    assert [each.refused for each in program.positions] == [CHANGED, STILL, STILL, ""]
     frame = "{X 1,Y 2,Z 3,A 0,B 0,C 0}"
     program = _read(
         tmp_path,
@@ -264,8 +268,8 @@ def test_poses_that_no_move_uses_are_left_alone(tmp_path):
 
 def test_shifts_of_a_job_are_no_positions(tmp_path):
     program = _read(tmp_path, "own.jbi", """///TOOL 0\n///POSTYPE BASE\n///RECTAN
-P0000=0.5,-151,-1,0,0,0\nP00100=275.0,0,875,180,45,0\n//INST
-MOVJ P100 VJ=10.00\nSFTON P000""")  # fmt: skip
+P0000=0.5,-151,-1,0,0,0\nP00100=275.0,0,875,180,45,0\nP00101=5,0,0,0,0,0\n//INST
+MOVJ P100 VJ=10.00\nMOVJ P101 VJ=10.00\nSFTON P000\nSFTON P101""")  # fmt: skip
     assert [each.name for each in program.positions] == ["P00100"]
 
 

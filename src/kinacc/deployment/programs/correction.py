@@ -56,7 +56,6 @@ LANGUAGES: tuple[Language, ...] = tuple(
 AT_MOST_MM = 20.0
 _RECORD = ".kinacc.json"
 _SAME_TOOL_MM, _SAME_TOOL_RAD = 5.0, np.deg2rad(1.0)
-_SAME = 1e-6  # mm and mrad: a pose that is no other
 _SINGULAR = 0.02  # smallest singular value of the Jacobian in rad and units of the reach
 _SHOWN = [
     "change_mm", "change_mrad", "largest_joint_change_deg", "expected_error_mm",
@@ -185,7 +184,7 @@ def compensate_program(
     for number, row in zip(rows.index, rows.itertuples(), strict=True):
         if reason := work.obstacle(positions[number], row, at_most_mm):
             reasons[number] = reason
-        elif positions[number].scale is not None or max(row.change_mm, row.change_mrad) > _SAME:
+        else:
             new[positions[number]] = work.numbers(positions[number], row)
     table = pd.DataFrame({
         "position": [item.name for item in positions],

@@ -124,8 +124,7 @@ def read(sources: Sequence[Source], _: np.ndarray | None) -> Program:
 def posture(sides: Sequence[bool], q_deg: np.ndarray) -> tuple[str, ...]:
     """Status and turn: bits 0 to 2, and of the six axes, in words."""
     is_ahead, is_above, _ = sides
-    bent_back = -180.0 <= q_deg[4] < 0.0 or q_deg[4] >= 180.0
-    status = (not is_ahead) + 2 * is_above + 4 * bent_back
+    status = (not is_ahead) + 2 * is_above + 4 * (q_deg[4] < 0.0)
     return _stated(status, sum(int(angle < 0.0) << axis for axis, angle in enumerate(q_deg)))
 
 
