@@ -273,6 +273,16 @@ MOVJ P100 VJ=10.00\nMOVJ P101 VJ=10.00\nSFTON P000\nSFTON P101""")  # fmt: skip
     assert [each.name for each in program.positions] == ["P00100"]
 
 
+def test_positions_that_were_not_taught_in_full_are_listed(tmp_path):
+    frame = "X = 1 mm, Y = ******** mm, Z = 3 mm, W = 0 deg, P = 0 deg, R = 0 deg"
+    joints = ", ".join(f"J{axis} = {axis} deg" for axis in range(1, 7))
+    program = _read(
+        tmp_path, "own.ls", f"/POS\nP[1]{{\n GP1: {frame}\n}};\nP[2]{{\n GP1: {joints}\n}};"
+    )
+    assert [each.name for each in program.positions] == ["P[2]"]
+    assert program.not_corrected == ["own.ls:2: P[1]"]
+
+
 def test_waypoints_of_polyscope_start_from_their_joints(tmp_path):
     program = _read(tmp_path, "own.script", """  global A_p=p[-.12,-.43,.14,0,3.11,.04]
   global A_q=[0.98, -1.29, 2.28, -2.52, -1.55, -0.57]

@@ -35,8 +35,13 @@ def read(sources: Sequence[Source], _: np.ndarray | None) -> Program:
         if motion[1] or _OFFSET.search(motion[0])
     ]
     start = max(source.text.find("/POS"), 0)
-    positions = [_position(source, match) for match in _POSITION.finditer(source.text, start)]
-    return Program(sources, [*filter(None, positions)], computed)
+    positions = []
+    for match in _POSITION.finditer(source.text, start):
+        if position := _position(source, match):
+            positions.append(position)
+        else:
+            computed.append(source.statement(match.start(1), f"{match[1]}]"))
+    return Program(sources, positions, computed)
 
 
 def _position(source: Source, match: re.Match[str]) -> Position | None:
@@ -48,7 +53,7 @@ def _position(source: Source, match: re.Match[str]) -> Position | None:
         return None
     slides = not is_pose and any(values[key][3] for key in keys)
     return Position(
-        match[1] + "]",
+        f"{match[1]}]",
         source,
         [values[key].span(2) for key in keys],
         3,
