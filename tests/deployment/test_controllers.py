@@ -95,6 +95,8 @@ def test_values_typed_into_a_controller_err_by_no_more_than_the_page_states(tmp_
     for each in answer["values"]:
         digits = {"ur": 9, "abb": 9 if each["name"][0] == "q" else 4}.get(maker, 4)
         typed.setdefault(each["group"], {})[each["name"]] = round(each["new"], digits)
+    first, *_, last = typed.get("joint zeros", {"A1": 0.0, "A6": 0.0}).values()
+    assert first == last == 0.0  # no pose tells them from base and tool
     misses = []
     for near in arm.draw(np.random.default_rng(6), POSES):
         goal = measured.BASE @ arm.pose(near) @ measured.TOOL
