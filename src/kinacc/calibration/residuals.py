@@ -37,17 +37,6 @@ class Errors:
         return np.column_stack([self.position_mm, 1e3 * self.rotation_rad])
 
 
-@dataclass(frozen=True)
-class Statistics:
-    """Statistics of n magnitudes, in their unit."""
-
-    n: int
-    mean: float
-    max: float
-    rms: float
-    gamma99: float
-
-
 def errors(fits: Mapping[str, Fit], observations: Observations) -> dict[str, Errors]:
     """Errors of every comparison, each in the base of the model compared.
 
@@ -104,8 +93,8 @@ def cross_validated(
     return held_out, trained
 
 
-def statistics(vectors: np.ndarray) -> Statistics | None:
-    """Statistics of magnitudes.
+def statistics(vectors: np.ndarray) -> tuple[int, float, float, float, float] | None:
+    """Number, mean, largest, rms and gamma99 of magnitudes, in their unit.
 
     Parameters
     ----------
@@ -114,22 +103,16 @@ def statistics(vectors: np.ndarray) -> Statistics | None:
 
     Returns
     -------
-    Statistics or None
+    tuple or None
         Of the finite ones, None without any; gamma99 is NaN where a magnitude is zero: the
-        likelihood
-        has no maximum there.
+        likelihood has no maximum there.
     """
-    magnitudes = np.linalg.norm(vectors, axis=1)
-    magnitudes = magnitudes[np.isfinite(magnitudes)]
-    if magnitudes.size == 0:
+    size = np.linalg.norm(vectors, axis=1)
+    size = size[np.isfinite(size)]
+    if not size.size:
         return None
-    return Statistics(
-        n=int(magnitudes.size),
-        mean=float(magnitudes.mean()),
-        max=float(magnitudes.max()),
-        rms=float(np.sqrt(np.mean(magnitudes**2))),
-        gamma99=gamma99(magnitudes) if magnitudes.min() > 0.0 else float("nan"),
-    )
+    quantile = gamma99(size) if size.min() > 0.0 else np.nan
+    return size.size, size.mean(), size.max(), np.sqrt(np.mean(size**2)), quantile
 
 
 def _difference(reference: Pose, model: Pose, bases: Pose) -> Errors:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import astuple
 from typing import Any
 
 import numpy as np
@@ -240,7 +239,7 @@ def _statistics(name: str, subset: str, fold: float, off: Errors) -> Iterator[tu
     ):
         figures = statistics(vectors)
         if figures is not None:
-            yield (name, subset, fold, quantity, unit, *astuple(figures))
+            yield (name, subset, fold, quantity, unit, *figures)
 
 
 def _error_rows(
