@@ -78,9 +78,10 @@ def test_closed_forms_return_to_the_pose_and_name_branches_by_posture(model):
         *((arm, "nominal") for arm in (MH180, UR10, IIWA, *SEARCHED)),
         *((arm, "vec") for arm in (MH180, UR10, IIWA, *SEARCHED[:5])),
     ],
+    ids=lambda value: getattr(value, "name", value),
 )
 def test_what_is_found_is_verified_and_own_postures_are_among_it(arm, kind):
-    q = arms.joints_within(arm, 3 if arm.dh.joints == 7 else COUNTS[kind])
+    q = arms.joints_within(arm, 2 if arm.dh.joints == 7 else COUNTS[kind])
     model = arm.dh if kind == "nominal" else wavy(arm, q)
     pose = model.pose(JointState(q))
     solved = inverse.solve(arm, model, pose)
