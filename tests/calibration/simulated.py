@@ -64,6 +64,7 @@ def measure(
         rotation=rotation,
         pose=pose,
         target=target,
+        payload=np.full((len(pose), 4), np.nan),
         repeat=np.zeros(len(pose), dtype=int),
         fold=pose % 5,
         target_names=tuple(f"t{number}" for number in range(targets)),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, fields, replace
 from typing import Self
 
 import numpy as np
@@ -32,10 +32,9 @@ class Observations:
     pose, target, repeat, fold : numpy.ndarray
         Integers, shape (n,): target an index into ``target_names``, fold -1 where none is assigned.
     session : numpy.ndarray
-        Index into ``session_names``, shape (n,), each with a base of its own; one if not given.
+        Index into ``session_names``, shape (n,), each with a base of its own.
     payload : numpy.ndarray
-        Mass in kg and centre in the last DH frame in mm, shape (n, 4); NaN where not stated, all
-        if not given.
+        Mass in kg and centre in the last DH frame in mm, shape (n, 4); NaN where not stated.
     """
 
     q_rad: np.ndarray
@@ -46,17 +45,10 @@ class Observations:
     target: np.ndarray
     repeat: np.ndarray
     fold: np.ndarray
+    session: np.ndarray
+    payload: np.ndarray
     target_names: tuple[str, ...] = (TOOL,)
-    session: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     session_names: tuple[str | None, ...] = (None,)
-    payload: np.ndarray = field(default_factory=lambda: np.zeros((0, 4)))
-
-    def __post_init__(self) -> None:
-        count = len(self.q_rad)
-        if len(self.session) != count:
-            object.__setattr__(self, "session", np.zeros(count, dtype=np.int64))
-        if len(self.payload) != count:
-            object.__setattr__(self, "payload", np.full((count, 4), np.nan))
 
     def __len__(self) -> int:
         return len(self.q_rad)
@@ -143,6 +135,8 @@ def full_poses(
         target=zeros,
         repeat=zeros,
         fold=np.full(count, -1) if fold is None else np.asarray(fold),
+        session=zeros,
+        payload=np.full((count, 4), np.nan),
     )
 
 
@@ -153,8 +147,7 @@ def from_columns(columns: Mapping[str, np.ndarray], robot: Robot) -> Observation
     ----------
     columns : mapping
         Reported joints ``q1`` .., directions ``s1`` .., position in mm, quaternion, and the numbers
-        of
-        pose, target, repeat; session, fold and payload where there are any.
+        of pose, target, repeat; session, fold and payload where there are any.
     robot : Robot
         The arm they were made with, which turns reported joints into DH joints.
 
@@ -184,5 +177,7 @@ def from_columns(columns: Mapping[str, np.ndarray], robot: Robot) -> Observation
         target_names=target_names,
         session=np.array([session_names.index(name) for name in sessions], dtype=np.int64),
         session_names=session_names,
-        payload=stack(*PAYLOAD_COLUMNS) if PAYLOAD_COLUMNS[0] in columns else np.zeros((0, 4)),
+        payload=stack(*PAYLOAD_COLUMNS)
+        if PAYLOAD_COLUMNS[0] in columns
+        else np.full((count, 4), np.nan),
     )
