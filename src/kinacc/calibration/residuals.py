@@ -189,18 +189,15 @@ def bias(pose_errors: pd.DataFrame, q_rad: np.ndarray) -> Iterator[tuple[Any, ..
         DH joints of all measured rows, shape (n, k).
     """
     for names, group in pose_errors.groupby(["comparison", "estimate"], sort=False):
-        vectors = group[_POSITION].to_numpy()
+        squared = np.square(group[_POSITION]).sum(axis=1)
         for joint, angle in enumerate(q_rad[group["row"]].T, 1):
             edges = np.linspace(angle.min(), angle.max(), REGIONS + 1)
             region = np.clip(np.searchsorted(edges, angle, side="right") - 1, 0, REGIONS - 1)
-            for number in np.unique(region):
-                part = vectors[region == number]
-                error = np.full(3, np.nan)
-                if len(part) > 1:
-                    error = part.std(axis=0, ddof=1) / np.sqrt(len(part))
-                rms = float(np.sqrt(np.mean(np.sum(part**2, axis=1))))
-                span = edges[number], edges[number + 1]
-                yield (*names, joint, *span, len(part), *part.mean(axis=0), *error, rms)
+            parts = group.groupby(region)[_POSITION]
+            rms = np.sqrt(squared.groupby(region).mean())
+            table = pd.concat([parts.size(), parts.mean(), parts.sem(), rms], axis=1)
+            for number, *figures in table.itertuples(name=None):
+                yield (*names, joint, edges[number], edges[number + 1], *figures)
 
 
 def worst(pose_errors: pd.DataFrame, line: np.ndarray) -> pd.DataFrame:

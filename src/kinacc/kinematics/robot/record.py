@@ -73,28 +73,6 @@ class Robot:
 
         return load(name)
 
-    @classmethod
-    def from_urdf(
-        cls, path: str | Path, base_link: str | None = None, tip_link: str | None = None
-    ) -> Robot:
-        """Load the arm of a URDF file.
-
-        Parameters
-        ----------
-        path
-            The URDF file.
-        base_link, tip_link
-            First and last link of the arm; the root and the end of the tree where not given.
-
-        Raises
-        ------
-        InputError
-            For a file that describes no serial arm of revolute and sliding joints.
-        """
-        from kinacc.kinematics.robot import urdf
-
-        return urdf.load(path, base_link, tip_link)
-
     def __repr__(self) -> str:
         return f"<Robot {self.name!r}, {self.dh.joints} joints>"
 
