@@ -8,6 +8,7 @@ from simulated import POINT, POSE, anywhere, far_off, fit, measure, predicted
 
 from kinacc.calibration import frames
 from kinacc.calibration.dh_estimator import free_parameters
+from kinacc.errors import InputError
 from kinacc.geometry import compose, log_so3
 from kinacc.kinematics import dh, robot
 
@@ -36,3 +37,14 @@ def test_poses_are_found_again_from_five_degrees_and_twenty_mm(name, hayati, mod
         if mode != POINT:
             turn = log_so3(got.rotation @ np.swapaxes(wanted.rotation, 1, 2))
             assert np.linalg.norm(turn, axis=1).max() < 1e-3
+
+
+def test_fewer_numbers_than_parameters_are_refused():
+    arm, rng = robot.load("mh180"), np.random.default_rng(0)
+    free = free_parameters(6)
+    seen = measure(arm.dh, rng.uniform(-REACH, REACH, (4, 6)), POINT, rng)
+    with pytest.raises(InputError, match="12 residual components of 4 training rows for the 33"):
+        fit(seen, arm.dh, free)
+    known = frames.FrameParameters.none(frames.known())
+    with pytest.raises(InputError, match="for the 24 free parameters of the DH fit"):
+        fit(seen, arm.dh, free, frames=known)
