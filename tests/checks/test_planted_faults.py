@@ -139,7 +139,7 @@ def test_a_drift_has_its_size(tmp_path):
     assert 0.75 < np.linalg.norm(found.values["drift_mm"]) < 2.25
 
 
-@pytest.mark.parametrize(("name", "joint"), [("arm", 1), ("ur10", 5), ("fanuc", 2)])
+@pytest.mark.parametrize(("name", "joint"), [("arm", 1), ("ur10", 5)])
 def test_a_joint_that_counts_the_other_way_is_named(name, joint, tmp_path):
     file = good(name)
     bad = plants.scaled(file, [f"q{joint}_deg"], -1.0, EVERY(file))

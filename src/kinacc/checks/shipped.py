@@ -40,9 +40,7 @@ def misfits(merged: Readings, progress: Progress) -> list[tuple[float, str]]:
 def fitting(merged: Readings, progress: Progress) -> list[str]:
     """Names of the shipped robots that fit: one, or those of equal geometry; or none."""
     shares = misfits(merged, progress)
-    if not shares or shares[0][0] > SURE:
-        return []
-    limit = (1.0 + _SAME_ARM) * shares[0][0]
-    others = [share for share, _ in shares if share > limit]
-    alone = not others or shares[0][0] <= _NEXT * others[0]
-    return [name for share, name in shares if share <= limit] if alone else []
+    least = shares[0][0] if shares else np.inf
+    same = [name for share, name in shares if share <= (1.0 + _SAME_ARM) * least]
+    others = shares[len(same) :]
+    return [] if least > SURE or (others and least > _NEXT * others[0][0]) else same
