@@ -15,7 +15,7 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from kinacc.errors import InputError, Problem, first_few, input_error, refuse
+from kinacc.errors import InputError, Problem, first_few, gathered, input_error, refuse
 from kinacc.tables import sums
 from kinacc.tables.atomic import write_whole
 from kinacc.tables.columns import (
@@ -148,41 +148,41 @@ def to_table(
         for name in columns
         if name not in names
     ]
-    rows = max((len(columns[name]) for name in columns), default=0)
+    count = max((len(columns[name]) for name in columns), default=0)
     arrays = []
     for column in known:
-        values, wrong = columns.get(column.name), ("missing", "")
-        if values is not None or column.optional:
-            array, wrong = _to_arrow(column, [None] * rows if values is None else values)
-            arrays.append(array)
-            if not any(wrong) and len(array) != rows:
-                wrong = "columns of different lengths", f"{rows} rows"
-        if any(wrong):
-            problems.append(Problem(f"{where}, column {column.name}", *wrong))
+        with gathered(problems):
+            place = f"{where}, column {column.name}"
+            arrays.append(_to_arrow(column, columns.get(column.name), count, place))
     refuse(problems, f"{artefact} does not fit its contract")
     return pa.Table.from_arrays(arrays, schema=arrow_schema(artefact, joints, provenance, columns))
 
 
-def _to_arrow(column: Column, values: Any) -> tuple[pa.Array, tuple[str, str]]:
-    """Values in the type of a column; and what is wrong with them, beside what is allowed."""
+def _to_arrow(column: Column, values: Any, count: int, where: str) -> pa.Array:
+    """Values in the type of a column, nulls where none are stated. InputError if unfit."""
     kind, is_text = _ARROW_TYPES[column.kind], column.kind == "text"
+    if values is None and not column.optional:
+        raise input_error(where, "missing")
     if isinstance(values, pd.Series):
         values = values.to_numpy(object if is_text else None)
     try:
+        values = [None] * count if values is None else values
         array = pa.array(values, kind if is_text else None, from_pandas=True)
         if pa.types.is_string(array.type) and not is_text:
-            return None, ("text in place of numbers", column.kind)
+            raise TypeError("text in place of numbers")
         array = array.cast(kind)
     except (pa.ArrowException, TypeError, ValueError, OverflowError) as error:
-        return None, (str(error).split("\n")[0], column.kind)
+        raise input_error(where, str(error).split("\n")[0], column.kind) from None
+    if len(array) != count:
+        raise input_error(where, "columns of different lengths", f"{count} rows")
     null = np.asarray(array.is_null())
     if null.any() and not column.nullable:
-        return None, (f"null or NaN in {rows(null)}", "a value in every row")
+        raise input_error(where, f"null or NaN in {rows(null)}", "a value in every row")
     if column.kind == "float" and (infinite := np.isinf(np.asarray(array))).any():
-        return None, (f"infinite in {rows(infinite)}", "finite numbers")
+        raise input_error(where, f"infinite in {rows(infinite)}", "finite numbers")
     if null.any() and not is_text:  # the same bytes below every null: digests depend on them
         array = pa.array(np.asarray(array.fill_null(0)), kind, mask=null)
-    return array, ("", "")
+    return array
 
 
 def digest_of(artefact: str, columns: pd.DataFrame | Mapping[str, Any]) -> str:
