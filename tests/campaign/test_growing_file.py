@@ -37,7 +37,7 @@ class Day:
         before = self.taken()
         done = self.record(rows, *words)
         assert done.exit_code == 0, done.output
-        assert f"Recorded {new} readings" in done.output
+        assert f"Recorded {new} reading" in done.output
         assert self.taken() == before + new
         return done.output
 
