@@ -40,10 +40,8 @@ class Models:
 
     def flange(self, model: str, q: list[float], s: list[int]) -> np.ndarray:
         """Flange in the robot base; the VEC's rotation projected to a true one."""
-        if model == "dh":
-            return kinematics.dh_forward(self.dh, q)
-        if model == "nominal":
-            return kinematics.dh_forward(self.nominal, q)
+        if model != "vec":
+            return kinematics.dh_forward(self.dh if model == "dh" else self.nominal, q)
         series = np.zeros((len(q), 6, 1 + max(row["order"] for row in self.vec)))
         offsets, low, high = np.zeros((len(q), 2)), np.zeros(len(q)), np.zeros(len(q))
         for row in self.vec:
@@ -115,12 +113,8 @@ def magnitudes(
         q, s, target = joints(row), directions(row), row["target"]
         left, right = comparison.split("_vs_")
         reading, full = measured_frame(row)
-        if right == "measured":
-            gap, turn = apart(models_.measured(left, q, s, target), reading)
-        else:
-            gap, turn = apart(
-                models_.measured(left, q, s, target), models_.measured(right, q, s, target)
-            )
+        other = reading if right == "measured" else models_.measured(right, q, s, target)
+        gap, turn = apart(models_.measured(left, q, s, target), other)
         position.append(gap)
         if full:
             orientation.append(turn)
