@@ -1,0 +1,40 @@
+"""Which campaign of a calibration counts, and what is said of the others."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+
+from campaign_on_disk import SIGMA_MM, Arm, recorded, standing
+
+from kinacc.campaign.of_calibration import finished, newest
+from kinacc.deployment.folder import read_tables
+
+
+def test_the_newest_campaign_counts_and_the_others_are_named(begun, calibration):
+    other, spoilt, newer, older = (begun("--noise-mm", SIGMA_MM) for _ in range(4))
+    plan = json.loads((other / "campaign.json").read_text())
+    plan["points"][0]["modelled_mm"][0] += 0.01
+    (other / "campaign.json").write_text(json.dumps(plan))
+    (spoilt / "campaign.json").write_text("{}")
+    for age, folder in enumerate((other, spoilt, newer, older)):
+        os.utime(folder / "campaign.json", (1e9 - age, 1e9 - age))
+    found = newest("arm", read_tables(calibration, "robot"), [older, newer, spoilt, other])
+    assert found.status.folder == str(newer)
+    assert found.remarks == (
+        f"campaign {other} was begun with another calibration of arm",
+        f"campaign {spoilt} cannot be read: kinacc campaign status '{spoilt}'",
+        f"there are older campaigns: {older}",
+    )
+
+
+def test_the_bound_of_a_finished_campaign_on_the_model_is_taken(begun, calibration):
+    tables = read_tables(calibration, "robot")
+    folder = begun("--noise-mm", SIGMA_MM, "--frame", "base")
+    recorded(folder, Arm(folder), 19)
+    assert math.isnan(finished(tables, "dh", [folder]))
+    folder = begun("--noise-mm", SIGMA_MM, "--frame", "base")
+    recorded(folder, Arm(folder), 20)
+    assert finished(tables, "dh", [folder]) == standing(folder)["bounds"][0]["upper_mm"]
+    assert math.isnan(finished(tables, "vec", [folder]))
