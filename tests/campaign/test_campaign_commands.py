@@ -10,7 +10,6 @@ import pytest
 from campaign_on_disk import SIGMA_MM, Arm, files_of, recorded, refused, standing
 from command_line import call
 
-from kinacc.assess.world import conduct
 from kinacc.campaign import folder as campaigns
 from kinacc.campaign import plan as plans
 from kinacc.campaign.campaign import Campaign
@@ -31,26 +30,6 @@ def campaign(begun):
 
 def written(values):
     return ",".join(map(repr, np.asarray(values).tolist()))
-
-
-def test_a_whole_campaign_ends_as_in_memory(begun):
-    folder = begun("--noise-mm", SIGMA_MM, "--frame", "base", points=8, budget=10)
-    arm, asked = Arm(folder), []
-    while point := standing(folder)["next_point"]:
-        asked.append(point)
-        done = call("campaign", "record", folder, "--point", point,
-                    "--position-mm", arm.position(point))  # fmt: skip
-        assert done.exit_code == 0, done.output
-    assert len(asked) == 10
-    bounds = {each["target"]: each for each in standing(folder)["bounds"]}
-    for wanted in conduct(arm.plan.assessor, arm.world).statements():
-        for name in ("value_mm", "lower_mm", "upper_mm"):
-            value = bounds[wanted.target][name] if wanted.target in bounds else None
-            if value is not None:
-                np.testing.assert_allclose(value, getattr(wanted, name), atol=1e-9)
-    assert len(bounds) >= 1
-    assert Campaign(folder).next_pose() is None
-    refused(folder, "record", folder, "--position-mm", "1,2,3")
 
 
 def test_next_names_joints_with_units_and_writes_nothing(campaign, tmp_path):

@@ -6,8 +6,9 @@ import json
 import math
 import os
 
-from campaign_on_disk import SIGMA_MM, Arm, recorded, standing
+from campaign_on_disk import SIGMA_MM, Arm, recorded, refused, standing
 
+from kinacc.campaign.campaign import Campaign
 from kinacc.campaign.of_calibration import finished, newest
 from kinacc.deployment.folder import read_tables
 
@@ -36,5 +37,9 @@ def test_the_bound_of_a_finished_campaign_on_the_model_is_taken(begun, calibrati
     assert math.isnan(finished(tables, "dh", [folder]))
     folder = begun("--noise-mm", SIGMA_MM, "--frame", "base")
     recorded(folder, Arm(folder), 20)
+    assert Campaign(folder).next_pose() is None
+    assert "no further reading is needed" in refused(
+        folder, "record", folder, "--position-mm", "1,2,3"
+    )
     assert finished(tables, "dh", [folder]) == standing(folder)["bounds"][0]["upper_mm"]
     assert math.isnan(finished(tables, "vec", [folder]))
