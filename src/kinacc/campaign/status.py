@@ -28,8 +28,14 @@ _CLEAR_OF_NOISE = 3.0  # standard deviations: larger bounds hold where the noise
 _UNJUDGED = Decision("", math.nan, math.nan, math.nan, math.nan)
 # What a bound has of a statement as it is.
 _STATED = (
-    *("target", "share", "value_mm", "lower_mm", "upper_mm"),
-    *("confidence", "excepted", "error_of"),
+    "target",
+    "share",
+    "value_mm",
+    "lower_mm",
+    "upper_mm",
+    "confidence",
+    "excepted",
+    "error_of",
 )
 
 
