@@ -14,14 +14,11 @@ from kinacc.assess.statement import CANDIDATES, MEASURED, REGION, Statement
 
 ERROR = 0.05
 Z = 1.6448536269514722
-SIGMA_MM, POINTS = 0.1, 40
 
 FIELDS = {
     "lone": np.r_[0.2 * np.ones(5), 1.0, 0.2 * np.ones(4)],
-    "two tied": np.r_[0.9, 0.3 * np.ones(8), 0.9],
     "all tied": np.full(10, 0.5),
     "spread": np.linspace(0.05, 0.8, 10),
-    "none is any": np.zeros(10),
 }
 
 

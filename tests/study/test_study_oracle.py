@@ -83,7 +83,7 @@ def test_every_row_of_a_small_study_equals_the_oracle(rows):
         assert (rows["measurements"][i], rows["points_visited"][i]) == (measurements, points)
 
 
-def test_a_shuffled_visit_takes_the_same_readings_in_another_order(rows):
+def test_a_shuffled_visit_takes_the_same_readings_in_another_order():
     study = {**SMALL, "measurements": 5, "visiting_order": "shuffled"}
     shuffled = simulated(small_errors(), NOISE[:1], range(1), study, seed=99)
     order = np.random.default_rng([99, 10000, 0, 1]).permutation(9)
