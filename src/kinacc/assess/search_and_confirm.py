@@ -93,11 +93,7 @@ class SearchAndConfirm(AdaptiveAssessor):
         conditions = (
             ("noise_freedom", not (known and freedom), f"0 where noise is {KNOWN}"),
             ("noise_freedom", known or freedom == 0 or freedom >= FEWEST, tested),
-            (
-                "arm_mm",
-                self.arm_mm is None or self.error_of == VISIT,
-                "null: only of visits",
-            ),
+            ("arm_mm", self.arm_mm is None or self.error_of == VISIT, "null: only of visits"),
             ("wrong_rate", known or freedom > 0 or not self.wrong_rate, guarded),
             ("references", least <= self.measurements, f"fewer: they take {least} readings"),
         )
