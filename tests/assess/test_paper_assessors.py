@@ -17,6 +17,7 @@ from oracles.worlds import philox_words
 from kinacc.assess.invalidation_kernels import chi2_3, philox
 from kinacc.assess.model_invalidation import ModelInvalidation
 from kinacc.assess.world import drawn_world, key_of
+from kinacc.errors import InputError
 
 kinds = st.sampled_from(["plain", "own_noise", "tied", "zeros"])
 words = st.integers(0, 2**64 - 1)
@@ -183,3 +184,9 @@ def test_scans_of_any_world_equal_every_single_run(
 def test_words_are_those_of_numpy_philox(key0, key1, visit, point):
     mine = philox(np.uint64(key0), np.uint64(key1), np.uint64(visit), np.uint64(point))
     assert [int(x) for x in mine] == philox_words([key0, key1], visit, point)
+
+
+def test_a_world_with_fewer_readings_of_a_point_than_the_budget_is_refused():
+    world = drawn_world(np.ones((2, 3)), 0.1, key_of(1), 5)
+    with pytest.raises(InputError, match="5 readings a point for 6 measurements"):
+        assessor(oracle.Switches(), 6).run(world, 0.1)
