@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from kinacc.config.error_models import COMPARISONS, MEASURED, NOMINAL, Comparison
+from kinacc.config.error_models import COMPARISONS, NOMINAL
 from kinacc.kinematics import dh
 from kinacc.kinematics.robot import Robot
-from kinacc.tables.allowed import LEFT_OUT, SELECTABLE
+from kinacc.tables.allowed import SELECTABLE
 from kinacc.tables.columns import Columns
 
 LARGE_SHARE = 0.99  # of rows whose error is at most the quantile stated
@@ -123,22 +123,6 @@ def frames_are_fitted(frames: Columns) -> bool:
     models = np.asarray(frames["model"])
     first = models == models[models != NOMINAL][0]
     return not np.array_equal(places[models == NOMINAL], places[first])
-
-
-def left_out(data_check: Columns | None) -> list[str]:
-    """Parts of the measured file that are not used, from a ``data_check`` table."""
-    if data_check is None:
-        return []
-    pairs = zip(data_check["finding"], data_check["what"], strict=True)
-    return [str(what) for kind, what in pairs if kind == LEFT_OUT]
-
-
-def excluded_errors(table: Columns, model: str) -> list[tuple[int, str, float]]:
-    """Line, reason and position error in mm of every excluded row; NaN where it has none."""
-    size = np.linalg.norm([table[f"e{axis}_mm"] for axis in "xyz"], axis=0)
-    rows = np.flatnonzero(table["comparison"] == Comparison(MEASURED, model).name)
-    rows = rows[np.argsort(table["line"][rows], kind="stable")]
-    return [(int(table["line"][i]), str(table["reason"][i]), float(size[i])) for i in rows]
 
 
 def reported_joints(measurements: Columns, joints: int) -> np.ndarray:

@@ -18,7 +18,7 @@ from kinacc.calibration import summary as figures
 from kinacc.calibration.summary import Tolerance
 from kinacc.campaign import of_calibration
 from kinacc.campaign.beside_results import PLAN, of_results
-from kinacc.config.error_models import ERROR_MODELS, MEASURED, PLAINEST
+from kinacc.config.error_models import ERROR_MODELS, MEASURED, PLAINEST, Comparison
 from kinacc.deployment import applicability
 from kinacc.deployment import folder as results
 from kinacc.errors import InputError, Problem, refuse
@@ -84,7 +84,8 @@ def summarise(
     name = folder.resolve().name
     places = of_results(folder) if campaigns is None else campaigns
     assessed = of_calibration.newest(name, tables, places)
-    measurements, check = tables["measurements"], tables.get("data_check")
+    measurements, noted = tables["measurements"], findings(tables.get("data_check"))
+    is_unused = noted["finding"] == LEFT_OUT
     fits = misfit.misfits(tables, arm)
     listed = identifiability.listed(tables["dh_identified"])
     always = (text for text in listed if not text.endswith(identifiability.POORLY_DETERMINED))
@@ -116,9 +117,9 @@ def summarise(
         flange_spread_deg=figures.flange_spread_deg(measurements, arm),
         unidentifiable=tuple(always),
         poorly_determined=tuple(identifiability.weak(listed)),
-        checked=check is not None,
-        findings=findings(check),
-        left_out=tuple(figures.left_out(check)),
+        checked="data_check" in tables,
+        findings=noted[~is_unused],
+        left_out=tuple(noted["text"][is_unused]),
         excluded=excluded(tables),
         compliance=compliance(tables.get("compliance_model")),
         noise_mm=fits[0].noise.per_axis_mm,
@@ -314,10 +315,9 @@ def joint_ranges(measurements: Columns, arm: Robot) -> pd.DataFrame:
 
 
 def findings(check: Columns | None) -> pd.DataFrame:
-    """Findings of the data check, the gravest first."""
+    """Findings of the data check, the gravest first, and parts of the file that are not used."""
     names = ["finding", "level", "rows", "what", "lines", "fix", "accepted"]
     table = pd.DataFrame(check or {}, columns=names).rename(columns={"what": "text"}).fillna("")
-    table = table[table["finding"] != LEFT_OUT]
     table["is_open"] = (table["level"] != FINDING_LEVELS[-1]) & (table["accepted"] == "")
     return table.sort_values(
         "level", key=lambda levels: levels.map(FINDING_LEVELS.index), kind="stable"
@@ -327,12 +327,13 @@ def findings(check: Columns | None) -> pd.DataFrame:
 def excluded(tables: Tables) -> pd.DataFrame:
     """Rows that the configuration excludes, with errors of a model that was not fitted to them."""
     names = ["line", "where", "reason", "error_mm"]
-    if (table := tables.get("excluded_rows")) is None:
+    if (columns := tables.get("excluded_rows")) is None:
         return pd.DataFrame(columns=names)
-    rows = RowNames.of_columns({**table, "row": table["line"]})
-    errors = figures.excluded_errors(table, figures.selected(tables["model_selection"]))
-    named = [(line, rows.one(line), reason, error_mm) for line, reason, error_mm in errors]
-    return pd.DataFrame(named, columns=names)
+    rows, table = RowNames.of_columns({**columns, "row": columns["line"]}), pd.DataFrame(columns)
+    selected = Comparison(MEASURED, figures.selected(tables["model_selection"])).name
+    table = table[table["comparison"] == selected].sort_values("line", kind="stable")
+    error_mm = np.linalg.norm(table[["ex_mm", "ey_mm", "ez_mm"]], axis=1)
+    return table.assign(where=table["line"].map(rows.one), error_mm=error_mm)[names]
 
 
 def compliance(model: Columns | None) -> pd.DataFrame:
