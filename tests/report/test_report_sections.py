@@ -130,7 +130,7 @@ def test_what_other_poses_would_show_stands_first(tables):
         j2__a_mm=("prior", 0.5, "known beforehand to 0.5 mm"),
         j3__alpha_rad=("identified", 0.0002, None),
         tool__z_mm=("undetermined", np.nan, f"tool z +1 mm{POORLY_DETERMINED}"),
-        base__x_mm=("undetermined", np.nan, ""),
+        base__x_mm=("undetermined", np.nan, None),
     )
     found = section(fit_sections.identifiability, tables)
     first, second = table(found, "What cannot be told apart").rows

@@ -59,19 +59,17 @@ def summary(folders: tuple[Path, ...], tolerance_mm: float | None, by: str, out:
     places = summaries.data_set_folders(folders or (Path(RESULTS),))
     reason = print_outdated(places[0]) if len(places) == 1 else ""
     result = summaries.summarise_all(places, reason)
-    known = [item for item in result if not isinstance(item, Problem)]
-    verdicts = [item.verdict(by, tolerance_mm) for item in known]
-    if by == HELD_OUT and not any(verdicts):
+    table = terminal.fleet_table(result, by, tolerance_mm)
+    if by == HELD_OUT and (table["verdict"] == "").all():
         message = "is not given, and no configuration has a tolerance of quantile_99"
         raise InputError(Problem("--tolerance-mm", message, "a number, in mm"))
-    table = terminal.fleet_table(result, by, tolerance_mm)
     if out.table is not None or out.as_json:
         out.show(as_plain(result, by, tolerance_mm), table)
-    elif len(known) == len(result) == 1:
-        terminal.print_summary(known[0], out.verbose, by, tolerance_mm)
+    elif len(result) == 1 and isinstance(result[0], CalibrationSummary):
+        terminal.print_summary(result[0], out.verbose, by, tolerance_mm)
     else:
         terminal.print_fleet(table, by)
-    if len(known) < len(result) or any(item and item.verdict != "accept" for item in verdicts):
+    if not table["verdict"].isin(["accept", ""]).all():
         sys.exit(AGAINST)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import shlex
 from contextlib import nullcontext
@@ -11,6 +10,7 @@ from pathlib import Path
 import click
 
 from kinacc.cli.choice import CONFIG, option, together
+from kinacc.cli.output import Output, answers
 from kinacc.cli.results import as_plain, written
 from kinacc.errors import InputError, Problem
 from kinacc.report.summarise import summarise_all
@@ -21,14 +21,14 @@ from kinacc.workflow.start import SNAKEFILE, run_workflow
 
 _options = together(
     option("--cores", "-c", type=click.IntRange(1), help="Processor cores. [all]"),
-    option("--json", "as_json", is_flag=True, help="Answer as JSON."),
     click.argument("arguments", nargs=-1, type=click.UNPROCESSED, metavar="[FILE.yaml|FOLDER]..."),
 )
 
 
 @click.command("calibrate", context_settings={"ignore_unknown_options": True})
 @_options
-def calibrate(arguments: tuple[str, ...], cores: int | None, as_json: bool) -> None:
+@answers()
+def calibrate(arguments: tuple[str, ...], cores: int | None, out: Output) -> None:
     """Fit the models of the data sets of FILE.yaml, and show their held-out errors.
 
     Results go to results/ in the current folder. Several files, or all of a FOLDER, are merged in
@@ -42,8 +42,8 @@ def calibrate(arguments: tuple[str, ...], cores: int | None, as_json: bool) -> N
     configs, folders = _carried_out("calibration", arguments, cores, None)
     if not folders:
         return
-    if as_json:
-        click.echo(json.dumps(as_plain(summarise_all(folders)), indent=2))
+    if out.as_json:
+        out.show(as_plain(summarise_all(folders)))
         return
     pages = [written(str(folder)) for folder in folders if len(folders) <= FEW]
     print_summaries(folders)
@@ -54,7 +54,8 @@ def calibrate(arguments: tuple[str, ...], cores: int | None, as_json: bool) -> N
 
 @click.command("study", context_settings={"ignore_unknown_options": True})
 @_options
-def study(arguments: tuple[str, ...], cores: int | None, as_json: bool) -> None:
+@answers()
+def study(arguments: tuple[str, ...], cores: int | None, out: Output) -> None:
     """Carry out the whole study of the data sets of FILE.yaml.
 
     Calibration, map of errors, operating points, the paper's assessors under noise, figures and
@@ -68,8 +69,8 @@ def study(arguments: tuple[str, ...], cores: int | None, as_json: bool) -> None:
     configs, folders = _carried_out("all", arguments, cores, SNAKEFILE.with_name("config.yaml"))
     if not folders:
         return
-    if as_json:
-        click.echo(json.dumps({"results": [str(folder) for folder in folders]}))
+    if out.as_json:
+        out.show({"results": folders})
         return
     print_summaries(folders)
     options = [word for name in configs for word in ("--config", name)]

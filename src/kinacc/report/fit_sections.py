@@ -118,6 +118,7 @@ def identifiability(tables: Tables, robot: Robot, summary: CalibrationSummary) -
     table["unit"] = np.where(table["parameter"].map(is_angle), "mrad", "mm")
     table["std"] *= np.where(table["unit"] == "mrad", 1e3, 1.0)
     table["called"] = table["parameter"].map(parameter_name)
+    table["statement"] = table["statement"].fillna("")
     for column in ("parameter", "other"):
         pairs[column] = pairs[column].map(parameter_name)
     counts = table["status"].map(_STATUSES).value_counts()
