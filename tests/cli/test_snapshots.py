@@ -31,7 +31,6 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "show": ("show", FIT, "residuals"),
     "show --describe": ("show", FIT, "residuals", "--describe"),
     "check-results": ("check-results", "results"),
-    "report": ("report", FIT, "--out", "page.html"),
     "predict": ("predict", FIT, "near.csv"),
     "compensate": ("compensate", FIT, "--program", "near.csv"),
     "export": ("export", FIT, "--out", "exported"),

@@ -212,21 +212,20 @@ def vec_errors(
     joints = 0.5 * (low + high)[:, None] + 0.5 * (high - low)[:, None] * places
     prismatic = np.asarray(robot.dh.prismatic)
     basis = np.polynomial.chebyshev.chebvander(places, model.order)
-    known = uncertainty(tables, "vec")
-    covariance = pd.DataFrame()
+    known, covariance = uncertainty(tables, "vec"), pd.DataFrame()
     if known is not None:
         covariance = pd.DataFrame(known.covariance, index=known.names, columns=known.names)
     values = np.empty((model.joints, len(ERRORS), _PLACES))
-    std = np.full(values.shape, np.nan)
+    std = np.empty(values.shape)
     for joint, error in np.ndindex(values.shape[:2]):
         scale = 1.0 if ERRORS[error].startswith("delta") else 1e3
         shared = _shared(ERRORS[error], joints[joint], bool(prismatic[joint]))
         rest = scale * (basis - shared @ np.linalg.lstsq(shared, basis, rcond=None)[0])
         values[joint, error] = rest @ model.coefficients[joint, error]
         names = [f"j{joint + 1}.{ERRORS[error]}.{n}" for n in range(basis.shape[1])]
-        if covariance.index.isin(names).sum() == len(names):
-            variance = np.einsum("mi,ij,mj->m", rest, covariance.loc[names, names], rest)
-            std[joint, error] = np.sqrt(np.maximum(variance, 0.0))
+        part = covariance.reindex(index=names, columns=names).to_numpy(float)
+        variance = np.einsum("mi,ij,mj->m", rest, part, rest)
+        std[joint, error] = np.sqrt(np.maximum(variance, 0.0))
     return np.where(prismatic[:, None], joints, np.rad2deg(joints)), values, std
 
 
