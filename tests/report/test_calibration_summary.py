@@ -18,7 +18,7 @@ from kinacc.campaign.folder import JOURNAL
 from kinacc.deployment import folder
 from kinacc.report import summarise
 from kinacc.report.rendering import size
-from kinacc.tables import store
+from kinacc.tables import store, sums
 
 
 @pytest.fixture(scope="module")
@@ -191,3 +191,13 @@ def test_a_line_of_a_series_has_the_day_of_its_measurement(study, tmp_path):
     line = shutil.copytree(study, tmp_path / "arm-2026-03-01")
     assert summarise.summarise(line).measured == "2026-03-01"
     assert summarise.summarise(study).measured == ""
+
+
+def test_a_study_of_an_earlier_calibration_is_left_out_whole(study, tmp_path):
+    line = shutil.copytree(study, tmp_path / "arm")
+    for name in ("assessment_points", "study_summary"):
+        (line / f"{name}.parquet").touch()
+    earlier = sums.text_of({"assessment_points.parquet": b""}, {"vec_model.parquet": "0" * 64})
+    (line / "sums" / "assessment_points.sha256").write_bytes(earlier)
+    assert summarise.made_of_others(line) == {"assessment_points", "study_summary"}
+    assert summarise.summarise(line).other_errors == {}

@@ -112,7 +112,7 @@ def written(folder: str, out: str | None = None) -> Path:
     Raises InputError naming all tables missing.
     """
     place, reason, needed = Path(folder), print_outdated(folder), summaries.PAGE_TABLES
-    old = {Path(name).stem for name in sums.outdated(place)} - {Path(_PAGE).stem, *needed}
+    old = summaries.made_of_others(place) - {Path(_PAGE).stem, *needed}
     optional = [name for name in summaries.ON_PAGE if name not in old]
     tables: dict[str, Any] = dict(read_tables(place, needed=needed, optional=optional))
     tables |= {role: Path(path) for role, path in campaign_files(of_results(place)).items()}

@@ -45,6 +45,10 @@ ON_PAGE = (
     *(f"{kind}_{part}" for kind in ERROR_MODELS for part in ("fit", "covariance")),
     *("study", "study_summary", "readings", "histories"),
 )
+_STUDIED = (
+    *("accuracy_map", "assessment_points", "study", "study_summary", "readings", "histories"),
+    "claims",
+)
 _ESTIMATES = {"cross_validated": "held_out", "train": "training"}
 _STATISTICS = ("n", "mean", "quantile_99", "largest")
 _DAY_OF_A_LINE = re.compile(r"-(\d{4}-\d{2}-\d{2})$")
@@ -77,7 +81,7 @@ def summarise(
     """
     folder = Path(folder)
     if tables is None:
-        old = {Path(name).stem for name in sums.outdated(folder)} - {"summary", "data_check"}
+        old = made_of_others(folder) - {"summary", "data_check"}
         optional = [name for name in OPTIONAL if name not in old]
         tables = results.read_tables(folder, needed=figures.TABLES, optional=optional)
     arm, selected = robot_of(tables), figures.selected(tables["model_selection"])
@@ -134,6 +138,13 @@ def summarise(
         outdated=outdated,
         next_steps=_next_steps(str(folder), selected, assessed.status),
     )
+
+
+def made_of_others(folder: Path) -> set[str]:
+    """Tables made from others than those now there; of the tables of a study all or none."""
+    old = {Path(name).stem for name in sums.outdated(folder)}
+    studied = {name for name in _STUDIED if (folder / f"{name}.parquet").is_file()}
+    return old if old.isdisjoint(studied) else old | studied
 
 
 def robot_of(tables: Tables) -> Robot:
