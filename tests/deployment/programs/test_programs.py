@@ -22,7 +22,7 @@ from kinacc.deployment.programs.orientation import (
     VECTOR,
     Convention,
 )
-from kinacc.deployment.programs.record import CHANGED, NUMBER, STILL, Source, _written
+from kinacc.deployment.programs.record import CHANGED, NUMBER, SEVERAL, STILL, Source, _written
 from kinacc.errors import InputError
 from kinacc.geometry import Pose, exp_so3
 from kinacc.kinematics import robot
@@ -163,9 +163,10 @@ def test_positions_that_cannot_be_corrected_are_named(tmp_path, line, reason):
 def test_a_turn_that_the_correction_would_change_is_refused(tmp_path):
     """Axis 4 within the correction of zero: its turn bit would change for some of these."""
     lines = [f"LIN {_pose(2 + (a1 < 0), a1, 1e-3)}" for a1 in range(-40, 50, 10)]
+    lines.append(f"LIN {_pose(2, a4=-0.01)}")  # rounding may have moved it across
     found = compensate_program(calibrated(KR6, "dh"), _kuka(tmp_path, *lines))
     assert found.refused
-    assert all("A4 " in each.what for each in found.refused)
+    assert all("would change to A4" in each.what for each in found.refused)
 
 
 def test_changes_beyond_a_limit_are_refused():
@@ -179,6 +180,8 @@ def test_frames_come_back_from_their_numbers(orientation):
     turns = [exp_so3(rng.normal(size=3)) for _ in range(20)]
     turns += [Convention(KUKA).pose([0, 0, 0, 20, b, 30]).rotation for b in (90, -90)]
     turns += [Convention(INTRINSIC).pose([0, 0, 0, 20, b, 30]).rotation for b in (90, -90)]
+    with pytest.raises(InputError, match=r"length 1\.414|6, mm and deg"):
+        convention.typed([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0])
     for turn in turns:
         near = rng.uniform(-180.0, 180.0, 7 if orientation == QUATERNION else 6)
         numbers = convention.numbers(Pose(turn, np.ones(3)), near)
@@ -220,12 +223,17 @@ def test_frames_that_a_program_changes_are_refused(tmp_path):
       PERS wobjdata w:=[FALSE,TRUE,"",[[1,0,8],[0,0,1,0]],[[0,0,0],[1,0,0,0]]];
       PERS wobjdata part:=[TRUE,TRUE,"",[[1,0,8],[0,0,1,0]],[[0,0,0],[1,0,0,0]]];
       PERS tooldata torch:=[FALSE,[[0,0,0],[1,0,0,0]],[1,[0,0,1],[1,0,0,0],0,0,0]];
+      CONST robtarget twice:={target};
       w.uframe.trans:=p;
       MoveL {target},v50,fine,tool0\\WObj:=w;
       MoveL {target},v50,fine,tool0\\WObj:=part;
       MoveL {target},v50,fine,torch;
-      MoveL {target},v50,fine,tool0;""")  # fmt: skip
-    assert [each.refused for each in program.positions] == [CHANGED, STILL, STILL, ""]
+      MoveL {target.replace("9E9]", "900]")},v50,fine,tool0;
+      MoveL twice,v50,fine,tool0;
+      MoveL twice,v50,fine,tool0\\WObj:=wobj1;""")  # fmt: skip
+    refused = [SEVERAL, CHANGED, STILL, STILL, ""]
+    assert [each.refused for each in program.positions] == refused
+    assert [each.moves_outside for each in program.positions] == [False] * 4 + [True]
     frame = "{X 1,Y 2,Z 3,A 0,B 0,C 0}"
     program = _read(
         tmp_path,
@@ -241,6 +249,13 @@ def test_columns_and_turns_are_read_where_and_as_they_are_written(tmp_path):
     text = "note,note,x,y,z,a,b,c\nu,v,1,2,3,4,5,6"
     (position,) = _read(tmp_path, "own.csv", text).positions
     assert position.numbers.tolist() == [1, 2, 3, 4, 5, 6]
+    text = "x_m,y_m,z_m,rvx_rad,rvy_rad,rvz_rad\n0.001,0.002,0.003,0.1,0.2,0.3"
+    program = _read(tmp_path, "own.csv", text)
+    pose = program.convention.pose(program.positions[0].numbers)
+    np.testing.assert_allclose(pose.position_mm, [1.0, 2.0, 3.0])
+    np.testing.assert_allclose(pose.rotation, exp_so3(np.array([0.1, 0.2, 0.3])))
+    (position,) = _read(tmp_path, "own.csv", "q1_rad,q2_deg\n0.5,3").positions
+    np.testing.assert_allclose(position.scale, [np.pi / 180.0, 1.0])
     frame = "{X 1,Y 2,Z 3,A 0,B 0,C 0,S 'B010',T 'H1B'}"
     (position,) = _read(tmp_path, "own.src", f"LIN {frame}").positions
     set_bits = [part for part in position.posture if part.endswith(("up", "negative"))]
