@@ -5,14 +5,16 @@ from __future__ import annotations
 import json
 
 import numpy as np
+import pandas as pd
 import pytest
 from command_line import call, small_study
 
-from kinacc.calibration.observations import full_poses
+from kinacc.calibration.observations import from_columns, full_poses
 from kinacc.deployment.folder import calibration, read_tables, recorded_robot, selected_model
 from kinacc.deployment.permutation import ErrorColumns, compare, smallest_changes
 from kinacc.deployment.predict import predict
-from kinacc.deployment.verify import error_columns
+from kinacc.deployment.verify import error_columns, model_errors
+from kinacc.errors import InputError
 from kinacc.geometry import Pose, exp_so3
 from kinacc.kinematics import dh, robot
 from kinacc.tables import store
@@ -126,6 +128,17 @@ def test_what_cannot_count_gives_no_verdict(folder, later):
     for described, known in ((base / "moved.yaml", 0), (later(1.0, 0, known=80), 80)):
         answer = answered(found, described)
         assert (answer["verdict"], answer["known"]) == ("undecided", known)
+
+
+def test_readings_without_a_session_belong_to_no_base_of_several(folder):
+    _, found = folder
+    tables, arm = read_tables(found), recorded_robot(found)
+    frames = pd.DataFrame(dict(tables["frames"]))
+    frames = pd.concat([frames.assign(session=name) for name in "ab"])
+    tables["frames"] = {name: column.to_numpy() for name, column in frames.items()}
+    seen = from_columns(tables["measurements"], arm)
+    with pytest.raises(InputError, match="each has its own base; allowed: one of a, b"):
+        model_errors(tables, arm, seen, (), 500.0)
 
 
 @pytest.fixture(scope="module")

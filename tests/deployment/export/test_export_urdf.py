@@ -152,7 +152,10 @@ def test_a_file_of_ones_own_is_corrected_in_place(tmp_path, robot_from, tail):
     assert np.linalg.norm(wanted.position_mm - before.position_mm, axis=1).min() > 0.1
 
 
-def test_another_arm_is_refused_with_the_distance(tmp_path):
+def test_joints_that_a_file_cannot_say_and_another_arm_are_refused(tmp_path):
+    scaled = replace(robot.load("ur10"), joint_map=0.5 * np.eye(6))
+    with pytest.raises(InputError, match="--dh-joints"):
+        urdf.text(of(bent(scaled)))
     path = tmp_path / "ur10.urdf"
     text = UR10_FILE.replace("TAIL", "")
     path.write_text(text.replace("0.5723", "0.5713"))
