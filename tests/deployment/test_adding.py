@@ -103,6 +103,13 @@ def test_the_day_is_that_of_the_files_own_times(cell):
     assert "date: 2026-06-02" in Path("tracker.yaml").read_text()
 
 
+def test_a_file_of_known_readings_is_refused(cell):
+    Path("june.csv").write_text(Path("data/march.csv").read_text())
+    done = added("june.csv", *JUNE, "--first-date", "2026-03-01")
+    assert done.exit_code == 2
+    assert "holds the readings of" in done.output
+
+
 def test_another_target_is_refused_where_the_tool_is_the_same(cell):
     text = Path("june.csv").read_text()
     for name in ("x_mm", "y_mm", "z_mm", "rx_deg", "ry_deg", "rz_deg"):

@@ -108,7 +108,7 @@ def assert_same(ours, theirs):
 
 @pytest.mark.parametrize("name", robot.shipped())
 def test_a_generated_file_moves_as_the_calibrated_arm(name):
-    arm = bent(robot.load(name))
+    arm = bent(replace(robot.load(name), base=TOOL_POSE))
     q_rad = some_joints(arm.robot)
     names = [f"joint_{i}" for i in range(1, arm.robot.dh.joints + 1)]
     names = [each.replace(" ", "_") for each in arm.robot.joint_names] or names
