@@ -7,11 +7,13 @@ kinacc is imported from where such a process finds it.
 from __future__ import annotations
 
 import atexit
+import ctypes
 import json
 import os
 import runpy
 import shlex
 import shutil
+import signal
 import socket
 import socketserver
 import subprocess
@@ -74,7 +76,8 @@ def python() -> str:
 
 
 def _serve(address: str, command: str) -> None:
-    """Fork at each start, until the process is ended."""
+    """Fork at each start, until the tests end."""
+    ctypes.CDLL(None).prctl(1, signal.SIGTERM)  # PR_SET_PDEATHSIG, should they be killed
     _import_packages()
 
     class Start(socketserver.StreamRequestHandler):

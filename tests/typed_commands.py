@@ -54,6 +54,6 @@ def installed(folder: Path) -> Path:
     shutil.unpack_archive(wheel, site, "zip")
     for path in source.rglob("*.py"):
         shutil.copystat(path, site / path.relative_to(source))
-    for path in source.rglob("*.nb[ic]"):  # kernels are compiled already: found by time of file
-        shutil.copy2(path, site / path.relative_to(source))
+    for path in source.rglob("__pycache__"):  # all is compiled already: found by time of file
+        shutil.copytree(path, site / path.relative_to(source), dirs_exist_ok=True)
     return site

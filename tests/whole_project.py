@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import math
 import os
 import re
 import shutil
@@ -11,9 +10,16 @@ import subprocess
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+import pandas as pd
 import pytest
 import shared_work
+import yaml
 from preloaded import python
+
+from kinacc import geometry
+from kinacc.config.load import overlay
+from kinacc.kinematics import dh, robot
 
 ROOT = Path(__file__).resolve().parents[1]
 CONFIGS = ("config.yaml", "small.yaml")
@@ -84,10 +90,9 @@ class Project:
 
     def configure(self, text: str) -> None:
         """Add to the small study's configuration."""
-        import yaml
-
         path = self.folder / "small.yaml"
-        path.write_text(yaml.safe_dump(_merged(yaml.safe_load(path.read_text()), text)))
+        changed = overlay(yaml.safe_load(path.read_text()), yaml.safe_load(text))
+        path.write_text(yaml.safe_dump(changed))
 
     def append(self, name: str, line: str) -> None:
         """Add a line to a file."""
@@ -105,31 +110,16 @@ class Project:
         }
 
 
-def _merged(below: dict, text: str) -> dict:
-    import yaml
-
-    from kinacc.config.load import overlay
-
-    return overlay(below, yaml.safe_load(text))
-
-
-def _copy(source: Path, target: Path) -> None:
-    """Copy a project with the times of its files, which Snakemake and numba's cache go by."""
+def copy(target: Path) -> None:
+    """Copy the project with the times of its files, which Snakemake and numba's cache go by."""
     target.mkdir(parents=True)
     for name in PARTS:
-        if (source / name).is_dir():
-            shutil.copytree(source / name, target / name)
-        else:
-            shutil.copy2(source / name, target / name)
+        copied = shutil.copytree if (ROOT / name).is_dir() else shutil.copy2
+        copied(ROOT / name, target / name)
 
 
 def write_poses(path: Path, poses: int = 60) -> None:
     """A file of measured poses: the nominal arm in joint space, shifted by a known small error."""
-    import numpy as np
-
-    from kinacc import geometry
-    from kinacc.kinematics import dh, robot
-
     arm = robot.load("mh180")
     generator = np.random.default_rng(3)
     share = generator.uniform(0.2, 0.8, (poses, 6))
@@ -139,10 +129,9 @@ def write_poses(path: Path, poses: int = 60) -> None:
     turn = geometry.exp_so3(generator.normal(0.0, 2e-4, (poses, 3)))
     quaternion = geometry.quaternion_from_rotation(turn @ flange.rotation)
     names = [*(f"q{i}_deg" for i in range(1, 7)), "x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz"]
-    rows = np.hstack([q_rad * 180.0 / math.pi, position, quaternion])
-    lines = [",".join(names), *(",".join(f"{value:.9f}" for value in row) for row in rows)]
+    table = pd.DataFrame(np.hstack([np.rad2deg(q_rad), position, quaternion]), columns=names)
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text("\n".join(lines) + "\n")
+    table.to_csv(path, index=False, float_format="%.9f")
 
 
 @pytest.fixture(scope="session")
@@ -151,7 +140,7 @@ def finished(tmp_path_factory) -> Project:
 
     def run(folder: Path) -> None:
         project = Project(folder / "project")
-        _copy(ROOT, project.folder)
+        copy(project.folder)
         (project.folder / "small.yaml").write_text(SMALL)
         write_poses(project.folder / "own data" / "poses.csv")
         project.snakemake()

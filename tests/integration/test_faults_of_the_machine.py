@@ -15,7 +15,7 @@ import pyarrow.parquet as pq
 import pytest
 from command_line import call
 from preloaded import python
-from whole_project import PARTS, ROOT, write_poses
+from whole_project import copy, write_poses
 
 RUN = ("snakemake", "-c1", "--nocolor", "--configfile", "config.yaml", "small.yaml", "--")
 FIT = (*RUN, "results/own/vec_model.parquet")
@@ -83,9 +83,9 @@ def test_a_run_killed_or_stopped_at_any_moment_is_continued_by_the_same_command(
     for name in ("results", ".snakemake"):
         shutil.rmtree(folder / name)
     for words, moment, by, code, limit_s in (
-        (FIT, "results/.lock", signal.SIGKILL, -9, 3.0),  # before the first stage
-        (FIT, FIRST, signal.SIGKILL, -9, 3.0),  # between two stages
-        (FIT, LOG, signal.SIGKILL, -9, 3.0),  # within one
+        (FIT, "results/.lock", signal.SIGKILL, -9, 60.0),  # before the first stage
+        (FIT, FIRST, signal.SIGKILL, -9, 60.0),  # between two stages
+        (FIT, LOG, signal.SIGKILL, -9, 60.0),  # within one
         (CALIBRATE, LOG, signal.SIGINT, 130, 3.0),
         (CALIBRATE, LOG, signal.SIGTERM, 143, 3.0),
         (BOTH, LOG, signal.SIGINT, 1, 60.0),  # Snakemake waits for a job that it is just beginning
@@ -183,10 +183,7 @@ def test_a_spoiled_table_is_refused_by_the_next_stage_and_made_again(project, sp
 
 def test_a_clone_in_a_folder_with_odd_letters_runs_and_braces_in_a_file_are_refused(tmp_path):
     clone = tmp_path / "a clone of 'ours' \"$HOME\" größe"
-    clone.mkdir()
-    for name in PARTS:
-        copy = shutil.copytree if (ROOT / name).is_dir() else shutil.copy
-        copy(ROOT / name, clone / name)
+    copy(clone)
     write_poses(clone / "poses.csv")
     ended(clone, ("kinacc", "init", "poses.csv", "--robot", "mh180", "--yes", "--name", "own"))
     ended(clone, ("snakemake", "-c1", "--configfile", "own.yaml", "--", FIRST))

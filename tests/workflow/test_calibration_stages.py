@@ -45,7 +45,7 @@ def test_rows_of_the_validation_fold_never_reach_the_delivered_models(measured):
 
 def test_a_session_that_one_fold_holds_alone_always_trains_and_is_named(measured):
     alone = (np.arange(POSES) >= 40) & (np.arange(POSES) < 44)
-    session = np.where(alone, "noon", "morning").astype(object)
+    session = np.where(alone, "noon", None)
     blocks = overlay(SETTINGS, {"measurements": {"fold_by": "time_block"}})
     with pytest.warns(UserWarning, match="session noon has fewer than 3 rows outside"):
         split = source.split({**measured, "session": session}, blocks)

@@ -184,7 +184,7 @@ def excluded_rows(inputs: Mapping[str, Columns], settings: Mapping[str, Any]) ->
     reading = read_excluded(section, arm)
     rows = pd.DataFrame(dict(reading.columns)) if reading else pd.DataFrame(columns=list(used))
     for name in ("target", "session"):  # only those of other rows have frames
-        rows = rows[rows[name].astype(str).isin({*map(str, used[name])})]
+        rows = rows[rows[name].map(str).isin({*map(str, used[name])})]  # None as well
     off: dict[str, Errors] = {}
     if len(rows):
         observations = from_columns({name: rows[name].to_numpy() for name in rows}, arm)

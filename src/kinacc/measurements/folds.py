@@ -84,7 +84,7 @@ def always_trained(
     it by: all rows of its configurations (n,) train. Where all rows have one label it is not asked.
     """
     for kind, label in labels.items():
-        table = pd.crosstab(pd.Series(label).astype(str), fold)
+        table = pd.crosstab(pd.Series(label).map(str), fold)  # None is a label as well
         # Too few rows outside one of its folds.
         scarce = (table.gt(0) & table.rsub(table.sum(axis=1), axis=0).lt(LEAST_ROWS)).any(axis=1)
         for name in table.index[scarce] if len(table) > 1 else ():
