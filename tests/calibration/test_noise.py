@@ -27,6 +27,8 @@ def read_again(kind, apart_deg, sessions=2, seed=1):
 def test_a_reading_that_went_wrong_is_no_noise():
     observations, nominal = read_again(POINT, 0.02, sessions=1)
     before = of_readings(observations, nominal)
+    assert before.freedom == pytest.approx(120, abs=4)
+    assert before.per_axis_mm == pytest.approx(NOISE_MM, rel=0.1)
     wrong = observations.position_mm.copy()
     wrong[17] += [0.0, 5.0, -3.0]
     after = of_readings(replace(observations, position_mm=wrong), nominal)

@@ -11,6 +11,7 @@ from simulated import POINT, POSE, THREE, disturbed, fit, joints, measure, predi
 from kinacc.calibration import dh_estimator, frames
 from kinacc.calibration.least_squares import HUBER, TUKEY
 from kinacc.config.parameter_rules import rules
+from kinacc.geometry import log_so3
 from kinacc.kinematics import robot
 
 ARM = robot.load("mh180")
@@ -50,6 +51,13 @@ def test_fixed_frames_stay_and_the_rest_fits_as_well(kind, sessions):
     if sessions == 2:
         assert found.frames.bases.position_mm[1, 1] == pytest.approx(at[6], abs=1e-9)
     assert found.solution.cost == pytest.approx(plain.solution.cost, rel=1e-5)
+
+
+def test_one_fixed_turn_of_a_frame_is_about_the_stated_orientation():
+    found = fitted(observed(), frame_rules={"t0 rz": {"value_mrad": 2.0}})
+    turn = log_so3(found.frames.tool.rotation @ robot.carried(ARM).rotation.T)
+    assert turn[2] == pytest.approx(2e-3, abs=1e-9)
+    assert np.abs(turn[:2]).max() > 0.1
 
 
 def test_a_prior_weighs_as_its_standard_deviation_says():

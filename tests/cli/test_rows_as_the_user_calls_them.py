@@ -69,6 +69,7 @@ def test_a_suspicion_names_the_pose_and_the_file_of_its_line(two_files):
 def test_the_summary_names_rows_as_the_file_does(results):
     found = json.loads(call("summary", results, "--json").stdout)["m"]
     assert found["excluded"][0]["where"] == f"line {AWAY + 2} ({NAMES[AWAY]}) of tracker.csv"
+    assert 0.0 < found["excluded"][0]["error_mm"] < 3.0
     places = [each["text"] + each["lines"] for each in found["findings"]]
     assert any(f"line {WRONG + 2} ({NAMES[WRONG]}) of tracker.csv" in each for each in places)
 

@@ -26,6 +26,7 @@ def test_the_rule_that_says_most_holds_in_any_order():
         assert terms.std[2, 1] == 0.5
         assert np.isinf(np.delete(terms.std, 2, axis=0)).all()
         assert terms.free[:, [0, 2, 3]].all()
+        assert not terms.free[:, 4].any()
 
 
 def test_values_are_in_the_units_they_say_and_fix_without_a_prior():
