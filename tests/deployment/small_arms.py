@@ -68,7 +68,6 @@ def results(name: str, count: int, seed: int, with_vec: bool) -> dict:
 def results_of(name: str, seen: Observations, with_vec: bool = False) -> dict:
     """The tables of what was seen of an arm; without a fit the VEC model has no errors."""
     arm = robot.load(name)
-    nominal = fitting.fit_frames(seen, arm.dh, rotation_weight_mm_per_rad=WEIGHT)
     dh_found = fitting.fit(
         seen,
         arm.dh,
@@ -78,9 +77,10 @@ def results_of(name: str, seen: Observations, with_vec: bool = False) -> dict:
     )
     low, high = seen.q_rad.min(axis=0) - 0.02, seen.q_rad.max(axis=0) + 0.02
     plain = vec.without_errors(arm.dh, low, high, 2)
-    of = {"vec": nominal, "dh": dh_found.frames, "nominal": nominal}
+    of = dict.fromkeys(("vec", "dh", "nominal"), dh_found.frames)
     tables_of_vec = {"vec_model": plain.to_columns(np.full_like(plain.start, np.nan))}
     if with_vec:
+        nominal = fitting.fit_frames(seen, arm.dh, rotation_weight_mm_per_rad=WEIGHT)
         vec_found = vec_fit.fit(
             seen,
             plain,
