@@ -74,7 +74,7 @@ ASSUMED = {
     """,
 }
 IN_FULL = bool(os.environ.get("KINACC_PAGES_IN_FULL"))
-# Few poses of a series that a page calibrates only to show how, among them a repeated reading. With
+# Few poses of a series that a page calibrates only to show how, of B with a repeated reading. With
 # 103 order 12 is the highest for all of them, and can still be fitted where a fold is left out.
 THINNED = {
     "series_B.csv": (*range(1, 1500, 15), 2, 3, 533, 534),
@@ -171,8 +171,3 @@ def test_a_page_does_what_it_says(page, shell, calibrated, request, tmp_path):
     code, printed, _ = shell(assumed, start, HOME=str(home))
     assert code == 0, printed
     assert typed(shell, page, start, home, clone) == []
-
-
-def test_what_is_not_typed_says_why():
-    skipped = [block for page in PAGES for block in blocks(page) if "not run" in block.notes]
-    assert {block.place: block.notes["not run"] for block in skipped if block.language} != {}
