@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from good_files import simulated
 
-from kinacc.checks import digits
+from kinacc.checks import digits, repeatability
 from kinacc.kinematics import robot as robots
 from kinacc.kinematics.robot import forward
 
@@ -41,3 +41,14 @@ def test_a_drift_is_how_far_the_points_went_where_a_turn_of_the_base_carries_the
     went = np.cross(turn, at.mean(axis=0))
     assert np.linalg.norm(went) > 0.5
     np.testing.assert_allclose(found.values["drift_mm"], went, atol=0.1)
+
+
+@pytest.mark.parametrize("freedom", [12, 60])
+def test_axes_that_scatter_alike_are_called_different_as_often_as_stated(freedom):
+    rng = np.random.default_rng(freedom)
+    drawn = rng.normal(size=(3000, freedom, 3))
+    covariances = np.swapaxes(drawn, 1, 2) @ drawn / freedom
+    chance = [repeatability.differ_by_axis(each, freedom) for each in covariances]
+    for level in (0.05, 0.2):  # within four standard deviations
+        wide = 4.0 * np.sqrt(level * (1.0 - level) / 3000)
+        assert np.mean(np.array(chance) < level) == pytest.approx(level, abs=wide)

@@ -87,6 +87,17 @@ def test_rows_are_spread_over_the_measured_ones_each_once():
     assert np.array_equal(rows[:50], operating_points.spread_rows(632, 50))
 
 
+def test_errors_of_repeats_are_averaged_for_every_target_by_itself():
+    errors = {"pose": [0, 0, 0, 0, 1], "target": ["a", "b", "a", "b", "a"], "row": [5, 6, 7, 8, 9]}
+    errors |= {"ex_mm": [1.0, -4.0, 3.0, -6.0, 9.0], "ey_mm": [0.0] * 5, "ez_mm": [2.0] * 5}
+    columns = {name: np.array(values) for name, values in errors.items()}
+    rows, mean_mm = operating_points.measured_errors(
+        columns, np.array([True, True, True, True, False])
+    )
+    assert rows.tolist() == [5, 6]
+    assert mean_mm.tolist() == [[2.0, 0.0, 2.0], [-5.0, 0.0, 2.0]]
+
+
 def test_poses_beyond_the_fitted_range_are_counted_and_left_out():
     lower, upper = (np.array(bound) for bound in RANGE)
     upper[4] = np.deg2rad(10.0)  # leaves only one wrist
