@@ -241,5 +241,15 @@ def test_map_sentences_differ_on_maps_unlike_the_papers():
     assert judged(far, "map_nonlinear") == "differs"
 
 
+@pytest.mark.parametrize("angle", [0.0, 15.0])
+def test_a_map_of_one_slice_cannot_be_compared_with_sentences_on_others(angle):
+    whole = accuracy_map(OUTER, SPREAD, in_stripe)["accuracy_map"]
+    here = whole["slice_deg"] == angle
+    slice_ = {"accuracy_map": {name: values[here] for name, values in whole.items()}}
+    for claim in ("map_largest_changes_location", "map_position_less_predictable_inside"):
+        assert judged(slice_, claim) == "not comparable", claim
+    assert judged(slice_, "map_discontinuities_at_wrist_changes") == "agrees"
+
+
 def test_missing_evidence_is_not_comparable_and_never_a_crash():
     assert set(evaluate({}, paper_arm=True)["verdict"]) == {"not comparable"}

@@ -33,7 +33,9 @@ class _Maps(NamedTuple):
     def worst(self) -> np.ndarray:
         """Places (slices, 2) of the largest values as fractions of a slice: (height, radius)."""
         slices, *shape = self.value.shape
-        place = np.nanargmax(self.value.reshape(slices, -1), axis=1) if slices else []
+        place = np.zeros(0, int)
+        if slices:
+            place = np.nanargmax(self.value.reshape(slices, -1), axis=1)
         return np.transpose(np.unravel_index(place, shape)) / np.maximum(np.array(shape) - 1, 1)
 
 
