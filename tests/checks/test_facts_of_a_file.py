@@ -1,6 +1,7 @@
 """Figures that a check states beside its findings, against simulated truth."""
 
 import numpy as np
+import pandas as pd
 import pytest
 from good_files import simulated
 
@@ -15,6 +16,7 @@ def test_the_noise_between_two_targets_is_the_noise_of_a_reading(tmp_path):
     # A median of 600 absolute values scatters by 1.17 / sqrt(2 * 600) of itself: 3.4 %.
     assert facts["noise"]["between_targets_mm"] == pytest.approx(0.1, rel=0.12)
     (pair,) = facts["target_distances"]
+    assert pair["noise_per_target_mm"] == facts["noise"]["between_targets_mm"]
     assert pair["std_mm"] == pytest.approx(0.1 * np.sqrt(2.0), rel=0.12)
 
 
@@ -30,17 +32,18 @@ def test_joints_written_in_steps_cost_what_rounding_them_moves_the_flange():
 
 
 def test_a_drift_is_how_far_the_points_went_where_a_turn_of_the_base_carries_them(tmp_path):
-    file = simulated("ur10", poses=160, noise_mm=0.02)
+    file = simulated(poses=100, noise_mm=0.02)
     names = ["x_mm", "y_mm", "z_mm"]
     at = file.columns[names].to_numpy()
-    turn = np.array([0.3e-3, -0.4e-3, 0.5e-3])  # about the origin of the readings, some metres away
+    middle = at.mean(axis=0)
+    # By 1 mm in the middle, about an axis through the origin of the readings, metres away.
+    turn = np.cross(middle, [0.6, 0.0, 0.8])
+    turn /= np.linalg.norm(np.cross(turn, middle))
     moved = at + np.linspace(0.0, 1.0, len(at))[:, None] * np.cross(turn, at)
     columns = {name: moved[:, i] for i, name in enumerate(names)}
     (found,) = file.but(**columns).check(tmp_path).suspicions
     assert found.kind == "drift"
-    went = np.cross(turn, at.mean(axis=0))
-    assert np.linalg.norm(went) > 0.5
-    np.testing.assert_allclose(found.values["drift_mm"], went, atol=0.1)
+    np.testing.assert_allclose(found.values["drift_mm"], np.cross(turn, middle), atol=0.15)
 
 
 @pytest.mark.parametrize("freedom", [12, 60])
@@ -52,3 +55,14 @@ def test_axes_that_scatter_alike_are_called_different_as_often_as_stated(freedom
     for level in (0.05, 0.2):  # within four standard deviations
         wide = 4.0 * np.sqrt(level * (1.0 - level) / 3000)
         assert np.mean(np.array(chance) < level) == pytest.approx(level, abs=wide)
+
+
+def test_repeatability_over_poses_pools_squares_about_the_mean_distance_of_each():
+    rng = np.random.default_rng(1)
+    distances = [rng.uniform(0.0, 0.1, count) for count in (3, 8, 30)]
+    sides = pd.DataFrame({"visits": [3, 8, 30], "mean_distance_mm": [d.mean() for d in distances]})
+    sides["rp_mm"] = [d.mean() + 3.0 * d.std(ddof=1) for d in distances]
+    squares = sum(np.sum((d - d.mean()) ** 2) for d in distances)
+    mean = np.concatenate(distances).mean()
+    rp = mean + 3.0 * np.sqrt(squares / (41 - 3))
+    np.testing.assert_allclose(repeatability.pooled_rp(sides), (mean, rp))

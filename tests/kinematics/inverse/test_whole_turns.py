@@ -35,6 +35,7 @@ def best_turn(angle, limits, preferred):
         ((-720.0, 720.0), (380.0, 700.0)),
         ((-720.0, 720.0), (-700.0, -600.0)),
         ((-360.0, 360.0), (-350.0, -200.0)),
+        ((-180.0, 180.0), (200.0, 500.0)),
     ],
 )
 def test_a_joint_takes_the_turn_that_the_rule_names(limits_deg, preferred_deg):
