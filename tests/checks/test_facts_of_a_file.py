@@ -32,7 +32,7 @@ def test_joints_written_in_steps_cost_what_rounding_them_moves_the_flange():
 
 
 def test_a_drift_is_how_far_the_points_went_where_a_turn_of_the_base_carries_them(tmp_path):
-    file = simulated(poses=100, noise_mm=0.02)
+    file = simulated(poses=60, noise_mm=0.02)
     names = ["x_mm", "y_mm", "z_mm"]
     at = file.columns[names].to_numpy()
     middle = at.mean(axis=0)
