@@ -12,6 +12,10 @@ from kinacc.kinematics import robot
 from kinacc.measurements.intake import guess as guesses
 from kinacc.measurements.reader import read
 
+Q = [f"q{i}_deg" for i in range(1, 7)]
+XYZ = ["X [mm]", "Y [mm]", "Z [mm]"]
+NAMES = [*Q, "x_mm", "y_mm", "z_mm"]
+
 
 @dataclass(frozen=True)
 class Tracked:
