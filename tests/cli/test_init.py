@@ -6,7 +6,6 @@ import shlex
 import numpy as np
 import pandas as pd
 import pytest
-import shared_data
 from command_line import call
 from scipy.spatial.transform import Rotation
 
@@ -93,18 +92,3 @@ def test_wrong_options_are_named(foreign, tmp_path):
         done = call("init", foreign, "--out", tmp_path, "--yes", *words)
         assert done.exit_code == 2
         assert words[0] in done.output
-
-
-@pytest.mark.parametrize(
-    ("path", "name"),
-    [
-        ("ur10_tmac/published_series_D.csv", "ur10"),
-        ("fanuc_r2000ic/poses.csv", "fanuc_r2000ic_165f"),
-    ],
-)
-def test_measured_files_are_described_without_a_word(path, name, tmp_path):
-    done = call("init", shared_data.path_of(path), "--out", tmp_path, "--name", "cell", "--json")
-    told = json.loads(done.stdout)
-    assert told["robot"] == name
-    assert told["suspicions"] == []
-    assert load((tmp_path / "cell.yaml",))["cell"]["measurements"]["source"] == "file"

@@ -3,12 +3,11 @@
 import numpy as np
 import pandas as pd
 import pytest
-from tracked_arm import assert_read, described, table, tracked, written
+from tracked_arm import XYZ, Q, assert_read, described, table, tracked, written
 
 from kinacc.measurements.intake import guess as guesses
 
 IT = tracked()
-XYZ = ["X [mm]", "Y [mm]", "Z [mm]"]
 LANGUAGES = {
     "English": ("Joint {} (deg)", "Measured {} (mm)", "Nominal {} (mm)"),
     "German": ("Achse {} [°]", "{} gemessen [mm]", "{} Soll [mm]"),
@@ -21,27 +20,23 @@ LANGUAGES = {
 }
 
 
-def joints(pattern, first=1):
-    return [pattern.format(i) for i in range(first, first + 6)]
-
-
-def axes(pattern):
-    return [pattern.format(axis) for axis in "XYZ"]
-
-
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_headers_of_a_language_are_read(language, tmp_path):
     joint, measured, nominal = LANGUAGES[language]
-    names = [*joints(joint), *axes(nominal), *axes(measured)]
+    names = [
+        *map(joint.format, range(1, 7)),
+        *map(nominal.format, "XYZ"),
+        *map(measured.format, "XYZ"),
+    ]
     files = written(tmp_path, m_csv=table(names, IT.q, IT.point + 1.5, IT.point, mark=";"))
     guess = guesses.look(files, {})
     assert_read(guess.section, IT)
-    assert guess.unused() == dict.fromkeys(axes(nominal), "nominal")
+    assert guess.unused() == dict.fromkeys(map(nominal.format, "XYZ"), "nominal")
 
 
 def described_with(tmp_path, *columns, names=(), options=()):
     """What init answers on joints, points and more."""
-    text = table([*joints("q{}_deg"), *XYZ, *names], *columns)
+    text = table([*Q, *XYZ, *names], *columns)
     return described(written(tmp_path, m_csv=text), *options)[1]
 
 

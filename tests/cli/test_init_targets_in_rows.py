@@ -1,7 +1,7 @@
 """Files with a row for every target of a pose, where no column calls the targets so."""
 
 import numpy as np
-from tracked_arm import looked, refused, table, tracked, written
+from tracked_arm import XYZ, Q, looked, refused, table, tracked, written
 
 from kinacc.kinematics import robot
 from kinacc.measurements.reader import read
@@ -9,8 +9,6 @@ from kinacc.measurements.reader import read
 IT = tracked()
 COUNT = len(IT.q)
 NAMES = [f"P{row + 1}" for row in range(COUNT)]
-Q = [f"q{i}_deg" for i in range(1, 7)]
-XYZ = ["X [mm]", "Y [mm]", "Z [mm]"]
 LOWER = IT.point + IT.turn.apply([0.0, 0.0, -12.7])
 JOINTS = table(["Pose", *Q], NAMES, IT.q)
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from command_line import call
-from tracked_arm import assert_read, looked, refused, table, tracked, written
+from tracked_arm import XYZ, Q, assert_read, looked, refused, table, tracked, written
 
 from kinacc.checks.contradictions import load
 from kinacc.kinematics import robot
@@ -12,8 +12,6 @@ from kinacc.measurements.reader import read
 IT = tracked()
 COUNT = len(IT.q)
 ORDER = np.random.default_rng(7).permutation(COUNT)
-Q = [f"q{i}_deg" for i in range(1, 7)]
-XYZ = ["X [mm]", "Y [mm]", "Z [mm]"]
 # Poses are not taken at regular times.
 START_S = np.cumsum(np.random.default_rng(3).uniform(20.0, 60.0, COUNT))
 
