@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from click.testing import CliRunner, Result
-from stages_by_hand import run_stage
+from stages_by_hand import CALIBRATED, perform
 
 from kinacc.cli.group import main
 
@@ -22,7 +22,6 @@ def small_study(base: Path) -> Path:
         "datasets: {mh180: {robot: mh180}}\nmeasurements: {folds: 2, synthetic: {poses: 80}}\n"
         "calibration: {vec: {order: 1}}\n"
     )
-    for stage in ("measurements", "vec", "dh", "residuals"):
-        done = run_stage(stage, "--config", config, "--results", base / "results")
-        assert done.exit_code == 0, done.output
-    return base / "results" / "mh180"
+    for stage in CALIBRATED:
+        folder = perform(stage, [str(config)], base / "results")
+    return folder

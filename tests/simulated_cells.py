@@ -9,7 +9,7 @@ from tempfile import TemporaryDirectory
 
 from oracles.controllers import measured
 from oracles.pendants.controllers import MAKERS
-from stages_by_hand import CALIBRATED, run_stage
+from stages_by_hand import CALIBRATED, perform
 
 _FOLDER = TemporaryDirectory()  # of all tests of a run
 
@@ -21,6 +21,5 @@ def calibrated(maker: str, wave: float = 0.0, poses: int = 90, order: int = 1) -
     folder.mkdir()
     config = measured.write(folder, replace(MAKERS[maker], wave=wave), poses=poses, order=order)
     for stage in CALIBRATED:
-        done = run_stage(stage, "--config", config, "--results", folder / "results")
-        assert done.exit_code == 0, done.output
-    return folder / "results" / "arm"
+        arm = perform(stage, [str(config)], folder / "results")
+    return arm

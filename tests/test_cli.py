@@ -4,14 +4,10 @@ import json
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
+from command_line import call
 
 from kinacc import __version__
 from kinacc.cli.group import main
-
-
-def call(*words: str):
-    return CliRunner().invoke(main, [str(word) for word in words])
 
 
 def test_version():

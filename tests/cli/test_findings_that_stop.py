@@ -5,15 +5,14 @@ import shutil
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
-from tracked_arm import table, tracked
+from command_line import call as called
+from tracked_arm import NAMES, table, tracked
 
 from kinacc.checks.contradictions import load
-from kinacc.cli.group import main
 
 
 def call(*words, code=0):
-    done = CliRunner().invoke(main, [str(each) for each in words])
+    done = called(*words)
     assert done.exit_code == code, done.output
     return done.output
 
@@ -24,8 +23,7 @@ def described(tmp_path_factory):
     folder = tmp_path_factory.mktemp("described")
     arm = tracked(poses=60)
     arm.point[4:6] += [0.0, 25.0, 0.0]
-    names = [*(f"q{i}_deg" for i in range(1, 7)), "x_mm", "y_mm", "z_mm"]
-    (folder / "seen.csv").write_text(table(names, arm.q, arm.point))
+    (folder / "seen.csv").write_text(table(NAMES, arm.q, arm.point))
     call("init", folder / "seen.csv", "--robot", "ur10", "--yes", "--out", folder)
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)

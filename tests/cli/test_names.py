@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import re
 
-import pyarrow.parquet as pq
+import numpy as np
+import pandas as pd
 import pytest
 from command_line import call
+from tracked_arm import Q, table
 
 from kinacc.config.names import in_csv, of_csv
 from kinacc.kinematics import robot
@@ -26,19 +27,15 @@ def test_an_export_stays_in_its_folder_whatever_its_name(study, tmp_path, name):
 
 def test_text_that_would_be_a_formula_is_read_back_as_it_was(study, tmp_path):
     names = ["=cmd|x", "+a", "-5", "-a", "@b", "'plain"]
-    joints, found = tmp_path / "joints.csv", tmp_path / "found.csv"
-    head = ",".join(["pose", *(f"q{i}_deg" for i in range(1, 7))])
-    joints.write_text("\n".join([head, *(f"{name},0,0,0,0,{60 + i},0"
-                                         for i, name in enumerate(names))]) + "\n")  # fmt: skip
+    joints, found, again = (tmp_path / name for name in ("q.csv", "found.csv", "again.parquet"))
+    q_deg = np.eye(6)[4] * np.arange(60.0, 66.0)[:, None]
+    joints.write_text(table(["pose", *Q], names, q_deg))
     assert call("predict", study, joints, "-o", found).exit_code == 0
-    rows = list(csv.reader(found.open()))[1:]
-    assert [row[0] for row in rows] == ["'=cmd|x", "'+a", "-5", "'-a", "'@b", "'plain"]
-    assert not any(cell[:1] in "=+@\t\r" for row in rows for cell in row if cell)
-    text = found.read_text().replace("row,", "pose,", 1)
-    found.write_text(text)
-    again = tmp_path / "again.parquet"
+    cells = pd.read_csv(found, dtype=str)["row"]
+    assert [*cells] == ["'=cmd|x", "'+a", "-5", "'-a", "'@b", "'plain"]
+    found.write_text(found.read_text().replace("row,", "pose,", 1))
     assert call("predict", study, found, "-o", again).exit_code == 0
-    assert pq.read_table(again).column("row").to_pylist() == names
+    assert [*pd.read_parquet(again)["row"]] == names
 
 
 @pytest.mark.parametrize("text", ["=1", "'=1", "''=1", "'", "-1", "-1e-3", "-", "+a", "@", "\t",

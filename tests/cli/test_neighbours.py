@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-import csv
 import json
 from itertools import product
 
+import numpy as np
+import pandas as pd
 import pytest
 from command_line import call
+from tracked_arm import Q
 
 from kinacc.campaign.campaign import Campaign
 
@@ -69,15 +71,12 @@ def test_joints_that_a_command_wrote_are_read_by_the_others(study, written, tmp_
     assert done.exit_code == 0, done.output
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_poses_that_predict_wrote_are_wanted_of_compensate(study, written, kind):
-    done = call("compensate", study, written["predict", kind], "--model", "dh", "--json")
-    assert done.exit_code == 0, done.output
-    found = json.loads(done.stdout)["rows"]
-    planned = json.loads(written["plan-poses", "json"].read_text())["rows"]
-    for one, other in zip(found, planned, strict=True):
-        for joint in range(1, 7):
-            assert one[f"q{joint}_deg"] == pytest.approx(other[f"q{joint}_deg"], abs=1e-6)
+def test_joints_come_back_from_the_poses_that_were_predicted_there(written):
+    planned, back = (
+        pd.DataFrame(json.loads(written[name, "json"].read_text())["rows"])[Q]
+        for name in ("plan-poses", "compensate")
+    )
+    np.testing.assert_allclose(back, planned, atol=1e-6)
 
 
 def test_rows_without_an_answer_are_told_and_left_out(study, tmp_path):
@@ -88,9 +87,4 @@ def test_rows_without_an_answer_are_told_and_left_out(study, tmp_path):
     done = call("predict", study, joints, "--model", "dh", "-o", back)
     assert done.exit_code == 0, done.output
     assert "left out, without joints by their status: line 3" in done.stderr
-    assert [row["row"] for row in csv.DictReader(back.open())] == ["2", "4"]
-    own = joints.read_text().replace("status", "remark")
-    joints.write_text(own)
-    done = call("predict", study, joints, "--model", "dh")
-    assert done.exit_code == 2
-    assert "q1_deg, line 3: not a finite number" in done.output
+    assert [*pd.read_csv(back)["row"]] == [2, 4]

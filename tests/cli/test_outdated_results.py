@@ -1,11 +1,12 @@
 """Results whose files or settings changed after them are named as outdated, in one line."""
 
 import json
+from pathlib import Path
 
 import pytest
 from command_line import call
-from stages_by_hand import run_stage
-from tracked_arm import table, tracked
+from stages_by_hand import perform
+from tracked_arm import NAMES, table, tracked
 
 from kinacc.workflow.start import run_workflow
 
@@ -21,8 +22,7 @@ COMMANDS = {
 def calibrated(tmp_path_factory):
     """A folder with a calibration; the workflow itself read its files, stages by hand fitted it."""
     folder, arm = tmp_path_factory.mktemp("cell"), tracked(poses=60)
-    names = [*(f"q{i}_deg" for i in range(1, 7)), "x_mm", "y_mm", "z_mm"]
-    (folder / "seen.csv").write_text(table(names, arm.q, arm.point))
+    (folder / "seen.csv").write_text(table(NAMES, arm.q, arm.point))
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
         assert call("init", "seen.csv", "--robot", "ur10", "--yes").exit_code == 0
@@ -31,8 +31,7 @@ def calibrated(tmp_path_factory):
         path.write_text(text)
         assert run_workflow("results/seen/measurements.parquet", ["seen.yaml"], 1) == 0
         for stage in ("vec", "dh", "residuals", "summary"):
-            done = run_stage(stage, "--config", "seen.yaml")
-            assert done.exit_code == 0, done.output
+            perform(stage, ["seen.yaml"], Path("results"))
     return folder
 
 

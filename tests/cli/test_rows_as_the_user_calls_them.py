@@ -3,14 +3,13 @@
 import json
 
 import pytest
-from stages_by_hand import run_stage
-from tracked_arm import call, table, tracked, written
+from stages_by_hand import perform
+from tracked_arm import XYZ, Q, call, table, tracked, written
 
 from kinacc.tables import store
 
 COUNT = 60
 IT = tracked("ur10", COUNT, 11)
-Q = [f"q{i}_deg" for i in range(1, 7)]
 NAMES = [f"P{i}_1" for i in range(1, COUNT + 1)]
 _STAGES = ("measurements", "data_check", "vec", "dh", "residuals", "excluded_rows", "summary")
 EMPTY, WRONG, AWAY = 4, 20, 33  # rows, from 0: blank, 6 mm off, left out by the configuration
@@ -24,9 +23,7 @@ def two_files(tmp_path_factory):
     point[WRONG, 2] += 6.0
     cells = point.astype(str).astype(object)
     cells[EMPTY] = "---"
-    points = table(
-        ["Point", "X [mm]", "Y [mm]", "Z [mm]", "Operator"], NAMES, cells, ["ab"] * COUNT
-    )
+    points = table(["Point", *XYZ, "Operator"], NAMES, cells, ["ab"] * COUNT)
     joints = table(["Name", *Q], [f"P{i}" for i in range(1, COUNT + 1)], IT.q)
     files = written(folder, tracker_csv=points, robot_csv=joints)
     said = call("init", *files, "--robot", "ur10", "--out", folder / "cell", "--name", "m")
@@ -46,13 +43,8 @@ def two_files(tmp_path_factory):
 def results(two_files):
     folder, configs, _ = two_files
     for stage in _STAGES:
-        done = run_stage(stage, *_options(configs), "--results", folder / "results")
-        assert done.exit_code == 0, done.output
-    return folder / "results" / "m"
-
-
-def _options(configs):
-    return [word for each in configs for word in ("--config", each)]
+        arm = perform(stage, [*map(str, configs)], folder / "results")
+    return arm
 
 
 def test_the_first_poses_have_the_names_of_the_file(two_files):

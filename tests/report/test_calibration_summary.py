@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from command_line import call, small_study
-from stages_by_hand import run_stage
+from stages_by_hand import perform
 
 from kinacc.calibration.summary import TABLES
 from kinacc.campaign import of_calibration
@@ -25,10 +25,8 @@ from kinacc.tables import store, sums
 def study(tmp_path_factory):
     """Results of a small synthetic study, up to its summary."""
     base = tmp_path_factory.mktemp("study")
-    folder = small_study(base)
-    done = run_stage("summary", "--config", base / "small.yaml", "--results", folder.parent)
-    assert done.exit_code == 0, done.output
-    return folder
+    small_study(base)
+    return perform("summary", [str(base / "small.yaml")], base / "results")
 
 
 @pytest.fixture
