@@ -11,6 +11,7 @@ from pathlib import Path
 import click
 import pytest
 import yaml
+from page_blocks import blocks
 
 from kinacc.cli.group import main
 from kinacc.config.load import load
@@ -22,7 +23,6 @@ PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").rglob("*.md"))]
 PLACE = re.compile(r"`((?:src|tests|tools|workflow|docs|examples|benchmarks)/[\w./-]+)`")
 MODULE = re.compile(r"\bkinacc(?:\.[a-z_]\w*)+")
 LINK = re.compile(r"\]\(([^)#\s]+)")
-BLOCK = re.compile(r"^```(\w*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 SHOWN = re.compile(r"^(?:\$ )?kinacc ([a-z][^\n]*)", re.MULTILINE)
 
 
@@ -49,18 +49,11 @@ def test_modules_that_are_named_are_there(page):
     assert missing == []
 
 
-def shown_commands(page: Path) -> list[list[str]]:
-    """Words of the command lines in a page's blocks, continued lines joined."""
-    found = BLOCK.findall(page.read_text())
-    blocks = "\n".join(text for kind, text in found if kind in ("console", "sh")).replace(
-        "\\\n", " "
-    )
-    return [shlex.split(line, comments=True) for line in SHOWN.findall(blocks)]
-
-
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_commands_are_there_and_take_what_is_shown(page):
-    for words in shown_commands(page):
+    shown = "\n".join(each.text for each in blocks(page) if each.language in ("console", "sh"))
+    for line in SHOWN.findall(shown.replace("\\\n", " ")):
+        words = shlex.split(line, comments=True)
         command, above = main, click.Context(main, **main.context_settings)
         while isinstance(command, click.Group):
             command = command.get_command(above, words[0])
@@ -72,41 +65,20 @@ def test_commands_are_there_and_take_what_is_shown(page):
             command.make_context(command.name, list(words), parent=above)
 
 
-def test_links_to_a_part_of_a_page_lead_there():
-    def anchors(page: Path) -> set[str]:
-        headings = re.findall(r"^#+ (.*)", page.read_text(), re.MULTILINE)
-        return {re.sub(r"[^\w -]", "", each.lower()).replace(" ", "-") for each in headings}
-
-    missing = []
-    for page in PAGES:
-        for link, part in re.findall(r"\]\(([^)#\s:]*)#([^)\s]+)\)", page.read_text()):
-            if part not in anchors(page.parent / link if link else page):
-                missing.append((page.name, link, part))
-    assert missing == []
-
-
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_settings_that_are_shown_are_settings(page, tmp_path):
-    for number, (kind, text) in enumerate(BLOCK.findall(page.read_text())):
-        shown = yaml.safe_load(text) if kind == "yaml" else {}
+    for number, block in enumerate(blocks(page)):
+        shown = yaml.safe_load(block.text) if block.language == "yaml" else {}
         if not {"datasets", "calibration"} & set(shown):
             continue
         arms = {name: {"robot": "ur10"} for name in shown.get("datasets", {"arm": {}})}
         base, given = tmp_path / f"{number}.base.yaml", tmp_path / f"{number}.yaml"
         base.write_text(yaml.safe_dump({"datasets": arms}))
-        given.write_text(text)
+        given.write_text(block.text)
         for each in shown.get("datasets", {}).values():
             if each.get("robot", "").endswith(".yaml"):
                 (tmp_path / each["robot"]).write_text(as_yaml(robots.load("ur10")))
         load([base, given])
-
-
-def test_every_page_stands_in_the_contents_of_the_site():
-    text = (ROOT / "docs" / "index.md").read_text()
-    found = re.findall(r"^- \[[^]]*\]\(([^)#]+\.md)\)", text, re.MULTILINE)
-    listed = {(ROOT / "docs" / each).resolve() for each in found}
-    pages = {*(ROOT / "docs").rglob("*.md"), *ROOT.glob("*.md")} - {ROOT / "docs" / "index.md"}
-    assert {page.name for page in pages - listed if "_build" not in page.parts} == set()
 
 
 PUBLIC = re.findall(r"^- `(kinacc\.[\w.]+)`$", (ROOT / "docs/api.md").read_text(), re.MULTILINE)
