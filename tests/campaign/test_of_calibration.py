@@ -43,3 +43,5 @@ def test_the_bound_of_a_finished_campaign_on_the_model_is_taken(begun, calibrati
     )
     assert finished(tables, "dh", [folder]) == standing(folder)["bounds"][0]["upper_mm"]
     assert math.isnan(finished(tables, "vec", [folder]))
+    (folder / "readings.jsonl").write_text("no journal")
+    assert math.isnan(finished(tables, "dh", [folder]))

@@ -208,10 +208,6 @@ REFUSED = {
         ],
         "never a measurement",
     ),
-    "the controller's own kinematics by axes": (
-        [Q, (by_axis("actual_TCP_pose_{a}"), IT.controller / 1000.0)],
-        "never a measurement",
-    ),
     "only nominal points": ([Q, (by_axis("soll_{a}"), IT.nominal)], "nominal"),
     "only deviations": ([Q, (by_axis("d{A} [mm]"), IT.deviation)], "a deviation"),
     "milliradians": ([(numbered("q{} [mrad]"), 1e3 * np.deg2rad(IT.q)), X], "mrad"),

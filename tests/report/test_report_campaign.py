@@ -7,12 +7,13 @@ from pathlib import Path
 import matplotlib.text
 import numpy as np
 import pytest
+from campaign_on_disk import entry_of, readings_of
 
 from kinacc.campaign import begin, folder, report
 from kinacc.campaign.folder import Opened
 from kinacc.campaign.instrument import instruments
 from kinacc.campaign.plan import Limits, assessor_of
-from kinacc.campaign.state import Reading, Readings, deviations
+from kinacc.campaign.state import deviations
 from kinacc.deployment.planning import spread
 from kinacc.deployment.record import nominal
 from kinacc.figures.campaign import draw_bounds
@@ -33,15 +34,12 @@ def opened(
     assessor = assessor_of("search_and_confirm", {"measurements": budget})
     used = instruments(("tracker=0.05",), "base")
     plan = begin.plan_of(arm, candidates, assessor, used, limits, about, 3)
-    rng, true = np.random.default_rng(4), np.random.default_rng(5).normal(0.0, 0.2, (points, 3))
-    rows = plan.visiting(frozenset())
-    asking, entries = plan.assessor.begin(plan.candidates(rows)), []
-    while len(entries) < readings and (row := asking.next()) is not None:
-        seen = true[rows[row]] + rng.normal(0.0, noise_mm, 3)
-        asking.record(row, seen, plan.instruments[0].covariance_mm2)
-        at = Reading(int(rows[row]), plan.points.modelled_mm[rows[row]] + seen, "tracker")
-        entries.append(Readings(readings=[at]).model_dump(exclude_none=True))
-    journal = folder.Journal((*entries, *extra), "cd", (), 0)
+    rng, rows = np.random.default_rng(4), plan.visiting(frozenset())
+    true = np.random.default_rng(5).normal(0.0, 0.2, (points, 3))[rows]
+    taken = readings_of(
+        plan, lambda row, _: true[row] + rng.normal(0.0, noise_mm, 3), limit=readings
+    )
+    journal = folder.Journal((entry_of(taken), *extra), "cd", (), 0)
     return Opened(Path("check"), plan, journal, "ab")
 
 

@@ -28,12 +28,6 @@ def tables():
     return {path.stem: dict(store.read(path)) for path in RESULTS.glob("*.parquet")}
 
 
-def check(*findings: tuple) -> dict:
-    """A ``data_check``."""
-    frame = pd.DataFrame(findings, columns=FINDING)
-    return {name: column.to_numpy(object) for name, column in frame.items()}
-
-
 def identified(tables, **parameters: tuple) -> dict:
     """``dh_identified`` with status, std and statement of some parameters: j1__d_mm."""
     frame = pd.DataFrame(tables["dh_identified"]).set_index("parameter")
@@ -64,12 +58,13 @@ def section(make, tables):
 
 
 def test_findings_stand_the_gravest_first_with_the_reason_they_were_accepted(tables):
-    tables["data_check"] = check(
+    findings = (
         ("thin_coverage", "note", "joint 4 hardly moves", None, "move it", None, 0),
         ("base_jump", "stops", "the base moved", "lines 9-12", "say so", "moved on purpose", 4),
         ("outliers", "warning", "1 row is off", "line 3", None, None, 1),
         ("left_out", "note", "column temp is not read", None, None, None, 0),
     )
+    tables["data_check"] = dict(pd.DataFrame(findings, columns=FINDING).astype(object))
     found = section(fit_sections.data, tables)
     rows = table(found, "Findings of the check: 3 findings").rows
     assert [row[0] for row in rows] == ["stops", "warning", "note"]
@@ -80,14 +75,13 @@ def test_findings_stand_the_gravest_first_with_the_reason_they_were_accepted(tab
 
 
 def test_excluded_rows_have_the_error_of_the_selected_model(tables):
-    tables["excluded_rows"] = {
-        "comparison": np.array(["vec_vs_measured", "dh_vs_measured", "vec_vs_measured"], object),
-        "line": np.array([9, 9, 4]),
-        "reason": np.array(["slip", "slip", "no number"], object),
-        "ex_mm": np.array([3.0, 9.0, np.nan]),
-        "ey_mm": np.array([4.0, 9.0, np.nan]),
-        "ez_mm": np.array([0.0, 9.0, np.nan]),
-    }
+    rows = [
+        ("vec_vs_measured", 9, "slip", 3.0, 4.0, 0.0),
+        ("dh_vs_measured", 9, "slip", 9.0, 9.0, 9.0),
+        ("vec_vs_measured", 4, "no number", *[np.nan] * 3),
+    ]
+    names = ["comparison", "line", "reason", "ex_mm", "ey_mm", "ez_mm"]
+    tables["excluded_rows"] = dict(pd.DataFrame(rows, columns=names))
     is_vec = np.asarray(tables["model_selection"]["model"]) == "vec"
     tables["model_selection"]["selected"] = is_vec.astype(int)
     found = table(section(fit_sections.data, tables), "Rows left out")
@@ -145,15 +139,12 @@ def test_what_other_poses_would_show_stands_first(tables):
 
 
 def test_the_closest_pair_comes_first_and_the_rank_has_its_limit(tables):
-    tables["dh_covariance"] = {
-        "parameter": np.array(["j1.a_mm", "j2.a_mm", "j2.a_mm", "j1.d_mm"], object),
-        "other": np.array(["base.x_mm", "j1.a_mm", "j2.a_mm", "base.x_mm"], object),
-        "correlation": np.array([0.25, -0.97, 1.0, np.nan]),
-    }
-    tables["dh_fit"] = {
-        "quantity": np.array(["rank", "rank_threshold", *["singular_value"] * 3], object),
-        "value": np.array([2.0, 0.01, 40.0, 10.0, 0.02]),
-    }
+    pairs = [("j1.a_mm", "base.x_mm", 0.25), ("j2.a_mm", "j1.a_mm", -0.97),
+             ("j2.a_mm", "j2.a_mm", 1.0), ("j1.d_mm", "base.x_mm", np.nan)]  # fmt: skip
+    covariance = pd.DataFrame(pairs, columns=["parameter", "other", "correlation"])
+    fit = {"quantity": ["rank", "rank_threshold", *["singular_value"] * 3],
+           "value": [2.0, 0.01, 40.0, 10.0, 0.02]}  # fmt: skip
+    tables |= {"dh_covariance": dict(covariance), "dh_fit": dict(pd.DataFrame(fit))}
     found = section(fit_sections.identifiability, tables)
     rows = table(found, "The 2 pairs of the largest |correlation|; 1 reach 0.95").rows
     assert rows == (
