@@ -67,8 +67,7 @@ def files_of(folder):
 def refused(folder, *words):
     """The message of a command that must fail and leave the campaign as it was."""
     before = files_of(folder)
-    done = call("campaign", *words)
-    assert done.exit_code == 2, done.output
+    done = call("campaign", *words, code=2)
     assert "Traceback" not in done.output
     assert files_of(folder) == before
     return done.output

@@ -10,9 +10,11 @@ from stages_by_hand import CALIBRATED, perform
 from kinacc.cli.group import main
 
 
-def call(*words: object, **more: object) -> Result:
-    """Run a command as a person would."""
-    return CliRunner().invoke(main, [str(word) for word in words], **more)
+def call(*words: object, code: int | None = None, **more: object) -> Result:
+    """Run a command as a person would; ``code`` is the exit code that it must have."""
+    done = CliRunner().invoke(main, [str(word) for word in words], **more)
+    assert code in (None, done.exit_code), done.output
+    return done
 
 
 def small_study(base: Path) -> Path:

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Iterable
 from functools import partial
 from pathlib import Path
-from types import SimpleNamespace
 
 from kinacc.calibration import stages
 from kinacc.checks import check
-from kinacc.errors import KinaccError
 from kinacc.report import summarise
 from kinacc.study import evaluation, histories, monte_carlo
 from kinacc.study.claims.evaluate import table_of
@@ -36,20 +35,18 @@ STAGES = {
 CALIBRATED = ("measurements", "vec", "dh", "residuals")
 
 
-def run_stage(name: str, *words: object) -> SimpleNamespace:
-    """Exit code and output of a stage, by ``--config``, ``--results`` and ``--dataset``."""
-    given = [str(word) for word in words]
-    pairs = list(zip(given[::2], given[1::2], strict=True))
-    configs = [value for option, value in pairs if option == "--config"]
-    options = dict(pairs)
+def run_stages(
+    names: Iterable[str],
+    configs: Iterable[object],
+    results: Path = Path("results"),
+    dataset: str | None = None,
+) -> str:
+    """Run stages one after another; their warnings."""
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
-        try:
-            perform(name, configs, Path(options.get("--results", "results")),
-                    options.get("--dataset"))  # fmt: skip
-        except KinaccError as error:
-            return SimpleNamespace(exit_code=1, output=str(error))
-    return SimpleNamespace(exit_code=0, output="\n".join(str(each.message) for each in told))
+        for name in names:
+            perform(name, list(map(str, configs)), results, dataset)
+    return "\n".join(str(each.message) for each in told)
 
 
 def perform(name: str, configs: list[str], results: Path, dataset: str | None = None) -> Path:

@@ -51,8 +51,7 @@ def test_every_command_is_listed_once_with_all_its_words():
     ],
 )
 def test_a_slip_of_the_hand_is_told_what_is_meant(words, near):
-    done = call(*words)
-    assert done.exit_code == 2
+    done = call(*words, code=2)
     assert near in done.stderr
 
 
@@ -60,8 +59,7 @@ def test_a_slip_of_the_hand_is_told_what_is_meant(words, near):
     "words", [("predict", "nowhere"), ("summary", "nowhere"), ("nonsense",), ("init", "--robto")]
 )
 def test_what_is_wrong_is_said_as_json_where_the_answer_is_wanted_so(words):
-    done = call(*words, "--json")
-    assert done.exit_code == 2
+    done = call(*words, "--json", code=2)
     problems = json.loads(done.stdout)["problems"]
     assert all({"where", "what", "allowed", "fix"} == set(each) for each in problems)
     assert problems[0]["what"]
@@ -85,4 +83,4 @@ def test_commands_of_a_build_server_end_with_the_codes_of_the_page(
     Path("wrong.yaml").write_text("datasets: {cell: {robt: mh180}}\n")
     Path("results/cell").mkdir(parents=True)
     Path("results/cell/robot.parquet").write_text("no table")
-    assert call(*words.split()).exit_code == code
+    call(*words.split(), code=code)

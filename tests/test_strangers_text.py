@@ -67,13 +67,11 @@ def test_a_file_of_a_long_name_is_described_under_a_shorter_one():
 
 def test_a_campaign_of_too_many_values_is_refused_before_they_are_made(tmp_path):
     (tmp_path / "campaign.json").write_text('{"format": [' + "[]," * 6_000_000 + "[]]}")
-    done = call("campaign", "status", tmp_path)
-    assert done.exit_code == 2, done.output
+    done = call("campaign", "status", tmp_path, code=2)
     assert "campaign.json: holds too many values; allowed: at most 5,000,000" in done.output
 
 
 def test_rows_in_a_file_of_json_without_end_are_refused(tmp_path):
     (tmp_path / "errors.json").write_text(json.dumps({"rows": []}) + " " * 100_000_000)
-    done = call("campaign", "plan", "--noise-mm", 0.1, "--errors", tmp_path / "errors.json")
-    assert done.exit_code == 2, done.output
+    done = call("campaign", "plan", "--noise-mm", 0.1, "--errors", tmp_path / "errors.json", code=2)
     assert "errors.json: is too large; allowed: at most 100 MB" in done.output

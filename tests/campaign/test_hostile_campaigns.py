@@ -18,8 +18,7 @@ def begun(tmp_path, make_plan):
 
 
 def refusal(path) -> str:
-    done = call("campaign", "status", path)
-    assert done.exit_code == 2, done.output
+    done = call("campaign", "status", path, code=2)
     assert isinstance(done.exception, SystemExit), done.exception
     return done.output
 
@@ -123,6 +122,5 @@ def test_an_entry_that_says_nothing_is_refused_with_its_line(begun, entry):
 )
 def test_settings_that_are_no_numbers_of_an_arm_are_named(words, said):
     done = call("campaign", "plan", "--noise-mm", "0.05", "--candidates", 20, "--budget", 20,
-                "--errors", "smooth", *words)  # fmt: skip
-    assert done.exit_code == 2, done.output
+                "--errors", "smooth", *words, code=2)  # fmt: skip
     assert said in done.output

@@ -22,8 +22,7 @@ def written(study, tmp_path_factory):
     """A file of every command that writes joints or poses, in every form, by command and kind."""
     base = tmp_path_factory.mktemp("written by others")
     campaign, made = base / "check", {}
-    done = call("campaign", "start", campaign, "--calibration", study, *STARTED, "--candidates", 8)
-    assert done.exit_code == 0, done.output
+    call("campaign", "start", campaign, "--calibration", study, *STARTED, "--candidates", 8, code=0)
     for kind in KINDS:
         commands = {
             "plan-poses": ("plan-poses", "mh180", "--poses", 8, "--candidates", 60, "--joints-deg",
@@ -34,12 +33,11 @@ def written(study, tmp_path_factory):
         }  # fmt: skip
         for name, words in commands.items():
             made[name, kind] = base / f"{name}.{kind}"
-            done = call(*words, "-o", made[name, kind])
-            assert done.exit_code == 0, (name, kind, done.output)
+            call(*words, "-o", made[name, kind], code=0)
     opened = Campaign(campaign)
     while (pose := opened.next_pose()) is not None:
         opened.add_reading(pose.expected_mm + 0.1)
-    assert call("campaign", "report", campaign).exit_code == 0
+    call("campaign", "report", campaign, code=0)
     made["campaign report", "parquet"] = campaign / "report" / "campaign_points.parquet"
     made["measurements", "parquet"] = study / "measurements.parquet"
     return made
@@ -67,8 +65,7 @@ def test_joints_that_a_command_wrote_are_read_by_the_others(study, written, tmp_
         ),
         "compare --joints": ("compare", "mh180", study, "--joints", file),
     }[reads]  # fmt: skip
-    done = call(*words, "--json")
-    assert done.exit_code == 0, done.output
+    call(*words, "--json", code=0)
 
 
 def test_joints_come_back_from_the_poses_that_were_predicted_there(written):
@@ -83,8 +80,7 @@ def test_rows_without_an_answer_are_told_and_left_out(study, tmp_path):
     wanted, joints, back = (tmp_path / name for name in ("wanted.csv", "joints.csv", "back.csv"))
     near = "1500,200,900,0,1,0,0"
     wanted.write_text(f"x_mm,y_mm,z_mm,qw,qx,qy,qz\n{near}\n9000,0,0,1,0,0,0\n{near}\n")
-    assert call("compensate", study, wanted, "--model", "dh", "-o", joints).exit_code == 1
-    done = call("predict", study, joints, "--model", "dh", "-o", back)
-    assert done.exit_code == 0, done.output
+    call("compensate", study, wanted, "--model", "dh", "-o", joints, code=1)
+    done = call("predict", study, joints, "--model", "dh", "-o", back, code=0)
     assert "left out, without joints by their status: line 3" in done.stderr
     assert [*pd.read_csv(back)["row"]] == [2, 4]

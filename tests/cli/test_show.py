@@ -29,8 +29,7 @@ def folder(study, tmp_path):
 
 
 def rows(*words):
-    done = call("show", *words, "--json")
-    assert done.exit_code == 0, done.output
+    done = call("show", *words, "--json", code=0)
     return json.loads(done.stdout)["rows"]
 
 
@@ -67,6 +66,5 @@ def test_columns_are_described_with_unit_and_meaning(folder):
 @pytest.mark.parametrize("name", ["measurement", "vec_model", "empty", "measurements.parquet/x"])
 def test_what_is_no_table_is_refused(folder, name):
     (folder / "empty.parquet").touch()
-    done = call("show", folder, name)
-    assert done.exit_code == 2
+    done = call("show", folder, name, code=2)
     assert ("did you mean" in done.output) == (name == "measurement")

@@ -37,6 +37,8 @@ datasets:
     evaluation: {space: measured}
 """
 JUNE = ("--date", "2026-06-02", "--base", "moved", "--tool", "same")
+FIRST = ("--first-date", "2026-03-01")
+SERIES = ("june.csv", *JUNE, *FIRST)
 
 
 @pytest.fixture
@@ -52,13 +54,12 @@ def cell(tmp_path, monkeypatch):
     return tmp_path
 
 
-def added(*words: str):
-    return call("add", *words, "--to", "tracker.yaml")
+def added(*words: str, code: int = 0):
+    return call("add", *words, "--to", "tracker.yaml", code=code)
 
 
 def test_a_second_file_makes_a_series_of_the_first_and_comments_stay(cell):
-    done = added("june.csv", *JUNE, "--first-date", "2026-03-01")
-    assert done.exit_code == 0, done.output
+    added(*SERIES)
     text = Path("tracker.yaml").read_text()
     assert text == HERE + (
         "    series:\n"
@@ -69,11 +70,10 @@ def test_a_second_file_makes_a_series_of_the_first_and_comments_stay(cell):
 
 
 def test_a_third_file_is_one_more_line_and_nothing_else_changes(cell):
-    assert added("june.csv", *JUNE, "--first-date", "2026-03-01").exit_code == 0
+    added(*SERIES)
     before = Path("tracker.yaml").read_text().splitlines()
     os.chmod("tracker.yaml", 0o640)
     done = added("may.csv", "--date", "2026-07-04", "--base", "same", "--tool", "same", "--json")
-    assert done.exit_code == 0, done.output
     (line,) = json.loads(done.output)["written"]
     after = Path("tracker.yaml").read_text().splitlines()
     assert [each for each in after if each not in before] == [f"      - {line}"]
@@ -86,8 +86,7 @@ def test_a_third_file_is_one_more_line_and_nothing_else_changes(cell):
     [(JUNE[:4], "--tool"), (JUNE[2:], "--date"), (JUNE, "--first-date")],
 )
 def test_what_is_not_said_is_named(cell, words, option):
-    done = added("june.csv", *words)
-    assert done.exit_code == 2
+    done = added("june.csv", *words, code=2)
     assert option in done.output
     assert Path("tracker.yaml").read_text() == HERE
 
@@ -98,15 +97,13 @@ def test_the_day_is_that_of_the_files_own_times(cell):
     stamped = [f"{row},{time}" for row, time in zip(rows, times, strict=True)]
     stamped = [f"{names},measured_at", *stamped]
     Path("june.csv").write_text("\n".join(stamped))
-    done = added("june.csv", *JUNE[2:], "--first-date", "2026-03-01")
-    assert done.exit_code == 0, done.output
+    added("june.csv", *JUNE[2:], *FIRST)
     assert "date: 2026-06-02" in Path("tracker.yaml").read_text()
 
 
 def test_a_file_of_known_readings_is_refused(cell):
     Path("june.csv").write_text(Path("data/march.csv").read_text())
-    done = added("june.csv", *JUNE, "--first-date", "2026-03-01")
-    assert done.exit_code == 2
+    done = added(*SERIES, code=2)
     assert "holds the readings of" in done.output
 
 
@@ -115,18 +112,15 @@ def test_another_target_is_refused_where_the_tool_is_the_same(cell):
     for name in ("x_mm", "y_mm", "z_mm", "rx_deg", "ry_deg", "rz_deg"):
         text = text.replace(name, f"probe_{name}")
     Path("june.csv").write_text(text)
-    done = added("june.csv", *JUNE, "--first-date", "2026-03-01")
-    assert done.exit_code == 2
-    moved = added("june.csv", *JUNE[:4], "--tool", "moved", "--first-date", "2026-03-01")
-    assert moved.exit_code == 0, moved.output
+    added(*SERIES, code=2)
+    added("june.csv", *JUNE[:4], "--tool", "moved", *FIRST)
 
 
 @pytest.mark.parametrize("day", ["2026-05-04", "2026-06-02", "June"])
 def test_a_line_that_is_not_the_newest_is_not_written(cell, day):
-    assert added("june.csv", *JUNE, "--first-date", "2026-03-01").exit_code == 0
+    added(*SERIES)
     text = Path("tracker.yaml").read_text()
-    done = added("may.csv", "--date", day, "--base", "same", "--tool", "same")
-    assert done.exit_code == 2
+    added("may.csv", "--date", day, "--base", "same", "--tool", "same", code=2)
     assert Path("tracker.yaml").read_text() == text
 
 

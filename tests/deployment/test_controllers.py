@@ -8,11 +8,10 @@ import pandas as pd
 import pytest
 import yaml
 from command_line import call
-from lxml import etree
 from oracles.controllers import judge, measured, programs
-from oracles.controllers.arms import ARMS, DEG, frame
+from oracles.controllers.arms import ARMS, frame
 from oracles.kinematics import dh_forward, rot_x, rot_y, rot_z, trans
-from oracles.pendants.controllers import MAKERS, joints_for
+from oracles.pendants.controllers import MAKERS, joints_for, shifted_arm
 from scipy.spatial.transform import Rotation
 from simulated_cells import calibrated
 
@@ -53,8 +52,9 @@ def judged(folder, results, language, arm):
     path = program.write(folder, "weld")
     before = path.read_bytes()
     out = path.with_name(f"weld_cal{path.suffix}")
-    done = call("compensate", results, "--program", path, "-o", out, *options(program, folder))
-    assert done.exit_code == 0, done.output
+    done = call(
+        "compensate", results, "--program", path, "-o", out, *options(program, folder), code=0
+    )
     assert all(f"weld_cal{ending}" in done.output for ending in program.files)
     assert path.read_bytes() == before
     frames = pd.read_parquet(results / "frames.parquet")
@@ -89,8 +89,7 @@ def test_an_arm_whose_axes_run_unevenly_goes_there_by_its_vec_model(tmp_path):
 def test_values_typed_into_a_controller_err_by_no_more_than_the_page_states(tmp_path, maker):
     """Goals in the frame of the instrument, drawn where the arm was measured."""
     arm, typed = MAKERS[maker], {}
-    done = call("export", calibrated(maker), "--for", maker, "--out", tmp_path, "--json")
-    assert done.exit_code == 0, done.output
+    done = call("export", calibrated(maker), "--for", maker, "--out", tmp_path, "--json", code=0)
     answer = json.loads(done.output)
     for each in answer["values"]:
         digits = {"ur": 9, "abb": 9 if each["name"][0] == "q" else 4}.get(maker, 4)
@@ -111,31 +110,24 @@ def test_values_typed_into_a_controller_err_by_no_more_than_the_page_states(tmp_
         assert stated["position_mm"] < 1.02 * best["position_mm"]
 
 
-def test_ur_staubli_and_ros_describe_the_same_arm():
+def test_ur_staubli_and_ros_describe_the_same_arm(tmp_path):
     """Common normals hundreds of metres away, offsets with a turn about y, and joint origins."""
     arm, rng = robot.load("ur10"), np.random.default_rng(3)
     off = rng.normal(0.0, [2e-3, 0.5, 0.5, 1e-3, 1e-3], (6, 5))
     off[5, 4] = 0.0  # which a UR controller cannot take
     model = arm.dh.with_parameters(arm.dh.start + off.ravel())
-    numbers = {maker: CONTROLLERS[maker].arm(arm, model) for maker in ("ur", "staubli", "ros")}
-    texts = {maker: CONTROLLERS[maker].text(values) for maker, values in numbers.items()}
-    nominal, names = ARMS["ur"].table, ("theta", "d", "a", "alpha", "beta")
-    deltas = dict(line.split(" = ") for line in texts["ur"].split("\n")[1:])
-    deltas = {name: json.loads(deltas.get(f"delta_{name}", "[0, 0, 0, 0, 0, 0]")) for name in names}
-    normals = np.array([*deltas.values()]).T * [1.0, 1e3, 1e3, 1.0, 1.0]
-    assert np.abs(normals).max() > 1e3
-    rows = [
-        [float(each.get(name)) for name in names] for each in etree.fromstring(texts["staubli"])
-    ]
-    rows = rows * np.array([DEG, 1.0, 1.0, DEG, DEG])
-    links = yaml.safe_load(texts["ros"])["kinematics"]
+    for maker, ending in (("ur", "conf"), ("staubli", "cfx"), ("ros", "yaml")):
+        text = CONTROLLERS[maker].text(CONTROLLERS[maker].arm(arm, model))
+        (tmp_path / f"arm.{ending}").write_text(text)
+    described = [shifted_arm(maker, ARMS["ur"], tmp_path / "arm") for maker in ("ur", "staubli")]
+    assert np.abs(described[0].errors).max() > 1e3
+    links = yaml.safe_load(text)["kinematics"]
     assert {"shoulder", "upper_arm", "wrist_3"} < set(links)
     del links["hash"]
     for q in rng.uniform(-3.0, 3.0, (5, 6)):
-        expected, here = dh_forward(nominal + off, q), np.eye(4)
-        for offsets in (normals, rows):
-            found = dh_forward(nominal + offsets, q)
-            np.testing.assert_allclose(found, expected, rtol=0, atol=1e-5)
+        expected, here = dh_forward(ARMS["ur"].table + off, q), np.eye(4)
+        for each in described:
+            np.testing.assert_allclose(each.pose(q), expected, rtol=0, atol=1e-5)
         for angle, link in zip(q, links.values(), strict=True):
             here = here @ trans(*(1e3 * link[axis] for axis in "xyz")) @ rot_z(link["yaw"])
             here = here @ rot_y(link["pitch"]) @ rot_x(link["roll"]) @ rot_z(angle)
@@ -145,8 +137,7 @@ def test_ur_staubli_and_ros_describe_the_same_arm():
 
 def test_a_table_or_joints_that_a_controller_does_not_have_are_refused(tmp_path):
     for maker in ("ur", "staubli", "ros"):
-        done = call("export", calibrated("fanuc"), "--for", maker, "--out", tmp_path)
-        assert done.exit_code == 2
+        call("export", calibrated("fanuc"), "--for", maker, "--out", tmp_path, code=2)
     arm = robot.load("irb120")
     with pytest.raises(InputError, match="no DH table of UR arms"):
         CONTROLLERS["ur"].arm(arm, arm.dh)

@@ -10,7 +10,7 @@ from oracles.controllers import measured
 from oracles.controllers.arms import ARMS, errors
 from oracles.controllers.measured import TOOL
 from scipy.spatial.transform import Rotation
-from stages_by_hand import CALIBRATED, run_stage
+from stages_by_hand import CALIBRATED, run_stages
 
 # Base and tool take up those of the first and the last joint.
 ERRORS = 0.3 * errors(3) * np.array([[0.0]] + [[1.0]] * 4 + [[0.0]])
@@ -28,9 +28,7 @@ def results(tmp_path_factory):
     turn = Rotation.from_matrix(TOOL[:3, :3]).as_rotvec(degrees=True)
     tool = {"position_mm": TOOL[:3, 3].tolist(), "rotation_vector_deg": turn.tolist()}
     (folder / "robot.yaml").write_text(f"{ARM.description()}tool: {json.dumps(tool)}\n")
-    for stage in CALIBRATED:
-        done = run_stage(stage, "--config", config, "--results", folder / "results")
-        assert done.exit_code == 0, done.output
+    run_stages(CALIBRATED, [config], folder / "results")
     return folder / "results" / "arm"
 
 

@@ -17,9 +17,9 @@ from kinacc.deployment.verify import error_columns, model_errors
 from kinacc.errors import InputError
 from kinacc.geometry import Pose, exp_so3
 from kinacc.kinematics import dh, robot
-from kinacc.tables import store
 
 ELSEWHERE = Pose(exp_so3(np.array([1.2, 0.3, -0.8])), np.array([-700.0, 3100.0, 250.0]))
+JOINTS, PLACE = [f"q{i}" for i in range(1, 7)], ["x_mm", "y_mm", "z_mm"]
 SAME, MOVED = (("--base", each, "--tool", each) for each in ("same", "moved"))
 
 
@@ -83,17 +83,15 @@ def folder(tmp_path_factory):
     """Results of a small arm, and its readings from elsewhere, without and with a target."""
     base = tmp_path_factory.mktemp("verify")
     found = small_study(base)
-    table = store.read(found / "measurements.parquet")
-    xyz = np.stack([table[f"{axis}_mm"] for axis in "xyz"], axis=1)
-    q_rad = np.stack([table[f"q{i}"] for i in range(1, 7)], axis=1)
-    elsewhere = np.hstack([q_rad, xyz @ ELSEWHERE.rotation.T + 2000.0])
+    table = pd.read_parquet(found / "measurements.parquet")
+    elsewhere = np.hstack([table[JOINTS], table[PLACE] @ ELSEWHERE.rotation.T + 2000.0])
     written(base, "moved", elsewhere)
     written(base, "other_target", elsewhere, target="ball_")
     return base, found
 
 
 def written(base, name, rows, target=""):
-    header = [*(f"q{i}_rad" for i in range(1, 7)), *(f"{target}{x}_mm" for x in "xyz")]
+    header = [*(f"{name}_rad" for name in JOINTS), *(target + name for name in PLACE)]
     np.savetxt(base / f"{name}.csv", rows, "%.17g", ",", header=",".join(header), comments="")
     (base / f"{name}.yaml").write_text(
         f"datasets: {{{name}: {{robot: mh180}}}}\nmeasurements: {{source: file, folds: 5, file:"
@@ -145,15 +143,13 @@ def test_readings_without_a_session_belong_to_no_base_of_several(folder):
 def later(folder, tmp_path_factory):
     """Readings near the poses of the arm, off by ``grown`` times its held-out errors."""
     _, found = folder
-    measured, errors = (store.read(found / f"{n}.parquet") for n in ("measurements", "pose_errors"))
+    measured = pd.read_parquet(found / "measurements.parquet")
     tables = read_tables(found)
     choice = selected_model(tables)
-    held = errors["estimate"] == "cross_validated"
-    held &= errors["comparison"] == f"{choice}_vs_measured"
-    off = np.stack([errors[f"e{axis}_mm"][held] for axis in "xyz"], axis=1)
-
-    every = np.stack([measured[f"q{i}"] for i in range(1, 7)], axis=1)
-    fitted = np.stack([measured[f"{axis}_mm"] for axis in "xyz"], axis=1)
+    held = pd.read_parquet(found / "pose_errors.parquet").query(
+        f"estimate == 'cross_validated' and comparison == '{choice}_vs_measured'"
+    )
+    off, every = held[["ex_mm", "ey_mm", "ez_mm"]].to_numpy(), measured[JOINTS].to_numpy()
     arm = calibration(tables, recorded_robot(found), choice)
 
     def write(grown: float, count: int, offset_rad=0.0, times=1, known=0):
@@ -165,7 +161,7 @@ def later(folder, tmp_path_factory):
         seen = seen + grown * off[rng.integers(len(off), size=count)]
         q_rad[:, 2] += offset_rad
         rows = np.tile(np.hstack([q_rad, seen]), (times, 1))
-        rows = np.vstack([rows, np.hstack([every, fitted])[:known]])
+        rows = np.vstack([rows, measured[JOINTS + PLACE][:known]])
         return written(tmp_path_factory.mktemp("later"), "today", rows)
 
     return write
@@ -212,8 +208,7 @@ def test_a_file_of_readings_is_read_as_those_of_the_calibration_were(folder, lat
     """No .yaml of its own: the configuration beside the results says how."""
     base, found = folder
     file = later(1.0, 12).with_suffix(".csv")
-    done = call("verify", file, "--calibration", found, *SAME)
-    assert done.exit_code == 2
+    done = call("verify", file, "--calibration", found, *SAME, code=2)
     assert f"`kinacc init {file}` writes a .yaml that describes it" in done.output
     own, text = found.parent.parent / "own.yaml", (base / "moved.yaml").read_text()
     text = text.replace("{moved:", f"{{{found.name}:")
@@ -225,6 +220,5 @@ def test_a_file_of_readings_is_read_as_those_of_the_calibration_were(folder, lat
     assert answer["errors"] == described["errors"]
     own.write_text(text.replace("moved.csv", str(base / "moved.csv")))
     file.write_text(file.read_text().replace("q1_rad", "axis one"))
-    done = call("verify", file, "--calibration", found, *SAME)
-    assert done.exit_code == 2
+    done = call("verify", file, "--calibration", found, *SAME, code=2)
     assert f"run kinacc init {file} first" in done.output

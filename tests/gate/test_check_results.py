@@ -8,11 +8,12 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
+import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from command_line import call
-from stages_by_hand import perform
+from stages_by_hand import run_stages
 from whole_project import finished
 
 from kinacc.tables import store, sums
@@ -32,8 +33,7 @@ WEEKS = {"first": (90, 0.05, 1), "again": (90, 0.05, 1), "next": (90, 0.051, 2),
 
 
 def calibrated(config: Path, results: Path, stages=STAGES) -> Path:
-    for stage in stages:
-        perform(stage, [str(config)], results)
+    run_stages(stages, [config], results)
     return results
 
 
@@ -75,8 +75,7 @@ def here(made, tmp_path, monkeypatch):
 
 def told(*words, code=0):
     """Outcomes by name, as the command prints them in JSON."""
-    done = call("check-results", *words, "--json")
-    assert done.exit_code == code, done.output
+    done = call("check-results", *words, "--json", code=code)
     report = json.loads(done.stdout)
     assert (report["schema_version"], report["passed"]) == (1, code == 0)
     return {each["name"]: each for each in report["outcomes"]}
@@ -84,12 +83,11 @@ def told(*words, code=0):
 
 def held_out_mm(folder: Path) -> np.ndarray:
     """Position errors of the selected model at held-out rows, straight from the tables."""
-    errors, chosen = (store.read(folder / f"{name}.parquet")
+    errors, chosen = (pd.read_parquet(folder / f"{name}.parquet")
                       for name in ("pose_errors", "model_selection"))  # fmt: skip
-    model = chosen["model"][np.asarray(chosen["selected"]) == 1][0]
-    own = errors["estimate"] == "cross_validated"
-    own &= errors["comparison"] == f"{model}_vs_measured"
-    return np.linalg.norm([errors[f"e{axis}_mm"][own] for axis in "xyz"], axis=0)
+    model = chosen.query("selected == 1")["model"].item()
+    own = f"estimate == 'cross_validated' and comparison == '{model}_vs_measured'"
+    return np.linalg.norm(errors.query(own)[["ex_mm", "ey_mm", "ez_mm"]], axis=1)
 
 
 def test_results_as_the_stages_left_them_pass(here):
@@ -140,7 +138,7 @@ def test_reports_for_machines_can_be_read_by_them(here):
         SMALL % WEEKS["first"]
         + "gates: [{name: 'a <b> & \"c\"', value: residuals.position.mean, at_most_mm: 1e-4}]\n"
     )
-    assert call("check-results", *words).exit_code == 1
+    call("check-results", *words, code=1)
     assert json.loads(Path("check.json").read_text())["passed"] is False
     metrics = json.loads(Path("metrics.json").read_text())
     assert all(isinstance(value, (int, float)) for value in metrics.values())
@@ -201,15 +199,15 @@ def test_a_parameter_moved_that_is_three_deviations_of_the_difference_off(made, 
 
 def test_a_run_is_accepted_for_a_reason_and_later_runs_are_compared_with_it(here):
     accept = ("check-results", "results", "--accept", "accepted")
-    assert call(*accept).exit_code == 2
+    call(*accept, code=2)
     assert not Path("accepted").exists()
-    assert call(*accept, "--reason", "after the new tracker").exit_code == 0
+    call(*accept, "--reason", "after the new tracker", code=0)
     (note,) = json.loads(Path("accepted/accepted.json").read_text())
     assert (note["reason"], note["datasets"]) == ("after the new tracker", ["mh180"])
     for path in Path("results/mh180").glob("*.parquet"):
         assert (Path("accepted/mh180") / path.name).read_bytes() == path.read_bytes()
     assert told("results", "--against", "accepted")["accepted run"]["verdict"] == "passed"
-    assert call(*accept, "--reason", "a second time").exit_code == 0
+    call(*accept, "--reason", "a second time", code=0)
     assert len(json.loads(Path("accepted/accepted.json").read_text())) == 2
 
 
@@ -224,11 +222,11 @@ def test_a_bit_turned_in_any_file_is_found(finished, tmp_path):
         path.write_bytes(good[:place] + bytes([good[place] ^ bit]) + good[place + 1 :])
         return good
 
-    assert call("check-results", folder).exit_code == 0
+    call("check-results", folder, code=0)
     made = [path for path in folder.rglob("*.*") if path.suffix in (".parquet", ".svg", ".html")]
     good = {path: turned(path) for path in made}
     assert {Path(problem.where) for problem in sums.changed(folder)} == {*made}
-    assert call("check-results", folder).exit_code == 1
+    call("check-results", folder, code=1)
     for path, content in good.items():
         path.write_bytes(content)
     lists = [*folder.rglob("*.sha256"), folder / "SHA256SUMS"]

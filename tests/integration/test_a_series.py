@@ -69,8 +69,7 @@ def two_lines(tmp_path_factory):
         with pytest.MonkeyPatch.context() as patch:
             patch.chdir(folder)
             patch.setattr(sys, "executable", python())  # of the workflow that is started
-            done = call("calibrate", "tracker.yaml", "--cores", "2")
-            assert done.exit_code == 0, done.output
+            call("calibrate", "tracker.yaml", "--cores", "2", code=0)
 
     return once(tmp_path_factory, "two_lines", make)
 
@@ -105,8 +104,7 @@ def test_a_history_has_a_row_for_every_line_made_of_its_own_tables(arm):
 
 def test_a_line_that_is_added_makes_itself_and_the_history_alone(arm, capfd):
     configured(arm, ["march", "june", "may"])
-    done = call("calibrate", "tracker.yaml", "--", "--dry-run", "--quiet", "reason")
-    assert done.exit_code == 0, done.output
+    call("calibrate", "tracker.yaml", "--", "--dry-run", "--quiet", "reason", code=0)
     jobs = re.findall(r"^Job \d+: ([\w-]+): (.*)", capfd.readouterr().out, re.M)
     assert {name for name, _ in jobs} == {"tracker", MAY}
     (history,) = (text for name, text in jobs if name == "tracker")
@@ -115,6 +113,7 @@ def test_a_line_that_is_added_makes_itself_and_the_history_alone(arm, capfd):
 
 def test_a_history_made_from_other_tables_is_noticed(arm):
     shutil.copy(f"results/{MARCH}/frames.parquet", f"results/{JUNE}/frames.parquet")
-    checked = call("check-results", "results", "--dataset", JUNE, "--config", "tracker.yaml")
-    assert checked.exit_code == 1
+    checked = call(
+        "check-results", "results", "--dataset", JUNE, "--config", "tracker.yaml", code=1
+    )
     assert "frames.parquet" in checked.output

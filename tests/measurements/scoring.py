@@ -17,8 +17,9 @@ import pandas as pd
 import yaml
 from command_line import call
 from scipy.spatial.transform import Rotation
-from stages_by_hand import run_stage
+from stages_by_hand import run_stages
 
+from kinacc.errors import KinaccError
 from kinacc.kinematics import robot
 
 RELATIVE = 1e-6
@@ -77,10 +78,11 @@ def fault(measured: SimpleNamespace, folder: Path) -> str:
     words = ["--robot", measured.robot, "--yes", "--json", "--out", folder, "--name", "n"]
     described = call("init", *measured.files, *words)
     if described.exit_code == 0:
-        read = run_stage("measurements", "--config", folder / "n.yaml", "--results", folder / "r")
-        if read.exit_code:
-            return f"run: {read.output}"
-        said = described.output + read.output
+        try:
+            read = run_stages(["measurements"], [folder / "n.yaml"], folder / "r")
+        except KinaccError as error:
+            return f"run: {error}"
+        said = described.output + read
         wrong = difference(measured, folder / "r" / "n")
         silent = not re.search(measured.says, said, re.IGNORECASE)
         return wrong or ("does not say so" if silent else "")

@@ -140,8 +140,7 @@ def test_a_vertical_angle_that_may_count_from_either_is_asked_about(tmp_path):
 
 def test_the_way_horizontal_angles_count_is_found_by_trying(tmp_path):
     path = directions(tmp_path, ["Hz [deg]", "V [deg]", "D [m]"], spherical(clockwise=False))
-    done = call("init", path, "--robot", "ur10", "--out", tmp_path, "--json")
-    assert done.exit_code == 0, done.output
+    done = call("init", path, "--robot", "ur10", "--out", tmp_path, "--json", code=0)
     answer = json.loads(done.stdout)
     assert answer["file"]["directions"]["horizontal"] == "counterclockwise"
     assert answer["suspicions"] == []
