@@ -78,22 +78,24 @@ def bent(arm, seed=0, size=1.0):
     )
 
 
-def seen_by_pinocchio(text, tip, q_rad, slides, names, base="base_link"):
+def pose_of(ends):
+    """Poses (n, ...) of matrices (n, 4, 4)."""
+    return Pose(np.array(ends)[:, :3, :3], np.array(ends)[:, :3, 3])
+
+
+def seen_by_pinocchio(model, tip, q_rad, slides, names, base="base_link"):
     """Tip frames (n, ...) in mm at joints (n, k), rad and mm."""
-    model = pin.buildModelFromXML(text)
     data = model.createData()
     order = [model.joints[model.getJointId(name)].idx_v for name in names]
-    steps = q_rad * np.where(slides, 1e-3, 1.0)
-    rotation, position = [], []
-    for row in steps:
+    ends = []
+    for row in q_rad * np.where(slides, 1e-3, 1.0):
         step = np.zeros(model.nv)
         step[order] = row
         pin.framesForwardKinematics(model, data, pin.integrate(model, pin.neutral(model), step))
-        ends = [data.oMf[model.getFrameId(link, pin.FrameType.BODY)] for link in (base, tip)]
-        frame = ends[0].inverse() * ends[1]
-        rotation.append(frame.rotation)
-        position.append(1e3 * frame.translation)
-    return Pose(np.array(rotation), np.array(position))
+        first, last = (data.oMf[model.getFrameId(link, pin.FrameType.BODY)] for link in (base, tip))
+        ends.append(first.inverse() * last)
+    found = pose_of([end.homogeneous for end in ends])
+    return found._replace(position_mm=1e3 * found.position_mm)
 
 
 def some_joints(arm, count=15, seed=1):
@@ -116,10 +118,10 @@ def test_a_generated_file_moves_as_the_calibrated_arm(name):
     if coupled := not np.array_equal(np.abs(arm.robot.joint_map), np.eye(len(names))):
         with pytest.raises(InputError, match="--dh-joints"):
             urdf.text(of(arm))
-    text = urdf.text(of(arm, dh_joints=coupled))
+    model = urdf.to_pinocchio(of(arm, dh_joints=coupled))
     for link in ("tool", "flange"):
         shown = q_dh if coupled else q_rad
-        theirs = seen_by_pinocchio(text, link, shown, arm.robot.dh.prismatic, names)
+        theirs = seen_by_pinocchio(model, link, shown, arm.robot.dh.prismatic, names)
         assert_same(arm.pose(JointState(q_dh), "base", link), theirs)
 
 
@@ -136,7 +138,7 @@ def test_a_file_of_ones_own_is_corrected_in_place(tmp_path, robot_from, tail):
     names = [name for name in joints if name not in ("stand", "mount", "hand", "stick")]
     q_rad = some_joints(base_robot)
     slides = np.zeros(6, dtype=bool)
-    before = seen_by_pinocchio(text, tip, q_rad, slides, names, "world")
+    before = seen_by_pinocchio(pin.buildModelFromXML(text), tip, q_rad, slides, names, "world")
     # What the calibration says of the tip, wherever the file puts base and tip on the arm.
     ends = dh.forward(base_robot.dh, q_rad)
     start = closed_form_start(full_poses(q_rad, before), ends)
@@ -146,7 +148,9 @@ def test_a_file_of_ones_own_is_corrected_in_place(tmp_path, robot_from, tail):
     if robot_from == "file":
         assert_same(arm.pose(JointState(q_rad), "base", "flange"), wanted)
     end = tip if tail else f"{tip}_calibrated"
-    assert_same(wanted, seen_by_pinocchio(done, end, q_rad, slides, names, "world"))
+    assert_same(
+        wanted, seen_by_pinocchio(pin.buildModelFromXML(done), end, q_rad, slides, names, "world")
+    )
     assert "<!-- kept as it is -->" in done
     assert 'effort="330"' in done
     assert np.linalg.norm(wanted.position_mm - before.position_mm, axis=1).min() > 0.1

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from test_export_urdf import bent
 
 from kinacc.deployment.export.files import FORMATS, contents, write
 from kinacc.deployment.export.paper_tables import with_deviation
@@ -13,17 +14,9 @@ from kinacc.deployment.export.source import Source, notes, read_source
 from kinacc.deployment.folder import recorded_robot
 from kinacc.deployment.record import TOOL, nominal
 from kinacc.errors import InputError
-from kinacc.geometry import Pose, compose, exp_so3, rotation_from_quaternion, rotation_x, rotation_z
+from kinacc.geometry import Pose, compose, rotation_from_quaternion, rotation_x, rotation_z
 from kinacc.kinematics import robot
 from kinacc.kinematics.model import JointState
-
-
-def bent(name, seed=0):
-    arm, rng = robot.load(name), np.random.default_rng(seed)
-    vector = arm.dh.start
-    model = arm.dh.with_parameters(vector + rng.normal(0.0, 1e-3, vector.size))
-    tool = Pose(exp_so3(np.array([0.1, 0.2, 3.0])), np.array([1.0, 2.0, 300.0]))
-    return replace(nominal(arm, "probe"), choice="dh", model=model, targets={TOOL: tool})
 
 
 def written(form, arm, **tables):
@@ -38,7 +31,7 @@ def read_back(arm, tmp_path):
 
 @pytest.mark.parametrize("name", robot.shipped())
 def test_a_robot_file_is_read_back_bit_by_bit(name, tmp_path):
-    arm = bent(name)
+    arm = bent(robot.load(name))
     back = read_back(arm, tmp_path)
     np.testing.assert_array_equal(back.dh.start, arm.model.start)
     np.testing.assert_array_equal(back.dh.prismatic, arm.model.prismatic)

@@ -62,11 +62,16 @@ def joints_for(
     tool, base = (as_frame(maker, typed[group]) for group in ("TOOL tool", "BASE"))
     flange = base @ goal @ np.linalg.inv(tool)
     if maker in ("ur", "staubli"):
-        rows = _mounting(file) if maker == "ur" else _array(file)
-        return _Shifted(**{**vars(arm), "errors": rows}).joints(flange, near)
+        return shifted_arm(maker, arm, file).joints(flange, near)
     # Every axis was driven to minus the value and mastered there as 0.
     zeros = np.deg2rad([*typed["joint zeros"].values()])
     return arm.joints(flange, near + zeros) - zeros
+
+
+def shifted_arm(maker: str, arm: Arm, file: Path) -> Arm:
+    """The arm as the file for its controller describes it."""
+    rows = _mounting(file) if maker == "ur" else _array(file)
+    return _Shifted(**{**vars(arm), "errors": rows})
 
 
 def _mounting(file: Path) -> np.ndarray:
@@ -76,7 +81,7 @@ def _mounting(file: Path) -> np.ndarray:
     for column, (name, unit) in {
         0: ("delta_theta", 1.0), 1: ("delta_d", 1e3), 2: ("delta_a", 1e3), 4: ("delta_alpha", 1.0),
     }.items():  # fmt: skip
-        rows[:, column] = unit * np.array(json.loads(values[name]))
+        rows[:, column] = unit * np.array(json.loads(values.get(name, "[0, 0, 0, 0, 0, 0]")))
     return rows
 
 
