@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 
 from kinacc.calibration import fitting, tables, uncertainty, vec_fit
 from kinacc.calibration.dh_estimator import free_parameters
+from kinacc.calibration.frames import MOTIONS
 from kinacc.calibration.observations import Observations, full_poses
 from kinacc.calibration.vec_fit import Prior
 from kinacc.deployment.folder import calibration
+from kinacc.deployment.record import Calibration
 from kinacc.geometry import Pose, compose, exp_so3
 from kinacc.kinematics import dh, robot, vec
 
@@ -27,12 +31,16 @@ RESIDUALS = {
 }  # fmt: skip
 
 
+def bent(model: dh.DHModel, seed: int) -> dh.DHModel:
+    """The model with axes askew by a milliradian and lengths off by tenths of a millimetre."""
+    errors = np.tile([1e-3, 0.3, 0.3, 1e-3, 0.0], model.joints)
+    errors *= np.random.default_rng(seed).normal(size=errors.size)
+    return model.with_parameters(model.start + errors)
+
+
 def truth(name: str, seed: int = 1) -> dh.DHModel:
     """A real arm: the nominal one with errors of a tenth of a millimetre and of a milliradian."""
-    arm, rng = robot.load(name), np.random.default_rng(seed)
-    vector = arm.dh.start
-    errors = rng.normal(0.0, 1.0, vector.size) * np.tile([1e-3, 0.3, 0.3, 1e-3, 0.0], arm.dh.joints)
-    return arm.dh.with_parameters(vector + errors)
+    return bent(robot.load(name).dh, seed)
 
 
 def joints(name: str, count: int, seed: int = 2, part: float = 0.36) -> np.ndarray:
@@ -104,6 +112,19 @@ def results_of(name: str, seen: Observations, with_vec: bool = False) -> dict:
     }
 
 
-def calibrated(name: str, model: str = "dh", count: int = 80, seed: int = 3):
+def calibrated(name: str, model: str = "dh", count: int = 80, seed: int = 3) -> Calibration:
     """The calibration of a simulated arm by one model."""
     return calibration(results(name, count, seed, model == "vec"), robot.load(name), model, name)
+
+
+def moved(arm: Calibration, steps: Mapping[str, float]) -> Calibration:
+    """The calibration with its named parameters displaced by steps in mm and rad."""
+
+    def frame(pose: Pose, name: str) -> Pose:
+        motion = np.array([steps.get(f"{name}.{each}", 0.0) for each in MOTIONS])
+        return Pose(exp_so3(motion[3:]) @ pose.rotation, pose.position_mm + motion[:3])
+
+    vector = arm.model.start + [steps.get(name, 0.0) for name in arm.model.names]
+    targets = {name: frame(pose, name) for name, pose in arm.targets.items()}
+    model, base = arm.model.with_parameters(vector), frame(arm.base, "base")
+    return replace(arm, model=model, base=base, targets=targets)

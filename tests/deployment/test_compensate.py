@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from small_arms import calibrated, joints
+from small_arms import calibrated, joints, moved
 
 from kinacc.deployment.compensate import PoseStatus, compensate
 from kinacc.deployment.predict import predict
@@ -75,11 +75,9 @@ def test_a_vec_model_gives_no_joints_outside_its_range():
 
 def test_each_pose_is_reached_in_its_own_directions_of_travel():
     arm, q_rad = calibrated("mh180", "vec"), joints("mh180", 6, seed=4)
-    offsets = np.array([name.endswith(("minus", "plus")) for name in arm.model.names])
-    errors = 1e-3 * np.random.default_rng(1).normal(size=offsets.sum())
-    vector = arm.model.start.copy()
-    vector[offsets] = errors
-    arm = replace(arm, model=arm.model.with_parameters(vector))
+    offsets = [name for name in arm.model.names if name.endswith(("minus", "plus"))]
+    errors = 1e-3 * np.random.default_rng(1).normal(size=len(offsets))
+    arm = moved(arm, dict(zip(offsets, errors, strict=True)))
     s = np.sign(np.random.default_rng(2).normal(size=q_rad.shape))
     wanted = arm.pose(JointState(q_rad, s))
     found = compensate(arm, wanted, q_rad + 0.03, s)

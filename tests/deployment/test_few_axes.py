@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from small_arms import bent
 
 from kinacc.deployment.compensate import FEW_AXES_TURN_RAD, PoseStatus, compensate
 from kinacc.deployment.record import nominal
@@ -34,11 +35,7 @@ BENT = {"scara": [0.4, 1.0, 90.0, -0.6], "five": [0.3, -0.2, 0.9, 0.5, -0.7]}
 def real_arm(name):
     """The arm as described, with axes askew by a milliradian and lengths off by tenths of a mm."""
     plain = nominal(robot.of_text({"scara": SCARA, "five": FIVE}[name], name))
-    rng = np.random.default_rng(4)
-    vector = plain.robot.dh.start
-    errors = np.tile([1e-3, 0.3, 0.3, 1e-3, 1e-3], plain.robot.dh.joints)
-    moved = plain.robot.dh.with_parameters(vector + errors * rng.normal(0.0, 1.0, vector.size))
-    return plain, replace(plain, model=moved, choice="dh")
+    return plain, replace(plain, model=bent(plain.robot.dh, 4), choice="dh")
 
 
 def program(name, count=12):

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shared_data
-from simulated_months import month, session, year_of
+from simulated_months import month, session
 
 from kinacc.calibration.observations import full_poses
 from kinacc.deployment import history as histories
@@ -16,7 +16,7 @@ from kinacc.deployment.history_model import Setup
 from kinacc.geometry import Pose
 from kinacc.kinematics import robot as robots
 from kinacc.measurements.orientation import euler
-from kinacc.tables.allowed import MOVED
+from kinacc.tables.allowed import MOVED, SAME
 
 KNOCK_RAD = np.array([0.0, 0.0, 2e-3, 0.0, 0.0, 0.0])
 
@@ -25,20 +25,17 @@ def history(*sessions):
     return histories.history(sessions, 500.0)
 
 
-def measured(number, knock_rad=0.0, other_poses=False):
-    return month(0, number, other_poses, False, np.broadcast_to(knock_rad, 6))
-
-
 @pytest.mark.parametrize(("other_poses", "moved"), [(False, False), (True, False), (True, True)])
 def test_months_in_which_nothing_happens_raise_no_alarm(other_poses, moved):
-    found = year_of(0, 3, other_poses, moved)
+    months = [(n, month(n, 0.0, other_poses, moved)) for n in (1, 2, 3)]
+    found = history(*(session(seen, n, MOVED if moved else SAME) for n, seen in months))
     assert list(found["verdict"]) == ["first", "holds", "holds"]
     assert (found["in_force_mean_mm"][1:] < 1.0).all()
 
 
 def test_a_knocked_joint_is_named_and_the_new_calibration_is_in_force_from_then_on():
     knocked = [0.0, KNOCK_RAD, KNOCK_RAD]
-    found = history(*(session(measured(n, k), n, False) for n, k in enumerate(knocked, 1)))
+    found = history(*(session(month(n, k), n) for n, k in enumerate(knocked, 1)))
     assert list(found["verdict"]) == ["first", "recalibrate", "holds"]
     assert found["in_force"][2] == "ur-2026-02-01"
     assert found["joint"][1] == 3
@@ -52,17 +49,17 @@ def test_a_tracker_that_was_moved_is_seen_but_not_beside_as_large_a_drift():
     for drift_mm, verdict in ((0.0, "recalibrate"), (0.4, "cannot be told")):
         lines = []
         for number, shift_mm in ((1, 0.0), (2, 0.3)):
-            seen = measured(number)
+            seen = month(number)
             rises_mm = shift_mm + drift_mm * np.linspace(-1.0, 1.0, len(seen))
             seen = replace(seen, position_mm=seen.position_mm + rises_mm[:, None] * up)
-            lines.append(session(seen, number, False))
+            lines.append(session(seen, number))
         found = history(*lines)
         assert found["verdict"][1] == verdict
         assert found["moved_mm"][1] == pytest.approx(0.3, abs=0.05)
 
 
 def test_misfit_that_differs_between_halves_widens_the_limit_at_other_poses(monkeypatch):
-    lines = [session(measured(n, other_poses=True), n, False) for n in (1, 2)]
+    lines = [session(month(n, other_poses=True), n) for n in (1, 2)]
     usual = history(*lines)
     monkeypatch.setattr(histories.history_model, "understated", lambda halves: 9.0)
     wide = history(*lines)
@@ -71,16 +68,16 @@ def test_misfit_that_differs_between_halves_widens_the_limit_at_other_poses(monk
 
 
 def test_the_history_is_the_same_in_whatever_order_lines_were_added():
-    one, two, three = (session(measured(n, other_poses=n == 3), n, False) for n in (1, 2, 3))
+    one, two, three = (session(month(n, other_poses=n == 3), n) for n in (1, 2, 3))
     whole, backward = history(one, two, three), history(two, one)
     for name, column in whole.items():
         np.testing.assert_array_equal(column[:2], backward[name])
 
 
 def test_readings_of_the_line_in_force_are_not_compared_with_themselves():
-    old, new = measured(1), measured(2, KNOCK_RAD)
+    old, new = month(1), month(2, KNOCK_RAD)
     both = histories.joined(new, old, Setup(True, True))
-    first, second = session(old, 1, False), session(new, 2, False)
+    first, second = session(old, 1), session(new, 2)
     alone, grown = (history(first, replace(second, observations=each)) for each in (new, both))
     assert grown["verdict"][1] == "recalibrate"
     for name in ("moved_mm", "chance_mm", "in_force_mean_mm"):
@@ -97,7 +94,7 @@ def ur10_series(name, number):
     )
     at = np.stack([table[f"{axis}_mm"] for axis in "xyz"], axis=1)
     seen = full_poses(robots.load("ur10").dh_joints(q), Pose(euler(turns, "XYZ"), at))
-    return replace(session(seen, number, True), tool=MOVED)
+    return replace(session(seen, number, MOVED), tool=MOVED)
 
 
 def test_series_of_one_ur10_measured_in_other_poses_raise_no_alarm():
@@ -113,6 +110,6 @@ def test_what_cannot_be_told_has_a_reason():
     found = history(ur10_series("C", 1), ur10_series("B", 2))
     assert found["verdict"][1] == "cannot be told"
     assert "joint ranges of ur-2026-01-01" in found["reason"][1]
-    few = session(measured(2).select(np.arange(12)), 2, False)
-    found = history(session(measured(1), 1, False), few)
+    few = session(month(2).select(np.arange(12)), 2)
+    found = history(session(month(1), 1), few)
     assert found["verdict"][1] == "cannot be told"

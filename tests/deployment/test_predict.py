@@ -2,31 +2,14 @@
 
 import numpy as np
 import pytest
-from small_arms import calibrated, joints
+from small_arms import calibrated, joints, moved
 
-from kinacc.calibration.frames import MOTIONS
 from kinacc.calibration.uncertainty import is_angle
 from kinacc.deployment.applicability import sensitivity
 from kinacc.deployment.predict import predict
-from kinacc.geometry import Pose, exp_so3, log_so3
+from kinacc.geometry import log_so3
 from kinacc.kinematics import robot
 from kinacc.kinematics.model import JointState
-
-
-def moved(arm, names, step):
-    """The calibration with its named parameters displaced by ``step`` (P,) in mm and rad."""
-    from dataclasses import replace
-
-    of = dict(zip(names, step, strict=True))
-
-    def frame(pose, name):
-        motion = np.array([of.get(f"{name}.{each}", 0.0) for each in MOTIONS])
-        return Pose(exp_so3(motion[3:]) @ pose.rotation, pose.position_mm + motion[:3])
-
-    vector = arm.model.start + [of.get(name, 0.0) for name in arm.model.names]
-    model = arm.model.with_parameters(vector)
-    targets = {name: frame(pose, name) for name, pose in arm.targets.items()}
-    return replace(arm, model=model, base=frame(arm.base, "base"), targets=targets)
 
 
 def slope(pose_at, step):
@@ -44,10 +27,10 @@ def test_slopes_are_the_finite_differences_of_the_pose(model, frame, point):
     state = JointState(q_rad, np.sign(np.random.default_rng(5).normal(size=q_rad.shape)))
     slopes, names = sensitivity(arm, state, frame, point), arm.known.names
     for column in np.linspace(0, len(names) - 1, 30).astype(int):
-        unit = np.eye(len(names))[column]
+        name = names[column]
         found = slope(
-            lambda step, unit=unit: moved(arm, names, step * unit).pose(state, frame, point),
-            1e-6 if is_angle(names[column]) else 1e-3,
+            lambda step, name=name: moved(arm, {name: step}).pose(state, frame, point),
+            1e-6 if is_angle(name) else 1e-3,
         )
         np.testing.assert_allclose(slopes[:, :3, column], found[:, :3], rtol=1e-5, atol=2e-4)
         np.testing.assert_allclose(slopes[:, 3:, column], found[:, 3:], rtol=1e-5, atol=1e-8)
