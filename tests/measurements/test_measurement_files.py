@@ -64,17 +64,17 @@ def test_euler_degrees_and_millimetres(tmp_path, good, truth):
     np.testing.assert_array_equal(reading.columns["row"], np.arange(2, 14))
 
 
-def test_quaternions_of_either_sign(tmp_path, good, truth):
-    quaternion = Rotation.from_matrix(truth[1].rotation).as_quat(scalar_first=True)
-    quaternion *= np.where(np.arange(12) % 2, 1.0, -1.0)[:, None]
-    columns = good | dict(zip(("qw", "qx", "qy", "qz"), quaternion.T, strict=True))
-    turn = SECTION["orientation"] | {"kind": "quaternion"}
-    reading = read(SECTION | {"path": written(tmp_path, columns), "orientation": turn}, ARM)
-    assert_is_truth(reading.columns, truth)
-    assert (reading.columns["qw"] >= 0).all()
+@pytest.mark.parametrize("order", ["wxyz", "xyzw"])
+def test_quaternions_of_either_sign_by_name_and_in_a_stated_order(tmp_path, good, truth, order):
+    turned = Rotation.from_matrix(truth[1].rotation).as_quat(scalar_first=order == "wxyz")
+    turned *= np.where(np.arange(12) % 2, 1.0, -1.0)[:, None]
+    orientation = SECTION["orientation"] | {"kind": "quaternion", "order": order}
     path = str(tmp_path / "poses.parquet")
-    pd.DataFrame(columns).to_parquet(path)
-    assert_is_truth(read(SECTION | {"path": path, "orientation": turn}, ARM).columns, truth)
+    for names in ([f"q{part}" for part in order], [f"quat{i}" for i in range(1, 5)]):
+        pd.DataFrame(good | dict(zip(names, turned.T, strict=True))).to_parquet(path)
+        columns = read(SECTION | {"path": path, "orientation": orientation}, ARM).columns
+        assert_is_truth(columns, truth)
+        assert (columns["qw"] >= 0).all()
 
 
 def test_a_missing_file_says_where_the_data_comes_from(tmp_path):

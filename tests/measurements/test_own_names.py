@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 import pytest
+from measurements.scoring import measured
 from scipy.spatial.transform import Rotation
 
 from kinacc.errors import InputError
@@ -26,24 +27,10 @@ def table(folder, names, *columns):
     return path
 
 
-def kuka(folder):
-    rows_ = [f"DECL E6AXIS XP{n}={{{','.join(f'A{a} {v}' for a, v in enumerate(q, 1))},E1 0.0}}"
-             for n, q in enumerate(Q_DEG)]  # fmt: skip
-    path = folder / "program.dat"
-    path.write_text("DEFDAT PROGRAM\n" + "\n".join(rows_) + "\nENDDAT\n")
-    return path
-
-
-PROGRAMS = {
-    "E6AXIS": kuka,
-    "ours": lambda folder: table(folder, [f"q{n}_deg" for n in range(1, 7)], Q_DEG),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("case", PROGRAMS)
-def test_joints_of_a_program_in_any_form(case, tmp_path):
-    found = read_rows(PROGRAMS[case](tmp_path), SLIDES)
-    np.testing.assert_allclose(np.rad2deg(found.joints), Q_DEG, atol=1e-6)
+def test_joints_of_a_program():
+    program = measured("kuka_data_list")
+    found = read_rows(program.files[0], SLIDES)
+    np.testing.assert_allclose(found.joints, program.joints_rad, atol=1e-6)
 
 
 CONVENTIONS = {

@@ -43,54 +43,45 @@ def test_what_is_no_workbook_is_refused_with_what_to_do(name, tmp_path):
         looked(path)
 
 
-@pytest.mark.parametrize("name", ["U({})", "Unc. {} [mm] (k = 2)"])
-def test_uncertainties_are_so_many_standard_deviations_as_stated_or_answered(name, tmp_path):
-    unit = " [mm]" if "k" in name else ""
-    names = [*JOINTS, *(f"{a}{unit}" for a in "XYZ"), *(name.format(axis) for axis in "xyz")]
-    path = file(tmp_path, lines([[*row, "0.02", "0.04", "0.06"] for row in cells()], names))
-    assert np.isnan(reading(path, sigma="none").columns["std_y_mm"]).all()
-    if unit:
-        np.testing.assert_allclose(reading(path).columns["std_y_mm"], 0.02)
-        with pytest.raises(InputError, match=r"--sigma 1: not all of"):
-            looked(path, sigma="1")
-    else:
-        assert "--sigma 1 or --sigma 2 or --sigma none" in undecided(path)
-        np.testing.assert_allclose(reading(path, sigma="2").columns["std_y_mm"], 0.02)
+def uncertain(folder, name):
+    """A file with three uncertainties a row, under names with this one's letters."""
+    names = [*JOINTS, *XYZ, *(name.format(axis) for axis in "XYZ")]
+    return file(folder, lines([[*row, "0.02", "0.04", "0.06"] for row in cells()], names))
 
 
-def test_a_standard_uncertainty_as_metrologists_write_it_is_one_standard_deviation(tmp_path):
-    names = [*JOINTS, *XYZ, *(f"u({axis}) [mm]" for axis in "XYZ")]
-    path = file(tmp_path, lines([[*row, "0.02", "0.04", "0.06"] for row in cells()], names))
-    assert looked(path).section["sigma"] == 1
-    np.testing.assert_allclose(reading(path).columns["std_y_mm"], 0.04)
+@pytest.mark.parametrize(
+    ("name", "answers", "std_mm"),
+    [("U({}) [mm]", {"sigma": "2"}, 0.02), ("Unc. {} [mm] (k = 2)", {}, 0.02), ("u({}) [mm]", {}, 0.04),
+     ("Unc. {} [mm] (k = 2)", {"sigma": "none"}, np.nan)],
+)  # fmt: skip
+def test_uncertainties_are_so_many_standard_deviations_as_stated_or_answered(
+    tmp_path, name, answers, std_mm
+):
+    found = reading(uncertain(tmp_path, name), **answers)
+    np.testing.assert_allclose(found.columns["std_y_mm"], std_mm)
 
 
-def report(names, axes=("X", "Y", "Z"), once=False):
-    """Rows per feature and axis, names of the features in the first of them where ``once``."""
-    return [
-        ["" if place and once else names(number), axis, f"{value + 0.5:.3f}", f"{value:.3f}",
-         "-0.500", *(f"{q:.3f}" for q in Q_DEG[number])]
-        for number in range(ROWS)
-        for place, axis in enumerate(axes)
-        for value in [[*POINT_MM[number], 0.1][place]]
-    ]  # fmt: skip
+def test_what_uncertainties_are_is_asked_unless_it_stands_there(tmp_path):
+    assert "--sigma 1 or --sigma 2 or --sigma none" in undecided(uncertain(tmp_path, "U({}) [mm]"))
+    with pytest.raises(InputError, match=r"--sigma 1: not all of"):
+        looked(uncertain(tmp_path, "Unc. {} [mm] (k = 2)"), sigma="1")
 
 
 def test_a_report_with_a_row_per_axis_becomes_a_row_per_feature(tmp_path):
+    """Features are named in their first rows; other controls and one without an axis are told."""
+    rows = [
+        ["" if axis != "X" else f"Point {number + 1}", axis, f"{value + 0.5:.3f}", f"{value:.3f}",
+         "-0.500", *row[:6]]
+        for number, row in enumerate(cells())
+        for axis, value in zip(["X", "Y", "Z", "3D"], [*POINT_MM[number], 0.1], strict=True)
+    ]  # fmt: skip
+    del rows[5]
     names = ["Feature", "Axis", "Nominal [mm]", "Actual [mm]", "Deviation [mm]"]
-    rows = report(lambda n: f"Point {n + 1}", once=True)
     path = file(tmp_path, lines(rows, [*names, *JOINTS], "\t"))
     assert looked(path).section["columns"]["x"] == "Actual [mm] X"
-    assert_is_truth(reading(path))
-    assert reading(path).columns["row"].tolist()[:2] == [2, 5]
-
-
-def test_other_controls_are_told_and_a_feature_without_an_axis_is_no_reading(tmp_path):
-    rows = report(lambda n: f"P{n}", ("X", "Y", "Z", "3D"))
-    del rows[5]
-    names = ["Name", "Control", "Nominal", "Meas", "Dev", *JOINTS]
-    found = reading(file(tmp_path, lines(rows, names)))
+    found = reading(path)
     assert_is_truth(found, np.arange(ROWS) != 1)
+    assert found.columns["row"].tolist()[:2] == [2, 9]
     left_out = " ".join(found.left_out())
     assert "1 row holds no reading: line 6" in left_out
     assert "14 rows of other quantities" in left_out

@@ -84,28 +84,15 @@ def test_only_the_targets_asked_for(tmp_path, joints):
     assert "column mB_x_mm or mB_x_m: is missing" in text
 
 
-@pytest.mark.parametrize("order", ["wxyz", "xyzw"])
-def test_quaternions_in_a_stated_order(tmp_path, joints, order):
+@pytest.mark.parametrize(
+    ("convention", "axes"), [("ZYX", "zyx"), ("zxy", "zxy"), ("YXZ", "yxz"), ("xzx", "xyz")]
+)
+def test_euler_angles_by_axis_and_in_order(tmp_path, joints, convention, axes):
     turn = Rotation.random(COUNT, random_state=4)
-    values = turn.as_quat(scalar_first=order == "wxyz")
-    table = joints | points() | {f"quat{i + 1}": values[:, i] for i in range(4)}
-    columns = reading(tmp_path, table, kind="quaternion", orientation={"order": order}).columns
-    found = np.stack([columns[f"q{part}"] for part in "wxyz"], axis=1)
-    np.testing.assert_allclose(rotation_from_quaternion(found), turn.as_matrix(), atol=1e-9)
-
-
-@pytest.mark.parametrize("convention", ["ZYX", "zxy", "YXZ", "xzx"])
-def test_euler_angles_by_axis_and_in_order(tmp_path, joints, convention):
-    turn = Rotation.random(COUNT, random_state=4)
-    angles = turn.as_euler(convention, degrees=True)
-    ordered = {f"e{i + 1}_deg": angles[:, i] for i in range(3)}
-    names = [f"r{axis}_deg" for axis in convention.lower()]
-    if len(set(names)) < 3:
-        names = ["rx_deg", "ry_deg", "rz_deg"]
-    by_axis = {name: angles[:, i] for i, name in enumerate(names)}
-    for given in (ordered, by_axis):
+    angles = turn.as_euler(convention, degrees=True).T
+    for names in ([f"e{i}_deg" for i in (1, 2, 3)], [f"r{axis}_deg" for axis in axes]):
+        table = joints | points() | dict(zip(names, angles, strict=True))
         orientation = {"convention": convention}
-        table = joints | points() | given
         columns = reading(tmp_path, table, kind="euler", orientation=orientation).columns
         found = np.stack([columns[f"q{part}"] for part in "wxyz"], axis=1)
         np.testing.assert_allclose(rotation_from_quaternion(found), turn.as_matrix(), atol=1e-9)

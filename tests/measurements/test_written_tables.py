@@ -28,7 +28,6 @@ WRITTEN = {
     "decimal commas between blanks": lines(
         cells(decimal=","), NO_UNITS, "  "
     ),
-    "French thousands": lines(cells(decimal=",", thousands="\u202f"), mark=";"),
     "a rule under the names": lines(
         [["---"] * 9, *cells()], NO_UNITS, "\t"
     ),

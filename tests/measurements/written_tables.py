@@ -26,18 +26,10 @@ XYZ = ["X [mm]", "Y [mm]", "Z [mm]"]
 NO_UNITS = [*(f"J{number}" for number in range(1, 7)), *"XYZ"]
 
 
-def cells(decimals=3, decimal=".", thousands="", q=Q_DEG, point=POINT_MM):
+def cells(decimal="."):
     """Rows of text: joints, then the point."""
-    return [
-        [number(value, decimals, decimal, thousands) for value in row]
-        for row in np.hstack([q, point])
-    ]
-
-
-def number(value, decimals=3, decimal=".", thousands=""):
-    """A number as a spreadsheet of some country writes it."""
-    text = f"{value:,.{decimals}f}" if thousands else f"{value:.{decimals}f}"
-    return text.replace(",", "T").replace(".", decimal).replace("T", thousands)
+    rows = np.hstack([Q_DEG, POINT_MM])
+    return [[f"{value:.3f}".replace(".", decimal) for value in row] for row in rows]
 
 
 def lines(rows, names=(*JOINTS, *XYZ), mark=","):
