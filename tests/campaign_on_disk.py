@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
 
 import numpy as np
 from command_line import call
 
 from kinacc.assess.world import carry_on, drawn_world, key_of
 from kinacc.campaign import folder as campaigns
+from kinacc.campaign.campaign import Campaign
 from kinacc.campaign.state import Reading, Readings
 
 SIGMA_MM = 0.05
@@ -33,30 +35,60 @@ def entry_of(readings):
     return Readings(readings=readings).model_dump(exclude_none=True)
 
 
+def errors_mm(points):
+    """True errors (m, 3) of candidates, one of them large."""
+    errors = np.random.default_rng(11).normal(size=(points, 3)) * 0.2
+    errors[7] = (0.9, -0.6, 0.5)
+    return errors
+
+
+def world_of(plan, left_out=frozenset(), sigma_mm=SIGMA_MM):
+    """All readings one campaign could take, rows as the assessor numbers them."""
+    errors = errors_mm(len(plan.points))[plan.visiting(left_out)]
+    return drawn_world(errors, sigma_mm, key_of(5), 400)
+
+
 class Arm:
     """The arm at the campaign: its errors are known here, and its readings are those of a world."""
 
     def __init__(self, folder, sigma_mm=SIGMA_MM):
         self.plan = campaigns.open_(folder).plan
-        rows = self.plan.visiting(frozenset())
-        errors = np.random.default_rng(11).normal(size=(len(rows), 3)) * 0.2
-        errors[5] = (0.9, -0.6, 0.5)
-        self.world = drawn_world(errors[rows], sigma_mm, key_of(5), 200)
-        self.row = {int(point): row for row, point in enumerate(rows)}
-        self.reads = np.zeros(len(rows), dtype=int)
+        self.world = world_of(self.plan, sigma_mm=sigma_mm)
+        self.rows = self.plan.visiting(frozenset()).tolist()
+        self.reads = Counter()
+
+    def seen_mm(self, label):
+        """What the instrument reads next at a point."""
+        point = self.plan.points.number(label)
+        reading_mm = self.world.reading_mm(self.rows.index(point), self.reads[label])
+        self.reads[label] += 1
+        return self.plan.points.modelled_mm[point] + reading_mm
 
     def position(self, label):
-        """What the instrument reads next at a point, as text."""
-        point = self.plan.points.number(label)
-        row = self.row[point]
-        seen = self.plan.points.modelled_mm[point] + self.world.reading_mm(row, self.reads[row])
-        self.reads[row] += 1
-        return ",".join(repr(float(each)) for each in seen)
+        """The same as text."""
+        return ",".join(map(repr, self.seen_mm(label).tolist()))
+
+
+def visit_of(folder, std_mm):
+    """A table of readings of the first visit, this far from where they are expected."""
+    visit = Campaign(folder).visit()
+    table = visit[["pose"]].copy()
+    off_mm = np.random.default_rng(5).normal(0.0, std_mm, (3, len(visit)))
+    for axis, off in zip("xyz", off_mm, strict=True):
+        table[f"{axis}_mm"] = visit[f"expected_{axis}_mm"] + off
+    return table
+
+
+def refusal(*words):
+    """The message of a command that must fail."""
+    said = call(*words, code=2).output
+    assert "Traceback" not in said
+    return said
 
 
 def standing(folder):
     """What status says, without a forecast."""
-    return json.loads(call("campaign", "status", folder, "--json").stdout)
+    return json.loads(call("campaign", "status", folder, "--json", code=0).stdout)
 
 
 def files_of(folder):
@@ -67,18 +99,13 @@ def files_of(folder):
 def refused(folder, *words):
     """The message of a command that must fail and leave the campaign as it was."""
     before = files_of(folder)
-    done = call("campaign", *words, code=2)
-    assert "Traceback" not in done.output
+    said = refusal("campaign", *words)
     assert files_of(folder) == before
-    return done.output
+    return said
 
 
 def recorded(folder, arm, count):
-    """Take the next ``count`` readings through one file per reading of the arm."""
+    """Take the next ``count`` readings, one by one."""
+    campaign = Campaign(folder)
     for _ in range(count):
-        with campaigns.writing(folder) as opened:
-            state = opened.state
-            label = arm.plan.points.label[state.requested]
-            seen = [float(each) for each in arm.position(label).split(",")]
-            taken = Reading(state.requested, np.array(seen), arm.plan.instruments[0].name)
-            opened.write(Readings(readings=[taken]))
+        campaign.add_reading(arm.seen_mm(campaign.next_pose().point))

@@ -9,15 +9,12 @@ import numpy as np
 import pytest
 from command_line import call, small_study
 
-from kinacc.assess.world import drawn_world, key_of
 from kinacc.campaign import begin
 from kinacc.campaign.instrument import instruments
 from kinacc.campaign.plan import Limits, Plan, assessor_of
 from kinacc.deployment.planning import spread
 from kinacc.deployment.record import nominal
 from kinacc.kinematics import robot as robots
-
-SIGMA_MM = 0.05
 
 
 @pytest.fixture(scope="session")
@@ -41,30 +38,6 @@ def make_plan(arm):
         about = {"robot": "mh180", "calibration": "none", "model": "nominal", "point": "tool",
                  "candidates": "drawn"}  # fmt: skip
         return begin.plan_of(arm, found, chosen, used, limits, about, seed)
-
-    return make
-
-
-@pytest.fixture(scope="session")
-def errors_mm():
-    """True errors (m, 3) of the candidates, a smooth field with one large error."""
-
-    def make(points: int) -> np.ndarray:
-        errors = np.random.default_rng(11).normal(size=(points, 3)) * 0.2
-        errors[7] = (0.9, -0.6, 0.5)
-        return errors
-
-    return make
-
-
-@pytest.fixture(scope="session")
-def make_world(errors_mm):
-    """All readings one campaign could take, rows as the assessor numbers them."""
-
-    def make(plan: Plan, left_out=frozenset(), seed=5, sigma_mm=SIGMA_MM):
-        order = plan.visiting(left_out)
-        errors = errors_mm(len(plan.points))
-        return drawn_world(errors[order], sigma_mm, key_of(seed), 400)
 
     return make
 

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import json
 
-import numpy as np
 import pytest
+from campaign_on_disk import refused, standing, visit_of
 from command_line import call
 
 from kinacc.campaign.campaign import Campaign
-
-HEAD = "pose,x_mm,y_mm,z_mm"
 
 
 class Day:
@@ -18,40 +16,24 @@ class Day:
 
     def __init__(self, folder, file):
         self.folder, self.file = folder, file
-        self.visit = Campaign(folder).visit().to_dict("records")
-        self.rng = np.random.default_rng(3)
+        self.rows = visit_of(folder, 0.1).round(4)
 
-    def row(self, place):
-        """A row of a new reading at a point of the visit."""
-        point = self.visit[place]
-        seen = [point[f"expected_{axis}_mm"] + self.rng.normal(0.1, 0.05) for axis in "xyz"]
-        return ",".join([point["pose"], *(f"{each:.4f}" for each in seen)])
+    def words(self, rows, *more):
+        """Write rows of the file; the words of a command that records it."""
+        rows.to_csv(self.file, index=False, float_format="%.4f")
+        return ("record", self.folder, self.file, *more)
 
-    def record(self, rows, *words):
-        """Write the rows and record the file."""
-        self.file.write_text("\n".join([HEAD, *rows]) + "\n")
-        return call("campaign", "record", self.folder, self.file, *words)
-
-    def takes(self, rows, new, *words):
+    def takes(self, rows, new, *more):
         """Record rows of which so many are new."""
-        before = self.taken()
-        done = self.record(rows, *words)
-        assert done.exit_code == 0, done.output
-        assert f"Recorded {new} reading" in done.output
-        assert self.taken() == before + new
-        return done.output
+        before = standing(self.folder)["readings"]
+        output = call("campaign", *self.words(rows, *more), code=0).output
+        assert f"Recorded {new} reading" in output
+        assert standing(self.folder)["readings"] == before + new
+        return output
 
-    def refuses(self, rows, *words):
+    def refuses(self, rows, *more):
         """The message of rows of which none may be taken."""
-        journal = self.folder / "readings.jsonl"
-        before = journal.read_bytes()
-        done = self.record(rows, *words)
-        assert done.exit_code == 2, done.output
-        assert journal.read_bytes() == before
-        return done.output
-
-    def taken(self):
-        return len({item.reading.digits for item in Campaign(self.folder).state.readings})
+        return refused(self.folder, *self.words(rows, *more))
 
     def strike(self, number):
         Campaign(self.folder).strike(number, "not seated")
@@ -65,45 +47,37 @@ def day(tmp_path, begun):
 
 
 def test_new_rows_are_taken_and_old_ones_are_told_as_known(day):
-    rows = [day.row(place) for place in range(6)]
+    rows = day.rows[:6]
     day.takes(rows[:2], 2)
     assert "2 rows were recorded before" in day.takes(rows[:3], 1)
-    content = json.loads(day.record(rows, "--json").stdout)
+    content = json.loads(call("campaign", *day.words(rows, "--json"), code=0).stdout)
     assert (content["numbers"], content["known"]) == ([4, 5, 6], [1, 2, 3])
-    assert day.taken() == 6
     assert "no new row" in day.refuses(rows)
     assert "no new row" in day.refuses(rows, "--again")
 
 
 @pytest.mark.parametrize(("changed", "appended"), [(0, 0), (1, 1), (2, 3)])
 def test_an_old_row_that_was_changed_is_asked_about(day, changed, appended):
-    rows = [day.row(place) for place in range(6)]
     for count in (1, 2, 3):  # one row at a time, each its own entry of the journal
-        day.takes(rows[:count], 1)
-    now = rows[: 3 + appended]
-    pose, x, *others = now[changed].split(",")
-    now[changed] = ",".join([pose, f"{float(x) + 0.02:.4f}", *others])
+        day.takes(day.rows[:count], 1)
+    now = day.rows[: 3 + appended].copy()
+    now.loc[changed, "x_mm"] += 0.02
     assert f"reading {changed + 1} any more" in day.refuses(now)
     day.strike(changed + 1)
     day.takes(now, 1 + appended)
-    assert day.taken() == 3 + appended
 
 
 def test_rows_that_repeat_to_the_last_digit_are_asked_about_and_can_be_taken(day):
-    rows = [day.row(place) for place in range(3)]
-    day.takes(rows[:2], 2)
-    now = [*rows, rows[2]]
+    day.takes(day.rows[:2], 2)
+    now = day.rows.loc[[0, 1, 2, 2]]
     said = day.refuses(now)
     assert "line 5: equals" in said
     assert "line 2: " not in said
-    assert "Recorded 2 reading" in day.record(now, "--again").output
+    day.takes(now, 2, "--again")
     assert "no new row" in day.refuses(now, "--again")
-    assert len(Campaign(day.folder).state.readings) == 4
 
 
 def test_a_row_whose_reading_was_struck_does_not_come_back(day):
-    rows = [day.row(place) for place in range(3)]
-    day.takes(rows[:2], 2)
+    day.takes(day.rows[:2], 2)
     day.strike(2)
-    day.takes(rows, 1)
-    assert day.taken() == 2
+    day.takes(day.rows[:3], 1)

@@ -68,12 +68,6 @@ def test_a_line_that_was_changed_is_noticed(tmp_path, line):
         journal.read_journal(path, SEED)
 
 
-def test_a_journal_of_another_plan_is_noticed(tmp_path):
-    written(tmp_path / "j", 2)
-    with pytest.raises(InputError, match="line 1: was changed, or belongs to another"):
-        journal.read_journal(tmp_path / "j", "f" * 16)
-
-
 def test_a_journal_of_an_earlier_version_goes_on(tmp_path):
     path = tmp_path / "j"
     path.write_text('{"chain": "0011223344556677", "entry": {"number": 0}, "head": "head.json"}\n')

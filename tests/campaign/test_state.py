@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from campaign_on_disk import entry_of, readings_of
+from campaign_on_disk import entry_of, readings_of, world_of
 from command_line import call
 
 from kinacc.assess.registry import ADAPTIVE
@@ -32,9 +32,9 @@ def assert_same(said, wanted):
 
 
 @pytest.mark.parametrize("name", ADAPTIVE)
-def test_a_campaign_on_disk_ends_as_in_memory(make_plan, make_world, name):
+def test_a_campaign_on_disk_ends_as_in_memory(make_plan, name):
     plan = make_plan(name)
-    world = make_world(plan)
+    world = world_of(plan)
     entries = entries_of(plan, world)
     wanted = conduct(plan.assessor, world)
     state = restore(from_json(to_json(plan), "here"), entries)
@@ -42,22 +42,22 @@ def test_a_campaign_on_disk_ends_as_in_memory(make_plan, make_world, name):
     assert_same(state.statements(), wanted.statements())
 
 
-def test_part_of_a_visit_by_travel_says_nothing_of_the_region(make_plan, make_world):
+def test_part_of_a_visit_by_travel_says_nothing_of_the_region(make_plan):
     plan = make_plan("region_share", points=60, budget=60)
-    entries = entries_of(plan, make_world(plan))
+    entries = entries_of(plan, world_of(plan))
     assert plan.by_travel
     for said in restore(plan, entries[:-1]).statements():
         assert np.isnan(said.upper_mm)
         assert (said.withheld.code, said.withheld.numbers["left"]) == ("first_visit_by_travel", 1)
     assert not any("travel" in str(said.withheld) for said in restore(plan, entries).statements())
     at_random = plan.model_copy(update={"route": plan.order[: len(plan.route)]})
-    begun = restore(at_random, entries_of(at_random, make_world(at_random))[:-1])
+    begun = restore(at_random, entries_of(at_random, world_of(at_random))[:-1])
     assert not any("travel" in str(said.withheld) for said in begun.statements())
 
 
-def test_readings_taken_ahead_change_nothing(make_plan, make_world):
+def test_readings_taken_ahead_change_nothing(make_plan):
     plan = make_plan()
-    world = make_world(plan)
+    world = world_of(plan)
     entries = entries_of(plan, world)
     shuffled = [entries[i] for i in np.random.default_rng(0).permutation(len(entries))]
     # Readings of one point keep their order: they are different readings.
@@ -71,7 +71,7 @@ def test_readings_taken_ahead_change_nothing(make_plan, make_world):
     assert_same(state.statements(), whole.statements())
 
 
-def test_a_point_left_out_is_never_asked_for_and_the_visit_stays_random(make_plan, make_world):
+def test_a_point_left_out_is_never_asked_for_and_the_visit_stays_random(make_plan):
     plan = make_plan(points=60, budget=60)
     gone = int(plan.route[4])
     rows = plan.visiting(frozenset([gone]))
@@ -83,7 +83,7 @@ def test_a_point_left_out_is_never_asked_for_and_the_visit_stays_random(make_pla
     left_out = frozenset([gone])
     entries = [
         {"kind": "leave_out", "point": gone, "reason": "hidden"},
-        *entries_of(plan, make_world(plan, left_out), left_out),
+        *entries_of(plan, world_of(plan, left_out), left_out),
     ]
     assert restore(plan, entries[:5]).requested == entries[5]["readings"][0]["point"]
     state = restore(plan, entries)
@@ -91,9 +91,9 @@ def test_a_point_left_out_is_never_asked_for_and_the_visit_stays_random(make_pla
     assert len(state.used) == 60
 
 
-def test_another_instrument_counts_with_its_own_covariance(make_plan, make_world):
+def test_another_instrument_counts_with_its_own_covariance(make_plan):
     plan = make_plan(texts=("tracker=0.05", "camera=0.5"))
-    entries = entries_of(plan, make_world(plan), limit=24)
+    entries = entries_of(plan, world_of(plan), limit=24)
     by_tracker = restore(plan, entries)
     entries[10]["readings"][0]["instrument"] = "camera"
     with_camera = restore(plan, entries)
@@ -126,6 +126,6 @@ def test_predictions_recorded_as_readings_bound_nothing(make_plan, tmp_path):
     with folder.writing(path) as opened:
         opened.write(readings_at(plan, plan.points.modelled_mm))
     for command in ("status", "report"):
-        done = call("campaign", command, path, code=0)
-        assert "equal the predicted positions" in done.output
-        assert " at most " not in done.output
+        said = call("campaign", command, path, code=0).output
+        assert "equal the predicted positions" in said
+        assert " at most " not in said

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from campaign_on_disk import entry_of, readings_of
+from campaign_on_disk import entry_of, errors_mm, readings_of, world_of
 
 import kinacc
 from kinacc.assess.attainable import width_limits
@@ -23,13 +23,13 @@ from kinacc.report.rendering import lines
 
 
 @pytest.fixture
-def measured(make_plan, make_world):
+def measured(make_plan):
     """The status of a campaign with so many readings of a world, and its plan."""
 
     def make(readings=999, points=40, budget=120, tolerance_mm=None, off_mm=None, **settings):
         limits = Limits(np.deg2rad(0.02), 10.0, tolerance_mm)
         plan = make_plan(points=points, budget=budget, limits=limits, **settings)
-        world, taken = make_world(plan), count()
+        world, taken = world_of(plan), count()
 
         def read(row, visit):
             off = off_mm(next(taken)) if off_mm else 0.0
@@ -49,7 +49,7 @@ def test_every_reason_has_a_text_and_no_text_is_left_over():
     assert set(ADVICE) < set(REASONS)
 
 
-def test_limits_of_a_finished_campaign_are_those_of_the_true_errors(measured, errors_mm):
+def test_limits_of_a_finished_campaign_are_those_of_the_true_errors(measured):
     found, _ = measured()
     sizes = np.linalg.norm(errors_mm(40), axis=1)
     true = width_limits(sizes, 0.05, 120, 0.05)

@@ -6,6 +6,7 @@ import json
 
 import numpy as np
 import pytest
+from campaign_on_disk import refusal
 from command_line import call
 
 from kinacc.campaign import folder as campaigns
@@ -29,19 +30,12 @@ def tested(tmp_path):
     return make
 
 
-def refused(*words):
-    """The message of a command that has to fail before anything is written."""
-    done = call(*words, code=2)
-    assert "Traceback" not in done.output
-    return done.output
-
-
-def test_a_noise_both_tested_and_stated_is_refused(tested, calibration, tmp_path):
+def test_a_noise_both_tested_and_stated_is_refusal(tested, calibration, tmp_path):
     file = tested()
     given = ["--repeatability", file, "--noise-mm", 0.1]
-    said = refused("campaign", "start", tmp_path / "check", "--calibration", calibration, *given)
+    said = refusal("campaign", "start", tmp_path / "check", "--calibration", calibration, *given)
     assert "--repeatability: is given beside instrument=0.1" in said
-    assert "is given beside" in refused("campaign", "plan", *given)
+    assert "is given beside" in refusal("campaign", "plan", *given)
     assert not (tmp_path / "check").exists()
 
 
@@ -67,7 +61,7 @@ def test_a_noise_that_differs_by_axis_is_turned_with_the_frame_of_its_readings(t
 
 def test_poses_that_scatter_differently_are_asked_about_before_one_noise_is_taken(tested, begun):
     file = tested(std_mm=(0.02,) * 19 + (0.2,), visits=6)
-    said = refused("campaign", "plan", "--repeatability", file)
+    said = refusal("campaign", "plan", "--repeatability", file)
     assert "pose P19" in said
     assert "--sure takes that of all poses together" in said
     plan = campaigns.open_(begun("--repeatability", file, "--sure")).plan
@@ -95,6 +89,6 @@ def test_a_file_that_tells_no_noise_is_refused_with_how_to_make_one(tested, cont
     if isinstance(content, dict):
         content = json.dumps({**json.loads(file.read_text()), **content})
     file.write_text(content)
-    told = refused("campaign", "plan", "--repeatability", file)
+    told = refusal("campaign", "plan", "--repeatability", file)
     assert said in told
     assert "kinacc repeatability FILE -o noise.json" in told
