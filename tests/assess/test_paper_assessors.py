@@ -24,8 +24,6 @@ words = st.integers(0, 2**64 - 1)
 
 
 SWITCHES = list(itertools.product(("squared", "as_printed"), ("r", "sqrt_r")))
-
-
 DECISION = 1e-11  # a probability this close to alpha may be decided either way by round-off
 
 
@@ -118,14 +116,6 @@ def test_one_run_equals_the_oracle(seed, m, budget, kind, switches, alpha, where
     np.testing.assert_allclose(steps, wanted, rtol=1e-12, atol=1e-12)
 
 
-def field(seed: int, points: int, largest_mm: float = 0.906) -> np.ndarray:
-    """Errors (points, 3) with gamma magnitudes of the shape of the paper's Table III."""
-    rng = np.random.default_rng(seed)
-    error = rng.normal(size=(points, 3))
-    error *= (rng.gamma(5.36, 1.0, points) / np.linalg.norm(error, axis=1))[:, None]
-    return error * largest_mm / np.linalg.norm(error, axis=1).max()
-
-
 def check(world, distance: str, covariance: str, **more) -> np.ndarray:
     """Hold the searches, and the scans between any two changes of decision, to single runs."""
     plain = paper.assessor("model_invalidation", distance=distance, covariance=covariance, **more)
@@ -159,7 +149,7 @@ def test_scans_of_any_world_equal_every_single_run(
     seed, points, budget, noise_mm, switches, alpha, kind
 ):
     rng = np.random.default_rng(seed)
-    error = field(seed, points, rng.choice([0.1, 0.9]))
+    error = rng.choice([0.05, 0.4]) * rng.normal(size=(points, 3))
     if kind == "equal":
         error[:] = error[0]
     if kind == "ties":
@@ -171,13 +161,6 @@ def test_scans_of_any_world_equal_every_single_run(
         sigma = noise_mm * rng.uniform(0.3, 2, points) if kind == "own_noise" else noise_mm
         world = drawn_world(error, sigma, key_of(seed), budget)
     check(world, *switches, alpha=alpha, measurements=budget)
-    plain = dict(zip(("distance", "covariance"), switches, strict=True))
-    single = paper.assessor("model_invalidation", alpha=alpha, measurements=budget, **plain)
-    for eta_mm in (0.0, 0.2, *rng.uniform(0.0, 1.2, 3)):
-        run, steps = single.run(world, eta_mm), single.history(world, eta_mm)
-        assert (run.measurements, run.points_visited) == (len(steps), steps["row"].nunique())
-        last = steps["rejection_probability"].iloc[-1]
-        assert run.rejection_probability == pytest.approx(last, abs=1e-12)
 
 
 @given(key0=words, key1=words, visit=st.integers(0, 1000), point=st.integers(0, 10**6))

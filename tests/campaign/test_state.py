@@ -112,19 +112,16 @@ def test_a_plan_comes_back_to_the_last_bit(make_plan):
     assert to_json(from_json(to_json(plan), "here")) == to_json(plan)
 
 
-def readings_at(plan, positions_mm):
-    """The same readings again and again, more than are requested."""
-    name = plan.instruments[0].name
-    repeated = [Reading(point, at, name) for _ in range(4) for point, at in enumerate(positions_mm)]
-    return Readings(readings=repeated)
-
-
 def test_predictions_recorded_as_readings_bound_nothing(make_plan, tmp_path):
     plan = make_plan(points=12, budget=14)
-    path = tmp_path / "check"
+    path, name = tmp_path / "check", plan.instruments[0].name
+    # Again and again, more than are requested.
+    readings = [
+        Reading(*each, name) for _ in range(4) for each in enumerate(plan.points.modelled_mm)
+    ]
     folder.start(path, plan)
     with folder.writing(path) as opened:
-        opened.write(readings_at(plan, plan.points.modelled_mm))
+        opened.write(Readings(readings=readings))
     for command in ("status", "report"):
         said = call("campaign", command, path, code=0).output
         assert "equal the predicted positions" in said

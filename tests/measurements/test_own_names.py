@@ -23,7 +23,7 @@ TURNED = Rotation.from_matrix(POSE.rotation)
 def table(folder, names, *columns):
     values = np.hstack([np.asarray(each, dtype=float) for each in columns])
     path = folder / "poses.csv"
-    pd.DataFrame(values, columns=names).to_csv(path, index=False, float_format="%.7f")
+    pd.DataFrame(values, columns=names).to_csv(path, index=False, float_format="%.9f")
     return path
 
 
@@ -33,33 +33,28 @@ def test_joints_of_a_program():
     np.testing.assert_allclose(found.joints, program.joints_rad, atol=1e-6)
 
 
-CONVENTIONS = {
-    "KUKA": (["A", "B", "C"], "ZYX"),
-    "FANUC": (["W", "P", "R"], "xyz"),
-    "Kawasaki": (["O", "A", "T"], "ZYZ"),
-    "roll, pitch, yaw": (["Roll [deg]", "Pitch [deg]", "Yaw [deg]"], "xyz"),
-    "ours": (["rx_deg", "ry_deg", "rz_deg"], "XYZ"),
+POSES = {  # names of the axes, their unit in mm, names of the turn, its convention
+    "KUKA": ("{} [inch]", 25.4, "ABC", "ZYX"),
+    "FANUC": ("{} [inch]", 25.4, "WPR", "xyz"),
+    "Kawasaki": ("{} [inch]", 25.4, "OAT", "ZYZ"),
+    "roll, pitch, yaw": ("{} [inch]", 25.4, ["Roll [deg]", "Pitch [deg]", "Yaw [deg]"], "xyz"),
+    "ours": ("{}_mm", 1.0, ["rx_deg", "ry_deg", "rz_deg"], "XYZ"),
+    "nominal": ("Soll {} (m)", 1000.0, [f"Soll q{n}" for n in range(1, 5)], None),
 }
 
 
-@pytest.mark.parametrize("case", CONVENTIONS)
-def test_wanted_poses_in_every_convention(case, tmp_path):
-    names, convention = CONVENTIONS[case]
-    axes = ["x_mm", "y_mm", "z_mm"] if case == "ours" else [f"{a} [inch]" for a in "XYZ"]
-    angles = TURNED.as_euler(convention, degrees=True)
-    position = POSE.position_mm / (1.0 if case == "ours" else 25.4)
-    path = table(tmp_path, [*axes, *names], position, angles)
+@pytest.mark.parametrize("case", POSES)
+def test_wanted_poses_in_every_convention_and_by_a_quaternion_with_its_scalar_first(case, tmp_path):
+    axis, unit_mm, turn, convention = POSES[case]
+    axes = [axis.format(letter) for letter in ("xyz" if case == "ours" else "XYZ")]
+    turned = (
+        TURNED.as_euler(convention, degrees=True)
+        if convention
+        else TURNED.as_quat(scalar_first=True)
+    )
+    path = table(tmp_path, [*axes, *turn], POSE.position_mm / unit_mm, turned)
     found = read_rows(path, SLIDES, "poses").pose
     np.testing.assert_allclose(found.position_mm, POSE.position_mm, atol=1e-5)
-    np.testing.assert_allclose(found.rotation, POSE.rotation, atol=1e-6)
-
-
-def test_nominal_poses_are_those_wanted_and_a_quaternion_may_have_its_scalar_first(tmp_path):
-    names = [*(f"Soll {a} (m)" for a in "XYZ"), *(f"Soll q{n}" for n in range(1, 5))]
-    turned = TURNED.as_quat(scalar_first=True)
-    path = table(tmp_path, names, POSE.position_mm / 1000.0, turned)
-    found = read_rows(path, SLIDES, "poses").pose
-    np.testing.assert_allclose(found.position_mm, POSE.position_mm, atol=1e-3)
     np.testing.assert_allclose(found.rotation, POSE.rotation, atol=1e-6)
 
 

@@ -51,8 +51,8 @@ def uncertain(folder, name):
 
 @pytest.mark.parametrize(
     ("name", "answers", "std_mm"),
-    [("U({}) [mm]", {"sigma": "2"}, 0.02), ("Unc. {} [mm] (k = 2)", {}, 0.02), ("u({}) [mm]", {}, 0.04),
-     ("Unc. {} [mm] (k = 2)", {"sigma": "none"}, np.nan)],
+    [("U({}) [mm]", {"sigma": "2"}, 0.02), ("Unc. {} [mm] (k = 2)", {}, 0.02),
+     ("u({}) [mm]", {}, 0.04), ("Unc. {} [mm] (k = 2)", {"sigma": "none"}, np.nan)],
 )  # fmt: skip
 def test_uncertainties_are_so_many_standard_deviations_as_stated_or_answered(
     tmp_path, name, answers, std_mm

@@ -67,9 +67,8 @@ def test_a_mark_that_may_be_one_of_thousands_is_asked_about(case, tmp_path):
     rows = [[*q, *map(AMBIGUOUS[case], p)] for q, p in zip(rows, points, strict=True)]
     path = file(tmp_path, lines(rows, mark=";"))
     assert "--decimal" in undecided(path)
-    values = {mark: reading(path, decimal=mark).columns["x_mm"] for mark in ",."}
-    ratio = values[","] / values["."]
-    assert np.isclose(np.abs(np.log10(np.median(ratio))), 3.0, atol=0.01) or (ratio != 1).any()
+    by_comma, by_point = (reading(path, decimal=mark).columns["x_mm"] for mark in ",.")
+    assert (by_comma != by_point).any()
 
 
 def test_a_thousand_where_all_others_have_none_is_asked_about(tmp_path):

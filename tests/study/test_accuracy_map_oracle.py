@@ -1,8 +1,9 @@
-"""Cells of the accuracy map, and the study's operating points, against brute force."""
+"""Cells of the map against brute force; operating points, where they lie, what is refused."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,13 +12,19 @@ from oracles import maps
 from two_models import two_models
 
 from kinacc import geometry
+from kinacc.errors import InputError
 from kinacc.kinematics import dh, region, robot, vec
+from kinacc.kinematics.inverse import limits
 from kinacc.study import accuracy_map, operating_points
+from kinacc.synthetic.draw import TABLE_II
 
 REFERENCE = np.diag([1.0, -1.0, -1.0])
 TURN = math.radians(45)
 CYLINDER = region.Cylinder(1200.0, 900.0, 0.0, 500.0, 0.0, math.radians(60))
 LOW, HIGH = np.radians([(-12, 72), (-30, 54), (-74, 18), (-180, 180), (-122, 122), (-180, 180)]).T
+ARM = robot.load("mh180")
+NINE = region.orientations(TURN, "signs_and_zero")
+WANTED = accuracy_map.PosesWanted(CYLINDER, REFERENCE, NINE, "dh")
 LIMITS = np.radians(oracle.MH180_LIMITS_DEG).T
 
 
@@ -64,12 +71,11 @@ TILTED = oracle.rot_z(0.3)[:3, :3] @ REFERENCE @ oracle.rot_z(-0.2)[:3, :3]
 def test_cell_equals_brute_force(arms, models, angle_deg, radius, height, frame):
     angle = math.radians(angle_deg)
     cells = region.Cells(np.array([angle]), np.array([radius]), np.array([height]))
-    rotations = region.orientations(TURN, "signs_and_zero")
     attitude = in_slice = REFERENCE
     if frame == "base":
         attitude, in_slice = TILTED, oracle.rot_z(-angle)[:3, :3] @ TILTED
-    wanted = accuracy_map.PosesWanted(CYLINDER, attitude, rotations, "dh", frame)
-    found = accuracy_map.accuracy_map(robot.load("mh180"), models, cells, wanted)
+    wanted = WANTED._replace(reference=attitude, frame=frame)
+    found = accuracy_map.accuracy_map(ARM, models, cells, wanted)
     position, turn, name, count = maps.cell(arms, LIMITS, angle, radius, height, in_slice, TURN)
     assert (found.wanted[0], found.solutions[0]) == (18, count)
     largest = found.position_max_mm[0], found.orientation_max_mrad[0]
@@ -93,9 +99,7 @@ def test_errors_at_joints_are_true_minus_model_tool(arms, models):
 
 @pytest.mark.parametrize("sequence", ["sobol", "halton"])
 def test_operating_points_stand_in_the_space_with_a_wanted_orientation(arms, models, sequence):
-    rotations = region.orientations(TURN, "signs_and_zero")
-    wanted = accuracy_map.PosesWanted(CYLINDER, REFERENCE, rotations, "dh")
-    q = operating_points.in_space(robot.load("mh180"), models, wanted, sequence, 40)
+    q = operating_points.in_space(ARM, models, WANTED, sequence, 40)
     assert q.shape == (40, 6)
     seen = set()
     for row in q:
@@ -107,8 +111,84 @@ def test_operating_points_stand_in_the_space_with_a_wanted_orientation(arms, mod
         assert -1e-9 <= angle <= math.radians(60) + 1e-9
         assert -1e-6 <= z <= 500 + 1e-6
         relative = (oracle.rot_z(angle)[:3, :3] @ REFERENCE).T @ tool[:3, :3]
-        gaps = [np.abs(relative - other).max() for other in rotations.rotation]
+        gaps = [np.abs(relative - other).max() for other in NINE.rotation]
         assert min(gaps) < 1e-8
         seen.add((int(np.argmin(gaps)), maps.branch_of(arms.dh, row)))
     assert {branch for _, branch in seen} == set(maps.BRANCHES)
     assert len({orientation for orientation, _ in seen}) >= 7
+
+
+def test_points_of_one_wrist_have_joint_5_on_one_side(models):
+    side = {
+        wrist: set(
+            np.sign(operating_points.in_space(ARM, models, WANTED, "sobol", 60, wrist)[:, 4])
+        )
+        for wrist in ("both", "noflip", "flip")
+    }
+    assert sorted(map(len, side.values())) == [1, 1, 2]
+    assert side["noflip"] | side["flip"] == side["both"]
+
+
+def test_a_box_of_coupled_joints_is_in_reported_angles(models):
+    coupling = np.diag([1.0, 1, 1, -1, 1, 1])
+    coupling[2, 1] = -1.0
+    arm = replace(ARM, joint_map=coupling)
+    box = np.deg2rad([-10.0, 0, -30, 5, -10, -10]), np.deg2rad([10.0, 40, 0, 20, 10, 10])
+    q = operating_points.in_joints(arm, models, box, "sobol", 60)
+    assert limits.within(limits.reported_joints(arm, q), *box).all()
+    assert limits.within(q, LOW, HIGH).all()
+    assert (q[:, 3] < 0).all()
+
+
+def test_a_region_of_joint_draws_is_in_the_base_frame_of_the_arm(models):
+    box = np.deg2rad([-10.0, 0, -30, 5, -10, -10]), np.deg2rad([60.0, 40, 0, 20, 10, 10])
+    lifted = replace(ARM, base=geometry.Pose(np.eye(3), np.array([0.0, 0.0, 2000.0])))
+    higher = replace(CYLINDER, bottom_mm=CYLINDER.bottom_mm + 2000.0)
+    q = operating_points.in_joints(ARM, models, box, "sobol", 60, CYLINDER)
+    assert np.array_equal(operating_points.in_joints(lifted, models, box, "sobol", 60, higher), q)
+
+
+def test_boxes_without_anything_to_assess_name_every_joint(models):
+    box = np.deg2rad([100.0, -10, -10, -10, -10, 200]), np.deg2rad([110.0, 10, 10, 10, 10, 210])
+    with pytest.raises(InputError) as refusal:
+        operating_points.in_joints(ARM, models, box, "sobol", 10)
+    assert [problem.where for problem in refusal.value.problems] == ["joint 1", "joint 6"]
+
+
+def test_a_space_out_of_reach_is_refused_with_the_reasons_counted(models):
+    far = WANTED._replace(cylinder=replace(CYLINDER, inner_radius_mm=4000.0))
+    with pytest.raises(InputError, match="out of reach"):
+        operating_points.in_space(ARM, models, far, "sobol", 2)
+
+
+def test_rows_are_spread_over_the_measured_ones_each_once():
+    assert sorted(operating_points.spread_rows(39, 39)) == list(range(39))
+    assert sorted(operating_points.spread_rows(1, 5)) == [0]
+    rows = operating_points.spread_rows(632, 200)
+    assert len(set(rows.tolist())) == 200
+    assert np.diff(np.sort(rows)).max() <= 8
+    assert np.array_equal(rows[:50], operating_points.spread_rows(632, 50))
+
+
+def test_errors_of_repeats_are_averaged_for_every_target_by_itself():
+    errors = {"pose": [0, 0, 0, 0, 1], "target": ["a", "b", "a", "b", "a"], "row": [5, 6, 7, 8, 9]}
+    errors |= {"ex_mm": [1.0, -4.0, 3.0, -6.0, 9.0], "ey_mm": [0.0] * 5, "ez_mm": [2.0] * 5}
+    columns = {name: np.array(values) for name, values in errors.items()}
+    rows, mean_mm = operating_points.measured_errors(
+        columns, np.array([True, True, True, True, False])
+    )
+    assert rows.tolist() == [5, 6]
+    assert mean_mm.tolist() == [[2.0, 0.0, 2.0], [-5.0, 0.0, 2.0]]
+
+
+def test_poses_beyond_the_fitted_range_are_counted_and_left_out():
+    # Joint 5 to 10 degrees leaves only one wrist.
+    lower, upper = np.deg2rad(
+        [(-20, 80), (-40, 70), (-90, 30), (-190, 190), (-130, 10), (-190, 190)]
+    ).T
+    fitted = vec.without_errors(TABLE_II, lower, upper, 5)
+    cells = region.grid(CYLINDER, np.array([0.2]), 300.0)
+    found = accuracy_map.accuracy_map(ARM, two_models(fitted, TABLE_II), cells, WANTED)
+    assert (found.solutions == 9).all()
+    assert (found.extrapolating == 9).all()
+    assert all(name.endswith("front-up-flip") for name in found.worst_branch)

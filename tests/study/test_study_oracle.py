@@ -72,28 +72,56 @@ def rows():
     return simulated(small_errors(), NOISE, range(3), SMALL, seed=99)
 
 
+def assert_are_the_oracles(table, study, order=None):
+    for i in range(len(table)):
+        assessed, *counts = expected_row(table, i, small_errors(), 99, study, order)
+        assert table["assessed_mm"][i] == pytest.approx(assessed, rel=1e-9, abs=1e-12)
+        assert [table["measurements"][i], table["points_visited"][i]] == counts
+
+
 def test_every_row_of_a_small_study_equals_the_oracle(rows):
-    error = small_errors()
-    count = len(rows["assessed_mm"])
     # One row of the maximum, three of outlier rejection, twelve of model invalidation.
-    assert count == 2 * 3 * 16
-    for i in range(count):
-        assessed, measurements, points = expected_row(rows, i, error, 99, SMALL)
-        assert rows["assessed_mm"][i] == pytest.approx(assessed, rel=1e-9, abs=1e-12)
-        assert (rows["measurements"][i], rows["points_visited"][i]) == (measurements, points)
+    assert len(rows) == 2 * 3 * 16
+    assert_are_the_oracles(rows, SMALL)
 
 
 def test_a_shuffled_visit_takes_the_same_readings_in_another_order():
     study = {**SMALL, "measurements": 5, "visiting_order": "shuffled"}
     shuffled = simulated(small_errors(), NOISE[:1], range(1), study, seed=99)
     order = np.random.default_rng([99, 10000, 0, 1]).permutation(9)
-    for i in range(len(shuffled["assessed_mm"])):
-        assessed, measurements, points = expected_row(shuffled, i, small_errors(), 99, study, order)
-        assert shuffled["assessed_mm"][i] == pytest.approx(assessed, rel=1e-9, abs=1e-12)
-        assert (shuffled["measurements"][i], shuffled["points_visited"][i]) == (
-            measurements,
-            points,
-        )
+    assert_are_the_oracles(shuffled, study, order)
+
+
+def same(one, other) -> bool:
+    """Whether two tables are the same to the last bit, rows numbered anew."""
+    tables = [pd.DataFrame(dict(each)).reset_index(drop=True) for each in (one, other)]
+    return tables[0].equals(tables[1])
+
+
+def test_parts_joined_in_any_order_give_the_same_bytes(rows):
+    rows = monte_carlo.ordered(rows).drop(columns="bounded_mm")
+    sizes = np.linalg.norm(small_errors(), axis=1)
+    components = dict(zip(("ex_mm", "ey_mm", "ez_mm"), small_errors().T, strict=True))
+    points = {"point": np.arange(9), **components, "true_error_mm": sizes}
+    inputs, config = {"assessment_points": points}, {"seed": 99, "study": SMALL}
+    for of in (1, 3):
+        parts = [
+            monte_carlo.simulated(inputs, config | {"part": {"number": i, "of": of}})["study_chunk"]
+            for i in range(of, 0, -1)
+        ]
+        joined = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+        made = monte_carlo.summed_up(inputs | {"study_chunk": joined}, config)
+        usual = monte_carlo.default_reading(rows, SMALL)
+        assert same(made["study"], monte_carlo._columns("study", usual))
+        assert same(made["study_summary"], monte_carlo.summary(usual, sizes.max()))
+        assert same(made["readings"], monte_carlo.readings(rows, sizes.max()))
+
+
+def test_a_simulation_does_not_know_its_neighbours(rows):
+    alone = simulated(small_errors(), NOISE[1:], [2], SMALL, seed=99)
+    assert same(alone, rows[(rows["noise_mm"] == NOISE[1]) & (rows["repetition"] == 2)])
+    other = simulated(small_errors(), NOISE[1:], [2], SMALL, seed=98)
+    assert not np.array_equal(other["assessed_mm"], alone["assessed_mm"])
 
 
 def test_summary_and_readings_are_plain_statistics_of_the_rows(rows):

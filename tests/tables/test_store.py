@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 import pyarrow.parquet as pq
 import pytest
+from assessed_points import points
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -20,13 +21,6 @@ from kinacc.tables.atomic import write_together
 from kinacc.tables.contract import PROVENANCE_KEYS
 
 PROVENANCE = {"kinacc_version": "0.1.0", "config_hash": "c", "seed": 7}
-
-
-def points(joints: int) -> dict:
-    table = {"point": np.arange(3)}
-    table |= {f"q{j + 1}": np.linspace(-1, 1, 3) for j in range(joints)}
-    table |= {f"s{j + 1}": np.array([-1, 0, 1], np.int8) for j in range(joints)}
-    return table | dict.fromkeys(("ex_mm", "ey_mm", "ez_mm", "true_error_mm"), np.full(3, 0.1))
 
 
 def residuals(**changes) -> dict:
