@@ -73,33 +73,22 @@ def test_one_name_for_two_poses_is_refused(tmp_path):
     assert "lines 5, 9" in refused(files, "--join", "Name")
 
 
-def dense_log(offset_s=0.0, period_s=0.2):
-    """A controller's record of joints that runs on between poses, and when each pose was held."""
-    times, rows = [], []
-    for row in range(COUNT):
-        held = np.arange(START_S[row], START_S[row] + 8.0, period_s)
-        times.append(held)
-        rows.append(np.repeat(IT.q[row : row + 1], len(held), axis=0))
-        if row + 1 < COUNT:
-            moving = np.arange(held[-1] + period_s, held[-1] + 6.0, period_s)
-            share = np.linspace(0.05, 0.95, len(moving))[:, None]
-            times.append(moving)
-            rows.append((1 - share) * IT.q[row] + share * IT.q[row + 1])
-    return np.concatenate(times) + offset_s, np.concatenate(rows)
-
-
-def clock(seconds):
-    return [
-        f"2026-03-02 {int(s // 3600):02d}:{int(s // 60) % 60:02d}:{s % 60:06.3f}" for s in seconds
-    ]
+def dense_log():
+    """A controller's record of joints: a pose is held for eight seconds, then left in six."""
+    time = np.arange(0.0, 14.0, 0.2)
+    share = np.clip((time - 7.8) / 6.2, 0.0, 1.0)[:, None]
+    after = np.roll(IT.q, -1, axis=0)
+    q = (1.0 - share) * IT.q[:, None] + share * after[:, None]
+    return np.ravel(START_S[:, None] + time), q.reshape(-1, 6)
 
 
 def test_a_point_taken_while_the_arm_moved_is_left_out_and_said(tmp_path):
-    time, q = dense_log(offset_s=-20.0)
+    time, q = dense_log()
     reading = START_S + np.random.default_rng(5).uniform(2.0, 6.0, COUNT)
     reading[6] = START_S[6] + 10.0
-    joints = table(["timestamp", *Q], time, q)
-    points = table(["Time", *XYZ], clock(reading), IT.point)
+    joints = table(["timestamp", *Q], time - 20.0, q)
+    clock = np.datetime64("2026-03-02") + (1e3 * reading).astype("timedelta64[ms]")
+    points = table(["Time", *XYZ], clock.astype(str), IT.point)
     section, notes = looked(written(tmp_path, joints_csv=joints, tracker_csv=points))
     assert_read(section, IT, np.delete(np.arange(COUNT), 6))
     assert "the arm was moving: line 8" in " ".join(notes)
