@@ -17,11 +17,10 @@ TRAVEL_RAD = np.pi / 2  # either way; of the sliding joint 100 mm
 
 def robot(slides: bool = False) -> Robot:
     """Four joints that turn, or three and one that slides."""
-    lengths = np.array([300.0, 0.0, 0.0, 100.0]), np.array([0.0, 500.0, 400.0, 0.0])
-    angles = np.array([np.pi / 2, 0.0, np.pi / 2, 0.0]), np.zeros(4)
-    prismatic = np.array([False, False, False, slides])
-    limit = np.where(prismatic, 100.0, TRAVEL_RAD)
-    model = DHModel(np.zeros(4), *lengths, *angles, prismatic)
+    turn, none = np.pi / 2, np.zeros(4)
+    lengths = [300.0, 0.0, 0.0, 100.0], [0.0, 500.0, 400.0, 0.0]
+    model = DHModel(none, *lengths, [turn, 0.0, turn, 0.0], none, [False] * 3 + [slides])
+    limit = np.where(model.prismatic, 100.0, TRAVEL_RAD)
     return Robot("made up", model, -limit, limit, np.eye(4), "nobody's catalogue")
 
 
@@ -102,17 +101,11 @@ def test_what_is_left_out_changes_no_pose_where_the_neighbour_takes_it_over(slid
 
 
 def test_the_standard_deviation_is_of_what_is_shown():
-    names = np.array(
-        [f"j{joint}.{e}.{n}" for joint in range(1, 5) for e in ERRORS for n in range(3)]
-    )
-    variance = np.where(names == "j1.eps_z.0", 1.0, 0.0)  # a constant: no pose tells whose it is
-    variance[names == "j1.eps_z.2"] = 1e-6
-    first, second = np.tril_indices(len(names))
-    known = {
-        "parameter": names[first].astype(object),
-        "other": names[second].astype(object),
-        "covariance": np.diag(variance)[first, second],
-    }
+    names = [f"j{joint}.{e}.{n}" for joint in range(1, 5) for e in ERRORS for n in range(3)]
+    # Of the constant no pose tells whose it is.
+    variance = pd.Series(0.0, names) + pd.Series({"j1.eps_z.0": 1.0, "j1.eps_z.2": 1e-6})
+    known = pd.DataFrame(np.diag(variance.fillna(0.0)[names]), names, names).stack().reset_index()
+    known = dict(known.set_axis(["parameter", "other", "covariance"], axis=1))
     found, std = errors(vec_model(j1__eps_z__2=0.002), vec_covariance=known)
     value, spread = found["j1.eps_z"], std["j1.eps_z"]
     # A standard deviation of half the coefficient: two of them are the curve's own height.
