@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 from click.testing import CliRunner, Result
@@ -15,6 +16,11 @@ def call(*words: object, code: int | None = None, **more: object) -> Result:
     done = CliRunner().invoke(main, [str(word) for word in words], **more)
     assert code in (None, done.exit_code), done.output
     return done
+
+
+def answer(*words: object, code: int = 0) -> dict:
+    """The answer of a command as JSON."""
+    return json.loads(call(*words, "--json", code=code).stdout)
 
 
 def small_study(base: Path) -> Path:

@@ -1,12 +1,11 @@
 """init as a person calls it: two files that check-data and the workflow take at once."""
 
-import json
 import shlex
 
 import numpy as np
 import pandas as pd
 import pytest
-from command_line import call
+from command_line import answer, call
 from scipy.spatial.transform import Rotation
 
 from kinacc.checks.contradictions import load
@@ -27,10 +26,9 @@ def foreign(tmp_path):
 
 
 def test_a_foreign_file_is_described_and_the_check_that_is_printed_passes(foreign, tmp_path):
-    words = ("--out", tmp_path / "my cell", "--name", "own", "--yes", "--json")
-    done = call("init", foreign, *words, code=0)
+    told = answer("init", foreign, "--out", tmp_path / "my cell", "--name", "own", "--yes")
     dataset = tmp_path / "my cell" / "own.yaml"
-    check, _ = json.loads(done.stdout)["next"]
+    check, _ = told["next"]
     assert f"#     {check}\n" in dataset.read_text(encoding="utf-8")
     settings = load((dataset,))["own"]
     file = settings["measurements"]["file"]

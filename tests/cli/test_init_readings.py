@@ -151,11 +151,6 @@ ASKED = {
     "a tool centre point": [Q, (by_axis("tcp_{a}"), IT.controller)],
     "a point and the length of its deviation": [Q, X, (["3D error [mm]"], IT.spread[:, :1])],
     "a target beside a point": [Q, X, (by_axis("target_{a}_mm"), IT.nominal)],
-    "a point and how far it is off": [
-        Q,
-        (by_axis("{A}"), IT.nominal),
-        (by_axis("d{A}"), IT.deviation),
-    ],
     "the published form of a robot's data": [
         (numbered("joint_{}"), IT.q),
         (by_axis("{a}_t"), IT.nominal),

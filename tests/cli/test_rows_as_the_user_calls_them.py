@@ -3,6 +3,7 @@
 import json
 
 import pytest
+from command_line import answer
 from stages_by_hand import perform
 from tracked_arm import XYZ, Q, call, table, tracked, written
 
@@ -59,7 +60,7 @@ def test_a_suspicion_names_the_pose_and_the_file_of_its_line(two_files):
 
 
 def test_the_summary_names_rows_as_the_file_does(results):
-    found = json.loads(call("summary", results, "--json").stdout)["m"]
+    found = answer("summary", results)["m"]
     assert found["excluded"][0]["where"] == f"line {AWAY + 2} ({NAMES[AWAY]}) of tracker.csv"
     assert 0.0 < found["excluded"][0]["error_mm"] < 3.0
     places = [each["text"] + each["lines"] for each in found["findings"]]
@@ -70,4 +71,4 @@ def test_nothing_is_left_out_without_a_word(results):
     table = store.read(results / "summary.parquet")
     told = [str(text) for text in table["text"][table["topic"] == "left_out"]]
     assert any(NAMES[EMPTY] in text for text in told)
-    assert json.loads(call("summary", results, "--json").stdout)["m"]["left_out"] == told
+    assert answer("summary", results)["m"]["left_out"] == told

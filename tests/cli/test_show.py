@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 
 import numpy as np
@@ -10,7 +9,7 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from command_line import call
+from command_line import answer, call
 
 from kinacc.tables.contract import ARTEFACTS
 
@@ -29,8 +28,7 @@ def folder(study, tmp_path):
 
 
 def rows(*words):
-    done = call("show", *words, "--json", code=0)
-    return json.loads(done.stdout)["rows"]
+    return answer("show", *words)["rows"]
 
 
 def test_folders_and_tables_are_listed(folder):

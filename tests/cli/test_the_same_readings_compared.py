@@ -1,11 +1,10 @@
 """Two calibrations from the same readings, or from some of the same, are no proof of a change."""
 
-import json
-
 import numpy as np
 import pytest
+from command_line import answer, call
 from stages_by_hand import CALIBRATED, perform
-from tracked_arm import NAMES, Q, call, table, tracked
+from tracked_arm import NAMES, Q, table, tracked
 
 ROWS = 50
 
@@ -38,16 +37,10 @@ def results(tmp_path_factory):
     return base / "results"
 
 
-def compared(results, first, second, *more):
-    done = call("compare", results / first, results / second, *more)
-    assert done.exit_code == 0, done.output
-    return done.output if "--json" not in more else json.loads(done.stdout)
-
-
 def test_one_file_fitted_twice_shows_no_change_of_the_arm(results, tmp_path):
-    compared(results, "before", "settings", "--picture", tmp_path / "moved.svg")
-    assert (tmp_path / "moved.svg").is_file()
-    told = compared(results, "before", "settings", "--json")
+    moved = ("--picture", tmp_path / "moved.svg")
+    told = answer("compare", results / "before", results / "settings", *moved)
+    assert moved[1].is_file()
     assert told["verdict"] == "same readings"
     assert told["shared"] == {"count": ROWS, "first": ROWS, "second": ROWS}
     assert told["probability"] is None
@@ -65,12 +58,11 @@ def joints_of(path, shifts_deg):
 
 def test_vec_models_are_compared_only_where_both_say_something(results, tmp_path):
     wide = joints_of(tmp_path / "wide.csv", (0.0, 400.0))
-    options = ("--model", "vec", "--joints", wide)
-    told = compared(results, "before", "anew", *options, "--json")
+    words = ("compare", results / "before", results / "anew", "--model", "vec", "--joints")
+    told = answer(*words, wide)
     assert (len(told["poses"]), told["poses_given"]) == (30, 60)
     own = joints_of(tmp_path / "own.csv", (0.0,))
-    alone = compared(results, "before", "anew", "--model", "vec", "--joints", own, "--json")
+    alone = answer(*words, own)
     assert told["shifts"] == alone["shifts"]
     far = joints_of(tmp_path / "far.csv", (400.0,))
-    done = call("compare", results / "before", results / "anew", "--model", "vec", "--joints", far)
-    assert done.exit_code == 2, done.output
+    assert call(*words, far).exit_code == 2

@@ -1,10 +1,9 @@
 """What an arm that is a little off did, as its controller and a laser tracker have it."""
 
-import json
 from dataclasses import dataclass, replace
 
 import numpy as np
-from command_line import call
+from command_line import answer, call
 from scipy.spatial.transform import Rotation
 
 from kinacc.checks.contradictions import load
@@ -68,9 +67,9 @@ def written(folder, **texts):
 def described(paths, *options, robot="ur10"):
     """What a run would read from the data set that init writes, and init's answer."""
     cell = paths[0].parent / "cell"
-    words = ("--robot", robot, "--out", cell, "--name", "m", "--json", "--force", *options)
-    done = call("init", *paths, *words, code=0)
-    return load((cell / "m.yaml",))["m"]["measurements"]["file"], json.loads(done.stdout)
+    words = ("--robot", robot, "--out", cell, "--name", "m", "--force", *options)
+    told = answer("init", *paths, *words)
+    return load((cell / "m.yaml",))["m"]["measurements"]["file"], told
 
 
 def looked(paths, **answers):
