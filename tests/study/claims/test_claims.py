@@ -165,25 +165,21 @@ SIDE = 21
 def accuracy_map(position_peaks, orientation_peaks, wrist) -> dict[str, np.ndarray]:
     """Bumps at given (radius, height) fractions; ``wrist`` gives the configuration per cell."""
     columns, rows = np.meshgrid(np.arange(SIDE), np.arange(SIDE))
-    parts = []
-    for angle, position, orientation in zip(
-        ANGLES_DEG, position_peaks, orientation_peaks, strict=True
-    ):
-        flip = wrist(columns, rows)
-        names = np.where(flip, "X+ Y+ Z+, front-up-flip", "X+ Y+ Z+, front-up-noflip")
-        parts.append(
-            {
-                "slice_deg": np.full(SIDE * SIDE, angle),
-                "radius_mm": columns.ravel() * 25.0,
-                "height_mm": rows.ravel() * 25.0,
-                "position_max_mm": bump(columns, rows, position).ravel(),
-                "orientation_max_mrad": (bump(columns, rows, orientation) - 0.5 * flip).ravel(),
-                "worst_branch": names.ravel().astype(object),
-                "orientation_worst_branch": names.ravel().astype(object),
-                "solutions": np.full(SIDE * SIDE, 18),
-            }
-        )
-    return {"accuracy_map": {k: np.concatenate([p[k] for p in parts]) for k in parts[0]}}
+    flip = wrist(columns, rows)
+    names = np.where(flip, "X+ Y+ Z+, front-up-flip", "X+ Y+ Z+, front-up-noflip").astype(object)
+    position = [bump(columns, rows, peak) for peak in position_peaks]
+    orientation = [bump(columns, rows, peak) - 0.5 * flip for peak in orientation_peaks]
+    slices = {
+        "radius_mm": [columns * 25.0] * 5,
+        "height_mm": [rows * 25.0] * 5,
+        "position_max_mm": position,
+        "orientation_max_mrad": orientation,
+        "worst_branch": [names] * 5,
+        "orientation_worst_branch": [names] * 5,
+    }
+    cells = {name: np.ravel(values) for name, values in slices.items()}
+    cells["slice_deg"] = np.repeat(ANGLES_DEG, SIDE * SIDE)
+    return {"accuracy_map": cells | {"solutions": np.full(5 * SIDE * SIDE, 18)}}
 
 
 def bump(columns, rows, peak):
