@@ -5,11 +5,16 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
+from scipy.spatial.transform import Rotation
 from simulated import POINT, POSE, THREE, disturbed, fit, joints, measure
+from stages_by_hand import run_stages
 
 from kinacc.calibration.dh_estimator import free_parameters
 from kinacc.kinematics import robot
+from kinacc.kinematics.robot import forward
+from kinacc.tables import store
 
 ARM = robot.load("ur10")
 FREE = free_parameters(6, (2, 3))
@@ -36,3 +41,31 @@ def test_a_session_of_three_poses_is_placed():
     seen = observed(POINT, 2, 80)
     few = (seen.session == 0) | (np.cumsum(seen.session == 1) <= 3)
     assert np.sqrt(fit(seen.select(few), ARM.dh, FREE).solution.variance) < 0.03
+
+
+def test_a_dh_model_that_follows_the_vec_model_is_of_all_sessions(tmp_path):
+    rng = np.random.default_rng(2)
+    arm = replace(ARM, dh=disturbed(ARM.dh, np.ones((6, 5), dtype=bool), rng))
+    q = joints(ARM, 60, rng)
+    pose = forward(arm, q)
+    session = np.arange(60) // 30
+    at = pose.position_mm + session[:, None] * [900.0, -400.0, 50.0]
+    turn = Rotation.from_matrix(pose.rotation).as_rotvec(degrees=True)
+    table = pd.DataFrame(np.column_stack([np.rad2deg(q), at, turn]))
+    table.columns = [*(f"q{i}_deg" for i in range(1, 7)), *"xyz", "rx_deg", "ry_deg", "rz_deg"]
+    table = table.rename(columns={axis: f"{axis}_mm" for axis in "xyz"})
+    table.assign(session=session).to_csv(tmp_path / "file.csv", index=False)
+    (tmp_path / "arm.yaml").write_text(
+        "datasets: {arm: {robot: ur10, measurements: {source: file, file: {path: file.csv,"
+        " orientation: {kind: rotation_vector, unit: deg}}}, calibration: {"
+        "base_and_tool: estimated, vec: {order: 0}, dh: {fit_to: vec}}, "
+        "evaluation: {space: measured}}}\n"
+    )
+    run_stages(("measurements", "vec", "dh"), [tmp_path / "arm.yaml"], tmp_path / "results")
+    frames = store.read(tmp_path / "results" / "arm" / "frames.parquet")
+    bases = [
+        (frames["model"] == "dh") & (frames["frame"] == "base") & (frames["session"] == name)
+        for name in ("0", "1")
+    ]
+    first, second = (np.array([frames[f"{a}_mm"][row][0] for a in "xyz"]) for row in bases)
+    np.testing.assert_allclose(second - first, [900.0, -400.0, 50.0], atol=0.5)

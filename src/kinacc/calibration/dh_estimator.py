@@ -175,8 +175,7 @@ class DHEstimator(Estimator):
         followed = others["vec"] if self.follows_vec else None
         if followed:
             frames = Frames(IDENTITY, followed.frames.targets)
-            session = np.zeros(len(observations), dtype=np.int64)
-            observations = replace(observations, session=session, session_names=(None,))
+            observations = _of_one_base(observations)
             at = frames.seen(followed.model, observations)
             observations = replace(observations, position_mm=at.position_mm, rotation=at.rotation)
             settings = {"frames": FrameParameters.none(frames)}
@@ -202,10 +201,17 @@ class DHEstimator(Estimator):
         self, fitted: ModelFit, known: Uncertainty, observations: Observations
     ) -> dict[str, Columns]:
         """How the fit went, and which parameters the observations determine."""
+        observations = _of_one_base(observations) if self.follows_vec else observations
         return {
             "dh_fit": tables.fit_columns("dh_fit", fitted, known),
             "dh_identified": identifiability.identified(fitted, known, observations),
         }
+
+
+def _of_one_base(observations: Observations) -> Observations:
+    """Observations of a DH model that follows the VEC model: all are in the robot's base."""
+    session = np.zeros(len(observations), dtype=np.int64)
+    return replace(observations, session=session, session_names=(None,))
 
 
 def hayati_joints(section: Mapping[str, Any], arm: Robot) -> tuple[int, ...]:
