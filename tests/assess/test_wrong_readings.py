@@ -111,6 +111,15 @@ def test_bounds_hold_as_stated_where_some_readings_go_wrong(wrong, rate, tied):
     assert max(too_low, too_high) <= most
 
 
+def test_as_many_large_readings_as_can_be_wrong_raise_no_lower_bound():
+    lower = []
+    for numbers in ((), (0,), (0, 1)):
+        campaign = run(3, slipped(*numbers), tied=30, wrong_rate=RATE)
+        assert campaign.looks.wrong >= 2
+        lower.append(campaign.looks.largest_lower_mm(np.ones(POINTS)))
+    assert 0.0 < max(lower) < LARGEST
+
+
 @pytest.mark.parametrize("rate", [0.001, 0.05])
 def test_more_readings_are_hardly_ever_wrong_than_are_counted_on(rate):
     campaign = SearchAndConfirm(BUDGET, wrong_rate=rate).begin(
