@@ -21,14 +21,14 @@ from kinacc.assess.world import conduct, drawn_world
 ERROR, SIGMA_MM = 0.05, 0.1
 
 
-def campaign(points, budget, noise_mm, **settings):
+def campaign(points, budget):
     """A campaign to its end, its readings and its noise by point; errors up to 1 mm."""
     rng = np.random.default_rng([points, budget])
     error = away(rng, rng.uniform(0.0, 1.0, points))
-    sigma = rng.uniform(0.8, 1.2, points) * noise_mm
+    sigma = rng.uniform(0.8, 1.2, points) * 0.05
     key = np.array([points, budget], np.uint64)
     world = drawn_world(error, sigma, key, budget, rng.permutation(points))
-    said = conduct(SearchAndConfirm(measurements=budget, **settings), world)
+    said = conduct(SearchAndConfirm(measurements=budget, noise_margin=1.0), world)
     given = [(row, np.array(reading)) for row, reading, _ in said.ledger.readings]
     return said, given, world.sigma_mm
 
@@ -68,7 +68,7 @@ def left_out(points, seen, error):
 
 @pytest.mark.parametrize(("points", "budget"), [(60, 90), (60, 300), (40, 200)])
 def test_the_upper_bound_follows_from_the_raw_readings(points, budget):
-    said, given, sigma = campaign(points, budget, 0.05, noise_margin=1.0)
+    said, given, sigma = campaign(points, budget)
     looks = said.boundary_of(ERROR)
     noise_mm = shown(said, given, sigma) * sigma
     wanted = largest_limit(given, noise_mm, looks.counts, looks.z)
@@ -81,7 +81,7 @@ def test_the_upper_bound_follows_from_the_raw_readings(points, budget):
 
 @pytest.mark.parametrize(("points", "budget"), [(60, 30), (200, 50), (200, 150)])
 def test_where_fewer_are_read_than_there_are_the_bound_is_of_all_but_the_fewest(points, budget):
-    said, given, sigma = campaign(points, budget, 0.05, noise_margin=1.0)
+    said, given, sigma = campaign(points, budget)
     everywhere = said.statements()[1]
     seen = len({row for row, _ in given})
     assert seen < points

@@ -20,21 +20,20 @@ RESULTS = Path(__file__).parents[1] / "golden" / "results" / "ur10_d"
 SIGMA_MM = 0.05
 
 
-def start(folder, *more, candidates=20):
+def start(folder, *more, candidates=20, code=0):
     return call("campaign", "start", folder, "--calibration", RESULTS, "--model", "dh",
-                "--candidates", candidates, "--noise-mm", SIGMA_MM, *more)  # fmt: skip
+                "--candidates", candidates, "--noise-mm", SIGMA_MM, *more,
+                code=code)  # fmt: skip
 
 
 def test_a_box_of_joints_that_was_hardly_measured_is_asked_about(tmp_path):
     """In all poses of the series the flange points the same way, in hardly any of the box."""
     folder = tmp_path / "campaign"
-    done = start(folder, "--region", "fitted")
-    assert done.exit_code == 2
-    assert "candidates: 20 of 20" in done.output
-    assert "--region measured" in done.output
+    said = start(folder, "--region", "fitted", code=2).output
+    assert "candidates: 20 of 20" in said
+    assert "--region measured" in said
     assert not folder.exists()
     done = start(folder, "--region", "fitted", "--sure", "--json")
-    assert done.exit_code == 0, done.output
     assert json.loads(done.stdout)["far_from_data"] == 20
 
 
@@ -42,7 +41,6 @@ def test_candidates_of_a_thin_series_are_drawn_where_it_was_measured(tmp_path):
     plans = []
     for name, more in (("one", ()), ("same", ()), ("other", ("--seed", 1))):
         done = start(tmp_path / name, "--json", *more)
-        assert done.exit_code == 0, done.output
         assert json.loads(done.stdout)["far_from_data"] == 0
         plans.append(campaigns.open_(tmp_path / name).plan)
     assert plans[0].about["candidates"] == "drawn between neighbouring measured poses"
@@ -63,8 +61,8 @@ def test_the_series_itself_imported_whole_says_what_it_says_in_memory(tmp_path):
     series = pd.DataFrame(store.read(RESULTS / "measurements.parquet"))[columns]
     series.rename(columns=joints).to_csv(file, index=False)
     more = ("--assessor", "single_shot", "--budget", len(series))
-    for done in (start(folder, *more, candidates=file), call("campaign", "record", folder, file)):
-        assert done.exit_code == 0, done.output
+    start(folder, *more, candidates=file)
+    call("campaign", "record", folder, file, code=0)
     state = campaigns.open_(folder).state
     assert len(state.used) == len(series)
     errors = np.array([each.error_mm for each in state.used])
