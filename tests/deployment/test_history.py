@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 import shared_data
 from simulated_months import month, session
@@ -87,12 +88,10 @@ def test_readings_of_the_line_in_force_are_not_compared_with_themselves():
 def ur10_series(name, number):
     """A third of a series of one UR10, tracker and tool set up anew for each."""
     path = shared_data.path_of(f"ur10_tmac/series_{name}.csv")
-    table = np.genfromtxt(path, delimiter=",", names=True)[::3]
-    q, turns = (
-        np.deg2rad(np.stack([table[each] for each in names], axis=1))
-        for names in ([f"q{i}_deg" for i in range(1, 7)], [f"r{i}_deg" for i in "xyz"])
-    )
-    at = np.stack([table[f"{axis}_mm"] for axis in "xyz"], axis=1)
+    table = pd.read_csv(path)[::3]
+    q = np.deg2rad(table[[f"q{i}_deg" for i in range(1, 7)]].to_numpy())
+    turns = np.deg2rad(table[["rx_deg", "ry_deg", "rz_deg"]].to_numpy())
+    at = table[["x_mm", "y_mm", "z_mm"]].to_numpy()
     seen = full_poses(robots.load("ur10").dh_joints(q), Pose(euler(turns, "XYZ"), at))
     return replace(session(seen, number, MOVED), tool=MOVED)
 

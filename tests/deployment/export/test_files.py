@@ -6,6 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from oracles.controllers.arms import frame
+from oracles.kinematics import dh_link
+from scipy.spatial.transform import Rotation
 from test_export_urdf import bent
 
 from kinacc.deployment.export.files import FORMATS, contents, write
@@ -14,13 +17,12 @@ from kinacc.deployment.export.source import Source, notes, read_source
 from kinacc.deployment.folder import recorded_robot
 from kinacc.deployment.record import TOOL, nominal
 from kinacc.errors import InputError
-from kinacc.geometry import Pose, compose, rotation_from_quaternion, rotation_x, rotation_z
 from kinacc.kinematics import robot
 from kinacc.kinematics.model import JointState
 
 
-def written(form, arm, **tables):
-    return FORMATS[form].text(Source(arm, tables))
+def written(form, arm):
+    return FORMATS[form].text(Source(arm, {}))
 
 
 def read_back(arm, tmp_path):
@@ -91,14 +93,12 @@ dh:
     arm = replace(nominal(robot.of_text(text, "down.yaml")), choice="dh")
     content = json.loads(written("json", arm))
     q = np.array([0.3, -0.7, 120.0, 0.2])
-    frame = content["first_dh_frame_in_base"]
-    turned = rotation_from_quaternion(np.array(frame["quaternion_wxyz"]))
-    here = Pose(turned, np.array(frame["position_mm"]))
+    first = content["first_dh_frame_in_base"]
+    turned = Rotation.from_quat(first["quaternion_wxyz"], scalar_first=True)
+    here = frame(*first["position_mm"], turned)
     for joint, value in zip(content["joints"], q, strict=True):
-        slides = joint["type"] == "prismatic"
-        turn = joint["theta_offset_rad"] + (0.0 if slides else value)
-        shift = joint["d_mm"] + (value if slides else 0.0)
-        here = compose(here, Pose(rotation_z(turn), np.array([0.0, 0.0, shift])))
-        here = compose(here, Pose(rotation_x(joint["alpha_rad"]), np.array([joint["a_mm"], 0, 0])))
+        row = [joint[name] for name in ("theta_offset_rad", "d_mm", "a_mm", "alpha_rad")]
+        row[joint["type"] == "prismatic"] += value
+        here = here @ dh_link((*row, 0.0), 0.0)
     wanted = arm.pose(JointState(q), "base", "flange")
-    np.testing.assert_allclose(here.position_mm, wanted.position_mm[0], rtol=0, atol=1e-9)
+    np.testing.assert_allclose(here[:3, 3], wanted.position_mm[0], rtol=0, atol=1e-9)

@@ -24,6 +24,12 @@ def shown(program: Program, numbers: list[float]) -> list[np.ndarray]:
     return found
 
 
+def miss(goal: np.ndarray, there: np.ndarray) -> tuple[float, float]:
+    """Distance, mm and mrad, of a frame from another one."""
+    turn = Rotation.from_matrix(goal[:3, :3].T @ there[:3, :3]).magnitude()
+    return float(np.linalg.norm(goal[:3, 3] - there[:3, 3])), 1e3 * turn
+
+
 def misses(program: Program, numbers: list[float], base: np.ndarray) -> np.ndarray:
     """Distances (n, 2), mm and mrad, of the true arm's tool from where the program means it.
 
@@ -34,7 +40,5 @@ def misses(program: Program, numbers: list[float], base: np.ndarray) -> np.ndarr
     rows = []
     for wanted, real in zip(meant, shown(program, numbers), strict=True):
         goal = base @ program.arm.pose(wanted) @ program.tool
-        there = measured.seen(program.arm, real)
-        turn = Rotation.from_matrix(goal[:3, :3].T @ there[:3, :3]).magnitude()
-        rows.append((np.linalg.norm(goal[:3, 3] - there[:3, 3]), 1e3 * turn))
+        rows.append(miss(goal, measured.seen(program.arm, real)))
     return np.array(rows)

@@ -20,23 +20,22 @@ def seen(arm: Arm, shown: np.ndarray) -> np.ndarray:
     return BASE @ arm.pose(shown, true=True) @ TOOL
 
 
-def write(folder: Path, arm: Arm, name: str = "arm", poses: int = 90, order: int = 1) -> Path:
+def write(folder: Path, arm: Arm, poses: int = 90, order: int = 1) -> Path:
     """A robot file, a file of measured poses and a configuration; the configuration's path."""
-    rng = np.random.default_rng(11)
-    lines = [",".join([*(f"q{i}_deg" for i in range(1, 7)), "x_mm,y_mm,z_mm,qw,qx,qy,qz"])]
+    rng, rows = np.random.default_rng(11), []
     for shown in arm.draw(rng, poses):
         there = seen(arm, shown)
         turn = Rotation.from_rotvec(rng.normal(0.0, NOISE_RAD, 3))
         turned = turn * Rotation.from_matrix(there[:3, :3])
         place = there[:3, 3] + rng.normal(0.0, NOISE_MM, 3)
-        values = [*np.rad2deg(shown), *place, *turned.as_quat(scalar_first=True)]
-        lines.append(",".join(f"{value:.9f}" for value in values))
+        rows.append([*np.rad2deg(shown), *place, *turned.as_quat(scalar_first=True)])
+    names = ",".join([*(f"q{i}_deg" for i in range(1, 7)), "x_mm,y_mm,z_mm,qw,qx,qy,qz"])
+    np.savetxt(folder / "poses.csv", rows, "%.9f", ",", header=names, comments="")
     (folder / "robot.yaml").write_text(arm.description())
-    (folder / "poses.csv").write_text("\n".join(lines) + "\n")
-    config = folder / f"{name}.yaml"
+    config = folder / "arm.yaml"
     config.write_text(
-        f"datasets: {{{name}: {{robot: '{folder / 'robot.yaml'}'}}}}\n"
-        f"measurements: {{source: file, folds: 5, file: {{path: '{folder / 'poses.csv'}',"
+        "datasets: {arm: {robot: robot.yaml}}\n"
+        "measurements: {source: file, folds: 5, file: {path: poses.csv,"
         " orientation: {kind: quaternion}}}\n"
         f"calibration: {{base_and_tool: estimated, vec: {{order: {order}}},"
         " dh: {fit_to: measurements, hayati_joints: auto}}\n"

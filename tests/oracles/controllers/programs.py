@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -54,21 +54,18 @@ def _euler(order: str, **more) -> Convention:
     )
 
 
+_QUATERNION = Convention(
+    lambda turn: turn.as_quat(canonical=True, scalar_first=True),
+    lambda v: Rotation.from_quat(v, scalar_first=True),
+    (2, 7, 4),
+)
 PULSES = np.array([1341.4, -1310.5, 1250.0, 1022.2, -980.0, 633.3])  # a degree
 CONVENTIONS = {
     "kuka": _euler("ZYX", decimals=(3, 4, 4)),
     "fanuc": _euler("xyz", decimals=(3, 3, 3)),
     "yaskawa": _euler("xyz", decimals=(3, 4, 0), joint=PULSES * np.rad2deg(1.0)),
-    "abb": Convention(
-        lambda turn: turn.as_quat(canonical=True, scalar_first=True),
-        lambda v: Rotation.from_quat(v, scalar_first=True),
-        (2, 7, 4),
-    ),
-    "table": Convention(
-        lambda turn: turn.as_quat(canonical=True, scalar_first=True),
-        lambda v: Rotation.from_quat(v, scalar_first=True),
-        (4, 7, 5),
-    ),
+    "abb": _QUATERNION,
+    "table": replace(_QUATERNION, decimals=(4, 7, 5)),
     "ur": Convention(
         lambda turn: turn.as_rotvec(), Rotation.from_rotvec, (6, 6, 6), metre=1e-3, joint=1.0
     ),
