@@ -1,13 +1,12 @@
 """Programs and values for controllers, on controllers that share no code with kinacc."""
 
-import json
 from dataclasses import replace
 
 import numpy as np
 import pandas as pd
 import pytest
 import yaml
-from command_line import call
+from command_line import answer, call
 from oracles.controllers import judge, measured, programs
 from oracles.controllers.arms import ARMS, frame
 from oracles.kinematics import dh_forward, rot_x, rot_y, rot_z, trans
@@ -89,9 +88,8 @@ def test_an_arm_whose_axes_run_unevenly_goes_there_by_its_vec_model(tmp_path):
 def test_values_typed_into_a_controller_err_by_no_more_than_the_page_states(tmp_path, maker):
     """Goals in the frame of the instrument, drawn where the arm was measured."""
     arm, typed = MAKERS[maker], {}
-    done = call("export", calibrated(maker), "--for", maker, "--out", tmp_path, "--json", code=0)
-    answer = json.loads(done.output)
-    for each in answer["values"]:
+    told = answer("export", calibrated(maker), "--for", maker, "--out", tmp_path)
+    for each in told["values"]:
         digits = {"ur": 9, "abb": 9 if each["name"][0] == "q" else 4}.get(maker, 4)
         typed.setdefault(each["group"], {})[each["name"]] = round(each["new"], digits)
     first, *_, last = typed.get("joint zeros", {"A1": 0.0, "A6": 0.0}).values()
@@ -103,7 +101,7 @@ def test_values_typed_into_a_controller_err_by_no_more_than_the_page_states(tmp_
         there = measured.seen(arm, shown)
         turn = Rotation.from_matrix(goal[:3, :3].T @ there[:3, :3]).magnitude()
         misses.append((np.linalg.norm(goal[:3, 3] - there[:3, 3]), 1e3 * turn))
-    mean, (stated, best, _) = np.mean(misses, axis=0), answer["errors"]
+    mean, (stated, best, _) = np.mean(misses, axis=0), told["errors"]
     assert mean[0] <= FACTOR * stated["position_mm"]
     assert mean[1] <= FACTOR * stated["orientation_mrad"]
     if maker in ("ur", "staubli"):  # which take all that was fitted

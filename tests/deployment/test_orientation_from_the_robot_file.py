@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from command_line import call
+from command_line import answer
 from oracles.controllers import measured
 from oracles.controllers.arms import ARMS, errors
 from oracles.controllers.measured import TOOL
@@ -42,9 +42,8 @@ def test_flange_and_tool_are_turned_as_the_robot_file_says(
     results, model, allowed_deg, point, behind
 ):
     words = [part for q in np.rad2deg(SHOWN) for part in ("--joints-deg", ",".join(map(str, q)))]
-    done = call("predict", results, "--model", model, "--point", point, "--json", *words)
-    answer = json.loads(done.stdout)
-    found = [[row[name] for name in ("qw", "qx", "qy", "qz")] for row in answer["rows"]]
+    told = answer("predict", results, "--model", model, "--point", point, *words)
+    found = [[row[name] for name in ("qw", "qx", "qy", "qz")] for row in told["rows"]]
     wanted = [(ARM.pose(q, true=model != "nominal") @ behind)[:3, :3] for q in SHOWN]
     assert apart_deg(Rotation.from_quat(found, scalar_first=True), wanted) < allowed_deg
-    assert answer["orientation"] == "stated"
+    assert told["orientation"] == "stated"

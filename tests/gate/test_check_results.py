@@ -12,7 +12,7 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from command_line import call
+from command_line import answer, call
 from stages_by_hand import run_stages
 from whole_project import finished
 
@@ -75,8 +75,7 @@ def here(made, tmp_path, monkeypatch):
 
 def told(*words, code=0):
     """Outcomes by name, as the command prints them in JSON."""
-    done = call("check-results", *words, "--json", code=code)
-    report = json.loads(done.stdout)
+    report = answer("check-results", *words, code=code)
     assert (report["schema_version"], report["passed"]) == (1, code == 0)
     return {each["name"]: each for each in report["outcomes"]}
 
