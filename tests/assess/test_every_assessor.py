@@ -130,6 +130,21 @@ def test_the_share_of_the_region_keeps_its_confidence(sigma):
     assert held.min() >= DRAWS * LEAST
 
 
+def test_a_share_of_the_region_needs_the_points_that_it_names():
+    errors = np.random.default_rng(2).normal(size=(200, 3))
+    stated = {}
+    for count in range(25, 60):
+        world = drawn_world(errors[:count], 0.01, key_of(1), 1)
+        (said,) = conduct(RegionShare(count), world).statements()
+        stated[count] = said.withheld is None
+        if said.withheld is not None:
+            needed = said.withheld.numbers["needed"]
+    fewest = min(count for count, is_stated in stated.items() if is_stated)
+    assert fewest == needed
+    # Exact readings take 29: 0.9 to the power of 29 is below 0.05; noise a few more.
+    assert 29 <= fewest <= 40
+
+
 @pytest.mark.parametrize(
     ("said", "tolerance", "verdict", "reason"),
     [

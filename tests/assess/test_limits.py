@@ -11,6 +11,7 @@ from scipy.optimize import minimize
 from scipy.special import chndtr, ndtri
 from scipy.stats import chi2, ncx2
 
+from kinacc.assess.adaptive import Candidates
 from kinacc.assess.limits import (
     largest_size,
     lower_limit_mm,
@@ -19,6 +20,7 @@ from kinacc.assess.limits import (
     visit_mm,
 )
 from kinacc.assess.population import excepted
+from kinacc.assess.search_and_confirm import SearchAndConfirm
 
 
 @pytest.mark.parametrize("a", [0.0, 1e-5, 1e-3, 0.1, 1.0, 4.0, 30.0])
@@ -100,3 +102,17 @@ def test_all_but_so_many_points_is_right_over_all_subsets_that_can_be_read(point
     left = excepted(points, seen, error)
     assert missed(left + 1) <= error
     assert left == 0 or missed(left) > error
+
+
+def test_noise_twice_as_large_is_a_covariance_four_times_as_large():
+    rng = np.random.default_rng(8)
+    root = 0.2 * rng.normal(size=(4, 3, 3)) + 0.3 * np.eye(3)
+    covariance, readings = root @ np.swapaxes(root, 1, 2), rng.normal(size=(4, 3)) + 2.0
+    limits = []
+    for scale, factor in ((1.0, 2.0), (4.0, 1.0)):
+        campaign = SearchAndConfirm(8).begin(Candidates(scale * covariance))
+        for point, reading in enumerate(readings):
+            campaign.record(point, reading)
+        limits.append(campaign.looks.lower_limits_mm(np.full(4, factor)))
+    assert limits[0].max() > 0.0
+    np.testing.assert_allclose(*limits, rtol=1e-9)

@@ -86,6 +86,7 @@ def test_the_budget_named_is_enough_on_all_errors_and_beyond():
         return smallest_budget(budgets, pd.Series(np.concatenate([*shares.values()])), aim)
 
     assert enough(a=[0.9, 0.9, 0.9], b=[0.1, 0.8, 1.0]) == 20
+    assert enough(a=[1.0, 1.0, 1.0], b=[0.7, 0.7, 0.8]) == 30
     assert enough(a=[0.9, 0.9, 0.9], b=[0.9, 0.1, 1.0]) == 30
     assert enough(a=[0.9, 0.9, 0.7]) is None
 
