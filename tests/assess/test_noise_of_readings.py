@@ -6,19 +6,21 @@ import math
 
 import numpy as np
 import pytest
-from scipy.stats import binom, chi2, kstest, norm, t
+from scipy.stats import binom, chi2, f, kstest, norm, t
 from simulated_campaigns import away, conducted
 
 from kinacc.assess.adaptive import Candidates, Ledger
 from kinacc.assess.limits import visit_mm
 from kinacc.assess.noise import (
     BESIDE_REFERENCES,
+    FALSE_ALARM,
     SCATTER,
     Contrasts,
     contrasts,
     estimated_factor,
     largest_factor,
     scatter_alarm,
+    suspicious_readings,
     tails_alarm,
 )
 from kinacc.assess.search_and_confirm import SearchAndConfirm
@@ -111,6 +113,30 @@ def test_one_reading_of_each_pose_bounds_the_noise_whatever_the_errors_are():
     assert largest_factor(equal(21), np.arange(21), more, 0.05) >= largest_factor(
         equal(21), np.arange(21), readings, 0.05
     )
+
+
+def test_a_pose_read_often_has_its_own_factor_where_that_is_larger():
+    rng = np.random.default_rng(9)
+    rows, values = np.repeat([0, 1, 2], [40, 40, 4]), rng.normal(size=(84, 3))
+    values[:40] *= 2.0
+    value, by_point = estimated_factor(Contrasts(rows, np.arange(84), values), 252, 4)
+    own = math.sqrt(np.mean(values[:40] ** 2))
+    assert value == pytest.approx(math.sqrt(np.mean(values**2)))
+    np.testing.assert_allclose(by_point, [own, value, value, value])
+
+
+@pytest.mark.parametrize("freedom", [12.0, math.inf])
+@pytest.mark.parametrize(("beyond", "named"), [(0.99, 0), (1.01, 1)])
+def test_a_reading_is_suspicious_from_the_distance_on_that_noise_seldom_has(freedom, beyond, named):
+    chance, factor = 0.5 * FALSE_ALARM / 5, 1.4
+    far = factor * math.sqrt(3.0 * f.isf(chance, 3.0, freedom) if freedom < 1e9
+                             else chi2.isf(chance, 3))  # fmt: skip
+    readings = np.zeros((4, 3))
+    # The last of three in a block, 0.1 mm noise each, against the mean of the two others.
+    readings[3, 1] = beyond * far * 0.1 * math.sqrt(1.5)
+    ledger = told(equal(2), [0] * 4, readings, {})
+    said = suspicious_readings(ledger, [1] * 4, (1, 9), 5, factor, freedom)
+    assert [each.number for each in said] == [4] * named
 
 
 def test_noise_20_percent_larger_than_stated_is_said_by_80_triples():

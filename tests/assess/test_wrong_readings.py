@@ -71,7 +71,10 @@ def test_the_lower_limit_holds_whatever_wrong_readings_say():
         # All at the point with the largest error, 3 mm: nothing is given away.
         along = 3.0 + 0.5 * rng.normal(size=40)
         along[rng.random(40) < 0.05] = 1e6
-        above += guarded_lower_mm(along, np.full(40, 0.5), z, 0.05) > 3.0
+        found = guarded_lower_mm(along, np.full(40, 0.5), z, 0.05)
+        above += found > 3.0
+    # In another unit the same.
+    assert guarded_lower_mm(9.0 * along, np.full(40, 4.5), z, 0.05) == pytest.approx(9.0 * found)
     assert 0.03 < above / 2000 < 0.05 + 3.0 * math.sqrt(0.05 * 0.95 / 2000)
 
 

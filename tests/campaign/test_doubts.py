@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
+import numpy as np
 import pandas as pd
 import pytest
 from campaign_on_disk import refusal, refused, standing, visit_of
@@ -78,3 +79,14 @@ def test_noise_below_the_scatter_of_repeated_readings_is_asked_about(freedom, no
     known = SimpleNamespace(freedom=freedom, per_axis_mm=0.06)
     used = instruments([f"tracker={noise_mm}"], "base")
     assert len(noise_doubts(used, known=known)) == doubted
+
+
+@pytest.mark.parametrize(
+    ("noise_mm", "left_mm", "doubted"),
+    [(0.2, 0.15, 1), (0.2, 0.2, 0), (0.02, 0.015, 1), (1.0, np.nan, 1), (0.5, np.nan, 0)],
+)
+def test_noise_larger_than_twice_what_the_calibration_left_is_asked_about(
+    noise_mm, left_mm, doubted
+):
+    used = instruments([f"tracker={noise_mm}"], "base")
+    assert len(noise_doubts(used, left_mm)) == doubted

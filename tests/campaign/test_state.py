@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from kinacc.assess.registry import ADAPTIVE
 from kinacc.assess.world import conduct
 from kinacc.campaign import folder
 from kinacc.campaign.plan import from_json, to_json
-from kinacc.campaign.state import Reading, Readings, restore
+from kinacc.campaign.state import Reading, Readings, most_plausible_mm, restore
 
 
 def entries_of(plan, world, left_out=frozenset(), limit=None):
@@ -126,3 +127,16 @@ def test_predictions_recorded_as_readings_bound_nothing(make_plan, tmp_path):
         said = call("campaign", command, path, code=0).output
         assert "equal the predicted positions" in said
         assert " at most " not in said
+
+
+@pytest.mark.parametrize(
+    ("size_mm", "most_mm"), [(0.01, 10.0 * 0.05 * np.sqrt(3.0)), (0.5, 3.0), (4.0, 10.0)]
+)
+def test_a_plausible_error_is_within_10_standard_deviations_or_6_medians(
+    make_plan, size_mm, most_mm
+):
+    readings = [SimpleNamespace(error_mm=np.array([0.0, 0.0, size_mm]))] * 10
+    state = SimpleNamespace(plan=make_plan(), readings=readings)
+    assert most_plausible_mm(state) == pytest.approx(most_mm)
+    state.readings = readings[:9]
+    assert most_plausible_mm(state) == state.plan.limits.implausible_mm

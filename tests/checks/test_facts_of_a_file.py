@@ -18,6 +18,10 @@ def test_the_noise_between_two_targets_is_the_noise_of_a_reading(tmp_path):
     (pair,) = facts["target_distances"]
     assert pair["noise_per_target_mm"] == facts["noise"]["between_targets_mm"]
     assert pair["std_mm"] == pytest.approx(0.1 * np.sqrt(2.0), rel=0.12)
+    seldom = {f"b_{axis}_mm": file.columns[f"b_{axis}_mm"].where(np.arange(600) % 3 > 0)
+              for axis in "xyz"}  # fmt: skip
+    (part,) = file.but(**seldom).check(tmp_path).facts["target_distances"]
+    assert part["std_mm"] == pytest.approx(0.1 * np.sqrt(2.0), rel=0.15)
 
 
 def test_joints_written_in_steps_cost_what_rounding_them_moves_the_flange():
