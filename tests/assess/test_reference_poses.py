@@ -56,6 +56,9 @@ def test_a_drift_is_what_least_squares_make_of_the_references(covariance):
     assert found_change.is_found
     assert_allclose(found_change.change_mm, slope, rtol=1e-9)
     assert_allclose(found_change.deviation_mm, math.sqrt(variance), rtol=1e-9)
+    # Before the first stage nothing is looked at.
+    early = stages(plan)[0][0] - 1
+    assert find_change(plan, Readings(*(column[:early] for column in readings))) is None
 
 
 @pytest.mark.parametrize("freedom", [math.inf, 0.0, 60.0])

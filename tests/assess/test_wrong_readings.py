@@ -60,6 +60,8 @@ def test_the_limit_is_the_largest_over_all_directions(count, even):
     climbed = [minimize(lambda x: -limit(x), each, method="Nelder-Mead").fun for each in begins]
     found = guarded_upper_mm(readings, covariances, 2.6, 0.01)
     assert found == pytest.approx(-min(climbed), rel=1e-3)
+    in_unit = guarded_upper_mm(9.0 * readings, 81.0 * covariances, 2.6, 0.01)
+    assert in_unit == pytest.approx(9.0 * found)
     assert guarded_upper_mm(readings[:2], covariances[:2], 9.0, 0.01) == math.inf
 
 
@@ -71,10 +73,7 @@ def test_the_lower_limit_holds_whatever_wrong_readings_say():
         # All at the point with the largest error, 3 mm: nothing is given away.
         along = 3.0 + 0.5 * rng.normal(size=40)
         along[rng.random(40) < 0.05] = 1e6
-        found = guarded_lower_mm(along, np.full(40, 0.5), z, 0.05)
-        above += found > 3.0
-    # In another unit the same.
-    assert guarded_lower_mm(9.0 * along, np.full(40, 4.5), z, 0.05) == pytest.approx(9.0 * found)
+        above += guarded_lower_mm(along, np.full(40, 0.5), z, 0.05) > 3.0
     assert 0.03 < above / 2000 < 0.05 + 3.0 * math.sqrt(0.05 * 0.95 / 2000)
 
 
