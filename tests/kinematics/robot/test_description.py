@@ -15,6 +15,7 @@ from kinacc.geometry import Pose, compose, rotation_x, rotation_z
 from kinacc.kinematics import robot
 from kinacc.kinematics.dh import DHModel
 from kinacc.kinematics.robot.description import from_modified
+from kinacc.kinematics.robot.record import outside_limits
 
 GOOD = """\
 name: small
@@ -228,3 +229,14 @@ def test_an_unknown_robot_names_the_nearest():
         robot.load("irb121")
     assert "irb120" in str(refusal.value)
     assert "ur3" not in str(refusal.value)
+
+
+def test_joints_beyond_their_limits_are_given_by_joint_and_row():
+    arm, joints = robot.load("irb120"), np.zeros((4, 6))
+    joints[1, 2], joints[3, 4] = arm.q_max_rad[2] + 0.02, arm.q_min_rad[4] - 0.02
+    joints[2, 0] = 250.0  # degrees
+    found = list(outside_limits(arm, joints, 0.01))
+    assert [(each.joint, each.rows.tolist()) for each in found] == [(1, [2]), (3, [1]), (5, [3])]
+    assert [each.looks_like_degrees for each in found] == [True, False, False]
+    assert found[1].values == pytest.approx([np.rad2deg(joints[1, 2])])
+    assert not list(outside_limits(arm, joints[1:2], 0.03))
