@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import copy
-from dataclasses import asdict
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
 from oracles import compliant_arm as oracle
 
 from kinacc.calibration import models, tables, uncertainty
+from kinacc.calibration.compliance_fit import ComplianceEstimator
 from kinacc.calibration.observations import full_poses
 from kinacc.config.schema import defaults
 from kinacc.geometry import Pose
@@ -66,3 +67,22 @@ def test_a_joint_that_gravity_does_not_turn_is_undetermined_and_stays_stiff():
     assert np.isnan(found.model.to_columns(found.std)["std_compliance_rad_per_nm"][0])
     columns = tables.fit_columns("compliance_fit", found, known_of)
     assert "j1.compliance_rad_per_nm" in set(columns["parameter"])
+
+
+@pytest.mark.parametrize(
+    ("asked", "wrong"),
+    [
+        ({"joints": [1, 6]}, []),
+        ({"joints": [2, 4]}, ["joints"]),  # joint 4 slides
+        ({"joints": [7, 8]}, ["joints", "joints"]),
+        ({"joints": [3], "links": LINKS[:5]}, ["links"]),
+        ({"joints": [3], "gravity": (0.0, 0.0, 0.0)}, ["gravity"]),
+        ({"joints": [3], "gravity": (0.0, 0.0, -9.81)}, []),
+    ],
+)
+def test_bending_of_joints_that_are_not_there_or_slide_is_refused(asked, wrong):
+    slides = np.arange(6) == 3
+    arm = replace(ARM, dh=replace(ARM.dh, prismatic=slides))
+    section = {"links": [], "gravity": (0.0, 0.0, -1.0), **asked}
+    found = ComplianceEstimator.contradictions({"compliance": section}, arm)
+    assert [keys[0] for keys, *_ in found] == wrong
