@@ -9,7 +9,7 @@ BEGIN_S, STEP_S, MOVES_S = 5000.0, 0.01, 0.5
 
 
 def record(stops_s):
-    """Times, one joint that turns between the stops at 1 rad/s, and when the stops begin and end."""
+    """Times, one joint that turns by 1 rad/s between the stops, begin and end of the stops."""
     turns, stands = [], []
     for stop_s in stops_s:
         turns += [STEP_S] * round(MOVES_S / STEP_S)
@@ -30,7 +30,7 @@ def test_short_stops_of_a_record_that_runs_on_are_no_standstills():
 
 def test_the_offset_between_two_clocks_is_found():
     rng = np.random.default_rng(4)
-    time, q, stands = record(rng.uniform(0.5, 3.0, 40))
+    time, q, _ = record(rng.uniform(0.5, 3.0, 40))
     found, within_s = standstills(time, q)
     points = found.mean(axis=1) - 1234.5 + rng.uniform(-0.1, 0.1, 40)
     offset, *_ = offsets(points, found, within_s)
