@@ -48,11 +48,11 @@ def test_three_parallel_axes_show_one_sum(kind, sessions):
     assert ("base2 z" in found.statement["j1.d_mm"]) == (sessions == 2)
 
 
-OF_ARM = ("base.z_mm", "base.rz_rad", "j1.d_mm", "j1.a_mm", "j2.d_mm", "j3.d_mm", "j3.a_mm")
-STRUCTURAL = np.array(
-    [[1, 0, -1, 0, 0, 0, 0], [0, 1, 0, -1, 0, 0, 0], [0, 0, 0, 0, 1, -1, 0]], dtype=float
-)
-WEAK = np.array([[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]])
+NAMES = ("base.z_mm", "base.rz_rad", "j1.d_mm", "j1.a_mm", "j2.d_mm", "j3.d_mm", "j3.a_mm",
+         "base.x_mm", "tool.x_mm")  # fmt: skip
+STRUCTURAL = np.zeros((4, 9))
+STRUCTURAL[range(4), [0, 1, 4, 7]], STRUCTURAL[range(4), [2, 3, 5, 8]] = 1.0, -1.0
+WEAK = np.eye(9)[6:7]
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -63,9 +63,9 @@ def test_directions_do_not_depend_on_the_basis_of_their_space(seed):
         return np.linalg.qr(rng.normal(size=(len(rows), len(rows))))[0] @ rows
 
     lost = rotated(np.concatenate([STRUCTURAL, WEAK]) / np.sqrt(2.0))
-    found = LeftOpen.of(rotated(STRUCTURAL), lost, OF_ARM, known())
+    found = LeftOpen.of(rotated(STRUCTURAL), lost, NAMES, known())
     parts = {tuple(np.flatnonzero(np.abs(row) > 1e-9)) for row in found.directions}
-    assert parts == {(0, 2), (1, 3), (4, 5), (6,)}
-    assert found.structural.tolist() == [True, True, True, False]
+    assert parts == {(0, 2), (1, 3), (4, 5), (6,), (7, 8)}
+    assert found.structural.tolist() == [True] * 4 + [False]
     np.testing.assert_allclose(np.abs(found.directions).max(axis=1), 1.0)
-    assert not len(LeftOpen.of(np.zeros((0, 7)), np.zeros((0, 7)), OF_ARM, known()).directions)
+    assert not len(LeftOpen.of(*np.zeros((2, 0, 9)), NAMES, known()).directions)

@@ -126,6 +126,7 @@ def test_a_dense_multistart_finds_nothing_more(arm):
         listed = solved.q_rad[row][np.isfinite(solved.q_rad[row, :, 0])]
         distance = arms.apart(arm, found.q_rad[found.converged][:, None], listed[None])
         assert found.converged.sum() > 50
+        assert np.quantile(found.error_mm[found.converged], 0.9) < 1e-9
         assert distance.min(axis=1).max() < 1e-4
         assert np.unique(distance.argmin(axis=1)).size == len(listed)
 
