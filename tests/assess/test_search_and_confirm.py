@@ -86,6 +86,8 @@ def test_where_fewer_are_read_than_there_are_the_bound_is_of_all_but_the_fewest(
     seen = len({row for row, _ in given})
     assert seen < points
     assert everywhere.excepted == left_out(points, seen, Fraction(1, 40))
+    ahead = said.settings.shortfall(points)
+    assert ahead.numbers["excepted"] == everywhere.excepted
     looks = said.boundary_of(ERROR / 2)
     wanted = largest_limit(given, sigma, looks.counts, looks.z)
     assert everywhere.upper_mm == pytest.approx(wanted, rel=1e-9)

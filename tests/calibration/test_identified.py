@@ -69,3 +69,11 @@ def test_directions_do_not_depend_on_the_basis_of_their_space(seed):
     assert found.structural.tolist() == [True] * 4 + [False]
     np.testing.assert_allclose(np.abs(found.directions).max(axis=1), 1.0)
     assert not len(LeftOpen.of(*np.zeros((2, 0, 9)), NAMES, known()).directions)
+
+
+def test_of_many_parts_of_a_direction_the_six_largest_are_listed():
+    names = tuple(f"j{joint}.{name}_mm" for joint in range(1, 5) for name in "da")
+    direction = np.array([[0.05, 1.0, 0.3, 0.1, 0.9, 0.2, 0.8, 0.7]])
+    (sentence,) = LeftOpen(direction, np.array([True]), names, known()).sentences
+    listed = [f"{name[3]} of joint {name[1]}" in sentence for name in names]
+    assert listed == (direction[0] > 0.1).tolist()

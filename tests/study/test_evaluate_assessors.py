@@ -75,7 +75,7 @@ def test_honest_bounds_cover_and_bounds_shrunk_by_a_fifth_are_shown_to_fail():
     honest, shrunk, maximum = table.to_dict("records")
     assert honest["coverage"] >= 0.91
     assert honest["lower_coverage"] >= 0.91
-    assert shrunk["coverage"] < 0.8
+    assert 0.1 < shrunk["coverage"] < 0.8  # 300 campaigns, each with a bound that holds or not
     assert (honest["stated"], maximum["stated"]) == (1.0, 0.0)
     # One world for all: the same readings have the same largest.
     assert honest["mean_mm"] == pytest.approx(maximum["mean_mm"], rel=1e-9)
