@@ -32,7 +32,7 @@ UNSEEN = ": no pose determines it"  # of one parameter alone
 POORLY_DETERMINED = ": poorly determined by these poses"
 LEAST = 0.02  # of the largest part of a direction; smaller parts are not listed
 _RANK = 1e-6
-_TIE = 1e-6  # of its length, by which a column goes behind the one before it
+_TIE = 1e-6  # relative reduction per column: of equal columns the earlier one is the pivot
 _SEPARATE = 0.5  # part of a unit direction beside the structural ones that is reported
 _MOST_NAMES = 6
 _JOIN = "; "
@@ -207,9 +207,9 @@ def _sparse(rows: np.ndarray, among: np.ndarray) -> np.ndarray:
     if not len(rows):
         return rows
     columns = rows[:, among]
-    # Of columns that are as long the first is the pivot, and not that which rounding made longer.
-    falling = 1.0 - _TIE * np.arange(columns.shape[1])
-    _, order = scipy.linalg.qr(columns * falling, mode="r", pivoting=True)
+    # Without weights rounding decides between equal columns, and processors differ.
+    weights = 1.0 - _TIE * np.arange(columns.shape[1])
+    _, order = scipy.linalg.qr(columns * weights, mode="r", pivoting=True)
     mixed = np.linalg.solve(columns[:, np.sort(order[: len(rows)])], rows)
     return mixed / np.abs(mixed).max(axis=1, keepdims=True)
 
