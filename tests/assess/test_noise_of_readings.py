@@ -129,14 +129,14 @@ def test_a_pose_read_often_has_its_own_factor_where_that_is_larger():
 @pytest.mark.parametrize(("beyond", "named"), [(0.99, 0), (1.01, 1)])
 def test_a_reading_is_suspicious_from_the_distance_on_that_noise_seldom_has(freedom, beyond, named):
     chance, factor = 0.5 * FALSE_ALARM / 5, 1.4
-    far = factor * math.sqrt(3.0 * f.isf(chance, 3.0, freedom) if freedom < 1e9
-                             else chi2.isf(chance, 3))  # fmt: skip
+    square = chi2.isf(chance, 3) if math.isinf(freedom) else 3.0 * f.isf(chance, 3.0, freedom)
+    limit_mm = 0.1 * factor * math.sqrt(square)
     readings = np.zeros((4, 3))
-    # The last of three in a block, 0.1 mm noise each, against the mean of the two others.
-    readings[3, 1] = beyond * far * 0.1 * math.sqrt(1.5)
+    # The last of three readings of a block is compared with the mean of the two others.
+    readings[3, 1] = beyond * limit_mm * math.sqrt(1.5)
     ledger = told(equal(2), [0] * 4, readings, {})
-    said = suspicious_readings(ledger, [1] * 4, (1, 9), 5, factor, freedom)
-    assert [each.number for each in said] == [4] * named
+    suspicious = suspicious_readings(ledger, [1] * 4, (1, 9), 5, factor, freedom)
+    assert [reading.number for reading in suspicious] == [4] * named
 
 
 def test_noise_20_percent_larger_than_stated_is_said_by_80_triples():

@@ -84,5 +84,5 @@ def test_bending_of_joints_that_are_not_there_or_slide_is_refused(asked, wrong):
     slides = np.arange(6) == 3
     arm = replace(ARM, dh=replace(ARM.dh, prismatic=slides))
     section = {"links": [], "gravity": (0.0, 0.0, -1.0), **asked}
-    found = ComplianceEstimator.contradictions({"compliance": section}, arm)
-    assert [keys[0] for keys, *_ in found] == wrong
+    contradictions = ComplianceEstimator.contradictions({"compliance": section}, arm)
+    assert [keys[0] for keys, *_ in contradictions] == wrong

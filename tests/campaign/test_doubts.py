@@ -82,11 +82,11 @@ def test_noise_below_the_scatter_of_repeated_readings_is_asked_about(freedom, no
 
 
 @pytest.mark.parametrize(
-    ("noise_mm", "left_mm", "doubted"),
+    ("noise_mm", "rms_error_mm", "doubted"),
     [(0.2, 0.15, 1), (0.2, 0.2, 0), (0.02, 0.015, 1), (1.0, np.nan, 1), (0.5, np.nan, 0)],
 )
-def test_noise_larger_than_twice_what_the_calibration_left_is_asked_about(
-    noise_mm, left_mm, doubted
+def test_noise_larger_than_twice_the_rms_error_of_the_calibration_is_asked_about(
+    noise_mm, rms_error_mm, doubted
 ):
     used = instruments([f"tracker={noise_mm}"], "base")
-    assert len(noise_doubts(used, left_mm)) == doubted
+    assert len(noise_doubts(used, rms_error_mm)) == doubted

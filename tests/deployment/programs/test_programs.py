@@ -352,23 +352,23 @@ def test_moves_to_positions_that_are_not_there_are_listed(name, text, expected):
     assert all(each.tool is not None for each in found.positions if each.scale is None)
 
 
-def test_postures_near_singular_ones_are_told(tmp_path):
+def test_postures_near_singularities_are_flagged(tmp_path):
     arm, rng = robot.load("irb120"), np.random.default_rng(1)
     q = rng.uniform(0.9 * arm.q_min_rad, 0.9 * arm.q_max_rad, (60, 6))
     names = [f"q{i}_deg" for i in range(1, 7)]
     pd.DataFrame(np.rad2deg(q).round(3), columns=names).to_csv(tmp_path / "joints.csv", index=False)
-    told = corrected("joints.csv", tmp_path).table["is_near_singular"].to_numpy(bool)
+    flagged = corrected("joints.csv", tmp_path).table["is_near_singular"].to_numpy(bool)
     table = arm.dh.start.reshape(6, 5)
     reach_mm, step = np.abs(table[:, 1:3]).sum(), 1e-6
     smallest = []
     for joints in q:
         moved = [dh_forward(table, joints + step * axis) for axis in np.eye(6)]
-        here = dh_forward(table, joints)
-        turns = [(each[:3, :3] @ here[:3, :3].T)[(2, 0, 1), (1, 2, 0)] for each in moved]
-        shifts = [each[:3, 3] - here[:3, 3] for each in moved]
+        start = dh_forward(table, joints)
+        turns = [(pose[:3, :3] @ start[:3, :3].T)[(2, 0, 1), (1, 2, 0)] for pose in moved]
+        shifts = [pose[:3, 3] - start[:3, 3] for pose in moved]
         slopes = np.column_stack([np.divide(shifts, reach_mm), turns]) / step
         smallest.append(np.linalg.svd(slopes, compute_uv=False)[-1])
     clear = np.abs(np.log(np.divide(smallest, 0.02))) > 0.1
     assert clear.sum() > 50
-    np.testing.assert_array_equal(told[clear], np.array(smallest)[clear] < 0.02)
-    assert 5 < told.sum() < 40
+    np.testing.assert_array_equal(flagged[clear], np.array(smallest)[clear] < 0.02)
+    assert 5 < flagged.sum() < 40

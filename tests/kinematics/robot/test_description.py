@@ -235,8 +235,8 @@ def test_joints_beyond_their_limits_are_given_by_joint_and_row():
     arm, joints = robot.load("irb120"), np.zeros((4, 6))
     joints[1, 2], joints[3, 4] = arm.q_max_rad[2] + 0.02, arm.q_min_rad[4] - 0.02
     joints[2, 0] = 250.0  # degrees
-    found = list(outside_limits(arm, joints, 0.01))
-    assert [(each.joint, each.rows.tolist()) for each in found] == [(1, [2]), (3, [1]), (5, [3])]
-    assert [each.looks_like_degrees for each in found] == [True, False, False]
-    assert found[1].values == pytest.approx([np.rad2deg(joints[1, 2])])
+    outside = list(outside_limits(arm, joints, 0.01))
+    assert [(joint.joint, *joint.rows) for joint in outside] == [(1, 2), (3, 1), (5, 3)]
+    assert [joint.looks_like_degrees for joint in outside] == [True, False, False]
+    assert outside[1].values == pytest.approx([np.rad2deg(joints[1, 2])])
     assert not list(outside_limits(arm, joints[1:2], 0.03))
