@@ -48,7 +48,7 @@ def largest_limit(given, sigma, counts, z):
 def shown(said, given, sigma):
     """Noise over that stated by the pooled variance within blocks; 1 at least."""
     of_block = {}
-    for block, (row, reading) in zip(said.reading_blocks(), given, strict=True):
+    for block, (row, reading) in zip(said.blocks, given, strict=True):
         of_block.setdefault(block, []).append(reading / sigma[row])
     freedom = sum(3 * (len(each) - 1) for each in of_block.values())
     square = sum(3 * len(each) * np.var(each, axis=0).mean() for each in of_block.values())

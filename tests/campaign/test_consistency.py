@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from campaign_on_disk import entry_of
+from campaign_on_disk import entry_of, readings_of
 
 from kinacc.campaign.state import Reading, restore, scatter, size_scatter
 
@@ -23,13 +23,14 @@ def campaign(plan, errors_mm, spread_mm, repeats=3, seed=0):
     return restore(plan, [entry_of(readings)])
 
 
-def test_noise_stated_too_small_or_too_large_is_told_and_no_noise_by_points_read_twice(make_plan):
-    """The first reading of a point chose it to be read again."""
-    plan = make_plan(texts=("camera=0.05,0.05,0.15",))
-    errors, stated = np.full((4, 3), 0.3), np.array([0.05, 0.05, 0.15])
-    assert scatter(campaign(plan, errors, 2.0 * stated, repeats=6)).too_large
-    assert scatter(campaign(plan, errors, 0.4 * stated, repeats=6)).too_small
-    assert scatter(campaign(plan, errors, stated, repeats=2)) is None
+@pytest.mark.parametrize("factor", [0.4, 1.0, 2.0])
+def test_repeated_readings_scatter_by_their_noise_over_the_noise_stated(make_plan, factor):
+    plan = make_plan(texts=("camera=0.05,0.05,0.15",), points=8, budget=160)
+    rng, noise_mm = np.random.default_rng(2), factor * np.array([0.05, 0.05, 0.15])
+    readings = readings_of(plan, lambda row, _: 0.3 + noise_mm * rng.normal(size=3))
+    found = scatter(restore(plan, [entry_of(readings)]))
+    assert found.ratio == pytest.approx(factor, rel=0.1)
+    assert found.too_small == (factor < 1.0)
     assert scatter(restore(plan, [])) is None
 
 

@@ -13,7 +13,6 @@ from kinacc.campaign import begin, folder, report
 from kinacc.campaign.folder import Opened
 from kinacc.campaign.instrument import instruments
 from kinacc.campaign.plan import Limits, assessor_of
-from kinacc.campaign.state import deviations
 from kinacc.deployment.planning import spread
 from kinacc.deployment.record import nominal
 from kinacc.figures.campaign import draw_bounds
@@ -103,12 +102,3 @@ def test_reasons_and_names_of_strangers_are_text():
     assert "&lt;script&gt;alert" in text
     assert '<b>"' not in text
     assert "these 11 candidates" in shown.first.notes["VALID"][0]
-
-
-def test_noise_as_stated_is_a_scatter_of_one_and_fourfold_noise_of_four():
-    def rms(noise_mm):
-        sizes = deviations(opened(points=4, budget=120, noise_mm=noise_mm).state)
-        return np.sqrt(np.mean(np.square([*sizes.values()])))
-
-    assert rms(0.05) == pytest.approx(1.0, abs=0.15)
-    assert rms(0.2) == pytest.approx(4.0, abs=0.6)

@@ -23,6 +23,7 @@ from kinacc.assess.statement import Reason, Statement, Suspicious
 from kinacc.errors import Problem, refuse
 
 if TYPE_CHECKING:
+    from kinacc.assess.noise import Contrasts
     from kinacc.assess.reference_poses import Change
 
 _SYMMETRY = 1e-9  # largest asymmetry of a covariance, and spread that counts as equal noise
@@ -174,14 +175,12 @@ class Campaign:
 
     ``first``: rows 0 to ``first`` - 1 are visited whatever is read, each before any other point.
     ``reference_poses``: of these, rows 0 to ``reference_poses`` - 1 come first of all, and are read
-    again by plan. ``factor``: times the noise stated that bounds allow for. ``ledger``: the
-    readings that count, for others to look at and not to change. A campaign of one's own has
-    ``next`` and ``statements``; the rest is here.
+    again by plan. ``ledger``: the readings that count, for others to look at and not to change. A
+    campaign of one's own has ``next`` and ``statements``; the rest is here.
     """
 
     first = 0
     reference_poses = 0
-    factor = 1.0
 
     def __init__(self, settings: AdaptiveAssessor, candidates: Candidates) -> None:
         self.settings = settings
@@ -209,13 +208,9 @@ class Campaign:
         """
         self.ledger.record(point, reading_mm, covariance_mm2)
 
-    def reading_blocks(self) -> list[int]:
-        """Of every reading in order the number of its block: what one decision reads at a point.
-
-        The first reading of a point is a block, all others of it are one.
-        """
-        rows = [row for row, _, _ in self.ledger.readings]
-        return [row if row in rows[:place] else -1 - row for place, row in enumerate(rows)]
+    def repeats(self) -> Contrasts | None:
+        """Differences of repeated readings, by which the noise is checked; None without such."""
+        return None
 
     def alarms(self) -> tuple[Reason, ...]:
         """What the readings say against what the statements rest on: codes with their numbers."""

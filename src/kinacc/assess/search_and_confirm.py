@@ -19,6 +19,7 @@ from kinacc.assess.noise import (
     FEWEST,
     KNOWN,
     CampaignNoise,
+    Contrasts,
     factor_limit,
     suspicious_readings,
 )
@@ -154,7 +155,6 @@ class SearchAndConfirmCampaign(Campaign):
         self.first, self.allowed = settings.visit(points), 1.0 - settings.confidence
         self.blocks: list[int] = []  # of every reading in order the number of its block
         self.noise = CampaignNoise(settings, self.ledger, self.blocks, self.first)
-        self.factor = self.noise.margin
         self.plan = schedule(settings.measurements, points, settings.references)
         self.reference_poses = self.plan.poses
         self.extra = settings.measurements - self.first - settings.references
@@ -177,7 +177,8 @@ class SearchAndConfirmCampaign(Campaign):
             wrong = int(np.argmax(exceeded <= 0.5 * self.single_error))
         self.average = LowerAverage(wanted, lower_error, self.noise.freedom, rate)
         upper = self.boundary_of(allowed)
-        self.looks = Looks(self.ledger, upper, point_error, shares, self.factor, rate, wrong)
+        margin = self.noise.margin
+        self.looks = Looks(self.ledger, upper, point_error, shares, margin, rate, wrong)
         # The block under way: its row, readings it still takes, whether these count for the lower
         # bound and along which direction; its number, and whether the next reading begins it.
         self._row, self._left, self._counted = -1, 0, False
@@ -234,9 +235,9 @@ class SearchAndConfirmCampaign(Campaign):
         if not self._left and len(ledger.visited) >= self.first and remaining > 0:
             self._begin_block(remaining)
 
-    def reading_blocks(self) -> list[int]:
-        """Of every reading in order the number of its block."""
-        return self.blocks
+    def repeats(self) -> Contrasts:
+        """Differences within blocks, without those of a wrong reading where some may be."""
+        return self.noise.telling
 
     def _begin_block(self, remaining: int) -> None:
         """Choose where the next readings are taken, and how many of them."""

@@ -25,8 +25,7 @@ from pydantic import (
 )
 from scipy.special import chdtrc
 
-from kinacc.assess.adaptive import Campaign, Ledger
-from kinacc.assess.noise import Contrasts, contrasts, false_scatter, scatter_alarm
+from kinacc.assess.adaptive import Campaign
 from kinacc.assess.statement import MEASURED, Reason, Statement
 from kinacc.campaign.instrument import INSTRUMENT, Numbers, covariance_of
 from kinacc.campaign.plan import Plan
@@ -355,14 +354,12 @@ def _of_campaign(plan: Plan, reading: Reading) -> Reading:
 class Scatter:
     """Root of chi-square over its degrees of freedom (1 on average where the noise is as stated).
 
-    ``probability`` of so much scatter or more by chance. ``too_large``: the readings contradict
-    the stated noise; bounds cannot be relied on.
+    ``probability`` of so much scatter or more by chance.
     """
 
     ratio: float
     freedom: int
     probability: float
-    too_large: bool = False
 
     @property
     def too_small(self) -> bool:
@@ -371,20 +368,11 @@ class Scatter:
 
 
 def scatter(state: State) -> Scatter | None:
-    """Return the scatter of readings within their blocks; None without two readings of one block.
-
-    A block is what one decision reads at one point. The first reading of a point, which decides
-    whether it is read again, belongs to none.
-    """
-    values = _within_blocks(state)
-    if not values.freedom:
+    """Return the scatter of repeated readings that were requested; None where there are none."""
+    repeats = state.campaign.repeats()
+    if repeats is None or not repeats.freedom:
         return None
-    alarm = scatter_alarm(
-        values,
-        margin=state.campaign.factor,
-        false=false_scatter(getattr(state.plan.assessor, "references", 0)),
-    )
-    return _scatter(float(np.sum(values.values**2)), values.freedom, alarm is not None)
+    return _scatter(float(repeats.squares.sum()), repeats.freedom)
 
 
 def size_scatter(state: State) -> Scatter | None:
@@ -400,32 +388,5 @@ def size_scatter(state: State) -> Scatter | None:
     return _scatter(square, 3 * len(readings)) if readings else None
 
 
-def deviations(state: State) -> dict[int, float]:
-    """Return the distance of each reading that ``scatter`` counts from those before in its block.
-
-    By number of the reading, in standard deviations: the root mean square is 1 where the noise is
-    as stated.
-    """
-    values = _within_blocks(state)
-    numbers = [item.number for item in state.readings]
-    sizes = np.sqrt(np.mean(values.values**2, axis=1)).tolist()
-    return {numbers[place]: size for place, size in zip(values.places, sizes, strict=True)}
-
-
-def _scatter(square: float, freedom: int, too_large: bool = False) -> Scatter:
-    return Scatter(math.sqrt(square / freedom), freedom, float(chdtrc(freedom, square)), too_large)
-
-
-def _within_blocks(state: State) -> Contrasts:
-    """Readings used by the blocks in which they were requested, those in hand by point."""
-    ledger, blocks = Ledger(state.campaign.ledger.candidates), state.campaign.reading_blocks()
-    row_of = {int(point): row for row, point in enumerate(state.rows)}
-    waiting = [item for item in state.waiting if item.reading.point in row_of]
-    for item in (*state.used, *waiting):
-        covariance = unplanned_mm2(state.plan, item.reading)
-        ledger.record(row_of[item.reading.point], item.error_mm, covariance)
-    beyond = max(blocks, default=0) + 1
-    every = [*blocks, *(beyond + row_of[item.reading.point] for item in waiting)]
-    values = contrasts(ledger, every)
-    guarded = getattr(state.plan.assessor, "wrong_rate", 0.0) > 0.0
-    return values.without_wrong_blocks(every) if guarded else values
+def _scatter(square: float, freedom: int) -> Scatter:
+    return Scatter(math.sqrt(square / freedom), freedom, float(chdtrc(freedom, square)))

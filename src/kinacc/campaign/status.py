@@ -185,9 +185,8 @@ def status(opened: Opened, tolerance_mm: float | None = None) -> CampaignStatus:
                 f"noise takes them ({near.freedom} degrees of freedom): noise overstated, or no "
                 "readings"
             )
-        against += [_scattered(checked)] if checked and checked.too_large else []
         against += [item.doubt for item in bounds if item.doubt]
-    if checked and not checked.too_large and not overstated:
+    if checked and "scatter" not in alarms and not overstated:
         notes.append(_scattered(checked))
     notes += [item.noise for item in bounds if item.noise]
     return CampaignStatus(
@@ -298,8 +297,6 @@ def _scattered(repeats: Scatter) -> str:
         f"repeated readings scatter {repeats.ratio:.2f} times the stated noise ({repeats.freedom} "
         "degrees of freedom)"
     )
-    if repeats.too_large:
-        return f"{text}, more than chance allows: noise understated, or something moved"
     return f"{text}: noise overstated, bounds wider than needed" if repeats.too_small else text
 
 

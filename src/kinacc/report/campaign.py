@@ -15,7 +15,6 @@ from kinacc.campaign import folder
 from kinacc.campaign.folder import Opened
 from kinacc.campaign.instrument import INSTRUMENT
 from kinacc.campaign.plan import Plan
-from kinacc.campaign.state import State, deviations
 from kinacc.campaign.status import Bound, CampaignStatus, percent, status
 from kinacc.config.error_models import model_name
 from kinacc.figures.campaign import draw_bounds, draw_readings
@@ -48,7 +47,7 @@ def section(opened: Opened, tables: Mapping[str, Columns]) -> Part:
         "measured": len(measured),
         "left_out": [{"point": name, "reason": why} for name, why in summary.left_out.items()],
         "struck": readings[readings["struck"].notna()],
-        "instruments": _instruments(summary, state, readings),
+        "instruments": _instruments(summary, readings),
         "assumptions": lines(
             "assumptions.txt",
             status=summary,
@@ -143,13 +142,12 @@ def _row(bound: Bound) -> dict[str, object]:
     return {**asdict(bound), "about": bound.about, "sure": sure}
 
 
-def _instruments(summary: CampaignStatus, state: State, readings: pd.DataFrame) -> pd.DataFrame:
-    """Readings by instrument, and the scatter of repeats over the stated noise."""
-    scatter, rows = deviations(state), []
+def _instruments(summary: CampaignStatus, readings: pd.DataFrame) -> pd.DataFrame:
+    """Readings by instrument."""
+    rows = []
     for name, noise in summary.noise.items():
         taken = readings[readings["instrument"] == name]
         used, struck = taken["used"].notna(), taken["struck"].notna()
-        repeats = taken["reading"].map(scatter).dropna().astype(float)
         rows.append(
             {
                 "name": name,
@@ -159,8 +157,6 @@ def _instruments(summary: CampaignStatus, state: State, readings: pd.DataFrame) 
                 "struck": int(struck.sum()),
                 "mean": taken["error_mm"][used].mean(),
                 "largest": taken["error_mm"][used].max(),
-                "repeats": len(repeats),
-                "scatter": np.sqrt(np.mean(repeats**2)),
             }
         )
     return pd.DataFrame(rows)
