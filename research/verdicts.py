@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 from scipy.special import bdtr
 
-from kinacc.assess.population import binomial_interval
+from kinacc.campaign.planning import binomial_interval
 
 KIND = ["assessor", "target", "setup", "world"]  # what a verdict is about
 CELL = ["assessor", "target", "field", "candidates", "noise_mm", "budget", "setup", "world"]

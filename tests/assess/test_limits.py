@@ -19,8 +19,7 @@ from kinacc.assess.limits import (
     upper_limit_mm,
     visit_mm,
 )
-from kinacc.assess.population import excepted
-from kinacc.assess.search_and_confirm import SearchAndConfirm
+from kinacc.assess.search_and_confirm import SearchAndConfirm, excepted
 
 
 @pytest.mark.parametrize("a", [0.0, 1e-5, 1e-3, 0.1, 1.0, 4.0, 30.0])

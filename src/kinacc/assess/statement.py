@@ -85,19 +85,15 @@ ACCEPT, REJECT, UNDECIDED = "accept", "reject", "undecided"
 
 @dataclass(frozen=True)
 class Decision:
-    """Verdict against a tolerance.
+    """Verdict against a tolerance, with its reason.
 
     ``guard_band_mm``: how far the value has to stay below the tolerance to be accepted (upper
-    bound minus value); ``acceptance_limit_mm``: tolerance minus guard band. ``risk``: probability
-    of accepting what is beyond the tolerance, and likewise of rejecting what is within.
+    bound minus value).
     """
 
     verdict: str
-    tolerance_mm: float
+    reason: Reason | None
     guard_band_mm: float
-    acceptance_limit_mm: float
-    risk: float
-    reason: Reason | None = None
 
 
 def decide(statement: Statement, tolerance_mm: float) -> Decision:
@@ -126,5 +122,4 @@ def decide(statement: Statement, tolerance_mm: float) -> Decision:
         verdict, reason = ACCEPT, Reason("within")
     elif math.isnan(statement.upper_mm):
         reason = statement.withheld or Reason("no_upper")
-    risk = 1.0 - statement.confidence
-    return Decision(verdict, tolerance_mm, band, tolerance_mm - band, risk, reason)
+    return Decision(verdict, reason, band)

@@ -84,24 +84,17 @@ def drawn_world(
 
     Parameters
     ----------
-    error_mm : (m, 3) true errors, robot base frame
-    sigma_mm : a number or (m,), standard deviation per axis
+    error_mm : (m, 3) true errors, robot base frame (:func:`checked_errors`)
+    sigma_mm : a number or (m,), standard deviation per axis, above 0
     key : (2,) uint64 from :func:`key_of`
     visits : readings available at each point
     order : (m,) point numbers in visiting order, default 0 .. m-1. The noise at a point belongs to
         its number, not to its place in the order.
-
-    Raises
-    ------
-    InputError
-        For errors or noise that cannot be used.
     """
-    error, sigma = checked_errors(error_mm), np.array(sigma_mm, dtype=np.float64)
+    error = np.array(error_mm, dtype=np.float64)
     index = np.arange(len(error)) if order is None else np.array(order, dtype=np.int64)
-    if sigma.shape not in ((), (len(error),)) or not np.all(np.isfinite(sigma) & (sigma > 0.0)):
-        allowed = "a number above 0, or one per point, in mm"
-        raise InputError(Problem("noise", f"{sigma_mm!r}"[:60], allowed))
-    points, sigma = index.size, np.broadcast_to(sigma, len(error))[index]
+    sigma = np.broadcast_to(np.array(sigma_mm, dtype=np.float64), len(error))[index]
+    points = index.size
     # Repeats stay untouched until asked for.
     readings, sizes = np.empty((points, visits, 3)), np.empty((points, visits))
     known, sums = np.zeros(points, np.int64), np.zeros((points, 3))

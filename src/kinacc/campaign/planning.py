@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
+from scipy.stats import binomtest
 
 from kinacc.assess.adaptive import AdaptiveAssessor, Candidates
 from kinacc.assess.attainable import limits_of
-from kinacc.assess.population import binomial_interval
 from kinacc.assess.statement import ACCEPT, CANDIDATES, REJECT, UNDECIDED, decide
 from kinacc.assess.world import carry_on, noisy, truth_mm
 from kinacc.errors import InputError, Problem, refuse
@@ -223,3 +223,14 @@ def smallest_budget(budget: pd.Series, share: pd.Series, aim: Aim) -> int | None
     worst = share.groupby(budget).min().sort_index(ascending=False)
     enough = worst[(worst >= aim.power).cummin()]
     return int(enough.index[-1]) if aim.is_set and len(enough) else None
+
+
+def binomial_interval(hits: int, trials: int) -> tuple[float, float]:
+    """Return two-sided 95 % limits on the probability of ``hits`` in ``trials``.
+
+    References
+    ----------
+    Clopper and Pearson, Biometrika 26 (1934) 404-413.
+    """
+    low, high = binomtest(hits, trials).proportion_ci(0.95, "exact")
+    return float(low), float(high)

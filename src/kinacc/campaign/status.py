@@ -25,7 +25,7 @@ from kinacc.campaign.plan import Plan
 from kinacc.campaign.state import Scatter, State, scatter, size_scatter
 
 _CLEAR_OF_NOISE = 3.0  # standard deviations: larger bounds hold where the noise is smaller
-_UNJUDGED = Decision("", math.nan, math.nan, math.nan, math.nan)
+_UNJUDGED = Decision("", None, math.nan)
 # What a bound has of a statement as it is.
 _STATED = (
     "target",
@@ -48,10 +48,11 @@ class Bound:
     the ``points`` out; ``unmeasured`` of them have no reading. ``error_of``: the ``mean`` error of
     a pose, or a future ``visit``. ``withheld``: why there is no bound; ``noise``: how large the
     bounds take it where not as stated; ``doubt``: that bounds and estimate contradict each other.
-    ``verdict``, by guard band (JCGM 106:2012), on ``tolerance_mm``, with ``reason``. ``risk``: of a
-    wrong verdict. ``attainable_mm``, ``proven_mm``, ``attainable_lower_mm``: mean excess of the
-    best design that knows all errors, excess below which no reliable bound stays, and the same for
-    the lower bound, by the estimated errors (:mod:`kinacc.assess.attainable`).
+    ``verdict``, by guard band (JCGM 106:2012), on ``tolerance_mm``, with ``reason``; it is wrong
+    with a probability of one less ``confidence`` at most. ``attainable_mm``, ``proven_mm``,
+    ``attainable_lower_mm``: mean excess of the best design that knows all errors, excess below
+    which no reliable bound stays, and the same for the lower bound, by the estimated errors
+    (:mod:`kinacc.assess.attainable`).
     """
 
     target: str
@@ -72,8 +73,6 @@ class Bound:
     verdict: str
     reason: str
     guard_band_mm: float
-    acceptance_limit_mm: float
-    risk: float
     attainable_mm: float
     proven_mm: float
     attainable_lower_mm: float
@@ -242,8 +241,6 @@ def _bound(stated: Statement, state: State, tolerance_mm: float | None, overstat
         verdict=judged.verdict,
         reason=reason(judged.reason),
         guard_band_mm=judged.guard_band_mm,
-        acceptance_limit_mm=judged.acceptance_limit_mm,
-        risk=judged.risk,
         attainable_mm=limits.attainable_mm,
         proven_mm=limits.proven_mm,
         attainable_lower_mm=limits.lower_mm,
