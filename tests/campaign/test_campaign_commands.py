@@ -82,8 +82,8 @@ def test_a_file_of_readings_is_taken_whole_and_bad_rows_refuse_it(campaign, tmp_
     said = refused(folder, "record", folder, file)
     for line in ("line 3", "line 4", "line 5", "line 6"):
         assert line in said
-    done = call("campaign", "record", folder, file, "--skip-bad", "--json", code=0)
-    assert len(json.loads(done.stdout)["skipped"]) == 4
+    file.write_text(f"{head}{good}")
+    call("campaign", "record", folder, file, code=0)
     file.write_text(head + good + "".join(f"{name},{arm.position(name)},\n" for name in names[1:]))
     done = call("campaign", "record", folder, file, "--json")
     assert json.loads(done.stdout)["known"] == [1]

@@ -52,8 +52,8 @@ def test_new_rows_are_taken_and_old_ones_are_told_as_known(day):
     assert "2 rows were recorded before" in day.takes(rows[:3], 1)
     content = json.loads(call("campaign", *day.words(rows, "--json"), code=0).stdout)
     assert (content["numbers"], content["known"]) == ([4, 5, 6], [1, 2, 3])
-    assert "no new row" in day.refuses(rows)
-    assert "no new row" in day.refuses(rows, "--again")
+    assert "no new reading" in day.refuses(rows)
+    assert "no new reading" in day.refuses(rows, "--again")
 
 
 @pytest.mark.parametrize(("changed", "appended"), [(0, 0), (1, 1), (2, 3)])
@@ -74,7 +74,7 @@ def test_rows_that_repeat_to_the_last_digit_are_asked_about_and_can_be_taken(day
     assert "line 5: equals" in said
     assert "line 2: " not in said
     day.takes(now, 2, "--again")
-    assert "no new row" in day.refuses(now, "--again")
+    assert "no new reading" in day.refuses(now, "--again")
 
 
 def test_a_row_whose_reading_was_struck_does_not_come_back(day):

@@ -56,14 +56,12 @@ class NextPose:
 class Recorded:
     """Readings taken: their ``numbers``, ``points`` and sizes ``error_mm`` of their errors.
 
-    ``skipped``: problems of rows that were not taken; ``known``: numbers of readings that rows of
-    the file repeat.
+    ``known``: numbers of readings that rows of the file repeat.
     """
 
     numbers: tuple[int, ...]
     points: tuple[str, ...]
     error_mm: tuple[float, ...]
-    skipped: tuple[str, ...]
     known: tuple[int, ...]
 
 
@@ -71,14 +69,15 @@ class Recorded:
 class FileOfReadings:
     """Rows of a file with their ``places`` in words, and ``problems`` of its other rows.
 
-    ``digest`` of the file and its ``path`` from the folder of the campaign.
+    ``digest`` of the file and its ``path`` from the folder of the campaign, None of a single
+    reading.
     """
 
     rows: Sequence[Reading]
     places: Sequence[str]
-    problems: Sequence[Problem]
-    digest: str
-    path: str
+    problems: Sequence[Problem] = ()
+    digest: str | None = None
+    path: str | None = None
 
 
 class CalibratedRobot(Protocol):
@@ -263,32 +262,25 @@ class Campaign:
             name = plan.instrument(instrument).name
             values = np.asarray(position_mm, dtype=float).reshape(-1)
             reported = None if joints is None else np.asarray(joints, dtype=float).reshape(-1)
-            reading, where = Reading(number, values, name, reported, std_mm), "the reading"
+            reading = Reading(number, values, name, reported, std_mm)
             most_mm = math.inf if accept_implausible else most_plausible_mm(state)
-            problems = problems_of(state, reading, where, most_mm)
-            equal = [item for item in state.readings if item.reading.digits == reading.digits]
-            if equal and not again:
-                problems.append(_equal(where, f"reading {equal[0].number}"))
-            refuse(problems, _NOTHING)
-            return _written(opened, Readings(readings=[reading]))
+            return _record(opened, FileOfReadings([reading], ["the reading"]), most_mm, again)
 
     def add_readings(
         self,
         file: FileOfReadings,
         accept_implausible: bool = False,
         again: bool = False,
-        skip_bad: bool = False,
     ) -> Recorded:
         """Record the rows of a file that are new, all or none of them; see ``add_reading``.
 
-        A row that equals a recorded reading to the last digit is known. ``skip_bad`` takes the good
-        rows. Raises InputError where a row is wrong, where none is new, and where readings of the
-        same file have no row any more.
+        A row that equals a recorded reading to the last digit is known. Raises InputError where a
+        row is wrong, where none is new, and where readings of the same file have no row any more.
         """
         with self._writing() as opened:
             plausible_mm = most_plausible_mm(opened.state, file.rows)
             most_mm = math.inf if accept_implausible else plausible_mm
-            return _record(opened, file, most_mm, again, skip_bad)
+            return _record(opened, file, most_mm, again)
 
     def leave_out(self, point: str, reason: str) -> None:
         """Leave a point without readings out, for a reason that is not its error."""
@@ -341,16 +333,16 @@ class Campaign:
 
 
 _NOTHING = "Nothing was recorded"
+_AGAIN = "--again takes it as a reading of its own"
 
 
-def _record(
-    opened: folders.Opened, file: FileOfReadings, most_mm: float, again: bool, skip_bad: bool
-) -> Recorded:
-    state, good, known, problems = opened.state, list[Reading](), list[int](), [*file.problems]
+def _record(opened: folders.Opened, file: FileOfReadings, most_mm: float, again: bool) -> Recorded:
+    plan, state, where = opened.plan, opened.state, file.path or file.places[0]
+    good, known, problems = list[Reading](), list[int](), [*file.problems]
     imported = state.imports.get(file.path, set())
     # A row that equals a reading is known, each reading once; ``again``: of the same file alone.
-    recorded, places = defaultdict[object, list[int]](list), dict[object, str]()
-    for item in (*state.readings, *(item for item, _ in state.struck)):
+    recorded, digits = defaultdict[object, list[int]](list), set[object]()
+    for item in state.taken:
         if item.number in imported or not again:
             recorded[item.reading.digits].append(item.number)
     for row, place in zip(file.rows, file.places, strict=True):
@@ -358,45 +350,28 @@ def _record(
             known.append(numbers.pop(0))
         elif wrong := problems_of(state, row, place, most_mm):
             problems += wrong
-        elif row.digits in places and not again:
-            problems.append(_equal(place, places[row.digits]))
+        elif row.digits in digits and not again:
+            message = "equals an earlier row to the last digit"
+            problems.append(Problem(place, message, fix=_AGAIN))
         else:
             good.append(row)
-        places.setdefault(row.digits, place)
+        digits.add(row.digits)
     missing = imported.intersection(item.number for item in state.readings).difference(known)
     if missing and not again:
         message = f"does not hold {_listed(missing)} any more, recorded from it before"
         fix = "bring the rows back, strike the readings, or give --again"
-        problems.append(Problem(file.path, message, fix=fix))
-        skip_bad = False
+        problems.append(Problem(where, message, fix=fix))
     if not good and not problems:
-        raise InputError(Problem(file.path, f"has no new row: {_listed(known)} recorded before"))
-    if problems and not (skip_bad and good):
-        raise InputError(problems, _NOTHING)
-    entry = Readings(readings=good, file=file.digest, path=file.path)
-    return _written(opened, entry, tuple(map(str, problems)), tuple(sorted(known)))
-
-
-def _written(
-    opened: folders.Opened,
-    entry: Readings,
-    skipped: tuple[str, ...] = (),
-    known: tuple[int, ...] = (),
-) -> Recorded:
-    opened.write(entry)
-    plan, first = opened.plan, opened.state.numbered + 1
+        message = f"holds no new reading: {_listed(known)} recorded before"
+        problems.append(Problem(where, message, fix="" if again or file.path else _AGAIN))
+    refuse(problems, _NOTHING)
+    opened.write(Readings(readings=good, file=file.digest, path=file.path))
     return Recorded(
-        tuple(range(first, first + len(entry.readings))),
-        tuple(plan.points.label[row.point] for row in entry.readings),
-        tuple(float(np.linalg.norm(error_mm(plan, row))) for row in entry.readings),
-        skipped,
-        known,
+        tuple(range(state.numbered + 1, state.numbered + 1 + len(good))),
+        tuple(plan.points.label[row.point] for row in good),
+        tuple(float(np.linalg.norm(error_mm(plan, row))) for row in good),
+        tuple(sorted(known)),
     )
-
-
-def _equal(where: str, other: str) -> Problem:
-    fix = "--again takes it as a reading of its own"
-    return Problem(where, f"equals {other} to the last digit", fix=fix)
 
 
 def _listed(numbers: Iterable[int]) -> str:

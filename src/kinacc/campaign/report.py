@@ -90,7 +90,6 @@ def _readings(state: State) -> Columns:
     plan = state.plan
     used = {item.number: place for place, item in enumerate(state.used, start=1)}
     void = {item.number: why for item, why in state.struck}
-    every = (*state.readings, *(item for item, _ in state.struck))
     rows = [
         (
             item.number,
@@ -104,6 +103,6 @@ def _readings(state: State) -> Columns:
             math.sqrt(float(np.trace(covariance_mm2(plan, item.reading))) / 3.0),
             void.get(item.number),
         )
-        for item in sorted(every, key=lambda item: item.number)
+        for item in state.taken
     ]
     return columns_of("campaign_readings", rows)

@@ -183,6 +183,12 @@ class State:
         return [*self.used, *self.waiting]
 
     @property
+    def taken(self) -> list[Taken]:
+        """All readings in the journal, by number."""
+        every = [*self.readings, *(item for item, _ in self.struck)]
+        return sorted(every, key=lambda item: item.number)
+
+    @property
     def numbered(self) -> int:
         """Number of the last reading in the journal."""
         return len(self.readings) + len(self.struck)

@@ -243,7 +243,6 @@ _OF_ONE = ("point", "joints_deg", "joints_rad", "std_mm")
 @option("--instrument", help="Instrument. [the first]")
 @option("--std-mm", help="Noise of this reading where it is not the instrument's.")
 @option("--accept-implausible", is_flag=True, help="Acceptance of an error of any size.")
-@option("--skip-bad", is_flag=True, help="Good rows of a file without the bad ones.")
 @option("--again", is_flag=True, help="Acceptance of readings that repeat or replace others.")
 @answers()
 def record(out: Output, folder: str, file: str | None, **options: Any) -> None:
@@ -268,9 +267,7 @@ def record(out: Output, folder: str, file: str | None, **options: Any) -> None:
         taken = campaign.add_reading(**_single(options, plan.slides), **flags)
     else:
         rows = _of_file(file, options, campaign)
-        taken = campaign.add_readings(rows, **flags, skip_bad=options["skip_bad"])
-    for problem in taken.skipped:
-        click.echo(f"not taken: {problem}", err=True)
+        taken = campaign.add_readings(rows, **flags)
     summary = campaign.status()
     first = texts("recorded.txt", taken=taken, file=file, requested=requested)
     out.show({**vars(taken), "status": summary}, lines=[*first, *_lines(summary)])
