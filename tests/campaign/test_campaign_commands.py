@@ -111,7 +111,7 @@ def test_the_wrong_pose_is_refused_by_joints_and_by_position(campaign):
     first, second = (int(point) for point in arm.plan.route[:2])
     position, joints = arm.position(points.label[first]), written(points.joints[second])
     said = refused(folder, "record", folder, "--joints-rad", joints, "--position-mm", position)
-    assert f"is not that of point {points.label[first]}" in said
+    assert f"deg from point {points.label[first]}" in said
     assert f"these joints are point {points.label[second]}" in said
     words = ("record", folder, "--position-mm", arm.position(points.label[second]))
     assert "--accept-implausible" in refused(folder, *words)

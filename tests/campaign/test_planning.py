@@ -70,8 +70,8 @@ def test_rows_count_what_is_stated_wanted_held_and_decided():
     (row,) = counted(table, Aim(width_mm=0.5, tolerance_mm=1.2)).itertuples()
     assert (row.stated, row.within, row.reached) == (0.75, 0.5, 2)
     assert (row.holding, row.judged) == (2, 3)
-    # Clopper, Pearson: 3 p^2 - 2 p^3 = 0.025 below; p^3 = 0.975 above
-    assert (row.holds_low, row.holds_high) == pytest.approx((0.09430, 0.99160), abs=1e-5)
+    # Clopper, Pearson: two or more of four, 6 p^2 - 8 p^3 + 3 p^4 = 0.025
+    assert row.reached_low == pytest.approx(0.06759, abs=1e-5)
     assert row.excess_mm == pytest.approx(0.5 / 3.0)
     assert (row.accept, row.reject, row.undecided) == (0.5, 0.25, 0.25)
     assert row.width_q05_mm == pytest.approx(0.2)

@@ -146,22 +146,15 @@ class Instrument:
     @property
     def noise(self) -> str:
         """The noise in few words."""
-        std, laser = np.sqrt(np.diag(self.covariance_mm2)), self.laser
-        uncorrelated = np.array_equal(self.covariance_mm2, np.diag(np.diag(self.covariance_mm2)))
-        if laser is not None:
-            text = (
-                f"{std[0]:.3g} mm per axis at the farthest candidate, less nearer "
-                f"({laser.range_mm:g} mm + {laser.range_um_per_m:g} um/m along the beam, "
-                f"{laser.angle_mm:g} mm + {laser.angle_um_per_m:g} um/m across it, "
-                f"{laser.repeat_mm:g} mm of the arm)"
-            )
-        elif uncorrelated:
-            axes = std[:1] if np.all(std == std[0]) else std
-            text = f"{', '.join(f'{axis:g}' for axis in axes)} mm per axis"
-        else:
-            text = f"{', '.join(f'{axis:.3g}' for axis in std)} mm, correlated"
-        steps = f", read in steps of {self.resolution_mm:g} mm" if self.resolution_mm else ""
-        return text + steps
+        std = np.sqrt(np.diag(self.covariance_mm2))
+        axes = std[:1] if np.all(std == std[0]) else std
+        parts = [f"{', '.join(f'{axis:.4g}' for axis in axes)} mm per axis"]
+        if self.laser is not None:
+            stated = (f"{name} {value:g}" for name, value in vars(self.laser).items() if value)
+            parts.append(f"less at nearer candidates (laser: {', '.join(stated)})")
+        parts += ["correlated"] if np.triu(self.covariance_mm2, 1).any() else []
+        parts += [f"read in steps of {self.resolution_mm:g} mm"] if self.resolution_mm else []
+        return ", ".join(parts)
 
 
 def floored(covariance_mm2: np.ndarray, resolution_mm: float) -> np.ndarray:

@@ -42,22 +42,16 @@ def newest(name: str, tables: Mapping[str, Columns], places: Iterable[Path]) -> 
     campaign holds the positions that its model predicts: one that was begun with an earlier
     calibration of that name is left out.
     """
-    remarks = []
-    ordered = sorted(set(places), key=_last_reading, reverse=True)
-    for number, place in enumerate(ordered, 1):
+    remarks: list[str] = []
+    for place in sorted(set(places), key=_last_reading, reverse=True):
         try:
             opened = folder.open_(place)
-            if not _is_of(opened.plan, tables):
-                remarks.append(f"campaign {place} was begun with another calibration of {name}")
-                continue
-            summary = status(opened)
+            if _is_of(opened.plan, tables):
+                return Newest(status(opened), tuple(remarks))
+            remarks.append(f"campaign {place} was begun with another calibration of {name}")
         except InputError:
             command = shlex.join(["kinacc", "campaign", "status", str(place)])
             remarks.append(f"campaign {place} cannot be read: {command}")
-            continue
-        if others := [str(path) for path in ordered[number:]]:
-            remarks.append(f"there are older campaigns: {', '.join(others)}")
-        return Newest(summary, tuple(remarks))
     return Newest(None, tuple(remarks))
 
 

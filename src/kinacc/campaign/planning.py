@@ -46,9 +46,9 @@ class BudgetPlan:
     infinite without a bound on all. ``stated``: share with an upper bound. Of these upper bounds:
     ``excess_mm``, mean of bound minus truth; ``attainable_mm``, the same of the best design that
     knows all errors; ``proven_mm``, the excess below which no reliable bound stays (NaN: none);
-    ``holding`` of ``judged`` hold, with exact 95 % limits of the share. ``within``: share as narrow
-    as wanted. ``accept``, ``reject``, ``undecided``: shares decided so. ``reached``: campaigns that
-    reach the aim; ``reached_low``: the share that they show with 97.5 % confidence.
+    ``holding`` of ``judged`` hold. ``within``: share as narrow as wanted. ``accept``, ``reject``,
+    ``undecided``: shares decided so. ``reached``: campaigns that reach the aim; ``reached_low``:
+    the share that they show with 97.5 % confidence.
 
     ``budget``: the smallest that reaches the aim in the share ``power`` of the simulated campaigns
     on all errors, as every larger one does; ``budget_shown``: the smallest for which so many
@@ -206,10 +206,6 @@ def counted(runs: pd.DataFrame, aim: Aim) -> pd.DataFrame:
         rows[f"width_{name}_mm"] = groups["width_mm"].agg(np.quantile, share, method="inverted_cdf")
     counts = groups[["holding", "stated", "reached"]].sum()
     rows[["holding", "judged", "reached"]] = counts.to_numpy()
-    limits = [
-        binomial_interval(*pair) for pair in zip(rows["holding"], rows["judged"], strict=True)
-    ]
-    rows[["holds_low", "holds_high"]] = limits
     shown = zip(rows["reached"], groups.size(), strict=True)
     rows["reached_low"] = [binomial_interval(*pair)[0] for pair in shown]
     return rows.reset_index()

@@ -60,30 +60,31 @@ def _bounds(opened: Opened, campaign: Campaign) -> list[tuple[object, ...]]:
 
 
 def _points(state: State) -> Columns:
-    points, ledger, used = state.plan.points, state.campaign.ledger, len(state.rows)
-    order = np.array([*state.rows, *state.left_out], dtype=int)
-    values = np.full((len(order), 7), math.nan)  # error x, y, z, size; noise; limits
-    read = np.flatnonzero(ledger.count)
-    values[read, :3], values[read, 4] = ledger.mean_mm[read], ledger.noise_mm[read]
-    values[:, 3] = np.linalg.norm(values[:, :3], axis=1)
-    for row, limits in state.campaign.point_limits().items():
-        values[row, 5:] = limits
-    directions = points.directions
-    if directions is None:
-        directions = np.zeros(points.joints.shape, np.int8)
-    count = np.zeros(len(order), dtype=int)
-    count[:used] = ledger.count
-    names = ("ex_mm", "ey_mm", "ez_mm", "error_mm", "noise_mm", "lower_mm", "upper_mm")
-    return {
-        "point": np.array([points.label[column] for column in order], dtype=object),
-        "visit": np.where(np.arange(len(order)) < used, np.arange(len(order)) + 1.0, math.nan),
-        **{f"q{i + 1}": column for i, column in enumerate(points.joints[order].T)},
-        **{f"s{i + 1}": column for i, column in enumerate(directions[order].T)},
-        **{f"{axis}_mm": points.modelled_mm[order, i] for i, axis in enumerate("xyz")},
-        "readings": count,
-        **dict(zip(names, values.T, strict=True)),
-        "left_out": np.array([*[None] * used, *state.left_out.values()], dtype=object),
-    }
+    points, ledger, limits = state.plan.points, state.campaign.ledger, state.campaign.point_limits()
+    travel = np.zeros(points.joints.shape) if points.directions is None else points.directions
+    rows = []
+    for row, point in enumerate([*state.rows.tolist(), *state.left_out]):
+        is_used = point not in state.left_out
+        count = ledger.count.item(row) if is_used else 0
+        error_mm = ledger.mean_mm[row] if count else np.full(3, math.nan)
+        lower_mm, upper_mm = limits.get(row, (None, None))
+        rows.append(
+            {
+                "point": points.label[point],
+                "visit": row + 1 if is_used else None,
+                **{f"q{joint}": value for joint, value in enumerate(points.joints[point], 1)},
+                **{f"s{joint}": value for joint, value in enumerate(travel[point], 1)},
+                **dict(zip(("x_mm", "y_mm", "z_mm"), points.modelled_mm[point], strict=True)),
+                "readings": count,
+                **dict(zip(("ex_mm", "ey_mm", "ez_mm"), error_mm, strict=True)),
+                "error_mm": np.linalg.norm(error_mm),
+                "noise_mm": ledger.noise_mm[row] if count else None,
+                "lower_mm": lower_mm,
+                "upper_mm": upper_mm,
+                "left_out": state.left_out.get(point),
+            }
+        )
+    return columns_of("campaign_points", rows)
 
 
 def _readings(state: State) -> Columns:

@@ -214,19 +214,18 @@ def problems_of(state: State, reading: Reading, where: str, most_mm: float) -> l
     plan = state.plan
     if problems := faults_of(plan, reading, where):
         return problems
-    label, points, tolerance = plan.points.label[reading.point], plan.points, _tolerance(plan)
+    label, points = plan.points.label[reading.point], plan.points
     if reading.point in state.left_out:
         problems.append(Problem(where, f"point {label} was left out of the campaign"))
     if reading.joints is not None:
-        off = np.abs(reading.joints - points.joints[reading.point]) / tolerance
-        if off.max() > 1.0:
-            worst, known = int(np.argmax(off)), point_at(plan, reading.joints)
+        off, tolerance = np.abs(reading.joints - points.joints[reading.point]), _tolerance(plan)
+        worst = int(np.argmax(off / tolerance))
+        if off[worst] > tolerance[worst]:
             unit, factor = ("mm", 1.0) if plan.slides[worst] else ("deg", 180.0 / math.pi)
-            measured = f"joint {worst + 1} at {reading.joints[worst] * factor:.4f} {unit}"
-            wanted = f"{points.joints[reading.point, worst] * factor:.4f} {unit}"
-            allowed = f"{wanted} within {tolerance[worst] * factor:g} {unit}"
+            message = f"joint {worst + 1} is {off[worst] * factor:.4f} {unit} from point {label}"
+            known = point_at(plan, reading.joints)
             fix = "" if known is None else f"these joints are point {points.label[known]}"
-            message = f"{measured} is not that of point {label}"
+            allowed = f"at most {tolerance[worst] * factor:g} {unit}"
             return [*problems, Problem(where, message, allowed, fix)]
     size = float(np.linalg.norm(error_mm(plan, reading)))
     if size > most_mm:
