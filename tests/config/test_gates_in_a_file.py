@@ -26,25 +26,25 @@ def test_every_mistake_in_gates_is_told_at_once_with_its_place_and_what_is_meant
         """gates:
 - {name: a, value: residual.position.p99, at_most_mm: 0.8}
 - {name: b, value: residuals.position.p99, at_most_mrad: 0.8}
-- {name: c, value: bound.upper, against: accepted, allow_mm: 0.02}
+- {name: c, value: data.poses, against: accepted, allow_mm: 0.02}
 - {name: d, campain: checks/march}
 - {name: e, claims: agree, suspicions: none}
 - {value: data.poses, at_least: 3}
 - {name: g, suspicions: none, on_fial: warn}
-- {name: h, value: residuals.position.p99, at_most_mm: 1, at_least_mm: 2}
+- {name: h, value: residuals.position.p99, at_most_mm: 1, at_most_mrad: 2}
 - {name: i, value: residuals.position.mean, against: accepted}
 - 7
 """,
     )
     wanted = [
         (":2, gates[0].value", "did you mean residuals.position.p99?"),
-        (":3, gates[1]", "in mm"),
-        (":4, gates[2]", "chance cannot be told of bound.upper"),
+        (":3, gates[1]", "give at_most_mm"),
+        (":4, gates[2].value", "'data.poses' should be"),
         (":5, gates[3]", "campaign"),
         (":6, gates[4]", "is not of one kind"),
         (":7, gates[5]", "has no name"),
         (":8, gates[6].on_fial", "did you mean on_fail?"),
-        (":9, gates[7]", "give one of"),
+        (":9, gates[7]", "give at_most_mm"),
         (":10, gates[8]", "has no allowance"),
         (":11, gates[9]", "7 is not of one kind"),
     ]
@@ -59,7 +59,6 @@ def test_every_mistake_in_gates_is_told_at_once_with_its_place_and_what_is_meant
     [
         ("{mm: 0.8, of: quantile_99}", "value: residuals.position.p99", True),
         ("{mm: 0.8, of: mean}", "value: residuals.position.mean", True),
-        ("{mm: 0.8}", "value: bound.upper", True),
         ("{mm: 0.8}", "campaign: check", True),
         ("{mm: 0.8, of: mean}", "value: residuals.position.p99", False),
         ("{mm: 0.8, of: quantile_99}", "value: residuals.position.p99_gamma", False),

@@ -118,8 +118,8 @@ def _edited(path):
         (lambda path: column_set(path, "d_mm", [np.inf] + [0.0] * 5), "inf in row 0"),
         (lambda path: column_set(path, "joint", [1, 2, 3, 4, 5, 5]), "same key in rows 4, 5"),
         (lambda path: column_set(path, "joint", [1, 2, 3, 4, 5, -6]), "-6 in row 5"),
-        (lambda path: column_set(path, "d_mm", [0.0] * 6, unit="m"), "unit 'm'"),
-        (lambda path: rewritten(path, pq.read_table(path).drop(["a_mm"])), "column a_mm"),
+        (lambda path: column_set(path, "d_mm", [0.0] * 6, unit="m"), "unit or meaning: d_mm"),
+        (lambda path: rewritten(path, pq.read_table(path).drop(["a_mm"])), "unit or meaning: a_mm"),
         (lambda path: rewritten(path, pq.read_table(path).replace_schema_metadata({})), "metadata"),
     ],
 )
@@ -131,23 +131,20 @@ def test_a_table_that_is_not_as_its_stage_and_schema_have_it_fails(here, spoil, 
 
 
 def test_reports_for_machines_can_be_read_by_them(here):
-    names = ["check.json", "metrics.json", "check.xml", "check.md", "check.txt"]
+    names = ["check.json", "check.xml", "check.md"]
     words = [word for name in names for word in ("--out", name)]
     Path("config.yaml").write_text(
         SMALL % WEEKS["first"]
         + "gates: [{name: 'a <b> & \"c\"', value: residuals.position.mean, at_most_mm: 1e-4}]\n"
     )
-    call("check-results", *words, code=1)
+    printed = call("check-results", *words, code=1).stdout
     assert json.loads(Path("check.json").read_text())["passed"] is False
-    metrics = json.loads(Path("metrics.json").read_text())
-    assert all(isinstance(value, (int, float)) for value in metrics.values())
-    assert metrics['mh180/a <b> & "c"/at_most_mm'] == 1e-4
     (suite,) = ElementTree.parse("check.xml").getroot()
     assert (suite.get("tests"), suite.get("failures"), suite.get("skipped")) == ("2", "1", "0")
     assert [case.get("name") for case in suite] == ["files", 'a <b> & "c"']
     assert suite[1].find("failure") is not None
     assert r"| failed | mh180 | a \<b\> & " in Path("check.md").read_text()
-    assert Path("check.txt").read_text().startswith("FAIL: results, 1 passed, 1 failed\n")
+    assert printed.startswith("FAIL: results, 1 passed, 1 failed\n")
 
 
 @pytest.mark.parametrize(
@@ -177,23 +174,6 @@ def test_a_knocked_joint_makes_the_accepted_calibration_hold_no_more(made, tmp_p
     assert found["arm"]["figures"]["moved_mm"] > 0.1
     unchanged = told(made["next"], "--against", made["first"])
     assert unchanged["arm"]["verdict"] == "passed"
-
-
-def test_a_parameter_moved_that_is_three_deviations_of_the_difference_off(made, tmp_path):
-    """Both runs are 1 mm uncertain of d of joint 3, their difference 1.41 mm: three are 4.24 mm."""
-    counts = []
-    for moved_mm in (4.2, 4.3):
-        folders = [tmp_path / f"{name} {moved_mm}" for name in ("first", "next")]
-        for folder in folders:
-            shutil.copytree(made[folder.name.split()[0]], folder)
-        before, now = (folder / "mh180" / "dh_model.parquet" for folder in folders)
-        d_mm = pq.read_table(before)["d_mm"].to_numpy()
-        column_set(now, "d_mm", d_mm + moved_mm * (np.arange(6) == 2))
-        for path in (before, now):
-            column_set(path, "std_d_mm", np.ones(6))
-        found = told(folders[1], "--against", folders[0])
-        counts.append(found["parameters"]["figures"]["moved"])
-    assert counts[1] == counts[0] + 1
 
 
 def test_a_run_is_accepted_for_a_reason_and_later_runs_are_compared_with_it(here):

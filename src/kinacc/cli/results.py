@@ -211,7 +211,7 @@ def _described(schema: pa.Schema, table: pd.DataFrame, key: Collection[str]) -> 
         help="Folder of the accepted run, made from RESULTS where nothing fails.")  # fmt: skip
 @REASON
 @option("--out", "-o", "files", multiple=True, type=click.Path(path_type=Path),
-        help="Further output file: .json, metrics.json, .xml (JUnit), .md or .txt.")  # fmt: skip
+        help="Further output file: .json, .xml (JUnit) or .md.")  # fmt: skip
 @answers()
 def check_results(
     results: Path,

@@ -17,7 +17,6 @@ from pydantic import (
 from kinacc.config.fields import Distinct, OneOf, Section, Text, distinct, refused, setting
 from kinacc.config.names import not_in_a_line
 
-COMPARED = "residuals."  # figures of errors, pose by pose: chance can be told of these alone
 _STATISTICS = {
     "mean": "mean {}",
     "rms": "root mean square of the {}s",
@@ -25,27 +24,18 @@ _STATISTICS = {
     "p99_gamma": "99 % gamma quantile: that of a gamma distribution fitted to the {}s",
     "largest": "largest {}",
 }
-_NEWEST = "position errors of the calibration in force at the newest readings"
 # Figures that a gate may name, with unit (1 where it is counted) and meaning.
-FIGURES = {
-    f"{COMPARED}{quantity}.{statistic}": (unit, text.format(f"{quantity} error"))
+ERRORS = {
+    f"residuals.{quantity}.{statistic}": (unit, text.format(f"{quantity} error"))
     for quantity, unit in (("position", "mm"), ("orientation", "mrad"))
     for statistic, text in _STATISTICS.items()
-} | {
-    "bound.upper": ("mm", "upper bound of the newest campaign on this calibration"),
+}
+FIGURES = ERRORS | {
     "data.readings": ("1", "number of readings"),
     "data.poses": ("1", "number of poses"),
-    "history.moved": ("mm", "rms movement of the arm since the calibration in force"),
-    "history.beyond_chance": ("mm", "movement since the calibration in force beyond chance"),
-    "history.in_force_mean": ("mm", f"mean of the {_NEWEST}"),
-    "history.in_force_p99": ("mm", f"empirical 99 % quantile of the {_NEWEST}"),
 }
 # The figure whose limit the section `tolerance` gives, by what its `of` says.
-OF_TOLERANCE = {
-    "mean": "residuals.position.mean",
-    "quantile_99": "residuals.position.p99",
-    "bound": "bound.upper",
-}
+_OF_TOLERANCE = {"mean": "residuals.position.mean", "quantile_99": "residuals.position.p99"}
 _LIMITS = ("at_most", "at_least", "allow")
 _MOST, _LEAST = "largest value that passes", "smallest value that passes"
 
@@ -84,23 +74,18 @@ class Gate(Section):
 class OfFigure(Gate):
     """What gates of a figure have; a limit is in the unit of the figure."""
 
-    limits: ClassVar[tuple[str, ...]] = ("at_most", "at_least")
+    limit_word: ClassVar[str] = "at_most"
     value: Annotated[str, OneOf(FIGURES)] = setting(..., "the figure")
     model: Literal["selected", "dh", "vec", "compliance", "nominal"] = setting(
-        "selected", "error model whose errors are meant"
-    )
-    at: Literal["held_out", "validation", "training"] = setting(
-        "held_out",
-        "errors at rows each fit had not seen, at those of the validation fold, or at those fitted",
+        "selected", "error model whose held-out errors are meant"
     )
 
     @model_validator(mode="after")
     def _one_limit(self) -> Self:
         unit = FIGURES[self.value][0]
-        keys = [f"{word}_{unit}".removesuffix("_1") for word in self.limits]
-        if len(self.limit) > 1 or not {*self.limit} <= {*keys}:
-            message = f"{' and '.join(self.limit)}, where the figure is in {unit}"
-            raise refused(message, f"give one of {' or '.join(keys)}")
+        key = "at_least" if unit == "1" else f"{self.limit_word}_{unit}"
+        if not {*self.limit} <= {key}:
+            raise refused(f"{' and '.join(self.limit)} is no limit of {self.value}", f"give {key}")
         return self
 
 
@@ -108,10 +93,7 @@ class Value(OfFigure):
     """A figure of the results within a limit; that of `tolerance` where the gate has none."""
 
     at_most_mm: float | None = setting(None, _MOST, "mm", gt=0, lt=10000)
-    at_least_mm: float | None = setting(None, _LEAST, "mm", ge=0, le=10000)
     at_most_mrad: float | None = setting(None, _MOST, "mrad", gt=0, lt=10000)
-    at_least_mrad: float | None = setting(None, _LEAST, "mrad", ge=0, le=10000)
-    at_most: float | None = setting(None, f"{_MOST}, of what is counted", ge=0, le=1e9)
     at_least: float | None = setting(None, f"{_LEAST}, of what is counted", ge=0, le=1e9)
 
 
@@ -136,7 +118,8 @@ class Table(Gate):
 class Against(OfFigure):
     """A figure of the errors not worse than that of the accepted run, beyond chance."""
 
-    limits: ClassVar[tuple[str, ...]] = ("allow",)
+    limit_word = "allow"
+    value: Annotated[str, OneOf(ERRORS)] = setting(..., "the figure")
     against: Literal["accepted"] = setting(..., "the run it is held against")
     allow_mm: float | None = setting(
         None, "by how much it may be worse, of positions", "mm", ge=0, le=1000
@@ -153,9 +136,6 @@ class Against(OfFigure):
 
     @model_validator(mode="after")
     def _allowance(self) -> Self:
-        if not self.value.startswith(COMPARED):
-            message = f"chance cannot be told of {self.value}"
-            raise refused(message, f"give a figure that begins with {COMPARED}")
         if not self.limit:
             raise refused("has no allowance", "give allow_mm or allow_mrad")
         return self
@@ -234,9 +214,12 @@ Gates = Annotated[
 def require_limits(gates: Sequence[Gate], tolerance_mm: float | None, of: str) -> None:
     """Raise for a gate that leaves its limit to the tolerance, which has none for its figure."""
     for number, gate in enumerate(gates):
-        figure = gate.value if isinstance(gate, Value) and not gate.limit else None
-        if isinstance(gate, Campaign) and gate.tolerance_mm is None:
-            figure = OF_TOLERANCE["bound"]
-        if figure and (tolerance_mm is None or OF_TOLERANCE[of] != figure):
-            message = f"has no limit, and tolerance has none for {figure}"
+        if isinstance(gate, Value):
+            lacks, fits = not gate.limit, gate.value == _OF_TOLERANCE.get(of)
+        elif isinstance(gate, Campaign):
+            lacks, fits = gate.tolerance_mm is None, of == "bound"
+        else:
+            continue
+        if lacks and (tolerance_mm is None or not fits):
+            message = "has no limit, and tolerance has none for its figure"
             raise refused(message, "write one into the gate", "gates", number)

@@ -16,9 +16,8 @@ from kinacc import __version__
 from kinacc.deployment import folder, history
 from kinacc.errors import FitError, InputError, Problem, first_few
 from kinacc.gate import chance
-from kinacc.gate.outcome import FAILED, PASSED, UNDECIDED, WARNED, Outcome
+from kinacc.gate.outcome import FAILED, PASSED, UNDECIDED, Outcome
 from kinacc.gate.values import SELECTED, RunTables
-from kinacc.kinematics.dh import PARAMETERS
 from kinacc.tables import sums
 from kinacc.tables.allowed import MOVED, OPEN, RECALIBRATE, SAME
 from kinacc.tables.atomic import unfinished, write_whole
@@ -29,7 +28,6 @@ NOTE = "accepted.json"
 # knocked joint, so that only the arm's test shows it.
 CONFIDENCE, ARM_LEVEL = 0.997, 0.007
 _PICTURES = shutil.ignore_patterns("*.svg", "*.png", "*.pdf", "*.html")
-_FAR = 3.0  # standard deviations beyond which a parameter counts as moved
 
 
 def accept(results: Path, folder: Path, datasets: Sequence[str], reason: str) -> dict[str, Any]:
@@ -67,7 +65,7 @@ def compared(now: Path, before: Path, rotation_weight_mm_per_rad: float) -> Iter
     """A data set compared with the accepted one.
 
     Where the measurements are the same, whether all tables are; else whether held-out errors are
-    better, same, worse or undecided, whether the arm changed, and which parameters moved.
+    better, same, worse or undecided, and whether the arm changed.
     """
 
     def outcome(name: str, verdict: str, says: str, fix: str = "", **figures: Any) -> Outcome:
@@ -95,15 +93,11 @@ def compared(now: Path, before: Path, rotation_weight_mm_per_rad: float) -> Iter
                 problem = getattr(error, "problems", [error])[0]
                 verdict, says, figures = UNDECIDED, f"undecided: {problem}", {}
             yield outcome(name, verdict, says, compare if verdict == FAILED else "", **figures)
-        moved = list(_moved_parameters(now, before))
-        says = f"{len(moved)} DH parameters moved by more than {_FAR:g} standard deviations"
-        says += f": {first_few(moved)}" if moved else ""
-        yield outcome("parameters", WARNED if moved else PASSED, says, moved=len(moved))
 
 
 def _errors(now: Path, before: Path, _: float) -> tuple[str, str, dict[str, Any]]:
     """Whether the mean held-out position error is better, the same or worse than accepted."""
-    new, old = (RunTables(item).errors(SELECTED, "held_out", "position") for item in (now, before))
+    new, old = (RunTables(item).errors(SELECTED, "position") for item in (now, before))
     worse = chance.change("mean", new, old, False, CONFIDENCE)
     better = chance.change("mean", old, new, False, CONFIDENCE)
     word = "worse" if worse.least > 0.0 else "better" if better.least > 0.0 else "same"
@@ -149,14 +143,3 @@ def _arm(
     joint = "" if np.isnan(row["joint"]) else f", mostly at joint {row['joint']:.0f}"
     says = f"worse: the accepted calibration no longer holds; {says}{joint}"
     return FAILED, says, figures | {"result": "worse"}
-
-
-def _moved_parameters(now: Path, before: Path) -> Iterator[str]:
-    """DH parameters that moved by more than their uncertainty, given the model."""
-    new, old = (RunTables(item)["dh_model"].set_index("joint") for item in (now, before))
-    for name in PARAMETERS:
-        change = new[name] - old[name]
-        std = np.hypot(new[f"std_{name}"], old[f"std_{name}"])  # NaN where undetermined
-        unit, factor = ("mm", 1.0) if name.endswith("mm") else ("mrad", 1e3)
-        for joint, size in change[change.abs() > _FAR * std].items():
-            yield f"{name.rpartition('_')[0]} of joint {joint} by {factor * size:+.3g} {unit}"

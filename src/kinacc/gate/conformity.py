@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 import pyarrow as pa
 
-from kinacc.errors import InputError, Problem
+from kinacc.errors import InputError, Problem, first_few
 from kinacc.tables import store
 from kinacc.tables.columns import JOINTS_MAX, JOINTS_MIN, Artefact, Column, joint_count
 from kinacc.tables.contract import PROVENANCE_KEYS
@@ -50,30 +50,18 @@ def check_file(path: Path, artefact: Artefact) -> list[Problem]:
 
 
 def _structure(path: Path, artefact: Artefact, schema: pa.Schema) -> Iterator[Problem]:
-    joints = joint_count(artefact, schema.names)
-    if artefact.has_joints and not JOINTS_MIN <= joints <= JOINTS_MAX:
-        yield Problem(str(path), f"{joints} joints", f"{JOINTS_MIN} to {JOINTS_MAX} joints")
-        return
+    joints = min(max(joint_count(artefact, schema.names), JOINTS_MIN), JOINTS_MAX)
     expected = store.arrow_schema(artefact.name, joints, names=schema.names)
-    for name in dict.fromkeys([*expected.names, *schema.names]):
-        results, wanted = (
-            _words(item.field(name)) if item.names.count(name) == 1 else "not there once"
-            for item in (schema, expected)
-        )
-        if results != wanted:
-            yield Problem(f"{path}, column {name}", results, wanted)
-    metadata = schema.metadata or {}
-    supplied = sorted(key.decode(errors="replace") for key, value in metadata.items() if value)
-    if supplied != sorted(PROVENANCE_KEYS) or len(metadata) != len(supplied):
-        yield Problem(str(path), f"schema metadata {supplied}", ", ".join(PROVENANCE_KEYS))
-
-
-def _words(field: pa.Field) -> str:
-    metadata = field.metadata or {}
-    unit, meaning = (
-        metadata.get(key, b"").decode(errors="replace") for key in (b"unit", b"meaning")
+    supplied, wanted = (
+        {item.name: (item.type, item.metadata) for item in each} for each in (schema, expected)
     )
-    return f"type {field.type}, unit {unit!r}, meaning {meaning!r}"
+    wrong = [name for name in wanted | supplied if supplied.get(name) != wanted.get(name)]
+    if wrong or len(schema) != len(expected):
+        message = f"missing, unknown, or of another type, unit or meaning: {first_few(wrong)}"
+        yield Problem(str(path), f"columns {message}")
+    metadata = schema.metadata or {}
+    if {*metadata} != {key.encode() for key in PROVENANCE_KEYS} or not all(metadata.values()):
+        yield Problem(str(path), f"schema metadata {metadata}", ", ".join(PROVENANCE_KEYS))
 
 
 def _values(where: str, column: Column, values: pd.Series) -> Iterator[Problem]:

@@ -14,7 +14,7 @@ from kinacc.config.values import did_you_mean
 from kinacc.errors import InputError
 from kinacc.gate import chance
 from kinacc.gate.outcome import FAILED, PASSED, UNDECIDED, WARNED, Outcome
-from kinacc.gate.values import RunTables, cell, figure, sample
+from kinacc.gate.values import Figure, RunTables, cell, figure, sample
 from kinacc.report.rendering import history_sentence, lines
 from kinacc.tables import sums
 from kinacc.tables.allowed import FINDING_LEVELS, FIRST, HOLDS, LEFT_OUT, RECALIBRATE
@@ -42,7 +42,7 @@ def judged(
         for gate in full["gates"]:
             if name in broken:
                 says = "not checked: files of the data set fail their check"
-                yield Outcome(name, gate["name"], _kind(gate), UNDECIDED, says)
+                yield Outcome(name, gate["name"], gate["kind"], UNDECIDED, says)
             else:
                 yield of_gate(gate, tables, full["tolerance"]["mm"], before)
 
@@ -51,15 +51,23 @@ def of_gate(
     gate: Gate, tables: RunTables, tolerance_mm: float | None, accepted: RunTables | None
 ) -> Outcome:
     """The outcome of one gate by the ``tables`` of a data set; a missing table is a failure."""
-    kind, of_limits = _kind(gate), {"value": _value, "table": _value, "campaign": _campaign}
+    kind, tolerated = gate["kind"], {"at_most": tolerance_mm}
     try:
-        if kind == "change":
-            result = _change(gate, tables, accepted)
-        elif kind in of_limits:
-            result = of_limits[kind](gate, tables, tolerance_mm)
-        else:
-            of = {"claims": _claims, "suspicions": _suspicions, "history": _history}
-            result = of[kind](gate, tables)
+        match kind:
+            case "value":
+                result = _limited(figure(tables, gate), gate["limit"] or tolerated)
+            case "table":
+                result = _limited(cell(tables, gate), gate["limit"])
+            case "against":
+                result = _against(gate, tables, accepted)
+            case "campaign":
+                result = _campaign(gate, tables, tolerance_mm)
+            case "claims":
+                result = _claims(gate, tables)
+            case "suspicions":
+                result = _suspicions(gate, tables)
+            case _:
+                result = _history(tables)
         says = "".join(lines("gate.txt", kind=kind, gate=gate, **result.facts))
     except InputError as error:
         first = error.problems[0]
@@ -74,10 +82,6 @@ def of_gate(
     return Outcome(tables.folder.name, gate["name"], kind, verdict, says, fix, result.figures)
 
 
-def _kind(gate: Gate) -> str:
-    return "change" if gate["kind"] == "against" else str(gate["kind"])
-
-
 @dataclass(frozen=True)
 class Found:
     """What a gate found: its verdict, a remedy, figures, and facts of which a template tells."""
@@ -88,21 +92,19 @@ class Found:
     facts: Mapping[str, Any] = field(default_factory=dict)
 
 
-def _value(gate: Gate, tables: RunTables, tolerance_mm: float | None) -> Found:
-    results = figure(tables, gate) if gate["kind"] == "value" else cell(tables, gate)
-    limits: Mapping[str, Any] = gate["limit"] or {"at_most": tolerance_mm}
+def _limited(result: Figure, limits: Mapping[str, Any]) -> Found:
+    """A figure held to its one limit."""
     ((key, limit),) = limits.items()
     word = "at_least" if key.startswith("at_least") else "at_most"
-    held = results.size >= limit if word == "at_least" else results.size <= limit
-    undecided = bool(results.open) and (held or np.isnan(results.size))
+    held = result.size >= limit if word == "at_least" else result.size <= limit
+    undecided = bool(result.open) and (held or np.isnan(result.size))
     verdict = UNDECIDED if undecided else PASSED if held else FAILED
-    figures: dict[str, Any] = {f"value{results.key}": results.size, f"{word}{results.key}": limit}
-    figures |= {"of": results.called, **results.about}
-    facts = {"figure": results, "limit": limit, "word": word.replace("_", " ")}
+    figures = {f"value{result.key}": result.size, f"{word}{result.key}": limit, **result.about}
+    facts = {"figure": result, "limit": limit, "word": word.replace("_", " ")}
     return Found(verdict, "", figures, {**facts, "undecided": undecided})
 
 
-def _change(gate: Gate, tables: RunTables, accepted: RunTables | None) -> Found:
+def _against(gate: Gate, tables: RunTables, accepted: RunTables | None) -> Found:
     if accepted is None or not accepted.folder.is_dir():
         fix = 'accept one: kinacc check-results RESULTS --accept FOLDER --reason ".."'
         return Found(FAILED, fix, facts={"no_run": tables.folder.name})
@@ -122,9 +124,7 @@ def _change(gate: Gate, tables: RunTables, accepted: RunTables | None) -> Found:
         f"worse_by_at_least{now.key}": results.least,
         f"allowed{now.key}": allowed,
         "beyond_chance": confidence,
-        "of": now.called,
         "paired": int(paired),
-        "accepted_rows": before.about["rows"],
         **now.about,
     }
     poses = [first.count] if paired else [first.count, second.count]
@@ -202,7 +202,7 @@ def _suspicions(gate: Gate, tables: RunTables) -> Found:
     return Found(FAILED if left else PASSED, fix, figures, facts)
 
 
-def _history(gate: Gate, tables: RunTables) -> Found:
+def _history(tables: RunTables) -> Found:
     table = tables["history"]
     last = table.iloc[-1]
     names = ("moved_mm", "chance_mm", "beyond_mm", "probability")

@@ -13,7 +13,7 @@ PASSED, WARNED, FAILED, UNDECIDED = "passed", "warned", "failed", "undecided"
 class Outcome:
     """One check of one data set.
 
-    ``kind``: files, value, change, campaign, claims, suspicions, history, accepted. ``figures`` are
+    ``kind``: files, accepted, or that of a gate. ``figures`` are
     numbers and words by name with unit (``mean_mm``).
     """
 

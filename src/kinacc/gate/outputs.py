@@ -1,38 +1,25 @@
-"""The report of a check as text, JSON, flat metrics, JUnit and Markdown."""
+"""The report of a check as text, JSON, JUnit and Markdown."""
 
 from __future__ import annotations
 
 import json
-import math
 import re
 from pathlib import Path
 
 from pydantic_core import to_jsonable_python
 
-from kinacc.errors import InputError, Problem
+from kinacc.errors import input_error
 from kinacc.gate.outcome import CheckReport
 from kinacc.report.rendering import environment
 from kinacc.tables.atomic import write_whole
 
 _NOT_XML = re.compile(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
-_TEXTS = (".xml", ".md", ".txt")  # each by its template
 
 
 def as_json(report: CheckReport) -> str:
     """The report as it is; numbers that are not finite are null."""
     values = {"schema_version": 1, "passed": report.passed, **vars(report)}
     return json.dumps(to_jsonable_python(values, inf_nan_mode="null"), indent=1) + "\n"
-
-
-def as_metrics(report: CheckReport) -> str:
-    """All numbers, flat, by ``<data set>/<check>/<figure>``."""
-    results = {
-        f"{item.dataset}/{item.name}/{name}": value
-        for item in report.outcomes
-        for name, value in item.figures.items()
-        if isinstance(value, (int, float)) and math.isfinite(value)
-    }
-    return json.dumps(results, indent=1) + "\n"
 
 
 def as_text(report: CheckReport, ending: str = ".txt") -> str:
@@ -43,11 +30,10 @@ def as_text(report: CheckReport, ending: str = ".txt") -> str:
 
 def write(report: CheckReport, path: Path) -> None:
     """Write a report by the ending of the file; InputError for an ending that is none of these."""
-    if path.suffix in _TEXTS:
+    if path.suffix == ".json":
+        text = as_json(report)
+    elif path.suffix in (".xml", ".md"):
         text = as_text(report, path.suffix)
-    elif path.suffix == ".json":
-        text = (as_metrics if path.name.endswith("metrics.json") else as_json)(report)
     else:
-        allowed = f"metrics.json, .json, {', '.join(_TEXTS)}"
-        raise InputError(Problem(str(path), f"ends in {path.suffix!r}", allowed))
+        raise input_error(str(path), f"ends in {path.suffix!r}", ".json, .xml, .md")
     write_whole(path, text.encode())

@@ -15,8 +15,8 @@ import pandas as pd
 
 from kinacc.calibration.summary import selected
 from kinacc.config.error_models import MEASURED, Comparison, model_name
-from kinacc.config.gate_rules import COMPARED, FIGURES
-from kinacc.errors import InputError, Problem, first_few
+from kinacc.config.gate_rules import ERRORS, FIGURES
+from kinacc.errors import first_few, input_error
 from kinacc.gate.chance import STATISTICS, Sample
 from kinacc.measurements.folds import configurations_of
 from kinacc.tables import store
@@ -25,17 +25,6 @@ from kinacc.tables.contract import ARTEFACTS
 
 SELECTED = "selected"
 FEWEST_OF_QUANTILE = 100  # rows of which 1 % is one: with fewer, the 99 % quantile is the largest
-_AT = {
-    "held_out": "held out",
-    "validation": "of the fold kept for validation",
-    "training": "at rows that were fitted",
-}
-_HISTORY = {
-    "moved": "moved_mm",
-    "beyond_chance": "beyond_mm",
-    "in_force_mean": "in_force_mean_mm",
-    "in_force_p99": "in_force_quantile_99_mm",
-}
 
 
 class RunTables(dict[str, pd.DataFrame]):
@@ -55,7 +44,7 @@ class RunTables(dict[str, pd.DataFrame]):
             fix = f"kinacc {'study' if studied else 'calibrate'} FILE.yaml makes it"
             if artefact == "history":
                 fix = "give the data set a series (docs/history.md) and calibrate it"
-            raise InputError(Problem(str(path), "missing", fix=fix))
+            raise input_error(str(path), "missing", fix=fix)
         self[artefact] = store.read_table(path)
         return self[artefact]
 
@@ -63,16 +52,13 @@ class RunTables(dict[str, pd.DataFrame]):
         """The error model of a gate; the selected one for ``selected``."""
         return selected(self["model_selection"]) if named == SELECTED else named
 
-    def errors(self, model: str, place: str, quantity: str) -> Sample:
-        """Sizes of errors of a model of a gate, mm or mrad, at rows at which every model was tried.
+    def errors(self, model: str, quantity: str) -> Sample:
+        """Sizes of held-out errors of a model of a gate, mm or mrad, at rows of every model.
 
-        ``place``: held_out, every row by a fit without it; validation, rows of the validation fold;
-        training, rows that were fitted. Raises InputError where there are none.
+        Raises InputError where there are none.
         """
         model, table = self.model(model), self["pose_errors"]
-        table = table[table["estimate"] == ("train" if place == "training" else "cross_validated")]
-        if place == "validation":
-            table = table[table["subset"] == "validation"]
+        table = table[table["estimate"] == "cross_validated"]
         tried = table.groupby("row")["comparison"].nunique()
         common = tried.index[tried == table["comparison"].nunique()]
         table = table[table["comparison"] == Comparison(MEASURED, model).name]
@@ -81,9 +67,8 @@ class RunTables(dict[str, pd.DataFrame]):
         sizes = np.linalg.norm(table[names], axis=1)
         known = np.isfinite(sizes)
         if not known.any():
-            message = f"has no {quantity} errors of model {model} at rows {place.replace('_', ' ')}"
-            fix = "name another model or other rows"
-            raise InputError(Problem("pose_errors.parquet", message, fix=fix))
+            message = f"has no held-out {quantity} errors of model {model}"
+            raise input_error("pose_errors.parquet", message, fix="name another model")
         rows = table["row"].to_numpy()[known]
         return Sample(sizes[known], configurations_of(self["measurements"])[rows])
 
@@ -114,23 +99,18 @@ class Figure:
 
 def sample(tables: RunTables, gate: Mapping[str, Any]) -> Sample:
     """The errors behind a gate's figure of errors."""
-    return tables.errors(gate["model"], gate["at"], gate["value"].split(".")[1])
+    return tables.errors(gate["model"], gate["value"].split(".")[1])
 
 
 def figure(tables: RunTables, gate: Mapping[str, Any]) -> Figure:
     """The figure of a gate. Raises InputError where its table is missing."""
     name = gate["value"]
-    (unit, meaning), (topic, _, word) = FIGURES[name], name.partition(".")
-    if name.startswith(COMPARED):
+    unit, meaning = FIGURES[name]
+    if name in ERRORS:
         return _of_errors(tables, gate, unit)
-    if topic == "bound":
-        return _of_bound(tables, unit)
-    if topic == "history":
-        size = float(tables["history"][_HISTORY[word]].iloc[-1])
-        why = "the history has no earlier calibration in force" if np.isnan(size) else ""
-        return Figure(size, unit, meaning, open=why)
     pose = tables["measurements"]["pose"]
-    return Figure(float(len(pose) if word == "readings" else pose.nunique()), unit, meaning)
+    count = len(pose) if name == "data.readings" else pose.nunique()
+    return Figure(float(count), unit, meaning)
 
 
 def cell(tables: RunTables, gate: Mapping[str, Any]) -> Figure:
@@ -142,12 +122,12 @@ def cell(tables: RunTables, gate: Mapping[str, Any]) -> Figure:
     table, where = tables[artefact], f"{artefact}.parquet"
     if unknown := [name for name in (*gate["row"], column) if name not in table]:
         message = f"has no column {first_few(unknown)}"
-        raise InputError(Problem(where, message, first_few(list(table), 30)))
+        raise input_error(where, message, first_few(list(table), 30))
     for name, value in gate["row"].items():
         table = table[table[name].isna() if value is None else table[name] == value]
     if len(table) != 1:
         fix = "name more columns in row" if len(table) else "other values in row"
-        raise InputError(Problem(where, f"has {len(table)} such rows", "one row", fix))
+        raise input_error(where, f"has {len(table)} such rows", "one row", fix)
     row = table.iloc[0]
     known = ARTEFACTS[artefact].for_joints(joint_count(ARTEFACTS[artefact], table.columns))
     unit = next(item.unit for item in known if item.name == column)
@@ -162,8 +142,8 @@ def _of_errors(tables: RunTables, gate: Mapping[str, Any], unit: str) -> Figure:
     _, quantity, statistic = gate["value"].split(".")
     sizes, model = sample(tables, gate).sizes, tables.model(gate["model"])
     of, text = STATISTICS[statistic]
-    called = f"{text} of the {quantity} errors {_AT[gate['at']]} ({model_name(model)} model)"
-    about = {"model": model, "statistic": text, "at": gate["at"], "rows": len(sizes)}
+    called = f"{text} of the held-out {quantity} errors ({model_name(model)} model)"
+    about: dict[str, Any] = {"model": model, "statistic": text, "rows": len(sizes)}
     size, why = of(sizes), ""
     if statistic == "p99" and len(sizes) < FEWEST_OF_QUANTILE:
         others = "a limit on mean, rms, largest or p99_gamma needs fewer"
@@ -171,25 +151,3 @@ def _of_errors(tables: RunTables, gate: Mapping[str, Any], unit: str) -> Figure:
     if np.isnan(size):
         why = "an error is exactly zero: no gamma distribution fits"
     return Figure(size, unit, called, about, why)
-
-
-def _of_bound(tables: RunTables, unit: str) -> Figure:
-    from kinacc.campaign import of_calibration
-    from kinacc.campaign.beside_results import of_results
-    from kinacc.deployment import folder
-
-    known = folder.read_tables(tables.folder, "robot")
-    name, places = tables.folder.resolve().name, of_results(tables.folder)
-    required = of_calibration.newest(name, known, places)
-    results = required.status
-    if results is None:
-        message = "; ".join(required.remarks) or "no campaign on this calibration"
-        fix = f"kinacc campaign start FOLDER --calibration {tables.folder}"
-        raise InputError(Problem(str(tables.folder), message, fix=fix))
-    bound = results.of_all
-    why = "" if np.isfinite(bound.upper_mm) else "its campaign has no upper bound so far"
-    if bound.excepted:
-        why = f"its upper bound leaves {bound.excepted} candidates out"
-    about: dict[str, Any] = {"campaign": results.folder, "confidence": bound.confidence}
-    called = f"upper bound on the largest error, by campaign {results.folder}"
-    return Figure(bound.upper_mm, unit, called, about, why)
