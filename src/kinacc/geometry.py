@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 _SMALL_ANGLE_RAD = 1e-4
 
@@ -143,7 +144,7 @@ def _axis_rotation(angle_rad: np.ndarray | float, axis: int) -> np.ndarray:
 
 
 def exp_so3(rotation_vector_rad: np.ndarray) -> np.ndarray:
-    """Rotation of a rotation vector (Rodrigues' formula).
+    """Rotation of a rotation vector.
 
     Parameters
     ----------
@@ -155,15 +156,7 @@ def exp_so3(rotation_vector_rad: np.ndarray) -> np.ndarray:
     numpy.ndarray
         Rotations, shape (..., 3, 3).
     """
-    vector = np.asarray(rotation_vector_rad, dtype=float)
-    angle_sq = np.sum(vector * vector, axis=-1)
-    angle = np.sqrt(angle_sq)
-    small = angle < _SMALL_ANGLE_RAD
-    safe = np.where(small, 1.0, angle)
-    sine = np.where(small, 1.0 - angle_sq / 6.0, np.sin(safe) / safe)
-    versine = np.where(small, 0.5 - angle_sq / 24.0, 2.0 * (np.sin(0.5 * safe) / safe) ** 2)
-    cross = skew(vector)
-    return np.eye(3) + sine[..., None, None] * cross + versine[..., None, None] * (cross @ cross)
+    return Rotation.from_rotvec(rotation_vector_rad).as_matrix()
 
 
 def log_so3(rotation: np.ndarray) -> np.ndarray:
@@ -264,20 +257,5 @@ def quaternion_from_rotation(rotation: np.ndarray) -> np.ndarray:
     numpy.ndarray
         Quaternions ``w, x, y, z`` with ``w >= 0``, shape (..., 4).
     """
-    rotation = np.asarray(rotation, dtype=float)
-    diagonal = np.diagonal(rotation, axis1=-2, axis2=-1)
-    trace = diagonal.sum(axis=-1)
-    # Four times the outer product of the quaternion with itself; its largest row is well scaled.
-    outer = np.empty((*rotation.shape[:-2], 4, 4))
-    outer[..., 0, 0] = 1.0 + trace
-    for i in range(3):
-        j, k = (i + 1) % 3, (i + 2) % 3
-        outer[..., 1 + i, 1 + i] = 1.0 - trace + 2.0 * diagonal[..., i]
-        outer[..., 0, 1 + i] = outer[..., 1 + i, 0] = rotation[..., k, j] - rotation[..., j, k]
-        outer[..., 1 + i, 1 + j] = outer[..., 1 + j, 1 + i] = (
-            rotation[..., j, i] + rotation[..., i, j]
-        )
-    largest = np.argmax(np.diagonal(outer, axis1=-2, axis2=-1), axis=-1)
-    row = np.take_along_axis(outer, largest[..., None, None], axis=-2)[..., 0, :]
-    quaternion = row / np.linalg.norm(row, axis=-1, keepdims=True)
-    return np.where(quaternion[..., :1] < 0.0, -quaternion, quaternion)
+    turn = Rotation.from_matrix(rotation, assume_valid=True)
+    return turn.as_quat(canonical=True, scalar_first=True)
