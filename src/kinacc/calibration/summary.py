@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 import pandas as pd
@@ -22,6 +23,7 @@ TOLERANCE_OF = {
     "bound": "upper bound of a campaign",
 }
 _ORDER = (NOMINAL, *SELECTABLE)
+_UNITS = {"position": "mm", "orientation": "mrad"}
 _PARALLEL_DEG = 5.0  # a flange axis that turns less is called parallel in all poses
 _LEAST_LENGTH = 1e-9
 
@@ -86,35 +88,41 @@ def error_statistics(pose_errors: Columns, configuration: np.ndarray) -> pd.Data
     """
     errors = pd.DataFrame({name: pose_errors[name] for name in ("comparison", "estimate", "row")})
     errors["configuration"] = configuration[errors["row"]]
-    units = {"position": "mm", "orientation": "mrad"}
-    for prefix, (quantity, unit) in zip("er", units.items(), strict=True):
+    for quantity, unit in _UNITS.items():
+        prefix = "e" if quantity == "position" else "r"
         parts = [np.asarray(pose_errors[f"{prefix}{axis}_{unit}"], dtype=float) for axis in "xyz"]
         errors[quantity] = np.linalg.norm(parts, axis=0)
-    known = {c.name: c for c in sorted(COMPARISONS, key=lambda c: _ORDER.index(c.model))}
-    errors = errors[errors["comparison"].isin(known)]
+    known = sorted(COMPARISONS, key=lambda comparison: _ORDER.index(comparison.model))
+    errors = errors[errors["comparison"].isin([comparison.name for comparison in known])]
     tried = errors.groupby(["estimate", "row"])["comparison"].transform("nunique")
     errors = errors[tried == errors.groupby("estimate")["comparison"].transform("nunique")]
-    keys = ["estimate", "comparison", "quantity"]
-    names = [*keys[:2], "configuration"]
-    sizes = errors.melt(names, list(units), "quantity", "size").dropna()
-    groups = sizes.groupby(keys)["size"]
-    table = groups.agg(n="size", mean="mean", largest="max").reset_index()
-    table["quantile_99"] = groups.quantile(LARGE_SHARE).to_numpy()
-    table["rms"] = np.sqrt(groups.agg(lambda size: np.mean(size**2)).to_numpy())
-    sizes["off"] = sizes["size"] - groups.transform("mean")
-    of_configurations = sizes.groupby([*keys, "configuration"])["off"].sum().groupby(keys)
-    count = table["configurations"] = of_configurations.size().to_numpy()
-    square = of_configurations.agg(lambda off: np.sum(off**2)).to_numpy()
-    others = np.where(count > 1, count - 1.0, np.nan)
-    table["std_error"] = np.sqrt(square * count / others) / table["n"]
-    table["reference"] = [known[name].reference for name in table["comparison"]]
-    table["model"] = [known[name].model for name in table["comparison"]]
-    table["unit"] = table["quantity"].map(units)
-    places = {name: i for i, name in enumerate((*known, *units))}
-    table = table.sort_values(keys, key=lambda names: names.map(places).fillna(0))
-    names = ["comparison", "reference", "model", "estimate", "quantity", "unit"]
-    names += ["n", "mean", "quantile_99", "largest", "rms", "std_error", "configurations"]
-    return table[names].reset_index(drop=True)
+    groups = dict(list(errors.groupby(["comparison", "estimate"])))
+    rows = []
+    for comparison, quantity, estimate in product(known, _UNITS, ("cross_validated", "train")):
+        group = groups.get((comparison.name, estimate), errors[:0]).dropna(subset=quantity)
+        if group.empty:
+            continue
+        size = group[quantity]
+        off = (size - size.mean()).groupby(group["configuration"]).sum()
+        spread = np.sqrt(len(off) * np.sum(off**2) / (len(off) - 1)) if len(off) > 1 else np.nan
+        rows.append(
+            {
+                "comparison": comparison.name,
+                "reference": comparison.reference,
+                "model": comparison.model,
+                "estimate": estimate,
+                "quantity": quantity,
+                "unit": _UNITS[quantity],
+                "n": len(size),
+                "mean": size.mean(),
+                "quantile_99": size.quantile(LARGE_SHARE),
+                "largest": size.max(),
+                "rms": np.sqrt(np.mean(size**2)),
+                "std_error": spread / len(size),
+                "configurations": len(off),
+            }
+        )
+    return pd.DataFrame(rows)
 
 
 def frames_are_fitted(frames: Columns) -> bool:
