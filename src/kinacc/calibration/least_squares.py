@@ -9,7 +9,7 @@ robust loss leans less on rows far off, with a scale taken from the data.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -41,23 +41,12 @@ class Spectrum:
     """What data can tell of a block of parameters.
 
     ``values``: singular values of the Jacobian in units of ``scale``, falling, after the frame
-    columns are projected out. ``rank`` of them exceed ``threshold`` times the largest; ``gap`` is
-    the ratio across that cut, inf at full rank.
+    columns are projected out. ``rank`` of them exceed ``threshold`` times the largest.
     """
 
     values: np.ndarray
     threshold: float
     rank: int
-    gap: float
-
-    @classmethod
-    def of(cls, values: np.ndarray, threshold: float, most: int | None = None) -> Spectrum:
-        """Spectrum of falling ``values``; no rank above ``most``."""
-        rank = int(np.sum(values > threshold * values[0])) if values.size else 0
-        rank = rank if most is None else min(rank, most)
-        past = values[rank] if rank < values.size else 0.0
-        gap = float(values[rank - 1] / past) if rank and past > 0.0 else float("inf")
-        return cls(values, threshold, rank, gap)
 
 
 @dataclass(frozen=True)
@@ -67,14 +56,14 @@ class Split:
     ``root`` (P, r): its product with its transpose inverts the normal matrix and the prior's on the
     determined directions. ``lost`` (P, l): the others, base and targets following those of the
     model, of which ``anchor`` (P, l) is the part that stays nominal. ``effective``: number of
-    parameters that the data, not a prior, decide.
+    parameters that the data, not a prior, decide. ``ranks``: numbers of frame and model directions
+    above the thresholds.
     """
 
     root: np.ndarray
     lost: np.ndarray
     anchor: np.ndarray
     effective: float
-    spectrum: Spectrum | None = None
     ranks: tuple[int, int] | None = None
 
     @classmethod
@@ -114,21 +103,19 @@ class Split:
         placed = np.eye(frames)[weight[:frames] > 0.0]
         base = normal[:frames, :frames]
         known = [(placed, TOUCH_SQUARED)] if reported else []
-        directions, lost_base, base_spectrum = _cut(base, thresholds[0], most and most[0], known)
+        directions, lost_base, rank_base = _cut(base, thresholds[0], most and most[0], known)
         root_base = _root(directions, base)
         follow = np.eye(len(normal))
         follow[:frames, arm] = -root_base @ (root_base.T @ normal[:frames, arm])
         rest = normal[arm, arm] + normal[arm, :frames] @ follow[:frames, arm]
         known = [(np.eye(len(rest))[weight[arm] > 0.0], TOUCH_SQUARED)]
         known += [(placed @ follow[:frames, arm], MOVES_SQUARED)] if reported else []
-        directions, lost_arm, spectrum = _cut(rest, thresholds[1], most and most[1], known)
+        directions, lost_arm, rank_arm = _cut(rest, thresholds[1], most and most[1], known)
         root_arm = _root(directions, rest + np.diag(weight[arm] ** 2))
         root = follow @ scipy.linalg.block_diag(root_base, root_arm)
         anchor = scipy.linalg.block_diag(lost_base, lost_arm)
         effective = float(np.sum(root * (gram[:-1, :-1] @ root)))
-        return cls(
-            root, follow @ anchor, anchor, effective, spectrum, (base_spectrum.rank, spectrum.rank)
-        )
+        return cls(root, follow @ anchor, anchor, effective, (rank_base, rank_arm))
 
     def step(
         self, gradient: np.ndarray, displacement: np.ndarray, weight_sq: np.ndarray
@@ -143,21 +130,26 @@ def _cut(
     threshold: float,
     most: int | None,
     known: Sequence[tuple[np.ndarray, float]],
-) -> tuple[np.ndarray, np.ndarray, Spectrum]:
-    """Orthonormal directions (P, r) kept, (P, l) lost, and the spectrum by which they are cut.
+) -> tuple[np.ndarray, np.ndarray, int]:
+    """Orthonormal directions (P, r) kept, (P, l) lost, and the number above ``threshold``.
 
     ``known``: derivatives of what is known otherwise; a lost direction is kept where its squared
     change exceeds the number beside.
     """
     values, vectors = np.linalg.eigh(normal)
-    spectrum = Spectrum.of(np.sqrt(np.maximum(values[::-1], 0.0)), threshold, most)
-    directions, lost = np.split(vectors[:, ::-1], [spectrum.rank], axis=1)
+    rank = _rank(np.sqrt(np.maximum(values[::-1], 0.0)), threshold, most)
+    directions, lost = np.split(vectors[:, ::-1], [rank], axis=1)
     for derivative, least in known:
         if len(derivative) and lost.size:
             _, change, turn = np.linalg.svd(derivative @ lost)
             back, lost = np.split(lost @ turn.T, [int(np.sum(change**2 > least))], axis=1)
             directions = np.concatenate([directions, back], axis=1)
-    return directions, lost, spectrum
+    return directions, lost, rank
+
+
+def _rank(values: np.ndarray, threshold: float, most: int | None) -> int:
+    """Number of falling ``values`` above a share of the first, no more than ``most``."""
+    return int(np.sum(values[:most] > threshold * values[:1]))
 
 
 def _root(directions: np.ndarray, normal: np.ndarray) -> np.ndarray:
@@ -165,18 +157,14 @@ def _root(directions: np.ndarray, normal: np.ndarray) -> np.ndarray:
     return directions @ np.linalg.inv(np.linalg.cholesky(directions.T @ normal @ directions)).T
 
 
-def singular_values(jacobians: Iterable[np.ndarray], frames: int = 0) -> np.ndarray:
-    """Singular values of a Jacobian (m, P) in blocks of rows, its first columns projected out.
+def _singular_values(jacobian: np.ndarray, frames: int) -> np.ndarray:
+    """Singular values of a Jacobian (m, P), its first columns projected out.
 
     By orthogonal reduction they keep their digits below 1e-7 of the largest, unlike through the
     normal equations.
     """
-    parts: list[np.ndarray] = []
-    for jacobian in jacobians:
-        rows = np.concatenate([*parts, jacobian])
-        (factor,) = scipy.linalg.qr(rows, mode="r", check_finite=False)
-        parts = [factor[: factor.shape[1]]]
-    return np.linalg.svd(parts[0][frames:, frames:], compute_uv=False)
+    (factor,) = scipy.linalg.qr(jacobian, mode="r", check_finite=False)
+    return np.linalg.svd(factor[frames : factor.shape[1], frames:], compute_uv=False)
 
 
 SQUARES, HUBER, TUKEY = "squares", "huber", "tukey"
@@ -444,12 +432,12 @@ class _Descent:
         variance = self.cost / freedom if freedom > 0 else np.nan
         variance = variance if self.truncated else self.variance
         along = variance * np.eye(reported.root.shape[1])
-        if self.task.threshold is not None and fitted.spectrum is not None:
+        if self.task.threshold is not None and fitted.ranks is not None:
             parts = zip(*system.blocks(self.x), strict=True)
             residual, jacobian = (np.concatenate(part) for part in parts)
             jacobian = jacobian[:, active] * self.scale
-            values = singular_values([jacobian], self.frames)
-            spectrum = Spectrum.of(values, self.task.threshold, fitted.spectrum.rank)
+            values, threshold = _singular_values(jacobian, self.frames), self.task.threshold
+            spectrum = Spectrum(values, threshold, _rank(values, threshold, fitted.ranks[1]))
             if freedom > 0:
                 along = covariance_along(
                     residual, jacobian, shared_errors(system.observations),

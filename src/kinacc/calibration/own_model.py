@@ -42,7 +42,6 @@ def register_error_model(model: type[ErrorModel]) -> type[ErrorModel]:
     of_dh = ARTEFACTS["dh_covariance"]
     for table in (
         replace(of_dh, name=f"{model.kind}_covariance"),
-        replace(ARTEFACTS["vec_fit"], name=f"{model.kind}_fit"),
         replace(ARTEFACTS["vec_frames"], name=f"{model.kind}_frames"),
         Artefact(f"{model.kind}_model", of_dh.topic, "Parameters.", _COLUMNS, ("parameter",)),
     ):

@@ -9,8 +9,7 @@ import numpy as np
 
 from kinacc.calibration.fitting import ModelFit
 from kinacc.calibration.frames import Frames, stacked
-from kinacc.calibration.least_squares import Spectrum
-from kinacc.calibration.uncertainty import Uncertainty, scaled_unit, unit_of
+from kinacc.calibration.uncertainty import Uncertainty, scaled_unit
 from kinacc.geometry import quaternion_from_rotation
 from kinacc.kinematics.tables import frame
 from kinacc.tables.columns import Columns
@@ -67,46 +66,31 @@ def frames_of(
     return Frames(stacked(bases), stacked(targets))
 
 
-def fit_columns(
-    name: str, fit: ModelFit, uncertainty: Uncertainty, gauge: Spectrum | None = None
-) -> Columns:
-    """``dh_fit`` or its like: figures, singular values, directions the data do not determine.
-
-    With a ``gauge``, what the data tell without priors, its singular values and the prior of every
-    parameter.
-    """
-    solution, spectrum = fit.solution, gauge or fit.solution.spectrum
-    rows: list[tuple[Any, ...]] = [
-        ("parameters", None, None, len(solution.x), "1"),
-        ("residual_components", None, None, solution.count, "1"),
-        ("degrees_of_freedom", None, None, solution.degrees_of_freedom, "1"),
-        ("cost", None, None, solution.cost, "mm^2"),
-        ("residual_std", None, None, np.sqrt(solution.variance), "mm"),
-        ("iterations", None, None, solution.iterations, "1"),
-        ("last_step", None, None, solution.last_step, "mm or mrad"),
-        ("converged", None, None, float(solution.converged), "1"),
+def fit_columns(name: str, fit: ModelFit, uncertainty: Uncertainty) -> Columns:
+    """``dh_fit`` or its like: figures, singular values, directions the data do not determine."""
+    solution, spectrum, weights = fit.solution, fit.solution.spectrum, fit.weights
+    figures = [
+        ("parameters", len(solution.x), "1"),
+        ("residual_components", solution.count, "1"),
+        ("degrees_of_freedom", solution.degrees_of_freedom, "1"),
+        ("cost", solution.cost, "mm^2"),
+        ("residual_std", np.sqrt(solution.variance), "mm"),
+        ("iterations", solution.iterations, "1"),
+        ("last_step", solution.last_step, "mm or mrad"),
+        ("converged", float(solution.converged), "1"),
     ]
     if spectrum is not None:
-        gap = spectrum.gap if np.isfinite(spectrum.gap) else np.nan
-        rows += [
-            ("rank", None, None, spectrum.rank, "1"),
-            ("rank_threshold", None, None, spectrum.threshold, "1"),
-            ("gap", None, None, gap, "1"),
+        figures += [("rank", spectrum.rank, "1"), ("rank_threshold", spectrum.threshold, "1")]
+    if weights is not None:
+        figures += [
+            ("loss_scale", weights.scale_mm, "mm"),
+            ("rows_below_half_weight", int(np.sum(weights.row < 0.5)), "1"),
+            ("rows_without_weight", int(np.sum(weights.row == 0.0)), "1"),
         ]
+    rows: list[tuple[Any, ...]] = [(name, None, None, value, unit) for name, value, unit in figures]
+    if spectrum is not None:
         values = enumerate(spectrum.values, 1)
         rows += [("singular_value", i, None, value, "mm per mm or mrad") for i, value in values]
-    if fit.weights is not None:
-        rows += [
-            ("loss_scale", None, None, fit.weights.scale_mm, "mm"),
-            ("rows_below_half_weight", None, None, int(np.sum(fit.weights.row < 0.5)), "1"),
-            ("rows_without_weight", None, None, int(np.sum(fit.weights.row == 0.0)), "1"),
-        ]
-    if gauge is not None:
-        priors = zip(fit.model.names, fit.prior_std, strict=True)
-        rows += [
-            ("prior_std", i, parameter, std, unit_of(parameter))
-            for i, (parameter, std) in enumerate(priors, 1)
-        ]
     rows += [
         ("undetermined_direction", i, parameter, value, scaled_unit(parameter))
         for i, direction in enumerate(uncertainty.undetermined, 1)

@@ -126,14 +126,8 @@ class VECEstimator(Estimator):
     def tables(
         self, fitted: ModelFit, known: Uncertainty, observations: Observations
     ) -> dict[str, Columns]:
-        """How the fit went, and what the poses tell of the coefficients without a prior."""
-        gauge = vec_fit.gauge(
-            self._wanted(observations),
-            self._empty(self.order),
-            fitted.frames,
-            self.common.rotation_weight_mm_per_rad,
-        )
-        return {"vec_fit": tables.fit_columns("vec_fit", fitted, known, gauge)}
+        """How the fit went."""
+        return {"vec_fit": tables.fit_columns("vec_fit", fitted, known)}
 
     def _choice(self, training: Observations, near: pd.DataFrame | None) -> pd.DataFrame:
         common, weight = self.common, self.common.rotation_weight_mm_per_rad

@@ -21,12 +21,10 @@ from scipy.linalg import blas, lapack
 from kinacc.calibration import fitting
 from kinacc.calibration.fitting import ModelFit, PoseSystem, distinct, once, scales
 from kinacc.calibration.frames import FrameParameters, Frames
-from kinacc.calibration.least_squares import Spectrum, one_thread, singular_values
+from kinacc.calibration.least_squares import one_thread
 from kinacc.calibration.observations import Observations
 from kinacc.kinematics import vec
 from kinacc.kinematics.vec import ERRORS, VECModel
-
-RANK_THRESHOLD = 1e-10  # far below every weak direction, far above rounding: exact gauges only
 
 
 @dataclass(frozen=True)
@@ -120,23 +118,6 @@ def fit(
         name="VEC fit",
     )
     return _with_centred_offsets(fitted, observations, prior.std(empty))
-
-
-@one_thread
-def gauge(
-    observations: Observations, empty: VECModel, frames: Frames, rotation_weight_mm_per_rad: float
-) -> Spectrum:
-    """What the poses tell of the coefficients without a prior, about zero errors.
-
-    Base and targets count as known. Directions beyond the rank change no pose to first order:
-    constant frame changes between neighbouring joints.
-    """
-    free, known = informed(observations, empty), FrameParameters.none(frames)
-    zero = empty.with_parameters(np.zeros(free.size))
-    system = PoseSystem(observations, zero, free, known, rotation_weight_mm_per_rad)
-    blocks, scale = system.blocks(np.zeros(system.size)), fitting.scales(empty)[free]
-    values = singular_values(jacobian * scale for _, jacobian in blocks)
-    return Spectrum.of(values, RANK_THRESHOLD)
 
 
 def informed(observations: Observations, empty: VECModel) -> np.ndarray:

@@ -29,7 +29,7 @@ from kinacc.tables.contract import ARTEFACTS
 _RELATIVE = 1e-6  # of variances, which have the units of both parameters
 _KEY_DIGITS = 9
 # Rows of a fit that rounding alone decides.
-_ROUNDING = ("last_step", "gap", "undetermined_direction")
+_ROUNDING = ("last_step", "undetermined_direction")
 
 
 def compare_folders(before: Path, now: Path) -> Iterator[str]:
