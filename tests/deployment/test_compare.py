@@ -1,6 +1,6 @@
 """Two calibrations side by side: nothing where nothing changed, and a planted change by name."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -128,3 +128,37 @@ def test_another_geometry_is_another_robot_and_a_calibration_is_not():
         found = compare(before, each, joints("mh180", 60))
         assert found.verdict != comparison.OTHER_ROBOT
         assert found.robots_apart_mm == 0.0
+
+
+class Curves(dh.DHModel):
+    """A model whose parameters say nothing by themselves, as those of VEC."""
+
+    comparable = None
+
+
+def covering(calibration, low_rad, high_rad):
+    """The calibration, as if joints between ``low_rad`` and ``high_rad`` were measured."""
+    return replace(calibration, fitted_range_rad=(low_rad, high_rad), fitted=None)
+
+
+def test_no_change_is_claimed_without_covariances_or_parameters():
+    before, after = (calibrated("mh180", "dh", 60, seed) for seed in (3, 4))
+    q_rad = joints("mh180", 60)
+    assert compare(before, replace(after, known=None), q_rad).verdict == comparison.UNKNOWN
+    values = {each.name: getattr(before.model, each.name) for each in fields(before.model)}
+    curves = replace(before, model=Curves(**values))
+    far = covering(curves, np.full(6, 3.0), np.full(6, 3.1))
+    assert compare(curves, far, q_rad).verdict == comparison.NOT_COMPARABLE
+
+
+@pytest.mark.parametrize(
+    ("outside", "verdict"), [(0, comparison.CHANGED), (35, comparison.IN_DOUBT)]
+)
+def test_no_arm_is_called_changed_that_was_measured_elsewhere(outside, verdict):
+    q_rad = joints("mh180", 60)
+    before = covering(calibrated("mh180", "dh", 60, 3), np.full(6, -9.0), np.full(6, 9.0))
+    low = np.array([np.sort(q_rad[:, 0])[outside], *[-9.0] * 5])
+    after = moved(covering(before, low, np.full(6, 9.0)), {"j3.alpha_rad": 2e-3})
+    found = compare(before, after, q_rad)
+    assert found.verdict == verdict
+    assert found.poses["measured_by_both"].sum() == 60 - outside

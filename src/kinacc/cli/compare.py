@@ -23,7 +23,7 @@ from kinacc.kinematics import robot as robots
 from kinacc.kinematics.region import points
 from kinacc.kinematics.robot import Robot
 from kinacc.progress import reporting
-from kinacc.report.comparison import comparison_page, lines
+from kinacc.report.rendering import lines
 from kinacc.study.operating_points import spread_rows
 from kinacc.tables import store
 from kinacc.tables.columns import Columns
@@ -37,7 +37,7 @@ from kinacc.tables.columns import Columns
         help="Largest number of poses.")  # fmt: skip
 @option("--model", type=choice.MODEL, default="dh", help="Error model.")
 @choice.ROBOT
-@answers(table=True, picture="Picture: .svg, .png or .pdf.", page="Page: .html.", verbose=True)
+@answers(table=True, picture="Picture: .svg, .png or .pdf.", verbose=True)
 def compare(
     first: str,
     second: str,
@@ -54,7 +54,7 @@ def compare(
 
     \b
     Example:
-      kinacc compare results/ur10_b results/ur10_d --page moved.html
+      kinacc compare results/ur10_b results/ur10_d --picture moved.svg
     """
     with reporting("compare", bar=True):
         both = [_calibration(place, model, robot) for place in (first, second)]
@@ -71,10 +71,9 @@ def compare(
         from kinacc.figures.calibration import draw_comparison
 
         out.draw(draw_comparison(result))
-    if out.page is not None:
-        out.write_page(comparison_page(result, both[0], q_rad))
     table = result.shifts if result.parameters is None else result.parameters
-    out.show(result, table, lines(result), table if out.verbose else result.shifts)
+    text = lines("comparison.txt", found=result, compare=comparison)
+    out.show(result, table, text, table if out.verbose else result.shifts)
 
 
 def _calibration(place: str, model: str, robot: str | None) -> Calibration:

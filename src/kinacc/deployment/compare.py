@@ -65,7 +65,7 @@ class Difference:
         calibration does not determine one (``undetermined``: first, second, both); or None.
     poses
         A row for each pose compared: its number, whether it is near measured poses of both, and
-        the change of the flange, as fitted and (``arm_``) after the best base and tool.
+        the change of the flange's position, as fitted and (``arm_``) after the best base and tool.
     poses_given
         Number of poses given; the others lie outside the range of a model.
     robots_apart_mm
@@ -161,10 +161,13 @@ def compare(
         CHANGED: enough,
         IN_DOUBT: True,
     }
-    poses = {"pose": 1 + np.flatnonzero(covered), "measured_by_both": measured}
-    for prefix, change in zip(("", "arm_"), moved, strict=True):
-        for name, vectors in (("moved_mm", change[:, :3]), ("turned_mrad", 1e3 * change[:, 3:])):
-            poses[prefix + name] = np.linalg.norm(vectors, axis=1)
+    as_fitted_mm, aligned_mm = (np.linalg.norm(change[:, :3], axis=1) for change in moved)
+    poses = {
+        "pose": 1 + np.flatnonzero(covered),
+        "measured_by_both": measured,
+        "moved_mm": as_fitted_mm,
+        "arm_moved_mm": aligned_mm,
+    }
     frames = ("as fitted", "best base and tool")
     return Difference(
         names,
