@@ -442,8 +442,6 @@ def load_calibration(folder: str | Path, model: str | None = None) -> Calibratio
     folder = Path(folder)
     tables = results.read_tables(folder, *summarise.PAGE_TABLES, *summarise.ON_PAGE)
     robot, name = results.recorded_robot(folder), folder.resolve().name
-    if robot is None:
-        raise InputError(Problem(str(folder / "robot.parquet"), "no such file"))
     made_by = store.read_metadata(folder / "summary.parquet").get("config_hash", "")
     return _of_tables(name, tables, robot, model, made_by)
 

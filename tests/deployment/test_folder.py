@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 from small_arms import results
 
-from kinacc.deployment.folder import calibration, read_tables, require_same_robot, selected_model
+from kinacc.deployment.folder import (
+    calibration,
+    read_tables,
+    recorded_robot,
+    require_same_robot,
+    selected_model,
+)
 from kinacc.errors import InputError
 from kinacc.geometry import Pose, rotation_x
 from kinacc.kinematics import robot
@@ -32,10 +38,11 @@ def test_another_robot_than_that_of_the_results_is_refused(change, message):
         require_same_robot(ARM, robot.load("iiwa14"), "results")
 
 
-def test_the_better_model_is_taken_where_none_was_selected():
-    assert selected_model(TABLES) == "dh"  # the VEC model has no errors here
+def test_a_model_is_asked_for_where_none_was_selected(tmp_path):
     with pytest.raises(InputError, match="give --model"):
-        selected_model({**TABLES, "residuals": {}})
+        selected_model(TABLES)
+    with pytest.raises(InputError, match=r"robot\.parquet"):
+        recorded_robot(tmp_path)
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,6 @@ from kinacc.assess.statement import CONFIDENCE
 from kinacc.config import schema
 from kinacc.deployment import folder as results
 from kinacc.deployment.record import Calibration
-from kinacc.errors import InputError, Problem
 from kinacc.kinematics import robot as robots
 from kinacc.kinematics.robot import Robot
 from kinacc.tables.allowed import SELECTABLE
@@ -209,13 +208,9 @@ def robot_of(folder: str | Path, robot: str | None) -> Robot:
     """
     recorded = results.recorded_robot(folder)
     if robot is None:
-        if recorded is None:
-            message = f"is not given, and {folder} has no robot.parquet"
-            raise InputError(Problem("--robot", message, "a shipped name, a robot file"))
         return recorded
     arm = robots.load(robot)
-    if recorded is not None:
-        results.require_same_robot(recorded, arm, str(folder))
+    results.require_same_robot(recorded, arm, str(folder))
     return arm
 
 

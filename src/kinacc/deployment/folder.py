@@ -16,7 +16,7 @@ from kinacc.deployment.record import MODELS, Calibration, Residual
 from kinacc.errors import InputError, Problem, gathered, refuse
 from kinacc.kinematics import robot as robots
 from kinacc.kinematics import tables as model_tables
-from kinacc.kinematics.dh import PARAMETERS, DHModel
+from kinacc.kinematics.dh import PARAMETERS
 from kinacc.kinematics.robot import Robot
 from kinacc.tables import store
 from kinacc.tables.allowed import SUBSETS
@@ -73,14 +73,11 @@ def read_tables(
     return tables
 
 
-def recorded_robot(folder: Path | str) -> Robot | None:
-    """The robot a results folder was made with; None where it has no table of it.
-
-    Raises InputError where that table cannot be read.
-    """
+def recorded_robot(folder: Path | str) -> Robot:
+    """The robot a results folder was made with; InputError where its table cannot be read."""
     path = Path(folder) / "robot.parquet"
     if not path.is_file():
-        return None
+        raise InputError(Problem(str(path), "no such file", fix="run kinacc calibrate"))
     description = next(iter(store.read(path).get("description", ())), None)
     if not isinstance(description, str):
         raise InputError(Problem(str(path), "has no description", fix=store.remake(path)))
@@ -132,7 +129,6 @@ def _calibration(
         message = f"{choice!r} is none of these results"
         raise InputError(Problem("model", message, ", ".join(created)))
     bounded = next(item for item in created.values() if item.domain is not None)
-    _require_same_arm(bounded.dh, robot, name)
     frames, identified = tables["frames"], tables.get(f"{PLAINEST}_identified")
     number = _session_number(frames, choice, session)
     bases = [model_tables.frame(frames, kind, "base", session) for kind in (PLAINEST, choice)]
@@ -161,7 +157,7 @@ def _calibration(
             for target in targets_of(frames, choice)
         },
         known=uncertainty(tables, choice),
-        residual=residual(tables, choice),
+        residual=_residual(tables, choice),
         fitted_range_rad=bounded.domain,
         fitted=fitted,
         orientation_measured=turned,
@@ -187,27 +183,15 @@ def _session_number(frames: Columns, model: str, session: str | None) -> int:
 
 
 def selected_model(tables: Tables) -> str:
-    """The selected model; where none was recorded, the better one on held-out poses.
-
-    Raises InputError where neither is known.
-    """
-    if recorded := recorded_model(tables):
-        return recorded
-    held_out = {kind: residual(tables, kind, "validation") for kind in ALWAYS}
-    rms_mm = {kind: item.position_mm for kind, item in held_out.items() if item}
-    if len(rms_mm) < len(ALWAYS):
-        message = "was not selected, and there are no held-out residuals to choose by"
-        raise InputError(Problem("model", message, ", ".join(MODELS), "give --model"))
-    return min(rms_mm, key=rms_mm.__getitem__)
+    """The model that ``model_selection`` selected; InputError without that table."""
+    if "model_selection" not in tables:
+        message, fix = "was not selected", "run kinacc calibrate, or give --model"
+        raise InputError(Problem("model", message, ", ".join(MODELS), fix))
+    table = pd.DataFrame(dict(tables["model_selection"]))
+    return str(table.loc[table["selected"] == 1, "model"].iloc[0])
 
 
-def recorded_model(tables: Tables) -> str:
-    """The model that ``model_selection`` selected; empty without that table."""
-    table = pd.DataFrame(dict(tables.get("model_selection", {"model": [], "selected": []})))
-    return str(next(iter(table.loc[table["selected"] == 1, "model"]), ""))
-
-
-def residual(tables: Tables, choice: str, subset: str | None = None) -> Residual | None:
+def _residual(tables: Tables, choice: str) -> Residual | None:
     """Rms of ``<choice>_vs_measured``: of held-out rows, or of training rows where there are none.
 
     None where the table does not say.
@@ -215,7 +199,7 @@ def residual(tables: Tables, choice: str, subset: str | None = None) -> Residual
     names = ("comparison", "subset", "quantity", "fold", "rms")
     table = pd.DataFrame({name: tables.get("residuals", {}).get(name, []) for name in names})
     pooled = table[(table["comparison"] == f"{choice}_vs_measured") & table["fold"].isna()]
-    for item in ("validation", "train") if subset is None else (subset,):
+    for item in reversed(SUBSETS):
         rms = pooled[pooled["subset"] == item].set_index("quantity")["rms"]
         if "position" in rms:
             turn = float(rms.get("orientation", np.nan))
@@ -246,7 +230,14 @@ def require_same_robot(recorded: Robot, robot: Robot, place: str) -> None:
 
     Limits and tool may differ: they are no part of what was fitted.
     """
-    _require_same_arm(recorded.dh, robot, place)
+    nominal = recorded.dh
+    if nominal.joints != robot.dh.joints:
+        raise _another_robot(place, robot, f"{nominal.joints} joints, not {robot.dh.joints}")
+    for parameter in PARAMETERS:
+        first, two = getattr(nominal, parameter), getattr(robot.dh, parameter)
+        if (apart := np.flatnonzero(np.abs(first - two) > _SAME * (1.0 + np.abs(two)))).size:
+            message = f"{first[apart[0]]:.9g}, not {two[apart[0]]:.9g}"
+            raise _another_robot(place, robot, f"{parameter} of joint {apart[0] + 1} {message}")
     pairs = {
         "sliding joints": (recorded.dh.prismatic, robot.dh.prismatic),
         "joint_map or signs": (recorded.joint_map, robot.joint_map),
@@ -256,16 +247,6 @@ def require_same_robot(recorded: Robot, robot: Robot, place: str) -> None:
     for message, (first, two) in pairs.items():
         if not np.allclose(first, two, rtol=_SAME, atol=_SAME):
             raise _another_robot(place, robot, message)
-
-
-def _require_same_arm(nominal: DHModel, robot: Robot, place: str) -> None:
-    if nominal.joints != robot.dh.joints:
-        raise _another_robot(place, robot, f"{nominal.joints} joints, not {robot.dh.joints}")
-    for parameter in PARAMETERS:
-        first, two = getattr(nominal, parameter), getattr(robot.dh, parameter)
-        if (apart := np.flatnonzero(np.abs(first - two) > _SAME * (1.0 + np.abs(two)))).size:
-            message = f"{first[apart[0]]:.9g}, not {two[apart[0]]:.9g}"
-            raise _another_robot(place, robot, f"{parameter} of joint {apart[0] + 1} {message}")
 
 
 def _another_robot(place: str, robot: Robot, difference: str) -> InputError:

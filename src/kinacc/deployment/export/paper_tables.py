@@ -13,7 +13,7 @@ from kinacc.calibration.misfit import in_words, misfit
 from kinacc.config.error_models import ERROR_MODELS, MEASURED, PLAINEST, Comparison, model_name
 from kinacc.config.names import in_markdown
 from kinacc.deployment.export.source import Source
-from kinacc.deployment.folder import recorded_model
+from kinacc.deployment.folder import selected_model
 from kinacc.deployment.record import POSES
 from kinacc.errors import InputError, Problem
 from kinacc.kinematics.dh import PARAMETERS
@@ -41,7 +41,7 @@ def paper_tables(source: Source) -> list[PaperTable]:
     if "residuals" not in source.tables:
         place = f"{source.calibration.name}: residuals.parquet"
         raise InputError(Problem(place, "no such file", "a finished run"))
-    name, selected = source.calibration.name, recorded_model(source.tables)
+    name, selected = source.calibration.name, selected_model(source.tables)
     measured = {
         model: _residuals(
             source,
