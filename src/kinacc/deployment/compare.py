@@ -20,10 +20,10 @@ from kinacc.calibration.uncertainty import scale_of, scaled_unit, unit_of
 from kinacc.deployment.applicability import frame_motions, is_measured_there, sensitivity
 from kinacc.deployment.record import FLANGE, Calibration
 from kinacc.deployment.shared_readings import NONE_SHARED, SharedReadings, counted_once
-from kinacc.deployment.verify import covers
 from kinacc.errors import InputError, Problem
 from kinacc.geometry import Pose, compose, exp_so3
 from kinacc.kinematics import robot as robots
+from kinacc.kinematics.inverse.limits import outside
 from kinacc.kinematics.inverse.newton import pose_error
 from kinacc.kinematics.model import JointState
 
@@ -121,8 +121,8 @@ def compare(
     """
     require_alike(first, second)
     both = (first, second)
-    inside = [covers(item.model, item.robot.dh_joints(q_rad)).all(axis=1) for item in both]
-    covered = np.all(inside, axis=0)
+    beyond = [outside(item.robot.dh_joints(q_rad), item.model.domain) for item in both]
+    covered = ~np.any(beyond, axis=(0, 2))
     if covered.sum() < min(_FEWEST, len(q_rad)):
         message = f"{covered.sum()} of {len(q_rad)} poses lie in the joint ranges of both models"
         fix = "give poses measured by both (--joints FILE), or compare DH models (--model dh)"

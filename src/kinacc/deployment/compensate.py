@@ -132,7 +132,7 @@ def compensate(
     reported = limits.reported_joints(robot, q_dh)
     outside = np.where(
         (status == PoseStatus.OUTSIDE_LIMITS)[:, None],
-        ~_within_each(calibration, reported),
+        limits.outside(reported, (robot.q_min_rad, robot.q_max_rad)),
         calibration.outside_range(q_dh),
     )
     q_rad = np.where((status <= PoseStatus.OTHER_POSTURE)[:, None], reported, np.nan)
@@ -180,10 +180,10 @@ class _Goals:
         it stands.
         """
         calibration, robot, model = self.calibration, self.calibration.robot, self.calibration.model
-        is_bounded = model.domain is not None
+        is_bounded, within = model.domain is not None, (robot.q_min_rad, robot.q_max_rad)
         reach = limits.travel_unit(robot) * SAME_POSTURE_RAD
         reported = limits.reported_joints(robot, start)
-        beyond_limits = ~_within_each(calibration, reported, reach).all(axis=1)
+        beyond_limits = limits.outside(reported, within, reach).any(axis=1)
         hopeless = beyond_limits | (
             calibration.outside_range(start, reach).any(axis=1) & is_bounded
         )
@@ -201,11 +201,11 @@ class _Goals:
         turn_rad = FEW_AXES_TURN_RAD if self.has_few_axes else ROTATION_TOLERANCE_RAD
         hit = (off <= POSITION_TOLERANCE_MM) & (angle <= turn_rad)
         reported = limits.reported_joints(robot, q_dh)
-        inside = np.all(_within_each(calibration, reported), axis=1)
-        covered = np.all(~calibration.outside_range(q_dh), axis=1)
+        outside = limits.outside(reported, within).any(axis=1)
+        covered = ~calibration.outside_range(q_dh).any(axis=1)
         beyond = PoseStatus.OUTSIDE_RANGE if is_bounded else PoseStatus.EXTRAPOLATED
         refined = np.select(
-            [~hit, ~inside, covered],
+            [~hit, outside, covered],
             [PoseStatus.NOT_REACHED, PoseStatus.OUTSIDE_LIMITS, PoseStatus.CONVERGED],
             beyond,
         )
@@ -248,7 +248,7 @@ class _Goals:
         turn = 2.0 * np.pi * ~robot.dh.prismatic
         base = q_dh + turn * np.rint((near - q_dh) / (2.0 * np.pi))
         angles = base + np.array([0, -1, 1, -2, 2])[:, None, None] * turn
-        outside = (angles < lower - 1e-9) | (angles > upper + 1e-9)
+        outside = limits.outside(angles, (lower, upper))
         cost = (np.abs(angles - near) + 100.0 * outside).round(9)
         return np.take_along_axis(angles, np.argmin(cost, axis=0)[None], axis=0)[0]
 
@@ -286,11 +286,3 @@ def distance(first: Pose, second: Pose) -> tuple[np.ndarray, np.ndarray]:
     turn = log_so3(first.rotation @ np.swapaxes(second.rotation, -1, -2))
     gap_mm = np.linalg.norm(first.position_mm - second.position_mm, axis=-1)
     return gap_mm, np.linalg.norm(turn, axis=-1)
-
-
-def _within_each(
-    calibration: Calibration, reported: np.ndarray, slack: np.ndarray | float = 1e-9
-) -> np.ndarray:
-    """Whether reported joints (n, k) are within the limits, joint by joint."""
-    robot = calibration.robot
-    return (reported >= robot.q_min_rad - slack) & (reported <= robot.q_max_rad + slack)

@@ -30,13 +30,13 @@ from kinacc.deployment.verify import (
     LEAST_HELD_OUT,
     STATISTICS,
     TOOL,
-    covers,
     frames_at,
     held_out_vectors,
     statistics,
 )
 from kinacc.errors import FitError, InputError
 from kinacc.kinematics import robot as robots
+from kinacc.kinematics.inverse.limits import outside
 from kinacc.kinematics.robot import carried
 from kinacc.measurements.folds import SAME_CONFIGURATION_RAD, configurations
 from kinacc.tables.allowed import FIRST, HOLDS, OPEN, RECALIBRATE, SAME
@@ -223,17 +223,17 @@ class _Comparison:
         """
         calibration, observed = force.calibration, session.observations
         kind, model = calibration.choice, calibration.model
-        observed = observed.select(np.all(covers(model, observed.q_rad), axis=1))
+        observed = observed.select(~np.any(outside(observed.q_rad, model.domain), axis=1))
         moved = [BASE] * (not setup.same_base or len(observed.session_names) > 1)
         moved += [TOOL] * (
             not setup.same_tool or not {*observed.target_names} <= {*calibration.targets}
         )
-        bases, sizes = [calibration] * len(observed.session_names), [np.zeros(0)]
+        sizes = [np.zeros(0)]
         for fold in np.unique(observed.fold):
             tried = observed.fold == fold
             train = observed.select(~tried if fold >= 0 else tried)
             if len(train):
-                frames = frames_at(bases, train, moved, self.rotation_weight_mm_per_rad)
+                frames = frames_at(calibration, train, moved, self.rotation_weight_mm_per_rad)
                 off = errors({kind: Fit(model, frames)}, observed.select(tried))
                 position_mm = off[Comparison(MEASURED, kind).name].position_mm
                 sizes.append(np.linalg.norm(position_mm, axis=1))

@@ -13,6 +13,7 @@ from kinacc.calibration.uncertainty import Uncertainty, scale_of
 from kinacc.config.error_models import ERROR_MODELS, NOMINAL
 from kinacc.errors import InputError, Problem
 from kinacc.geometry import IDENTITY, Pose, compose, invert, skew
+from kinacc.kinematics.inverse import limits
 from kinacc.kinematics.model import ErrorModel, JointState
 from kinacc.kinematics.robot import Robot
 from kinacc.tables.allowed import SUBSETS
@@ -163,11 +164,7 @@ class Calibration:
 
     def outside_range(self, q_rad: np.ndarray, slack: np.ndarray | float = 1e-9) -> np.ndarray:
         """True (n, k) where a DH joint lies outside what the data cover by more than ``slack``."""
-        q_rad = np.atleast_2d(q_rad)
-        if self.fitted_range_rad is None:
-            return np.zeros(q_rad.shape, dtype=bool)
-        low, high = self.fitted_range_rad
-        return (q_rad < low - slack) | (q_rad > high + slack)
+        return limits.outside(np.atleast_2d(q_rad), self.fitted_range_rad, slack)
 
 
 def nominal(robot: Robot, name: str = "") -> Calibration:

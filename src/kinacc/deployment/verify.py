@@ -34,6 +34,7 @@ from kinacc.deployment.record import Calibration
 from kinacc.deployment.shared_readings import known_rows
 from kinacc.errors import InputError, Problem
 from kinacc.geometry import Pose, skew
+from kinacc.kinematics.inverse.limits import outside
 from kinacc.kinematics.model import ErrorModel
 from kinacc.kinematics.robot import Robot, carried
 from kinacc.kinematics.tables import models
@@ -48,7 +49,6 @@ LEAST_HELD_OUT = 20  # configurations: fewer do not tell the size of errors
 DOUBLED = 2.0  # readings that would not show errors this many times as large decide nothing
 STATISTICS = ("mean", "quantile_99", "largest", "rms")
 _FAR_MM = 10.0
-_SLACK = 1e-9  # rad and mm beyond the fitted range: rounding
 
 
 @dataclass(frozen=True)
@@ -140,11 +140,14 @@ def verify(
     kind, model = calibration.choice, calibration.model
     is_known = known_rows(columns, tables.get("measurements", {}))
     observed = from_columns(columns, robot).select(~is_known)
+    if len(observed.session_names) > 1:
+        message = "are of several sessions, each with its own base"
+        raise InputError(Problem("the readings", message, "readings of one session"))
     point = next((name for name in observed.target_names if name in calibration.targets), None)
     near = is_measured_there(calibration, observed.at, point) if len(observed) else is_known[:0]
     table = model_errors(tables, robot, observed, moved, rotation_weight_mm_per_rad)
     held_out = _held_out(tables, kind, model, robot, observed, moved) if len(observed) else None
-    rows = _whole_configurations(observed, near & covers(model, observed.q_rad).all(axis=1))
+    rows = _whole_configurations(observed, near)
     result = Verification(
         UNDECIDED, "", kind, len(is_known), int(is_known.sum()), int(near.sum()), table,
         held_out and _level(held_out),
@@ -153,8 +156,6 @@ def verify(
         "the calibration was fitted to all of these readings": not len(observed),
         SET_UP_MOVED: not moved and table["mean_mm"].min() > _FAR_MM,
         FEW_HELD_OUT: held_out is None or len(held_out.columns) < LEAST_HELD_OUT,
-        "several sessions, each with its own base": BASE in moved
-        and len(observed.session_names) > 1,
         "no reading near a measured pose": not len(rows),
     }
     obstacle = next((text for text, holds in obstacles.items() if holds), "")
@@ -162,8 +163,8 @@ def verify(
         return replace(result, reason=obstacle)
     new = observed.select(rows.ravel())
     new = replace(new, rotation=np.full_like(new.rotation, np.nan))
-    of_sessions = _of_sessions(tables, robot, kind, new.session_names, moved)
-    frames = frames_at(of_sessions, new, moved, rotation_weight_mm_per_rad)
+    calibration = _at_session(tables, robot, kind, new, moved)
+    frames = frames_at(calibration, new, moved, rotation_weight_mm_per_rad)
     off_mm = errors({kind: Fit(model, frames)}, new)[Comparison(MEASURED, kind).name].position_mm
     poses = new.select(slice(None, None, rows.shape[1]))
     fresh = error_columns(
@@ -197,13 +198,13 @@ def model_errors(
     for a target or session without a frame, and FitError.
     """
     fitted = models(tables, robot.dh)
-    inside = [covers(model, observations.q_rad).all(axis=1) for model in fitted.values()]
-    part = observations.select(np.all(inside, axis=0))
+    beyond = [outside(observations.q_rad, model.domain) for model in fitted.values()]
+    part = observations.select(~np.any(beyond, axis=(0, 2)))
     rows = []
     for kind in sorted(fitted, key=(NOMINAL, *ERROR_MODELS).index) if len(part) else ():
         model = fitted[kind]
-        of_sessions = _of_sessions(tables, robot, kind, part.session_names, moved)
-        frames = frames_at(of_sessions, part, moved, rotation_weight_mm_per_rad)
+        calibration = _at_session(tables, robot, kind, part, moved)
+        frames = frames_at(calibration, part, moved, rotation_weight_mm_per_rad)
         off = errors({kind: Fit(model, frames)}, part)[Comparison(MEASURED, kind).name]
         row: list[object] = [kind, len(part)]
         for vectors in (off.position_mm, 1e3 * off.rotation_rad):
@@ -305,52 +306,42 @@ def statistics(errors: np.ndarray) -> list[float]:
     return [float(value) for value in values]
 
 
-def _of_sessions(
-    tables: Tables, robot: Robot, kind: str, sessions: Sequence[str | None], moved: Sequence[str]
-) -> list[Calibration]:
-    """The calibration with the base of each session. InputError where a session is not clear."""
+def _at_session(
+    tables: Tables, robot: Robot, kind: str, readings: Observations, moved: Sequence[str]
+) -> Calibration:
+    """The calibration with the base of the readings' session; InputError where it is not clear."""
     if BASE in moved:
-        return [folder.calibration(tables, robot, kind)] * len(sessions)
+        return folder.calibration(tables, robot, kind)
+    (session,) = readings.session_names
     frames = pd.DataFrame(dict(tables["frames"]))
     measured = frames.loc[frames["frame"] == BASE].get("session", pd.Series()).unique()
-    if tuple(sessions) == (None,) and len(measured) > 1:
-        message, allowed = (
-            "have no session, and each has its own base",
-            ", ".join(map(str, measured)),
-        )
+    if session is None and len(measured) > 1:
+        message, allowed = "have no session, and each has its own base", ", ".join(measured)
         raise InputError(Problem("the readings", message, f"one of {allowed}"))
-    return [folder.calibration(tables, robot, kind, session=session) for session in sessions]
+    return folder.calibration(tables, robot, kind, session=session)
 
 
 def frames_at(
-    calibrations: Sequence[Calibration],
+    calibration: Calibration,
     readings: Observations,
     moved: Sequence[str],
     rotation_weight_mm_per_rad: float,
 ) -> Frames:
-    """Base and targets of ``readings``: those of the calibration, or fitted to it where ``moved``.
+    """Bases and targets of ``readings``: those of the calibration, or fitted to it where ``moved``.
 
-    ``calibrations``: one for each session, with its base; the joint model stays as fitted.
+    The joint model stays as fitted.
     """
-    calibration, names = calibrations[0], readings.target_names
+    names, sessions = readings.target_names, len(readings.session_names)
     tool = carried(calibration.robot)
     targets = [
         calibration.targets.get(name, tool) if TOOL in moved else calibration.point(name)
         for name in names
     ]
-    frames = Frames(stacked([item.base for item in calibrations]), stacked(targets))
+    frames = Frames(stacked([calibration.base] * sessions), stacked(targets))
     if not moved:
         return frames
     terms = frame_terms(readings, frames)
-    of_base = np.arange(len(terms.names)) < len(MOTIONS) * len(calibrations)  # these stand first
+    of_base = np.arange(len(terms.names)) < len(MOTIONS) * sessions  # these stand first
     terms = replace(terms, free=np.where(of_base, BASE in moved, TOOL in moved))
     weight = rotation_weight_mm_per_rad
     return fit_frames(readings, calibration.model, rotation_weight_mm_per_rad=weight, frames=terms)
-
-
-def covers(model: ErrorModel, q_rad: np.ndarray) -> np.ndarray:
-    """True (n, k) where DH joints lie in the range of the model."""
-    if model.domain is None:
-        return np.ones(q_rad.shape, dtype=bool)
-    low, high = model.domain
-    return (q_rad >= low - _SLACK) & (q_rad <= high + _SLACK)

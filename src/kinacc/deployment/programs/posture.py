@@ -60,8 +60,7 @@ def choose(
     """
     turns = [(0.0,) if slides else 2.0 * np.pi * np.arange(-2, 3) for slides in robot.dh.prismatic]
     ways = (ways[:, None] + np.array([*product(*turns)])).reshape(-1, robot.dh.joints)
-    inside = (ways >= robot.q_min_rad - 1e-9) & (ways <= robot.q_max_rad + 1e-9)
-    ways = ways[inside.all(axis=1)]
+    ways = ways[~limits.outside(ways, (robot.q_min_rad, robot.q_max_rad)).any(axis=1)]
     texts = "within its limits"
     if stated:
         fits = [not unmatched(robot, posture, stated, way, _ROUNDING_DEG) for way in ways]

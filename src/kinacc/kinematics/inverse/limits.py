@@ -147,8 +147,34 @@ def within(q_rad: np.ndarray, lower_rad: np.ndarray, upper_rad: np.ndarray) -> n
     numpy.ndarray
         Booleans, shape (...).
     """
-    inside = (q_rad >= lower_rad - _ROUND_OFF_RAD) & (q_rad <= upper_rad + _ROUND_OFF_RAD)
-    return np.asarray(inside.all(axis=-1))
+    return ~np.any(outside(q_rad, (lower_rad, upper_rad), _ROUND_OFF_RAD), axis=-1)
+
+
+def outside(
+    q_rad: np.ndarray,
+    box: tuple[np.ndarray, np.ndarray] | None,
+    slack: np.ndarray | float = 1e-9,
+) -> np.ndarray:
+    """Test joint by joint whether joints lie outside a box, as NaN does.
+
+    Parameters
+    ----------
+    q_rad : numpy.ndarray
+        Joints, shape (..., k), rad (mm where a joint slides).
+    box : tuple of numpy.ndarray or None
+        Ends (k,), (k,); None: no joint is outside.
+    slack : numpy.ndarray or float
+        Distance beyond the ends that is allowed, rad (mm).
+
+    Returns
+    -------
+    numpy.ndarray
+        Booleans, shape (..., k).
+    """
+    if box is None:
+        return np.zeros(q_rad.shape, dtype=bool)
+    low, high = box
+    return ~((q_rad >= low - slack) & (q_rad <= high + slack))
 
 
 def take_turns(
