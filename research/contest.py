@@ -24,11 +24,11 @@ from kinacc.assess.registry import ADAPTIVE, ASSESSORS, RECOMMENDED
 from kinacc.assess.statement import CANDIDATES, REGION, Reason, Statement
 from kinacc.assess.world import World, assess_world, carry_on, drawn_world, key_of, truth_mm
 from kinacc.config.records import of_section
-from kinacc.study.fields import ErrorField, of_measurements, of_points, synthetic
+from kinacc.study.fields import ErrorField, of_measurements, of_points
 from kinacc.tables import store
 from research import verdicts
 from research.conditions import CONDITIONS, STATED, Course
-from research.made_up_fields import ARMS, MADE_UP, made_up
+from research.made_up_fields import ARMS, MADE_UP, made_up, synthetic
 
 NM_PER_MM = 1_000_000
 CONTESTANTS = tuple(ASSESSORS)

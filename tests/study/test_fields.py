@@ -1,18 +1,18 @@
-"""Error fields that simulated campaigns draw from: synthetic families, measured arms, points."""
+"""Error fields that simulated campaigns draw from: made up, and of measured arms."""
 
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
-from kinacc.study.fields import of_measurements, synthetic
+from kinacc.study.fields import FAMILIES, made_up, of_measurements
 
 
-def test_a_defect_makes_a_heavier_tail_than_smooth_errors():
-    def tail(name):
-        size = np.linalg.norm(synthetic(name, 0).error_mm, axis=1)
-        return size.max() / np.median(size)
-
-    assert tail("defect") > 1.2 * tail("smooth")
+def test_made_up_errors_have_their_size_and_a_defect_a_heavier_tail():
+    for name, (std_mm, times) in FAMILIES.items():
+        error_mm = made_up(name).error_mm
+        assert np.std(error_mm[20:]) == pytest.approx(std_mm, rel=0.03)
+        assert np.std(error_mm[:20]) == pytest.approx(times * std_mm, rel=0.3)
 
 
 def test_measured_fields_average_the_readings_of_a_pose_and_leave_out_what_was_fitted():

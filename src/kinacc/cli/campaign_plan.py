@@ -67,7 +67,7 @@ def plan(out: Output, **options: Any) -> None:
     """Simulate campaigns: the width of the bounds by budget, and the budget for a wanted width.
 
     --errors is a results folder (its held-out errors), a file with columns ex_mm, ey_mm, ez_mm, or
-    a family of synthetic arms: smooth, workshop, defect.
+    made-up errors: smooth, workshop (larger), defect (larger still at 2 % of the poses).
 
     \b
     Example:
@@ -130,13 +130,13 @@ def _question(
 
 
 def errors_of(name: str, point: str | None = None) -> ErrorField:
-    """Return the errors of a family, a results folder or a file.
+    """Return made-up errors, those of a results folder or of a file.
 
     ``point``: target of a results folder, by default the one that a campaign is about.
     """
     path, columns = Path(name), ("ex_mm", "ey_mm", "ez_mm")
     if name in fields.FAMILIES:
-        return replace(fields.synthetic(name, 0), name=name)
+        return fields.made_up(name)
     if path.is_dir():
         return _errors_of_folder(path, point)
     if not path.is_file():
