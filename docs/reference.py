@@ -59,13 +59,13 @@ def settings():
 
 def tables():
     """A table of columns for each artefact."""
-    parts = []
+    parts, same = [], {0.0: "equal", None: "by the row's unit"}
     for each in ARTEFACTS.values():
         key = ", ".join(f"`{name}`" for name in each.key)
         parts.append(f"## {each.file_name}\n\n{each.meaning} Key: {key}.\n")
         rows = (
             (f"`{column.name}`", column.kind, column.unit or "-", column.limits or "any",
-             str(column.same_within or "equal"), column.meaning)
+             same.get(column.same_within, str(column.same_within)), column.meaning)
             for column in each.columns
         )  # fmt: skip
         head = ("column", "type", "unit", "allowed", "same within", "meaning")

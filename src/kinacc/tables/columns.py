@@ -24,8 +24,6 @@ SAME_WITHIN = {
 }
 # Among values of several units pure numbers may be as large as thousands of degrees of freedom.
 SAME_AMONG = {**SAME_WITHIN, "1": 1e-6}
-# Where a column is not held to its unit: what it is held to in its place.
-BY_ROW, BY_POSES, BY_STD = "the row's unit", "predicted poses", "standard deviations"
 
 
 @dataclass(frozen=True)
@@ -50,16 +48,14 @@ class Column:
     pattern: str = ""
     optional: bool = False
     may_be_absent: bool = False
-    same: float | str | None = None
+    same: float | None = None
 
     @property
-    def same_within(self) -> float | str:
-        """What two runs of one work may differ by, or what the column is held to in its place."""
+    def same_within(self) -> float | None:
+        """What two runs of one work may differ by; None where that depends on the row."""
         if self.kind != "float":
             return 0.0
-        if self.same is not None:
-            return self.same
-        return BY_ROW if self.unit == "see unit" else SAME_WITHIN[self.unit]
+        return SAME_WITHIN.get(self.unit) if self.same is None else self.same
 
     @property
     def per_joint(self) -> bool:

@@ -15,15 +15,7 @@ import pandas as pd
 
 from kinacc.errors import input_error
 from kinacc.tables import store
-from kinacc.tables.columns import (
-    BY_POSES,
-    BY_ROW,
-    BY_STD,
-    SAME_AMONG,
-    SAME_WITHIN,
-    Column,
-    joint_count,
-)
+from kinacc.tables.columns import SAME_AMONG, SAME_WITHIN, Column, joint_count
 from kinacc.tables.contract import ARTEFACTS
 
 _RELATIVE = 1e-6  # of variances, which have the units of both parameters
@@ -137,14 +129,11 @@ def _tolerance(column: Column | None, rows: pd.DataFrame) -> np.ndarray | float:
     """What numbers of a column may differ by: one for all, or one for each row."""
     if column is None:
         return 0.0
-    if not isinstance(within := column.same_within, str):
+    if (within := column.same_within) is not None:
         return within
-    if within == BY_STD:
+    if column.unit == "product of the units of both":
         return _RELATIVE * float(np.nanmax(np.abs(rows[column.name].to_numpy(float)), initial=0.0))
-    if within not in (BY_ROW, BY_POSES) or column.unit in SAME_WITHIN:
-        return SAME_WITHIN.get(column.unit, _RELATIVE)
     if "error" in rows:
         lengths = rows["error"].str.startswith("delta").to_numpy(bool)
         return np.where(lengths, SAME_WITHIN["mm"], SAME_WITHIN["rad"])
-    units = rows["unit"] if "unit" in rows else pd.Series("", index=rows.index)
-    return units.map(SAME_AMONG).fillna(_RELATIVE).to_numpy(float)
+    return rows["unit"].map(SAME_AMONG).fillna(_RELATIVE).to_numpy(float)
