@@ -123,7 +123,7 @@ def test_a_second_run_is_refused_while_the_first_goes_on(unfitted):
 
 def test_a_stage_whose_disk_fills_leaves_nothing_half_written_and_is_continued(unfitted):
     folder, wanted = unfitted
-    script = folder / "workflow/scripts/fit_vec.py"
+    script = folder / "workflow/scripts/fit_model.py"
     good = script.read_text()
     full = "import resource\n\nresource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))\n"
     script.write_text(full + good)

@@ -62,11 +62,12 @@ rule fit_vec:
     conda:
         "../envs/kinacc.yaml"
     params:
-        **job("fit_vec.py", "robot", calibration="rotation_weight_mm_per_rad base_and_tool frames vec"),
+        **job("fit_model.py", "robot", calibration="rotation_weight_mm_per_rad base_and_tool frames vec"),
+        kind="vec",
     message:
         "{wildcards.dataset}: fitting the VEC model to the training poses"
     script:
-        "../scripts/fit_vec.py"
+        "../scripts/fit_model.py"
 
 
 rule fit_compliance:
@@ -85,11 +86,12 @@ rule fit_compliance:
     conda:
         "../envs/kinacc.yaml"
     params:
-        **job("fit_compliance.py", "robot", calibration="rotation_weight_mm_per_rad base_and_tool frames dh compliance"),
+        **job("fit_model.py", "robot", calibration="rotation_weight_mm_per_rad base_and_tool frames dh compliance"),
+        kind="compliance",
     message:
         "{wildcards.dataset}: fitting the DH model with joints that bend"
     script:
-        "../scripts/fit_compliance.py"
+        "../scripts/fit_model.py"
 
 
 rule fit_dh:
@@ -111,11 +113,12 @@ rule fit_dh:
     conda:
         "../envs/kinacc.yaml"
     params:
-        **job("fit_dh.py", "robot", calibration="rotation_weight_mm_per_rad base_and_tool frames dh"),
+        **job("fit_model.py", "robot", calibration="rotation_weight_mm_per_rad base_and_tool frames dh"),
+        kind="dh",
     message:
         "{wildcards.dataset}: fitting the DH model"
     script:
-        "../scripts/fit_dh.py"
+        "../scripts/fit_model.py"
 
 
 rule residuals:
