@@ -77,7 +77,7 @@ def test_the_proven_excess_is_the_integral_of_what_readings_can_pay_for(field):
 @pytest.mark.parametrize(("readings", "at_largest"), [(10, 1), (18, 9)])
 def test_below_all_spare_readings_are_at_the_largest_point(readings, at_largest):
     sizes, noise = FIELDS["lone"], np.linspace(0.08, 0.2, 10)
-    lower_mm = width_limits(sizes, noise, readings, ERROR).lower_mm
+    lower_mm = width_limits(sizes, noise, readings, ERROR).attainable_lower_mm
     assert lower_mm == pytest.approx(Z * noise[5] / math.sqrt(at_largest))
 
 

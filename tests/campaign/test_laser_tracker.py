@@ -9,7 +9,6 @@ from scipy.spatial.transform import Rotation
 
 from kinacc.campaign import folder as campaigns
 from kinacc.campaign.instrument import instruments
-from kinacc.campaign.plan import from_json, to_json
 from kinacc.errors import InputError
 from kinacc.geometry import Pose
 
@@ -52,14 +51,6 @@ def test_the_beam_of_a_tracker_that_is_turned_against_the_base_is_along_its_line
     at = np.random.default_rng(4).uniform(-800.0, 800.0, (5, 3))
     wanted = [turn @ of_spherical_readings(turn.T @ (each - head)) @ turn.T for each in at]
     np.testing.assert_allclose(tracker.in_base(Pose(turn, head), at), wanted, rtol=1e-5, atol=1e-9)
-
-
-def test_a_plan_with_a_laser_tracker_is_read_as_it_was_written(begun):
-    plan = campaigns.open_(begun("--instrument", f"tracker={LASER}", "--resolution-mm", 0.01)).plan
-    again = from_json(to_json(plan), "here")
-    assert again.instruments[0].laser == plan.instruments[0].laser
-    assert again.instruments[0].resolution_mm == 0.01
-    np.testing.assert_array_equal(again.covariance_mm2, plan.covariance_mm2)
 
 
 @pytest.mark.parametrize(

@@ -56,7 +56,7 @@ def test_limits_of_a_finished_campaign_are_those_of_the_true_errors(measured):
     for each in found.bounds:
         assert each.attainable_mm == pytest.approx(true.attainable_mm, rel=0.15)
         assert each.proven_mm == pytest.approx(true.proven_mm, rel=0.15)
-        assert each.attainable_lower_mm == pytest.approx(true.lower_mm, rel=1e-3)
+        assert each.attainable_lower_mm == pytest.approx(true.attainable_lower_mm, rel=1e-3)
         assert each.lower_mm <= sizes.max() <= each.upper_mm
 
 

@@ -117,13 +117,6 @@ def test_parts_joined_in_any_order_give_the_same_bytes(rows):
         assert same(made["readings"], monte_carlo.readings(rows, sizes.max()))
 
 
-def test_a_simulation_does_not_know_its_neighbours(rows):
-    alone = simulated(small_errors(), NOISE[1:], [2], SMALL, seed=99)
-    assert same(alone, rows[(rows["noise_mm"] == NOISE[1]) & (rows["repetition"] == 2)])
-    other = simulated(small_errors(), NOISE[1:], [2], SMALL, seed=98)
-    assert not np.array_equal(other["assessed_mm"], alone["assessed_mm"])
-
-
 def test_summary_and_readings_are_plain_statistics_of_the_rows(rows):
     """Six rows of three values; thirty of the readings, three and twelve a noise and assessor."""
     switches = {"outlier_rule": "normal", "distance": "squared", "covariance": "r"}

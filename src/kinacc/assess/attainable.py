@@ -33,7 +33,7 @@ class WidthLimits(NamedTuple):
 
     attainable_mm: float  # mean excess of the upper bound by the best fixed design, sizes known
     proven_mm: float  # mean excess below which no rule stays whose bound holds whatever is true
-    lower_mm: float  # mean distance of the lower bound where the largest point is known
+    attainable_lower_mm: float  # mean distance of the lower bound where the largest point is known
 
 
 NONE = WidthLimits(math.nan, math.nan, math.nan)

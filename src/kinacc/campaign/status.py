@@ -6,6 +6,7 @@ import math
 import shlex
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -26,17 +27,6 @@ from kinacc.campaign.state import Scatter, State, scatter, size_scatter
 
 _CLEAR_OF_NOISE = 3.0  # standard deviations: larger bounds hold where the noise is smaller
 _UNJUDGED = Decision("", None, math.nan)
-# What a bound has of a statement as it is.
-_STATED = (
-    "target",
-    "share",
-    "value_mm",
-    "lower_mm",
-    "upper_mm",
-    "confidence",
-    "excepted",
-    "error_of",
-)
 
 
 @dataclass(frozen=True)
@@ -221,29 +211,24 @@ def percent(share: float) -> str:
 def _bound(stated: Statement, state: State, tolerance_mm: float | None, overstated: bool) -> Bound:
     visited, candidates = len(state.campaign.ledger.visited), len(state.rows)
     judged = _UNJUDGED if tolerance_mm is None else decide(stated, tolerance_mm)
-    limits, doubt = _limits(stated, state), ""
-    if stated.upper_mm < stated.lower_mm:
-        doubt = "the bounds contradict each other"
-    elif stated.value_mm > stated.upper_mm:
-        doubt = "the estimate lies above the upper bound, which cannot be relied on"
-    if doubt:
+    doubt = ""
+    if stated.upper_mm < stated.lower_mm or stated.upper_mm < stated.value_mm:
         kind = "overstated" if overstated else "understated"
-        doubt += f": noise {kind}, or one of the few campaigns that the confidence leaves out"
+        doubt = (
+            f"the bounds and the estimate contradict each other: noise {kind}, or one of the few "
+            "campaigns that the confidence leaves out"
+        )
+    fields: dict[str, Any] = {**vars(stated), **_limits(stated, state)._asdict()}
+    texts = {name: reason(fields[name]) for name in ("withheld", "assumption", "noise")}
     return Bound(
-        **{name: getattr(stated, name) for name in _STATED},
+        **(fields | texts),
         points=visited if stated.target == MEASURED else candidates,
         unmeasured=candidates - visited if stated.target == CANDIDATES else 0,
-        withheld=reason(stated.withheld),
-        assumption=reason(stated.assumption),
-        noise=reason(stated.noise),
         doubt=doubt,
         tolerance_mm=tolerance_mm,
         verdict=judged.verdict,
         reason=reason(judged.reason),
         guard_band_mm=judged.guard_band_mm,
-        attainable_mm=limits.attainable_mm,
-        proven_mm=limits.proven_mm,
-        attainable_lower_mm=limits.lower_mm,
     )
 
 

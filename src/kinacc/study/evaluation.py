@@ -6,7 +6,7 @@ import warnings
 
 import numpy as np
 
-from kinacc.config.error_models import MEASURED, PLAINEST, Comparison
+from kinacc.config.error_models import PLAINEST
 from kinacc.config.records import Settings
 from kinacc.geometry import Pose, compose, invert
 from kinacc.kinematics import region, robot, tables
@@ -121,11 +121,10 @@ def _error_columns(error_mm: np.ndarray) -> Columns:
 def _measured(inputs: Tables, count: int) -> Columns:
     """Configurations spread over the measured ones, errors averaged over repeated readings."""
     errors, measurements = inputs["pose_errors"], inputs["measurements"]
-    wanted = np.asarray(errors["comparison"]) == Comparison(MEASURED, PLAINEST).name
-    held_out = wanted & (np.asarray(errors["estimate"]) == "cross_validated")
+    of_model, held_out = operating_points.rows_of(errors, PLAINEST)
     if not held_out.any():
         warnings.warn("no held-out errors: the points use training errors", stacklevel=2)
-        held_out = wanted
+        held_out = of_model
     rows, error_mm = operating_points.measured_errors(errors, held_out)
     chosen = operating_points.spread_rows(len(rows), count)
     names = [name for name in measurements if name[:1] in "qs" and name[1:].isdigit()]

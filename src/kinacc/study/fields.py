@@ -12,9 +12,9 @@ from functools import cached_property
 import numpy as np
 
 from kinacc.assess.world import checked_errors, error_vectors
-from kinacc.config.error_models import MEASURED, PLAINEST, Comparison, model_name
+from kinacc.config.error_models import PLAINEST, model_name
 from kinacc.errors import InputError, Problem
-from kinacc.study.operating_points import measured_errors
+from kinacc.study.operating_points import measured_errors, rows_of
 from kinacc.tables.columns import Columns
 
 POINTS = 1000
@@ -82,9 +82,7 @@ def of_measurements(
     InputError
         Where no errors are held out.
     """
-    wanted = (np.asarray(errors["comparison"]) == Comparison(MEASURED, model).name) & (
-        np.asarray(errors["estimate"]) == "cross_validated"
-    )
+    wanted = rows_of(errors, model)[1]
     if target is not None:
         wanted &= np.asarray(errors["target"]).astype(str) == target
     if not wanted.any():

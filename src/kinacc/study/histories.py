@@ -32,16 +32,7 @@ RULES = {
     LARGER: "the simulation of 'rejected', at the slightly larger eta",
     KEPT: "first simulation that does not reject although a point was measured again",
 }
-FALLBACKS = {
-    REJECTED: (
-        "first simulation that rejects at eta",
-        "first simulation; none searched rejects at eta",
-    ),
-    KEPT: (
-        "first simulation that does not reject",
-        "first simulation; all searched reject at eta",
-    ),
-}
+FALLBACK = "first simulation decided so, else the first: none searched obeys the rule"
 
 
 @dataclass(frozen=True)
@@ -110,7 +101,7 @@ def examples(
     """The runs to show, each the first simulation that satisfies its rule (see RULES).
 
     Where none of the simulations searched does, the closest thing that exists is shown and said to
-    be that (FALLBACKS), with ``rule_met`` false.
+    be that (FALLBACK), with ``rule_met`` false.
     """
     sizes = np.linalg.norm(error_mm, axis=1)
     truth, worst = float(sizes.max()), int(sizes.argmax())
@@ -136,7 +127,7 @@ def examples(
             if shows(world, eta):
                 return Example(name, number, eta, RULES[name], True)
             nearest = number if nearest is None else nearest
-        return Example(name, nearest or 0, eta, FALLBACKS[name][nearest is None], False)
+        return Example(name, nearest or 0, eta, FALLBACK, False)
 
     fig5 = search(REJECTED, truth * settings.eta_ratio_rejected, shows_fig5)
     fig6 = search(KEPT, truth * settings.eta_ratio_kept, shows_fig6)

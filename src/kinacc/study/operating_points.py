@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pandas as pd
 
+from kinacc.config.error_models import MEASURED, Comparison
 from kinacc.errors import InputError, Problem, refuse
 from kinacc.geometry import compose
 from kinacc.kinematics import inverse, region
@@ -139,6 +140,12 @@ def spread_rows(total: int, count: int) -> np.ndarray:
     draws = region.points("halton", 4 * max(total, 1), 1, 0)[:, 0]
     rows = list(dict.fromkeys((draws * total).astype(int).tolist()))
     return np.array(rows[:count], dtype=int)
+
+
+def rows_of(errors: Columns, model: str) -> tuple[np.ndarray, np.ndarray]:
+    """Which rows (n,) of pose_errors are of a model at measured poses, and which are held out."""
+    of_model = np.asarray(errors["comparison"]) == Comparison(MEASURED, model).name
+    return of_model, of_model & (np.asarray(errors["estimate"]) == "cross_validated")
 
 
 def measured_errors(errors: Columns, wanted: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
