@@ -17,8 +17,8 @@ from kinacc.study.claims.claim import number_claims
 from kinacc.synthetic import columns
 from kinacc.synthetic.accepted import GEOMETRY, AcceptedDraw, geometry_columns
 from kinacc.synthetic.draw import TABLE_II, Scales
+from kinacc.synthetic.plan import Run, calibration_run
 from kinacc.synthetic.source import attitude, split
-from kinacc.synthetic.tracker import Run, calibration_run
 from research import arm_acceptance as acceptance
 from research.response import Response, linearise
 from research.tuning import Targets, targets_of, tuned

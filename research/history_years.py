@@ -37,7 +37,7 @@ from kinacc.deployment import history_model
 from kinacc.deployment.history import LEVEL
 from kinacc.deployment.history_model import Pair, Setup
 from kinacc.kinematics import robot as robots
-from kinacc.synthetic import plan, tracker
+from kinacc.synthetic import plan
 from kinacc.synthetic.accepted import accepted_draw, rows
 from kinacc.synthetic.draw import physical_robot
 from kinacc.synthetic.physical import PhysicalRobot, Visits
@@ -82,9 +82,9 @@ class Arm:
         time_h = plan.time_h(POSES) + self.rng.uniform(0.0, plan.RUN_H)
         s, normal = plan.directions(q_rad), self.rng.standard_normal((3, POSES, 6))
         visits = Visits(q_rad, s, time_h, normal[0])
-        run = tracker.Run(visits, normal[1, :, :3], normal[2, :, :3])
+        run = plan.Run(visits, normal[1, :, :3], normal[2, :, :3])
         arm = grown(true or self.true, self.rng.normal(0.0, HALL_K))
-        return full_poses(q_rad, tracker.measured(arm, run, NOISE_MM), s)
+        return full_poses(q_rad, plan.measured(arm, run, NOISE_MM), s)
 
     def pair(self, first: Observations, second: Observations) -> Pair:
         """Both, about the arm's geometry."""

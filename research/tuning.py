@@ -18,7 +18,7 @@ from kinacc.kinematics import dh
 from kinacc.kinematics.dh import DHModel
 from kinacc.synthetic.accepted import AcceptedDraw
 from kinacc.synthetic.draw import TABLE_II, Scales, physical_robot
-from kinacc.synthetic.tracker import Run, measured
+from kinacc.synthetic.plan import Run, measured
 from research.response import Answer, Response, answer
 
 ROWS = (

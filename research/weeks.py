@@ -26,7 +26,7 @@ from kinacc.gate import accepted, chance
 from kinacc.geometry import Pose, compose, exp_so3, invert
 from kinacc.kinematics import robot as robots
 from kinacc.measurements.folds import assign
-from kinacc.synthetic import plan, tracker
+from kinacc.synthetic import plan
 from kinacc.synthetic.accepted import accepted_draw
 from kinacc.synthetic.draw import physical_robot
 from kinacc.synthetic.physical import Visits
@@ -45,9 +45,9 @@ def measured(seed: int, week: int, q_rad: np.ndarray, offset_rad: np.ndarray) ->
         plan.time_h(poses) + rng.uniform(0.0, 6.0),
         rng.standard_normal((poses, 6)),
     )
-    run = tracker.Run(visits, *rng.standard_normal((2, poses, 3)))
+    run = plan.Run(visits, *rng.standard_normal((2, poses, 3)))
     arm = physical_robot(100_000 + seed, draw.scales, draw.geometry)
-    seen = full_poses(q_rad, tracker.measured(arm, run, 0.02), plan.directions(q_rad))
+    seen = full_poses(q_rad, plan.measured(arm, run, 0.02), plan.directions(q_rad))
     anywhere = Pose(exp_so3(rng.normal(size=3)), 2000.0 * rng.normal(size=3))
     placed = compose(invert(anywhere), seen.measured)
     seen = replace(seen, position_mm=placed.position_mm, rotation=placed.rotation)

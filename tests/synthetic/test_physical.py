@@ -11,7 +11,7 @@ from kinacc.kinematics import dh, robot
 from kinacc.synthetic import physical, plan
 from kinacc.synthetic.draw import TABLE_II, Scales, physical_robot
 from kinacc.synthetic.physical import Visits
-from kinacc.synthetic.tracker import calibration_run, measured
+from kinacc.synthetic.plan import calibration_run, measured
 
 NOTHING = Scales(0.0, 0.0, 0.0, 0.0)
 

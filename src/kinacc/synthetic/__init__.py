@@ -15,8 +15,7 @@ from kinacc.kinematics.region import Attitude
 from kinacc.kinematics.robot import Robot
 from kinacc.synthetic.accepted import AcceptedDraw, accepted_draw
 from kinacc.synthetic.draw import AS_TUNED, TABLE_II, physical_robot
-from kinacc.synthetic.plan import DOWN
-from kinacc.synthetic.tracker import Run, calibration_run, measured
+from kinacc.synthetic.plan import DOWN, Run, calibration_run, measured
 
 # How far poses of a nominal arm may be from those of Table II: the arm the draws were made for.
 _SAME_ARM_MM = 25.0

@@ -1,18 +1,23 @@
-"""The calibration run: which poses the arm is driven to, in which order, and how it arrives.
+"""The calibration run: poses in order, how the arm arrives, and what a laser tracker reads.
 
 One plan for every synthetic arm, as a cell has one measuring programme. The poses enclose the
 evaluation space: a sector of a cylinder larger than the space on every side, the flange in its
 reference orientation and turned about its own axes beyond +-45 degrees, both wrist configurations.
+The tracker sees a probe on the flange.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
-from kinacc.geometry import Pose, rotation_x, rotation_y, rotation_z
+from kinacc.geometry import Pose, exp_so3, rotation_x, rotation_y, rotation_z
 from kinacc.kinematics.inverse import closed_form
 from kinacc.kinematics.region import Attitude, Cylinder, fill, tool_poses
 from kinacc.kinematics.robot import Robot
+from kinacc.synthetic.draw import noise_generator
+from kinacc.synthetic.physical import PhysicalRobot, Visits, pose
 
 SPACE = Cylinder(1150.0, 1000.0, -50.0, 600.0, np.deg2rad(-5.0), np.deg2rad(65.0))
 TURN_DEG = 50.0
@@ -22,6 +27,7 @@ CORNER_DEG = (43.0, TURN_DEG)
 DOWN = Attitude(rotation_x(np.pi))
 BRANCHES = 2  # the first: facing the space, elbow up, either wrist
 RUN_H = 6.0
+PROBE_MM = 200.0  # distance over which the probe's orientation is measured
 _PLAN_SEED = 180
 _BLOCK = 256
 
@@ -52,6 +58,33 @@ def directions(q_rad: np.ndarray) -> np.ndarray:
 def time_h(poses: int) -> np.ndarray:
     """Time (n,) of each visit since the cold start."""
     return RUN_H * (np.arange(poses) + 0.5) / poses
+
+
+@dataclass(frozen=True)
+class Run:
+    """What was done and how well it is seen, in units of chance: one standard normal each.
+
+    ``visits`` as the arm makes them; ``position`` and ``rotation`` (n, 3) of the tracker.
+    """
+
+    visits: Visits
+    position: np.ndarray
+    rotation: np.ndarray
+
+
+def calibration_run(robot: Robot, poses: int, seed: int, attitude: Attitude = DOWN) -> Run:
+    """The plan's ``poses`` visited in order, with the chance of draw ``seed``."""
+    q_rad = configurations(robot, poses, attitude)
+    rng = noise_generator(seed)
+    visits = Visits(q_rad, directions(q_rad), time_h(poses), rng.standard_normal((poses, 6)))
+    return Run(visits, rng.standard_normal((poses, 3)), rng.standard_normal((poses, 3)))
+
+
+def measured(arm: PhysicalRobot, run: Run, tracker_noise_mm: float) -> Pose:
+    """Measured flange poses (n, ...), tracker frame = robot base."""
+    true = pose(arm, run.visits)
+    turn = exp_so3(tracker_noise_mm / PROBE_MM * run.rotation)
+    return Pose(turn @ true.rotation, true.position_mm + tracker_noise_mm * run.position)
 
 
 def _poses(rng: np.random.Generator, attitude: Attitude) -> Pose:
