@@ -71,7 +71,6 @@ def test_the_joints_of_a_cell_are_those_the_controller_reports(inputs, tmp_path)
     [
         {},
         {"points_in": "joints"},
-        {"space": "joint_box", "joint_box": {"joints_deg": [[-10, 10]] * 6}},
         {"sequence": "halton", "rotations": "all_27", "invert_with": "vec", "travel_direction": -1},
     ],
 )

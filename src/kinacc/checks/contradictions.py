@@ -7,8 +7,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from kinacc.config import load as configuration
 from kinacc.config.error_models import ALWAYS, ERROR_MODELS, asked_for, loaded
 from kinacc.config.parameter_rules import rules, strangers
@@ -85,7 +83,7 @@ def _arm(full: Mapping[str, Any], folder: Path) -> Found:
     """Settings of joints the robot does not have; faults of a robot file are its reader's."""
     from kinacc.kinematics.robot import load, shipped
 
-    robot, calibration, box = full["robot"], full["calibration"], full["evaluation"]["joint_box"]
+    robot, calibration = full["robot"], full["calibration"]
     try:
         arm = load(robot if robot in shipped() else folder / robot)
     except InputError:
@@ -103,14 +101,7 @@ def _arm(full: Mapping[str, Any], folder: Path) -> Found:
                 yield ("calibration", kind, *keys), *text
     for rule, *text in strangers(rules(calibration["dh"]["parameters"]), joints):
         yield ("calibration", "dh", "parameters", rule.name), *text
-    ranges = ("calibration", "vec", "joint_range"), ("evaluation", "joint_box", "joints_deg")
-    boxes = (calibration["vec"]["joint_range"], box["joints_deg"])
-    for keys, pairs in zip(ranges, boxes, strict=True):
-        if isinstance(pairs, list) and len(pairs) != joints:
-            yield keys, f"{len(pairs)} pairs for the {joints} joints of {robot}", "one per joint"
-        elif isinstance(pairs, list) and keys == ranges[1]:
-            limits = np.round(np.degrees([arm.q_min_rad, arm.q_max_rad]).T, 9).tolist()
-            for number, (pair, (low, high)) in enumerate(zip(pairs, limits, strict=True), 1):
-                if not arm.dh.prismatic[number - 1] and not low <= pair[0] < pair[1] <= high:
-                    message = f"{pair} reaches beyond the limits of joint {number} of {robot}"
-                    yield keys, message, f"{low:g} to {high:g} deg"
+    pairs = calibration["vec"]["joint_range"]
+    if isinstance(pairs, list) and len(pairs) != joints:
+        message = f"{len(pairs)} pairs for the {joints} joints of {robot}"
+        yield ("calibration", "vec", "joint_range"), message, "one per joint"

@@ -11,7 +11,7 @@ from kinacc.cli.choice import CONFIG
 from kinacc.errors import InputError, Problem, refuse
 from kinacc.kinematics import region
 from kinacc.kinematics import robot as robots
-from kinacc.study.evaluation import cylinder, joint_box
+from kinacc.study.evaluation import cylinder
 from kinacc.workflow.data_sets import read_data_sets
 
 Ends = tuple[np.ndarray, np.ndarray]
@@ -31,8 +31,6 @@ def settings_of(dataset: str, config: Sequence[str]) -> Mapping[str, Any]:
 def configured(settings: Mapping[str, Any], robot: robots.Robot) -> Space:
     """The evaluation space of a data set."""
     evaluation = settings["evaluation"]
-    if evaluation["space"] == "joint_box":
-        return joint_box(evaluation, robot), None
     if evaluation["space"] == "cylinder":
         space = cylinder(evaluation)
         return None, lambda at_mm: np.asarray(region.contains(space, at_mm))

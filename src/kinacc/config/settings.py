@@ -211,25 +211,14 @@ class Cylinder(Section):
     angle_deg: Pair = setting([0.0, 60.0], "angles about the first axis", "deg")
 
 
-class JointBox(Section):
-    """Box in joint space (used where space is joint_box)."""
-
-    joints_deg: JointPairs | None = setting(
-        None,
-        "one pair per joint (mm where it slides); null for the joint limits",
-        "deg",
-    )
-
-
 class Evaluation(Section):
     """The evaluation space and the points assessed in it."""
 
-    space: Literal["cylinder", "joint_box", "measured"] = setting(
+    space: Literal["cylinder", "measured"] = setting(
         "cylinder",
-        "sector of a cylinder, box in joint space, or the measured configurations",
+        "sector of a cylinder, or the measured configurations",
     )
     cylinder: Cylinder = Cylinder()
-    joint_box: JointBox = JointBox()
     reference_orientation_deg: Angles = setting(
         [180.0, -90.0, -30.0],
         "flange orientation before the rotations, intrinsic XYZ angles in the reference frame",

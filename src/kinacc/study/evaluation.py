@@ -18,15 +18,6 @@ from kinacc.study.accuracy_map import Equipped, Models, PosesWanted, accuracy_ma
 from kinacc.tables.columns import Columns, Tables
 
 
-def joint_box(evaluation: Settings, arm: Robot) -> tuple[np.ndarray, np.ndarray] | None:
-    """Ends (k,), (k,) of the reported joints in the ``evaluation`` settings; None: the limits."""
-    ranges = evaluation["joint_box"]["joints_deg"]
-    if ranges is None:
-        return None
-    low, high = robot.in_own_units(arm, np.array(ranges, dtype=float).T)
-    return low, high
-
-
 def cylinder(evaluation: Settings) -> Cylinder:
     """The cylinder of the ``evaluation`` settings."""
     section = evaluation["cylinder"]
@@ -92,11 +83,8 @@ def points(inputs: Tables, settings: Settings) -> dict[str, Columns]:
     if section["space"] == "measured":
         return {"assessment_points": _measured(inputs, section["points"])}
     models, drawn = equipped(inputs, section, arm), (section["sequence"], section["points"])
-    limited = arm.q_min_rad, arm.q_max_rad
-    if section["space"] == "joint_box":
-        box = joint_box(section, arm) or limited
-        q_rad = operating_points.in_joints(arm, models, box, *drawn)
-    elif section["points_in"] == "joints":
+    if section["points_in"] == "joints":
+        limited = arm.q_min_rad, arm.q_max_rad
         q_rad = operating_points.in_joints(arm, models, limited, *drawn, cylinder(section))
     else:
         wanted, wrist = poses_wanted(section), section["wrist"]
