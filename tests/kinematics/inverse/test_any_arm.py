@@ -93,7 +93,6 @@ def test_what_is_found_is_verified_and_own_postures_are_among_it(arm, kind):
     assert limits.within_limits(arm, solved.q_rad[inside]).all()
     outside = solved.status == Status.OUTSIDE_LIMITS
     assert not limits.within_limits(arm, solved.q_rad[outside]).any()
-    assert kind != "nominal" or not (solved.status == Status.NOT_CONVERGED).any()
     if arm is IIWA:
         first = [float(name.split("=")[1].split("deg")[0]) for name in solved.branches]
         assert sorted(set(first)) == list(range(-150, 151, 30))
@@ -112,7 +111,8 @@ def test_few_branches_are_dropped_near_singular_postures(where):
     solved = inverse.solve(MH180, model, pose)
     arms.assert_verified(model, pose, solved)
     assert arms.share_missed(MH180, q, solved) < 0.01
-    assert np.mean(solved.status == Status.NOT_CONVERGED) < 0.02
+    _, reached = closed_form.recognise(MH180.dh).solve(pose)
+    assert np.mean(reached & (solved.status == Status.NOT_FOUND)) < 0.02
 
 
 @pytest.mark.parametrize("arm", [UR10, arms.OFFSET_WRIST, arms.GENERAL], ids=lambda arm: arm.name)
@@ -198,7 +198,7 @@ def test_out_of_reach_is_said():
     pose = Pose(np.eye(3)[None], np.array([[9000.0, 0.0, 0.0]]))
     for arm in (MH180, UR10, IIWA, arms.OFFSET_WRIST, arms.STANFORD):
         solved = inverse.solve(arm, arm.dh, pose)
-        assert (solved.status == Status.OUT_OF_REACH).all()
+        assert (solved.status == Status.NOT_FOUND).all()
         assert np.isnan(solved.q_rad).all()
     refined = newton.refine(MH180.dh, pose, np.zeros((1, 6)))
     assert not refined.converged[0]

@@ -35,18 +35,15 @@ _PER_NAME = 8  # postures of one name: of sixteen in all five were the most seen
 
 
 class Status(IntEnum):
-    """Why a branch has a solution, or none.
+    """Whether a branch has a solution, and whether it can be used.
 
-    OUT_OF_REACH: neither the nominal arm nor the model has it. NOT_CONVERGED: the nominal arm has
-    it, the refinement did not reach it on the model.
+    NOT_FOUND: the pose is out of reach in this branch, or another branch has the same joints.
     """
 
     FOUND = 0
-    OUT_OF_REACH = 1
-    NOT_CONVERGED = 2
-    DUPLICATE = 3
-    OUTSIDE_LIMITS = 4
-    OUTSIDE_RANGE = 5
+    NOT_FOUND = 1
+    OUTSIDE_LIMITS = 2
+    OUTSIDE_RANGE = 3
 
 
 class Solutions(NamedTuple):
@@ -151,7 +148,7 @@ def solve(
     within ``newton.POSITION_TOLERANCE_MM`` and ``newton.ROTATION_TOLERANCE_RAD``. Of the turns of a
     joint ``limits.take_turns`` chooses one.
 
-    With a closed form, a branch that converged to the joints of an earlier one is a DUPLICATE and
+    With a closed form, a branch that converged to the joints of an earlier one is NOT_FOUND and
     branches keep the name they started from; on a calibrated arm one may be missed within 5 mm of
     axis 1 and where two singularities meet. The search looks for postures within the limits and
     slightly beyond, and names what it finds by ``postures.classes_of``.
@@ -193,16 +190,13 @@ def solve(
     onto = _Onto(robot, model, like, fitted_range_rad)
     form = closed_form.recognise(robot.dh)
     if form is not None:
-        q_rad, status = _by_closed_form(onto, form, pose, columns)
+        q_rad = _by_closed_form(onto, form, pose, columns)
     else:
         starts: list[float | None] = [None] if robot.dh.joints < 7 else list(grid_of(robot))
         parts = [_searched(onto, pose, value) for value in starts]
-        q_rad, expected = (
-            np.concatenate(part, axis=1)[:, columns] for part in zip(*parts, strict=True)
-        )
-        status = np.where(expected, Status.NOT_CONVERGED, Status.OUT_OF_REACH).astype(np.int8)
-        status[np.isfinite(q_rad[..., 0])] = Status.FOUND
-    good = status == Status.FOUND
+        q_rad = np.concatenate(parts, axis=1)[:, columns]
+    good = np.isfinite(q_rad[..., 0])
+    status = np.where(good, Status.FOUND, Status.NOT_FOUND).astype(np.int8)
     if fitted_range_rad is not None:
         status[good & ~limits.within(q_rad, *fitted_range_rad)] = Status.OUTSIDE_RANGE
     status[good & ~limits.within_limits(robot, q_rad)] = Status.OUTSIDE_LIMITS
@@ -234,45 +228,37 @@ class _Onto(NamedTuple):
 
 def _by_closed_form(
     onto: _Onto, form: closed_form.SixAxes, pose: Pose, columns: list[int]
-) -> tuple[np.ndarray, np.ndarray]:
-    """Joints (n, b, 6) and status (n, b)."""
+) -> np.ndarray:
+    """Joints (n, b, 6), NaN where a branch has none or those of an earlier one."""
     starts, near = (part[:, columns] for part in form.solve(pose, closed_form.Start()))
-    reached = form.solve(pose)[1][:, columns]
-    status = np.where(reached, Status.NOT_CONVERGED, Status.OUT_OF_REACH).astype(np.int8)
     rows, places = np.nonzero(near)
     found, converged = onto.converge(pose.select(rows), starts[rows, places], 0)
     rows, places, found = rows[converged], places[converged], found[converged]
-    again = postures.repeats(rows, found, onto.robot.dh.prismatic)
-    status[rows, places] = np.where(again, Status.DUPLICATE, Status.FOUND)
-    q_rad = np.full((*status.shape, 6), np.nan)
-    q_rad[rows[~again], places[~again]] = found[~again]
-    return q_rad, status
+    new = ~postures.repeats(rows, found, onto.robot.dh.prismatic)
+    q_rad = np.full(starts.shape, np.nan)
+    q_rad[rows[new], places[new]] = found[new]
+    return q_rad
 
 
-def _searched(onto: _Onto, pose: Pose, first: float | None) -> tuple[np.ndarray, np.ndarray]:
-    """Joints (n, b, k) in their branches, NaN where empty, and whether the nominal arm has one.
-
-    Joint 1 stands at ``first`` where that is given.
-    """
+def _searched(onto: _Onto, pose: Pose, first: float | None) -> np.ndarray:
+    """Joints (n, b, k) in their branches, NaN where empty; joint 1 at ``first`` where given."""
     dh, fixed = onto.robot.dh, int(first is not None)
     # Coupled joints, which have no limits of their own, make a turn.
     low, high = np.nan_to_num(limits.dh_limits(onto.robot), neginf=-np.pi, posinf=np.pi)
     before = _dh.forward(dh.part(slice(fixed)), np.full((1, fixed), first, dtype=float))
     tail = slice(fixed, None)
     table = postures.table_of(dh.part(tail), low[tail], high[tail])
-    rows, start, error = postures.search(table, compose(invert(before), pose), _NEAR_MISS_MM)
+    rows, start = postures.search(table, compose(invert(before), pose), _NEAR_MISS_MM)
     if first is not None:
         start = np.insert(start, 0, first, axis=1)
     q_rad, converged = onto.converge(pose.select(rows), start, fixed)
-    exact, count = error < 1e-6, len(pose.position_mm)
-    expected = np.isfinite(_placed(dh, count, rows[exact], start[exact])[..., 0])
     rows, q_rad = rows[converged], q_rad[converged]
     number, start = _beside(dh, q_rad, fixed)
     again, converged = onto.converge(pose.select(rows[number]), start, fixed)
     rows = np.concatenate([rows, rows[number[converged]]])
     q_rad = np.concatenate([q_rad, again[converged]])
     new = ~postures.repeats(rows, q_rad, dh.prismatic)
-    return _placed(dh, count, rows[new], q_rad[new]), expected
+    return _placed(dh, len(pose.position_mm), rows[new], q_rad[new])
 
 
 def _beside(dh: _dh.DHModel, q_rad: np.ndarray, first: int) -> tuple[np.ndarray, np.ndarray]:

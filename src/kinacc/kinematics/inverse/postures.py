@@ -98,9 +98,7 @@ def _table(columns: bytes) -> Table:
     return Table(model, inner, joints, at_joints, slopes, unit, reach_mm, cKDTree(at_joints))
 
 
-def search(
-    table: Table, pose: Pose, near_miss_mm: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def search(table: Table, pose: Pose, near_miss_mm: float) -> tuple[np.ndarray, np.ndarray]:
     """Postures of poses of the arm of a table, and near misses.
 
     Parameters
@@ -115,7 +113,7 @@ def search(
     Returns
     -------
     tuple of numpy.ndarray
-        Of m postures: the pose (m,), joints (m, k) in (-pi, pi], and the error (m,) in mm.
+        Of m postures: the pose (m,) and joints (m, k) in (-pi, pi].
     """
     goal = pose if table.inner.start == 0 else before_last(table.dh, pose)
     wanted = _features(table.dh, goal, table.reach_mm)
@@ -132,7 +130,7 @@ def search(
     order = np.lexsort([found.error_mm, rows])
     order = order[(found.error_mm <= max(near_miss_mm, 1e-6))[order]]
     order = order[~repeats(rows[order], q_rad[order], table.dh.prismatic, _SAME_START_RAD)]
-    return rows[order], q_rad[order], found.error_mm[order]
+    return rows[order], q_rad[order]
 
 
 def repeats(
