@@ -154,10 +154,6 @@ def _chain(path: Path, base: str | None, tip: str | None) -> tuple[str, list[Joi
         for name, count in Counter(getattr(joint, key) for joint in joints).items():
             if count > 1:
                 raise _refusal(path, place, f"{kind} {name} is given more than once")
-    for key, link in (("base_link", base), ("tip_link", tip)):
-        if link is not None and link not in links:
-            fault = f"there is no link {link!r}"
-            raise _refusal(path, f"{place}, {key}", fault, ", ".join(links))
     above = {joint.child: joint for joint in joints}
     roots = [link for link in links if link not in above]
     if base is None and len(roots) != 1:
@@ -165,23 +161,21 @@ def _chain(path: Path, base: str | None, tip: str | None) -> tuple[str, list[Joi
         raise _refusal(path, place, fault, "one root, or base_link", ", ".join(roots or links))
     base = base or roots[0]
     parents = {joint.parent for joint in joints}
-    chains, usable = {}, {}
-    for end in [link for link in links if link not in parents] if tip is None else [tip]:
+    leaves = [link for link in links if link not in parents]
+    chains: dict[str, list[Joint]] = {}
+    for end in dict.fromkeys([*leaves, tip or base]):
         chain: list[Joint] = []
         link = end
         while link != base and link in above and len(chain) < len(joints):
             chain.insert(0, above[link])
             link = above[link].parent
         if chain and link == base:
-            chains[end] = sum(joint.kind in MOVING for joint in chain)
-            if FEWEST_JOINTS <= chains[end] <= MOST_JOINTS:
-                usable[end] = chain
-    if len(usable) == 1:
-        return str(root.get("name")), next(iter(usable.values()))
-    if tip is not None and not chains:
-        fault = f"link {tip} does not hang on {base}"
-        raise _refusal(path, f"{place}, tip_link", fault, "a link below base_link")
-    ends = "; ".join(f"{link} ({count} moving joints)" for link, count in chains.items())
+            chains[end] = chain
+    moving = {end: sum(joint.kind in MOVING for joint in chains[end]) for end in chains}
+    usable = [end for end in chains if FEWEST_JOINTS <= moving[end] <= MOST_JOINTS]
+    if tip in usable or (tip is None and len(usable) == 1):
+        return str(root.get("name")), chains[tip or usable[0]]
+    ends = "; ".join(f"{link} ({count} moving joints)" for link, count in moving.items())
     fault = f"the chain from {base} can end at {len(chains)} links: {ends}"
     allowed = f"one with {FEWEST_JOINTS} to {MOST_JOINTS} moving joints before it"
     fix = f"write a robot YAML with urdf: {path.name}, base_link and tip_link"
