@@ -194,8 +194,7 @@ def row_weights(
     noise lies beyond as for one component. ``scale_mm``: a scale held from before.
     """
     components = np.where(observations.has_rotation, 6, 3)
-    row = np.repeat(np.arange(len(observations)), components)
-    length = np.sqrt(np.bincount(row, residual**2, minlength=len(observations)))
+    length = np.sqrt(np.bincount(observations.places[0], residual**2))
     scale = scale_mm
     if scale is None:
         scale = float(np.median(length / np.sqrt(scipy.special.chdtri(components, 0.5))))

@@ -74,11 +74,11 @@ class Observations:
         return 3 * len(self) + 3 * int(self.has_rotation.sum())
 
     @property
-    def is_rotation(self) -> np.ndarray:
-        """True (components,) where a residual is one of an orientation; row by row."""
-        kinds = np.array([False] * 3 + [True] * 3)
-        keep = np.repeat(np.stack([np.ones(len(self), bool), self.has_rotation], 1), 3, axis=1)
-        return np.broadcast_to(kinds, keep.shape)[keep]
+    def places(self) -> tuple[np.ndarray, np.ndarray]:
+        """Row and axis (components,) of every residual: 0 to 2 of position, 3 to 5 of rotation."""
+        measured = np.stack([np.ones(len(self), bool), self.has_rotation], axis=1)
+        row, axis = np.nonzero(np.repeat(measured, 3, axis=1))
+        return row, axis
 
     @property
     def measured(self) -> Pose:

@@ -182,8 +182,7 @@ def shared_errors(observations: Observations) -> list[csr_array]:
         levels.append(of_target)
         if configuration.max() < of_target.max():
             levels.append(configuration)
-    measured = np.stack([np.ones(len(observations), bool), observations.has_rotation], axis=1)
-    row, axis = np.nonzero(np.repeat(measured, 3, axis=1))
+    row, axis = observations.places
     return [
         csr_array((np.ones(len(part)), (6 * level[row[part]] + axis[part], part)),
                   (6 * (level.max() + 1), len(row)))

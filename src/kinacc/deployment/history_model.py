@@ -115,7 +115,7 @@ def about(
     residual, jacobian = (
         np.concatenate(parts) for parts in zip(*system.blocks(state), strict=True)
     )
-    row = np.repeat(np.arange(len(both)), 3 + 3 * both.has_rotation)
+    row, axis = both.places
     of_frames, errors = np.split(jacobian, [coords.size], axis=1)
     # Coefficients by joint, error and order; behind them offsets by travel direction.
     joint, order = np.divmod(np.arange(errors.shape[1]), len(ERRORS) * (ORDER + 1))
@@ -135,7 +135,7 @@ def about(
         joint=joint[order > 0],
         residual=-residual,
         second=row >= first,
-        position=~both.is_rotation,
+        position=axis < 3,
         cluster=configurations(both.pose, both.q_rad)[row],
         late=late[row],
     )
