@@ -11,7 +11,7 @@ from kinacc.calibration.uncertainty import scale_of
 from kinacc.config.error_models import ERROR_MODELS
 from kinacc.geometry import log_so3
 from kinacc.kinematics import compliance, dh, robot, vec
-from kinacc.kinematics.model import ErrorModel, JointState
+from kinacc.kinematics.model import JointState
 from kinacc.kinematics.tables import of_kind
 
 ARM = robot.load("mh180")
@@ -106,16 +106,6 @@ def test_every_parameter_has_a_name_a_slope_and_a_place_in_the_table(model, at):
         ends = (model.with_parameters(x + way * direction).pose(at) for way in (-step, step))
         moved = movement(*ends) / (2.0 * step)
         np.testing.assert_allclose(slopes @ direction, moved, rtol=1e-5, atol=1e-3)
-
-
-def test_slopes_by_differences_serve_a_model_that_has_no_others(model, at):
-    pose, slopes = ErrorModel.linearised(model, at)
-    exact = model.linearised(at)
-    unit = np.array([scale_of(name) for name in model.names])
-    np.testing.assert_array_equal(pose.position_mm, exact[0].position_mm)
-    np.testing.assert_allclose(slopes * unit, exact[1] * unit, atol=1e-5)
-    joints = ErrorModel.joint_jacobian(model, at)
-    np.testing.assert_allclose(joints, model.joint_jacobian(at), rtol=1e-5, atol=1e-3)
 
 
 def test_a_model_comes_back_from_its_table_bit_by_bit(model, at):
