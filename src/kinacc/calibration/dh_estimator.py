@@ -83,9 +83,8 @@ def free_parameters(
     """
     free = np.ones((joints, 5), dtype=bool)
     free[:, _BETA] = False
-    for joint in hayati_joints:
-        free[joint - 1, _BETA] = True
-        free[joint - 1, _D] = not instead
+    parallel = np.array(hayati_joints, dtype=int) - 1
+    free[parallel, _BETA], free[parallel, _D] = True, not instead
     return free
 
 
@@ -126,12 +125,8 @@ class DHEstimator(Estimator):
     ----------
     follows_vec : bool
         The DH model follows the VEC at the measured joints instead of the measurements.
-    hayati_joints : tuple of int
-        Joints (1-based) with a free beta (Hayati, Proc. CDC 1983).
-    hayati_instead : bool
-        Beta in place of d, else beside it.
-    rules : tuple of Rule
-        Parameters that are fixed or known beforehand.
+    arm : ArmTerms
+        What the fit takes for granted of the arm.
     loss : str
         squares, huber or tukey.
     threshold : float
@@ -139,9 +134,7 @@ class DHEstimator(Estimator):
     """
 
     follows_vec: bool
-    hayati_joints: tuple[int, ...]
-    hayati_instead: bool
-    rules: tuple[Rule, ...]
+    arm: ArmTerms
     loss: str
     threshold: float
 
@@ -151,22 +144,15 @@ class DHEstimator(Estimator):
     def of(cls, calibration: Mapping[str, Any], arm: Robot, every: Observations) -> Self:
         """By the ``calibration`` settings."""
         section = calibration["dh"]
+        instead = section["hayati_joints"] == _AUTO
+        free = free_parameters(arm.dh.joints, hayati_joints(section, arm), instead)
         return cls(
             Common.of(calibration, arm),
             section["fit_to"] == "vec",
-            hayati_joints(section, arm),
-            section["hayati_joints"] == _AUTO,
-            tuple(parameter_rules.rules(section["parameters"])),
+            arm_terms(arm.dh, free, parameter_rules.rules(section["parameters"])),
             section["loss"],
-            float(section["truncation"]),
+            section["truncation"],
         )
-
-    @property
-    def arm(self) -> ArmTerms:
-        """What the fit takes for granted of the arm."""
-        nominal = self.common.nominal
-        free = free_parameters(nominal.joints, self.hayati_joints, self.hayati_instead)
-        return arm_terms(nominal, free, self.rules)
 
     def fit(self, observations: Observations, others: Mapping[str, Fit]) -> ModelFit:
         """The DH model; base and targets are those of the VEC model where it follows that."""
@@ -231,4 +217,4 @@ def hayati_joints(section: Mapping[str, Any], arm: Robot) -> tuple[int, ...]:
     """
     if section["hayati_joints"] == _AUTO:
         return parallel_joints(arm.dh)
-    return tuple(int(joint) for joint in section["hayati_joints"])
+    return tuple(section["hayati_joints"])

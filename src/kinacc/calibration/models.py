@@ -44,7 +44,7 @@ class Common:
         """By the ``calibration`` settings."""
         return cls(
             arm.dh,
-            float(calibration["rotation_weight_mm_per_rad"]),
+            calibration["rotation_weight_mm_per_rad"],
             calibration["base_and_tool"] == "estimated",
             tuple(parameter_rules.rules(calibration["frames"])),
             arm.base,

@@ -58,19 +58,17 @@ class VECEstimator(Estimator):
     def of(cls, calibration: Mapping[str, Any], arm: Robot, every: Observations) -> Self:
         """By the ``calibration`` settings."""
         section = calibration["vec"]
-        angle_rad = 1e-3 * float(section["prior_std_mrad"])
-        stated = Prior(
-            float(section["prior_std_mm"]), angle_rad, float(section["prior_decay"]), angle_rad
-        )
-        orders = [order for order in vec_fit.ORDERS if order <= int(section["order_highest"])]
+        angle_rad = 1e-3 * section["prior_std_mrad"]
+        orders = [order for order in vec_fit.ORDERS if order <= section["order_highest"]]
+        orders = orders if section["order"] == _AUTO else [section["order"]]
         return cls(
             Common.of(calibration, arm),
             _joint_range_rad(section, arm, every.q_rad),
-            1 if section["order"] == _AUTO else int(section["order"]),
-            stated,
-            tuple(orders) if section["order"] == _AUTO else (int(section["order"]),),
+            orders[0],
+            Prior(section["prior_std_mm"], angle_rad, section["prior_decay"], angle_rad),
+            tuple(orders),
             section["prior"] != "chosen",
-            bool(section["travel_direction"]),
+            section["travel_direction"],
         )
 
     @property
@@ -157,7 +155,7 @@ def _joint_range_rad(
     """Range (k,), (k,) of the DH joints; those of the data are ``q_rad`` (n, k)."""
     wanted = section["joint_range"]
     if wanted == "data":
-        margin = np.deg2rad(float(section["joint_range_margin_deg"]))
+        margin = np.deg2rad(section["joint_range_margin_deg"])
         return q_rad.min(axis=0) - margin, q_rad.max(axis=0) + margin
     low, high = arm.q_min_rad, arm.q_max_rad
     if wanted != "limits":

@@ -117,7 +117,7 @@ def fit(
         few=few,
         name="VEC fit",
     )
-    return _with_centred_offsets(fitted, observations, prior.std(empty))
+    return _with_centred_offsets(fitted, observations)
 
 
 def informed(observations: Observations, empty: VECModel) -> np.ndarray:
@@ -126,32 +126,32 @@ def informed(observations: Observations, empty: VECModel) -> np.ndarray:
     return np.concatenate([np.ones(empty.coefficients.size, dtype=bool), travelled.ravel()])
 
 
-def _with_centred_offsets(fit: ModelFit, observations: Observations, std: np.ndarray) -> ModelFit:
+def _with_centred_offsets(fit: ModelFit, observations: Observations) -> ModelFit:
     """The fit with the mean of both offsets of a joint moved into eps_z of order 0.
 
     A gauge: it changes no pose of a joint whose every observation travels in a known direction.
     Without it the prior splits the constant between both, and a pose at s = 0 loses a part.
     """
     empty, free, frames = cast(VECModel, fit.model), fit.free, fit.parameters.size
-    (joints, errors, terms), split = empty.coefficients.shape, empty.coefficients.size
-    place, solution = frames + np.cumsum(free) - 1, fit.solution
-    if not free[split:].any():
-        return replace(fit, prior_std=std)
-    mapping = np.eye(solution.x.size)
+    (joints, errors, terms), solution = empty.coefficients.shape, fit.solution
+    if not free[empty.coefficients.size :].any():
+        return fit
+    mapping = np.eye(frames + free.size)
     for joint in range(joints):
-        offsets = split + 2 * joint + np.arange(2)
-        if not free[offsets].all() or (observations.s[:, joint] == 0).any():
-            continue
-        eps_z = (joint * errors + ERRORS.index("eps_z")) * terms
-        mapping[place[eps_z], place[offsets]] += 0.5
-        mapping[np.ix_(place[offsets], place[offsets])] -= 0.5
+        offsets = frames + empty.coefficients.size + 2 * joint + np.arange(2)
+        if free[offsets - frames].all() and observations.s[:, joint].all():
+            eps_z = frames + (joint * errors + ERRORS.index("eps_z")) * terms
+            mapping[eps_z, offsets] += 0.5
+            mapping[np.ix_(offsets, offsets)] -= 0.5
+    estimated = np.append(np.ones(frames, dtype=bool), free)
+    mapping = mapping[np.ix_(estimated, estimated)]
     covariance = mapping @ solution.covariance @ mapping.T
     deviation = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     solution = replace(solution, x=mapping @ solution.x, covariance=covariance, std=deviation)
     vector, fitted_std = np.zeros(free.size), np.full(free.size, np.nan)
     vector[free], fitted_std[free] = solution.x[frames:], deviation[frames:]
     model = fit.model.with_parameters(vector)
-    return replace(fit, model=model, std=fitted_std, prior_std=std, solution=solution)
+    return replace(fit, model=model, std=fitted_std, solution=solution)
 
 
 ORDERS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 28, 40)
