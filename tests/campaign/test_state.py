@@ -141,3 +141,15 @@ def test_a_plausible_error_is_within_10_standard_deviations_or_6_medians(
     assert most_plausible_mm(state) == pytest.approx(most_mm)
     state.readings = readings[:9]
     assert most_plausible_mm(state) == state.plan.limits.implausible_mm
+
+
+def test_all_that_is_certain_lists_planned_revisits_in_their_places(make_plan):
+    plan = make_plan(points=30, budget=70, references=20)
+    entries = [entry_of([reading]) for reading in readings_of(plan, world_of(plan).reading_mm)]
+    ahead = restore(plan, []).ahead()
+    assert ahead[:10] == [*plan.route[:5], *plan.route[:5]]
+    assert set(ahead) == set(plan.route)
+    read = [entry["readings"][0]["point"] for entry in entries]
+    assert read[: len(ahead)] == ahead
+    for done in (3, 7, 25):
+        assert restore(plan, entries[:done]).ahead() == ahead[done:]

@@ -7,13 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from kinacc.errors import InputError
 from kinacc.kinematics import dh, robot
-from kinacc.synthetic import physical, plan
+from kinacc.synthetic import accepted, measure, physical, plan
 from kinacc.synthetic.draw import TABLE_II, Scales, physical_robot
 from kinacc.synthetic.physical import Visits
 from kinacc.synthetic.plan import calibration_run, measured
 
 NOTHING = Scales(0.0, 0.0, 0.0, 0.0)
+SETTINGS = {"draw": 1, "poses": 10, "tracker_noise_mm": 0.0}
 
 
 @pytest.fixture(scope="module")
@@ -86,3 +88,20 @@ def _only(arm, name: str):
         if field != name
     }
     return replace(arm.beyond, **silent)
+
+
+def test_further_draws_leave_the_own_one_out():
+    assert accepted.further_draws(0, 3) == [1, 2, 3]
+    assert accepted.further_draws(2, 3) == [0, 1, 3]
+    with pytest.raises(InputError, match="searches for more"):
+        accepted.further_draws(0, len(accepted.rows()))
+
+
+def test_another_roughness_makes_another_arm_of_a_draw(arm):
+    seen, again = (measure(arm, SETTINGS | change)["x_mm"] for change in ({}, {"ripple": 0.0}))
+    assert 0.01 < np.abs(again - seen).max() < 1.0
+
+
+def test_another_arm_is_refused():
+    with pytest.raises(InputError, match="ur10"):
+        measure(robot.load("ur10"), SETTINGS)
