@@ -17,7 +17,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import cached_property
-from itertools import accumulate
 from pathlib import Path
 from typing import Any
 
@@ -261,28 +260,22 @@ def doubts(opened: Opened) -> list[str]:
 
 @dataclass(frozen=True)
 class Verification:
-    """Whether a journal is whole, and continues the one of a report; ``problems`` where not."""
+    """A journal whose lines are whole, and whether it ``continues`` the one of a report."""
 
     campaign: str
     entries: int
     readings: int
     sha256: str
-    problems: tuple[str, ...]
+    continues: bool
 
 
-def verify(opened: Opened, sha256: str | None = None, readings: int | None = None) -> Verification:
-    """Compare a journal with what a report states of it.
+def verify(opened: Opened, sha256: str | None = None) -> Verification:
+    """Compare a journal with the SHA-256 that a report states of it.
 
-    ``readings``: their number; ``sha256``: of the journal up to them. Checksums of the lines are
-    checked where a journal is opened.
+    Checksums of the lines are checked where a journal is opened.
     """
     journal = opened.journal
-    counts = [0, *accumulate(len(entry.get("readings", ())) for entry in journal.entries)]
-    ends = [end for end, count in enumerate(counts) if readings is None or count == readings]
-    problems: tuple[str, ...] = ()
-    if readings is not None and counts[-1] < readings:
-        problems = (f"{counts[-1]} readings, {readings} reported",)
-    elif sha256 is not None and sha256 not in map(journal.sha256, ends):
-        problems = ("not the journal of that report: it was shortened or rewritten",)
     count = len(journal.entries)
-    return Verification(opened.digest, count, counts[-1], journal.sha256(), problems)
+    readings = sum(len(entry.get("readings", ())) for entry in journal.entries)
+    continues = sha256 is None or sha256 in map(journal.sha256, range(count + 1))
+    return Verification(opened.digest, count, readings, journal.sha256(), continues)
