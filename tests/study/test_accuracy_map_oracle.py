@@ -157,7 +157,7 @@ def test_boxes_without_anything_to_assess_name_every_joint(models):
 
 def test_a_space_out_of_reach_is_refused_with_the_reasons_counted(models):
     far = WANTED._replace(cylinder=replace(CYLINDER, inner_radius_mm=4000.0))
-    with pytest.raises(InputError, match="out of reach"):
+    with pytest.raises(InputError, match="not reached"):
         operating_points.in_space(ARM, models, far, "sobol", 2)
 
 

@@ -112,7 +112,7 @@ def test_few_branches_are_dropped_near_singular_postures(where):
     arms.assert_verified(model, pose, solved)
     assert arms.share_missed(MH180, q, solved) < 0.01
     _, reached = closed_form.recognise(MH180.dh).solve(pose)
-    assert np.mean(reached & (solved.status == Status.NOT_FOUND)) < 0.02
+    assert np.mean(reached & (solved.status == Status.NOT_REACHED)) < 0.02
 
 
 @pytest.mark.parametrize("arm", [UR10, arms.OFFSET_WRIST, arms.GENERAL], ids=lambda arm: arm.name)
@@ -198,7 +198,7 @@ def test_out_of_reach_is_said():
     pose = Pose(np.eye(3)[None], np.array([[9000.0, 0.0, 0.0]]))
     for arm in (MH180, UR10, IIWA, arms.OFFSET_WRIST, arms.STANFORD):
         solved = inverse.solve(arm, arm.dh, pose)
-        assert (solved.status == Status.NOT_FOUND).all()
+        assert (solved.status == Status.NOT_REACHED).all()
         assert np.isnan(solved.q_rad).all()
     refined = newton.refine(MH180.dh, pose, np.zeros((1, 6)))
     assert not refined.converged[0]

@@ -37,11 +37,11 @@ _PER_NAME = 8  # postures of one name: of sixteen in all five were the most seen
 class Status(IntEnum):
     """Whether a branch has a solution, and whether it can be used.
 
-    NOT_FOUND: the pose is out of reach in this branch, or another branch has the same joints.
+    NOT_REACHED: the pose is out of reach in this branch, or another branch has the same joints.
     """
 
     FOUND = 0
-    NOT_FOUND = 1
+    NOT_REACHED = 1
     OUTSIDE_LIMITS = 2
     OUTSIDE_RANGE = 3
 
@@ -148,7 +148,7 @@ def solve(
     within ``newton.POSITION_TOLERANCE_MM`` and ``newton.ROTATION_TOLERANCE_RAD``. Of the turns of a
     joint ``limits.take_turns`` chooses one.
 
-    With a closed form, a branch that converged to the joints of an earlier one is NOT_FOUND and
+    With a closed form, a branch that converged to the joints of an earlier one is NOT_REACHED and
     branches keep the name they started from; on a calibrated arm one may be missed within 5 mm of
     axis 1 and where two singularities meet. The search looks for postures within the limits and
     slightly beyond, and names what it finds by ``postures.classes_of``.
@@ -196,7 +196,7 @@ def solve(
         parts = [_searched(onto, pose, value) for value in starts]
         q_rad = np.concatenate(parts, axis=1)[:, columns]
     good = np.isfinite(q_rad[..., 0])
-    status = np.where(good, Status.FOUND, Status.NOT_FOUND).astype(np.int8)
+    status = np.where(good, Status.FOUND, Status.NOT_REACHED).astype(np.int8)
     if fitted_range_rad is not None:
         status[good & ~limits.within(q_rad, *fitted_range_rad)] = Status.OUTSIDE_RANGE
     status[good & ~limits.within_limits(robot, q_rad)] = Status.OUTSIDE_LIMITS
