@@ -103,13 +103,13 @@ def load(
         where = places.get(("datasets",), str([*paths, source][0]))
         problems.append(Problem(where, message, allowed))
     if problems:
-        problems = sorted(dict.fromkeys(problems), key=_by_line)[:_MOST_PROBLEMS]
+        problems = sorted(dict.fromkeys(problems), key=by_line)[:_MOST_PROBLEMS]
         title = f"{len(problems)} problems in the configuration" if len(problems) > 1 else ""
         raise InputError(problems, title)
     return resolved
 
 
-def _by_line(problem: Problem) -> list[Any]:
+def by_line(problem: Problem) -> list[Any]:
     """Texts and numbers of a place in turn, by which line 9 comes before line 10."""
     parts = re.split(r"(\d+)", problem.where)
     return [int(part) if part.isdecimal() else part for part in parts]
@@ -173,26 +173,6 @@ def _data_set(
     return resolved
 
 
-def problems_of(error: ValidationError, place: Place) -> Iterator[Problem]:
-    """The problems of a pydantic error, with the key that is nearest to an unknown one."""
-    for item in error.errors(include_url=False)[: _MOST_PROBLEMS + 1]:
-        more = item.get("ctx", {})
-        # Kinds of gates and of values, and keys that are values, are no steps of the file.
-        path = (*item["loc"], *more.get("keys", ()))
-        path = tuple(step for step in path if not (isinstance(step, str) and step[:1] == "["))
-        message = item["msg"].removeprefix("Input ").partition(" or instance of ")[0]
-        reason, fix = f"{shown(item['input'])} {message}", ""
-        if item["type"] == "missing":
-            path, reason = path[:-1], f"has no {path[-1]}"
-        elif item["type"] == "extra_forbidden":
-            reason, fix = f"unknown key {path[-1]!r}", _meant(path)
-        elif item["type"] == "refused":
-            reason, fix = more["what"], more["fix"]
-        elif item["type"] == "literal_error":
-            fix = did_you_mean(item["input"], re.findall(r"'([^']*)'", more["expected"]))
-        yield Problem(place(path), reason, fix=fix)
-
-
 def _meant(path: KeyPath) -> str:
     """What to write instead of an unknown key of the settings."""
     path = path[2:] if path[0] == "datasets" else path
@@ -203,3 +183,25 @@ def _meant(path: KeyPath) -> str:
     return did_you_mean(key, there) or (
         f"it belongs at {' or '.join(homes)}" if homes else f"known: {', '.join(there)}"
     )
+
+
+def problems_of(
+    error: ValidationError, place: Place, meant: Callable[[KeyPath], str] = _meant
+) -> Iterator[Problem]:
+    """The problems of a pydantic error; ``meant`` names what to write for an unknown key."""
+    for item in error.errors(include_url=False)[: _MOST_PROBLEMS + 1]:
+        more = item.get("ctx", {})
+        # Kinds of gates and of values, and keys that are values, are no steps of the file.
+        path = (*item["loc"], *more.get("keys", ()))
+        path = tuple(step for step in path if not (isinstance(step, str) and step[:1] == "["))
+        message = item["msg"].removeprefix("Input ").partition(" or instance of ")[0]
+        reason, fix = f"{shown(item['input'])} {message}", ""
+        if item["type"] == "missing":
+            path, reason = path[:-1], f"has no {path[-1]}"
+        elif item["type"] == "extra_forbidden":
+            reason, fix = f"unknown key {path[-1]!r}", meant(path)
+        elif item["type"] == "refused":
+            reason, fix = more["what"], more["fix"]
+        elif item["type"] == "literal_error":
+            fix = did_you_mean(item["input"], re.findall(r"'([^']*)'", more["expected"]))
+        yield Problem(place(path), reason, fix=fix)

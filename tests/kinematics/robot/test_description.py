@@ -168,11 +168,11 @@ def test_all_faults_are_listed_in_order_with_line_and_key(arm):
     )
     said = faults(arm, text)
     for words in (
-        "arm.yaml:1, nmae: unknown key; did you mean name?",
-        "arm.yaml:5, dh[0].d: unknown key",
+        "arm.yaml:1, nmae: unknown key 'nmae'; did you mean name?",
+        "arm.yaml:5, dh[0].d: unknown key 'd'",
         "arm.yaml:6, dh[1].sign: 2",
-        "arm.yaml:8, dh[3].a_mm: zero",
-        "arm.yaml:8, dh[3].alpah_deg: unknown key; did you mean alpha_deg?",
+        "arm.yaml:8, dh[3].a_mm: 'zero'",
+        "arm.yaml:8, dh[3].alpah_deg: unknown key 'alpah_deg'; did you mean alpha_deg?",
     ):
         assert words in said, (words, said)
     lines = [int(line.split("arm.yaml:")[1].split(",")[0]) for line in said.splitlines()[1:]]
@@ -200,7 +200,7 @@ def test_all_faults_are_listed_in_order_with_line_and_key(arm):
         ("source:", "tool: {rpy_deg: [0, 0, 1], rpy_rad: [0, 0, 1]}\nsource:", ":2, tool"),
         ("name: small", "name: small\nname: other", "name"),
         ("dh:", "dh: [", "arm.yaml"),
-        ("dh:", "rows:", "dh is missing"),
+        ("dh:", "rows:", "has no dh"),
     ],
 )
 def test_each_fault_is_named_with_its_place(arm, old, new, place):
@@ -220,8 +220,8 @@ def test_units_that_only_make_sense_in_another_are_noticed(arm):
 
 def test_too_few_and_too_many_joints_are_refused(arm):
     last = GOOD.splitlines()[-1] + "\n"
-    assert "dh: List should have at most 7 items" in faults(arm, GOOD + 4 * last)
-    assert "dh: List should have at least 4 items" in faults(arm, GOOD.removesuffix(last))
+    assert "dh: has 8 rows; 4 to 7" in faults(arm, GOOD + 4 * last)
+    assert "dh: has 3 rows; 4 to 7" in faults(arm, GOOD.removesuffix(last))
 
 
 def test_an_unknown_robot_names_the_nearest():

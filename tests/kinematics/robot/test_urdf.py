@@ -198,7 +198,7 @@ def test_a_yaml_chooses_the_chain_and_adds_what_a_urdf_lacks(tmp_path):
     path.write_text("urdf: arm.urdf\ntip_lnk: l6\ndh: []\n")
     said = refusal(robot.load, path)
     assert "did you mean tip_link?" in said
-    assert "dh: unknown key" in said
+    assert "dh: unknown key 'dh'" in said
     path.write_text("urdf: other.urdf\n")
     assert "there is no such file" in refusal(robot.load, path)
 

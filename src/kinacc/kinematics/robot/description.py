@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import difflib
 import json
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from math import pi
 from pathlib import Path
@@ -24,9 +23,12 @@ from pydantic import (
 )
 from scipy.spatial.transform import Rotation
 
+from kinacc.config.fields import refused
+from kinacc.config.load import by_line, problems_of
 from kinacc.config.names import not_in_a_line
-from kinacc.config.reading import Document, parsed, read
-from kinacc.errors import InputError, Problem, refuse
+from kinacc.config.reading import Document, KeyPath, parsed, read
+from kinacc.config.values import did_you_mean
+from kinacc.errors import InputError, Problem, input_error, refuse
 from kinacc.geometry import (
     IDENTITY,
     Pose,
@@ -43,7 +45,6 @@ _SHIPPED = Path(__file__).parents[1] / "robots"
 _LARGEST = 1e9  # of any number: beyond, nothing about an arm is meant, and products overflow
 _SHORTEST_MM = 20.0  # of all lengths together
 _LEAST_TURN_RAD = 0.11  # some joint of every arm turns further
-_SUGGESTIONS = 20
 # Keys in another unit, with their fields and the factors.
 _ANGLES = ("theta_offset", "alpha", "beta", "limits", "rotation_vector", "rpy")
 _OTHER_UNITS = {f"{name}_deg": (f"{name}_rad", pi / 180.0) for name in _ANGLES}
@@ -65,7 +66,7 @@ def _times(value: Any, factor: float) -> Any:
 
 def _rising(limits: tuple[float, float]) -> tuple[float, float]:
     if not limits[0] < limits[1]:
-        raise ValueError(f"limits {list(limits)} are reversed or empty")
+        raise refused(f"limits {list(limits)} are reversed or empty")
     return limits
 
 
@@ -91,7 +92,7 @@ class _Strict(BaseModel):
                 name, factor = _OTHER_UNITS[key]
                 value = _times(value, factor)
             if name in converted:
-                raise ValueError(f"{name.rpartition('_')[0]} is given twice, in two units")
+                raise refused(f"{name.rpartition('_')[0]} is given twice, in two units")
             converted[name] = value
         return converted
 
@@ -107,9 +108,9 @@ class Frame(_Strict):
     @model_validator(mode="after")
     def _one_orientation(self) -> Self:
         if len(self.model_fields_set - {"position_mm"}) > 1:
-            raise ValueError("a second orientation: give one")
+            raise refused("has a second orientation", "give one")
         if self.quaternion_wxyz and abs(np.linalg.norm(self.quaternion_wxyz) - 1.0) > 1e-3:
-            raise ValueError("quaternion_wxyz is no unit quaternion w, x, y, z")
+            raise refused("quaternion_wxyz is no unit quaternion w, x, y, z")
         return self
 
     def pose(self) -> Pose:
@@ -140,7 +141,7 @@ class Row(_Strict):
     def _limits_of_its_kind(self) -> Self:
         if (self.limits_rad if self.joint == "prismatic" else self.limits_mm) is not None:
             units = "mm or m" if self.joint == "prismatic" else "deg or rad"
-            raise ValueError(f"the joint is {self.joint}: give its limits in {units}")
+            raise refused(f"the joint is {self.joint}", f"give its limits in {units}")
         return self
 
 
@@ -155,7 +156,7 @@ class _About(_Strict):
     @classmethod
     def _in_a_line(cls, value: str) -> str:
         for fault in not_in_a_line("name", value) if value else ():
-            raise ValueError(fault.what)
+            raise refused(fault.what)
         return value
 
     def matrix(self, default: np.ndarray) -> np.ndarray:
@@ -169,11 +170,17 @@ class _About(_Strict):
         return np.array(self.joint_map)
 
 
+def _of_an_arm(rows: list[Row]) -> list[Row]:
+    if not FEWEST_JOINTS <= len(rows) <= MOST_JOINTS:
+        raise refused(f"has {len(rows)} rows", f"{FEWEST_JOINTS} to {MOST_JOINTS}, one per joint")
+    return rows
+
+
 class Table(_About):
     """A robot file with a table of DH rows."""
 
     convention: Literal["standard", "modified"] = "standard"
-    dh: list[Row] = Field(min_length=FEWEST_JOINTS, max_length=MOST_JOINTS)
+    dh: Annotated[list[Row], AfterValidator(_of_an_arm)]
     limits_rad: list[TurnLimits] | None = None
     base: Frame = Frame()
     flange: Frame = Frame()
@@ -320,10 +327,9 @@ def _path(name_or_path: str | Path) -> Path:
         return _SHIPPED / f"{name}.yaml"
     if os.path.isfile(name):  # false, too, for a name no file can have
         return Path(name)
-    close = difflib.get_close_matches(name[:100].lower(), shipped(), n=1)
     allowed = "a name listed in docs/robots.md, or the path of a robot YAML or URDF"
-    fix = f"did you mean {close[0]}?" if close else ""
-    raise InputError(Problem(name, "is neither a shipped robot nor a file", allowed, fix))
+    fix = did_you_mean(name.lower(), shipped())
+    raise input_error(name, "is neither a shipped robot nor a file", allowed, fix)
 
 
 def _described(document: Document, problems: list[Problem], path: Path) -> Robot:
@@ -335,8 +341,7 @@ def _described(document: Document, problems: list[Problem], path: Path) -> Robot
         described = ByUrdf.model_validate(document.data)
         file = path.parent / described.urdf
         if not os.path.isfile(file):
-            where = document.place(("urdf",))
-            raise InputError(Problem(where, f"{file}: there is no such file"))
+            raise input_error(document.place(("urdf",)), f"{file}: there is no such file")
         robot = _urdf.load(file, described.base_link, described.tip_link)
         return replace(
             robot,
@@ -353,29 +358,22 @@ def _described(document: Document, problems: list[Problem], path: Path) -> Robot
 
 
 def _problems(error: ValidationError, document: Document) -> list[Problem]:
-    """The faults pydantic lists, as they stand in the file."""
-    models = (Row, Frame, Table, ByUrdf)
-    known = {name for model in models for name in model.model_fields} | set(_OTHER_UNITS)
-    problems = []
-    for number, fault in enumerate(error.errors(include_url=False)):
-        place: tuple[Any, ...] = ()
-        for part in fault["loc"]:
-            keys = [part, *(key for key, (name, _) in _OTHER_UNITS.items() if name == part)]
-            deeper = [(*place, key) for key in keys if document.gives((*place, key))]
-            if not deeper:
-                break
-            place = deeper[0]
-        message = fault["msg"].removeprefix("Value error, ")
-        if fault["type"] == "extra_forbidden":
-            name = str(place[-1])[:100].lower()
-            close = difflib.get_close_matches(name, known, n=1) if number < _SUGGESTIONS else []
-            message = "unknown key" + (f"; did you mean {close[0]}?" if close else "")
-        elif fault["type"] == "missing":
-            message = f"{fault['loc'][-1]} is missing"
-        elif not isinstance(fault["input"], Mapping | list):
-            message = f"{str(fault['input'])[:60]}: {message}"
-        problems.append((document.lines.get(place, 0), Problem(document.place(place), message)))
-    return [problem for _, problem in sorted(problems, key=lambda pair: pair[0])]
+    """The faults pydantic lists, as they stand in the file, line by line."""
+    known = {name for model in (Row, Frame, Table, ByUrdf) for name in model.model_fields}
+
+    def place(path: KeyPath) -> str:
+        written: KeyPath = ()
+        for part in path:
+            names = [part, *(key for key, (name, _) in _OTHER_UNITS.items() if name == part)]
+            written = next(
+                ((*written, name) for name in names if document.gives((*written, name))), written
+            )
+        return document.place(written)
+
+    def meant(path: KeyPath) -> str:
+        return did_you_mean(path[-1], {*known, *_OTHER_UNITS})
+
+    return sorted(problems_of(error, place, meant), key=by_line)
 
 
 def from_modified(table: DHModel) -> tuple[DHModel, Pose]:
