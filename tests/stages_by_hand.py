@@ -16,8 +16,7 @@ from kinacc.synthetic import source
 from kinacc.tables import store, sums
 from kinacc.tables.atomic import write_together
 from kinacc.workflow.code import config_hash
-from kinacc.workflow.data_sets import read_data_sets
-from kinacc.workflow.outdated import CALIBRATION
+from kinacc.workflow.data_sets import CALIBRATION, read_data_sets
 
 STAGES = {
     "measurements": source.run,

@@ -7,7 +7,7 @@ from stages_by_hand import CALIBRATED, perform
 
 import kinacc
 import kinacc.errors
-from kinacc.workflow.outdated import outdated_reason
+from kinacc.workflow.described import outdated_reason
 
 CONFIG = """\
 datasets: {arm: {robot: mh180}}

@@ -17,7 +17,7 @@ from kinacc.deployment.record import Calibration
 from kinacc.kinematics import robot as robots
 from kinacc.kinematics.robot import Robot
 from kinacc.tables.allowed import SELECTABLE
-from kinacc.workflow.outdated import outdated_reason
+from kinacc.workflow.described import outdated_reason
 
 CONFIG = "config.yaml"
 Command = Callable[..., Any]

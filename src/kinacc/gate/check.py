@@ -16,8 +16,7 @@ from kinacc.gate.outcome import FAILED, PASSED, WARNED, CheckReport, Outcome
 from kinacc.tables import store, sums
 from kinacc.tables.contract import ARTEFACTS
 from kinacc.workflow.data_sets import DataSets, data_sets
-from kinacc.workflow.described import beside
-from kinacc.workflow.outdated import made_with_other_settings
+from kinacc.workflow.described import beside, made_with_other_settings
 
 _NEEDED = ("measurements", "robot", "vec_model", "dh_model", "frames", "residuals", "pose_errors")
 _SHOWN = 3

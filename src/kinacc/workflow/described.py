@@ -1,9 +1,11 @@
-"""Settings of a data set whose results are there, from the configurations beside these."""
+"""Configurations beside results: by which one they were made, and what has changed since."""
 
 from __future__ import annotations
 
+import os
 import re
-from collections.abc import Iterator, Mapping, Sequence
+import shlex
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
@@ -11,26 +13,63 @@ from typing import Any
 
 from kinacc.checks.contradictions import load
 from kinacc.config.schema import defaults
-from kinacc.errors import InputError, Problem
-from kinacc.workflow.data_sets import DataSets, read_data_sets
+from kinacc.errors import InputError, first_few, input_error
+from kinacc.tables import store, sums
+from kinacc.workflow.code import config_hash
+from kinacc.workflow.data_sets import CALIBRATION, DataSets, read_data_sets
 
 CONFIG = "config.yaml"
 _OF_A_LINE = re.compile(r"-\d{4}-\d{2}-\d{2}$")
 _FILES = 20  # beside results, looked through for a configuration
+# Tables of rules that depend on whole sections of the settings, with these.
+_MADE_WITH = {
+    "summary": CALIBRATION,
+    "assessment_points": ("robot", "evaluation"),
+    "study": ("seed", "study"),
+}
 
 
-def beside(folder: Path) -> Iterator[tuple[Path, DataSets]]:
+def beside(folder: Path) -> list[tuple[Path, DataSets]]:
     """Configurations beside the folder of all results with the data set of a ``folder`` of them.
 
-    That of a line of a series stands there by the name of the series.
+    Those by which its calibration was made come first. That of a line of a series stands there by
+    the name of the series.
     """
-    series = _OF_A_LINE.sub("", folder.name).encode()
+    series, results = _OF_A_LINE.sub("", folder.name).encode(), []
     for path in sorted((folder.parent / "..").glob("*.yaml"))[:_FILES]:
         with suppress(InputError, OSError):
             if path.name == CONFIG or series in path.read_bytes():
-                plan = _planned(str(path), path.stat().st_mtime_ns)
-                if folder.name in plan.settings:
-                    yield path, plan
+                data = _planned(str(path), path.stat().st_mtime_ns)
+                if folder.name in data.settings:
+                    results.append((path, data))
+    return sorted(results, key=lambda item: _is_other(folder, item[1]))
+
+
+@cache
+def _planned(path: str, changed_ns: int) -> DataSets:
+    return read_data_sets([path])
+
+
+def _is_other(folder: Path, data: DataSets) -> bool:
+    """Whether the calibration in a folder was made with other settings."""
+    return "summary.parquet" in made_with_other_settings(folder, data)
+
+
+def made_with_other_settings(folder: Path, data: DataSets) -> list[str]:
+    """Names of tables in a results folder whose settings are not those of its data set now.
+
+    None where the configuration does not name the data set.
+    """
+    if folder.name not in data.settings:
+        return []
+    paths = [(folder / f"{name}.parquet", keys) for name, keys in _MADE_WITH.items()]
+    return [
+        path.name
+        for path, keys in paths
+        if path.is_file()
+        and store.read_metadata(path).get("config_hash")
+        != config_hash(data.chosen(folder.name, *keys))
+    ]
 
 
 def calibration_settings(folder: Path, configs: Sequence[str] = ()) -> Mapping[str, Any]:
@@ -54,44 +93,56 @@ def calibration_settings(folder: Path, configs: Sequence[str] = ()) -> Mapping[s
     return [*known, defaults()][0]["calibration"]
 
 
-@cache
-def _planned(path: str, changed_ns: int) -> DataSets:
-    return read_data_sets([path])
-
-
 def like_those_of(folder: Path, readings: Path) -> dict[str, Any]:
     """Settings by which a file of ``readings`` is read as those of the results in ``folder`` were.
 
-    Nothing is left out of it and nothing held out. Raises InputError where the configuration of the
-    results is not found, several are, or it names more than one file.
+    Nothing is left out of it and nothing held out. Raises InputError where no configuration beside
+    the results reads one file.
     """
     folder = folder.resolve()
-    candidates: dict[str, dict[str, Any]] = {}
     for path, _ in beside(folder):
-        settings = _of_file(load([path])[folder.name], readings)
-        if settings is not None and settings not in candidates.values():
-            candidates[path.name] = settings
-    first = next(iter(candidates.values()), None)
-    if (
-        first is not None
-        and len(candidates) == 1
-        and not first["measurements"]["file"]["joints"]["path"]
-    ):
-        return first
-    message = "is in a form that is not known: no configuration beside the results says how "
-    message += f"the readings of {folder.name} were read"
-    if len(candidates) > 1:
-        message = f"could be read in several ways: {', '.join(candidates)} describe {folder.name}"
-    elif first is not None:
-        message = f"has no joints of its own: those of {folder.name} stand in a second file"
+        settings = load([path])[folder.name]
+        measurements = settings["measurements"]
+        file = {**measurements["file"], "path": str(readings), "source": None, "exclude": []}
+        if measurements["source"] == "file" and not file["joints"]["path"]:
+            return {**settings, "measurements": {**measurements, "folds": None, "file": file}}
+    message = f"no configuration beside the results reads {folder.name} from one such file"
     fix = f"`kinacc init {readings}` writes a .yaml that describes it: give that in its place"
-    raise InputError(Problem(str(readings), message, fix=fix))
+    raise input_error(str(readings), message, fix=fix)
 
 
-def _of_file(settings: Mapping[str, Any], readings: Path) -> dict[str, Any] | None:
-    """The settings of a data set with another file; None where its poses are from none."""
-    measurements = settings["measurements"]
-    if measurements["source"] != "file":
-        return None
-    file = {**measurements["file"], "path": str(readings), "source": None, "exclude": []}
-    return {**settings, "measurements": {**measurements, "folds": None, "file": file}}
+def outdated_reason(folder: Path | str) -> str:
+    """Why the calibration in a results folder is outdated, and the command that makes it anew.
+
+    Measured files, robot files and tables are held to the digests that the stages left, settings
+    to those of the configurations beside the results, where there are any.
+
+    Parameters
+    ----------
+    folder
+        Results folder of a data set.
+
+    Returns
+    -------
+    str
+        One line; empty where the calibration is not outdated, or cannot be read.
+    """
+    folder = Path(folder).resolve()
+    try:
+        changed = sums.changed_since(folder)
+        known = [(os.path.relpath(path), _is_other(folder, data)) for path, data in beside(folder)]
+    except (InputError, OSError):
+        return ""  # whoever reads the results reports what is wrong with them
+    if changed:
+        again = shlex.join(["kinacc", "calibrate", *(path for path, _ in known[:1])])
+        return f"changed since the calibration: {first_few(changed, 3)}; run {again}"
+    others = [path for path, is_other in known if is_other]
+    if not others:
+        return ""
+    again = shlex.join(["kinacc", "calibrate", others[0]])
+    if len(others) == len(known):
+        return f"settings in {others[0]} changed since the calibration; run {again}"
+    return (
+        f"made with the settings of {known[0][0]}; {others[0]} has other settings for "
+        f"{folder.name}; to use these run {again}"
+    )
