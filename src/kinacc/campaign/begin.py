@@ -314,26 +314,18 @@ def noise_by_repeats(known: Noise | None) -> str:
     )
 
 
-def far_from_data(arm: Calibration, points: Points, point: str | None) -> int:
-    """Return how many candidates lie where the calibration was not measured."""
-    if arm.known is None or math.isnan(_unexplained_mm(arm)):
-        return 0
-    return int(np.sum(~is_measured_there(arm, _at(arm, points), point)))
-
-
 def _candidate_doubts(arm: Calibration, points: Points, point: str | None) -> list[Problem]:
     """A problem where more than a tenth of the candidates lie far from measured poses."""
-    far = far_from_data(arm, points, point)
+    if arm.known is None or math.isnan(_unexplained_mm(arm)):
+        return []
+    at = JointState(arm.robot.dh_joints(points.joints), points.directions)
+    far = int(np.sum(~is_measured_there(arm, at, point)))
     if far <= _FAR_SHARE * len(points):
         return []
-    largest_mm = float(np.max(position_std_mm(arm, _at(arm, points), point)))
+    largest_mm = float(np.max(position_std_mm(arm, at, point)))
     message = (
         f"{far} of {len(points)} lie outside the joint ranges of the calibration, or have a larger "
         f"standard deviation than {LIKE_FITTED:.0%} of its poses (up to {largest_mm:.3g} mm)"
     )
     fix = "--region measured draws them between measured poses; --sure takes them as they are"
     return [Problem("candidates", message, f"at most {_FAR_SHARE:.0%} of them", fix)]
-
-
-def _at(arm: Calibration, points: Points) -> JointState:
-    return JointState(arm.robot.dh_joints(points.joints), points.directions)

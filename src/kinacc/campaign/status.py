@@ -97,7 +97,6 @@ class CampaignStatus:
     budget: int
     readings: int
     readings_used: int
-    last_reading: int
     candidates: int
     points_measured: int
     left_out: Mapping[str, str]
@@ -185,7 +184,6 @@ def status(opened: Opened, tolerance_mm: float | None = None) -> CampaignStatus:
         budget=plan.assessor.measurements,
         readings=len(state.readings),
         readings_used=len(state.used),
-        last_reading=state.numbered,
         candidates=candidates,
         points_measured=visited,
         left_out={label[point]: why for point, why in state.left_out.items()},

@@ -122,7 +122,6 @@ def start(out: Output, **options: Any) -> None:
         "noise": {device.name: device.noise for device in plan.instruments},
         "tolerance_mm": limits.tolerance_mm,
         "implausible_mm": plan.limits.implausible_mm,
-        "far_from_data": begin.far_from_data(arm, points, point),
         "shortfall": reason(assessor.shortfall(len(points))),
         "overruled": plan.overruled,
     }
