@@ -79,7 +79,6 @@ NIGHT = tuple(
     for name in (
         "benchmarks",
         "calibration/test_reach.py",
-        "integration/test_real_arm.py",
         "integration/test_site.py",
         "report/test_in_a_browser.py",
         "research",

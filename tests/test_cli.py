@@ -35,13 +35,6 @@ def test_every_command_has_an_example_of_itself_and_says_its_answer_in_json(word
         assert all(option.help for option in command.params if option.param_type_name == "option")
 
 
-def test_every_command_is_listed_once_with_all_its_words():
-    shown = call("--help").output
-    for name in main.list_commands(None):
-        (line,) = (line for line in shown.splitlines() if line.startswith(f"  {name} "))
-        assert not line.endswith("...")
-
-
 @pytest.mark.parametrize(
     ("words", "near"),
     [

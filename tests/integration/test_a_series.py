@@ -109,11 +109,3 @@ def test_a_line_that_is_added_makes_itself_and_the_history_alone(arm, capfd):
     assert {name for name, _ in jobs} == {"tracker", MAY}
     (history,) = (text for name, text in jobs if name == "tracker")
     assert history.startswith("holding the calibrations of the series")
-
-
-def test_a_history_made_from_other_tables_is_noticed(arm):
-    shutil.copy(f"results/{MARCH}/frames.parquet", f"results/{JUNE}/frames.parquet")
-    checked = call(
-        "check-results", "results", "--dataset", JUNE, "--config", "tracker.yaml", code=1
-    )
-    assert "frames.parquet" in checked.output

@@ -63,18 +63,13 @@ def test_an_environment_in_a_folder_with_a_space_runs_the_rules(project, cell):
     assert (cell / robot).is_file()
 
 
-@pytest.mark.parametrize("by", ["folder", "--directory"])
-def test_ones_own_data_are_calibrated_in_ones_own_folder(project, cell, by):
+def test_ones_own_data_are_calibrated_in_ones_own_folder(project, cell):
     table = "results/own/measurements.parquet"
-    base = str(project.folder / "config.yaml")
-    if by == "folder":
-        started(project, cell, snakemake(project, table, "--configfile", base, "own.yaml"))
-        again = started(project, cell, snakemake(project, table, "--configfile", base, "own.yaml"))
-        assert "Nothing to be done" in again
-    else:
-        command = ["snakemake", "-c2", table, "--directory", str(cell)]
-        command += ["--configfile", "config.yaml", str(cell / "own.yaml")]
-        started(project, project.folder, command)
+    command = snakemake(
+        project, table, "--configfile", str(project.folder / "config.yaml"), "own.yaml"
+    )
+    started(project, cell, command)
+    assert "Nothing to be done" in started(project, cell, command)
     found, known = ((each / table).read_bytes() for each in (cell, project.folder))
     assert found == known
 

@@ -21,17 +21,6 @@ def test_a_stage_that_fails(project):
     assert not [*(project.folder / "results").rglob("*.partial")]
 
 
-def test_a_configuration_with_several_mistakes(project):
-    before = project.digests()
-    project.configure("study: {alhpa: 0.5, repetitions: many}")
-    project.configure("datasets: {'../mh180': {robot: mh180}}")
-    text = project.snakemake(ok=False)
-    for part in ("alhpa", "alpha", "many", "../mh180", "small.yaml"):
-        assert part in text
-    assert "Traceback" not in text
-    assert project.digests() == before
-
-
 def test_a_data_file_that_is_not_there(project):
     before = project.digests()
     (project.folder / CSV).rename(project.folder / "own data" / "moved.csv")
