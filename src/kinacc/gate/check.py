@@ -13,7 +13,7 @@ from kinacc.gate.accepted import compared
 from kinacc.gate.conformity import check_file
 from kinacc.gate.gates import judged
 from kinacc.gate.outcome import FAILED, PASSED, WARNED, CheckReport, Outcome
-from kinacc.tables import store, sums
+from kinacc.tables import sums
 from kinacc.tables.contract import ARTEFACTS
 from kinacc.workflow.data_sets import DataSets, data_sets
 from kinacc.workflow.described import beside, made_with_other_settings
@@ -46,8 +46,6 @@ def check_results(
     InputError
         Where there is no such folder or data set.
     """
-    if (results / "campaign_points.parquet").is_file():
-        return CheckReport(str(results), "", (check_campaign(results),))
     names = list(datasets) or sorted({*configurations, *data_sets_in(results)})
     if not names:
         raise InputError(Problem(str(results), "holds no data set", "a folder of results"))
@@ -72,46 +70,27 @@ def data_sets_in(results: Path) -> list[str]:
     return sorted(item.parent.name for item in results.glob(f"*/{sums.FOLDER}"))
 
 
-def check_campaign(folder: Path) -> Outcome:
-    """Whether the tables of a campaign's report are there, made together and fit their schemas."""
-    subset = [item for item in ARTEFACTS.values() if item.topic == "campaign"]
-    problems = [
-        item for artefact in subset for item in check_file(folder / artefact.file_name, artefact)
-    ]
-    if not problems:
-        marks = [store.read_metadata(folder / item.file_name) for item in subset]
-        if any(item != marks[0] for item in marks):
-            problems.append(Problem(str(folder), "tables of different states of a campaign"))
-    says = "tables fit their schemas and each other"
-    return _files(folder, problems, says, len(subset), "run `kinacc campaign report` again")
-
-
 def check_files(folder: Path, data: DataSets | None = None) -> Outcome:
     """Whether every file of a data set is there, as its stage left it, and fits its schema.
 
     A warning where files or settings (``data``, where the data set is in it) have changed since.
     """
-    problems, says = list(_problems(folder)), ""
-    if not problems and (old := sums.outdated(folder)):
-        says = f"{len(old)} files were made from files that have changed since: {first_few(old)}"
-    elif not problems and data is not None and (old := made_with_other_settings(folder, data)):
-        says = f"made with other settings than the configuration has now: {first_few(old)}"
-    if says:
-        return Outcome(folder.name, "files", "files", WARNED, says, "run the workflow again")
-    count = 0 if problems else len(sums.stated(folder))
-    says = f"{count} files are as their stages left them, and tables fit their schemas"
-    return _files(folder, problems, says, count)
-
-
-def _files(
-    folder: Path, problems: Sequence[Problem], says: str, count: int, fix: str = ""
-) -> Outcome:
-    if problems:
+    verdict, fix, figures = PASSED, "", {}
+    if problems := list(_problems(folder)):
         shown = "\n".join(map(str, problems[:_SHOWN]))
         says = shown + and_more(len(problems) - _SHOWN).replace(" ", "\n", 1)
-    figures = {"problems": len(problems)} if problems else {"files": count}
-    verdict = FAILED if problems else PASSED
-    return Outcome(folder.name, "files", "files", verdict, says, fix if problems else "", figures)
+        verdict, figures = FAILED, {"problems": len(problems)}
+    elif old := sums.outdated(folder):
+        says = f"{len(old)} files were made from files that have changed since: {first_few(old)}"
+        verdict, fix = WARNED, "run the workflow again"
+    elif data is not None and (old := made_with_other_settings(folder, data)):
+        says = f"made with other settings than the configuration has now: {first_few(old)}"
+        verdict, fix = WARNED, "run the workflow again"
+    else:
+        count = len(sums.stated(folder))
+        says = f"{count} files are as their stages left them, and tables fit their schemas"
+        figures = {"files": count}
+    return Outcome(folder.name, "files", "files", verdict, says, fix, figures)
 
 
 def _problems(folder: Path) -> Iterator[Problem]:
