@@ -7,7 +7,6 @@ import html
 import io
 import shlex
 import xml.etree.ElementTree as ET
-from dataclasses import replace
 from pathlib import Path
 
 import openpyxl
@@ -41,19 +40,6 @@ def test_no_cell_of_a_workbook_is_a_formula(tmp_path):
     rows = list(openpyxl.load_workbook(tmp_path / "a.xlsx").active.iter_rows())
     assert all(cell.data_type in "sn" for row in rows for cell in row)
     assert [row[0].value for row in rows[:2]] == ["'=name", "'=1+1"]
-
-
-def test_a_table_of_a_calibrated_arm_holds_no_formula():
-    from kinacc.deployment.export.files import csv_text
-    from kinacc.deployment.export.source import Source
-    from kinacc.deployment.record import nominal
-    from kinacc.kinematics import robot
-
-    arm = replace(nominal(robot.load("mh180")), choice="dh", left_open=("=HYPERLINK(1)",))
-    text = csv_text(Source(arm, {}))
-    assert [row["undetermined"] for row in csv.DictReader(io.StringIO(text))][-1].startswith(
-        "'=HYPERLINK(1)"
-    )
 
 
 @pytest.mark.parametrize("name", ["$\\frac$", "$x$", "_left out", "a--><script>1</script>"])

@@ -281,7 +281,8 @@ class Calibration:
     def to_pinocchio(self) -> Any:
         """The calibrated DH model as ``pinocchio.Model`` (m, rad; frames ``flange``, ``tool``).
 
-        Joints are those that the controller reports; InputError where these are coupled.
+        Joints are those that the controller reports, or those of the DH table where these are
+        coupled.
         """
         return urdf.to_pinocchio(Source(self.model, self.tables))
 

@@ -34,7 +34,6 @@ from kinacc.workflow.described import calibration_settings
 @option("--urdf", type=click.Path(), help="URDF file whose origins are corrected.")
 @option("--base-link", help="Link of that file where the arm starts. [its root]")
 @option("--tip-link", help="Link of that file where the arm ends. [the only one it can]")
-@option("--dh-joints", is_flag=True, help="URDF in the joints of the DH table.")
 @choice.ROBOT
 @option("--config", multiple=True,
         help="Configuration file for --for; repeatable. [those beside the results]")  # fmt: skip
@@ -49,7 +48,6 @@ def export(
     urdf: str | None,
     base_link: str | None,
     tip_link: str | None,
-    dh_joints: bool,
     robot: str | None,
     config: tuple[str, ...],
     out: Output,
@@ -84,7 +82,7 @@ def export(
     if maker is not None:
         _to_controller(folder, arm, target, maker, name, config, out)
         return
-    content = source.read_source(folder, arm, model, urdf, (base_link, tip_link), dh_joints)
+    content = source.read_source(folder, arm, model, urdf, (base_link, tip_link))
     paths = files.write(files.contents(content, wanted, name), target, out.force)
     out.show({"files": paths, **({"outdated": reason} if reason else {})}, lines=paths)
     for item in source.notes(content):

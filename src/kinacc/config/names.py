@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import csv
 import re
 import unicodedata
-from collections.abc import Iterable
-from types import SimpleNamespace
 
 from kinacc.errors import Problem
 
@@ -43,17 +40,6 @@ def in_markdown(text: str) -> str:
 def in_csv(text: str) -> str:
     """Text that no spreadsheet takes for a formula: an apostrophe before what would be one."""
     return f"'{text}" if _FORMULA.match(text) and not _NUMBER.fullmatch(text) else text
-
-
-def csv_text(rows: Iterable[Iterable[object]]) -> str:
-    """Rows of cells as CSV; a text that holds the end of a line, of whatever kind, in quotes.
-
-    Python's writer leaves a carriage return bare where lines do not end in it, and a spreadsheet
-    begins a row there.
-    """
-    lines: list[str] = []
-    csv.writer(SimpleNamespace(write=lines.append), lineterminator="\r\n").writerows(rows)
-    return "".join(f"{line[:-2]}\n" for line in lines)
 
 
 def of_csv(cell: str) -> str:

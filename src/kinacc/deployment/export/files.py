@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -12,7 +11,6 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from kinacc.calibration.misfit import in_words
 from kinacc.config import names
 from kinacc.config.error_models import PLAINEST
 from kinacc.deployment.export import paper_tables, urdf
@@ -28,26 +26,14 @@ _SLIDING = "T = Rz(theta_offset) Tz(q + d) Tx(a) Rx(alpha) Ry(beta) where a join
 
 
 def csv_text(source: Source) -> str:
-    """One row per joint, in degrees and mm, with what the poses leave open of a joint.
-
-    What is of no joint, as of base and tool, stands in the row of the last one.
-    """
-    joints = source.joints(source.dh)
+    """One row per joint, in degrees and mm."""
+    table = source.joints(source.dh)
     columns = [f"{group}{name}" for group in ("", "std_", "nominal_") for name in PARAMETERS]
-    values = joints[columns].to_numpy()
-    values = np.where(np.char.endswith(columns, "_rad"), np.rad2deg(values), values)
-    heads = [name.replace("_rad", "_deg") for name in columns]
-    texts: list[list[str]] = [[] for _ in range(len(joints))]
-    for sentence in source.calibration.left_open or ():
-        for joint in {*map(int, re.findall(r"joint (\d+)", sentence))} or {len(joints)}:
-            texts[joint - 1].append(sentence)
-    texts[-1] += source.orientation_lines
-    note = names.in_csv(in_words([source.misfit]))
-    rows: list[list[object]] = [["joint", "type", *heads, "undetermined", "std_note"]]
-    for row, numbers, about in zip(joints.itertuples(), values, texts, strict=True):
-        cells = ("" if np.isnan(x) else f"{x:.12g}" for x in numbers)
-        rows.append([row.joint, row.type, *cells, names.in_csv("; ".join(about)), note])
-    return names.csv_text(rows)
+    angles = [name for name in columns if name.endswith("_rad")]
+    table[angles] = np.rad2deg(table[angles])
+    table = table[["joint", "type", *columns]]
+    table = table.rename(columns=lambda name: name.replace("_rad", "_deg"))
+    return table.to_csv(index=False, float_format="%.12g", lineterminator="\n")
 
 
 def json_text(source: Source) -> str:

@@ -28,8 +28,7 @@ class Source:
     """A calibrated model, the ``tables`` of its results and what was asked for.
 
     ``provenance``: version, settings and seed that the model was made with.
-    ``urdf_file``: a URDF whose origins are to be corrected, from link ``links[0]`` to ``links[1]``;
-    ``dh_joints``: a URDF in the joints of the DH table.
+    ``urdf_file``: a URDF whose origins are to be corrected, from link ``links[0]`` to ``links[1]``.
     """
 
     calibration: Calibration
@@ -37,7 +36,6 @@ class Source:
     provenance: Mapping[str, str] = field(default_factory=dict)
     urdf_file: Path | str | None = None
     links: tuple[str | None, str | None] = (None, None)
-    dh_joints: bool = False
 
     @property
     def name(self) -> str:
@@ -80,6 +78,16 @@ class Source:
         return misfit(self.tables, self.calibration.robot, self.calibration.choice)
 
     @property
+    def coupled_lines(self) -> list[str]:
+        """Which joints a URDF has, where they are not the reported ones; else nothing."""
+        joint_map = self.calibration.robot.joint_map
+        if np.array_equal(joint_map, np.diag(np.sign(np.diag(joint_map)))):
+            return []
+        return [
+            "Joints of the URDF are those of the DH table: reported ones are coupled or scaled."
+        ]
+
+    @property
     def orientation_lines(self) -> list[str]:
         """Targets whose orientation no reading has, for a comment; nothing where there are none."""
         arm = self.calibration
@@ -100,7 +108,6 @@ def read_source(
     model: str = PLAINEST,
     urdf_file: Path | str | None = None,
     links: tuple[str | None, str | None] = (None, None),
-    dh_joints: bool = False,
 ) -> Source:
     """What formats are made of, from a results folder; InputError where it cannot be used."""
     tables = results.read_tables(folder)
@@ -108,7 +115,7 @@ def read_source(
     path = Path(folder) / f"{model}_model.parquet"
     known = store.read_metadata(path) if path.is_file() else {}
     marks = {key: known[key] for key in PROVENANCE_KEYS if key in known}
-    return Source(arm, tables, marks, urdf_file, links, dh_joints)
+    return Source(arm, tables, marks, urdf_file, links)
 
 
 def notes(source: Source) -> list[str]:
@@ -120,4 +127,4 @@ def notes(source: Source) -> list[str]:
     selected = results.selected_model(source.tables)
     if selected != source.calibration.choice:
         lines.append(f"note: {model_name(selected)} was selected (--model {selected})")
-    return lines
+    return [*lines, *source.coupled_lines]

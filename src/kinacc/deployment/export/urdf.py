@@ -49,16 +49,16 @@ def text(source: Source) -> str:
 def generated(source: Source) -> str:
     """A URDF of the calibrated DH chain: base_link, link_1 .. link_k, flange and tool.
 
-    Joints are those the controller reports, or with ``dh_joints`` those of the DH table. Raises
-    InputError where the robot's reported joints are coupled.
+    Joints are those the controller reports, or those of the DH table where reported joints are
+    coupled or scaled, which no chain of single joints can express.
     """
     calibration = source.calibration
     robot, dh = calibration.robot, source.dh
     names = robot.joint_names or tuple(f"joint_{i}" for i in range(1, dh.joints + 1))
-    senses = np.ones(dh.joints) if source.dh_joints else _signs(robot)
-    low, high = robot.q_min_rad, robot.q_max_rad
-    if source.dh_joints:
-        low, high = robot.dh_box(low, high)
+    about = f"{source.about}; effort and velocity are placeholders"
+    senses, low, high = np.diag(robot.joint_map), robot.q_min_rad, robot.q_max_rad
+    if source.coupled_lines:
+        senses, (low, high) = np.ones(dh.joints), robot.dh_box(low, high)
     scale = np.where(dh.prismatic, _M_PER_MM, 1.0)
     joints = [
         {"name": _name(name), "kind": kind, "sense": int(sense), "low": lower, "high": upper}
@@ -79,8 +79,7 @@ def generated(source: Source) -> str:
         links.append("tool")
         frames.append(compose(invert(robot.flange), calibration.targets[TOOL]))
     joints += [{"name": f"{link}_fixed"} for link in links[dh.joints + 1 :]]
-    about = f"{source.about}; effort and velocity are placeholders"
-    lines = [about, *source.orientation_lines, *source.left_open_lines]
+    lines = [about, *source.coupled_lines, *source.orientation_lines, *source.left_open_lines]
     template = Template(
         (files("kinacc.deployment.export") / "arm.urdf").read_text("utf-8"),
         autoescape=True, trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True,
@@ -147,7 +146,6 @@ def _ends_in_file(
     if described.dh.joints != robot.dh.joints:
         message = f"its chain has {described.dh.joints} moving joints, {robot.name}"
         raise InputError(Problem(str(path), f"{message} has {robot.dh.joints}"))
-    _signs(robot)  # coupled joints have no URDF
     low, high = np.maximum(robot.q_min_rad, -3.0e3), np.minimum(robot.q_max_rad, 3.0e3)
     share = np.random.default_rng(0).uniform(0.0, 1.0, (_PROBES, len(low)))
     q_rad = low + share * (high - low)
@@ -212,28 +210,10 @@ def origins(dh: DHModel) -> tuple[list[Pose], Pose]:
     return result, before
 
 
-def _signs(robot: Robot) -> np.ndarray:
-    """Sense (k,) in which reported joints turn the DH axes.
-
-    Raises InputError where reported joints are coupled or scaled, which no chain of single joints
-    can express.
-    """
-    diagonal = np.diag(robot.joint_map)
-    if np.array_equal(robot.joint_map, np.diag(diagonal)) and (np.abs(diagonal) == 1.0).all():
-        return diagonal
-    problem = Problem(
-        f"robot {robot.name}",
-        "reports joints that are coupled or scaled, which a URDF cannot say",
-        "every reported joint turns one axis, by its own angle",
-        "export with the joints of the DH table instead (--dh-joints)",
-    )
-    raise InputError(problem)
-
-
 def to_pinocchio(source: Source) -> Any:
     """A ``pinocchio.Model`` of the calibrated arm (m, rad), with frames ``flange`` and ``tool``.
 
-    Joints are those that the controller reports. Raises InputError where these are coupled.
+    Joints are those of ``generated``.
     """
     import pinocchio
 
