@@ -91,16 +91,6 @@ def test_what_is_not_said_is_named(cell, words, option):
     assert Path("tracker.yaml").read_text() == HERE
 
 
-def test_the_day_is_that_of_the_files_own_times(cell):
-    names, *rows = Path("june.csv").read_text().splitlines()
-    times = [f"2026-06-02 10:07:{number % 60:02}" for number in range(len(rows))]
-    stamped = [f"{row},{time}" for row, time in zip(rows, times, strict=True)]
-    stamped = [f"{names},measured_at", *stamped]
-    Path("june.csv").write_text("\n".join(stamped))
-    added("june.csv", *JUNE[2:], *FIRST)
-    assert "date: 2026-06-02" in Path("tracker.yaml").read_text()
-
-
 def test_a_file_of_known_readings_is_refused(cell):
     Path("june.csv").write_text(Path("data/march.csv").read_text())
     done = added(*SERIES, code=2)

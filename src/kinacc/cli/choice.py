@@ -26,18 +26,10 @@ option = partial(click.option, show_default=True)
 MODEL = click.Choice([*SELECTABLE, "nominal"])
 
 
-def values_of(path: str) -> click.ParamType[Any]:
-    """Values of an option for a key of the configuration, such as measurements.file.decimal."""
-    key = schema.key(path)
-    if "enum" in key:
-        return click.Choice(key["enum"])
-    ends = key["exclusiveMinimum"], key["exclusiveMaximum"]
-    return click.FloatRange(*ends, min_open=True, max_open=True)
-
-
 def setting(name: str, key: str, text: str) -> Decorator:
     """An option with the values of a key of ``measurements.file``."""
-    return option(name, type=values_of(f"measurements.file.{key}"), help=text)
+    values = click.Choice(schema.key(f"measurements.file.{key}")["enum"])
+    return option(name, type=values, help=text)
 
 
 def positive(text: str) -> float:

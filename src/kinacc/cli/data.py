@@ -7,6 +7,7 @@ import shlex
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
+from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
 
 _MOST = 100_000  # lines of a range
 _SETUP = click.Choice([SAME, MOVED])
+_DAY = click.DateTime(["%Y-%m-%d"])
 _EMPTY_REASON = Problem("--reason", "is empty", "why, in words")
 
 
@@ -200,19 +202,19 @@ def _numbers(text: str) -> list[int]:
 @click.argument("measurement_file", metavar="FILE", type=click.Path())
 @option("--to", "config", required=True, type=click.Path(), help="Configuration file of the arm.")
 @DATASET
-@option("--date", help="Day of the measurement, as 2026-06-02. [from times in the file]")
+@option("--date", type=_DAY, required=True, help="Day of the measurement.")
 @option("--base", type=_SETUP, required=True, help="Robot and instrument since the newest line.")
 @option("--tool", type=_SETUP, required=True, help="Tool or targets since the newest line.")
-@option("--first-date", help="Day of the first file, where it is no series yet.")
+@option("--first-date", type=_DAY, help="Day of the first file, where it is no series yet.")
 @answers()
 def add(
     measurement_file: str,
     config: str,
     dataset: str | None,
-    date: str | None,
+    date: datetime,
     base: str,
     tool: str,
-    first_date: str | None,
+    first_date: datetime | None,
     out: Output,
 ) -> None:
     """Add a measured FILE of the same arm to its series, as a line of the configuration.
@@ -221,6 +223,7 @@ def add(
     Example:
       kinacc add june.csv --to tracker.yaml --date 2026-06-02 --base moved --tool same
     """
-    result = adding.add(measurement_file, config, base, tool, dataset, date, first_date)
+    first_day = first_date and first_date.date()
+    result = adding.add(measurement_file, config, base, tool, date.date(), dataset, first_day)
     lines = [f"{config}, series of {result.dataset}:", *(f"  - {line}" for line in result.written)]
     out.show(result, lines=[*lines, f"Next: {shlex.join(['kinacc', 'calibrate', config])}"])

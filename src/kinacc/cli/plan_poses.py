@@ -24,7 +24,6 @@ from kinacc.progress import reporting
 from kinacc.report.rendering import lines
 
 _MOST_CANDIDATES = 100_000
-_TRUNCATION = "calibration.dh.truncation"
 
 
 @click.command("plan-poses")
@@ -38,11 +37,7 @@ _TRUNCATION = "calibration.dh.truncation"
 @choice.CONFIGS
 @option("--tool-mm", help="Measured point in the flange frame. [the robot's tool]")
 @option("--position-only", is_flag=True, help="No measured orientations.")
-@option("--frames-known", is_flag=True, help="No estimation of base and tool.")
 @option("--hayati", help='Joints with a Hayati angle, e.g. "2,3".')
-@option("--threshold", default=schema.key(_TRUNCATION)["default"],
-        type=choice.values_of(_TRUNCATION),
-        help="Least share of the best-determined direction.")  # fmt: skip
 @choice.FROM_DEG
 @answers(table=True, picture="Index against number of poses: .svg, .png, .pdf.")
 def plan_poses(
@@ -119,7 +114,6 @@ def _experiment(
     """What is measured and fitted; without ``settings`` base and tool are unknown."""
     problems: list[Problem] = []
     calibration = (settings or schema.defaults())["calibration"]
-    is_unknown = settings is None or calibration["base_and_tool"] == "estimated"
     tool, hayati = robots.carried(arm), tuple(hayati_joints(calibration["dh"], arm))
     if options["tool_mm"] is not None:
         offset = numbers_of(options["tool_mm"])
@@ -136,8 +130,8 @@ def _experiment(
     return planning.Experiment(
         tool,
         orientation=not options["position_only"],
-        frames_estimated=is_unknown and not options["frames_known"],
+        frames_estimated=settings is None or calibration["base_and_tool"] == "estimated",
         hayati_joints=hayati,
         rotation_weight_mm_per_rad=float(calibration["rotation_weight_mm_per_rad"]),
-        threshold=options["threshold"],
+        threshold=float(calibration["dh"]["truncation"]),
     )

@@ -6,7 +6,6 @@ import datetime
 import os
 import warnings
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,9 +16,7 @@ from kinacc.config.series import MOVED
 from kinacc.deployment.shared_readings import known_rows
 from kinacc.errors import InputError, Problem, first_few
 from kinacc.kinematics import robot
-from kinacc.measurements import files, times
 from kinacc.measurements.folds import split
-from kinacc.measurements.layout import Layout
 from kinacc.measurements.reader import read as read_measured
 from kinacc.tables.atomic import write_whole
 from kinacc.tables.columns import Columns
@@ -41,9 +38,9 @@ def add(
     config: str,
     base: str,
     tool: str,
+    date: datetime.date,
     dataset: str | None = None,
-    date: str | None = None,
-    first_date: str | None = None,
+    first_date: datetime.date | None = None,
 ) -> Added:
     """Add a measured file to the series of a data set; one file becomes a series of two.
 
@@ -53,18 +50,18 @@ def add(
         The measured file and the configuration file.
     base, tool
         ``same`` or ``moved`` since the newest line.
+    date
+        Day of the file, after that of the newest line.
     dataset
         Name of the data set; needed where there are several.
-    date
-        Day of the file, after that of the newest line; of its own times where not given.
     first_date
         Day of the file that is there, where the data set is no series yet.
 
     Raises
     ------
     InputError
-        Where the settings cannot read the file, its day is unknown or not the newest, it has other
-        targets or only known readings, or the text cannot be changed safely.
+        Where the settings cannot read the file, its day is not the newest, it has other targets or
+        only known readings, or the text cannot be changed safely.
     """
     full = load([config])
     names = [
@@ -81,19 +78,18 @@ def add(
     lines = settings.get("series", ())
     known = [full[line["name"]]["measurements"]["file"]["path"] for line in lines]
     known = known or [settings["measurements"]["file"]["path"]]
-    day = _day("--date", date, path, settings)
-    last = lines[-1]["date"] if lines else _day("--first-date", first_date, known[-1], settings)
-    if day <= last:
-        message = f"{day} is not after {last}, the day of {known[-1]}"
+    last = datetime.date.fromisoformat(lines[-1]["date"]) if lines else first_date
+    if last is None:
+        raise InputError(Problem("--first-date", "is not given", f"the day of {known[-1]}"))
+    if date <= last:
+        message = f"{date} is not after {last}, the day of {known[-1]}"
         raise InputError(Problem("--date", message, "a later day; write earlier lines by hand"))
     _require_alike(path, known, settings, tool)
     new: list[dict[str, Any]] = [
-        {"path": _beside(config, path), "date": day, "base": base, "tool": tool}
+        {"path": _beside(config, path), "date": date, "base": base, "tool": tool}
     ]
     if not lines:
         new.insert(0, {"path": _beside(config, known[0]), "date": last})
-    for line in new:
-        line["date"] = datetime.date.fromisoformat(line["date"])
     place = Path(os.path.realpath(config))
     text = place.read_bytes().decode("utf-8")  # as bytes: line ends stay
     changed = with_added(text, ("datasets", name, "series"), new, config)
@@ -108,19 +104,6 @@ def _beside(config: str, path: str) -> str:
     if os.path.isabs(path):
         return path
     return os.path.relpath(path, Path(config).absolute().parent).replace(os.sep, "/")
-
-
-def _day(option: str, date: str | None, path: str, settings: Settings) -> str:
-    """A day as given, or of the times of the file."""
-    days: list[str] = []
-    if date is None:
-        days = times.days(files.load(path, Layout.of(settings["measurements"]["file"])))
-    else:
-        with suppress(ValueError):
-            days = [datetime.date.fromisoformat(date).isoformat()]
-    if len(days) != 1:
-        raise InputError(Problem(option, f"{date or path} has no day", "a day as 2026-06-02"))
-    return days[0]
 
 
 def _require_alike(path: str, known: Sequence[str], settings: Settings, tool: str) -> None:

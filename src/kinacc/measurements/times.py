@@ -1,10 +1,9 @@
-"""Times of rows in seconds, days, and the offset between the clocks of two files."""
+"""Times of rows in seconds, and the offset between the clocks of two files."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Collection
-from datetime import datetime
 
 import numpy as np
 import pandas as pd
@@ -19,7 +18,6 @@ _DATES = ("%Y-%m-%d", "%d.%m.%Y", "%Y/%m/%d", "%d/%m/%Y", "%m/%d/%Y", "%d.%m.%y"
 # Numbers that can be no seconds of this century are milli-, micro- or nanoseconds.
 _LATEST_S = 4.2e9
 _UNITS = {"ms": 1e-3, "us": 1e-6, "µs": 1e-6, "μs": 1e-6, "ns": 1e-9}
-_DAY = re.compile(r"(\d{1,4}[-./]\d{1,2}[-./]\d{2,4})(?:[T ].*)?")
 _FEWEST = 4
 _SHARE = 0.6  # of the points, that must fall where the arm stood still
 _RIVAL = 0.85  # of the most points: another offset explains as much
@@ -64,25 +62,6 @@ def _dates(texts: Collection[str]) -> list[pd.DatetimeIndex]:
     """Dates by every form in which all of them are dates of measurements."""
     forms = [pd.to_datetime([*texts], format=form, errors="coerce") for form in _DATES]
     return [f for f in forms if ((f.year >= _YEARS[0]) & (f.year <= _YEARS[1])).all()]
-
-
-def days(table: RawTable) -> list[str]:
-    """Days (ISO) that the columns of dates of a file hold, from the first to the last.
-
-    None where no column holds dates alone, or where they can be read as those of other days.
-    """
-    known: set[str] = set()
-    for column in table.columns:
-        cells = [c for c in table.columns[column] if str(c).strip()]
-        stated = {c.date().isoformat() for c in cells if isinstance(c, datetime)}
-        texts = [_DAY.fullmatch(str(c).strip()) for c in cells if not isinstance(c, datetime)]
-        if not all(texts):
-            continue
-        forms = _dates([match[1] for match in texts if match])
-        ways = {tuple(sorted({*form.strftime("%Y-%m-%d")})) for form in forms}
-        if not texts or len(ways) == 1:
-            known |= stated.union(*ways)
-    return sorted(known)
 
 
 def offsets(points_s: np.ndarray, stands: np.ndarray, within_s: float) -> list[float]:
