@@ -102,12 +102,13 @@ def test_planned_poses_of_an_arm_beat_random_ones_and_are_driven_on_a_short_way(
 def test_paths_are_near_the_shortest_of_all():
     shares = []
     for seed in range(15):
-        distance = distances(np.random.default_rng(seed).uniform(-2, 2, (7, 6)))
+        places = np.random.default_rng(seed).uniform(-2, 2, (7, 6))
+        distance = distances(places)
 
         def length(path, distance=distance):
             return distance[path[:-1], path[1:]].sum()
 
-        path = shortest_path(distance)
+        path = shortest_path(places)
         assert path[0] == 0
         assert sorted(path.tolist()) == list(range(7))
         best = min(length(np.array([0, *rest])) for rest in permutations(range(1, 7)))

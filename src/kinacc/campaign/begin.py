@@ -18,7 +18,7 @@ from kinacc.campaign.instrument import Instrument
 from kinacc.campaign.plan import Arm, Limits, Plan, Points
 from kinacc.config.names import not_in_a_line
 from kinacc.deployment.applicability import LIKE_FITTED, is_measured_there, position_std_mm
-from kinacc.deployment.planning import distances, shortest_path
+from kinacc.deployment.planning import shortest_path
 from kinacc.deployment.record import Calibration
 from kinacc.errors import InputError, Problem, first_few, refuse
 from kinacc.geometry import compose, invert
@@ -28,7 +28,6 @@ from kinacc.kinematics.model import JointState
 from kinacc.kinematics.robot import outside_limits
 from kinacc.tables import store
 
-_ROUTED = 400  # points beyond which the route goes to the nearest neighbour
 _MUCH_NOISE = 2.0  # times what the calibration left unexplained, noise included
 _MUCH_NOISE_MM = 1.0  # where nothing is known of the calibration
 _LITTLE_NOISE = 0.8  # of the scatter that was measured
@@ -178,15 +177,7 @@ def plan_of(
 
 def _short_path(places: np.ndarray, start: np.ndarray) -> np.ndarray:
     """Rows (n,) of places (n, k) in an order with little travel from ``start`` (k,)."""
-    if 0 < len(places) <= _ROUTED:
-        return shortest_path(distances(np.concatenate([start[None], places])))[1:] - 1
-    # Improving a path takes time with the cube of its length.
-    remaining, path, here = np.arange(len(places)), np.zeros(len(places), dtype=int), start
-    for place in range(len(places)):
-        nearest = int(np.argmin(np.abs(places[remaining] - here).max(axis=1)))
-        path[place] = remaining[nearest]
-        here, remaining = places[path[place]], np.delete(remaining, nearest)
-    return path
+    return shortest_path(np.concatenate([start[None], places]))[1:] - 1
 
 
 def start(

@@ -30,6 +30,7 @@ _REGULAR = 1e-9  # of the mean eigenvalue: makes sets without all directions com
 _TIE = 1e-6  # of the log determinant: less may be rounding
 _MOST_SWEEPS = 100
 _SHORTER_RAD = 1e-9
+_IMPROVED = 401  # places of a path that 2-opt improves: its time goes with the cube of them
 
 
 @dataclass(frozen=True)
@@ -130,8 +131,8 @@ def plan_poses(
         raise InputError(Problem("candidates", "determine no parameter"))
     chosen, index = choose(shown.rows, count)
     chosen = np.sort(chosen)
-    distance = distances(np.concatenate([start_rad[None], q_rad[chosen]]) / travel_unit(robot))
-    path = shortest_path(distance)
+    places = np.concatenate([start_rad[None], q_rad[chosen]]) / travel_unit(robot)
+    distance, path = distances(places), shortest_path(places)
     return PosePlan(
         chosen[path[1:] - 1],
         distance[path[:-1], path[1:]],
@@ -313,17 +314,21 @@ def distances(places: np.ndarray) -> np.ndarray:
     return np.abs(places[:, None] - places[None]).max(axis=2)
 
 
-def shortest_path(distance: np.ndarray) -> np.ndarray:
-    """A short open path (n,) from the first point of ``distance`` (n, n): nearest neighbour, then
-    2-opt.
+def shortest_path(places: np.ndarray) -> np.ndarray:
+    """A short open path (n,) from the first of the ``places`` (n, k): nearest neighbour, then 2-opt
+    where they are few.
     """
-    count = len(distance)
+    count = len(places)
     remaining, path = np.ones(count, dtype=bool), [0]
     remaining[0] = False
     while remaining.any():
-        path.append(int(np.argmin(np.where(remaining, distance[path[-1]], np.inf))))
+        distance = np.abs(places - places[path[-1]]).max(axis=1)
+        path.append(int(np.argmin(np.where(remaining, distance, np.inf))))
         remaining[path[-1]] = False
     order = np.array(path)
+    if count > _IMPROVED:
+        return order
+    distance = distances(places)
     first, last = np.triu_indices(count, 1)
     first, last = first[first >= 1], last[first >= 1]
     after, is_end = np.minimum(last + 1, count - 1), last == count - 1
