@@ -51,7 +51,6 @@ _STATUS = {
 @choice.calibration_options
 @click.argument("joints", type=click.Path(), required=False)
 @option("--joints-deg", multiple=True, help='One configuration, e.g. "0,-20,30,0,45,0".')
-@option("--joints-rad", multiple=True, help="The same in radians.")
 @choice.joint_file_options
 @choice.point_options
 @answers(table=True, verbose=True)
@@ -61,7 +60,6 @@ def predict(
     robot: str | None,
     joints: str | None,
     joints_deg: tuple[str, ...],
-    joints_rad: tuple[str, ...],
     frame: str,
     point: str | None,
     session: str | None,
@@ -84,7 +82,7 @@ def predict(
     """
     calibration = choice.calibration_of(folder, model, robot, session)
     arm = calibration.robot
-    inputs, q = rows.joints_of(arm, joints, joints_deg, joints_rad, choice.joint_answers(file))
+    inputs, q = rows.joints_of(arm, joints, joints_deg, choice.joint_answers(file))
     with reporting("predict", bar=True):
         result = prediction.predict(calibration, q, inputs.directions, frame, point, inputs.payload)
     named = pd.DataFrame({"row": inputs.label, **rows.joint_columns(arm.dh.prismatic, q)})
@@ -150,7 +148,7 @@ def compensate(
     calibration = choice.calibration_of(folder, model, robot, session)
     near = None
     if near_deg is not None:
-        near = rows.of_arguments((near_deg,), "deg", calibration.robot, "--near-deg")[0]
+        near = rows.of_arguments((near_deg,), calibration.robot, "--near-deg")[0]
     if program is not None:
         _correct(calibration, program, near, point, target, options, out)
         return

@@ -38,20 +38,20 @@ def read_joints(
     return rows, rows.joints
 
 
-def of_arguments(texts: Sequence[str], unit: str, robot: Robot, option: str) -> np.ndarray:
-    """Joints (n, k) of arguments such as "10,-20,30,0,45,0" in ``unit``; InputError if unfit."""
+def of_arguments(texts: Sequence[str], robot: Robot, option: str) -> np.ndarray:
+    """Joints (n, k) of arguments such as "10,-20,30,0,45,0" in deg (mm); InputError if unfit."""
     slides, rows = robot.dh.prismatic, [numbers_of(text) for text in texts]
     allowed = f"{len(slides)} numbers, one per joint of {robot.name}"
     refuse(Problem(option, repr(text), allowed) for text, row in zip(texts, rows, strict=True)
            if len(row) != len(slides))  # fmt: skip
-    return np.array(rows) * np.where(slides, 1.0, ANGLE[unit])
+    return np.array(rows) * np.where(slides, 1.0, ANGLE["deg"])
 
 
 def stand_of(robot: Robot, text: str | None) -> np.ndarray:
     """Joints (k,) of ``--from-deg``, zero where it is not given."""
     if text is None:
         return np.zeros(robot.dh.joints)
-    joints: np.ndarray = of_arguments((text,), "deg", robot, "--from-deg")[0]
+    joints: np.ndarray = of_arguments((text,), robot, "--from-deg")[0]
     return joints
 
 
@@ -59,7 +59,6 @@ def joints_of(
     robot: Robot,
     path: str | None,
     in_deg: Sequence[str],
-    in_rad: Sequence[str],
     answers: Mapping[str, Any],
 ) -> tuple[Rows, np.ndarray]:
     """Rows and joints (n, k) of a file or of arguments.
@@ -67,13 +66,12 @@ def joints_of(
     InputError without any, or outside the limits. ``answers`` to what the file leaves open, by
     option.
     """
-    if [path is not None, bool(in_deg), bool(in_rad)].count(True) != 1:
-        raise InputError(Problem("joints", "are needed once", "a file, --joints-deg, --joints-rad"))
+    if (path is None) != bool(in_deg):
+        raise InputError(Problem("joints", "are needed once", "a file, --joints-deg"))
     if path is not None:
         rows, joints = read_joints(path, robot, answers)
     else:
-        unit = "deg" if in_deg else "rad"
-        joints = of_arguments(in_deg or in_rad, unit, robot, f"--joints-{unit}")
+        joints = of_arguments(in_deg, robot, "--joints-deg")
         rows = Rows(np.arange(1, len(joints) + 1), joints)
     require_within_limits(robot, rows.label, joints, path or "joints")
     return rows, joints
