@@ -13,7 +13,7 @@ take it minutes.
 
 VEC fits have 1,000 full poses and 216 coefficients beside base and tool. They
 are held to a product of the transposed Jacobian, 6,000 x 216, with itself. No fit takes less than
-three such products.
+three such products. The rank report named below took one more factorisation; it is gone since.
 """
 
 from __future__ import annotations
