@@ -70,7 +70,7 @@ def commands() -> list[list[str]]:
     found = []
     for name in dict.fromkeys([*FITTED, *(judged for _, judged, _ in VERIFIED)]):
         robot = "ur5.robot.yaml" if name.startswith("ur5") else "ur10"
-        found.append(f"kinacc init {name}.csv --robot {robot} --yes")
+        found.append(f"kinacc init {name}.csv --robot {robot}")
     found += [f"kinacc calibrate {name}.yaml" for name in FITTED]
     found += [
         f"kinacc verify {judged}.yaml --calibration results/{fitted} --base {setup} --tool {setup}"

@@ -24,7 +24,7 @@ def described(tmp_path_factory):
     arm = tracked(poses=60)
     arm.point[4:6] += [0.0, 25.0, 0.0]
     (folder / "seen.csv").write_text(table(NAMES, arm.q, arm.point))
-    call("init", folder / "seen.csv", "--robot", "ur10", "--yes", "--out", folder)
+    call("init", folder / "seen.csv", "--robot", "ur10", "--out", folder)
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
         return folder, next_commands(call("check-data", "seen.yaml", code=1))

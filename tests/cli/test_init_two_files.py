@@ -2,10 +2,8 @@
 
 import numpy as np
 import pytest
-from command_line import call
 from tracked_arm import XYZ, Q, assert_read, looked, refused, table, tracked, written
 
-from kinacc.checks.contradictions import load
 from kinacc.kinematics import robot
 from kinacc.measurements.reader import read
 
@@ -49,9 +47,6 @@ def test_as_many_rows_without_a_key_are_asked_about(tmp_path):
     assert "--join order" in refused(files)
     section, _ = looked(files, join="order")
     assert_read(section, IT)
-    cell = tmp_path / "asked"
-    call("init", *files, "--robot", "ur10", "--out", cell, "--name", "m", input="order\n", code=0)
-    assert load((cell / "m.yaml",))["m"]["measurements"]["file"]["joints"]["by"] == "order"
 
 
 def test_a_count_of_rows_is_no_name(tmp_path):

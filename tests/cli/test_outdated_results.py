@@ -25,7 +25,7 @@ def calibrated(tmp_path_factory):
     (folder / "seen.csv").write_text(table(NAMES, arm.q, arm.point))
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
-        call("init", "seen.csv", "--robot", "ur10", "--yes", code=0)
+        call("init", "seen.csv", "--robot", "ur10", code=0)
         path = folder / "seen.yaml"
         text = path.read_text().replace("order: auto", "order: 1").replace("folds: 5", "folds: 2")
         path.write_text(text)

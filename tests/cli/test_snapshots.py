@@ -23,7 +23,7 @@ NOISE = ("--noise-mm", "0.1")
 # In this order, each in the folder that those before it left; the exit code is part of it.
 COMMANDS: dict[str, tuple[str, ...]] = {
     "kinacc": ("--help",),
-    "init": ("init", "arm.csv", "--robot", "ur10", "--yes", "--force"),
+    "init": ("init", "arm.csv", "--robot", "ur10", "--force"),
     "check-data": ("check-data", "arm.yaml"),
     "summary": ("summary", FIT),
     "summary of many": ("summary", "results"),

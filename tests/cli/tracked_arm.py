@@ -81,7 +81,7 @@ def looked(paths, **answers):
 def refused(paths, *options, robot="ur10"):
     """What init says where it does not go on."""
     cell = paths[0].parent / "cell"
-    done = call("init", *paths, "--robot", robot, "--out", cell, "--yes", *options, code=2)
+    done = call("init", *paths, "--robot", robot, "--out", cell, *options, code=2)
     assert not cell.exists()
     return done.output
 

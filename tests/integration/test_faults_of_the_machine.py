@@ -184,7 +184,7 @@ def test_a_clone_in_a_folder_with_odd_letters_runs_and_braces_in_a_file_are_refu
     clone = tmp_path / "a clone of 'ours' \"$HOME\" größe"
     copy(clone)
     write_poses(clone / "poses.csv")
-    ended(clone, ("kinacc", "init", "poses.csv", "--robot", "mh180", "--yes", "--name", "own"))
+    ended(clone, ("kinacc", "init", "poses.csv", "--robot", "mh180", "--name", "own"))
     ended(clone, ("snakemake", "-c1", "--configfile", "own.yaml", "--", FIRST))
     assert (clone / FIRST).is_file()
     (clone / "{data}").mkdir()

@@ -75,7 +75,7 @@ def test_ones_own_data_are_calibrated_in_ones_own_folder(project, cell):
 
 
 def test_init_prints_commands_that_run_from_where_it_was_called(project, cell):
-    options = ["--robot", "mh180", "--yes", "--name", "ours", "--out", "my files"]
+    options = ["--robot", "mh180", "--name", "ours", "--out", "my files"]
     text = started(project, cell, ["kinacc", "init", "own data/poses.csv", *options])
     check, run = (line.strip() for line in text.partition("next:")[2].strip().splitlines()[:2])
     started(project, cell, ["sh", "-c", check])

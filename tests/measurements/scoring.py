@@ -75,7 +75,7 @@ def measured(name: str) -> SimpleNamespace:
 def fault(measured: SimpleNamespace, folder: Path) -> str:
     """What is wrong with the answer of init and run; nothing where the file is read right, asked
     about what it leaves open, or refused where that may be."""
-    words = ["--robot", measured.robot, "--yes", "--json", "--out", folder, "--name", "n"]
+    words = ["--robot", measured.robot, "--json", "--out", folder, "--name", "n"]
     described = call("init", *measured.files, *words)
     if described.exit_code == 0:
         try:

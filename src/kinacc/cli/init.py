@@ -17,14 +17,13 @@ from kinacc.checks.described import corrected, coupling_of, fitting, remarks_on
 from kinacc.checks.findings import Report
 from kinacc.cli import choice, rows
 from kinacc.cli.choice import option
-from kinacc.cli.init_questions import confirmed, guessed, unanswered
 from kinacc.cli.output import Output, answers, require_writable
 from kinacc.config.names import LONGEST
 from kinacc.errors import InputError, Problem
 from kinacc.kinematics import robot as robots
 from kinacc.measurements.intake import write
 from kinacc.measurements.intake.groups import listed
-from kinacc.measurements.intake.guess import Guess
+from kinacc.measurements.intake.guess import Guess, look
 from kinacc.measurements.reader import MeasuredFile, read
 from kinacc.progress import reporting
 from kinacc.report import rendering
@@ -98,31 +97,31 @@ class Description:
         "as B of the points), time or order.")  # fmt: skip
 @option("--clock-offset", metavar="SECONDS",
         help="Seconds added to times of points to get the joints'.")  # fmt: skip
-@option("--yes", is_flag=True, help="No questions: guesses are taken, and stated.")
 @answers(force=True)
 def init(measurement_files: tuple[str, ...], out: Output, **options: Any) -> None:
     """Describe MEASUREMENT_FILES: write their data set and, where needed, its robot.
 
-    Asks what the files leave open; with --yes or --json, stops where there is no guess. Two files
-    are joints and points of the same poses.
+    Where the files can be read in several ways, nothing is written, and the options that decide are
+    named. Two files are joints and points of the same poses.
 
     \b
     Example:
       kinacc init series_D.csv --robot ur10 --name ur10_d
       kinacc init joints.csv points.csv --join Name=Point
     """
-    ask = not (options["yes"] or out.as_json)
+    if len(measurement_files) > 2:
+        message = f"{len(measurement_files)} files"
+        allowed = "one file, or one of joints and one of points"
+        raise InputError(Problem(" ".join(measurement_files), message, allowed))
     stated = {key: value for key, value in options.items() if value not in (None, ())}
-    guess = guessed(measurement_files, stated, ask)
+    guess = look(measurement_files, stated)
     name = options["name"] or write.plain_name(guess.table.path)
     if name != write.plain_name(f"{name}.csv"):
         raise InputError(Problem("--name", name, f"at most {LONGEST} letters, digits, _ and -"))
     dataset = Path(options["folder"], f"{name}.yaml")
     robot_file = dataset.with_name(f"{name}.robot.yaml")
     require_writable([dataset], out.force)
-    if ask and (changed := confirmed(guess, options["robot"])):
-        guess = guessed(measurement_files, stated | changed, ask)
-    robot, chosen = _robot(guess, options["robot"], ask)
+    robot, chosen = _robot(guess, options["robot"])
     text = _robot_text(robot, guess.joints, name, robot_file.parent)
     texts = {} if text is None else {robot_file: text}
     report, remarks = None, []
@@ -189,19 +188,12 @@ def _first_poses(reading: MeasuredFile, prismatic: np.ndarray) -> pd.DataFrame:
     return first.join(vectors).assign(readings=counts.to_numpy())
 
 
-def _robot(guess: Guess, stated: str | None, ask: bool) -> tuple[str | None, str]:
-    """The robot as stated, found by fitting, or as answered; None for a template. And why."""
+def _robot(guess: Guess, stated: str | None) -> tuple[str | None, str]:
+    """The robot as stated or found by fitting, None for a template; and why."""
     if stated is not None:
         return stated, "as given"
     with reporting("init", bar=True) as progress:
         fit = fitting(guess, progress)
-    if ask:
-        question = "Robot (name in docs/robots.md, robot or URDF file, or 'new' for a form)"
-        try:
-            answer = click.prompt(question, default=fit[0] if fit else "new")
-        except click.Abort:
-            raise unanswered(guess, [], None) from None
-        return (None, "a template to fill in") if answer == "new" else (answer, "as answered")
     if not fit:
         return None, "none of the shipped robots fits; a template to fill in"
     if len(fit) > 1:

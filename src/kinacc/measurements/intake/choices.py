@@ -17,29 +17,22 @@ Answers = Mapping[str, Any]  # to choices, by their keys
 class Choice:
     """A question ``about`` a file, and the meaning of each of the ``answers`` to ``option``.
 
-    ``option`` is that of ``kinacc init``, such as --decimal; ``key`` its name among the answers.
-    ``several``: more than one column may be taken; ``without``: none of them is an answer too.
+    ``option`` is that of ``kinacc init``, such as --decimal. ``without``: none of the answers is
+    one too.
     """
 
     option: str
     about: str
     answers: Mapping[str, str]
-    several: bool = False
     without: bool = False
-
-    @property
-    def key(self) -> str:
-        """Name of the answer: decimal, sheet, direction_unit."""
-        return self.option.removeprefix("--").replace("-", "_")
 
 
 class Undecided(InputError):
-    """The file can be read in more than one way; carries the ``choices``."""
+    """The file can be read in more than one way: the ``choices`` that are open."""
 
     def __init__(self, path: str, *choices: Choice) -> None:
-        self.choices = choices
         problems = []
-        for choice in self.choices:
+        for choice in choices:
             meant = "; ".join(f"{value}: {text}" for value, text in choice.answers.items())
             ways = [f"{choice.option} {shlex.quote(value)}" for value in choice.answers]
             ways += ["--orientation none"] if choice.without else []

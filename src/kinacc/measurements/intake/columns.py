@@ -179,11 +179,9 @@ class _Choice:
                 distinct.append(group)
         return [group for group in candidates if group in distinct]
 
-    def _ask(
-        self, about: str, groups: Sequence[Group], several: bool = False, without: bool = False
-    ) -> Group:
+    def _ask(self, about: str, groups: Sequence[Group], without: bool = False) -> Group:
         answers = {group.names[0]: group.text for group in groups}
-        self.questions.append(Choice(TAKE, about, answers, several and len(groups) > 1, without))
+        self.questions.append(Choice(TAKE, about, answers, without))
         return groups[0]
 
     def joints(self) -> Group | None:
@@ -245,7 +243,7 @@ class _Choice:
                 why = "they do not keep the distance of targets on a flange"
         if not why:
             return candidates
-        self._ask(f"the names do not tell the measured point ({why})", candidates, several=True)
+        self._ask(f"the names do not tell the measured point ({why})", candidates)
         return _named_apart(candidates)
 
     def _is_rigid(self, groups: Sequence[Group]) -> bool:

@@ -39,23 +39,14 @@ _ORIENTATIONS = {
     "quaternion_xyzw": {"kind": "quaternion", "order": "xyzw"},
     **{name: {"kind": "euler", "convention": name} for name in CONVENTIONS},
 }
-# Options that answer what was assumed, and the answers there are.
-OPTIONS: dict[str, tuple[str, tuple[str, ...]]] = {
-    "joint_unit": ("--joint-unit", ("deg", "rad")),
-    "length_unit": ("--length-unit", ("mm", "m")),
-    "angle_unit": ("--angle-unit", ("deg", "rad")),
-    "orientation": ("--orientation", ("none", "quaternion", "rotation_vector", *CONVENTIONS)),
-    "order": ("--orientation", ("quaternion", "quaternion_xyzw")),
-    "horizontal": ("--horizontal", ("clockwise", "counterclockwise")),
-}
 
 
 @dataclass(frozen=True)
 class Guess:
     """A ``measurements.file`` section, and what of it the file does not state.
 
-    ``assumed``: settings taken by default or by the size of numbers, with a text on each (see
-    ``OPTIONS``). ``columns``: their meaning. ``notes``: facts on how the file was read.
+    ``assumed``: settings taken by default or by the size of numbers, with a text on each.
+    ``columns``: their meaning. ``notes``: facts on how the file was read.
     """
 
     section: dict[str, Any]
@@ -271,7 +262,7 @@ class _Guesser:
         unit = unit or self.looked.stated.get(setting.removesuffix("_unit"), "")
         message, allowed = "", ""
         if len({*stated, unit} - {""}) > 1:
-            option = f" ({OPTIONS[setting][0]} {answer})" if answer else ""
+            option = f" (--{setting.replace('_', '-')} {answer})" if answer else ""
             message = f"are in {' and '.join(sorted({*stated, unit}))}{option}"
             allowed = "one unit for all"
         elif unit and unit not in known:
