@@ -79,6 +79,18 @@ def test_fig3_draws_unusual_maps(tables, rows, reached):
     assert ("none reached" in said(figure)) != reached
 
 
+def test_fig3_lists_only_the_marks_that_are_there(tables):
+    table = dict(tables["accuracy_map"])
+    some = table["solutions"] > 0
+    assert some.all()
+    marks = {"not reachable", "some poses not reachable", "largest in the slice"}
+    legends = []
+    for solutions in (table["wanted"], table["solutions"], np.where(np.arange(some.size), 1, 0)):
+        (legend,) = fig3.draw(table | {"solutions": solutions}).legends
+        legends.append({text.get_text() for text in legend.texts} & marks)
+    assert legends == [{"largest in the slice"}, marks - {"not reachable"}, marks]
+
+
 def test_fig4_bars_reach_from_the_smallest_to_the_largest_beside_the_truth(tables):
     table = tables["study_summary"]
     implied = np.median(table["mean_mm"] - table["bias_mm"])

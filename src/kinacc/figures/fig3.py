@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
@@ -20,6 +21,7 @@ PLACE = ["slice_deg", "radius_mm", "height_mm"]
 ROWS = (("position_max_mm", "Position", "mm"), ("orientation_max_mrad", "Orientation", "mrad"))
 HEAD = "Map error, DH to VEC, in slices at these angles about the robot's first axis"
 DEFAULT_CELL_MM = 25.0
+RING, PARTLY = "largest in the slice", "some poses not reachable"
 MARGINS_IN = (1.6, 1.7)  # of all panels together: beside them, and above and below
 _HATCHED: dict[str, Any] = {
     "facecolor": "#e2e2e2",
@@ -33,8 +35,8 @@ def draw(accuracy_map: Columns, *, dataset: str | None = None) -> Figure:
     """Draw ``accuracy_map``: a column per slice, position above orientation.
 
     One colour scale per row; unreachable cells are hatched, and those reached in some but not all
-    orientations and branches dotted; the largest value of each slice is ringed and stated.
-    Raises InputError where there is no row.
+    orientations and branches dotted; the largest value of each slice is ringed and stated. The
+    legend lists the marks that are there. Raises InputError where there is no row.
     """
     cells = pd.DataFrame(accuracy_map)
     if cells.empty:
@@ -73,10 +75,12 @@ def draw(accuracy_map: Columns, *, dataset: str | None = None) -> Figure:
         name = style.shortened(dataset or "", int(15 * width))
         head = HEAD if wide else fill(HEAD, 40)
         figure.suptitle(f"{name}\n{head}" if name else head, parse_math=False)
-        marks = {line.get_label(): line for line in panels[0, 0].lines} | {
-            "some poses not reachable": Patch(fc="#21918c", ec="white", hatch="...", lw=0),
-            "not reachable": Patch(**_HATCHED),
-        }
+        rings = [line for ax in panels.flat for line in ax.lines if line.get_label() == RING]
+        marks: dict[str, Artist] = {RING: rings[-1]} if rings else {}
+        if _partly_reached(cells).any():
+            marks[PARTLY] = Patch(fc="#21918c", ec="white", hatch="...", lw=0)
+        if (cells["solutions"] > 0).sum() < slices.size * radii.size * heights.size:
+            marks["not reachable"] = Patch(**_HATCHED)
         figure.legend(marks.values(), marks, loc="outside lower center", ncols=3 if wide else 2)
     return figure
 
@@ -101,15 +105,19 @@ def colour_range(values: np.ndarray) -> tuple[float, float]:
     return (low, high) if high - low > 1e-3 * abs(high) else (0.9 * low, 1.1 * high + 1e-3)
 
 
+def _partly_reached(cells: pd.DataFrame) -> pd.Series:
+    return (cells["solutions"] > 0) & (cells["solutions"] < cells["wanted"])
+
+
 def _marks(ax: Axes, cells: pd.DataFrame, column: str, unit: str) -> str:
     """Dot cells that are partly reached, ring the largest value; return it in words."""
-    partly = cells[(cells["solutions"] > 0) & (cells["solutions"] < cells["wanted"])]
+    partly = cells[_partly_reached(cells)]
     ax.plot(partly["radius_mm"], partly["height_mm"], ".", ms=1.6, mew=0, color="white",
-            rasterized=True, label="some poses not reachable")  # fmt: skip
+            rasterized=True, label=PARTLY)  # fmt: skip
     if cells[column].isna().all():
         return "none reached"
     worst = cells.loc[cells[column].idxmax()]
     for colour, line in (("white", 2.2), (style.INK, 0.9)):
         ax.plot(worst["radius_mm"], worst["height_mm"], "o", ms=5.5, mfc="none", mec=colour,
-                mew=line, clip_on=False, label="largest in the slice")  # fmt: skip
+                mew=line, clip_on=False, label=RING)  # fmt: skip
     return f"max {worst[column]:.2f} {unit}"
