@@ -35,15 +35,14 @@ from kinacc.tables.contract import columns_of
 
 OPTIONAL = (
     *(f"{kind}_model" for kind in ERROR_MODELS),
-    *("summary", "data_check", "excluded_rows", "vec_orders", "accuracy_map"),
-    *("assessment_points", "claims", "history"),
+    *("summary", "data_check", "excluded_rows", "vec_orders", "claims", "history"),
 )
 # Tables that the page needs, and those that it shows where they are there.
 PAGE_TABLES = (*figures.TABLES, "dh_model", "vec_model", "residuals", "worst_rows", "summary")
 ON_PAGE = (
     *OPTIONAL,
     *(f"{kind}_{part}" for kind in ERROR_MODELS for part in ("fit", "covariance")),
-    *("study", "study_summary", "readings", "histories"),
+    *("accuracy_map", "assessment_points", "study", "study_summary", "readings", "histories"),
 )
 _STUDIED = (
     *("accuracy_map", "assessment_points", "study", "study_summary", "readings", "histories"),
@@ -133,7 +132,6 @@ def summarise(
         remarks=assessed.remarks,
         tolerance=tolerance_of(tables),
         claims=_claims(tables["claims"]) if synthetic and "claims" in tables else None,
-        other_errors=_other_errors(tables),
         history=history_sentence(pd.DataFrame(tables["history"])) if "history" in tables else "",
         outdated=outdated,
         next_steps=_next_steps(str(folder), selected, assessed.status),
@@ -228,39 +226,16 @@ def run(inputs: Tables, settings: Mapping[str, Any]) -> dict[str, Columns]:
     share = applicability.share_of_box(calibration, *figures.covered(inputs["measurements"], arm))
     known = summarise(Path("results"), inputs, campaigns=())
     rows = [
-        ("robot", known.robot, "name", np.nan, None, known.robot),
-        ("robot", "base and tool", "fitted", float(known.frames_fitted), "1", None),
         *(
-            ("data", "measurements", name, float(getattr(known, name)), "1", None)
+            ("data", "measurements", name, float(getattr(known, name)), "1")
             for name in ("readings", "poses", "targets", "fitted", "synthetic")
         ),
-        *(
-            (topic, str(number), "statement", np.nan, None, text)
-            for topic in ("left_out", "unidentifiable", "poorly_determined")
-            for number, text in enumerate(getattr(known, topic), 1)
-        ),
-        *(
-            ("check", row.finding, row.level, float(row.rows), "1", row.text)
-            for row in known.findings.itertuples()
-        ),
-        *(
-            ("excluded_rows", row.where, "error", row.error_mm, "mm", row.reason)
-            for row in known.excluded.itertuples()
-        ),
         *_error_rows(known.errors),
-        *_selection_rows(known.selection),
-        *(
-            ("range", f"joint {row['joint']}", name, float(row[name]), unit, None)
-            for row in known.joint_ranges.to_dict("records")
-            for name, unit in (("low", row["unit"]), ("high", row["unit"]), ("share", "1"))
-        ),
-        ("like_measured", "ranges of all joints", "share", share, "1", None),
+        ("like_measured", "ranges of all joints", "share", share, "1"),
     ]
-    if known.flange_spread_deg is not None:
-        rows.append(("one_way", "flange", "farthest_off", known.flange_spread_deg, "deg", None))
     section = settings.get("tolerance")
     if section and section["mm"] is not None:
-        rows.append(("tolerance", section["of"], "allowed", float(section["mm"]), "mm", None))
+        rows.append(("tolerance", section["of"], "allowed", float(section["mm"]), "mm"))
     return {"summary": columns_of("summary", rows)}
 
 
@@ -276,19 +251,7 @@ def _error_rows(errors: pd.DataFrame) -> Iterable[tuple[Any, ...]]:
                 continue
             topic = "held_out_orientation_error"
         for name in _STATISTICS:
-            yield topic, item, name, float(row[name]), "1" if name == "n" else row["unit"], None
-
-
-def _selection_rows(selection: pd.DataFrame) -> Iterable[tuple[Any, ...]]:
-    units = {"selected": "1", "held_out_rms_mm": "mm", "gain_mm2": "mm^2",
-             "gain_std_error_mm2": "mm^2"}  # fmt: skip
-    for row in selection.to_dict("records"):
-        model = row.pop("model")
-        for name, value in row.items():
-            if value is not None:
-                unit = units.get(name, "1")
-                suffix = f"_{unit.replace('^', '')}"
-                yield "selection", model, name.removesuffix(suffix), float(value), unit, None
+            yield topic, item, name, float(row[name]), "1" if name == "n" else row["unit"]
 
 
 def _selection(tables: Tables) -> pd.DataFrame:
@@ -299,16 +262,12 @@ def _selection(tables: Tables) -> pd.DataFrame:
 
 
 def _orders(tables: Tables, model: str) -> dict[str, int | None]:
-    """The order of a model, those chosen in folds, and the highest where several were tried."""
+    """The order of a model, and the highest where several were tried."""
     order = tables.get(f"{model}_model", {}).get("order")
-    none = dict.fromkeys(("order", "fold", "chosen"), ())
-    table = pd.DataFrame(tables.get(f"{model}_orders", none))
-    in_folds = table["order"][table["fold"].notna() & (table["chosen"] == 1)]
+    tried = np.unique(tables.get(f"{model}_orders", {}).get("order", ()))
     return {
         "order": None if order is None else int(np.max(order)),
-        "low_order_held_out": int(in_folds.min()) if len(in_folds) else None,
-        "high_order_held_out": int(in_folds.max()) if len(in_folds) else None,
-        "highest_order_tried": int(table["order"].max()) if table["order"].nunique() > 1 else None,
+        "highest_order_tried": int(tried[-1]) if len(tried) > 1 else None,
     }
 
 
@@ -385,17 +344,6 @@ def _claims(claims: Columns) -> dict[str, Any]:
     agree, differ, open_ = counts.values()
     differing = tuple(table["claim"][table["verdict"] == VERDICTS[1]])
     return {"agree": agree, "differ": differ, "not_comparable": open_, "differing": differing}
-
-
-def _other_errors(tables: Tables) -> dict[str, float]:
-    """Largest difference of the DH model from the VEC model, mm, by population."""
-    largest = {}
-    if (points := tables.get("assessment_points")) is not None:
-        largest[f"{len(points['point'])} operating points"] = float(np.max(points["true_error_mm"]))
-    cells = pd.Series(tables.get("accuracy_map", {}).get("position_max_mm", ()), dtype=float)
-    if cells.notna().any():
-        largest[f"accuracy map of {cells.count()} cells"] = float(cells.max())
-    return largest
 
 
 def _stated_noise_mm(measurements: Columns) -> float:

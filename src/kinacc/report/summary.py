@@ -49,8 +49,8 @@ class CalibrationSummary:
         was tried on, ``mean``, ``quantile_99``, ``largest``, ``rms``, and ``std_error`` of the mean
         over ``configurations``.
     selection
-        ``model_selection`` with the ``order`` of a VEC model, the lowest and highest order chosen
-        in folds, and the highest that was tried; None where there is none.
+        ``model_selection`` with the ``order`` of a VEC model and the highest that was tried; None
+        where there is none.
     joint_ranges
         Measured ``low`` and ``high`` of each joint and its limits ``least`` and ``most``, in deg or
         mm, and the ``share`` of the travel that is measured.
@@ -109,7 +109,6 @@ class CalibrationSummary:
     remarks: tuple[str, ...]
     tolerance: Tolerance | None
     claims: Mapping[str, Any] | None
-    other_errors: Mapping[str, float]
     history: str
     outdated: str
     next_steps: Mapping[str, str]
@@ -172,10 +171,8 @@ class CalibrationSummary:
         row = self.selection.set_index("model").loc[model]
         if row["order"] is None:
             return model_name(model)
-        low, high = row["low_order_held_out"], row["high_order_held_out"]
-        folds = f" (held out: {low} to {high})" if low != high else ""
         most = ", the highest tried" if row["order"] == row["highest_order_tried"] else ""
-        return f"{model_name(model)}, order {row['order']}{folds}{most}"
+        return f"{model_name(model)}, order {row['order']}{most}"
 
     def verdict(self, by: str, tolerance_mm: float | None = None) -> Verdict | None:
         """The verdict ``by`` the bound of the campaign or by held-out errors.
