@@ -84,7 +84,7 @@ def test_a_line_that_is_none_of_this_campaign_is_refused(begun, entry):
         (("--arm-mm", "0.1"), "only of visits"),
         (("--references", "20"), "fewer: they take 30 readings"),
         (("--noise-mm", "1e-320"), "at least 1e-09 mm"),
-        (("--largest-mm", "1e308"), "1e308; allowed: above 0, to 1e+06"),
+        (("--width-mm", "1e308"), "1e308; allowed: above 0, to 1e+06"),
     ],
     ids=lambda given: " ".join(given)[:30] if isinstance(given, tuple) else "",
 )

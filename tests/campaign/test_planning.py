@@ -129,7 +129,7 @@ def test_the_command_answers_with_table_picture_and_budget(errors_file, tmp_path
         ((), "--noise-mm"),
         (("--noise-mm", "0.1", "--errors", "nowhere"), "smooth, workshop"),
         (("--noise-mm", "0.1", "--width-mm", "-1"), "--width-mm"),
-        (("--noise-mm", "0.1", "--largest-mm", "nan"), "--largest-mm"),
+        (("--noise-mm", "0.1", "--tolerance-mm", "nan"), "--tolerance-mm"),
     ],
 )
 def test_what_cannot_be_simulated_is_named(words, place):

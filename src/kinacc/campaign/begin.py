@@ -38,7 +38,7 @@ WAYS_TO_NOISE = """give it in one of three ways:
       a test (the surest): visit 20 poses three times each, leaving them between,
         run kinacc repeatability FILE -o noise.json, then --repeatability noise.json
       an estimate: --noise-mm MM --noise estimate (MM is a guess)
-      a number: --noise-mm MM, or --covariance-mm2, or --instrument NAME=MM"""
+      a number: --noise-mm MM, or --instrument NAME=MM"""
 
 
 def points_of(
@@ -119,10 +119,10 @@ def plan_of(
     limits: Limits,
     about: dict[str, str],
     seed: int = 0,
-    stand: np.ndarray | None = None,
-    by_travel: bool = True,
 ) -> Plan:
     """Return the plan of a campaign; the order of the candidates follows from ``seed`` alone.
+
+    The first visit is ordered for little travel.
 
     Parameters
     ----------
@@ -140,10 +140,6 @@ def plan_of(
         Robot, calibration, model, point and source of the candidates (:func:`about`).
     seed : int
         Seed of the random order.
-    stand : (k,) array, optional
-        Reported joints where the arm stands, rad (mm where a joint slides); zero by default.
-    by_travel : bool
-        Order the first visit for little travel, else in the random order.
 
     Returns
     -------
@@ -161,13 +157,12 @@ def plan_of(
     noise = used[0].in_base(to_base, points.modelled_mm)
     begun = assessor.begin(Candidates(noise[order]))
     route = order[: begun.first]
-    if by_travel:
-        unit, count = travel_unit(arm.robot), begun.reference_poses
-        stand = np.zeros(len(unit)) if stand is None else stand
-        places, here = points.joints[route] / unit, stand / unit
-        first = _short_path(places[:count], here)
-        here = places[first[-1]] if count else here
-        route = route[np.concatenate([first, count + _short_path(places[count:], here)])]
+    count = begun.reference_poses
+    places = points.joints[route] / travel_unit(arm.robot)
+    here = np.zeros(places.shape[1])
+    first = _short_path(places[:count], here)
+    here = places[first[-1]] if count else here
+    route = route[np.concatenate([first, count + _short_path(places[count:], here)])]
     return Plan(
         about=about, assessor=assessor, instruments=used, to_base=to_base, limits=limits,
         arm=Arm(prismatic=arm.robot.dh.prismatic.tolist()), seed=seed, order=order, route=route,
@@ -318,5 +313,5 @@ def _candidate_doubts(arm: Calibration, points: Points, point: str | None) -> li
         f"{far} of {len(points)} lie outside the joint ranges of the calibration, or have a larger "
         f"standard deviation than {LIKE_FITTED:.0%} of its poses (up to {largest_mm:.3g} mm)"
     )
-    fix = "--region measured draws them between measured poses; --sure takes them as they are"
+    fix = "without --joints-deg they are drawn between measured poses; --sure takes them"
     return [Problem("candidates", message, f"at most {_FAR_SHARE:.0%} of them", fix)]

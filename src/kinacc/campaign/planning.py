@@ -136,8 +136,7 @@ def simulate(
         Problem(
             f"errors {field.name}",
             f"only {field.points}, fewer than {points} candidates",
-            fix=f"--candidates {field.points}, or --errors smooth "
-            f"--largest-mm {field.size_mm.max():.3g}",
+            fix=f"--candidates {field.points}, or --errors smooth",
         )
         for field in fields
         if field.points < points

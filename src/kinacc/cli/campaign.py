@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import click
 import numpy as np
-import pandas as pd
 
 from kinacc.campaign import folder as folders
 from kinacc.campaign import report as reports
@@ -20,7 +19,7 @@ from kinacc.campaign.status import CampaignStatus
 from kinacc.cli import campaign_plan, campaign_start
 from kinacc.cli.choice import option, positive
 from kinacc.cli.group import InOrder
-from kinacc.cli.output import Output, answers, require_writable, write_table
+from kinacc.cli.output import Output, answers, require_writable
 from kinacc.cli.process import AGAINST
 from kinacc.errors import InputError, Problem, refuse
 from kinacc.measurements.rows import POINTS, read_rows
@@ -130,22 +129,20 @@ def status(folder: str, tolerance_mm: float | None, out: Output) -> None:
 @click.argument("folder", type=click.Path())
 @option("--out", "-o", "to", type=click.Path(file_okay=False),
         help="Folder. [report in the campaign's]")  # fmt: skip
-@option("--table", "formats", multiple=True, type=click.Choice(["csv", "xlsx"]),
-        help="Further form of the tables; repeatable.")  # fmt: skip
-@answers(page="Page for a browser: an .html file.",
-         force=True)  # fmt: skip
-def report(folder: str, to: str | None, formats: Sequence[str], out: Output) -> None:
+@answers(page="Page for a browser: an .html file.", force=True)
+def report(folder: str, to: str | None, out: Output) -> None:
     """Write tables, picture and text of a campaign.
 
     Files: campaign_points, _readings, _bounds (.parquet), campaign (.svg, .png), report.md.
+    `kinacc show FOLDER/report campaign_points -o points.xlsx` writes a table in another form.
 
     \b
     Example:
-      kinacc campaign report check --page check.html --table xlsx
+      kinacc campaign report check --page check.html
     """
     opened = _open(folder)
     into = Path(to or opened.folder / "report")
-    files = _write_report(opened, into, formats, out, out.force or to is None)
+    files = _write_report(opened, into, out, out.force or to is None)
     result = opened.status()
     lines = [_lines(result)[0], f"{into}: {', '.join(files)}", out.page or ""]
     answer = {**vars(result), "report": str(into), "files": files, "page": out.page}
@@ -176,9 +173,7 @@ def verify(folder: str, sha256: str | None, out: Output) -> None:
         raise SystemExit(AGAINST)
 
 
-def _write_report(
-    opened: Campaign, into: Path, formats: Sequence[str], out: Output, force: bool
-) -> list[str]:
+def _write_report(opened: Campaign, into: Path, out: Output, force: bool) -> list[str]:
     """Write the report; the names of its files."""
     from kinacc.figures.campaign import draw_bounds
     from kinacc.figures.save import render
@@ -201,14 +196,11 @@ def _write_report(
     pictures = render(figure, ("svg", "png"))
     contents |= {f"campaign.{kind}": content for kind, content in pictures.items()}
     contents["report.md"] = markdown(opened.opened, tables, "campaign.svg").encode()
-    sheets = {f"{name}.{kind}": name for kind in dict.fromkeys(formats) for name in tables}
-    require_writable([into / name for name in (*contents, *sheets)], force)
+    require_writable([into / name for name in contents], force)
     write_together({into / name: content for name, content in contents.items()})
-    for path, name in sheets.items():
-        write_table(pd.DataFrame(tables[name]), into / path)
     if out.page is not None:
         out.write_page(campaign_page(opened.opened, tables))
-    return [*contents, *sheets]
+    return [*contents]
 
 
 def _show(summary: CampaignStatus, out: Output) -> None:
@@ -230,7 +222,7 @@ def _open(folder: str) -> Campaign:
 
 
 _COMPUTED = {"predict": "unexplained_mm", "compensate": "solver_residual_mm"}  # columns of theirs
-_OF_ONE = ("point", "joints_deg", "joints_rad", "std_mm")
+_OF_ONE = ("point", "joints_deg", "std_mm")
 
 
 @campaign.command("record")
@@ -239,7 +231,6 @@ _OF_ONE = ("point", "joints_deg", "joints_rad", "std_mm")
 @option("--position-mm", help='Measured position "x,y,z".')
 @option("--point", help="Measured candidate. [the next one]")
 @option("--joints-deg", help="Joints of the controller (mm where a joint slides).")
-@option("--joints-rad", help="Joints of the controller in radians.")
 @option("--instrument", help="Instrument. [the first]")
 @option("--std-mm", help="Noise of this reading where it is not the instrument's.")
 @option("--accept-implausible", is_flag=True, help="Acceptance of an error of any size.")
@@ -275,7 +266,7 @@ def record(out: Output, folder: str, file: str | None, **options: Any) -> None:
 
 def _single(options: Mapping[str, Any], slides: np.ndarray) -> dict[str, Any]:
     """Arguments of ``Campaign.add_reading``."""
-    sizes = {"position_mm": 3, "joints_deg": len(slides), "joints_rad": len(slides)}
+    sizes = {"position_mm": 3, "joints_deg": len(slides)}
     values = {name: numbers_of(options[name]) for name in sizes if options[name] is not None}
     refuse(
         (
@@ -285,9 +276,9 @@ def _single(options: Mapping[str, Any], slides: np.ndarray) -> dict[str, Any]:
         ),
         "Nothing was recorded",
     )
-    joints = values.get("joints_rad")
-    if joints is None and "joints_deg" in values:
-        joints = values["joints_deg"] * np.where(slides, 1.0, np.pi / 180.0)
+    joints = values.get("joints_deg")
+    if joints is not None:
+        joints = joints * np.where(slides, 1.0, np.pi / 180.0)
     others = {name: options[name] for name in ("point", "instrument", "std_mm")}
     return {"position_mm": values["position_mm"], "joints": joints, **others}
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -59,7 +58,6 @@ _SHOWN = {
 @option("--errors", multiple=True,
         help="Errors to simulate; repeatable. [smooth, workshop, defect]")  # fmt: skip
 @option("--point", help="Target of a results folder. [the tool, else the first]")
-@option("--largest-mm", type=choice.positive, help="Largest error to scale the errors to.")
 @option("--repetitions", default=30, type=click.IntRange(2, 100_000),
         help="Simulated campaigns per budget.")  # fmt: skip
 @answers(table=True, picture="Picture of width against budget: .svg, .png, .pdf.")
@@ -121,11 +119,6 @@ def _question(
         raise InputError(Problem("--candidates, --budget", message, allowed))
     assessors = [assessor_of(options, budget, points, freedom) for budget in budgets]
     chosen = [errors_of(name, options["point"]) for name in names]
-    if (largest_mm := options["largest_mm"]) is not None:
-        chosen = [
-            replace(field, error_mm=field.error_mm * (largest_mm / field.size_mm.max()))
-            for field in chosen
-        ]
     return chosen, instruments[0].covariance_mm2, assessors
 
 

@@ -33,12 +33,6 @@ from kinacc.report.rendering import lines
 from kinacc.report.summarise import tolerance_of
 from kinacc.tables import store
 
-_SOURCES = {
-    "measured": "drawn between neighbouring measured poses",
-    "configured": "drawn evenly from the configured evaluation space",
-    "fitted": "drawn evenly from the joints the calibration covers",
-    "limits": "drawn evenly from the joint limits",
-}
 # Settings of assessors by the options that set them.
 _SETTINGS = {
     "wrong_readings": "wrong_rate",
@@ -57,15 +51,14 @@ _MOST_CANDIDATES = 20_000
 @option("--calibration", required=True, type=click.Path(), help="Results folder of the arm.")
 @choice.SELECTED
 @choice.ROBOT
-@choice.CONFIGS
 @choice.SESSION
 @choice.POINT
 @option("--candidates", default="200", help="File of joints, or number of joints to draw.")
 @choice.joint_file_options
-@option("--region", type=click.Choice([*_SOURCES]),
-        help="Where joints are drawn. [configured if a space is configured, fitted with "
-        "--joints-deg, else measured]")  # fmt: skip
-@choice.JOINTS_DEG
+@option(
+    "--joints-deg",
+    help='Ranges of joints to draw, e.g. "-90:90,-60:60,...". [between measured poses]',
+)
 @choice.INSIDE
 @option("--instrument", multiple=True,
         help="NAME=noise: 1, 3 or 9 numbers, or laser:KEY=..; repeatable.")  # fmt: skip
@@ -76,9 +69,6 @@ _MOST_CANDIDATES = 20_000
 @option("--joint-tolerance-deg", default=0.02, type=choice.positive,
         help="Largest distance of reported joints from those of the pose.")  # fmt: skip
 @option("--implausible-mm", type=choice.positive, help="Error beyond which a reading is refused.")
-@choice.FROM_DEG
-@option("--visit", type=click.Choice(["travel", "random"]), default="travel",
-        help="Order of the first visit.")  # fmt: skip
 @answers()
 def start(out: Output, **options: Any) -> None:
     """Start a campaign in FOLDER. Nothing of this can be changed once there are readings.
@@ -97,7 +87,6 @@ def start(out: Output, **options: Any) -> None:
     arm = choice.calibration_of(results, *(options[name] for name in names))
     joints, labels, directions, source = _candidates(options, arm)
     points = begin.points_of(arm, joints, labels, directions, point)
-    stand = rows.stand_of(arm.robot, options["from_deg"])
     limits = Limits(
         np.deg2rad(options["joint_tolerance_deg"]),
         options["implausible_mm"] or np.inf,
@@ -105,10 +94,8 @@ def start(out: Output, **options: Any) -> None:
         options["target"],
     )
     assessor = assessor_of(options, options["budget"], len(points), freedom)
-    about, by_travel = begin.about(arm, point, source), options["visit"] == "travel"
-    plan = begin.plan_of(
-        arm, points, assessor, used, limits, about, options["seed"], stand, by_travel
-    )
+    about = begin.about(arm, point, source)
+    plan = begin.plan_of(arm, points, assessor, used, limits, about, options["seed"])
     known = begin.noise_of(results)
     plan = begin.start(options["folder"], arm, plan, doubts, known, options["sure"])
     answer = {
@@ -138,8 +125,8 @@ def instruments_of(
     Raises InputError without any noise, with the scatter of readings in the folders ``results``.
     """
     frame, resolution_mm = options.get("frame", BASE), options["resolution_mm"] or 0.0
-    unnamed = (options["covariance_mm2"], options["noise_mm"])
-    texts = [f"instrument={text}" for text in unnamed if text is not None]
+    noise_mm = options["noise_mm"]
+    texts = [] if noise_mm is None else [f"instrument={noise_mm}"]
     texts += options.get("instrument", ())
     if options["repeatability"] is not None:
         if texts:
@@ -204,68 +191,44 @@ def _candidates(
     count = int(path)
     if not 2 <= count <= _MOST_CANDIDATES:
         raise InputError(Problem("--candidates", path, f"2 to {_MOST_CANDIDATES}, or a file"))
-    region, draw = _region(options, arm)
-    only_measured = region == "measured" or not (options["region"] or options["joints_deg"])
+    draw, source = _drawing(options, arm)
     for times in (1, 4, 16, _MOST_DRAWS):
         joints = draw(times * count)
         state = JointState(arm.robot.dh_joints(joints))
-        if only_measured:
+        if options["joints_deg"] is None:
             joints = joints[is_measured_there(arm, state, options["point"])]
         elif arm.model.domain is not None:  # coupled joints have no box of their own
             joints = joints[~arm.outside_range(state.q_rad).any(axis=1)]
         if len(joints) >= count:
             labels = [str(number) for number in range(1, count + 1)]
-            return joints[:count], labels, None, _SOURCES[region]
+            return joints[:count], labels, None, source
     message = (
         f"only {len(joints)} of {_MOST_DRAWS * count} joint values drawn are near measured poses"
     )
     raise InputError(Problem("candidates", message, f"{count}", "narrow the region"))
 
 
-def _region(
+def _drawing(
     options: Mapping[str, Any], arm: Calibration
-) -> tuple[str, Callable[[int], np.ndarray]]:
-    """The region's name, and a function that draws so many reported joints (at most n, k)."""
-    robot, fitted, target = arm.robot, arm.fitted, arm.point(options["point"])
+) -> tuple[Callable[[int], np.ndarray], str]:
+    """A function that draws at most so many reported joints (n, k), and where it draws them."""
+    robot, target = arm.robot, arm.point(options["point"])
     box, inside = spaces.of_options(options, robot)
-    usual = "measured" if fitted is not None else "fitted"
-    region = options["region"] or ("fitted" if box is not None else None)
-    if region in (None, "configured"):
-        configured = _configured(options, arm, wanted=region is not None)
-        region = usual if configured == (None, None) else "configured"
-        box, inside = box or configured[0], inside or configured[1]
-    if region == "measured" and usual != region:
-        message = "the results do not hold the poses that were fitted"
-        raise InputError(Problem("--region measured", message, "fitted, limits, configured"))
-    if region == "limits" and arm.model.domain is not None and box is None:
-        message = f"the {arm.choice.upper()} model ends at the joints the data cover"
-        raise InputError(Problem("--region limits", message, "measured, fitted"))
     low, high = robot.q_min_rad, robot.q_max_rad
-    if region not in ("measured", "limits") and arm.fitted_range_rad is not None:
+    if box is None and arm.fitted is not None:
+        poses = ends.reported_joints(robot, arm.fitted.q_rad)
+
+        def draw(count: int) -> np.ndarray:
+            drawn = between(poses, ends.travel_unit(robot), count, options["seed"])
+            usable = ends.within(drawn, low, high)
+            if inside is not None:
+                usable &= inside(tool_positions(robot, drawn, target))
+            return drawn[usable]
+
+        return draw, "drawn between neighbouring measured poses"
+    if arm.fitted_range_rad is not None:
         low, high = ends.cut_to_range(robot, low, high, arm.fitted_range_rad)
     if box is not None:
         low, high = np.maximum(low, box[0]), np.minimum(high, box[1])
-    if region != "measured" or fitted is None:
-        return region, lambda count: spread(robot, count, (low, high), inside, target)
-
-    def draw(count: int) -> np.ndarray:
-        poses = ends.reported_joints(robot, fitted.q_rad)
-        drawn = between(poses, ends.travel_unit(robot), count, options["seed"])
-        usable = ends.within(drawn, low, high)
-        if inside is not None:
-            usable &= inside(tool_positions(robot, drawn, target))
-        return drawn[usable]
-
-    return region, draw
-
-
-def _configured(options: Mapping[str, Any], arm: Calibration, wanted: bool) -> spaces.Space:
-    """The space of the calibration's data set in the configuration."""
-    if not wanted and not options["config"] and not Path(choice.CONFIG).is_file():
-        return None, None
-    try:
-        return spaces.configured(spaces.settings_of(arm.name, options["config"]), arm.robot)
-    except InputError:
-        if wanted:
-            raise
-        return None, None
+    source = "drawn evenly from the joints the calibration covers"
+    return lambda count: spread(robot, count, (low, high), inside, target), source

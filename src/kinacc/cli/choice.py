@@ -53,12 +53,7 @@ SELECTED = option(
 DATASET = option("--dataset", help="Data set; needed where the configuration has several.")
 REASON = option("--reason", help="Reason of the decision, kept with it.")
 SESSION = option("--session", help="Session of the instrument. [the first]")
-CONFIGS = option("--config", multiple=True, help=f"Configuration file; repeatable. [{CONFIG}]")
-JOINTS_DEG = option(
-    "--joints-deg", help='Ranges of joints to draw, e.g. "-90:90,-60:60,...". [limits]'
-)
 INSIDE = option("--inside-mm", help='Box of the tool in the base: "x0:x1,y0:y1,z0:z1".')
-FROM_DEG = option("--from-deg", help="Joints where the arm starts. [zero]")
 POINT = option("--point", help="Target, or flange. [the tool]")
 
 
@@ -134,8 +129,10 @@ _JOINT_ANSWERS = ("encoding", "sheet", "decimal", "thousands", "names", "take", 
                   "pulses_per_deg")  # fmt: skip
 # Noise, assessor and aims of a campaign that is begun or planned.
 campaign_options = together(
-    option("--noise-mm", help="Standard deviation per axis: one number, or three."),
-    option("--covariance-mm2", help="Covariance of a reading: nine numbers, row by row."),
+    option(
+        "--noise-mm",
+        help="Standard deviation per axis: one number, three, or nine of a covariance (mm^2).",
+    ),
     option(
         "--repeatability",
         type=click.Path(),

@@ -28,13 +28,13 @@ from kinacc.study.operating_points import spread_rows
 from kinacc.tables import store
 from kinacc.tables.columns import Columns
 
+_POSES = 500  # at most, of measured ones
+
 
 @click.command("compare")
 @click.argument("first", type=click.Path())
 @click.argument("second", type=click.Path())
 @option("--joints", type=click.Path(), help="File of joints to compare poses at. [as measured]")
-@option("--poses", "count", default=500, type=click.IntRange(10, 100_000),
-        help="Largest number of poses.")  # fmt: skip
 @option("--model", type=choice.MODEL, default="dh", help="Error model.")
 @choice.ROBOT
 @answers(table=True, picture="Picture: .svg, .png or .pdf.", verbose=True)
@@ -42,7 +42,6 @@ def compare(
     first: str,
     second: str,
     joints: str | None,
-    count: int,
     model: str,
     robot: str | None,
     out: Output,
@@ -64,7 +63,7 @@ def compare(
         if joints is not None:
             q_rad = rows.read_joints(joints, both[0].robot)[1]
         else:
-            q_rad = _joints([item.robot for item in both], tables, count)
+            q_rad = _joints([item.robot for item in both], tables)
         weight = schema.key("calibration.rotation_weight_mm_per_rad")["default"]
         result = comparison.compare(both[0], both[1], q_rad, weight, shared(*tables))
     if out.picture is not None:
@@ -88,13 +87,13 @@ def _calibration(place: str, model: str, robot: str | None) -> Calibration:
     raise InputError(Problem(place, "no such file or folder", "a results folder, a robot file"))
 
 
-def _joints(arms: Sequence[Robot], measured: Sequence[Columns | None], count: int) -> np.ndarray:
+def _joints(arms: Sequence[Robot], measured: Sequence[Columns | None]) -> np.ndarray:
     """Reported joints (n, k) to compare at: as measured, or all over the limits."""
     names = [f"q{joint + 1}" for joint in range(arms[0].dh.joints)]
     tables = [np.stack([table[name] for name in names], axis=1) for table in measured if table]
     if tables:
-        share = max(1, count // len(tables))
+        share = _POSES // len(tables)
         return np.concatenate([q[np.sort(spread_rows(len(q), share))] for q in tables])
     low = np.max([arm.q_min_rad for arm in arms], axis=0)
     high = np.min([arm.q_max_rad for arm in arms], axis=0)
-    return low + points("sobol", count, len(low)) * (high - low)
+    return low + points("sobol", _POSES, len(low)) * (high - low)

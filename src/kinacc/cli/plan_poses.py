@@ -27,49 +27,30 @@ _MOST_CANDIDATES = 100_000
 
 
 @click.command("plan-poses")
-@click.argument("robot", required=False)
+@click.argument("robot")
 @option("--poses", "count", default=40, type=click.IntRange(1, 2000), help="Number of poses.")
 @option("--candidates", default="1000", metavar="FILE|N", help="File of joints, or number to draw.")
 @choice.joint_file_options
-@choice.JOINTS_DEG
+@option("--joints-deg", help='Ranges of joints to draw, e.g. "-90:90,-60:60,...". [limits]')
 @choice.INSIDE
-@option("--dataset", help="Data set whose robot, fit and region are taken.")
-@choice.CONFIGS
 @option("--tool-mm", help="Measured point in the flange frame. [the robot's tool]")
 @option("--position-only", is_flag=True, help="No measured orientations.")
+@option("--frames-known", is_flag=True, help="No estimation of base and tool.")
 @option("--hayati", help='Joints with a Hayati angle, e.g. "2,3".')
-@choice.FROM_DEG
-@answers(table=True, picture="Index against number of poses: .svg, .png, .pdf.")
-def plan_poses(
-    robot: str | None,
-    count: int,
-    candidates: str,
-    config: tuple[str, ...],
-    dataset: str | None,
-    from_deg: str | None,
-    out: Output,
-    **options: Any,
-) -> None:
+@answers(table=True)
+def plan_poses(robot: str, count: int, candidates: str, out: Output, **options: Any) -> None:
     """Choose a D-optimal set of poses, in an order with little travel.
 
-    ROBOT is a shipped name or a robot file (not needed with --dataset). Collisions and the view of
-    the instrument are not known: leave such poses out of a file of candidates.
+    ROBOT is a shipped name or a robot file. Collisions and the view of the instrument are not
+    known: leave such poses out of a file of candidates.
 
     \b
     Example:
-      kinacc plan-poses ur10 --hayati 2,3 --poses 50 -o plan.csv --picture index.svg
+      kinacc plan-poses ur10 --hayati 2,3 --poses 50 -o plan.csv
     """
-    settings = spaces.settings_of(dataset, config) if dataset else None
-    name = robot or (settings["robot"] if settings else None)
-    if name is None:
-        raise InputError(Problem("ROBOT", "is not given", "a shipped name, a robot file"))
-    arm = robots.load(name)
-    experiment = _experiment(arm, settings, options)
+    arm = robots.load(robot)
+    experiment = _experiment(arm, options)
     box, inside = spaces.of_options(options, arm)
-    if settings is not None:
-        usual = spaces.configured(settings, arm)
-        box, inside = box or usual[0], inside or usual[1]
-    start = rows.stand_of(arm, from_deg)
     with reporting("plan-poses", bar=True):
         if not candidates.isdecimal():
             answered = choice.joint_answers(options)
@@ -82,11 +63,7 @@ def plan_poses(
                 raise InputError(Problem("--candidates", candidates, allowed))
             joints = planning.spread(arm, number, box, inside, experiment.tool)
             label = np.arange(1, number + 1)
-        plan = planning.plan_poses(arm, joints, experiment, count, start)
-    if out.picture is not None:
-        from kinacc.figures.campaign import draw_observability
-
-        out.draw(draw_observability(plan.index, arm.name))
+        plan = planning.plan_poses(arm, joints, experiment, count, np.zeros(arm.dh.joints))
     table = pd.DataFrame({
         "order": np.arange(1, count + 1),
         **rows.joint_columns(arm.dh.prismatic, joints[plan.chosen]),
@@ -108,12 +85,10 @@ def plan_poses(
     out.show(facts, table, lines("plan_poses.txt", **facts))
 
 
-def _experiment(
-    arm: Robot, settings: Mapping[str, Any] | None, options: Mapping[str, Any]
-) -> planning.Experiment:
-    """What is measured and fitted; without ``settings`` base and tool are unknown."""
+def _experiment(arm: Robot, options: Mapping[str, Any]) -> planning.Experiment:
+    """What is measured and fitted."""
     problems: list[Problem] = []
-    calibration = (settings or schema.defaults())["calibration"]
+    calibration = schema.defaults()["calibration"]
     tool, hayati = robots.carried(arm), tuple(hayati_joints(calibration["dh"], arm))
     if options["tool_mm"] is not None:
         offset = numbers_of(options["tool_mm"])
@@ -130,8 +105,8 @@ def _experiment(
     return planning.Experiment(
         tool,
         orientation=not options["position_only"],
-        frames_estimated=settings is None or calibration["base_and_tool"] == "estimated",
+        frames_estimated=not options["frames_known"],
         hayati_joints=hayati,
         rotation_weight_mm_per_rad=float(calibration["rotation_weight_mm_per_rad"]),
-        threshold=float(calibration["dh"]["truncation"]),
+        threshold=calibration["dh"]["truncation"],
     )

@@ -15,7 +15,7 @@ import pyarrow as pa
 
 from kinacc.campaign.beside_results import of_results
 from kinacc.checks.contradictions import load
-from kinacc.cli.choice import CONFIG, CONFIGS, REASON, option, positive, print_outdated
+from kinacc.cli.choice import CONFIG, REASON, option, positive, print_outdated
 from kinacc.cli.output import Output, answers, plain
 from kinacc.cli.process import AGAINST
 from kinacc.config.values import nearest
@@ -204,7 +204,7 @@ def _described(schema: pa.Schema, table: pd.DataFrame, key: Collection[str]) -> 
 
 @click.command("check-results")
 @click.argument("results", type=click.Path(path_type=Path), default=Path(RESULTS))
-@CONFIGS
+@option("--config", multiple=True, help=f"Configuration file; repeatable. [{CONFIG}]")
 @option("--against", type=click.Path(path_type=Path), metavar="FOLDER", help="Accepted run.")
 @option("--dataset", "datasets", multiple=True, help="Data set; repeatable. [all]")
 @option("--accept", "accepted", type=click.Path(path_type=Path), metavar="FOLDER",

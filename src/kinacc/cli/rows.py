@@ -12,7 +12,6 @@ from kinacc.cli.process import AGAINST
 from kinacc.deployment.record import Calibration
 from kinacc.errors import InputError, Problem, first_few, refuse
 from kinacc.kinematics.robot import Robot, outside_limits
-from kinacc.measurements.layout import ANGLE
 from kinacc.measurements.rows import Rows, read_rows
 from kinacc.measurements.table import numbers_of
 
@@ -39,27 +38,16 @@ def read_joints(
 
 
 def of_arguments(texts: Sequence[str], robot: Robot, option: str) -> np.ndarray:
-    """Joints (n, k) of arguments such as "10,-20,30,0,45,0" in deg (mm); InputError if unfit."""
+    """Joints (n, k) of arguments such as "10,-20,30,0,45,0" in deg; InputError if unfit."""
     slides, rows = robot.dh.prismatic, [numbers_of(text) for text in texts]
     allowed = f"{len(slides)} numbers, one per joint of {robot.name}"
     refuse(Problem(option, repr(text), allowed) for text, row in zip(texts, rows, strict=True)
            if len(row) != len(slides))  # fmt: skip
-    return np.array(rows) * np.where(slides, 1.0, ANGLE["deg"])
-
-
-def stand_of(robot: Robot, text: str | None) -> np.ndarray:
-    """Joints (k,) of ``--from-deg``, zero where it is not given."""
-    if text is None:
-        return np.zeros(robot.dh.joints)
-    joints: np.ndarray = of_arguments((text,), robot, "--from-deg")[0]
-    return joints
+    return np.array(rows) * np.where(slides, 1.0, np.pi / 180.0)
 
 
 def joints_of(
-    robot: Robot,
-    path: str | None,
-    in_deg: Sequence[str],
-    answers: Mapping[str, Any],
+    robot: Robot, path: str | None, in_deg: Sequence[str], answers: Mapping[str, Any]
 ) -> tuple[Rows, np.ndarray]:
     """Rows and joints (n, k) of a file or of arguments.
 

@@ -1,40 +1,18 @@
-"""Where poses may be drawn: ranges and boxes of options, and a data set's own space."""
+"""Where poses may be drawn: ranges of joints and a box of the tool, as options give them."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 
-from kinacc.cli.choice import CONFIG
-from kinacc.errors import InputError, Problem, refuse
-from kinacc.kinematics import region
+from kinacc.errors import Problem, refuse
 from kinacc.kinematics import robot as robots
-from kinacc.study.evaluation import cylinder
-from kinacc.workflow.data_sets import read_data_sets
 
 Ends = tuple[np.ndarray, np.ndarray]
 # Ends (k,), (k,) of the reported joints, and a test of positions (n, 3) of the tool.
 Space = tuple[Ends | None, Callable[[np.ndarray], np.ndarray] | None]
-
-
-def settings_of(dataset: str, config: Sequence[str]) -> Mapping[str, Any]:
-    """The settings of a configured data set. Raises InputError."""
-    datasets = read_data_sets(config or (CONFIG,)).settings
-    if dataset not in datasets:
-        what = f"{dataset!r} is not in the configuration"
-        raise InputError(Problem("--dataset", what, ", ".join(datasets)))
-    return datasets[dataset]
-
-
-def configured(settings: Mapping[str, Any], robot: robots.Robot) -> Space:
-    """The evaluation space of a data set."""
-    evaluation = settings["evaluation"]
-    if evaluation["space"] == "cylinder":
-        space = cylinder(evaluation)
-        return None, lambda at_mm: np.asarray(region.contains(space, at_mm))
-    return None, None
 
 
 def of_options(options: Mapping[str, Any], robot: robots.Robot) -> Space:

@@ -19,7 +19,7 @@ from kinacc.calibration.residuals import STANDARD_ERRORS
 from kinacc.calibration.uncertainty import is_angle
 from kinacc.config.error_models import MEASURED, NOMINAL, PLAINEST, Comparison, model_name
 from kinacc.deployment.folder import uncertainty
-from kinacc.figures.calibration import draw_coverage, draw_joint_errors
+from kinacc.figures.calibration import draw_joint_errors
 from kinacc.kinematics.dh import PARAMETERS, DHModel
 from kinacc.kinematics.robot import Robot
 from kinacc.kinematics.vec import VECModel
@@ -106,7 +106,7 @@ def data(tables: Tables, robot: Robot, summary: CalibrationSummary) -> Part:
         "noise": noise.of_measurements(tables["measurements"], robot),
         "stated": (len(std), std.median().tolist()) if len(std) else None,
     }
-    return Part("data", values, figures={"coverage": draw_coverage(summary.joint_ranges)})
+    return Part("data", values)
 
 
 def identifiability(tables: Tables, robot: Robot, summary: CalibrationSummary) -> Part:
@@ -154,11 +154,6 @@ def parameters(tables: Tables, robot: Robot, summary: CalibrationSummary) -> Par
     """DH parameters against nominal, and what the VEC model adds to them."""
     model = VECModel.from_columns(tables["vec_model"], robot.dh.prismatic)
     joints, errors, std = vec_errors(tables, model, robot)
-    largest: list[dict[str, str]] = [{"joint": f"joint {n + 1}"} for n in range(model.joints)]
-    for joint, error in np.ndindex(errors.shape[:2]):
-        place = (joint, error, int(np.argmax(np.abs(errors[joint, error]))))
-        spread = f" ± {std[place]:.3f}" if np.isfinite(std[place]) else ""
-        largest[joint][ERRORS[error]] = f"{errors[place]:+.3f}{spread}"
     offsets = pd.DataFrame(tables["vec_model"])
     values = {
         "s": summary,
@@ -166,7 +161,6 @@ def parameters(tables: Tables, robot: Robot, summary: CalibrationSummary) -> Par
         "parameters": dh_parameters(tables["dh_model"], tables["dh_identified"], robot),
         "order": model.order,
         "banded": bool(np.isfinite(std).any()),
-        "largest": largest,
         "offsets": offsets[offsets["direction"] != 0],
     }
     figure = draw_joint_errors(joints, errors, std, [*summary.joint_ranges["unit"]])
