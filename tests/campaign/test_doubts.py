@@ -57,7 +57,7 @@ def test_a_report_has_a_page_that_is_not_overwritten(visited, tmp_path):
     rows.to_csv(tmp_path / "readings.csv", index=False)
     call("campaign", "record", folder, tmp_path / "readings.csv", code=0)
     page = tmp_path / "check.html"
-    call("campaign", "report", folder, "--page", page, code=0)
+    call("campaign", "report", folder, "--out", tmp_path / "one", "--page", page, code=0)
     text = page.read_text("utf-8")
     assert f"{standing(folder)['bounds'][0]['upper_mm']:.3f}" in text
     assert "://" not in text.partition("<script")[0]
