@@ -7,10 +7,9 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from kinacc.errors import Problem
-from kinacc.kinematics.robot import Robot, forward, outside_limits
+from kinacc.kinematics.robot import Robot, outside_limits
 from kinacc.measurements.layout import Place
 from kinacc.measurements.table import RawTable
-from kinacc.tables.columns import Columns
 
 BEYOND = 1e8  # no unit makes a length of this
 LIMIT_SLACK = 1e-6  # a joint may be beyond its limits by the last written digit
@@ -60,28 +59,3 @@ def limit_problems(
         if place.factor == 1.0 and fault.looks_like_degrees:
             message += ": the column looks like degrees"
         yield Problem(table.where(place.column, rows), message, fault.allowed)
-
-
-def scale_problems(table: RawTable, columns: Columns, robot: Robot) -> Iterator[Problem]:
-    """Units that cannot be meant: measured points spread unlike the points the arm reaches."""
-    joints = robot.dh.joints
-    q_rad = np.stack([columns[f"q{i + 1}"] for i in range(joints)], axis=1)
-    points = np.stack([columns[f"{axis}_mm"] for axis in "xyz"], axis=1)
-    expected, measured = (
-        float(np.sqrt(points.var(axis=0).sum()))
-        for points in (forward(robot, q_rad).position_mm, points)
-    )
-    if len(q_rad) < 4 or expected < 1.0:
-        return
-    ratio, turning = measured / expected, np.abs(q_rad[:, ~robot.dh.prismatic])
-    hint = ""
-    if ratio < 0.02:
-        hint = "the positions look like metres"
-    elif ratio > 50.0:
-        hint = "the positions look like micrometres, or the joints like radians"
-    elif ratio > 3.0 and turning.max() < np.deg2rad(2.0 * np.pi) + 1e-9:
-        hint = "the joints look like radians"
-    if hint:
-        message = f"the points spread over {measured:.4g} mm rms, the arm over {expected:.4g} mm"
-        where = f"{table.path}: columns x, y, z and q1 .. q{joints}"
-        yield Problem(where, message, "about the same", hint)

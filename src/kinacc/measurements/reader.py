@@ -57,9 +57,8 @@ class MeasuredFile:
 def read(section: Mapping[str, Any], robot: Robot, strict: bool = True) -> MeasuredFile:
     """Measurements of the file that ``section`` (``measurements.file``) names.
 
-    ``strict``: values that cannot be meant (joints outside their limits, metres taken for
-    millimetres) are refused too, and so are readings that are there twice. Raises InputError
-    listing everything that is wrong with the file.
+    ``strict``: joints outside their limits and readings that are there twice are refused too.
+    Raises InputError listing everything that is wrong with the file.
     """
     table = _loaded(section)
     used = ~np.isin(table.line, [*excluded_lines(section)])
@@ -158,8 +157,6 @@ def convert(table: RawTable, layout: Layout, robot: Robot, strict: bool = True) 
     measured = {name: rows[name].to_numpy() for name in rows if name not in turns}
     measured["row"] = table.line[order]
     measured |= table.row_names.columns(measured["row"])
-    if strict and not problems:
-        problems += faults.scale_problems(table, measured, robot)
     refuse(problems, title)
     unused = tuple(name for name in columns.unused(table) if name != table.key)
     commanded = None if commanded is None else commanded[order]
