@@ -32,7 +32,6 @@ from kinacc.measurements.intake.groups import (
     JOINTS,
     POINT,
     POSE,
-    RADIUS,
     TURN,
     UNCERTAINTY,
     Group,
@@ -214,19 +213,13 @@ class _Choice:
         measured, reported, plain, unclear, nominal, deviations = (
             self._of(POINT, name) for name in (MEASURED, REPORTED, PLAIN, OPEN, NOMINAL, DEVIATION)
         )
-        not_corrected = self._of(RADIUS, OPEN)
-        goals = [g for g in unclear if "target" in g.columns["x"].terms]
         # A record of measurement: nominal, actual, deviation.
         record = any({*g.columns["x"].terms} & WORDS["records"] for g in nominal)
         record = record or bool(nominal and deviations)
         by_arm = not record or (joints is not None and joints.role == REPORTED)
         rules: list[tuple[object, list[Group], str]] = [
-            (not_corrected, [*measured, *reported, *plain, *unclear],
-             "points may not be corrected for the radius"),
             (measured, measured, ""),
-            (reported and (plain or len(goals) < len(unclear)), [*reported, *plain, *unclear],
-             "no name states that an instrument measured it"),
-            (reported and by_arm, reported,
+            (reported and by_arm, [*reported, *plain, *unclear],
              "cannot tell whether an instrument measured it or the controller computed it"),
             (reported, reported, ""),
             (unclear, [*plain, *unclear], "no name states that an instrument measured it"),
@@ -255,7 +248,7 @@ class _Choice:
         return all(keeps_distance(a, b) for a, b in combinations(points, 2))
 
     def turns(self, points: Sequence[Group]) -> dict[str, Group]:
-        """Orientations by target, all of the kind of the first."""
+        """Orientations by target; the reader takes those of the kind of the first."""
         taken = self._taken(TURN)
         every = taken or [g for g in self._of(TURN) if g.role not in _NOT_MEASURED]
         turns: dict[str, Group] = {}
@@ -264,11 +257,6 @@ class _Choice:
             beside = beside or (list(every) if len(points) == 1 else [])
             if beside:
                 turns[point.target] = beside[0] if taken else self._turn(point, beside)
-        kinds = {turn.turn[0] for turn in turns.values()}
-        units = {unit for turn in turns.values() for unit in turn.units}
-        if len(kinds) > 1 or len(units) > 1:
-            about = "the orientations are of different kinds or units"
-            self._ask(about, list(turns.values()), without=True)
         return turns
 
     def _turn(self, point: Group, beside: Sequence[Group]) -> Group:

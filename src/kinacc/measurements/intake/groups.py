@@ -114,9 +114,8 @@ def all_groups(names: Sequence[Name], values: Values | None = None) -> list[Grou
                 target, turn = _target(columns[letters[0]], terms), ("euler", convention)
                 groups.append(Group(TURN, role(terms), target, turned, turn))
     for name in names:
-        if WORDS["radius"] & {*name.terms}:  # open where the points may be no centres
-            known = OPEN if WORDS["not_corrected"] & {*name.terms} else OTHER
-            groups.append(Group(RADIUS, known, "", {"radius": name}))
+        if WORDS["radius"] & {*name.terms}:
+            groups.append(Group(RADIUS, OTHER, "", {"radius": name}))
     return groups
 
 
