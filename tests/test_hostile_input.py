@@ -98,7 +98,7 @@ def test_a_measured_file_with_a_description(folder, text, encoding):
     taken_or_refused("check-data", folder / "own.yaml")
 
 
-@settings(max_examples=50)
+@settings(max_examples=100)
 @given(edited(CONFIG.replace("series_B", "absent")))
 def test_a_configuration(folder, text):
     (folder / "odd.yaml").write_bytes(text.encode("utf-8", "replace"))

@@ -80,9 +80,8 @@ def stage(snakemake: Any) -> Iterator[Stage]:
         def show(
             message: Any, category: type[Warning], filename: str, lineno: int, *_: Any
         ) -> None:
-            is_plain = category is UserWarning
-            tell(str(message) if is_plain else f"{category.__name__}: {message}",
-                 "" if is_plain else f"{filename}:{lineno}\n")  # fmt: skip
+            kind = "" if category is UserWarning else f"{category.__name__}: "
+            tell(f"{kind}{message}", f"{filename}:{lineno}\n")
 
         warnings.simplefilter("default")
         warnings.showwarning = show  # type: ignore[assignment]
