@@ -6,10 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import chi2, norm
 from simulated import POINT, POSE, THREE, disturbed, fit, joints, measure, predicted
 
 from kinacc.calibration import dh_estimator, frames
-from kinacc.calibration.least_squares import HUBER, TUKEY
+from kinacc.calibration.least_squares import HUBER, TUKEY, row_weights
 from kinacc.config.parameter_rules import rules
 from kinacc.geometry import log_so3
 from kinacc.kinematics import robot
@@ -104,3 +105,19 @@ def test_a_robust_loss_forgives_rows_far_off(loss):
     assert off(found) < 0.05
     assert (found.weights.row[:12] < 0.5).all()
     assert found.weights.scale_mm == pytest.approx(0.05, rel=0.2)
+
+
+@pytest.mark.parametrize("kind", [POINT, POSE])
+def test_weights_are_those_of_huber_and_tukey(kind):
+    """Bends of 1.345 and 4.685 standard deviations of one component (Holland and Welsch 1977)."""
+    data, components = observed(kind, count=5), 6 if kind == POSE else 3
+    share = np.array([0.0, 0.5, 0.9, 1.5, 4.0])  # of the bend
+    bend_huber, bend_tukey = chi2.isf(2 * norm.sf([1.345, 4.685]), components) ** 0.5
+    unit = np.full(components, components**-0.5)
+    for loss, bend, wanted in (
+        (HUBER, bend_huber, [1.0, 1.0, 1.0, 1 / 1.5, 1 / 4.0]),
+        (TUKEY, bend_tukey, [1.0, 0.75**2, 0.19**2, 0.0, 0.0]),
+    ):
+        residual = np.kron(0.2 * bend * share, unit)
+        found = row_weights(loss, residual, data, scale_mm=0.2)
+        np.testing.assert_allclose(found.row, wanted, atol=1e-3)

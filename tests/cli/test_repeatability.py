@@ -145,6 +145,7 @@ def test_rows_of_one_pose_after_another_are_asked_about(tmp_path):
     ("header", "stamps", "hours"),
     [
         ("time", [f"2026-05-04T08:0{each}:00" for each in range(5)], 4 / 60),
+        ("time_s", [3600 * each for each in range(5)], 4.0),
         ("time_min", [60 * each for each in range(5)], 4.0),
     ],
 )
