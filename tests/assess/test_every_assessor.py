@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.stats import binom, norm
 from simulated_campaigns import away
 
 from kinacc.assess.adaptive import Candidates, Ledger
@@ -130,6 +131,15 @@ def test_the_share_of_the_region_keeps_its_confidence(sigma):
     assert held.min() >= DRAWS * LEAST
 
 
+def test_bounds_on_a_share_are_the_readings_that_binomial_counts_allow():
+    errors = np.arange(1.0, 201.0)[:, None] * [1.0, 0.0, 0.0]
+    (said,) = conduct(RegionShare(200), drawn_world(errors, 1e-6, key_of(1), 1)).statements()
+    numbers = np.arange(1, 201)  # of largest readings
+    upper = numbers[binom.cdf(numbers - 1, 200, 0.1 * norm.cdf(1.0)) <= 0.05].max()
+    lower = numbers[binom.sf(numbers - 1, 200, 0.1 + 0.9 * 0.01) <= 0.05].min()
+    assert (said.upper_mm, said.lower_mm) == pytest.approx((201 - upper, 201 - lower), abs=1e-4)
+
+
 def test_a_share_of_the_region_needs_the_points_that_it_names():
     errors = np.random.default_rng(2).normal(size=(200, 3))
     stated = {}
@@ -150,6 +160,7 @@ def test_a_share_of_the_region_needs_the_points_that_it_names():
     [
         (Statement(MEASURED, 0.9, 0.8, 1.2, 0.95), 1.2, ACCEPT, "within"),
         (Statement(MEASURED, 0.9, 0.8, 1.2, 0.95), 1.0, UNDECIDED, "between"),
+        (Statement(MEASURED, 0.9, 0.8, 1.2, 0.95), 0.85, UNDECIDED, "between"),
         (Statement(MEASURED, 0.9, 0.8, 1.2, 0.95), 0.7, REJECT, "beyond"),
         (Statement(MEASURED, 1.1, 0.9, 1.0, 0.95), 1.3, UNDECIDED, "contradict"),
         (Statement(MEASURED, 0.9, 1.2, 1.0, 0.95), 0.8, UNDECIDED, "contradict"),

@@ -139,3 +139,12 @@ def test_the_search_ends_where_high_orders_gain_nothing():
     table = orders(*positions(600))
     assert set(table.query("chosen == 1")["order"]) <= {1, 2}
     assert table["order"].max() <= 6  # 600 poses can carry 40
+
+
+@pytest.mark.parametrize("poses", [35, 36, 37, 71, 72, 73])
+def test_the_highest_order_has_no_more_parameters_than_residuals(poses):
+    arm, rng = robot.load("ur10"), np.random.default_rng(1)
+    seen = simulated.measure(arm.dh, simulated.joints(arm, poses, rng), simulated.POINT, rng)
+    order = vec_fit.highest_order(seen, 6, frames=9)
+    parameters = [9 + 6 * 6 * (highest + 1) for highest in (order, order + 1)]
+    assert parameters[0] <= 3 * poses < parameters[1]

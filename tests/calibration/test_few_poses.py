@@ -11,6 +11,7 @@ import simulated
 from kinacc.calibration import models
 from kinacc.calibration.dh_estimator import free_parameters, parallel_joints
 from kinacc.calibration.residuals import errors
+from kinacc.checks.coverage import few_poses
 from kinacc.config.schema import defaults
 from kinacc.kinematics import robot
 
@@ -78,3 +79,25 @@ def test_every_model_of_an_automatic_calibration_ends(size):
     found = mean_errors(arm, seen.select(slice(size)), test, "vec", "dh")
     assert np.isfinite(found).all()
     assert found[1] <= found[2] * (1.0 + 1e-9)
+
+
+@pytest.mark.parametrize(("targets", "numbers"), [(1, 3), (2, 6), (3, 6)])
+def test_a_pose_gives_six_numbers_at_most_whatever_it_carries(targets, numbers):
+    arm, stated = robot.load("ur10"), settings()
+    stated["vec"] |= {"order": 2, "prior": "stated"}
+    names = [*"abc"][:targets]
+    frames = 6 + 3 * targets
+
+    def found(poses):
+        q_rad = np.repeat(np.random.default_rng(2).uniform(-1.0, 1.0, (poses, 6)), targets, axis=0)
+        columns = {f"q{i + 1}": q_rad[:, i] for i in range(6)}
+        columns |= {f"s{i + 1}": np.zeros(len(q_rad)) for i in range(6)}
+        columns |= {name: np.full(len(q_rad), np.nan) for name in ("qw", "qx", "qy", "qz")}
+        columns |= {name: np.zeros(len(q_rad)) for name in ("x_mm", "y_mm", "z_mm", "repeat")}
+        columns |= {"pose": np.repeat(np.arange(poses), targets), "target": names * poses}
+        return few_poses(columns, arm, stated)
+
+    enough = -(-(frames + 6 * 6 * 3) // numbers)  # orders 0, 1 and 2 of six errors of six joints
+    assert not found(enough)
+    (finding,) = found(enough - 1)
+    assert finding.values["numbers"] == numbers * (enough - 1)

@@ -105,6 +105,10 @@ def test_a_robust_loss_forgives_rows_far_off(loss):
     assert off(found) < 0.05
     assert (found.weights.row[:12] < 0.5).all()
     assert found.weights.scale_mm == pytest.approx(0.05, rel=0.2)
+    assert found.solution.variance == found.weights.scale_mm**2
+    known = np.isfinite(found.solution.std)
+    variances = np.diag(found.solution.covariance)[known]
+    np.testing.assert_allclose(found.solution.std[known] ** 2, variances)
 
 
 @pytest.mark.parametrize("kind", [POINT, POSE])

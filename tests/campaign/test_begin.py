@@ -12,7 +12,7 @@ from kinacc.campaign import begin
 from kinacc.campaign.instrument import instruments
 from kinacc.campaign.plan import Limits
 from kinacc.deployment.planning import spread
-from kinacc.deployment.record import nominal
+from kinacc.deployment.record import Residual, nominal
 from kinacc.errors import InputError
 from kinacc.geometry import Pose, compose, exp_so3
 from kinacc.kinematics import robot
@@ -91,3 +91,20 @@ def test_many_candidates_are_driven_to_in_an_order_with_less_travel(make_plan):
 
     assert sorted(plan.route) == sorted(plan.order)
     assert travel(plan.route) < 0.6 * travel(plan.order)
+
+
+@pytest.mark.parametrize(("left_mm", "limit_mm"), [(None, 50.5), (0.1, 5.5), (1.0, 20.5)])
+def test_a_reading_is_implausible_far_beyond_the_errors_of_the_calibration(left_mm, limit_mm):
+    arm = nominal(robot.load("irb120"))
+    if left_mm is not None:
+        arm = replace(arm, residual=Residual(left_mm, 1e-4, "validation"))
+    points = begin.points_of(arm, spread(arm.robot, 6), [str(number) for number in range(6)])
+    plan = begin.plan_of(
+        arm,
+        points,
+        ADAPTIVE["single_shot"](measurements=6),
+        instruments(["tracker=0.05"], "instrument"),
+        Limits(),
+        {},
+    )
+    assert plan.limits.implausible_mm == pytest.approx(limit_mm)

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from kinacc.errors import InputError
-from kinacc.geometry import Pose, compose, rotation_x, rotation_z
+from kinacc.geometry import Pose, compose, exp_so3, rotation_x, rotation_z
 from kinacc.kinematics import robot
 from kinacc.kinematics.dh import DHModel
 from kinacc.kinematics.robot.description import from_modified
@@ -93,6 +93,13 @@ def test_base_flange_and_tool_frames_are_read(arm):
     assert np.allclose(pose.position_mm, wanted.position_mm)
     assert np.allclose(pose.rotation, wanted.rotation)
     assert np.allclose(robot.carried(framed).rotation, rotation_z(np.pi * 0.75))
+
+
+def test_angles_of_a_frame_turn_about_the_fixed_axes_x_y_z(arm):
+    angles = np.deg2rad(np.diag([10.0, 20.0, 30.0]))
+    about_x, about_y, about_z = exp_so3(angles)
+    carried = robot.carried(arm(GOOD + "tool: {rpy_deg: [10, 20, 30]}\n"))
+    assert np.allclose(carried.rotation, about_z @ about_y @ about_x)
 
 
 # --- modified tables ------------------------------------------------------------------------------
