@@ -204,8 +204,3 @@ def commands(terms: Collection[str]) -> bool:
 def is_controller_pose(terms: Collection[str]) -> bool:
     """Whether the terms are those of a pose that the controller calculates from its joints."""
     return bool(WORDS["frame"] & {*terms}) and REPORTED in map(_ROLE.get, terms)
-
-
-def is_frame(terms: Collection[str]) -> bool:
-    """Whether the terms name the tool centre point, and nothing else."""
-    return bool(terms) and {*terms} <= WORDS["frame"]

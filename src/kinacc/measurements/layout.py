@@ -262,9 +262,6 @@ class _Finder:
                 points[target or TOOL] = column
         roles = {name: column_names.role(name_of(f"{name} x").terms) for name in points}
         read = [name for name in points if roles[name] in _READ or name in named]
-        if not read and not named:  # the tool centre point, under its usual name
-            frames = [name for name in points if column_names.is_frame(name_of(name).terms)]
-            read = frames if len(frames) == 1 else []
         unclear = [n for n in points if n not in read and roles[n] == column_names.OPEN]
         unclear = unclear if read or named else unclear or [*points]
         if unclear:
