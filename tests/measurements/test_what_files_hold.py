@@ -15,8 +15,6 @@ from kinacc.config.schema import defaults
 from kinacc.errors import InputError
 from kinacc.geometry import rotation_from_quaternion
 from kinacc.kinematics import robot
-from kinacc.measurements.column_names import name_of
-from kinacc.measurements.intake.columns import recognise
 from kinacc.measurements.reader import UNCERTAINTY, read
 
 ROOT = Path(__file__).parents[2]
@@ -178,17 +176,3 @@ def test_a_mass_alone_hangs_at_the_last_frame_and_an_empty_cell_says_nothing(tmp
     columns = reading(tmp_path, table, columns={"payload": "Last"}).columns
     assert columns["payload_z_mm"][0] == 0.0
     assert np.isnan([columns["payload_kg"][2], columns["payload_x_mm"][2]]).all()
-
-
-@pytest.mark.parametrize(
-    ("names", "expected"),
-    [
-        (["Payload [kg]"], {"payload"}),
-        (["charge utile (kg)"], {"payload"}),
-        (["charge"], set()),  # of a battery
-        (["Nutzlast [kg]", *(f"Schwerpunkt Nutzlast {axis} [mm]" for axis in "XYZ")],
-         {"payload", "payload_x", "payload_y", "payload_z"}),
-    ],
-)  # fmt: skip
-def test_a_load_is_known_under_names_people_use_with_their_unit(names, expected):
-    assert {*recognise([*map(name_of, names)]).single} == expected

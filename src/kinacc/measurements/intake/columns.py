@@ -41,7 +41,7 @@ from kinacc.measurements.intake.groups import (
     listed,
     same,
 )
-from kinacc.measurements.layout import ANGLE, LENGTH, TOOL
+from kinacc.measurements.layout import ANGLE, TOOL
 from kinacc.measurements.table import RawTable
 
 _WRONG = (DEVIATION, SPREAD, OTHER)
@@ -55,8 +55,8 @@ class NamedColumns:
 
     ``joints`` q1 ..; ``commanded`` the same as commanded, may be empty; ``targets`` by name, each a
     mapping of x, rx, qw, quat1, std_x and the like; ``turn`` kind and convention of the
-    orientations as their names have it; ``single`` pose, repeat, session, target, temperature,
-    payload, payload_x and so on. ``aside``: groups that are not read; ``questions``: open choices.
+    orientations as their names have it; ``single`` pose, repeat, session, target, temperature.
+    ``aside``: groups that are not read; ``questions``: open choices.
     """
 
     joints: tuple[Name, ...] = ()
@@ -110,7 +110,7 @@ def recognise(
     ``wanted``: nominal poses are read, not measured ones.
     """
     answers = answers or {}
-    choice = _Choice([n for n in names if not _payload_of(n)], values, answers, wanted)
+    choice = _Choice(names, values, answers, wanted)
     joints = choice.joints()
     points = choice.points(joints)
     turns = choice.turns(points) if answers.get("orientation") != "none" else {}
@@ -132,7 +132,7 @@ def recognise(
     used = result.read()
     single: dict[str, Name] = {}
     for name in names:
-        if name.column not in used and (quantity := _payload_of(name) or _single_of(name)):
+        if name.column not in used and (quantity := _single_of(name)):
             single.setdefault(quantity, name)
     aside = tuple(group for group in choice.every if not used & {*group.names})
     return replace(result, single=single, aside=aside)
@@ -318,15 +318,3 @@ def _single_of(name: Name) -> str:
     quantities = [q for q, known in WORDS["single"].items() if len(terms) == 1 and terms[0] in known
                   and (q != "temperature" or name.unit in ("", "C"))]  # fmt: skip
     return next(iter(quantities), "")
-
-
-def _payload_of(name: Name) -> str:
-    """payload or payload_x .. where the name is one and states its unit; else nothing."""
-    terms = {*name.terms}
-    if not terms & WORDS["payload"]:
-        return ""
-    rest = terms - WORDS["payload"] - WORDS["weight"]
-    if not rest and name.unit == "kg":  # a charge of a battery states none
-        return "payload"
-    axis = "".join(rest - WORDS["centre"])
-    return f"payload_{axis}" if axis in ("x", "y", "z") and name.unit in LENGTH else ""
