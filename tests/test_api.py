@@ -1,5 +1,7 @@
 """The public face on a small data set: the same tables and answers as the commands give."""
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -7,6 +9,7 @@ from stages_by_hand import CALIBRATED, perform
 
 import kinacc
 import kinacc.errors
+from kinacc.deployment import folder
 from kinacc.workflow.described import outdated_reason
 
 CONFIG = """\
@@ -107,6 +110,15 @@ def test_rows_taken_out_are_not_fitted(config):
         measured.settings,
     )  # fmt: skip
     assert kinacc.calibrate(fewer).summary.readings == len(measured) - 5
+
+
+def test_pinocchio_gets_the_dh_model_whatever_was_selected(calibration):
+    pytest.importorskip("pinocchio")
+    made = [
+        replace(calibration, model=folder.calibration(calibration.tables, calibration.robot, kind))
+        for kind in ("dh", "vec")
+    ]
+    assert made[0].to_pinocchio() == made[1].to_pinocchio()
 
 
 def test_export_writes_files(calibration, tmp_path):

@@ -284,7 +284,7 @@ class Calibration:
         Joints are those that the controller reports, or those of the DH table where these are
         coupled.
         """
-        return urdf.to_pinocchio(Source(self.model, self.tables))
+        return urdf.to_pinocchio(self._dh_source())
 
     def to_pybotics(self, point: str | None = None) -> Any:
         """The calibrated DH model as ``pybotics.robot.Robot`` (mm, rad).
@@ -299,7 +299,11 @@ class Calibration:
         pybotics.robot.Robot
             Its joints are those of the DH table: ``calibration.robot.dh_joints(q_rad)``.
         """
-        return urdf.to_pybotics(Source(self.model, self.tables), point)
+        return urdf.to_pybotics(self._dh_source(), point)
+
+    def _dh_source(self) -> Source:
+        """The DH model, whatever model was selected."""
+        return Source(results.calibration(self.tables, self.robot, PLAINEST), self.tables)
 
     def values_for(
         self, controller: str, settings: Mapping[str, Any] | None = None
