@@ -97,6 +97,22 @@ def test_a_drift_or_step_of_three_deviations_is_said(change, freedom):
     assert np.mean(said) >= 0.95
 
 
+@pytest.mark.parametrize("freedom", [math.inf, 60.0])
+def test_half_of_the_drifts_that_may_be_unseen_are_found(freedom):
+    plan, rng = schedule(200, 180, 20), np.random.default_rng(8)
+
+    def found(change_mm):
+        return [find_change(plan, read(plan, rng, change_mm), freedom) for _ in range(400)]
+
+    # By the step that fits best as by none; the noise is estimated where its freedom is finite.
+    after_steps = np.median([change.unseen_mm for change in found(lambda time: 9.0 * (time > 0.5))])
+    unseen_mm = np.median([change.unseen_mm for change in found(lambda time: 0.0)])
+    assert after_steps == pytest.approx(unseen_mm, rel=1e-9 if math.isinf(freedom) else 0.03)
+    # Steps find some more; 0.43 is 3 standard errors below one half.
+    share = np.mean([change.is_found for change in found(lambda time: unseen_mm * time)])
+    assert 0.43 < share < 0.65
+
+
 @pytest.mark.parametrize(
     ("change", "code", "size"),
     [(lambda time: 8.0 * time, "drift", 8.0), (lambda time: 9.0 * (time > 0.55), "step", 9.0)],
