@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 from campaign_on_disk import entry_of, readings_of, world_of
 from command_line import call
+from scipy.stats import chi2
 
 from kinacc.assess.registry import ADAPTIVE
 from kinacc.assess.world import conduct
 from kinacc.campaign import folder
 from kinacc.campaign.plan import from_json, to_json
-from kinacc.campaign.state import Reading, Readings, most_plausible_mm, restore
+from kinacc.campaign.state import Reading, Readings, most_plausible_mm, restore, size_scatter
 
 
 def entries_of(plan, world, left_out=frozenset(), limit=None):
@@ -153,3 +154,14 @@ def test_all_that_is_certain_lists_planned_revisits_in_their_places(make_plan):
     assert read[: len(ahead)] == ahead
     for done in (3, 7, 25):
         assert restore(plan, entries[:done]).ahead() == ahead[done:]
+
+
+def test_sizes_of_readings_are_held_to_the_noise_of_three_axes(make_plan):
+    plan = make_plan(texts=("tracker=0.05",))
+    state = restore(plan, entries_of(plan, world_of(plan), limit=12))
+    squares = np.array([item.error_mm for item in state.readings]) ** 2 / 0.05**2
+    found = size_scatter(state)
+    assert squares.shape == (12, 3)
+    assert found.freedom == 36
+    assert found.ratio == pytest.approx(np.sqrt(squares.mean()))
+    assert found.probability == pytest.approx(chi2.sf(squares.sum(), 36))
