@@ -18,7 +18,7 @@ from kinacc.calibration.observations import Observations
 from kinacc.config import parameter_rules
 from kinacc.config.parameter_rules import Rule
 from kinacc.errors import Problem, refuse
-from kinacc.geometry import IDENTITY, Pose, compose, exp_so3, log_so3, project_so3, skew
+from kinacc.geometry import IDENTITY, Pose, compose, exp_so3, log_so3, skew
 from kinacc.kinematics.model import ErrorModel
 
 MOTIONS = ("x_mm", "y_mm", "z_mm", "rx_rad", "ry_rad", "rz_rad")
@@ -389,7 +389,7 @@ def closed_form_start(observations: Observations, flange: Pose) -> Frames:
         measured = np.isin(np.arange(names), part.target)
         new = measured & ~placed
         if not placed[measured].any():
-            base, points = _one_session(part, at)
+            base, points = one_session(part, at)
             start.targets.position_mm[new] = points[new]
         else:
             base = base_from_targets(part, at, start.targets, placed)
@@ -408,14 +408,28 @@ def closed_form_start(observations: Observations, flange: Pose) -> Frames:
     return start
 
 
-def _one_session(observations: Observations, flange: Pose) -> tuple[Pose, np.ndarray]:
-    """Base and target positions (T, 3) from the rows of one session.
+def one_session(observations: Observations, flange: Pose) -> tuple[Pose, np.ndarray]:
+    """Base and positions of targets from the rows of one session.
 
     Linear solutions for the base rotation, the one that leaves the smallest position error: from
     positions with a free 3x3 matrix, C m - R_flange t + c = p_flange, which fails where they lie in
     a plane; and from orientations of each target, robot-world/hand-eye by the leading singular
     vectors of a sum of Kronecker products (Shah, J. Mechanisms Robotics 5, 2013), which fails where
     the tool turns about one axis only.
+
+    Parameters
+    ----------
+    observations : Observations
+        n measured points and poses of one session.
+    flange : Pose
+        Flange poses in the robot base, shape (n, ...), mm.
+
+    Returns
+    -------
+    base : Pose
+        Robot base in the instrument's frame, mm.
+    points : numpy.ndarray
+        Targets in the flange frame, shape (T, 3), mm; zero for targets that were not measured.
     """
     count, targets = len(observations), len(observations.target_names)
     carried = np.eye(targets)[observations.target]
@@ -488,4 +502,4 @@ def base_from_targets(
 def _nearest_rotation(matrix: np.ndarray) -> np.ndarray:
     left, _, right = np.linalg.svd(matrix)
     left[:, 2] *= np.sign(np.linalg.det(left @ right))
-    return project_so3(left @ right)
+    return left @ right

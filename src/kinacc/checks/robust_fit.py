@@ -23,6 +23,7 @@ from kinacc.calibration.frames import (
     base_from_targets,
     closed_form_start,
     frame_terms,
+    one_session,
 )
 from kinacc.checks import tails
 from kinacc.checks.readings import Readings, thinned
@@ -142,10 +143,10 @@ def fit(observed: Readings, model: DHModel) -> Fitted:
     return Fitted(observed, chosen, trial, remaining, lengths[0], left_rad, *limits)
 
 
-def residuals(arm: Arm, observed: Readings, flange: Pose | None = None) -> Residuals:
-    """What ``arm`` leaves of the readings; ``flange`` (n) where the model's poses are known."""
+def residuals(arm: Arm, observed: Readings) -> Residuals:
+    """What ``arm`` leaves of the readings."""
     base, target = arm.frames.at_rows(observed)
-    flange = compose(base, flange or dh.forward(arm.model, observed.q_rad))
+    flange = compose(base, dh.forward(arm.model, observed.q_rad))
     predicted = compose(flange, target)
     # Where no orientation was measured, its rotation vector is NaN.
     turn = log_so3(predicted.rotation @ np.swapaxes(observed.rotation, 1, 2))
@@ -243,8 +244,8 @@ class Linear:
             np.pad(columns, ((0, 0), (0, 6 - columns.shape[1]), (0, 0)))
             for columns, _ in system.columns(x)
         ]
-        both = np.ascontiguousarray(np.concatenate(blocks, axis=2).transpose(2, 1, 0))
-        design, residual = both[..., :-1], both[..., -1]
+        columns = np.concatenate(blocks, axis=2)
+        design, residual = columns[:-1].transpose(2, 1, 0), columns[-1].T
         weights, sigmas = np.zeros((len(observed), 6)), []
         every = np.ones(len(observed), dtype=bool)
         for part, there in zip(_PARTS, (every, observed.has_rotation), strict=True):
@@ -254,15 +255,15 @@ class Linear:
                 weights[there, part] = _weight(vectors, sigma, huber) / sigma**2
         lean = np.append(np.zeros(frames.size), (strength * _units(nominal))[free] ** -2.0)
         moved = np.append(np.zeros(frames.size), (arm.model.start - nominal.start)[free])
-        flat = design.reshape(-1, system.size)
-        weighted = flat * weights.reshape(-1, 1)
-        gram = weighted.T @ flat + np.diag(lean)
+        flat = columns.reshape(len(columns), -1)
+        normal = (flat[:-1] * weights.T.ravel()) @ flat.T
+        gram = normal[:, :-1] + np.diag(lean)
         # What no reading shows (a base nobody sees) stays where it is.
         diagonal = np.diag(gram)
         scale = np.divide(1.0, np.sqrt(diagonal), out=0.0 * diagonal, where=diagonal > 0.0)
         both = np.outer(scale, scale)
         inverse = np.linalg.pinv(gram * both, rcond=1e-12, hermitian=True) * both
-        step = -inverse @ (weighted.T @ residual.ravel() + lean * moved)
+        step = -inverse @ (normal[:, -1] + lean * moved)
         return cls(design, residual, weights, inverse, step, frames, *sigmas)
 
     def taken(self, arm: Arm) -> tuple[Arm, float]:
@@ -341,18 +342,17 @@ def start(observed: Readings, model: DHModel, is_clean: bool = False) -> Arm:
         pieces += [piece for piece in stretches if len(np.unique(part.pose[piece])) >= _DRAWN]
         draws = [rng.choice(poses, _DRAWN, replace=False) for _ in range(_DRAWS)]
         pieces += [np.flatnonzero(np.isin(part.pose, draw)) for draw in draws]
-    better: list[tuple[float, Arm]] = []
+    chosen, least = every, np.inf
     for rows in pieces:
         for _ in range(_REFINEMENTS):
-            trial = Arm(model, closed_form_start(part.select(rows), flange.select(rows)))
-            misfit = np.linalg.norm(residuals(trial, part, flange).position_mm, axis=1)
-            middle = float(np.quantile(misfit, _JUDGED))
-            if better and middle >= better[-1][0]:
+            base, points = one_session(part.select(rows), flange.select(rows))
+            distance = _distances(part, flange, base, points)
+            middle = float(np.quantile(distance, _JUDGED))
+            if middle >= least:
                 break
-            better.append((middle, trial))
-            rows = np.argsort(misfit)[: max(int(_TRUSTED * len(misfit)), _DRAWN)]
-    arm = better[-1][1]
-    frames = arm.frames
+            chosen, least = rows, middle
+            rows = np.argsort(distance)[: max(int(_TRUSTED * len(distance)), _DRAWN)]
+    frames = closed_form_start(part.select(chosen), flange.select(chosen))
     if len(observed.target_names) > 1:
         _place_targets(frames, part, flange)
     for session in np.unique(observed.session[observed.session != largest]):
@@ -360,10 +360,17 @@ def start(observed: Readings, model: DHModel, is_clean: bool = False) -> Arm:
         flange, rows = dh.forward(model, part.q_rad), np.arange(len(part))
         for _ in range(_REFINEMENTS):
             base = base_from_targets(part.select(rows), flange.select(rows), frames.targets)
-            frames.bases.rotation[session], frames.bases.position_mm[session] = base
-            misfit = np.linalg.norm(residuals(arm, part, flange).position_mm, axis=1)
-            rows = np.argsort(misfit)[: max(int(_TRUSTED * len(part)), min(len(part), 4))]
-    return arm
+            distance = _distances(part, flange, base, frames.targets.position_mm)
+            rows = np.argsort(distance)[: max(int(_TRUSTED * len(part)), min(len(part), 4))]
+        frames.bases.rotation[session], frames.bases.position_mm[session] = base
+    return Arm(model, frames)
+
+
+def _distances(observed: Readings, flange: Pose, base: Pose, points: ndarray) -> ndarray:
+    """Distances (n,) of positions from targets at ``points`` (T, 3) of the flanges, mm."""
+    by_arm = flange.position_mm + (flange.rotation @ points[observed.target, :, None])[..., 0]
+    predicted = by_arm @ base.rotation.T + base.position_mm
+    return np.linalg.norm(predicted - observed.position_mm, axis=1)
 
 
 def _place_targets(frames: Frames, part: Readings, flange: Pose) -> None:
