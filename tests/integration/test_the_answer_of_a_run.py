@@ -8,7 +8,6 @@ def test_a_run_ends_with_what_the_calibrations_are_worth(project):
     text = project.snakemake(*summaries)
     paper, own = text[text.index("\nmh180: ") :], text[text.index("\nown (") :]
     assert "Paper's claims" in paper
-    assert "Model difference" in paper
     assert "Paper's claims" not in own
     for name, page in (("mh180", paper), ("own", own)):
         assert "Mean position error at" in page
