@@ -10,10 +10,10 @@ import pytest
 import run
 
 
-def work(*others: harness.Contender, **said) -> harness.Work:
+def work(*others: harness.Contender) -> harness.Work:
     """A work of one unit whose contenders give the number 1."""
     kinacc = harness.Contender("kinacc", "0", lambda: 1)
-    return harness.Work("one", "number", 1, (kinacc, *others), equal, **said)
+    return harness.Work("one", "number", 1, (kinacc, *others), equal)
 
 
 def equal(outputs):
@@ -48,21 +48,6 @@ def test_nothing_is_timed_where_outputs_differ(monkeypatch):
     monkeypatch.setattr(harness, "sample_s", lambda *_: pytest.fail("timed"))
     with pytest.raises(ValueError, match=r"\[1, 2\]"):
         harness.measure(work(harness.Contender("other", "2", lambda: 2)))
-
-
-def test_a_wish_that_is_not_met_stands_out_on_the_page():
-    other = harness.Contender("other", "3.1", lambda: 1)
-    table = pd.DataFrame(harness.measure(work(other, wanted={"other": 1e9}), smoke=True))
-    table.attrs["on"] = ""
-    assert "**1e+09 x faster: not met**" in run.page({"fits": table})
-
-
-def test_errors_stand_on_the_page_beside_seconds_that_another_process_measured():
-    other = harness.Contender("other", "3.1", lambda: 1, taken_s=lambda output: 2.0 * output)
-    rows = harness.measure(work(other, error_mm=lambda output: 0.25 * output, seconds=0.0))
-    table = pd.DataFrame(rows)
-    table.attrs["on"] = ""
-    assert "| 2 s a number, 0.2500 mm |" in run.page({"fits": table})
 
 
 def test_the_page_is_written_from_the_results():

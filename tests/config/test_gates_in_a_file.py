@@ -1,28 +1,16 @@
 """Gates as people write them into a configuration, right and wrong."""
 
 import pytest
+from complaints import complaints
 
-from kinacc.config.load import load
-from kinacc.errors import InputError
+from kinacc.checks.contradictions import load
 
 END = "datasets: {mh180: {robot: mh180}, other: {robot: mh180}}\n"
 
 
-def loaded(tmp_path, text, end=END):
-    path = tmp_path / "cell.yaml"
-    path.write_text(text + end)
-    return load([path], folder=tmp_path)
-
-
-def problems(tmp_path, text, end=END):
-    with pytest.raises(InputError) as caught:
-        loaded(tmp_path, text, end)
-    return [str(each) for each in caught.value.problems]
-
-
 def test_every_mistake_in_gates_is_told_at_once_with_its_place_and_what_is_meant(tmp_path):
-    told = problems(
-        tmp_path,
+    path = tmp_path / "cell.yaml"
+    path.write_text(
         """gates:
 - {name: a, value: residual.position.p99, at_most_mm: 0.8}
 - {name: b, value: residuals.position.p99, at_most_mrad: 0.8}
@@ -34,8 +22,10 @@ def test_every_mistake_in_gates_is_told_at_once_with_its_place_and_what_is_meant
 - {name: h, value: residuals.position.p99, at_most_mm: 1, at_most_mrad: 2}
 - {name: i, value: residuals.position.mean, against: accepted}
 - 7
-""",
+"""
+        + END
     )
+    told = complaints(path, folder=tmp_path)
     wanted = [
         (":2, gates[0].value", "did you mean residuals.position.p99?"),
         (":3, gates[1]", "give at_most_mm"),
@@ -69,9 +59,10 @@ def test_every_mistake_in_gates_is_told_at_once_with_its_place_and_what_is_meant
 def test_a_gate_without_a_limit_has_that_of_the_tolerance_if_it_is_of_the_same(
     tmp_path, tolerance, gate, fits
 ):
-    text = f"tolerance: {tolerance}\ngates: [{{name: a, {gate}}}]\n"
+    path = tmp_path / "cell.yaml"
+    path.write_text(f"tolerance: {tolerance}\ngates: [{{name: a, {gate}}}]\n{END}")
     if fits:
-        assert len(loaded(tmp_path, text)["mh180"]["gates"]) == 1
+        assert len(load([path], folder=tmp_path)["mh180"]["gates"]) == 1
     else:
-        (told,) = problems(tmp_path, text)
+        (told,) = complaints(path, folder=tmp_path)
         assert "gates[0]" in told

@@ -6,9 +6,9 @@ import textwrap
 from pathlib import Path
 
 import pytest
+from complaints import complaints
 
 from kinacc.checks.contradictions import load
-from kinacc.errors import InputError
 
 MARCH, MAY, JUNE = (f"tracker-2026-0{month}" for month in ("3-01", "5-04", "6-02"))
 SERIES = """\
@@ -41,12 +41,6 @@ def written(tmp_path, monkeypatch):
         return "tracker.yaml"
 
     return write
-
-
-def complaints(path) -> list[str]:
-    with pytest.raises(InputError) as caught:
-        load([path])
-    return [str(problem) for problem in caught.value.problems]
 
 
 def test_every_line_is_a_data_set_and_the_arm_is_its_newest(written):
@@ -99,5 +93,4 @@ def test_a_series_beside_what_is_of_one_file_is_a_contradiction(written):
 def test_a_series_given_in_two_files_is_refused(written, tmp_path):
     path = written(SERIES)
     (tmp_path / "other.yaml").write_text(Path(path).read_text())
-    with pytest.raises(InputError, match="given in two files"):
-        load([path, "other.yaml"])
+    assert any("given in two files" in each for each in complaints(path, "other.yaml"))

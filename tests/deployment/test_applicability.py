@@ -13,8 +13,6 @@ from kinacc.deployment.folder import calibration
 from kinacc.kinematics import robot
 from kinacc.kinematics.model import JointState
 
-SERIES = "ur10_tmac/series_D.csv"
-
 
 @pytest.mark.parametrize("model", ["dh", "vec"])
 def test_a_gap_between_two_clusters_of_poses_is_not_where_it_was_measured(model):

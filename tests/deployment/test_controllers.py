@@ -51,10 +51,7 @@ def judged(folder, results, language, arm):
     path = program.write(folder, "weld")
     before = path.read_bytes()
     out = path.with_name(f"weld_cal{path.suffix}")
-    done = call(
-        "compensate", results, "--program", path, "-o", out, *options(program, folder), code=0
-    )
-    assert all(f"weld_cal{ending}" in done.output for ending in program.files)
+    call("compensate", results, "--program", path, "-o", out, *options(program, folder), code=0)
     assert path.read_bytes() == before
     frames = pd.read_parquet(results / "frames.parquet")
     row = frames[(frames["model"] == "dh") & (frames["frame"] == "base")].iloc[0]

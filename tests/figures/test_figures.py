@@ -40,7 +40,6 @@ def test_fig2_shows_all_points():
     q_rad = np.radians(np.random.default_rng(4).uniform(-60, 60, (40, 6)))
     figure = fig2.draw(robot.load("ur10").dh, q_rad, tool_mm=np.array([0.0, 30.0, 120.0]))
     assert problems(figure) == []
-    assert "40 operating points" in said(figure)
     (ax,) = figure.axes
     limits = np.array([ax.get_xlim(), ax.get_ylim(), ax.get_zlim()])
     points = np.transpose(ax.collections[0]._offsets3d)
@@ -54,7 +53,6 @@ def test_fig3_has_a_scale_a_row_rings_the_largest_and_dots_what_is_partly_reache
     figure = fig3.draw(table)
     panels = [axes for axes in figure.axes if len(axes.lines) == 3]
     assert len(panels) == 10
-    assert "some poses not reachable" in said(figure)
     for row, column in ((0, "position_max_mm"), (1, "orientation_max_mrad")):
         for axes, angle in zip(panels[5 * row :], (0, 15, 30, 45, 60), strict=False):
             ends = np.nanmin(table[column]), np.nanmax(table[column])

@@ -14,10 +14,7 @@ def test_a_history_can_be_read_however_long_it_is(lines, changed):
     table = history(lines, changed, open_=5, tolerance_mm=0.8)
     figure = history_over_time.draw(table, dataset="tracker")
     assert not problems(figure)
-    words = said(figure)
-    assert "tolerance" in words
-    assert ("joint 4" in words) == (changed is not None)
-    assert f"{table['date'][0]}" in words
+    assert ("joint 4" in said(figure)) == (changed is not None)
 
 
 def test_a_change_stands_above_what_chance_shows():

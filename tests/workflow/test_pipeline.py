@@ -81,15 +81,3 @@ def test_a_changed_row_of_a_measured_file_makes_its_data_set_anew(project):
     cells[6] = f"{float(cells[6]) + 0.01:.9f}"
     path.write_text("\n".join([*lines[:7], ",".join(cells), *lines[8:]]) + "\n")
     assert project.to_do() == EVERY - {"accuracy_map", "map_figure", "claims"}
-
-
-def test_a_stage_is_made_anew_on_request_without_what_follows(project):
-    assert project.to_do("-R", "fit_dh", "--until", "residuals") == {"fit_dh", "residuals"}
-
-
-def test_a_table_that_was_deleted_is_made_anew(project):
-    before = project.digests()
-    (project.folder / ARM / "histories.parquet").unlink()
-    project.snakemake()
-    assert project.digests() == before
-    assert project.to_do() == set()

