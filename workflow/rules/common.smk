@@ -3,11 +3,8 @@ FIGURES = ("fig1", "fig2", "fig4", "fig5", "fig6")  # drawn by kinacc.figures.pa
 
 
 def job(script, sections="", shown=False, measured=False, **keys):
-    """Parameters of a rule: all that makes its files anew beside its tables, by content, not date.
-
-    That are whole sections of the settings, single keys of sections by name, files from outside, the
-    seed, and the code: the script and the package, or the rooms that draw and show.
-    """
+    """What makes a rule's files anew, by content: settings, files from outside, the seed and the code."""
+    # Whole sections of the settings, and single keys by section.
     path = os.path.join(str(workflow.current_basedir), "..", "scripts", script)
     paths = sections.split() + [f"{section}.{key}" for section, own in keys.items() for key in own.split()]
     return {
