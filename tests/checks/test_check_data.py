@@ -25,15 +25,18 @@ def test_a_good_file_is_described_and_passes(good, tmp_path):
         assert words in done.output
 
 
-def test_suspicions_name_their_lines_and_end_with_1(good, tmp_path):
+def test_suspicions_name_their_lines_and_end_with_1_and_are_drawn_once(good, tmp_path):
     by_mm = np.where(np.isin(np.arange(80), (4, 11)), 30.0, 0.0)
     config = good.but(x_mm=good.columns["x_mm"] + by_mm).write(tmp_path)
-    done = call("check-data", config, "--json", code=1)
+    words = ("check-data", config, "--picture", tmp_path / "checked.svg")
+    done = call(*words, "--json", code=1)
     told = json.loads(done.stdout)
     assert told["verdict"] == "suspicions"
     assert told["datasets"][0]["suspicions"][0]["lines"] == [6, 13]
     assert told["datasets"][0]["suspicions"][0]["where"] == "lines 6, 13"
     assert told["datasets"][0]["facts"]["poses"] == 80
+    call(*words, code=2)
+    assert (tmp_path / "checked.svg").read_bytes().startswith(b"<?xml")
 
 
 def test_what_cannot_be_used_ends_with_2(good, tmp_path):

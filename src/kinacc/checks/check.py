@@ -166,6 +166,7 @@ def check(
             *(finding(LEFT_OUT, words=text) for text in unread),
             *coverage.thin(facts["joint_coverage"]),
         ),
+        *((fitted.readings.line, fitted.left_mm) if fits else ()),
     )
 
 

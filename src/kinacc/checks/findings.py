@@ -100,6 +100,9 @@ class Report:
         What is in the file, by name; units stand in the names.
     suspicions, notes
         Findings; notes are on what is not used and where the data are thin.
+    line, left_mm
+        For a picture: lines (n,) of the readings as compared and what a robust fit leaves of
+        each, mm; empty where nothing was fitted.
     accepted
         Reasons of the configuration to go on with findings, by their code.
     """
@@ -109,6 +112,8 @@ class Report:
     facts: Mapping[str, Any]
     suspicions: tuple[Finding, ...]
     notes: tuple[Finding, ...] = ()
+    line: np.ndarray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    left_mm: np.ndarray = field(default_factory=lambda: np.empty(0))
     accepted: Mapping[str, str] = field(default_factory=dict)
 
     @property

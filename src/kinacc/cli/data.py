@@ -9,13 +9,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from datetime import datetime
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
+import pandas as pd
 
 from kinacc.checks.check import examined
 from kinacc.checks.contradictions import load
-from kinacc.checks.findings import VERDICTS
+from kinacc.checks.findings import VERDICTS, Report
 from kinacc.cli.choice import CONFIG, DATASET, REASON, option
 from kinacc.cli.output import Output, answers
 from kinacc.cli.process import AGAINST, DONE, UNUSABLE
@@ -29,6 +30,9 @@ from kinacc.progress import reporting
 from kinacc.report.rendering import environment
 from kinacc.tables.atomic import write_whole
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 _MOST = 100_000  # lines of a range
 _SETUP = click.Choice([SAME, MOVED])
 _DAY = click.DateTime(["%Y-%m-%d"])
@@ -40,7 +44,7 @@ _EMPTY_REASON = Problem("--reason", "is empty", "why, in words")
 @option("--dataset", multiple=True, help="Data set of the configuration; repeatable. [all]")
 @option("--accept", metavar="FINDING", help="Finding to go on with, kept in FILE.yaml.")
 @REASON
-@answers()
+@answers(picture="Picture of one data set: .svg, .png or .pdf.")
 def check_data(
     files: tuple[str, ...],
     dataset: tuple[str, ...],
@@ -55,12 +59,15 @@ def check_data(
 
     \b
     Example:
-      kinacc check-data examples/ur10_published.yaml
+      kinacc check-data examples/ur10_published.yaml --picture checked.svg
     """
     files = files or (CONFIG,)
     if accept is not None:
         _accept(files, dataset, accept, reason or "")
     sections = _sections(files, dataset)
+    if out.picture is not None and len(sections) > 1:
+        message = "draws one data set, and there are several"
+        raise InputError(Problem("--picture", message, ", ".join(sections), "give --dataset"))
     code = DONE
     reports: list[Mapping[str, Any]] = []
     following: list[str] = []
@@ -80,6 +87,8 @@ def check_data(
             reports.append(report.as_dict())
             following += [line for item in report.stopping for line in item.commands(files[0])]
             text = environment(is_page=False).get_template("data_check.txt").render(report=report)
+            if out.picture is not None:
+                out.draw(_drawn(report))
         if not out.as_json:
             click.echo(f"{text}\n", err="problems" in reports[-1])
     if out.as_json:
@@ -119,6 +128,15 @@ def _sections(files: Sequence[str], wanted: Sequence[str]) -> dict[str, dict[str
     if not chosen:
         raise InputError(Problem(", ".join(files), "no data set is read from a file"))
     return {name: full[name] for name in chosen}
+
+
+def _drawn(report: Report) -> Figure:
+    from kinacc.figures.calibration import draw_check
+
+    suspects = {item.kind: item.lines for item in report.suspicions}
+    limit_mm = report.facts.get("quick_fit", {}).get("most_expected_mm", float("nan"))
+    joints = pd.DataFrame(report.facts["joint_coverage"])
+    return draw_check(joints, report.line, report.left_mm, limit_mm, suspects)
 
 
 @click.command("exclude")

@@ -37,7 +37,7 @@ _MOST_CANDIDATES = 100_000
 @option("--position-only", is_flag=True, help="No measured orientations.")
 @option("--frames-known", is_flag=True, help="No estimation of base and tool.")
 @option("--hayati", help='Joints with a Hayati angle, e.g. "2,3".')
-@answers(table=True)
+@answers(table=True, picture="Index against number of poses: .svg, .png, .pdf.")
 def plan_poses(robot: str, count: int, candidates: str, out: Output, **options: Any) -> None:
     """Choose a D-optimal set of poses, in an order with little travel.
 
@@ -46,7 +46,7 @@ def plan_poses(robot: str, count: int, candidates: str, out: Output, **options: 
 
     \b
     Example:
-      kinacc plan-poses ur10 --hayati 2,3 --poses 50 -o plan.csv
+      kinacc plan-poses ur10 --hayati 2,3 --poses 50 -o plan.csv --picture index.svg
     """
     arm = robots.load(robot)
     experiment = _experiment(arm, options)
@@ -64,6 +64,10 @@ def plan_poses(robot: str, count: int, candidates: str, out: Output, **options: 
             joints = planning.spread(arm, number, box, inside, experiment.tool)
             label = np.arange(1, number + 1)
         plan = planning.plan_poses(arm, joints, experiment, count, np.zeros(arm.dh.joints))
+    if out.picture is not None:
+        from kinacc.figures.campaign import draw_observability
+
+        out.draw(draw_observability(plan.index, arm.name))
     table = pd.DataFrame({
         "order": np.arange(1, count + 1),
         **rows.joint_columns(arm.dh.prismatic, joints[plan.chosen]),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
@@ -263,6 +264,7 @@ def _correct(
         point,
         options["at_most_mm"],
         options["base_is_fixed"],
+        _asked if sys.stdin.isatty() else None,
     )
     if out.picture:
         from kinacc.figures.calibration import draw_program
@@ -284,3 +286,7 @@ def _frames(texts: Sequence[str]) -> dict[str, np.ndarray]:
     """Frames by name; the name is empty where a frame is for all."""
     parts = (text.rpartition("=") for text in texts)
     return {name.strip(): np.array(numbers_of(numbers)) for name, _, numbers in parts}
+
+
+def _asked(kind: str, name: str) -> np.ndarray:
+    return np.array(numbers_of(click.prompt(f"{kind} {name} (six numbers, mm and deg)")))

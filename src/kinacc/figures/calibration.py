@@ -1,8 +1,9 @@
-"""Pictures of a calibration: joint errors, a comparison, a corrected program."""
+"""Pictures of a calibration: the checked file, joint errors, a comparison, a corrected program."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from itertools import cycle
 
 import numpy as np
 import pandas as pd
@@ -11,6 +12,67 @@ from matplotlib.figure import Figure
 
 from kinacc.deployment.compare import ROUNDING, Difference
 from kinacc.figures import style
+
+_DOTS = 20000  # more readings than this are not drawn one by one
+
+
+def draw_check(
+    joints: pd.DataFrame,
+    line: np.ndarray,
+    left_mm: np.ndarray,
+    limit_mm: float,
+    suspects: Mapping[str, Sequence[int]],
+) -> Figure:
+    """Joint coverage against limits above, residuals against the line of the file below.
+
+    ``joints`` has joint, low, high, least, most and unit per joint; ``line`` (n,) and ``left_mm``
+    (n,) of the readings, empty where nothing was fitted; ``suspects`` lines by kind.
+    """
+    with style.house():
+        figure = style.new_figure(style.DOUBLE_COLUMN_IN, 4.2)
+        above, below = figure.subplots(2, 1, height_ratios=(1, 2))
+        _joints(above, joints)
+        if left_mm.size:
+            _residuals(below, line, left_mm, limit_mm, suspects)
+        else:
+            below.text(0.5, 0.5, "the robot does not fit the file", ha="center", va="center")
+            below.set_axis_off()
+    return figure
+
+
+def _joints(axes: Axes, joints: pd.DataFrame) -> None:
+    for row in joints.itertuples():
+        low, high = np.interp([row.low, row.high], [row.least, row.most], [0.0, 1.0])
+        axes.barh(row.joint, 1.0, height=0.62, color=style.FAINT)
+        axes.barh(row.joint, high - low, left=low, height=0.62, color=style.SKY)
+        label = f"{row.low:.0f} to {row.high:.0f} {row.unit}"
+        axes.text(1.01, row.joint, label, va="center", fontsize=style.SMALL_PT)
+    axes.set_yticks(joints["joint"])
+    axes.invert_yaxis()
+    axes.set(xlim=(0.0, 1.18), ylabel="joint")
+    axes.set_xticks([0.0, 0.5, 1.0], ["lower limit", "middle", "upper limit"])
+    axes.grid(visible=False)
+
+
+def _residuals(
+    axes: Axes,
+    line: np.ndarray,
+    left_mm: np.ndarray,
+    limit_mm: float,
+    suspects: Mapping[str, Sequence[int]],
+) -> None:
+    step = max(len(line) // _DOTS, 1)
+    shown = np.maximum(left_mm, max(0.1 * float(np.quantile(left_mm, 0.01)), 1e-7))
+    axes.plot(line[::step], shown[::step], ".", ms=2.5, color=style.MUTED, label="readings")
+    for (kind, lines), (colour, marker) in zip(suspects.items(), cycle(style.SERIES), strict=False):
+        rows = np.isin(line, [*lines])
+        axes.plot(line[rows], shown[rows], marker, mfc="none", mec=colour,
+                  label=kind.replace("_", " "))  # fmt: skip
+    if np.isfinite(limit_mm):
+        axes.axhline(limit_mm, color=style.INK, lw=0.8, ls="--", label="most to be expected")
+    axes.set(yscale="log", xlabel="line of the file", ylabel="left by a quick fit (mm)")
+    axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0))
+
 
 _LINES = ((style.BLUE, "-"), (style.ORANGE, "--"), (style.GREEN, "-."))  # of x, y, z
 _DEVIATIONS = 2.0

@@ -1,4 +1,4 @@
-"""Pictures of campaigns and of plans: bounds as they grow, readings, budgets."""
+"""Pictures of campaigns and of plans: bounds as they grow, readings, budgets, chosen poses."""
 
 from __future__ import annotations
 
@@ -153,4 +153,25 @@ def draw_budgets(
         right.set(ylim=(0.0, 1.04), xlabel="Readings allowed", ylabel=share)
         title = "median, 5 to 95 % of campaigns; to the top where some state no bound"
         figure.legend(loc="outside lower center", ncols=4, title=title)
+    return figure
+
+
+def draw_observability(index: np.ndarray, robot: str) -> Figure:
+    """Draw the observability index against the number of poses.
+
+    Parameters
+    ----------
+    index
+        O1 (n,) after each added pose, the last one after all swaps, mm or mrad.
+    robot
+        Name above the figure.
+    """
+    with style.house():
+        figure = style.new_figure(style.SINGLE_COLUMN_IN, 2.6)
+        ax = figure.subplots()
+        ax.plot(np.arange(1, len(index) + 1), index, color=style.BLUE, marker="o", ms=3)
+        ax.set(
+            xlabel="Poses", ylabel="O1 (mm or mrad)", ylim=(0.0, 1.18 * float(index.max()) or 1.0)
+        )
+        style.name_dataset(figure, robot)
     return figure

@@ -69,20 +69,25 @@ def test_every_example_is_corrected_and_only_its_numbers_change(name):
         assert without_numbers(content) == without_numbers(old)
 
 
-def test_frames_that_are_missing_are_named_by_their_options(tmp_path):
+def test_frames_that_are_missing_are_asked_for(tmp_path):
     shutil.copy(EXAMPLES / "weld.ls", tmp_path / "weld.ls")
     arm = calibrated(ARMS["weld.ls"], "dh")
     with pytest.raises(InputError, match="--tool"):
         compensate_program(arm, tmp_path / "weld.ls")
     given = {"1": np.array([30.0, -20.0, 150.0, -29.0, 1.0, 41.0])}
     base = np.array([1200.0, -200.0, 300.0, 0.0, 0.0, 10.0])
-    with pytest.raises(InputError, match='--base "1='):
-        compensate_program(arm, tmp_path / "weld.ls", given)
+    asked = []
+
+    def ask(*words):
+        asked.append(words)
+        return base
+
     found = [
-        compensate_program(arm, tmp_path / "weld.ls", given, bases)
-        for bases in ({"": base}, {"1": base})
+        compensate_program(arm, tmp_path / "weld.ls", given, {"": base}),
+        compensate_program(arm, tmp_path / "weld.ls", given, ask=ask),
     ]
     assert found[0].files == found[1].files
+    assert asked == [("base", "1")]
 
 
 def test_files_without_positions_are_refused(tmp_path):

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -63,6 +63,7 @@ _SHOWN = [
 ]  # fmt: skip
 _POINT = "tool of the program"
 _TRACK = "an external axis is not at zero (--base-is-fixed: none moves the robot's base)"
+Ask = Callable[[str, str], np.ndarray]
 Options = Mapping[str, Mapping[str, np.ndarray]]
 
 
@@ -145,6 +146,7 @@ def compensate_program(
     point: str | None = None,
     at_most_mm: float = AT_MOST_MM,
     base_is_fixed: bool = False,
+    ask: Ask | None = None,
 ) -> CorrectedProgram:
     """A program corrected for a calibrated arm.
 
@@ -162,6 +164,8 @@ def compensate_program(
         A larger change of a position is refused.
     base_is_fixed
         External axes that are not at zero do not move the robot's base.
+    ask
+        Called with kind and name of a frame that is missing; gives its numbers.
 
     Raises
     ------
@@ -172,7 +176,7 @@ def compensate_program(
     _refuse_second_time(program)
     options = {TOOL: tools or {}, BASE: bases or {}}
     program = _in_use(program, options)
-    frames = _all_frames(program, program.convention or language.convention, options)
+    frames = _all_frames(program, program.convention or language.convention, options, ask)
     work = _Correction(calibration, language, replace(program, frames=frames))
     starts, reasons = work.starts(near_rad, base_is_fixed)
     rows, remarks = work.outcomes(starts, point)
@@ -326,7 +330,9 @@ def _in_use(program: Program, options: Options) -> Program:
     return replace(program, positions=used, not_corrected=lines)
 
 
-def _all_frames(program: Program, convention: Convention, options: Options) -> Frames:
+def _all_frames(
+    program: Program, convention: Convention, options: Options, ask: Ask | None
+) -> Frames:
     """The program's frames and those a person gave; InputError naming those that are missing."""
     frames, problems = dict(program.frames), []
     poses = [item for item in program.positions if item.scale is None and not item.refused]
@@ -334,6 +340,8 @@ def _all_frames(program: Program, convention: Convention, options: Options) -> F
     wanted |= {(TOOL, name) for name in options[TOOL] if not name}
     for kind, name in sorted(wanted - set(frames)):
         numbers = options[kind].get(name, options[kind].get(""))
+        if numbers is None and ask is not None:
+            numbers = ask(kind, name)
         if numbers is None:
             fix = f'give --{kind} "{name and name + "="}x,y,z,.." (mm, deg) or --frames FILE'
             message = f"{kind} {name or 'of its positions'} is not in the program"
