@@ -58,7 +58,7 @@ def _is_other(folder: Path, data: DataSets) -> bool:
 def made_with_other_settings(folder: Path, data: DataSets) -> list[str]:
     """Names of tables in a results folder whose settings are not those of its data set now.
 
-    None where the configuration does not name the data set.
+    An empty list where the configuration does not name the data set.
     """
     if folder.name not in data.settings:
         return []
