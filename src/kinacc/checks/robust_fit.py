@@ -347,11 +347,11 @@ def start(observed: Readings, model: DHModel, is_clean: bool = False) -> Arm:
         for _ in range(_REFINEMENTS):
             base, points = one_session(part.select(rows), flange.select(rows))
             distance = _distances(part, flange, base, points)
-            middle = float(np.quantile(distance, _JUDGED))
-            if middle >= least:
+            nearest = np.argsort(distance)
+            if (middle := distance[nearest[int(_JUDGED * len(nearest))]]) >= least:
                 break
             chosen, least = rows, middle
-            rows = np.argsort(distance)[: max(int(_TRUSTED * len(distance)), _DRAWN)]
+            rows = nearest[: max(int(_TRUSTED * len(nearest)), _DRAWN)]
     frames = closed_form_start(part.select(chosen), flange.select(chosen))
     if len(observed.target_names) > 1:
         _place_targets(frames, part, flange)
