@@ -34,15 +34,12 @@ class Change:
 
 
 def joint_units(robot: Robot) -> Iterator[Change]:
-    """Joints in another unit."""
+    """Turning joints in another unit."""
     slides = robot.dh.prismatic
     for unit, stated, short, factor in () if slides.all() else _ANGLE_UNITS:
         setting = {"joint_unit": short}
         change = finding("joint_units", unit=unit, stated=stated, short=short, setting=setting)
         yield _joints(change, robot, np.diag(np.where(slides, 1.0, factor)))
-    for unit, factor in (("metres", 1e3), ("millimetres", 1e-3)) if slides.any() else ():
-        change = finding("joint_units/sliding", unit=unit)
-        yield _joints(change, robot, np.diag(np.where(slides, factor, 1.0)))
 
 
 def length_units() -> Iterator[Change]:

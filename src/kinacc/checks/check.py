@@ -40,7 +40,6 @@ from kinacc.tables.contract import columns_of
 _FEWEST_POSES = 6
 _SYMPTOMS = ("outliers", "outside_limits")
 _OTHER_LENGTHS = 0.01  # of the arm's: real arms are off their description by a tenth of that
-_REACH = (0.02, 3.0)  # of the arm's length: what points that an arm reaches may spread over
 _GROSS = 20.0  # robust spreads per axis: further off is no reading of this arm
 
 
@@ -125,7 +124,6 @@ def check(
     every = readings.of_file(reading, robot)
     if (count := len(np.unique(every.pose))) < _FEWEST_POSES:
         raise InputError(Problem(section["path"], f"{count} poses", f"at least {_FEWEST_POSES}"))
-    every = replace(every, earlier=digits.unread(every))
     distances = readings.distances(every)
     by_distances, renamed = moved.by_distances(every, distances)
     single, cell, away_mm = readings.merged(every)
@@ -178,9 +176,8 @@ def _meant(
     read, findings = meanings.find(single, robot, fitted.trial, progress)
     if findings:
         fitted = robust_fit.fit(read, robot.dh)
-    spread_mm = meanings.spread_mm(read.position_mm)
-    if fitted.trial.sigma_mm > meanings.FAR * spread_mm:
-        return fitted, [*findings, _no_fit(single, fitted, robot, spread_mm, progress)]
+    if fitted.trial.sigma_mm > meanings.FAR * meanings.spread_mm(read.position_mm):
+        return fitted, [*findings, _no_fit(single, fitted, robot, progress)]
     findings += _of_other_lengths(single, fitted, robot, progress)
     if not read.has_rotation.any():
         return fitted, findings
@@ -212,20 +209,12 @@ def _shipped(single: Readings, robot: Robot, progress: Progress) -> str:
     return f". Shipped robots that fit, best first: {', '.join(names)}" if names else ""
 
 
-def _no_fit(
-    single: Readings, fitted: Fitted, robot: Robot, spread_mm: float, progress: Progress
-) -> Finding:
-    whole_mm = float(np.sum(np.abs([robot.dh.a_mm, robot.dh.d_mm])))
-    unit = (
-        f". The points spread over {spread_mm:.3g} mm, links and offsets of {robot.name} add up "
-        f"to {whole_mm:.4g} mm: check the unit of the positions too"
-    )
+def _no_fit(single: Readings, fitted: Fitted, robot: Robot, progress: Progress) -> Finding:
     return finding(
         "does_not_fit",
         single.lines(),
         robot=robot.name,
         sigma_mm=fitted.trial.sigma_mm,
-        more="" if _REACH[0] * whole_mm < spread_mm < _REACH[1] * whole_mm else unit,
         shipped=_shipped(single, robot, progress),
     )
 

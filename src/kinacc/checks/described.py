@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from kinacc.calibration.least_squares import one_thread
-from kinacc.checks import check, digits, readings, shipped
+from kinacc.checks import check, readings, shipped
 from kinacc.checks.findings import Finding, Progress, Report
 from kinacc.errors import InputError, Problem
 from kinacc.kinematics import robot as robots
@@ -18,13 +16,10 @@ from kinacc.kinematics.robot import Robot
 from kinacc.measurements.intake import guess as guesses
 from kinacc.measurements.intake.guess import Guess
 from kinacc.measurements.intake.write import dataset_content, plain_name, template_text
-from kinacc.measurements.layout import ANGLE, LENGTH
 from kinacc.measurements.reader import MeasuredFile, read
 from kinacc.progress import SILENT
 
-_CALCULATED_MM = 0.002  # closer to an arm than any instrument measures
-_FINE_MM = 0.01  # coarser steps would hide what instruments measure
-_ROUNDED_MM = 0.02  # rms; less is nothing beside what instruments measure with
+_CALCULATED_MM = 0.004  # closer to an arm than any instrument measures
 
 
 def describe_files(
@@ -165,47 +160,23 @@ def fitting(guess: Guess, progress: Progress) -> list[str]:
     return shipped.fitting(readings.merged(every)[0], progress)
 
 
-def remarks_on(guess: Guess, report: Report, reading: MeasuredFile, arm: Robot) -> Iterator[str]:
-    """Limits of readings that contradict nothing: points that were calculated, rounded joints.
+def remarks_on(report: Report) -> list[str]:
+    """Remark on readings that contradict nothing: points that were calculated.
 
     Parameters
     ----------
-    guess, reading
-        The description of a file, and its readings.
     report
         The check of the readings.
-    arm
-        The robot that was measured.
 
-    Yields
-    ------
-    str
+    Returns
+    -------
+    list of str
         A remark each, with lengths in mm.
     """
-    cells, decimal = guess.table.columns, guess.table.decimal
-    targets = guess.columns.targets.values()
-    points = [cells[target[axis].column] for target in targets for axis in "xyz"]
-    unit_mm = LENGTH[guess.section["length_unit"]]
-    step = min(digits.step(column, unit_mm, decimal) for column in points)
     fit = report.facts.get("quick_fit")
-    residual = fit["left_per_axis_mm"] if isinstance(fit, Mapping) else np.inf
-    # Rounding alone leaves 0.3 of a step.
-    if residual <= max(_CALCULATED_MM, 0.4 * min(step, _FINE_MM)):
-        yield (
-            f"the points follow the joints to {residual:.1g} mm, closer than instruments measure:"
-            " were they calculated by the controller or a simulation?"
-        )
-    if guess.section.get("pulses_per_deg") or arm.dh.prismatic.any():
-        return
-    unit_deg = np.rad2deg(ANGLE[guess.section["joint_unit"]])
-    joints = [cells[name.column] for name in guess.columns.joints]
-    step = min(digits.step(column, unit_deg, decimal) for column in joints)
-    if step > 0.0:
-        q = np.stack([reading.columns[f"q{i + 1}"] for i in range(guess.joints)], axis=1)
-        reach_mm, rms_mm = digits.cost(arm.dh, arm.dh_joints(q), step)
-        if rms_mm >= _ROUNDED_MM:
-            yield (
-                f"joints are written in steps of {step:.2g} deg: "
-                f"{reach_mm * np.deg2rad(step):.2g} mm at {reach_mm / 1000.0:.2g} m from an axis, "
-                f"{rms_mm:.2g} mm rms in all; export more digits"
-            )
+    if fit is None or fit["left_per_axis_mm"] > _CALCULATED_MM:
+        return []
+    return [
+        f"the points follow the joints to {fit['left_per_axis_mm']:.1g} mm, closer than instruments"
+        " measure: were they calculated by the controller or a simulation?"
+    ]

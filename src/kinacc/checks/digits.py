@@ -1,4 +1,4 @@
-"""What digits tell: readings not taken anew, joints on round numbers, cost of rounding."""
+"""What digits tell: readings not taken anew, joints on round numbers, the step of a column."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from dataclasses import replace
 from decimal import Decimal
 
 import numpy as np
-import pandas as pd
 import scipy
 from numpy import ndarray
 
@@ -17,8 +16,6 @@ from kinacc.checks.findings import Finding, finding
 from kinacc.checks.readings import Readings, grouped
 from kinacc.checks.robust_fit import Fitted
 from kinacc.errors import first_few
-from kinacc.kinematics import dh
-from kinacc.kinematics.dh import DHModel
 from kinacc.kinematics.robot import Robot
 
 _CHANCE = 0.01  # expected number of coincidences above which equal readings tell nothing
@@ -29,8 +26,6 @@ _WORSE = 1.5  # times the median error of the other rows
 _RANKED = 1e-3  # significance of that
 _EXACT = 1e-6  # of the grid
 _FITTED_AWAY = 0.3  # of the errors that rounding makes: what a fit of few poses leaves of them
-_MOST_POSES = 200
-_STEP = 1e-4  # of a difference quotient, rad
 
 
 def copies(every: Readings, noise_mm: float) -> Iterator[Finding]:
@@ -43,29 +38,29 @@ def copies(every: Readings, noise_mm: float) -> Iterator[Finding]:
         return
     names = every.row_names
     line, reading, q = _by_line(every)
-    rows = pd.DataFrame(np.column_stack([q, reading]))
-    again = np.flatnonzero(rows.duplicated())
+    first = _first_alike(np.column_stack([q, reading]))
+    again = np.flatnonzero(first != np.arange(len(line)))
     if again.size:
-        first = int(line[np.argmax((rows == rows.iloc[again[0]]).all(axis=1))])
-        row = names.one(first)
+        of = int(line[first[again[0]]])
         yield finding(
-            "duplicate_rows", line[again], count=again.size, row=row, first_copied_line=first
+            "duplicate_rows",
+            line[again],
+            count=again.size,
+            row=names.one(of),
+            first_copied_line=of,
         )
-    there = every.earlier > 0
-    again, place = np.unique(every.line[there], return_index=True)
-    if again.size:
-        pairs = zip(again, every.earlier[there][place], strict=True)
-        texts = [f"{names.one(int(row))} repeats {names.number(int(of))}" for row, of in pairs]
-        yield finding("repeated_reading", again, pairs=first_few(texts, 4))
+    first = _first_alike(reading)
+    others = (np.abs(q - q[first]) > 1e-6).any(axis=1)
+    if others.any():
+        pairs = zip(line[others], line[first[others]], strict=True)
+        texts = [f"{names.one(row)} repeats {names.number(of)}" for row, of in pairs]
+        yield finding("repeated_reading", line[others], pairs=first_few(texts, 4))
 
 
-def unread(every: Readings) -> ndarray:
-    """Line (n,) of an earlier row of other joints whose readings are equal in every digit, or 0."""
-    line, reading, q = _by_line(every)
-    number = grouped(reading)
-    first = np.unique(number, return_index=True)[1][number]
-    is_other = (np.abs(q - q[first]) > 1e-6).any(axis=1)
-    return np.where(is_other, line[first], 0)[np.searchsorted(line, every.line)]
+def _first_alike(values: ndarray) -> ndarray:
+    """Index (n,) of the first row of ``values`` (n, k) that is equal to each."""
+    number = grouped(values)
+    return np.unique(number, return_index=True)[1][number]
 
 
 def _by_line(every: Readings) -> tuple[ndarray, ndarray, ndarray]:
@@ -120,9 +115,6 @@ def commanded(fitted: Fitted, robot: Robot) -> Iterator[Finding]:
             better="the commanded" if nearer else "those read back",
             largest_mm=float(apart[rows].max()),
         )
-    sigma = robust_fit.sigma_of(sent[both])
-    if sigma < 0.7 * robust_fit.sigma_of(read[both]):
-        yield finding("commanded_joints/exchanged", observed.lines(both), sigma=f"{sigma:.3g}")
 
 
 def _round(fitted: Fitted, q_deg: ndarray) -> Iterator[Finding]:
@@ -185,28 +177,3 @@ def step(cells: Iterable[object], unit: float, decimal: str) -> float:
     except (ArithmeticError, ValueError):
         return 0.0
     return unit * (math.gcd(*(number - whole[0] for number in whole)) or 1) * 10.0**last
-
-
-def cost(model: DHModel, q: ndarray, step: float) -> tuple[float, float]:
-    """What joints written in steps cost.
-
-    Parameters
-    ----------
-    model
-        DH model of the arm.
-    q
-        Joints (n, k), rad or mm.
-    step
-        Step of the turning joints, deg; a rounded number is off by half of it at most.
-
-    Returns
-    -------
-    reach_mm, rms_mm
-        The largest distance of the flange from a joint's axis, and what rounding all joints adds
-        to its position.
-    """
-    moves = dh.joint_jacobian(model, q[:: max(len(q) // _MOST_POSES, 1)])[:, :3, ~model.prismatic]
-    lever = np.linalg.norm(moves, axis=1)  # (n, joints) distances of the flange from every axis
-    # Rounding is uniform over a step: its standard deviation is a step over the root of 12.
-    rms = np.deg2rad(step) / np.sqrt(12.0) * np.sqrt(np.mean(np.sum(lever**2, axis=1)))
-    return float(lever.max()), float(rms)

@@ -35,8 +35,6 @@ class Readings(Observations):
         ``q_rad`` are the DH joints they mean.
     turns
         Orientations as written, shape (n, 3 or 4), rad.
-    earlier
-        Line (n,) of an earlier row of other joints with equal readings, 0 where there is none.
     line
         Line of the file (n,), the first where repeats were merged; ``drawn`` (n,) all of them.
     row_names
@@ -46,7 +44,6 @@ class Readings(Observations):
     q: ndarray
     commanded: ndarray
     turns: ndarray
-    earlier: ndarray
     line: ndarray
     drawn: ndarray
     row_names: RowNames = field(default_factory=RowNames)
@@ -65,7 +62,6 @@ def of_file(reading: MeasuredFile, robot: Robot) -> Readings:
         q=q,
         commanded=np.full_like(q, np.nan) if reading.commanded is None else reading.commanded,
         turns=np.asarray(reading.turns),
-        earlier=np.zeros(len(line), dtype=np.int64),
         line=line,
         drawn=texts(np.split(line, np.arange(1, len(line)))),
         row_names=reading.row_names,

@@ -14,7 +14,6 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 from numpy import ndarray
-from scipy.spatial.distance import pdist
 from scipy.special import chdtrc, gammaincinv
 
 AXES = ["x_mm", "y_mm", "z_mm"]
@@ -212,13 +211,6 @@ def pooled_rp(sides: pd.DataFrame) -> tuple[float, float]:
     std = (known["rp_mm"] - known["mean_distance_mm"]) / 3.0
     pooled = math.sqrt(np.average(std**2, weights=known["visits"] - 1))
     return float(mean), float(mean + 3.0 * pooled)
-
-
-def between_sides_mm(read: pd.DataFrame) -> float:
-    """ISO 9283's vAP: largest distance of a pose's middle from one side to that from another."""
-    visits = read.groupby(VISIT, sort=False)[AXES].mean()
-    poses = visits.groupby(SIDE, sort=False).mean().groupby(POSE, sort=False)
-    return float(max((pdist(s).max() for _, s in poses if len(s) > 1), default=math.nan))
 
 
 def far_off(read: pd.DataFrame) -> ndarray:

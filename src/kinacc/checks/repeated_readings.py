@@ -64,9 +64,9 @@ class Repeatability:
         deviations (3,) and their 95 % limits.
     instrument_std_mm, one_side_std_mm, all_sides_std_mm
         Standard deviations (3,) of the instrument, and of the arm from one and from all sides.
-    mean_distance_mm, rp_mm, between_sides_mm
-        By the formulas of ISO 9283: mean distance from the mean position, RP, and vAP, pooled over
-        the poses. RP is that of the standard from 30 visits of a pose on.
+    mean_distance_mm, rp_mm
+        By the formulas of ISO 9283: mean distance from the mean position, and RP, pooled over the
+        poses. RP is that of the standard from 30 visits of a pose on.
     poses_equal_probability, poses_differ
         Probability that poses differ as much by chance, and which scatters most, or None.
     resolution_mm
@@ -95,7 +95,6 @@ class Repeatability:
     all_sides_std_mm: np.ndarray
     mean_distance_mm: float
     rp_mm: float
-    between_sides_mm: float
     poses_equal_probability: float
     poses_differ: str | None
     resolution_mm: np.ndarray
@@ -222,7 +221,6 @@ def estimate(file: RepeatedFile) -> Repeatability:
         all_sides_std_mm=np.sqrt(np.diag(parts.visits + parts.sides)),
         mean_distance_mm=mean_mm,
         rp_mm=rp_mm,
-        between_sides_mm=checks.between_sides_mm(rows),
         poses_equal_probability=by_pose,
         poses_differ=differ,
         resolution_mm=file.resolution_mm,

@@ -30,20 +30,15 @@ def explained(fitted: Fitted, robot: Robot, stated: Orientation) -> Iterator[Fin
             largest_mm = float(fitted.left_mm[rows].max())
             yield item.of_lines(lines(rows), " in these rows", largest_error_mm=largest_mm)
             open_rows = np.setdiff1d(open_rows, rows)
-    is_stale = fitted.readings.earlier[open_rows] > 0
-    if is_stale.any():
-        stale = open_rows[is_stale]
-        yield finding("repeated_reading/off", lines(stale), count=stale.size)
-    rows = open_rows[~is_stale]
-    if rows.size:
-        worst, angle = rows[np.argmax(fitted.left_mm[rows])], fitted.left_rad[rows].max()
+    if open_rows.size:
+        left_mm, angle = fitted.left_mm[open_rows], fitted.left_rad[open_rows].max()
         yield finding(
             "outliers",
-            lines(rows),
-            count=rows.size,
+            lines(open_rows),
+            count=open_rows.size,
             turned=f" and {1e3 * angle:.3g} mrad" if angle > fitted.limit_rad else "",
-            row=observed.row_names.one(fitted.readings.line[worst]),
-            largest_mm=float(fitted.left_mm[worst]),
+            row=observed.row_names.one(fitted.readings.line[open_rows[np.argmax(left_mm)]]),
+            largest_mm=float(left_mm.max()),
             limit_mm=fitted.limit_mm,
         )
 
