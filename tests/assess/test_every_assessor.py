@@ -172,6 +172,8 @@ def test_a_share_of_the_region_needs_the_points_that_it_names():
 def test_a_tolerance_is_held_to_both_bounds(said, tolerance, verdict, reason):
     found = decide(said, tolerance)
     assert (found.verdict, found.reason.code) == (verdict, reason)
+    above_mm = said.upper_mm - said.value_mm
+    assert found.guard_band_mm == pytest.approx(above_mm, nan_ok=True)
     for wrong in (0.0, math.nan, math.inf):
         with pytest.raises(InputError, match="tolerance"):
             decide(said, wrong)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from kinacc.calibration import summary
+from kinacc.kinematics import robot
 
 
 def pose_errors(*rows):
@@ -59,3 +60,14 @@ def test_the_standard_error_is_that_of_the_means_of_configurations():
     assert found.rms == pytest.approx(np.sqrt(np.mean(sizes**2)), rel=1e-12)
     (alone,) = summary.error_statistics(pose_errors(*rows), np.zeros(6, dtype=int)).itertuples()
     assert np.isnan(alone.std_error)
+
+
+@pytest.mark.parametrize("tilt_deg", [0.0, 4.0, 6.0])
+def test_a_flange_that_keeps_its_axis_is_told_with_how_far_it_turns(tilt_deg):
+    """Joint 5 of an arm with parallel axes 2, 3 and 4 tilts the flange; joint 6 turns it."""
+    arm = robot.load("ur10")
+    tilts = np.deg2rad([-tilt_deg, tilt_deg, 0.0, 0.0])
+    q_rad = np.array([[0.3, -1.0, 1.2, -1.8, 0.7 + tilt, n] for n, tilt in enumerate(tilts)])
+    columns = {f"q{n}": column for n, column in enumerate(q_rad.T, 1)}
+    found = summary.flange_spread_deg(columns, arm)
+    assert found is None if tilt_deg > 5.0 else found == pytest.approx(tilt_deg, abs=1e-6)

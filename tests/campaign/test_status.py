@@ -77,6 +77,7 @@ def test_few_readings_state_no_bound_and_no_limit(measured):
 def test_the_verdict_is_the_headline(measured, tolerance_mm, verdict):
     found, _ = measured(tolerance_mm=tolerance_mm)
     bound = found.bound
+    assert (found.readings_used, found.points_measured, bound.unmeasured) == (120, 40, 0)
     if verdict == "undecided":
         assert bound.lower_mm < tolerance_mm < bound.upper_mm
     assert bound.verdict == verdict
