@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Make the golden results anew: python tools/renew_golden.py [CASE ..]
 
-CASE is a data set, faults, foreign, exports or campaign; all without one. Prints what differs from
+CASE is a data set, faults, exports or campaign; all without one. Prints what differs from
 before.
 """
 
@@ -62,15 +62,6 @@ def renew_faults() -> None:
     _write(cases.GOLDEN / "faults" / "findings.json", found)
 
 
-def renew_foreign() -> None:
-    """What init makes of foreign files, those of tests/measurements/foreign."""
-    found = {}
-    for name in json.loads((cases.GOLDEN / "understanding.json").read_text()):
-        with tempfile.TemporaryDirectory() as folder:
-            found[name] = cases.understanding(name, Path(folder))
-    _write(cases.GOLDEN / "understanding.json", found)
-
-
 def renew_exports() -> None:
     """Exports of the UR10: the DH model in all formats, the VEC model as JSON."""
     folder = cases.GOLDEN / "exports"
@@ -99,11 +90,10 @@ def _plain(value: object) -> object:
 
 
 if __name__ == "__main__":
-    wanted = sys.argv[1:] or [*cases.DATA_SETS, "faults", "foreign", "exports", "campaign"]
+    wanted = sys.argv[1:] or [*cases.DATA_SETS, "faults", "exports", "campaign"]
     renew_inputs()
     others = {
         "faults": renew_faults,
-        "foreign": renew_foreign,
         "exports": renew_exports,
         "campaign": renew_campaign,
     }

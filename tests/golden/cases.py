@@ -1,4 +1,4 @@
-"""What the golden results are made of: data sets, faults, foreign files, exports, a campaign.
+"""What the golden results are made of: data sets, faults, exports, a campaign.
 
 Shared by the tests beside it and by ``tools/renew_golden.py``, which makes the files.
 """
@@ -19,7 +19,6 @@ sys.path[:0] = [str(TESTS), *(str(TESTS / name) for name in ("checks", "cli", "c
 import plants  # noqa: E402
 from command_line import call  # noqa: E402
 from good_files import File, simulated  # noqa: E402
-from measurements.scoring import fault, measured, understood  # noqa: E402
 
 from kinacc.calibration import stages  # noqa: E402
 from kinacc.campaign import folder as campaigns  # noqa: E402
@@ -152,12 +151,6 @@ def findings(folder: Path, name: str) -> list[dict]:
 def _is_number(value: object) -> bool:
     values = value if isinstance(value, list) else [value]
     return bool(values) and all(isinstance(each, float) for each in values)
-
-
-def understanding(name: str, folder: Path) -> dict:
-    """What ``init`` makes of a foreign file: the data set it describes, or why it does not."""
-    fault(measured(name), folder)
-    return understood(folder)
 
 
 def campaign_course() -> dict:

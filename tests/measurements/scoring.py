@@ -14,7 +14,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
-import yaml
 from command_line import call
 from scipy.spatial.transform import Rotation
 from stages_by_hand import run_stages
@@ -133,29 +132,6 @@ def difference(measured: SimpleNamespace, results: Path) -> str:
         "reach of the robot as described": _reach_mm(found, joints, results) < REACHED_MM,
     }
     return ", ".join(name for name, right in checks.items() if not right)
-
-
-def understood(folder: Path) -> dict:
-    """What init made of a file whose ``fault`` was looked for in a folder, and its first rows."""
-    if not (folder / "n.yaml").is_file():
-        return {"exit_code": 2}
-    described = yaml.safe_load((folder / "n.yaml").read_text())["datasets"]["n"]
-    table = pd.read_parquet(folder / "r" / "n" / "measurements.parquet")
-    numbers = table.filter(regex="^[qxyz]").select_dtypes("float").head(3).round(9)
-    file = {k: v for k, v in described["measurements"]["file"].items() if "path" not in k}
-    first = numbers.dropna(axis=1).to_dict("list")
-    return {"exit_code": 0, "rows": len(table), "first": first, "file": file}
-
-
-def same(found: object, golden: object) -> bool:
-    """Whether two values agree: numbers to 1e-6, all else exactly."""
-    if isinstance(golden, dict):
-        return found.keys() == golden.keys() and all(same(found[k], golden[k]) for k in golden)
-    if isinstance(golden, list):
-        return len(found) == len(golden) and all(map(same, found, golden))
-    if isinstance(golden, float):
-        return np.isclose(found, golden, rtol=1e-6, atol=1e-6, equal_nan=True)
-    return found == golden
 
 
 def _same_groups(true: pd.Series, found: pd.Series) -> bool:

@@ -1,9 +1,9 @@
-"""Standstills in a record of joints, and the offset between two clocks, against made-up truth."""
+"""Standstills in a record of joints, against made-up truth."""
 
 import numpy as np
 import pytest
 
-from kinacc.measurements.times import offsets, standstills
+from kinacc.measurements.times import standstills
 
 BEGIN_S, STEP_S, MOVES_S = 5000.0, 0.01, 0.5
 
@@ -26,12 +26,3 @@ def test_short_stops_of_a_record_that_runs_on_are_no_standstills():
     stands, within_s = standstills(time_s, q_rad)
     np.testing.assert_allclose(stands, stops[[0, 2, 4]])
     assert within_s == pytest.approx(0.05)
-
-
-def test_the_offset_between_two_clocks_is_found():
-    rng = np.random.default_rng(4)
-    time_s, q_rad, _ = record(rng.uniform(0.5, 3.0, 40))
-    stands, within_s = standstills(time_s, q_rad)
-    points_s = stands.mean(axis=1) - 1234.5 + rng.uniform(-0.1, 0.1, 40)
-    offset, *_ = offsets(points_s, stands, within_s)
-    assert offset == pytest.approx(1234.5, abs=0.25)

@@ -73,15 +73,6 @@ def test_half_a_point_is_no_reading_of_its_target(tmp_path, joints):
     assert 4 in read_of["mB"]
 
 
-def test_only_the_targets_asked_for(tmp_path, joints):
-    table = joints | points("mA_") | points("goal_")
-    found = reading(tmp_path, table, targets=["mA"])
-    assert set(found.columns["target"]) == {"mA"}
-    assert found.unused == ("goal_x_mm", "goal_y_mm", "goal_z_mm")
-    text = refused(tmp_path, table, targets=["mB"])
-    assert "column mB_x_mm or mB_x_m: is missing" in text
-
-
 @pytest.mark.parametrize(
     ("convention", "axes"), [("ZYX", "zyx"), ("zxy", "zxy"), ("YXZ", "yxz"), ("xzx", "xyz")]
 )
