@@ -10,9 +10,7 @@ from pathlib import Path
 import pytest
 
 
-def once(
-    factory: pytest.TempPathFactory, name: str, make: Callable[[Path], object], wait_s: int = 600
-) -> Path:
+def once(factory: pytest.TempPathFactory, name: str, make: Callable[[Path], object]) -> Path:
     """A folder that ``make`` has filled; others wait for it, and nobody changes it afterwards."""
     base = factory.getbasetemp()
     base = base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
@@ -20,7 +18,7 @@ def once(
     try:
         folder.mkdir()
     except FileExistsError:
-        for _ in range(2 * wait_s):
+        for _ in range(1200):
             if over.exists():
                 break
             time.sleep(0.5)

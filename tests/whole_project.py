@@ -52,27 +52,18 @@ class Project:
         shutil.copytree(self.folder, folder, symlinks=True)
         return Project(folder)
 
-    def snakemake(
-        self,
-        *targets: str,
-        options: tuple[str, ...] = (),
-        ok: bool = True,
-        cores: int = 2,
-        configs: tuple[str, ...] = CONFIGS,
-        **env: str,
-    ) -> str:
+    def snakemake(self, *targets: str, options: tuple[str, ...] = (), ok: bool = True) -> str:
         """What ``snakemake`` prints; fails the test unless it ends as expected."""
-        command = [python(), "-m", "snakemake", "--cores", str(cores), "--nocolor", *options]
-        return self.run([*command, "--configfile", *configs, "--", *targets], ok, **env)
+        command = [python(), "-m", "snakemake", "--cores", "2", "--nocolor", *options]
+        return self.run([*command, "--configfile", *CONFIGS, "--", *targets], ok)
 
-    def kinacc(self, *words: str, ok: bool = True, configs: tuple[str, ...] = CONFIGS) -> str:
-        """What ``kinacc`` prints when given the same configuration."""
-        options = [word for name in configs for word in ("--config", name)]
-        return self.run([python(), "-m", "kinacc", *words, *options], ok)
+    def kinacc(self, *words: str) -> str:
+        """What ``kinacc`` prints."""
+        return self.run([python(), "-m", "kinacc", *words])
 
-    def run(self, command: list[str], ok: bool = True, **environment: str) -> str:
+    def run(self, command: list[str], ok: bool = True) -> str:
         """Output and errors of a command started in the project's folder."""
-        settings = os.environ | {"PYTHONPATH": str(self.folder / "src")} | environment
+        settings = os.environ | {"PYTHONPATH": str(self.folder / "src")}
         done = subprocess.run(
             command, cwd=self.folder, env=settings, capture_output=True, text=True, check=False
         )
@@ -118,15 +109,15 @@ def copy(target: Path) -> None:
         copied(ROOT / name, target / name)
 
 
-def write_poses(path: Path, poses: int = 60) -> None:
+def write_poses(path: Path) -> None:
     """A file of measured poses: the nominal arm in joint space, shifted by a known small error."""
     arm = robot.load("mh180")
     generator = np.random.default_rng(3)
-    share = generator.uniform(0.2, 0.8, (poses, 6))
+    share = generator.uniform(0.2, 0.8, (60, 6))
     q_rad = arm.q_min_rad + share * (arm.q_max_rad - arm.q_min_rad)
     flange = dh.forward(arm.dh, arm.dh_joints(q_rad))
-    position = flange.position_mm + generator.normal(0.0, 0.2, (poses, 3))
-    turn = geometry.exp_so3(generator.normal(0.0, 2e-4, (poses, 3)))
+    position = flange.position_mm + generator.normal(0.0, 0.2, (60, 3))
+    turn = geometry.exp_so3(generator.normal(0.0, 2e-4, (60, 3)))
     quaternion = geometry.quaternion_from_rotation(turn @ flange.rotation)
     names = [*(f"q{i}_deg" for i in range(1, 7)), "x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz"]
     table = pd.DataFrame(np.hstack([np.rad2deg(q_rad), position, quaternion]), columns=names)

@@ -19,13 +19,13 @@ from kinacc.assess.reference_poses import (
 SLANTED = np.array([[4.0, 1.0, 0.5], [1.0, 2.0, 0.3], [0.5, 0.3, 1.0]]) * 1e-2
 
 
-def read(plan, rng, change_mm=lambda time: 0.0, covariance=None, errors=5.0):
+def read(plan, rng, change_mm=lambda time: 0.0, covariance=None):
     """Readings of the planned places: errors of poses, a change along a random direction, noise."""
     place = np.array(sorted(plan.row_at))
     row = np.array([plan.row_at[each] for each in place])
     covariance = np.eye(3) if covariance is None else covariance
     (way,) = away(rng, np.ones(1))
-    vectors = (rng.normal(size=(plan.poses, 3)) * errors)[row]
+    vectors = (rng.normal(size=(plan.poses, 3)) * 5.0)[row]
     vectors = (
         vectors + np.array([change_mm(time) for time in place / plan.measurements])[..., None] * way
     )

@@ -26,7 +26,7 @@ def settings():
     return made
 
 
-def positions(name, offset_deg=(0.2, 0.45), count=300):
+def positions(name, offset_deg=(0.2, 0.45)):
     """Positions of an arm whose joints are off by ``offset_deg`` either way."""
     arm, rng = robot.load(name), np.random.default_rng(1)
     free = free_parameters(6, parallel_joints(arm.dh), True)
@@ -34,7 +34,7 @@ def positions(name, offset_deg=(0.2, 0.45), count=300):
     turned = np.zeros((6, 5))
     turned[:, 0] = np.deg2rad(rng.uniform(*offset_deg, 6)) * rng.choice([-1.0, 1.0], 6)
     true = true.with_parameters(true.start + turned.ravel())
-    return arm, simulated.measure(true, simulated.joints(arm, count, rng), simulated.POINT, rng)
+    return arm, simulated.measure(true, simulated.joints(arm, 300, rng), simulated.POINT, rng)
 
 
 def mean_errors(arm, train, test, *kinds):

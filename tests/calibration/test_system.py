@@ -17,15 +17,15 @@ from kinacc.kinematics import robot, vec
 ARM, WEIGHT = robot.load("mh180"), 350.0
 
 
-def system_of(name, kind, sessions=2, estimated=True, count=12):
+def system_of(name, kind, estimated=True, count=12):
     """A system with a third of the orientations missing, and a point far from the optimum."""
     rng = np.random.default_rng(3)
-    seen = simulated.measure(ARM.dh, simulated.joints(ARM, count, rng), kind, rng, 0.05, sessions)
+    seen = simulated.measure(ARM.dh, simulated.joints(ARM, count, rng), kind, rng, 0.05, sessions=2)
     rotation = seen.rotation.copy()
     rotation[::3] = np.nan
     seen = replace(seen, rotation=rotation, s=rng.choice([-1, 0, 1], seen.s.shape).astype(np.int8))
     anchor = Frames(
-        simulated.anywhere(rng, 900.0, sessions),
+        simulated.anywhere(rng, 900.0, 2),
         simulated.anywhere(rng, 90.0, len(seen.target_names)),
     )
     parameters = frame_terms(seen, anchor)

@@ -9,8 +9,8 @@ from campaign_on_disk import entry_of, readings_of
 from kinacc.campaign.state import Reading, restore, scatter, size_scatter
 
 
-def campaign(plan, errors_mm, spread_mm, repeats=3, seed=0):
-    """A campaign whose points with these errors were read so often, with this noise."""
+def campaign(plan, errors_mm, spread_mm, seed=0):
+    """A campaign whose points with these errors were read three times, with this noise."""
     rng, name = np.random.default_rng(seed), plan.instruments[0].name
     points = [*dict.fromkeys([*plan.route.tolist(), *plan.order.tolist()])][: len(errors_mm)]
     readings = [
@@ -18,7 +18,7 @@ def campaign(plan, errors_mm, spread_mm, repeats=3, seed=0):
             point, plan.points.modelled_mm[point] + error + spread_mm * rng.normal(size=3), name
         )
         for point, error in zip(points, errors_mm, strict=True)
-        for _ in range(repeats)
+        for _ in range(3)
     ]
     return restore(plan, [entry_of(readings)])
 

@@ -27,11 +27,11 @@ class Tracked:
     controller: np.ndarray
 
 
-def tracked(name="ur10", poses=16, seed=4, digits=4):
+def tracked(name="ur10", poses=16, seed=4):
     """A run of ``poses`` on the shipped robot ``name``, whose links are off by up to 0.5 mm."""
     arm, rng = robot.load(name), np.random.default_rng(seed)
     low, high = np.maximum(arm.q_min_rad, -1.8), np.minimum(arm.q_max_rad, 1.8)
-    q = np.round(np.rad2deg(rng.uniform(0.9 * low, 0.9 * high, (poses, arm.dh.joints))), digits)
+    q = np.round(np.rad2deg(rng.uniform(0.9 * low, 0.9 * high, (poses, arm.dh.joints))), 4)
     off = replace(arm.dh, a_mm=arm.dh.a_mm + rng.uniform(-0.5, 0.5, arm.dh.a_mm.shape))
     nominal = robot.forward(arm, np.deg2rad(q))
     pose = robot.forward(replace(arm, dh=off), np.deg2rad(q))
@@ -64,10 +64,10 @@ def written(folder, **texts):
     return paths
 
 
-def described(paths, *options, robot="ur10"):
+def described(paths, *options):
     """What a run would read from the data set that init writes, and init's answer."""
     cell = paths[0].parent / "cell"
-    words = ("--robot", robot, "--out", cell, "--name", "m", "--force", *options)
+    words = ("--robot", "ur10", "--out", cell, "--name", "m", "--force", *options)
     told = answer("init", *paths, *words)
     return load((cell / "m.yaml",))["m"]["measurements"]["file"], told
 
@@ -78,19 +78,19 @@ def looked(paths, **answers):
     return guess.section, guess.notes
 
 
-def refused(paths, *options, robot="ur10"):
+def refused(paths, *options):
     """What init says where it does not go on."""
     cell = paths[0].parent / "cell"
-    done = call("init", *paths, "--robot", robot, "--out", cell, *options, code=2)
+    done = call("init", *paths, "--robot", "ur10", "--out", cell, *options, code=2)
     assert not cell.exists()
     return done.output
 
 
-def assert_read(section, arm, rows=None, target="tool"):
+def assert_read(section, arm, rows=None):
     """The run reads joints and points of these rows of the arm, in order; returns its columns."""
     rows = np.arange(len(arm.q)) if rows is None else np.asarray(rows)
     columns = read(section, robot.load(arm.name), strict=False).columns
-    columns = {name: values[columns["target"] == target] for name, values in columns.items()}
+    columns = {name: values[columns["target"] == "tool"] for name, values in columns.items()}
     q = np.rad2deg(np.stack([columns[f"q{i}"] for i in range(1, arm.q.shape[1] + 1)], axis=1))
     point = np.stack([columns[f"{axis}_mm"] for axis in "xyz"], axis=1)
     np.testing.assert_allclose(q, arm.q[rows], atol=1e-4)

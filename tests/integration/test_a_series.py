@@ -31,7 +31,7 @@ LINES = {
 MARCH, MAY, JUNE = "tracker-2026-03-01", "tracker-2026-05-04", "tracker-2026-06-02"
 
 
-def configured(folder: Path, names: Iterable[str], more: str = "") -> Path:
+def configured(folder: Path, names: Iterable[str]) -> Path:
     """A configuration with the lines of some files, in this order."""
     lines = "\n".join(f"      - {LINES[name]}" for name in names)
     path = folder / "tracker.yaml"
@@ -50,7 +50,6 @@ datasets:
     evaluation: {{space: measured}}
     series:
 {lines}
-{more}
 figures: {{formats: [svg]}}
 """)
     return path

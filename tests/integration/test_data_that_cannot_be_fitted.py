@@ -38,7 +38,7 @@ def test_a_slip_of_80_mm_in_one_row(project):
     (project.folder / "results/own/SHA256SUMS").unlink()  # of the study, which stays as it was
     project.snakemake(SUMMARY, "results/own/excluded_rows.parquet")
     assert project.digests()["own/vec_model.parquet"] != slipped
-    text = project.kinacc("summary", "results/own", "--json", configs=())
+    text = project.kinacc("summary", "results/own", "--json")
     answer = json.JSONDecoder().raw_decode(text)[0]["own"]  # warnings may follow
     (excluded,) = answer["excluded"]
     assert (excluded["line"], excluded["reason"]) == (22, reason)

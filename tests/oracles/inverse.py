@@ -34,16 +34,14 @@ def newton(
     step: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]],
     target: np.ndarray,
     start: np.ndarray,
-    iterations: int = 60,
-    tolerance_mm: float = 1e-9,
 ) -> np.ndarray | None:
     """Levenberg-Marquardt to a pose; None where it does not get there."""
     weight = np.array([1, 1, 1, LEVER_MM, LEVER_MM, LEVER_MM])
     q, damping = start.astype(float), 1e-3
     here, slope = step(q)
     error = pose_error(target, here) * weight
-    for _ in range(iterations):
-        if np.abs(error).max() < tolerance_mm:
+    for _ in range(60):
+        if np.abs(error).max() < 1e-9:
             return q
         scaled = slope * weight[:, None]
         normal = scaled.T @ scaled
@@ -66,8 +64,8 @@ def wrapped(angles: np.ndarray) -> np.ndarray:
     return -((-np.asarray(angles) + math.pi) % (2 * math.pi) - math.pi)
 
 
-def same_turn(first: np.ndarray, second: np.ndarray, tolerance: float = 1e-5) -> bool:
-    return bool(np.abs(wrapped(np.asarray(first) - second)).max() < tolerance)
+def same_turn(first: np.ndarray, second: np.ndarray) -> bool:
+    return bool(np.abs(wrapped(np.asarray(first) - second)).max() < 1e-5)
 
 
 def all_solutions(

@@ -12,9 +12,9 @@ from research.conditions import CONDITIONS, Course
 SIGMA = 0.2
 
 
-def readings(condition, poses=40, visits=50, key=1):
+def readings(condition, poses=40, visits=50):
     """Deviations (visits, poses, 3) in units of the noise stated, read pose after pose in turn."""
-    world = drawn_world(np.ones((poses, 3)), SIGMA, key_of(key), visits)
+    world = drawn_world(np.ones((poses, 3)), SIGMA, key_of(1), visits)
     course = Course(CONDITIONS[condition], world, poses * visits)
     read = [[course.reading_mm(row, visit) for row in range(poses)] for visit in range(visits)]
     return (np.array(read) - 1.0) / course.stated_mm()[:, None]

@@ -16,9 +16,9 @@ def one_cell(rows: pd.DataFrame) -> pd.Series:
     return table.iloc[0]
 
 
-def verdict_of(rows: pd.DataFrame, times: int = 200) -> pd.Series:
+def verdict_of(rows: pd.DataFrame) -> pd.Series:
     """The verdict on campaigns that came out so again and again."""
-    (found,) = verdicts.judged(verdicts.cells(pd.concat([rows] * times))).to_dict("records")
+    (found,) = verdicts.judged(verdicts.cells(pd.concat([rows] * 200))).to_dict("records")
     return found
 
 

@@ -26,8 +26,8 @@ def simulated(error, noise_mm, repetitions, section, seed):
     return monte_carlo.simulate(error, noise_mm, repetitions, visits, seed, made)
 
 
-def small_errors(points: int = 9) -> np.ndarray:
-    return np.random.default_rng(31).normal(size=(points, 3)) * 0.02
+def small_errors() -> np.ndarray:
+    return np.random.default_rng(31).normal(size=(9, 3)) * 0.02
 
 
 def text(table, name, i):

@@ -94,11 +94,11 @@ class Arm:
         return "\n".join(lines) + "\n"
 
 
-def errors(seed: int, zeros: float = 1.0, lengths: float = 1.0) -> np.ndarray:
+def errors(seed: int) -> np.ndarray:
     """Errors of about 4 mrad in joint zeros, 0.8 mm in lengths and 0.8 mrad in axes."""
-    size = np.array([4e-3 * zeros, 0.8 * lengths, 0.8 * lengths, 8e-4 * lengths, 0.0])
+    size = np.array([4e-3, 0.8, 0.8, 8e-4, 0.0])
     found = np.random.default_rng(seed).choice([-1.0, 1.0], (6, 5)) * size
-    found[1:3, 4] = [5e-4 * lengths, -8e-4 * lengths]
+    found[1:3, 4] = [5e-4, -8e-4]
     return found
 
 
