@@ -1,4 +1,4 @@
-"""Rotations and frames against half angles, singular values and 4x4 algebra, hard angles too."""
+"""Rotations and frames against half angles, polar factors and 4x4 algebra, hard angles too."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def test_an_orientation_that_was_not_measured_stays_unknown():
 def test_projection_is_the_nearest_rotation():
     turned = geometry.exp_so3(AXES * RNG.uniform(0, math.pi, (100, 1)))
     matrix = turned + 0.05 * RNG.normal(size=(100, 3, 3))
-    wanted = [oracle.nearest_rotation(each) for each in matrix]
+    wanted = oracle.nearest_rotation(matrix)
     np.testing.assert_allclose(geometry.project_so3(matrix), wanted, rtol=0, atol=1e-13)
 
 

@@ -45,7 +45,7 @@ def test_dh_fit_is_the_smallest_displacement_that_minimises_the_residual(hayati,
     nominal, rng = np.array(oracle.MH180), np.random.default_rng(1)
     truth = nominal + rng.normal(size=(6, 5)) * [1e-3, 0.8, 0.8, 1e-3, 0]
     q, free = joints(22, 2), free_parameters(6, hayati)
-    mask, poses = free.ravel(), fits.dh_poses(truth, q)
+    mask, poses = free.ravel(), oracle.dh_forward(truth, q)
     if not placed:
         poses = matrix(anywhere(rng, 900.0)) @ poses @ matrix(anywhere(rng, 90.0))
     seen, poses = measured(poses, rng, 0.05, 1e-4)
@@ -64,11 +64,11 @@ def test_dh_fit_is_the_smallest_displacement_that_minimises_the_residual(hayati,
         """Residual at free parameters, and small motions of base and tool, in mm and mrad."""
         table = found + 0j
         table[mask] = x[:count] * unit
-        at = fits.dh_poses(table.reshape(6, 5), q)
+        at = oracle.dh_forward(table.reshape(6, 5), q)
         if placed:
             return fits.residual(at, seen, WEIGHT)
         moved = x[count:].reshape(2, 6) * np.repeat([1.0, 1e-3], 3)
-        own_base, own_tool = base @ fits.motion(moved[0]), tool @ fits.motion(moved[1])
+        own_base, own_tool = base @ oracle.motion(moved[0]), tool @ oracle.motion(moved[1])
         return fits.residual(at @ own_tool, np.linalg.inv(own_base) @ seen, WEIGHT)
 
     x = np.append(found[mask] / unit, np.zeros(0 if placed else 12))
@@ -107,7 +107,7 @@ def test_vec_fit_is_where_the_gradient_with_its_prior_vanishes():
     def poses_at(x):
         """Poses at coefficients and offsets in mm and mrad."""
         series, offsets = (x * unit)[:-8].reshape(shape), (x * unit)[-8:].reshape(4, 2)
-        return fits.vec_poses(arm, series, low, high, offsets, q, s)
+        return oracle.projected(oracle.vec_forward(arm, series, low, high, offsets, q, s))
 
     seen, poses = measured(poses_at(true), rng, 0.03, 5e-5)
     fit = vec_fit.fit(

@@ -18,6 +18,8 @@ import yaml
 from command_line import call
 from oracles import compliant_arm
 from oracles.compliant_arm import Arm, Body
+from oracles.kinematics import frame
+from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 from stages_by_hand import perform
 
@@ -26,8 +28,8 @@ from kinacc import read_table
 POSES = 60
 NOISE_MM = 0.03
 WEIGHT = 500.0  # mm per rad, the default of calibration.rotation_weight_mm_per_rad
-BASE = compliant_arm.placed((0.02, -0.03, 0.7), (2600.0, -400.0, 350.0))
-TOOL = compliant_arm.placed((0.3, -0.2, 0.5), (40.0, -25.0, 180.0))
+BASE = frame(2600.0, -400.0, 350.0, Rotation.from_rotvec([0.02, -0.03, 0.7]))
+TOOL = frame(40.0, -25.0, 180.0, Rotation.from_rotvec([0.3, -0.2, 0.5]))
 NAME = "bent"
 
 FANUC, MH180 = (compliant_arm.described(name) for name in ("fanuc_r2000ic_165f", "mh180"))
@@ -88,7 +90,7 @@ def written(path: Path, cell: Cell, seed: int, with_payload: bool = False) -> Pa
     lines = [",".join(names)]
     poses = cell.tool_poses(cell.joints_deg, cell.payloads)
     for joints, pose, load in zip(cell.joints_deg, poses, cell.payloads, strict=True):
-        turn = compliant_arm.placed(rng.normal(0.0, NOISE_MM / WEIGHT, 3), np.zeros(3))[:3, :3]
+        turn = Rotation.from_rotvec(rng.normal(0.0, NOISE_MM / WEIGHT, 3)).as_matrix()
         position = pose[:3, 3] + rng.normal(0.0, NOISE_MM, 3)
         row = [*joints, *position, *compliant_arm.quaternion(turn @ pose[:3, :3])]
         row += [load.mass_kg, *load.centre_mm] * with_payload

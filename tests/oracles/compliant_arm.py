@@ -8,7 +8,6 @@ direction in the first DH frame, centres of gravity stand in the DH frame that c
 
 from __future__ import annotations
 
-import cmath
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -17,6 +16,8 @@ from pathlib import Path
 import numpy as np
 import yaml
 from scipy.spatial.transform import Rotation
+
+from .kinematics import dh_forward, dh_frames
 
 STANDARD_GRAVITY = 9.80665  # m/s^2
 ROBOTS = Path(__file__).resolve().parents[2] / "src" / "kinacc" / "kinematics" / "robots"
@@ -50,21 +51,6 @@ class Arm:
     gravity: tuple[float, float, float] = (0.0, 0.0, -1.0)
 
 
-def frames(table: Sequence[Sequence[float]], q: Sequence[complex]) -> list[np.ndarray]:
-    """The DH frames after each joint in the first one, at joint angles that may be complex."""
-    found, frame = [], np.eye(4, dtype=complex)
-    for (theta, d, a, alpha, beta), angle in zip(table, q, strict=True):
-        c, s = cmath.cos(angle + theta), cmath.sin(angle + theta)
-        ca, sa = math.cos(alpha), math.sin(alpha)
-        cb, sb = math.cos(beta), math.sin(beta)
-        twist = np.array([[1, 0, 0, a], [0, ca, -sa, 0], [0, sa, ca, d], [0, 0, 0, 1]])
-        hayati = np.array([[cb, 0, sb, 0], [0, 1, 0, 0], [-sb, 0, cb, 0], [0, 0, 0, 1]])
-        turn = np.array([[c, -s, 0, 0], [s, c, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
-        frame = frame @ turn @ twist @ hayati
-        found.append(frame)
-    return found
-
-
 def height_mm(arm: Arm, frame: np.ndarray, centre_mm: Sequence[float]) -> complex:
     """How far a point of a frame lies against gravity."""
     size = math.hypot(*arm.gravity)
@@ -74,7 +60,7 @@ def height_mm(arm: Arm, frame: np.ndarray, centre_mm: Sequence[float]) -> comple
 
 def energy_j(arm: Arm, q: Sequence[complex], payload: Body) -> complex:
     """Potential energy in joule of links and payload."""
-    at = frames(arm.table, q)
+    _, *at = dh_frames(arm.table, q)
     bodies = [*zip(at, arm.links, strict=False), (at[-1], payload)]
     return sum(
         body.mass_kg * STANDARD_GRAVITY * 1e-3 * height_mm(arm, frame, body.centre_mm)
@@ -82,8 +68,8 @@ def energy_j(arm: Arm, q: Sequence[complex], payload: Body) -> complex:
     )
 
 
-def _stepped(q: Sequence[float], joint: int) -> list[complex]:
-    return [angle + (1j * _STEP if i == joint - 1 else 0.0) for i, angle in enumerate(q)]
+def _stepped(q: Sequence[float], joint: int) -> np.ndarray:
+    return q + 1j * _STEP * np.eye(len(q))[joint - 1]
 
 
 def moment_nm(arm: Arm, q: Sequence[float], joint: int, payload: Body = NOTHING) -> float:
@@ -93,7 +79,7 @@ def moment_nm(arm: Arm, q: Sequence[float], joint: int, payload: Body = NOTHING)
 
 def lever_mm(arm: Arm, q: Sequence[float], joint: int) -> float:
     """How fast the last DH frame sinks with a joint, in mm per rad."""
-    last = frames(arm.table, _stepped(q, joint))[-1]
+    last = dh_forward(arm.table, _stepped(q, joint))
     return -complex(height_mm(arm, last, (0.0, 0.0, 0.0))).imag / _STEP
 
 
@@ -109,7 +95,7 @@ def deflections(arm: Arm, q: Sequence[float], payload: Body = NOTHING) -> np.nda
 
 def flange(arm: Arm, q: Sequence[float], payload: Body = NOTHING) -> np.ndarray:
     """Pose (4, 4) of the last DH frame of the bent arm, to first order."""
-    return frames(arm.table, np.asarray(q) + deflections(arm, q, payload))[-1].real
+    return dh_forward(arm.table, np.asarray(q) + deflections(arm, q, payload))
 
 
 @dataclass(frozen=True)
@@ -147,13 +133,6 @@ def disturbed(arm: Arm, rng: np.random.Generator, hayati_joints: Sequence[int] =
         size[joint - 1] = [5e-4, 0.0, 0.3, 5e-4, 5e-4]
     table = np.array(arm.table) + size * rng.normal(size=size.shape)
     return replace(arm, table=tuple(tuple(row) for row in table.tolist()))
-
-
-def placed(rotation_vector: Sequence[float], position_mm: Sequence[float]) -> np.ndarray:
-    """Pose (4, 4) of a frame."""
-    pose = np.eye(4)
-    pose[:3, :3], pose[:3, 3] = Rotation.from_rotvec(rotation_vector).as_matrix(), position_mm
-    return pose
 
 
 def quaternion(rotation: np.ndarray) -> np.ndarray:

@@ -1,67 +1,18 @@
 """Least squares on kinematic models, with derivatives by complex steps: exact to rounding.
 
-Poses are products of 4x4 matrices, n at a time, at parameters that may be complex. A residual of
-one pose is the position difference in mm (model minus measurement, robot base) and the rotation
+Poses are those of `oracles.kinematics`, n at a time, at parameters that may be complex. A residual
+of one pose is the position difference in mm (model minus measurement, robot base) and the rotation
 vector of R_model R_measured' times a weight in mm/rad.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.polynomial import chebyshev
 
 _STEP = 1e-30
-
-
-def turn(axis: int, angle) -> np.ndarray:
-    """Rotations (n, 4, 4) about an axis."""
-    cosine, sine = np.cos(angle + 0j), np.sin(angle + 0j)
-    matrix = np.broadcast_to(np.eye(4, dtype=complex), (*np.shape(cosine), 4, 4)).copy()
-    second, third = (axis + 1) % 3, (axis + 2) % 3
-    matrix[..., second, second] = matrix[..., third, third] = cosine
-    matrix[..., third, second], matrix[..., second, third] = sine, -sine
-    return matrix
-
-
-def motion(change) -> np.ndarray:
-    """Eq. 6 as printed: displacements and small turns ``change`` (6, ...) as (..., 4, 4)."""
-    dx, dy, dz, ex, ey, ez = change
-    one, nothing = np.ones_like(ex), np.zeros_like(ex)
-    rows = [one, -ez, ey, dx], [ez, one, -ex, dy], [-ey, ex, one, dz], [nothing] * 3 + [one]
-    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
-
-
-def link(row: Sequence[complex], q: np.ndarray) -> np.ndarray:
-    """Eq. 4: Rz(q + theta) Tz(d) Tx(a) Rx(alpha) Ry(beta)."""
-    theta, d, a, alpha, beta = row
-    along = motion(np.array([a, 0, d, 0, 0, 0], dtype=complex))
-    return turn(2, q + theta) @ along @ turn(0, alpha) @ turn(1, beta)
-
-
-def dh_poses(table: np.ndarray, q: np.ndarray) -> np.ndarray:
-    """Eq. 3 at joints (n, k)."""
-    frame = np.eye(4)
-    for row, angle in zip(table, q.T, strict=True):
-        frame = frame @ link(row, angle)
-    return frame
-
-
-def vec_poses(table, series, low, high, offsets, q, s) -> np.ndarray:
-    """Eq. 5 at joints (n, k) and travel directions (n, k), the rotation by its polar factor."""
-    frame = np.eye(4)
-    for i, row in enumerate(table):
-        mapped = (2 * q[:, i] - low[i] - high[i]) / (high[i] - low[i])
-        errors = chebyshev.chebval(mapped, series[i].T + 0j)
-        errors[5] += offsets[i, 0] * (s[:, i] == -1) + offsets[i, 1] * (s[:, i] == 1)
-        frame = frame @ motion(errors) @ link(row, q[:, i])
-    rotation = frame[:, :3, :3]
-    for _ in range(8):
-        rotation = (rotation + np.swapaxes(np.linalg.inv(rotation), 1, 2)) / 2
-    frame[:, :3, :3] = rotation
-    return frame
 
 
 def residual(poses: np.ndarray, measured: np.ndarray, weight: float) -> np.ndarray:

@@ -1,12 +1,14 @@
-"""Forward kinematics one 4x4 matrix at a time (paper eqs. 1-6).
+"""Forward kinematics by products of 4x4 matrices (paper eqs. 1-6).
 
-A DH table is a sequence of rows (theta_offset_rad, d_mm, a_mm, alpha_rad, beta_rad).
+A DH table is a sequence of rows (theta_offset_rad, d_mm, a_mm, alpha_rad, beta_rad); joints are
+(k,) or (n, k). Tables, joints and errors may be complex, for derivatives by complex steps.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 from numpy.polynomial import chebyshev
@@ -34,90 +36,78 @@ UR10 = [
 ]
 
 
-def rot_x(angle: float) -> np.ndarray:
-    c, s = math.cos(angle), math.sin(angle)
-    return np.array([[1, 0, 0, 0], [0, c, -s, 0], [0, s, c, 0], [0, 0, 0, 1.0]])
+def turn(axis: int, angle) -> np.ndarray:
+    """Rotations (..., 4, 4) about an axis."""
+    cosine, sine = np.cos(angle), np.sin(angle)
+    matrix = np.zeros((*np.shape(cosine), 4, 4), cosine.dtype)
+    second, third = (axis + 1) % 3, (axis + 2) % 3
+    matrix[..., axis, axis] = matrix[..., 3, 3] = 1.0
+    matrix[..., second, second] = matrix[..., third, third] = cosine
+    matrix[..., third, second], matrix[..., second, third] = sine, -sine
+    return matrix
 
 
-def rot_y(angle: float) -> np.ndarray:
-    c, s = math.cos(angle), math.sin(angle)
-    return np.array([[c, 0, s, 0], [0, 1, 0, 0], [-s, 0, c, 0], [0, 0, 0, 1.0]])
+rot_x, rot_y, rot_z = (partial(turn, axis) for axis in range(3))
 
 
-def rot_z(angle: float) -> np.ndarray:
-    c, s = math.cos(angle), math.sin(angle)
-    return np.array([[c, -s, 0, 0], [s, c, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1.0]])
+def motion(change) -> np.ndarray:
+    """Eq. 6 as printed: displacements and small turns ``change`` (6, ...) as (..., 4, 4)."""
+    dx, dy, dz, ex, ey, ez = np.asarray(change)
+    one, nothing = np.ones_like(ex), np.zeros_like(ex)
+    rows = [one, -ez, ey, dx], [ez, one, -ex, dy], [-ey, ex, one, dz], [nothing] * 3 + [one]
+    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
 
 
 def trans(x: float, y: float, z: float) -> np.ndarray:
-    return np.array([[1, 0, 0, x], [0, 1, 0, y], [0, 0, 1, z], [0, 0, 0, 1.0]])
+    return motion([x, y, z, 0.0, 0.0, 0.0])
 
 
-def dh_link(row: Sequence[float], q: float) -> np.ndarray:
+def links(table, q) -> list[np.ndarray]:
     """Eq. 4 with Hayati's extra rotation: Rz(q + theta) Tz(d) Tx(a) Rx(alpha) Ry(beta)."""
-    theta, d, a, alpha, beta = row
-    return rot_z(q + theta) @ trans(0, 0, d) @ trans(a, 0, 0) @ rot_x(alpha) @ rot_y(beta)
+    theta, d, a, alpha, beta = np.transpose(table)
+    along = motion([a, 0 * a, d, 0 * a, 0 * a, 0 * a])
+    product = turn(2, np.asarray(q) + theta) @ along @ turn(0, alpha) @ turn(1, beta)
+    return [*np.moveaxis(product, -3, 0)]
 
 
-def dh_frames(table: Sequence[Sequence[float]], q: Sequence[float]) -> list[np.ndarray]:
+def dh_frames(table, q) -> list[np.ndarray]:
     """The base frame and the frame after each joint."""
     frames = [np.eye(4)]
-    for row, angle in zip(table, q, strict=True):
-        frames.append(frames[-1] @ dh_link(row, angle))
+    for link in links(table, q):
+        frames.append(frames[-1] @ link)
     return frames
 
 
-def dh_forward(table: Sequence[Sequence[float]], q: Sequence[float]) -> np.ndarray:
+def dh_forward(table, q) -> np.ndarray:
     """Eq. 3."""
     return dh_frames(table, q)[-1]
 
 
-def error_matrix(errors: Sequence[float]) -> np.ndarray:
-    """Eq. 6 as printed; errors in the order of ERROR_NAMES."""
-    dx, dy, dz, ex, ey, ez = errors
-    return np.array([[1, -ez, ey, dx], [ez, 1, -ex, dy], [-ey, ex, 1, dz], [0, 0, 0, 1.0]])
+def vec_forward(table, series, low, high, offsets, q, s) -> np.ndarray:
+    """Eq. 5: the rotation block is a product of first-order matrices and not orthonormal.
 
-
-def vec_errors(
-    series: np.ndarray, q: float, low: float, high: float, offsets: Sequence[float], s: int
-) -> list[float]:
-    """Six errors of one joint: Chebyshev series on [low, high] -> [-1, 1], plus the backlash
-    offset of eps_z for travel direction -1 (offsets[0]) or +1 (offsets[1]); none for 0."""
-    u = (2 * q - low - high) / (high - low)
-    values = [float(chebyshev.chebval(u, list(row))) for row in series]
-    if s == -1:
-        values[5] += offsets[0]
-    elif s == +1:
-        values[5] += offsets[1]
-    return values
-
-
-def vec_forward(
-    table: Sequence[Sequence[float]],
-    series: np.ndarray,
-    low: Sequence[float],
-    high: Sequence[float],
-    offsets: np.ndarray,
-    q: Sequence[float],
-    s: Sequence[int],
-) -> np.ndarray:
-    """Eq. 5: the rotation block is a product of first-order matrices and not orthonormal."""
-    frame = np.eye(4)
-    for i, row in enumerate(table):
-        errors = vec_errors(series[i], q[i], low[i], high[i], offsets[i], int(s[i]))
-        frame = frame @ error_matrix(errors) @ dh_link(row, q[i])
+    Chebyshev series (k, 6, order + 1) on [low, high] -> [-1, 1], plus the backlash offset of eps_z
+    for travel direction -1 (offsets[:, 0]) or +1 (offsets[:, 1]); none for 0.
+    """
+    q, s = np.asarray(q), np.asarray(s)
+    mapped, frame = (2 * q - low - high) / (np.asarray(high) - low), np.eye(4)
+    for i, link in enumerate(links(table, q)):
+        errors = chebyshev.chebval(mapped[..., i], series[i].T)
+        errors[5] += offsets[i, 0] * (s[..., i] == -1) + offsets[i, 1] * (s[..., i] == 1)
+        frame = frame @ motion(errors) @ link
     return frame
 
 
 def nearest_rotation(matrix: np.ndarray) -> np.ndarray:
-    """Rotation closest to a 3x3 matrix in the Frobenius norm."""
-    left, _, right = np.linalg.svd(matrix)
-    return left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
+    """Rotations (..., 3, 3) closest to matrices: their polar factors, by Newton's iteration."""
+    for _ in range(8):
+        matrix = (matrix + np.swapaxes(np.linalg.inv(matrix), -1, -2)) / 2
+    return matrix
 
 
 def projected(frame: np.ndarray) -> np.ndarray:
     result = frame.copy()
-    result[:3, :3] = nearest_rotation(frame[:3, :3])
+    result[..., :3, :3] = nearest_rotation(frame[..., :3, :3])
     return result
 
 
@@ -125,9 +115,19 @@ def rotation_vector(matrix: np.ndarray) -> np.ndarray:
     return Rotation.from_matrix(matrix).as_rotvec()
 
 
+def apart(first: np.ndarray, second: np.ndarray) -> tuple[float, float]:
+    """Distance (mm) and angle (mrad) between two frames."""
+    turned = rotation_vector(first[:3, :3].T @ second[:3, :3])
+    return float(np.linalg.norm(first[:3, 3] - second[:3, 3])), 1e3 * float(np.linalg.norm(turned))
+
+
+def frame(x=0.0, y=0.0, z=0.0, turned=None) -> np.ndarray:
+    """A 4 x 4 matrix of a position and a scipy rotation."""
+    found = trans(x, y, z)
+    if turned is not None:
+        found[:3, :3] = turned.as_matrix()
+    return found
+
+
 def pose_matrix(x: float, y: float, z: float, wxyz: Sequence[float]) -> np.ndarray:
-    w, i, j, k = wxyz
-    result = np.eye(4)
-    result[:3, :3] = Rotation.from_quat([i, j, k, w]).as_matrix()
-    result[:3, 3] = (x, y, z)
-    return result
+    return frame(x, y, z, Rotation.from_quat(wxyz, scalar_first=True))

@@ -92,15 +92,6 @@ def measured_frame(row: Row) -> tuple[np.ndarray, bool]:
     return kinematics.pose_matrix(row["x_mm"], row["y_mm"], row["z_mm"], wxyz), True
 
 
-def apart(first: np.ndarray, second: np.ndarray) -> tuple[float, float]:
-    """Distance (mm) and angle (mrad) between two frames."""
-    turn = kinematics.rotation_vector(first[:3, :3].T @ second[:3, :3])
-    return (
-        float(np.linalg.norm(first[:3, 3] - second[:3, 3])),
-        float(np.linalg.norm(turn)) * 1e3,
-    )
-
-
 def magnitudes(
     models_: Models, measurements: list[Row], comparison: str
 ) -> tuple[list[float], list[float]]:
@@ -114,7 +105,7 @@ def magnitudes(
         left, right = comparison.split("_vs_")
         reading, full = measured_frame(row)
         other = reading if right == "measured" else models_.measured(right, q, s, target)
-        gap, turn = apart(models_.measured(left, q, s, target), other)
+        gap, turn = kinematics.apart(models_.measured(left, q, s, target), other)
         position.append(gap)
         if full:
             orientation.append(turn)

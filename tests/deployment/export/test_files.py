@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from oracles.controllers.arms import frame
-from oracles.kinematics import dh_link
+from oracles.kinematics import dh_forward
 from scipy.spatial.transform import Rotation
 from test_export_urdf import bent
 
@@ -90,6 +90,6 @@ dh:
     for joint, value in zip(content["joints"], q, strict=True):
         row = [joint[name] for name in ("theta_offset_rad", "d_mm", "a_mm", "alpha_rad")]
         row[joint["type"] == "prismatic"] += value
-        here = here @ dh_link((*row, 0.0), 0.0)
+        here = here @ dh_forward([(*row, 0.0)], [0.0])
     wanted = arm.pose(JointState(q), "base", "flange")
     np.testing.assert_allclose(here[:3, 3], wanted.position_mm[0], rtol=0, atol=1e-9)

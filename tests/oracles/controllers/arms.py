@@ -10,19 +10,10 @@ import yaml
 from scipy.optimize import root
 from scipy.spatial.transform import Rotation
 
-from oracles.kinematics import dh_frames
+from oracles.kinematics import dh_frames, frame
 
 DEG = np.pi / 180.0
 ROBOTS = Path(__file__).parents[3] / "src" / "kinacc" / "kinematics" / "robots"
-
-
-def frame(x=0.0, y=0.0, z=0.0, turn=None) -> np.ndarray:
-    """A 4 x 4 matrix of a position and a scipy rotation."""
-    found = np.eye(4)
-    found[:3, 3] = x, y, z
-    if turn is not None:
-        found[:3, :3] = turn.as_matrix()
-    return found
 
 
 @dataclass(frozen=True)

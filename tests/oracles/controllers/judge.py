@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from oracles.controllers import measured
 from oracles.controllers.programs import Program
+from oracles.kinematics import apart
 
 
 def shown(program: Program, numbers: list[float]) -> list[np.ndarray]:
@@ -24,12 +24,6 @@ def shown(program: Program, numbers: list[float]) -> list[np.ndarray]:
     return found
 
 
-def miss(goal: np.ndarray, there: np.ndarray) -> tuple[float, float]:
-    """Distance, mm and mrad, of a frame from another one."""
-    turn = Rotation.from_matrix(goal[:3, :3].T @ there[:3, :3]).magnitude()
-    return float(np.linalg.norm(goal[:3, 3] - there[:3, 3])), 1e3 * turn
-
-
 def misses(program: Program, numbers: list[float], base: np.ndarray) -> np.ndarray:
     """Distances (n, 2), mm and mrad, of the true arm's tool from where the program means it.
 
@@ -40,5 +34,5 @@ def misses(program: Program, numbers: list[float], base: np.ndarray) -> np.ndarr
     rows = []
     for wanted, real in zip(meant, shown(program, numbers), strict=True):
         goal = base @ program.arm.pose(wanted) @ program.tool
-        rows.append(miss(goal, measured.seen(program.arm, real)))
+        rows.append(apart(goal, measured.seen(program.arm, real)))
     return np.array(rows)
