@@ -55,7 +55,7 @@ def started(calibration, tmp_path_factory):
     @cache
     def start(points, budget, *more):
         folder = tmp_path_factory.mktemp("started") / "campaign"
-        call("campaign", "start", folder, "--calibration", calibration, "--robot", "mh180",
+        call("campaign", "start", folder, "--calibration", calibration,
              "--model", "dh", "--candidates", points, "--budget", budget, *more,
              code=0)  # fmt: skip
         return folder

@@ -16,8 +16,7 @@ from kinacc.campaign.instrument import instruments
 @pytest.fixture
 def start(calibration, tmp_path):
     """Words that start a campaign of 200 candidates."""
-    return ("campaign", "start", tmp_path / "check", "--calibration", calibration, "--robot",
-            "mh180", "--model", "dh")  # fmt: skip
+    return ("campaign", "start", tmp_path / "check", "--calibration", calibration, "--model", "dh")
 
 
 def test_micrometres_given_as_millimetres_of_noise_are_asked_about(start, tmp_path):

@@ -7,11 +7,9 @@ from pathlib import Path
 
 from command_line import answer, call
 
-from kinacc.kinematics import robot
-
 
 def test_export_writes_every_form(study, tmp_path):
-    told = answer("export", study, "--robot", "mh180", "--out", tmp_path)
+    told = answer("export", study, "--out", tmp_path)
     files = [Path(name).name for name in told["files"]]
     assert sorted(files) == ["mh180.csv", "mh180.json", "mh180.urdf", "mh180.yaml",
                              "mh180_tables.md", "mh180_tables.tex"]  # fmt: skip
@@ -19,7 +17,7 @@ def test_export_writes_every_form(study, tmp_path):
     (known,) = answer("summary", study).values()
     assert len(left_open) == len(known["unidentifiable"] + known["poorly_determined"]) > 0
     assert f"Left open by the poses: {left_open[0]}" in (tmp_path / "mh180_tables.md").read_text()
-    compared = answer("compare", tmp_path / "mh180.yaml", study, "--robot", "mh180")
+    compared = answer("compare", tmp_path / "mh180.yaml", study)
     assert compared["shifts"][0]["largest_mm"] < 1e-9
 
 
@@ -29,13 +27,7 @@ def test_arms_of_six_and_seven_joints_are_not_compared():
 
 def test_results_say_which_robot_they_were_made_with(study, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)  # no configuration here
-    words = ("predict", study.resolve(), "--joints-deg", "0,0,0,0,60,0")
-    told = call(*words, code=0)
-    assert told.output == call(*words, "--robot", "mh180").output
-    other = tmp_path / "signs.yaml"
-    text = robot.as_yaml(robot.load("mh180")).replace("limits_rad", "sign: -1, limits_rad", 1)
-    other.write_text(text)
-    call(*words, "--robot", other, code=2)
+    call("predict", study.resolve(), "--joints-deg", "0,0,0,0,60,0", code=0)
 
 
 def test_what_campaign_start_names_next_runs_as_printed(study, tmp_path):

@@ -22,20 +22,19 @@ TABLES = results("mh180", 80, 3, False)
 
 
 @pytest.mark.parametrize(
-    ("change", "message"),
+    "other",
     [
-        ({"dh": replace(ARM.dh, d_mm=ARM.dh.d_mm + 1e-3)}, "d_mm of joint 1"),
-        ({"dh": replace(ARM.dh, prismatic=np.arange(6) == 2)}, "sliding joints"),
-        ({"joint_map": np.diag([1.0, 1, 1, 1, 1, -1])}, "joint_map or signs"),
-        ({"flange": Pose(rotation_x(0.1), np.zeros(3))}, "flange"),
+        replace(ARM, dh=replace(ARM.dh, d_mm=ARM.dh.d_mm + 1e-3)),
+        replace(ARM, dh=replace(ARM.dh, prismatic=np.arange(6) == 2)),
+        replace(ARM, joint_map=np.diag([1.0, 1, 1, 1, 1, -1])),
+        replace(ARM, flange=Pose(rotation_x(0.1), np.zeros(3))),
+        robot.load("iiwa14"),
     ],
 )
-def test_another_robot_than_that_of_the_results_is_refused(change, message):
+def test_another_robot_than_that_of_the_results_is_refused(other):
     require_same_robot(ARM, replace(ARM, q_max_rad=2.0 * ARM.q_max_rad), "results")
-    with pytest.raises(InputError, match=f"another robot than mh180: .*{message}"):
-        require_same_robot(ARM, replace(ARM, **change), "results")
-    with pytest.raises(InputError, match="6 joints, not 7"):
-        require_same_robot(ARM, robot.load("iiwa14"), "results")
+    with pytest.raises(InputError, match=f"another robot than {other.name}"):
+        require_same_robot(ARM, other, "results")
 
 
 def test_a_model_is_asked_for_where_none_was_selected(tmp_path):

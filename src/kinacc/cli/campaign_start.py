@@ -50,7 +50,6 @@ _MOST_CANDIDATES = 20_000
 @click.argument("folder", type=click.Path(file_okay=False))
 @option("--calibration", required=True, type=click.Path(), help="Results folder of the arm.")
 @choice.SELECTED
-@choice.ROBOT
 @choice.SESSION
 @choice.POINT
 @option("--candidates", default="200", help="File of joints, or number of joints to draw.")
@@ -83,8 +82,7 @@ def start(out: Output, **options: Any) -> None:
     refuse(folders.in_the_way(options["folder"]), "The campaign was not begun")
     results, point = Path(options["calibration"]), options["point"]
     used, freedom, doubts = instruments_of(options, [results])
-    names = ("model", "robot", "session")
-    arm = choice.calibration_of(results, *(options[name] for name in names))
+    arm = choice.calibration_of(results, options["model"], options["session"])
     joints, labels, directions, source = _candidates(options, arm)
     points = begin.points_of(arm, joints, labels, directions, point)
     limits = Limits(

@@ -14,8 +14,6 @@ from kinacc.assess.statement import CONFIDENCE
 from kinacc.config import schema
 from kinacc.deployment import folder as results
 from kinacc.deployment.record import Calibration
-from kinacc.kinematics import robot as robots
-from kinacc.kinematics.robot import Robot
 from kinacc.tables.allowed import SELECTABLE
 from kinacc.workflow.described import outdated_reason
 
@@ -44,7 +42,6 @@ def share(text: str) -> float:
     return float(text.strip().removesuffix("%")) * (0.01 if "%" in text else 1.0)
 
 
-ROBOT = option("--robot", help="Robot of the results: a shipped name or a file. [as recorded]")
 SELECTED = option(
     "--model",
     type=MODEL,
@@ -68,8 +65,8 @@ def together(*options: Decorator) -> Decorator:
     return decorate
 
 
-# Which calibration: its folder, the model, and the robot.
-calibration_options = together(click.argument("folder", type=click.Path()), SELECTED, ROBOT)
+# Which calibration: its folder, and the model.
+calibration_options = together(click.argument("folder", type=click.Path()), SELECTED)
 # Which point in which frame.
 point_options = together(
     option(
@@ -190,28 +187,12 @@ def joint_answers(options: Mapping[str, Any]) -> dict[str, Any]:
     return {name: options[name] for name in _JOINT_ANSWERS if options.get(name)}
 
 
-def robot_of(folder: str | Path, robot: str | None) -> Robot:
-    """The robot of a results folder: as given, or as recorded.
-
-    Raises InputError for a robot that is not the one the results were made with.
-    """
-    recorded = results.recorded_robot(folder)
-    if robot is None:
-        return recorded
-    arm = robots.load(robot)
-    results.require_same_robot(recorded, arm, str(folder))
-    return arm
-
-
 def calibration_of(
-    folder: str | Path,
-    model: str | None = None,
-    robot: str | None = None,
-    session: str | None = None,
+    folder: str | Path, model: str | None = None, session: str | None = None
 ) -> Calibration:
     """The calibration of a results folder."""
     tables = results.read_tables(folder)
-    arm = robot_of(folder, robot)
+    arm = results.recorded_robot(folder)
     calibration = results.calibration(tables, arm, model, Path(folder).resolve().name, session)
     return replace(calibration, outdated=print_outdated(folder))
 

@@ -36,14 +36,12 @@ _POSES = 500  # at most, of measured ones
 @click.argument("second", type=click.Path())
 @option("--joints", type=click.Path(), help="File of joints to compare poses at. [as measured]")
 @option("--model", type=choice.MODEL, default="dh", help="Error model.")
-@choice.ROBOT
 @answers(table=True, picture="Picture: .svg, .png or .pdf.", verbose=True)
 def compare(
     first: str,
     second: str,
     joints: str | None,
     model: str,
-    robot: str | None,
     out: Output,
 ) -> None:
     """Compare two calibrations of one arm: whether it changed, and how far its poses moved.
@@ -56,7 +54,7 @@ def compare(
       kinacc compare results/ur10_b results/ur10_d --picture moved.svg
     """
     with reporting("compare", bar=True):
-        both = [_calibration(place, model, robot) for place in (first, second)]
+        both = [_calibration(place, model) for place in (first, second)]
         comparison.require_alike(*both)
         files = [Path(place) / "measurements.parquet" for place in (first, second)]
         tables = [store.read(file) if file.is_file() else None for file in files]
@@ -75,11 +73,11 @@ def compare(
     out.show(result, table, text, table if out.verbose else result.shifts)
 
 
-def _calibration(place: str, model: str, robot: str | None) -> Calibration:
+def _calibration(place: str, model: str) -> Calibration:
     """The calibration of a results folder, or the robot of a file."""
     path = Path(place)
     if path.is_dir():
-        calibration = choice.calibration_of(path, model, robot)
+        calibration = choice.calibration_of(path, model)
         left = misfit(read_tables(path), calibration.robot, calibration.choice)
         return replace(calibration, name=place, misfit=left)
     if path.is_file() or place in robots.shipped():

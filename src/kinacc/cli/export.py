@@ -34,7 +34,6 @@ from kinacc.workflow.described import calibration_settings
 @option("--urdf", type=click.Path(), help="URDF file whose origins are corrected.")
 @option("--base-link", help="Link of that file where the arm starts. [its root]")
 @option("--tip-link", help="Link of that file where the arm ends. [the only one it can]")
-@choice.ROBOT
 @option("--config", multiple=True,
         help="Configuration file for --for; repeatable. [those beside the results]")  # fmt: skip
 @answers(force=True)
@@ -48,7 +47,6 @@ def export(
     urdf: str | None,
     base_link: str | None,
     tip_link: str | None,
-    robot: str | None,
     config: tuple[str, ...],
     out: Output,
 ) -> None:
@@ -77,7 +75,7 @@ def export(
     if urdf is not None and "urdf" not in wanted:
         problems.append(Problem("--urdf", f"{urdf} is not wanted", "with --format urdf"))
     refuse(problems, "Nothing was written")
-    arm = choice.robot_of(folder, robot)
+    arm = results.recorded_robot(folder)
     reason = choice.print_outdated(folder)
     if maker is not None:
         _to_controller(folder, arm, target, maker, name, config, out)

@@ -57,7 +57,6 @@ _STATUS = {
 def predict(
     folder: str,
     model: str | None,
-    robot: str | None,
     joints: str | None,
     joints_deg: tuple[str, ...],
     frame: str,
@@ -80,7 +79,7 @@ def predict(
     Example:
       kinacc predict results/mh180 --joints-deg "10,-20,30,0,45,0"
     """
-    calibration = choice.calibration_of(folder, model, robot, session)
+    calibration = choice.calibration_of(folder, model, session)
     arm = calibration.robot
     inputs, q = rows.joints_of(arm, joints, joints_deg, choice.joint_answers(file))
     with reporting("predict", bar=True):
@@ -116,7 +115,6 @@ def predict(
 def compensate(
     folder: str,
     model: str | None,
-    robot: str | None,
     poses: str | None,
     texts: tuple[str, ...],
     near_deg: str | None,
@@ -145,7 +143,7 @@ def compensate(
         raise InputError(Problem("--frame", "programs are in the robot's own base", "base"))
     if program is None:
         out = replace(out, table=target)
-    calibration = choice.calibration_of(folder, model, robot, session)
+    calibration = choice.calibration_of(folder, model, session)
     near = None
     if near_deg is not None:
         near = rows.of_arguments((near_deg,), calibration.robot, "--near-deg")[0]

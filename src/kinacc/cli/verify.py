@@ -10,7 +10,6 @@ from typing import Any
 import click
 
 from kinacc.checks.contradictions import load
-from kinacc.cli import choice
 from kinacc.cli.choice import option
 from kinacc.cli.output import Output, answers
 from kinacc.cli.process import AGAINST, DONE, UNDECIDED
@@ -18,6 +17,7 @@ from kinacc.deployment import folder as results
 from kinacc.deployment import verify as verification
 from kinacc.deployment.permutation import LEVEL
 from kinacc.errors import InputError, Problem
+from kinacc.kinematics import robot as robots
 from kinacc.progress import reporting
 from kinacc.report import rendering
 from kinacc.synthetic import source
@@ -51,7 +51,8 @@ def verify(
     moved = [name for name, how in (("base", base), ("tool", tool)) if how == "moved"]
     name, config = _settings(readings, folder, dataset)
     tables = results.read_tables(folder, "pose_errors")
-    arm = choice.robot_of(folder, config["robot"])
+    arm = results.recorded_robot(folder)
+    results.require_same_robot(arm, robots.load(config["robot"]), folder)
     weight = float(config["calibration"]["rotation_weight_mm_per_rad"])
     with reporting("verify", bar=True), warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")

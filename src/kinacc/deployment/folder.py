@@ -16,7 +16,6 @@ from kinacc.deployment.record import MODELS, Calibration, Residual
 from kinacc.errors import InputError, Problem, gathered, refuse
 from kinacc.kinematics import robot as robots
 from kinacc.kinematics import tables as model_tables
-from kinacc.kinematics.dh import PARAMETERS
 from kinacc.kinematics.robot import Robot
 from kinacc.tables import store
 from kinacc.tables.allowed import SUBSETS
@@ -230,25 +229,13 @@ def require_same_robot(recorded: Robot, robot: Robot, place: str) -> None:
 
     Limits and tool may differ: they are no part of what was fitted.
     """
-    nominal = recorded.dh
-    if nominal.joints != robot.dh.joints:
-        raise _another_robot(place, robot, f"{nominal.joints} joints, not {robot.dh.joints}")
-    for parameter in PARAMETERS:
-        first, two = getattr(nominal, parameter), getattr(robot.dh, parameter)
-        if (apart := np.flatnonzero(np.abs(first - two) > _SAME * (1.0 + np.abs(two)))).size:
-            message = f"{first[apart[0]]:.9g}, not {two[apart[0]]:.9g}"
-            raise _another_robot(place, robot, f"{parameter} of joint {apart[0] + 1} {message}")
-    pairs = {
-        "sliding joints": (recorded.dh.prismatic, robot.dh.prismatic),
-        "joint_map or signs": (recorded.joint_map, robot.joint_map),
-        "base": (np.column_stack(recorded.base), np.column_stack(robot.base)),
-        "flange": (np.column_stack(recorded.flange), np.column_stack(robot.flange)),
-    }
-    for message, (first, two) in pairs.items():
-        if not np.allclose(first, two, rtol=_SAME, atol=_SAME):
-            raise _another_robot(place, robot, message)
+    pairs = list(zip(_fitted_on(recorded), _fitted_on(robot), strict=True))
+    same_shape = recorded.dh.joints == robot.dh.joints
+    if not (same_shape and all(np.allclose(*pair, rtol=_SAME, atol=_SAME) for pair in pairs)):
+        message = f"was made with another robot than {robot.name}"
+        raise InputError(Problem(place, message, fix="give readings of its robot"))
 
 
-def _another_robot(place: str, robot: Robot, difference: str) -> InputError:
-    text = f"was made with another robot than {robot.name}: {difference}"
-    return InputError(Problem(place or "results", text, fix="give its robot (--robot)"))
+def _fitted_on(robot: Robot) -> list[np.ndarray]:
+    """The parts of a robot that a fit takes as they are."""
+    return [robot.dh.start, robot.dh.prismatic, robot.joint_map, *robot.base, *robot.flange]
