@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 
 from click.testing import CliRunner, Result
-from stages_by_hand import CALIBRATED, perform
+from stages_by_hand import CALIBRATED, run_stages
 
 from kinacc.cli.group import main
 
@@ -30,6 +30,4 @@ def small_study(base: Path) -> Path:
         "datasets: {mh180: {robot: mh180}}\nmeasurements: {folds: 2, synthetic: {poses: 80}}\n"
         "calibration: {vec: {order: 1}}\n"
     )
-    for stage in CALIBRATED:
-        folder = perform(stage, [str(config)], base / "results")
-    return folder
+    return run_stages(CALIBRATED, [config], base / "results")

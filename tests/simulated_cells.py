@@ -9,7 +9,7 @@ from tempfile import TemporaryDirectory
 
 from oracles.controllers import measured
 from oracles.pendants.controllers import MAKERS
-from stages_by_hand import CALIBRATED, perform
+from stages_by_hand import CALIBRATED, run_stages
 
 _FOLDER = TemporaryDirectory()  # of all tests of a run
 
@@ -20,6 +20,4 @@ def calibrated(maker: str, wave: float = 0.0, poses: int = 90, order: int = 1) -
     folder = Path(_FOLDER.name) / f"{maker}_{wave}_{poses}_{order}"
     folder.mkdir()
     config = measured.write(folder, replace(MAKERS[maker], wave=wave), poses=poses, order=order)
-    for stage in CALIBRATED:
-        arm = perform(stage, [str(config)], folder / "results")
-    return arm
+    return run_stages(CALIBRATED, [config], folder / "results")

@@ -1,8 +1,7 @@
-"""One stage of the workflow on the tables of a results folder, as its rule would run it."""
+"""Stages of the workflow on the tables of a results folder, as their rules would run them."""
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterable
 from functools import partial
 from pathlib import Path
@@ -32,6 +31,23 @@ STAGES = {
     "claims": table_of,
 }
 CALIBRATED = ("measurements", "vec", "dh", "residuals")
+# Of the synthetic arm, all but its figures.
+STUDIED = (
+    *CALIBRATED,
+    "summary",
+    "accuracy_map",
+    "assessment_points",
+    "study",
+    "histories",
+    "claims",
+)
+
+
+def made(name: str, tables: dict, settings: dict) -> dict:
+    """Tables that a stage makes of others."""
+    if name == "study":
+        tables = tables | monte_carlo.simulated(tables, settings)
+    return STAGES[name](tables, settings)
 
 
 def run_stages(
@@ -39,30 +55,20 @@ def run_stages(
     configs: Iterable[object],
     results: Path = Path("results"),
     dataset: str | None = None,
-) -> str:
-    """Run stages one after another; their warnings."""
-    with warnings.catch_warnings(record=True) as told:
-        warnings.simplefilter("always")
-        for name in names:
-            perform(name, list(map(str, configs)), results, dataset)
-    return "\n".join(str(each.message) for each in told)
-
-
-def perform(name: str, configs: list[str], results: Path, dataset: str | None = None) -> Path:
-    """Run a stage and write its tables and their digests; the folder of the data set."""
-    data = read_data_sets(configs)
+) -> Path:
+    """Run stages and write their tables and their digests; the folder of the data set."""
+    data = read_data_sets(list(map(str, configs)))
     dataset = dataset or next(iter(data.settings))
     settings, folder = data.settings[dataset], results / dataset
     folder.mkdir(parents=True, exist_ok=True)
-    tables = {path.stem: store.read(path) for path in folder.glob("*.parquet")}
-    if name == "study":
-        tables |= monte_carlo.simulated(tables, settings)
-    own = data.chosen(dataset, *CALIBRATION) if name == "summary" else settings
-    marks = {"kinacc_version": "0", "config_hash": config_hash(own), "seed": settings["seed"]}
-    contents = {
-        f"{table}.parquet": store.content_of(store.to_table(table, columns, marks))
-        for table, columns in STAGES[name](tables, settings).items()
-    }
-    left = {folder / file: content for file, content in contents.items()}
-    write_together({**left, folder / "sums" / f"{name}.sha256": sums.text_of(contents, {})})
+    for name in names:
+        tables = {path.stem: store.read(path) for path in folder.glob("*.parquet")}
+        own = data.chosen(dataset, *CALIBRATION) if name == "summary" else settings
+        marks = {"kinacc_version": "0", "config_hash": config_hash(own), "seed": settings["seed"]}
+        contents = {
+            f"{table}.parquet": store.content_of(store.to_table(table, columns, marks))
+            for table, columns in made(name, tables, settings).items()
+        }
+        left = {folder / file: content for file, content in contents.items()}
+        write_together({**left, folder / "sums" / f"{name}.sha256": sums.text_of(contents, {})})
     return folder

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-from stages_by_hand import CALIBRATED, perform
+from stages_by_hand import CALIBRATED, run_stages
 
 import kinacc
 import kinacc.errors
@@ -37,8 +37,7 @@ def q_rad(calibration):
 
 
 def test_tables_are_those_of_the_workflow(calibration, config, tmp_path):
-    for stage in (*CALIBRATED, "summary"):
-        folder = perform(stage, [str(config)], tmp_path / "results")
+    folder = run_stages((*CALIBRATED, "summary"), [config], tmp_path / "results")
     for path in folder.glob("*.parquet"):
         workflow, own = kinacc.read_table(path), calibration.table(path.stem)
         assert list(workflow) == list(own)

@@ -61,8 +61,10 @@ def test_a_dh_model_that_follows_the_vec_model_is_of_all_sessions(tmp_path):
         "base_and_tool: estimated, vec: {order: 0}, dh: {fit_to: vec}}, "
         "evaluation: {space: measured}}}\n"
     )
-    run_stages(("measurements", "vec", "dh"), [tmp_path / "arm.yaml"], tmp_path / "results")
-    frames = store.read(tmp_path / "results" / "arm" / "frames.parquet")
+    results = run_stages(
+        ("measurements", "vec", "dh"), [tmp_path / "arm.yaml"], tmp_path / "results"
+    )
+    frames = store.read(results / "frames.parquet")
     bases = [
         (frames["model"] == "dh") & (frames["frame"] == "base") & (frames["session"] == name)
         for name in ("0", "1")

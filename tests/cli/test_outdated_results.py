@@ -1,11 +1,10 @@
 """Results whose files or settings changed after them are named as outdated, in one line."""
 
 import json
-from pathlib import Path
 
 import pytest
 from command_line import call
-from stages_by_hand import perform
+from stages_by_hand import run_stages
 from tracked_arm import NAMES, table, tracked
 
 from kinacc.workflow.start import run_workflow
@@ -30,8 +29,7 @@ def calibrated(tmp_path_factory):
         text = path.read_text().replace("order: auto", "order: 1").replace("folds: 5", "folds: 2")
         path.write_text(text)
         assert run_workflow("results/seen/measurements.parquet", ["seen.yaml"], 1) == 0
-        for stage in ("vec", "dh", "residuals", "summary"):
-            perform(stage, ["seen.yaml"], Path("results"))
+        run_stages(("vec", "dh", "residuals", "summary"), ["seen.yaml"])
     return folder
 
 

@@ -4,7 +4,7 @@ import json
 
 import pytest
 from command_line import answer
-from stages_by_hand import perform
+from stages_by_hand import run_stages
 from tracked_arm import XYZ, Q, call, table, tracked, written
 
 COUNT = 60
@@ -41,9 +41,7 @@ def two_files(tmp_path_factory):
 @pytest.fixture(scope="module")
 def results(two_files):
     folder, configs, _ = two_files
-    for stage in _STAGES:
-        arm = perform(stage, [*map(str, configs)], folder / "results")
-    return arm
+    return run_stages(_STAGES, configs, folder / "results")
 
 
 def test_the_first_poses_have_the_names_of_the_file(two_files):

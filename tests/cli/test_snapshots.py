@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 from command_line import call
-from stages_by_hand import perform
+from stages_by_hand import run_stages
 
 import kinacc
 
@@ -96,8 +96,7 @@ def prepare() -> None:
     later = path.read_text().replace("  arm:", "  later:").replace("arm.csv", "new.csv")
     Path("new.yaml").write_text(later)
     for config, stages in (("arm.yaml", STAGES), ("new.yaml", STAGES[:1] + STAGES[2:])):
-        for stage in stages:
-            perform(stage, [config], Path("results"))
+        run_stages(stages, [config])
 
 
 @pytest.mark.parametrize("name", COMMANDS)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from command_line import answer, call
-from stages_by_hand import CALIBRATED, perform
+from stages_by_hand import CALIBRATED, run_stages
 from tracked_arm import NAMES, Q, table, tracked
 
 ROWS = 50
@@ -32,8 +32,7 @@ def results(tmp_path_factory):
         )
     (base / "sets.yaml").write_text("\n".join(lines) + "\n")
     for name in sets:
-        for stage in CALIBRATED:
-            perform(stage, [str(base / "sets.yaml")], base / "results", name)
+        run_stages(CALIBRATED, [base / "sets.yaml"], base / "results", name)
     return base / "results"
 
 

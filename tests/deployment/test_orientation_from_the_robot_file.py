@@ -28,8 +28,7 @@ def results(tmp_path_factory):
     turn = Rotation.from_matrix(TOOL[:3, :3]).as_rotvec(degrees=True)
     tool = {"position_mm": TOOL[:3, 3].tolist(), "rotation_vector_deg": turn.tolist()}
     (folder / "robot.yaml").write_text(f"{ARM.description()}tool: {json.dumps(tool)}\n")
-    run_stages(CALIBRATED, [config], folder / "results")
-    return folder / "results" / "arm"
+    return run_stages(CALIBRATED, [config], folder / "results")
 
 
 def apart_deg(found, wanted):

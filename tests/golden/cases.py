@@ -7,8 +7,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable, Iterator, Mapping
-from functools import partial
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -19,17 +18,9 @@ sys.path[:0] = [str(TESTS), *(str(TESTS / name) for name in ("checks", "cli", "c
 import plants  # noqa: E402
 from command_line import call  # noqa: E402
 from good_files import File, simulated  # noqa: E402
+from stages_by_hand import made  # noqa: E402
 
-from kinacc.calibration import stages  # noqa: E402
 from kinacc.campaign import folder as campaigns  # noqa: E402
-from kinacc.report import summarise  # noqa: E402
-from kinacc.study import (  # noqa: E402
-    evaluation,
-    histories,
-    monte_carlo,
-)
-from kinacc.study.claims.evaluate import table_of  # noqa: E402
-from kinacc.synthetic import source  # noqa: E402
 from kinacc.tables import store  # noqa: E402
 from kinacc.workflow.data_sets import DataSets, read_data_sets  # noqa: E402
 
@@ -39,35 +30,23 @@ RESULTS = GOLDEN / "results"
 MARKS = {"kinacc_version": "golden", "config_hash": "golden", "seed": "0"}
 MODELS = ("vec_model", "dh_model", "frames")
 
-# Stages by name: the function, and the golden tables it reads.
-STAGES: dict[str, tuple[Callable, tuple[str, ...]]] = {
-    "measurements": (source.run, ()),
-    "fit_vec": (partial(stages.fit_model, kind="vec"), ("measurements",)),
-    "fit_dh": (
-        partial(stages.fit_model, kind="dh"),
-        ("measurements", "vec_model", "vec_frames"),
-    ),
-    "residuals": (stages.compare_models, ("measurements", *MODELS, "vec_orders")),
-    "summary": (
-        summarise.run,
-        ("measurements", "robot", *MODELS, "dh_identified", "pose_errors", "model_selection",
-         "vec_fit", "vec_covariance", "dh_fit", "dh_covariance", "vec_orders"),
-    ),
-    "accuracy_map": (evaluation.mapped, MODELS),
-    "operating_points": (
-        evaluation.points,
-        ("measurements", *MODELS, "pose_errors"),
-    ),
-    "study": (monte_carlo.summed_up, ("study_chunk", "assessment_points")),
-    "histories": (histories.run, ("assessment_points",)),
-    "claims": (
-        table_of,
-        ("residuals", "dh_model", "assessment_points", "study", "study_summary", "readings",
-         "histories", "accuracy_map"),
-    ),
+# The golden tables that a stage reads.
+READS: dict[str, tuple[str, ...]] = {
+    "measurements": (),
+    "fit_vec": ("measurements",),
+    "fit_dh": ("measurements", "vec_model", "vec_frames"),
+    "residuals": ("measurements", *MODELS, "vec_orders"),
+    "summary": ("measurements", "robot", *MODELS, "dh_identified", "pose_errors", "model_selection",
+                "vec_fit", "vec_covariance", "dh_fit", "dh_covariance", "vec_orders"),
+    "accuracy_map": MODELS,
+    "assessment_points": ("measurements", *MODELS, "pose_errors"),
+    "study": ("study_chunk", "assessment_points"),
+    "histories": ("assessment_points",),
+    "claims": ("residuals", "dh_model", "assessment_points", "study", "study_summary", "readings",
+               "histories", "accuracy_map"),
 }  # fmt: skip
 CALIBRATION = ("measurements", "fit_vec", "fit_dh", "residuals", "summary")
-PAPER = (*CALIBRATION, "accuracy_map", "operating_points", "study", "histories", "claims")
+PAPER = (*CALIBRATION, "accuracy_map", "assessment_points", "study", "histories", "claims")
 DATA_SETS = {
     "mh180": PAPER,
     "ur10_d": CALIBRATION,
@@ -94,16 +73,9 @@ def write_simulated_files() -> None:
 
 def run_stage(data: DataSets, dataset: str, stage: str, folder: Path) -> dict[str, Mapping]:
     """Tables that one stage makes of the tables in a folder."""
-    function, reads = STAGES[stage]
-    tables = {
-        name: store.read(folder / f"{name}.parquet")
-        for name in reads
-        if (folder / f"{name}.parquet").is_file()
-    }
-    settings = dict(data.settings[dataset])
-    if stage == "study":
-        tables |= monte_carlo.simulated(tables, settings)
-    return function(tables, settings)
+    paths = {name: folder / f"{name}.parquet" for name in READS[stage]}
+    tables = {name: store.read(path) for name, path in paths.items() if path.is_file()}
+    return made(stage.removeprefix("fit_"), tables, data.settings[dataset])
 
 
 def write_tables(tables: Mapping[str, Mapping], folder: Path) -> None:

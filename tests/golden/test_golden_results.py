@@ -3,8 +3,8 @@
 import json
 
 import cases
+import numpy as np
 import pytest
-from measurements.scoring import same
 
 from kinacc.deployment.export.files import contents
 from kinacc.deployment.export.source import read_source
@@ -31,6 +31,17 @@ def test_a_stage_makes_its_golden_tables(name, stage, data, tmp_path):
         for each in compare_tables(golden / f"{table}.parquet", tmp_path / f"{table}.parquet")
     ]
     assert not differences, "\n".join(map(str, differences))
+
+
+def same(found: object, golden: object) -> bool:
+    """Whether two values agree: numbers to 1e-6, all else exactly."""
+    if isinstance(golden, dict):
+        return found.keys() == golden.keys() and all(same(found[k], golden[k]) for k in golden)
+    if isinstance(golden, list):
+        return len(found) == len(golden) and all(map(same, found, golden))
+    if isinstance(golden, float):
+        return np.isclose(found, golden, rtol=1e-6, atol=1e-6, equal_nan=True)
+    return found == golden
 
 
 FINDINGS = json.loads((cases.GOLDEN / "faults" / "findings.json").read_text())

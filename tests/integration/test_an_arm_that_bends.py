@@ -21,7 +21,7 @@ from oracles.compliant_arm import Arm, Body
 from oracles.kinematics import frame
 from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
-from stages_by_hand import perform
+from stages_by_hand import run_stages
 
 from kinacc import read_table
 
@@ -30,7 +30,6 @@ NOISE_MM = 0.03
 WEIGHT = 500.0  # mm per rad, the default of calibration.rotation_weight_mm_per_rad
 BASE = frame(2600.0, -400.0, 350.0, Rotation.from_rotvec([0.02, -0.03, 0.7]))
 TOOL = frame(40.0, -25.0, 180.0, Rotation.from_rotvec([0.3, -0.2, 0.5]))
-NAME = "bent"
 
 FANUC, MH180 = (compliant_arm.described(name) for name in ("fanuc_r2000ic_165f", "mh180"))
 FANUC_LINKS = (  # of a class of arms of 1.3 t; each centre in the DH frame its joint carries
@@ -119,19 +118,16 @@ def calibrated(
     settings = {
         "measurements": {"folds": folds} if folds else {"folds": None, "validation_fold": None},
         "calibration": calibration,
-        "datasets": {NAME: {"robot": cell.robot, "measurements": {"source": "file", "file": file}}},
+        "datasets": {
+            "bent": {"robot": cell.robot, "measurements": {"source": "file", "file": file}}
+        },
     }
     config = folder / "cell.yaml"
     config.write_text(yaml.safe_dump(settings))
-    stages = [
-        "measurements",
-        "vec",
-        "compliance",
-        *(["dh", "residuals", "summary"] if folds else []),
-    ]
-    for name in stages:
-        perform(name, [str(config)], folder / "results", NAME)
-    return folder / "results" / NAME
+    held_out = ("dh", "residuals", "summary") if folds else ()
+    return run_stages(
+        ("measurements", "vec", "compliance", *held_out), [config], folder / "results"
+    )
 
 
 def fanuc(seed: int, loads: Sequence[Body], compliance=BENT) -> Cell:

@@ -60,8 +60,7 @@ def calibrated(folder, gears_rad):
     """The configuration and the results folder of such an arm."""
     config = written(folder, gears_rad)
     stages = ("measurements", "data_check", "vec", "dh", "residuals", "summary")
-    run_stages(stages, [config], folder / "results")
-    return config, folder / "results" / "arm"
+    return config, run_stages(stages, [config], folder / "results")
 
 
 @pytest.fixture(scope="module")

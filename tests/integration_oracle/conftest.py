@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from oracles.small_study import SETTINGS, run_stages, write_measurements
+from oracles.small_study import SETTINGS, write_measurements
+from stages_by_hand import STUDIED, run_stages
 
 
 @pytest.fixture(scope="session")
@@ -22,4 +23,4 @@ def papers_arm(tmp_path_factory, measured) -> Path:
     folder = tmp_path_factory.mktemp("study")
     config = folder / "config.yaml"
     config.write_text(SETTINGS % ("synthetic", measured), encoding="utf-8")
-    return run_stages(config, "small", folder / "results")
+    return run_stages(STUDIED, [config], folder / "results")

@@ -6,7 +6,8 @@ import numpy as np
 import pandas as pd
 import pytest
 import shared_data
-from oracles import small_study, tables
+from oracles import tables
+from stages_by_hand import run_stages
 
 # An independent fit's cross-validated position rms over several random splits, upper end.
 REACH_MM = {"series_B": 0.475, "series_D": 0.43}
@@ -28,7 +29,7 @@ def series(request, tmp_path_factory):
     path = shared_data.path_of(f"ur10_tmac/{request.param}.csv")
     config.write_text(SETTINGS % path, encoding="utf-8")
     stages = ("measurements", "vec", "dh", "residuals", "assessment_points")
-    return request.param, small_study.run_stages(config, "arm", folder / "results", stages)
+    return request.param, run_stages(stages, [config], folder / "results")
 
 
 def test_residuals_of_the_measured_arm(series):

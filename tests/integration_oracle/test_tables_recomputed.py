@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 from oracles import small_study, tables
+from stages_by_hand import run_stages
 
 PAPER = {
     ("table1", "vec_vs_measured", "position"): (0.705, 1.635, 1.731),
@@ -63,8 +64,7 @@ def calibrated(tmp_path_factory, measured):
         settings = settings.replace("validation_fold: 1", f"validation_fold: {fold}")
         (folder / "config.yaml").write_text(settings, "utf-8")
         stages = ("measurements", "vec", "dh", "residuals")
-        run = small_study.run_stages(folder / "config.yaml", "small", folder / "results", stages)
-        folders.append(run)
+        folders.append(run_stages(stages, [folder / "config.yaml"], folder / "results"))
     return folders
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import re
+import warnings
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -78,10 +79,12 @@ def fault(measured: SimpleNamespace, folder: Path) -> str:
     described = call("init", *measured.files, *words)
     if described.exit_code == 0:
         try:
-            read = run_stages(["measurements"], [folder / "n.yaml"], folder / "r")
+            with warnings.catch_warnings(record=True) as told:
+                warnings.simplefilter("always")
+                run_stages(["measurements"], [folder / "n.yaml"], folder / "r")
         except KinaccError as error:
             return f"run: {error}"
-        said = described.output + read
+        said = "\n".join([described.output, *(str(each.message) for each in told)])
         wrong = difference(measured, folder / "r" / "n")
         silent = not re.search(measured.says, said, re.IGNORECASE)
         return wrong or ("does not say so" if silent else "")

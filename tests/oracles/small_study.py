@@ -1,4 +1,4 @@
-"""Small but whole studies run stage by stage, and measurements that nothing of kinacc made."""
+"""Settings of small but whole studies, and measurements that nothing of kinacc made."""
 
 from __future__ import annotations
 
@@ -58,18 +58,3 @@ def write_measurements(path: Path) -> None:
         angles = Rotation.from_matrix(frame[:3, :3]).as_euler("XYZ", degrees=True).round(8)
         lines.append(",".join(repr(float(x)) for x in [*row, *position, *angles]))
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-
-
-def run_stages(config: Path, dataset: str, results: Path, names: tuple[str, ...] = ()) -> Path:
-    """Every stage of a data set but its figures, or those named; its folder."""
-    from stages_by_hand import STAGES, perform
-
-    from kinacc.workflow.data_sets import read_data_sets
-
-    data = read_data_sets([str(config)])
-    left_out = {"compliance", "excluded_rows"}
-    left_out |= {"claims"} if data.is_measured(dataset) else {"data_check"}
-    for stage in STAGES:
-        if (stage in names) if names else (stage not in left_out):
-            perform(stage, [str(config)], results, dataset)
-    return results / dataset

@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 from command_line import answer, call, small_study
 from held_out_errors import held_out_mm
-from stages_by_hand import perform
+from stages_by_hand import run_stages
 
 from kinacc.calibration.summary import TABLES
 from kinacc.campaign.campaign import Campaign
@@ -23,7 +23,7 @@ def study(tmp_path_factory):
     """Results of a small synthetic study, up to its summary."""
     base = tmp_path_factory.mktemp("study")
     small_study(base)
-    return perform("summary", [str(base / "small.yaml")], base / "results")
+    return run_stages(["summary"], [base / "small.yaml"], base / "results")
 
 
 @pytest.fixture

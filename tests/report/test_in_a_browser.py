@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from chromium import PHONE, Chromium
-from oracles.small_study import run_stages
+from stages_by_hand import STUDIED, run_stages
 
 SMALL = """\
 datasets: {small: {robot: mh180}}
@@ -42,7 +42,7 @@ def folder(tmp_path_factory) -> Path:
     """Results of a small study of the paper's arm: every section of the page has its tables."""
     base = tmp_path_factory.mktemp("small")
     (base / "small.yaml").write_text(SMALL)
-    return run_stages(base / "small.yaml", "small", base / "results")
+    return run_stages(STUDIED, [base / "small.yaml"], base / "results")
 
 
 @pytest.fixture(scope="session")
