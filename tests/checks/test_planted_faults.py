@@ -256,3 +256,15 @@ def test_sound_rows_that_alone_show_a_movement_are_no_slips(tmp_path):
     file = measured("ur10_d").rows(slice(0, 299, 5))
     file = file.but(q4_deg=file.columns["q4_deg"] + np.rad2deg(1e-3))
     assert file.check(tmp_path).suspicions == ()
+
+
+def test_one_target_touched_in_one_row_shows_by_its_distances_where_the_arm_errs_by_more(tmp_path):
+    file = simulated(poses=80, targets=("mA", "mB"), noise_mm=0.03)
+    errors = 0.3 * np.random.default_rng(4).normal(size=(80, 3))  # the same for both targets
+    names = plants.points(file)
+    file = plants.put(
+        file, names, EVERY(file), plants.taken(file, names, EVERY(file)) + np.tile(errors, 2)
+    )
+    assert not file.check(tmp_path).suspicions
+    touched = plants.put(file, ["mA_x_mm"], [33], plants.taken(file, ["mA_x_mm"], [33]) + 1.0)
+    only(touched.check(tmp_path), "outliers", [33])

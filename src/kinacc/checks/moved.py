@@ -234,12 +234,12 @@ def _drifts_mm(whole: Fitted, split: Fitted) -> dict[str | None, ndarray]:
 
 
 def by_distances(every: Readings, distances: list[Distance]) -> tuple[list[Finding], Readings]:
-    """Targets that moved against the others.
+    """Targets that moved against the others, and single rows in which one stood elsewhere.
 
     Findings, and the readings in which a target that moved counts as another from there on.
     """
     moved, line, names = every, every.line, every.target_names
-    moves = ((distance, *_move(distance.length_mm)) for distance in distances)
+    moves = [(distance, *_move(distance.length_mm)) for distance in distances]
     steps, findings = [move for move in moves if move[2]], []
     while steps:
         # The target that most of the changed distances have in common.
@@ -265,6 +265,17 @@ def by_distances(every: Readings, distances: list[Distance]) -> tuple[list[Findi
                 largest_change_mm=max(abs(size) for _, _, size in mine),
             )
         )
+    off: list[int] = []
+    largest = 0.0
+    for distance, place, size in moves:
+        length = distance.length_mm - size * (np.arange(len(distance.rows)) >= place)
+        away = np.abs(length - np.median(length))
+        far = away > tails.limit(away, 1, len(away) * len(moves))
+        off += line[distance.rows[far, 0]].tolist()
+        largest = max(largest, float(away[far].max(initial=0.0)))
+    if off:
+        count = len({*off})
+        findings.append(finding("outliers/distances", off, count=count, largest_mm=largest))
     return findings, moved
 
 
