@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
@@ -11,17 +11,16 @@ import pandas as pd
 from kinacc.checks import digits
 from kinacc.checks import repeatability as checks
 from kinacc.checks.repeatability import Noise
-from kinacc.config.measured import POSITION
 from kinacc.errors import InputError, Problem, first_few, refuse
-from kinacc.measurements.layout import find, listed
-from kinacc.measurements.reader import stacked
-from kinacc.measurements.rows import open_table
+from kinacc.measurements.layout import listed
+from kinacc.measurements.rows import POINTS, read_rows
 from kinacc.measurements.table import RawTable
 from kinacc.measurements.times import seconds
 
 FORMAT = "kinacc repeatability 1"
 _LEAST_MM = 1e-6  # no instrument scatters less
-_NAMES = {"pose": ("pose",), "side": ("side", "direction"), "visit": ("visit", "approach")}
+_NAMES = {"direction": "side", "side": "side", "approach": "visit", "visit": "visit"}
+_NAMES |= {"instrument": "instrument"}
 _EMPTY = ("", "nan", "None")  # + and - are names of sides
 _SINGLE = ("target", "session", "instrument")
 _HOURS = {"time": 1.0 / 3600.0, "time_s": 1.0 / 3600.0, "time_min": 1.0 / 60.0, "time_h": 1.0}
@@ -125,31 +124,31 @@ def read_repeats(path: str, rows_are: str | None) -> RepeatedFile:
         With all problems of the file.
     """
     problems: list[Problem] = []
-    table, layout, notes = open_table(path)
-    layout_columns = find(table, layout, np.zeros(0), problems, POSITION)
-    refuse(problems, f"{path} cannot be used")
-    axes = layout_columns.targets[0].position
-    position = stacked(table, axes, problems, gaps=False)
-    singles = {place.column: name for name, place in layout_columns.single.items()}
-    table = replace(table, columns=table.columns.rename(columns=singles))
+    read = read_rows(path, np.zeros(0), POINTS, spoilt=problems)
+    assert read.table is not None  # as of every file
+    assert read.columns is not None
+    table = read.table
+    names = {ours: column for column, ours in _NAMES.items() if column in table.columns}
+    names |= {name: place.column for name, place in read.columns.single.items()}
     rows = pd.DataFrame({"side": "", "visit": "", "hours": math.nan}, index=range(len(table)))
-    if "pose" not in table.columns:
+    if "pose" not in names:
         problems.append(Problem(f"{path}: column pose", "is missing", fix=listed(table)))
-    columns = {name: [n for n in names if n in table.columns] for name, names in _NAMES.items()}
-    for name, column in ((name, names[0]) for name, names in columns.items() if names):
-        rows[name] = [str(cell).strip().removesuffix(".0") for cell in table.columns[column]]
+    for name in (name for name in ("pose", "side", "visit") if name in names):
+        rows[name] = [text.removesuffix(".0") for text in table.texts(names[name])]
         gaps = np.flatnonzero(rows[name].isin(_EMPTY))
         if gaps.size:
-            problems.append(Problem(table.where(column, gaps), "an empty cell", fix="fill it in"))
-    for name in table.columns.columns.intersection(_SINGLE):
-        if len(kinds := {*table.texts(name)}) > 1:
+            where = table.where(names[name], gaps)
+            problems.append(Problem(where, "an empty cell", fix="fill it in"))
+    for name in (name for name in _SINGLE if name in names):
+        if len(kinds := {*table.texts(names[name])}) > 1:
             message, fix = f"holds several: {first_few(sorted(kinds))}", "one file for each"
-            problems.append(Problem(table.where(name), message, "one", fix))
-    if timed := [name for name in _HOURS if name in table.columns]:
-        rows["hours"] = seconds(table, timed[0], problems) * _HOURS[timed[0]]
+            problems.append(Problem(table.where(names[name]), message, "one", fix))
+    time = next((name for name in _HOURS if name in table.columns), None)
+    if time is not None:
+        rows["hours"] = seconds(table, time, problems) * _HOURS[time]
         if (gaps := np.flatnonzero(rows["hours"].isna())).size:
-            problems.append(Problem(table.where(timed[0], gaps), "no time"))
-    if "pose" in rows and not columns["visit"]:
+            problems.append(Problem(table.where(time, gaps), "no time"))
+    if "pose" in rows and "visit" not in names:
         again = np.flatnonzero(rows["pose"] == rows["pose"].shift())
         if rows_are is None and again.size:
             where = f"{path}: {table.rows_in_words(again)}"
@@ -161,11 +160,11 @@ def read_repeats(path: str, rows_are: str | None) -> RepeatedFile:
     if not problems and rows["pose"].is_unique:
         problems.append(Problem(path, "no pose has more than one reading"))
     refuse(problems, f"{path} cannot be used")
-    used = {axis.column for axis in axes}.union(*_NAMES.values(), _SINGLE, _HOURS)
-    unused = ", ".join(name for name in table.columns if name not in used)
-    notes = (*notes, f"not used: {unused}") if unused else notes
+    unused = [name for name in read.unused if name not in {time, *names.values()}]
+    notes = (*read.notes, f"not used: {', '.join(unused)}") if unused else read.notes
+    axes = read.columns.targets[0].position
     steps = [digits.step(table.columns[a.column], a.factor, table.decimal) for a in axes]
-    rows[checks.AXES] = position
+    rows[checks.AXES] = read.position_mm
     return RepeatedFile(table, rows, np.array(steps), notes)
 
 

@@ -255,29 +255,28 @@ class _Guesser:
         known, usual, small, largest = _UNITS[setting]
         if not names:
             return usual
-        answer, stated = self.answers.get(setting), {name.unit for name in names} - {""}
-        columns = [name.column for name in names]
+        answer, columns = self.answers.get(setting, ""), [name.column for name in names]
+        units = ({name.unit for name in names} | {answer}) - {""}
+        units = units or {*filter(None, [self.looked.stated.get(setting.removesuffix("_unit"))])}
         most = np.nanmax(np.abs(self.stacked(names)), initial=0.0)
-        unit = answer or next(iter(stated), "")
-        unit = unit or self.looked.stated.get(setting.removesuffix("_unit"), "")
-        message, allowed = "", ""
-        if len({*stated, unit} - {""}) > 1:
-            option = f" (--{setting.replace('_', '-')} {answer})" if answer else ""
-            message = f"are in {' and '.join(sorted({*stated, unit}))}{option}"
-            allowed = "one unit for all"
-        elif unit and unit not in known:
-            message, allowed = f"are in {unit}", " or ".join(known)
-        elif unit == "m" and most > largest:
-            message = f"are in m, and the largest number is {most:.4g}"
-            allowed = f"at most {largest:g} m"
-        elif not unit:
+        if not units:
             unit = small if most <= largest else usual
             text = f"{listed(columns)} are in {unit}: the largest number is {most:.4g}"
             self.assumed[setting] = text
-        if message:
-            where = f"{self.table.path}: columns {', '.join(columns)}"
-            self.problems.append(Problem(where, message, allowed))
-        return unit if unit in known else usual
+            return unit
+        unit = min(units)
+        if len(units) > 1:
+            option = f" (--{setting.replace('_', '-')} {answer})" if answer else ""
+            wrong = f"are in {' and '.join(sorted(units))}{option}", "one unit for all"
+        elif unit not in known:
+            wrong = f"are in {unit}", " or ".join(known)
+        elif unit == "m" and most > largest:
+            wrong = f"are in m, and the largest number is {most:.4g}", f"at most {largest:g} m"
+        else:
+            return unit
+        where = f"{self.table.path}: columns {', '.join(columns)}"
+        self.problems.append(Problem(where, *wrong))
+        return usual
 
     def orientation(self, angle_unit: str) -> dict[str, str]:
         """The section on orientations, as answered or by the names of their columns."""
