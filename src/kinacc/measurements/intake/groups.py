@@ -166,10 +166,9 @@ def _numbered(names: Sequence[Name], values: Values | None) -> Iterator[Group]:
         ):
             yield Group(POSE, role(terms), "", dict(zip("123456", row, strict=True)))
         elif len(row) == 3 and about & (WORDS["turn"] - WORDS["joint"]):
-            if {name.unit for name in row} in ({"deg"}, {"rad"}):
-                turned = dict(zip(("rx", "ry", "rz"), row, strict=True))
-                target = _target(row[0], None, True)
-                yield Group(TURN, role(terms), target, turned, ("euler", "XYZ"))
+            turned = dict(zip(("rx", "ry", "rz"), row, strict=True))
+            target = _target(row[0], None, True)
+            yield Group(TURN, role(terms), target, turned, ("euler", "XYZ"))
         elif 6 - 2 * is_joint <= len(row) <= 7:
             yield _joints(row, terms, weak=not is_joint)
 
@@ -177,7 +176,7 @@ def _numbered(names: Sequence[Name], values: Values | None) -> Iterator[Group]:
 def _is_quaternion(row: list[Name], about: set[str], values: Values | None) -> bool:
     """Whether four numbered columns are a quaternion, by their terms and their length."""
     if values is None or not about & (WORDS["quaternion_or_joint"] | WORDS["quaternion"]):
-        return bool(about & (WORDS["quaternion"] - {"q"}))
+        return False
     length = np.sqrt(sum(values(name) ** 2 for name in row))
     length = length[np.isfinite(length)]
     return length.size > 0 and bool(np.mean(np.abs(length - 1.0) < _UNIT_LENGTH) > 0.9)
@@ -188,21 +187,16 @@ def _joints(row: Sequence[Name], terms: Sequence[str], weak: bool = False) -> Gr
     rest = [t for t in rest if role([t]) != CALCULATED]
     known = NOMINAL if commands(rest) else role(rest)
     known = REPORTED if known == MEASURED else known
-    if weak and WORDS["external"] & {*terms}:
-        known = OTHER
     columns = {f"q{number}": name for number, name in enumerate(row, 1)}
     return Group(JOINTS, known, "", columns, weak=weak)
 
 
 def _named_joints(names: Sequence[Name]) -> Iterator[Group]:
     """Joints by the names that those of some arms have."""
-    taken: set[str] = set()
     for series in WORDS["named_joints"]:
-        free = [name for name in names if name.column not in taken]
-        for terms, _, columns in _alike(free, "|".join(series)):
+        for terms, _, columns in _alike(names, "|".join(series)):
             known = all(t in WORDS["joint"] or role([t]) != PLAIN for t in terms)
             if {*columns} == {*series} and (known or len(series[0]) > 1):
-                taken |= {name.column for name in columns.values()}
                 yield _joints([columns[joint] for joint in series], terms)
 
 
@@ -216,8 +210,8 @@ def _by_axis(names: Sequence[Name]) -> Iterator[Group]:
         is_turn = stem in ("r", "rv") or bool(about & WORDS["turn"])
         vector = stem == "rv" or (bool(about & WORDS["vector"]) and is_turn)
         known = role([t for t in terms if not (vector and t == "vector")])
-        letters = [t for t in first.terms[first.terms.index(f"{stem}x") + 1 :] if len(t) == 1]
-        if known == PLAIN and any(t.isalpha() and t not in WORDS["turn"] for t in letters):
+        behind = first.terms[first.terms.index(f"{stem}x") + 1 :]
+        if known == PLAIN and any(len(term) == 1 and term.isalpha() for term in behind):
             known = OPEN  # x_n, x_c: the meaning of the letter is open
         if stem == "q" or about & WORDS["quaternion"] or (is_turn and "w" in axes and not stem):
             if "w" in axes:

@@ -29,7 +29,6 @@ from kinacc.measurements.joining import (
 from kinacc.measurements.layout import ANGLE, LENGTH
 from kinacc.measurements.times import offsets, seconds, standstills
 
-_FEWEST_NAMES = 0.05  # of the rows: targets of a pose stand in rows of their own
 _SHARE = 0.5  # of the points: fewer in common are no key
 
 
@@ -64,8 +63,6 @@ def _sheets(path: Path, answers: Answers) -> list[str]:
 
 def _together(files: Sequence[Looked], answers: Answers) -> Looked:
     holding = [file for file in files if file.columns.joints]
-    if len(holding) == 2:  # a controller's log may hold points too, a tracker's file no joints
-        holding = [file for file in files if not file.columns.targets]
     others = [file for file in files if file not in holding]
     if len(holding) != 1 or not others[0].columns.targets:
         paths = " and ".join(file.table.path for file in files)
@@ -111,11 +108,7 @@ def _join(joints: Looked, points: Looked, answers: Answers) -> tuple[JointsFile,
     times = _times(joints), _times(points)
     if all(times):
         return _by_clock(joints, points, *times, answers)
-    if len(points.table) == len(joints.table):
-        raise _undecided(joints, points, [])
-    message = f"its {len(points.table)} points belong to unknown rows of {joints.table.path}"
-    fix = "add a column with the names of poses, or with times, to both; --join A=B names them"
-    raise input_error(points.table.path, message, fix=fix)
+    raise _undecided(joints, points, [])
 
 
 def _by_name(key: str, key_of_points: str) -> JointsFile:
@@ -124,7 +117,7 @@ def _by_name(key: str, key_of_points: str) -> JointsFile:
 
 def _by_names(joints: Looked, points: Looked) -> tuple[str, str] | None:
     """The columns whose names of poses are those of the other file. Asks where several differ."""
-    ways: list[tuple[int, tuple[str, str], bytes, bool]] = []
+    ways: list[tuple[tuple[str, str], bytes, bool]] = []
     as_many = len(joints.table) == len(points.table)
     for keys in product(_keys(joints), _keys(points)):
         with gathered([]):
@@ -133,17 +126,16 @@ def _by_names(joints: Looked, points: Looked) -> tuple[str, str] | None:
             if count >= max(_SHARE * min(len(row), len(joints.table)), 2):
                 counts = all(_counts_rows(file, key, as_many)
                              for file, key in zip((joints, points), keys, strict=True))  # fmt: skip
-                ways.append((count, keys, row.tobytes(), counts))
+                ways.append((keys, row.tobytes(), counts))
     # A count of rows is no name: a point that was left out shifts all behind it.
-    certain = [way for way in ways if not way[3]]
-    ways = sorted(certain or ways, key=lambda way: -way[0])
-    if ways and (not certain or len({rows for _, _, rows, _ in ways}) > 1):
-        raise _undecided(joints, points, [keys for _, keys, *_ in ways])
-    return ways[0][1] if ways else None
+    certain = [(keys, rows) for keys, rows, counts in ways if not counts]
+    if ways and len({rows for _, rows in certain}) != 1:
+        raise _undecided(joints, points, [keys for keys, *_ in certain or ways])
+    return certain[0][0] if certain else None
 
 
 def _keys(file: Looked) -> list[str]:
-    """Columns that may name poses: texts or whole numbers that hardly repeat, and no times."""
+    """Columns that may name poses: texts or whole numbers, and no times."""
     used = replace(file.columns, single={}).read()
     keys = []
     for name in columns.names_in(file.table):
@@ -151,8 +143,8 @@ def _keys(file: Looked) -> list[str]:
         timed = bool(WORDS["time"] & {*name.terms}) or any(":" in label for label in names)
         numbers = np.isfinite(file.table.values(name.column))
         whole = np.array([label.isdigit() for label in names])
-        is_key = len({*names}) > max(_FEWEST_NAMES * len(names), 1) and not name.unit and not timed
-        if is_key and name.column not in used and not (numbers & ~whole).any():
+        is_name = not name.unit and not timed and not (numbers & ~whole).any()
+        if is_name and name.column not in used and len({*names}) > 1:
             keys.append(name.column)
     return keys
 
@@ -207,5 +199,6 @@ def _undecided(joints: Looked, points: Looked, ways: Sequence[tuple[str, str]]) 
     answers = {f"{key}={other}": f"{key} of the joints is {other}" for key, other in ways}
     if count == others:
         answers[ORDER] = "the first row belongs to the first, and so on"
+    answers = answers or {"A=B": "columns A of the joints and B of the points name the poses"}
     about = f"nothing decides which of {others} rows of joints belong to {count} points"
     return Undecided(points.table.path, Choice("--join", about, answers))

@@ -32,25 +32,15 @@ def with_targets(
     """
     if len(columns.targets) != 1:
         return columns
-    named = [columns.single[n].column for n in ("pose", "session") if n in columns.single]
-    keys = table.columns[named].astype(str) if "pose" in columns.single else pd.DataFrame(q_rad)
-    pose = keys.groupby([*keys.columns], sort=False).ngroup().to_numpy()
-    pose = np.where(np.isfinite(q_rad).all(axis=1), pose, -1)
-    if np.max(_spans(q_rad, pose), initial=0.0) > _STILL_RAD:
-        pose = np.full(len(pose), -1)
+    keys = pd.DataFrame(np.round(q_rad / _STILL_RAD))
+    if "session" in columns.single:
+        keys["session"] = table.texts(columns.single["session"].column)
+    pose = keys.groupby([*keys.columns], sort=False).ngroup().fillna(-1).to_numpy(int)
     target = columns.single.get("target")
     radius = next((g.names[0] for g in columns.aside if g.kind == RADIUS), "")
     size = np.nan_to_num(table.values(radius)) if radius else np.zeros(len(table))
     if np.ptp(size) > _SAME_RADIUS * np.max(size):
         # A reflector of another radius has its centre elsewhere in the same nest.
-        if target:
-            wrong = pd.Series(size).groupby(table.texts(target.column)).nunique().max() > 1
-        else:
-            of_radius = np.where(pose < 0, -1, pd.factorize(size)[0] * len(pose) + pose)
-            wrong = _are_apart(point_mm, of_radius) or len({*size}) > _MOST_TARGETS
-        if wrong:
-            message = "the radius of the reflectors changes, so that their centres lie elsewhere"
-            raise input_error(table.where(radius), message, _ALLOWED)
         return columns if target else _with_target(columns, radius)
     if target or not _are_apart(point_mm, pose):
         return columns
@@ -103,7 +93,7 @@ def counts_readings(table: RawTable, columns: NamedColumns, q_rad: np.ndarray) -
     """
     names = table.texts(columns.single["pose"].column) if "pose" in columns.single else []
     poses = [AGAIN.sub("", name) for name in names]
-    if any(a == b for a, b in zip(names, poses, strict=True)) or len({*names}) < len(names):
+    if any(a == b for a, b in zip(names, poses, strict=True)):
         return False
     if any(WORDS["approach"] & {*name_of(column).terms} for column in table.columns):
         return False
