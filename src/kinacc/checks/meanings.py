@@ -120,13 +120,13 @@ def find(
     if least >= _BETTER * written.sigma_mm / spread or least > FAR:
         return read, []
     (_, found_mm, applied), *others = (item for item in fitted if item[0] < _AS_GOOD * least)
-    texts = {change.finding.what for change in applied}
-    rivals: dict[str, None] = {}
-    for _, _, rival in others:
-        parts = [change.finding.what for change in rival]
-        if not texts <= {*parts}:
-            rivals[" and ".join(text for text in parts if text not in texts)] = None
-    equal = ", or ".join(list(rivals)[:3])
+    known = {change.finding.what for change in applied}
+    rivals = [[change.finding.what for change in rival] for _, _, rival in others]
+    equal = ", or ".join(
+        " and ".join(text for text in texts if text not in known)
+        for texts in rivals
+        if not known <= {*texts}
+    )
     numbers = {"as_written_mm": written.sigma_mm, "found_mm": found_mm}
     detail = " ({as_written_mm:.3g} mm per axis as written, {found_mm:.3g} mm so{equal})"
     findings = []

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -12,7 +11,7 @@ import numpy as np
 
 from kinacc.config.measured import CONVENTIONS
 from kinacc.errors import Problem, input_error, refuse
-from kinacc.measurements.column_names import NOMINAL, Name
+from kinacc.measurements.column_names import Name
 from kinacc.measurements.faults import BEYOND, is_no_coordinate, none_read
 from kinacc.measurements.intake import pairs, targets_in_rows
 from kinacc.measurements.intake.choices import TAKE, Answers, Choice, Undecided
@@ -171,8 +170,6 @@ def _missing(
         why = "; ".join(f"{group.text}: {group.why_unread}" for group in spare)
         why = f" ({why})" if why else f" in {', '.join(table.columns)}"
         fix = f"name them {names} (also by --names), or give joints and points as two files"
-        nominal = [g.names[0] for g in spare if g.kind == POINT and g.role == NOMINAL][:1]
-        fix += "".join(f"; --take {shlex.quote(name)} reads them all the same" for name in nominal)
         yield Problem(path, f"{message} were found{why}", fix=fix)
 
 
