@@ -1,7 +1,6 @@
 """Figures that a check states beside its findings, against simulated truth."""
 
 import numpy as np
-import pandas as pd
 import pytest
 from good_files import simulated
 
@@ -53,14 +52,3 @@ def test_axes_that_scatter_alike_are_called_different_as_often_as_stated(freedom
     for level in (0.05, 0.2):  # within four standard deviations
         wide = 4.0 * np.sqrt(level * (1.0 - level) / 3000)
         assert np.mean(np.array(chance) < level) == pytest.approx(level, abs=wide)
-
-
-def test_repeatability_over_poses_pools_squares_about_the_mean_distance_of_each():
-    rng = np.random.default_rng(1)
-    distances = [rng.uniform(0.0, 0.1, count) for count in (3, 8, 30)]
-    sides = pd.DataFrame({"visits": [3, 8, 30], "mean_distance_mm": [d.mean() for d in distances]})
-    sides["rp_mm"] = [d.mean() + 3.0 * d.std(ddof=1) for d in distances]
-    squares = sum(np.sum((d - d.mean()) ** 2) for d in distances)
-    mean = np.concatenate(distances).mean()
-    rp = mean + 3.0 * np.sqrt(squares / (41 - 3))
-    np.testing.assert_allclose(repeatability.pooled_rp(sides), (mean, rp))

@@ -30,17 +30,21 @@ def visits(position_mm, **columns):
 
 
 def test_pose_repeatability_is_that_of_iso_9283_worked_by_hand(tmp_path):
-    position = np.stack([FIVE + 100.0 * np.arange(1, 4), 2.0 * FIVE])
-    result = estimated(tmp_path / "five.csv", visits(position))
-    distance = np.linalg.norm(FIVE - [0.04, -0.04, 0.06], axis=1)
-    mean, spread = sum(distance) / 5.0, (sum((distance - sum(distance) / 5.0) ** 2) / 4.0) ** 0.5
-    first, second = result["rows"]
-    assert first["rp_mm"] == pytest.approx(mean + 3.0 * spread, rel=1e-9)
-    assert second["rp_mm"] == pytest.approx(2.0 * (mean + 3.0 * spread), rel=1e-9)
-    pooled = (4.0 * (1.0 + 4.0) * spread**2 / 8.0) ** 0.5
-    assert result["mean_distance_mm"] == pytest.approx(1.5 * mean, rel=1e-9)
-    assert result["rp_mm"] == pytest.approx(1.5 * mean + 3.0 * pooled, rel=1e-9)
-    np.testing.assert_allclose(first["std_x_mm"], np.std(FIVE[:, 0], ddof=1), rtol=1e-9)
+    three = FIVE[:3]
+    rows = pd.concat([visits(FIVE[None] + 100.0 * np.arange(1, 4)), visits(three[None] * 2.0)])
+    rows["pose"] = ["P0"] * 5 + ["P1"] * 3
+    result = estimated(tmp_path / "five.csv", rows)
+    one = np.linalg.norm(FIVE - [0.04, -0.04, 0.06], axis=1)
+    other = 2.0 * np.linalg.norm(three - three.mean(axis=0), axis=1)
+    for row, distance in zip(result["rows"], (one, other), strict=True):
+        wanted = distance.mean() + 3.0 * distance.std(ddof=1)
+        assert row["rp_mm"] == pytest.approx(wanted, rel=1e-9)
+    mean = np.concatenate([one, other]).mean()
+    pooled = ((4.0 * one.var(ddof=1) + 2.0 * other.var(ddof=1)) / 6.0) ** 0.5
+    assert result["mean_distance_mm"] == pytest.approx(mean, rel=1e-9)
+    assert result["rp_mm"] == pytest.approx(mean + 3.0 * pooled, rel=1e-9)
+    std = np.std(FIVE[:, 0], ddof=1)
+    np.testing.assert_allclose(result["rows"][0]["std_x_mm"], std, rtol=1e-9)
 
 
 def test_instrument_visits_and_sides_are_separated_as_by_the_analysis_of_variance(tmp_path):

@@ -16,6 +16,7 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 from command_line import call
+from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 from stages_by_hand import run_stages
 
@@ -156,13 +157,13 @@ def _reach_mm(found: pd.DataFrame, joints: list[str], results: Path) -> float:
     text = pd.read_parquet(results / "robot.parquet")["description"][0]
     first = found[found["target"] == found["target"].iloc[0]]
     pose = robot.forward(robot.of_text(text, "arm.yaml"), first[joints].to_numpy(float))
-    turned, moved, seen = pose.rotation, pose.position_mm, first[XYZ].to_numpy(float)
-    target = np.zeros(3)
-    for _ in range(60):
-        reached = turned @ target + moved
-        base, _ = Rotation.align_vectors(seen - seen.mean(0), reached - reached.mean(0))
-        place = seen.mean(0) - base.apply(reached.mean(0))
-        wanted = base.inv().apply(seen - place) - moved
-        target = np.einsum("nij,ni->j", turned, wanted) / len(seen)
-    off = base.apply(turned @ target + moved) + place - seen
-    return float(np.sqrt((off**2).sum(axis=1).mean()))
+    seen = (first[XYZ] - first[XYZ].mean()).to_numpy(float)
+
+    def off(target: np.ndarray) -> np.ndarray:
+        reached = pose.rotation @ target + pose.position_mm
+        reached -= reached.mean(axis=0)
+        base, _ = Rotation.align_vectors(seen, reached)
+        return np.linalg.norm(base.apply(reached) - seen, axis=1)
+
+    least = least_squares(off, np.zeros(3), x_scale=100.0)
+    return float(np.sqrt(np.mean(least.fun**2)))

@@ -49,20 +49,6 @@ def refused(folder, columns, **given) -> str:
     return str(caught.value)
 
 
-def test_targets_are_found_by_their_names_and_may_be_missing(tmp_path, joints):
-    one, two = points("mA_"), {n: v.astype(object) for n, v in points("ball 2_", 100.0).items()}
-    for name in two:
-        two[name][[1, 4]] = ""
-    columns = reading(tmp_path, joints | one | two).columns
-    assert list(columns["target"][:3]) == ["mA", "ball 2", "mA"]
-    second = columns["target"] == "ball 2"
-    np.testing.assert_array_equal(columns["pose"][second], [0, 2, 3, 5, 6, 7])
-    np.testing.assert_array_equal(columns["row"][second], [2, 4, 5, 7, 8, 9])
-    np.testing.assert_array_equal(columns["x_mm"][second], 100.0 + 7.0 * columns["pose"][second])
-    assert (columns["repeat"] == 0).all()
-    assert np.isnan(columns["qw"]).all()
-
-
 def test_half_a_point_is_no_reading_of_its_target(tmp_path, joints):
     one = {n: v.astype(object) for n, v in points("mA_").items()}
     one["mA_y_mm"][2] = ""
