@@ -133,11 +133,11 @@ def read_repeats(path: str, rows_are: str | None) -> RepeatedFile:
     rows = pd.DataFrame({"side": "", "visit": "", "hours": math.nan}, index=range(len(table)))
     if "pose" not in names:
         problems.append(Problem(f"{path}: column pose", "is missing", fix=listed(table)))
-    for name in (name for name in ("pose", "side", "visit") if name in names):
-        rows[name] = [text.removesuffix(".0") for text in table.texts(names[name])]
-        gaps = np.flatnonzero(rows[name].isin(_EMPTY))
+    for label in (label for label in ("pose", "side", "visit") if label in names):
+        rows[label] = [text.removesuffix(".0") for text in table.texts(names[label])]
+        gaps = np.flatnonzero(rows[label].isin(_EMPTY))
         if gaps.size:
-            where = table.where(names[name], gaps)
+            where = table.where(names[label], gaps)
             problems.append(Problem(where, "an empty cell", fix="fill it in"))
     for name in (name for name in _SINGLE if name in names):
         if len(kinds := {*table.texts(names[name])}) > 1:
