@@ -115,21 +115,3 @@ def pytest_collection_modifyitems(items):
         elif place(item.path) < len(SLOW):
             item.add_marker(pytest.mark.slow)
     items.sort(key=lambda item: place(item.path))
-
-
-def pytest_terminal_summary(terminalreporter):
-    """Say how many tests were skipped because measured data, a browser or Slurm is absent."""
-    import shared_data
-
-    reasons = [str(report.longrepr) for report in terminalreporter.stats.get("skipped", ())]
-    absent = sum(shared_data.ABSENT in reason for reason in reasons)
-    if absent:
-        line = f"{absent} skipped: the measured data sets are expected in {shared_data.FOLDER}"
-        terminalreporter.write_line(line, yellow=True)
-    if any("Slurm absent" in reason for reason in reasons):
-        line = "runs on a cluster are tested as root with Debian's slurm-wlm and .venv/cluster"
-        terminalreporter.write_line(line, yellow=True)
-    unseen = sum("Chromium absent" in reason for reason in reasons)
-    if unseen:
-        line = f"{unseen} skipped: pages are looked at in Debian's chromium and chromium-driver"
-        terminalreporter.write_line(line, yellow=True)

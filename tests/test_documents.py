@@ -20,24 +20,25 @@ from kinacc.kinematics.robot import as_yaml
 
 ROOT = Path(__file__).parents[1]
 PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").rglob("*.md"))]
+every_page = pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 PLACE = re.compile(r"`((?:src|tests|tools|workflow|docs|examples|benchmarks)/[\w./-]+)`")
 MODULE = re.compile(r"\bkinacc(?:\.[a-z_]\w*)+")
 LINK = re.compile(r"\]\(([^)#\s]+)")
 SHOWN = re.compile(r"^(?:\$ )?kinacc ([a-z][^\n]*)", re.MULTILINE)
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+@every_page
 def test_links_lead_to_files(page):
     inside = [link for link in LINK.findall(page.read_text()) if "://" not in link]
     assert [link for link in inside if not (page.parent / link).exists()] == []
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+@every_page
 def test_files_that_are_named_are_there(page):
     assert [place for place in PLACE.findall(page.read_text()) if not (ROOT / place).exists()] == []
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+@every_page
 def test_modules_that_are_named_are_there(page):
     missing = []
     for name in set(MODULE.findall(page.read_text())):
@@ -49,7 +50,7 @@ def test_modules_that_are_named_are_there(page):
     assert missing == []
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+@every_page
 def test_commands_are_there_and_take_what_is_shown(page):
     shown = "\n".join(each.text for each in blocks(page) if each.language in ("console", "sh"))
     for line in SHOWN.findall(shown.replace("\\\n", " ")):
@@ -65,7 +66,7 @@ def test_commands_are_there_and_take_what_is_shown(page):
             command.make_context(command.name, list(words), parent=above)
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+@every_page
 def test_settings_that_are_shown_are_settings(page, tmp_path):
     for number, block in enumerate(blocks(page)):
         shown = yaml.safe_load(block.text) if block.language == "yaml" else {}

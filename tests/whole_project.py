@@ -11,13 +11,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pytest
 import shared_work
 import yaml
+from measured_files import write_readings
 from preloaded import python
+from scipy.spatial.transform import Rotation
 
-from kinacc import geometry
 from kinacc.config.load import overlay
 from kinacc.kinematics import dh, robot
 
@@ -61,11 +61,11 @@ class Project:
         """What ``kinacc`` prints."""
         return self.run([python(), "-m", "kinacc", *words])
 
-    def run(self, command: list[str], ok: bool = True) -> str:
-        """Output and errors of a command started in the project's folder."""
-        settings = os.environ | {"PYTHONPATH": str(self.folder / "src")}
+    def run(self, command: list[str], ok: bool = True, cwd: Path | None = None, **more: str) -> str:
+        """Output and errors of a command started in a folder, the project's if none is named."""
+        settings = os.environ | {"PYTHONPATH": str(self.folder / "src")} | more
         done = subprocess.run(
-            command, cwd=self.folder, env=settings, capture_output=True, text=True, check=False
+            command, cwd=cwd or self.folder, env=settings, capture_output=True, text=True
         )
         text = done.stdout + done.stderr
         assert (done.returncode == 0) == ok, text
@@ -117,12 +117,9 @@ def write_poses(path: Path) -> None:
     q_rad = arm.q_min_rad + share * (arm.q_max_rad - arm.q_min_rad)
     flange = dh.forward(arm.dh, arm.dh_joints(q_rad))
     position = flange.position_mm + generator.normal(0.0, 0.2, (60, 3))
-    turn = geometry.exp_so3(generator.normal(0.0, 2e-4, (60, 3)))
-    quaternion = geometry.quaternion_from_rotation(turn @ flange.rotation)
-    names = [*(f"q{i}_deg" for i in range(1, 7)), "x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz"]
-    table = pd.DataFrame(np.hstack([np.rad2deg(q_rad), position, quaternion]), columns=names)
+    turn = Rotation.from_rotvec(generator.normal(0.0, 2e-4, (60, 3)))
     path.parent.mkdir(parents=True, exist_ok=True)
-    table.to_csv(path, index=False, float_format="%.9f")
+    write_readings(path, q_rad, position, turn * Rotation.from_matrix(flange.rotation))
 
 
 @pytest.fixture(scope="session")

@@ -10,13 +10,12 @@ import paper_settings as paper
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from measured_worlds import measured_world
 from oracles import assessors as oracle
 from oracles.worlds import philox_words
 
 from kinacc.assess.invalidation_kernels import chi2_3, philox
 from kinacc.assess.model_invalidation import ModelInvalidation
-from kinacc.assess.world import drawn_world, key_of
+from kinacc.assess.world import World, drawn_world, key_of
 from kinacc.errors import InputError
 
 kinds = st.sampled_from(["plain", "own_noise", "tied", "zeros"])
@@ -25,6 +24,18 @@ words = st.integers(0, 2**64 - 1)
 
 SWITCHES = list(itertools.product(("squared", "as_printed"), ("r", "sqrt_r")))
 DECISION = 1e-11  # a probability this close to alpha may be decided either way by round-off
+
+
+def measured_world(first_mm, repeats_mm, sigma_mm) -> World:
+    """World of first readings (m, 3) and repeats (m, V, 3), noise a number or (m,), mm."""
+    first = np.asarray(first_mm, dtype=float)
+    readings = np.concatenate([first[:, None, :], np.asarray(repeats_mm, dtype=float)], axis=1)
+    points, visits = readings.shape[:2]
+    sums = np.cumsum(readings, axis=1)
+    sizes = np.sqrt(np.sum((sums / np.arange(1.0, visits + 1)[:, None]) ** 2, axis=2))
+    sigma = np.broadcast_to(np.asarray(sigma_mm, dtype=float), points).copy()
+    known, index = np.full(points, visits), np.arange(points)
+    return World(readings, known, sigma, first, np.zeros(2, np.uint64), index, sums[:, -1], sizes)
 
 
 class Case:

@@ -10,6 +10,7 @@ import pytest
 import shared_data
 import simulated
 from measured_arms import measured_arm
+from oracles.kinematics import MEASURED_RAD
 from scipy.stats import multivariate_normal
 from test_few_poses import settings
 
@@ -22,7 +23,7 @@ from kinacc.geometry import Pose, exp_so3
 from kinacc.kinematics import robot, vec
 
 ARM = robot.load("mh180")
-LOW, HIGH = np.deg2rad([(-10, 70), (-30, 54), (-74, 18), (-170, 170), (-120, 120), (-170, 170)]).T
+LOW, HIGH = MEASURED_RAD
 WEIGHT, POSES, NOISE_MM = 500.0, 200, 0.03
 FIXED = FrameParameters.none(known())
 WAVY = Prior(0.3, 0.3e-3, 1.0, 1e-4)

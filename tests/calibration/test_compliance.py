@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from dataclasses import asdict, replace
 
 import numpy as np
@@ -40,7 +39,7 @@ def measured(count=150):
 
 
 def fitted(seen, joints, gravity=(0.0, 0.0, -1.0)):
-    settings = copy.deepcopy(defaults()["calibration"])
+    settings = defaults()["calibration"]
     settings["dh"]["fit_to"] = "measurements"
     links = [asdict(body) for body in LINKS]
     settings["compliance"] |= {"joints": joints, "links": links, "gravity": gravity}

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import copy
-
 import numpy as np
 import pytest
 import simulated
@@ -19,7 +17,7 @@ SIZES, SUBSETS = (6, 8, 12, 20, 30), 12
 
 
 def settings():
-    made = copy.deepcopy(defaults()["calibration"])
+    made = defaults()["calibration"]
     made["base_and_tool"] = "estimated"
     made["dh"] |= {"fit_to": "measurements", "hayati_joints": "auto"}
     made["vec"] |= {"order": "auto", "prior": "chosen"}

@@ -15,7 +15,7 @@ from kinacc.calibration.observations import full_poses
 from kinacc.kinematics import dh, vec
 
 WEIGHT = 500.0
-LOW, HIGH = np.radians([(-12, 72), (-30, 54), (-74, 18), (-180, 180), (-122, 122), (-180, 180)]).T
+LOW, HIGH = oracle.MEASURED_RAD
 DH_UNIT = np.tile([1e-3, 1.0, 1.0, 1e-3, 1e-3], 6)
 KNOWN = frames.FrameParameters.none(frames.known())
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import pandas as pd
 import pytest
+from measured_files import write_readings
 from scipy.spatial.transform import Rotation
 from simulated import POINT, POSE, THREE, disturbed, fit, joints, measure
 from stages_by_hand import run_stages
@@ -50,14 +50,11 @@ def test_a_dh_model_that_follows_the_vec_model_is_of_all_sessions(tmp_path):
     pose = forward(arm, q)
     session = np.arange(60) // 30
     at = pose.position_mm + session[:, None] * [900.0, -400.0, 50.0]
-    turn = Rotation.from_matrix(pose.rotation).as_rotvec(degrees=True)
-    table = pd.DataFrame(np.column_stack([np.rad2deg(q), at, turn]))
-    table.columns = [*(f"q{i}_deg" for i in range(1, 7)), *"xyz", "rx_deg", "ry_deg", "rz_deg"]
-    table = table.rename(columns={axis: f"{axis}_mm" for axis in "xyz"})
-    table.assign(session=session).to_csv(tmp_path / "file.csv", index=False)
+    turned = Rotation.from_matrix(pose.rotation)
+    write_readings(tmp_path / "file.csv", q, at, turned, session=session)
     (tmp_path / "arm.yaml").write_text(
         "datasets: {arm: {robot: ur10, measurements: {source: file, file: {path: file.csv,"
-        " orientation: {kind: rotation_vector, unit: deg}}}, calibration: {"
+        " orientation: {kind: quaternion}}}, calibration: {"
         "base_and_tool: estimated, vec: {order: 0}, dh: {fit_to: vec}}, "
         "evaluation: {space: measured}}}\n"
     )

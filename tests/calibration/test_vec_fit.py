@@ -7,6 +7,7 @@ from itertools import product
 
 import numpy as np
 import pytest
+from oracles.kinematics import MEASURED_RAD
 
 from kinacc.calibration import frames, vec_fit
 from kinacc.calibration.observations import full_poses
@@ -17,7 +18,7 @@ from kinacc.kinematics import dh, robot, vec
 
 WEIGHT = 500.0
 ARM = robot.load("mh180")
-LOW, HIGH = np.deg2rad([(-10, 70), (-30, 54), (-74, 18), (-170, 170), (-120, 120), (-170, 170)]).T
+LOW, HIGH = MEASURED_RAD
 
 
 def joints(count, seed=0):

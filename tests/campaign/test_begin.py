@@ -44,6 +44,14 @@ def test_slopes_are_the_finite_differences_of_the_modelled_position():
         np.testing.assert_allclose(found.slope[:, :, joint], apart, atol=1e-5)
 
 
+def planned(arm, limits):
+    """A plan of six readings at as many points, in the instrument's frame."""
+    points = begin.points_of(arm, spread(arm.robot, 6), [str(number) for number in range(6)])
+    assessor = ADAPTIVE["single_shot"](measurements=6)
+    used = instruments(["tracker=0.05"], "instrument")
+    return begin.plan_of(arm, points, assessor, used, limits, {})
+
+
 def shifted(x_mm, y_mm, z_mm, turn_rad):
     return Pose(exp_so3(np.array([0.3, -0.5, 1.0]) * turn_rad), np.array([x_mm, y_mm, z_mm]))
 
@@ -56,19 +64,11 @@ def test_readings_as_the_calibration_predicts_them_have_no_error(anchored):
     arm = replace(arm, base=compose(station, shifted(0.4, -1.2, 0.7, 2e-3)))
     if anchored:
         arm = replace(arm, anchor=replace(arm, base=station))
-    joints = spread(arm.robot, 6)
-    points = begin.points_of(arm, joints, [str(number) for number in range(6)])
-    plan = begin.plan_of(
-        arm,
-        points,
-        ADAPTIVE["single_shot"](measurements=6),
-        instruments(["tracker=0.05"], "instrument"),
-        Limits(3e-4, 5.0),
-        {},
-    )
-    seen = arm.pose(JointState(joints @ arm.robot.joint_map.T), frame="instrument").position_mm
+    plan = planned(arm, Limits(3e-4, 5.0))
+    at = JointState(plan.points.joints @ arm.robot.joint_map.T)
+    seen = arm.pose(at, frame="instrument").position_mm
     in_base = seen @ plan.to_base.rotation.T + plan.to_base.position_mm
-    np.testing.assert_allclose(in_base, points.modelled_mm, atol=1e-9)
+    np.testing.assert_allclose(in_base, plan.points.modelled_mm, atol=1e-9)
 
 
 def test_candidates_that_cannot_be_measured_against_the_model_are_named(arm):
@@ -98,13 +98,4 @@ def test_a_reading_is_implausible_far_beyond_the_errors_of_the_calibration(left_
     arm = nominal(robot.load("irb120"))
     if left_mm is not None:
         arm = replace(arm, residual=Residual(left_mm, 1e-4, "validation"))
-    points = begin.points_of(arm, spread(arm.robot, 6), [str(number) for number in range(6)])
-    plan = begin.plan_of(
-        arm,
-        points,
-        ADAPTIVE["single_shot"](measurements=6),
-        instruments(["tracker=0.05"], "instrument"),
-        Limits(),
-        {},
-    )
-    assert plan.limits.implausible_mm == pytest.approx(limit_mm)
+    assert planned(arm, Limits()).limits.implausible_mm == pytest.approx(limit_mm)

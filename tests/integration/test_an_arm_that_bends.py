@@ -16,8 +16,10 @@ import pandas as pd
 import pytest
 import yaml
 from command_line import call
+from measured_files import write_readings
 from oracles import compliant_arm
 from oracles.compliant_arm import Arm, Body
+from oracles.controllers.arms import shipped
 from oracles.kinematics import frame
 from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
@@ -31,7 +33,7 @@ WEIGHT = 500.0  # mm per rad, the default of calibration.rotation_weight_mm_per_
 BASE = frame(2600.0, -400.0, 350.0, Rotation.from_rotvec([0.02, -0.03, 0.7]))
 TOOL = frame(40.0, -25.0, 180.0, Rotation.from_rotvec([0.3, -0.2, 0.5]))
 
-FANUC, MH180 = (compliant_arm.described(name) for name in ("fanuc_r2000ic_165f", "mh180"))
+FANUC, MH180 = map(shipped, ("fanuc_r2000ic_165f", "mh180"))
 FANUC_LINKS = (  # of a class of arms of 1.3 t; each centre in the DH frame its joint carries
     Body(380.0, (-150.0, 60.0, 20.0)),
     Body(260.0, (-520.0, 10.0, 90.0)),
@@ -63,7 +65,7 @@ class Cell:
     payloads: Sequence[Body]
 
     def dh_joints(self, joints_deg: np.ndarray) -> np.ndarray:
-        return np.radians(joints_deg) * compliant_arm.described(self.robot).sign
+        return np.radians(joints_deg) @ shipped(self.robot).matrix.T
 
     def tool_poses(self, joints_deg: np.ndarray, payloads: Sequence[Body]) -> np.ndarray:
         """Where the tool truly is for the instrument (n, 4, 4)."""
@@ -74,8 +76,7 @@ class Cell:
 def arm_in_a_cell(name: str, arm: Arm, seed: int, loads: Sequence[Body]) -> Cell:
     """An arm built a little off its drawing, visited all over its working range."""
     rng = np.random.default_rng(seed)
-    low, high = compliant_arm.described(name).limits_deg.T
-    low, high = np.maximum(low, -170.0), np.minimum(high, 170.0)
+    low, high = np.clip(shipped(name).limits, -170.0, 170.0).T
     joints_deg = low + rng.uniform(0.05, 0.95, (POSES, len(low))) * (high - low)
     built = compliant_arm.disturbed(arm, rng, hayati_joints=(2,))
     return Cell(name, built, joints_deg, [loads[i % len(loads)] for i in range(POSES)])
@@ -83,19 +84,13 @@ def arm_in_a_cell(name: str, arm: Arm, seed: int, loads: Sequence[Body]) -> Cell
 
 def written(path: Path, cell: Cell, seed: int, with_payload: bool = False) -> Path:
     """The file of a tracker that sees full poses, with noise."""
-    rng = np.random.default_rng([seed, 1])
-    names = [f"q{i}_deg" for i in range(1, 7)] + ["x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz"]
-    names += ["payload_kg", "payload_x_mm", "payload_y_mm", "payload_z_mm"] * with_payload
-    lines = [",".join(names)]
+    noise = NOISE_MM * np.random.default_rng([seed, 1]).normal(size=(POSES, 6))
     poses = cell.tool_poses(cell.joints_deg, cell.payloads)
-    for joints, pose, load in zip(cell.joints_deg, poses, cell.payloads, strict=True):
-        turn = Rotation.from_rotvec(rng.normal(0.0, NOISE_MM / WEIGHT, 3)).as_matrix()
-        position = pose[:3, 3] + rng.normal(0.0, NOISE_MM, 3)
-        row = [*joints, *position, *compliant_arm.quaternion(turn @ pose[:3, :3])]
-        row += [load.mass_kg, *load.centre_mm] * with_payload
-        lines.append(",".join(repr(float(value)) for value in row))
-    path.write_text("\n".join(lines) + "\n")
-    return path
+    turn = Rotation.from_rotvec(noise[:, :3] / WEIGHT) * Rotation.from_matrix(poses[:, :3, :3])
+    names = ("payload_kg", "payload_x_mm", "payload_y_mm", "payload_z_mm") if with_payload else ()
+    loads = np.transpose([[load.mass_kg, *load.centre_mm] for load in cell.payloads])
+    position, payloads = poses[:, :3, 3] + noise[:, 3:], dict(zip(names, loads, strict=False))
+    return write_readings(path, np.radians(cell.joints_deg), position, turn, **payloads)
 
 
 def stated(body: Body) -> dict:
@@ -227,7 +222,7 @@ def test_an_arm_that_bends_is_selected_by_held_out_poses(finished):
 
 def new_joints(count: int) -> np.ndarray:
     """Reported joints (count, k) in degrees that no fit has seen."""
-    low, high = np.clip(FANUC.limits_deg, -150.0, 150.0).T
+    low, high = np.clip(FANUC.limits, -150.0, 150.0).T
     share = np.random.default_rng(77).uniform(0.15, 0.85, (count, len(low)))
     return low + share * (high - low)
 
@@ -268,8 +263,9 @@ def test_compensated_joints_bring_the_bent_arm_to_the_wanted_pose(finished, tmp_
     cell, folder = finished
     program = new_joints(8)
     wanted = replace(cell, arm=Arm(FANUC.table)).tool_poses(program, [NONE] * len(program))
-    poses = [[*pose[:3, 3], *compliant_arm.quaternion(pose[:3, :3])] for pose in wanted]
-    rows = pd.DataFrame(np.hstack([poses, program]), columns=[*POSE_NAMES, *JOINT_NAMES])
+    turned = Rotation.from_matrix(wanted[:, :3, :3]).as_quat(scalar_first=True)
+    columns = [*POSE_NAMES, *JOINT_NAMES]
+    rows = pd.DataFrame(np.hstack([wanted[:, :3, 3], turned, program]), columns=columns)
     corrected = answered("compensate", folder, rows, tmp_path / "wanted.csv", "compliance")
     assert corrected["status"].str.startswith("converged").all()
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import shutil
-import subprocess
 import sysconfig
 import venv
 from pathlib import Path
@@ -24,15 +23,8 @@ def cell(project, tmp_path) -> Path:
 
 def started(project, folder: Path, command: list[str], ok: bool = True) -> str:
     """Output of a command started in a folder, with the project's code."""
-    settings = {
-        "PATH": f"{preloaded.commands()}:{os.environ['PATH']}",
-        "PYTHONPATH": str(project.folder / "src"),
-    }
-    done = subprocess.run(
-        command, cwd=folder, env=os.environ | settings, capture_output=True, text=True, check=False
-    )
-    text = done.stdout + done.stderr
-    assert (done.returncode == 0) == ok, text
+    path = f"{preloaded.commands()}:{os.environ['PATH']}"
+    text = project.run(command, ok, cwd=folder, PATH=path)
     assert "Traceback" not in text
     return text
 

@@ -9,44 +9,32 @@ from __future__ import annotations
 import numpy as np
 import public_robots as runs
 import pytest
-import yaml
 
+import kinacc
 from kinacc.calibration.models import estimators, fit_all
 from kinacc.calibration.observations import from_columns
 from kinacc.calibration.residuals import errors, statistics
-from kinacc.checks.contradictions import load
 from kinacc.config.error_models import MEASURED, Comparison
-from kinacc.kinematics import robot
-from kinacc.synthetic import source
 
 CHOSEN = {"fold": [np.nan], "chosen": [1], "prior_std_mm": [0.1], "prior_decay": [0.85]}
-COLUMNS = {f"q{i}": f"joint_{i}" for i in range(1, 7)}
 
 
 def test_the_authors_test_poses_are_predicted_as_the_page_says(tmp_path):
     runs.prepare(tmp_path)
-    configs, seen = {}, {}
-    for name in ("ur5_grid", "ur5_random"):
-        file = {"path": f"{name}.csv", "orientation": {"kind": "none"}, "columns": COLUMNS}
-        section = {
-            "robot": "ur5.robot.yaml",
-            "measurements": {**runs.SETTINGS["measurements"], "source": "file", "file": file},
-            "calibration": runs.SETTINGS["calibration"],
-            "evaluation": {"space": "measured"},
-        }
-        path = tmp_path / f"{name}.yaml"
-        path.write_text(yaml.safe_dump({"datasets": {name: section}}), encoding="utf-8")
-        configs[name] = load([path])[name]
-        arm = robot.load(configs[name]["robot"])
-        columns = source.run({}, configs[name])["measurements"]
-        seen[name] = from_columns(columns, arm)
+    read = {
+        name: kinacc.read_measurements(
+            tmp_path / f"{name}.csv", robot=str(tmp_path / "ur5.robot.yaml"), settings=runs.SETTINGS
+        )
+        for name in ("ur5_grid", "ur5_random")
+    }
+    grid, random = (from_columns(dict(each.table.items()), each.robot) for each in read.values())
     told = {row.model: row for row in runs.read().query("judged == 'ur5_random'").itertuples()}
     (order,) = runs.read().query("fitted == 'ur5_grid'")["order"].dropna()
     chosen = {"vec_orders": {**CHOSEN, "order": [order]}}
-    grid = seen["ur5_grid"]
-    wanted = estimators(configs["ur5_grid"]["calibration"], arm, grid)
+    arm, settings = read["ur5_grid"].robot, read["ur5_grid"].settings
+    wanted = estimators(settings["calibration"], arm, grid)
     fits = fit_all(grid, [each.chosen(chosen, None) for each in wanted.values()])
-    found = errors(fits, seen["ur5_random"])
+    found = errors(fits, random)
     for model, row in told.items():
         vectors = found[Comparison(MEASURED, model).name].position_mm
         count, mean_mm, largest_mm, *_ = statistics(vectors)

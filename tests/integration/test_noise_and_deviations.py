@@ -5,9 +5,9 @@ from __future__ import annotations
 import json
 
 import numpy as np
-import pandas as pd
 import pytest
 from command_line import call
+from measured_files import write_readings
 from stages_by_hand import run_stages
 
 from kinacc.calibration.misfit import misfit
@@ -38,15 +38,7 @@ def written(folder, gears_rad):
     point = flange.position_mm + flange.rotation @ [30.0, -20.0, 60.0]
     point = point @ exp_so3(np.array([0.3, -0.2, 1.1])).T + [1500.0, 200.0, -400.0]
     point = point + rng.normal(size=point.shape) * NOISE_MM
-    names = [*(f"q{i}_deg" for i in range(1, 7)), "x_mm", "y_mm", "z_mm"]
-    np.savetxt(
-        folder / "arm.csv",
-        np.column_stack([np.rad2deg(q), point]),
-        fmt="%.6f",
-        delimiter=",",
-        header=",".join(names),
-        comments="",
-    )
+    write_readings(folder / "arm.csv", q, point)
     config = folder / "arm.yaml"
     config.write_text(
         f"datasets: {{arm: {{robot: irb120, measurements: {{source: file, file: {{path: "
@@ -90,9 +82,7 @@ def test_a_repeatability_test_and_a_check_of_the_same_readings_agree(tmp_path):
     rng, arm = np.random.default_rng(2), robot.load("irb120")
     q = np.tile(np.deg2rad(rng.uniform(-60, 60, (20, 6))), (4, 1))  # every pose is left in between
     point = robot.forward(arm, q).position_mm + 0.03 * rng.normal(size=(80, 3))
-    rows = pd.DataFrame(np.rad2deg(q), columns=[f"q{i}_deg" for i in range(1, 7)])
-    rows[["x_mm", "y_mm", "z_mm"]] = point
-    rows.assign(pose=np.arange(80) % 20).to_csv(path := tmp_path / "a.csv", index=False)
+    path = write_readings(tmp_path / "a.csv", q, point, pose=np.arange(80) % 20)
     config = tmp_path / "arm.yaml"
     config.write_text(
         f"datasets: {{cell: {{robot: irb120, measurements: {{source: file, file: {{path: {path}, "

@@ -14,20 +14,19 @@ from kinacc.kinematics import region
 CYLINDER = region.Cylinder(1200.0, 900.0, 0.0, 500.0, 0.0, math.radians(60))
 
 
-def test_orientations_are_flange_rotations_about_x_then_y_then_z():
+@pytest.mark.parametrize(
+    ("name", "signs"),
+    [
+        ("signs_and_zero", [*itertools.product((-1, 1), repeat=3), (0, 0, 0)]),
+        ("all_27", [*itertools.product((-1, 0, 1), repeat=3)]),
+    ],
+)
+def test_orientations_are_flange_rotations_about_x_then_y_then_z(name, signs):
     angle = math.radians(45)
-    both = region.orientations(angle, "signs_and_zero")
-    signs = list(itertools.product((-1, 1), repeat=3))
-    expected = [Rotation.from_euler("XYZ", np.array(s) * angle).as_matrix() for s in signs]
-    expected.append(np.eye(3))
-    assert both.rotation.shape == (9, 3, 3)
-    for matrix in expected:
-        assert min(np.abs(matrix - other).max() for other in both.rotation) < 1e-14
-    every = region.orientations(angle, "all_27")
-    assert every.rotation.shape == (27, 3, 3)
-    for s in itertools.product((-1, 0, 1), repeat=3):
-        matrix = Rotation.from_euler("XYZ", np.array(s) * angle).as_matrix()
-        assert min(np.abs(matrix - other).max() for other in every.rotation) < 1e-14
+    found = region.orientations(angle, name).rotation
+    assert found.shape == (len(signs), 3, 3)
+    wanted = Rotation.from_euler("XYZ", np.array(signs) * angle).as_matrix()
+    assert np.abs(wanted[:, None] - found).max(axis=(2, 3)).min(axis=1).max() < 1e-14
 
 
 def test_grid_covers_every_slice_edges_included_and_no_wider_than_asked():

@@ -11,16 +11,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 
 import numpy as np
-import yaml
-from scipy.spatial.transform import Rotation
 
 from .kinematics import dh_forward, dh_frames
 
 STANDARD_GRAVITY = 9.80665  # m/s^2
-ROBOTS = Path(__file__).resolve().parents[2] / "src" / "kinacc" / "kinematics" / "robots"
 _STEP = 1e-30
 
 
@@ -98,34 +94,6 @@ def flange(arm: Arm, q: Sequence[float], payload: Body = NOTHING) -> np.ndarray:
     return dh_forward(arm.table, np.asarray(q) + deflections(arm, q, payload))
 
 
-@dataclass(frozen=True)
-class Described:
-    """What a shipped robot file says, read without the package."""
-
-    table: tuple[tuple[float, ...], ...]
-    sign: np.ndarray  # DH joint angle = sign * reported angle
-    limits_deg: np.ndarray  # (k, 2), of reported angles
-
-
-def described(name: str) -> Described:
-    """A shipped robot file of revolute joints without couplings."""
-    told = yaml.safe_load((ROBOTS / f"{name}.yaml").read_text())
-    if "joint_map" in told or told.get("convention", "standard") != "standard":
-        raise ValueError(f"{name} is not a plain chain of standard DH rows")
-    table = tuple(
-        (
-            math.radians(row["theta_offset_deg"]),
-            float(row["d_mm"]),
-            float(row["a_mm"]),
-            math.radians(row["alpha_deg"]),
-            0.0,
-        )
-        for row in told["dh"]
-    )
-    sign = np.array([float(row.get("sign", 1)) for row in told["dh"]])
-    return Described(table, sign, np.array(told["limits_deg"], dtype=float))
-
-
 def disturbed(arm: Arm, rng: np.random.Generator, hayati_joints: Sequence[int] = ()) -> Arm:
     """The arm as it was built: theta, d, a and alpha a little off, beta for d at joints named."""
     size = np.tile([5e-4, 0.3, 0.3, 5e-4, 0.0], (len(arm.table), 1))
@@ -133,8 +101,3 @@ def disturbed(arm: Arm, rng: np.random.Generator, hayati_joints: Sequence[int] =
         size[joint - 1] = [5e-4, 0.0, 0.3, 5e-4, 5e-4]
     table = np.array(arm.table) + size * rng.normal(size=size.shape)
     return replace(arm, table=tuple(tuple(row) for row in table.tolist()))
-
-
-def quaternion(rotation: np.ndarray) -> np.ndarray:
-    """Unit quaternion (w, x, y, z), w >= 0."""
-    return Rotation.from_matrix(rotation).as_quat(canonical=True, scalar_first=True)

@@ -22,12 +22,8 @@ def rows(folder: Path, name: str) -> list[Row]:
     return pq.read_table(Path(folder) / f"{name}.parquet").to_pylist()
 
 
-def joints(row: Row) -> list[float]:
-    return [row[f"q{i}"] for i in range(1, 8) if f"q{i}" in row]
-
-
-def directions(row: Row) -> list[int]:
-    return [row[f"s{i}"] for i in range(1, 8) if f"s{i}" in row]
+def joints(row: Row, letter: str = "q") -> list[float]:
+    return [row[f"{letter}{i}"] for i in range(1, 8) if f"{letter}{i}" in row]
 
 
 @dataclass(frozen=True)
@@ -101,7 +97,7 @@ def magnitudes(
     one place."""
     position, orientation = [], []
     for row in measurements:
-        q, s, target = joints(row), directions(row), row["target"]
+        q, s, target = joints(row), joints(row, "s"), row["target"]
         left, right = comparison.split("_vs_")
         reading, full = measured_frame(row)
         other = reading if right == "measured" else models_.measured(right, q, s, target)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import copy
-
 import numpy as np
 import pytest
 
@@ -21,7 +19,7 @@ NAMES = ["vec_order", "reference_frame", "search"]
 
 @pytest.fixture(scope="module")
 def config() -> dict:
-    config = {"robot": "mh180", **copy.deepcopy(defaults())}
+    config = {"robot": "mh180", **defaults()}
     config["map"]["grid_mm"] = 300.0
     config["study"] |= {"repetitions": 3, "measurements": 40}
     config["evaluation"]["points"] = 40

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from pathlib import Path
 
 import pandas as pd
@@ -18,7 +17,7 @@ CHOICE = Path(__file__).parents[2] / "research" / "data" / "map_choice.csv"
 
 @pytest.fixture(scope="module")
 def config() -> dict:
-    config = {"robot": "mh180", **copy.deepcopy(defaults())}
+    config = {"robot": "mh180", **defaults()}
     config["map"]["grid_mm"] = 300.0
     return config
 

@@ -11,7 +11,6 @@ import pytest
 from oracles import kinematics as oracle
 from oracles import maps
 from scipy.spatial.transform import Rotation
-from two_models import two_models
 
 from kinacc import geometry
 from kinacc.config.schema import defaults
@@ -25,11 +24,19 @@ from kinacc.tables import store
 REFERENCE = np.diag([1.0, -1.0, -1.0])
 TURN = math.radians(45)
 CYLINDER = region.Cylinder(1200.0, 900.0, 0.0, 500.0, 0.0, math.radians(60))
-LOW, HIGH = np.radians([(-12, 72), (-30, 54), (-74, 18), (-180, 180), (-122, 122), (-180, 180)]).T
+LOW, HIGH = oracle.MEASURED_RAD
 ARM = robot.load("mh180")
 NINE = region.orientations(TURN, "signs_and_zero")
 WANTED = accuracy_map.PosesWanted(CYLINDER, REFERENCE, NINE, "dh")
 LIMITS = np.radians(oracle.MH180_LIMITS_DEG).T
+
+
+def two_models(vec, dh, vec_tool=geometry.IDENTITY, dh_tool=geometry.IDENTITY, travel=None):
+    """A VEC model as the true arm and a DH model under assessment."""
+    by_name = {"vec": (vec, vec_tool), "dh": (dh, dh_tool)}
+    return accuracy_map.Models(
+        {name: accuracy_map.Equipped(*each) for name, each in by_name.items()}, travel
+    )
 
 
 @pytest.fixture(scope="module")

@@ -25,9 +25,7 @@ def test_errors_stand_in_front_of_their_joints_as_true_rotations(seed):
     for n in range(2):
         frame = np.eye(4)
         for i in range(6):
-            error = np.eye(4)
-            error[:3, :3] = Rotation.from_rotvec(errors[n, i, 3:]).as_matrix()
-            error[:3, 3] = errors[n, i, :3]
+            error = oracle.frame(*errors[n, i, :3], Rotation.from_rotvec(errors[n, i, 3:]))
             frame = frame @ error @ oracle.dh_forward(table[[i]], q[n, [i]])
         np.testing.assert_allclose(pose.position_mm[n], frame[:3, 3], rtol=0, atol=1e-9)
         np.testing.assert_allclose(pose.rotation[n], frame[:3, :3], rtol=0, atol=1e-12)

@@ -17,7 +17,7 @@ from kinacc.study.claims.evaluate import evaluate, table_of
 
 @pytest.fixture(scope="module")
 def config() -> dict:
-    config = {"robot": "mh180", **copy.deepcopy(defaults())}
+    config = {"robot": "mh180", **defaults()}
     config["map"]["grid_mm"] = 300.0
     config["study"]["repetitions"] = 3
     config["evaluation"]["points"] = 60

@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from oracles.kinematics import frame
 from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 
@@ -38,23 +39,27 @@ def by_urdf(name: str, q_rad: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Flange position (mm) and rotation in the controller's base at controller joints ``q_rad``."""
     turned = q_rad.copy()
     turned[2] += COUPLED.get(name, 0.0) * q_rad[1]
-    frames, place = {}, np.eye(4)
+    place = np.eye(4)
     for row in URDF[name].itertuples():
-        frame = np.eye(4)
         angles = [row.roll_deg, row.pitch_deg, row.yaw_deg]
-        frame[:3, :3] = Rotation.from_euler("xyz", angles, degrees=True).as_matrix()
-        frame[:3, 3] = row.x_mm, row.y_mm, row.z_mm
-        frames[row.joint] = frame
+        turn = Rotation.from_euler("xyz", angles, degrees=True)
+        in_parent = frame(row.x_mm, row.y_mm, row.z_mm, turn)
         if row.joint == "base":
-            place = np.linalg.inv(frame)
+            place = np.linalg.inv(in_parent)
             continue
-        place = place @ frame
+        place = place @ in_parent
         if row.joint != "tool0":
-            turn = np.eye(4)
             angle = turned[int(row.joint) - 1]
-            turn[:3, :3] = Rotation.from_rotvec(angle * AXES[row.axis]).as_matrix()
-            place = place @ turn
+            place = place @ frame(turned=Rotation.from_rotvec(angle * AXES[row.axis]))
     return place[:3, 3], place[:3, :3]
+
+
+def assert_published(name: str, arm: robot.Robot, q_rad: np.ndarray) -> None:
+    """The arm stands at joints as its URDF has it."""
+    position, rotation = by_urdf(name, q_rad)
+    pose = robot.forward(arm, q_rad)
+    assert np.abs(pose.position_mm[0] - position).max() < 1e-6
+    assert np.abs(pose.rotation[0] - rotation).max() < 1e-9
 
 
 def test_every_shipped_robot_is_held_here_and_names_its_source():
@@ -77,21 +82,17 @@ def test_zero_pose_and_others_are_those_of_the_published_model(name):
     arm = robot.load(name)
     poses = np.random.default_rng(1).uniform(arm.q_min_rad, arm.q_max_rad, (20, arm.dh.joints))
     for q_rad in (np.zeros(arm.dh.joints), *poses):
-        position, rotation = by_urdf(name, q_rad)
-        pose = robot.forward(arm, q_rad)
-        assert np.abs(pose.position_mm[0] - position).max() < 1e-6
-        assert np.abs(pose.rotation[0] - rotation).max() < 1e-9
+        assert_published(name, arm, q_rad)
 
 
 @pytest.mark.parametrize("name", REACH.index)
 def test_reach_is_the_makers(name):
-    reach, frame, about, within = REACH.loc[name]
-    frame, about = int(frame), int(about)
+    reach, last, about, within = REACH.loc[name]
     arm = robot.load(name)
 
     def apart(q: np.ndarray) -> np.ndarray:
         frames = dh.chain(arm.dh, q).position_mm
-        between = frames[:, frame] - frames[:, about]
+        between = frames[:, int(last)] - frames[:, int(about)]
         return np.linalg.norm(between[:, :2] if about == 0 else between, axis=1)
 
     q = np.random.default_rng(0).uniform(-np.pi, np.pi, (2000, arm.dh.joints))
@@ -109,8 +110,5 @@ def test_the_form_is_the_arm_whose_lengths_are_filled_in(name, lengths):
         at = next(i for i, line in enumerate(lines) if re.search(f"[da]: {letter}", line))
         key = re.search(f"([da]): {letter}", lines[at])[1]
         lines[at] = lines[at].replace(f"{key}_mm: 100", f"{key}_mm: {length}")
-    arm, q_rad = robot.of_text("\n".join(lines), "form.yaml"), np.linspace(-1.0, 1.0, 6)
-    position, rotation = by_urdf(name, q_rad)
-    pose = robot.forward(arm, q_rad)
-    assert np.abs(pose.position_mm[0] - position).max() < 1e-6
-    assert np.abs(pose.rotation[0] - rotation).max() < 1e-9
+    arm = robot.of_text("\n".join(lines), "form.yaml")
+    assert_published(name, arm, np.linspace(-1.0, 1.0, 6))

@@ -93,7 +93,9 @@ def errors(seed: int) -> np.ndarray:
     return found
 
 
-def _shipped(name: str, middle: tuple, half: tuple, seed: int, flange: tuple = (0.0,) * 6) -> Arm:
+def shipped(
+    name: str, middle: tuple = (), half: tuple = (), seed: int = 0, flange: tuple = (0.0,) * 6
+) -> Arm:
     """The arm of a shipped robot file, read without the package."""
     content = yaml.safe_load((ROBOTS / f"{name}.yaml").read_text())
     keys = ("theta_offset_deg", "d_mm", "a_mm", "alpha_deg")
@@ -106,11 +108,11 @@ def _shipped(name: str, middle: tuple, half: tuple, seed: int, flange: tuple = (
 
 _TURNED = (0.0, 0.0, 10.0, 0.0, 0.0, 180.0)
 ARMS = {
-    "kuka": _shipped(
+    "kuka": shipped(
         "kr6_r900_sixx", (0, -75, 85, 10, 60, 20), (60, 25, 25, 60, 35, 90), 1, _TURNED
     ),
-    "abb": _shipped("irb2400_12_155", (0, 20, 20, 10, 50, 20), (60, 30, 25, 50, 30, 80), 2),
-    "fanuc": _shipped("fanuc_m20ia", (0, 20, -10, 10, -70, 20), (60, 25, 20, 50, 30, 80), 3),
-    "ur": _shipped("ur10", (0, -80, 90, -100, -80, 0), (70, 30, 35, 40, 35, 90), 4),
-    "yaskawa": _shipped("gp25", (0, 10, -10, 10, 65, 20), (60, 30, 25, 50, 30, 80), 5),
+    "abb": shipped("irb2400_12_155", (0, 20, 20, 10, 50, 20), (60, 30, 25, 50, 30, 80), 2),
+    "fanuc": shipped("fanuc_m20ia", (0, 20, -10, 10, -70, 20), (60, 25, 20, 50, 30, 80), 3),
+    "ur": shipped("ur10", (0, -80, 90, -100, -80, 0), (70, 30, 35, 40, 35, 90), 4),
+    "yaskawa": shipped("gp25", (0, 10, -10, 10, 65, 20), (60, 30, 25, 50, 30, 80), 5),
 }

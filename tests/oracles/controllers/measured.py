@@ -5,9 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from measured_files import write_readings
 from scipy.spatial.transform import Rotation
 
-from oracles.controllers.arms import Arm, frame
+from oracles.controllers.arms import Arm
+from oracles.kinematics import frame
 
 # The arm's base in the tracker's frame, and the measured target on the flange.
 BASE = frame(2600.0, -700.0, 350.0, Rotation.from_rotvec([0.2, -0.4, 1.9]))
@@ -22,15 +24,13 @@ def seen(arm: Arm, shown: np.ndarray) -> np.ndarray:
 
 def write(folder: Path, arm: Arm, poses: int = 90, order: int = 1) -> Path:
     """A robot file, a file of measured poses and a configuration; the configuration's path."""
-    rng, rows = np.random.default_rng(11), []
-    for shown in arm.draw(rng, poses):
-        there = seen(arm, shown)
-        turn = Rotation.from_rotvec(rng.normal(0.0, NOISE_RAD, 3))
-        turned = turn * Rotation.from_matrix(there[:3, :3])
-        place = there[:3, 3] + rng.normal(0.0, NOISE_MM, 3)
-        rows.append([*np.rad2deg(shown), *place, *turned.as_quat(scalar_first=True)])
-    names = ",".join([*(f"q{i}_deg" for i in range(1, 7)), "x_mm,y_mm,z_mm,qw,qx,qy,qz"])
-    np.savetxt(folder / "poses.csv", rows, "%.9f", ",", header=names, comments="")
+    rng = np.random.default_rng(11)
+    shown = arm.draw(rng, poses)
+    there = np.array([seen(arm, each) for each in shown])
+    noise = rng.normal(size=(poses, 6))
+    turned = Rotation.from_rotvec(NOISE_RAD * noise[:, :3]) * Rotation.from_matrix(there[:, :3, :3])
+    place = there[:, :3, 3] + NOISE_MM * noise[:, 3:]
+    write_readings(folder / "poses.csv", shown, place, turned)
     (folder / "robot.yaml").write_text(arm.description())
     config = folder / "arm.yaml"
     config.write_text(

@@ -65,6 +65,7 @@ CONVENTIONS = {
     "fanuc": _euler("xyz", decimals=(3, 3, 3)),
     "yaskawa": _euler("xyz", decimals=(3, 4, 0), joint=PULSES * np.rad2deg(1.0)),
     "abb": _QUATERNION,
+    "staubli": _euler("XYZ", decimals=(3, 4, 4)),
     "table": replace(_QUATERNION, decimals=(4, 7, 5)),
     "ur": Convention(
         lambda turn: turn.as_rotvec(), Rotation.from_rotvec, (6, 6, 6), metre=1e-3, joint=1.0

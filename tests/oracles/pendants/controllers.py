@@ -11,19 +11,11 @@ import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
-from oracles.controllers.arms import ARMS, DEG, Arm, errors, frame
+from oracles.controllers.arms import ARMS, DEG, Arm, errors
+from oracles.controllers.programs import CONVENTIONS
 from oracles.kinematics import rot_x, rot_y, rot_z, trans
 
-TURNS = {  # of the numbers of a frame behind x, y, z
-    "kuka": lambda v: Rotation.from_euler("ZYX", v, degrees=True),
-    "abb": lambda v: Rotation.from_quat(v, scalar_first=True),
-    "fanuc": lambda v: Rotation.from_euler("xyz", v, degrees=True),
-    "yaskawa": lambda v: Rotation.from_euler("xyz", v, degrees=True),
-    "ur": Rotation.from_rotvec,
-    "staubli": lambda v: Rotation.from_euler("XYZ", v, degrees=True),
-}
 STAUBLI = Arm(
     "tx2_90_like",
     ((0, 478, 50, -90), (-90, 50, 425, 0), (90, 0, 0, 90), (0, 425, 0, -90), (0, 0, 0, 90),
@@ -48,18 +40,12 @@ class _Shifted(Arm):
         return here
 
 
-def as_frame(maker: str, numbers: dict[str, float]) -> np.ndarray:
-    """The matrix of typed numbers of a frame."""
-    values = np.array([*numbers.values()])
-    length = 1e3 if maker == "ur" else 1.0
-    return frame(*(length * values[:3]), TURNS[maker](values[3:]))
-
-
 def joints_for(
     maker: str, arm: Arm, typed: dict[str, dict[str, float]], file: Path, goal: np.ndarray, near
 ) -> np.ndarray:
     """Joints (6,) of the arm as first mastered when its controller is sent to ``goal`` in BASE."""
-    tool, base = (as_frame(maker, typed[group]) for group in ("TOOL tool", "BASE"))
+    to_frame = CONVENTIONS[maker].pose
+    tool, base = (to_frame([*typed[group].values()]) for group in ("TOOL tool", "BASE"))
     flange = base @ goal @ np.linalg.inv(tool)
     if maker in ("ur", "staubli"):
         return shifted_arm(maker, arm, file).joints(flange, near)

@@ -1,0 +1,21 @@
+"""Files of measured poses, as a tracker writes them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from scipy.spatial.transform import Rotation
+
+
+def write_readings(
+    path: Path, q_rad: np.ndarray, position_mm: np.ndarray, turned: Rotation | None = None, **more
+) -> Path:
+    """Joints (n, k), points (n, 3), orientations and further columns by name; the path."""
+    rows = pd.DataFrame(np.rad2deg(q_rad)).rename(columns=lambda i: f"q{i + 1}_deg")
+    rows[["x_mm", "y_mm", "z_mm"]] = position_mm
+    if turned is not None:
+        rows[["qw", "qx", "qy", "qz"]] = turned.as_quat(scalar_first=True)
+    rows.assign(**more).to_csv(path, index=False, float_format="%.9f")
+    return path
