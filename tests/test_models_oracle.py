@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from oracles import kinematics as oracle
 
-from kinacc.kinematics import chain, dh, robot, vec
+from kinacc.kinematics import chain, dh, vec
 
 
 def dh_table(rng, joints):
@@ -20,19 +20,6 @@ def dh_table(rng, joints):
 def assert_same(rotation, position_mm, expected) -> None:
     np.testing.assert_allclose(rotation, expected[..., :3, :3], rtol=0, atol=1e-12)
     np.testing.assert_allclose(position_mm, expected[..., :3, 3], rtol=0, atol=1e-9)
-
-
-# --- nominal arms ---------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("name", "table"), [("mh180", oracle.MH180), ("ur10", oracle.UR10)], ids=["mh180", "ur10"]
-)
-def test_shipped_robot_is_the_published_table(name, table):
-    arm = robot.load(name).dh
-    shipped = np.column_stack([arm.theta_offset_rad, arm.d_mm, arm.a_mm, arm.alpha_rad])
-    np.testing.assert_allclose(shipped, np.array(table)[:, :4], rtol=0, atol=1e-15)
-    assert not arm.beta_rad.any()
 
 
 # --- DH, eqs. 1-4 ---------------------------------------------------------------------------------

@@ -72,7 +72,6 @@ def assert_measured(section, others=()):
 
 RIGHT = {
     "nominal beside ours": [Q, X, (by_axis("nom_{a}_mm"), IT.nominal)],
-    "commanded behind the axis": [Q, X, (by_axis("{a}_cmd_mm"), IT.nominal)],
     "nominal, actual, d": [
         Q,
         (by_axis("Nominal {A} [mm]"), IT.nominal),
@@ -148,7 +147,6 @@ def test_standard_deviations_are_those_of_the_measured_point(file):
 
 
 ASKED = {
-    "a tool centre point": [Q, (by_axis("tcp_{a}"), IT.controller)],
     "a point and the length of its deviation": [Q, X, (["3D error [mm]"], IT.spread[:, :1])],
     "a target beside a point": [Q, X, (by_axis("target_{a}_mm"), IT.nominal)],
     "the published form of a robot's data": [
@@ -169,12 +167,6 @@ ASKED = {
         (by_axis("trans_{a}"), IT.controller),
         (numbered("rot_q{}", 4), IT.quaternion),
         (by_axis("tracker_{a}"), IT.measured),
-    ],
-    "an orientation beside nominal and measured": [
-        Q,
-        (by_axis("Nominal {A}"), IT.nominal),
-        (by_axis("Measured {A}"), IT.measured),
-        (by_axis("R{a}"), IT.turn.as_euler("XYZ", degrees=True)),
     ],
 }
 

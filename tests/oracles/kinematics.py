@@ -55,6 +55,15 @@ def turn(axis: int, angle) -> np.ndarray:
 rot_x, rot_y, rot_z = (partial(turn, axis) for axis in range(3))
 
 
+def posture(frames: Sequence[np.ndarray], turned: float) -> tuple[bool, bool]:
+    """Whether the wrist is behind axis 1 at ``turned``, and the elbow above shoulder to wrist."""
+    ahead = np.array([math.cos(turned), math.sin(turned), 0.0])
+    flat = np.array([[frame[:3, 3] @ ahead, frame[2, 3]] for frame in frames])
+    shoulder, elbow, wrist = flat[[1, 2, 4]]
+    upper, fore = elbow - shoulder, wrist - elbow
+    return bool(wrist[0] < 0.0), bool(upper[1] * fore[0] - upper[0] * fore[1] > 0.0)
+
+
 def motion(change) -> np.ndarray:
     """Eq. 6 as printed: displacements and small turns ``change`` (6, ...) as (..., 4, 4)."""
     dx, dy, dz, ex, ey, ez = np.asarray(change)

@@ -41,14 +41,9 @@ class Arms:
 
 def branch_of(table, q: np.ndarray) -> str:
     """Shoulder, elbow and wrist of a posture, from where its axes stand."""
-    frames = kinematics.dh_frames(table, q)
-    axis_2, elbow, wrist = (frames[i][:3, 3] for i in (1, 2, 4))
-    facing = np.array([math.cos(q[0]), math.sin(q[0]), 0.0])
-    shoulder = "front" if wrist @ facing > 0 else "back"
-    seen = facing if shoulder == "front" else -facing
-    arm, upper = wrist - axis_2, elbow - axis_2
-    above = (arm @ seen) * upper[2] - arm[2] * (upper @ seen)
-    return f"{shoulder}-{'up' if above > 0 else 'down'}-{'noflip' if q[4] > 0 else 'flip'}"
+    behind, above = kinematics.posture(kinematics.dh_frames(table, q), q[0])
+    shoulder, elbow = ("front", "back")[behind], ("down", "up")[above != behind]
+    return f"{shoulder}-{elbow}-{'noflip' if q[4] > 0 else 'flip'}"
 
 
 def nearest_turns(q: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
@@ -86,18 +81,11 @@ def cell(arms: Arms, limits, angle: float, radius: float, height: float, referen
             q = nearest_turns(q, low, high)
             if branch not in BRANCHES or not ((q >= low) & (q <= high)).all():
                 continue
-            true, model = arms.true_at(q), arms.model_at(q)
-            spin = kinematics.rotation_vector(true[:3, :3] @ model[:3, :3].T)
+            apart = kinematics.apart(arms.true_at(q), arms.model_at(q))
             letters = " ".join(
                 f"{axis}{'-0+'[sign + 1]}" for axis, sign in zip("XYZ", signs, strict=True)
             )
-            results.append(
-                (
-                    float(np.linalg.norm(true[:3, 3] - model[:3, 3])),
-                    float(np.linalg.norm(spin)) * 1e3,
-                    f"{letters}, {branch}",
-                )
-            )
+            results.append((*apart, f"{letters}, {branch}"))
     if not results:
         return math.nan, math.nan, None, 0
     return (

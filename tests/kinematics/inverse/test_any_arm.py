@@ -13,16 +13,10 @@ from kinacc.geometry import Pose
 from kinacc.kinematics import dh, inverse, robot, vec
 from kinacc.kinematics.inverse import Status, closed_form, limits, newton, postures
 from kinacc.kinematics.model import JointState
+from kinacc.synthetic.draw import TABLE_II
 
 MH180, UR10, IIWA = (robot.load(name) for name in ("mh180", "ur10", "iiwa14"))
 FANUC = robot.load("fanuc_r2000ic_165f").dh
-TABLE_II = dh.DHModel(  # of the paper, q5 offset read as -3.141
-    [0.001, -1.568, 0.001, -3.142, -3.141, 0.002],
-    [-1.157, -0.898, 0.066, -1226.154, -0.104, -224.698],
-    [323.453, 1151.356, 299.501, 0.029, 0.026, 0.028],
-    [-1.573, 3.140, -1.571, -1.571, -1.571, 3.142],
-    np.zeros(6),
-)
 COUNTS = {"nominal": 25, "vec": 35}
 SEARCHED = [
     arms.OFFSET_WRIST,
@@ -103,13 +97,12 @@ def test_what_is_found_is_verified_and_own_postures_are_among_it(arm, kind):
 
 @pytest.mark.parametrize("where", ["wrist", "elbow"])
 def test_few_branches_are_dropped_near_singular_postures(where):
-    model = TABLE_II
     q = np.random.default_rng(7).uniform(MH180.q_min_rad, MH180.q_max_rad, (1000, 6))
     aside = np.random.default_rng(8).uniform(-0.02, 0.02, 1000)
     q[:, 4 if where == "wrist" else 2] = aside + (0 if where == "wrist" else np.arctan2(1225, 300))
-    pose = dh.forward(model, q)
-    solved = inverse.solve(MH180, model, pose)
-    arms.assert_verified(model, pose, solved)
+    pose = dh.forward(TABLE_II, q)
+    solved = inverse.solve(MH180, TABLE_II, pose)
+    arms.assert_verified(TABLE_II, pose, solved)
     assert arms.share_missed(MH180, q, solved) < 0.01
     _, reached = closed_form.recognise(MH180.dh).solve(pose)
     assert np.mean(reached & (solved.status == Status.NOT_REACHED)) < 0.02

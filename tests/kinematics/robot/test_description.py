@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from oracles.kinematics import trans, turn
 
 from kinacc.errors import InputError
 from kinacc.geometry import Pose, compose, exp_so3, rotation_x, rotation_z
@@ -106,22 +107,12 @@ def test_angles_of_a_frame_turn_about_the_fixed_axes_x_y_z(arm):
 
 
 def craig(table: DHModel, q: np.ndarray) -> np.ndarray:
-    """Product of a modified table, from Craig's matrix for one joint."""
+    """Product of a modified table, by Craig's Rx(alpha) Tx(a) Rz(theta) Tz(d) for one joint."""
     total = np.eye(4)
-    for i in range(table.joints):
-        slides = table.prismatic[i]
-        t = table.theta_offset_rad[i] + (0 if slides else q[i])
-        d = table.d_mm[i] + (q[i] if slides else 0)
-        a, al = table.a_mm[i], table.alpha_rad[i]
-        st_, ct, sa, ca = np.sin(t), np.cos(t), np.sin(al), np.cos(al)
-        total = total @ np.array(
-            [
-                [ct, -st_, 0, a],
-                [st_ * ca, ct * ca, -sa, -sa * d],
-                [st_ * sa, ct * sa, ca, ca * d],
-                [0, 0, 0, 1],
-            ]
-        )
+    for i, slides in enumerate(table.prismatic):
+        theta, d = table.theta_offset_rad[i] + q[i] * (not slides), table.d_mm[i] + q[i] * slides
+        total = total @ turn(0, table.alpha_rad[i]) @ trans(table.a_mm[i], 0.0, 0.0)
+        total = total @ turn(2, theta) @ trans(0.0, 0.0, d)
     return total
 
 

@@ -14,7 +14,8 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from oracles.controllers.arms import Arm, frame
+from oracles import kinematics
+from oracles.controllers.arms import Arm
 
 POINTS = 20
 _PLACE = re.compile(r"<(\d+)>")
@@ -37,7 +38,7 @@ class Convention:
 
     def pose(self, numbers) -> np.ndarray:
         place = np.array(numbers[:3]) / self.metre
-        return frame(*place, self.back(np.array(numbers[3:])))
+        return kinematics.frame(*place, self.back(np.array(numbers[3:])))
 
     def of_joints(self, shown: np.ndarray) -> list[float]:
         return [*(shown * self.joint)]
@@ -138,12 +139,7 @@ class Program:
 
 def posture(arm: Arm, shown: np.ndarray) -> tuple[bool, bool]:
     """Whether the wrist is behind axis 1, and the elbow above the line from shoulder to wrist."""
-    turn = (arm.matrix @ shown)[0]
-    ahead = np.array([np.cos(turn), np.sin(turn), 0.0])
-    places = [here[:3, 3] for here in arm.frames(shown)]
-    flat = [np.array([p @ ahead, p[2]]) for p in places]
-    upper, fore = flat[2] - flat[1], flat[4] - flat[2]
-    return bool(flat[4][0] < 0.0), bool(upper[1] * fore[0] - upper[0] * fore[1] > 0.0)
+    return kinematics.posture(arm.frames(shown), (arm.matrix @ shown)[0])
 
 
 def _filled(text: str, points: np.ndarray, **forms: Callable) -> str:
