@@ -1,62 +1,50 @@
-"""Every joint solution of a pose by brute force: damped Newton from many random starts."""
+"""Every joint solution of a pose by brute force: damped Newton from many random starts at once."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from . import kinematics
 
 LEVER_MM = 1000.0  # turns rotation errors into lengths while searching
+WEIGHT = np.repeat([1.0, LEVER_MM], 3)
 
 
 def pose_error(target: np.ndarray, reached: np.ndarray) -> np.ndarray:
-    """Position difference (mm) and rotation vector (rad) from ``reached`` to ``target``."""
-    turn = kinematics.rotation_vector(target[:3, :3] @ reached[:3, :3].T)
-    return np.concatenate([target[:3, 3] - reached[:3, 3], turn])
-
-
-def geometric_jacobian(frames: Sequence[np.ndarray]) -> np.ndarray:
-    """Joint i turns about the z axis of the frame before it."""
-    tip = frames[-1][:3, 3]
-    columns = [np.concatenate([np.cross(f[:3, 2], tip - f[:3, 3]), f[:3, 2]]) for f in frames[:-1]]
-    return np.array(columns).T
+    """Position difference and rotation vector (n, 6), in mm, from frames (n, 4, 4) to a target."""
+    turn = kinematics.rotation_vector(target[:3, :3] @ np.swapaxes(reached[:, :3, :3], 1, 2))
+    return WEIGHT * np.hstack([target[:3, 3] - reached[:, :3, 3], turn])
 
 
 def dh_step(table, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    frames = kinematics.dh_frames(table, q)
-    return frames[-1], geometric_jacobian(frames)
+    """Flanges (n, 4, 4) and their slopes: joint i turns about the z axis of the frame before it."""
+    *before, flange = np.broadcast_arrays(*kinematics.dh_frames(table, q))
+    columns = []
+    for frame in before:
+        lever = flange[:, :3, 3] - frame[:, :3, 3]
+        columns.append(np.hstack([np.cross(frame[:, :3, 2], lever), frame[:, :3, 2]]))
+    return flange, WEIGHT[:, None] * np.stack(columns, axis=2)
 
 
-def newton(
-    step: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]],
-    target: np.ndarray,
-    start: np.ndarray,
-) -> np.ndarray | None:
-    """Levenberg-Marquardt to a pose; None where it does not get there."""
-    weight = np.array([1, 1, 1, LEVER_MM, LEVER_MM, LEVER_MM])
-    q, damping = start.astype(float), 1e-3
-    here, slope = step(q)
-    error = pose_error(target, here) * weight
+def newton(table, target: np.ndarray, starts: np.ndarray) -> np.ndarray:
+    """Joints (m, k) to which Levenberg-Marquardt gets from starts (n, k), of those that arrive."""
+    q, damping = starts.astype(float), np.full((len(starts), 1, 1), 1e-3)
+    here, slope = dh_step(table, q)
+    error = pose_error(target, here)
     for _ in range(60):
-        if np.abs(error).max() < 1e-9:
-            return q
-        scaled = slope * weight[:, None]
-        normal = scaled.T @ scaled
-        trial = q + np.linalg.solve(
-            normal + damping * np.diag(np.diag(normal) + 1e-9), scaled.T @ error
-        )
-        there, new_slope = step(trial)
-        new_error = pose_error(target, there) * weight
-        if np.linalg.norm(new_error) < np.linalg.norm(error):
-            q, slope, error, damping = trial, new_slope, new_error, max(damping / 10, 1e-15)
-        else:
-            damping *= 10
-            if damping > 1e8:
-                break
-    return q if np.abs(error).max() < 1e-6 else None
+        across = np.swapaxes(slope, 1, 2)
+        normal = across @ slope
+        held = damping * np.eye(q.shape[1]) * (normal + 1e-9)
+        trial = q + np.linalg.solve(normal + held, across @ error[..., None])[..., 0]
+        there, new_slope = dh_step(table, trial)
+        new_error = pose_error(target, there)
+        better = np.linalg.norm(new_error, axis=1) < np.linalg.norm(error, axis=1)
+        for old, new in ((q, trial), (slope, new_slope), (error, new_error)):
+            old[better] = new[better]
+        damping = np.clip(np.where(better[:, None, None], damping / 10, damping * 10), 1e-15, 1e8)
+    return q[np.abs(error).max(axis=1) < 1e-6]
 
 
 def wrapped(angles: np.ndarray) -> np.ndarray:
@@ -68,15 +56,10 @@ def same_turn(first: np.ndarray, second: np.ndarray) -> bool:
     return bool(np.abs(wrapped(np.asarray(first) - second)).max() < 1e-5)
 
 
-def all_solutions(
-    step: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]],
-    target: np.ndarray,
-    starts: np.ndarray,
-) -> list[np.ndarray]:
-    """Distinct solutions (whole turns aside) reached from any of the starts (n, 6)."""
+def all_solutions(table, target: np.ndarray, starts: np.ndarray) -> list[np.ndarray]:
+    """Distinct solutions (whole turns aside) reached from any of the starts (n, k)."""
     found: list[np.ndarray] = []
-    for start in starts:
-        q = newton(step, target, start)
-        if q is not None and not any(same_turn(q, other) for other in found):
+    for q in newton(table, target, starts):
+        if not any(same_turn(q, other) for other in found):
             found.append(wrapped(q))
     return found

@@ -75,7 +75,7 @@ def cell(arms: Arms, limits, angle: float, radius: float, height: float, referen
         relative = Rotation.from_euler("XYZ", np.array(signs) * turn).as_matrix()
         wanted[:3, :3] = wanted[:3, :3] @ reference @ relative
         flange = wanted @ np.linalg.inv(arms.dh_tool)
-        found = inverse.all_solutions(lambda q: inverse.dh_step(arms.dh, q), flange, starts(angle))
+        found = inverse.all_solutions(arms.dh, flange, starts(angle))
         for q in found:
             branch = branch_of(arms.dh, q)
             q = nearest_turns(q, low, high)
