@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from oracles import fits
 from oracles import kinematics as oracle
+from scipy.spatial.transform import Rotation
 from simulated import anywhere
 
 from kinacc import geometry
@@ -33,7 +34,7 @@ def measured(matrices, rng, noise_mm, noise_rad):
 
 
 def matrix(pose):
-    return oracle.pose_matrix(*pose.position_mm, geometry.quaternion_from_rotation(pose.rotation))
+    return oracle.frame(*pose.position_mm, Rotation.from_matrix(pose.rotation))
 
 
 @pytest.mark.parametrize(

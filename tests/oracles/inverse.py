@@ -52,6 +52,16 @@ def wrapped(angles: np.ndarray) -> np.ndarray:
     return -((-np.asarray(angles) + math.pi) % (2 * math.pi) - math.pi)
 
 
+def best_turn(angle: float, limits, preferred=(-math.inf, math.inf)) -> float:
+    """The whole turn that a joint takes, as the documentation states the rule."""
+    turns = [angle + 2 * math.pi * n for n in range(-6, 7)]
+    allowed = [turn for turn in turns if limits[0] <= turn <= limits[1]]
+    liked = [turn for turn in allowed if preferred[0] <= turn <= preferred[1]]
+    if not allowed:
+        return next(turn for turn in turns if -math.pi < turn <= math.pi)
+    return min(liked or allowed, key=abs)
+
+
 def same_turn(first: np.ndarray, second: np.ndarray) -> bool:
     return bool(np.abs(wrapped(np.asarray(first) - second)).max() < 1e-5)
 

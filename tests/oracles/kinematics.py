@@ -141,7 +141,3 @@ def frame(x=0.0, y=0.0, z=0.0, turned=None) -> np.ndarray:
     if turned is not None:
         found[:3, :3] = turned.as_matrix()
     return found
-
-
-def pose_matrix(x: float, y: float, z: float, wxyz: Sequence[float]) -> np.ndarray:
-    return frame(x, y, z, Rotation.from_quat(wxyz, scalar_first=True))

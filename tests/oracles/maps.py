@@ -46,16 +46,6 @@ def branch_of(table, q: np.ndarray) -> str:
     return f"{shoulder}-{elbow}-{'noflip' if q[4] > 0 else 'flip'}"
 
 
-def nearest_turns(q: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """Each joint moved by whole turns into [low, high] where it can be, as near zero as it can."""
-    result = q.copy()
-    for i, angle in enumerate(q):
-        turns = [angle + 2 * math.pi * n for n in (-1, 0, 1)]
-        inside = [x for x in turns if low[i] <= x <= high[i]]
-        result[i] = min(inside or turns, key=abs)
-    return result
-
-
 def starts(angle: float) -> np.ndarray:
     """Postures facing the slice with the elbow up, over the wrist."""
     upper = [(-0.1, -0.3), (0.5, 0.2), (0.9, -0.6)]
@@ -78,7 +68,7 @@ def cell(arms: Arms, limits, angle: float, radius: float, height: float, referen
         found = inverse.all_solutions(arms.dh, flange, starts(angle))
         for q in found:
             branch = branch_of(arms.dh, q)
-            q = nearest_turns(q, low, high)
+            q = np.array([*map(inverse.best_turn, q, zip(low, high, strict=True))])
             if branch not in BRANCHES or not ((q >= low) & (q <= high)).all():
                 continue
             apart = kinematics.apart(arms.true_at(q), arms.model_at(q))

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pyarrow.parquet as pq
 from scipy import stats
+from scipy.spatial.transform import Rotation
 
 from . import kinematics
 
@@ -71,21 +72,16 @@ def dh_table(records) -> list[tuple[float, ...]]:
 
 
 def models(folder: Path) -> Models:
-    frames = {
-        (row["model"], row["frame"]): kinematics.pose_matrix(
-            row["x_mm"], row["y_mm"], row["z_mm"], [row[f"q{c}"] for c in "wxyz"]
-        )
-        for row in rows(folder, "frames")
-    }
+    frames = {(row["model"], row["frame"]): placed(row) for row in rows(folder, "frames")}
     return Models(dh_table(rows(folder, "dh_model")), rows(folder, "vec_model"), frames)
 
 
-def measured_frame(row: Row) -> tuple[np.ndarray, bool]:
-    """The reading as a 4x4 frame and whether it has an orientation."""
-    if row["qw"] is None:
-        return kinematics.trans(row["x_mm"], row["y_mm"], row["z_mm"]), False
-    wxyz = [row[f"q{c}"] for c in "wxyz"]
-    return kinematics.pose_matrix(row["x_mm"], row["y_mm"], row["z_mm"], wxyz), True
+def placed(row: Row) -> np.ndarray:
+    """The frame (4, 4) of a row; not turned where it has a position alone."""
+    turned = None
+    if row["qw"] is not None:
+        turned = Rotation.from_quat([row[f"q{c}"] for c in "wxyz"], scalar_first=True)
+    return kinematics.frame(row["x_mm"], row["y_mm"], row["z_mm"], turned)
 
 
 def magnitudes(
@@ -99,11 +95,10 @@ def magnitudes(
     for row in measurements:
         q, s, target = joints(row), joints(row, "s"), row["target"]
         left, right = comparison.split("_vs_")
-        reading, full = measured_frame(row)
-        other = reading if right == "measured" else models_.measured(right, q, s, target)
+        other = placed(row) if right == "measured" else models_.measured(right, q, s, target)
         gap, turn = kinematics.apart(models_.measured(left, q, s, target), other)
         position.append(gap)
-        if full:
+        if row["qw"] is not None:
             orientation.append(turn)
     return position, orientation
 

@@ -43,7 +43,7 @@ def two_models(vec, dh, vec_tool=geometry.IDENTITY, dh_tool=geometry.IDENTITY, t
 def arms() -> maps.Arms:
     rng = np.random.default_rng(8)
     nominal = np.array(oracle.MH180)
-    tool = oracle.pose_matrix(40.0, -25.0, 130.0, [0.8, 0.6, 0.0, 0.0])
+    tool = oracle.frame(40.0, -25.0, 130.0, Rotation.from_quat([0.6, 0.0, 0.0, 0.8]))
     return maps.Arms(
         dh=nominal + rng.normal(size=(6, 5)) * [5e-4, 0.5, 0.5, 5e-4, 0],
         nominal=nominal,
@@ -51,7 +51,7 @@ def arms() -> maps.Arms:
         low=LOW,
         high=HIGH,
         dh_tool=tool,
-        true_tool=tool @ oracle.pose_matrix(0.1, -0.05, 0.08, [1.0, 0.0, 0.0, 0.0]),
+        true_tool=tool @ oracle.frame(0.1, -0.05, 0.08),
         s=(1, -1, 0, 1, 1, -1),
         offsets=rng.normal(size=(6, 2)) * 1e-4,
     )

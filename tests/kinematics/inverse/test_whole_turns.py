@@ -6,21 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from oracles.inverse import best_turn
 
 from kinacc.kinematics import dh, inverse, robot
 from kinacc.kinematics.inverse.limits import reported_joints, take_turns
 
 TURN, ARM = 2.0 * np.pi, robot.load("mh180")
-
-
-def best_turn(angle, limits, preferred):
-    """The rule as the documentation states it, for one angle."""
-    turns = [angle + TURN * n for n in range(-6, 7)]
-    allowed = [turn for turn in turns if limits[0] <= turn <= limits[1]]
-    liked = [turn for turn in allowed if preferred[0] <= turn <= preferred[1]]
-    if not allowed:
-        return next(turn for turn in turns if -np.pi < turn <= np.pi)
-    return min(liked or allowed, key=abs)
 
 
 @pytest.mark.parametrize(
