@@ -51,7 +51,7 @@ def written(folder, gears_rad):
 def calibrated(folder, gears_rad):
     """The configuration and the results folder of such an arm."""
     config = written(folder, gears_rad)
-    stages = ("measurements", "data_check", "vec", "dh", "residuals", "summary")
+    stages = ("measurements", "vec", "dh", "residuals", "summary")
     return config, run_stages(stages, [config], folder / "results")
 
 
