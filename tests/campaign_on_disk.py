@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import json
 from collections import Counter
 
 import numpy as np
-from command_line import call
+from command_line import answer, call
 
 from kinacc.assess.world import carry_on, drawn_world, key_of
 from kinacc.campaign import folder as campaigns
@@ -88,7 +87,7 @@ def refusal(*words):
 
 def standing(folder):
     """What status says, without a forecast."""
-    return json.loads(call("campaign", "status", folder, "--json", code=0).stdout)
+    return answer("campaign", "status", folder)
 
 
 def files_of(folder):

@@ -18,8 +18,8 @@ def call(*words: object, code: int | None = None, **more: object) -> Result:
     return done
 
 
-def answer(*words: object, code: int = 0) -> dict:
-    """The answer of a command as JSON."""
+def answer(*words: object, code: int | None = 0) -> dict:
+    """The answer of a command as JSON; ``code`` as in ``call``."""
     return json.loads(call(*words, "--json", code=code).stdout)
 
 

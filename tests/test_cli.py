@@ -1,10 +1,9 @@
 """The command line as a person uses it: help, one stage by hand, mistakes."""
 
-import json
 from pathlib import Path
 
 import pytest
-from command_line import call
+from command_line import answer, call
 
 from kinacc import __version__
 from kinacc.cli.group import main
@@ -52,8 +51,7 @@ def test_a_slip_of_the_hand_is_told_what_is_meant(words, near):
     "words", [("predict", "nowhere"), ("summary", "nowhere"), ("nonsense",), ("init", "--robto")]
 )
 def test_what_is_wrong_is_said_as_json_where_the_answer_is_wanted_so(words):
-    done = call(*words, "--json", code=2)
-    problems = json.loads(done.stdout)["problems"]
+    problems = answer(*words, code=2)["problems"]
     assert all({"where", "what", "allowed", "fix"} == set(each) for each in problems)
     assert problems[0]["what"]
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import re
 from dataclasses import replace
 
@@ -18,7 +17,7 @@ from campaign_on_disk import (
     refused,
     standing,
 )
-from command_line import call
+from command_line import answer, call
 
 from kinacc.campaign import folder as campaigns
 from kinacc.campaign import plan as plans
@@ -87,8 +86,7 @@ def test_a_file_of_readings_is_taken_whole_and_bad_rows_refuse_it(campaign, tmp_
     file.write_text(f"{head}{good}")
     call("campaign", "record", folder, file, code=0)
     file.write_text(head + good + "".join(f"{name},{arm.position(name)},\n" for name in names[1:]))
-    done = call("campaign", "record", folder, file, "--json")
-    assert json.loads(done.stdout)["known"] == [1]
+    assert answer("campaign", "record", folder, file)["known"] == [1]
     assert standing(folder)["readings_used"] == len(names)
     refused(folder, "record", folder, file)
 

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import json
-
 import pytest
 from campaign_on_disk import refused, standing, visit_of
-from command_line import call
+from command_line import answer, call
 
 from kinacc.campaign.campaign import Campaign
 
@@ -50,7 +48,7 @@ def test_new_rows_are_taken_and_old_ones_are_told_as_known(day):
     rows = day.rows[:6]
     day.takes(rows[:2], 2)
     assert "2 rows were recorded before" in day.takes(rows[:3], 1)
-    content = json.loads(call("campaign", *day.words(rows, "--json"), code=0).stdout)
+    content = answer("campaign", *day.words(rows))
     assert (content["numbers"], content["known"]) == ([4, 5, 6], [1, 2, 3])
     assert "no new reading" in day.refuses(rows)
     assert "no new reading" in day.refuses(rows, "--again")

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
+from campaign_on_disk import standing
 from command_line import call
 
 from kinacc.campaign import folder as campaigns
@@ -72,5 +72,5 @@ def test_the_series_itself_imported_whole_says_what_it_says_in_memory(tmp_path):
     assert sizes.max() == pytest.approx(row["max"], rel=1e-6)
     assert np.sqrt(np.mean(sizes**2)) == pytest.approx(row["rms"], rel=1e-6)
     # Bounds at equal points stand once.
-    (bound,) = json.loads(call("campaign", "status", folder, "--json").stdout)["bounds"]
+    (bound,) = standing(folder)["bounds"]
     assert bound["value_mm"] == pytest.approx(sizes.max(), abs=1e-7)

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import math
 
 import numpy as np
 import pandas as pd
 import pytest
 from campaign_on_disk import refusal
-from command_line import call
+from command_line import answer, call
 
 from kinacc.assess.attainable import width_limits
 from kinacc.assess.region_share import RegionShare
@@ -115,12 +114,12 @@ def test_the_command_answers_with_table_picture_and_budget(errors_file, tmp_path
     assert "6 of 6" in first
     assert "54%" in first
     assert picture.stat().st_size > 1000
-    content = json.loads(call(*words, "--json").stdout)
+    content = answer(*words)
     assert (content["budget"], content["budget_shown"]) == (60, None)
     assert content["noise_mm"] == [0.05] * 3
     assert [row["budget"] for row in content["rows"]] == [15, 60]
     assert pd.read_csv(table)["true_mm"].iloc[1] == pytest.approx(content["rows"][1]["true_mm"])
-    assert call(*words, "--json").stdout == call(*words, "--json").stdout
+    assert answer(*words) == content
 
 
 @pytest.mark.parametrize(

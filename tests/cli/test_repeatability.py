@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-
 import numpy as np
 import pandas as pd
 import pytest
@@ -177,5 +175,4 @@ A,1,left,12:00:00,m2,1,zwei,3
 def test_problems_of_a_file_are_listed_together(tmp_path, content, problems):
     file = tmp_path / "bad.csv"
     file.write_text(content.format(*range(9)))
-    done = call("repeatability", file, "--json", code=2)
-    assert len(json.loads(done.stdout)["problems"]) == problems
+    assert len(answer("repeatability", file, code=2)["problems"]) == problems

@@ -1,7 +1,5 @@
 """Rows of measurements are named as the user's own files name them, and none is left out unsaid."""
 
-import json
-
 import pytest
 from command_line import answer
 from stages_by_hand import run_stages
@@ -49,7 +47,7 @@ def test_the_first_poses_have_the_names_of_the_file(two_files):
 
 
 def test_a_suspicion_names_the_pose_and_the_file_of_its_line(two_files):
-    told = json.loads(call("check-data", two_files[1][0], "--json").stdout)
+    told = answer("check-data", two_files[1][0], code=None)
     found = next(e for e in told["datasets"][0]["suspicions"] if e["kind"] == "outliers")
     assert found["lines"] == [WRONG + 2]
     assert found["where"] == f"line {WRONG + 2} ({NAMES[WRONG]}) of tracker.csv"

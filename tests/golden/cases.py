@@ -5,7 +5,6 @@ Shared by the tests beside it and by ``tools/renew_golden.py``, which makes the 
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -16,7 +15,7 @@ TESTS = Path(__file__).parents[1]
 sys.path[:0] = [str(TESTS), *(str(TESTS / name) for name in ("checks", "cli", "campaign"))]
 
 import plants  # noqa: E402
-from command_line import call  # noqa: E402
+from command_line import answer  # noqa: E402
 from good_files import File, simulated  # noqa: E402
 from stages_by_hand import made  # noqa: E402
 
@@ -111,7 +110,7 @@ def faults() -> Iterator[tuple[str, File]]:
 
 def findings(folder: Path, name: str) -> list[dict]:
     """Codes, levels, lines and numbers that ``check-data`` finds in a configured file."""
-    told = json.loads(call("check-data", folder / f"{name}.yaml", "--json").stdout)
+    told = answer("check-data", folder / f"{name}.yaml", code=None)
     kept = ("kind", "level", "lines")
     found = []
     for each in told["datasets"][0].get("suspicions", []):

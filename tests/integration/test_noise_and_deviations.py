@@ -6,7 +6,7 @@ import json
 
 import numpy as np
 import pytest
-from command_line import call
+from command_line import answer, call
 from measured_files import write_readings
 from stages_by_hand import run_stages
 
@@ -60,12 +60,8 @@ def eccentric(tmp_path_factory):
     return calibrated(tmp_path_factory.mktemp("eccentric"), GEARS_RAD)
 
 
-def told(*words):
-    return json.loads(call(*words, "--json").stdout)
-
-
 def checked(config):
-    return told("check-data", config)["datasets"][0]["facts"]["noise"]
+    return answer("check-data", config, code=None)["datasets"][0]["facts"]["noise"]
 
 
 def test_check_and_calibration_state_one_noise_of_a_file(eccentric):
@@ -89,7 +85,7 @@ def test_a_repeatability_test_and_a_check_of_the_same_readings_agree(tmp_path):
         "orientation: {kind: none}}}, calibration: {base_and_tool: estimated}, evaluation: "
         "{space: measured}}}\n"
     )
-    std_mm = told("repeatability", path, "--rows", "visits")["std_mm"]
+    std_mm = answer("repeatability", path, "--rows", "visits")["std_mm"]
     noise = checked(config)
     assert noise["degrees_of_freedom"] == 60
     assert noise["per_axis_mm"] == pytest.approx(np.sqrt(np.mean(np.square(std_mm))), rel=1e-6)
@@ -107,7 +103,7 @@ def test_standard_deviations_of_an_arm_with_eccentric_gears_are_marked(eccentric
     call("export", results, "--out", tmp_path, code=0)
     exported = json.loads(next(tmp_path.glob("*.json")).read_text())["standard_deviations"]
     assert exported["held_out_over_noise"] == pytest.approx(ratio)
-    compared = told("compare", results, results)["held_out_over_noise"]
+    compared = answer("compare", results, results)["held_out_over_noise"]
     assert compared == pytest.approx([ratio, ratio])
 
 
