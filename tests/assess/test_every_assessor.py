@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from scipy.stats import binom, norm
+from scipy.stats import binom, chi2, norm
 from simulated_campaigns import away
 
 from kinacc.assess.adaptive import Candidates, Ledger
@@ -97,6 +97,7 @@ def test_unequal_noise_is_weighted_as_least_squares_would():
     weighted = sum(each @ reading for each, reading in zip(inverses, readings, strict=True))
     assert ledger.mean_mm[1] == pytest.approx(total @ weighted)
     assert ledger.noise(1) == pytest.approx(total)
+    assert ledger.noise_mm[1] == pytest.approx(math.sqrt(np.diag(total).mean()))
 
 
 # Share of 400 bounds that 95 % confidence may fall to by chance in a test of many.
@@ -132,12 +133,17 @@ def test_the_share_of_the_region_keeps_its_confidence(sigma):
 
 
 def test_bounds_on_a_share_are_the_readings_that_binomial_counts_allow():
-    errors = np.arange(1.0, 201.0)[:, None] * [1.0, 0.0, 0.0]
-    (said,) = conduct(RegionShare(200), drawn_world(errors, 1e-6, key_of(1), 1)).statements()
+    campaign = RegionShare(200).begin(Candidates(np.tile(np.diag([0.04, 0.09, 0.01]), (200, 1, 1))))
+    for row in range(200):
+        campaign.record(row, [1.0 + row, 0.0, 0.0])
+    (said,) = campaign.statements()
     numbers = np.arange(1, 201)  # of largest readings
     upper = numbers[binom.cdf(numbers - 1, 200, 0.1 * norm.cdf(1.0)) <= 0.05].max()
     lower = numbers[binom.sf(numbers - 1, 200, 0.1 + 0.9 * 0.01) <= 0.05].min()
-    assert (said.upper_mm, said.lower_mm) == pytest.approx((201 - upper, 201 - lower), abs=1e-4)
+    # Of the largest noise, one standard deviation more; less by a length that 1 % exceed.
+    assert said.upper_mm == pytest.approx(201 - upper + 0.3)
+    assert said.lower_mm == pytest.approx(201 - lower - 0.3 * math.sqrt(chi2.isf(0.01, 3)))
+    assert said.value_mm == pytest.approx(180.1)
 
 
 def test_a_share_of_the_region_needs_the_points_that_it_names():

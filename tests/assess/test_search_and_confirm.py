@@ -70,9 +70,11 @@ def left_out(points, seen, error):
 def test_the_upper_bound_follows_from_the_raw_readings(points, budget):
     said, given, sigma = campaign(points, budget)
     looks = said.boundary_of(ERROR)
-    noise_mm = shown(said, given, sigma) * sigma
-    wanted = largest_limit(given, noise_mm, looks.counts, looks.z)
+    factor = shown(said, given, sigma)
+    wanted = largest_limit(given, factor * sigma, looks.counts, looks.z)
     measured, everywhere = said.statements()
+    stated = measured.noise.numbers["factor"] if measured.noise else 1.0
+    assert stated == pytest.approx(factor)
     assert len(given) == budget
     assert measured.upper_mm == pytest.approx(max(wanted, measured.value_mm), rel=1e-9)
     assert everywhere.upper_mm == pytest.approx(measured.upper_mm, rel=1e-9)
