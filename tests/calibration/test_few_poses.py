@@ -68,6 +68,11 @@ def test_very_few_positions_leave_the_arm_nominal():
     arm, seen = positions("ur10")
     by_dh, nominal = mean_errors(arm, seen.select(slice(5)), seen.select(slice(100, None)), "dh")
     assert by_dh == pytest.approx(nominal, rel=1e-9)
+    # Priors hold the arm below three numbers a parameter, 24 and 9 of base and tool.
+    estimator = models.estimators(settings(), arm, seen)["dh"]
+    for count, held in ((32, True), (33, False)):
+        found = estimator.fit(seen.select(slice(count)), {})
+        assert (found.solution.spectrum is None) == held
 
 
 @pytest.mark.parametrize("size", [5, 20])

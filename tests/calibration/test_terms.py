@@ -5,12 +5,16 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 from scipy.stats import chi2, norm
 from simulated import POINT, POSE, THREE, disturbed, fit, joints, measure, predicted
 
 from kinacc.calibration import dh_estimator, frames
+from kinacc.calibration.identifiability import identified
 from kinacc.calibration.least_squares import HUBER, TUKEY, row_weights
+from kinacc.calibration.tables import fit_columns
+from kinacc.calibration.uncertainty import of_fit
 from kinacc.config.parameter_rules import rules
 from kinacc.geometry import log_so3
 from kinacc.kinematics import robot
@@ -71,6 +75,13 @@ def test_a_prior_weighs_as_its_standard_deviation_says():
     found = fitted(data, rule)
     assert found.model.theta_offset_rad[3] == pytest.approx(0.5 * (at + value), abs=0.1 * std)
     assert found.std[3, 0] == pytest.approx(std / np.sqrt(2), rel=0.05)
+    # Of a prior is what is known to no better than half of it: std / sqrt(1 + k^2) of k std.
+    for times, status in ((1.6, "prior"), (1.9, "identified")):
+        rule["joint 4 theta"]["prior_std_rad"] = float(times * std)
+        found = fitted(data, rule)
+        table = pd.DataFrame(identified(found, of_fit(found), data)).set_index("parameter")
+        row = table.loc["j4.theta_offset_rad"]
+        assert (row["status"], row["std"]) == (status, pytest.approx(found.std[3, 0]))
 
 
 def test_a_prior_determines_what_the_data_leave_open():
@@ -107,6 +118,12 @@ def test_a_robust_loss_forgives_rows_far_off(loss):
     assert found.weights.scale_mm == pytest.approx(0.05, rel=0.2)
     assert found.solution.variance == found.weights.scale_mm**2
     known = np.isfinite(found.solution.std)
+    table = fit_columns("dh_fit", found, of_fit(found))
+    told = dict(zip(table["quantity"], table["value"], strict=True))
+    weight = found.weights.row
+    assert told["rows_below_half_weight"] == np.sum(weight < 0.5)
+    assert told["rows_without_weight"] == np.sum(weight == 0.0) == 12 * (loss == TUKEY)
+    assert told["loss_scale"] == told["residual_std"] == found.weights.scale_mm
     variances = np.diag(found.solution.covariance)[known]
     np.testing.assert_allclose(found.solution.std[known] ** 2, variances)
 
@@ -125,3 +142,5 @@ def test_weights_are_those_of_huber_and_tukey(kind):
         residual = np.kron(0.2 * bend * share, unit)
         found = row_weights(loss, residual, data, scale_mm=0.2)
         np.testing.assert_allclose(found.row, wanted, atol=1e-3)
+        scale = 0.2 * bend * 0.9 / chi2.median(components) ** 0.5
+        assert row_weights(loss, residual, data).scale_mm == pytest.approx(scale)
