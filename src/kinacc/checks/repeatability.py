@@ -148,13 +148,10 @@ def differ_by_pose(read: pd.DataFrame, resolution_mm: ndarray) -> tuple[float, p
     """Probability that poses scatter so differently by chance (Bartlett), and their scatter.
 
     Of the visits of every pose from one side, over that of all poses; NaN where a pose tells
-    nothing. Where there is none, of the readings of one visit. Less than the rounding of
-    ``resolution_mm`` (3,) counts as that.
+    nothing. Less than the rounding of ``resolution_mm`` (3,) counts as that.
     """
-    values, keys = read.groupby(VISIT, sort=False)[AXES].mean(), SIDE
-    if len(values) == values.groupby(keys).ngroups:
-        values, keys = read.set_index(VISIT)[AXES], VISIT
-    groups, poses = (values.groupby(names, sort=False) for names in (keys, POSE))
+    values = read.groupby(VISIT, sort=False)[AXES].mean()
+    groups, poses = (values.groupby(names, sort=False) for names in (SIDE, POSE))
     square_mm2, pooled = scatter(values.to_numpy(), groups.ngroup().to_numpy())
     unknown = poses.size() * math.nan
     if not pooled:

@@ -100,13 +100,10 @@ def tabled(path: str, rows: Iterable[Row], layout: Layout, sheet: bool = False) 
     while len(readings) > 1 and _is_text(readings[-1][1], width):
         again.append(readings.pop())
     aside = sorted([*aside, *again], key=lambda row: row[0])
-    places = [place for place, name in enumerate(names)
-              if name or any(filled(row[place : place + 1]) for _, row in readings)]  # fmt: skip
-    if len(places) < width:
-        names = [names[place] for place in places]
-        under = [cell for place, cell in enumerate(under) if place in places]
-        readings = [(n, [c for place, c in enumerate(row) if place in places or place >= width])
-                    for n, row in readings]  # fmt: skip
+    for place in reversed(range(width)):
+        if not names[place] and not any(filled(row[place : place + 1]) for _, row in readings):
+            for row in (names, under, *(cells for _, cells in readings)):
+                del row[place : place + 1]
     word = "row" if sheet else "line"
     refuse(_problems(path, names, readings, line, word), f"{path} cannot be read")
     cells = frame(dict(zip(names, zip(*(c for _, c in readings), strict=True), strict=True)))
