@@ -19,12 +19,6 @@ def report(config, code):
     return json.loads(done.stdout)
 
 
-def test_a_good_file_is_described_and_passes(good, tmp_path):
-    done = call("check-data", good.write(tmp_path), code=0)
-    for words in ("poses: 80", "limits -165 to 165", "nothing suspicious"):
-        assert words in done.output
-
-
 def test_suspicions_name_their_lines_and_end_with_1_and_are_drawn_once(good, tmp_path):
     by_mm = np.where(np.isin(np.arange(80), (4, 11)), 30.0, 0.0)
     config = good.but(x_mm=good.columns["x_mm"] + by_mm).write(tmp_path)

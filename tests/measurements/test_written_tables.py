@@ -111,23 +111,19 @@ def test_numbers_that_stand_for_no_reading_are_found_and_told(text, value, unit,
     assert len(reading(path).columns["x_mm"]) == ROWS - 3
 
 
-def test_one_zero_among_points_around_it_is_asked_about(tmp_path):
+@pytest.mark.parametrize(
+    ("reading_is", "answer"), [(["0", "0", "0"], "0"), (["100.000", "0.000", "9999"], "9999")]
+)
+def test_a_zero_among_points_around_it_and_a_nine_in_one_coordinate_are_asked_about(
+    reading_is, answer, tmp_path
+):
     near = POINT_MM - POINT_MM.mean(axis=0)
     rows = [[*row[:6], *map(str, np.round(p, 3))] for row, p in zip(cells(), near, strict=True)]
-    rows[4][6:] = ["0", "0", "0"]
+    rows[4][6:] = reading_is
     path = file(tmp_path, lines(rows, mark=";"))
     assert re.search("line 6.*--no-reading", undecided(path))
-    assert len(reading(path, no_reading="0").columns["row"]) == ROWS - 1
+    assert len(reading(path, no_reading=answer).columns["row"]) == ROWS - 1
     assert len(reading(path, no_reading="none").columns["row"]) == ROWS
-
-
-def test_a_nine_in_one_coordinate_is_asked_about(tmp_path):
-    rows = cells()
-    rows[4][8] = "9999"
-    path = file(tmp_path, lines(rows, mark=";"))
-    assert "--no-reading" in undecided(path)
-    found = reading(path, no_reading="9999")
-    assert_is_truth(found, np.arange(ROWS) != 4)
 
 
 def test_joints_that_stand_for_the_rows_below_are_not_guessed(tmp_path):

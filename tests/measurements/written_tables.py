@@ -6,21 +6,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
+from cli.tracked_arm import tracked
 
 from kinacc.kinematics import robot
 from kinacc.measurements.intake import guess
 from kinacc.measurements.intake.choices import Undecided
 from kinacc.measurements.reader import read
 
-ARM = robot.load("ur10")
-ROWS = 14
+IT = tracked(poses=14)
+ROWS, POINT_MM, Q_DEG = len(IT.q), np.round(IT.point, 3), np.round(IT.q, 3)
 AXES = "xyz"
-_RNG = np.random.default_rng(8)
-Q_DEG = np.round(_RNG.uniform(-100, 100, (ROWS, 6)), 3)
-TURN = Rotation.from_euler("XYZ", [5, -10, 130], degrees=True)
-POINT_MM = np.add(TURN.apply(robot.forward(ARM, np.deg2rad(Q_DEG)).position_mm), (2600, -900, 300))
-POINT_MM = np.round(POINT_MM + _RNG.normal(0, 0.04, (ROWS, 3)), 3)
 JOINTS = [f"J{number} [deg]" for number in range(1, 7)]
 XYZ = ["X [mm]", "Y [mm]", "Z [mm]"]
 NO_UNITS = [*(f"J{number}" for number in range(1, 7)), *"XYZ"]
@@ -66,7 +61,7 @@ def looked(path, **answers):
 
 def reading(path, **answers):
     """What a run reads of the file, by the keys init writes."""
-    return read(looked(path, **answers).section, ARM, strict=False)
+    return read(looked(path, **answers).section, robot.load(IT.name), strict=False)
 
 
 def assert_is_truth(found, rows=slice(None), atol=2e-3):
