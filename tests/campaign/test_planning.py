@@ -73,7 +73,7 @@ def test_rows_count_what_is_stated_wanted_held_and_decided():
     assert row.reached_low == pytest.approx(0.06759, abs=1e-5)
     assert row.excess_mm == pytest.approx(0.5 / 3.0)
     assert (row.accept, row.reject, row.undecided) == (0.5, 0.25, 0.25)
-    assert row.width_q05_mm == pytest.approx(0.2)
+    assert (row.width_q05_mm, row.width_median_mm) == pytest.approx((0.2, 0.4))
     assert row.width_q95_mm == math.inf
 
 

@@ -7,13 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
+import scipy.stats
 import shared_data
 from simulated_months import month, session
 
 from kinacc.calibration.observations import full_poses
 from kinacc.deployment import history as histories
 from kinacc.deployment.history import LEVEL
-from kinacc.deployment.history_model import Setup
+from kinacc.deployment.history_model import Moved, Setup
 from kinacc.geometry import Pose
 from kinacc.kinematics import robot as robots
 from kinacc.measurements.orientation import euler
@@ -40,7 +41,7 @@ def test_a_knocked_joint_is_named_and_the_new_calibration_is_in_force_from_then_
     assert list(found["verdict"]) == ["first", "recalibrate", "holds"]
     assert found["in_force"][2] == "ur-2026-02-01"
     assert found["joint"][1] == 3
-    assert found["beyond_mm"][1] > 0.1
+    assert found["beyond_mm"][1] == found["moved_mm"][1] - found["chance_mm"][1] > 0.1
     assert found["probability"][1] < LEVEL
 
 
@@ -57,6 +58,13 @@ def test_a_tracker_that_was_moved_is_seen_but_not_beside_as_large_a_drift():
         found = history(*lines)
         assert found["verdict"][1] == verdict
         assert found["moved_mm"][1] == pytest.approx(0.3, abs=0.05)
+
+
+def test_chance_along_all_directions_alike_is_that_of_chi_square():
+    moved = Moved(np.eye(4), np.array([0.1, -0.2, 0.25, 0.1]), 0.01 * np.eye(4))
+    probability, chance_mm = moved.test(0.005)
+    assert probability == pytest.approx(scipy.stats.chi2.sf(12.25, 4), rel=0.05)
+    assert chance_mm == pytest.approx(0.1 * scipy.stats.chi2.isf(0.005, 4) ** 0.5, rel=0.01)
 
 
 def test_misfit_that_differs_between_halves_widens_the_limit_at_other_poses(monkeypatch):

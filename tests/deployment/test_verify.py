@@ -136,6 +136,14 @@ def test_readings_without_a_session_belong_to_no_base_of_several(folder):
     frames = pd.concat([frames.assign(session=name) for name in "ab"])
     tables["frames"] = {name: column.to_numpy() for name, column in frames.items()}
     seen = from_columns(tables["measurements"], arm)
+    fitted = "estimate == 'train' and comparison == 'dh_vs_measured'"
+    left = pd.read_parquet(found / "pose_errors.parquet").query(fitted)
+    there = seen.select(left["row"].to_numpy())
+    stated = model_errors(read_tables(found), arm, there, (), 500.0).set_index("model").loc["dh"]
+    for unit in ("_mm$", "_mrad$"):
+        sizes = np.linalg.norm(left.filter(regex=unit), axis=1)
+        wanted = [sizes.mean(), np.quantile(sizes, 0.99), sizes.max(), (sizes**2).mean() ** 0.5]
+        assert stated.filter(regex=unit).tolist() == pytest.approx(wanted)
     with pytest.raises(InputError, match="each has its own base; allowed: one of a, b"):
         model_errors(tables, arm, seen, (), 500.0)
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import scipy.stats
 
 from kinacc.gate.chance import STATISTICS, Sample, change
 
@@ -38,6 +39,12 @@ def test_the_interval_of_a_mean_is_students_where_errors_are_normal():
     spread = np.sqrt(now.var(ddof=1) / 2000 + before.var(ddof=1) / 2000)
     least = changed("mean", now, before).least
     assert least == pytest.approx(now.mean() - before.mean() - 2.33 * spread, abs=0.2 * spread)
+    # Of 20 the spread has 19 degrees of freedom; 19 are too few.
+    now, before = now[:20], before[:20]
+    spread = np.sqrt((now.var(ddof=1) + before.var(ddof=1)) / 20)
+    student = now.mean() - before.mean() - scipy.stats.t.ppf(0.999, 19) * spread
+    assert changed("mean", now, before, confidence=0.999).least == pytest.approx(student, abs=0.02)
+    assert changed("mean", now[1:], before).open
 
 
 def test_an_arm_that_is_worse_by_exactly_the_allowance_seldom_fails():

@@ -144,6 +144,7 @@ def test_new_measurements_are_better_the_same_worse_or_undecided(made, now, befo
     means = [np.linalg.norm(each, axis=1).mean() for each in errors]
     told_means = found["mean_mm"], found["accepted_mean_mm"]
     assert told_means == pytest.approx(means, rel=1e-9)
+    assert found["difference_mm"] == pytest.approx(means[0] - means[1])
 
 
 def test_a_knocked_joint_makes_the_accepted_calibration_hold_no_more(made, tmp_path):

@@ -13,6 +13,9 @@ from stages_by_hand import run_stages
 from kinacc.calibration.summary import TABLES
 from kinacc.campaign.campaign import Campaign
 from kinacc.deployment import folder
+from kinacc.gate.gates import of_gate
+from kinacc.gate.outcome import FAILED, PASSED
+from kinacc.gate.values import RunTables
 from kinacc.report import summarise
 from kinacc.report.rendering import size
 from kinacc.tables import sums
@@ -80,6 +83,15 @@ def test_a_campaign_bounds_the_robot_it_is_about_and_no_other_by_its_own_toleran
     assert (bound["confidence"], status["candidates"], status["readings"]) == (0.95, 5, 8)
     assert (verdict["tolerance_mm"], verdict["verdict"]) == (2.0, "accept")
     assert (found["line_a"]["campaign"], found["line_a"]["verdict"]) == (None, None)
+    wide_mm = bound["upper_mm"] + 0.01
+    for own_mm, tolerance_mm, confidence, wanted in (
+        (None, wide_mm, 0.95, PASSED), (wide_mm, 1e-3, None, PASSED), (None, wide_mm, 0.96, FAILED),
+    ):  # fmt: skip
+        gate = {"kind": "campaign", "campaign": "check_line_b", "name": "", "on_fail": "fail",
+                "tolerance_mm": own_mm, "confidence": confidence}  # fmt: skip
+        result = of_gate(gate, RunTables(fleet / "line_b"), tolerance_mm, None)
+        assert result.verdict == wanted
+        assert result.figures["bound_mm"] == bound["upper_mm"]
 
 
 def test_readings_that_contradict_the_noise_accept_nothing(fleet):
