@@ -48,8 +48,6 @@ def test_revisits_come_first_in_between_and_last_a_pose_after_the_other():
     plan = schedule(100, 80, 22)  # 5 revisits, 11 in steps of 84 / 12, and 6
     assert [*plan.row_at] == [*range(10), *range(17, 94, 7), *range(94, 100)]
     assert [*plan.row_at.values()] == [place % 5 for place in range(27)]
-    assert plan.left(18) == 16
-    assert plan.visit(12) == (0, 1, 2, 3, 4, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 0)
     assert [schedule(100, 80, few).poses for few in (7, 8)] == [1, 2]
 
 
@@ -120,6 +118,12 @@ def test_references_without_a_change_alarm_as_rarely_as_stated(freedom):
     assert_allclose(sum(error for _, error in stages(plan)), FALSE_ALARMS)
     spread = math.sqrt(FALSE_ALARMS / reps)
     assert 0.6 * FALSE_ALARMS < alarm.mean() < FALSE_ALARMS + 3.0 * spread
+
+
+def test_a_drift_of_three_deviations_is_said():
+    plan, rng = schedule(200, 180, 20), np.random.default_rng(3)
+    readings = [read(plan, rng, lambda time: 3.0 * time) for _ in range(300)]
+    assert np.mean([find_change(plan, each).is_found for each in readings]) >= 0.95
 
 
 @pytest.mark.parametrize(
