@@ -143,9 +143,10 @@ def test_points_of_one_wrist_have_joint_5_on_one_side(models):
 def test_a_box_of_coupled_joints_is_in_reported_angles(models):
     coupling = np.diag([1.0, 1, 1, -1, 1, 1])
     coupling[2, 1] = -1.0
-    arm = replace(ARM, joint_map=coupling)
     box = np.deg2rad([-10.0, 0, -30, 5, -10, -10]), np.deg2rad([10.0, 40, 0, 20, 10, 10])
-    q = operating_points.in_joints(arm, models, box, "sobol", 60)
+    arm = replace(ARM, joint_map=coupling, q_min_rad=box[0], q_max_rad=box[1])
+    everywhere = region.Cylinder(0.0, 1e5, -1e5, 2e5, -np.pi, np.pi)
+    q = operating_points.in_joints(arm, models, "sobol", 60, everywhere)
     assert limits.within(limits.reported_joints(arm, q), *box).all()
     assert limits.within(q, LOW, HIGH).all()
     assert (q[:, 3] < 0).all()
@@ -153,17 +154,18 @@ def test_a_box_of_coupled_joints_is_in_reported_angles(models):
 
 def test_a_region_of_joint_draws_is_in_the_base_frame_of_the_arm(models):
     box = np.deg2rad([-10.0, 0, -30, 5, -10, -10]), np.deg2rad([60.0, 40, 0, 20, 10, 10])
-    lifted = replace(ARM, base=geometry.Pose(np.eye(3), np.array([0.0, 0.0, 2000.0])))
+    arm = replace(ARM, q_min_rad=box[0], q_max_rad=box[1])
+    lifted = replace(arm, base=geometry.Pose(np.eye(3), np.array([0.0, 0.0, 2000.0])))
     higher = replace(CYLINDER, bottom_mm=CYLINDER.bottom_mm + 2000.0)
-    q = operating_points.in_joints(ARM, models, box, "sobol", 60, CYLINDER)
-    assert np.array_equal(operating_points.in_joints(lifted, models, box, "sobol", 60, higher), q)
+    q = operating_points.in_joints(arm, models, "sobol", 60, CYLINDER)
+    assert np.array_equal(operating_points.in_joints(lifted, models, "sobol", 60, higher), q)
 
 
-def test_boxes_without_anything_to_assess_name_every_joint(models):
-    box = np.deg2rad([100.0, -10, -10, -10, -10, 200]), np.deg2rad([110.0, 10, 10, 10, 10, 210])
-    with pytest.raises(InputError) as refusal:
-        operating_points.in_joints(ARM, models, box, "sobol", 10)
-    assert [problem.where for problem in refusal.value.problems] == ["joint 1", "joint 6"]
+def test_limits_without_anything_to_assess_are_refused(models):
+    low, high = ([100.0, -10, -10, -10, -10, 200], [110.0, 10, 10, 10, 10, 210])
+    arm = replace(ARM, q_min_rad=np.deg2rad(low), q_max_rad=np.deg2rad(high))
+    with pytest.raises(InputError, match=r"only 0 of .* outside range"):
+        operating_points.in_joints(arm, models, "sobol", 2, CYLINDER)
 
 
 def test_a_space_out_of_reach_is_refused_with_the_reasons_counted(models):

@@ -84,8 +84,7 @@ def points(inputs: Tables, settings: Settings) -> dict[str, Columns]:
         return {"assessment_points": _measured(inputs, section["points"])}
     models, drawn = equipped(inputs, section, arm), (section["sequence"], section["points"])
     if section["points_in"] == "joints":
-        limited = arm.q_min_rad, arm.q_max_rad
-        q_rad = operating_points.in_joints(arm, models, limited, *drawn, cylinder(section))
+        q_rad = operating_points.in_joints(arm, models, *drawn, cylinder(section))
     else:
         wanted, wrist = poses_wanted(section), section["wrist"]
         q_rad = operating_points.in_space(arm, models, wanted, *drawn, wrist)

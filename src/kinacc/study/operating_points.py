@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from kinacc.config.error_models import MEASURED, Comparison
-from kinacc.errors import InputError, Problem, refuse
+from kinacc.errors import InputError, Problem
 from kinacc.geometry import compose
 from kinacc.kinematics import inverse, region
 from kinacc.kinematics.inverse import Status, limits
@@ -86,49 +86,24 @@ def _branches(robot: Robot, wrist: str) -> np.ndarray:
 
 
 def in_joints(
-    robot: Robot,
-    models: Models,
-    box_rad: tuple[np.ndarray, np.ndarray],
-    sequence: str,
-    count: int,
-    cylinder: Cylinder | None = None,
+    robot: Robot, models: Models, sequence: str, count: int, cylinder: Cylinder
 ) -> np.ndarray:
-    """DH joint angles (count, k) drawn evenly in a box of reported joints (k,), (k,).
+    """DH joint angles (count, k) drawn evenly within the limits of the reported joints.
 
-    Only configurations within the joint limits and within the range of the reference are
-    kept, and with ``cylinder`` only those whose tool (assessed model) lies in it. Raises InputError
-    naming the joints of which nothing is left, or saying how few configurations qualify.
+    Only configurations within the range of the reference are kept whose tool (assessed model) lies
+    in the cylinder. Raises InputError, with the reasons counted, where too few qualify.
     """
-    lower, upper = _assessable_box(robot, models, *box_rad)
+    limited = robot.q_min_rad, robot.q_max_rad
+    lower, upper = limits.cut_to_range(robot, *limited, models.range_rad)
 
     def solve(unit: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         q_rad = robot.dh_joints(lower + unit * (upper - lower))
+        tool = models.by_name[models.assessed].tool_poses(q_rad, models.travel)
         good = limits.within(q_rad, *models.range_rad)
-        if cylinder is not None:
-            tool = models.by_name[models.assessed].tool_poses(q_rad, models.travel)
-            good &= region.contains(cylinder, compose(robot.base, tool).position_mm)
+        good &= region.contains(cylinder, compose(robot.base, tool).position_mm)
         return q_rad, np.where(good, Status.FOUND, Status.OUTSIDE_RANGE)
 
     return _drawn(sequence, count, len(lower), solve)
-
-
-def _assessable_box(
-    robot: Robot, models: Models, lower_rad: np.ndarray, upper_rad: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """A box of reported joints cut to the joint limits and, where uncoupled, the fitted range."""
-    lower = np.maximum(lower_rad, robot.q_min_rad)
-    upper = np.minimum(upper_rad, robot.q_max_rad)
-    lower, upper = limits.cut_to_range(robot, lower, upper, models.range_rad)
-    problems = [
-        Problem(
-            f"joint {joint + 1}",
-            f"{np.rad2deg(lower_rad[joint]):.6g} to {np.rad2deg(upper_rad[joint]):.6g} deg is "
-            "outside the joint limits or the range the VEC model was fitted over",
-        )
-        for joint in np.flatnonzero(lower > upper)
-    ]
-    refuse(problems, "The joint box cannot be assessed")
-    return lower, upper
 
 
 def spread_rows(total: int, count: int) -> np.ndarray:
