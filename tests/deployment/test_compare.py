@@ -142,7 +142,7 @@ def test_another_geometry_is_another_robot_and_a_calibration_is_not():
 class Curves(dh.DHModel):
     """A model whose parameters say nothing by themselves, as those of VEC."""
 
-    comparable = None
+    kind = "curves"
 
 
 def covering(calibration, low_rad, high_rad):

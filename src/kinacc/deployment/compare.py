@@ -37,6 +37,7 @@ _STEPS = 8
 _ANOTHER = 0.005  # of the length of an arm; a calibration changes far less
 _FEWEST = 5  # poses: base and tool absorb nearly all of three
 _UNLIKELY = 0.001
+_BY_PARAMETERS = {"dh", "compliance"}  # kinds of models whose parameters are compared
 _ENOUGH = 0.5  # of the poses near measured poses of both
 
 
@@ -136,11 +137,12 @@ def compare(
     names = (Path(first.name).name, Path(second.name).name)
     names = names if names[0] != names[1] else (first.name, second.name)
     first, second = both = counted_once(first, second, shared)
-    parametric = first.model.comparable is not None and second.model.comparable is not None
+    # Coefficients of two series depend on their ranges and orders.
+    parametric = {first.model.kind, second.model.kind} <= _BY_PARAMETERS
     test, parameters = (np.nan, 0, np.nan), None
     if parametric:
         scale = np.array([scale_of(name) for name in first.model.names])
-        before_, after_ = (np.asarray(item.model.comparable) / scale for item in both)
+        before_, after_ = (item.model.start / scale for item in both)
         known = [_Knowledge.of(item, scale) for item in both]
         test = _test(after_ - before_, known)
         parameters = _parameters(first.model.names, before_, after_, known)

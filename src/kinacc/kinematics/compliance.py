@@ -62,11 +62,6 @@ class ComplianceModel(ErrorModel):
         return bool(np.isfinite(self.coefficients[:, 0]).any())
 
     @property
-    def comparable(self) -> np.ndarray:
-        """All parameters (P,)."""
-        return self.start
-
-    @property
     def names(self) -> tuple[str, ...]:
         """Names (P,): of the DH arm, then j2.compliance_rad_per_nm, .."""
         places = np.argwhere(np.isfinite(self.coefficients))

@@ -84,11 +84,6 @@ class DHModel(ErrorModel):
 
     table = dh
 
-    @property
-    def comparable(self) -> np.ndarray:
-        """All parameters (5k,)."""
-        return self.start
-
     @cached_property
     def names(self) -> tuple[str, ...]:
         """Names (5k,) of the parameters: j1.theta_offset_rad, ..."""

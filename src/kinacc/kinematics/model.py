@@ -222,11 +222,6 @@ class ErrorModel:
         """Whether poses depend on the payload of a state."""
         return False
 
-    @property
-    def comparable(self) -> np.ndarray | None:
-        """Values (P,) by ``names`` that two fits may be compared by, if there are."""
-        return None
-
     def to_columns(self, std: np.ndarray) -> dict[str, np.ndarray]:
         """Write the table ``<kind>_model``.
 
