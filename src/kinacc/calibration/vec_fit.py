@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -132,26 +132,27 @@ def _with_centred_offsets(fit: ModelFit, observations: Observations) -> ModelFit
     A gauge: it changes no pose of a joint whose every observation travels in a known direction.
     Without it the prior splits the constant between both, and a pose at s = 0 loses a part.
     """
-    empty, free, frames = cast(VECModel, fit.model), fit.free, fit.parameters.size
-    (joints, errors, terms), solution = empty.coefficients.shape, fit.solution
-    if not free[empty.coefficients.size :].any():
+    free, frames, solution = fit.free, fit.parameters.size, fit.solution
+    if not observations.s.any():
         return fit
-    mapping = np.eye(frames + free.size)
-    for joint in range(joints):
-        offsets = frames + empty.coefficients.size + 2 * joint + np.arange(2)
-        if free[offsets - frames].all() and observations.s[:, joint].all():
-            eps_z = frames + (joint * errors + ERRORS.index("eps_z")) * terms
-            mapping[eps_z, offsets] += 0.5
-            mapping[np.ix_(offsets, offsets)] -= 0.5
-    estimated = np.append(np.ones(frames, dtype=bool), free)
-    mapping = mapping[np.ix_(estimated, estimated)]
+    place, mapping = frames - 1 + np.cumsum(free), np.eye(len(solution.x))
+    names = dict(zip(fit.model.names, range(free.size), strict=True))
+    for joint, travelled in enumerate(np.all(observations.s, axis=0).tolist(), 1):
+        offsets = [names[f"j{joint}.eps_z.minus"], names[f"j{joint}.eps_z.plus"]]
+        if travelled and free[offsets].all():
+            both = place[offsets]
+            mapping[place[names[f"j{joint}.eps_z.0"]], both] += 0.5
+            mapping[both[:, None], both] -= 0.5
     covariance = mapping @ solution.covariance @ mapping.T
-    deviation = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    solution = replace(solution, x=mapping @ solution.x, covariance=covariance, std=deviation)
-    vector, fitted_std = np.zeros(free.size), np.full(free.size, np.nan)
-    vector[free], fitted_std[free] = solution.x[frames:], deviation[frames:]
-    model = fit.model.with_parameters(vector)
-    return replace(fit, model=model, std=fitted_std, solution=solution)
+    solution = replace(
+        solution,
+        x=mapping @ solution.x,
+        covariance=covariance,
+        std=np.sqrt(np.maximum(np.diag(covariance), 0.0)),
+    )
+    vector, std = np.zeros(free.size), np.full(free.size, np.nan)
+    vector[free], std[free] = solution.x[frames:], solution.std[frames:]
+    return replace(fit, model=fit.model.with_parameters(vector), std=std, solution=solution)
 
 
 ORDERS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 28, 40)
