@@ -22,9 +22,17 @@ from kinacc.assess.adaptive import Campaign, Candidates
 from kinacc.assess.attainable import NONE, limits_of
 from kinacc.assess.registry import ADAPTIVE, ASSESSORS, RECOMMENDED
 from kinacc.assess.statement import CANDIDATES, REGION, Reason, Statement
-from kinacc.assess.world import World, assess_world, carry_on, drawn_world, key_of, truth_mm
+from kinacc.assess.world import (
+    World,
+    assess_world,
+    carry_on,
+    drawn_world,
+    error_vectors,
+    key_of,
+    truth_mm,
+)
 from kinacc.config.records import of_section
-from kinacc.study.fields import ErrorField, of_measurements, of_points
+from kinacc.study.fields import ErrorField, of_measurements
 from kinacc.tables import store
 from research import verdicts
 from research.conditions import CONDITIONS, STATED, Course
@@ -144,7 +152,7 @@ def field_of(folder: Path) -> ErrorField:
 
     if (folder / "data_check.parquet").is_file():  # of measured files alone
         return of_measurements(folder.name, table("pose_errors"))
-    return of_points(folder.name, table("assessment_points"))
+    return ErrorField(folder.name, error_vectors(table("assessment_points")))
 
 
 @dataclass(frozen=True)

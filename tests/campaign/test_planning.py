@@ -97,25 +97,19 @@ def test_fewer_errors_than_candidates_and_targets_without_a_statement_are_refuse
         simulate([field()], 40, np.eye(3), [RegionShare(measurements=40)], 1, 0, Aim())
 
 
-@pytest.fixture
-def errors_file(tmp_path):
-    path = tmp_path / "errors.csv"
-    np.savetxt(path, field(60).error_mm, delimiter=",", header="ex_mm,ey_mm,ez_mm", comments="")
-    return path
-
-
-def test_the_command_answers_with_table_picture_and_budget(errors_file, tmp_path):
+def test_the_command_answers_with_table_picture_and_budget(tmp_path):
     picture, table = tmp_path / "width.svg", tmp_path / "plan.csv"
-    words = ("campaign", "plan", "--noise-mm", "0.05", "--candidates", 30, "--errors", errors_file,
-             "--width-mm", "0.2", "--repetitions", 6, "--budget", 15, "--budget", 60)  # fmt: skip
+    words = ("campaign", "plan", "--noise-mm", "0.05", "--candidates", 30, "--errors", "smooth",
+             "--width-mm", "0.2", "--power", "0.5", "--repetitions", 6, "--budget", 15,
+             "--budget", 60)  # fmt: skip
     first = call(*words, "--picture", picture, "-o", table, code=0).output.splitlines()[0]
     # Six of six leave room for a share of 0.025 ** (1 / 6) = 54 %.
-    assert first.startswith("60 readings may suffice")
+    assert first.startswith("60 readings give")
     assert "6 of 6" in first
     assert "54%" in first
     assert picture.stat().st_size > 1000
     content = answer(*words)
-    assert (content["budget"], content["budget_shown"]) == (60, None)
+    assert content["budget"] == 60
     assert content["noise_mm"] == [0.05] * 3
     assert [row["budget"] for row in content["rows"]] == [15, 60]
     assert pd.read_csv(table)["true_mm"].iloc[1] == pytest.approx(content["rows"][1]["true_mm"])

@@ -15,15 +15,6 @@ from kinacc.config.names import in_csv, of_csv
 from kinacc.kinematics import robot
 
 
-@pytest.mark.parametrize("name", ["../../evil", "/tmp/evil", "a/b", "..", "", "-x", "a\nb", "a "])
-def test_an_export_stays_in_its_folder_whatever_its_name(study, tmp_path, name):
-    inside = tmp_path / "a" / "b"
-    inside.mkdir(parents=True)
-    done = call("export", study, "--out", inside, "--name", name, code=2)
-    assert "--name" in done.output
-    assert [path for path in tmp_path.rglob("*") if path.is_file()] == []
-
-
 def test_text_that_would_be_a_formula_is_read_back_as_it_was(study, tmp_path):
     names = ["=cmd|x", "+a", "-5", "-a", "@b", "'plain"]
     joints, found, again = (tmp_path / name for name in ("q.csv", "found.csv", "again.parquet"))

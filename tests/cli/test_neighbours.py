@@ -32,7 +32,7 @@ def written(study, tmp_path_factory):
     campaign = base / "check"
     call("campaign", "start", campaign, "--calibration", study, *STARTED, "--candidates", 8, code=0)
     plan = ("plan-poses", "mh180", "--poses", 8, "--candidates", 60, "--joints-deg",
-            "-30:30,-20:20,-20:20,-30:30,40:70,-30:30", "--hayati", "2")  # fmt: skip
+            "-30:30,-20:20,-20:20,-30:30,40:70,-30:30")  # fmt: skip
     made = {f"plan-poses.{kind}": plan for kind in ("csv", "json", "parquet")}
     made |= {
         "campaign next.csv": ("campaign", "next", campaign, "--all"),

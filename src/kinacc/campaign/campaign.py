@@ -117,7 +117,7 @@ class Campaign:
         self.opened = folders.open_(self.folder)
 
     def __repr__(self) -> str:
-        readings, candidates = self.status().readings, len(self.plan.points.label)
+        readings, candidates = len(self.state.readings), len(self.plan.points)
         return f"<Campaign {str(self.folder)!r}, {candidates} candidates, {readings} readings>"
 
     @classmethod
@@ -226,7 +226,6 @@ class Campaign:
         point: str | None = None,
         joints: ArrayLike | None = None,
         instrument: str | None = None,
-        std_mm: str | None = None,
         accept_implausible: bool = False,
         again: bool = False,
     ) -> Recorded:
@@ -242,8 +241,6 @@ class Campaign:
             Reported joints, rad (mm where a joint slides).
         instrument : str, optional
             Instrument, by default the first.
-        std_mm : str, optional
-            Noise of this reading where it is not the instrument's: 1, 3 or 9 numbers.
         accept_implausible, again : bool
             Take a reading of any size, or one that repeats an earlier one to the last digit.
 
@@ -262,7 +259,7 @@ class Campaign:
             name = plan.instrument(instrument).name
             values = np.asarray(position_mm, dtype=float).reshape(-1)
             reported = None if joints is None else np.asarray(joints, dtype=float).reshape(-1)
-            reading = Reading(number, values, name, reported, std_mm)
+            reading = Reading(number, values, name, reported)
             most_mm = math.inf if accept_implausible else most_plausible_mm(state)
             return _record(opened, FileOfReadings([reading], ["the reading"]), most_mm, again)
 

@@ -13,7 +13,7 @@ import hashlib
 import json
 import os
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import cached_property
@@ -114,17 +114,12 @@ def locked(folder: Path, patience_s: float = _PATIENCE_S) -> Iterator[None]:
 
     Raises InputError where another holds it for longer than ``patience_s``.
     """
-    try:
-        lock = open(folder / LOCK, "a+")  # noqa: SIM115 closed by the next line's block
-    except OSError as error:
-        raise _not_written(folder / LOCK, error) from None
-    with lock as file:
+    with ExitStack() as stack:
         try:
+            file = stack.enter_context(open(folder / LOCK, "a+"))
             held = taken(file.fileno(), patience_s)
         except OSError as error:
-            message = f"the file system of this folder holds no locks: {error.strerror}"
-            fix = "two writers could spoil the campaign: move its folder to a local disk"
-            raise InputError(Problem(str(folder), message, fix=fix)) from None
+            raise _not_written(folder / LOCK, error) from None
         if not held:
             message = "another process is writing to this campaign"
             fix = "wait until it is done, then try again"

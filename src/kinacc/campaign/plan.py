@@ -235,11 +235,6 @@ class Plan(BaseModel):
         robot's base."""
         return self.instruments[0].in_base(self.to_base, self.points.modelled_mm)
 
-    @property
-    def by_travel(self) -> bool:
-        """Whether the first visit is made in order of travel."""
-        return not np.array_equal(self.route, self.order[: len(self.route)])
-
     def instrument(self, name: str | None) -> Instrument:
         """An instrument by name, the first where none is named. InputError for another name."""
         if name is None:

@@ -50,9 +50,9 @@ class BudgetPlan:
     ``undecided``: shares decided so. ``reached``: campaigns that reach the aim; ``reached_low``:
     the share that they show with 97.5 % confidence.
 
-    ``budget``: the smallest that reaches the aim in the share ``power`` of the simulated campaigns
-    on all errors, as every larger one does; ``budget_shown``: the smallest for which so many
-    simulations show it with 97.5 % confidence. None where there is none, or no aim.
+    ``budget``: the smallest for which the simulations show with 97.5 % confidence that the share
+    ``power`` of campaigns reaches the aim on all errors, as every larger one does. None where there
+    is none, or no aim.
     """
 
     assessor: str
@@ -65,7 +65,6 @@ class BudgetPlan:
     repetitions: int
     seed: int
     budget: int | None
-    budget_shown: int | None
     rows: pd.DataFrame
 
 
@@ -115,7 +114,6 @@ def plan_budget(
         tuple(np.sqrt(np.diag(covariance_mm2)).tolist()),
         aim.target,
         *(aim.width_mm, aim.tolerance_mm, aim.power, repetitions, seed),
-        smallest_budget(rows["budget"], rows["reached"] / repetitions, aim),
         smallest_budget(rows["budget"], rows["reached_low"], aim),
         rows,
     )

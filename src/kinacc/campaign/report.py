@@ -36,18 +36,18 @@ def tables(opened: Opened) -> dict[str, Columns]:
     def watch(campaign: Campaign) -> None:
         count = campaign.ledger.taken
         if count % pause == 0 or count == total:
-            rows.extend(_bounds(opened, campaign))
+            rows.extend(_bounds(campaign))
 
     opened.watched(watch)
     state = opened.state
     return {
         "campaign_points": _points(state),
         "campaign_readings": _readings(state),
-        "campaign_bounds": columns_of("campaign_bounds", rows or _bounds(opened, state.campaign)),
+        "campaign_bounds": columns_of("campaign_bounds", rows or _bounds(state.campaign)),
     }
 
 
-def _bounds(opened: Opened, campaign: Campaign) -> list[tuple[object, ...]]:
+def _bounds(campaign: Campaign) -> list[tuple[object, ...]]:
     taken, visited = campaign.ledger.taken, len(campaign.ledger.visited)
     return [
         (
@@ -55,7 +55,7 @@ def _bounds(opened: Opened, campaign: Campaign) -> list[tuple[object, ...]]:
             *(item.upper_mm, item.excepted, item.confidence),
             *(reason(code) or None for code in (item.assumption, item.withheld)),
         )
-        for item in sayable(opened.plan, campaign)
+        for item in sayable(campaign)
     ]
 
 

@@ -195,7 +195,7 @@ class State:
 
     def statements(self) -> tuple[Statement, ...]:
         """Return the statements that the readings support."""
-        return sayable(self.plan, self.campaign)
+        return sayable(self.campaign)
 
     def ahead(self) -> list[int]:
         """Return points to be read whatever is read, in order, planned revisits in their places."""
@@ -252,19 +252,19 @@ def most_plausible_mm(state: State, rows: Sequence[Reading] = ()) -> float:
     return min(plan.limits.implausible_mm, unusual)
 
 
-def sayable(plan: Plan, campaign: Campaign) -> tuple[Statement, ...]:
+def sayable(campaign: Campaign) -> tuple[Statement, ...]:
     """Return the statements of a campaign, without those that its visit does not support yet.
 
-    Part of a visit made in order of travel is no random sample: until it is complete, nothing is
-    stated about points that were not measured. Readings that all equal the prediction to the last
-    digit are none: whatever the errors, noise keeps them apart.
+    Part of the first visit, which is made in order of travel, is no random sample: until it is
+    complete, nothing is stated about points that were not measured. Readings that all equal the
+    prediction to the last digit are none: whatever the errors, noise keeps them apart.
     """
     stated = campaign.statements()
     if campaign.ledger.taken and not campaign.ledger.sizes_mm().any():
         reason = Reason("predicted", {"read": campaign.ledger.taken})
         return tuple(Statement(item.target, share=item.share, withheld=reason) for item in stated)
     missing = campaign.first - len(campaign.ledger.visited)
-    if missing <= 0 or not plan.by_travel:
+    if missing <= 0:
         return stated
     reason = Reason("first_visit_by_travel", {"left": missing})
     return tuple(

@@ -222,7 +222,7 @@ def _open(folder: str) -> Campaign:
 
 
 _COMPUTED = {"predict": "unexplained_mm", "compensate": "solver_residual_mm"}  # columns of theirs
-_OF_ONE = ("point", "joints_deg", "std_mm")
+_OF_ONE = ("point", "joints_deg")
 
 
 @campaign.command("record")
@@ -232,7 +232,6 @@ _OF_ONE = ("point", "joints_deg", "std_mm")
 @option("--point", help="Measured candidate. [the next one]")
 @option("--joints-deg", help="Joints of the controller (mm where a joint slides).")
 @option("--instrument", help="Instrument. [the first]")
-@option("--std-mm", help="Noise of this reading where it is not the instrument's.")
 @option("--accept-implausible", is_flag=True, help="Acceptance of an error of any size.")
 @option("--again", is_flag=True, help="Acceptance of readings that repeat or replace others.")
 @answers()
@@ -279,7 +278,7 @@ def _single(options: Mapping[str, Any], slides: np.ndarray) -> dict[str, Any]:
     joints = values.get("joints_deg")
     if joints is not None:
         joints = joints * np.where(slides, 1.0, np.pi / 180.0)
-    others = {name: options[name] for name in ("point", "instrument", "std_mm")}
+    others = {name: options[name] for name in ("point", "instrument")}
     return {"position_mm": values["position_mm"], "joints": joints, **others}
 
 
@@ -293,8 +292,9 @@ def _of_file(path: str, options: Mapping[str, Any], campaign: Campaign) -> FileO
     # A cell that is no number spoils its row, not the file: it is named row by row.
     read = read_rows(path, plan.slides, POINTS, spoilt=[])
     table, columns, joints, position_mm = read.table, read.columns, read.joints, read.position_mm
-    if table is None or columns is None or position_mm is None:
-        raise InputError(Problem(path, "holds no positions", "x_mm, y_mm, z_mm"))
+    assert table is not None  # a file has them all, or read_rows refuses it
+    assert columns is not None
+    assert position_mm is not None
     pose = columns.single.get("pose")
     if pose:
         table = table.with_pose_names(pose.column)

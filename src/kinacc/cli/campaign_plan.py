@@ -19,13 +19,10 @@ from kinacc.cli.choice import calibration_of, option
 from kinacc.cli.output import Output, answers
 from kinacc.deployment.folder import read_tables
 from kinacc.errors import InputError, Problem, refuse
-from kinacc.measurements.rows import open_table
-from kinacc.measurements.table import numbers
 from kinacc.progress import reporting
 from kinacc.report.rendering import lines
 from kinacc.study import fields
 from kinacc.study.fields import ErrorField
-from kinacc.tables import store
 
 DEFAULT_ERRORS = ("smooth", "workshop", "defect")
 SHARES = (0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0)  # of the candidates: budgets by default
@@ -64,8 +61,8 @@ _SHOWN = {
 def plan(out: Output, **options: Any) -> None:
     """Simulate campaigns: the width of the bounds by budget, and the budget for a wanted width.
 
-    --errors is a results folder (its held-out errors), a file with columns ex_mm, ey_mm, ez_mm, or
-    made-up errors: smooth, workshop (larger), defect (larger still at 2 % of the poses).
+    --errors is a results folder (its held-out errors) or made-up errors: smooth, workshop (larger),
+    defect (larger still at 2 % of the poses).
 
     \b
     Example:
@@ -82,15 +79,15 @@ def plan(out: Output, **options: Any) -> None:
         from kinacc.figures.campaign import draw_budgets
 
         rows = budgets.rows.assign(share=budgets.rows["reached"] / repetitions)
-        power, budget = aim.power if aim.is_set else None, budgets.budget_shown or budgets.budget
-        out.draw(draw_budgets(rows, aim.width_mm, power, budget))
+        power = aim.power if aim.is_set else None
+        out.draw(draw_budgets(rows, aim.width_mm, power, budgets.budget))
     table = budgets.rows.replace(math.inf, math.nan)
     absent = [] if table["excepted"].any() else ["excepted"]
     absent += ["within"] if aim.width_mm is None else []
     absent += ["accept", "reject", "undecided"] if aim.tolerance_mm is None else []
     holding = [f"{row.holding} of {row.judged}" for row in table.itertuples()]
     shown = table.assign(holding=holding)[[*_SHOWN]].drop(columns=absent).rename(columns=_SHOWN)
-    budget = budgets.budget_shown or budgets.budget or int(table["budget"].max())
+    budget = budgets.budget or int(table["budget"].max())
     worst = table[table["budget"] == budget].nsmallest(1, "reached")
     judged = budgets.rows.dropna(subset="attainable_mm")
     last = judged[judged["budget"] == judged["budget"].max()].nlargest(1, "excess_mm")
@@ -123,38 +120,20 @@ def _question(
 
 
 def errors_of(name: str, point: str | None = None) -> ErrorField:
-    """Return made-up errors, those of a results folder or of a file.
+    """Return made-up errors, or those of a results folder.
 
     ``point``: target of a results folder, by default the one that a campaign is about.
     """
-    path, columns = Path(name), ("ex_mm", "ey_mm", "ez_mm")
+    path = Path(name)
     if name in fields.FAMILIES:
         return fields.made_up(name)
-    if path.is_dir():
-        return _errors_of_folder(path, point)
-    if not path.is_file():
-        allowed = f"a results folder, a file, {', '.join(fields.FAMILIES)}"
-        raise InputError(Problem("--errors", f"{name!r} does not exist", allowed))
-    problems, table = list[Problem](), open_table(path)[0]
-    if not {*columns} <= {*table.columns}:
-        raise InputError(Problem(name, "lacks columns", ", ".join(columns)))
-    errors = np.stack([numbers(table, column, problems, gaps=True) for column in columns], axis=1)
-    refuse(problems)
-    errors = errors[~np.isnan(errors).all(axis=1)]
-    if not np.isfinite(errors).all() or not len(errors):
-        raise InputError(Problem(name, "has no error, or one that is not complete"))
-    return ErrorField(path.stem, errors)
-
-
-def _errors_of_folder(path: Path, point: str | None) -> ErrorField:
-    name, points = path.resolve().name, path / "assessment_points.parquet"
-    if points.is_file() and not (path / "pose_errors.parquet").is_file():
-        return fields.of_points(name, store.read(points))
+    if not path.is_dir():
+        allowed = f"a results folder, {', '.join(fields.FAMILIES)}"
+        raise InputError(Problem("--errors", f"{name!r} is no folder", allowed))
     tables, arm = read_tables(path, needed=("pose_errors",), optional=()), calibration_of(path)
     target, targets = point or arm.default_point, ", ".join(arm.targets)
     if target not in arm.targets:
         raise InputError(Problem("--point", f"{target!r} is no target", targets))
-    if len(arm.targets) == 1:
-        return fields.of_measurements(name, tables["pose_errors"], arm.choice, None)
-    click.echo(f"{path}: errors of {target} ({targets}); --point names another", err=True)
-    return fields.of_measurements(name, tables["pose_errors"], arm.choice, target)
+    if len(arm.targets) > 1:
+        click.echo(f"{path}: errors of {target} ({targets}); --point names another", err=True)
+    return fields.of_measurements(path.resolve().name, tables["pose_errors"], arm.choice, target)

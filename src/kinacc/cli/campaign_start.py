@@ -65,9 +65,6 @@ _MOST_CANDIDATES = 20_000
         help="Frame of readings and covariances.")  # fmt: skip
 @choice.campaign_options
 @option("--budget", default=200, type=click.IntRange(1, 1_000_000), help="Readings in all.")
-@option("--joint-tolerance-deg", default=0.02, type=choice.positive,
-        help="Largest distance of reported joints from those of the pose.")  # fmt: skip
-@option("--implausible-mm", type=choice.positive, help="Error beyond which a reading is refused.")
 @answers()
 def start(out: Output, **options: Any) -> None:
     """Start a campaign in FOLDER. Nothing of this can be changed once there are readings.
@@ -85,12 +82,8 @@ def start(out: Output, **options: Any) -> None:
     arm = choice.calibration_of(results, options["model"], options["session"])
     joints, labels, directions, source = _candidates(options, arm)
     points = begin.points_of(arm, joints, labels, directions, point)
-    limits = Limits(
-        np.deg2rad(options["joint_tolerance_deg"]),
-        options["implausible_mm"] or np.inf,
-        _tolerance_mm(options["tolerance_mm"], results),
-        options["target"],
-    )
+    tolerance_mm = _tolerance_mm(options["tolerance_mm"], results)
+    limits = Limits(tolerance_mm=tolerance_mm, target=options["target"])
     assessor = assessor_of(options, options["budget"], len(points), freedom)
     about = begin.about(arm, point, source)
     plan = begin.plan_of(arm, points, assessor, used, limits, about, options["seed"])

@@ -30,12 +30,9 @@ from kinacc.workflow.described import calibration_settings
         help="Controller whose values are written, as a page.")  # fmt: skip
 @option("--model", type=click.Choice(list(ERROR_MODELS)), default=PLAINEST,
         help="Error model; one that is no DH table goes into json alone.")  # fmt: skip
-@option("--name", help="Name of the files. [the data set's, and the --model]")
 @option("--urdf", type=click.Path(), help="URDF file whose origins are corrected.")
 @option("--base-link", help="Link of that file where the arm starts. [its root]")
 @option("--tip-link", help="Link of that file where the arm ends. [the only one it can]")
-@option("--config", multiple=True,
-        help="Configuration file for --for; repeatable. [those beside the results]")  # fmt: skip
 @answers(force=True)
 def export(
     folder: str,
@@ -43,11 +40,9 @@ def export(
     formats: tuple[str, ...],
     maker: str | None,
     model: str,
-    name: str | None,
     urdf: str | None,
     base_link: str | None,
     tip_link: str | None,
-    config: tuple[str, ...],
     out: Output,
 ) -> None:
     """Write the calibrated model of the results in FOLDER for other programs.
@@ -78,29 +73,21 @@ def export(
     arm = results.recorded_robot(folder)
     reason = choice.print_outdated(folder)
     if maker is not None:
-        _to_controller(folder, arm, target, maker, name, config, out)
+        _to_controller(folder, arm, target, maker, out)
         return
     content = source.read_source(folder, arm, model, urdf, (base_link, tip_link))
-    paths = files.write(files.contents(content, wanted, name), target, out.force)
+    paths = files.write(files.contents(content, wanted), target, out.force)
     out.show({"files": paths, **({"outdated": reason} if reason else {})}, lines=paths)
     for item in source.notes(content):
         click.echo(item, err=True)
 
 
-def _to_controller(
-    folder: str,
-    arm: Robot,
-    target: str,
-    maker: str,
-    name: str | None,
-    config: tuple[str, ...],
-    out: Output,
-) -> None:
+def _to_controller(folder: str, arm: Robot, target: str, maker: str, out: Output) -> None:
     """Write the page of values for a controller, and its file where it reads one."""
     data_set = Path(folder).resolve().name
-    settings = calibration_settings(Path(folder), config)
+    settings = calibration_settings(Path(folder))
     result = fit_pendant(results.read_tables(folder), arm, settings, maker, data_set)
-    stem = f"{name or data_set}_{maker}"
+    stem = f"{data_set}_{maker}"
     page = environment().get_template("pendant.html")
     contents = {f"{stem}.html": page.render(found=result, version=__version__)}
     if result.ending:

@@ -15,7 +15,7 @@ from kinacc.cli.choice import option
 from kinacc.cli.output import Output, answers
 from kinacc.config import schema
 from kinacc.deployment import planning
-from kinacc.errors import InputError, Problem, refuse
+from kinacc.errors import InputError, Problem
 from kinacc.geometry import Pose, compose
 from kinacc.kinematics import robot as robots
 from kinacc.kinematics.robot import Robot
@@ -35,8 +35,6 @@ _MOST_CANDIDATES = 100_000
 @choice.INSIDE
 @option("--tool-mm", help="Measured point in the flange frame. [the robot's tool]")
 @option("--position-only", is_flag=True, help="No measured orientations.")
-@option("--frames-known", is_flag=True, help="No estimation of base and tool.")
-@option("--hayati", help='Joints with a Hayati angle, e.g. "2,3".')
 @answers(table=True, picture="Index against number of poses: .svg, .png, .pdf.")
 def plan_poses(robot: str, count: int, candidates: str, out: Output, **options: Any) -> None:
     """Choose a D-optimal set of poses, in an order with little travel.
@@ -46,7 +44,7 @@ def plan_poses(robot: str, count: int, candidates: str, out: Output, **options: 
 
     \b
     Example:
-      kinacc plan-poses ur10 --hayati 2,3 --poses 50 -o plan.csv --picture index.svg
+      kinacc plan-poses ur10 --poses 50 -o plan.csv --picture index.svg
     """
     arm = robots.load(robot)
     experiment = _experiment(arm, options)
@@ -91,26 +89,18 @@ def plan_poses(robot: str, count: int, candidates: str, out: Output, **options: 
 
 def _experiment(arm: Robot, options: Mapping[str, Any]) -> planning.Experiment:
     """What is measured and fitted."""
-    problems: list[Problem] = []
     calibration = schema.defaults()["calibration"]
-    tool, hayati = robots.carried(arm), tuple(hayati_joints(calibration["dh"], arm))
+    tool = robots.carried(arm)
     if options["tool_mm"] is not None:
         offset = numbers_of(options["tool_mm"])
         if len(offset) != 3:
-            problems.append(Problem("--tool-mm", repr(options["tool_mm"]), "3 numbers, 1,2,3"))
-        else:
-            tool = compose(arm.flange, Pose(np.eye(3), offset))
-    if options["hayati"] is not None:
-        hayati = tuple(map(int, numbers_of(options["hayati"])))
-        if not hayati or not set(hayati) <= set(range(1, arm.dh.joints + 1)):
-            allowed = f"joints 1 to {arm.dh.joints}, 2,3"
-            problems.append(Problem("--hayati", repr(options["hayati"]), allowed))
-    refuse(problems)
+            raise InputError(Problem("--tool-mm", repr(options["tool_mm"]), "3 numbers, 1,2,3"))
+        tool = compose(arm.flange, Pose(np.eye(3), offset))
     return planning.Experiment(
         tool,
         orientation=not options["position_only"],
-        frames_estimated=not options["frames_known"],
-        hayati_joints=hayati,
+        frames_estimated=True,
+        hayati_joints=hayati_joints(calibration["dh"], arm),
         rotation_weight_mm_per_rad=float(calibration["rotation_weight_mm_per_rad"]),
         threshold=calibration["dh"]["truncation"],
     )

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from kinacc.errors import Problem, refuse
+from kinacc.errors import InputError, Problem
 from kinacc.kinematics import robot as robots
 
 Ends = tuple[np.ndarray, np.ndarray]
@@ -17,10 +17,8 @@ Space = tuple[Ends | None, Callable[[np.ndarray], np.ndarray] | None]
 
 def of_options(options: Mapping[str, Any], robot: robots.Robot) -> Space:
     """The space of ``--joints-deg`` and ``--inside-mm``. Raises InputError."""
-    problems: list[Problem] = []
-    joints = _ranges("--joints-deg", options["joints_deg"], robot.dh.joints, problems)
-    box = _ranges("--inside-mm", options["inside_mm"], 3, problems)
-    refuse(problems)
+    joints = _ranges("--joints-deg", options["joints_deg"], robot.dh.joints)
+    box = _ranges("--inside-mm", options["inside_mm"], 3)
     ends = None if joints is None else tuple(robots.in_own_units(robot, joints))
     if box is None:
         return ends, None
@@ -28,9 +26,7 @@ def of_options(options: Mapping[str, Any], robot: robots.Robot) -> Space:
     return ends, lambda at_mm: np.all((at_mm >= low) & (at_mm <= high), axis=1)
 
 
-def _ranges(
-    option: str, text: str | None, count: int, problems: list[Problem]
-) -> np.ndarray | None:
+def _ranges(option: str, text: str | None, count: int) -> np.ndarray | None:
     """Ends (2, count) of a text such as "-90:90,-60:60"; None where there is none."""
     if text is None:
         return None
@@ -39,6 +35,5 @@ def _ranges(
     except ValueError:
         ends = np.empty(0)
     if ends.shape != (2, count) or not (ends[0] < ends[1]).all():
-        problems.append(Problem(option, repr(text), f"{count} ranges low:high, apart by commas"))
-        return None
+        raise InputError(Problem(option, repr(text), f"{count} ranges low:high, apart by commas"))
     return ends

@@ -7,21 +7,12 @@ import unicodedata
 
 from kinacc.errors import Problem
 
-_OF_FILES = re.compile(r"\w(?:[\w. -]*[\w.-])?")
 LONGEST = 100  # a file name has at most 255 bytes, and others are made of it
 # An underscore inside a word, as in ur10_b, is no mark of Markdown.
 _MARKS = re.compile(r"[\\`*\[\]<>|~$]|(?<![^\W_])_|_(?![^\W_])|&(?=#?\w+;)")
 # A spreadsheet takes a cell that begins so for a formula; a number may begin with its sign.
 _FORMULA = re.compile(r"'*[=+\-@＝＋－＠\t\r\n]")
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
-
-
-def not_of_a_file(where: str, name: str) -> list[Problem]:
-    """The problem with a name that cannot be that of a file in the folder asked for."""
-    if _OF_FILES.fullmatch(name) and len(name) <= LONGEST:
-        return []
-    allowed = f"at most {LONGEST} letters, digits, _ - . and spaces, the first a letter or digit"
-    return [Problem(where, f"{name!r} cannot be the name of a file", allowed)]
 
 
 def not_in_a_line(where: str, name: str) -> list[Problem]:

@@ -11,7 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
-from kinacc.assess.world import checked_errors, error_vectors
+from kinacc.assess.world import checked_errors
 from kinacc.config.error_models import PLAINEST, model_name
 from kinacc.errors import InputError, Problem
 from kinacc.study.operating_points import measured_errors, rows_of
@@ -47,11 +47,6 @@ class ErrorField:
     def size_mm(self) -> np.ndarray:
         """Sizes of the errors (n,)."""
         return np.linalg.norm(self.error_mm, axis=1)
-
-
-def of_points(name: str, points: Columns) -> ErrorField:
-    """The paper's field: ``assessment_points`` of a modelled space."""
-    return ErrorField(name, error_vectors(points))
 
 
 def of_measurements(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
@@ -72,24 +72,21 @@ def made_with_other_settings(folder: Path, data: DataSets) -> list[str]:
     ]
 
 
-def calibration_settings(folder: Path, configs: Sequence[str] = ()) -> Mapping[str, Any]:
+def calibration_settings(folder: Path) -> Mapping[str, Any]:
     """The section ``calibration`` by which the results in a folder were made.
 
     Parameters
     ----------
     folder
         Folder of a data set's results.
-    configs
-        Configuration files; without them, those beside the results.
 
     Returns
     -------
     Mapping
-        The defaults where no configuration names the data set.
+        Of a configuration beside the results; the defaults where none names the data set.
     """
     folder = folder.resolve()
-    plans = [read_data_sets(configs)] if configs else [plan for _, plan in beside(folder)]
-    known = [plan.settings[folder.name] for plan in plans if folder.name in plan.settings]
+    known = [plan.settings[folder.name] for _, plan in beside(folder)]
     return [*known, defaults()][0]["calibration"]
 
 

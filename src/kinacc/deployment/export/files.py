@@ -11,7 +11,6 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from kinacc.config import names
 from kinacc.config.error_models import PLAINEST
 from kinacc.deployment.export import paper_tables, urdf
 from kinacc.deployment.export.source import CONVENTION, Source
@@ -130,24 +129,23 @@ def formats_of(model: str) -> tuple[str, ...]:
     return tuple(name for name, item in FORMATS.items() if model == PLAINEST or item.any_model)
 
 
-def contents(
-    source: Source, formats: Sequence[str] = (), name: str | None = None
-) -> dict[str, str]:
+def contents(source: Source, formats: Sequence[str] = ()) -> dict[str, str]:
     """File names and their text for a calibrated model; all formats that carry it by default.
 
     Raises InputError for what cannot be exported.
     """
     arm, able = source.calibration, formats_of(source.calibration.choice)
     # A name of its own, so that the DH files may stand beside it.
-    stem = name or (arm.name if arm.choice == PLAINEST else f"{arm.name}_{arm.choice}")
+    stem = arm.name if arm.choice == PLAINEST else f"{arm.name}_{arm.choice}"
     message, fix = f"cannot carry a {arm.choice} model", f"or give --model {PLAINEST}"
-    problems = names.not_of_a_file("--name", stem if name is None else name)
-    problems += [
-        Problem(f"--format {item}", message, ", ".join(able), fix)
-        for item in formats
-        if item not in able
-    ]
-    refuse(problems, "Nothing was written")
+    refuse(
+        [
+            Problem(f"--format {item}", message, ", ".join(able), fix)
+            for item in formats
+            if item not in able
+        ],
+        "Nothing was written",
+    )
     chosen = [FORMATS[item] for item in dict.fromkeys(formats or able)]
     return {f"{stem}{item.ending}": item.text(source) for item in chosen}
 
