@@ -235,3 +235,21 @@ def test_the_reader_takes_no_point_alone_that_says_it_was_not_measured(file, wor
     with pytest.raises(InputError, match=r"measurements\.file\.targets"):
         read(section, ARM)
     assert len(read(section | {"targets": [word]}, ARM).columns["x_mm"]) == ROWS
+
+
+@pytest.mark.parametrize("same_target", [True, False])
+def test_a_reflector_of_another_radius_needs_a_target_of_its_own(file, same_target):
+    first = np.arange(ROWS) < ROWS // 2
+    radius = (["radius_mm"], np.where(first, 19.05, 6.35))
+    names = np.full(ROWS, "A") if same_target else np.where(first, "A", "B")
+    path = file(Q, X, (["target"], names), radius)
+    if same_target:
+        assert "radius_mm" in refused([path])
+    else:
+        assert looked([path])[0]["columns"]["target"] == "target"
+
+
+@pytest.mark.parametrize("unit", ["mil", "arcsec"])
+def test_directions_in_a_unit_that_is_not_read_are_refused_by_it(file, unit):
+    angles = ([f"Hz [{unit}]", f"V [{unit}]", "D [mm]"], IT.measured)
+    assert f"are in {unit}" in refused([file(Q, angles)])

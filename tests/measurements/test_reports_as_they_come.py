@@ -35,6 +35,11 @@ def test_a_sheet_that_is_not_there_is_answered_with_those_that_are(tmp_path):
         looked(path, sheet="between")
 
 
+def test_a_sheet_of_a_few_points_beside_the_data_is_not_asked_about(tmp_path):
+    path = workbook(tmp_path, {"base": [["X", "Y", "Z"], [1.0, 2.0, 3.0]], "data": TABLE})
+    assert looked(path).section["sheet"] == "data"
+
+
 @pytest.mark.parametrize("name", ["a.xls", "a.ods", "a.xlsx"])
 def test_what_is_no_workbook_is_refused_with_what_to_do(name, tmp_path):
     path = tmp_path / name

@@ -196,6 +196,9 @@ class Workbook:
 
     def _unreadable(self, error: Exception) -> InputError:
         reason = str(error).splitlines()[0][:200] if str(error) else type(error).__name__
+        with open(self.path, "rb") as file:
+            if file.read(4) == b"\xd0\xcf\x11\xe0":
+                reason = "it is locked by a password, or of the old Excel format under a new name"
         message = f"cannot be read as a workbook: {reason}"
         return input_error(self.path, message, "an .xlsx file", "save it as .xlsx or CSV")
 

@@ -43,6 +43,8 @@ def is_comment(cells: Cells, delimiter: str = "") -> bool:
     first = cells[0].lstrip() if cells and isinstance(cells[0], str) else ""
     if first.startswith(_COMMENTS) and not (delimiter == ";" and first.startswith(";")):
         return True
+    if delimiter == ";" and not first and len(cells) > 1 and not filled(cells[2:]):
+        return isinstance(cells[1], str) and not cells[1].strip().isdigit()  # "; Units: mm"
     return all(isinstance(cell, str) and _RULE.fullmatch(cell) for cell in cells) and any(
         len(cell.strip()) > 1 for cell in cells
     )

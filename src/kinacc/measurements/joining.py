@@ -57,10 +57,11 @@ def joined(points: RawTable, joints: RawTable, how: JointsFile) -> RawTable:
     if moving.any():
         lines = points.rows_in_words(moving)
         notes.append(f"{points.path}: left out, the arm was moving: {lines}")
-    # Cells are numbers of their own file.
-    marks = str.maketrans({joints.thousands or "\0": "", joints.decimal: points.decimal})
     beside = joints.columns.iloc[row[there]].reset_index(drop=True)
-    beside = beside.map(lambda cell: cell.translate(marks) if isinstance(cell, str) else cell)
+    if (joints.decimal, joints.thousands) != (points.decimal, points.thousands):
+        # Cells are numbers of their own file.
+        marks = str.maketrans({joints.thousands or "\0": "", joints.decimal: points.decimal})
+        beside = beside.map(lambda cell: cell.translate(marks) if isinstance(cell, str) else cell)
     names = {name: beside_name(name, points) for name in beside}
     table = points.select(there)
     return replace(

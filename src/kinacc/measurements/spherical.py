@@ -14,9 +14,10 @@ from typing import Any
 import numpy as np
 
 from kinacc.config.measured import Directions
-from kinacc.errors import Problem, refuse
+from kinacc.errors import Problem, input_error, refuse
 from kinacc.measurements.column_names import MEASURED, PLAIN, REPORTED, WORDS, Name, name_of, role
 from kinacc.measurements.intake.choices import Answers, Choice, Undecided
+from kinacc.measurements.layout import LENGTH
 from kinacc.measurements.table import RawTable, frame, numbers
 
 PER_UNIT = {"deg": np.pi / 180.0, "gon": np.pi / 200.0, "rad": 1.0}
@@ -53,7 +54,9 @@ def readings_of(names: Sequence[Name]) -> list[Reading]:
         whole = "".join(name.spelled).lower()  # Az is no acceleration along z here
         terms = (whole,) if whole in _PARTS else name.terms
         rest = tuple(t for t in terms if t not in _PARTS and t not in _WORDS["filling"])
-        if len(part := {_PARTS[term] for term in terms if term in _PARTS}) == 1:
+        of_part = [t for t in terms if t in _PARTS]
+        of_part = [t for t in of_part if t not in _WORDS["filling"]] or of_part
+        if len(part := {_PARTS[term] for term in of_part}) == 1:
             parts.setdefault(rest, {}).setdefault(part.pop(), name)
     return [
         Reading(**columns, rest=rest)
@@ -67,9 +70,14 @@ def directions_of(
 ) -> Directions:
     """How the angles of readings are counted; ``stated``: their unit, above the rows.
 
-    Raises Undecided where it is open.
+    Raises Undecided where it is open, InputError where they state units that are not read.
     """
     first, units = readings[0], set[str]().union(*(reading.angle_units for reading in readings))
+    lengths = {reading.distance.unit for reading in readings} - {"", *LENGTH}
+    if wrong := sorted(units - {*PER_UNIT} | lengths):
+        where = f"{table.path}: columns {', '.join(n for r in readings for n in r.names)}"
+        allowed = ", ".join((*PER_UNIT, *LENGTH))
+        raise input_error(where, f"are in {' and '.join(wrong)}", allowed)
     horizontal, vertical, _ = first.names
     if re.search(r"\bgra(d|de|ds|des)\b", f"{horizontal} {vertical}".lower()):
         units = set()  # grad is gon in one language and degrees in another
@@ -123,7 +131,7 @@ def cartesian(table: RawTable, directions: Directions) -> RawTable:
             problems.append(Problem(table.where(column), message, fix=fix))
         points = _points(table, reading, directions, problems).T
         for axis, values in zip("xyz", points.tolist(), strict=True):
-            name = "_".join(filter(None, [*reading.rest, axis, unit]))
+            name = "_".join([*reading.rest, axis, *([unit] if unit in LENGTH else [])])
             columns[name] = [None if value != value else value for value in values]
     refuse(problems, f"{table.path} cannot be read")
     return replace(table, columns=frame(columns))

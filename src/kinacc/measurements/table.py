@@ -115,7 +115,10 @@ def numbers(
     if bad.any():
         cells = table.columns[name][bad].tolist()
         shown = ", ".join(repr(cell)[:60] for cell in cells[:_SHOWN])
-        fix = "correct the cells, or set measurements.file.decimal or .thousands"
+        comma = "," if table.decimal == "." else "."
+        fix = "correct the cells"
+        if np.isfinite(_converted(cells, comma, None)).any():
+            fix += f", or set measurements.file.decimal or .thousands to {comma!r}"
         where, allowed = table.where(name, bad), f"numbers with decimal mark {table.decimal!r}"
         problems.append(Problem(where, f"not a finite number: {shown}", allowed, fix))
     return values

@@ -203,6 +203,7 @@ class _Choice:
         """The joints as commanded beside ``joints``, where there is one such group."""
         fit = [g for g in self._of(JOINTS, NOMINAL) if joints and g is not joints
                and len(g.columns) == len(joints.columns) and g.units == joints.units]  # fmt: skip
+        fit = [g for g in fit if not {"target", "ref"} & {*g.terms}] or fit
         return fit[0] if len(fit) == 1 else None
 
     def points(self, joints: Group | None) -> list[Group]:

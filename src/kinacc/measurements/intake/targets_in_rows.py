@@ -41,6 +41,14 @@ def with_targets(
     size = np.nan_to_num(table.values(radius)) if radius else np.zeros(len(table))
     if np.ptp(size) > _SAME_RADIUS * np.max(size):
         # A reflector of another radius has its centre elsewhere in the same nest.
+        if target:
+            wrong = pd.Series(size).groupby(table.texts(target.column)).nunique().max() > 1
+        else:
+            of_radius = np.where(pose < 0, -1, pd.factorize(size)[0] * len(pose) + pose)
+            wrong = _are_apart(point_mm, of_radius) or len({*size}) > _MOST_TARGETS
+        if wrong:
+            message = "the radius of the reflectors changes, so that their centres lie elsewhere"
+            raise input_error(table.where(radius), message, _ALLOWED)
         return columns if target else _with_target(columns, radius)
     if target or not _are_apart(point_mm, pose):
         return columns

@@ -42,6 +42,7 @@ DELIMITERS = (";", "\t", ",", BLANKS)
 _LINES, _CHARACTERS = 400, 1_000_000  # looked at
 _NEAR = 0.6  # of the most numbers: so many there are if names are parted by the right mark
 _SEP = re.compile(r'"?sep=(.|\\t)"?\s*', re.IGNORECASE)
+_FEWEST_ROWS, _FEWEST_COLUMNS = 3, 4  # of a sheet that may be meant
 _Written = tuple[Layout, Head, list[Row], list[str]]  # with the first rows, and notes
 
 
@@ -90,6 +91,9 @@ def look(path: str | Path, answers: Answers | None = None) -> Looked:
         raise Undecided(str(path), choice)
     written = written.but(decimal=decimal, thousands=thousands)
     table = replace(table, decimal=decimal, thousands=thousands)
+    if head.line > 1 and head.names is None:
+        notes.append(f"{written.skip_lines} rows above the names, not read")
+    notes += [f"columns are called {', '.join(written.names)}"] if written.names else []
     notes += ["decimal commas"] if decimal == "," else []
     notes += [f"{thousands!r} between thousands"] if thousands else []
     assumed: dict[str, str] = {}
@@ -158,10 +162,16 @@ def _workbook(path: Path, answers: Answers) -> _Written:
     if not tables:
         message = "no sheet has rows of numbers under names"
         raise input_error(str(path), message, "a sheet with columns of joints and points")
+    # Those that may be meant have several columns and rows, those of points x, y, z.
+    large = [
+        name
+        for name, (head, rows) in tables.items()
+        if head.width >= _FEWEST_COLUMNS and len(rows) - head.first >= _FEWEST_ROWS
+    ]
     names = {sheet: [*map(name_of, _names(*table))] for sheet, table in tables.items()}
-    points = [sheet for sheet in tables if readings_of(names[sheet])
+    points = [sheet for sheet in large if readings_of(names[sheet])
               or {*"xyz"} <= {t for name in names[sheet] for t in name.terms}]  # fmt: skip
-    likely = points or [*tables]
+    likely = points or large or [*tables]
     if len(likely) > 1:
         meant = {sheet: first_few(_names(*tables[sheet]), 12) for sheet in likely}
         raise Undecided(str(path), Choice("--sheet", "several sheets hold tables", meant))
