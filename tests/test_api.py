@@ -136,7 +136,6 @@ WRONG = {
     "no such controller": lambda calibration, _: calibration.values_for("arduino"),
     "no such table": lambda calibration, _: calibration.table("residual"),
     "a missing file": lambda _, folder: kinacc.calibrate(str(folder / "arm.yaml")),
-    "a folder": lambda _, folder: kinacc.calibrate(folder),
     "no paths": lambda *_: kinacc.read_measurements(),
     "no folder": lambda _, folder: kinacc.load_calibration(folder / "results"),
     "no calibration": lambda calibration, _: kinacc.compare(calibration, "results/arm"),

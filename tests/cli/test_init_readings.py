@@ -26,18 +26,14 @@ def by_axis(pattern):
     return [pattern.format(a=axis, A=axis.upper()) for axis in "xyz"]
 
 
-def _it():
-    """What else stands in the files of a tracked arm."""
-    rng, measured = np.random.default_rng(4), TRACKED.point
-    nominal = np.round(measured + rng.normal(0, 0.7, (ROWS, 3)), 4)
-    return SimpleNamespace(
-        q=TRACKED.q, measured=measured, nominal=nominal, deviation=measured - nominal,
-        spread=rng.uniform(0.01, 0.05, (ROWS, 3)), turn=TRACKED.turn, rounded=np.round(TRACKED.q),
-        quaternion=TRACKED.turn.as_quat(scalar_first=True), controller=TRACKED.controller,
-    )  # fmt: skip
-
-
-IT = _it()
+RNG, MEASURED = np.random.default_rng(4), TRACKED.point
+NOMINAL = np.round(MEASURED + RNG.normal(0, 0.7, (ROWS, 3)), 4)
+# What else stands in the files of a tracked arm.
+IT = SimpleNamespace(
+    q=TRACKED.q, measured=MEASURED, nominal=NOMINAL, deviation=MEASURED - NOMINAL,
+    spread=RNG.uniform(0.01, 0.05, (ROWS, 3)), turn=TRACKED.turn, rounded=np.round(TRACKED.q),
+    quaternion=TRACKED.turn.as_quat(scalar_first=True), controller=TRACKED.controller,
+)  # fmt: skip
 Q = (numbered("q{}_deg"), IT.q)
 X = (by_axis("{a}_mm"), IT.measured)
 

@@ -38,12 +38,16 @@ def written(folder, gears_rad):
     point = flange.position_mm + flange.rotation @ [30.0, -20.0, 60.0]
     point = point @ exp_so3(np.array([0.3, -0.2, 1.1])).T + [1500.0, 200.0, -400.0]
     point = point + rng.normal(size=point.shape) * NOISE_MM
-    write_readings(folder / "arm.csv", q, point)
-    config = folder / "arm.yaml"
+    return configured(write_readings(folder / "arm.csv", q, point))
+
+
+def configured(path):
+    """A configuration of the positions in a file, beside it."""
+    config = path.with_suffix(".yaml")
     config.write_text(
-        f"datasets: {{arm: {{robot: irb120, measurements: {{source: file, file: {{path: "
-        f"{folder / 'arm.csv'}, orientation: {{kind: none}}}}}}, calibration: {{base_and_tool: "
-        "estimated, vec: {order: 2}, dh: {fit_to: measurements}}, evaluation: {space: measured}}}\n"
+        f"datasets: {{arm: {{robot: irb120, measurements: {{source: file, file: {{path: {path}, "
+        "orientation: {kind: none}}}, calibration: {base_and_tool: estimated, vec: {order: 2}, "
+        "dh: {fit_to: measurements}}, evaluation: {space: measured}}}\n"
     )
     return config
 
@@ -79,14 +83,8 @@ def test_a_repeatability_test_and_a_check_of_the_same_readings_agree(tmp_path):
     q = np.tile(np.deg2rad(rng.uniform(-60, 60, (20, 6))), (4, 1))  # every pose is left in between
     point = robot.forward(arm, q).position_mm + 0.03 * rng.normal(size=(80, 3))
     path = write_readings(tmp_path / "a.csv", q, point, pose=np.arange(80) % 20)
-    config = tmp_path / "arm.yaml"
-    config.write_text(
-        f"datasets: {{cell: {{robot: irb120, measurements: {{source: file, file: {{path: {path}, "
-        "orientation: {kind: none}}}, calibration: {base_and_tool: estimated}, evaluation: "
-        "{space: measured}}}\n"
-    )
     std_mm = answer("repeatability", path, "--rows", "visits")["std_mm"]
-    noise = checked(config)
+    noise = checked(configured(path))
     assert noise["degrees_of_freedom"] == 60
     assert noise["per_axis_mm"] == pytest.approx(np.sqrt(np.mean(np.square(std_mm))), rel=1e-6)
 

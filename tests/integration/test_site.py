@@ -35,9 +35,3 @@ def test_every_page_is_there_and_asks_for_nothing_outside(site):
     for sheet in site.rglob("*.css"):
         loaded = re.findall(r"url\(([^)]*)\)|@import", sheet.read_text(encoding="utf-8"))
         assert [each for each in loaded if re.match(r"[\"']?(https?:)?//", each)] == [], sheet
-
-
-def test_the_names_a_script_imports_stand_there_with_what_they_do(site):
-    text = (site / "docs" / "api.html").read_text(encoding="utf-8")
-    for name in ("deployment.predict.predict", "Calibration.predict", "Campaign.next_pose"):
-        assert f'id="kinacc.{name}"' in text

@@ -23,11 +23,7 @@ def norm(vector: Sequence[float]) -> float:
     return math.sqrt(math.fsum(x * x for x in vector))
 
 
-# --- maximum measurement (eqs. 11-12) and outlier rejection (eqs. 13-14) -------------------------
-
-
-def maximum(magnitudes: Sequence[float]) -> float:
-    return max(magnitudes)
+# --- outlier rejection (eqs. 13-14) ---------------------------------------------------------------
 
 
 def outlier_limit(magnitudes: Sequence[float], rule: str) -> float:

@@ -53,13 +53,9 @@ class Models:
             kinematics.vec_forward(self.nominal, series, low, high, offsets, q, s)
         )
 
-    def tool(self, model: str, q: list[float], s: list[int], frame: str = "tool") -> np.ndarray:
-        """A target in the robot base."""
-        return self.flange(model, q, s) @ self.frames[model, frame]
-
     def measured(self, model: str, q: list[float], s: list[int], frame: str) -> np.ndarray:
         """A target as the instrument would see it."""
-        return self.frames[model, "base"] @ self.tool(model, q, s, frame)
+        return self.frames[model, "base"] @ self.flange(model, q, s) @ self.frames[model, frame]
 
     @property
     def nominal(self) -> list[tuple[float, ...]]:

@@ -1,23 +1,14 @@
-"""Research stands apart: kinacc works without it, and its rules run from the repository."""
+"""Research stands apart: its rules run from the repository."""
 
 from __future__ import annotations
 
-import re
 import subprocess
 import sys
 from pathlib import Path
 
 import pandas as pd
-import pytest
 
 TOP = Path(__file__).parents[2]
-
-
-@pytest.mark.parametrize("folder", ["src", "workflow", "tools", "benchmarks"])
-def test_nothing_imports_research(folder):
-    for path in (TOP / folder).rglob("*.py"):
-        text = path.read_text(encoding="utf-8")
-        assert not re.search(r"^\s*(from|import)\s+research\b", text, re.MULTILINE), path
 
 
 def snakemake(*arguments: str) -> None:

@@ -22,15 +22,15 @@ UR10 = [
     ("fixed", "0 0.0922 0", "0 0 1.570796325", None),
 ]
 IIWA = [
-    ("continuous" if i == 6 else "revolute", f"0 0 {z}", "0 0 0", axis)
-    for i, (z, axis) in enumerate(
-        zip(
-            (0.15, 0.21, 0.2, 0.22, 0.18, 0.22, 0.081),
-            ("0 0 1", "0 1 0", "0 0 1", "0 -1 0", "0 0 1", "0 1 0", "0 0 1"),
-            strict=True,
-        )
-    )
-] + [("fixed", "0 0 0.045", "0 0 0", None)]
+    ("revolute", "0 0 0.15", "0 0 0", "0 0 1"),
+    ("revolute", "0 0 0.21", "0 0 0", "0 1 0"),
+    ("revolute", "0 0 0.2", "0 0 0", "0 0 1"),
+    ("revolute", "0 0 0.22", "0 0 0", "0 -1 0"),
+    ("revolute", "0 0 0.18", "0 0 0", "0 0 1"),
+    ("revolute", "0 0 0.22", "0 0 0", "0 1 0"),
+    ("continuous", "0 0 0.081", "0 0 0", "0 0 1"),
+    ("fixed", "0 0 0.045", "0 0 0", None),
+]
 SCARA = [
     ("revolute", "0 0 0.3", "0 0 0", "0 0 1"),
     ("revolute", "0.4 0 0", "0 0 0", "0 0 1"),
@@ -96,16 +96,17 @@ AXIS = st.one_of(
         lambda v: " ".join(map(repr, (np.array(v) / np.linalg.norm(v)).tolist()))
     ),
 )
+XYZ, RPY = (st.tuples(each, each, each).map(" ".join) for each in (LENGTH, ANGLE))
 JOINT = st.tuples(
     st.sampled_from(["revolute", "revolute", "continuous", "prismatic"]),
-    st.tuples(LENGTH, LENGTH, LENGTH).map(" ".join),
-    st.tuples(ANGLE, ANGLE, ANGLE).map(" ".join),
+    XYZ,
+    RPY,
     AXIS,
 )
 FIXED = st.tuples(
     st.just("fixed"),
-    st.tuples(LENGTH, LENGTH, LENGTH).map(" ".join),
-    st.tuples(ANGLE, ANGLE, ANGLE).map(" ".join),
+    XYZ,
+    RPY,
     st.none(),
 )
 
