@@ -92,14 +92,13 @@ def test_a_file_of_readings_is_taken_whole_and_bad_rows_refuse_it(campaign, tmp_
 
 
 def test_a_reading_at_slightly_other_joints_is_held_to_the_model_there(begun, calibration):
-    folder = begun("--noise-mm", SIGMA_MM, "--frame", "base")
+    folder = begun("--noise-mm", SIGMA_MM, "--frame", "base", "--joint-tolerance-deg", "0.05")
     plan = campaigns.open_(folder).plan
     point = int(plan.route[0])
-    off = np.deg2rad([0.0118, -0.008, 0.0158, 0.004, -0.0198, 0.008])
-    joints = plan.points.joints[point] + off
+    joints = plan.points.joints[point] + np.deg2rad([0.03, -0.02, 0.04, 0.01, -0.05, 0.02]) * 0.99
     arm = choice.calibration_of(calibration, "dh")
     there = arm.pose(JointState(joints[None] @ arm.robot.joint_map.T)).position_mm[0]
-    assert np.linalg.norm(there - plan.points.modelled_mm[point]) > 0.2
+    assert np.linalg.norm(there - plan.points.modelled_mm[point]) > 0.5
     call("campaign", "record", folder, "--joints-deg", written(np.rad2deg(joints)),
                 "--position-mm", written(there), code=0)  # fmt: skip
     (told,) = campaigns.open_(folder).state.used

@@ -65,6 +65,8 @@ _MOST_CANDIDATES = 20_000
         help="Frame of readings and covariances.")  # fmt: skip
 @choice.campaign_options
 @option("--budget", default=200, type=click.IntRange(1, 1_000_000), help="Readings in all.")
+@option("--joint-tolerance-deg", default=0.02, type=choice.positive,
+        help="Largest distance of reported joints from those of the pose.")  # fmt: skip
 @answers()
 def start(out: Output, **options: Any) -> None:
     """Start a campaign in FOLDER. Nothing of this can be changed once there are readings.
@@ -83,7 +85,8 @@ def start(out: Output, **options: Any) -> None:
     joints, labels, directions, source = _candidates(options, arm)
     points = begin.points_of(arm, joints, labels, directions, point)
     tolerance_mm = _tolerance_mm(options["tolerance_mm"], results)
-    limits = Limits(tolerance_mm=tolerance_mm, target=options["target"])
+    apart_rad = np.deg2rad(options["joint_tolerance_deg"])
+    limits = Limits(apart_rad, tolerance_mm=tolerance_mm, target=options["target"])
     assessor = assessor_of(options, options["budget"], len(points), freedom)
     about = begin.about(arm, point, source)
     plan = begin.plan_of(arm, points, assessor, used, limits, about, options["seed"])

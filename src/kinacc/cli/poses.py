@@ -107,15 +107,10 @@ def predict(
 @option("--pulses-per-degree", help="Pulses of a Yaskawa job: one number an axis.")
 @option("--base-is-fixed", is_flag=True, help="No external axis moves the robot's base.")
 @option("--at-most-mm", type=float, default=programs.AT_MOST_MM, help="Largest change of a pose.")
+@option("--dry-run", is_flag=True, help="Corrections without a written program.")
 @option("--table", type=click.Path(), help="Corrections of a program, as a table.")
 @choice.point_options
-@option(
-    "--out",
-    "-o",
-    "target",
-    type=click.Path(),
-    help="Program, or table of joints. [program: not written]",
-)
+@option("--out", "-o", "target", type=click.Path(), help="Program, or table of joints.")
 @answers(picture="Corrections of a program, as a picture.", force=True)
 def compensate(
     folder: str,
@@ -280,7 +275,7 @@ def _correct(
         click.echo(text, err=True)
     if answer.refused:
         raise SystemExit(AGAINST)
-    if target is not None:
+    if not options["dry_run"] and target is not None:
         written = answer.write(target, out.force)
         click.echo(f"Written: {', '.join(written)}", err=out.as_json)
 

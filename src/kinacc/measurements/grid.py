@@ -104,8 +104,8 @@ def tabled(path: str, rows: Iterable[Row], layout: Layout, sheet: bool = False) 
     aside = sorted([*aside, *again], key=lambda row: row[0])
     for place in reversed(range(width)):
         if not names[place] and not any(filled(row[place : place + 1]) for _, row in readings):
-            for row in (names, under, *(cells for _, cells in readings)):
-                del row[place : place + 1]
+            for single in (names, under, *(cells for _, cells in readings)):
+                del single[place : place + 1]
     word = "row" if sheet else "line"
     refuse(_problems(path, names, readings, line, word), f"{path} cannot be read")
     cells = frame(dict(zip(names, zip(*(c for _, c in readings), strict=True), strict=True)))
