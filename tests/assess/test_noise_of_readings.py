@@ -158,6 +158,17 @@ def test_scatter_is_an_alarm_from_a_ratio_of_likelihoods_on(tested, larger, fals
     assert said.numbers["ratio"] == pytest.approx(math.sqrt(np.mean(values**2)))
 
 
+@pytest.mark.parametrize("tested", [math.inf, 60])
+def test_scatter_as_stated_is_hardly_ever_an_alarm_at_any_time(tested):
+    rng, false = np.random.default_rng(8), 0
+    for _ in range(4000):
+        # A noise that a test told is off by what its degrees of freedom leave open.
+        off = 1.0 if math.isinf(tested) else math.sqrt(tested / rng.chisquare(tested))
+        values = off * rng.normal(size=(100, 3))
+        false += scatter_alarm(of_values(values), tested=tested) is not None
+    assert binom.sf(false - 1, 4000, SCATTER) > 0.005
+
+
 def student_triples(rng, campaigns, joint):
     """Contrasts of 100 triples of Student's t with four degrees of freedom and variance 1."""
     z = rng.normal(size=(campaigns, 100, 3, 3))
