@@ -7,6 +7,8 @@ from dataclasses import replace
 import arms
 import numpy as np
 import pytest
+from oracles import inverse as brute
+from oracles import kinematics as oracle
 
 from kinacc.errors import InputError
 from kinacc.geometry import Pose
@@ -108,18 +110,21 @@ def test_few_branches_are_dropped_near_singular_postures(where):
     assert np.mean(reached & (solved.status == Status.NOT_REACHED)) < 0.02
 
 
-@pytest.mark.parametrize("arm", [UR10, arms.OFFSET_WRIST, arms.GENERAL], ids=lambda arm: arm.name)
-def test_a_dense_multistart_finds_nothing_more(arm):
-    q = arms.joints_within(arm, 4, seed=3)
-    pose = dh.forward(arm.dh, q)
-    solved = inverse.solve(arm, arm.dh, pose)
-    for row in range(len(q)):
-        start = np.random.default_rng(row).uniform(-np.pi, np.pi, (1000, 6))
-        found = newton.refine(arm.dh, arms.pick(pose, np.full(1000, row)), start, most_steps=60)
-        listed = solved.q_rad[row][np.isfinite(solved.q_rad[row, :, 0])]
-        distance = arms.apart(arm, found.q_rad[found.converged][:, None], listed[None])
-        assert found.converged.sum() > 50
-        assert np.quantile(found.error_mm[found.converged], 0.9) < 1e-9
+@pytest.mark.parametrize(
+    ("arm", "off_mm"),
+    [(MH180, 0.0), (MH180, 0.3), (UR10, 0.0), (arms.OFFSET_WRIST, 0.0), (arms.GENERAL, 0.0)],
+    ids=["closed form", "off a closed form", "ur10", "offset wrist", "general"],
+)
+def test_brute_force_finds_all_that_is_listed_and_nothing_more(arm, off_mm):
+    model, rng = arms.calibrated(arm, off_mm), np.random.default_rng(11)
+    table = model.start.reshape(-1, 5)
+    for q in arms.joints_within(arm, 4, seed=3):
+        target = oracle.dh_forward(table, q)
+        pose = Pose(target[None, :3, :3], target[None, :3, 3])
+        solved = inverse.solve(arm, model, pose).q_rad[0]
+        listed = solved[np.isfinite(solved[:, 0])]
+        found = brute.all_solutions(table, target, rng.uniform(-np.pi, np.pi, (400, 6)))
+        distance = arms.apart(arm, np.array(found)[:, None], listed[None])
         assert distance.min(axis=1).max() < 1e-4
         assert np.unique(distance.argmin(axis=1)).size == len(listed)
 
