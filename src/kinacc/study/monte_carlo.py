@@ -193,9 +193,10 @@ def evaluate_assessors(
     DataFrame
         A row for each assessor and noise, with the columns of ``study_summary`` that Fig. 4 draws
         (mean_mm, min_mm, max_mm, bias_mm, rmse_mm against the largest true error, repetitions), and
-        of the bounds: stated (share of worlds with an upper bound), coverage and lower_coverage
-        (share of these whose upper, lower bound holds for the points it is about), width_mm (mean
-        of upper less lower bound). NaN where no bound is stated.
+        of the bounds: stated (share of worlds with an upper bound), coverage (share of these whose
+        upper bound holds for the points it is about), lower_coverage (share whose lower bound is
+        not above the largest error), width_mm (mean of upper less lower bound). NaN where no bound
+        is stated.
 
     Raises
     ------
