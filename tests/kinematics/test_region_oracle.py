@@ -69,16 +69,11 @@ def test_tool_poses_turn_with_the_slice():
     reference = Rotation.from_euler("XYZ", [180, 20, 5], degrees=True)
     relative = Rotation.from_euler("XYZ", [45, -45, 45], degrees=True)
     poses = region.tool_poses(cells, reference.as_matrix(), relative.as_matrix())
-    for i in range(2):
-        turn = Rotation.from_euler("z", cells.angle_rad[i])
-        np.testing.assert_allclose(
-            poses.rotation[i], (turn * reference * relative).as_matrix(), atol=1e-14
-        )
-        np.testing.assert_allclose(
-            poses.position_mm[i],
-            turn.apply([cells.radius_mm[i], 0, cells.height_mm[i]]),
-            atol=1e-10,
-        )
+    turn = Rotation.from_euler("z", cells.angle_rad[:, None])
+    place = turn.apply(np.column_stack([cells.radius_mm, np.zeros(2), cells.height_mm]))
+    wanted = (turn * reference * relative).as_matrix()
+    np.testing.assert_allclose(poses.rotation, wanted, atol=1e-14)
+    np.testing.assert_allclose(poses.position_mm, place, atol=1e-10)
     np.testing.assert_allclose(
         region.reference_rotation(np.radians([180, 20, 5])), reference.as_matrix(), atol=1e-14
     )

@@ -74,15 +74,16 @@ class Arm:
 
     def description(self) -> str:
         """The robot file."""
-        lines = [f"name: {self.name}", "dh:"]
-        for theta, d, a, alpha in self.rows:
-            row = f"theta_offset_deg: {theta}, d_mm: {d}, a_mm: {a}, alpha_deg: {alpha}"
-            lines.append(f"  - {{{row}}}")
-        lines.append(f"joint_map: {self.matrix.tolist()}")
-        lines.append(f"limits_deg: {[list(each) for each in self.limits]}")
-        lines.append(f"flange: {{position_mm: {[*self.flange[:3]]}, ")
-        lines[-1] += f"rotation_vector_deg: {[*self.flange[3:]]}}}"
-        return "\n".join(lines) + "\n"
+        keys = ("theta_offset_deg", "d_mm", "a_mm", "alpha_deg")
+        place = {"position_mm": self.flange[:3], "rotation_vector_deg": self.flange[3:]}
+        content = {
+            "name": self.name,
+            "dh": [dict(zip(keys, row, strict=True)) for row in self.rows],
+            "joint_map": self.matrix.tolist(),
+            "limits_deg": self.limits,
+            "flange": place,
+        }
+        return yaml.safe_dump(content)
 
 
 def errors(seed: int) -> np.ndarray:
