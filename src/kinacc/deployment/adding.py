@@ -14,7 +14,7 @@ from kinacc.checks.contradictions import load
 from kinacc.config.edit import flow, with_added
 from kinacc.config.series import MOVED
 from kinacc.deployment.shared_readings import known_rows
-from kinacc.errors import InputError, Problem, first_few
+from kinacc.errors import first_few, input_error
 from kinacc.kinematics import robot
 from kinacc.measurements.folds import split
 from kinacc.measurements.reader import read as read_measured
@@ -71,19 +71,17 @@ def add(
     ]
     name = dataset or (names[0] if len(names) == 1 else "")
     if name not in names:
-        raise InputError(
-            Problem("--dataset", f"{name!r} is no measured data set", ", ".join(names))
-        )
+        raise input_error("--dataset", f"{name!r} is no measured data set", ", ".join(names))
     settings = full[name]
     lines = settings.get("series", ())
     known = [full[line["name"]]["measurements"]["file"]["path"] for line in lines]
     known = known or [settings["measurements"]["file"]["path"]]
     last = datetime.date.fromisoformat(lines[-1]["date"]) if lines else first_date
     if last is None:
-        raise InputError(Problem("--first-date", "is not given", f"the day of {known[-1]}"))
+        raise input_error("--first-date", "is not given", f"the day of {known[-1]}")
     if date <= last:
         message = f"{date} is not after {last}, the day of {known[-1]}"
-        raise InputError(Problem("--date", message, "a later day; write earlier lines by hand"))
+        raise input_error("--date", message, "a later day; write earlier lines by hand")
     _require_alike(path, known, settings, tool)
     new: list[dict[str, Any]] = [
         {"path": _beside(config, path), "date": date, "base": base, "tool": tool}
@@ -121,9 +119,9 @@ def _require_alike(path: str, known: Sequence[str], settings: Settings, tool: st
     for name in known:
         old = measured(name)
         if known_rows(new, old).all():
-            raise InputError(Problem(path, f"holds the readings of {name}", "new readings"))
+            raise input_error(path, f"holds the readings of {name}", "new readings")
     targets, targets_before = (sorted({*table["target"].tolist()}) for table in (new, old))
     if targets != targets_before and (tool != MOVED or len(targets) != len(targets_before)):
         fix = "name them in measurements.file.targets or columns"
         allowed = f"{first_few(targets_before)}, as {known[-1]}"
-        raise InputError(Problem(path, f"has target {first_few(targets)}", allowed, fix))
+        raise input_error(path, f"has target {first_few(targets)}", allowed, fix)

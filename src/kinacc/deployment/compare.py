@@ -20,7 +20,7 @@ from kinacc.calibration.uncertainty import scale_of, scaled_unit, unit_of
 from kinacc.deployment.applicability import frame_motions, is_measured_there, sensitivity
 from kinacc.deployment.record import FLANGE, Calibration
 from kinacc.deployment.shared_readings import NONE_SHARED, SharedReadings, counted_once
-from kinacc.errors import InputError, Problem
+from kinacc.errors import input_error
 from kinacc.geometry import Pose, compose, exp_so3
 from kinacc.kinematics import robot as robots
 from kinacc.kinematics.inverse.limits import outside
@@ -127,9 +127,7 @@ def compare(
     if covered.sum() < min(_FEWEST, len(q_rad)):
         message = f"{covered.sum()} of {len(q_rad)} poses lie in the joint ranges of both models"
         fix = "give poses measured by both (--joints FILE), or compare DH models (--model dh)"
-        raise InputError(
-            Problem(f"{first.name}, {second.name}", message, f"{_FEWEST} or more", fix)
-        )
+        raise input_error(f"{first.name}, {second.name}", message, f"{_FEWEST} or more", fix)
     q_rad = q_rad[covered]
     states = [JointState(item.robot.dh_joints(q_rad)) for item in both]
     pairs = zip(both, states, strict=True)
@@ -202,7 +200,7 @@ def require_alike(first: Calibration, second: Calibration) -> None:
         message = f"has another joint_map than {first.name}"
     else:
         return
-    raise InputError(Problem(second.name, message, "the same kind of robot"))
+    raise input_error(second.name, message, "the same kind of robot")
 
 
 class _Knowledge(NamedTuple):

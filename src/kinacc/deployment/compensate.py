@@ -16,7 +16,7 @@ import numpy as np
 import pandas as pd
 
 from kinacc.deployment.record import Calibration
-from kinacc.errors import InputError, Problem
+from kinacc.errors import InputError, input_error
 from kinacc.geometry import IDENTITY, Pose, compose, invert, log_so3
 from kinacc.kinematics.inverse import few_axes, limits, newton, solve
 from kinacc.kinematics.model import ErrorModel, JointState
@@ -104,7 +104,7 @@ def compensate(
     known &= np.isfinite(wanted.rotation).all(axis=(1, 2))
     if not known.all():
         shown = ", ".join(str(row) for row in np.flatnonzero(~known)[:5])
-        raise InputError(Problem("wanted poses", f"no number in row {shown}", "finite poses"))
+        raise input_error("wanted poses", f"no number in row {shown}", "finite poses")
     robot, every = calibration.robot, np.arange(len(wanted.position_mm))
     carried, origin = calibration.point(point), calibration.origin(frame)
     goal = compose(invert(origin), compose(wanted, invert(carried)))

@@ -13,7 +13,7 @@ from kinacc.calibration.observations import from_columns
 from kinacc.calibration.uncertainty import Uncertainty
 from kinacc.config.error_models import ALWAYS, ERROR_MODELS, PLAINEST
 from kinacc.deployment.record import MODELS, Calibration, Residual
-from kinacc.errors import InputError, Problem, gathered, refuse
+from kinacc.errors import InputError, Problem, gathered, input_error, refuse
 from kinacc.kinematics import robot as robots
 from kinacc.kinematics import tables as model_tables
 from kinacc.kinematics.robot import Robot
@@ -59,7 +59,7 @@ def read_tables(
     missing = [name for name in needed if not paths[name].is_file()]
     if len(missing) == len(needed):
         message = "holds no calibration" if folder.is_dir() else "no such folder"
-        raise InputError(Problem(str(folder), message, fix="kinacc calibrate FILE.yaml makes one"))
+        raise input_error(str(folder), message, fix="kinacc calibrate FILE.yaml makes one")
     problems = [
         Problem(str(paths[name]), "no such file", fix="run the workflow first") for name in missing
     ]
@@ -76,10 +76,10 @@ def recorded_robot(folder: Path | str) -> Robot:
     """The robot a results folder was made with; InputError where its table cannot be read."""
     path = Path(folder) / "robot.parquet"
     if not path.is_file():
-        raise InputError(Problem(str(path), "no such file", fix="run kinacc calibrate"))
+        raise input_error(str(path), "no such file", fix="run kinacc calibrate")
     description = next(iter(store.read(path).get("description", ())), None)
     if not isinstance(description, str):
-        raise InputError(Problem(str(path), "has no description", fix=store.remake(path)))
+        raise input_error(str(path), "has no description", fix=store.remake(path))
     return robots.of_text(description, str(path))
 
 
@@ -116,7 +116,7 @@ def calibration(
         raise
     except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
         message = f"tables cannot be used: {error}"
-        raise InputError(Problem(f"results {name}", message, fix="run kinacc calibrate")) from None
+        raise input_error(f"results {name}", message, fix="run kinacc calibrate") from None
 
 
 def _calibration(
@@ -126,7 +126,7 @@ def _calibration(
     created = model_tables.models(tables, robot.dh)
     if choice not in created:
         message = f"{choice!r} is none of these results"
-        raise InputError(Problem("model", message, ", ".join(created)))
+        raise input_error("model", message, ", ".join(created))
     bounded = next(item for item in created.values() if item.domain is not None)
     frames, identified = tables["frames"], tables.get(f"{PLAINEST}_identified")
     number = _session_number(frames, choice, session)
@@ -177,7 +177,7 @@ def _session_number(frames: Columns, model: str, session: str | None) -> int:
     known = [str(item) for item in np.asarray(frames["session"])[bases] if item is not None]
     if session not in known:
         allowed = ", ".join(known) or "none: the data name no sessions"
-        raise InputError(Problem("session", f"{session!r} is not there", allowed))
+        raise input_error("session", f"{session!r} is not there", allowed)
     return known.index(session)
 
 
@@ -185,7 +185,7 @@ def selected_model(tables: Tables) -> str:
     """The model that ``model_selection`` selected; InputError without that table."""
     if "model_selection" not in tables:
         message, fix = "was not selected", "run kinacc calibrate, or give --model"
-        raise InputError(Problem("model", message, ", ".join(MODELS), fix))
+        raise input_error("model", message, ", ".join(MODELS), fix)
     table = pd.DataFrame(dict(tables["model_selection"]))
     return str(table.loc[table["selected"] == 1, "model"].iloc[0])
 
@@ -233,7 +233,7 @@ def require_same_robot(recorded: Robot, robot: Robot, place: str) -> None:
     same_shape = recorded.dh.joints == robot.dh.joints
     if not (same_shape and all(np.allclose(*pair, rtol=_SAME, atol=_SAME) for pair in pairs)):
         message = f"was made with another robot than {robot.name}"
-        raise InputError(Problem(place, message, fix="give readings of its robot"))
+        raise input_error(place, message, fix="give readings of its robot")
 
 
 def _fitted_on(robot: Robot) -> list[np.ndarray]:

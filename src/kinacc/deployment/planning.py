@@ -16,7 +16,7 @@ from kinacc.calibration.identifiability import STRUCTURAL, LeftOpen, joints_anyw
 from kinacc.calibration.uncertainty import Uncertainty
 from kinacc.deployment.applicability import BLOCK, sensitivity
 from kinacc.deployment.record import TOOL, Calibration, nominal
-from kinacc.errors import InputError, Problem, refuse
+from kinacc.errors import Problem, input_error, refuse
 from kinacc.geometry import Pose, compose
 from kinacc.kinematics import dh
 from kinacc.kinematics.inverse.limits import travel_unit
@@ -128,7 +128,7 @@ def plan_poses(
     """
     shown = information(robot, q_rad, experiment)
     if shown.rank == 0:
-        raise InputError(Problem("candidates", "determine no parameter"))
+        raise input_error("candidates", "determine no parameter")
     chosen, index = choose(shown.rows, count)
     chosen = np.sort(chosen)
     places = np.concatenate([start_rad[None], q_rad[chosen]]) / travel_unit(robot)
@@ -191,7 +191,7 @@ def spread(
     message = (
         f"only {len(result)} of {_MOST_DRAWS_PER_POSE * block} joint values put the tool there"
     )
-    raise InputError(Problem("region", message, f"{count} candidates", "enlarge the region"))
+    raise input_error("region", message, f"{count} candidates", "enlarge the region")
 
 
 def between(measured: np.ndarray, unit: np.ndarray, count: int, seed: int) -> np.ndarray:
@@ -205,7 +205,7 @@ def between(measured: np.ndarray, unit: np.ndarray, count: int, seed: int) -> np
     different = np.unique(measured, axis=0)
     if len(different) < 2:
         message = "all measured poses are at the same joints"
-        raise InputError(Problem("region", message, "at least 2 different poses"))
+        raise input_error("region", message, "at least 2 different poses")
     random = np.random.default_rng(seed)
     _, near = cKDTree(different / unit).query(
         different / unit, min(_NEIGHBOURS + 1, len(different))
@@ -268,9 +268,7 @@ def choose(rows: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
     least = -(-directions // components)
     if not least <= count <= len(rows):
         allowed = f"at least {least}, at most {len(rows)} (candidates)"
-        raise InputError(
-            Problem("poses", f"{count}, to determine {directions} directions", allowed)
-        )
+        raise input_error("poses", f"{count}, to determine {directions} directions", allowed)
     floor = _REGULAR * float(np.sum(rows**2)) / (len(rows) * directions) * np.eye(directions)
     chosen: list[int] = []
     index = np.zeros(count)

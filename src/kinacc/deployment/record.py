@@ -11,7 +11,7 @@ import numpy as np
 from kinacc.calibration.misfit import Misfit
 from kinacc.calibration.uncertainty import Uncertainty, scale_of
 from kinacc.config.error_models import ERROR_MODELS, NOMINAL
-from kinacc.errors import InputError, Problem
+from kinacc.errors import input_error
 from kinacc.geometry import IDENTITY, Pose, compose, invert, skew
 from kinacc.kinematics.inverse import limits
 from kinacc.kinematics.model import ErrorModel, JointState
@@ -110,7 +110,7 @@ class Calibration:
         if name == FLANGE:
             return self.robot.flange
         known = ", ".join([*self.targets, FLANGE])
-        raise InputError(Problem("point", f"{name!r} is none of this calibration", known))
+        raise input_error("point", f"{name!r} is none of this calibration", known)
 
     @property
     def plainest(self) -> Calibration:
@@ -120,7 +120,7 @@ class Calibration:
     def origin(self, frame: str) -> Pose:
         """First DH frame in ``frame``: the robot's own base, or the instrument."""
         if frame not in FRAMES:
-            raise InputError(Problem("frame", f"{frame!r}", ", ".join(FRAMES)))
+            raise input_error("frame", f"{frame!r}", ", ".join(FRAMES))
         if frame == "instrument":
             return self.base
         if self.anchor is None:

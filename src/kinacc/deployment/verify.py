@@ -32,7 +32,7 @@ from kinacc.deployment.permutation import (
 )
 from kinacc.deployment.record import Calibration
 from kinacc.deployment.shared_readings import known_rows
-from kinacc.errors import InputError, Problem
+from kinacc.errors import input_error
 from kinacc.geometry import Pose, skew
 from kinacc.kinematics.inverse.limits import outside
 from kinacc.kinematics.model import ErrorModel
@@ -142,7 +142,7 @@ def verify(
     observed = from_columns(columns, robot).select(~is_known)
     if len(observed.session_names) > 1:
         message = "are of several sessions, each with its own base"
-        raise InputError(Problem("the readings", message, "readings of one session"))
+        raise input_error("the readings", message, "readings of one session")
     point = next((name for name in observed.target_names if name in calibration.targets), None)
     near = is_measured_there(calibration, observed.at, point) if len(observed) else is_known[:0]
     table = model_errors(tables, robot, observed, moved, rotation_weight_mm_per_rad)
@@ -317,7 +317,7 @@ def _at_session(
     measured = frames.loc[frames["frame"] == BASE].get("session", pd.Series()).unique()
     if session is None and len(measured) > 1:
         message, allowed = "have no session, and each has its own base", ", ".join(measured)
-        raise InputError(Problem("the readings", message, f"one of {allowed}"))
+        raise input_error("the readings", message, f"one of {allowed}")
     return folder.calibration(tables, robot, kind, session=session)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d import Axes3D
 
-from kinacc.errors import InputError, Problem
+from kinacc.errors import input_error
 from kinacc.figures import style
 from kinacc.kinematics import dh, tables
 from kinacc.kinematics import robot as robots
@@ -61,7 +61,7 @@ def draw(
     """
     q_rad = q_rad[np.isfinite(q_rad).all(axis=1)]
     if not len(q_rad):
-        raise InputError(Problem("assessment_points", "no point has joint angles", "at least one"))
+        raise input_error("assessment_points", "no point has joint angles", "at least one")
     flange = dh.forward(model, q_rad)
     points_mm = flange.position_mm + flange.rotation @ tool_mm
     edges = [] if cylinder is None else _edges(cylinder)

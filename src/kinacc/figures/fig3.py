@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
-from kinacc.errors import InputError, Problem
+from kinacc.errors import input_error
 from kinacc.figures import style
 from kinacc.tables.columns import Columns
 
@@ -40,7 +40,7 @@ def draw(accuracy_map: Columns, *, dataset: str | None = None) -> Figure:
     """
     cells = pd.DataFrame(accuracy_map)
     if cells.empty:
-        raise InputError(Problem("accuracy_map", "the table has no row", "at least one"))
+        raise input_error("accuracy_map", "the table has no row", "at least one")
     cells[PLACE] = cells[PLACE].round(3)
     slices, radii, heights = (np.unique(cells[name]) for name in PLACE)
     edges = _edges(radii), _edges(heights)

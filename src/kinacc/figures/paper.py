@@ -11,7 +11,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from kinacc.errors import InputError, Problem
+from kinacc.errors import input_error
 from kinacc.figures import fig1, fig2, fig3, style
 from kinacc.tables.columns import Columns, Tables
 
@@ -106,8 +106,8 @@ def draw_iterations(
     steps = table[table["example"] == example].sort_values("iteration", kind="stable")
     if steps.empty:
         present = ", ".join(sorted(set(table["example"]))) or "none"
-        raise InputError(
-            Problem("histories", f"no row belongs to example {example!r}", f"found: {present}")
+        raise input_error(
+            "histories", f"no row belongs to example {example!r}", f"found: {present}"
         )
     eta_mm, alpha = steps[["eta_mm", "alpha"]].iloc[0]
     true = "“true” {}*" if taken_as_true else "true {}"

@@ -14,7 +14,7 @@ import numpy as np
 
 from kinacc import __version__
 from kinacc.deployment import folder, history
-from kinacc.errors import FitError, InputError, Problem, first_few
+from kinacc.errors import FitError, InputError, first_few, input_error
 from kinacc.gate import chance
 from kinacc.gate.outcome import FAILED, PASSED, UNDECIDED, Outcome
 from kinacc.gate.values import SELECTED, RunTables
@@ -36,13 +36,13 @@ def accept(results: Path, folder: Path, datasets: Sequence[str], reason: str) ->
     Raises InputError without a reason, or where the folder holds something else.
     """
     if not reason.strip():
-        raise InputError(Problem("--reason", "is empty", "why this run is as it should be"))
+        raise input_error("--reason", "is empty", "why this run is as it should be")
     note, known = folder / NOTE, []
     if note.is_file():
         known = json.loads(note.read_text("utf-8"))
     elif folder.exists() and any(folder.iterdir()):
         message = f"holds no accepted run, and is not empty: {NOTE} is missing"
-        raise InputError(Problem(str(folder), message, "a folder of its own"))
+        raise input_error(str(folder), message, "a folder of its own")
     for name in datasets:
         new, target = unfinished(folder / name), folder / name
         shutil.copytree(results / name, new, ignore=_PICTURES)

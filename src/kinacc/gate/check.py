@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from kinacc.config.schema import defaults
-from kinacc.errors import InputError, Problem, and_more, first_few
+from kinacc.errors import Problem, and_more, first_few, input_error
 from kinacc.gate.accepted import compared
 from kinacc.gate.conformity import check_file
 from kinacc.gate.gates import judged
@@ -48,7 +48,7 @@ def check_results(
     """
     names = list(datasets) or sorted({*configurations, *data_sets_in(results)})
     if not names:
-        raise InputError(Problem(str(results), "holds no data set", "a folder of results"))
+        raise input_error(str(results), "holds no data set", "a folder of results")
     data = data_sets(configurations) if configurations else None
     outcomes = [check_files(results / name, data) for name in names]
     broken = {item.dataset for item in outcomes if item.verdict == FAILED}
@@ -66,7 +66,7 @@ def check_results(
 def data_sets_in(results: Path) -> list[str]:
     """Names of the data sets in a results folder."""
     if not results.is_dir():
-        raise InputError(Problem(str(results), "no such folder", fix="name a results folder"))
+        raise input_error(str(results), "no such folder", fix="name a results folder")
     return sorted(item.parent.name for item in results.glob(f"*/{sums.FOLDER}"))
 
 

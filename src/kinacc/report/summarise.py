@@ -21,7 +21,7 @@ from kinacc.campaign.beside_results import PLAN, of_results
 from kinacc.config.error_models import ERROR_MODELS, MEASURED, PLAINEST, Comparison
 from kinacc.deployment import applicability
 from kinacc.deployment import folder as results
-from kinacc.errors import InputError, Problem, refuse
+from kinacc.errors import InputError, Problem, input_error, refuse
 from kinacc.kinematics import robot
 from kinacc.kinematics.robot import Robot
 from kinacc.measurements.folds import configurations_of
@@ -208,7 +208,7 @@ def summarise_all(
         try:
             if path.is_file() and path.name in sums.outdated(folder):
                 what = "was made from other tables than those now beside it"
-                raise InputError(Problem(str(path), what, fix=store.remake(path)))
+                raise input_error(str(path), what, fix=store.remake(path))
             summaries.append(summarise(folder, outdated=outdated))
         except InputError as error:
             problem = error.problems[0]

@@ -18,7 +18,7 @@ from kinacc.deployment.programs.orientation import (
     Convention,
     Orientation,
 )
-from kinacc.errors import InputError, Problem
+from kinacc.errors import input_error
 from kinacc.geometry import IDENTITY, Pose, compose, invert, rotation_x, rotation_y, rotation_z
 from kinacc.kinematics import dh
 from kinacc.kinematics.dh import PARAMETERS, DHModel
@@ -108,7 +108,7 @@ def _ur(robot: Robot, model: DHModel) -> Numbers:
     if model.joints != len(_UR_ALPHA) or np.abs(nominal.alpha_rad - _UR_ALPHA).max() > 1e-3:
         message = "has no DH table of UR arms (alpha 90, 0, 0, 90, -90, 0 deg)"
         fix = "use the table that UR publishes"
-        raise InputError(Problem(f"robot {robot.name}", message, fix=fix))
+        raise input_error(f"robot {robot.name}", message, fix=fix)
     _, standard = standard_chain(model)
     turns = standard.theta_offset_rad - nominal.theta_offset_rad
     return _by_joint({

@@ -15,7 +15,7 @@ from kinacc.config.names import in_markdown
 from kinacc.deployment.export.source import Source
 from kinacc.deployment.folder import selected_model
 from kinacc.deployment.record import POSES
-from kinacc.errors import InputError, Problem
+from kinacc.errors import input_error
 from kinacc.kinematics.dh import PARAMETERS
 
 _STATISTICS = {"mean": "mean", "max": "max", "rms": "rms", "gamma99": "99 % gamma"}
@@ -40,7 +40,7 @@ def paper_tables(source: Source) -> list[PaperTable]:
     """Residuals of the models and DH parameters; the selected model comes first."""
     if "residuals" not in source.tables:
         place = f"{source.calibration.name}: residuals.parquet"
-        raise InputError(Problem(place, "no such file", "a finished run"))
+        raise input_error(place, "no such file", "a finished run")
     name, selected = source.calibration.name, selected_model(source.tables)
     measured = {
         model: _residuals(

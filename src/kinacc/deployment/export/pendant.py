@@ -18,7 +18,7 @@ from kinacc.config.error_models import NOMINAL, PLAINEST, model_name
 from kinacc.deployment.export.controllers import CONTROLLERS, ZEROS, Controller, Numbers
 from kinacc.deployment.folder import Tables, selected_model
 from kinacc.deployment.record import POSES
-from kinacc.errors import InputError, Problem
+from kinacc.errors import input_error
 from kinacc.geometry import Pose, compose, invert
 from kinacc.kinematics.dh import PARAMETERS
 from kinacc.kinematics.robot import Robot
@@ -141,12 +141,12 @@ def _require_fitting(robot: Robot, maker: Controller) -> None:
     """InputError where the controller cannot take this robot."""
     if robot.dh.prismatic.any():
         message = "has joints that slide: their zeros are lengths, which no export writes"
-        raise InputError(Problem(f"robot {robot.name}", message))
+        raise input_error(f"robot {robot.name}", message)
     if maker.takes != ZEROS and not np.array_equal(robot.joint_map, np.eye(robot.dh.joints)):
         message = (
             f"reports joints with signs or couplings; {maker.name} counts those of its DH table"
         )
-        raise InputError(Problem(f"robot {robot.name}", message, fix="use --format urdf"))
+        raise input_error(f"robot {robot.name}", message, fix="use --format urdf")
 
 
 def _mean_errors(tables: Tables, maker: Controller, off: residuals.Errors) -> pd.DataFrame:

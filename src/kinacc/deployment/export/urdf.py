@@ -21,7 +21,7 @@ from kinacc.calibration.observations import full_poses
 from kinacc.deployment.export.controllers import standard_chain
 from kinacc.deployment.export.source import Source
 from kinacc.deployment.record import TOOL
-from kinacc.errors import InputError, Problem
+from kinacc.errors import input_error
 from kinacc.geometry import (
     IDENTITY,
     Pose,
@@ -145,7 +145,7 @@ def _ends_in_file(
     described = load(path, *links)
     if described.dh.joints != robot.dh.joints:
         message = f"its chain has {described.dh.joints} moving joints, {robot.name}"
-        raise InputError(Problem(str(path), f"{message} has {robot.dh.joints}"))
+        raise input_error(str(path), f"{message} has {robot.dh.joints}")
     low, high = np.maximum(robot.q_min_rad, -3.0e3), np.minimum(robot.q_max_rad, 3.0e3)
     share = np.random.default_rng(0).uniform(0.0, 1.0, (_PROBES, len(low)))
     q_rad = low + share * (high - low)
@@ -160,7 +160,7 @@ def _ends_in_file(
     if min(misfits) > _SAME_ARM_MM:
         message = f"its arm differs from {robot.name} by up to {min(misfits):.3g} mm"
         allowed = f"the arm that was calibrated, within {_SAME_ARM_MM:g} mm, joints alike"
-        raise InputError(Problem(str(path), message, allowed))
+        raise input_error(str(path), message, allowed)
     return options[0] if misfits[0] <= 1e-8 else options[int(np.argmin(misfits))]
 
 

@@ -43,7 +43,7 @@ from kinacc.deployment.programs.record import (
     replaced,
 )
 from kinacc.deployment.record import FLANGE, MEASURED, Calibration
-from kinacc.errors import InputError, Problem, refuse
+from kinacc.errors import InputError, Problem, input_error, refuse
 from kinacc.geometry import IDENTITY, Pose, compose, invert
 from kinacc.kinematics import dh
 from kinacc.kinematics.inverse import limits
@@ -115,7 +115,7 @@ def read_program(
     languages = {known: item for item in LANGUAGES for known in item.endings}
     if ending not in languages:
         message = f"ends in {ending!r}: no robot language"
-        raise InputError(Problem(str(path), message, ", ".join(languages)))
+        raise input_error(str(path), message, ", ".join(languages))
     language = languages[ending]
     beside = {item.name.lower(): item for item in path.parent.iterdir() if item != path}
     partners = (beside.get(path.stem.lower() + suffix) for suffix in language.partners)
@@ -313,7 +313,7 @@ def _refuse_second_time(program: Program) -> None:
     for record in sorted(path.parent.glob(f"*{_RECORD}")):
         if digest in record.read_text(errors="replace"):
             fix = "give the program it was made from"
-            raise InputError(Problem(str(path), f"was compensated before ({record.name})", fix=fix))
+            raise input_error(str(path), f"was compensated before ({record.name})", fix=fix)
 
 
 def _in_use(program: Program, options: Options) -> Program:

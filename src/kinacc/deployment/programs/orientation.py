@@ -7,7 +7,7 @@ from typing import Final, Literal, NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from kinacc.errors import InputError, Problem
+from kinacc.errors import input_error
 from kinacc.geometry import Pose
 
 Orientation = Literal["ZYX", "xyz", "XYZ", "quaternion", "rotation vector"]
@@ -37,7 +37,7 @@ class Convention(NamedTuple):
         if self.orientation == QUATERNION:
             length = np.linalg.norm(turn)
             if abs(length - 1.0) > _UNIT:
-                raise InputError(Problem(where, f"has a quaternion of length {length:.4g}", "1"))
+                raise input_error(where, f"has a quaternion of length {length:.4g}", "1")
             rotation = Rotation.from_quat(turn, scalar_first=True)
         elif self.orientation == VECTOR:
             rotation = Rotation.from_rotvec(self.angle_deg * turn, degrees=True)
@@ -69,5 +69,5 @@ class Convention(NamedTuple):
         if orientation == QUATERNION and count == 6:
             orientation = FIXED
         if count != 6 + (orientation == QUATERNION):
-            raise InputError(Problem("frame", f"has {count} numbers", "6, mm and deg"))
+            raise input_error("frame", f"has {count} numbers", "6, mm and deg")
         return Convention(orientation).pose(numbers)

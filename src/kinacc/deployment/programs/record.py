@@ -15,7 +15,7 @@ import numpy as np
 import yaml
 
 from kinacc.deployment.programs.orientation import Convention
-from kinacc.errors import InputError, Problem
+from kinacc.errors import input_error
 from kinacc.geometry import IDENTITY, Pose
 
 NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
@@ -42,7 +42,7 @@ class Source:
         """The file's bytes as text; InputError for a file of two bytes a character."""
         content = path.read_bytes()
         if b"\0" in content[:4096]:
-            raise InputError(Problem(str(path), "is no text of one byte a character"))
+            raise input_error(str(path), "is no text of one byte a character")
         return cls(path, content.decode("latin-1"))
 
     def line(self, offset: int) -> str:
@@ -195,4 +195,4 @@ def frames_of_yaml(source: Source, convention: Convention) -> Frames:
         }
     except (yaml.YAMLError, AttributeError, TypeError, ValueError):
         allowed = "tools: {1: [six numbers]}, bases: {1: [six numbers]}"
-        raise InputError(Problem(str(source.path), "is no file of frames", allowed)) from None
+        raise input_error(str(source.path), "is no file of frames", allowed) from None

@@ -23,7 +23,7 @@ from kinacc.deployment.programs.record import (
     Program,
     Source,
 )
-from kinacc.errors import InputError, Problem
+from kinacc.errors import input_error
 
 _UNITS = {"rad": 180.0 / np.pi, "m": 1e3}  # deg and mm where not stated
 _KEYS: dict[Orientation, str] = {
@@ -55,7 +55,7 @@ def read(sources: Sequence[Source], _: np.ndarray | None) -> Program:
         convention = Convention(kind, units["x"], units[keys[-1]])
     else:
         allowed = "q1_deg .., or x_mm .. with qw .., rvx_deg .., rx_deg .., a .. c or w, p, r"
-        raise InputError(Problem(f"{source.path}:1", "names no columns of positions", allowed))
+        raise input_error(f"{source.path}:1", "names no columns of positions", allowed)
     positions = []
     cells = re.compile(rf'[ \t]*"?([^{separator}"\r\n]*?)"?[ \t]*(?:{separator}|$)', re.M)
     for line in lines[1:]:
@@ -67,7 +67,7 @@ def read(sources: Sequence[Source], _: np.ndarray | None) -> Program:
         except (KeyError, ValueError):
             message = f"has no number in a column of {', '.join(keys)}"
             where = source.path.parent / source.where(line.start())
-            raise InputError(Problem(str(where), message)) from None
+            raise input_error(str(where), message) from None
         label = source.text[slice(*row["pose"])] if "pose" in row else source.line(line.start())
         positions.append(Position(label, source, places, 6, scale, "", ROBOT))
     return Program(sources, positions, convention=convention)

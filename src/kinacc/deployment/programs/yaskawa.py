@@ -19,7 +19,7 @@ from kinacc.deployment.programs.record import (
     Program,
     Source,
 )
-from kinacc.errors import InputError, Problem
+from kinacc.errors import input_error
 
 CONVENTION = Convention(FIXED)
 _POSITION = re.compile(r"^(B?C|B?P|E[CX])(\d+)\s*=(.*)|^///(\w+)(.*)", re.M)
@@ -89,7 +89,7 @@ def _position(
     if state.get("unit") != "RECTAN":
         if pulses is None:
             fix = "give --pulses-per-degree, one number an axis (S, L, U, R, B, T)"
-            raise InputError(Problem(str(source.path), "positions are in pulses", fix=fix))
+            raise input_error(str(source.path), "positions are in pulses", fix=fix)
         return Position(name, source, places[: len(pulses)], 0, pulses)
     reference, rconf = state.get("POSTYPE", "").upper(), state.get("RCONF")
     known = reference in ("USER", "ROBOT", "BASE")
