@@ -11,8 +11,7 @@ from pathlib import Path
 import pytest
 from figure_words import figures
 
-from kinacc.errors import InputError
-from kinacc.figures import fig1, save
+from kinacc.figures import save
 
 EACH_WAY = ("fig3", "fig4")  # a map of pixels; assessors, which come as a set
 
@@ -56,10 +55,3 @@ def test_files_are_small_and_hold_no_picture_but_the_maps(rendered):
         assert (b"<image" in files["svg"]) == (name == "fig3")
         assert len(files["svg"]) < 500_000
         assert len(files.get("pdf", "")) < 250_000
-
-
-def test_nothing_is_written_where_a_format_is_none(tmp_path):
-    with pytest.raises(InputError) as error:
-        save.write(fig1.draw(), {k: tmp_path / "b" / k for k in ("svg", "gif", "jpeg")})
-    assert len(error.value.problems) == 2
-    assert not (tmp_path / "b").exists()

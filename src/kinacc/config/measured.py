@@ -23,23 +23,11 @@ CONVENTIONS = (*_ORDERS, *map(str.lower, _ORDERS))  # of Euler angles: intrinsic
 _NAMES = f"{', '.join(ROW)}; of a target, or of one named before it (mA_x), {', '.join(POINT)}"
 
 
-def _is_column(name: Any) -> bool:
-    ends = tuple(f"_{word}" for word in POINT)
-    return name in ROW or name in POINT or (isinstance(name, str) and name.endswith(ends))
-
-
 def _column(name: Any) -> Any:
-    if not _is_column(name):
+    of_target = isinstance(name, str) and name.endswith(tuple(f"_{word}" for word in POINT))
+    if name not in (*ROW, *POINT) and not of_target:
         raise refused(f"unknown name {name!r}", did_you_mean(name, (*ROW, *POINT)))
     return name
-
-
-def _ours_first(names: Any) -> Any:
-    for name, of_file in names.items() if isinstance(names, dict) else ():
-        if not any(map(_is_column, names)) and _is_column(of_file):
-            message = f"the file's names stand first, as in {name}: {of_file}"
-            raise refused(message, f"turn them all round, as in {of_file}: {name}")
-    return names
 
 
 def _listed(lines: Any) -> Any:
@@ -48,7 +36,6 @@ def _listed(lines: Any) -> Any:
 
 Columns = Annotated[
     dict[Annotated[str, BeforeValidator(_column)], Text],
-    BeforeValidator(_ours_first),
     distinct(dict.values),
 ]
 Names = Annotated[list[Text], Field(min_length=1, max_length=10000), Distinct]

@@ -10,6 +10,7 @@ import pandas as pd
 
 from kinacc.calibration import identifiability
 from kinacc.calibration.observations import from_columns
+from kinacc.calibration.summary import selected
 from kinacc.calibration.uncertainty import Uncertainty
 from kinacc.config.error_models import ALWAYS, ERROR_MODELS, PLAINEST
 from kinacc.deployment.record import MODELS, Calibration, Residual
@@ -74,13 +75,15 @@ def read_tables(
 
 def recorded_robot(folder: Path | str) -> Robot:
     """The robot a results folder was made with; InputError where its table cannot be read."""
-    path = Path(folder) / "robot.parquet"
-    if not path.is_file():
-        raise input_error(str(path), "no such file", fix="run kinacc calibrate")
-    description = next(iter(store.read(path).get("description", ())), None)
-    if not isinstance(description, str):
-        raise input_error(str(path), "has no description", fix=store.remake(path))
-    return robots.of_text(description, str(path))
+    return robot_of(read_tables(folder, needed=("robot",), optional=()))
+
+
+def robot_of(tables: Tables) -> Robot:
+    """The robot that the table ``robot`` describes; InputError where it describes none."""
+    described = [*tables["robot"].get("description", ())]
+    if not described or not isinstance(described[0], str):
+        raise input_error("robot.parquet", "has no description", fix="run kinacc calibrate")
+    return robots.of_text(described[0], "robot.parquet")
 
 
 def calibration(
@@ -129,7 +132,8 @@ def _calibration(
         raise input_error("model", message, ", ".join(created))
     bounded = next(item for item in created.values() if item.domain is not None)
     frames, identified = tables["frames"], tables.get(f"{PLAINEST}_identified")
-    number = _session_number(frames, choice, session)
+    of_model = pd.DataFrame(dict(frames)).query("model == @choice").set_index("frame")
+    number = _session_number(of_model, session)
     bases = [model_tables.frame(frames, kind, "base", session) for kind in (PLAINEST, choice)]
     # A model with the base of the DH model: neither was fitted with it.
     same_base = all(np.array_equal(first, two) for first, two in zip(*bases, strict=True))
@@ -153,7 +157,7 @@ def _calibration(
         left_open=None if identified is None else tuple(identifiability.listed(identified)),
         targets={
             target: model_tables.frame(frames, choice, target)
-            for target in targets_of(frames, choice)
+            for target in of_model.index.drop("base")
         },
         known=uncertainty(tables, choice),
         residual=_residual(tables, choice),
@@ -163,18 +167,11 @@ def _calibration(
     )
 
 
-def targets_of(frames: Columns, model: str) -> list[str]:
-    """Names of the targets that a model was fitted with, from the table ``frames``."""
-    of_model = np.asarray(frames["model"]) == model
-    return [str(item) for item in np.asarray(frames["frame"])[of_model] if item != "base"]
-
-
-def _session_number(frames: Columns, model: str, session: str | None) -> int:
+def _session_number(frames: pd.DataFrame, session: str | None) -> int:
     """Place of a session among the bases of a model; InputError for one that is not there."""
     if session is None or "session" not in frames:
         return 0
-    bases = (np.asarray(frames["model"]) == model) & (np.asarray(frames["frame"]) == "base")
-    known = [str(item) for item in np.asarray(frames["session"])[bases] if item is not None]
+    known = [*frames.loc[["base"], "session"].dropna()]
     if session not in known:
         allowed = ", ".join(known) or "none: the data name no sessions"
         raise input_error("session", f"{session!r} is not there", allowed)
@@ -186,8 +183,7 @@ def selected_model(tables: Tables) -> str:
     if "model_selection" not in tables:
         message, fix = "was not selected", "run kinacc calibrate, or give --model"
         raise input_error("model", message, ", ".join(MODELS), fix)
-    table = pd.DataFrame(dict(tables["model_selection"]))
-    return str(table.loc[table["selected"] == 1, "model"].iloc[0])
+    return selected(tables["model_selection"])
 
 
 def _residual(tables: Tables, choice: str) -> Residual | None:

@@ -35,7 +35,6 @@ from kinacc.deployment.verify import (
     statistics,
 )
 from kinacc.errors import FitError, InputError
-from kinacc.kinematics import robot as robots
 from kinacc.kinematics.inverse.limits import outside
 from kinacc.kinematics.robot import carried
 from kinacc.measurements.folds import SAME_CONFIGURATION_RAD, configurations
@@ -76,7 +75,7 @@ def session_of(
     tables: Mapping[str, Columns], name: str, date: str, base: str, tool: str
 ) -> Session:
     """A line of a series from the tables of its results."""
-    arm = robots.of_text(str(tables["robot"]["description"][0]), "robot.parquet")
+    arm = folder.robot_of(tables)
     calibration, measured = folder.calibration(tables, arm, name=name), tables["measurements"]
     observed = from_columns(measured, arm)
     held_out = held_out_vectors(tables["pose_errors"], calibration.choice, len(observed))

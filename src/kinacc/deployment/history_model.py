@@ -178,15 +178,12 @@ def joined(first: Observations, second: Observations, setup: Setup) -> Observati
         name: np.concatenate([getattr(first, name), getattr(second, name)]) for name in names
     }
     for name, same in (("session", setup.same_base), ("target", setup.same_tool)):
-        of_first, place = [*getattr(first, f"{name}_names")], []
-        for item in getattr(second, f"{name}_names"):
-            if not same or item not in of_first:
-                of_first.append(item if item not in of_first else f"{item}, second series")
-                place.append(len(of_first) - 1)
-            else:
-                place.append(of_first.index(item))
-        local = np.array(place, dtype=np.int64)[getattr(second, name)]
-        columns |= {name: np.append(getattr(first, name), local), f"{name}_names": tuple(of_first)}
+        before, after = (getattr(item, f"{name}_names") for item in (first, second))
+        if not same:
+            after = [f"{item}, second series" if item in before else item for item in after]
+        every = tuple(dict.fromkeys([*before, *after]))
+        number = np.array([every.index(item) for item in after])[getattr(second, name)]
+        columns |= {name: np.append(getattr(first, name), number), f"{name}_names": every}
     pose = np.append(first.pose, second.pose + first.pose.max() + 1 - second.pose.min())
     return replace(first, **columns, pose=pose)
 

@@ -9,7 +9,6 @@ import numpy as np
 from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d import Axes3D
 
-from kinacc.errors import input_error
 from kinacc.figures import style
 from kinacc.kinematics import dh, tables
 from kinacc.kinematics import robot as robots
@@ -57,11 +56,9 @@ def draw(
     in the flange frame; ``cylinder`` is the evaluation space as a sector about the axis of joint 1
     with ``inner_radius_mm``, ``radial_span_mm``, ``bottom_mm``, ``height_mm`` and ``angle_deg``
     (two values); ``measured``: the points are poses that were measured. Everything is in the robot
-    base frame. Raises InputError without a point.
+    base frame.
     """
     q_rad = q_rad[np.isfinite(q_rad).all(axis=1)]
-    if not len(q_rad):
-        raise input_error("assessment_points", "no point has joint angles", "at least one")
     flange = dh.forward(model, q_rad)
     points_mm = flange.position_mm + flange.rotation @ tool_mm
     edges = [] if cylinder is None else _edges(cylinder)

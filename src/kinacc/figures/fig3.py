@@ -13,7 +13,6 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
-from kinacc.errors import input_error
 from kinacc.figures import style
 from kinacc.tables.columns import Columns
 
@@ -36,11 +35,9 @@ def draw(accuracy_map: Columns, *, dataset: str | None = None) -> Figure:
 
     One colour scale per row; unreachable cells are hatched, and those reached in some but not all
     orientations and branches dotted; the largest value of each slice is ringed and stated. The
-    legend lists the marks that are there. Raises InputError where there is no row.
+    legend lists the marks that are there.
     """
     cells = pd.DataFrame(accuracy_map)
-    if cells.empty:
-        raise input_error("accuracy_map", "the table has no row", "at least one")
     cells[PLACE] = cells[PLACE].round(3)
     slices, radii, heights = (np.unique(cells[name]) for name in PLACE)
     edges = _edges(radii), _edges(heights)

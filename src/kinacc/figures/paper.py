@@ -11,7 +11,6 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from kinacc.errors import input_error
 from kinacc.figures import fig1, fig2, fig3, style
 from kinacc.tables.columns import Columns, Tables
 
@@ -100,15 +99,9 @@ def draw_iterations(
     not; NaN where unknown); a dotted line where the largest is first measured. Below: rejection
     probability and its threshold alpha.
     ``taken_as_true``: footnote where the truth is not known; what the study took for it.
-    Raises InputError where there is no row.
     """
     table = pd.DataFrame(histories)
     steps = table[table["example"] == example].sort_values("iteration", kind="stable")
-    if steps.empty:
-        present = ", ".join(sorted(set(table["example"]))) or "none"
-        raise input_error(
-            "histories", f"no row belongs to example {example!r}", f"found: {present}"
-        )
     eta_mm, alpha = steps[["eta_mm", "alpha"]].iloc[0]
     true = "“true” {}*" if taken_as_true else "true {}"
     title = _verdict(steps)

@@ -12,7 +12,6 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from kinacc.errors import Problem, refuse
 from kinacc.figures import style
 from kinacc.tables.atomic import write_together
 
@@ -39,15 +38,7 @@ def render(figure: Figure, formats: Iterable[str]) -> dict[str, bytes]:
     -------
     dict of bytes
         Content by format; the same bytes for the same figure and versions.
-
-    Raises
-    ------
-    InputError
-        With each format that is none of these.
     """
-    formats = tuple(formats)
-    unknown = [name for name in formats if name not in FORMATS]
-    refuse([Problem("figures.formats", f"{name!r}", ", ".join(FORMATS)) for name in unknown])
     contents = {}
     with style.house():
         settle(figure)

@@ -40,10 +40,7 @@ class RunTables(dict[str, pd.DataFrame]):
     def __missing__(self, artefact: str) -> pd.DataFrame:
         path = self.folder / f"{artefact}.parquet"
         if not path.is_file():
-            studied = artefact in ARTEFACTS and ARTEFACTS[artefact].topic == "assessment"
-            fix = f"kinacc {'study' if studied else 'calibrate'} FILE.yaml makes it"
-            if artefact == "history":
-                fix = "give the data set a series (docs/history.md) and calibrate it"
+            fix = "kinacc calibrate or kinacc study makes it; a history needs a series of files"
             raise input_error(str(path), "missing", fix=fix)
         self[artefact] = store.read_table(path)
         return self[artefact]

@@ -10,10 +10,11 @@ import numpy as np
 
 from kinacc.campaign import folder as campaigns
 from kinacc.campaign import report
+from kinacc.deployment import folder
 from kinacc.report import campaign, fit_sections, study_sections, terminal
 from kinacc.report.page import FirstScreen, Page, Table
 from kinacc.report.rendering import counted
-from kinacc.report.summarise import robot_of, summarise
+from kinacc.report.summarise import summarise
 from kinacc.report.summary import CalibrationSummary
 
 _OF_THE_STUDY = (
@@ -35,7 +36,7 @@ def run(inputs: Mapping[str, Any], settings: Mapping[str, Any]) -> Page:
     places = [path.parent for role, path in files.items() if role.startswith("campaign_")]
     place = Path(settings.get("folder", f"results/{settings['dataset']}"))
     summary = summarise(place, tables, places, settings.get("reason", ""))
-    arm = robot_of(tables)
+    arm = folder.robot_of(tables)
     sections = [study_sections.history(tables)] if "history" in tables else []
     sections.append(fit_sections.residuals(tables, summary))
     if "accuracy_map" in tables:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -95,6 +94,9 @@ def html(page: Page, marks: Mapping[str, object] | None = None) -> str:
     str
         HTML with all styles, pictures and scripts in it.
     """
+    from bokeh.core.types import ID
+    from bokeh.embed import json_item
+
     charts = {
         f"chart-{part.key}-{name}": chart
         for part in page.sections
@@ -115,19 +117,8 @@ def html(page: Page, marks: Mapping[str, object] | None = None) -> str:
         style=text_of("page.css"),
         script=text_of("page.js"),
         library=_library() if charts else "",
-        charts=_items(charts),
+        charts={name: json_item(chart, ID(name)) for name, chart in charts.items()},
     )
-
-
-def _items(charts: Mapping[str, LayoutDOM]) -> str:
-    """Charts as JSON that can stand inside a script element, whatever texts it holds."""
-    from bokeh.core.types import ID
-    from bokeh.embed import json_item
-
-    text = json.dumps({name: json_item(chart, ID(name)) for name, chart in charts.items()})
-    for character in "<>&\u2028\u2029":
-        text = text.replace(character, f"\\u{ord(character):04x}")
-    return text
 
 
 def _library() -> str:

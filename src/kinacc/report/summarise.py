@@ -22,7 +22,6 @@ from kinacc.config.error_models import ERROR_MODELS, MEASURED, PLAINEST, Compari
 from kinacc.deployment import applicability
 from kinacc.deployment import folder as results
 from kinacc.errors import InputError, Problem, input_error, refuse
-from kinacc.kinematics import robot
 from kinacc.kinematics.robot import Robot
 from kinacc.measurements.folds import configurations_of
 from kinacc.measurements.row_names import RowNames
@@ -83,7 +82,7 @@ def summarise(
         old = made_of_others(folder) - {"summary", "data_check"}
         optional = [name for name in OPTIONAL if name not in old]
         tables = results.read_tables(folder, needed=figures.TABLES, optional=optional)
-    arm, selected = robot_of(tables), figures.selected(tables["model_selection"])
+    arm, selected = results.robot_of(tables), figures.selected(tables["model_selection"])
     name = folder.resolve().name
     places = of_results(folder) if campaigns is None else campaigns
     assessed = of_calibration.newest(name, tables, places)
@@ -143,11 +142,6 @@ def made_of_others(folder: Path) -> set[str]:
     old = {Path(name).stem for name in sums.outdated(folder)}
     studied = {name for name in _STUDIED if (folder / f"{name}.parquet").is_file()}
     return old if old.isdisjoint(studied) else old | studied
-
-
-def robot_of(tables: Tables) -> Robot:
-    """The robot that the table ``robot`` describes."""
-    return robot.of_text(str(tables["robot"]["description"][0]), "robot.parquet")
 
 
 def data_set_folders(folders: Iterable[Path]) -> list[Path]:
@@ -221,7 +215,7 @@ def summarise_all(
 
 def run(inputs: Tables, settings: Mapping[str, Any]) -> dict[str, Columns]:
     """The stage ``summary``: figures of a calibration, one a row."""
-    arm = robot_of(inputs)
+    arm = results.robot_of(inputs)
     calibration = results.calibration(inputs, arm)
     share = applicability.share_of_box(calibration, *figures.covered(inputs["measurements"], arm))
     known = summarise(Path("results"), inputs, campaigns=())
@@ -348,8 +342,8 @@ def _claims(claims: Columns) -> dict[str, Any]:
 
 def _stated_noise_mm(measurements: Columns) -> float:
     """Rms over readings and axes of the standard deviations in the file, NaN without any."""
-    axes = [measurements[f"std_{axis}_mm"] for axis in "xyz" if f"std_{axis}_mm" in measurements]
-    return float(np.sqrt(np.mean(np.square(axes)))) if axes else np.nan
+    axes = [measurements[f"std_{axis}_mm"] for axis in "xyz"]
+    return float(np.sqrt(np.mean(np.square(axes))))
 
 
 def _measured(name: str, history: Columns | None) -> str:

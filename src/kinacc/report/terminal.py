@@ -13,11 +13,11 @@ from rich.table import Table
 
 from kinacc.assess.statement import UNDECIDED
 from kinacc.calibration.summary import LARGE_SHARE
-from kinacc.config.error_models import PLAINEST, model_name
+from kinacc.config.error_models import PLAINEST
 from kinacc.errors import Problem, as_seen, first_few
-from kinacc.report.rendering import counted, lines, size
+from kinacc.report.rendering import counted, lines
 from kinacc.report.summarise import summarise, summarise_all
-from kinacc.report.summary import BOUND, STATISTICS, CalibrationSummary
+from kinacc.report.summary import BOUND, CalibrationSummary
 
 FEW = 4  # data sets whose summaries are printed one after another
 WIDTH = 100
@@ -47,13 +47,13 @@ def print_summary(
 ) -> None:
     """Print half a page on one calibration, with the verdict ``by`` a statistic; see ``verdict``.
 
-    ``verbose``: every finding, parameter and population of errors.
+    ``verbose``: every finding and parameter.
     """
     console = screen(WIDTH)
     first, *answers = headline(summary, by, tolerance_mm)
     console.print(first, soft_wrap=True)
     console.print("\n".join(answers), end="\n\n")
-    console.print(_error_table(summary, verbose))
+    console.print(_error_table(summary))
     grid = Table.grid(padding=(0, 2))
     grid.add_column(no_wrap=True)
     grid.add_column(overflow="fold")
@@ -207,7 +207,7 @@ def _shown(value: object) -> str:
     return f"{value:.4f}" if abs(value) >= 0.01 or abs(value) < 5e-5 else f"{value:.3g}"
 
 
-def _error_table(summary: CalibrationSummary, verbose: bool) -> Table:
+def _error_table(summary: CalibrationSummary) -> Table:
     table = Table(box=None, pad_edge=False)
     where = "Held-out" if summary.is_held_out else "Training"
     table.add_column(f"{where} errors ({counted(summary.best.n, 'reading')})", no_wrap=True)
@@ -217,13 +217,4 @@ def _error_table(summary: CalibrationSummary, verbose: bool) -> Table:
     table.add_column("", no_wrap=True)
     for model, row in errors.iterrows():
         table.add_row(*map(as_seen, row), "<- selected" if model == summary.selected else "")
-    others = summary.errors[summary.errors["quantity"] == "position"]
-    shown = summary.position_errors
-    for row in others.itertuples() if verbose else ():
-        is_measured = row.reference == "measured"
-        if is_measured and row.estimate == shown["estimate"].iloc[0]:
-            continue
-        to = "" if is_measured else f" to {model_name(row.reference)}"
-        label = f"{row.estimate.replace('_', '-')}: {model_name(row.model)}{to}"
-        table.add_row(label, *(size(getattr(row, name)) for name in STATISTICS.values()))
     return table
