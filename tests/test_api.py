@@ -114,7 +114,7 @@ def test_rows_taken_out_are_not_fitted(config):
 def test_pinocchio_gets_the_dh_model_whatever_was_selected(calibration):
     pytest.importorskip("pinocchio")
     made = [
-        replace(calibration, model=folder.calibration(calibration.tables, calibration.robot, kind))
+        replace(calibration, model=folder.calibration(calibration.tables, kind))
         for kind in ("dh", "vec")
     ]
     assert made[0].to_pinocchio() == made[1].to_pinocchio()

@@ -303,7 +303,7 @@ class Calibration:
 
     def _dh_source(self) -> Source:
         """The DH model, whatever model was selected."""
-        return Source(results.calibration(self.tables, self.robot, PLAINEST), self.tables)
+        return Source(results.calibration(self.tables, PLAINEST), self.tables)
 
     def values_for(
         self, controller: str, settings: Mapping[str, Any] | None = None
@@ -327,7 +327,7 @@ class Calibration:
             raise InputError(Problem("controller", repr(controller), ", ".join(CONTROLLERS)))
         fitted = "estimated" if self.summary.frames_fitted else "fixed"
         settings = settings or defaults()["calibration"] | {"base_and_tool": fitted}
-        return pendants.fit_pendant(self.tables, self.robot, settings, controller, self.name)
+        return pendants.fit_pendant(self.tables, settings, controller, self.name)
 
 
 def read_measurements(
@@ -425,7 +425,7 @@ def calibrate(measurements: Measurements | str | Path) -> Calibration:
         tables |= _as_written(stage(tables, settings))
     data = DataSets({measurements.name: settings}, 1, ())
     made_by = config_hash(data.chosen(measurements.name, *CALIBRATION))
-    return _of_tables(measurements.name, tables, measurements.robot, None, made_by)
+    return _of_tables(measurements.name, tables, None, made_by)
 
 
 def load_calibration(folder: str | Path, model: str | None = None) -> Calibration:
@@ -446,9 +446,8 @@ def load_calibration(folder: str | Path, model: str | None = None) -> Calibratio
     _require("folder", folder, (str, Path))
     folder = Path(folder)
     tables = results.read_tables(folder, *summarise.PAGE_TABLES, *summarise.ON_PAGE)
-    robot, name = results.recorded_robot(folder), folder.resolve().name
     made_by = store.read_metadata(folder / "summary.parquet").get("config_hash", "")
-    return _of_tables(name, tables, robot, model, made_by)
+    return _of_tables(folder.resolve().name, tables, model, made_by)
 
 
 def verify(
@@ -487,7 +486,7 @@ def verify(
     moved = [name for name, setup in setups.items() if setup == "moved"]
     weight = float(readings.settings["calibration"]["rotation_weight_mm_per_rad"])
     columns = {name: readings.table[name].to_numpy() for name in readings.table}
-    return verifying.verify(calibration.tables, calibration.robot, columns, moved, weight)
+    return verifying.verify(calibration.tables, columns, moved, weight)
 
 
 def compare(
@@ -545,10 +544,10 @@ def _array(name: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
 
 
 def _of_tables(
-    name: str, tables: dict[str, Columns], robot: Robot, kind: str | None, made_by: str
+    name: str, tables: dict[str, Columns], kind: str | None, made_by: str
 ) -> Calibration:
-    model = results.calibration(tables, robot, kind, name)
-    model = replace(model, misfit=misfit(tables, robot, model.choice))
+    model = results.calibration(tables, kind, name)
+    model = replace(model, misfit=misfit(tables, model.robot, model.choice))
     return Calibration(name, model, tables, made_by)
 
 

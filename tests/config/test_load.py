@@ -108,7 +108,6 @@ BAD = [  # text, key path, and what is wrong or nearest
         "4 pairs for the 6 joints of mh180",
     ),
     (OWN + "path: own.yaml, thousands: '.'}}}}", "file.thousands", "also the decimal"),
-    ("measurements: {file: {columns: {A1: q1, X: x}}}", "file.columns", "q1: A1"),
     ("measurements: {file: {columns: {qx1: a}}}", "columns.qx1", "unknown name"),
     (
         "calibration: {base_and_tool: estimated}\nevaluation: {space: measured}",

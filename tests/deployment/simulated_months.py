@@ -16,7 +16,6 @@ from kinacc.calibration.observations import Observations, full_poses
 from kinacc.deployment.folder import calibration
 from kinacc.deployment.history import Session
 from kinacc.geometry import Pose
-from kinacc.kinematics import robot as robots
 from kinacc.tables.allowed import SAME
 
 POSES = 50
@@ -57,7 +56,7 @@ def month(
 
 def session(seen: Observations, number: int, base: str = SAME) -> Session:
     """A line of the series with a DH calibration of its own."""
-    arm = calibration(results_of("ur10", seen), robots.load("ur10"), "dh", str(number))
+    arm = calibration(results_of("ur10", seen), "dh", str(number))
     at = arm.pose(seen.at, "instrument")
     sizes = np.linalg.norm(seen.position_mm - at.position_mm, axis=1)
     date = f"2026-{number:02}-01"

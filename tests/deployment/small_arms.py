@@ -104,6 +104,7 @@ def results_of(name: str, seen: Observations, with_vec: bool = False) -> dict:
     known = uncertainty.of_fit(dh_found)
     return {
         **tables_of_vec,
+        "robot": {"description": [robot.as_yaml(arm)]},
         "dh_model": dh_found.model.to_columns(dh_found.std.ravel()),
         "frames": tables.frames_columns(of, ("tool",)),
         "dh_fit": tables.fit_columns("dh_fit", dh_found, known),
@@ -114,7 +115,7 @@ def results_of(name: str, seen: Observations, with_vec: bool = False) -> dict:
 
 def calibrated(name: str, model: str = "dh", count: int = 80, seed: int = 3) -> Calibration:
     """The calibration of a simulated arm by one model."""
-    return calibration(results(name, count, seed, model == "vec"), robot.load(name), model, name)
+    return calibration(results(name, count, seed, model == "vec"), model, name)
 
 
 def moved(arm: Calibration, steps: Mapping[str, float]) -> Calibration:

@@ -10,7 +10,6 @@ from small_arms import calibrated, joints, measured, measured_at, results_of
 
 from kinacc.deployment.applicability import is_measured_there, share_of_box
 from kinacc.deployment.folder import calibration
-from kinacc.kinematics import robot
 from kinacc.kinematics.model import JointState
 
 
@@ -19,7 +18,7 @@ def test_a_gap_between_two_clusters_of_poses_is_not_where_it_was_measured(model)
     rng, middle = np.random.default_rng(5), np.deg2rad([-50.0, -90.0, 30.0, -60.0, -60.0, 10.0])
     sides = np.where(rng.random(200) < 0.5, -0.85, 0.85)[:, None]
     seen = measured_at("ur10", middle + sides + rng.uniform(-0.35, 0.35, (200, 6)))
-    found = calibration(results_of("ur10", seen, model == "vec"), robot.load("ur10"), model, "ur10")
+    found = calibration(results_of("ur10", seen, model == "vec"), model, "ur10")
     found = replace(found, fitted=JointState(seen.q_rad))
     between = middle + rng.uniform(-0.3, 0.3, (100, 6))
     assert not found.outside_range(between).any()

@@ -62,12 +62,11 @@ def test_predictions_are_as_far_off_as_they_say():
 
 @pytest.mark.parametrize(("first", "second", "common"), [(60, 60, 30), (50, 90, 50)])
 def test_readings_in_both_calibrations_are_counted_once(first, second, common):
-    q_rad, arm = joints("mh180", 60), robot.load("mh180")
-    found, apart = [], []
+    q_rad, found, apart = joints("mh180", 60), [], []
     for seed in range(500, 509):
         seen = measured("mh180", first + second - common, seed=seed)
         one, other = (
-            calibration(results_of("mh180", seen.select(rows)), arm, "dh", "mh180")
+            calibration(results_of("mh180", seen.select(rows)), "dh", "mh180")
             for rows in (slice(0, first), slice(first - common, None))
         )
         known = SharedReadings(common, first, second)

@@ -9,7 +9,6 @@ from small_arms import results
 from kinacc.deployment.folder import (
     calibration,
     read_tables,
-    recorded_robot,
     require_same_robot,
     selected_model,
 )
@@ -37,11 +36,9 @@ def test_another_robot_than_that_of_the_results_is_refused(other):
         require_same_robot(ARM, other, "results")
 
 
-def test_a_model_is_asked_for_where_none_was_selected(tmp_path):
+def test_a_model_is_asked_for_where_none_was_selected():
     with pytest.raises(InputError, match="give --model"):
         selected_model(TABLES)
-    with pytest.raises(InputError, match=r"robot\.parquet"):
-        recorded_robot(tmp_path)
 
 
 @pytest.mark.parametrize(
@@ -55,7 +52,7 @@ def test_a_model_is_asked_for_where_none_was_selected(tmp_path):
 def test_tables_that_hold_no_such_calibration_are_refused(words, changed, message):
     frames = changed.get("frames", {**TABLES["frames"], **changed})
     with pytest.raises(InputError, match=message):
-        calibration({**TABLES, "frames": frames}, ARM, *words)
+        calibration({**TABLES, "frames": frames}, *words)
 
 
 def test_all_files_that_are_missing_or_damaged_are_named(tmp_path):
@@ -65,5 +62,5 @@ def test_all_files_that_are_missing_or_damaged_are_named(tmp_path):
     with pytest.raises(InputError) as refused:
         read_tables(tmp_path)
     assert [problem.where.rpartition("/")[2] for problem in refused.value.problems] == [
-        "vec_model.parquet", "dh_model.parquet", "frames.parquet"
+        "vec_model.parquet", "dh_model.parquet", "robot.parquet", "frames.parquet"
     ]  # fmt: skip

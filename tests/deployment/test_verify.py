@@ -11,7 +11,7 @@ from command_line import call, small_study
 from held_out_errors import held_out_mm
 
 from kinacc.calibration.observations import from_columns, full_poses
-from kinacc.deployment.folder import calibration, read_tables, recorded_robot, selected_model
+from kinacc.deployment.folder import calibration, read_tables, robot_of
 from kinacc.deployment.permutation import ErrorColumns, compare, smallest_changes
 from kinacc.deployment.predict import predict
 from kinacc.deployment.verify import error_columns, model_errors
@@ -131,21 +131,21 @@ def test_what_cannot_count_gives_no_verdict(folder, later):
 
 def test_readings_without_a_session_belong_to_no_base_of_several(folder):
     _, found = folder
-    tables, arm = read_tables(found), recorded_robot(found)
+    tables = read_tables(found)
     frames = pd.DataFrame(dict(tables["frames"]))
     frames = pd.concat([frames.assign(session=name) for name in "ab"])
     tables["frames"] = {name: column.to_numpy() for name, column in frames.items()}
-    seen = from_columns(tables["measurements"], arm)
+    seen = from_columns(tables["measurements"], robot_of(tables))
     fitted = "estimate == 'train' and comparison == 'dh_vs_measured'"
     left = pd.read_parquet(found / "pose_errors.parquet").query(fitted)
     there = seen.select(left["row"].to_numpy())
-    stated = model_errors(read_tables(found), arm, there, (), 500.0).set_index("model").loc["dh"]
+    stated = model_errors(read_tables(found), there, (), 500.0).set_index("model").loc["dh"]
     for unit in ("_mm$", "_mrad$"):
         sizes = np.linalg.norm(left.filter(regex=unit), axis=1)
         wanted = [sizes.mean(), np.quantile(sizes, 0.99), sizes.max(), (sizes**2).mean() ** 0.5]
         assert stated.filter(regex=unit).tolist() == pytest.approx(wanted)
     with pytest.raises(InputError, match="each has its own base; allowed: one of a, b"):
-        model_errors(tables, arm, seen, (), 500.0)
+        model_errors(tables, seen, (), 500.0)
 
 
 @pytest.fixture(scope="module")
@@ -153,9 +153,8 @@ def later(folder, tmp_path_factory):
     """Readings near the poses of the arm, off by ``grown`` times its held-out errors."""
     _, found = folder
     measured = pd.read_parquet(found / "measurements.parquet")
-    tables = read_tables(found)
     off, every = held_out_mm(found), measured[JOINTS].to_numpy()
-    arm = calibration(tables, recorded_robot(found), selected_model(tables))
+    arm = calibration(read_tables(found))
 
     def write(grown: float, count: int, offset_rad=0.0, times=1, known=0):
         rng = np.random.default_rng(5)

@@ -8,7 +8,6 @@ import pytest
 
 from kinacc.deployment.export.files import contents
 from kinacc.deployment.export.source import read_source
-from kinacc.deployment.folder import recorded_robot
 from kinacc.tables.comparison import compare_tables
 
 STAGES = [(name, stage) for name, stages in cases.DATA_SETS.items() for stage in stages]
@@ -61,7 +60,7 @@ def test_every_planted_fault_but_none_has_a_finding():
                                                 ("vec", ("json",))])  # fmt: skip
 def test_exports_are_as_before(model, formats):
     folder = cases.RESULTS / "ur10_d"
-    made = contents(read_source(folder, recorded_robot(folder), model), formats)
+    made = contents(read_source(folder, model), formats)
     for name, text in made.items():
         golden = (cases.GOLDEN / "exports" / name).read_text()
         if name.endswith(".json"):

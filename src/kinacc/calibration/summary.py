@@ -8,7 +8,7 @@ from itertools import product
 import numpy as np
 import pandas as pd
 
-from kinacc.config.error_models import COMPARISONS, NOMINAL
+from kinacc.config.error_models import COMPARISONS, MEASURED, NOMINAL, Comparison
 from kinacc.kinematics import dh
 from kinacc.kinematics.robot import Robot
 from kinacc.tables.allowed import SELECTABLE
@@ -61,6 +61,28 @@ def selected(choice: Columns) -> str:
         Kind of the model.
     """
     return next(str(n) for n, yes in zip(choice["model"], choice["selected"], strict=True) if yes)
+
+
+def held_out_errors(pose_errors: Columns | pd.DataFrame, model: str) -> pd.DataFrame:
+    """Rows of ``pose_errors`` of a model against measurements, held out in every comparison.
+
+    Parameters
+    ----------
+    pose_errors
+        The table.
+    model
+        Kind of the model.
+
+    Returns
+    -------
+    DataFrame
+        Its columns, at rows that all models were tried on.
+    """
+    table = pd.DataFrame(pose_errors)
+    table = table[table["estimate"] == "cross_validated"]
+    tried = table.groupby("row")["comparison"].transform("nunique")
+    table = table[tried == table["comparison"].nunique()]
+    return table[table["comparison"] == Comparison(MEASURED, model).name]
 
 
 def error_statistics(pose_errors: Columns, configuration: np.ndarray) -> pd.DataFrame:

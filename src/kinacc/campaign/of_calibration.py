@@ -19,7 +19,6 @@ from kinacc.deployment import folder as results
 from kinacc.deployment.history import history as compared
 from kinacc.deployment.history import session_of
 from kinacc.errors import InputError
-from kinacc.kinematics import robot
 from kinacc.kinematics.model import JointState
 from kinacc.tables import store
 from kinacc.tables.columns import Columns
@@ -117,11 +116,11 @@ def _last_reading(place: Path) -> float:
 def _is_of(plan: Plan, tables: Mapping[str, Columns]) -> bool:
     """Whether the model the campaign judges is the one that the tables hold now."""
     try:
-        arm = robot.of_text(str(tables["robot"]["description"][0]), "robot.parquet")
+        about = plan.about
+        calibration = results.calibration(tables, about["model"], about["calibration"])
+        arm = calibration.robot
         if len(arm.q_min_rad) != plan.points.joints.shape[1]:
             return False
-        about = plan.about
-        calibration = results.calibration(tables, arm, about["model"], about["calibration"])
         state = JointState(arm.dh_joints(plan.points.joints), plan.points.directions)
         modelled_mm = calibration.pose(state, "base", about["point"]).position_mm
     except InputError:

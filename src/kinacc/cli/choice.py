@@ -192,8 +192,7 @@ def calibration_of(
 ) -> Calibration:
     """The calibration of a results folder."""
     tables = results.read_tables(folder)
-    arm = results.recorded_robot(folder)
-    calibration = results.calibration(tables, arm, model, Path(folder).resolve().name, session)
+    calibration = results.calibration(tables, model, Path(folder).resolve().name, session)
     return replace(calibration, outdated=print_outdated(folder))
 
 

@@ -16,7 +16,6 @@ from kinacc.deployment.export import files, source
 from kinacc.deployment.export.controllers import CONTROLLERS
 from kinacc.deployment.export.pendant import fit_pendant
 from kinacc.errors import Problem, refuse
-from kinacc.kinematics.robot import Robot
 from kinacc.report.rendering import environment, lines
 from kinacc.workflow.described import calibration_settings
 
@@ -70,23 +69,22 @@ def export(
     if urdf is not None and "urdf" not in wanted:
         problems.append(Problem("--urdf", f"{urdf} is not wanted", "with --format urdf"))
     refuse(problems, "Nothing was written")
-    arm = results.recorded_robot(folder)
     reason = choice.print_outdated(folder)
     if maker is not None:
-        _to_controller(folder, arm, target, maker, out)
+        _to_controller(folder, target, maker, out)
         return
-    content = source.read_source(folder, arm, model, urdf, (base_link, tip_link))
+    content = source.read_source(folder, model, urdf, (base_link, tip_link))
     paths = files.write(files.contents(content, wanted), target, out.force)
     out.show({"files": paths, **({"outdated": reason} if reason else {})}, lines=paths)
     for item in source.notes(content):
         click.echo(item, err=True)
 
 
-def _to_controller(folder: str, arm: Robot, target: str, maker: str, out: Output) -> None:
+def _to_controller(folder: str, target: str, maker: str, out: Output) -> None:
     """Write the page of values for a controller, and its file where it reads one."""
     data_set = Path(folder).resolve().name
     settings = calibration_settings(Path(folder))
-    result = fit_pendant(results.read_tables(folder), arm, settings, maker, data_set)
+    result = fit_pendant(results.read_tables(folder), settings, maker, data_set)
     stem = f"{data_set}_{maker}"
     page = environment().get_template("pendant.html")
     contents = {f"{stem}.html": page.render(found=result, version=__version__)}

@@ -51,7 +51,7 @@ def verify(
     moved = [name for name, how in (("base", base), ("tool", tool)) if how == "moved"]
     name, config = _settings(readings, folder, dataset)
     tables = results.read_tables(folder, "pose_errors")
-    arm = results.recorded_robot(folder)
+    arm = results.robot_of(tables)
     results.require_same_robot(arm, robots.load(config["robot"]), folder)
     weight = float(config["calibration"]["rotation_weight_mm_per_rad"])
     with reporting("verify", bar=True), warnings.catch_warnings(record=True) as caught:
@@ -64,7 +64,7 @@ def verify(
             message = "cannot be read as the readings of the calibration were"
             fix = f"if it has another form: run kinacc init {readings} first, and give the .yaml"
             raise InputError([Problem(str(readings), message, fix=fix), *error.problems]) from None
-        result = verification.verify(tables, arm, columns, moved, weight)
+        result = verification.verify(tables, columns, moved, weight)
     for text in dict.fromkeys(str(warning.message) for warning in caught):
         click.echo(f"{name}: {text}", err=True)
     asked = {"new": str(readings), "folder": folder, "dataset": dataset, "moved": moved}

@@ -24,7 +24,7 @@ from kinacc.tables.columns import Columns
 
 Tables = Mapping[str, Columns]
 
-_NEEDED = (*(f"{kind}_model" for kind in ALWAYS), "frames")
+_NEEDED = (*(f"{kind}_model" for kind in ALWAYS), "frames", "robot")
 # Used where they are there.
 _WANTED = (
     *(f"{kind}_{table}" for kind in ERROR_MODELS for table in ("model", "fit", "covariance")),
@@ -73,11 +73,6 @@ def read_tables(
     return tables
 
 
-def recorded_robot(folder: Path | str) -> Robot:
-    """The robot a results folder was made with; InputError where its table cannot be read."""
-    return robot_of(read_tables(folder, needed=("robot",), optional=()))
-
-
 def robot_of(tables: Tables) -> Robot:
     """The robot that the table ``robot`` describes; InputError where it describes none."""
     described = [*tables["robot"].get("description", ())]
@@ -88,7 +83,6 @@ def robot_of(tables: Tables) -> Robot:
 
 def calibration(
     tables: Tables,
-    robot: Robot,
     model: str | None = None,
     name: str = "",
     session: str | None = None,
@@ -99,8 +93,6 @@ def calibration(
     ----------
     tables
         As of ``read_tables``.
-    robot
-        The robot that the tables were made with.
     model
         Kind of the model; the selected one where not given.
     name
@@ -111,10 +103,10 @@ def calibration(
     Raises
     ------
     InputError
-        For another robot, model or session, and where the tables cannot be used.
+        For another model or session, and where the tables cannot be used.
     """
     try:
-        return _calibration(tables, robot, model, name, session)
+        return _calibration(tables, model, name, session)
     except InputError:
         raise
     except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
@@ -122,9 +114,8 @@ def calibration(
         raise input_error(f"results {name}", message, fix="run kinacc calibrate") from None
 
 
-def _calibration(
-    tables: Tables, robot: Robot, model: str | None, name: str, session: str | None
-) -> Calibration:
+def _calibration(tables: Tables, model: str | None, name: str, session: str | None) -> Calibration:
+    robot = robot_of(tables)
     choice = selected_model(tables) if model is None else model
     created = model_tables.models(tables, robot.dh)
     if choice not in created:
@@ -153,7 +144,7 @@ def _calibration(
         model=created[choice],
         base=bases[1],
         base_name="base" if number == 0 else f"base{number + 1}",
-        anchor=_calibration(tables, robot, PLAINEST, name, session) if anchored else None,
+        anchor=_calibration(tables, PLAINEST, name, session) if anchored else None,
         left_open=None if identified is None else tuple(identifiability.listed(identified)),
         targets={
             target: model_tables.frame(frames, choice, target)

@@ -75,9 +75,8 @@ def session_of(
     tables: Mapping[str, Columns], name: str, date: str, base: str, tool: str
 ) -> Session:
     """A line of a series from the tables of its results."""
-    arm = folder.robot_of(tables)
-    calibration, measured = folder.calibration(tables, arm, name=name), tables["measurements"]
-    observed = from_columns(measured, arm)
+    calibration, measured = folder.calibration(tables, name=name), tables["measurements"]
+    observed = from_columns(measured, calibration.robot)
     held_out = held_out_vectors(tables["pose_errors"], calibration.choice, len(observed))
     held_out_mm = np.linalg.norm(held_out[np.isfinite(held_out).all(axis=1)], axis=1)
     temperature_c = float(pd.Series(measured.get("temperature_c", []), dtype=float).mean())

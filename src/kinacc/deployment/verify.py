@@ -17,7 +17,7 @@ from kinacc.calibration.fitting import Fit, fit_frames
 from kinacc.calibration.frames import ANGLE_UNIT_RAD, MOTIONS, Frames, frame_terms, stacked
 from kinacc.calibration.observations import Observations, from_columns
 from kinacc.calibration.residuals import errors
-from kinacc.calibration.summary import LARGE_SHARE
+from kinacc.calibration.summary import LARGE_SHARE, held_out_errors
 from kinacc.calibration.tables import frames_of
 from kinacc.config.error_models import ERROR_MODELS, MEASURED, NOMINAL, Comparison
 from kinacc.deployment import folder
@@ -113,7 +113,6 @@ class Verification:
 
 def verify(
     tables: Tables,
-    robot: Robot,
     columns: Columns,
     moved: Sequence[str],
     rotation_weight_mm_per_rad: float,
@@ -128,7 +127,7 @@ def verify(
         The table ``measurements`` of the new readings.
     moved
         Which of BASE and TOOL are fitted to the new readings. Where these do not determine a
-        frame, it stays as in ``robot``.
+        frame, it stays as in the robot.
 
     Raises
     ------
@@ -136,8 +135,8 @@ def verify(
         Where a frame that did not move is not in the tables.
     FitError
     """
-    calibration = folder.calibration(tables, robot)
-    kind, model = calibration.choice, calibration.model
+    calibration = folder.calibration(tables)
+    kind, model, robot = calibration.choice, calibration.model, calibration.robot
     is_known = known_rows(columns, tables.get("measurements", {}))
     observed = from_columns(columns, robot).select(~is_known)
     if len(observed.session_names) > 1:
@@ -145,8 +144,8 @@ def verify(
         raise input_error("the readings", message, "readings of one session")
     point = next((name for name in observed.target_names if name in calibration.targets), None)
     near = is_measured_there(calibration, observed.at, point) if len(observed) else is_known[:0]
-    table = model_errors(tables, robot, observed, moved, rotation_weight_mm_per_rad)
-    held_out = _held_out(tables, kind, model, robot, observed, moved) if len(observed) else None
+    table = model_errors(tables, observed, moved, rotation_weight_mm_per_rad)
+    held_out = _held_out(tables, calibration, observed, moved) if len(observed) else None
     rows = _whole_configurations(observed, near)
     result = Verification(
         UNDECIDED, "", kind, len(is_known), int(is_known.sum()), int(near.sum()), table,
@@ -163,7 +162,7 @@ def verify(
         return replace(result, reason=obstacle)
     new = observed.select(rows.ravel())
     new = replace(new, rotation=np.full_like(new.rotation, np.nan))
-    calibration = _at_session(tables, robot, kind, new, moved)
+    calibration = _at_session(tables, kind, new, moved)
     frames = frames_at(calibration, new, moved, rotation_weight_mm_per_rad)
     off_mm = errors({kind: Fit(model, frames)}, new)[Comparison(MEASURED, kind).name].position_mm
     poses = new.select(slice(None, None, rows.shape[1]))
@@ -187,7 +186,6 @@ def verify(
 
 def model_errors(
     tables: Tables,
-    robot: Robot,
     observations: Observations,
     moved: Sequence[str],
     rotation_weight_mm_per_rad: float,
@@ -197,13 +195,13 @@ def model_errors(
     Columns: model, readings, and mean, 99 %, largest and rms in mm and mrad. Raises InputError
     for a target or session without a frame, and FitError.
     """
-    fitted = models(tables, robot.dh)
+    fitted = models(tables, folder.robot_of(tables).dh)
     beyond = [outside(observations.q_rad, model.domain) for model in fitted.values()]
     part = observations.select(~np.any(beyond, axis=(0, 2)))
     rows = []
     for kind in sorted(fitted, key=(NOMINAL, *ERROR_MODELS).index) if len(part) else ():
         model = fitted[kind]
-        calibration = _at_session(tables, robot, kind, part, moved)
+        calibration = _at_session(tables, kind, part, moved)
         frames = frames_at(calibration, part, moved, rotation_weight_mm_per_rad)
         off = errors({kind: Fit(model, frames)}, part)[Comparison(MEASURED, kind).name]
         row: list[object] = [kind, len(part)]
@@ -227,16 +225,12 @@ def _whole_configurations(readings: Observations, counted: np.ndarray) -> np.nda
 
 
 def _held_out(
-    tables: Tables,
-    kind: str,
-    model: ErrorModel,
-    robot: Robot,
-    readings: Observations,
-    moved: Sequence[str],
+    tables: Tables, calibration: Calibration, readings: Observations, moved: Sequence[str]
 ) -> ErrorColumns | None:
     """Held-out errors of configurations with the targets of ``readings``; None where none are."""
     if not {"pose_errors", "measurements"} <= set(tables):
         return None
+    kind, model, robot = calibration.choice, calibration.model, calibration.robot
     measured, names = from_columns(tables["measurements"], robot), readings.target_names
     if TOOL in moved:
         names = measured.target_names[: len(names)]
@@ -252,14 +246,9 @@ def _held_out(
 
 def held_out_vectors(pose_errors: Mapping[str, np.ndarray], kind: str, count: int) -> np.ndarray:
     """Held-out position errors (count, 3) of measured rows, mm; NaN where any model has none."""
-    names = ["estimate", "comparison", "row", "ex_mm", "ey_mm", "ez_mm"]
-    table = pd.DataFrame({name: pose_errors[name] for name in names})
-    table = table[table["estimate"] == "cross_validated"]
-    kinds = table["comparison"].nunique()
-    table = table[table.groupby("row")["comparison"].transform("nunique") == kinds]
-    table = table[table["comparison"] == Comparison(MEASURED, kind).name]
+    table = held_out_errors(pose_errors, kind)
     vectors = np.full((count, 3), np.nan)
-    vectors[table["row"].to_numpy(int)] = table[names[3:]]
+    vectors[table["row"].to_numpy(int)] = table[["ex_mm", "ey_mm", "ez_mm"]]
     return vectors
 
 
@@ -307,18 +296,18 @@ def statistics(errors: np.ndarray) -> list[float]:
 
 
 def _at_session(
-    tables: Tables, robot: Robot, kind: str, readings: Observations, moved: Sequence[str]
+    tables: Tables, kind: str, readings: Observations, moved: Sequence[str]
 ) -> Calibration:
     """The calibration with the base of the readings' session; InputError where it is not clear."""
     if BASE in moved:
-        return folder.calibration(tables, robot, kind)
+        return folder.calibration(tables, kind)
     (session,) = readings.session_names
     frames = pd.DataFrame(dict(tables["frames"]))
     measured = frames.loc[frames["frame"] == BASE].get("session", pd.Series()).unique()
     if session is None and len(measured) > 1:
         message, allowed = "have no session, and each has its own base", ", ".join(measured)
         raise input_error("the readings", message, f"one of {allowed}")
-    return folder.calibration(tables, robot, kind, session=session)
+    return folder.calibration(tables, kind, session=session)
 
 
 def frames_at(

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from kinacc.calibration.summary import selected
-from kinacc.config.error_models import MEASURED, Comparison, model_name
+from kinacc.calibration.summary import held_out_errors, selected
+from kinacc.config.error_models import model_name
 from kinacc.config.gate_rules import ERRORS, FIGURES
 from kinacc.errors import first_few, input_error
 from kinacc.gate.chance import STATISTICS, Sample
@@ -54,12 +54,8 @@ class RunTables(dict[str, pd.DataFrame]):
 
         Raises InputError where there are none.
         """
-        model, table = self.model(model), self["pose_errors"]
-        table = table[table["estimate"] == "cross_validated"]
-        tried = table.groupby("row")["comparison"].nunique()
-        common = tried.index[tried == table["comparison"].nunique()]
-        table = table[table["comparison"] == Comparison(MEASURED, model).name]
-        table = table[table["row"].isin(common)]
+        model = self.model(model)
+        table = held_out_errors(self["pose_errors"], model)
         names = [f"e{axis}_mm" if quantity == "position" else f"r{axis}_mrad" for axis in "xyz"]
         sizes = np.linalg.norm(table[names], axis=1)
         known = np.isfinite(sizes)

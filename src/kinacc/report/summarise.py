@@ -216,7 +216,7 @@ def summarise_all(
 def run(inputs: Tables, settings: Mapping[str, Any]) -> dict[str, Columns]:
     """The stage ``summary``: figures of a calibration, one a row."""
     arm = results.robot_of(inputs)
-    calibration = results.calibration(inputs, arm)
+    calibration = results.calibration(inputs)
     share = applicability.share_of_box(calibration, *figures.covered(inputs["measurements"], arm))
     known = summarise(Path("results"), inputs, campaigns=())
     rows = [

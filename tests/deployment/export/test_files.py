@@ -14,7 +14,6 @@ from test_export_urdf import bent
 from kinacc.deployment.export.files import FORMATS, contents, write
 from kinacc.deployment.export.paper_tables import with_deviation
 from kinacc.deployment.export.source import Source, notes, read_source
-from kinacc.deployment.folder import recorded_robot
 from kinacc.deployment.record import TOOL, nominal
 from kinacc.errors import InputError
 from kinacc.kinematics import robot
@@ -51,7 +50,7 @@ def test_values_carry_two_digits_of_their_deviation(value, std, text):
 def test_tables_of_a_paper_show_the_selected_model_deviations_and_what_is_left_open():
     """Of a UR10 whose flange pointed one way; the other formats are golden."""
     folder = Path(__file__).parents[2] / "golden" / "results" / "ur10_d"
-    source = read_source(folder, recorded_robot(folder))
+    source = read_source(folder)
     markdown, latex = contents(source, ("markdown", "latex")).values()
     for text, signs in ((markdown, "± †"), (latex, r"$\pm$ $^\dagger$")):
         assert "VEC model (selected) against measurements" in text[:200]

@@ -16,7 +16,7 @@ from kinacc.calibration.identifiability import identified, listed
 from kinacc.calibration.observations import Observations
 from kinacc.config.error_models import NOMINAL, PLAINEST, model_name
 from kinacc.deployment.export.controllers import CONTROLLERS, ZEROS, Controller, Numbers
-from kinacc.deployment.folder import Tables, selected_model
+from kinacc.deployment.folder import Tables, robot_of, selected_model
 from kinacc.deployment.record import POSES
 from kinacc.errors import input_error
 from kinacc.geometry import Pose, compose, invert
@@ -60,16 +60,14 @@ class Pendant:
 
 
 def fit_pendant(
-    tables: Tables, robot: Robot, settings: Mapping[str, Any], controller: str, name: str = ""
+    tables: Tables, settings: Mapping[str, Any], controller: str, name: str = ""
 ) -> Pendant:
     """The numbers for a controller (a key of ``CONTROLLERS``), fitted to measured poses.
 
     Parameters
     ----------
     tables
-        Of a results folder: measurements, residuals and models.
-    robot
-        The robot of these results.
+        Of a results folder: robot, measurements, residuals and models.
     settings
         The section ``calibration`` of the settings.
 
@@ -80,7 +78,7 @@ def fit_pendant(
     InputError
         The controller cannot take this robot, or there are too few measurements.
     """
-    maker = CONTROLLERS[controller]
+    maker, robot = CONTROLLERS[controller], robot_of(tables)
     _require_fitting(robot, maker)
     every, train = stages.observed(tables, robot)
     used = every.select(train)

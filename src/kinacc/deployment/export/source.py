@@ -16,7 +16,6 @@ from kinacc.config.error_models import PLAINEST, model_name
 from kinacc.deployment import folder as results
 from kinacc.deployment.record import STATED, Calibration
 from kinacc.kinematics.dh import PARAMETERS, DHModel
-from kinacc.kinematics.robot import Robot
 from kinacc.tables import store
 from kinacc.tables.contract import PROVENANCE_KEYS
 
@@ -104,14 +103,13 @@ class Source:
 
 def read_source(
     folder: Path | str,
-    robot: Robot,
     model: str = PLAINEST,
     urdf_file: Path | str | None = None,
     links: tuple[str | None, str | None] = (None, None),
 ) -> Source:
     """What formats are made of, from a results folder; InputError where it cannot be used."""
     tables = results.read_tables(folder)
-    arm = results.calibration(tables, robot, model, Path(folder).resolve().name)
+    arm = results.calibration(tables, model, Path(folder).resolve().name)
     path = Path(folder) / f"{model}_model.parquet"
     known = store.read_metadata(path) if path.is_file() else {}
     marks = {key: known[key] for key in PROVENANCE_KEYS if key in known}
