@@ -300,10 +300,9 @@ def _scatter(
         ],
         axis=2,
     )
-    remaining, values, _ = np.linalg.svd(_frame_slopes(pose, weights), full_matrices=False)
-    remaining = remaining[:, values > 1e-9 * values[0]]
-    flat = (moved * weights[:, None]).reshape(len(remaining), -1)
-    apart = (flat - remaining @ (remaining.T @ flat)).reshape(moved.shape) / weights[:, None]
+    absorbed = scipy.linalg.orth(_frame_slopes(pose, weights), 1e-9)
+    flat = (moved * weights[:, None]).reshape(len(absorbed), -1)
+    apart = (flat - absorbed @ (absorbed.T @ flat)).reshape(moved.shape) / weights[:, None]
     return [moved, apart]
 
 

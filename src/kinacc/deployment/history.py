@@ -20,6 +20,7 @@ from kinacc.calibration.frames import frame_terms, known
 from kinacc.calibration.least_squares import one_thread
 from kinacc.calibration.observations import Observations, from_columns
 from kinacc.calibration.residuals import errors
+from kinacc.calibration.summary import held_out_errors
 from kinacc.config.error_models import MEASURED, Comparison
 from kinacc.deployment import folder, history_model
 from kinacc.deployment.history_model import Setup, joined
@@ -31,7 +32,6 @@ from kinacc.deployment.verify import (
     STATISTICS,
     TOOL,
     frames_at,
-    held_out_vectors,
     statistics,
 )
 from kinacc.errors import FitError, InputError
@@ -77,8 +77,8 @@ def session_of(
     """A line of a series from the tables of its results."""
     calibration, measured = folder.calibration(tables, name=name), tables["measurements"]
     observed = from_columns(measured, calibration.robot)
-    held_out = held_out_vectors(tables["pose_errors"], calibration.choice, len(observed))
-    held_out_mm = np.linalg.norm(held_out[np.isfinite(held_out).all(axis=1)], axis=1)
+    held_out = held_out_errors(tables["pose_errors"], calibration.choice)
+    held_out_mm = np.linalg.norm(held_out[["ex_mm", "ey_mm", "ez_mm"]], axis=1)
     temperature_c = float(pd.Series(measured.get("temperature_c", []), dtype=float).mean())
     return Session(name, date, "", base, tool, calibration, observed, held_out_mm, temperature_c)
 

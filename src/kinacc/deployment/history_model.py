@@ -299,9 +299,8 @@ def _seen_directions(pair: Pair) -> np.ndarray:
     rows = pair.second
     constant = pair.constant[rows]
     local = np.column_stack([pair.frames[rows][:, pair.own], constant @ pair.longer])
-    remaining, values, _ = np.linalg.svd(_unit(local), full_matrices=False)
-    remaining = remaining[:, values > _FIRM * values[0]]
-    state = (constant - remaining @ (remaining.T @ constant))[pair.position[rows]]
+    absorbed = scipy.linalg.orth(_unit(local), _FIRM)
+    state = (constant - absorbed @ (absorbed.T @ constant))[pair.position[rows]]
     units = np.tile(UNITS, state.shape[1] // 6)
     _, values, right = np.linalg.svd(state * units, full_matrices=False)
     retained = values > _SEEN * values[0]

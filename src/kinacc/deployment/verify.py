@@ -7,7 +7,7 @@ errors of the selected model with its held-out errors.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -235,21 +235,17 @@ def _held_out(
     if TOOL in moved:
         names = measured.target_names[: len(names)]
     target = pd.Index(names).get_indexer(list(measured.target_names))[measured.target]
-    vectors = held_out_vectors(tables["pose_errors"], kind, len(measured))
+    held_out, vectors = (
+        held_out_errors(tables["pose_errors"], kind),
+        np.full((len(measured), 3), np.nan),
+    )
+    vectors[held_out["row"].to_numpy(int)] = held_out[["ex_mm", "ey_mm", "ez_mm"]]
     named = replace(measured, target=target, target_names=names)
     rows = _whole_configurations(named, np.isfinite(vectors).all(axis=1) & (target >= 0))
     if not len(rows):
         return None
     targets = frames_of(tables["frames"], kind, names, measured.session_names).targets
     return error_columns(model, robot, measured.select(rows[:, 0]), targets, moved, vectors[rows])
-
-
-def held_out_vectors(pose_errors: Mapping[str, np.ndarray], kind: str, count: int) -> np.ndarray:
-    """Held-out position errors (count, 3) of measured rows, mm; NaN where any model has none."""
-    table = held_out_errors(pose_errors, kind)
-    vectors = np.full((count, 3), np.nan)
-    vectors[table["row"].to_numpy(int)] = table[["ex_mm", "ey_mm", "ez_mm"]]
-    return vectors
 
 
 def error_columns(

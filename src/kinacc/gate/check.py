@@ -75,21 +75,20 @@ def check_files(folder: Path, data: DataSets | None = None) -> Outcome:
 
     A warning where files or settings (``data``, where the data set is in it) have changed since.
     """
-    verdict, fix, figures = PASSED, "", {}
+    verdict, fix, figures = WARNED, "run the workflow again", {}
     if problems := list(_problems(folder)):
         shown = "\n".join(map(str, problems[:_SHOWN]))
         says = shown + and_more(len(problems) - _SHOWN).replace(" ", "\n", 1)
-        verdict, figures = FAILED, {"problems": len(problems)}
+        verdict, fix, figures = FAILED, "", {"problems": len(problems)}
     elif old := sums.outdated(folder):
         says = f"{len(old)} files were made from files that have changed since: {first_few(old)}"
-        verdict, fix = WARNED, "run the workflow again"
     elif data is not None and (old := made_with_other_settings(folder, data)):
         says = f"made with other settings than the configuration has now: {first_few(old)}"
-        verdict, fix = WARNED, "run the workflow again"
     else:
-        count = len(sums.stated(folder))
-        says = f"{count} files are as their stages left them, and tables fit their schemas"
-        figures = {"files": count}
+        verdict, fix, figures = PASSED, "", {"files": len(sums.stated(folder))}
+        says = (
+            f"{figures['files']} files are as their stages left them, and tables fit their schemas"
+        )
     return Outcome(folder.name, "files", "files", verdict, says, fix, figures)
 
 

@@ -81,7 +81,8 @@ def read(sources: Sequence[Source], _: np.ndarray | None) -> Program:
     uses: dict[int, set[tuple[str | None, str | None]]] = defaultdict(set)
     refused: dict[str | None, str] = {}
     computed: list[str] = []
-    depending: list[tuple[str, set[str], bool]] = []  # listed if a name is, or none is, a target
+    moves: list[tuple[str, set[str]]] = []
+    assigned: list[tuple[str, str]] = []
     for data in _FRAME_DATA.finditer(text):
         holds, programmed = data[3].upper(), data[1] or (data[4] or "").upper()
         if holds == ("FALSE" if data[1] else "TRUE") or programmed == "FALSE":
@@ -97,23 +98,22 @@ def read(sources: Sequence[Source], _: np.ndarray | None) -> Program:
             work = re.search(r"\\WOBJ\s*:=\s*(\w+)", statement.upper())
             names_used = {*re.findall(r"(?<!\\)\b[A-Z]\w*", bare)}
             if not here and not _COMPUTED.search(statement):
-                depending.append((line, names_used, False))
+                moves.append((line, names_used))
             here += [start for start, name in names.items() if name.upper() in names_used]
             for start in here:
                 way = tool and tool[1], work[1] if work else "WOBJ0"
                 uses[start].add(way)
         else:
             ends = {start: end for start, end in ends.items() if start not in here}
-            if assigned := re.match(r"\s*(\w+)\s*(?:\{[^}]*\}\s*)?:=", statement):
-                depending.append((line, {assigned[1].upper()}, True))
+            if target := re.match(r"\s*(\w+)\s*(?:\{[^}]*\}\s*)?:=", statement):
+                assigned.append((line, target[1].upper()))
         if _COMPUTED.search(statement):
             computed.append(line)
         if changed := _SET.match(statement):
             refused[changed[1].upper()] = CHANGED
     defined = {name.upper() for name in names.values()}
-    for line, words, listed in depending:
-        if bool(words & defined) == listed and line not in computed:
-            computed.append(line)
+    computed += [line for line, words in moves if not words & defined]
+    computed += [line for line, name in assigned if name in defined]
     positions = []
     for start, end in ends.items():
         ways: set[Use] = {
@@ -124,7 +124,7 @@ def read(sources: Sequence[Source], _: np.ndarray | None) -> Program:
         index = f"{{{array.index(start) + 1}}}" if len(array) > 1 else ""
         name = names.get(start, source.line(start)) + index
         positions.append(in_use(_position(name, source, start, end), ways))
-    return Program(sources, positions, computed)
+    return Program(sources, positions, [*dict.fromkeys(computed)])
 
 
 def _position(name: str, source: Source, start: int, end: int) -> Position:
