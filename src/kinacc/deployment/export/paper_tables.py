@@ -84,24 +84,24 @@ def _residuals(source: Source, comparison: str, name: str, caption: str) -> Pape
 
 
 def _parameters(source: Source) -> PaperTable:
-    fitted = pd.DataFrame(dict(source.tables["dh_model"])).sort_values("joint", kind="stable")
+    fitted = source.joints(source.dh)
     reported = pd.DataFrame(
         source.tables.get(f"{PLAINEST}_identified", {}), columns=["parameter", "status"]
     )
     fixed = {*reported.loc[reported["status"] == FIXED, "parameter"]}
     shown = PARAMETERS if fitted["beta_rad"].any() else PARAMETERS[:-1]
-
-    def cell(joint: int, parameter: str, value: float, std: float) -> str:
-        nominal = float(getattr(source.calibration.robot.dh, parameter)[joint - 1])
-        if parameter == "beta_rad" and not np.isfinite(std) and value == nominal:
-            return "-"
-        is_fixed = f"j{joint}.{parameter}" in fixed
-        return f"{value:g} (fixed)" if is_fixed else with_deviation(value, std)
-
-    cells = pd.DataFrame({"joint": fitted["joint"].astype(int).astype(str)})
-    for item in shown:
-        columns = zip(fitted["joint"], fitted[item], fitted[f"std_{item}"], strict=True)
-        cells[_HEADS[item]] = [cell(int(joint), item, x, std) for joint, x, std in columns]
+    cells = pd.DataFrame({"joint": fitted["joint"].astype(str)})
+    for name in shown:
+        columns = fitted[["joint", name, f"nominal_{name}", f"std_{name}"]]
+        texts = []
+        for joint, value, nominal, std in columns.itertuples(index=False):
+            if name == "beta_rad" and not np.isfinite(std) and value == nominal:
+                texts.append("-")
+            elif f"j{joint}.{name}" in fixed:
+                texts.append(f"{value:g} (fixed)")
+            else:
+                texts.append(with_deviation(value, std))
+        cells[_HEADS[name]] = texts
     worth = misfit(source.tables, source.calibration.robot, PLAINEST)
     notes = [f"One standard deviation behind ±, {in_words([worth])}."]
     marks = "".join(cells.to_numpy().ravel())

@@ -155,20 +155,21 @@ def _mean_errors(tables: Tables, maker: Controller, off: residuals.Errors) -> pd
     means = recorded[recorded["subset"] == subset].pivot(
         index="comparison", columns="quantity", values="mean"
     )
-    means = means.reindex(
-        [f"{selected}_vs_measured", f"{NOMINAL}_vs_measured"], columns=["position", "orientation"]
+    models = {
+        "controller": f"{maker.name} controller",
+        f"{selected}_vs_measured": f"calibrated ({model_name(selected)})",
+        f"{NOMINAL}_vs_measured": "nominal, base and tool fitted",
+    }
+    means = means.reindex(index=[*models], columns=["position", "orientation"])
+    position_mm, turn_mrad = (
+        np.linalg.norm(part, axis=1) for part in (off.position_mm, 1e3 * off.rotation_rad)
     )
-    sizes = [np.linalg.norm(part, axis=1) for part in (off.position_mm, 1e3 * off.rotation_rad)]
-    own = pd.DataFrame(sizes).mean(axis=1).to_numpy()
-    table = pd.DataFrame(np.vstack([own, means]), columns=means.columns)
+    means.loc["controller"] = pd.Series(position_mm).mean(), pd.Series(turn_mrad).mean()
     return pd.DataFrame({
-        "model": [
-            f"{maker.name} controller", f"calibrated ({model_name(selected)})",
-            "nominal, base and tool fitted",
-        ],
-        "position_mm": table["position"],
-        "orientation_mrad": table["orientation"],
-        "points": int(np.isfinite(sizes[0]).sum()),
+        "model": [*models.values()],
+        "position_mm": means["position"].to_numpy(),
+        "orientation_mrad": means["orientation"].to_numpy(),
+        "points": int(np.isfinite(position_mm).sum()),
         "poses": POSES[subset],
     })  # fmt: skip
 
