@@ -27,7 +27,7 @@ def test_the_same_errors_are_not_worse_however_few(statistic):
 def test_errors_twice_as_large_are_worse_and_the_least_is_below_the_difference(statistic, paired):
     before, now = sizes(1, 300), sizes(2, 300, 2.0)
     found = changed(statistic, now, before, paired)
-    of = STATISTICS[statistic][0]
+    of = STATISTICS[statistic]
     assert found.difference == of(now) - of(before)
     assert 0.0 < found.least < found.difference
     assert found.least < changed(statistic, now, before, paired, 0.9).least < found.difference

@@ -30,13 +30,13 @@ def _gamma(sizes: np.ndarray) -> float:
         return float("nan")
 
 
-# Statistics of sizes (n,), by the last word of a figure's name, with what they are called.
-STATISTICS: Mapping[str, tuple[Callable[[np.ndarray], float], str]] = {
-    "mean": (lambda sizes: float(sizes.mean()), "mean"),
-    "rms": (lambda sizes: float(np.sqrt(np.mean(sizes**2))), "root mean square"),
-    "p99": (lambda sizes: float(np.quantile(sizes, 0.99)), "empirical 99 % quantile"),
-    "p99_gamma": (_gamma, "99 % gamma quantile"),
-    "largest": (lambda sizes: float(sizes.max()), "largest"),
+# Statistics of sizes (n,), by the last word of a figure's name.
+STATISTICS: Mapping[str, Callable[[np.ndarray], float]] = {
+    "mean": lambda sizes: float(sizes.mean()),
+    "rms": lambda sizes: float(np.sqrt(np.mean(sizes**2))),
+    "p99": lambda sizes: float(np.quantile(sizes, 0.99)),
+    "p99_gamma": _gamma,
+    "largest": lambda sizes: float(sizes.max()),
 }
 
 
@@ -71,7 +71,7 @@ def change(statistic: str, now: Sample, before: Sample, paired: bool, confidence
 
     ``paired``: configurations of both are numbered alike and were measured once for both.
     """
-    of, count = STATISTICS[statistic][0], min(now.count, before.count)
+    of, count = STATISTICS[statistic], min(now.count, before.count)
     difference = of(now.sizes) - of(before.sizes)
     fewest = FEWEST_OF_QUANTILE if statistic == "p99" else FEWEST
     why = ""

@@ -100,7 +100,7 @@ def figure(tables: RunTables, gate: Mapping[str, Any]) -> Figure:
     name = gate["value"]
     unit, meaning = FIGURES[name]
     if name in ERRORS:
-        return _of_errors(tables, gate, unit)
+        return _of_errors(tables, gate, unit, meaning)
     pose = tables["measurements"]["pose"]
     count = len(pose) if name == "data.readings" else pose.nunique()
     return Figure(float(count), unit, meaning)
@@ -131,13 +131,12 @@ def cell(tables: RunTables, gate: Mapping[str, Any]) -> Figure:
     return Figure(float(size), unit, called, open="no number" if np.isnan(size) else "")
 
 
-def _of_errors(tables: RunTables, gate: Mapping[str, Any], unit: str) -> Figure:
-    _, quantity, statistic = gate["value"].split(".")
+def _of_errors(tables: RunTables, gate: Mapping[str, Any], unit: str, meaning: str) -> Figure:
+    statistic = gate["value"].rpartition(".")[2]
     sizes, model = sample(tables, gate).sizes, tables.model(gate["model"])
-    of, text = STATISTICS[statistic]
-    called = f"{text} of the held-out {quantity} errors ({model_name(model)} model)"
-    about: dict[str, Any] = {"model": model, "statistic": text, "rows": len(sizes)}
-    size, why = of(sizes), ""
+    called = f"{meaning}, held out ({model_name(model)} model)"
+    about: dict[str, Any] = {"model": model, "rows": len(sizes)}
+    size, why = STATISTICS[statistic](sizes), ""
     if statistic == "p99" and len(sizes) < FEWEST_OF_QUANTILE:
         others = "a limit on mean, rms, largest or p99_gamma needs fewer"
         why = f"{len(sizes)} rows are too few, {FEWEST_OF_QUANTILE} would do; {others}"

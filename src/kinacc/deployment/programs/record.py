@@ -15,6 +15,7 @@ import numpy as np
 import yaml
 
 from kinacc.deployment.programs.orientation import Convention
+from kinacc.deployment.programs.posture import Posture
 from kinacc.errors import input_error
 from kinacc.geometry import IDENTITY, Pose
 
@@ -144,7 +145,7 @@ class Language:
     convention: Convention
     read: Callable[[Sequence[Source], np.ndarray | None], Program]
     frames: Callable[[Source], Frames] = lambda source: {}
-    posture: Callable[[Sequence[bool], np.ndarray], tuple[str, ...]] = lambda sides, q_deg: ()
+    posture: Posture = lambda sides, q_deg: ()
     partners: tuple[str, ...] = ()
     frame_files: tuple[str, ...] = ()
 
