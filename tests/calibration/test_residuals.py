@@ -11,7 +11,7 @@ from scipy import stats
 
 from kinacc.calibration import residuals
 from kinacc.calibration.fitting import Fit
-from kinacc.calibration.frames import Frames
+from kinacc.calibration.frames import Frames, stacked
 from kinacc.calibration.observations import full_poses
 from kinacc.geometry import Pose, compose, exp_so3
 from kinacc.kinematics import dh, robot, vec
@@ -25,8 +25,8 @@ Q = np.random.default_rng(0).uniform(-0.5, 0.5, (COUNT, 6))
 
 def fit_of(model, shift_mm=(0.0, 0.0, 0.0)):
     """A model whose base is moved in the instrument's frame."""
-    tool = Pose(TOOL.rotation[None], TOOL.position_mm[None])
-    return Fit(model, Frames(Pose(BASE.rotation, BASE.position_mm + shift_mm), tool))
+    base = Pose(BASE.rotation, BASE.position_mm + shift_mm)
+    return Fit(model, Frames(stacked([base]), stacked([TOOL])))
 
 
 def fitted(shift_mm=(0.0, 0.0, 0.0)):

@@ -21,9 +21,10 @@ def test_the_newest_campaign_counts_and_the_others_are_named(begun, calibration)
     (spoilt / "campaign.json").write_text("{}")
     for age, folder in enumerate((other, spoilt, newer, older)):
         os.utime(folder / "campaign.json", (1e9 - age, 1e9 - age))
-    found = newest("arm", read_tables(calibration, "robot"), [older, newer, spoilt, other])
-    assert found.status.folder == str(newer)
-    assert found.remarks == (
+    tables = read_tables(calibration, "robot")
+    found, remarks = newest("arm", tables, [older, newer, spoilt, other])
+    assert found.folder == str(newer)
+    assert remarks == (
         f"campaign {other} was begun with another calibration of arm",
         f"campaign {spoilt} cannot be read: kinacc campaign status '{spoilt}'",
     )

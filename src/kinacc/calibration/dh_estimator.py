@@ -10,7 +10,7 @@ import numpy as np
 
 from kinacc.calibration import identifiability, tables
 from kinacc.calibration.fitting import Fit, ModelFit, distinct
-from kinacc.calibration.frames import FrameParameters, Frames, ruled
+from kinacc.calibration.frames import FrameParameters, Frames, ruled, stacked
 from kinacc.calibration.models import Common, Estimator
 from kinacc.calibration.observations import Observations
 from kinacc.calibration.uncertainty import Uncertainty
@@ -160,7 +160,7 @@ class DHEstimator(Estimator):
         free, std, held = arm.free, arm.std, False
         followed = others["vec"] if self.follows_vec else None
         if followed:
-            frames = Frames(IDENTITY, followed.frames.targets)
+            frames = Frames(stacked([IDENTITY]), followed.frames.targets)
             observations = _of_one_base(observations)
             at = frames.seen(followed.model, observations)
             observations = replace(observations, position_mm=at.position_mm, rotation=at.rotation)

@@ -34,19 +34,13 @@ class Frames:
     Attributes
     ----------
     bases : Pose
-        Robot base of S sessions in the instrument's frame, shape (S, ...) in mm; one may be given
-        without its leading axis.
+        Robot base of S sessions in the instrument's frame, shape (S, ...) in mm.
     targets : Pose
         T targets in the flange frame, shape (T, ...) in mm.
     """
 
     bases: Pose
     targets: Pose
-
-    def __post_init__(self) -> None:
-        if self.bases.rotation.ndim == 2:
-            alone = Pose(self.bases.rotation[None], self.bases.position_mm[None])
-            object.__setattr__(self, "bases", alone)
 
     @classmethod
     def split(cls, frames: Pose, sessions: int) -> Frames:

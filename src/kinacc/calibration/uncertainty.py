@@ -10,7 +10,7 @@ the frame the motion is given in. DH parameters are ``j1.d_mm`` and the like, VE
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import combinations_with_replacement, compress
+from itertools import compress
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -233,14 +233,12 @@ def _variances(
     ``along`` (m, r): the Jacobian along a root. With H = along along' the expected square sum of
     (I - H) e added up by Za is the sum over kinds b of variance_b |Za (I - H) Zb'|^2.
     """
-    count = len(errors)
-    added, expected = [sums @ along for sums in errors], np.zeros((count, count))
-    grams = [part.T @ part for part in added]
-    for a, b in combinations_with_replacement(range(count), 2):
-        common = (errors[a] @ errors[b].T).tocoo()
-        crossed = np.sum(added[a][common.row] * added[b][common.col], axis=1)
-        both = common.data @ (common.data - 2.0 * crossed) + np.sum(grams[a] * grams[b])
-        expected[a, b] = expected[b, a] = both
+    count, added = len(errors), [sums @ along for sums in errors]
+    grams, expected = [part.T @ part for part in added], np.zeros((count, count))
+    for a, b in np.ndindex(count, count):
+        common = errors[a] @ errors[b].T
+        crossed = np.sum(added[a] * (common @ added[b]))
+        expected[a, b] = common.power(2).sum() - 2.0 * crossed + np.sum(grams[a] * grams[b])
     prior = np.eye(along.shape[1]) - along.T @ along
     squares = np.array([np.sum((sums @ residual) ** 2) for sums in errors])
     squares -= pooled * np.array([np.sum(gram * prior) for gram in grams])

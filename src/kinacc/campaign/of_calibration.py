@@ -5,7 +5,7 @@ from __future__ import annotations
 import shlex
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -26,32 +26,27 @@ from kinacc.tables.columns import Columns
 _SAME_MM = 1e-6  # modelled positions that differ by less are of one model
 
 
-@dataclass(frozen=True)
-class Newest:
-    """The status of the newest campaign of a calibration, None without one; remarks on others."""
+def newest(
+    name: str, tables: Mapping[str, Columns], places: Iterable[Path]
+) -> tuple[CampaignStatus | None, tuple[str, ...]]:
+    """Return the status of the newest campaign of a calibration, and remarks on others.
 
-    status: CampaignStatus | None
-    remarks: tuple[str, ...] = ()
-
-
-def newest(name: str, tables: Mapping[str, Columns], places: Iterable[Path]) -> Newest:
-    """Return the campaign of the calibration ``name`` among the folders ``places``, the newest.
-
-    ``tables`` are those of its results folder, ``places`` those of :func:`folder.of_results`. A
-    campaign holds the positions that its model predicts: one that was begun with an earlier
-    calibration of that name is left out.
+    ``name`` of the calibration; ``tables`` are those of its results folder, ``places`` those of
+    :func:`kinacc.campaign.beside_results.of_results`. None without a campaign. A campaign holds
+    the positions that its model predicts: one that was begun with an earlier calibration of that
+    name is left out.
     """
     remarks: list[str] = []
     for place in sorted(set(places), key=_last_reading, reverse=True):
         try:
             opened = folder.open_(place)
             if _is_of(opened.plan, tables):
-                return Newest(status(opened), tuple(remarks))
+                return status(opened), tuple(remarks)
             remarks.append(f"campaign {place} was begun with another calibration of {name}")
         except InputError:
             command = shlex.join(["kinacc", "campaign", "status", str(place)])
             remarks.append(f"campaign {place} cannot be read: {command}")
-    return Newest(None, tuple(remarks))
+    return None, tuple(remarks)
 
 
 def history(inputs: Mapping[str, Any], settings: Mapping[str, Any]) -> Columns:

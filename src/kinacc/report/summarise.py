@@ -85,7 +85,7 @@ def summarise(
     arm, selected = results.robot_of(tables), figures.selected(tables["model_selection"])
     name = folder.resolve().name
     places = of_results(folder) if campaigns is None else campaigns
-    assessed = of_calibration.newest(name, tables, places)
+    campaign, remarks = of_calibration.newest(name, tables, places)
     measurements, noted = tables["measurements"], findings(tables.get("data_check"))
     is_unused = noted["finding"] == LEFT_OUT
     fits = misfit.misfits(tables, arm)
@@ -127,13 +127,13 @@ def summarise(
         noise_mm=fits[0].noise.per_axis_mm,
         stated_noise_mm=_stated_noise_mm(measurements),
         held_out_over_noise={fit.model: fit.ratio for fit in fits},
-        campaign=assessed.status,
-        remarks=assessed.remarks,
+        campaign=campaign,
+        remarks=remarks,
         tolerance=tolerance_of(tables),
         claims=_claims(tables["claims"]) if synthetic and "claims" in tables else None,
         history=history_sentence(pd.DataFrame(tables["history"])) if "history" in tables else "",
         outdated=outdated,
-        next_steps=_next_steps(str(folder), selected, assessed.status),
+        next_steps=_next_steps(str(folder), selected, campaign),
     )
 
 
