@@ -27,11 +27,11 @@ class Tracked:
     controller: np.ndarray
 
 
-def tracked(name="ur10", poses=16, seed=4):
+def tracked(name="ur10", poses=16, seed=4, digits=4):
     """A run of ``poses`` on the shipped robot ``name``, whose links are off by up to 0.5 mm."""
     arm, rng = robot.load(name), np.random.default_rng(seed)
     low, high = np.maximum(arm.q_min_rad, -1.8), np.minimum(arm.q_max_rad, 1.8)
-    q = np.round(np.rad2deg(rng.uniform(0.9 * low, 0.9 * high, (poses, arm.dh.joints))), 4)
+    q = np.round(np.rad2deg(rng.uniform(0.9 * low, 0.9 * high, (poses, arm.dh.joints))), digits)
     off = replace(arm.dh, a_mm=arm.dh.a_mm + rng.uniform(-0.5, 0.5, arm.dh.a_mm.shape))
     nominal = robot.forward(arm, np.deg2rad(q))
     pose = robot.forward(replace(arm, dh=off), np.deg2rad(q))
