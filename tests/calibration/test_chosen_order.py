@@ -39,7 +39,8 @@ def observed(order, seed=0, prior=WAVY):
     seen = vec.pose(true, q)
     turn = exp_so3(NOISE_MM / WEIGHT * rng.normal(size=(POSES, 3)))
     moved = seen.position_mm + NOISE_MM * rng.normal(size=(POSES, 3))
-    return full_poses(q, Pose(turn @ seen.rotation, moved), fold=np.arange(POSES) % 5)
+    observed = full_poses(q, Pose(turn @ seen.rotation, moved))
+    return replace(observed, fold=np.arange(POSES) % 5)
 
 
 def choose(seen, orders=(1, 2, 3, 4, 6), stated=None):

@@ -48,14 +48,11 @@ class Statement:
 
     ``lower_mm`` and ``upper_mm`` each hold with ``confidence`` by themselves. ``share`` is the part
     of the region the statement is about (1 for the other targets). ``assumption`` is what the
-    bounds rest on beyond normal readings of known covariance; None if nothing. Its numbers
-    ``crowd`` and ``isolation`` say that at least so many candidates have an error above the largest
-    divided by ``isolation``. ``withheld`` is why no bound is stated; None if one is. Where an
-    assumption was at hand, a statement that is withheld still names it. ``excepted``: so many
-    points may lie above the upper bound, which is of all but these; no confidence is lost by
-    saying which. ``error_of``: ``mean``, what stays when a pose is measured again, or ``visit``,
-    what 95 % of visits to the worst pose keep. ``noise``: how
-    large the bounds take the noise; None where it is as stated.
+    bounds rest on beyond normal readings of known covariance; None if nothing. ``withheld`` is why
+    no bound is stated; None if one is. ``excepted``: so many points may lie above the upper bound,
+    which is of all but these; no confidence is lost by saying which. ``error_of``: ``mean``, what
+    stays when a pose is measured again, or ``visit``, what 95 % of visits to the worst pose keep.
+    ``noise``: how large the bounds take the noise; None where it is as stated.
     """
 
     target: str

@@ -99,12 +99,7 @@ class Observations:
         return replace(self, s=np.zeros_like(self.s))
 
 
-def full_poses(
-    q_rad: np.ndarray,
-    poses: Pose,
-    s: np.ndarray | None = None,
-    fold: np.ndarray | None = None,
-) -> Observations:
+def full_poses(q_rad: np.ndarray, poses: Pose, s: np.ndarray | None = None) -> Observations:
     """Observations of one full-pose target, one row per pose.
 
     Parameters
@@ -115,13 +110,11 @@ def full_poses(
         Measured poses in the instrument's frame, shape (n, ...) in mm.
     s : numpy.ndarray, optional
         Travel directions, shape (n, k); unknown if not given.
-    fold : numpy.ndarray, optional
-        Folds, shape (n,); none if not given.
 
     Returns
     -------
     Observations
-        n rows of the target ``tool``.
+        n rows of the target ``tool``, none in a fold.
     """
     q_rad = np.asarray(q_rad, dtype=float)
     count = len(q_rad)
@@ -134,7 +127,7 @@ def full_poses(
         pose=np.arange(count),
         target=zeros,
         repeat=zeros,
-        fold=np.full(count, -1) if fold is None else np.asarray(fold),
+        fold=np.full(count, -1),
         session=zeros,
         payload=np.full((count, 4), np.nan),
     )

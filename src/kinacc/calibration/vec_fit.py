@@ -42,26 +42,23 @@ class Prior:
         From each order to the next.
     offset_rad : float
         Of a direction offset.
-    constant_mm, constant_rad : float or None
-        At order 0 where it differs: constants are what a DH model can express as well.
+    constant : float or None
+        At order 0 where it differs, mm and mrad: what a DH model can express as well.
     """
 
     delta_mm: float
     eps_rad: float
     decay: float
     offset_rad: float
-    constant_mm: float | None = None
-    constant_rad: float | None = None
+    constant: float | None = None
 
     def std(self, model: VECModel) -> np.ndarray:
         """Standard deviations (P,) ordered as the parameters of a VEC model."""
         falling = self.decay ** np.maximum(np.arange(model.order + 1) - 1, 0)
         per_error = np.where(np.arange(len(ERRORS)) < 3, self.delta_mm, self.eps_rad)
         deviation = np.outer(per_error, falling)
-        if self.constant_mm is not None:
-            deviation[:3, 0] = self.constant_mm
-        if self.constant_rad is not None:
-            deviation[3:, 0] = self.constant_rad
+        if self.constant is not None:
+            deviation[:, 0] = self.constant * np.repeat([1.0, 1e-3], 3)
         offsets = np.full(model.direction_offsets_rad.size, self.offset_rad)
         return np.concatenate([np.tile(deviation.ravel(), model.joints), offsets])
 
@@ -178,8 +175,7 @@ def highest_order(observations: Observations, joints: int, frames: int) -> int:
 
 def prior_of(std_mm: float, decay: float, offset_rad: float) -> Prior:
     """The prior of a chosen width and fall."""
-    constant = CONSTANT_STD, 1e-3 * CONSTANT_STD
-    return Prior(std_mm, 1e-3 * std_mm, decay, offset_rad, *constant)
+    return Prior(std_mm, 1e-3 * std_mm, decay, offset_rad, CONSTANT_STD)
 
 
 @one_thread
