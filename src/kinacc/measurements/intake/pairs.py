@@ -101,9 +101,7 @@ def _join(joints: Looked, points: Looked, answers: Answers) -> tuple[JointsFile,
         key, _, key_of_points = answer.partition("=")
         return _by_name(key, key_of_points or key), ()
     if answer != TIME and (keys := _by_names(joints, points)):
-        count = int(np.sum(rows_by_name(points.table, joints.table, *keys) >= 0))
-        note = f"joined where {keys[0]} of the joints is {keys[1]} of the points: "
-        note += f"{count} of {len(points.table)} points have joints"
+        note = f"joined where {keys[0]} of the joints is {keys[1]} of the points"
         return _by_name(*keys), (note,)
     times = _times(joints), _times(points)
     if all(times):

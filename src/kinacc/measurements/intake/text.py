@@ -81,7 +81,7 @@ def look(path: str | Path, answers: Answers | None = None) -> Looked:
     above = [
         " ".join(str(cell) for cell in cells if cell is not None)
         for line, cells in rows
-        if line < first_line or str(next(iter(cells), "")).lstrip().startswith((*"#/;%",))
+        if line < first_line
     ]
     stated = heads.stated_above(above)
     written = written.but(**_names_of(path, head, rows, stated, answers))
