@@ -177,7 +177,10 @@ def _meant(
     if findings:
         fitted = robust_fit.fit(read, robot.dh)
     if fitted.trial.sigma_mm > meanings.FAR * meanings.spread_mm(read.position_mm):
-        return fitted, [*findings, _no_fit(single, fitted, robot, progress)]
+        names = {"robot": robot.name, "shipped": _shipped(single, robot, progress)}
+        sigma_mm = fitted.trial.sigma_mm
+        no_fit = finding("does_not_fit", single.lines(), sigma_mm=sigma_mm, **names)
+        return fitted, [*findings, no_fit]
     findings += _of_other_lengths(single, fitted, robot, progress)
     if not read.has_rotation.any():
         return fitted, findings
@@ -207,16 +210,6 @@ def _shipped(single: Readings, robot: Robot, progress: Progress) -> str:
     rivals = shipped.misfits(single, progress)
     names = [name for share, name in rivals if share <= shipped.SURE and name != robot.name]
     return f". Shipped robots that fit, best first: {', '.join(names)}" if names else ""
-
-
-def _no_fit(single: Readings, fitted: Fitted, robot: Robot, progress: Progress) -> Finding:
-    return finding(
-        "does_not_fit",
-        single.lines(),
-        robot=robot.name,
-        sigma_mm=fitted.trial.sigma_mm,
-        shipped=_shipped(single, robot, progress),
-    )
 
 
 def _of_other_lengths(

@@ -116,10 +116,7 @@ def split(columns: Columns, settings: Mapping[str, Any]) -> Columns:
             )
     held_out = fold == (-1 if section["validation_fold"] is None else section["validation_fold"])
     subset = np.where(held_out, "validation", "train").astype(object)
-    return {**_not_stated(count), **columns, "subset": subset, "fold": fold}
-
-
-def _not_stated(count: int) -> Columns:
-    """Null columns of all that a source of measurements need not state."""
+    # What a source of measurements need not state is null.
     null = {name: np.full(count, np.nan) for name in ("row", "temperature_c", *UNCERTAINTY)}
-    return null | {"session": np.full(count, None, dtype=object)}
+    null["session"] = np.full(count, None, dtype=object)
+    return {**null, **columns, "subset": subset, "fold": fold}
