@@ -43,9 +43,8 @@ def report_of(table: RawTable) -> tuple[str, str, list[str]] | None:
         return None
     cells = table.columns.drop(columns=axes[0]).mask(table.columns.map(table.is_gap))
     roles = {name: role(name_of(name).terms) for name in cells}
-    numeric = cells.map(lambda c: not isinstance(c, str) or c.strip()[:1] in "+-.−0123456789")
     values = [name for name in cells if roles[name] in (NOMINAL, MEASURED, REPORTED, DEVIATION)
-              and 2 * numeric[name].sum() > len(cells)]  # fmt: skip
+              and 2 * np.isfinite(table.values(name)).sum() > len(table)]  # fmt: skip
     # A name stands for several rows: in each of them, or in the first.
     names = [name for name in cells if name not in values and pd.notna(cells[name][0])
              and 2 * cells[name].nunique() <= len(table) + 1]  # fmt: skip

@@ -11,7 +11,7 @@ import pandas as pd
 from kinacc.errors import Problem
 from kinacc.measurements.table import RawTable
 
-_CLOCK = r"(?:(\S+)[ T])?(\d{1,2}):(\d{2}):(\d{2}(?:[.,]\d+)?) ?(?:Z|[+-]\d{2}:?\d{2})?"
+_CLOCK = r"(?:(\S+)[ T])?(\d{1,2}:\d{2}:\d{2}(?:[.,]\d+)?) ?(?:Z|[+-]\d{2}:?\d{2})?"
 # A spreadsheet has rounded them (2,02E+13), or shows them without hours or seconds.
 _SPOILT = r"\d(?:[.,]\d+)?[eE]\+?\d+|\d{1,2}:\d{2}[.,]\d+|(?:\S+[ T])?\d{1,2}:\d{2}"
 _DATES = ("%Y-%m-%d", "%d.%m.%Y", "%Y/%m/%d", "%d/%m/%Y", "%m/%d/%Y", "%d.%m.%y")
@@ -42,8 +42,8 @@ def seconds(table: RawTable, column: str, problems: list[Problem]) -> np.ndarray
         values = values * (_UNITS[units[0]] if units else fit)
     else:
         parts = texts.str.extract(f"^{_CLOCK}$")
-        clock = parts[[1, 2, 3]].replace(",", ".", regex=True).astype(float)
-        values = (clock * [3600.0, 60.0, 1.0]).sum(axis=1, skipna=False).to_numpy()
+        clock = pd.to_timedelta(parts[1].str.replace(",", "."), errors="coerce")
+        values = clock.dt.total_seconds().to_numpy()
         dates = parts[0].dropna()
         if len(dates):
             spans = {tuple((days - days[0]).days) for days in _dates(dates.tolist())}
