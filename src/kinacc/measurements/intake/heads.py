@@ -78,7 +78,8 @@ def head_of(rows: Sequence[Row], delimiter: str, sheet: bool = False) -> Head | 
         under += 1
     if not above:
         return Head(0, first, 0, width, _in_remark(rows[:first], width, delimiter))
-    place = above[-1]
+    most = max(len(filled(rows[number][1])) for number in above)
+    place = max(number for number in above if 2 * len(filled(rows[number][1])) >= most)
     line, cells = rows[place][0], header_cells(rows[place][1], width)
     over = rows[place - 1][1] if place else []
     names = None

@@ -50,8 +50,7 @@ def with_targets(
             message = "the radius of the reflectors changes, so that their centres lie elsewhere"
             raise input_error(table.where(radius), message, _ALLOWED)
         return columns if target else _with_target(columns, radius)
-    spans = _spans(point_mm, pose)
-    if target or not spans.size or np.median(spans) <= _APART_MM:
+    if target or not _are_apart(point_mm, pose):
         return columns
     ways: dict[tuple[int, ...], str] = {}
     for column in (name for name in table.columns if name not in columns.read()):
@@ -73,6 +72,12 @@ def _spans(values: np.ndarray, group: np.ndarray) -> np.ndarray:
     """Largest extent along an axis of ``values`` (n, k) in every group of several rows."""
     frame = pd.DataFrame(values[group >= 0]).groupby(group[group >= 0])
     return (frame.max() - frame.min()).max(axis=1)[frame.size() > 1].dropna().to_numpy()
+
+
+def _are_apart(point_mm: np.ndarray, group: np.ndarray) -> bool:
+    """Whether rows of a group are, as a rule, far from one another."""
+    spans = _spans(point_mm, group)
+    return bool(spans.size) and float(np.median(spans)) > _APART_MM
 
 
 def _names_targets(labels: np.ndarray, point_mm: np.ndarray, pose: np.ndarray) -> bool:

@@ -81,7 +81,7 @@ def look(path: str | Path, answers: Answers | None = None) -> Looked:
     above = [
         " ".join(str(cell) for cell in cells if cell is not None)
         for line, cells in rows
-        if line < first_line
+        if line < first_line or str(next(iter(cells), "")).lstrip().startswith((*"#/;%",))
     ]
     stated = heads.stated_above(above)
     written = written.but(**_names_of(path, head, rows, stated, answers))
@@ -244,6 +244,9 @@ def _point_names(rows: Sequence[Cells], stated: Mapping[str, str]) -> list[str]:
     columns = list(zip(*rows, strict=True))
     texts = [not any(map(heads.is_number, column)) for column in columns]
     before = texts.index(False) if False in texts else 0
+    if before and len(texts) == before + 4 and len({*columns[before]}) == len(rows):
+        # Points that are called 1, 2, 3.
+        before += all(str(cell).strip().isdigit() for cell in columns[before])
     if not 1 <= before <= 3 or len(texts) != before + 3 or any(texts[before:]):
         return []
     unit = f"_{stated['length']}" if "length" in stated else ""
