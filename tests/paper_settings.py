@@ -29,7 +29,6 @@ def experiment(tool: Pose, **changes: object) -> Experiment:
     calibration = defaults()["calibration"]
     usual = {
         "orientation": True,
-        "frames_estimated": True,
         "hayati_joints": (),
         "rotation_weight_mm_per_rad": calibration["rotation_weight_mm_per_rad"],
         "threshold": calibration["dh"]["truncation"],

@@ -99,7 +99,6 @@ def _experiment(arm: Robot, options: Mapping[str, Any]) -> planning.Experiment:
     return planning.Experiment(
         tool,
         orientation=not options["position_only"],
-        frames_estimated=True,
         hayati_joints=hayati_joints(calibration["dh"], arm),
         rotation_weight_mm_per_rad=float(calibration["rotation_weight_mm_per_rad"]),
         threshold=calibration["dh"]["truncation"],

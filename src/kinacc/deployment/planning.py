@@ -35,7 +35,7 @@ _IMPROVED = 401  # places of a path that 2-opt improves: its time goes with the 
 
 @dataclass(frozen=True)
 class Experiment:
-    """What is measured and fitted.
+    """What is measured; base and tool are fitted with the arm.
 
     Attributes
     ----------
@@ -43,8 +43,6 @@ class Experiment:
         Measured point or frame in the last DH frame.
     orientation
         Whether orientations are measured beside positions.
-    frames_estimated
-        Whether base and tool are fitted as well.
     hayati_joints
         Joints (1-based) with a beta.
     rotation_weight_mm_per_rad
@@ -55,7 +53,6 @@ class Experiment:
 
     tool: Pose
     orientation: bool
-    frames_estimated: bool
     hayati_joints: tuple[int, ...]
     rotation_weight_mm_per_rad: float
     threshold: float
@@ -227,10 +224,9 @@ def information(robot: Robot, q_rad: np.ndarray, experiment: Experiment) -> Info
     """Information of poses at reported joints (n, k), rad and mm."""
     beta = {f"j{joint}.beta_rad" for joint in experiment.hayati_joints}
     names = tuple(item for item in robot.dh.names if not item.endswith("beta_rad") or item in beta)
-    if experiment.frames_estimated:
-        motions = frames.MOTIONS if experiment.orientation else frames.MOTIONS[:3]
-        base = [f"{frames.BASE}.{motion}" for motion in frames.MOTIONS]
-        names = (*base, *(f"{TOOL}.{motion}" for motion in motions), *names)
+    motions = frames.MOTIONS if experiment.orientation else frames.MOTIONS[:3]
+    base = [f"{frames.BASE}.{motion}" for motion in frames.MOTIONS]
+    names = (*base, *(f"{TOOL}.{motion}" for motion in motions), *names)
     blank = Uncertainty(names, np.eye(len(names)), np.zeros((0, len(names))))
     arm = replace(nominal(robot), targets={TOOL: experiment.tool}, known=blank)
     slopes = _slopes(arm, robot.dh_joints(np.atleast_2d(q_rad)), experiment)
