@@ -10,6 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 
 from kinacc.calibration import frames
 from kinacc.calibration.identifiability import STRUCTURAL, LeftOpen, joints_anywhere
@@ -289,7 +290,7 @@ def observability(rows: np.ndarray) -> float:
     values = np.linalg.svd(rows.reshape(-1, rows.shape[2]), compute_uv=False)
     if len(values) < rows.shape[2] or values[-1] <= 0.0:
         return 0.0
-    return float(np.exp(np.mean(np.log(values))) / np.sqrt(len(rows)))
+    return float(scipy.stats.gmean(values) / np.sqrt(len(rows)))
 
 
 def _best_addition(rows: np.ndarray, chosen: list[int], floor: np.ndarray) -> int:

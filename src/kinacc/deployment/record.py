@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -33,12 +33,6 @@ class Residual:
     position_mm: float
     orientation_rad: float
     subset: str
-
-
-def default_point(targets: Iterable[str]) -> str:
-    """The point meant where none is named: the tool where there is one, else the first target."""
-    names = [*targets]
-    return TOOL if TOOL in names else next(iter(names), FLANGE)
 
 
 @dataclass(frozen=True)
@@ -99,8 +93,8 @@ class Calibration:
 
     @property
     def default_point(self) -> str:
-        """The tool where there is one, else the first target."""
-        return default_point(self.targets)
+        """The tool where there is one, else the first target, or the flange."""
+        return TOOL if TOOL in self.targets else next(iter(self.targets), FLANGE)
 
     def point(self, name: str | None) -> Pose:
         """A target by name, or the flange, in the last DH frame. InputError for another name."""

@@ -33,7 +33,7 @@ class SharedReadings:
 NONE_SHARED = SharedReadings(0, 0, 0)
 
 
-def known_rows(table: Columns, earlier: Columns) -> np.ndarray:
+def known_rows(table: Columns | pd.DataFrame, earlier: Columns | pd.DataFrame) -> np.ndarray:
     """True (n,) for rows of a table ``measurements`` that an ``earlier`` one holds as well.
 
     Joints and position agree to the last digits; nowhere where so few do that it may be chance.
@@ -41,10 +41,9 @@ def known_rows(table: Columns, earlier: Columns) -> np.ndarray:
     if not len(earlier):
         return np.zeros(len(table["x_mm"]), dtype=bool)
     joints = [name for name in table if name[0] == "q" and name[1:].isdecimal()]
-    parts = (joints, ["x_mm", "y_mm", "z_mm"])
     both = [
-        [np.stack([np.asarray(item[name], dtype=float) for name in part], axis=1) for part in parts]
-        for item in (table, earlier)
+        [item[part].to_numpy(float) for part in (joints, ["x_mm", "y_mm", "z_mm"])]
+        for item in map(pd.DataFrame, (table, earlier))
     ]
     return known_readings(*both)
 
@@ -65,12 +64,10 @@ def shared(first: Columns | None, second: Columns | None) -> SharedReadings:
     """Readings in both of two tables ``measurements``, of those that are fitted to."""
     if first is None or second is None:
         return NONE_SHARED
-    fitted = []
-    for table in (first, second):
-        rows = np.asarray(table["subset"]) == SUBSETS[0]
-        fitted.append({name: np.asarray(values)[rows] for name, values in table.items()})
+    tables = map(pd.DataFrame, (first, second))
+    fitted = [table[table["subset"] == SUBSETS[0]] for table in tables]
     count = int(known_rows(*fitted).sum())
-    return SharedReadings(count, *(len(table["subset"]) for table in fitted))
+    return SharedReadings(count, *map(len, fitted))
 
 
 def counted_once(

@@ -38,14 +38,14 @@ OPTIONAL = (
 )
 # Tables that the page needs, and those that it shows where they are there.
 PAGE_TABLES = (*figures.TABLES, "dh_model", "vec_model", "residuals", "worst_rows", "summary")
-ON_PAGE = (
-    *OPTIONAL,
-    *(f"{kind}_{part}" for kind in ERROR_MODELS for part in ("fit", "covariance")),
-    *("accuracy_map", "assessment_points", "study", "study_summary", "readings", "histories"),
-)
 _STUDIED = (
     *("accuracy_map", "assessment_points", "study", "study_summary", "readings", "histories"),
     "claims",
+)
+ON_PAGE = (
+    *OPTIONAL,
+    *(f"{kind}_{part}" for kind in ERROR_MODELS for part in ("fit", "covariance")),
+    *_STUDIED,
 )
 _ESTIMATES = {"cross_validated": "held_out", "train": "training"}
 _STATISTICS = ("n", "mean", "quantile_99", "largest")
