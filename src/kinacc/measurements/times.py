@@ -21,6 +21,7 @@ _UNITS = {"ms": 1e-3, "us": 1e-6, "µs": 1e-6, "μs": 1e-6, "ns": 1e-9}
 _FEWEST = 4
 _SHARE = 0.6  # of the points, that must fall where the arm stood still
 _RIVAL = 0.85  # of the most points: another offset explains as much
+_SHORTEST_S = 0.3  # of a standstill in a record that runs on
 _MOST = 4_000_000
 STILL_RAD = np.deg2rad(0.02)  # joints that move less stand still
 _YEARS = (1990, 2100)  # of measurements; others are numbers that look like a day
@@ -103,6 +104,7 @@ def standstills(time_s: np.ndarray, q_rad: np.ndarray) -> tuple[np.ndarray, floa
     runs, gaps = ends - starts + 1, np.diff(time)
     long = runs >= 3
     if 2 * long.sum() >= len(runs) or runs[long].sum() > 0.3 * len(time):
+        long &= time[ends] - time[starts] >= _SHORTEST_S
         stands = np.stack([time[starts[long]], time[ends[long]]], axis=1)
         return stands, max(2.0 * float(np.median(gaps)), 0.05)
     within = 0.25 * float(np.min(gaps[gaps > 0.0], initial=np.inf))  # single rows, far apart
