@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import math
 import os
+from datetime import UTC, datetime, timedelta
+from types import SimpleNamespace
 
 from campaign_on_disk import SIGMA_MM, Arm, recorded, refused, standing
 
@@ -30,7 +32,7 @@ def test_the_newest_campaign_counts_and_the_others_are_named(begun, calibration)
     )
 
 
-def test_the_bound_of_a_finished_campaign_on_the_model_is_taken(begun, calibration):
+def test_the_bound_of_a_finished_campaign_on_the_model_is_taken(begun, calibration, monkeypatch):
     tables = read_tables(calibration, "robot")
     folder = begun("--noise-mm", SIGMA_MM, "--frame", "base")
     recorded(folder, Arm(folder), 19)
@@ -41,7 +43,16 @@ def test_the_bound_of_a_finished_campaign_on_the_model_is_taken(begun, calibrati
     assert "no further reading is needed" in refused(
         folder, "record", folder, "--position-mm", "1,2,3"
     )
-    assert finished(tables, "dh", [folder]) == standing(folder)["bounds"][0]["upper_mm"]
+    bound_mm = standing(folder)["bounds"][0]["upper_mm"]
+    assert finished(tables, "dh", [folder]) == bound_mm
+    later = begun("--noise-mm", SIGMA_MM, "--frame", "base")
+    tomorrow = datetime.now(UTC) + timedelta(days=1)
+    monkeypatch.setattr("kinacc.campaign.folder.datetime", SimpleNamespace(now=lambda _: tomorrow))
+    recorded(later, Arm(later, 0.5 * SIGMA_MM), 20)
+    last_mm = standing(later)["bounds"][0]["upper_mm"]
+    assert last_mm != bound_mm
+    assert finished(tables, "dh", [later, folder]) == finished(tables, "dh", [folder, later])
+    assert finished(tables, "dh", [later, folder]) == last_mm
     assert math.isnan(finished(tables, "vec", [folder]))
     (folder / "readings.jsonl").write_text("no journal")
     assert math.isnan(finished(tables, "dh", [folder]))
