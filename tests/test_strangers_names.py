@@ -44,9 +44,11 @@ def test_no_cell_of_a_workbook_is_a_formula(tmp_path):
 
 @pytest.mark.parametrize("name", ["$\\frac$", "$x$", "_left out", "a--><script>1</script>"])
 def test_a_file_of_errors_of_any_name_is_drawn_under_it(name):
-    widths = dict.fromkeys(("width_q05_mm", "width_median_mm", "width_q95_mm"), 1.0)
-    rows = pd.DataFrame({"errors": name, "budget": [1, 2], "share": 1.0} | widths)
+    widths = {"width_q05_mm": 0.5, "width_median_mm": 1.0, "width_q95_mm": 3.0}
+    rows = pd.DataFrame({"errors": name, "budget": [1, 2], "share": 0.7} | widths)
     figure = draw_budgets(rows, None, None, None)
+    medians, shares = (axes.lines[0].get_ydata()[0] for axes in figure.axes)
+    assert (medians, shares) == (1.0, 0.7)
     picture = render(figure, ["svg"])["svg"]
     assert not any("script" in each.tag for each in ET.fromstring(picture).iter())
     assert name in html.unescape(picture.decode()).replace("- -", "--")

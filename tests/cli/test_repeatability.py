@@ -66,8 +66,9 @@ def test_instrument_visits_and_sides_are_separated_as_by_the_analysis_of_varianc
     terms = np.mean(within) / 2.0, np.mean(between) * 2.0 / 3.0, np.mean(across)
     welch = whole**2 / sum(t**2 / nu for t, nu in zip(terms, (72, 48, 12), strict=True))
     assert result["noise"]["freedom"] == pytest.approx(3.0 * welch, rel=1e-9)
-    low = np.sqrt(whole * 3.0 * welch / scipy.stats.chi2.ppf(0.975, 3.0 * welch))
-    assert result["std_low_mm"][0] == pytest.approx(low, rel=1e-9)
+    for name, share in (("std_low_mm", 0.975), ("std_high_mm", 0.025)):
+        end = np.sqrt(whole * 3.0 * welch / scipy.stats.chi2.ppf(share, 3.0 * welch))
+        assert result[name][0] == pytest.approx(end, rel=1e-9)
 
 
 def test_a_campaign_of_readings_like_these_has_the_noise_told_of_them():

@@ -14,7 +14,7 @@ from simulated_months import month, session
 from kinacc.calibration.observations import full_poses
 from kinacc.deployment import history as histories
 from kinacc.deployment.history import LEVEL
-from kinacc.deployment.history_model import Moved, Setup
+from kinacc.deployment.history_model import Moved, Setup, misfit_factor, understated
 from kinacc.geometry import Pose
 from kinacc.kinematics import robot as robots
 from kinacc.measurements.orientation import euler
@@ -30,9 +30,15 @@ def history(*sessions):
 @pytest.mark.parametrize(("other_poses", "moved"), [(False, False), (True, False), (True, True)])
 def test_months_in_which_nothing_happens_raise_no_alarm(other_poses, moved):
     months = [(n, month(n, 0.0, other_poses, moved)) for n in (1, 2, 3)]
-    found = history(*(session(seen, n, MOVED if moved else SAME) for n, seen in months))
+    lines = [session(seen, n, MOVED if moved else SAME) for n, seen in months]
+    found = history(*lines)
     assert list(found["verdict"]) == ["first", "holds", "holds"]
     assert (found["in_force_mean_mm"][1:] < 1.0).all()
+    if not moved:
+        later = months[1][1]
+        at = lines[0].calibration.pose(later.at, "instrument")
+        sizes = np.linalg.norm(later.position_mm - at.position_mm, axis=1)
+        assert found["in_force_mean_mm"][1] == pytest.approx(sizes.mean())
 
 
 def test_a_knocked_joint_is_named_and_the_new_calibration_is_in_force_from_then_on():
@@ -60,11 +66,15 @@ def test_a_tracker_that_was_moved_is_seen_but_not_beside_as_large_a_drift():
         assert found["moved_mm"][1] == pytest.approx(0.3, abs=0.05)
 
 
-def test_chance_along_all_directions_alike_is_that_of_chi_square():
+def test_chance_along_all_directions_alike_is_that_of_chi_square(monkeypatch):
     moved = Moved(np.eye(4), np.array([0.1, -0.2, 0.25, 0.1]), 0.01 * np.eye(4))
     probability, chance_mm = moved.test(0.005)
     assert probability == pytest.approx(scipy.stats.chi2.sf(12.25, 4), rel=0.05)
     assert chance_mm == pytest.approx(0.1 * scipy.stats.chi2.isf(0.005, 4) ** 0.5, rel=0.01)
+    monkeypatch.setattr(histories.history_model, "moved", lambda half, _: half)
+    still = moved._replace(change=np.zeros(4))
+    assert understated([moved, still]) == pytest.approx(0.5 * 12.25 / 4.0)
+    assert misfit_factor(3.0, 5.0) == 2.0
 
 
 def test_misfit_that_differs_between_halves_widens_the_limit_at_other_poses(monkeypatch):

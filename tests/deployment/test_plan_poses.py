@@ -93,6 +93,8 @@ def test_planned_poses_of_an_arm_beat_random_ones_and_are_driven_on_a_short_way(
     assert (plan.index[:4] == 0.0).all()  # four full poses cannot tell thirty directions
     assert len(set(plan.chosen.tolist())) == 15
     assert plan.moves_rad.sum() < plan.candidate_travel_rad
+    moves = np.diff(joints[plan.chosen], axis=0, prepend=0.0)
+    np.testing.assert_allclose(plan.moves_rad, np.abs(moves).max(axis=1))
     with pytest.raises(InputError, match="at most"):
         choose(rows, 201)
     with pytest.raises(InputError, match="at least"):

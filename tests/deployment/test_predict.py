@@ -1,5 +1,7 @@
 """Predicted poses, what the fit knows of them, and what it does not."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from small_arms import calibrated, joints, moved
@@ -47,7 +49,11 @@ def test_undetermined_directions_show_where_the_frame_is_a_convention():
     arm, q_rad = calibrated("mh180", "dh"), joints("mh180", 5)
     # From the instrument to the tool everything was measured; where the base stands was not.
     assert predict(arm, q_rad, None, "instrument").undetermined[:, 0].max() < 0.02
-    assert predict(arm, q_rad, None, "base").undetermined[:, 0].min() > 0.5
+    found = predict(arm, q_rad, None, "base")
+    assert found.undetermined[:, 0].min() > 0.5
+    table = replace(found, std=np.full((5, 6), 2e-3)).table()
+    turns = table[["std_orientation_mrad", "undetermined_mrad"]]
+    np.testing.assert_allclose(turns, [[12.0**0.5, 1.0]] * 5, rtol=1e-4)
 
 
 def test_a_vec_model_says_nothing_outside_its_range_and_dh_says_so():

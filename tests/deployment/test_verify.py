@@ -45,6 +45,12 @@ def test_the_level_does_not_rest_on_how_errors_are_spread():
         assert np.mean(np.array(chances) <= level) == pytest.approx(level, abs=0.09)
 
 
+def test_a_single_configuration_is_expected_to_err_as_the_median_one():
+    columns = np.multiply.outer([3.0, 4.0, 90.0, 90.0, 8.0], np.eye(3)[:, :2])
+    found = compare(ErrorColumns(columns[:4], 0), ErrorColumns(columns[4:], 0))
+    assert found.expected_mm == pytest.approx(8.0)
+
+
 def test_changes_of_the_stated_sizes_are_found_in_four_of_five_cases():
     found = np.zeros((3, 40, 2))
     for seed in range(3):

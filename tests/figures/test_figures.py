@@ -8,6 +8,7 @@ from figure_words import figures, golden, problems, said, words
 from scipy.special import gammainc
 
 from kinacc.figures import fig1, fig2, fig3, paper, style
+from kinacc.figures.calibration import draw_joint_errors
 from kinacc.kinematics import robot
 
 LONG_NAME = "laser tracker campaign of the second machining cell, $spring$_{a}, series B " * 3
@@ -119,3 +120,10 @@ def test_history_states_outcome_largest_error_and_a_rule_that_was_not_met(
     assert (rule in text) != met
     away = paper.draw_iterations(table, "rejected", largest + 0.01)
     assert "largest true error not measured" in said(away)
+
+
+def test_joint_errors_have_bands_of_two_standard_deviations():
+    ones = np.ones((1, 6, 2))
+    _, turn = draw_joint_errors(ones[:, 0], ones, 0.1 * ones, ["deg"]).axes
+    band = turn.collections[0].get_paths()[0].get_extents()
+    assert (band.y0, band.y1) == pytest.approx((0.8, 1.2))

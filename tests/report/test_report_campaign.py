@@ -15,7 +15,7 @@ from kinacc.campaign.instrument import instruments
 from kinacc.campaign.plan import Limits, assessor_of
 from kinacc.deployment.planning import spread
 from kinacc.deployment.record import nominal
-from kinacc.figures.campaign import draw_bounds
+from kinacc.figures.campaign import draw_bounds, draw_readings
 from kinacc.kinematics import robot as robots
 from kinacc.report import page
 from kinacc.report.campaign import campaign_page, markdown, section
@@ -78,6 +78,11 @@ def test_picture_and_conformity_have_the_number_of_excepted_candidates():
     assert values["largest"][0]["error_mm"] == np.nanmax(points["error_mm"])
     assert (np.asarray(about["excepted"]) > 0).any()
     drawn = draw_bounds(points, about, len(campaign.plan.route))
+    shown = drawn.axes[1].lines[0].get_ydata()
+    np.testing.assert_array_equal(shown, about["upper_mm"][about["target"] == "measured"])
+    readings = tables["campaign_readings"]
+    shown = draw_readings(readings).axes[0].lines[0].get_ydata()
+    np.testing.assert_array_equal(shown, readings["error_mm"])
     labels = [each.get_text() for each in drawn.findobj(matplotlib.text.Text)]
     assert "bounds, all but 3 candidates" in labels
     assert "all but 3 of these 60 candidates: **undecided**" in markdown(

@@ -62,7 +62,7 @@ def test_every_example_is_corrected_and_only_its_numbers_change(name):
     assert not found.refused
     assert (found.table["status"] == "corrected").all()
     assert len(found.not_corrected) == LEFT.get(name, 0)
-    assert found.table["change_mm"].between(0.05, 20.0).all()
+    assert found.table[["change_mm", "change_mrad"]].stack().between(0.05, 20.0).all()
     for path, content in found.files.items():
         old = path.read_bytes()
         assert content != old
