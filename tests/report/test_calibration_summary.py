@@ -86,12 +86,14 @@ def test_a_campaign_bounds_the_robot_it_is_about_and_no_other_by_its_own_toleran
     wide_mm = bound["upper_mm"] + 0.01
     for own_mm, tolerance_mm, confidence, wanted in (
         (None, wide_mm, 0.95, PASSED), (wide_mm, 1e-3, None, PASSED), (None, wide_mm, 0.96, FAILED),
+        (0.5 * bound["lower_mm"], wide_mm, None, FAILED),
     ):  # fmt: skip
         gate = {"kind": "campaign", "campaign": "check_line_b", "name": "", "on_fail": "fail",
                 "tolerance_mm": own_mm, "confidence": confidence}  # fmt: skip
         result = of_gate(gate, RunTables(fleet / "line_b"), tolerance_mm, None)
         assert result.verdict == wanted
         assert result.figures["bound_mm"] == bound["upper_mm"]
+        assert result.figures["lower_mm"] == bound["lower_mm"] > 0.0
 
 
 def test_readings_that_contradict_the_noise_accept_nothing(fleet):
