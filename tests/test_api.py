@@ -92,7 +92,8 @@ def test_measured_files_are_read_without_a_configuration(tmp_path):
     table = pd.DataFrame(np.hstack([q_rad, point / 1000.0]), columns=[*"123456", *"XYZ"])
     table.columns = [*(f"J{n}" for n in range(1, 7)), *(f"{axis} [m]" for axis in "XYZ")]
     table.to_csv(path := tmp_path / "tracker.csv", sep=";", index=False)
-    for robot in ("ur10", None):
+    file = Path(kinacc.__file__).parent / "kinematics" / "robots" / "ur10.yaml"
+    for robot in ("ur10", file, None):
         read = kinacc.read_measurements(
             path, robot=robot, settings={"calibration": {"vec": {"order": 2}}}
         )

@@ -332,7 +332,7 @@ class Calibration:
 
 def read_measurements(
     *paths: str | Path,
-    robot: str | None = None,
+    robot: str | Path | None = None,
     dataset: str | None = None,
     settings: Mapping[str, Any] | None = None,
     **answers: Any,
@@ -372,7 +372,7 @@ def read_measurements(
             overrides = {"datasets": dict.fromkeys(described, settings)}
             described = read_data_sets(paths, overrides).settings
     else:
-        files = describe_files(paths, robot, answers)
+        files = describe_files(paths, None if robot is None else str(robot), answers)
         content = {name: overlay(item, settings or {}) for name, item in files.items()}
         described = data_sets(contradictions.load([], {"datasets": content})).settings
     if dataset is None and len(described) > 1:
