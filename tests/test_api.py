@@ -1,6 +1,7 @@
 """The public face on a small data set: the same tables and answers as the commands give."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
