@@ -100,7 +100,7 @@ def test_values_typed_into_a_controller_err_by_no_more_than_the_page_states(tmp_
         misses.append((np.linalg.norm(goal[:3, 3] - there[:3, 3]), 1e3 * turn))
     mean, (stated, best, _) = np.mean(misses, axis=0), told["errors"]
     assert mean[0] <= FACTOR * stated["position_mm"]
-    assert mean[1] <= FACTOR * stated["orientation_mrad"]
+    assert mean[1] <= FACTOR * stated["orientation_mrad"] < 9.0
     if maker in ("ur", "staubli"):  # which take all that was fitted
         assert stated["position_mm"] < 1.02 * best["position_mm"]
 
