@@ -72,6 +72,7 @@ def test_a_campaign_of_too_many_values_is_refused_before_they_are_made(tmp_path)
 
 
 def test_rows_in_a_file_of_json_without_end_are_refused(tmp_path):
-    (tmp_path / "joints.json").write_text(json.dumps({"rows": []}) + " " * 100_000_000)
-    done = call("plan-poses", "ur10", "--poses", 9, "--candidates", tmp_path / "joints.json", code=2)
+    path = tmp_path / "joints.json"
+    path.write_text(json.dumps({"rows": []}) + " " * 100_000_000)
+    done = call("plan-poses", "ur10", "--poses", 9, "--candidates", path, code=2)
     assert "joints.json: is too large; allowed: at most 100 MB" in done.output
