@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from scipy.stats import binom, chi2, norm
+from scipy.stats import binom, chi2, ncx2, norm
 from simulated_campaigns import away
 
 from kinacc.assess.adaptive import Candidates, Ledger
@@ -183,3 +183,11 @@ def test_a_tolerance_is_held_to_both_bounds(said, tolerance, verdict, reason):
     for wrong in (0.0, math.nan, math.inf):
         with pytest.raises(InputError, match="tolerance"):
             decide(said, wrong)
+
+
+def test_the_lower_bound_of_single_readings_counts_every_point():
+    campaign = SingleShot(40).begin(Candidates.with_equal_noise(np.full(40, 0.1)))
+    for row in range(40):
+        campaign.record(row, [0.1 * row, 0.0, 0.0])
+    lower_mm = campaign.statements()[0].lower_mm
+    assert ncx2.sf(1521.0, 3, 100.0 * lower_mm**2) == pytest.approx(0.05 / 40, rel=1e-3)
