@@ -124,6 +124,6 @@ def test_history_states_outcome_largest_error_and_a_rule_that_was_not_met(
 
 def test_joint_errors_have_bands_of_two_standard_deviations():
     ones = np.ones((1, 6, 2))
-    _, turn = draw_joint_errors(ones[:, 0], ones, 0.1 * ones, ["deg"]).axes
+    _, turn = draw_joint_errors(ones[:, 0], ones, ones.cumsum(1) / 40, ["deg"]).axes
     band = turn.collections[0].get_paths()[0].get_extents()
     assert (band.y0, band.y1) == pytest.approx((0.8, 1.2))
