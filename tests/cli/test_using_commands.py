@@ -3,6 +3,8 @@
 import json
 import re
 import shlex
+import subprocess
+import sys
 from pathlib import Path
 
 from command_line import answer, call
@@ -25,9 +27,16 @@ def test_arms_of_six_and_seven_joints_are_not_compared():
     call("compare", "mh180", "iiwa14", code=2)
 
 
-def test_results_say_which_robot_they_were_made_with(study, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)  # no configuration here
-    call("predict", study.resolve(), "--joints-deg", "0,0,0,0,60,0", code=0)
+def test_frames_are_not_asked_for_where_the_input_is_closed(study, tmp_path):
+    (tmp_path / "w.src").write_text("PTP {X 1,Y 2,Z 3,A 0,B 0,C 0}\n")
+    command = f'"{sys.executable}" -m kinacc compensate "{study}" --program w.src <&-'
+    assert subprocess.run(["sh", "-c", command], cwd=tmp_path).returncode == 2
+
+
+def test_an_orientation_in_two_forms_is_refused(study, tmp_path):
+    path = tmp_path / "poses.csv"
+    path.write_text("x_mm,y_mm,z_mm,qw,qx,qy,qz,rx_deg,ry_deg,rz_deg\n9,0,8,1,0,0,0,0,90,0\n")
+    assert "more than one form" in call("compensate", study, path, code=2).output
 
 
 def test_what_campaign_start_names_next_runs_as_printed(study, tmp_path):

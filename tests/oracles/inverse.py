@@ -62,14 +62,10 @@ def best_turn(angle: float, limits, preferred=(-math.inf, math.inf)) -> float:
     return min(liked or allowed, key=abs)
 
 
-def same_turn(first: np.ndarray, second: np.ndarray) -> bool:
-    return bool(np.abs(wrapped(np.asarray(first) - second)).max() < 1e-5)
-
-
 def all_solutions(table, target: np.ndarray, starts: np.ndarray) -> list[np.ndarray]:
     """Distinct solutions (whole turns aside) reached from any of the starts (n, k)."""
     found: list[np.ndarray] = []
     for q in newton(table, target, starts):
-        if not any(same_turn(q, other) for other in found):
+        if not any(np.abs(wrapped(q - other)).max() < 1e-5 for other in found):
             found.append(wrapped(q))
     return found

@@ -22,6 +22,12 @@ def main(prog_name: str = "kinacc") -> NoReturn:
     """Run the command line; no signal and no stream ends it in a traceback."""
     if signal.getsignal(signal.SIGINT) != signal.SIG_IGN:  # as of a command in the background
         signal.signal(signal.SIGINT, _leave)
+    for number in range(3):  # the null device stands for closed streams, and no file opened later
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)
+    sys.stdin = sys.stdin or open(0, closefd=False)  # noqa: SIM115
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")

@@ -11,7 +11,7 @@ import numpy as np
 
 from kinacc.config.measured import POSITION, Orientation
 from kinacc.config.names import of_csv
-from kinacc.errors import Problem, refuse
+from kinacc.errors import Problem, input_error, refuse
 from kinacc.geometry import Pose
 from kinacc.measurements import faults
 from kinacc.measurements.intake import pairs
@@ -35,6 +35,7 @@ _FIRST_NAMES = {  # of a file under our names
     POINTS: r"e?x_(?:mm|m)",
     POSES: r"(?:qw|rv?x_(?:deg|rad))",
 }
+_TURNS = {"quaternion": "qw", "rotation_vector": "rvx", "euler": "rx"}
 
 
 @dataclass(frozen=True)
@@ -173,13 +174,14 @@ def open_table(
 def _plain_layout(table: RawTable, need: str) -> Layout:
     """The layout of a table under our names, by the kind of its orientations."""
     names = {*table.columns} if need == POSES else set()
+    kinds = [kind for kind, name in _TURNS.items()
+             if names & {name, f"{name}_deg", f"{name}_rad"}]  # fmt: skip
+    if len(kinds) > 1:
+        message = "is given in more than one form"
+        raise input_error(f"{table.path}: orientation", message, "one form")
+    kind = next(iter(kinds), "none")
     unit = "rad" if "rvx_rad" in names else "deg"
-    kind, columns = "none", {}
-    if "qw" in names:
-        kind = "quaternion"
-    elif f"rvx_{unit}" in names:
-        kind, columns = "rotation_vector", {f"r{axis}": f"rv{axis}_{unit}" for axis in "xyz"}
-    elif names & {"rx_deg", "rx_rad"}:
-        kind = "euler"
+    vector = {f"r{axis}": f"rv{axis}_{unit}" for axis in "xyz"}
+    columns = vector if kind == "rotation_vector" else {}
     turn = Orientation.model_construct(kind=kind, unit=unit)
     return Layout().but(columns=columns, orientation=turn, targets=[TOOL])
