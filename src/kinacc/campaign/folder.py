@@ -251,3 +251,26 @@ def doubts(opened: Opened) -> list[str]:
             "be recorded again?"
         )
     return lines
+
+
+@dataclass(frozen=True)
+class Verification:
+    """A journal whose lines are whole, and whether it ``continues`` the one of a report."""
+
+    campaign: str
+    entries: int
+    readings: int
+    sha256: str
+    continues: bool
+
+
+def verify(opened: Opened, sha256: str | None = None) -> Verification:
+    """Compare a journal with the SHA-256 that a report states of it.
+
+    Checksums of the lines are checked where a journal is opened.
+    """
+    journal = opened.journal
+    count = len(journal.entries)
+    readings = sum(len(entry.get("readings", ())) for entry in journal.entries)
+    continues = sha256 is None or sha256 in map(journal.sha256, range(count + 1))
+    return Verification(opened.digest, count, readings, journal.sha256(), continues)

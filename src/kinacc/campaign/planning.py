@@ -37,6 +37,88 @@ class Aim:
         return self.width_mm is not None or self.tolerance_mm is not None
 
 
+@dataclass(frozen=True)
+class BudgetPlan:
+    """Answer of ``kinacc campaign plan``: ``rows``, one for each kind of errors and budget.
+
+    ``true_mm``: mean largest error of the candidates that the bound is on (all but ``excepted``).
+    ``width_*_mm``: quantiles of upper minus lower bound; 0 where they contradict each other,
+    infinite without a bound on all. ``stated``: share with an upper bound. Of these upper bounds:
+    ``excess_mm``, mean of bound minus truth; ``attainable_mm``, the same of the best design that
+    knows all errors; ``proven_mm``, the excess below which no reliable bound stays (NaN: none);
+    ``holding`` of ``judged`` hold. ``within``: share as narrow as wanted. ``accept``, ``reject``,
+    ``undecided``: shares decided so. ``reached``: campaigns that reach the aim; ``reached_low``:
+    the share that they show with 97.5 % confidence.
+
+    ``budget``: the smallest for which the simulations show with 97.5 % confidence that the share
+    ``power`` of campaigns reaches the aim on all errors, as every larger one does. None where there
+    is none, or no aim.
+    """
+
+    assessor: str
+    candidates: int
+    noise_mm: tuple[float, ...]
+    target: str
+    width_mm: float | None
+    tolerance_mm: float | None
+    power: float
+    repetitions: int
+    seed: int
+    budget: int | None
+    rows: pd.DataFrame
+
+
+def plan_budget(
+    fields: Sequence[ErrorField],
+    candidates: int,
+    covariance_mm2: np.ndarray,
+    assessors: Sequence[AdaptiveAssessor],
+    aim: Aim,
+    repetitions: int = 30,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> BudgetPlan:
+    """Simulate campaigns of assessors, one for each budget, on every kind of errors.
+
+    Parameters
+    ----------
+    fields : sequence of ErrorField
+        Errors in mm from which candidates are drawn.
+    candidates : int
+        Number of candidates of a campaign.
+    covariance_mm2 : (3, 3) array
+        Covariance of a reading, mm^2, robot base frame.
+    assessors : sequence
+        Adaptive assessors that differ in their budget ``measurements``.
+    aim : Aim
+        Width or decision that a campaign is for.
+    repetitions, seed : int
+        Campaigns simulated for each row; the same readings serve all budgets.
+    progress : callable, optional
+        Reports on an iterable.
+
+    Returns
+    -------
+    BudgetPlan
+
+    Raises
+    ------
+    InputError
+        Where a field has too few errors, or an assessor states no bound on the target.
+    """
+    runs = simulate(fields, candidates, covariance_mm2, assessors, repetitions, seed, aim, progress)
+    rows = counted(runs, aim)
+    return BudgetPlan(
+        assessors[0].name,
+        candidates,
+        tuple(np.sqrt(np.diag(covariance_mm2)).tolist()),
+        aim.target,
+        *(aim.width_mm, aim.tolerance_mm, aim.power, repetitions, seed),
+        smallest_budget(rows["budget"], rows["reached_low"], aim),
+        rows,
+    )
+
+
 def simulate(
     fields: Sequence[ErrorField],
     points: int,
@@ -47,35 +129,7 @@ def simulate(
     aim: Aim,
     progress: Progress | None = None,
 ) -> pd.DataFrame:
-    """Simulate campaigns of assessors, one for each budget, on every kind of errors.
-
-    Parameters
-    ----------
-    fields : sequence of ErrorField
-        Errors in mm from which candidates are drawn.
-    points : int
-        Number of candidates of a campaign.
-    covariance_mm2 : (3, 3) array
-        Covariance of a reading, mm^2, robot base frame.
-    assessors : sequence
-        Adaptive assessors that differ in their budget ``measurements``.
-    repetitions, seed : int
-        Campaigns simulated for each kind of errors; the same readings serve all budgets.
-    aim : Aim
-        Width or decision that a campaign is for.
-    progress : callable, optional
-        Reports on an iterable.
-
-    Returns
-    -------
-    DataFrame
-        One row for each simulated campaign.
-
-    Raises
-    ------
-    InputError
-        Where a field has too few errors, or an assessor states no bound on the target.
-    """
+    """Return one row for each simulated campaign; see :func:`plan_budget`."""
     refuse(
         Problem(
             f"errors {field.name}",
@@ -128,17 +182,7 @@ def simulate(
 
 
 def counted(runs: pd.DataFrame, aim: Aim) -> pd.DataFrame:
-    """Return one row for each kind of errors and budget of simulated campaigns (:func:`simulate`).
-
-    ``true_mm``: mean largest error of the candidates that the bound is on (all but ``excepted``).
-    ``width_*_mm``: quantiles of upper minus lower bound; 0 where they contradict each other,
-    infinite without a bound on all. ``stated``: share with an upper bound. Of these upper bounds:
-    ``excess_mm``, mean of bound minus truth; ``attainable_mm``, the same of the best design that
-    knows all errors; ``proven_mm``, the excess below which no reliable bound stays (NaN: none);
-    ``holding`` of ``judged`` hold. ``within``: share as narrow as wanted. ``accept``, ``reject``,
-    ``undecided``: shares decided so. ``reached``: campaigns that reach the aim; ``reached_low``:
-    the share that they show with 97.5 % confidence.
-    """
+    """Return the rows of a :class:`BudgetPlan` for simulated campaigns (:func:`simulate`)."""
     width_mm, excess_mm = runs["upper_mm"] - runs["lower_mm"], runs["upper_mm"] - runs["true_mm"]
     width_mm = width_mm.where(runs["excepted"] == 0).clip(lower=0.0).fillna(math.inf)
     stated = runs["upper_mm"].notna()

@@ -163,21 +163,13 @@ def verify(folder: str, sha256: str | None, out: Output) -> None:
       kinacc campaign verify check --sha256 5bd24b8a..
     """
     opened = folders.open_(folder)
-    journal, entries = opened.journal, len(opened.journal.entries)
-    readings = sum(len(entry.get("readings", ())) for entry in journal.entries)
-    continues = sha256 is None or sha256 in map(journal.sha256, range(entries + 1))
+    checked = folders.verify(opened, sha256)
     against = "FAIL: not the journal of that report; it was shortened or rewritten."
-    text = f"{entries} entries are whole, {readings} readings, SHA-256 {journal.sha256()}"
-    lines = ["PASS." if continues else against, f"{opened.folder}: {text}"]
-    answer = {
-        "campaign": opened.digest,
-        "entries": entries,
-        "readings": readings,
-        "sha256": journal.sha256(),
-        "continues": continues,
-    }
-    out.show(answer, lines=[*lines, *folders.doubts(opened)])
-    if not continues:
+    verdict = "PASS." if checked.continues else against
+    text = f"{checked.entries} entries are whole, {checked.readings} readings"
+    lines = [verdict, f"{opened.folder}: {text}, SHA-256 {checked.sha256}"]
+    out.show(checked, lines=[*lines, *folders.doubts(opened)])
+    if not checked.continues:
         raise SystemExit(AGAINST)
 
 

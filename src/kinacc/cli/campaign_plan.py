@@ -12,7 +12,7 @@ import numpy as np
 
 from kinacc.assess.adaptive import AdaptiveAssessor
 from kinacc.campaign.begin import noise_doubts, noise_of
-from kinacc.campaign.planning import Aim, counted, simulate, smallest_budget
+from kinacc.campaign.planning import Aim, plan_budget
 from kinacc.cli import choice
 from kinacc.cli.campaign_start import assessor_of, instruments_of
 from kinacc.cli.choice import calibration_of, option
@@ -72,40 +72,30 @@ def plan(out: Output, **options: Any) -> None:
     errors, covariance, assessors = _question(options)
     points, repetitions, seed = (options[name] for name in ("candidates", "repetitions", "seed"))
     with reporting("campaign plan", bar=True) as progress:
-        rows = counted(
-            simulate(errors, points, covariance, assessors, repetitions, seed, aim, progress), aim
+        budgets = plan_budget(
+            errors, points, covariance, assessors, aim, repetitions, seed, progress
         )
-    answer: dict[str, Any] = {
-        "assessor": assessors[0].name,
-        "candidates": points,
-        "noise_mm": np.sqrt(np.diag(covariance)).tolist(),
-        **vars(aim),
-        "repetitions": repetitions,
-        "seed": seed,
-        "budget": smallest_budget(rows["budget"], rows["reached_low"], aim),
-        "rows": rows,
-    }
     if out.picture is not None:
         from kinacc.figures.campaign import draw_budgets
 
-        shares = rows.assign(share=rows["reached"] / repetitions)
+        rows = budgets.rows.assign(share=budgets.rows["reached"] / repetitions)
         power = aim.power if aim.is_set else None
-        out.draw(draw_budgets(shares, aim.width_mm, power, answer["budget"]))
-    table = rows.replace(math.inf, math.nan)
+        out.draw(draw_budgets(rows, aim.width_mm, power, budgets.budget))
+    table = budgets.rows.replace(math.inf, math.nan)
     absent = [] if table["excepted"].any() else ["excepted"]
     absent += ["within"] if aim.width_mm is None else []
     absent += ["accept", "reject", "undecided"] if aim.tolerance_mm is None else []
     holding = [f"{row.holding} of {row.judged}" for row in table.itertuples()]
     shown = table.assign(holding=holding)[[*_SHOWN]].drop(columns=absent).rename(columns=_SHOWN)
-    budget = answer["budget"] or int(table["budget"].max())
+    budget = budgets.budget or int(table["budget"].max())
     worst = table[table["budget"] == budget].nsmallest(1, "reached")
-    judged = rows.dropna(subset="attainable_mm")
+    judged = budgets.rows.dropna(subset="attainable_mm")
     last = judged[judged["budget"] == judged["budget"].max()].nlargest(1, "excess_mm")
     limited = next(last.itertuples(), None)
     texts = lines(
-        "campaign_plan.txt", plan=answer, aim=aim, worst=next(worst.itertuples()), limited=limited
+        "campaign_plan.txt", plan=budgets, aim=aim, worst=next(worst.itertuples()), limited=limited
     )
-    out.show(answer, table, texts, shown)
+    out.show(budgets, table, texts, shown)
 
 
 def _question(
