@@ -235,10 +235,8 @@ def _held_out(
     if TOOL in moved:
         names = measured.target_names[: len(names)]
     target = pd.Index(names).get_indexer(list(measured.target_names))[measured.target]
-    held_out, vectors = (
-        held_out_errors(tables["pose_errors"], kind),
-        np.full((len(measured), 3), np.nan),
-    )
+    held_out = held_out_errors(tables["pose_errors"], kind)
+    vectors = np.full((len(measured), 3), np.nan)
     vectors[held_out["row"].to_numpy(int)] = held_out[["ex_mm", "ey_mm", "ez_mm"]]
     named = replace(measured, target=target, target_names=names)
     rows = _whole_configurations(named, np.isfinite(vectors).all(axis=1) & (target >= 0))
