@@ -4,6 +4,7 @@ import shlex
 import shutil
 from pathlib import Path
 
+import pandas as pd
 import pytest
 from command_line import call
 from tracked_arm import NAMES, table, tracked
@@ -68,3 +69,19 @@ def test_lines_that_are_excluded_already_or_none_leave_the_file_as_it_is(two_sli
         words = ("exclude", "seen.yaml", "--lines", lines, "--reason", "x")
         assert "Traceback" not in printed(*words, code=2)
         assert Path("seen.yaml").read_bytes() == before
+
+
+def test_rows_outside_the_limits_stop_the_workflow_until_they_are_excluded(two_slips):
+    path, robot = Path("seen.yaml"), Path("seen.robot.yaml")
+    robot.write_text(robot.read_text().replace("[-360", "[-70", 1))
+    path.write_text(path.read_text().replace(load([path])["seen"]["robot"], robot.name))
+    before = path.read_bytes()
+    call("check-data", path, "--accept", "outside_limits", "--reason", "x", code=2)
+    assert path.read_bytes() == before
+    *excluding, _ = next_commands(printed("check-data", path, code=1))
+    for words in excluding:
+        call(*words[1:], code=0)
+    assert next_commands(printed("check-data", path)) == [["kinacc", "calibrate", "seen.yaml"]]
+    beyond = pd.read_csv("seen.csv")["q1_deg"] < -70.0
+    lines, _ = (item["lines"] for item in load([path])["seen"]["measurements"]["file"]["exclude"])
+    assert lines == [*beyond.index[beyond] + 2]

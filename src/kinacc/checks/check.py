@@ -33,12 +33,12 @@ from kinacc.measurements.faults import LIMIT_SLACK
 from kinacc.measurements.layout import Layout
 from kinacc.measurements.reader import MeasuredFile, read
 from kinacc.progress import SILENT
-from kinacc.tables.allowed import LEFT_OUT
+from kinacc.tables.allowed import LEFT_OUT, OUTSIDE_LIMITS
 from kinacc.tables.columns import Columns
 from kinacc.tables.contract import columns_of
 
 _FEWEST_POSES = 6
-_SYMPTOMS = ("outliers", "outside_limits")
+_SYMPTOMS = ("outliers", OUTSIDE_LIMITS)
 _OTHER_LENGTHS = 0.01  # of the arm's: real arms are off their description by a tenth of that
 _GROSS = 20.0  # robust spreads per axis: further off is no reading of this arm
 
@@ -238,7 +238,7 @@ def _outside(every: Readings, robot: Robot) -> Iterator[Finding]:
     """Rows in which a joint is beyond its limits."""
     for item in outside_limits(robot, every.q, LIMIT_SLACK):
         yield finding(
-            "outside_limits",
+            OUTSIDE_LIMITS,
             every.line[item.rows],
             joint=item.joint,
             largest=item.values[np.argmax(np.abs(item.values))],

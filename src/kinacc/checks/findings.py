@@ -11,14 +11,15 @@ import numpy as np
 import yaml
 
 from kinacc.measurements.row_names import RowNames
-from kinacc.tables.allowed import LEFT_OUT
+from kinacc.tables.allowed import LEFT_OUT, OUTSIDE_LIMITS
 
 STOPS, WARNING, NOTE = "stops", "warning", "note"
 TEXTS: dict[str, list[str]] = yaml.safe_load(
     (files("kinacc.checks") / "findings.yaml").read_text("utf-8")
 )
-_OF_ROWS = {"outside_limits", "target_swapped", "duplicate_rows", "repeated_reading", "outliers"}
-_WARN = _OF_ROWS | {"commanded_joints"}  # they stop a workflow where a reading is far off
+_WARN_OF_ROWS = {"target_swapped", "duplicate_rows", "repeated_reading", "outliers"}
+_OF_ROWS = _WARN_OF_ROWS | {OUTSIDE_LIMITS}
+_WARN = _WARN_OF_ROWS | {"commanded_joints"}  # they stop a workflow where a reading is far off
 _NOTES = {"thin_coverage", LEFT_OUT}
 _NEVER_STOP = _NOTES | {"largest_rows"}
 VERDICTS = ("clean", "suspicions", "unusable")  # by exit code
@@ -78,7 +79,8 @@ class Finding:
             return [accept]
         runs = np.split(self.lines, np.flatnonzero(np.diff(self.lines) > 1) + 1)
         lines = ",".join(f"{run[0]}" if len(run) < 2 else f"{run[0]}-{run[-1]}" for run in runs)
-        return [f'kinacc exclude {config} --lines {lines} --reason ".."', accept]
+        exclude = f'kinacc exclude {config} --lines {lines} --reason ".."'
+        return [exclude] if self.kind == OUTSIDE_LIMITS else [exclude, accept]
 
 
 def finding(key: str, lines: Iterable[int] = (), **values: Any) -> Finding:

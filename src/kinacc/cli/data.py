@@ -20,6 +20,7 @@ from kinacc.checks.findings import VERDICTS, Report
 from kinacc.cli.choice import CONFIG, DATASET, REASON, option
 from kinacc.cli.output import Output, answers
 from kinacc.cli.process import AGAINST, DONE, UNUSABLE
+from kinacc.config import schema
 from kinacc.config.edit import with_added
 from kinacc.config.series import MOVED, SAME
 from kinacc.deployment import adding
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
 
 _MOST = 100_000  # lines of a range
 _SETUP = click.Choice([SAME, MOVED])
+_FINDING = click.Choice(schema.key("data_check.accept")["propertyNames"]["enum"])
 _DAY = click.DateTime(["%Y-%m-%d"])
 _EMPTY_REASON = Problem("--reason", "is empty", "why, in words")
 
@@ -42,7 +44,8 @@ _EMPTY_REASON = Problem("--reason", "is empty", "why, in words")
 @click.command("check-data")
 @click.argument("files", nargs=-1, type=click.Path())
 @option("--dataset", multiple=True, help="Data set of the configuration; repeatable. [all]")
-@option("--accept", metavar="FINDING", help="Finding to go on with, kept in FILE.yaml.")
+@option("--accept", type=_FINDING, metavar="FINDING",
+        help="Finding to go on with, kept in FILE.yaml.")  # fmt: skip
 @REASON
 @answers(picture="Picture of one data set: .svg, .png or .pdf.")
 def check_data(

@@ -91,7 +91,7 @@ def _loaded(section: Mapping[str, Any]) -> RawTable:
     excluded, where = excluded_lines(section), "measurements.file.exclude"
     absent = sorted(set(excluded) - set(table.line.tolist()) - set(table.not_rows))
     if absent:
-        message = f"line{'s' * (len(absent) > 1)} {', '.join(map(str, absent))} hold no reading"
+        message = f"no reading in line{'s' * (len(absent) > 1)} {', '.join(map(str, absent))}"
         allowed = f"lines {table.line[0]} to {table.line[-1]} of {table.path}"
         raise input_error(where, message, allowed)
     if len(excluded) == len(table):
