@@ -120,6 +120,11 @@ def test_references_without_a_change_alarm_as_rarely_as_stated(freedom):
     assert 0.6 * FALSE_ALARMS < alarm.mean() < FALSE_ALARMS + 3.0 * spread
 
 
+def test_a_change_that_went_back_is_still_found():
+    plan, rng = schedule(200, 180, 60), np.random.default_rng(3)
+    assert find_change(plan, read(plan, rng, lambda time: 9.0 * (0.1 < time < 0.2))).is_found
+
+
 def test_a_drift_of_three_deviations_is_said():
     plan, rng = schedule(200, 180, 20), np.random.default_rng(3)
     readings = [read(plan, rng, lambda time: 3.0 * time) for _ in range(300)]

@@ -66,6 +66,12 @@ def left_out(points, seen, error):
     raise AssertionError
 
 
+@pytest.mark.parametrize(("budget", "visited"), [(194, 175), (195, 195), (204, 195), (205, 200)])
+def test_candidates_are_left_out_where_hardly_a_reading_would_confirm(budget, visited):
+    """195 of 200 are the fewest of which 5 others hold the largest in 2.5 % of cases at most."""
+    assert SearchAndConfirm(measurements=budget).visit(200) == visited
+
+
 @pytest.mark.parametrize(("points", "budget"), [(60, 90), (60, 300), (40, 200)])
 def test_the_upper_bound_follows_from_the_raw_readings(points, budget):
     said, given, sigma = campaign(points, budget)

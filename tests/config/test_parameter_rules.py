@@ -18,11 +18,12 @@ def joint_rules(content):
 
 def test_the_rule_that_says_most_holds_in_any_order():
     content = {"d": "fixed", "joint 3": "free", "joint 3 d": {"prior_std_mm": 0.5}}
+    content["joint 4"] = "free"
     nominal = load("mh180").dh
     for names in (list(content), list(content)[::-1]):
         rules = joint_rules({name: content[name] for name in names})
         terms = arm_terms(nominal, free_parameters(6), rules)
-        np.testing.assert_array_equal(terms.free[:, 1], [False, False, True, False, False, False])
+        np.testing.assert_array_equal(terms.free[:, 1], [False, False, True, True, False, False])
         assert terms.std[2, 1] == 0.5
         assert np.isinf(np.delete(terms.std, 2, axis=0)).all()
         assert terms.free[:, [0, 2, 3]].all()

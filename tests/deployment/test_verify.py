@@ -14,7 +14,7 @@ from kinacc.calibration.observations import from_columns, full_poses
 from kinacc.deployment.folder import calibration, read_tables, robot_of
 from kinacc.deployment.permutation import ErrorColumns, compare, smallest_changes
 from kinacc.deployment.predict import predict
-from kinacc.deployment.verify import error_columns, model_errors
+from kinacc.deployment.verify import error_columns, model_errors, verify
 from kinacc.errors import InputError
 from kinacc.geometry import Pose, exp_so3
 from kinacc.kinematics import dh, robot
@@ -189,6 +189,17 @@ def test_an_arm_passes_that_did_not_change_alone(folder, later, grown, count, ve
     assert (
         (test["rms_mm"] < test["limit_mm"]) == (verdict == "pass") == (test["probability"] > 0.01)
     )
+
+
+def test_an_arm_far_from_its_nominal_lengths_was_not_set_up_anew(folder):
+    tables = read_tables(folder[1], "pose_errors")
+    moved, apart = ({name: table.copy() for name, table in tables[each].items()}
+                    for each in ("measurements", "frames"))  # fmt: skip
+    moved["x_mm"] += 1e-3
+    apart["x_mm"][apart["model"] == "nominal"] += 20.0
+    answer = verify(tables | {"frames": apart}, moved, (), 500.0)
+    assert answer.errors["mean_mm"].max() > 10.0
+    assert answer.test == verify(tables, moved, (), 500.0).test is not None
 
 
 def test_readings_that_were_fitted_are_left_out_and_the_others_count(folder, later):

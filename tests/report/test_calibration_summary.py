@@ -2,6 +2,7 @@
 
 import math
 import shutil
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -83,6 +84,9 @@ def test_a_campaign_bounds_the_robot_it_is_about_and_no_other_by_its_own_toleran
     assert (bound["confidence"], status["candidates"], status["readings"]) == (0.95, 5, 8)
     assert (verdict["tolerance_mm"], verdict["verdict"]) == (2.0, "accept")
     assert (found["line_a"]["campaign"], found["line_a"]["verdict"]) == (None, None)
+    summary = summarise.summarise("results/line_b")
+    some = replace(summary.campaign, bounds=[replace(summary.campaign.of_all, excepted=1)])
+    assert replace(summary, campaign=some).verdict("bound", 2.0).verdict == "undecided"
     wide_mm = bound["upper_mm"] + 0.01
     for own_mm, tolerance_mm, confidence, wanted in (
         (None, wide_mm, 0.95, PASSED), (wide_mm, 1e-3, None, PASSED), (None, wide_mm, 0.96, FAILED),

@@ -10,7 +10,7 @@ import pytest
 from kinacc.errors import InputError
 from kinacc.kinematics import dh, robot
 from kinacc.synthetic import accepted, measure, physical, plan
-from kinacc.synthetic.draw import TABLE_II, Scales, physical_robot
+from kinacc.synthetic.draw import TABLE_II, Roughness, Scales, physical_robot
 from kinacc.synthetic.physical import Visits
 from kinacc.synthetic.plan import calibration_run, measured
 
@@ -46,6 +46,13 @@ def test_backlash_follows_travel_and_closes_under_load():
     assert np.all(forth > 0.0)
     assert forth[0] == pytest.approx(arm_of.beyond.backlash_rad[0])
     assert forth[1] < 0.5 * arm_of.beyond.backlash_rad[1]
+
+
+def test_waves_that_fall_faster_are_of_the_same_size_together():
+    scales = Scales(1.0, 1.0, 0.0, 0.0)
+    arms = [physical_robot(0, scales, roughness=Roughness(decay, 1.0)) for decay in (0.5, 1.0, 2.0)]
+    sizes = [np.linalg.norm(arm.smooth.amplitude) for arm in arms]
+    assert sizes == pytest.approx([sizes[1]] * 3, rel=0.05)
 
 
 def test_smooth_errors_are_waves_over_the_working_range():
