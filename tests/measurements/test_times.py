@@ -35,3 +35,10 @@ def test_the_offset_between_two_clocks_is_found():
     points_s = stands.mean(axis=1) - 1234.5 + rng.uniform(-0.1, 0.1, 40)
     offset, *_ = offsets(points_s, stands, within_s)
     assert offset == pytest.approx(1234.5, abs=0.25)
+
+
+def test_of_offsets_that_fit_as_many_points_the_middle_of_the_widest_span_is_taken():
+    begin_s = np.array([0.0, 10.0, 21.0, 33.0, 46.0, 60.0])
+    # The last but one fits below -0.25 s, the last above: five of six from -0.5 to 0.5 s.
+    points_s = begin_s + np.array([0.5, 0.5, 0.5, 0.5, 1.25, 0.25])
+    assert offsets(points_s, begin_s[:, None] + [0.0, 1.0], 0.05) == [0.125]

@@ -54,11 +54,13 @@ UR10_FILE = """<?xml version="1.0"?>
     <parent link="w3"/><child link="camera"/></joint>
 </robot>
 """
-TAIL = """<link name="ee"/><link name="probe"/>
+TAIL = """<link name="ee"/><link name="rod"/><link name="probe"/>
   <joint name="hand" type="fixed"><origin xyz="0 0.0922 0" rpy="0 0 1.5707963267948966"/>
     <parent link="w3"/><child link="ee"/></joint>
   <joint name="stick" type="fixed"><origin xyz="0 0 0.2" rpy="0.1 0.2 0.3"/>
-    <parent link="ee"/><child link="probe"/></joint>"""
+    <parent link="ee"/><child link="rod"/></joint>
+  <joint name="ball" type="fixed"><origin xyz="0.03 0 0.01" rpy="-0.4 0.1 0"/>
+    <parent link="rod"/><child link="probe"/></joint>"""
 
 
 def of(arm, path=None, tip=None):
@@ -134,7 +136,7 @@ def test_a_file_of_ones_own_is_corrected_in_place(tmp_path, robot_from, tail):
     arm = bent(base_robot)
     done = urdf.text(of(arm, path, tip))
     joints = [joint.name for joint in robot.urdf.joints_between(path, "world", tip)]
-    names = [name for name in joints if name not in ("stand", "mount", "hand", "stick")]
+    names = [name for name in joints if name not in ("stand", "mount", "hand", "stick", "ball")]
     q_rad = some_joints(base_robot)
     slides = np.zeros(6, dtype=bool)
     before = seen_by_pinocchio(pin.buildModelFromXML(text), tip, q_rad, slides, names, "world")

@@ -232,7 +232,7 @@ RAPID = """%%%
 %%%
 MODULE Weld
   PERS tooldata tGun:=[TRUE,%TOOL,[1,[0,0,1],[1,0,0,0],0,0,0]];
-  PERS wobjdata wTab:=[FALSE,TRUE,"",%BASE,[[0,0,0],[1,0,0,0]]];
+  PERS wobjdata wTab:=[FALSE,TRUE,"",%USER,%OBJECT];
   ! caf\xe9: [[1,2,3],[1,0,0,0]] stays
   CONST robtarget p10:=@P;
   LOCAL CONST robtarget p20:=@P;
@@ -292,7 +292,9 @@ def abb(arm: Arm, points: np.ndarray, tool: np.ndarray, base: np.ndarray) -> Pro
         return f"[[{','.join(program.add(q, True))}],[9E9,9E9,9E9,9E9,9E9,9E9]]"
 
     text = _filled(RAPID, points, P=pose, J=joints).replace("%F", "tGun\\WObj:=wTab")
-    for mark, frames in (("%TOOL", tool), ("%BASE", base)):
+    user = tool  # any frame: the object's stands in it
+    marks = {"%TOOL": tool, "%USER": user, "%OBJECT": np.linalg.inv(user) @ base}
+    for mark, frames in marks.items():
         values = [f"{value:.9f}" for value in program.convention.of_pose(frames)]
         text = text.replace(mark, f"[{framed(values)}]")
     program.files = {".mod": text}
