@@ -189,5 +189,7 @@ def test_the_lower_bound_of_single_readings_counts_every_point():
     campaign = SingleShot(40).begin(Candidates.with_equal_noise(np.full(40, 0.1)))
     for row in range(40):
         campaign.record(row, [0.1 * row, 0.0, 0.0])
-    lower_mm = campaign.statements()[0].lower_mm
-    assert ncx2.sf(1521.0, 3, 100.0 * lower_mm**2) == pytest.approx(0.05 / 40, rel=1e-3)
+    for lower_mm in (campaign.statements()[0].lower_mm, campaign.point_limits()[39][0]):
+        assert ncx2.sf(1521.0, 3, 100.0 * lower_mm**2) == pytest.approx(0.05 / 40, rel=1e-3)
+    upper_mm = campaign.point_limits()[39][1]
+    assert ncx2.cdf(1521.0, 3, 100.0 * upper_mm**2) == pytest.approx(0.05, rel=1e-3)

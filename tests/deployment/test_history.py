@@ -64,6 +64,10 @@ def test_a_tracker_that_was_moved_is_seen_but_not_beside_as_large_a_drift():
         found = history(*lines)
         assert found["verdict"][1] == verdict
         assert found["moved_mm"][1] == pytest.approx(0.3, abs=0.05)
+    # Either series may be in a state as large as these, along any of 25 directions.
+    state_mm2 = np.mean((drift_mm * np.linspace(-1.0, 1.0, len(seen))) ** 2) / 25
+    chance_mm = np.sqrt(2.0 * state_mm2 * scipy.stats.chi2.isf(LEVEL, 25))
+    assert found["chance_mm"][1] == pytest.approx(chance_mm, rel=0.05)
 
 
 def test_chance_along_all_directions_alike_is_that_of_chi_square(monkeypatch):
