@@ -35,11 +35,11 @@ def test_a_name_joins_whatever_the_order(there, here, tmp_path):
 def test_what_stays_unmatched_is_printed_with_its_lines(tmp_path):
     rows = np.arange(COUNT)
     joints = table(["Name", *Q], named("P{}", rows[3:]), IT.q[3:])
-    points = table(["Name", *XYZ], named("P{}", rows[:-2]), IT.point[:-2])
+    points = table(["Name", *XYZ], named("P{}", rows[1:8]), IT.point[1:8])
     files = written(tmp_path, joints_csv=joints, tracker_csv=points)
     section, _ = looked(files)
-    assert_read(section, IT, rows[3:-2])
-    assert "lines 2-4" in "\n".join(read(section, robot.load("ur10")).notes)
+    assert_read(section, IT, rows[3:8])
+    assert "lines 2-3" in "\n".join(read(section, robot.load("ur10")).notes)
 
 
 def test_as_many_rows_without_a_key_are_asked_about(tmp_path):
