@@ -56,6 +56,16 @@ def test_stated_masses_give_the_compliance_of_each_joint():
     assert np.sqrt(found.solution.variance) == pytest.approx(NOISE_MM, rel=0.15)
 
 
+def test_a_load_that_is_stated_in_some_rows_only_does_not_change():
+    """Where masses are unknown, loads that change show the compliance by itself."""
+    settings, seen = defaults()["calibration"], measured(2)
+    settings["compliance"] |= {"joints": [2], "payload": {"mass_kg": 5.0, "centre_mm": [0, 0, 9]}}
+    for mass_kg, changes in ((5.0, False), (6.0, True)):
+        seen.payload[0] = [mass_kg, 0.0, 0.0, 9.0]
+        model = ComplianceEstimator.of(settings, ARM, seen).stiff
+        assert np.isfinite(model.coefficients[1]).tolist() == [changes, True]
+
+
 def test_a_joint_that_gravity_does_not_turn_is_undetermined_and_stays_stiff():
     seen = measured()
     found = fitted(seen, [1, 2, 3])  # axis 1 is upright

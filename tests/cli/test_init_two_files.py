@@ -69,9 +69,9 @@ def test_one_name_for_two_poses_is_refused(tmp_path):
 
 
 def dense_log():
-    """A controller's record of joints: a pose is held for eight seconds, then left in six."""
+    """A controller's record: a pose is held for eight seconds, then left joint by joint in six."""
     time = np.arange(0.0, 14.0, 0.2)
-    share = np.clip((time - 7.8) / 6.2, 0.0, 1.0)[:, None]
+    share = np.clip((time[:, None] - 7.8 - np.arange(6)) / 1.2, 0.0, 1.0)
     after = np.roll(IT.q, -1, axis=0)
     q = (1.0 - share) * IT.q[:, None] + share * after[:, None]
     return np.ravel(START_S[:, None] + time), q.reshape(-1, 6)
