@@ -51,7 +51,8 @@ def judged(folder, results, language, arm):
     path = program.write(folder, "weld")
     before = path.read_bytes()
     out = path.with_name(f"weld_cal{path.suffix}")
-    call("compensate", results, "--program", path, "-o", out, *options(program, folder), code=0)
+    files = "-o", out, "--table", folder / "changes.csv"
+    call("compensate", results, "--program", path, *files, *options(program, folder), code=0)
     assert path.read_bytes() == before
     frames = pd.read_parquet(results / "frames.parquet")
     row = frames[(frames["model"] == "dh") & (frames["frame"] == "base")].iloc[0]
@@ -64,6 +65,8 @@ def judged(folder, results, language, arm):
     pooled = residuals[residuals["fold"].isna() & (residuals["subset"] == "validation")]
     held = pooled[pooled["comparison"] == f"{chosen.iloc[0]}_vs_measured"]
     allowed = FACTOR * held.set_index("quantity")["mean"]
+    rms_mm = held.set_index("quantity")["rms"]["position"]
+    assert pd.read_csv(files[-1])["expected_error_mm"].between(rms_mm, 2.0 * rms_mm).all()
     assert as_written[:, 0].mean() > 1.0
     assert corrected[:, 0].mean() <= allowed["position"]
     assert corrected[:, 1].mean() <= allowed["orientation"]
@@ -77,8 +80,13 @@ def test_the_true_arm_goes_where_the_program_means(tmp_path, language):
 
 
 def test_an_arm_whose_axes_run_unevenly_goes_there_by_its_vec_model(tmp_path):
-    arm = replace(ARMS["kuka"], wave=1e-3)
-    assert judged(tmp_path, calibrated("kuka", 1e-3, 200, 4), "kuka", arm) == "vec"
+    arm, results = replace(ARMS["kuka"], wave=1e-3), calibrated("kuka", 1e-3, 200, 4)
+    assert judged(tmp_path, results, "kuka", arm) == "vec"
+    seen = pd.read_parquet(results / "measurements.parquet").filter(regex=r"^q\d$")
+    beyond = np.rad2deg(seen.mean().where(seen.columns != "q5", seen.max() + 0.02))  # or turned
+    beyond.add_suffix("_deg").to_frame().T.to_csv(tmp_path / "beyond.csv", index=False)
+    told = answer("compensate", results, "--program", tmp_path / "beyond.csv", code=1)
+    assert told["table"][0]["status"].endswith("outside range: joint 5")
 
 
 @pytest.mark.parametrize("maker", MAKERS)

@@ -272,17 +272,17 @@ class _Correction:
         for name in dict.fromkeys(positions[number].tool for number in starts):
             group = [number for number in starts if positions[number].tool == name]
             tool = self.frame(TOOL, positions[group[0]])
-            place, remark = _carried(self.calibration, tool, point)
+            target, place, remark = _carried(self.calibration, tool, point)
             remarks += [f"Tool {name or ''}: {remark}"] if remark else []
             q_rad = np.stack([starts[number] for number in group])
-            parts.append(_corrected(self.calibration, q_rad, place, tool).set_axis(group))
+            parts.append(_corrected(self.calibration, q_rad, target, place, tool).set_axis(group))
         return pd.concat(parts[1:] or parts), remarks
 
     def obstacle(self, position: Position, row: Any, at_most_mm: float) -> str:
         """Why a position cannot be corrected as its ``row`` has it; empty where it can."""
         if row.outcome > PoseStatus.EXTRAPOLATED:
             status = PoseStatus(row.outcome).name.lower().replace("_", " ")
-            return f"the calibrated arm: {status}"
+            return f"the calibrated arm: {status}" + f": joint {row.joints}" * bool(row.joints)
         if row.change_mm > at_most_mm:
             return f"would move by {row.change_mm:.3g} mm (--at-most-mm; is --tool right?)"
         if not position.posture:
@@ -352,8 +352,11 @@ def _all_frames(
     return frames
 
 
-def _carried(calibration: Calibration, tool: Pose, point: str | None) -> tuple[Pose, str]:
-    """The program's tool on the calibrated arm, in the last frame of its model, and a remark."""
+def _carried(calibration: Calibration, tool: Pose, point: str | None) -> tuple[str, Pose, str]:
+    """The program's tool on the calibrated arm: its name, its place in the last frame, a remark.
+
+    The name is that of the target whose place and covariance are its own.
+    """
     mounted = compose(compose(_moved(calibration), calibration.robot.flange), tool)
     for target in [point] if point else calibration.targets:
         place = calibration.point(target)
@@ -363,8 +366,8 @@ def _carried(calibration: Calibration, tool: Pose, point: str | None) -> tuple[P
         if target != FLANGE and (point or (gap_mm <= _SAME_TOOL_MM and gap_rad <= _SAME_TOOL_RAD)):
             gap = f"{gap_mm:.3g} mm and {1e3 * gap_rad:.3g} mrad"
             remark = f"the calibrated {target}, {gap} from the controller's tool, takes its place"
-            return place, f"{remark} (--point flange: the controller's tool)."
-    return mounted, ""
+            return target, place, f"{remark} (--point flange: the controller's tool)."
+    return _POINT, mounted, ""
 
 
 def _moved(calibration: Calibration) -> Pose:
@@ -377,21 +380,29 @@ def _moved(calibration: Calibration) -> Pose:
 
 
 def _corrected(
-    calibration: Calibration, start: np.ndarray, carried: Pose, tool: Pose
+    calibration: Calibration, start: np.ndarray, target: str, carried: Pose, tool: Pose
 ) -> pd.DataFrame:
-    """Outcomes of positions of one tool: corrected joints, nominal poses there, changes."""
+    """Outcomes of positions of one tool: corrected joints, nominal poses there, changes.
+
+    Joints that the model does not cover are so whatever another posture would reach.
+    """
     robot, anchor = calibration.robot, calibration.anchor
     if anchor is not None:
         place = compose(invert(_moved(calibration)), carried)
-        anchor = replace(anchor, targets={**anchor.targets, _POINT: place})
-    targets = {**calibration.targets, _POINT: carried}
+        anchor = replace(anchor, targets={**anchor.targets, target: place})
+    targets = {**calibration.targets, target: carried}
     arm = replace(calibration, targets=targets, anchor=anchor)
     wanted = compose(forward(robot, start), tool)
-    result = inverse.compensate(arm, wanted, start, point=_POINT)
-    q_rad = np.where(np.isfinite(result.q_rad), result.q_rad, start)
+    result = inverse.compensate(arm, wanted, start, point=target)
+    beyond = arm.outside_range(robot.dh_joints(start))
+    other = (result.status == PoseStatus.OTHER_POSTURE) & beyond.any(axis=1)
+    status = np.where(other, PoseStatus.OUTSIDE_RANGE, result.status)
+    beyond = np.where(other[:, None], beyond, result.offending)
+    joints = [", ".join(map(str, 1 + np.flatnonzero(row))) for row in beyond]
+    q_rad = np.where(np.isfinite(result.q_rad) & ~other[:, None], result.q_rad, start)
     new = compose(forward(robot, q_rad), tool)
     shift_mm, turn_rad = inverse.distance(new, wanted)
-    known = predict(arm, q_rad, point=_POINT)
+    known = predict(arm, q_rad, point=target)
     slopes = dh.joint_jacobian(robot.dh, robot.dh_joints(q_rad))
     slopes[:, :3] /= np.sum(np.abs(robot.dh.a_mm) + np.abs(robot.dh.d_mm))
     errors_mm = np.nan_to_num([known.unexplained[:, 0], known.std_position_mm])
@@ -399,7 +410,8 @@ def _corrected(
         {
             "q_rad": list(q_rad),
             "pose": [Pose(*parts) for parts in zip(*new, strict=True)],
-            "outcome": result.status,
+            "outcome": status,
+            "joints": joints,
             "change_mm": shift_mm,
             "change_mrad": 1e3 * turn_rad,
             "largest_joint_change_deg": np.rad2deg(np.abs(q_rad - start).max(axis=1)),
