@@ -167,16 +167,6 @@ def test_coupled_joints_keep_the_limits_of_what_is_reported():
     q = np.random.default_rng(1).uniform(-1.0, 1.0, (5, 6))
     assert np.allclose(limits.reported_joints(arm, arm.dh_joints(q)), q)
     assert limits.uncoupled(arm).tolist() == [True, False, False, True, True, True]
-    assert np.isinf(limits.dh_limits(arm)[0][1:3]).all()
-
-
-def test_limits_of_a_joint_that_counts_backwards_are_exchanged():
-    backwards = np.diag([1.0, -1.0, 1.0, 1.0, 1.0, 1.0])
-    low, high = np.full(6, -0.5), np.full(6, 1.5)
-    arm = replace(arms.OFFSET_WRIST, joint_map=backwards, q_min_rad=low, q_max_rad=high)
-    lower, upper = limits.dh_limits(arm)
-    assert lower.tolist() == [-0.5, -1.5, *[-0.5] * 4]
-    assert upper.tolist() == [1.5, 0.5, *[1.5] * 4]
 
 
 def test_solutions_outside_the_fitted_range_say_so():

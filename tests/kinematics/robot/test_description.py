@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from pathlib import Path
 
 import numpy as np
@@ -70,14 +69,6 @@ def test_a_coupled_joint_is_turned_by_both(arm):
     same = robot.forward(plain, np.array([[0.1, 0.2, 30.0, 0.6]]))
     assert np.allclose(pose.position_mm, same.position_mm)
     assert np.allclose(coupled.dh_joints(q), [[0.1, 0.2, 30.0, 0.6]])
-
-
-def test_a_box_of_reported_joints_spans_what_its_corners_reach_in_dh_joints():
-    arm = robot.load("fanuc_lrmate200id")
-    assert np.diag(arm.joint_map).min() < 0.0
-    low, high = arm.q_min_rad, arm.q_max_rad
-    corners = arm.dh_joints(np.where(list(itertools.product([False, True], repeat=6)), high, low))
-    np.testing.assert_allclose(arm.dh_box(low, high), [corners.min(axis=0), corners.max(axis=0)])
 
 
 def test_base_flange_and_tool_frames_are_read(arm):
