@@ -37,12 +37,6 @@ def test_sessions_share_the_arm_and_not_the_base(kind, noise_mm):
     assert np.nanmedian(found.std / alone.std) == pytest.approx(0.5, abs=0.2)
 
 
-def test_a_session_of_three_poses_is_placed():
-    seen = observed(POINT, 2, 80)
-    few = (seen.session == 0) | (np.cumsum(seen.session == 1) <= 3)
-    assert np.sqrt(fit(seen.select(few), ARM.dh, FREE).solution.variance) < 0.03
-
-
 def test_a_dh_model_that_follows_the_vec_model_is_of_all_sessions(tmp_path):
     rng = np.random.default_rng(2)
     arm = replace(ARM, dh=disturbed(ARM.dh, np.ones((6, 5), dtype=bool), rng))
