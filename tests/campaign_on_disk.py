@@ -3,16 +3,45 @@
 from __future__ import annotations
 
 from collections import Counter
+from functools import cache
 
 import numpy as np
 from command_line import answer, call
 
 from kinacc.assess.world import carry_on, drawn_world, key_of
+from kinacc.campaign import begin
 from kinacc.campaign import folder as campaigns
 from kinacc.campaign.campaign import Campaign
+from kinacc.campaign.instrument import instruments
+from kinacc.campaign.plan import Limits, Plan, assessor_of
 from kinacc.campaign.state import Reading, Readings
+from kinacc.deployment.planning import spread
+from kinacc.deployment.record import nominal
+from kinacc.kinematics import robot as robots
 
 SIGMA_MM = 0.05
+
+
+@cache
+def mh180():
+    """The nominal arm of all plans."""
+    return nominal(robots.load("mh180"))
+
+
+def make_plan(
+    assessor="search_and_confirm", points=40, budget=40, texts=("tracker=0.05",), frame="base",
+    limits=None, names=None, **settings,
+) -> Plan:  # fmt: skip
+    """A plan of a campaign over ``points`` candidates."""
+    arm = mh180()
+    labels = names or [f"p{i}" for i in range(points)]
+    found = begin.points_of(arm, spread(arm.robot, points), labels)
+    chosen = assessor_of(assessor, {"measurements": budget, **settings})
+    used = instruments(texts, frame)
+    limits = limits or Limits(np.deg2rad(0.02), 10.0)
+    about = {"robot": "mh180", "calibration": "none", "model": "nominal", "point": "tool",
+             "candidates": "drawn"}  # fmt: skip
+    return begin.plan_of(arm, found, chosen, used, limits, about, 3)
 
 
 def readings_of(plan, read, left_out=frozenset(), limit=None):

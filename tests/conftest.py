@@ -86,6 +86,17 @@ NIGHT = tuple(
     )
 )
 
+
+@pytest.fixture(scope="session")
+def study(tmp_path_factory):
+    """Results folder of a small synthetic study, made once; left as it was by every test."""
+    from command_line import small_study  # imports all of kinacc
+    from shared_work import once
+
+    folder = once(tmp_path_factory, "small study", small_study)
+    return folder / "results" / "mh180"
+
+
 settings.register_profile("repeatable", derandomize=True, deadline=None, database=None)
 settings.register_profile("night", settings.get_profile("repeatable"), max_examples=1000)
 settings.load_profile("repeatable")

@@ -9,7 +9,7 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from command_line import call, small_study
+from command_line import call
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
@@ -86,8 +86,8 @@ def folder(tmp_path_factory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def results(tmp_path_factory) -> Path:
-    return small_study(tmp_path_factory.mktemp("results"))
+def results(study, tmp_path_factory) -> Path:
+    return shutil.copytree(study, tmp_path_factory.mktemp("results") / "arm")
 
 
 @settings(max_examples=10)

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from campaign_on_disk import make_plan, mh180
 
 from kinacc.assess.registry import ADAPTIVE
 from kinacc.campaign import begin
@@ -71,7 +72,8 @@ def test_readings_as_the_calibration_predicts_them_have_no_error(anchored):
     np.testing.assert_allclose(in_base, plan.points.modelled_mm, atol=1e-9)
 
 
-def test_candidates_that_cannot_be_measured_against_the_model_are_named(arm):
+def test_candidates_that_cannot_be_measured_against_the_model_are_named():
+    arm = mh180()
     joints = spread(arm.robot, 4)
     with pytest.raises(InputError, match="all 3 are at the same joints"):
         begin.points_of(arm, joints[[0, 0, 0]], ["a", "b", "c"])
@@ -83,7 +85,7 @@ def test_candidates_that_cannot_be_measured_against_the_model_are_named(arm):
     assert "joint 2 outside the limits" in refused.value.problems[0].what
 
 
-def test_many_candidates_are_driven_to_in_an_order_with_less_travel(make_plan):
+def test_many_candidates_are_driven_to_in_an_order_with_less_travel():
     plan = make_plan(points=420, budget=500)
 
     def travel(route):

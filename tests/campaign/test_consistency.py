@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from campaign_on_disk import entry_of, readings_of
+from campaign_on_disk import entry_of, make_plan, readings_of
 
 from kinacc.campaign.state import Reading, restore, scatter, size_scatter
 
@@ -24,7 +24,7 @@ def campaign(plan, errors_mm, spread_mm, seed=0):
 
 
 @pytest.mark.parametrize("factor", [0.4, 1.0, 2.0])
-def test_repeated_readings_scatter_by_their_noise_over_the_noise_stated(make_plan, factor):
+def test_repeated_readings_scatter_by_their_noise_over_the_noise_stated(factor):
     plan = make_plan(texts=("camera=0.05,0.05,0.15",), points=8, budget=160)
     rng, noise_mm = np.random.default_rng(2), factor * np.array([0.05, 0.05, 0.15])
     readings = readings_of(plan, lambda row, _: 0.3 + noise_mm * rng.normal(size=3))
@@ -37,9 +37,7 @@ def test_repeated_readings_scatter_by_their_noise_over_the_noise_stated(make_pla
 @pytest.mark.parametrize(
     ("assessor", "short"), [("search_and_confirm", False), ("single_shot", True)]
 )
-def test_noise_stated_far_above_noise_and_errors_is_told_for_bounds_may_fall_short(
-    make_plan, assessor, short
-):
+def test_noise_stated_far_above_noise_and_errors_is_told_for_bounds_may_fall_short(assessor, short):
     plan, errors = make_plan(assessor), np.random.default_rng(1).normal(0.0, 0.006, (40, 3))
     state, largest_mm = campaign(plan, errors, 0.005), np.linalg.norm(errors, axis=1).max()
     # 0.05 mm is stated
@@ -47,7 +45,7 @@ def test_noise_stated_far_above_noise_and_errors_is_told_for_bounds_may_fall_sho
     assert size_scatter(state).too_small
 
 
-def test_readings_of_a_perfect_arm_with_the_noise_stated_are_not_called_too_near(make_plan):
+def test_readings_of_a_perfect_arm_with_the_noise_stated_are_not_called_too_near():
     plan, none = make_plan(), np.zeros((40, 3))
     seeds = range(60)
     assert not any(size_scatter(campaign(plan, none, 0.05, seed=each)).too_small for each in seeds)

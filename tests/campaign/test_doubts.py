@@ -14,9 +14,9 @@ from kinacc.campaign.instrument import instruments
 
 
 @pytest.fixture
-def start(calibration, tmp_path):
+def start(study, tmp_path):
     """Words that start a campaign of 200 candidates."""
-    return ("campaign", "start", tmp_path / "check", "--calibration", calibration, "--model", "dh")
+    return ("campaign", "start", tmp_path / "check", "--calibration", study, "--model", "dh")
 
 
 def test_micrometres_given_as_millimetres_of_noise_are_asked_about(start, tmp_path):

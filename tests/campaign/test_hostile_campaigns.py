@@ -5,13 +5,13 @@ from __future__ import annotations
 import json
 
 import pytest
-from campaign_on_disk import refusal
+from campaign_on_disk import make_plan, refusal
 
 from kinacc.campaign import folder
 
 
 @pytest.fixture
-def begun(tmp_path, make_plan):
+def begun(tmp_path):
     """A campaign on disk."""
     folder.start(tmp_path, make_plan(points=8, budget=8))
     return tmp_path

@@ -15,7 +15,7 @@ from kinacc.campaign.of_calibration import finished, newest
 from kinacc.deployment.folder import read_tables
 
 
-def test_the_newest_campaign_counts_and_the_others_are_named(begun, calibration):
+def test_the_newest_campaign_counts_and_the_others_are_named(begun, study):
     other, spoilt, newer, older = (begun("--noise-mm", SIGMA_MM) for _ in range(4))
     plan = json.loads((other / "campaign.json").read_text())
     plan["points"][0]["modelled_mm"][0] += 0.01
@@ -23,7 +23,7 @@ def test_the_newest_campaign_counts_and_the_others_are_named(begun, calibration)
     (spoilt / "campaign.json").write_text("{}")
     for age, folder in enumerate((other, spoilt, newer, older)):
         os.utime(folder / "campaign.json", (1e9 - age, 1e9 - age))
-    tables = read_tables(calibration, "robot")
+    tables = read_tables(study, "robot")
     found, remarks = newest("arm", tables, [older, newer, spoilt, other])
     assert found.folder == str(newer)
     assert remarks == (
@@ -32,8 +32,8 @@ def test_the_newest_campaign_counts_and_the_others_are_named(begun, calibration)
     )
 
 
-def test_the_bound_of_a_finished_campaign_on_the_model_is_taken(begun, calibration, monkeypatch):
-    tables = read_tables(calibration, "robot")
+def test_the_bound_of_a_finished_campaign_on_the_model_is_taken(begun, study, monkeypatch):
+    tables = read_tables(study, "robot")
     folder = begun("--noise-mm", SIGMA_MM, "--frame", "base")
     recorded(folder, Arm(folder), 19)
     assert math.isnan(finished(tables, "dh", [folder]))

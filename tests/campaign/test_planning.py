@@ -113,7 +113,6 @@ def test_the_command_answers_with_table_picture_and_budget(tmp_path):
     assert content["noise_mm"] == [0.05] * 3
     assert [row["budget"] for row in content["rows"]] == [15, 60]
     assert pd.read_csv(table)["true_mm"].iloc[1] == pytest.approx(content["rows"][1]["true_mm"])
-    assert answer(*words) == content
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from campaign_on_disk import entry_of, readings_of, world_of
+from campaign_on_disk import entry_of, make_plan, readings_of, world_of
 from command_line import call
 from scipy.stats import chi2
 
@@ -34,7 +34,7 @@ def assert_same(said, wanted):
 
 
 @pytest.mark.parametrize("name", ADAPTIVE)
-def test_a_campaign_on_disk_ends_as_in_memory(make_plan, name):
+def test_a_campaign_on_disk_ends_as_in_memory(name):
     plan = make_plan(name)
     world = world_of(plan)
     entries = entries_of(plan, world)
@@ -44,7 +44,7 @@ def test_a_campaign_on_disk_ends_as_in_memory(make_plan, name):
     assert_same(state.statements(), wanted.statements())
 
 
-def test_part_of_a_visit_by_travel_says_nothing_of_the_region(make_plan):
+def test_part_of_a_visit_by_travel_says_nothing_of_the_region():
     plan = make_plan("region_share", points=60, budget=60)
     entries = entries_of(plan, world_of(plan))
     for said in restore(plan, entries[:-1]).statements():
@@ -53,7 +53,7 @@ def test_part_of_a_visit_by_travel_says_nothing_of_the_region(make_plan):
     assert not any("travel" in str(said.withheld) for said in restore(plan, entries).statements())
 
 
-def test_readings_taken_ahead_change_nothing(make_plan):
+def test_readings_taken_ahead_change_nothing():
     plan = make_plan()
     world = world_of(plan)
     entries = entries_of(plan, world)
@@ -69,7 +69,7 @@ def test_readings_taken_ahead_change_nothing(make_plan):
     assert_same(state.statements(), whole.statements())
 
 
-def test_a_point_left_out_is_never_asked_for_and_the_visit_stays_random(make_plan):
+def test_a_point_left_out_is_never_asked_for_and_the_visit_stays_random():
     plan = make_plan(points=60, budget=60)
     gone = int(plan.route[4])
     rows = plan.visiting(frozenset([gone]))
@@ -89,7 +89,7 @@ def test_a_point_left_out_is_never_asked_for_and_the_visit_stays_random(make_pla
     assert len(state.used) == 60
 
 
-def test_another_instrument_counts_with_its_own_covariance(make_plan):
+def test_another_instrument_counts_with_its_own_covariance():
     plan = make_plan(texts=("tracker=0.05", "camera=0.5"))
     entries = entries_of(plan, world_of(plan), limit=24)
     by_tracker = restore(plan, entries)
@@ -103,7 +103,7 @@ def test_another_instrument_counts_with_its_own_covariance(make_plan):
     assert by_itself.campaign.ledger.noise_mm[place] == pytest.approx(0.4)
 
 
-def test_a_plan_comes_back_to_the_last_bit(make_plan):
+def test_a_plan_comes_back_to_the_last_bit():
     laser = "laser:range_mm=0.01,angle_um_per_m=15,repeat_mm=0.03"
     plan = make_plan(texts=("a=0.1,0.2,0.3", f"b={laser}"), frame="instrument")
     directed = replace(plan.points, directions=np.sign(plan.points.joints).astype(np.int8))
@@ -111,7 +111,7 @@ def test_a_plan_comes_back_to_the_last_bit(make_plan):
     assert to_json(from_json(to_json(plan), "here")) == to_json(plan)
 
 
-def test_predictions_recorded_as_readings_bound_nothing(make_plan, tmp_path):
+def test_predictions_recorded_as_readings_bound_nothing(tmp_path):
     plan = make_plan(points=12, budget=14)
     path, name = tmp_path / "check", plan.instruments[0].name
     # Again and again, more than are requested.
@@ -130,9 +130,7 @@ def test_predictions_recorded_as_readings_bound_nothing(make_plan, tmp_path):
 @pytest.mark.parametrize(
     ("size_mm", "most_mm"), [(0.01, 10.0 * 0.05 * np.sqrt(3.0)), (0.5, 3.0), (4.0, 10.0)]
 )
-def test_a_plausible_error_is_within_10_standard_deviations_or_6_medians(
-    make_plan, size_mm, most_mm
-):
+def test_a_plausible_error_is_within_10_standard_deviations_or_6_medians(size_mm, most_mm):
     readings = [SimpleNamespace(error_mm=np.array([0.0, 0.0, size_mm]))] * 10
     state = SimpleNamespace(plan=make_plan(), readings=readings)
     assert most_plausible_mm(state) == pytest.approx(most_mm)
@@ -140,7 +138,7 @@ def test_a_plausible_error_is_within_10_standard_deviations_or_6_medians(
     assert most_plausible_mm(state) == state.plan.limits.implausible_mm
 
 
-def test_all_that_is_certain_lists_planned_revisits_in_their_places(make_plan):
+def test_all_that_is_certain_lists_planned_revisits_in_their_places():
     plan = make_plan(points=30, budget=70, references=20)
     entries = [entry_of([reading]) for reading in readings_of(plan, world_of(plan).reading_mm)]
     ahead = restore(plan, []).ahead()
@@ -152,7 +150,7 @@ def test_all_that_is_certain_lists_planned_revisits_in_their_places(make_plan):
         assert restore(plan, entries[:done]).ahead() == ahead[done:]
 
 
-def test_sizes_of_readings_are_held_to_the_noise_of_three_axes(make_plan):
+def test_sizes_of_readings_are_held_to_the_noise_of_three_axes():
     plan = make_plan(texts=("tracker=0.05",))
     state = restore(plan, entries_of(plan, world_of(plan), limit=12))
     squares = np.array([item.error_mm for item in state.readings]) ** 2 / 0.05**2

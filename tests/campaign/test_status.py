@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from campaign_on_disk import entry_of, errors_mm, readings_of, world_of
+from campaign_on_disk import entry_of, errors_mm, make_plan, readings_of, world_of
 
 import kinacc
 from kinacc.assess.attainable import width_limits
@@ -22,24 +22,18 @@ from kinacc.cli.output import plain
 from kinacc.report.rendering import lines
 
 
-@pytest.fixture
-def measured(make_plan):
-    """The status of a campaign with so many readings of a world, and its plan."""
+def measured(readings=999, points=40, budget=120, tolerance_mm=None, off_mm=None, **settings):
+    """The status of a campaign with so many readings of a world."""
+    limits = Limits(np.deg2rad(0.02), 10.0, tolerance_mm)
+    plan = make_plan(points=points, budget=budget, limits=limits, **settings)
+    world, taken = world_of(plan), count()
 
-    def make(readings=999, points=40, budget=120, tolerance_mm=None, off_mm=None, **settings):
-        limits = Limits(np.deg2rad(0.02), 10.0, tolerance_mm)
-        plan = make_plan(points=points, budget=budget, limits=limits, **settings)
-        world, taken = world_of(plan), count()
+    def read(row, visit):
+        off = off_mm(next(taken)) if off_mm else 0.0
+        return world.reading_mm(row, visit) + off
 
-        def read(row, visit):
-            off = off_mm(next(taken)) if off_mm else 0.0
-            return world.reading_mm(row, visit) + off
-
-        entries = (entry_of(readings_of(plan, read, limit=readings)),)
-        opened = Opened(Path("check"), plan, folder.Journal(entries, "ab", (), 0), "ab")
-        return status(opened), plan
-
-    return make
+    entries = (entry_of(readings_of(plan, read, limit=readings)),)
+    return status(Opened(Path("check"), plan, folder.Journal(entries, "ab", (), 0), "ab"))
 
 
 def test_every_reason_has_a_text_and_no_text_is_left_over():
@@ -49,8 +43,8 @@ def test_every_reason_has_a_text_and_no_text_is_left_over():
     assert set(ADVICE) < set(REASONS)
 
 
-def test_limits_of_a_finished_campaign_are_those_of_the_true_errors(measured):
-    found, _ = measured()
+def test_limits_of_a_finished_campaign_are_those_of_the_true_errors():
+    found = measured()
     sizes = np.linalg.norm(errors_mm(40), axis=1)
     true = width_limits(sizes, 0.05, 120, 0.05)
     for each in found.bounds:
@@ -60,8 +54,8 @@ def test_limits_of_a_finished_campaign_are_those_of_the_true_errors(measured):
         assert each.lower_mm <= sizes.max() <= each.upper_mm
 
 
-def test_few_readings_state_no_bound_and_no_limit(measured):
-    found, _ = measured(3)
+def test_few_readings_state_no_bound_and_no_limit():
+    found = measured(3)
     assert found.next_point is not None
     assert found.assumes == ""
     for each in found.bounds:
@@ -74,8 +68,8 @@ def test_few_readings_state_no_bound_and_no_limit(measured):
 @pytest.mark.parametrize(
     ("tolerance_mm", "verdict"), [(2.0, "accept"), (0.1, "reject"), (1.19, "undecided")]
 )
-def test_the_verdict_is_the_headline(measured, tolerance_mm, verdict):
-    found, _ = measured(tolerance_mm=tolerance_mm)
+def test_the_verdict_is_the_headline(tolerance_mm, verdict):
+    found = measured(tolerance_mm=tolerance_mm)
     bound = found.bound
     assert (found.readings_used, found.points_measured, bound.unmeasured) == (120, 40, 0)
     if verdict == "undecided":
@@ -99,8 +93,8 @@ def test_the_verdict_is_the_headline(measured, tolerance_mm, verdict):
           "off_mm": lambda n: np.random.default_rng(n).normal(0.0, 0.4, 3)}, "scatter"),
     ],
 )  # fmt: skip
-def test_readings_against_an_assumption_withhold_the_bounds(measured, change, code):
-    found, _ = measured(**change, tolerance_mm=5.0)
+def test_readings_against_an_assumption_withhold_the_bounds(change, code):
+    found = measured(**change, tolerance_mm=5.0)
     assert lines("campaign_status.txt", s=found, verbose=False)[0].startswith("NO BOUND")
     assert found.advice == (ADVICE[code],)
     assert all(math.isnan(each.upper_mm) for each in found.bounds)
@@ -108,15 +102,15 @@ def test_readings_against_an_assumption_withhold_the_bounds(measured, change, co
         assert "reading 71 at point" in found.against[1]
 
 
-def test_bounds_below_the_estimate_are_doubted_with_the_noise(measured):
-    found, _ = measured(assessor="single_shot", texts=("tracker=3",), tolerance_mm=5.0)
+def test_bounds_below_the_estimate_are_doubted_with_the_noise():
+    found = measured(assessor="single_shot", texts=("tracker=3",), tolerance_mm=5.0)
     assert found.bound.verdict == "undecided"
     assert "noise overstated" in found.bound.doubt
     assert "times as far from the predictions as the stated noise" in found.against[0]
 
 
-def test_what_was_looked_for_and_not_found_is_noted_with_its_condition(measured):
-    found, _ = measured(references=20, noise="estimated", noise_freedom=60)
+def test_what_was_looked_for_and_not_found_is_noted_with_its_condition():
+    found = measured(references=20, noise="estimated", noise_freedom=60)
     assert found.against == ()
     assert "determined by a test with 60 degrees of freedom" in found.assumes
     assert any("no drift and no step" in note for note in found.notes)

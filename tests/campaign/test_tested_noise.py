@@ -30,10 +30,10 @@ def tested(tmp_path):
     return make
 
 
-def test_a_noise_both_tested_and_stated_is_refusal(tested, calibration, tmp_path):
+def test_a_noise_both_tested_and_stated_is_refusal(tested, study, tmp_path):
     file = tested()
     given = ["--repeatability", file, "--noise-mm", 0.1]
-    said = refusal("campaign", "start", tmp_path / "check", "--calibration", calibration, *given)
+    said = refusal("campaign", "start", tmp_path / "check", "--calibration", study, *given)
     assert "--repeatability: is given beside instrument=0.1" in said
     assert "is given beside" in refusal("campaign", "plan", *given)
     assert not (tmp_path / "check").exists()

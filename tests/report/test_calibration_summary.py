@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-from command_line import answer, call, small_study
+from command_line import answer, call
 from held_out_errors import held_out_mm
 from stages_by_hand import run_stages
 
@@ -23,10 +23,9 @@ from kinacc.tables import sums
 
 
 @pytest.fixture(scope="module")
-def study(tmp_path_factory):
+def study(study, tmp_path_factory):
     """Results of a small synthetic study, up to its summary."""
-    base = tmp_path_factory.mktemp("study")
-    small_study(base)
+    base = shutil.copytree(study.parents[1], tmp_path_factory.mktemp("summary") / "study")
     return run_stages(["summary"], [base / "small.yaml"], base / "results")
 
 

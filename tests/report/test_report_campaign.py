@@ -7,34 +7,22 @@ from pathlib import Path
 import matplotlib.text
 import numpy as np
 import pytest
-from campaign_on_disk import entry_of, readings_of
+from campaign_on_disk import entry_of, make_plan, readings_of
 
-from kinacc.campaign import begin, folder, report
+from kinacc.campaign import folder, report
 from kinacc.campaign.folder import Opened
-from kinacc.campaign.instrument import instruments
-from kinacc.campaign.plan import Limits, assessor_of
-from kinacc.deployment.planning import spread
-from kinacc.deployment.record import nominal
+from kinacc.campaign.plan import Limits
 from kinacc.figures.campaign import draw_bounds, draw_readings
-from kinacc.kinematics import robot as robots
 from kinacc.report import page
 from kinacc.report.campaign import campaign_page, markdown, section
 
 
-def opened(
-    points=12, budget=16, readings=99, noise_mm=0.05, tolerance_mm=None, extra=(), names=None
-):
-    """A campaign of an arm whose errors are known."""
-    arm = nominal(robots.load("mh180"))
-    labels = names or [f"p{i}" for i in range(points)]
-    candidates = begin.points_of(arm, spread(arm.robot, points), labels)
+def opened(readings=99, noise_mm=0.05, tolerance_mm=None, extra=(), **settings):
+    """A campaign of an arm whose errors are known; ``settings`` of its plan."""
     limits = Limits(np.deg2rad(0.02), 10.0, tolerance_mm)
-    about = begin.about(arm, None, "drawn") | {"calibration": "cell 3", "model": "dh"}
-    assessor = assessor_of("search_and_confirm", {"measurements": budget})
-    used = instruments(("tracker=0.05",), "base")
-    plan = begin.plan_of(arm, candidates, assessor, used, limits, about, 3)
+    plan = make_plan(**{"points": 12, "budget": 16, "limits": limits, **settings})
     rng, rows = np.random.default_rng(4), plan.visiting(frozenset())
-    true = np.random.default_rng(5).normal(0.0, 0.2, (points, 3))[rows]
+    true = np.random.default_rng(5).normal(0.0, 0.2, (len(rows), 3))[rows]
     taken = readings_of(
         plan, lambda row, _: true[row] + rng.normal(0.0, noise_mm, 3), limit=readings
     )
