@@ -180,13 +180,6 @@ def test_an_option_decides(file, tmp_path):
 
 
 REFUSED = {
-    "only the controller's own kinematics": (
-        [
-            (numbered("actual_q_{}", first=0), np.deg2rad(IT.q)),
-            (numbered("actual_TCP_pose_{}", first=0), np.hstack([IT.controller / 1000.0] * 2)),
-        ],
-        "never a measurement",
-    ),
     "only nominal points": ([Q, (by_axis("soll_{a}"), IT.nominal)], "nominal"),
     "only deviations": ([Q, (by_axis("d{A} [mm]"), IT.deviation)], "a deviation"),
     "milliradians": ([(numbered("q{} [mrad]"), 1e3 * np.deg2rad(IT.q)), X], "mrad"),

@@ -12,7 +12,6 @@ LANGUAGES = {
     "English": ("Joint {} (deg)", "Measured {} (mm)", "Nominal {} (mm)"),
     "German": ("Achse {} [°]", "{} gemessen [mm]", "{} Soll [mm]"),
     "French": ("axe {} (degrés)", "{} mesuré (mm)", "{} théorique (mm)"),
-    "Spanish": ("Eje {} (grados)", "Posición {} medida (mm)", "Posición {} nominal (mm)"),
     "Italian": ("Giunto {} (gradi)", "Quota {} misurata (mm)", "Quota {} nominale (mm)"),
     "Portuguese": ("Articulação {} (graus)", "Posição {} medido (mm)", "Posição {} nominal (mm)"),
     "Japanese": ("関節{}[度]", "測定位置{}[mm]", "指令位置{}[mm]"),

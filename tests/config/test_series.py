@@ -25,7 +25,7 @@ def written(tmp_path, monkeypatch):
     for name in ("march", "may", "june"):
         (tmp_path / f"{name}.csv").write_text("q1_deg,x_mm\n")
 
-    def write(series: str, own: str = "", top: str = "", more: str = "") -> str:
+    def write(series: str, own: str = "", top: str = "") -> str:
         text = f"""\
         {top}
         datasets:
@@ -36,7 +36,7 @@ def written(tmp_path, monkeypatch):
             {own}
             series:
         """
-        text = textwrap.dedent(text) + series + more
+        text = textwrap.dedent(text) + series
         Path("tracker.yaml").write_text(text)
         return "tracker.yaml"
 

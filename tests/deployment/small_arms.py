@@ -38,9 +38,9 @@ def bent(model: dh.DHModel, seed: int) -> dh.DHModel:
     return model.with_parameters(model.start + errors)
 
 
-def truth(name: str, seed: int = 1) -> dh.DHModel:
+def truth(name: str) -> dh.DHModel:
     """A real arm: the nominal one with errors of a tenth of a millimetre and of a milliradian."""
-    return bent(robot.load(name).dh, seed)
+    return bent(robot.load(name).dh, 1)
 
 
 def joints(name: str, count: int, seed: int = 2, part: float = 0.36) -> np.ndarray:

@@ -15,9 +15,9 @@ from kinacc.kinematics import robot
 from kinacc.kinematics.model import JointState
 
 
-def left(arm, q_rad, wanted, frame="base", point=None):
+def left(arm, q_rad, wanted, frame="base"):
     """What the forward model says is left of the wanted poses, mm and rad."""
-    seen = predict(arm, q_rad, None, frame, point).pose
+    seen = predict(arm, q_rad, None, frame).pose
     off = np.linalg.norm(seen.position_mm - wanted.position_mm, axis=1)
     turn = log_so3(seen.rotation @ np.swapaxes(wanted.rotation, 1, 2))
     return off.max(), np.linalg.norm(turn, axis=1).max()

@@ -17,8 +17,8 @@ MEAN = "value: residuals.position.mean"
 SINCE = f"{MEAN}, against: accepted"
 
 
-def vectors(count, seed=1, scale=1.0):
-    return scale * np.random.default_rng(seed).normal(size=(count, 3))
+def vectors(count, seed=1):
+    return np.random.default_rng(seed).normal(size=(count, 3))
 
 
 def run(folder, errors, measured_as=b"0"):

@@ -10,12 +10,6 @@ from scipy.stats import binomtest
 from research import verdicts
 
 
-def one_cell(rows: pd.DataFrame) -> pd.Series:
-    table = verdicts.cells(rows)
-    assert len(table) == 1
-    return table.iloc[0]
-
-
 def verdict_of(rows: pd.DataFrame) -> pd.Series:
     """The verdict on campaigns that came out so again and again."""
     (found,) = verdicts.judged(verdicts.cells(pd.concat([rows] * 200))).to_dict("records")
@@ -58,7 +52,7 @@ def test_a_cell_is_summed_up_as_by_hand():
         value_mm=[1.1, 0.9, 1.1, 0.9, 1.3],
         lower_mm=[0.9, 1.1, 0.9, np.nan, 0.9],
     )
-    cell = one_cell(said)
+    (cell,) = verdicts.cells(said).to_dict("records")
     assert (cell["repetitions"], cell["stated"], cell["broken"]) == (5, 4, 1)
     assert cell["sound"] == 4
     assert cell["upper_holds"] == pytest.approx(2 / 3)

@@ -100,8 +100,8 @@ def seen_by_pinocchio(model, tip, q_rad, slides, names, base="base_link"):
     return found._replace(position_mm=1e3 * found.position_mm)
 
 
-def some_joints(arm, count=15, seed=1):
-    share = np.random.default_rng(seed).uniform(0.1, 0.9, (count, arm.dh.joints))
+def some_joints(arm):
+    share = np.random.default_rng(1).uniform(0.1, 0.9, (15, arm.dh.joints))
     return arm.q_min_rad + share * (arm.q_max_rad - arm.q_min_rad)
 
 
