@@ -151,7 +151,7 @@ def test_all_that_is_certain_lists_planned_revisits_in_their_places():
 
 
 def test_sizes_of_readings_are_held_to_the_noise_of_three_axes():
-    plan = make_plan(texts=("tracker=0.05",))
+    plan = make_plan()
     state = restore(plan, entries_of(plan, world_of(plan), limit=12))
     squares = np.array([item.error_mm for item in state.readings]) ** 2 / 0.05**2
     found = size_scatter(state)

@@ -23,7 +23,7 @@ def golden() -> dict[str, dict]:
     return {name: store.read(RESULTS / f"{name}.parquet") for name in ROLES}
 
 
-def figures(dataset: str | None = None, names=NAMES) -> dict[str, Figure]:
+def figures(dataset: str, names=NAMES) -> dict[str, Figure]:
     """Each figure as its stage draws it."""
     tables, settings = golden(), defaults() | {"dataset": dataset, "robot": "mh180"}
     return {name: draw_figure(name, tables, settings) for name in names}

@@ -12,9 +12,3 @@ def test_a_run_ends_with_what_the_calibrations_are_worth(project):
     for name, page in (("mh180", paper), ("own", own)):
         assert "Mean position error at" in page
         assert f"kinacc compensate results/{name} --program " in page
-
-
-def test_a_run_up_to_one_table_says_nothing_of_tables_it_did_not_ask_for(project):
-    (project.folder / "results/own/vec_model.parquet").unlink()
-    text = project.snakemake("results/own/vec_model.parquet")
-    assert "Mean position error" not in text

@@ -21,15 +21,6 @@ def test_a_stage_that_fails(project):
     assert not [*(project.folder / "results").rglob("*.partial")]
 
 
-def test_a_data_file_that_is_not_there(project):
-    before = project.digests()
-    (project.folder / CSV).rename(project.folder / "own data" / "moved.csv")
-    text = project.snakemake(ok=False)
-    assert CSV in text
-    assert "Traceback" not in text
-    assert project.digests() == before
-
-
 def test_a_row_that_cannot_be_right(project):
     before = project.digests()
     path = project.folder / CSV

@@ -68,18 +68,6 @@ def calibrated(tmp_path_factory, measured):
     return folders
 
 
-def test_folds_keep_a_configuration_together_and_name_the_validation_rows(calibrated):
-    measurements = tables.rows(calibrated[0], "measurements")
-    assert len(measurements) >= 160
-    fold_of = {}
-    for row in measurements:
-        key = tuple(round(q, 9) for q in tables.joints(row))
-        assert fold_of.setdefault(key, row["fold"]) == row["fold"]
-        assert row["subset"] == ("validation" if row["fold"] == 1 else "train")
-    sizes = [list(fold_of.values()).count(fold) for fold in range(4)]
-    assert max(sizes) - min(sizes) <= 1
-
-
 def test_cross_validated_errors_are_those_of_models_that_never_saw_the_fold(calibrated):
     here, other_fold = calibrated
     rows, unseen = tables.rows(here, "measurements"), tables.models(other_fold)
