@@ -24,8 +24,10 @@ def test_the_newest_campaign_counts_and_the_others_are_named(begun, study):
     for age, folder in enumerate((other, spoilt, newer, older)):
         os.utime(folder / "campaign.json", (1e9 - age, 1e9 - age))
     tables = read_tables(study, "robot")
-    found, remarks = newest("arm", tables, [older, newer, spoilt, other])
+    of_vec = begun("--noise-mm", SIGMA_MM, "--model", "vec")  # the newest of all
+    found, remarks = newest("arm", "dh", tables, [of_vec, older, newer, spoilt, other])
     assert found.folder == str(newer)
+    assert newest("arm", "vec", tables, [older, newer])[0].folder == str(newer)
     assert remarks == (
         f"campaign {other} was begun with another calibration of arm",
         f"campaign {spoilt} cannot be read: kinacc campaign status '{spoilt}'",

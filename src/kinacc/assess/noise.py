@@ -157,6 +157,7 @@ class CampaignNoise:
         # of all others tell of the noise.
         spare = settings.measurements - first - settings.references
         within, tested = 3 * max((spare - _SINGLES + 1) // 2, 0), settings.noise_freedom
+        self._sure = within
         self.is_known, self._guarded = settings.noise == KNOWN, settings.wrong_rate > 0.0
         self.margin = settings.noise_margin if self.is_known and within < MOST else 1.0
         # The law of clipped scores is known for a stated noise alone, or one that is no larger:
@@ -258,7 +259,8 @@ class CampaignNoise:
         shown = math.sqrt(float(differences.squares.sum()) / max(differences.freedom, 1))
         if differences.freedom >= FEWEST and shown > margin:
             return shown, Reason("noise_shown", {"factor": shown, "freedom": differences.freedom})
-        return margin, Reason("noise_margin", {"margin": margin}) if margin > 1.0 else None
+        numbers = {"margin": margin, "sure": self._sure, "needed": MOST}
+        return margin, Reason("noise_margin", numbers) if margin > 1.0 else None
 
 
 def estimated_factor(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -33,6 +33,7 @@ from kinacc.campaign.status import Bound, CampaignStatus, status
 from kinacc.deployment.record import Calibration
 from kinacc.errors import InputError, Problem, refuse
 from kinacc.geometry import invert
+from kinacc.measurements.row_names import RowNames
 
 
 @dataclass(frozen=True)
@@ -330,6 +331,7 @@ class Campaign:
 
 
 _NOTHING = "Nothing was recorded"
+_NAMES = RowNames(word="reading")
 _AGAIN = "--again takes it as a reading of its own"
 
 
@@ -355,11 +357,11 @@ def _record(opened: folders.Opened, file: FileOfReadings, most_mm: float, again:
         digits.add(row.digits)
     missing = imported.intersection(item.number for item in state.readings).difference(known)
     if missing and not again:
-        message = f"does not hold {_listed(missing)} any more, recorded from it before"
+        message = f"does not hold {_NAMES.spans(missing)} any more, recorded from it before"
         fix = "bring the rows back, strike the readings, or give --again"
         problems.append(Problem(where, message, fix=fix))
     if not good and not problems:
-        message = f"holds no new reading: {_listed(known)} recorded before"
+        message = f"holds no new reading: {_NAMES.spans(known)} recorded before"
         problems.append(Problem(where, message, fix="" if again or file.path else _AGAIN))
     refuse(problems, _NOTHING)
     opened.write(Readings(readings=good, file=file.digest, path=file.path))
@@ -369,12 +371,6 @@ def _record(opened: folders.Opened, file: FileOfReadings, most_mm: float, again:
         tuple(float(np.linalg.norm(error_mm(plan, row))) for row in good),
         tuple(sorted(known)),
     )
-
-
-def _listed(numbers: Iterable[int]) -> str:
-    """Numbers of readings: ``readings 1, 2, 3``."""
-    shown = ", ".join(map(str, sorted(numbers)))
-    return f"reading{'s' if ',' in shown else ''} {shown}"
 
 
 def _refuse(where: str, message: str, reason: str) -> None:

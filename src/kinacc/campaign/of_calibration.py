@@ -27,26 +27,30 @@ _SAME_MM = 1e-6  # modelled positions that differ by less are of one model
 
 
 def newest(
-    name: str, tables: Mapping[str, Columns], places: Iterable[Path]
+    name: str, model: str, tables: Mapping[str, Columns], places: Iterable[Path]
 ) -> tuple[CampaignStatus | None, tuple[str, ...]]:
     """Return the status of the newest campaign of a calibration, and remarks on others.
 
     ``name`` of the calibration; ``tables`` are those of its results folder, ``places`` those of
-    :func:`kinacc.campaign.beside_results.of_results`. None without a campaign. A campaign holds
-    the positions that its model predicts: one that was begun with an earlier calibration of that
-    name is left out.
+    :func:`kinacc.campaign.beside_results.of_results`. None without a campaign. Campaigns on the
+    selected ``model`` come before those on another. A campaign holds the positions that its model
+    predicts: one that was begun with an earlier calibration of that name is left out.
     """
     remarks: list[str] = []
+    other = None
     for place in sorted(set(places), key=_last_reading, reverse=True):
         try:
             opened = folder.open_(place)
-            if _is_of(opened.plan, tables):
+            if not _is_of(opened.plan, tables):
+                remarks.append(f"campaign {place} was begun with another calibration of {name}")
+            elif opened.plan.about["model"] == model:
                 return status(opened), tuple(remarks)
-            remarks.append(f"campaign {place} was begun with another calibration of {name}")
+            else:
+                other = other or opened
         except InputError:
             command = shlex.join(["kinacc", "campaign", "status", str(place)])
             remarks.append(f"campaign {place} cannot be read: {command}")
-    return None, tuple(remarks)
+    return status(other) if other else None, tuple(remarks)
 
 
 def history(inputs: Mapping[str, Any], settings: Mapping[str, Any]) -> Columns:

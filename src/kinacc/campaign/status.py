@@ -310,19 +310,21 @@ REASONS = {
     "unmeasured": "{left} of {points} candidates are not measured",
     "few_points": "{read} points read; {share:.0%} of the region needs {needed}",
     "drift": "the reference poses show a drift of {size:.3f} mm over the campaign "
-    "({x:+.3f}, {y:+.3f}, {z:+.3f}; standard deviation {deviation:.3f} mm)",
+    "({x:+.3f}, {y:+.3f}, {z:+.3f} in the robot's base; standard deviation {deviation:.3f} mm)",
     "step": "the reference poses show a step of {size:.3f} mm between readings {after} and "
-    "{before} ({x:+.3f}, {y:+.3f}, {z:+.3f}; standard deviation {deviation:.3f} mm)",
+    "{before} ({x:+.3f}, {y:+.3f}, {z:+.3f} in the robot's base; standard deviation "
+    "{deviation:.3f} mm)",
     "scatter": "readings of one pose in a row scatter {ratio:.2f} times the stated noise "
     "({freedom:.0f} degrees of freedom): noise understated, or something moves",
     "tails": "readings of one pose lie {farthest:.1f} standard deviations apart: some are wrong, "
     "or the noise is not normal",
-    "wrong_readings": "{readings:.0f} readings do not fit the others of their pose",
+    "wrong_readings": "readings that do not fit the others of their pose: {readings:.0f}",
     "noise_unknown": "the noise is not estimated yet: {freedom:.0f} of {needed:.0f} degrees of "
     "freedom",
     # noise of the bounds
-    "noise_margin": "too few repeated readings to check the stated noise: bounds use {margin:g} "
-    "times the stated value (--set noise_margin=1 takes it as stated)",
+    "noise_margin": "bounds use {margin:g} times the stated noise: the budget is sure of {sure} "
+    "degrees of freedom to check it, and {needed} are needed (--set noise_margin=1 takes it as "
+    "stated)",
     "noise_shown": "bounds use {factor:.2f} times the stated noise, as repeated readings show "
     "({freedom:.0f} degrees of freedom)",
     "noise_estimated": "noise estimated in this campaign: {factor:.2f} times the planned value "
@@ -336,12 +338,12 @@ REASONS = {
     "excepted_ahead": "the bound will leave {excepted:.0f} candidates out; {enough:.0f} readings "
     "bound all of them",
     # decisions
-    "between": "the tolerance lies between lower and upper bound: measure more",
+    "between": "the tolerance lies between lower and upper bound",
     "contradict": "bounds and estimate contradict each other: is the noise understated?",
     "within": "the upper bound is within the tolerance",
     "beyond": "the lower bound exceeds the tolerance",
     "some_excepted": "the upper bound is within the tolerance but leaves {excepted:.0f} candidates "
-    "out: measure more points",
+    "out",
     "no_upper": "no upper bound is stated",
 }
 

@@ -130,7 +130,7 @@ def _round(fitted: Fitted, q_deg: ndarray) -> Iterator[Finding]:
         worse = float(np.median(remaining[on]) / np.median(remaining[fine]))
         test = scipy.stats.mannwhitneyu(remaining[on], remaining[fine], alternative="greater")
         if worse > _WORSE and test.pvalue < _RANKED:
-            rows, times = observed.lines(on), f"{worse:.2g}"
+            rows, times = observed.lines(on), f"{worse:.3g}"
             yield finding("commanded_joints", rows, grid_deg=grid, count=len(rows), times=times)
             return
     grid = next((item for item in _GRIDS_DEG[:4] if _on(q_deg, item).all()), 0.0)

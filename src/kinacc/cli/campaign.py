@@ -29,6 +29,8 @@ from kinacc.report.rendering import lines as texts
 from kinacc.tables.atomic import write_together
 from kinacc.tables.store import content_of, to_table
 
+_SHA256 = 64  # hexadecimal digits
+
 
 @click.group("campaign", cls=InOrder)
 def campaign() -> None:
@@ -163,6 +165,8 @@ def verify(folder: str, sha256: str | None, out: Output) -> None:
       kinacc campaign verify check --sha256 5bd24b8a..
     """
     opened = folders.open_(folder)
+    if sha256 is not None and len(sha256) != _SHA256:
+        raise InputError(Problem("--sha256", f"{len(sha256)} digits", f"all {_SHA256}"))
     checked = folders.verify(opened, sha256)
     against = "FAIL: not the journal of that report; it was shortened or rewritten."
     verdict = "PASS." if checked.continues else against

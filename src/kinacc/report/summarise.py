@@ -85,7 +85,7 @@ def summarise(
     arm, selected = results.robot_of(tables), figures.selected(tables["model_selection"])
     name = folder.resolve().name
     places = of_results(folder) if campaigns is None else campaigns
-    campaign, remarks = of_calibration.newest(name, tables, places)
+    campaign, remarks = of_calibration.newest(name, selected, tables, places)
     measurements, noted = tables["measurements"], findings(tables.get("data_check"))
     is_unused = noted["finding"] == LEFT_OUT
     fits = misfit.misfits(tables, arm)
@@ -365,7 +365,10 @@ def _next_steps(folder: str, model: str, campaign: Any) -> dict[str, str]:
     option = "" if model == PLAINEST else f" --model {model}"
     start = f"kinacc campaign start check --calibration {place} --noise-mm NOISE --budget 300"
     bound = "bound the largest error; NOISE is the standard deviation of a reading in mm"
-    first = {bound: start} if campaign is None else {"continue the campaign": campaign.next_command}
+    first = {bound: start}
+    if campaign is not None:
+        ended = campaign.next_point is None
+        first = {f"{'report on' if ended else 'continue'} the campaign": campaign.next_command}
     return first | {
         "a robot program, corrected": f"kinacc compensate {place} --program PROGRAM -o CORRECTED",
         "files of the model for simulators": f"kinacc export {place}{option} --out exported",

@@ -20,7 +20,6 @@ from kinacc.workflow.data_sets import CALIBRATION, DataSets, read_data_sets
 
 CONFIG = "config.yaml"
 _OF_A_LINE = re.compile(r"-\d{4}-\d{2}-\d{2}$")
-_FILES = 20  # beside results, looked through for a configuration
 # Tables of rules that depend on whole sections of the settings, with these.
 _MADE_WITH = {
     "summary": CALIBRATION,
@@ -36,7 +35,7 @@ def beside(folder: Path) -> list[tuple[Path, DataSets]]:
     the name of the series.
     """
     series, results = _OF_A_LINE.sub("", folder.name).encode(), []
-    for path in sorted((folder.parent / "..").glob("*.yaml"))[:_FILES]:
+    for path in sorted((folder.parent / "..").glob("*.yaml")):
         with suppress(InputError, OSError):
             if path.name == CONFIG or series in path.read_bytes():
                 data = _planned(str(path), path.stat().st_mtime_ns)

@@ -36,6 +36,6 @@ class Undecided(InputError):
             meant = "; ".join(f"{value}: {text}" for value, text in choice.answers.items())
             ways = [f"{choice.option} {shlex.quote(value)}" for value in choice.answers]
             ways += ["--orientation none"] if choice.without else []
-            fix = f"give {' or '.join(ways)}"
+            fix = f"give {' or '.join(ways)}" + " (or several)" * (choice.option == TAKE)
             problems.append(Problem(path, f"{choice.about}: {meant}", fix=fix))
         super().__init__(problems, f"{path} leaves open how it is to be read")
