@@ -54,5 +54,8 @@ def test_the_bound_of_a_finished_campaign_on_the_model_is_taken(begun, study, mo
     last_mm = finished(tables, "dh", [later])
     assert finished(tables, "dh", [later, folder]) == last_mm != bound_mm
     assert math.isnan(finished(tables, "vec", [folder]))
+    some = begun("--noise-mm", SIGMA_MM, "--frame", "base", points=40)  # bounds all but a few
+    recorded(some, Arm(some), 20)
+    assert math.isnan(finished(tables, "dh", [some]))
     (folder / "readings.jsonl").write_text("no journal")
     assert math.isnan(finished(tables, "dh", [folder]))

@@ -10,6 +10,7 @@ from tracked_arm import assert_read, assert_turned, described, looked, refused, 
 from kinacc.checks.contradictions import load
 from kinacc.errors import InputError
 from kinacc.kinematics import robot
+from kinacc.measurements.intake import guess as guesses
 from kinacc.measurements.reader import read
 
 ROWS = 14
@@ -224,6 +225,21 @@ def test_the_reader_takes_no_point_alone_that_says_it_was_not_measured(file, wor
     with pytest.raises(InputError, match=r"measurements\.file\.targets"):
         read(section, ARM)
     assert len(read(section | {"targets": [word]}, ARM).columns["x_mm"]) == ROWS
+
+
+def test_a_unit_is_told_by_the_size_of_numbers_below_zero_too(file):
+    path = file((numbered("J{}"), -np.abs(IT.q)), ([*"XYZ"], -np.abs(IT.measured)))
+    section = guesses.look(path).section
+    assert (section["joint_unit"], section["length_unit"]) == ("deg", "mm")
+
+
+@pytest.mark.parametrize("turned_deg", [0.0, 5.0])
+def test_numbers_behind_names_count_readings_unless_one_is_of_other_joints(file, turned_deg):
+    names = [f"P{row // 2}_{row % 2}" for row in range(ROWS)]
+    q, point = (np.repeat(each[::2], 2, axis=0) for each in (IT.q, IT.measured))
+    q[-1] += turned_deg
+    section = guesses.look(file((["Name"], names), (Q[0], q), (X[0], point))).section
+    assert section.get("repeats_in_names", False) == (turned_deg == 0.0)
 
 
 def test_a_reflector_of_another_radius_needs_a_target_of_its_own(file):
