@@ -238,7 +238,7 @@ def test_numbers_behind_names_count_readings_unless_one_is_of_other_joints(file,
     names = [f"P{row // 2}_{row % 2}" for row in range(ROWS)]
     q, point = (np.repeat(each[::2], 2, axis=0) for each in (IT.q, IT.measured))
     q[-1] += turned_deg
-    section = guesses.look(file((["Name"], names), (Q[0], q), (X[0], point))).section
+    section = guesses.look(file((["pose"], names), (Q[0], q), (X[0], point))).section
     assert section.get("repeats_in_names", False) == (turned_deg == 0.0)
 
 
