@@ -11,7 +11,7 @@ from test_few_poses import settings
 
 import kinacc
 from kinacc.calibration import models
-from kinacc.calibration.own_model import register_error_model
+from kinacc.calibration.own_model import OwnEstimator, register_error_model
 from kinacc.calibration.residuals import cross_validated
 from kinacc.calibration.stages import selection
 from kinacc.config import error_models
@@ -47,12 +47,19 @@ class Ripple(ErrorModel):
         return np.concatenate([self.dh.prior_std, np.full(12, 1e-3)])
 
     def with_parameters(self, x):
-        return Ripple(self.dh.with_parameters(x[:-12]), x[-12:].reshape(6, 2))
+        return type(self)(self.dh.with_parameters(x[:-12]), x[-12:].reshape(6, 2))
 
     def pose(self, at):
         q = at.q_rad
         turned = self.waves[:, 0] * np.sin(q) + self.waves[:, 1] * np.cos(q)
         return self.dh.pose(at.moved(q + turned))
+
+
+class Loose(Ripple):
+    """The same without priors, under names that say no unit."""
+
+    names = property(lambda self: tuple(f"p{n}" for n in range(42)))
+    prior_std = property(lambda self: np.full(42, np.inf))
 
 
 @pytest.fixture
@@ -71,13 +78,19 @@ def test_a_registered_model_is_fitted_held_out_and_selected(registered):
     true = Ripple(arm.dh, 1e-3 * rng.normal(size=(6, 2)))
     q = simulated.joints(arm, 80, rng)
     turned = q + true.waves[:, 0] * np.sin(q) + true.waves[:, 1] * np.cos(q)
-    seen = replace(simulated.measure(arm.dh, turned, simulated.POSE, rng, 0.03), q_rad=q)
+    off = np.tile([0.0, 0.5, 0.5, 0.0, 0.0], 6) * rng.normal(size=30)  # mm
+    built = arm.dh.with_parameters(arm.dh.start + off)
+    seen = replace(simulated.measure(built, turned, simulated.POSE, rng, 0.03), q_rad=q)
     every = models.estimators(settings(), arm, seen)
     assert next(iter(every)) == "ripple"
     pair = [every["ripple"], every["dh"]]
-    waves = pair[0].fit(seen, {}).model.waves
+    found = pair[0].fit(seen, {})
+    waves = found.model.waves
     # Of the first and last joints some is base and tool.
     np.testing.assert_allclose(waves[1:5], true.waves[1:5], atol=1e-4)
+    loose = type("Of", (OwnEstimator,), {"kind": "loose", "model": Loose})(pair[0].common)
+    variance = loose.fit(seen, {}).solution.variance
+    assert variance == pytest.approx(found.solution.variance, rel=0.2)
     held_out, _ = cross_validated(
         seen, lambda train, fold: models.fit_all(train, pair), range(3), ("ripple", "dh", "nominal")
     )

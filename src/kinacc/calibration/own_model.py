@@ -60,14 +60,21 @@ class OwnEstimator(Estimator):
         return cls(Common.of(calibration, arm))
 
     def fit(self, observations: Observations, others: Mapping[str, Fit]) -> ModelFit:
-        """The model closest to the measurements."""
+        """The model closest to the measurements, whatever the units of its parameters.
+
+        What of a parameter moves the poses by one mm, rms, counts as much as one mm of another.
+        """
         nominal = self.model(self.common.nominal)
+        moved = nominal.linearised(observations.at)[1]
+        moved[:, 3:] *= self.common.rotation_weight_mm_per_rad
+        size_mm = np.sqrt(np.mean(np.sum(moved**2, axis=1), axis=0))
         return self.common.fit(
             observations,
             nominal,
             free=np.ones(len(nominal.start), dtype=bool),
             std=nominal.prior_std,
             held=bool(np.isfinite(nominal.prior_std).all()),
+            scale=np.divide(1.0, size_mm, out=np.ones_like(size_mm), where=size_mm > 0.0),
             threshold=THRESHOLD,
             name=f"{self.kind} fit",
         )
