@@ -38,11 +38,7 @@ def written(folder):
     point = flange.position_mm + flange.rotation @ [30.0, -20.0, 60.0]
     point = point @ exp_so3(np.array([0.3, -0.2, 1.1])).T + [1500.0, 200.0, -400.0]
     point = point + rng.normal(size=point.shape) * NOISE_MM
-    return configured(write_readings(folder / "arm.csv", q, point))
-
-
-def configured(path):
-    """A configuration of the positions in a file, beside it."""
+    path = write_readings(folder / "arm.csv", q, point)
     config = path.with_suffix(".yaml")
     config.write_text(
         f"datasets: {{arm: {{robot: irb120, measurements: {{source: file, file: {{path: {path}, "
@@ -61,29 +57,14 @@ def eccentric(tmp_path_factory):
     return config, run_stages(stages, [config], folder / "results")
 
 
-def checked(config):
-    return answer("check-data", config, code=None)["datasets"][0]["facts"]["noise"]
-
-
 def test_check_and_calibration_state_one_noise_of_a_file(eccentric):
     config, results = eccentric
-    noise = checked(config)
+    noise = answer("check-data", config, code=None)["datasets"][0]["facts"]["noise"]
     freedom = AGAIN * (TIMES - 1)
     assert (noise["degrees_of_freedom"], noise["configurations"]) == (freedom, AGAIN)
     off = np.array(noise["std_mm"]) / NOISE_MM - 1.0
     assert np.all(np.abs(off) < 4.0 / np.sqrt(2.0 * freedom))
     assert summarise(results).noise_mm == pytest.approx(noise["per_axis_mm"], rel=1e-9)
-
-
-def test_a_repeatability_test_and_a_check_of_the_same_readings_agree(tmp_path):
-    rng, arm = np.random.default_rng(2), robot.load("irb120")
-    q = np.tile(np.deg2rad(rng.uniform(-60, 60, (20, 6))), (4, 1))  # every pose is left in between
-    point = robot.forward(arm, q).position_mm + 0.03 * rng.normal(size=(80, 3))
-    path = write_readings(tmp_path / "a.csv", q, point, pose=np.arange(80) % 20)
-    std_mm = answer("repeatability", path, "--rows", "visits")["std_mm"]
-    noise = checked(configured(path))
-    assert noise["degrees_of_freedom"] == 60
-    assert noise["per_axis_mm"] == pytest.approx(np.sqrt(np.mean(np.square(std_mm))), rel=1e-6)
 
 
 def test_standard_deviations_of_an_arm_with_eccentric_gears_are_marked(eccentric, tmp_path):
