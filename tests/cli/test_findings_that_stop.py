@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
-from command_line import call
+from command_line import answer, call
 from tracked_arm import NAMES, table, tracked
 
 from kinacc.checks.contradictions import load
@@ -85,3 +85,11 @@ def test_rows_outside_the_limits_stop_the_workflow_until_they_are_excluded(two_s
     beyond = pd.read_csv("seen.csv")["q1_deg"] < -70.0
     lines, _ = (item["lines"] for item in load([path])["seen"]["measurements"]["file"]["exclude"])
     assert lines == [*beyond.index[beyond] + 2]
+
+
+def test_frames_held_fixed_far_from_the_readings_stop_the_workflow(two_slips):
+    text = Path("seen.yaml").read_text()
+    Path("seen.yaml").write_text(text.replace("base_and_tool: estimated", "base_and_tool: fixed"))
+    (told,) = answer("check-data", "seen.yaml", code=1)["datasets"]
+    found = {item["kind"]: item for item in told["suspicions"]}["fixed_frames"]
+    assert (found["level"], found["apart_mm"] > 1000.0) == ("stops", True)

@@ -12,6 +12,7 @@ from kinacc.calibration import fitting
 from kinacc.calibration.dh_estimator import free_parameters
 from kinacc.calibration.observations import full_poses
 from kinacc.deployment.planning import (
+    between,
     choose,
     distances,
     information,
@@ -42,6 +43,15 @@ def test_the_rank_is_that_of_a_fit_to_the_same_poses(name, hayati):
     )
     assert shown.rank == 12 + fit.solution.spectrum.rank
     assert shown.rows.shape == (120, 6, shown.rank)
+
+
+def test_candidates_between_measured_poses_are_on_the_way_to_one_of_the_nearest():
+    measured = np.arange(40.0)[:, None] * [1.0, 0.0]
+    found = between(measured, np.ones(2), 500, 1)
+    ends = np.abs(found[:, :1] - measured[:, 0]).min(axis=1)
+    assert ends.min() > 0.0  # and no pose again
+    assert (found[:, 1] == 0.0).all()
+    assert 0.0 < found[:, 0].min() < found[:, 0].max() < 39.0
 
 
 def test_candidates_are_where_they_were_asked_to_be():

@@ -106,9 +106,10 @@ def examined(settings: Mapping[str, Any], dataset: str, progress: Progress) -> R
     arm, section = robots.load(settings["robot"]), settings["measurements"]["file"]
     reading = read(section, arm, strict=False)
     report = check(reading, section, arm, dataset, progress)
-    few = coverage.few_poses(reading.columns, arm, settings["calibration"])
+    of_fit = (reading.columns, arm, settings["calibration"])
+    more = (*coverage.few_poses(*of_fit), *coverage.fixed_frames(*of_fit))
     accepted = dict(settings["data_check"]["accept"])
-    return replace(report, suspicions=(*report.suspicions, *few), accepted=accepted)
+    return replace(report, suspicions=(*report.suspicions, *more), accepted=accepted)
 
 
 @one_thread

@@ -14,7 +14,9 @@ from kinacc.calibration.vec_estimator import VECEstimator
 from kinacc.checks.findings import Finding, finding
 from kinacc.checks.readings import Distance, Readings
 from kinacc.checks.robust_fit import Fitted
-from kinacc.kinematics.robot import Robot
+from kinacc.geometry import compose
+from kinacc.kinematics import dh
+from kinacc.kinematics.robot import Robot, carried
 from kinacc.measurements import folds
 from kinacc.tables.columns import Columns
 
@@ -22,6 +24,7 @@ _WEAK = 0.1  # of a joint's range
 # Of the largest residual expected: larger jumps of the base were found in four files, two of them
 # measured; in one of these a jump of a third less stayed unfound.
 _SMALLEST_MOVE = 1.5
+_ELSEWHERE_MM = 50.0  # no arm is so far from its description
 _PER_POSE = 6  # independent numbers of a rigid body, however many targets it carries
 
 
@@ -128,3 +131,15 @@ def few_poses(columns: Columns, robot: Robot, calibration: Mapping[str, Any]) ->
         frames=f" and {frames} of base and targets" if frames else "",
     )
     return [few.held_to(())]
+
+
+def fixed_frames(columns: Columns, robot: Robot, calibration: Mapping[str, Any]) -> list[Finding]:
+    """Whether base and tool are held fixed, and the readings are elsewhere."""
+    if calibration["base_and_tool"] != "fixed":
+        return []
+    observed = from_columns(columns, robot)
+    end = compose(compose(robot.base, dh.forward(robot.dh, observed.q_rad)), carried(robot))
+    apart = np.linalg.norm(end.position_mm - observed.position_mm, axis=1)
+    if (apart_mm := float(np.median(apart))) < _ELSEWHERE_MM:
+        return []
+    return [finding("fixed_frames", apart_mm=apart_mm).held_to(())]
