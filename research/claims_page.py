@@ -193,11 +193,11 @@ def _figure_5(choices: pd.DataFrame, factors: pd.DataFrame, why: pd.DataFrame) -
     return "\n\n".join(
         [
             "## The worst point of Fig. 5",
-            "Two sentences on Fig. 5 differ on the arm of `results/mh180`: that the rejection "
-            "probability approaches alpha after only 20 iterations, and that the worst point, once "
-            "found, is measured again for the rest of the run. Both are about one simulation on "
-            "one arm. Over arms, noise, alpha and seeds they hold as follows (the simulation shown "
-            "is chosen anew each time, by the rule that `histories.parquet` states):",
+            "Two sentences on Fig. 5, that the rejection probability approaches alpha after only "
+            "20 iterations and that the worst point, once found, is measured again for the rest of "
+            "the run, are about one simulation on one arm. Over arms, noise, alpha and seeds they "
+            "hold as follows (the simulation shown is chosen anew each time, by the rule that "
+            "`histories.parquet` states):",
             _grid(("over", "value", "runs", *_FIG_5.values()), rows),
             "\n".join(
                 f"- *{statements[claim]}* hangs most on {_most(why, claim, FIG_5)}."
