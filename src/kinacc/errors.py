@@ -53,7 +53,7 @@ def first_few(items: Sequence[object], shown: int = 5) -> str:
     return ", ".join(map(str, items[:shown])) + and_more(len(items) - shown)
 
 
-_MOST_SHOWN = 100  # nobody reads more, and a file may hold a hundred thousand faults
+_MOST_SHOWN = 30  # nobody reads more, and a file may hold a hundred thousand faults; JSON has all
 
 
 class KinaccError(Exception):

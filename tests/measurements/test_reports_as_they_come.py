@@ -140,3 +140,14 @@ def test_the_way_horizontal_angles_count_is_found_by_trying(tmp_path):
     answer = json.loads(done.stdout)
     assert answer["file"]["directions"]["horizontal"] == "counterclockwise"
     assert answer["suspicions"] == []
+
+
+def test_records_of_krl_under_the_names_of_their_poses(tmp_path):
+    axes, frame = [f"A{n}" for n in range(1, 7)], [*"XYZ"]
+    path = tmp_path / "points.txt"
+    path.write_text("".join(
+        f"P{row}={{E6AXIS: {', '.join(f'{a} {v:.6f}' for a, v in zip(axes, q, strict=True))}}} "
+        f"MEAS={{FRAME: {', '.join(f'{a} {v:.6f}' for a, v in zip(frame, p, strict=True))}}}\n"
+        for row, (q, p) in enumerate(zip(Q_DEG, POINT_MM, strict=True), 1)
+    ))  # fmt: skip
+    assert_is_truth(reading(path))

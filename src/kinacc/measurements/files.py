@@ -126,7 +126,7 @@ def rows_of_lines(lines: Iterable[str], delimiter: str, path: str) -> Iterator[R
     """Rows of the lines of a text, blank ones too."""
     if delimiter == BLANKS:
         for number, line in enumerate(lines, 1):
-            text = line.removeprefix("\ufeff")
+            text = line.removeprefix("\ufeff").replace("={", " {")  # P1={E6AXIS: ..}
             brackets = "{" in text or "[" in text
             yield number, _WITH_BRACKETS.findall(text) if brackets else text.split()
         return
