@@ -62,6 +62,7 @@ _SHOWN = [
     "is_measured_there", "is_near_singular",
 ]  # fmt: skip
 _POINT = "tool of the program"
+_UNKNOWN = "no calibrated target is near, so expected errors hold what is not known of its place"
 _TRACK = "an external axis is not at zero (--base-is-fixed: none moves the robot's base)"
 Ask = Callable[[str, str], np.ndarray]
 Options = Mapping[str, Mapping[str, np.ndarray]]
@@ -273,7 +274,7 @@ class _Correction:
             group = [number for number in starts if positions[number].tool == name]
             tool = self.frame(TOOL, positions[group[0]])
             target, place, remark = _carried(self.calibration, tool, point)
-            remarks += [f"Tool {name or ''}: {remark}"] if remark else []
+            remarks += [f"Tool {name or 'of joints'}: {remark}"] if remark else []
             q_rad = np.stack([starts[number] for number in group])
             parts.append(_corrected(self.calibration, q_rad, target, place, tool).set_axis(group))
         return pd.concat(parts[1:] or parts), remarks
@@ -367,7 +368,7 @@ def _carried(calibration: Calibration, tool: Pose, point: str | None) -> tuple[s
             gap = f"{gap_mm:.3g} mm and {1e3 * gap_rad:.3g} mrad"
             remark = f"the calibrated {target}, {gap} from the controller's tool, takes its place"
             return target, place, f"{remark} (--point flange: the controller's tool)."
-    return _POINT, mounted, ""
+    return _POINT, mounted, _UNKNOWN if calibration.targets else ""
 
 
 def _moved(calibration: Calibration) -> Pose:
