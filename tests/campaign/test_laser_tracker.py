@@ -73,5 +73,7 @@ def test_a_laser_tracker_stated_wrongly_is_refused(text, key):
 
 def test_a_noise_below_the_rounding_of_the_readings_is_taken_as_the_rounding(begun):
     plan = campaigns.open_(begun("--noise-mm", "0.001,0.001,0.2", "--resolution-mm", 0.1)).plan
-    std = np.sqrt(np.diag(plan.instruments[0].covariance_mm2))
-    np.testing.assert_allclose(std, [0.1 / np.sqrt(12), 0.1 / np.sqrt(12), 0.2])
+    device = plan.instruments[0]
+    for used in (device, device.of_reading("0.001,0.001,0.2")):
+        std = np.sqrt(np.diag(used.covariance_mm2))
+        np.testing.assert_allclose(std, [0.1 / np.sqrt(12), 0.1 / np.sqrt(12), 0.2])

@@ -62,17 +62,23 @@ def runs(*bounds):
 def test_rows_count_what_is_stated_wanted_held_and_decided():
     table = runs(
         (0.9, 1.1, 1.0, "accept"),
-        (0.5, 0.9, 1.0, "accept"),
+        (0.5, 0.9, 1.0, "undecided"),
         (1.3, 2.0, 1.5, "reject"),
         (0.9, math.nan, 1.0, "undecided"),
     ).assign(attainable_mm=[0.1, 0.1, 0.3, 0.7])
+    wide = counted(table.assign(excepted=[0, 1, 0, 0]), Aim(width_mm=0.5)).loc[0]
+    assert (wide["excepted"], wide["reached"], wide["width_median_mm"]) == (
+        1,
+        1,
+        pytest.approx(0.7),
+    )
     (row,) = counted(table, Aim(width_mm=0.5, tolerance_mm=1.2)).itertuples()
-    assert (row.stated, row.within, row.reached) == (0.75, 0.5, 2)
+    assert (row.stated, row.within, row.reached) == (0.75, 0.5, 1)
     assert (row.holding, row.judged) == (2, 3)
-    # Clopper, Pearson: two or more of four, 6 p^2 - 8 p^3 + 3 p^4 = 0.025
-    assert row.reached_low == pytest.approx(0.06759, abs=1e-5)
+    # Clopper, Pearson: one or more of four, 1 - (1 - p)^4 = 0.025
+    assert row.reached_low == pytest.approx(0.006309, abs=1e-6)
     assert (row.excess_mm, row.attainable_mm) == pytest.approx((0.5 / 3.0, 0.3))
-    assert (row.accept, row.reject, row.undecided) == (0.5, 0.25, 0.25)
+    assert (row.accept, row.reject, row.undecided) == (0.25, 0.25, 0.5)
     assert (row.width_q05_mm, row.width_median_mm) == pytest.approx((0.2, 0.4))
     assert row.width_q95_mm == math.inf
 

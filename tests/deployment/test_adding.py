@@ -92,6 +92,9 @@ def test_a_file_of_known_readings_is_refused(cell):
     Path("june.csv").write_text(Path("data/march.csv").read_text())
     done = added(*SERIES, code=2)
     assert "holds the readings of" in done.output
+    added("may.csv", *SERIES[1:])
+    done = added("june.csv", "--date", "2026-07-04", *JUNE[2:], code=2)
+    assert "holds the readings of" in done.output
 
 
 def test_another_target_is_refused_where_the_tool_is_the_same(cell):

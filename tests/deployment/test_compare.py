@@ -119,7 +119,8 @@ def test_what_no_pose_shows_is_marked_and_counts_for_nothing():
 
 def test_what_base_and_tool_take_up_is_no_change_of_the_arm():
     before = calibrated("mh180", "dh", 60, 3)
-    found = compare(before, moved(before, {"j1.d_mm": 3.0, "j6.d_mm": 4.0}), joints("mh180", 60))
+    steps = {"j1.d_mm": 3.0, "j6.d_mm": 4.0, "j1.theta_offset_rad": 0.1, "j6.theta_offset_rad": 0.2}
+    found = compare(before, moved(before, steps), joints("mh180", 60))
     assert found.shifts["rms_mm"][0] > 1.0
     assert found.shifts["rms_mm"][1] < 1e-9
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from small_arms import calibrated, joints, moved
+from small_arms import BASE, calibrated, joints, moved
 
 from kinacc.calibration.uncertainty import is_angle
 from kinacc.deployment.applicability import sensitivity
@@ -26,6 +26,7 @@ def slope(pose_at, step):
 @pytest.mark.parametrize("point", ["tool", "flange"])
 def test_slopes_are_the_finite_differences_of_the_pose(model, frame, point):
     arm, q_rad = calibrated("mh180", model), joints("mh180", 3, seed=8)
+    arm = replace(arm, robot=replace(arm.robot, base=BASE))
     state = JointState(q_rad, np.sign(np.random.default_rng(5).normal(size=q_rad.shape)))
     slopes, names = sensitivity(arm, state, frame, point), arm.known.names
     for column in np.linspace(0, len(names) - 1, 30).astype(int):

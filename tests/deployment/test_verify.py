@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -16,7 +17,7 @@ from kinacc.deployment.permutation import ErrorColumns, compare, smallest_change
 from kinacc.deployment.predict import predict
 from kinacc.deployment.verify import error_columns, model_errors, verify
 from kinacc.errors import InputError
-from kinacc.geometry import Pose, exp_so3
+from kinacc.geometry import Pose, compose, exp_so3
 from kinacc.kinematics import dh, robot
 
 ELSEWHERE = Pose(exp_so3(np.array([1.2, 0.3, -0.8])), np.array([-700.0, 3100.0, 250.0]))
@@ -67,22 +68,27 @@ def test_changes_of_the_stated_sizes_are_found_in_four_of_five_cases():
     assert factor < 2.5
 
 
-def test_offsets_are_those_of_the_joints_as_reported():
-    """Of an arm with signs and a coupling, by differences of its poses."""
-    arm, step = robot.load("fanuc_crx10ia"), 1e-4
+def test_columns_are_those_of_what_was_moved_and_of_the_joints_as_reported():
+    """Of two targets on an arm with signs, a coupling and a sliding joint, by differences."""
+    arm, slides = robot.load("fanuc_crx10ia"), np.arange(6) == 4
+    arm = replace(arm, dh=replace(arm.dh, prismatic=slides))
     q = np.random.default_rng(0).uniform(-1.0, 1.0, (5, 6))
-    point = Pose(np.eye(3)[None], np.array([[10.0, 20.0, 150.0]]))
+    points = Pose(np.array([np.eye(3)] * 2), np.array([[10.0, 20.0, 150.0], [-80.0, 5.0, 60.0]]))
 
-    def at(reported):
-        flange = dh.forward(arm.dh, arm.dh_joints(reported))
-        return flange.position_mm + flange.rotation @ point.position_mm[0]
+    def at(motion):
+        reported = q + motion[12:] * np.where(slides, 1.0, 1e-3)
+        base = Pose(exp_so3(1e-3 * motion[3:6]), motion[:3])
+        flange = compose(base, dh.forward(arm.dh, arm.dh_joints(reported)))
+        places = points.position_mm + motion[6:12].reshape(2, 3)
+        turned = places @ np.swapaxes(flange.rotation, 1, 2)
+        return (flange.position_mm[:, None] + turned).reshape(5, 6)
 
     seen = full_poses(arm.dh_joints(q), dh.forward(arm.dh, arm.dh_joints(q)))
-    columns = error_columns(arm.dh, arm, seen, point, (), np.zeros((5, 1, 3))).columns
-    for joint in range(6):
-        shift = step * np.eye(6)[joint]
-        per_mrad = 1e-3 * (at(q + shift) - at(q - shift)) / (2.0 * step)
-        np.testing.assert_allclose(columns[..., joint], per_mrad, atol=1e-6)
+    found = error_columns(arm.dh, arm, seen, points, ("base", "tool"), np.zeros((5, 2, 3)))
+    assert found.fitted == 12
+    for number, step in enumerate(0.1 * np.eye(18)):
+        per_unit = (at(step) - at(-step)) / 0.2
+        np.testing.assert_allclose(found.columns[..., number], per_unit, atol=1e-5)
 
 
 @pytest.fixture(scope="module")

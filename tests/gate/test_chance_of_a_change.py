@@ -45,6 +45,7 @@ def test_the_interval_of_a_mean_is_students_where_errors_are_normal():
     student = now.mean() - before.mean() - scipy.stats.t.ppf(0.999, 19) * spread
     assert changed("mean", now, before, confidence=0.999).least == pytest.approx(student, abs=0.02)
     assert changed("mean", now[1:], before).open
+    assert changed("p99", sizes(1, 300), sizes(2, 199)).open
     assert changed("mean", now, before, poses=np.arange(20) // 2).open
     # Of 40, four copies or more of one, 4 less, are drawn in 1.8 %, five or more in 0.4 %.
     now = np.append(np.full(39, 5.0), 1.0)

@@ -209,10 +209,11 @@ def test_poses_beyond_the_fitted_range_are_counted_and_left_out():
 
 def test_a_configured_tool_stands_on_the_flange_as_that_is_turned():
     flange = geometry.Pose(TILTED, np.array([10.0, 20.0, 30.0]))
-    settings = defaults()["evaluation"] | {"tool_mm": [40.0, -25.0, 130.0]}
+    settings = defaults()["evaluation"] | {"tool_mm": [40.0, -25.0, 130.0], "travel_direction": -1}
     models = evaluation.equipped({}, settings, replace(ARM, flange=flange))
     wanted = TILTED @ settings["tool_mm"] + flange.position_mm
     np.testing.assert_allclose(models.by_name["nominal"].tool.position_mm, wanted, atol=1e-9)
+    assert models.travel.tolist() == [-1.0] * 6
 
 
 def test_the_base_of_a_fitted_vec_model_stands_in_that_of_the_dh_model():

@@ -21,10 +21,11 @@ def test_measured_fields_average_the_readings_of_a_pose_and_leave_out_what_was_f
         "estimate": np.array(["cross_validated"] * 3 + ["train"] * 2, object),
         "pose": np.array([7, 7, 8, 9, 9]),
         "row": np.array([2, 3, 1, 0, 0]),
-        "target": np.array(["tool"] * 5, object),
+        "target": np.array(["tool"] * 2 + ["probe"] + ["tool"] * 2, object),
         "ex_mm": np.array([1.0, 3.0, 5.0, 50.0, 50.0]),
         "ey_mm": np.zeros(5),
         "ez_mm": np.zeros(5),
     }
-    made = of_measurements("arm", errors)
-    assert made.error_mm[:, 0].tolist() == [2.0, 5.0]
+    for target, sizes in ((None, [2.0, 5.0]), ("tool", [2.0])):
+        made = of_measurements("arm", errors, target=target)
+        assert made.error_mm[:, 0].tolist() == sizes
