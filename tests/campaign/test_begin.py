@@ -12,6 +12,7 @@ from kinacc.assess.registry import ADAPTIVE
 from kinacc.campaign import begin
 from kinacc.campaign.instrument import instruments
 from kinacc.campaign.plan import Limits
+from kinacc.campaign.state import Reading, covariance_mm2, error_mm
 from kinacc.deployment.planning import spread
 from kinacc.deployment.record import Residual, nominal
 from kinacc.errors import InputError
@@ -49,7 +50,7 @@ def planned(arm, limits):
     """A plan of six readings at as many points, in the instrument's frame."""
     points = begin.points_of(arm, spread(arm.robot, 6), [str(number) for number in range(6)])
     assessor = ADAPTIVE["single_shot"](measurements=6)
-    used = instruments(["tracker=0.05"], "instrument")
+    used = instruments(["tracker=0.05", "camera=0.01,0.02,0.05"], "instrument")
     return begin.plan_of(arm, points, assessor, used, limits, {})
 
 
@@ -68,8 +69,11 @@ def test_readings_as_the_calibration_predicts_them_have_no_error(anchored):
     plan = planned(arm, Limits(3e-4, 5.0))
     at = JointState(plan.points.joints @ arm.robot.joint_map.T)
     seen = arm.pose(at, frame="instrument").position_mm
-    in_base = seen @ plan.to_base.rotation.T + plan.to_base.position_mm
-    np.testing.assert_allclose(in_base, plan.points.modelled_mm, atol=1e-9)
+    readings = [Reading(point, place, "camera") for point, place in enumerate(seen)]
+    np.testing.assert_allclose([error_mm(plan, each) for each in readings], 0.0, atol=1e-9)
+    turn = (station if anchored else arm.base).rotation
+    by_camera = turn.T @ np.diag([1e-4, 4e-4, 25e-4]) @ turn
+    np.testing.assert_allclose(covariance_mm2(plan, readings[0]), by_camera, atol=1e-12)
 
 
 def test_candidates_that_cannot_be_measured_against_the_model_are_named():

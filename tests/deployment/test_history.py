@@ -98,6 +98,19 @@ def test_the_history_is_the_same_in_whatever_order_lines_were_added():
         np.testing.assert_array_equal(column[:2], backward[name])
 
 
+def test_what_was_moved_counts_since_the_line_in_force_and_not_before_it():
+    seen = month(2, KNOCK_RAD, moved=True)
+    pushed = replace(seen, position_mm=seen.position_mm + 0.3)
+    lines = [month(1), month(2, moved=True), seen, pushed]
+    found = history(
+        *(session(each, n, MOVED if n == 2 else SAME) for n, each in enumerate(lines, 1))
+    )
+    assert list(found["verdict"]) == ["first", "holds", "recalibrate", "recalibrate"]
+    assert found["joint"][2] == 3
+    # A growth of all lengths takes up a part of the push.
+    assert found["moved_mm"][3] == pytest.approx(0.3 * 3.0**0.5, abs=0.03)
+
+
 def test_readings_of_the_line_in_force_are_not_compared_with_themselves():
     old, new = month(1), month(2, KNOCK_RAD)
     both = histories.joined(new, old, Setup(True, True))
