@@ -60,8 +60,8 @@ def test_a_load_that_is_stated_in_some_rows_only_does_not_change():
     """Where masses are unknown, loads that change show the compliance by itself."""
     settings, seen = defaults()["calibration"], measured(2)
     settings["compliance"] |= {"joints": [2], "payload": {"mass_kg": 5.0, "centre_mm": [0, 0, 9]}}
-    for mass_kg, changes in ((5.0, False), (6.0, True)):
-        seen.payload[0] = [mass_kg, 0.0, 0.0, 9.0]
+    for mass_kg, z_mm, changes in ((5.0, 9.0, False), (6.0, 9.0, True), (5.0, 80.0, True)):
+        seen.payload[0] = [mass_kg, 0.0, 0.0, z_mm]
         model = ComplianceEstimator.of(settings, ARM, seen).stiff
         assert np.isfinite(model.coefficients[1]).tolist() == [changes, True]
 

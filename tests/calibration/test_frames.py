@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from simulated import POINT, POSE, anywhere, measure
+from simulated import POINT, POSE, THREE, anywhere, measure
 
 from kinacc.calibration.frames import base_from_targets, closed_form_start
 from kinacc.calibration.observations import full_poses
@@ -17,10 +19,10 @@ ARM = robot.load("ur10")
 def exact(kind, count, sessions=1, seed=0):
     """Exact readings, flange poses and the frames they were made with."""
     rng = np.random.default_rng(seed)
-    frames = anywhere(rng, 1500.0, sessions), anywhere(rng, 80.0, 1)
+    frames = anywhere(rng, 1500.0, sessions), anywhere(rng, 80.0, 3 if kind == THREE else 1)
     q = rng.uniform(-2.5, 2.5, (count, 6))
     seen = measure(ARM.dh, q, kind, rng, 0.0, sessions, frames, noise_rad=0.0)
-    return seen, dh.forward(ARM.dh, q), *frames
+    return seen, dh.forward(ARM.dh, seen.q_rad), *frames
 
 
 def assert_close(pose, wanted):
@@ -67,3 +69,13 @@ def test_a_short_session_is_placed_by_the_long_one_whichever_comes_first(short):
     start = closed_form_start(seen.select(rows), Pose(*(part[rows] for part in flange)))
     assert_close(start.bases, bases)
     np.testing.assert_allclose(start.tool.position_mm, tools.position_mm[0], atol=1e-6)
+
+
+def test_a_target_of_the_short_session_alone_is_placed_beside_one_of_both():
+    seen, flange, bases, tools = exact(THREE, 40, 2)
+    turned = bases.rotation[seen.session] @ flange.rotation @ tools.rotation[seen.target]
+    here = np.where(seen.session == 0, seen.target < 2, (seen.target > 0) & (seen.pose < 20))
+    part = replace(seen, rotation=turned).select(here)
+    start = closed_form_start(part, Pose(*(values[here] for values in flange)))
+    assert_close(start.bases, bases)
+    assert_close(start.targets, tools)

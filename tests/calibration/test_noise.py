@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-from simulated import POINT, disturbed, joints, measure
+from simulated import POINT, THREE, disturbed, joints, measure
 
 from kinacc.calibration.dh_estimator import free_parameters
 from kinacc.calibration.misfit import misfit
@@ -17,13 +17,13 @@ from kinacc.kinematics import robot
 NOISE_MM = 0.02
 
 
-def read_again(apart_deg=0.0):
+def read_again(apart_deg=0.0, kind=POINT, sessions=1):
     """Positions at 60 configurations, gone to three times by an arm 4 mrad and 2 mm off."""
     rng, arm = np.random.default_rng(1), robot.load("irb120")
     true = disturbed(arm.dh, free_parameters(6), rng, 4e-3, 2.0)
     q = np.repeat(joints(arm, 60, rng), 3, axis=0)[rng.permutation(180)]
     q = q + np.deg2rad(apart_deg) * rng.uniform(-0.5, 0.5, q.shape)
-    return measure(true, q, POINT, rng, NOISE_MM), arm.dh
+    return measure(true, q, kind, rng, NOISE_MM, sessions), arm.dh
 
 
 def test_a_reading_that_went_wrong_is_no_noise():
@@ -43,3 +43,8 @@ def test_a_reading_that_went_wrong_is_no_noise():
     tables = {"model_selection": {"model": ["dh"], "held_out_rms_mm": [0.3]}}
     assert misfit(tables, robot.load("irb120"), "dh").held_out_mm == pytest.approx(0.3 / 3**0.5)
     assert after.per_axis_mm == pytest.approx(NOISE_MM, rel=0.1)
+
+
+def test_readings_of_other_targets_and_sessions_are_not_compared():
+    found = of_readings(*read_again(0.0, THREE, 2))
+    assert found.per_axis_mm == pytest.approx(NOISE_MM, rel=0.1)

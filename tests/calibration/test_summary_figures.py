@@ -49,14 +49,15 @@ def test_models_are_compared_at_rows_that_all_of_them_were_tried_on():
 
 
 def test_the_standard_error_is_that_of_the_means_of_configurations():
-    sizes = np.array([[1.0, 1.2], [2.0, 2.6], [0.4, 0.5]])
+    """Cochran 1977, eq. 6.13: configurations count by the number of their readings."""
+    sizes, counts = np.array([1.0, 1.2, 1.4, 2.0, 2.6, 0.4]), np.array([3, 2, 1])
     rows = [("dh_vs_measured", "cross_validated", row, size, np.nan)
-            for row, size in enumerate(sizes.ravel())]  # fmt: skip
-    table = summary.error_statistics(pose_errors(*rows), np.repeat([5, 3, 9], 2))
+            for row, size in enumerate(sizes)]  # fmt: skip
+    table = summary.error_statistics(pose_errors(*rows), np.repeat([5, 3, 9], counts))
     (found,) = table.itertuples()
-    means = sizes.mean(axis=1)
+    apart = counts / 2.0 * (np.array([1.2, 2.3, 0.4]) - sizes.mean())
     assert found.configurations == 3
-    assert found.std_error == pytest.approx(means.std(ddof=1) / np.sqrt(3.0), rel=1e-12)
+    assert found.std_error == pytest.approx(np.sqrt(np.sum(apart**2) / 2.0 / 3.0), rel=1e-12)
     assert found.rms == pytest.approx(np.sqrt(np.mean(sizes**2)), rel=1e-12)
     (alone,) = summary.error_statistics(pose_errors(*rows), np.zeros(6, dtype=int)).itertuples()
     assert np.isnan(alone.std_error)

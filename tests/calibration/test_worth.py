@@ -50,3 +50,10 @@ def test_of_two_models_worth_it_the_better_is_selected_wherever_it_stands():
     plain, configuration, fold = scattered(60, 0.2, 8), np.arange(60), np.arange(60) % 5
     for others in ({"a": 0.6 * plain, "b": 0.5 * plain}, {"b": 0.5 * plain, "a": 0.6 * plain}):
         assert best(selection({"dh": plain, **others}, configuration, fold)) == "b"
+
+
+def test_a_model_that_gains_in_most_rows_and_loses_in_the_mean_of_folds_is_not_selected():
+    by_dh, rows = scattered(100, 0.2, 3), np.arange(100)
+    by_vec = 0.8 * by_dh
+    by_dh[99], by_vec[99] = 1e-3, 0.2  # the only row of its fold
+    assert best(selection({"dh": by_dh, "vec": by_vec}, rows, rows // 99)) == "dh"

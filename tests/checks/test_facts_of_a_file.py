@@ -10,6 +10,8 @@ from kinacc.checks import repeatability
 def test_the_noise_between_two_targets_is_the_noise_of_a_reading(tmp_path):
     file = simulated(poses=300, noise_mm=0.1, targets=("a", "b"), repeats=2, off=0.0)
     facts = file.check(tmp_path).facts
+    share = np.ptp(file.columns["q4_deg"]) / 320.0  # joint 4 turns from -160 to 160 deg
+    assert facts["joint_coverage"][3]["share"] == pytest.approx(share)
     # A median of 600 absolute values scatters by 1.17 / sqrt(2 * 600) of itself: 3.4 %.
     assert facts["noise"]["between_targets_mm"] == pytest.approx(0.1, rel=0.12)
     (pair,) = facts["target_distances"]

@@ -134,6 +134,13 @@ def test_a_joint_that_counts_the_other_way_is_named(name, joint, tmp_path):
     assert only(bad.check(tmp_path), "joint_sign", EVERY(file)).values["joint"] == joint
 
 
+def test_a_joint_that_counts_from_another_zero_is_found_with_its_sign(tmp_path):
+    file = good("arm").rows(slice(0, 40))
+    bad = file.but(q3_deg=file.columns["q3_deg"] - 90.0)
+    found = only(bad.check(tmp_path), "joint_zero", EVERY(bad))
+    assert found.values["zero_deg"] == 90.0
+
+
 def test_joints_in_radians_of_which_two_count_the_other_way_are_all_named(tmp_path):
     file = good("arm").rows(slice(0, 40))
     for names, factor in ((["q2_deg", "q3_deg"], -1.0), (plants.joints(file), np.pi / 180.0)):

@@ -62,7 +62,7 @@ def test_a_count_of_rows_is_no_name(tmp_path):
 def test_one_name_for_two_poses_is_refused(tmp_path):
     names = named("P{}", range(COUNT))
     names[7] = names[3]
-    joints = table(["Name", *Q], names, IT.q)
+    joints = table(["Name", *Q], names, IT.q * [0, 0, 0, 0, 0, 1])  # joint 6 alone differs
     points = table(["Name", *XYZ], named("P{}", range(COUNT)), IT.point)
     files = written(tmp_path, joints_csv=joints, tracker_csv=points)
     assert "lines 5, 9" in refused(files, "--join", "Name")

@@ -109,7 +109,8 @@ def directions(folder, names, values):
 
 SPHERICAL = {
     "letters": (["Az [deg]", "El [deg]", "R [m]"], spherical(horizon=True, clockwise=False)),
-    "words": (["Azimuth [deg]", "Zenith [deg]", "Distance [m]"], spherical(clockwise=False)),
+    "words": (["Azimuth [rad]", "Zenith [rad]", "Distance [m]"], spherical(1.0, clockwise=False)),
+    "sizes": (["Hz [gon]", "V [gon]", "D [m]"], spherical(np.pi / 200, horizon=True)),
 }
 
 

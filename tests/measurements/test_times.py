@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from kinacc.measurements.times import offsets, standstills
+from kinacc.measurements.table import RawTable, frame
+from kinacc.measurements.times import offsets, seconds, standstills
 
 BEGIN_S, STEP_S, MOVES_S = 5000.0, 0.01, 0.5
 
@@ -42,3 +43,11 @@ def test_of_offsets_that_fit_as_many_points_the_middle_of_the_widest_span_is_tak
     # The last but one fits below -0.25 s, the last above: five of six from -0.5 to 0.5 s.
     points_s = begin_s + np.array([0.5, 0.5, 0.5, 0.5, 1.25, 0.25])
     assert offsets(points_s, begin_s[:, None] + [0.0, 1.0], 0.05) == [0.125]
+
+
+def test_times_go_on_over_midnight_and_milliseconds_are_known_by_their_size():
+    columns = {"time": ["30/04/2026 23:59:59,5", "01/05/2026 00:00:01"]}
+    columns["stamp"] = ["1767225600000", "1767225601500"]
+    table = RawTable("log.csv", frame(columns), np.arange(2))
+    for name in table.columns:
+        assert np.diff(seconds(table, name, [])) == pytest.approx(1.5)

@@ -112,6 +112,11 @@ def test_a_sliding_joint_is_read_as_a_length(tmp_path, joints):
     np.testing.assert_allclose(columns["q2"], np.deg2rad(joints["q2_deg"]))
 
 
+def test_pulses_of_motors_are_read_by_the_number_per_degree_of_each(tmp_path, joints):
+    read_of = reading(tmp_path, joints | points(), pulses_per_deg=[2.0] * 5 + [-4.0])
+    np.testing.assert_allclose(read_of.columns["q6"], np.deg2rad(joints["q6_deg"]) / -4.0)
+
+
 def example(name: str, dataset: str):
     config = load([ROOT / "config.yaml", ROOT / "examples" / name], folder=ROOT)[dataset]
     file = config["measurements"]["file"]
@@ -136,13 +141,13 @@ def test_a_published_file_is_used_as_its_publisher_wrote_it():
 def test_mass_and_centre_of_the_payload_of_every_row(tmp_path, joints):
     mass = {"payload_kg": np.arange(COUNT) % 3}
     centre = {"payload_x_mm": np.full(COUNT, 10.0), "payload_y_m": np.full(COUNT, 0.02)}
-    centre |= {"payload_z_mm": np.full(COUNT, -30.0)}
+    centre |= {"payload_z_cm": np.full(COUNT, -3.0)}
     columns = reading(tmp_path, joints | points() | mass | centre).columns
     np.testing.assert_array_equal(columns["payload_kg"], mass["payload_kg"])
     assert [columns[f"payload_{axis}_mm"][1] for axis in "xyz"] == [10.0, 20.0, -30.0]
     table = joints | points()
     assert "payload_kg: is missing beside the centre" in refused(tmp_path, table | centre)
-    del centre["payload_z_mm"]
+    del centre["payload_z_cm"]
     assert "payload_z: is missing beside" in refused(tmp_path, table | mass | centre)
     negative = {"payload_kg": np.full(COUNT, -2.5)}
     assert "a mass of -2.5 kg" in refused(tmp_path, table | negative)
