@@ -109,5 +109,7 @@ def test_a_registered_model_is_calibrated_and_saved_as_others_are(registered, tm
     folder = calibration.save(tmp_path / "arm")
     read = kinacc.load_calibration(folder).table("model_selection")
     assert "ripple" in set(read["model"])
+    (path,) = kinacc.load_calibration(folder, "ripple").export(tmp_path)
+    assert '"error_model": "ripple"' in path.read_text()
     own = kinacc.read_table(folder / "ripple_model.parquet")
     np.testing.assert_array_equal(own["value"], calibration.table("ripple_model")["value"])

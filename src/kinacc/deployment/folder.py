@@ -24,20 +24,17 @@ from kinacc.tables.columns import Columns
 
 Tables = Mapping[str, Columns]
 
-_NEEDED = (*(f"{kind}_model" for kind in ALWAYS), "frames", "robot")
-# Used where they are there.
-_WANTED = (
-    *(f"{kind}_{table}" for kind in ERROR_MODELS for table in ("model", "fit", "covariance")),
-    *("measurements", "dh_identified", "residuals", "model_selection"),
-)
+NEEDED = (*(f"{kind}_model" for kind in ALWAYS), "frames", "robot")
+# Used where they are there, beside those of every kind of model.
+_WANTED = ("measurements", "dh_identified", "residuals", "model_selection")
 _SAME = 1e-9
 
 
 def read_tables(
     folder: Path | str,
     *more: str,
-    needed: Sequence[str] = _NEEDED,
-    optional: Sequence[str] = _WANTED,
+    needed: Sequence[str] = NEEDED,
+    optional: Sequence[str] | None = None,
 ) -> dict[str, Columns]:
     """The tables of a data set's results folder: columns (rows,) by table and name.
 
@@ -56,20 +53,24 @@ def read_tables(
         Naming all ``needed`` tables that are missing, and damaged ones.
     """
     folder = Path(folder)
+    if optional is None:
+        parts = ("model", "fit", "covariance")
+        optional = (*(f"{kind}_{part}" for kind in ERROR_MODELS for part in parts), *_WANTED)
     paths = {name: folder / f"{name}.parquet" for name in (*needed, *optional, *more)}
     missing = [name for name in needed if not paths[name].is_file()]
     if len(missing) == len(needed):
         message = "holds no calibration" if folder.is_dir() else "no such folder"
         raise input_error(str(folder), message, fix="kinacc calibrate FILE.yaml makes one")
-    problems = [
-        Problem(str(paths[name]), "no such file", fix="run the workflow first") for name in missing
-    ]
+    problems: list[Problem] = []
+    if missing:
+        message = f"the calibration is not finished: no {', '.join(missing)}"
+        problems = [Problem(str(folder), message, fix="kinacc calibrate FILE.yaml finishes it")]
     tables = {}
     for name, path in paths.items():
         with gathered(problems):
             if path.is_file():
                 tables[name] = store.read(path)
-    refuse(problems, f"{folder} holds no calibration that can be used")
+    refuse(problems)
     return tables
 
 

@@ -206,7 +206,7 @@ def summarise_all(
             summaries.append(summarise(folder, outdated=outdated))
         except InputError as error:
             problem = error.problems[0]
-            if problem.where != str(path):
+            if problem.where not in (str(path), str(folder)):
                 what = f"{problem.where}: {problem.what}"
                 problem = replace(problem, where=str(folder), what=what)
             summaries.append(problem)

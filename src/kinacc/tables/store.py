@@ -289,7 +289,7 @@ def _opened(path: Path | str, content: bytes | None = None) -> Iterator[pq.Parqu
     except InputError as error:
         raise InputError([replace(item, fix=remake(path)) for item in error.problems]) from None
     except FileNotFoundError:
-        raise input_error(str(path), "no such file", fix=remake(path)) from None
+        raise input_error(str(path), "no such file", "a Parquet file") from None
     except (pa.ArrowException, OSError, ValueError, OverflowError) as error:
         reason = (str(error) or type(error).__name__).splitlines()[0]
         message = f"not a readable Parquet file: {reason}"

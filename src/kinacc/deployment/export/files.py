@@ -137,14 +137,11 @@ def contents(source: Source, formats: Sequence[str] = ()) -> dict[str, str]:
     arm, able = source.calibration, formats_of(source.calibration.choice)
     # A name of its own, so that the DH files may stand beside it.
     stem = arm.name if arm.choice == PLAINEST else f"{arm.name}_{arm.choice}"
-    message, fix = f"cannot carry a {arm.choice} model", f"or give --model {PLAINEST}"
+    unable = f"cannot carry a model of kind {arm.choice}; the {PLAINEST} model has all formats"
     refuse(
-        [
-            Problem(f"--format {item}", message, ", ".join(able), fix)
-            for item in formats
-            if item not in able
-        ],
-        "Nothing was written",
+        Problem(f"format {item}", unable if item in FORMATS else "is unknown", ", ".join(able))
+        for item in formats
+        if item not in able
     )
     chosen = [FORMATS[item] for item in dict.fromkeys(formats or able)]
     return {f"{stem}{item.ending}": item.text(source) for item in chosen}

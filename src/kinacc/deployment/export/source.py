@@ -62,7 +62,9 @@ class Source:
         NaN where there is no standard deviation.
         """
         joint = np.arange(1, dh.joints + 1)
-        fitted = pd.DataFrame(self.tables.get(f"{self.calibration.choice}_model", {"joint": joint}))
+        fitted = pd.DataFrame(self.tables.get(f"{self.calibration.choice}_model", {}))
+        if "joint" not in fitted:  # no fit, or a registered model
+            fitted = pd.DataFrame({"joint": joint})
         fitted = fitted.drop_duplicates("joint").set_index("joint").reindex(joint)
         table = {"joint": joint, "type": np.where(dh.prismatic, "prismatic", "revolute")}
         for name in PARAMETERS:
