@@ -11,6 +11,9 @@ from stages_by_hand import CALIBRATED, run_stages
 import kinacc
 import kinacc.errors
 from kinacc.deployment import folder
+from kinacc.deployment.planning import Experiment
+from kinacc.geometry import IDENTITY
+from kinacc.kinematics.model import ErrorModel
 from kinacc.workflow.described import outdated_reason
 
 CONFIG = """\
@@ -128,6 +131,20 @@ def test_export_writes_files(calibration, tmp_path):
     assert len(calibration.values_for("staubli").values) == 6 * 6 + 2 * 6
 
 
+def plan(degrees=0.0, count=40, joint=2):
+    arm, experiment = (
+        kinacc.Robot.from_name("ur10"),
+        Experiment(IDENTITY, True, (joint,), 500, 0.01),
+    )
+    kinacc.plan_poses(arm, np.full((50, 6), degrees), experiment, count, np.zeros(6))
+
+
+def unfinished(calibration, folder):
+    (calibration.save(folder) / "summary.parquet").unlink()
+    kinacc.load_calibration(folder)
+
+
+NAN = np.full((3, 6), np.nan)
 WRONG = {
     "five joints": lambda calibration, _: calibration.predict(np.zeros(5)),
     "a text": lambda calibration, _: calibration.predict("home"),
@@ -141,9 +158,20 @@ WRONG = {
     "no paths": lambda *_: kinacc.read_measurements(),
     "no folder": lambda _, folder: kinacc.load_calibration(folder / "results"),
     "no calibration": lambda calibration, _: kinacc.compare(calibration, "results/arm"),
-    "joints of five": lambda calibration, _: kinacc.compare(
-        calibration, calibration, np.zeros((2, 5))
+    "joints of NaN": lambda calibration, _: kinacc.compare(calibration, calibration, NAN),
+    "a pose of NaN": lambda calibration, _: calibration.robot.forward(NAN),
+    "an unknown answer": lambda *_: kinacc.read_measurements("a.csv", joint_units="rad"),
+    "candidates in degrees": lambda *_: plan(degrees=45.0),
+    "half a pose": lambda *_: plan(count=40.5),
+    "a ninth joint": lambda *_: plan(joint=9),
+    "an assessor's name": lambda *_: kinacc.evaluate_assessors(
+        [[1, 0, 0]], ["maximum"], 0.1, 9, 1, 1
     ),
+    "candidates of four": lambda calibration, folder: kinacc.Campaign.start(
+        folder, calibration, np.zeros((9, 4)), 0.1
+    ),
+    "half a model": lambda *_: kinacc.register_error_model(ErrorModel),
+    "an unfinished folder": unfinished,
 }
 
 

@@ -32,8 +32,8 @@ from kinacc.deployment.export import urdf
 from kinacc.deployment.export.controllers import CONTROLLERS
 from kinacc.deployment.export.source import Source
 from kinacc.deployment.record import Calibration as CalibratedModel
-from kinacc.errors import InputError, Problem, refuse
-from kinacc.geometry import Pose
+from kinacc.errors import InputError, Problem, refuse, require_type
+from kinacc.geometry import Pose, numbers
 from kinacc.kinematics import robot as robots
 from kinacc.kinematics.robot import Robot
 from kinacc.report import summarise
@@ -184,7 +184,7 @@ class Calibration:
             For arrays of another shape, an unknown frame or point.
         """
         if s is not None:
-            s = _array("s", s, np.shape(np.atleast_2d(q_rad)))
+            s = numbers("s", s, np.shape(np.atleast_2d(q_rad)))
         return predicting.predict(self.model, q_rad, s, frame, point)
 
     def compensate(
@@ -212,10 +212,10 @@ class Calibration:
         InputError
             For something else than poses, arrays of another shape, an unknown frame or point.
         """
-        _require("poses", poses, Pose)
+        require_type("poses", poses, Pose)
         shape = len(poses.position_mm), self.robot.dh.joints
-        near_rad = None if near_rad is None else _array("near_rad", near_rad, shape)
-        s = None if s is None else _array("s", s, shape)
+        near_rad = None if near_rad is None else numbers("near_rad", near_rad, shape)
+        s = None if s is None else numbers("s", s, shape)
         return compensating.compensate(self.model, poses, near_rad, s, frame, point)
 
     def compensate_program(self, path: str | Path, **options: Any) -> programs.CorrectedProgram:
@@ -365,12 +365,13 @@ def read_measurements(
     if not paths:
         raise InputError(Problem("paths", "are not given", "a measured file or FILE.yaml"))
     for path in paths:
-        _require("path", path, (str, Path))
+        require_type("path", path, str, Path)
     if all(Path(path).suffix in (".yaml", ".yml") for path in paths):
         described = read_data_sets(paths).settings
         if settings:
             overrides = {"datasets": dict.fromkeys(described, settings)}
             described = read_data_sets(paths, overrides).settings
+        refuse(Problem(key, "is for measured files alone", fix="use settings") for key in answers)
     else:
         files = describe_files(paths, None if robot is None else str(robot), answers)
         content = {name: overlay(item, settings or {}) for name, item in files.items()}
@@ -410,7 +411,7 @@ def calibrate(measurements: Measurements | str | Path) -> Calibration:
     """
     if isinstance(measurements, (str, Path)):
         measurements = read_measurements(measurements)
-    _require("measurements", measurements, Measurements)
+    require_type("measurements", measurements, Measurements)
     settings = measurements.settings
     tables = _as_written(source.run({}, settings))
     tables["measurements"] = {
@@ -443,9 +444,10 @@ def load_calibration(folder: str | Path, model: str | None = None) -> Calibratio
     InputError
         Naming the tables that are missing or damaged.
     """
-    _require("folder", folder, (str, Path))
+    require_type("folder", folder, str, Path)
     folder = Path(folder)
-    tables = results.read_tables(folder, *summarise.PAGE_TABLES, *summarise.ON_PAGE)
+    optional = (*summarise.PAGE_TABLES, *summarise.ON_PAGE)
+    tables = results.read_tables(folder, *optional, needed=(*results.NEEDED, "summary"))
     made_by = store.read_metadata(folder / "summary.parquet").get("config_hash", "")
     return _of_tables(folder.resolve().name, tables, model, made_by)
 
@@ -475,8 +477,8 @@ def verify(
     InputError
         For readings of another robot, or other values of ``base`` and ``tool``.
     """
-    _require("calibration", calibration, Calibration)
-    _require("readings", readings, Measurements)
+    require_type("calibration", calibration, Calibration)
+    require_type("readings", readings, Measurements)
     setups = {verifying.BASE: base, verifying.TOOL: tool}
     refuse(
         Problem(name, repr(setup), "same, moved")
@@ -512,35 +514,18 @@ def compare(
     InputError
         For calibrations of different robots, or joints of another shape.
     """
-    _require("first", first, Calibration)
-    _require("second", second, Calibration)
+    require_type("first", first, Calibration)
+    require_type("second", second, Calibration)
     if q_rad is None:
         names = [f"q{joint + 1}" for joint in range(first.robot.dh.joints)]
         q_rad = np.concatenate(
             [fit.table("measurements")[names].to_numpy(dtype=float) for fit in (first, second)]
         )
-    first.robot.dh_joints(q_rad)
+    q_rad = first.robot.finite_joints(q_rad, "q_rad")
     measured = first.tables["measurements"], second.tables["measurements"]
     readings = shared_readings.shared(*measured)
     weight = schema.key("calibration.rotation_weight_mm_per_rad")["default"]
     return comparing.compare(first.model, second.model, q_rad, weight, readings)
-
-
-def _require(name: str, value: object, kinds: type | tuple[type, ...]) -> None:
-    """Raise InputError for a value of another type."""
-    if not isinstance(value, kinds):
-        kinds = kinds if isinstance(kinds, tuple) else (kinds,)
-        expected = " or ".join(kind.__name__ for kind in kinds)
-        raise InputError(Problem(name, f"is of type {type(value).__name__}", expected))
-
-
-def _array(name: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
-    """Numbers of a shape, or InputError."""
-    try:
-        return np.broadcast_to(np.asarray(value, dtype=float), shape)
-    except (TypeError, ValueError):
-        received = f"shape {np.shape(value)}"
-        raise InputError(Problem(name, received, f"an array of shape {shape}")) from None
 
 
 def _of_tables(

@@ -123,6 +123,13 @@ def refuse(problems: Iterable[Problem], title: str = "") -> None:
         raise InputError(several, title)
 
 
+def require_type(name: str, value: object, *kinds: type) -> None:
+    """Raise InputError for a value of another type."""
+    if not isinstance(value, kinds):
+        expected = " or ".join(kind.__name__ for kind in kinds)
+        raise input_error(name, f"is of type {type(value).__name__}", expected)
+
+
 @contextmanager
 def gathered(problems: list[Problem]) -> Iterator[None]:
     """Let problems of an InputError raised inside join ``problems``, and go on."""

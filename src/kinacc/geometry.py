@@ -9,9 +9,22 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
+from kinacc.errors import input_error
+
 _SMALL_ANGLE_RAD = 1e-4
+
+
+def numbers(name: str, value: ArrayLike, shape: tuple[int, ...] | None = None) -> np.ndarray:
+    """An array of numbers that somebody gave, spread to a shape; InputError where it is none."""
+    try:
+        array = np.asarray(value, dtype=float)
+        return array if shape is None else np.broadcast_to(array, shape)
+    except (TypeError, ValueError):
+        message = "is not an array of numbers" + (f" of shape {shape}" if shape else "")
+        raise input_error(name, message) from None
 
 
 class Pose(NamedTuple):

@@ -24,7 +24,8 @@ from kinacc.assess.adaptive import AdaptiveAssessor, Campaign, Candidates
 from kinacc.assess.invalidation_kernels import extend, extend_all
 from kinacc.assess.limits import visit_mm
 from kinacc.assess.statement import CANDIDATES, MEASURED, REGION, VISIT, Statement
-from kinacc.errors import InputError, Problem
+from kinacc.errors import InputError, Problem, require_type
+from kinacc.geometry import numbers
 
 
 class World(NamedTuple):
@@ -105,7 +106,7 @@ def drawn_world(
 
 def checked_errors(error_mm: ArrayLike) -> np.ndarray:
     """Return true errors as (m, 3) float64; InputError where they cannot be used."""
-    errors = np.ascontiguousarray(error_mm, dtype=np.float64)
+    errors = np.ascontiguousarray(numbers("true errors", error_mm))
     if errors.ndim != 2 or errors.shape[1] != 3 or errors.shape[0] == 0:
         message, allowed = f"shape {errors.shape}", "(m, 3) with m at least 1, in mm"
         raise InputError(Problem("true errors", message, allowed))
@@ -162,6 +163,7 @@ def carry_on(campaign: Campaign, reading_mm: Reading, limit: int | None = None) 
 def conduct(assessor: AdaptiveAssessor, world: World, limit: int | None = None) -> Campaign:
     """Run a campaign to its end, or ``limit`` readings, on the readings of a world."""
     campaign = assessor.begin(Candidates.with_equal_noise(world.sigma_mm))
+    require_type("begin(candidates)", campaign, Campaign)
     carry_on(campaign, world.reading_mm, limit)
     return campaign
 

@@ -12,6 +12,7 @@ from kinacc.calibration.fitting import Fit, ModelFit
 from kinacc.calibration.models import Common, Estimator
 from kinacc.calibration.observations import Observations
 from kinacc.config import error_models
+from kinacc.errors import input_error
 from kinacc.kinematics.model import ErrorModel
 from kinacc.kinematics.robot import Robot
 from kinacc.tables.columns import Artefact, Column
@@ -36,7 +37,21 @@ def register_error_model(model: type[ErrorModel]) -> type[ErrorModel]:
     -------
     type
         The class, so that this serves as a decorator.
+
+    Raises
+    ------
+    InputError
+        For a class that lacks parts of a model.
     """
+    stated = getattr(model, "__dataclass_fields__", ())
+    missing = [
+        name
+        for name in _NEEDED
+        if name not in stated and getattr(model, name, None) is getattr(ErrorModel, name, None)
+    ]
+    if missing:
+        allowed = "a dataclass that inherits ErrorModel"
+        raise input_error(f"{model}", f"lacks {', '.join(missing)}", allowed)
     own = type(f"{model.__name__}Estimator", (OwnEstimator,), {"kind": model.kind, "model": model})
     error_models.register(model.kind, model, own)
     of_dh = ARTEFACTS["dh_covariance"]
@@ -81,6 +96,7 @@ class OwnEstimator(Estimator):
 
 
 THRESHOLD = 0.01
+_NEEDED = ("kind", "dh", "names", "units", "start", "prior_std", "with_parameters", "pose")
 _COLUMNS = (
     Column("parameter", "text", "", "a parameter of the model"),
     Column("value", "float", "see unit", "its value"),

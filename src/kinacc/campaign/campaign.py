@@ -32,7 +32,7 @@ from kinacc.campaign.state import (
 from kinacc.campaign.status import Bound, CampaignStatus, status
 from kinacc.deployment.record import Calibration
 from kinacc.errors import InputError, Problem, refuse
-from kinacc.geometry import invert
+from kinacc.geometry import invert, numbers
 from kinacc.measurements.row_names import RowNames
 
 
@@ -160,8 +160,9 @@ class Campaign:
         InputError
             For candidates the model does not cover, a wrong noise, or a folder in use.
         """
-        arm, joints = calibration.model, np.asarray(candidates, dtype=float)
-        text = ",".join(map(repr, np.asarray(noise_mm, dtype=float).ravel().tolist()))
+        arm = calibration.model
+        joints = arm.robot.finite_joints(candidates, "candidates")
+        text = ",".join(map(repr, numbers("noise_mm", noise_mm).ravel().tolist()))
         instrument = Instrument(INSTRUMENT, covariance_of(text, "noise_mm"), frame)
         labels = [str(number) for number in range(1, len(joints) + 1)]
         points = begin.points_of(arm, joints, labels, None, point)
@@ -258,7 +259,7 @@ class Campaign:
                 message = message if point is None else f"{point!r} is unknown"
                 raise InputError(Problem("point", message, fix="name a candidate"), _NOTHING)
             name = plan.instrument(instrument).name
-            values = np.asarray(position_mm, dtype=float).reshape(-1)
+            values = numbers("position_mm", position_mm).reshape(-1)
             reported = None if joints is None else np.asarray(joints, dtype=float).reshape(-1)
             reading = Reading(number, values, name, reported)
             most_mm = math.inf if accept_implausible else most_plausible_mm(state)

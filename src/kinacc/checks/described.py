@@ -12,7 +12,8 @@ import numpy as np
 from kinacc.calibration.least_squares import one_thread
 from kinacc.checks import check, digits, readings, shipped
 from kinacc.checks.findings import Finding, Progress, Report
-from kinacc.errors import InputError, Problem
+from kinacc.config.values import did_you_mean
+from kinacc.errors import InputError, Problem, refuse
 from kinacc.kinematics import robot as robots
 from kinacc.kinematics.robot import Robot
 from kinacc.measurements.intake import guess as guesses
@@ -22,6 +23,11 @@ from kinacc.measurements.layout import ANGLE, LENGTH
 from kinacc.measurements.reader import MeasuredFile, read
 from kinacc.progress import SILENT
 
+ANSWERS = (
+    *("joint_unit", "length_unit", "angle_unit", "orientation", "take", "join", "clock_offset"),
+    *("decimal", "thousands", "encoding", "sheet", "names", "pulses_per_deg", "no_reading"),
+    *("sigma", "direction_unit", "vertical", "horizontal"),
+)
 _CALCULATED_MM = 0.004  # closer to an arm than any instrument measures
 _COARSE_DEG = 0.005  # 0.09 mm at 1 m; less is nothing beside what instruments measure with
 
@@ -38,8 +44,7 @@ def describe_files(
     robot
         A shipped name, a robot file or a URDF file; None for a shipped robot that fits.
     answers
-        What the files leave open, by the option of ``kinacc init``: joint_unit, length_unit,
-        orientation, take, join, clock_offset, decimal, sheet and so on.
+        What the files leave open, by the option of ``kinacc init``: some of ``ANSWERS``.
 
     Returns
     -------
@@ -51,7 +56,14 @@ def describe_files(
     InputError
         Listing the questions that the files leave open with their answers, or what is wrong.
     """
-    guess = guesses.look(list(files), answers)
+    answers = answers or {}
+    refuse(
+        Problem(key, "is no answer on a file", ", ".join(ANSWERS), did_you_mean(key, ANSWERS))
+        for key in answers
+        if key not in ANSWERS
+    )
+    texts = {key: value if key == "take" else str(value) for key, value in answers.items()}
+    guess = guesses.look(list(files), texts)
     if robot is None:
         if not (fit := fitting(guess, SILENT)):
             fix = "give robot: a name in docs/robots.md, a robot file or a URDF file"

@@ -17,10 +17,10 @@ from kinacc.calibration.identifiability import STRUCTURAL, LeftOpen, joints_anyw
 from kinacc.calibration.uncertainty import Uncertainty
 from kinacc.deployment.applicability import BLOCK, sensitivity
 from kinacc.deployment.record import TOOL, Calibration, nominal
-from kinacc.errors import Problem, input_error, refuse
+from kinacc.errors import Problem, input_error, refuse, require_type
 from kinacc.geometry import Pose, compose
 from kinacc.kinematics import dh
-from kinacc.kinematics.inverse.limits import travel_unit
+from kinacc.kinematics.inverse.limits import outside, travel_unit
 from kinacc.kinematics.model import JointState
 from kinacc.kinematics.region import points
 from kinacc.kinematics.robot import Robot
@@ -122,14 +122,23 @@ def plan_poses(
     Raises
     ------
     InputError
-        Where so many poses cannot be chosen, or the candidates determine no parameter.
+        Where so many poses cannot be chosen, the candidates determine no parameter or lie outside
+        the robot's limits, and for arrays of another shape.
     """
+    require_type("robot", robot, Robot)
+    q_rad = robot.finite_joints(q_rad, "candidates")
+    start_rad = robot.finite_joints(np.ravel(start_rad), "start_rad")
+    if outside(q_rad, (robot.q_min_rad, robot.q_max_rad)).any():
+        allowed = f"{robot.q_min_rad} to {robot.q_max_rad} rad (mm where a joint slides)"
+        raise input_error("candidates", f"outside the limits of {robot.name}", allowed)
+    if unknown := {*experiment.hayati_joints}.difference(range(1, robot.dh.joints + 1)):
+        raise input_error("hayati_joints", f"{sorted(unknown)}", f"1 to {robot.dh.joints}")
     shown = information(robot, q_rad, experiment)
     if shown.rank == 0:
         raise input_error("candidates", "determine no parameter")
     chosen, index = choose(shown.rows, count)
     chosen = np.sort(chosen)
-    places = np.concatenate([start_rad[None], q_rad[chosen]]) / travel_unit(robot)
+    places = np.concatenate([start_rad, q_rad[chosen]]) / travel_unit(robot)
     distance, path = distances(places), shortest_path(places)
     return PosePlan(
         chosen[path[1:] - 1],
@@ -263,8 +272,8 @@ def choose(rows: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
     """
     _, components, directions = rows.shape
     least = -(-directions // components)
-    if not least <= count <= len(rows):
-        allowed = f"at least {least}, at most {len(rows)} (candidates)"
+    if count not in range(least, len(rows) + 1):
+        allowed = f"a whole number, at least {least}, at most {len(rows)} (candidates)"
         raise input_error("poses", f"{count}, to determine {directions} directions", allowed)
     floor = _REGULAR * float(np.sum(rows**2)) / (len(rows) * directions) * np.eye(directions)
     chosen: list[int] = []

@@ -32,6 +32,7 @@ from kinacc.assess.world import (
 )
 from kinacc.config.records import Settings, of_section
 from kinacc.errors import Problem, refuse
+from kinacc.geometry import numbers
 from kinacc.progress import SILENT, Progress
 from kinacc.tables.columns import Columns, Tables
 from kinacc.tables.contract import ARTEFACTS, columns_of
@@ -152,6 +153,10 @@ def simulate(
     return pd.DataFrame(rows).astype({"lower_mm": float, "upper_mm": float})
 
 
+def _can_assess(item: object) -> bool:
+    return not isinstance(item, type) and (hasattr(item, "begin") or hasattr(item, "assess"))
+
+
 def name_of(assessor: object) -> str:
     """Name of an assessor in tables."""
     return str(getattr(assessor, "name", type(assessor).__name__))
@@ -213,12 +218,18 @@ def evaluate_assessors(
     >>> table["assessor"].tolist()
     ['maximum', 'single_shot']
     """
-    error_mm, levels = checked_errors(errors), np.atleast_1d(np.asarray(noise_mm, dtype=float))
+    error_mm, levels = checked_errors(errors), np.atleast_1d(numbers("noise_mm", noise_mm))
     problems = [
-        Problem(name, f"{value!r}", "a whole number, at least 1")
-        for name, value in (("budget", budget), ("repetitions", repetitions))
-        if not isinstance(value, (int, np.integer)) or value < 1
+        Problem(name, f"{value!r}", f"a whole number, at least {least}")
+        for name, value, least in (
+            ("budget", budget, 1),
+            ("repetitions", repetitions, 1),
+            ("seed", seed, 0),
+        )
+        if not isinstance(value, (int, np.integer)) or value < least
     ]
+    if not assessors or not all(map(_can_assess, assessors)):
+        problems.append(Problem("assessors", f"{assessors}", "objects with begin(candidates)"))
     if not levels.size or not np.all(np.isfinite(levels) & (levels > 0.0)):
         problems.append(Problem("noise_mm", f"{noise_mm}", "above 0, in mm"))
     names = [name_of(assessor) for assessor in assessors]

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from kinacc.errors import InputError, Problem
-from kinacc.geometry import IDENTITY, Pose, compose
+from kinacc.errors import input_error
+from kinacc.geometry import IDENTITY, Pose, compose, numbers
 from kinacc.kinematics import dh as _dh
 from kinacc.kinematics.dh import DHModel
 
@@ -92,14 +93,14 @@ class Robot:
         Raises
         ------
         InputError
-            For joints of another shape.
+            For joints of another shape, and NaN.
 
         Examples
         --------
         >>> Robot.from_name("ur10").forward([0, 0, 0, 0, 0, 0]).position_mm
         array([[-1184.3  ,  -256.141,    11.6  ]])
         """
-        end = _dh.forward(self.dh, self.dh_joints(np.atleast_2d(q_rad)))
+        end = _dh.forward(self.dh, self.dh_joints(self.finite_joints(q_rad)))
         return compose(compose(self.base, end), self.flange)
 
     def dh_joints(self, reported: np.ndarray) -> np.ndarray:
@@ -120,15 +121,21 @@ class Robot:
         InputError
             For joints of another shape.
         """
-        try:
-            joints = np.asarray(reported, dtype=float)
-        except (TypeError, ValueError):
-            joints = np.zeros(())
+        joints = numbers("joints", reported)
         if joints.shape[-1:] != (self.dh.joints,):
-            received = f"shape {joints.shape}" if joints.ndim else "no array of numbers"
             allowed = f"an array (n, {self.dh.joints}) for the joints of {self.name}"
-            raise InputError(Problem("joints", received, allowed))
+            raise input_error("joints", f"shape {joints.shape}", allowed)
         return joints @ self.joint_map.T
+
+    def finite_joints(self, reported: ArrayLike, name: str = "joints") -> np.ndarray:
+        """Reported joints as an array (n, k); InputError, by ``name``, where they are none."""
+        joints = np.atleast_2d(numbers(name, reported))
+        finite = np.isfinite(joints)
+        if joints.shape[1:] != (self.dh.joints,) or not joints.size or not finite.all():
+            received = f"shape {joints.shape}, {finite.sum()} numbers"
+            allowed = f"finite numbers (n, {self.dh.joints}) for the joints of {self.name}"
+            raise input_error(name, received, allowed)
+        return joints
 
     def dh_box(self, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Range of the DH joints over a box of reported joints.
