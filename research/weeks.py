@@ -73,7 +73,7 @@ def session(seen: Observations, name: str) -> Session:
     whole = fit(seen)
     own = Calibration(name, ARM, "dh", whole.model, whole.frames.base, {"tool": whole.frames.tool})
     return Session(name, name, "", SAME if name == "1" else "moved", SAME, own,
-                         seen, held_out_mm, *[np.nan] * 3)  # fmt: skip
+                         whole.model, seen, held_out_mm, *[np.nan] * 3)  # fmt: skip
 
 
 def verdict(seed: int, changed: bool, poses: int) -> str:

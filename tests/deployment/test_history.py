@@ -10,16 +10,18 @@ import pytest
 import scipy.stats
 import shared_data
 from simulated_months import month, session
+from small_arms import results_of
 
 from kinacc.calibration.observations import full_poses
 from kinacc.deployment import history as histories
-from kinacc.deployment.history import LEVEL
+from kinacc.deployment.history import LEVEL, session_of
 from kinacc.deployment.history_model import Moved, Setup, misfit_factor, understated
-from kinacc.geometry import Pose
+from kinacc.geometry import Pose, quaternion_from_rotation
 from kinacc.kinematics import robot as robots
 from kinacc.measurements.orientation import euler
-from kinacc.tables.allowed import MOVED, SAME
+from kinacc.tables.allowed import MOVED, SAME, SUBSETS
 
+FAR_RAD = 0.02 * np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
 KNOCK_RAD = np.array([0.0, 0.0, 2e-3, 0.0, 0.0, 0.0])
 
 
@@ -119,6 +121,49 @@ def test_readings_of_the_line_in_force_are_not_compared_with_themselves():
     assert grown["verdict"][1] == "recalibrate"
     for name in ("moved_mm", "chance_mm", "in_force_mean_mm"):
         assert grown[name][1] == pytest.approx(alone[name][1], rel=1e-3)
+
+
+def tables_as_the_workflow_gives_them(seen):
+    """A VEC model is selected; covariances are not among the tables that a history is made of."""
+    made = results_of("ur10", seen, with_vec=True)
+    names = ("robot", "frames", "dh_model", "vec_model")
+    quaternion = quaternion_from_rotation(seen.rotation)
+    measured = {
+        **{f"q{joint + 1}": column for joint, column in enumerate(seen.q_rad.T)},
+        **{f"s{joint + 1}": column for joint, column in enumerate(seen.s.T)},
+        **dict(zip(("x_mm", "y_mm", "z_mm"), seen.position_mm.T, strict=True)),
+        **dict(zip(("qw", "qx", "qy", "qz"), quaternion.T, strict=True)),
+        **{"pose": seen.pose, "repeat": seen.repeat, "target": np.full(len(seen), "tool")},
+        "subset": np.full(len(seen), SUBSETS[0]),
+    }
+    none = dict.fromkeys(("estimate", "comparison", "row", "ex_mm", "ey_mm", "ez_mm"), np.zeros(0))
+    choice = {"model": np.array(["dh", "vec"]), "selected": np.array([False, True])}
+    return {name: made[name] for name in names} | {
+        "measurements": measured, "pose_errors": none, "model_selection": choice
+    }  # fmt: skip
+
+
+def test_series_are_compared_about_the_fitted_dh_model_where_a_vec_model_is_selected():
+    """A VEC model holds the nominal one: about that, noise alone moves this arm by 16 % more."""
+    months = [(number, month(number, FAR_RAD, moved=True)) for number in (1, 2)]
+    lines = [
+        session_of(tables_as_the_workflow_gives_them(seen), f"ur-{n}", f"{n}", MOVED, SAME)
+        for n, seen in months
+    ]
+    found, about_dh = history(*lines), history(*(session(seen, n, MOVED) for n, seen in months))
+    assert found["model"][1] == "vec"
+    assert found["probability"][1] > LEVEL
+    for name in ("moved_mm", "chance_mm", "probability"):
+        assert found[name][1] == pytest.approx(about_dh[name][1], rel=1e-6)
+
+
+def test_an_arm_far_from_its_dh_model_raises_no_alarm():
+    """What base, tool and joints share is bound to the model, but so softly that nothing moves."""
+    lines = [session(month(n, FAR_RAD, moved=True), n, MOVED) for n in (1, 2)]
+    far = history(*(replace(line, dh=robots.load("ur10").dh) for line in lines))
+    assert far["verdict"][1] == "holds"
+    assert far["probability"][1] > 0.05
+    assert far["moved_mm"][1] == pytest.approx(history(*lines)["moved_mm"][1], rel=0.2)
 
 
 def ur10_series(name, number):

@@ -21,7 +21,7 @@ from kinacc.calibration.least_squares import one_thread
 from kinacc.calibration.observations import Observations, from_columns
 from kinacc.calibration.residuals import errors
 from kinacc.calibration.summary import held_out_errors
-from kinacc.config.error_models import MEASURED, Comparison
+from kinacc.config.error_models import MEASURED, PLAINEST, Comparison
 from kinacc.deployment import folder, history_model
 from kinacc.deployment.history_model import Setup, joined
 from kinacc.deployment.record import Calibration
@@ -35,6 +35,7 @@ from kinacc.deployment.verify import (
     statistics,
 )
 from kinacc.errors import FitError, InputError
+from kinacc.kinematics.dh import DHModel
 from kinacc.kinematics.inverse.limits import outside
 from kinacc.kinematics.robot import carried
 from kinacc.measurements.folds import SAME_CONFIGURATION_RAD, configurations
@@ -51,11 +52,11 @@ MOST = 1500  # configurations of a series: what more would add is small beside t
 class Session:
     """One line of a series: what was measured, and the calibration it gave.
 
-    ``calibration``: the selected model of this line's data set. ``observations``: all its rows in
-    the order they were measured. ``held_out_mm`` (m,): position errors of that model at held-out
-    rows, empty without folds. ``base``, ``tool``: SAME or MOVED since the line before (of the
-    first: whatever is written there). ``temperature_c``, ``bound_mm``, ``tolerance_mm``: NaN where
-    not known.
+    ``calibration``: the selected model of this line's data set. ``dh``: its fitted DH model, about
+    which series are compared. ``observations``: all its rows in the order they were measured.
+    ``held_out_mm`` (m,): position errors of the selected model at held-out rows, empty without
+    folds. ``base``, ``tool``: SAME or MOVED since the line before (of the first: whatever is
+    written there). ``temperature_c``, ``bound_mm``, ``tolerance_mm``: NaN where not known.
     """
 
     name: str
@@ -64,6 +65,7 @@ class Session:
     base: str
     tool: str
     calibration: Calibration
+    dh: DHModel
     observations: Observations
     held_out_mm: np.ndarray
     temperature_c: float = np.nan
@@ -76,11 +78,15 @@ def session_of(
 ) -> Session:
     """A line of a series from the tables of its results."""
     calibration, measured = folder.calibration(tables, name=name), tables["measurements"]
+    # A VEC model holds the nominal DH parameters: too far from the arm for a linear comparison.
+    dh = folder.calibration(tables, PLAINEST, name=name).model.dh
     observed = from_columns(measured, calibration.robot)
     held_out = held_out_errors(tables["pose_errors"], calibration.choice)
     held_out_mm = np.linalg.norm(held_out[["ex_mm", "ey_mm", "ez_mm"]], axis=1)
     temperature_c = float(pd.Series(measured.get("temperature_c", []), dtype=float).mean())
-    return Session(name, date, "", base, tool, calibration, observed, held_out_mm, temperature_c)
+    return Session(
+        name, date, "", base, tool, calibration, dh, observed, held_out_mm, temperature_c
+    )
 
 
 def history(
@@ -206,13 +212,13 @@ class _Comparison:
         return self.known[key]
 
     def _about(self, session: Session, series: Observations, first: int) -> history_model.Pair:
-        """The pair about the DH model of a session's calibration, with its own base and targets."""
-        robot, model = session.calibration.robot, session.calibration.plainest.model.dh
+        """The pair about the fitted DH model of a session, with its own base and targets."""
+        robot = session.calibration.robot
         counts = len(series.session_names), len(series.target_names)
         weight = self.rotation_weight_mm_per_rad
         terms = frame_terms(series, known(robot.base, carried(robot), *counts))
-        frames = fit_frames(series, model, rotation_weight_mm_per_rad=weight, frames=terms)
-        return history_model.about(model, frames, series, first, weight)
+        frames = fit_frames(series, session.dh, rotation_weight_mm_per_rad=weight, frames=terms)
+        return history_model.about(session.dh, frames, series, first, weight)
 
     def errors_mm(self, force: Session, session: Session, setup: Setup) -> np.ndarray:
         """Position errors (n,) of the calibration in force where its model covers the joints.

@@ -259,13 +259,18 @@ def moved(pair: Pair, misfit: float) -> Moved:
 
     ``misfit``: factor on the deviations of the misfit that the series do not share, 1 or more.
     """
-    directions = _seen_directions(pair)
+    absorbed = _absorbed(pair)
+    directions = _seen_directions(pair, absorbed)
     count = len(directions)
     change = pair.constant @ directions.T
     drift = change * pair.late[:, None]
     grown = pair.constant @ pair.longer * pair.second
     firm = _unit(np.column_stack([pair.frames, pair.constant, grown]))
-    free = np.concatenate([firm, change * pair.second[:, None]], axis=1)
+    # Their part along base, tool and growth can be a thousand times as large as the rest.
+    anew = change[pair.second]
+    moves = np.zeros_like(change)
+    moves[pair.second] = anew - absorbed @ (absorbed.T @ anew)
+    free = np.concatenate([firm, moves], axis=1)
     states = [drift * (pair.second == item)[:, None] for item in (False, True)]
     warming = int(pair.joint.max(initial=-1)) + 1
     group = np.concatenate([pair.joint, np.full(2 * count, warming)])
@@ -290,7 +295,14 @@ def _unit(columns: np.ndarray) -> np.ndarray:
     return columns / np.where(size > 0.0, size, 1.0)
 
 
-def _seen_directions(pair: Pair) -> np.ndarray:
+def _absorbed(pair: Pair) -> np.ndarray:
+    """Orthonormal movements (n, r) of the second series by its own base and tool, and growth."""
+    rows = pair.second
+    local = np.column_stack([pair.frames[rows][:, pair.own], pair.constant[rows] @ pair.longer])
+    return scipy.linalg.orth(_unit(local), _FIRM)
+
+
+def _seen_directions(pair: Pair, absorbed: np.ndarray) -> np.ndarray:
     """Directions (d, 6k) of joint errors, each moving the second series by 1 mm rms.
 
     After the best growth of all lengths, and base and tool where these are its own; orthogonal as
@@ -298,8 +310,6 @@ def _seen_directions(pair: Pair) -> np.ndarray:
     """
     rows = pair.second
     constant = pair.constant[rows]
-    local = np.column_stack([pair.frames[rows][:, pair.own], constant @ pair.longer])
-    absorbed = scipy.linalg.orth(_unit(local), _FIRM)
     state = (constant - absorbed @ (absorbed.T @ constant))[pair.position[rows]]
     units = np.tile(UNITS, state.shape[1] // 6)
     _, values, right = np.linalg.svd(state * units, full_matrices=False)
