@@ -40,6 +40,10 @@ def test_a_reading_that_went_wrong_is_no_noise():
     wrong[17] += [0.0, 5.0, -3.0]
     after = of_readings(replace(observations, position_mm=wrong), nominal)
     assert (after.freedom, after.readings, after.configurations) == (119, 179, 60)
+    few = np.argsort(observations.q_rad[:, 0])[:5]  # three and two, of which one is wrong
+    place = observations.position_mm[few] + np.eye(5)[0][:, None] * 5.0
+    found = of_readings(replace(observations.select(few), position_mm=place), nominal)
+    assert found.readings == 4
     tables = {"model_selection": {"model": ["dh"], "held_out_rms_mm": [0.3]}}
     assert misfit(tables, robot.load("irb120"), "dh").held_out_mm == pytest.approx(0.3 / 3**0.5)
     assert after.per_axis_mm == pytest.approx(NOISE_MM, rel=0.1)

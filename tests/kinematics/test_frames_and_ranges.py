@@ -27,9 +27,11 @@ def test_the_first_row_is_the_frame_where_no_session_is_named():
 
 def test_limits_of_a_turned_joint_change_places_and_coupled_joints_keep_their_own():
     turned = np.diag([-1.0, 1, 1, 1, 1, 1])
-    turned[2, 1] = 1.0
+    turned[2, 1] = -1.0
     low, high = np.full(6, -1.0), np.full(6, 3.0)
     arm = replace(Robot.from_name("ur10"), joint_map=turned, q_min_rad=low, q_max_rad=high)
+    np.testing.assert_array_equal(arm.dh_box(low, high)[0][:3], [-3, -1, -4])
+    np.testing.assert_array_equal(arm.dh_box(low, high)[1][:3], [1, 3, 4])
     found = np.array(limits.dh_limits(arm))
     np.testing.assert_array_equal(found[:, :2], [[-3, -np.inf], [1, np.inf]])
     cut = np.array(limits.cut_to_range(arm, low, high, (low - 1, high - 2.5)))
