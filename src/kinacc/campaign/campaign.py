@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from kinacc.assess.registry import RECOMMENDED
 from kinacc.campaign import begin
 from kinacc.campaign import folder as folders
-from kinacc.campaign.instrument import INSTRUMENT, Frame, Instrument, covariance_of
+from kinacc.campaign.instrument import BASE, INSTRUMENT, Frame, Instrument, covariance_of
 from kinacc.campaign.plan import Limits, Plan, assessor_of
 from kinacc.campaign.state import (
     LeaveOut,
@@ -162,6 +162,10 @@ class Campaign:
         """
         arm = calibration.model
         joints = arm.robot.finite_joints(candidates, "candidates")
+        if frame not in (BASE, INSTRUMENT):
+            raise InputError(Problem("frame", repr(frame), f"{BASE}, {INSTRUMENT}"))
+        if tolerance_mm is not None:
+            tolerance_mm = float(numbers("tolerance_mm", tolerance_mm, ()))
         text = ",".join(map(repr, numbers("noise_mm", noise_mm).ravel().tolist()))
         instrument = Instrument(INSTRUMENT, covariance_of(text, "noise_mm"), frame)
         labels = [str(number) for number in range(1, len(joints) + 1)]
