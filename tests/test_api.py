@@ -199,6 +199,6 @@ def test_a_campaign_ends_with_a_bound_on_the_largest_error(calibration, q_rad, t
         with pytest.raises(kinacc.errors.InputError):
             kinacc.Campaign.start(tmp_path / "other", calibration, q_rad, noise_mm)
     for wrong in ({"frame": "x"}, {"tolerance_mm": "x"}):
-        with pytest.raises(InputError):
+        with pytest.raises(kinacc.errors.InputError):
             kinacc.Campaign.start(tmp_path / "other", calibration, q_rad, 0.05, **wrong)
     assert not (tmp_path / "other").exists()
