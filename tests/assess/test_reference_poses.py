@@ -16,6 +16,7 @@ from kinacc.assess.reference_poses import (
     schedule,
     stages,
 )
+from kinacc.assess.world import noisy
 
 SLANTED = np.array([[4.0, 1.0, 0.5], [1.0, 2.0, 0.3], [0.5, 0.3, 1.0]]) * 1e-2
 
@@ -32,6 +33,13 @@ def read(plan, rng, change_mm=lambda time: 0.0, covariance=None):
     )
     vectors += rng.multivariate_normal(np.zeros(3), covariance, len(place))
     return Readings(place, row, vectors, np.tile(covariance, (len(place), 1, 1)))
+
+
+def test_simulated_readings_have_the_covariance_of_their_root():
+    root = np.array([[1.0, 0.0, 0.0], [2.0, 1.0, 0.0], [0.0, 0.5, 0.3]])
+    reading = noisy(np.zeros((1, 3)), root, 4000, 1)
+    found = np.cov([reading(0, visit) for visit in range(4000)], rowvar=False)
+    assert_allclose(found, root @ root.T, atol=0.3)
 
 
 @pytest.mark.parametrize("references", range(1, 45))
