@@ -42,7 +42,6 @@ SLOW = (
     "cli/test_init.py",
     "figures/test_figure_files.py",
     "figures/test_figures.py",
-    "cli/test_drift_and_jump.py",
     "deployment/test_compare.py",
     "cli/test_snapshots.py",
     "cli/test_rows_as_the_user_calls_them.py",

@@ -7,14 +7,11 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
-import pandas as pd
 import plants
 import pytest
 import yaml
-from good_files import File, measured, simulated
+from good_files import measured, simulated
 
-from kinacc.kinematics import robot as robots
-from kinacc.kinematics.robot import forward
 from kinacc.measurements.intake.write import shipped_text
 
 EVERY, SOME, LATE = plants.every, plants.some, plants.late
@@ -233,14 +230,6 @@ def test_a_measured_file_whose_largest_error_hangs_on_three_rows(tmp_path):
 )
 def test_simulated_files_raise_no_suspicion(robot, kind, tmp_path):
     assert simulated(robot, **kind).check(tmp_path).suspicions == ()
-
-
-def test_readings_without_noise_of_the_arm_as_described_raise_no_suspicion(tmp_path):
-    q = np.round(np.random.default_rng(0).uniform(-1.0, 1.0, (40, 6)), 6)
-    point = forward(robots.load("irb120"), q).position_mm
-    names = [*(f"q{i}_rad" for i in range(1, 7)), "x_mm", "y_mm", "z_mm"]
-    file = File(pd.DataFrame(np.hstack([q, point]), columns=names), "irb120")
-    assert file.check(tmp_path).suspicions == ()
 
 
 def test_the_joint_map_that_is_advised_mends_a_coupling(tmp_path):

@@ -58,14 +58,6 @@ def assert_is_truth(columns, truth):
     np.testing.assert_allclose(rotation_from_quaternion(quaternion), pose.rotation, atol=1e-9)
 
 
-def test_euler_degrees_and_millimetres(tmp_path, good, truth):
-    reading = read(SECTION | {"path": written(tmp_path, good | {"stamp": np.ones(12)})}, ARM)
-    assert_is_truth(reading.columns, truth)
-    assert reading.unused == ("stamp",)
-    assert reading.left_out() == ["columns not used: stamp"]
-    np.testing.assert_array_equal(reading.columns["row"], np.arange(2, 14))
-
-
 @pytest.mark.parametrize("order", ["wxyz", "xyzw"])
 def test_quaternions_of_either_sign_by_name_and_in_a_stated_order(tmp_path, good, truth, order):
     turned = Rotation.from_matrix(truth[1].rotation).as_quat(scalar_first=order == "wxyz")
