@@ -213,13 +213,6 @@ def test_too_few_and_too_many_joints_are_refused(arm):
     assert "dh: has 3 rows; 4 to 7" in faults(arm, GOOD.removesuffix(last))
 
 
-def test_an_unknown_robot_names_the_nearest():
-    with pytest.raises(InputError) as refusal:
-        robot.load("irb121")
-    assert "irb120" in str(refusal.value)
-    assert "ur3" not in str(refusal.value)
-
-
 def test_joints_beyond_their_limits_are_given_by_joint_and_row():
     arm, joints = robot.load("irb120"), np.zeros((4, 6))
     joints[1, 2], joints[3, 4] = arm.q_max_rad[2] + 0.02, arm.q_min_rad[4] - 0.02

@@ -37,9 +37,6 @@ SCARA = [
     ("prismatic", "0.25 0 0.1", "0 0 0", "0 0 -1"),
     ("revolute", "0 0 0", "3.141592653589793 0 0", "0 0 1"),
 ]
-ON_A_TRACK = [("prismatic", "0 0.2 0", "0 0 0", "1 0 0"), ("fixed", "0 0 0.1", "0 0 1", None)] + [
-    (kind, *rest) for kind, *rest in UR10
-]
 
 
 def text_of(joints, extra: str = "") -> str:
@@ -71,16 +68,6 @@ def assert_same(path, arm: robot.Robot, tip: str, seed: int, count: int = 20, ba
         theirs = frames[0].inverse() * frames[1]
         assert np.abs(ours.position_mm[row] - theirs.translation * 1e3).max() < 1e-9
         assert np.abs(ours.rotation[row] - theirs.rotation).max() < 1e-12
-
-
-@pytest.mark.parametrize("joints", [UR10, IIWA, SCARA, ON_A_TRACK])
-def test_known_arms_agree_with_pinocchio(joints, tmp_path):
-    path = tmp_path / "arm.urdf"
-    path.write_text(text_of(joints))
-    arm = robot.load(path)
-    assert_same(path, arm, f"l{len(joints)}", 1)
-    assert np.abs(arm.dh.d_mm).max() < 2000
-    assert robot.files(path) == [path]
 
 
 EXACT = ["0", "1.5707963267948966", "-1.5707963267948966", "3.141592653589793"]
@@ -160,6 +147,7 @@ def test_an_open_end_is_asked_for_with_the_links_there_are(tmp_path):
         assert words in said
     arm = urdf.load(path, tip_link="l7")
     assert arm.dh.joints == 6
+    assert np.abs(arm.dh.d_mm).max() < 2000
     assert_same(path, arm, "l7", 2)
     part = urdf.load(path, "l1", "l6")
     assert part.dh.joints == 5
