@@ -182,19 +182,7 @@ def test_wrong_values_end_in_one_line(calibration, tmp_path, case):
     assert len(caught.value.problems) == 1
 
 
-def test_a_campaign_ends_with_a_bound_on_the_largest_error(calibration, q_rad, tmp_path):
-    start = {"frame": "base", "tolerance_mm": 2.0}
-    campaign = kinacc.Campaign.start(tmp_path / "check", calibration, q_rad, 0.05, 60, **start)
-    random = np.random.default_rng(4)
-    errors_mm = {str(i + 1): random.normal(0.0, 0.1, 3) for i in range(30)}
-    while (pose := campaign.next_pose()) is not None:
-        noise_mm = random.normal(0.0, 0.05, 3)
-        campaign.add_reading(pose.expected_mm + errors_mm[pose.point] + noise_mm)
-    bound = kinacc.Campaign(tmp_path / "check").bounds()[0]
-    largest_mm = max(map(np.linalg.norm, errors_mm.values()))
-    assert bound.lower_mm <= largest_mm <= bound.upper_mm < largest_mm + 0.2
-    assert bound.verdict == "accept"
-    assert campaign.status().readings == 60
+def test_a_campaign_that_cannot_be_begun_leaves_no_folder(calibration, q_rad, tmp_path):
     for noise_mm in (-0.1, np.zeros((3, 3)), 0.0):
         with pytest.raises(kinacc.errors.InputError):
             kinacc.Campaign.start(tmp_path / "other", calibration, q_rad, noise_mm)

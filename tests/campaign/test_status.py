@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import re
 from itertools import count
@@ -18,7 +17,6 @@ from kinacc.campaign import folder
 from kinacc.campaign.folder import Opened
 from kinacc.campaign.plan import Limits
 from kinacc.campaign.status import ADVICE, REASONS, status
-from kinacc.cli.output import plain
 from kinacc.report.rendering import lines
 
 
@@ -52,17 +50,6 @@ def test_limits_of_a_finished_campaign_are_those_of_the_true_errors():
         assert each.proven_mm == pytest.approx(true.proven_mm, rel=0.15)
         assert each.attainable_lower_mm == pytest.approx(true.attainable_lower_mm, rel=1e-3)
         assert each.lower_mm <= sizes.max() <= each.upper_mm
-
-
-def test_few_readings_state_no_bound_and_no_limit():
-    found = measured(3)
-    assert found.next_point is not None
-    assert found.assumes == ""
-    for each in found.bounds:
-        assert math.isnan(each.upper_mm)
-        assert math.isnan(each.attainable_mm)
-        assert each.withheld
-    json.dumps(plain(found.bounds[0].__dict__))
 
 
 @pytest.mark.parametrize(

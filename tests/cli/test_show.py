@@ -11,8 +11,6 @@ import pyarrow.parquet as pq
 import pytest
 from command_line import answer, call
 
-from kinacc.tables.contract import ARTEFACTS
-
 POSES = 80  # of the small study
 
 
@@ -51,14 +49,6 @@ def test_files_hold_all_rows_and_all_digits(folder, tmp_path, kind):
     assert [call("show", folder, "measurements", "-o", file).exit_code for _ in "12"] == [0, 2]
     found = getattr(pd, f"read_{kind}")(file)
     np.testing.assert_allclose(found["q3"], known["q3"], rtol=1e-11)
-
-
-def test_columns_are_described_with_unit_and_meaning(folder):
-    known = {row["column"]: row for row in rows(folder, "measurements", "--describe")}
-    assert known["q1"]["unit"] == "rad"
-    assert known["pose"]["holds"] == "0 to 79"
-    assert {name for name, row in known.items() if row["key"]} == {*ARTEFACTS["measurements"].key}
-    assert known["x_mm"]["meaning"]
 
 
 @pytest.mark.parametrize("name", ["measurement", "vec_model", "empty", "measurements.parquet/x"])

