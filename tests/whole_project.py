@@ -71,9 +71,9 @@ class Project:
         assert (done.returncode == 0) == ok, text
         return text
 
-    def to_do(self, *options: str) -> set[str]:
+    def to_do(self) -> set[str]:
         """The rules a run would go through now."""
-        text = self.snakemake(options=("--dry-run", "--quiet", "reason", *options))
+        text = self.snakemake(options=("--dry-run", "--quiet", "reason"))
         table = text.partition("Job stats:")[2].partition("\ntotal ")[0]
         found = set(re.findall(r"^(\w+) +\d+$", table, re.M)) - {"all"}
         assert found or "Nothing to be done" in text, text

@@ -35,11 +35,8 @@ def snakemake(project, *options: str) -> list[str]:
     return ["snakemake", "-c2", "-s", str(project.folder / "Snakefile"), *options]
 
 
-def test_the_papers_study_is_the_default_from_any_folder(project, cell):
+def test_a_configuration_of_ones_own_folder_goes_before_the_projects(project, cell):
     robot = "results/mh180/robot.parquet"
-    started(project, cell, snakemake(project, robot))
-    assert (cell / robot).is_file()
-    # A config.yaml of this folder goes before the project's.
     (cell / "config.yaml").write_text("datasets: {here: {robot: mh180}}\n")
     text = started(project, cell, snakemake(project, "-n", robot), ok=False)
     assert "results/mh180/robot.parquet" in text
@@ -55,14 +52,6 @@ def test_an_environment_in_a_folder_with_a_space_runs_the_rules(project, cell):
     command = [str(cell / "own env/bin/python"), "-m", *snakemake(project, robot)]
     started(project, cell, command)
     assert (cell / robot).is_file()
-
-
-def test_init_prints_commands_that_run_from_where_it_was_called(project, cell):
-    options = ["--robot", "mh180", "--name", "ours", "--out", "my files"]
-    text = started(project, cell, ["kinacc", "init", "own data/poses.csv", *options])
-    check, run = (line.strip() for line in text.partition("next:")[2].strip().splitlines()[:2])
-    started(project, cell, ["sh", "-c", check])
-    assert "data_check" in started(project, cell, ["sh", "-c", f"{run} -- -n"])
 
 
 MODULE = """\
