@@ -19,9 +19,9 @@ OFFSET_WRIST, GENERAL, STANFORD, SCARA, FIVE, ON_A_TRACK, OFFSET_ELBOW = (
 )
 
 
-def calibrated(arm: Robot, size: float = 0.3, seed: int = 5) -> DHModel:
+def calibrated(arm: Robot, size: float = 0.3) -> DHModel:
     """The arm's model off by ``size`` mm and mrad in every parameter."""
-    off = np.random.default_rng(seed).normal(0, size, (5, arm.dh.joints)).T
+    off = np.random.default_rng(5).normal(0, size, (5, arm.dh.joints)).T
     return arm.dh.with_parameters(arm.dh.start + (off * [1e-3, 1, 1, 1e-3, 1e-3]).ravel())
 
 

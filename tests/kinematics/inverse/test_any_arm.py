@@ -155,20 +155,6 @@ def test_some_branches_are_that_part_of_all():
         inverse.solve(UR10, UR10.dh, pose, ("front",))
 
 
-def test_coupled_joints_keep_the_limits_of_what_is_reported():
-    coupling = np.eye(6)
-    coupling[2, 1] = -1.0  # joint 3 is reported against the horizontal
-    arm = replace(arms.OFFSET_WRIST, joint_map=coupling, q_min_rad=np.full(6, -1.0))
-    q = arms.joints_within(arm, 40)
-    solved = inverse.solve(arm, arm.dh, dh.forward(arm.dh, q))
-    assert arms.share_missed(arm, q, solved) == 0.0
-    reported = limits.reported_joints(arm, solved.q_rad[solved.status == Status.FOUND])
-    assert limits.within(reported, arm.q_min_rad, arm.q_max_rad).all()
-    q = np.random.default_rng(1).uniform(-1.0, 1.0, (5, 6))
-    assert np.allclose(limits.reported_joints(arm, arm.dh_joints(q)), q)
-    assert limits.uncoupled(arm).tolist() == [True, False, False, True, True, True]
-
-
 def test_solutions_outside_the_fitted_range_say_so():
     q = arms.joints_within(MH180, 300)
     model = wavy(MH180, q)

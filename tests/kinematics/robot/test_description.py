@@ -60,17 +60,6 @@ def test_units_kinds_signs_and_limits_are_read(arm):
     assert np.allclose(in_other_units.q_max_rad, small.q_max_rad)
 
 
-def test_a_coupled_joint_is_turned_by_both(arm):
-    text = GOOD.replace(", sign: -1", "")
-    text += "joint_map: [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 1, 0, 1]]\n"
-    q = np.array([[0.1, 0.2, 30.0, 0.4]])
-    coupled, plain = arm(text), arm(GOOD.replace(", sign: -1", ""))
-    pose = robot.forward(coupled, q)
-    same = robot.forward(plain, np.array([[0.1, 0.2, 30.0, 0.6]]))
-    assert np.allclose(pose.position_mm, same.position_mm)
-    assert np.allclose(coupled.dh_joints(q), [[0.1, 0.2, 30.0, 0.6]])
-
-
 def test_base_flange_and_tool_frames_are_read(arm):
     framed = arm(
         GOOD

@@ -21,16 +21,6 @@ UR10 = [
     ("revolute", "0 0 0.1157", "0 0 0", "0 1 0"),
     ("fixed", "0 0.0922 0", "0 0 1.570796325", None),
 ]
-IIWA = [
-    ("revolute", "0 0 0.15", "0 0 0", "0 0 1"),
-    ("revolute", "0 0 0.21", "0 0 0", "0 1 0"),
-    ("revolute", "0 0 0.2", "0 0 0", "0 0 1"),
-    ("revolute", "0 0 0.22", "0 0 0", "0 -1 0"),
-    ("revolute", "0 0 0.18", "0 0 0", "0 0 1"),
-    ("revolute", "0 0 0.22", "0 0 0", "0 1 0"),
-    ("continuous", "0 0 0.081", "0 0 0", "0 0 1"),
-    ("fixed", "0 0 0.045", "0 0 0", None),
-]
 SCARA = [
     ("revolute", "0 0 0.3", "0 0 0", "0 0 1"),
     ("revolute", "0.4 0 0", "0 0 0", "0 0 1"),
@@ -118,9 +108,9 @@ def test_limits_names_and_kinds_come_from_the_file(tmp_path):
     assert arm.joint_names == ("j0", "j1", "j2", "j3")
     assert arm.dh.prismatic.tolist() == [False, False, True, False]
     assert np.allclose(arm.q_min_rad, [-2.5, -2.5, -2500, -2.5])
-    path.write_text(text_of(IIWA))
-    assert np.allclose(robot.load(path).q_max_rad, [2.0] * 6 + [2 * np.pi])
-    assert "l0 to link l8" in robot.load(path).source
+    path.write_text(text_of([*UR10[:5], ("continuous", *UR10[5][1:]), UR10[6]]))
+    assert np.allclose(robot.load(path).q_max_rad, [2.0] * 5 + [2 * np.pi])
+    assert "l0 to link l7" in robot.load(path).source
 
 
 # --- which chain ----------------------------------------------------------------------------------
