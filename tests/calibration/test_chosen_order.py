@@ -29,9 +29,9 @@ FIXED = FrameParameters.none(known())
 WAVY = Prior(0.3, 0.3e-3, 1.0, 1e-4)
 
 
-def observed(order, seed=0, prior=WAVY):
+def observed(order, prior=WAVY):
     """Poses of an arm whose joint errors are polynomials of ``order``."""
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     empty = vec.without_errors(ARM.dh, LOW, HIGH, order)
     spread = prior.std(empty)
     true = empty.with_parameters(spread * rng.normal(size=spread.size))

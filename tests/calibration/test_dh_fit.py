@@ -45,6 +45,3 @@ def test_fewer_numbers_than_parameters_are_refused():
     seen = measure(arm.dh, rng.uniform(-REACH, REACH, (4, 6)), POINT, rng)
     with pytest.raises(InputError, match="12 residual components of 4 training rows for the 33"):
         fit(seen, arm.dh, free)
-    known = frames.FrameParameters.none(frames.known())
-    with pytest.raises(InputError, match="for the 24 free parameters of the DH fit"):
-        fit(seen, arm.dh, free, frames=known)

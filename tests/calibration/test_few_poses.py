@@ -94,9 +94,9 @@ def test_a_pose_gives_six_numbers_at_most_whatever_it_carries(targets, numbers):
     def found(poses):
         q_rad = np.repeat(np.random.default_rng(2).uniform(-1.0, 1.0, (poses, 6)), targets, axis=0)
         columns = {f"q{i + 1}": q_rad[:, i] for i in range(6)}
-        columns |= {f"s{i + 1}": np.zeros(len(q_rad)) for i in range(6)}
-        columns |= {name: np.full(len(q_rad), np.nan) for name in ("qw", "qx", "qy", "qz")}
-        columns |= {name: np.zeros(len(q_rad)) for name in ("x_mm", "y_mm", "z_mm", "repeat")}
+        nothing = ["s1", "s2", "s3", "s4", "s5", "s6", "x_mm", "y_mm", "z_mm", "repeat"]
+        columns |= dict.fromkeys(nothing, np.zeros(len(q_rad)))
+        columns |= dict.fromkeys(["qw", "qx", "qy", "qz"], np.full(len(q_rad), np.nan))
         columns |= {"pose": np.repeat(np.arange(poses), targets), "target": names * poses}
         return few_poses(columns, arm, stated)
 

@@ -43,12 +43,6 @@ def test_rows_of_one_configuration_share_a_fold_or_a_block_of_time(plan, count, 
     assert (np.diff(block[first]) >= 0).all()
 
 
-def test_fewer_configurations_than_folds_leave_folds_empty():
-    fold = folds.assign(np.array([0, 0, 1]), 5, 0)
-    assert len(set(fold.tolist())) == 2
-    assert fold[0] == fold[1]
-
-
 def test_a_label_of_one_fold_alone_must_train():
     fold = np.array([0, 0, 1, 1, 1, 1, 1, 1, 1])
     label = np.array(["a", "a", "a", "a", "a", "b", "b", "b", "b"])

@@ -12,7 +12,6 @@ from test_few_poses import settings
 
 from kinacc.calibration import uncertainty
 from kinacc.calibration.dh_estimator import free_parameters
-from kinacc.calibration.identifiability import identified
 from kinacc.calibration.models import estimators
 from kinacc.geometry import Pose
 from kinacc.kinematics import robot
@@ -63,6 +62,3 @@ def test_a_stated_length_of_the_tool_holds_every_model(std_mm):
         known = uncertainty.of_fit(fit)
         left_open = known.undetermined[:, known.names.index("t0.z_mm")]
         assert np.abs(left_open).max(initial=0.0) < 0.1, kind
-    known = uncertainty.of_fit(found["dh"])
-    table = identified(found["dh"], known, pointing_one_way())
-    assert dict(zip(table["parameter"], table["status"], strict=True))["t0.z_mm"] == "prior"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from simulated import POSE, anywhere, fit, measure
+from simulated import POSE, fit, measure
 
 from kinacc.calibration import frames, tables, uncertainty
 from kinacc.calibration.dh_estimator import free_parameters
@@ -11,7 +11,6 @@ from kinacc.geometry import Pose, compose, exp_so3, log_so3
 from kinacc.kinematics import dh, robot
 
 ARM = robot.load("mh180")
-FRAMES = tuple(anywhere(np.random.default_rng(7), size, 1) for size in (2000.0, 90.0))
 
 
 def moved(fit, names, step, q_rad):
@@ -28,22 +27,19 @@ def moved(fit, names, step, q_rad):
     return compose(base, compose(dh.forward(model, q_rad), tool))
 
 
-def units(names):
-    return np.array([uncertainty.scale_of(name) for name in names])
-
-
 def test_undetermined_directions_move_no_measured_pose():
     share = np.random.default_rng(5).uniform(0.3, 0.7, (60, 6))
     q = ARM.q_min_rad + share * (ARM.q_max_rad - ARM.q_min_rad)
-    seen = measure(ARM.dh, q, POSE, np.random.default_rng(0), frames=FRAMES)
+    seen = measure(ARM.dh, q, POSE, np.random.default_rng(0))
     found = fit(seen, ARM.dh, free_parameters(6))
     known = uncertainty.of_fit(found)
     assert len(known.undetermined) == 24 - found.solution.spectrum.rank > 3
-    before = moved(found, known.names, np.zeros(len(known.names)), q)
+    unit = np.array([uncertainty.scale_of(name) for name in known.names])
+    before = moved(found, known.names, 0.0 * unit, q)
     for direction in known.undetermined:
         assert np.linalg.norm(direction) >= 1.0 - 1e-9
         # Small enough that the second order, 1e-6 of the arm's length per mrad squared, is nothing.
-        after = moved(found, known.names, 1e-3 * direction * units(known.names), q)
+        after = moved(found, known.names, 1e-3 * direction * unit, q)
         assert np.abs(after.position_mm - before.position_mm).max() < 1e-5
         assert np.abs(log_so3(after.rotation @ np.swapaxes(before.rotation, 1, 2))).max() < 1e-8
     # Where nothing is known of a parameter, nothing is said of it.

@@ -21,13 +21,10 @@ ARM = robot.load("mh180")
 LOW, HIGH = MEASURED_RAD
 
 
-def joints(count, seed=0):
-    return np.random.default_rng(seed).uniform(LOW, HIGH, (count, 6))
-
-
 def test_an_unknown_direction_is_the_mean_of_both():
     """Constants of eps_z and of both offsets are one: none of it may be lost at s = 0."""
-    empty, q = vec.without_errors(ARM.dh, LOW, HIGH, 1), joints(300, 9)
+    empty = vec.without_errors(ARM.dh, LOW, HIGH, 1)
+    q = np.random.default_rng(9).uniform(LOW, HIGH, (300, 6))
     true = replace(empty, direction_offsets_rad=np.full((6, 2), 4e-4))
     s = np.random.default_rng(10).choice([-1, 1], q.shape).astype(np.int8)
     s[:, 5] = np.where(np.arange(300) % 3, s[:, 5], 0)  # joint 6 also seen standing still
