@@ -9,6 +9,7 @@ import pytest
 from simulated import POINT, POSE, THREE, anywhere, disturbed, fit, joints, measure
 from test_few_poses import settings
 
+from kinacc.calibration import tables
 from kinacc.calibration.dh_estimator import free_parameters
 from kinacc.calibration.models import estimators
 from kinacc.geometry import Pose
@@ -32,6 +33,7 @@ def test_sessions_share_the_arm_and_not_the_base(kind, noise_mm):
 
 
 def test_a_dh_model_that_follows_the_vec_model_is_of_all_sessions():
+    """Of both fits the frames are those of a table, as stages hand them on."""
     rng, shift = np.random.default_rng(2), [900.0, -400.0, 50.0]
     first, tools = anywhere(rng, 900.0), anywhere(rng, 90.0, 1)
     bases = Pose(np.stack(2 * [first.rotation]), first.position_mm + np.outer([0.0, 1.0], shift))
@@ -41,6 +43,8 @@ def test_a_dh_model_that_follows_the_vec_model_is_of_all_sessions():
     calibration["vec"] |= {"order": 0, "prior": "stated"}
     calibration["dh"]["fit_to"] = "vec"
     for kind, estimator in estimators(calibration, ARM, seen).items():
-        found[kind] = estimator.fit(seen, found)
+        fitted, names = estimator.fit(seen, found), (seen.target_names, seen.session_names)
+        table = tables.frames_columns({kind: fitted.frames}, *names)
+        found[kind] = replace(fitted, frames=tables.frames_of(table, kind, *names))
     place = found["dh"].frames.bases.position_mm
     np.testing.assert_allclose(place[1] - place[0], shift, atol=0.5)
