@@ -8,7 +8,8 @@ where asked for.
 from __future__ import annotations
 
 import numpy as np
-from oracles.kinematics import UR10, dh_forward, rot_x, rot_y, rot_z, trans
+from oracles.controllers.arms import ARMS
+from oracles.kinematics import dh_forward, rot_x, rot_y, rot_z, trans
 from scipy.spatial.transform import Rotation
 from small_arms import WEIGHT, results_of
 
@@ -31,7 +32,7 @@ def month(
 ) -> Observations:
     """The readings of one month; ``knock_rad`` (6,) is added to the joints' zeros."""
     arm, chance = np.random.default_rng([0, 0]), np.random.default_rng([0, 1, number])
-    table = UR10 + arm.normal(0.0, [1e-3, 0.2, 0.2, 5e-4, 0.0], (6, 5))
+    table = ARMS["ur"].table + arm.normal(0.0, [1e-3, 0.2, 0.2, 5e-4, 0.0], (6, 5))
     phase = arm.uniform(0.0, 2.0 * np.pi, (2, 6))
     plan = np.random.default_rng([0, 2, number if other_poses else 0])
     q_rad = plan.uniform(-1.6, 1.6, (POSES, 6))

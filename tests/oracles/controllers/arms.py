@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 from oracles.kinematics import dh_frames, frame
 
 DEG = np.pi / 180.0
+KEYS = ("theta_offset_deg", "d_mm", "a_mm", "alpha_deg")
 ROBOTS = Path(__file__).parents[3] / "src" / "kinacc" / "kinematics" / "robots"
 
 
@@ -74,11 +75,10 @@ class Arm:
 
     def description(self) -> str:
         """The robot file."""
-        keys = ("theta_offset_deg", "d_mm", "a_mm", "alpha_deg")
         place = {"position_mm": self.flange[:3], "rotation_vector_deg": self.flange[3:]}
         content = {
             "name": self.name,
-            "dh": [dict(zip(keys, row, strict=True)) for row in self.rows],
+            "dh": [dict(zip(KEYS, row, strict=True)) for row in self.rows],
             "joint_map": self.matrix.tolist(),
             "limits_deg": self.limits,
             "flange": place,
@@ -99,8 +99,7 @@ def shipped(
 ) -> Arm:
     """The arm of a shipped robot file, read without the package."""
     content = yaml.safe_load((ROBOTS / f"{name}.yaml").read_text())
-    keys = ("theta_offset_deg", "d_mm", "a_mm", "alpha_deg")
-    rows = tuple(tuple(row[key] for key in keys) for row in content["dh"])
+    rows = tuple(tuple(row[key] for key in KEYS) for row in content["dh"])
     signs = np.diag([row.get("sign", 1) for row in content["dh"]])
     matrix = np.array(content.get("joint_map", signs), dtype=float)
     limits = tuple(map(tuple, content["limits_deg"]))

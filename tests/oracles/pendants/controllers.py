@@ -23,10 +23,7 @@ STAUBLI = Arm(
     np.eye(6), (0.0,) * 6,
     (0, 10, 80, 10, 50, 20), (60, 30, 25, 50, 30, 80), ((-200, 200),) * 6, errors(6),
 )  # fmt: skip
-MAKERS = {
-    **{name: ARMS[name] for name in ("kuka", "abb", "fanuc", "ur", "yaskawa")},
-    "staubli": STAUBLI,
-}
+MAKERS = {**ARMS, "staubli": STAUBLI}
 
 
 class _Shifted(Arm):
