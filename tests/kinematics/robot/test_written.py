@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinacc.errors import InputError
 from kinacc.geometry import Pose, exp_so3
 from kinacc.kinematics import robot
 from kinacc.kinematics.dh import PARAMETERS
@@ -39,8 +38,3 @@ def test_an_arm_reads_back(arm):
             np.testing.assert_allclose(made, own, rtol=0, atol=1e-14, err_msg=name)
     assert (back.name, back.source, back.date) == (arm.name, arm.source, arm.date)
     assert back.joint_names == (arm.joint_names or tuple(f"joint {i + 1}" for i in range(6)))
-
-
-def test_what_is_wrong_with_a_text_is_said_with_its_name():
-    with pytest.raises(InputError, match=r"results/x/robot\.parquet"):
-        robot.of_text("dh: 3", "results/x/robot.parquet")
