@@ -26,6 +26,7 @@ from kinacc.checks.findings import Finding, Progress, Report, finding
 from kinacc.checks.readings import Readings
 from kinacc.checks.robust_fit import Fitted
 from kinacc.config.measured import Orientation
+from kinacc.config.settings import OUTSIDE_LIMITS
 from kinacc.errors import InputError, Problem
 from kinacc.kinematics import robot as robots
 from kinacc.kinematics.robot import Robot, outside_limits
@@ -33,7 +34,7 @@ from kinacc.measurements.faults import LIMIT_SLACK
 from kinacc.measurements.layout import Layout
 from kinacc.measurements.reader import MeasuredFile, read
 from kinacc.progress import SILENT
-from kinacc.tables.allowed import LEFT_OUT, OUTSIDE_LIMITS
+from kinacc.tables.allowed import LEFT_OUT
 from kinacc.tables.columns import Columns
 from kinacc.tables.contract import columns_of
 

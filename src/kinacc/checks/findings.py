@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 import yaml
 
+from kinacc.config.settings import OUTSIDE_LIMITS
 from kinacc.measurements.row_names import RowNames
-from kinacc.tables.allowed import LEFT_OUT, OUTSIDE_LIMITS
+from kinacc.tables.allowed import LEFT_OUT
 
 STOPS, WARNING, NOTE = "stops", "warning", "note"
 TEXTS: dict[str, list[str]] = yaml.safe_load(

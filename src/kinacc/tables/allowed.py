@@ -10,7 +10,6 @@ SUBSETS = ("train", "validation")
 COMPARISONS = tuple(item.name for item in error_models.COMPARISONS)
 FINDING_LEVELS = ("stops", "warning", "note")
 LEFT_OUT = "left_out"  # the finding that something of a file is not used
-OUTSIDE_LIMITS = "outside_limits"  # the finding of rows that no fit reads, accepted or not
 ERRORS = ("delta_x", "delta_y", "delta_z", "eps_x", "eps_y", "eps_z")
 VERDICTS = ("agrees", "differs", "not comparable")
 # What becomes of a calibration by the next line of a series, and of base and tool since the line.
