@@ -371,7 +371,7 @@ def read_measurements(
         if settings:
             overrides = {"datasets": dict.fromkeys(described, settings)}
             described = read_data_sets(paths, overrides).settings
-        refuse(Problem(key, "is for measured files alone", fix="use settings") for key in answers)
+        refuse(Problem(key, "only measured files take it", fix="use settings") for key in answers)
     else:
         files = describe_files(paths, None if robot is None else str(robot), answers)
         content = {name: overlay(item, settings or {}) for name, item in files.items()}

@@ -37,7 +37,7 @@ def newest(
     predicts: one that was begun with an earlier calibration of that name is left out.
     """
     remarks: list[str] = []
-    other = None
+    fallback = None
     for place in sorted(set(places), key=_last_reading, reverse=True):
         try:
             opened = folder.open_(place)
@@ -46,11 +46,11 @@ def newest(
             elif opened.plan.about["model"] == model:
                 return status(opened), tuple(remarks)
             else:
-                other = other or opened
+                fallback = fallback or opened
         except InputError:
             command = shlex.join(["kinacc", "campaign", "status", str(place)])
             remarks.append(f"campaign {place} cannot be read: {command}")
-    return status(other) if other else None, tuple(remarks)
+    return status(fallback) if fallback else None, tuple(remarks)
 
 
 def history(inputs: Mapping[str, Any], settings: Mapping[str, Any]) -> Columns:

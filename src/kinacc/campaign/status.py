@@ -322,9 +322,9 @@ REASONS = {
     "noise_unknown": "the noise is not estimated yet: {freedom:.0f} of {needed:.0f} degrees of "
     "freedom",
     # noise of the bounds
-    "noise_margin": "bounds use {margin:g} times the stated noise: the budget is sure of {sure} "
-    "degrees of freedom to check it, and {needed} are needed (--set noise_margin=1 takes it as "
-    "stated)",
+    "noise_margin": "too few repeated readings planned to check the stated noise ({sure} of "
+    "{needed} degrees of freedom): bounds use {margin:g} times the stated value (--set "
+    "noise_margin=1 takes it as stated)",
     "noise_shown": "bounds use {factor:.2f} times the stated noise, as repeated readings show "
     "({freedom:.0f} degrees of freedom)",
     "noise_estimated": "noise estimated in this campaign: {factor:.2f} times the planned value "

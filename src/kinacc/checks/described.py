@@ -58,7 +58,7 @@ def describe_files(
     """
     answers = answers or {}
     refuse(
-        Problem(key, "is no answer on a file", ", ".join(ANSWERS), did_you_mean(key, ANSWERS))
+        Problem(key, "is not an answer on files", ", ".join(ANSWERS), did_you_mean(key, ANSWERS))
         for key in answers
         if key not in ANSWERS
     )

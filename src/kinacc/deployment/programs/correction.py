@@ -62,7 +62,7 @@ _SHOWN = [
     "is_measured_there", "is_near_singular",
 ]  # fmt: skip
 _POINT = "tool of the program"
-_UNKNOWN = "no calibrated target is near, so expected errors hold what is not known of its place"
+_UNKNOWN = "not a calibrated target; expected errors include the uncertainty of its position"
 _TRACK = "an external axis is not at zero (--base-is-fixed: none moves the robot's base)"
 Ask = Callable[[str, str], np.ndarray]
 Options = Mapping[str, Mapping[str, np.ndarray]]
@@ -396,11 +396,11 @@ def _corrected(
     wanted = compose(forward(robot, start), tool)
     result = inverse.compensate(arm, wanted, start, point=target)
     beyond = arm.outside_range(robot.dh_joints(start))
-    other = (result.status == PoseStatus.OTHER_POSTURE) & beyond.any(axis=1)
-    status = np.where(other, PoseStatus.OUTSIDE_RANGE, result.status)
-    beyond = np.where(other[:, None], beyond, result.offending)
+    uncovered = (result.status == PoseStatus.OTHER_POSTURE) & beyond.any(axis=1)
+    status = np.where(uncovered, PoseStatus.OUTSIDE_RANGE, result.status)
+    beyond = np.where(uncovered[:, None], beyond, result.offending)
     joints = [", ".join(map(str, 1 + np.flatnonzero(row))) for row in beyond]
-    q_rad = np.where(np.isfinite(result.q_rad) & ~other[:, None], result.q_rad, start)
+    q_rad = np.where(np.isfinite(result.q_rad) & ~uncovered[:, None], result.q_rad, start)
     new = compose(forward(robot, q_rad), tool)
     shift_mm, turn_rad = inverse.distance(new, wanted)
     known = predict(arm, q_rad, point=target)
