@@ -36,8 +36,7 @@ class GammaFit(NamedTuple):
 def fit(magnitudes: ArrayLike) -> GammaFit:
     """Fit a gamma distribution with location 0 by maximum likelihood.
 
-    Solves ``log k - digamma(k) = log mean(x) - mean(log x)`` for the shape k by Newton steps in 1/k
-    (Minka 2002); the scale is mean / k.
+    The shape k solves ``log k - digamma(k) = log mean(x) - mean(log x)``; the scale is mean / k.
 
     Parameters
     ----------
@@ -70,7 +69,7 @@ def fit(magnitudes: ArrayLike) -> GammaFit:
     gap = -float(np.log(x / mean).mean())
     if gap < _LEAST_GAP:
         return GammaFit(np.inf, 0.0, mean)
-    shape = _solve_shape(gap)
+    shape = float(scipy.stats.gamma.fit(x / mean, floc=0.0)[0])
     return GammaFit(shape, mean / shape, mean)
 
 
@@ -113,17 +112,3 @@ def gamma99(magnitudes: ArrayLike) -> float:
         As ``fit``.
     """
     return quantile(fit(magnitudes), 0.99)
-
-
-def _solve_shape(gap: float) -> float:
-    # Minka's start, good to 1.5 % everywhere; his step converges quadratically from it.
-    shape = (3.0 - gap + np.sqrt((gap - 3.0) ** 2 + 24.0 * gap)) / (12.0 * gap)
-    for _ in range(50):
-        miss = np.log(shape) - scipy.special.digamma(shape) - gap
-        slope = shape**2 * scipy.special.zeta(2.0, shape) - shape  # d miss / d (1/shape)
-        inverse = 1.0 / shape - miss / slope
-        step = 1.0 / inverse - shape
-        shape = 1.0 / inverse
-        if abs(step) <= 1e-13 * shape:
-            break
-    return float(shape)

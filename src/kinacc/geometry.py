@@ -14,8 +14,6 @@ from scipy.spatial.transform import Rotation
 
 from kinacc.errors import input_error
 
-_SMALL_ANGLE_RAD = 1e-4
-
 
 def numbers(name: str, value: ArrayLike, shape: tuple[int, ...] | None = None) -> np.ndarray:
     """An array of numbers that somebody gave, spread to a shape; InputError where it is none."""
@@ -187,16 +185,8 @@ def log_so3(rotation: np.ndarray) -> np.ndarray:
     """
     quaternion = quaternion_from_rotation(rotation)
     scalar, vector = quaternion[..., 0], quaternion[..., 1:]
-    length = np.linalg.norm(vector, axis=-1)
-    small = length < _SMALL_ANGLE_RAD
-    safe = np.where(small, 1.0, length)
-    # asin(x)/x near zero: the arctangent loses no digits there either, but divides by zero.
-    factor = np.where(
-        small,
-        2.0 + length * length / 3.0,
-        2.0 * np.arctan2(safe, np.where(small, 1.0, scalar)) / safe,
-    )
-    return factor[..., None] * vector
+    half = np.arctan2(np.linalg.norm(vector, axis=-1), scalar)
+    return 2.0 / np.sinc(half / np.pi)[..., None] * vector
 
 
 def project_so3(matrix: np.ndarray) -> np.ndarray:
@@ -248,13 +238,9 @@ def rotation_from_quaternion(quaternion: np.ndarray) -> np.ndarray:
     numpy.ndarray
         Rotations, shape (..., 3, 3).
     """
-    w, x, y, z = np.moveaxis(np.asarray(quaternion, dtype=float), -1, 0)
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-    ]
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+    values = np.asarray(quaternion, dtype=float)
+    cross = skew(values[..., 1:])
+    return np.eye(3) + 2.0 * (values[..., :1, None] * cross + cross @ cross)
 
 
 def quaternion_from_rotation(rotation: np.ndarray) -> np.ndarray:
