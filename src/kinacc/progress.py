@@ -1,8 +1,4 @@
-"""Telling a person that something long is under way: nothing for two seconds, then every few.
-
-A terminal used by one stage gets a bar; a workflow, where jobs share the screen, and a log file get
-plain lines.
-"""
+"""Telling a person that something long is under way: nothing for two seconds, then every few."""
 
 from __future__ import annotations
 
@@ -11,6 +7,8 @@ import threading
 import time
 from collections.abc import Iterable, Iterator, Sized
 from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass
 from typing import TypeVar
 
 QUIET_S = 2.0
@@ -18,55 +16,44 @@ EVERY_S = 5.0
 Item = TypeVar("Item")
 
 
-class Progress:
-    """Reports on one stage; call it on an iterable to have its items counted."""
+@dataclass
+class _Stage:
+    """A stage under way: how many items of what are done."""
 
-    def __init__(self, label: str, bar: bool = False) -> None:
-        self.label = label
-        self.bar = bar and sys.stderr.isatty()
-        self.state = ""
-        self._begun = time.monotonic()
-
-    def __call__(
-        self, items: Iterable[Item], what: str = "", total: int | None = None
-    ) -> Iterator[Item]:
-        """Yield the items, counting them as ``what`` ("simulations", "slices")."""
-        total = len(items) if total is None and isinstance(items, Sized) else total
-        if self.bar:
-            from tqdm import tqdm
-
-            yield from tqdm(items, self.label, total, unit=f" {what}", delay=QUIET_S, leave=False)
-            return
-        for done, item in enumerate(items):
-            self.state = f"{done} of {total} {what}" if total is not None else f"{done} {what}"
-            yield item
-        self.state = ""
-
-    def line(self) -> str:
-        """Where the stage stands, in one line."""
-        elapsed = f"{time.monotonic() - self._begun:.0f} s so far"
-        return f"{self.label}: {', '.join(filter(None, [self.state, elapsed]))}"
+    state: str = ""
 
 
-SILENT = Progress("")  # counts and shows nothing
+_CURRENT: ContextVar[_Stage | None] = ContextVar("stage", default=None)
+
+
+def with_progress(items: Iterable[Item], what: str) -> Iterator[Item]:
+    """Yield the items; the lines of :func:`reporting` count them as ``what`` ("simulations")."""
+    stage = _CURRENT.get() or _Stage()
+    total = f" of {len(items)}" if isinstance(items, Sized) else ""
+    for done, item in enumerate(items):
+        stage.state = f"{done}{total} {what}, "
+        yield item
+    stage.state = ""
 
 
 @contextmanager
-def reporting(label: str, bar: bool = False) -> Iterator[Progress]:
-    """A Progress whose line is printed while the block runs longer than two seconds."""
-    progress, over = Progress(label, bar), threading.Event()
+def reporting(label: str) -> Iterator[None]:
+    """Print a line every few seconds while the block runs longer than two."""
+    stage, over, begun = _Stage(), threading.Event(), time.monotonic()
 
     def report() -> None:
         wait = QUIET_S
         while not over.wait(wait):
-            wait = EVERY_S
-            if not progress.bar:
-                print(progress.line(), file=sys.stderr, flush=True)
+            wait, elapsed_s = EVERY_S, time.monotonic() - begun
+            line = f"{label}: {stage.state}{elapsed_s:.0f} s so far"
+            print(line, file=sys.stderr, flush=True)
 
     thread = threading.Thread(target=report, daemon=True)
     thread.start()
+    token = _CURRENT.set(stage)
     try:
-        yield progress
+        yield
     finally:
+        _CURRENT.reset(token)
         over.set()
         thread.join()

@@ -9,7 +9,7 @@ def test_a_stage_that_fails(project):
     project.configure("histories: {noise_mm: 0.2}")
     project.append(
         "src/kinacc/study/histories.py",
-        "def run(inputs, settings, progress):\n    raise ArithmeticError('the world ended')",
+        "def run(inputs, settings):\n    raise ArithmeticError('the world ended')",
     )
     text = project.snakemake("results/mh180/histories.parquet", ok=False)
     log = (project.folder / "results/mh180/logs/histories.log").read_text()

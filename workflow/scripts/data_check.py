@@ -4,4 +4,4 @@ from kinacc.checks import check
 from kinacc.workflow.script import stage
 
 with stage(snakemake) as job:
-    job.write_tables(check.run(job.inputs, job.settings, progress=job.progress))
+    job.write_tables(check.run(job.inputs, job.settings))

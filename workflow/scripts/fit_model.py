@@ -5,4 +5,4 @@ from kinacc.workflow.script import stage
 
 with stage(snakemake) as job:
     kind = snakemake.params.kind
-    job.write_tables(stages.fit_model(job.inputs, job.settings, kind, progress=job.progress))
+    job.write_tables(stages.fit_model(job.inputs, job.settings, kind))

@@ -4,4 +4,4 @@ from kinacc.study import histories
 from kinacc.workflow.script import stage
 
 with stage(snakemake) as job:
-    job.write_tables(histories.run(job.inputs, job.settings, progress=job.progress))
+    job.write_tables(histories.run(job.inputs, job.settings))

@@ -4,4 +4,4 @@ from kinacc.calibration import stages
 from kinacc.workflow.script import stage
 
 with stage(snakemake) as job:
-    job.write_tables(stages.compare_models(job.inputs, job.settings, progress=job.progress))
+    job.write_tables(stages.compare_models(job.inputs, job.settings))

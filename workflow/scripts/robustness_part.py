@@ -5,4 +5,4 @@ from kinacc.workflow.script import part_of, stage
 
 with stage(snakemake) as job:
     settings = {**job.settings, "part": part_of(snakemake)}
-    job.write_tables(robustness.run(job.inputs, settings, progress=job.progress))
+    job.write_tables(robustness.run(job.inputs, settings))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
@@ -19,8 +19,6 @@ from kinacc.kinematics.dh import DHModel
 from kinacc.kinematics.model import ErrorModel
 from kinacc.kinematics.robot import Robot, carried
 from kinacc.tables.columns import Columns
-
-Progress = Callable[..., Iterable[Any]]  # counts the items of an iterable, with a label
 
 
 @dataclass(frozen=True)
@@ -95,7 +93,7 @@ class Estimator:
         """Keys of its section that cannot be for ``arm``, what is wrong, and what is allowed."""
         yield from ()
 
-    def choices(self, every: Observations, progress: Progress | None = None) -> dict[str, Columns]:
+    def choices(self, every: Observations) -> dict[str, Columns]:
         """Tables that say how settings left open were chosen. Raises FitError."""
         return {}
 

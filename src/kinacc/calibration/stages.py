@@ -10,7 +10,7 @@ import pandas as pd
 
 from kinacc.calibration import residuals, tables, uncertainty
 from kinacc.calibration.fitting import Fit
-from kinacc.calibration.models import Progress, estimators, fit_all
+from kinacc.calibration.models import estimators, fit_all
 from kinacc.calibration.observations import Observations, from_columns
 from kinacc.calibration.residuals import Errors, errors, statistics
 from kinacc.config.error_models import (
@@ -27,6 +27,7 @@ from kinacc.kinematics.robot import Robot
 from kinacc.measurements import folds
 from kinacc.measurements.reader import excluded_lines, read_excluded
 from kinacc.measurements.row_names import RowNames
+from kinacc.progress import with_progress
 from kinacc.tables.columns import Columns
 from kinacc.tables.contract import columns_of
 
@@ -37,7 +38,6 @@ def fit_model(
     inputs: Mapping[str, Columns],
     settings: Mapping[str, Any],
     kind: str,
-    progress: Progress | None = None,
 ) -> dict[str, Columns]:
     """Fit the model of one kind to the training rows.
 
@@ -51,8 +51,6 @@ def fit_model(
         Sections ``robot`` and ``calibration`` of the configuration.
     kind : str
         ``vec``, ``dh``, ``compliance`` or a registered one.
-    progress : callable, optional
-        Wraps an iterable to show how far a choice is, with a label.
 
     Returns
     -------
@@ -69,7 +67,7 @@ def fit_model(
     arm = robot.load(settings["robot"])
     every, train = observed(inputs, arm)
     estimator = estimators(settings["calibration"], arm, every)[kind]
-    choices = estimator.choices(every, progress)
+    choices = estimator.choices(every)
     held_out = np.unique(every.fold[~train])
     estimator = estimator.chosen(choices, int(held_out[0]) if len(held_out) else None)
     observations = every.select(train)
@@ -96,7 +94,6 @@ def fit_model(
 def compare_models(
     inputs: Mapping[str, Columns],
     settings: Mapping[str, Any],
-    progress: Progress | None = None,
 ) -> dict[str, Columns]:
     """Errors of every comparison, in sample and held out, and the model selected by them.
 
@@ -109,8 +106,6 @@ def compare_models(
         Tables ``measurements``, of models and of frames, and ``vec_orders``.
     settings : mapping
         Sections ``robot`` and ``calibration`` of the configuration.
-    progress : callable, optional
-        Wraps an iterable to show how far the folds are, with a label.
 
     Returns
     -------
@@ -135,8 +130,8 @@ def compare_models(
         return fit_all(observations, chosen)
 
     numbers = [int(fold) for fold in np.unique(every.fold) if fold >= 0]
-    counted = progress(numbers, "shares of the poses held out") if progress else numbers
-    held_out, trained = residuals.cross_validated(every, refit, counted, delivered)
+    folds = with_progress(numbers, "shares of the poses held out")
+    held_out, trained = residuals.cross_validated(every, refit, folds, delivered)
     rows: list[tuple[Any, ...]] = []
     parts = []
     for name, fitted in errors(delivered, every.select(train)).items():

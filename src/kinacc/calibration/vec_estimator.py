@@ -11,7 +11,7 @@ import pandas as pd
 
 from kinacc.calibration import tables, vec_fit
 from kinacc.calibration.fitting import Fit, ModelFit, placed
-from kinacc.calibration.models import Common, Estimator, Progress
+from kinacc.calibration.models import Common, Estimator
 from kinacc.calibration.observations import Observations
 from kinacc.calibration.uncertainty import Uncertainty
 from kinacc.calibration.vec_fit import Prior
@@ -19,6 +19,7 @@ from kinacc.config.error_models import NOMINAL
 from kinacc.kinematics import vec
 from kinacc.kinematics.robot import Robot
 from kinacc.kinematics.vec import VECModel
+from kinacc.progress import with_progress
 from kinacc.tables.columns import Columns
 from kinacc.tables.contract import ARTEFACTS
 
@@ -81,15 +82,14 @@ class VECEstimator(Estimator):
         """Whether order or prior are left to the vec_fit."""
         return len(self.orders) > 1 or not self.prior_stated
 
-    def choices(self, every: Observations, progress: Progress | None = None) -> dict[str, Columns]:
+    def choices(self, every: Observations) -> dict[str, Columns]:
         """``vec_orders``: orders and priors tried with each fold unseen and with all seen."""
         parts: list[pd.DataFrame] = []
         folds = [None, *(int(fold) for fold in np.unique(every.fold) if fold >= 0)]
         if not self.open:
             unjudged = vec_fit.table_of([(self.order, self.prior, np.nan, None)])
             parts.append(unjudged.assign(fold=np.nan))
-        counted = progress(folds, "shares of the poses held out") if progress else folds
-        for fold in counted if self.open else ():
+        for fold in with_progress(folds if self.open else (), "shares of the poses held out"):
             training = every if fold is None else every.select(every.fold != fold)
             parts.append(self._choice(training, parts[0] if parts else None).assign(fold=fold))
         table = pd.concat([part.astype({"fold": float, "chosen": int}) for part in parts])

@@ -15,7 +15,7 @@ from kinacc.assess.attainable import limits_of
 from kinacc.assess.statement import ACCEPT, CANDIDATES, REJECT, UNDECIDED, decide
 from kinacc.assess.world import carry_on, noisy, truth_mm
 from kinacc.errors import InputError, Problem, refuse
-from kinacc.progress import Progress
+from kinacc.progress import with_progress
 from kinacc.study.fields import ErrorField
 
 
@@ -76,7 +76,6 @@ def plan_budget(
     aim: Aim,
     repetitions: int = 30,
     seed: int = 0,
-    progress: Progress | None = None,
 ) -> BudgetPlan:
     """Simulate campaigns of assessors, one for each budget, on every kind of errors.
 
@@ -94,8 +93,6 @@ def plan_budget(
         Width or decision that a campaign is for.
     repetitions, seed : int
         Campaigns simulated for each row; the same readings serve all budgets.
-    progress : callable, optional
-        Reports on an iterable.
 
     Returns
     -------
@@ -106,7 +103,7 @@ def plan_budget(
     InputError
         Where a field has too few errors, or an assessor states no bound on the target.
     """
-    runs = simulate(fields, candidates, covariance_mm2, assessors, repetitions, seed, aim, progress)
+    runs = simulate(fields, candidates, covariance_mm2, assessors, repetitions, seed, aim)
     rows = counted(runs, aim)
     return BudgetPlan(
         assessors[0].name,
@@ -127,7 +124,6 @@ def simulate(
     repetitions: int,
     seed: int,
     aim: Aim,
-    progress: Progress | None = None,
 ) -> pd.DataFrame:
     """Return one row for each simulated campaign; see :func:`plan_budget`."""
     refuse(
@@ -146,7 +142,7 @@ def simulate(
         (number, repetition) for number in range(len(fields)) for repetition in range(repetitions)
     ]
     runs = []
-    for number, repetition in progress(work, "simulated sets of readings") if progress else work:
+    for number, repetition in with_progress(work, "simulated sets of readings"):
         field, entropy = fields[number], (seed, number, repetition)
         drawn = np.random.default_rng(entropy).permutation(field.points)[:points]
         size_mm = field.size_mm[drawn]

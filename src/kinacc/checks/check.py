@@ -22,7 +22,7 @@ from kinacc.checks import (
     shipped,
     tails,
 )
-from kinacc.checks.findings import Finding, Progress, Report, finding
+from kinacc.checks.findings import Finding, Report, finding
 from kinacc.checks.readings import Readings
 from kinacc.checks.robust_fit import Fitted
 from kinacc.config.measured import Orientation
@@ -33,7 +33,6 @@ from kinacc.kinematics.robot import Robot, outside_limits
 from kinacc.measurements.faults import LIMIT_SLACK
 from kinacc.measurements.layout import Layout
 from kinacc.measurements.reader import MeasuredFile, read
-from kinacc.progress import SILENT
 from kinacc.tables.allowed import LEFT_OUT
 from kinacc.tables.columns import Columns
 from kinacc.tables.contract import columns_of
@@ -44,14 +43,12 @@ _OTHER_LENGTHS = 0.01  # of the arm's: real arms are off their description by a 
 _GROSS = 20.0  # robust spreads per axis: further off is no reading of this arm
 
 
-def run(
-    inputs: Mapping[str, Columns], settings: Mapping[str, Any], progress: Progress = SILENT
-) -> dict[str, Columns]:
+def run(inputs: Mapping[str, Columns], settings: Mapping[str, Any]) -> dict[str, Columns]:
     """``data_check``: every finding with its level and, where it was accepted, the reason.
 
     Raises InputError where findings stop the workflow, one problem each.
     """
-    report = examined(settings, "", progress)
+    report = examined(settings, "")
     if report.stopping:
         title = f"{report.path} is not ready to be fitted"
         raise InputError(
@@ -82,7 +79,7 @@ def run(
     return {"data_check": columns_of("data_check", table)}
 
 
-def examined(settings: Mapping[str, Any], dataset: str, progress: Progress) -> Report:
+def examined(settings: Mapping[str, Any], dataset: str) -> Report:
     """Check a data set's file, with what its configuration accepts.
 
     Parameters
@@ -91,8 +88,6 @@ def examined(settings: Mapping[str, Any], dataset: str, progress: Progress) -> R
         ``robot`` and the sections ``measurements``, ``calibration`` and ``data_check``.
     dataset
         Its name in the report.
-    progress
-        Called on what is iterated and a label.
 
     Returns
     -------
@@ -106,7 +101,7 @@ def examined(settings: Mapping[str, Any], dataset: str, progress: Progress) -> R
     """
     arm, section = robots.load(settings["robot"]), settings["measurements"]["file"]
     reading = read(section, arm, strict=False)
-    report = check(reading, section, arm, dataset, progress)
+    report = check(reading, section, arm, dataset)
     of_fit = (reading.columns, arm, settings["calibration"])
     more = (*coverage.few_poses(*of_fit), *coverage.fixed_frames(*of_fit))
     accepted = dict(settings["data_check"]["accept"])
@@ -119,7 +114,6 @@ def check(
     section: Mapping[str, Any],
     robot: Robot,
     dataset: str,
-    progress: Progress = SILENT,
 ) -> Report:
     """Report on what was read as in ``section``. Raises InputError for too few poses."""
     stated = Layout.of(section).orientation
@@ -130,7 +124,7 @@ def check(
     by_distances, renamed = moved.by_distances(every, distances)
     single, cell, away_mm = readings.merged(every)
     scatter = of_readings(every, robot.dh)
-    fitted, findings = _meant(single, stated, robot, progress)
+    fitted, findings = _meant(single, stated, robot)
     kinds = {item.kind for item in findings}
     findings += by_distances
     if not any(kind.startswith("joint_") for kind in kinds):
@@ -141,7 +135,7 @@ def check(
             target = renamed.target[np.unique(cell, return_index=True)[1]]
             named = replace(fitted.readings, target=target, target_names=renamed.target_names)
             fitted = robust_fit.fit(named, robot.dh)
-        fitted, jumps = moved.without_jumps(fitted, progress)
+        fitted, jumps = moved.without_jumps(fitted)
         findings += [*jumps, *_scattered(fitted), *digits.commanded(fitted, robot)]
         findings += [*rows.explained(fitted, robot, stated), *rows.largest(fitted)]
         gross = fitted.readings.lines(fitted.left_mm > _GROSS * fitted.trial.sigma_mm)
@@ -170,20 +164,18 @@ def check(
     )
 
 
-def _meant(
-    single: Readings, stated: Orientation, robot: Robot, progress: Progress
-) -> tuple[Fitted, list[Finding]]:
+def _meant(single: Readings, stated: Orientation, robot: Robot) -> tuple[Fitted, list[Finding]]:
     """The fit of the file as it is meant, and findings of all rows."""
     fitted = robust_fit.fit(single, robot.dh)
-    read, findings = meanings.find(single, robot, fitted.trial, progress)
+    read, findings = meanings.find(single, robot, fitted.trial)
     if findings:
         fitted = robust_fit.fit(read, robot.dh)
     if fitted.trial.sigma_mm > meanings.FAR * meanings.spread_mm(read.position_mm):
-        names = {"robot": robot.name, "shipped": _shipped(single, robot, progress)}
+        names = {"robot": robot.name, "shipped": _shipped(single, robot)}
         sigma_mm = fitted.trial.sigma_mm
         no_fit = finding("does_not_fit", single.lines(), sigma_mm=sigma_mm, **names)
         return fitted, [*findings, no_fit]
-    findings += _of_other_lengths(single, fitted, robot, progress)
+    findings += _of_other_lengths(single, fitted, robot)
     if not read.has_rotation.any():
         return fitted, findings
     way, least, before = meanings.find_orientations(read, stated, fitted.residuals.flange)
@@ -208,15 +200,13 @@ def _scattered(fitted: Fitted) -> Iterator[Finding]:
             yield finding("orientations", part.lines(), as_written_deg=degrees)
 
 
-def _shipped(single: Readings, robot: Robot, progress: Progress) -> str:
-    rivals = shipped.misfits(single, progress)
+def _shipped(single: Readings, robot: Robot) -> str:
+    rivals = shipped.misfits(single)
     names = [name for share, name in rivals if share <= shipped.SURE and name != robot.name]
     return f". Shipped robots that fit, best first: {', '.join(names)}" if names else ""
 
 
-def _of_other_lengths(
-    single: Readings, fitted: Fitted, robot: Robot, progress: Progress
-) -> Iterator[Finding]:
+def _of_other_lengths(single: Readings, fitted: Fitted, robot: Robot) -> Iterator[Finding]:
     """An arm that fits with other lengths alone is another one of the same build."""
     new, old = (np.stack([arm.a_mm, arm.d_mm]) for arm in (fitted.trial.arm.model, robot.dh))
     apart = np.abs(new - old)
@@ -232,7 +222,7 @@ def _of_other_lengths(
             robot=robot.name,
             lengths=", ".join(lengths),
             largest_mm=float(apart.max()),
-            shipped=_shipped(single, robot, progress),
+            shipped=_shipped(single, robot),
         )
 
 

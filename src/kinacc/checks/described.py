@@ -11,7 +11,7 @@ import numpy as np
 
 from kinacc.calibration.least_squares import one_thread
 from kinacc.checks import check, digits, readings, shipped
-from kinacc.checks.findings import Finding, Progress, Report
+from kinacc.checks.findings import Finding, Report
 from kinacc.config.values import did_you_mean
 from kinacc.errors import InputError, Problem, refuse
 from kinacc.kinematics import robot as robots
@@ -21,7 +21,6 @@ from kinacc.measurements.intake.guess import Guess
 from kinacc.measurements.intake.write import dataset_content, plain_name, template_text
 from kinacc.measurements.layout import ANGLE, LENGTH
 from kinacc.measurements.reader import MeasuredFile, read
-from kinacc.progress import SILENT
 
 ANSWERS = (
     *("joint_unit", "length_unit", "angle_unit", "orientation", "take", "join", "clock_offset"),
@@ -65,23 +64,21 @@ def describe_files(
     texts = {key: value if key == "take" else str(value) for key, value in answers.items()}
     guess = guesses.look(list(files), texts)
     if robot is None:
-        if not (fit := fitting(guess, SILENT)):
+        if not (fit := fitting(guess)):
             fix = "give robot: a name in docs/robots.md, a robot file or a URDF file"
             raise InputError(
                 Problem(guess.table.path, "no shipped robot fits the readings", fix=fix)
             )
         robot = fit[0]
     name = plain_name(guess.table.path)
-    guess, report, _ = corrected(guess, robots.load(robot), name, SILENT)
+    guess, report, _ = corrected(guess, robots.load(robot), name)
     if (coupling := coupling_of(report)) is not None:
         fix = "kinacc init writes the robot file with this joint_map"
         raise InputError(Problem(f"robot {robot}", coupling.what, fix=fix))
     return {name: dataset_content(robot, guess, int(report.facts["poses"]))}
 
 
-def corrected(
-    guess: Guess, robot: Robot, name: str, progress: Progress
-) -> tuple[Guess, Report, MeasuredFile]:
+def corrected(guess: Guess, robot: Robot, name: str) -> tuple[Guess, Report, MeasuredFile]:
     """Correct assumed settings of a file where its readings contradict them.
 
     Parameters
@@ -92,8 +89,6 @@ def corrected(
         The arm that was measured.
     name
         Name of the data set in the report.
-    progress
-        Called on what is iterated and a label.
 
     Returns
     -------
@@ -110,7 +105,7 @@ def corrected(
         raise InputError(Problem("--robot", message))
     for _ in range(3):
         reading = read(guess.section, robot, strict=False)
-        report = check.check(reading, guess.section, robot, name, progress)
+        report = check.check(reading, guess.section, robot, name)
         guess = replace(guess, notes=tuple(dict.fromkeys((*guess.notes, *reading.notes))))
         before, guess = guess, _set_right(guess, report)
         if guess is before:
@@ -153,15 +148,13 @@ def _set_right(guess: Guess, report: Report) -> Guess:
 
 
 @one_thread
-def fitting(guess: Guess, progress: Progress) -> list[str]:
+def fitting(guess: Guess) -> list[str]:
     """Fit the shipped robots to a file.
 
     Parameters
     ----------
     guess
         What a measured file holds.
-    progress
-        Called on what is iterated and a label.
 
     Returns
     -------
@@ -173,7 +166,7 @@ def fitting(guess: Guess, progress: Progress) -> list[str]:
         every = readings.of_file(read(guess.section, arm, strict=False), arm)
     except InputError:
         return []
-    return shipped.fitting(readings.merged(every)[0], progress)
+    return shipped.fitting(readings.merged(every)[0])
 
 
 def remarks_on(guess: Guess, report: Report) -> Iterator[str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from importlib.resources import files
 from typing import Any
@@ -24,7 +24,6 @@ _WARN = _WARN_OF_ROWS | {"commanded_joints"}  # they stop a workflow where a rea
 _NOTES = {"thin_coverage", LEFT_OUT}
 _NEVER_STOP = _NOTES | {"largest_rows"}
 VERDICTS = ("clean", "suspicions", "unusable")  # by exit code
-Progress = Callable[[Iterable[Any], str], Iterable[Any]]
 
 
 @dataclass(frozen=True)

@@ -20,12 +20,13 @@ from scipy.spatial.transform import Rotation
 
 from kinacc.checks import changes, robust_fit
 from kinacc.checks.changes import Change
-from kinacc.checks.findings import Finding, Progress
+from kinacc.checks.findings import Finding
 from kinacc.checks.readings import Readings, thinned
 from kinacc.checks.robust_fit import Residuals, Trial
 from kinacc.config.measured import Orientation
 from kinacc.kinematics import dh
 from kinacc.kinematics.robot import Robot
+from kinacc.progress import with_progress
 
 FAR = 0.02  # of the points' spread: what leaves more explains nothing, of this arm
 BAD_RAD = 0.02  # scatter of orientations that no arm as described leaves, calibrated or not
@@ -89,9 +90,7 @@ def changed(read: Readings, applied: Iterable[Change]) -> Readings:
     return read
 
 
-def find(
-    read: Readings, robot: Robot, written: Trial, progress: Progress
-) -> tuple[Readings, list[Finding]]:
+def find(read: Readings, robot: Robot, written: Trial) -> tuple[Readings, list[Finding]]:
     """The merged readings as they are meant, and the changes as findings of all lines.
 
     ``written`` is the fit of the readings as they stand.
@@ -103,7 +102,7 @@ def find(
         return read, []
     few = part.select(thinned(np.arange(len(part)), _TRIED_ROWS))
     here = Meaning.of(few, robot, ())
-    tried = _searched(here, robot, written.sigma_mm < _GOOD * spread, progress)
+    tried = _searched(here, robot, written.sigma_mm < _GOOD * spread)
     best = min(item.misfit for item in tried)
     if not best < _PROMISING * here.misfit:
         return read, []
@@ -114,7 +113,7 @@ def find(
     likely = [item.changes for item in close[:_FITTED]]
     fitted = [
         (*_fitted(many, robot, applied), applied)
-        for applied in progress(likely, "likely ways to read the columns fitted")
+        for applied in with_progress(likely, "likely ways to read the columns fitted")
     ]
     least = min(share for share, _, _ in fitted)
     if least >= _BETTER * written.sigma_mm / spread or least > FAR:
@@ -243,7 +242,7 @@ def _fitted(read: Readings, robot: Robot, applied: Changes) -> tuple[float, floa
     return sigma_mm / spread_mm(meant.position_mm), sigma_mm
 
 
-def _searched(here: Meaning, robot: Robot, good: bool, progress: Progress) -> list[Meaning]:
+def _searched(here: Meaning, robot: Robot, good: bool) -> list[Meaning]:
     """Meanings tried, ever further from the file as written (``here``) until one fits.
 
     Only single changes of the joints where the file as written is ``good``.
@@ -251,7 +250,7 @@ def _searched(here: Meaning, robot: Robot, good: bool, progress: Progress) -> li
     tried = {_numbers(here.read): here}
     single = [(change,) for change in changes.joint_changes(robot)]
     for rivals in [single] if good else _rounds(here, robot, tried):
-        for applied in progress(rivals, _TRIED):
+        for applied in with_progress(rivals, _TRIED):
             # A meaning that comes again keeps the fewest changes.
             if (numbers := _numbers(changed(here.read, applied))) not in tried:
                 tried[numbers] = Meaning.of(here.read, robot, applied)

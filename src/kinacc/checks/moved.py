@@ -11,10 +11,11 @@ import scipy
 from numpy import ndarray
 
 from kinacc.checks import robust_fit, tails
-from kinacc.checks.findings import Finding, Progress, finding
+from kinacc.checks.findings import Finding, finding
 from kinacc.checks.readings import Distance, Readings
 from kinacc.checks.robust_fit import Fitted, Linear, fit
 from kinacc.geometry import Pose, compose, invert, log_so3
+from kinacc.progress import with_progress
 
 _MOST_SPLITS = 8
 _TRIED = 3  # places tried for one split
@@ -32,13 +33,13 @@ _FEWEST_ROWS = 4  # on either side of a change of a distance
 Jump = tuple[str, ndarray]  # session (the base) or target, and the readings from there on
 
 
-def without_jumps(whole: Fitted, progress: Progress) -> tuple[Fitted, list[Finding]]:
+def without_jumps(whole: Fitted) -> tuple[Fitted, list[Finding]]:
     """The fit with every jump of base or target taken out, one after the other, and these."""
     fitted = whole
     jumps: list[Jump] = []
     # Poses of equal joints are one: read often, they make no jump any surer.
     few = len(np.unique(np.round(whole.readings.q_rad, 6), axis=0)) < _FEW
-    for _ in progress(range(_MOST_SPLITS), "searches for a moved instrument or target"):
+    for _ in with_progress(range(_MOST_SPLITS), "searches for a moved instrument or target"):
         best, least = None, _PLAIN if few else 1.0
         for row, likely in _places(fitted):
             for kind in dict.fromkeys([likely, "session", "target"]):

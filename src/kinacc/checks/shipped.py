@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from kinacc.checks import robust_fit
-from kinacc.checks.findings import Progress
 from kinacc.checks.meanings import Meaning, spread_mm
 from kinacc.checks.readings import Readings, thinned
 from kinacc.kinematics import robot as robots
+from kinacc.progress import with_progress
 
 _ROWS = 240
 _TRIED = 4  # robots that base and target alone put first
@@ -19,7 +19,7 @@ _NEXT = 0.2  # of what the next best leaves
 _SAME_ARM = 1e-6  # of the misfit: two names of one geometry
 
 
-def misfits(merged: Readings, progress: Progress) -> list[tuple[float, str]]:
+def misfits(merged: Readings) -> list[tuple[float, str]]:
     """What shipped robots leave, as a share of the points' spread, and their names, best first.
 
     The arms are taken as described: corrected, an arm of similar build would fit as well.
@@ -30,16 +30,16 @@ def misfits(merged: Readings, progress: Progress) -> list[tuple[float, str]]:
     rivals = [(arm, replace(few, q_rad=arm.dh_joints(few.q))) for arm in arms]
     rivals.sort(key=lambda pair: Meaning.of(pair[1], pair[0], ()).misfit)
     shares = []
-    for arm, observed in progress(rivals[:_TRIED], "shipped robots tried"):
+    for arm, observed in with_progress(rivals[:_TRIED], "shipped robots tried"):
         begin = robust_fit.start(observed, arm.dh)
         fit = robust_fit.best(observed, begin, strengths=(0.0,))
         shares.append((fit.sigma_mm / spread, arm.name))
     return sorted(shares)
 
 
-def fitting(merged: Readings, progress: Progress) -> list[str]:
+def fitting(merged: Readings) -> list[str]:
     """Names of the shipped robots that fit: one, or those of equal geometry; or none."""
-    shares = misfits(merged, progress)
+    shares = misfits(merged)
     least = shares[0][0] if shares else np.inf
     same = [name for share, name in shares if share <= (1.0 + _SAME_ARM) * least]
     others = shares[len(same) :]

@@ -72,10 +72,8 @@ def plan(out: Output, **options: Any) -> None:
     aim = Aim(options["width_mm"], options["tolerance_mm"], options["power"], options["target"])
     errors, covariance, assessors = _question(options)
     points, repetitions, seed = (options[name] for name in ("candidates", "repetitions", "seed"))
-    with reporting("campaign plan", bar=True) as progress:
-        budgets = plan_budget(
-            errors, points, covariance, assessors, aim, repetitions, seed, progress
-        )
+    with reporting("campaign plan"):
+        budgets = plan_budget(errors, points, covariance, assessors, aim, repetitions, seed)
     if out.picture is not None:
         from kinacc.figures.campaign import draw_budgets
 

@@ -53,7 +53,7 @@ def compare(
     Example:
       kinacc compare results/ur10_b results/ur10_d --picture moved.svg
     """
-    with reporting("compare", bar=True):
+    with reporting("compare"):
         both = [_calibration(place, model) for place in (first, second)]
         comparison.require_alike(*both)
         files = [Path(place) / "measurements.parquet" for place in (first, second)]

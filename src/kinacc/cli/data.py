@@ -76,8 +76,8 @@ def check_data(
     following: list[str] = []
     for name, settings in sections.items():
         try:
-            with reporting(f"check-data {name}", bar=True) as progress:
-                report = examined(settings, name, progress)
+            with reporting(f"check-data {name}"):
+                report = examined(settings, name)
         except InputError as error:
             code = UNUSABLE
             path = settings["measurements"]["file"]["path"]

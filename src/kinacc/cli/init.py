@@ -130,8 +130,8 @@ def init(measurement_files: tuple[str, ...], out: Output, **options: Any) -> Non
         reading = read(guess.section, arm, strict=False)
     else:
         arm = robots.load(robot)
-        with reporting(f"init {name}", bar=True) as progress:
-            guess, report, reading = corrected(guess, arm, name, progress)
+        with reporting(f"init {name}"):
+            guess, report, reading = corrected(guess, arm, name)
             if text is not None and (coupling := coupling_of(report)) is not None:
                 matrix = coupling.values["joint_map"]
                 why = f"found by trying it on the readings: {coupling.what}"
@@ -139,7 +139,7 @@ def init(measurement_files: tuple[str, ...], out: Output, **options: Any) -> Non
                 note = f"joint_map of the robot file that is written couples joints, {why}"
                 arm = replace(arm, joint_map=np.array(matrix, dtype=float))
                 guess = replace(guess, notes=(*guess.notes, note))
-                guess, report, reading = corrected(guess, arm, name, progress)
+                guess, report, reading = corrected(guess, arm, name)
         remarks = list(remarks_on(guess, report))
     poses = _first_poses(reading, arm.dh.prismatic)
     if not out.as_json:
@@ -192,8 +192,8 @@ def _robot(guess: Guess, stated: str | None) -> tuple[str | None, str]:
     """The robot as stated or found by fitting, None for a template; and why."""
     if stated is not None:
         return stated, "as given"
-    with reporting("init", bar=True) as progress:
-        fit = fitting(guess, progress)
+    with reporting("init"):
+        fit = fitting(guess)
     if not fit:
         return None, "none of the shipped robots fits; a template to fill in"
     if len(fit) > 1:

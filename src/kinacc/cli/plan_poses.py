@@ -49,7 +49,7 @@ def plan_poses(robot: str, count: int, candidates: str, out: Output, **options: 
     arm = robots.load(robot)
     experiment = _experiment(arm, options)
     box, inside = spaces.of_options(options, arm)
-    with reporting("plan-poses", bar=True):
+    with reporting("plan-poses"):
         if not candidates.isdecimal():
             answered = choice.joint_answers(options)
             file, joints = rows.candidates(candidates, arm, _MOST_CANDIDATES, answered)

@@ -82,7 +82,7 @@ def predict(
     calibration = choice.calibration_of(folder, model, session)
     arm = calibration.robot
     inputs, q = rows.joints_of(arm, joints, joints_deg, choice.joint_answers(file))
-    with reporting("predict", bar=True):
+    with reporting("predict"):
         result = prediction.predict(calibration, q, inputs.directions, frame, point, inputs.payload)
     named = pd.DataFrame({"row": inputs.label, **rows.joint_columns(arm.dh.prismatic, q)})
     table = named.join(result.table())
@@ -153,7 +153,7 @@ def compensate(
     inputs = _wanted(calibration, poses, texts, near)
     wanted = inputs.pose
     assert wanted is not None  # read_rows refuses a file without poses
-    with reporting("compensate", bar=True):
+    with reporting("compensate"):
         result = joints_for(
             calibration, wanted, inputs.joints, inputs.directions, frame, point, inputs.payload
         )

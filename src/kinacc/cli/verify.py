@@ -54,7 +54,7 @@ def verify(
     arm = results.robot_of(tables)
     results.require_same_robot(arm, robots.load(config["robot"]), folder)
     weight = float(config["calibration"]["rotation_weight_mm_per_rad"])
-    with reporting("verify", bar=True), warnings.catch_warnings(record=True) as caught:
+    with reporting("verify"), warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         try:
             columns = source.run({}, config)["measurements"]

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from kinacc.assess.model_invalidation import ModelInvalidation
 from kinacc.assess.world import World, checked_errors, error_vectors
 from kinacc.config.records import Settings, of_section
-from kinacc.progress import SILENT, Progress
+from kinacc.progress import with_progress
 from kinacc.study.monte_carlo import Visits, world_of
 from kinacc.tables.columns import Columns, Tables
 from kinacc.tables.contract import columns_of
@@ -68,7 +68,6 @@ def histories(
     assessor: ModelInvalidation,
     seed: int,
     point: ArrayLike | None = None,
-    progress: Progress = SILENT,
 ) -> Columns:
     """Columns of ``histories``: each example measurement by measurement.
 
@@ -80,7 +79,7 @@ def histories(
     numbers = np.arange(len(errors)) if point is None else np.asarray(point, np.int64)
     sizes, tables = np.linalg.norm(errors, axis=1), []
     settled = {name: getattr(assessor, name) for name in ("alpha", "distance", "covariance")}
-    for example in examples(errors, settings, visits, assessor, seed, progress):
+    for example in examples(errors, settings, visits, assessor, seed):
         world = world_of(errors, settings.noise_mm, example.simulation, visits, seed)
         steps = assessor.history(world, example.eta_mm)
         rows = world.point[steps.pop("row")]
@@ -96,7 +95,6 @@ def examples(
     visits: Visits,
     assessor: ModelInvalidation,
     seed: int,
-    progress: Progress = SILENT,
 ) -> list[Example]:
     """The runs to show, each the first simulation that satisfies its rule (see RULES).
 
@@ -120,7 +118,7 @@ def examples(
     def search(name: str, eta: float, shows: Callable[[World, float], bool]) -> Example:
         """The first simulation rejected (or not, for Fig. 6) at eta that shows what it is for."""
         nearest, simulations = None, range(settings.simulations_searched)
-        for number in progress(simulations, "simulations searched"):
+        for number in with_progress(simulations, "simulations searched"):
             world = world_of(error_mm, settings.noise_mm, number, visits, seed)
             if assessor.run(world, eta).rejected != (name == REJECTED):
                 continue
@@ -137,7 +135,6 @@ def examples(
 def run(
     inputs: Tables,
     settings: Settings,
-    progress: Progress = SILENT,
 ) -> dict[str, Columns]:
     """Return ``histories``."""
     points, study = inputs["assessment_points"], settings["study"]
@@ -148,6 +145,5 @@ def run(
         of_section(ModelInvalidation, study),
         settings["seed"],
         points["point"],
-        progress,
     )
     return {"histories": rows}

@@ -33,7 +33,7 @@ from kinacc.assess.world import (
 from kinacc.config.records import Settings, of_section
 from kinacc.errors import Problem, refuse
 from kinacc.geometry import numbers
-from kinacc.progress import SILENT, Progress
+from kinacc.progress import with_progress
 from kinacc.tables.columns import Columns, Tables
 from kinacc.tables.contract import ARTEFACTS, columns_of
 
@@ -108,7 +108,6 @@ def simulate(
     visits: Visits,
     seed: int,
     assessors: Sequence[Any],
-    progress: Progress = SILENT,
 ) -> pd.DataFrame:
     """Run every assessor on repetitions of each noise.
 
@@ -126,8 +125,6 @@ def simulate(
         Seed of the study.
     assessors : sequence
         All see the same worlds.
-    progress : Progress, optional
-        Reports on the simulations.
 
     Returns
     -------
@@ -143,7 +140,7 @@ def simulate(
     errors = checked_errors(error_mm)
     jobs = [(noise, repetition) for noise in noise_mm for repetition in repetitions]
     rows = []
-    for noise, repetition in progress(jobs, "simulations"):
+    for noise, repetition in with_progress(jobs, "simulations"):
         world = world_of(errors, noise, repetition, visits, seed)
         for assessor in assessors:
             assessment, bounded_mm = assess_world(assessor, world, world.visits)
@@ -301,7 +298,6 @@ def _columns(artefact: str, table: pd.DataFrame) -> Columns:
 def simulated(
     inputs: Tables,
     settings: Settings,
-    progress: Progress = SILENT,
 ) -> dict[str, Columns]:
     """Return ``study_chunk`` for ``settings["part"]`` (default: all repetitions).
 
@@ -318,7 +314,6 @@ def simulated(
         study,
         settings["seed"],
         assessors(settings["study"], settings.get("all_readings", True)),
-        progress,
     )
     return {"study_chunk": _columns("study_chunk", ordered(rows))}
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from kinacc.config.error_models import ALWAYS
 from kinacc.config.records import Settings
-from kinacc.progress import SILENT, Progress
+from kinacc.progress import with_progress
 from kinacc.study import in_memory
 from kinacc.study.claims.evaluate import evaluate
 from kinacc.synthetic.accepted import further_draws
@@ -24,7 +24,7 @@ STAGES = (
 )
 
 
-def run(inputs: Tables, settings: Settings, progress: Progress = SILENT) -> dict[str, Columns]:
+def run(inputs: Tables, settings: Settings) -> dict[str, Columns]:
     """Return ``robustness_chunk`` for ``settings["part"]`` (default: all further draws).
 
     Raises InputError where fewer draws were accepted than are wanted.
@@ -34,7 +34,9 @@ def run(inputs: Tables, settings: Settings, progress: Progress = SILENT) -> dict
     part = settings.get("part") or {"number": 1, "of": 1}
     chosen = draws[part["number"] - 1 :: part["of"]]
     config = {name: value for name, value in settings.items() if name != "part"}
-    parts = [claims_on(draw, config) for draw in progress(chosen, "further synthetic arms studied")]
+    parts = [
+        claims_on(draw, config) for draw in with_progress(chosen, "further synthetic arms studied")
+    ]
     return {
         "robustness_chunk": {
             name: np.concatenate([empty, *(part[name] for part in parts)])

@@ -7,7 +7,7 @@ import signal
 import sys
 import traceback
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,8 +21,6 @@ from kinacc.progress import reporting
 from kinacc.tables import store, sums
 from kinacc.tables.atomic import write_together
 from kinacc.workflow.code import config_hash
-
-Progress = Callable[..., Iterable[Any]]
 
 
 @dataclass(frozen=True)
@@ -39,7 +37,6 @@ class Stage:
     outputs: Mapping[str, str]
     folder: Path
     read: Mapping[str, str]
-    progress: Progress
 
     def marks(self) -> dict[str, str]:
         """What the artefacts of this job are marked with, see the artefact contract."""
@@ -86,8 +83,8 @@ def stage(snakemake: Any) -> Iterator[Stage]:
         warnings.simplefilter("default")
         warnings.showwarning = show  # type: ignore[assignment]
         try:
-            with reporting(label) as progress:
-                yield _opened(snakemake, dataset, progress)
+            with reporting(label):
+                yield _opened(snakemake, dataset)
             return
         except Exception as error:
             text = f"{type(error).__name__}: {error} (a fault of kinacc; see {log})"
@@ -99,13 +96,13 @@ def stage(snakemake: Any) -> Iterator[Stage]:
     raise SystemExit(1)
 
 
-def _opened(snakemake: Any, dataset: str, progress: Progress) -> Stage:
+def _opened(snakemake: Any, dataset: str) -> Stage:
     sums_file = Path(snakemake.output.sums)
     folder = next(item for item in sums_file.parents if item.name == sums.FOLDER).parent
     inputs, read = _read(dict(snakemake.input.items()), folder)
     settings, seed = snakemake.params.settings, snakemake.params.seed
     outputs = dict(snakemake.output.items())
-    return Stage(dataset, inputs, settings, seed, outputs, folder, read, progress)
+    return Stage(dataset, inputs, settings, seed, outputs, folder, read)
 
 
 def _read(
