@@ -9,7 +9,6 @@ from __future__ import annotations
 from contextlib import suppress
 from dataclasses import dataclass
 from enum import IntEnum
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -17,7 +16,7 @@ import pandas as pd
 
 from kinacc.deployment.record import Calibration
 from kinacc.errors import InputError, input_error
-from kinacc.geometry import IDENTITY, Pose, compose, invert, log_so3
+from kinacc.geometry import Pose, compose, invert, log_so3
 from kinacc.kinematics.inverse import few_axes, limits, newton, solve
 from kinacc.kinematics.model import ErrorModel, JointState
 from kinacc.kinematics.region import points
@@ -108,26 +107,26 @@ def compensate(
     robot, every = calibration.robot, np.arange(len(wanted.position_mm))
     carried, origin = calibration.point(point), calibration.origin(frame)
     goal = compose(invert(origin), compose(wanted, invert(carried)))
-    inputs = near_rad is not None
     near = np.broadcast_to(0.0 if near_rad is None else near_rad, (len(every), robot.dh.joints))
     like = JointState(robot.dh_joints(near), s, payload)
     arm = _Goals(calibration, goal, near, like, carried)
-    more, tried = every, []
-    if inputs:
-        first = arm.judged(robot.dh_joints(near), every)
-        good = first["status"] <= PoseStatus.EXTRAPOLATED
-        more, tried = every[~(good & (first["movement"] <= SAME_POSTURE_RAD))], [first]
-    tried = pd.concat([*tried, arm.judged(*arm.postures(more))], ignore_index=True)
-    hit, status = tried["status"] != PoseStatus.NOT_REACHED, tried["status"]
-    nearest = tried[hit].groupby("row")["movement"].min().reindex(every, fill_value=np.inf)
-    least = PoseStatus.EXTRAPOLATED if inputs else PoseStatus.CONVERGED
-    tried["class"] = np.select([~hit, status > PoseStatus.EXTRAPOLATED, status > least], [3, 2, 1])
-    tried["cost"] = tried["movement"].where(hit, tried["off_mm"])
-    best = tried.sort_values(["class", "cost"]).drop_duplicates("row")
-    best = best.set_index("row").reindex(every)
+    more, tried, least = every, [], PoseStatus.CONVERGED
+    if near_rad is not None:
+        tried, least = [arm.judged(like.q_rad, every)], PoseStatus.EXTRAPOLATED
+        close = tried[0]["movement"] <= SAME_POSTURE_RAD
+        more = every[~(close & (tried[0]["status"] <= PoseStatus.EXTRAPOLATED))]
+    table = pd.concat([*tried, arm.judged(*arm.postures(more))], ignore_index=True)
+    hit, status = table["status"] != PoseStatus.NOT_REACHED, table["status"]
+    nearest = table[hit].groupby("row")["movement"].min().reindex(every, fill_value=np.inf)
+    table["class"] = np.select([~hit, status > PoseStatus.EXTRAPOLATED, status > least], [3, 2, 1])
+    table["cost"] = table["movement"].where(hit, table["off_mm"])
+    best = table.sort_values(["class", "cost"]).drop_duplicates("row").set_index("row")
+    best = best.reindex(every)
     status = best["status"].fillna(PoseStatus.NOT_REACHED)
-    farther = (status <= PoseStatus.EXTRAPOLATED) & (best["movement"] > nearest + SAME_RAD)
-    status = status.mask(farther & inputs, PoseStatus.OTHER_POSTURE).to_numpy(int)
+    if near_rad is not None:
+        farther = (status <= PoseStatus.EXTRAPOLATED) & (best["movement"] > nearest + SAME_RAD)
+        status = status.mask(farther, PoseStatus.OTHER_POSTURE)
+    status = status.to_numpy(int)
     q_dh = best[[*range(robot.dh.joints)]].to_numpy(float)
     reported = limits.reported_joints(robot, q_dh)
     outside = np.where(
@@ -142,7 +141,7 @@ def compensate(
         best["off_mm"].fillna(np.inf).to_numpy(),
         best["angle_rad"].fillna(np.inf).to_numpy(),
         outside & (status != PoseStatus.NOT_REACHED)[:, None],
-        q_rad - near if inputs else np.full(q_rad.shape, np.nan),
+        q_rad - (np.nan if near_rad is None else near),
     )
 
 
@@ -163,72 +162,58 @@ class _Goals:
     def has_few_axes(self) -> bool:
         return self.calibration.robot.dh.joints < few_axes.SIX
 
-    @property
-    def carried(self) -> Pose:
-        """What is brought to the goal; an arm of few axes turns about its point."""
-        return self.point if self.has_few_axes else IDENTITY
-
-    @cached_property
-    def wanted(self) -> Pose:
-        return compose(self.goal, self.carried)
-
     def judged(self, start: np.ndarray, rows: np.ndarray) -> pd.DataFrame:
         """Joints refined from ``start`` (m, k) onto the goals ``rows`` (m,), verified forward.
 
         Columns: row, status, what is left, the largest movement of a joint, and joints 0 ..
         A start so far from limits or covered range that no refinement brings it back is judged as
-        it stands.
+        it stands, with nothing known of what is left.
         """
         calibration, robot, model = self.calibration, self.calibration.robot, self.calibration.model
         is_bounded, within = model.domain is not None, (robot.q_min_rad, robot.q_max_rad)
         reach = limits.travel_unit(robot) * SAME_POSTURE_RAD
-        reported = limits.reported_joints(robot, start)
-        beyond_limits = limits.outside(reported, within, reach).any(axis=1)
-        hopeless = beyond_limits | (
-            calibration.outside_range(start, reach).any(axis=1) & is_bounded
-        )
-        q_dh, worth = start.copy(), np.flatnonzero(~hopeless)
+        far = limits.outside(limits.reported_joints(robot, start), within, reach)
+        if is_bounded:
+            far |= calibration.outside_range(start, reach)
+        worth = ~far.any(axis=1)
+        goals, q_dh = rows[worth], start.copy()
         off, angle = np.full((2, len(start)), np.nan)
-        local = rows[worth]
         with np.errstate(all="ignore"):  # far outside its range a model may be no number
-            q_dh[worth] = self._refined(start[worth], local)
-            turned = self._turned(q_dh[worth], local)
-            again = np.flatnonzero((np.abs(turned - q_dh[worth]) > 1.0).any(axis=1))
-            q_dh[worth[again]] = turned[again]
-            if len(again) and is_bounded:  # errors need not repeat after a turn
-                q_dh[worth[again]] = self._refined(turned[again], local[again])
-            off[worth], angle[worth] = self._left(model, q_dh[worth], local)
+            refined = self._refined(model, start[worth], goals)
+            turned = self._turned(refined, goals)
+            again = (np.abs(turned - refined) > 1.0).any(axis=1)
+            # Errors need not repeat after a turn.
+            refined[again] = self._refined(model, turned[again], goals[again])
+            off[worth], angle[worth] = self._left(model, refined, goals)
+        q_dh[worth] = refined
         turn_rad = FEW_AXES_TURN_RAD if self.has_few_axes else ROTATION_TOLERANCE_RAD
-        hit = (off <= POSITION_TOLERANCE_MM) & (angle <= turn_rad)
         reported = limits.reported_joints(robot, q_dh)
-        outside = limits.outside(reported, within).any(axis=1)
-        covered = ~calibration.outside_range(q_dh).any(axis=1)
-        beyond = PoseStatus.OUTSIDE_RANGE if is_bounded else PoseStatus.EXTRAPOLATED
-        refined = np.select(
-            [~hit, outside, covered],
+        status = np.select(
+            [
+                (off > POSITION_TOLERANCE_MM) | (angle > turn_rad),
+                limits.outside(reported, within).any(axis=1),
+                ~calibration.outside_range(q_dh).any(axis=1),
+            ],
             [PoseStatus.NOT_REACHED, PoseStatus.OUTSIDE_LIMITS, PoseStatus.CONVERGED],
-            beyond,
+            PoseStatus.OUTSIDE_RANGE if is_bounded else PoseStatus.EXTRAPOLATED,
         )
-        stays = np.where(beyond_limits, PoseStatus.OUTSIDE_LIMITS, PoseStatus.OUTSIDE_RANGE)
-        status = np.where(hopeless, stays, refined)
         apart = np.abs(reported - self.near[rows]) / limits.travel_unit(robot)
         table = pd.DataFrame(q_dh).assign(row=rows, status=status, off_mm=off, angle_rad=angle)
         return table.assign(movement=np.max(apart, axis=1))
 
     def postures(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Starts (m, k) in every posture of the plain arm at goals ``rows``, and their goals."""
-        calibration, robot = self.calibration, self.calibration.robot
-        plain, count = calibration.model.dh, _FEW_STARTS if self.has_few_axes else _STARTS
+        robot, plain, count = self.calibration.robot, self.calibration.model.dh, _FEW_STARTS
         if not self.has_few_axes:
+            count = _STARTS
             with suppress(InputError):
                 result = solve(robot, plain, self.goal.select(rows)).q_rad
-                there = np.isfinite(result).all(axis=2)
-                local = np.broadcast_to(rows[:, None], there.shape)[there]
-                return self._turned(result[there], local), local
+                local, branch = np.nonzero(np.isfinite(result).all(axis=2))
+                return self._turned(result[local, branch], rows[local]), rows[local]
         share = points("sobol", count, robot.dh.joints)
         starts = robot.dh_joints(robot.q_min_rad + share * (robot.q_max_rad - robot.q_min_rad))
         local = np.repeat(rows, count)
-        q_dh = self._onto(plain, np.tile(starts, (len(rows), 1)), local, None)
+        q_dh = self._refined(plain, np.tile(starts, (len(rows), 1)), local)
         near = self._left(plain, q_dh, local)[0] <= _NEAR_START_MM
         return self._turned(q_dh[near], local[near]), local[near]
 
@@ -252,32 +237,25 @@ class _Goals:
         cost = (np.abs(angles - near) + 100.0 * outside).round(9)
         return np.take_along_axis(angles, np.argmin(cost, axis=0)[None], axis=0)[0]
 
-    def _refined(self, start: np.ndarray, rows: np.ndarray) -> np.ndarray:
-        model, like = self.calibration.model, self.like.select(rows)
-        kinds = [np.nan_to_num(item) for item in (like.s, like.payload) if item is not None]
-        if not kinds or model.table is not None:
-            return self._onto(model, start, rows, None)
-        # Directions and payloads differ by row, and a refinement takes one state.
-        refined, states = np.empty_like(start), pd.DataFrame(np.hstack(kinds))
-        for state in states.groupby([*states]).indices.values():
-            refined[state] = self._onto(model, start[state], rows[state], like.select(state[:1]))
-        return refined
-
-    def _onto(
-        self, model: ErrorModel, start: np.ndarray, rows: np.ndarray, like: JointState | None
-    ) -> np.ndarray:
+    def _refined(self, model: ErrorModel, start: np.ndarray, rows: np.ndarray) -> np.ndarray:
         """Joints (m, k) refined from ``start`` onto the goals ``rows`` (m,), reached or not."""
-        wanted = self.wanted.select(rows)
+        goal, like = self.goal.select(rows), self.like.select(rows)
         if self.has_few_axes:
-            return few_axes.refine(model, wanted, self.carried, start, like)
-        return newton.refine(model, wanted, start, like).q_rad
+            goal = compose(goal, self.point)
+            return few_axes.refine(model, goal, self.point, start, like)
+        return newton.refine(model, goal, start, like).q_rad
 
     def _left(
         self, model: ErrorModel, q_dh: np.ndarray, rows: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """What is left, (m,) mm and (m,) rad, at DH joints (m, k) of goals ``rows``."""
-        end = compose(model.pose(self.like.select(rows).moved(q_dh)), self.carried)
-        off, angle = distance(end, self.wanted.select(rows))
+        """What is left, (m,) mm and (m,) rad, at DH joints (m, k) of goals ``rows``.
+
+        Of the last DH frame, or of the point about which an arm of few axes turns.
+        """
+        end, goal = model.pose(self.like.select(rows).moved(q_dh)), self.goal.select(rows)
+        if self.has_few_axes:
+            end, goal = compose(end, self.point), compose(goal, self.point)
+        off, angle = distance(end, goal)
         return np.nan_to_num(off, nan=np.inf), np.nan_to_num(angle, nan=np.inf)
 
 

@@ -124,7 +124,7 @@ def read(sources: Sequence[Source], _: np.ndarray | None) -> Program:
         index = f"{{{array.index(start) + 1}}}" if len(array) > 1 else ""
         name = names.get(start, source.line(start)) + index
         positions.append(in_use(_position(name, source, start, end), ways))
-    return Program(sources, positions, [*dict.fromkeys(computed)])
+    return Program(sources, positions, CONVENTION, [*dict.fromkeys(computed)])
 
 
 def _position(name: str, source: Source, start: int, end: int) -> Position:

@@ -29,7 +29,6 @@ from kinacc.deployment.programs import (
     universal,
     yaskawa,
 )
-from kinacc.deployment.programs.orientation import Convention
 from kinacc.deployment.programs.record import (
     BASE,
     KNOWN,
@@ -129,11 +128,12 @@ def read_program(
             frames_of_yaml(source, language.convention) if is_yaml else language.frames(source)
         )
     program = language.read(sources, pulses_per_degree)
+    program = replace(program, frames=frames | program.frames)
     if not program.positions:
         message = "is computed, incomplete or defined elsewhere"
         computed = [Problem(line, message) for line in program.not_corrected]
         raise InputError([Problem(str(path), "has no positions that can be corrected"), *computed])
-    return language, replace(program, frames=frames | program.frames)
+    return language, program
 
 
 def compensate_program(
@@ -177,29 +177,32 @@ def compensate_program(
     _refuse_second_time(program)
     options = {TOOL: tools or {}, BASE: bases or {}}
     program = _in_use(program, options)
-    frames = _all_frames(program, program.convention or language.convention, options, ask)
-    work = _Correction(calibration, language, replace(program, frames=frames))
-    starts, reasons = work.starts(near_rad, base_is_fixed)
-    rows, remarks = work.outcomes(starts, point)
-    positions, new = program.positions, {}
-    for number, row in zip(rows.index, rows.itertuples(), strict=True):
-        if reason := work.obstacle(positions[number], row, at_most_mm):
-            reasons[number] = reason
+    program = replace(program, frames=_all_frames(program, options, ask))
+    robot, positions, new = calibration.robot, program.positions, {}
+    starts, reasons = _starts(robot, language, program, near_rad, base_is_fixed)
+    rows, remarks = _outcomes(calibration, program, starts, point)
+    for position, row in zip(rows.index, rows.itertuples(), strict=True):
+        if reason := _obstacle(robot, language, position, row, at_most_mm):
+            reasons[position] = reason
+        elif position.scale is None:
+            place = compose(invert(program.frame(BASE, position)), row.pose)
+            new[position] = program.convention.numbers(place, position.numbers)
         else:
-            new[positions[number]] = work.numbers(positions[number], row)
+            new[position] = row.q_rad / _unit(robot) * position.scale
     table = pd.DataFrame({
         "position": [item.name for item in positions],
         "file": [item.where for item in positions],
         "kind": ["pose" if item.scale is None else "joints" for item in positions],
-    }).join(rows[_SHOWN])  # fmt: skip
-    table["status"] = [reasons.get(number, "corrected") for number in table.index]
+    }).join(rows.reindex(positions)[_SHOWN].reset_index(drop=True))  # fmt: skip
+    table["status"] = [reasons.get(item, "corrected") for item in positions]
     return CorrectedProgram(
         language.name,
         f"{calibration.name}, {calibration.choice}",
         table,
         tuple(
-            Problem(f"{positions[number].where} {positions[number].name}", reason)
-            for number, reason in sorted(reasons.items())
+            Problem(f"{item.where} {item.name}", reasons[item])
+            for item in positions
+            if item in reasons
         ),
         tuple(program.not_corrected),
         tuple(remarks),
@@ -207,101 +210,76 @@ def compensate_program(
     )
 
 
-@dataclass(frozen=True)
-class _Correction:
-    """A program with all its frames, and the calibrated arm that it is corrected for."""
-
-    calibration: Calibration
-    language: Language
-    program: Program
-
-    @property
-    def robot(self) -> Robot:
-        return self.calibration.robot
-
-    @property
-    def convention(self) -> Convention:
-        return self.program.convention or self.language.convention
-
-    def frame(self, kind: str, position: Position) -> Pose:
-        """Tool or base of a position."""
-        return self.program.frames.get((kind, getattr(position, kind) or ""), IDENTITY)
-
-    def flange(self, position: Position) -> Pose:
-        """Wanted pose of the flange, of a position that is no joints."""
-        place = self.convention.pose(position.numbers, position.where)
-        tool = invert(self.frame(TOOL, position))
-        return compose(compose(self.frame(BASE, position), place), tool)
-
-    def starts(
-        self, near_rad: np.ndarray | None, base_is_fixed: bool
-    ) -> tuple[dict[int, np.ndarray], dict[int, str]]:
-        """Reported joints (k,) of the nominal arm by number of the position; why some have none."""
-        robot, positions = self.robot, self.program.positions
-        poses = [n for n, item in enumerate(positions) if item.scale is None and not item.refused]
-        flange = [self.flange(positions[number]) for number in poses]
-        ways = dict(zip(poses, posture.postures_of(robot, flange), strict=True))
-        starts: dict[int, np.ndarray] = {}
-        reasons: dict[int, str] = {}
-        for number, item in enumerate(positions):
-            start: np.ndarray | str = item.refused
-            if number in ways and item.moves_outside and not base_is_fixed:
-                start = _TRACK
-            elif number in ways:
-                near = near_rad if item.near_rad is None else item.near_rad
-                start = posture.choose(
-                    robot, ways[number], self.language.posture, item.posture, near
-                )
-            elif not start and len(item.places) != robot.dh.joints:
-                start = f"has {len(item.places)} joints, not {robot.dh.joints}"
-            elif not start:
-                q_rad = item.numbers / item.scale * _unit(robot)
-                inside = limits.within(q_rad, robot.q_min_rad, robot.q_max_rad)
-                start = q_rad if inside else "its joints are beyond the limits"
-            if isinstance(start, str):
-                reasons[number] = start
-            else:
-                near_rad = starts[number] = start
-        return starts, reasons
-
-    def outcomes(
-        self, starts: Mapping[int, np.ndarray], point: str | None
-    ) -> tuple[pd.DataFrame, list[str]]:
-        """Rows of ``_corrected`` by number of the position, and remarks."""
-        remarks: list[str] = []
-        parts, positions = [pd.DataFrame(columns=_SHOWN)], self.program.positions
-        for name in dict.fromkeys(positions[number].tool for number in starts):
-            group = [number for number in starts if positions[number].tool == name]
-            tool = self.frame(TOOL, positions[group[0]])
-            target, place, remark = _carried(self.calibration, tool, point)
-            remarks += [f"Tool {name or 'of joints'}: {remark}"] if remark else []
-            q_rad = np.stack([starts[number] for number in group])
-            parts.append(_corrected(self.calibration, q_rad, target, place, tool).set_axis(group))
-        return pd.concat(parts[1:] or parts), remarks
-
-    def obstacle(self, position: Position, row: Any, at_most_mm: float) -> str:
-        """Why a position cannot be corrected as its ``row`` has it; empty where it can."""
-        if row.outcome > PoseStatus.EXTRAPOLATED:
-            status = PoseStatus(row.outcome).name.lower().replace("_", " ")
-            return f"the calibrated arm: {status}" + f": joint {row.joints}" * bool(row.joints)
-        if row.change_mm > at_most_mm:
-            return f"would move by {row.change_mm:.3g} mm (--at-most-mm; is --tool right?)"
-        if not position.posture:
-            return ""
-        changed = posture.unmatched(self.robot, self.language.posture, position.posture, row.q_rad)
-        return f"the posture would change to {changed}" if changed else ""
-
-    def numbers(self, position: Position, row: Any) -> np.ndarray:
-        """New numbers of a position."""
-        if position.scale is not None:
-            return row.q_rad / _unit(self.robot) * position.scale
-        place = compose(invert(self.frame(BASE, position)), row.pose)
-        return self.convention.numbers(place, position.numbers)
+def _starts(
+    robot: Robot,
+    language: Language,
+    program: Program,
+    near_rad: np.ndarray | None,
+    base_is_fixed: bool,
+) -> tuple[dict[Position, np.ndarray], dict[Position, str]]:
+    """Reported joints (k,) of the nominal arm at positions, and why others have none."""
+    poses = [item for item in program.positions if item.has_frames]
+    flange = [program.flange(item) for item in poses]
+    ways = dict(zip(poses, posture.postures_of(robot, flange), strict=True))
+    starts: dict[Position, np.ndarray] = {}
+    reasons: dict[Position, str] = {}
+    for item in program.positions:
+        start: np.ndarray | str = item.refused
+        if item in ways and item.moves_outside and not base_is_fixed:
+            start = _TRACK
+        elif item in ways:
+            near = near_rad if item.near_rad is None else item.near_rad
+            start = posture.choose(robot, ways[item], language.posture, item.posture, near)
+        elif not start and len(item.places) != robot.dh.joints:
+            start = f"has {len(item.places)} joints, not {robot.dh.joints}"
+        elif not start:
+            q_rad = item.numbers / item.scale * _unit(robot)
+            inside = limits.within(q_rad, robot.q_min_rad, robot.q_max_rad)
+            start = q_rad if inside else "its joints are beyond the limits"
+        if isinstance(start, str):
+            reasons[item] = start
+        else:
+            near_rad = starts[item] = start
+    return starts, reasons
 
 
 def _unit(robot: Robot) -> np.ndarray:
     """Radians (mm where a joint slides) of a unit in which joints are written, (k,)."""
     return np.where(robot.dh.prismatic, 1.0, np.pi / 180.0)
+
+
+def _outcomes(
+    calibration: Calibration,
+    program: Program,
+    starts: Mapping[Position, np.ndarray],
+    point: str | None,
+) -> tuple[pd.DataFrame, list[str]]:
+    """Rows of ``_corrected`` by position, and remarks."""
+    remarks: list[str] = []
+    parts = [pd.DataFrame(columns=_SHOWN)]
+    for name in dict.fromkeys(position.tool for position in starts):
+        group = [position for position in starts if position.tool == name]
+        tool = program.frame(TOOL, group[0])
+        target, place, remark = _carried(calibration, tool, point)
+        remarks += [f"Tool {name or 'of joints'}: {remark}"] if remark else []
+        q_rad = np.stack([starts[position] for position in group])
+        parts.append(_corrected(calibration, q_rad, target, place, tool).set_axis(group))
+    return pd.concat(parts[1:] or parts), remarks
+
+
+def _obstacle(
+    robot: Robot, language: Language, position: Position, row: Any, at_most_mm: float
+) -> str:
+    """Why a position cannot be corrected as its ``row`` has it; empty where it can."""
+    if row.outcome > PoseStatus.EXTRAPOLATED:
+        status = PoseStatus(row.outcome).name.lower().replace("_", " ")
+        return f"the calibrated arm: {status}" + f": joint {row.joints}" * bool(row.joints)
+    if row.change_mm > at_most_mm:
+        return f"would move by {row.change_mm:.3g} mm (--at-most-mm; is --tool right?)"
+    if not position.posture:
+        return ""
+    changed = posture.unmatched(robot, language.posture, position.posture, row.q_rad)
+    return f"the posture would change to {changed}" if changed else ""
 
 
 def _digest(contents: Iterable[bytes]) -> str:
@@ -319,24 +297,19 @@ def _refuse_second_time(program: Program) -> None:
 
 def _in_use(program: Program, options: Options) -> Program:
     """The program without poses that no move uses, unless a frame for all of them is given."""
-    used: list[Position] = []
-    lines = [*program.not_corrected]
-    for item in program.positions:
-        if item.scale is None and item.tool is None and item.base is None and not item.refused:
-            lines.append(f"{item.where}: {item.name}, which no move uses")
-        else:
-            used.append(item)
+    idle = [item for item in program.positions
+            if item.has_frames and item.tool is None and item.base is None]  # fmt: skip
+    used = [item for item in program.positions if item not in idle]
     if "" in {*options[TOOL], *options[BASE]} or not used:
         return program
-    return replace(program, positions=used, not_corrected=lines)
+    lines = [f"{item.where}: {item.name}, which no move uses" for item in idle]
+    return replace(program, positions=used, not_corrected=[*program.not_corrected, *lines])
 
 
-def _all_frames(
-    program: Program, convention: Convention, options: Options, ask: Ask | None
-) -> Frames:
+def _all_frames(program: Program, options: Options, ask: Ask | None) -> Frames:
     """The program's frames and those a person gave; InputError naming those that are missing."""
     frames, problems = dict(program.frames), []
-    poses = [item for item in program.positions if item.scale is None and not item.refused]
+    poses = [item for item in program.positions if item.has_frames]
     wanted = {(kind, getattr(item, kind) or "") for item in poses for kind in (TOOL, BASE)}
     wanted |= {(TOOL, name) for name in options[TOOL] if not name}
     for kind, name in sorted(wanted - set(frames)):
@@ -348,7 +321,7 @@ def _all_frames(
             message = f"{kind} {name or 'of its positions'} is not in the program"
             problems.append(Problem(str(program.sources[0].path), message, fix=fix))
         else:
-            frames[kind, name] = convention.typed(numbers)
+            frames[kind, name] = program.convention.typed(numbers)
     refuse(problems, "Frames are missing")
     return frames
 

@@ -16,6 +16,7 @@ from kinacc.deployment.programs.record import (
     Source,
 )
 
+CONVENTION = Convention(FIXED)
 _POSITION = re.compile(
     r"^[ \t]*(P\[\d+)[^\]{]*\]\s*\{\s*GP1\s*:(.*?)(?=GP\d+\s*:|\}\s*;)", re.M | re.S
 )
@@ -41,7 +42,7 @@ def read(sources: Sequence[Source], _: np.ndarray | None) -> Program:
             positions.append(position)
         else:
             computed.append(source.statement(match.start(1), f"{match[1]}]"))
-    return Program(sources, positions, computed)
+    return Program(sources, positions, CONVENTION, computed)
 
 
 def _position(source: Source, match: re.Match[str]) -> Position | None:
@@ -81,7 +82,7 @@ def posture(sides: Sequence[bool], q_deg: np.ndarray) -> tuple[str, ...]:
 LANGUAGE = Language(
     "FANUC LS",
     (".ls",),
-    Convention(FIXED),
+    CONVENTION,
     read,
     posture=posture,
     frame_files=("frames.yaml",),

@@ -118,7 +118,7 @@ def read(sources: Sequence[Source], _: np.ndarray | None) -> Program:
         }
         result.append(in_use(replace(positions[name], name=name), ways))
     computed += [statement for statement, names in moves if not defined.issuperset(names)]
-    return Program(sources, result, computed)
+    return Program(sources, result, CONVENTION, computed)
 
 
 def posture(sides: Sequence[bool], q_deg: np.ndarray) -> tuple[str, ...]:

@@ -17,7 +17,7 @@ import yaml
 from kinacc.deployment.programs.orientation import Convention
 from kinacc.deployment.programs.posture import Posture
 from kinacc.errors import input_error
-from kinacc.geometry import IDENTITY, Pose
+from kinacc.geometry import IDENTITY, Pose, compose, invert
 
 NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 TOOL, BASE = "tool", "base"
@@ -93,6 +93,11 @@ class Position:
     refused: str = ""
 
     @property
+    def has_frames(self) -> bool:
+        """Whether it is a pose in a base, of a tool, that can be corrected."""
+        return self.scale is None and not self.refused
+
+    @property
     def numbers(self) -> np.ndarray:
         """The numbers as written."""
         return self.source.values(self.places)
@@ -118,15 +123,25 @@ class Program:
     """A program as read.
 
     ``not_corrected``: statements whose positions are computed, incomplete or defined elsewhere.
-    ``convention``: that of this file, where files of the language differ. ``frames``: tools and
+    ``convention``: how this file writes poses. ``frames``: tools and
     bases by kind and name; of a language's ``read`` those of the program's own statements.
     """
 
     sources: Sequence[Source]
     positions: Sequence[Position]
+    convention: Convention
     not_corrected: Sequence[str] = ()
-    convention: Convention | None = None
     frames: Frames = field(default_factory=dict)
+
+    def frame(self, kind: str, position: Position) -> Pose:
+        """Tool or base of a position."""
+        return self.frames.get((kind, getattr(position, kind) or ""), IDENTITY)
+
+    def flange(self, position: Position) -> Pose:
+        """Wanted pose of the flange, of a position that is no joints."""
+        place = self.convention.pose(position.numbers, position.where)
+        tool = invert(self.frame(TOOL, position))
+        return compose(compose(self.frame(BASE, position), place), tool)
 
 
 @dataclass(frozen=True)

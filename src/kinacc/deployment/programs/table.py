@@ -47,7 +47,7 @@ def read(sources: Sequence[Source], _: np.ndarray | None) -> Program:
         column = _COLUMN.fullmatch(cell.strip('\xef\xbb\xbf" ').lower())
         names.append(column[1] if column else cell)
         units[names[-1]] = _UNITS.get(column[2] if column else "", 1.0)
-    convention = scale = None
+    convention, scale = Convention(FIXED), None
     if keys := sorted(name for name in units if re.fullmatch(r"q[1-9]", name)):
         scale = np.array([1.0 / units[key] for key in keys])
     elif kind := next((kind for kind in _KEYS if {*_KEYS[kind].split()} <= {*units}), None):
@@ -70,7 +70,7 @@ def read(sources: Sequence[Source], _: np.ndarray | None) -> Program:
             raise input_error(str(where), message) from None
         label = source.text[slice(*row["pose"])] if "pose" in row else source.line(line.start())
         positions.append(Position(label, source, places, 6, scale, "", ROBOT))
-    return Program(sources, positions, convention=convention)
+    return Program(sources, positions, convention)
 
 
 LANGUAGE = Language("CSV", (".csv",), Convention(FIXED), read)

@@ -71,7 +71,7 @@ def read(sources: Sequence[Source], _: np.ndarray | None) -> Program:
         name, places = names.get(span, source.line(span[0])), source.numbers(*span)
         position = Position(name, source, places, 6, scale, near_rad=near.get(span))
         positions.append(in_use(position, uses[span]))
-    return Program(sources, positions, computed, frames=frames)
+    return Program(sources, positions, CONVENTION, computed, frames)
 
 
 LANGUAGE = Language("URScript", (".script", ".urscript"), CONVENTION, read)

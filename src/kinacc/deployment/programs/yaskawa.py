@@ -75,7 +75,7 @@ def read(sources: Sequence[Source], pulses: np.ndarray | None) -> Program:
         _position(source, kind + name, places, state, pulses, name in moving)
         for kind, name, places, state in positions
     ]
-    return Program(sources, read, computed)
+    return Program(sources, read, CONVENTION, computed)
 
 
 def _position(

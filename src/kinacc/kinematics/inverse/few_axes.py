@@ -38,7 +38,7 @@ def refine(
     q : numpy.ndarray
         DH joints to start from, shape (n, k), rad (mm where a joint slides).
     like : JointState, optional
-        One state whose travel directions and payload the arm has at every pose.
+        States whose travel directions and payload the arm has: of every pose, or one for all.
 
     Returns
     -------
@@ -47,9 +47,9 @@ def refine(
     """
     unit = np.where(model.dh.prismatic, _MM_PER_UNIT, 1.0)
     q = np.array(q, dtype=float)
-    active = np.arange(len(q))
+    active, state = np.arange(len(q)), JointState(q) if like is None else like.moved(q)
     for _ in range(_MOST_STEPS):
-        at = JointState(q[active]) if like is None else like.moved(q[active])
+        at = state.select(active).moved(q[active])
         end = model.pose(at)
         arm = (end.rotation @ carried.position_mm[:, None])[..., 0]
         goal = Pose(target.rotation[active], target.position_mm[active])

@@ -85,7 +85,7 @@ def refine(
     q_rad : numpy.ndarray
         DH joints to start from, rad, or mm where a joint slides, shape (n, k).
     like : JointState, optional
-        One state whose travel directions and payload the arm has at every pose.
+        States whose travel directions and payload the arm has: of every pose, or one for all.
     first : int
         Joints before this one stay.
     most_steps : int
@@ -97,9 +97,13 @@ def refine(
         Angles are not wrapped and limits are not looked at. A pose without a solution near its
         start has ``converged`` False and the joints of its smallest error.
     """
+    at = JointState(q_rad) if like is None else like.moved(q_rad)
     if len(q_rad) > _BLOCK:
         blocks = [slice(begin, begin + _BLOCK) for begin in range(0, len(q_rad), _BLOCK)]
-        parts = [refine(model, target.select(b), q_rad[b], like, first, most_steps) for b in blocks]
+        parts = [
+            refine(model, target.select(block), q_rad[block], at.select(block), first, most_steps)
+            for block in blocks
+        ]
         return Refined(*map(np.concatenate, zip(*parts, strict=True)))
     best, trial = np.array(q_rad, dtype=float), np.array(q_rad, dtype=float)
     count, unit = len(best), np.where(model.dh.prismatic, _LEVER_MM, 1.0)[first:]
@@ -107,12 +111,10 @@ def refine(
     active, converged = np.arange(count), np.zeros(count, dtype=bool)
     damping, lowest = np.zeros(count), np.full(count, np.inf)
     slopes, gap = np.empty((count, 6, unit.size)), np.empty((count, 6))
-
-    def state(joints: np.ndarray) -> JointState:
-        return JointState(joints) if like is None else like.moved(joints)
-
     for step in range(most_steps + 1):
-        error = weight * pose_error(target.select(active), model.pose(state(trial)))
+        error = weight * pose_error(
+            target.select(active), model.pose(at.select(active).moved(trial))
+        )
         cost = np.sum(error**2, axis=1)
         met = (np.sum(error.reshape(-1, 2, 3) ** 2, axis=2) < POSITION_TOLERANCE_MM**2).all(axis=1)
         better, already = cost < lowest[active], converged[active]
@@ -131,7 +133,7 @@ def refine(
         if not len(active):
             break
         if len(rows):
-            jacobian = model.joint_jacobian(state(best[rows]))
+            jacobian = model.joint_jacobian(at.select(rows).moved(best[rows]))
             slopes[rows] = jacobian[..., first:] * weight[:, None] * unit
         turned = np.swapaxes(slopes[active], 1, 2)
         normal = turned @ slopes[active]
