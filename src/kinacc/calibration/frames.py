@@ -433,7 +433,7 @@ def one_session(observations: Observations, flange: Pose) -> tuple[Pose, np.ndar
     free = np.einsum("ab,nj->nabj", np.eye(3), centred).reshape(3 * count, 9)
     constant, system = np.tile(np.eye(3), (count, 1)), -levers.reshape(3 * count, -1)
     system = np.hstack([free, constant, system])
-    solution = np.linalg.lstsq(system, flange.position_mm.ravel(), rcond=_START_RCOND)[0]
+    solution = _solved(system, flange.position_mm.ravel())
     rotations = [_nearest_rotation(solution[:9].reshape(3, 3)).T]
     for target in np.unique(observations.target[observations.has_rotation]):
         rows = observations.has_rotation & (observations.target == target)
@@ -447,12 +447,18 @@ def one_session(observations: Observations, flange: Pose) -> tuple[Pose, np.ndar
         goal = observations.position_mm - flange.position_mm @ rotation.T
         # Centred, so that what the turns cannot show of a target is left at zero.
         system = (design - design.mean(axis=0)).reshape(3 * count, -1)
-        points = np.linalg.lstsq(system, (goal - goal.mean(axis=0)).ravel(), rcond=_START_RCOND)[0]
+        points = _solved(system, (goal - goal.mean(axis=0)).ravel())
         rest = goal - design @ points
         position = rest.mean(axis=0)
         misfit = float(np.sum((rest - position) ** 2))
         starts.append((misfit, Pose(rotation, position), points.reshape(targets, 3)))
     return min(starts, key=lambda start: start[0])[1:]
+
+
+def _solved(system: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Least squares by normal equations, weak directions left at zero: enough for a start."""
+    gram = np.linalg.pinv(system.T @ system, rcond=_START_RCOND**2, hermitian=True)
+    return gram @ (system.T @ right)
 
 
 def base_from_targets(

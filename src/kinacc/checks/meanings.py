@@ -22,8 +22,9 @@ from kinacc.checks import changes, robust_fit
 from kinacc.checks.changes import Change
 from kinacc.checks.findings import Finding
 from kinacc.checks.readings import Readings, thinned
-from kinacc.checks.robust_fit import Residuals, Trial
+from kinacc.checks.robust_fit import Trial
 from kinacc.config.measured import Orientation
+from kinacc.geometry import Pose, compose
 from kinacc.kinematics import dh
 from kinacc.kinematics.robot import Robot
 from kinacc.progress import with_progress
@@ -58,12 +59,13 @@ Changes = tuple[Change, ...]
 class Meaning:
     """Readings as ``changes`` have them, and what base and target alone leave of them.
 
-    ``misfit`` is a share of the points' spread.
+    ``flange`` (n, 3, 3) turns of the flange in the instrument's frame; ``misfit`` a share of the
+    points' spread.
     """
 
     changes: Changes
     read: Readings
-    residuals: Residuals
+    flange: ndarray
     misfit: float
 
     @classmethod
@@ -71,16 +73,19 @@ class Meaning:
         """The meaning of a few readings under changes that are ``applied`` one after the other."""
         read = changed(few, applied)
         positions = replace(read, rotation=np.full_like(read.rotation, np.nan))
-        begin = robust_fit.start(positions, robot.dh, is_clean=True)
-        left = robust_fit.residuals(begin, positions)
-        length = np.linalg.norm(left.position_mm, axis=1)
+        by_arm = dh.forward(robot.dh, read.q_rad)
+        _, base, points = robust_fit.placed(positions, by_arm, [np.arange(len(read))])
+        flange = compose(base, by_arm)
+        if len(points) > 1:
+            robust_fit.place_targets(Pose(np.zeros((len(points), 3, 3)), points), positions, flange)
+        length = robust_fit.distances(read, by_arm, base, points)
         misfit = float(np.quantile(length, _MAJORITY)) / max(spread_mm(read.position_mm), 1e-12)
-        return cls(applied, read, left, misfit)
+        return cls(applied, read, flange.rotation, misfit)
 
     @property
     def scatter_rad(self) -> float:
         """Scatter of the orientations seen from the flange, placed by the positions alone."""
-        return scatter(self.residuals.flange, self.read)
+        return scatter(self.flange, self.read)
 
 
 def changed(read: Readings, applied: Iterable[Change]) -> Readings:

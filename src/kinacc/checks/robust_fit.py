@@ -27,7 +27,7 @@ from kinacc.calibration.frames import (
 )
 from kinacc.checks import tails
 from kinacc.checks.readings import Readings, thinned
-from kinacc.geometry import Pose, compose, invert, log_so3
+from kinacc.geometry import IDENTITY, Pose, compose, invert, log_so3
 from kinacc.kinematics import dh
 from kinacc.kinematics.dh import DHModel
 
@@ -327,58 +327,72 @@ def _weight(vectors: ndarray, sigma: float, huber: bool) -> ndarray:
     return ((1.0 - share**2) ** 2)[:, None]
 
 
-def start(observed: Readings, model: DHModel, is_clean: bool = False) -> Arm:
+def start(observed: Readings, model: DHModel) -> Arm:
     """Bases and targets to start from, though part of the readings may be wrong.
 
-    Of closed forms on all readings of the largest session and, unless it ``is_clean``, on stretches
-    of it and on random draws, the one that fits the better two fifths best.
+    Of closed forms on all readings of the largest session, on stretches of it and on random draws,
+    the one that fits the better two fifths best.
     """
     largest = np.argmax(np.bincount(observed.session))
     part = observed.select(thinned(np.flatnonzero(observed.session == largest), _START_ROWS))
     flange, every = dh.forward(model, part.q_rad), np.arange(len(part))
     poses, rng, pieces = np.unique(part.pose), np.random.default_rng(0), [every]
-    if not is_clean and len(poses) > _DRAWN:
+    if len(poses) > _DRAWN:
         stretches = [piece for count in _STRETCHES for piece in np.array_split(every, count)]
         pieces += [piece for piece in stretches if len(np.unique(part.pose[piece])) >= _DRAWN]
         draws = [rng.choice(poses, _DRAWN, replace=False) for _ in range(_DRAWS)]
         pieces += [np.flatnonzero(np.isin(part.pose, draw)) for draw in draws]
-    chosen, least = every, np.inf
-    for rows in pieces:
-        for _ in range(_REFINEMENTS):
-            base, points = one_session(part.select(rows), flange.select(rows))
-            distance = _distances(part, flange, base, points)
-            nearest = np.argsort(distance)
-            if (middle := distance[nearest[int(_JUDGED * len(nearest))]]) >= least:
-                break
-            chosen, least = rows, middle
-            rows = nearest[: max(int(_TRUSTED * len(nearest)), _DRAWN)]
+    chosen = placed(part, flange, pieces)[0]
     frames = closed_form_start(part.select(chosen), flange.select(chosen))
     if len(observed.target_names) > 1:
-        _place_targets(frames, part, flange)
+        place_targets(frames.targets, part, compose(frames.at_rows(part)[0], flange))
     for session in np.unique(observed.session[observed.session != largest]):
         part = observed.select(observed.session == session)
         flange, rows = dh.forward(model, part.q_rad), np.arange(len(part))
         for _ in range(_REFINEMENTS):
             base = base_from_targets(part.select(rows), flange.select(rows), frames.targets)
-            distance = _distances(part, flange, base, frames.targets.position_mm)
+            distance = distances(part, flange, base, frames.targets.position_mm)
             rows = np.argsort(distance)[: max(int(_TRUSTED * len(part)), min(len(part), 4))]
         frames.bases.rotation[session], frames.bases.position_mm[session] = base
     return Arm(model, frames)
 
 
-def _distances(observed: Readings, flange: Pose, base: Pose, points: ndarray) -> ndarray:
+def placed(
+    observed: Readings, flange: Pose, pieces: list[ndarray]
+) -> tuple[ndarray, Pose, ndarray]:
+    """Rows, base and targets (T, 3) of the closed form that fits the better two fifths best.
+
+    Of one session; of every piece (rows), and then of the half of all readings nearest to it.
+    """
+    best, least = (pieces[0], IDENTITY, np.zeros((len(observed.target_names), 3))), np.inf
+    for rows in pieces:
+        for _ in range(_REFINEMENTS):
+            base, points = one_session(observed.select(rows), flange.select(rows))
+            distance = distances(observed, flange, base, points)
+            nearest = np.argsort(distance)
+            if (middle := distance[nearest[int(_JUDGED * len(nearest))]]) >= least:
+                break
+            best, least = (rows, base, points), middle
+            rows = nearest[: max(int(_TRUSTED * len(nearest)), _DRAWN)]
+    return best
+
+
+def distances(observed: Readings, flange: Pose, base: Pose, points: ndarray) -> ndarray:
     """Distances (n,) of positions from targets at ``points`` (T, 3) of the flanges, mm."""
     by_arm = flange.position_mm + (flange.rotation @ points[observed.target, :, None])[..., 0]
     predicted = by_arm @ base.rotation.T + base.position_mm
     return np.linalg.norm(predicted - observed.position_mm, axis=1)
 
 
-def _place_targets(frames: Frames, part: Readings, flange: Pose) -> None:
-    """Put targets where the readings have them: a part of those may have been none of theirs."""
-    there = compose(invert(compose(frames.at_rows(part)[0], flange)), part.measured)
-    for target in np.unique(part.target):
-        rows = part.target == target
-        frames.targets.position_mm[target] = np.median(there.position_mm[rows], axis=0)
-        if (rows := rows & part.has_rotation).any():
+def place_targets(targets: Pose, observed: Readings, flange: Pose) -> None:
+    """Put targets where the readings have them: a part of those may have been none of theirs.
+
+    ``flange`` (n,) in the instrument's frame.
+    """
+    there = compose(invert(flange), observed.measured)
+    for target in np.unique(observed.target):
+        rows = observed.target == target
+        targets.position_mm[target] = np.median(there.position_mm[rows], axis=0)
+        if (rows := rows & observed.has_rotation).any():
             mean = Rotation.from_matrix(there.rotation[rows]).mean()
-            frames.targets.rotation[target] = mean.as_matrix()
+            targets.rotation[target] = mean.as_matrix()
