@@ -32,8 +32,7 @@ def draw(shares: pd.DataFrame, reasons: pd.DataFrame) -> Figure:
     reasons = reasons[reasons["sample"] == _SAMPLE]
     claims = [*shares["claim"]]
     factors = _factors(reasons)
-    with style.house():
-        figure = style.new_figure(style.DOUBLE_COLUMN_IN, 1.5 + _ROW_IN * len(claims))
+    with style.new_figure(style.DOUBLE_COLUMN_IN, 1.5 + _ROW_IN * len(claims)) as figure:
         left, right = figure.subplots(
             1, 2, sharey=True, width_ratios=[1, max(len(factors), 1) / 11]
         )

@@ -37,8 +37,7 @@ def draw(table: pd.DataFrame, *, dataset: str | None = None) -> Figure:
         new = number > 0 and reading.reference_frame != READINGS[number - 1].reference_frame
         place += 1.0 + _GAP * (number == 0) + (_GAP + 0.4) * new
         heights.append(place)
-    with style.house():
-        figure = style.new_figure(style.DOUBLE_COLUMN_IN, 1.25 + _ROW_IN * heights[-1])
+    with style.new_figure(style.DOUBLE_COLUMN_IN, 1.25 + _ROW_IN * heights[-1], dataset) as figure:
         ax = figure.subplots()
         for number, (reading, y) in enumerate(zip(READINGS, heights, strict=True)):
             _row(ax, y, reading, found.holds[number])
@@ -61,7 +60,6 @@ def draw(table: pd.DataFrame, *, dataset: str | None = None) -> Figure:
             "calibration plan and its own arms, none chosen by its maps.",
             fontsize=style.SMALL_PT, color=style.MUTED, x=0.01, ha="left",
         )  # fmt: skip
-        style.name_dataset(figure, dataset)
     return figure
 
 

@@ -38,8 +38,7 @@ def draw(cells: pd.DataFrame, quantity: str, budget: int) -> Figure:
     fields, names = sorted(set(own["field"])), sorted(set(own["assessor"]))
     looks = {name: look for name, look in _looks().items() if name in names}
     levels = sorted(set(own["noise_mm"]))
-    with style.house():
-        figure = style.new_figure(style.DOUBLE_COLUMN_IN, 3.1)
+    with style.new_figure(style.DOUBLE_COLUMN_IN, 3.1) as figure:
         axes = figure.subplots(1, len(levels), sharey=True, squeeze=False)[0]
         for ax, noise_mm in zip(axes, levels, strict=True):
             _panel(ax, own[own["noise_mm"] == noise_mm], column, fields, looks)

@@ -217,8 +217,7 @@ def text(table: pd.DataFrame) -> str:
 def picture(table: pd.DataFrame) -> Figure:
     """Mean to largest error of every model in every line of the table."""
     shown = list(lines(table))
-    with style.house():
-        figure = style.new_figure(style.DOUBLE_COLUMN_IN, 0.62 * len(shown) + 0.75)
+    with style.new_figure(style.DOUBLE_COLUMN_IN, 0.62 * len(shown) + 0.75) as figure:
         axes = figure.subplots()
 
         def note(x: float, y: float, label: str, colour: str, side: str = "left") -> None:

@@ -50,7 +50,7 @@ def measured(**change):
 )
 def test_the_badge_is_the_verdict(change, badge):
     campaign, tables = measured(**change)
-    first = campaign_page(campaign, tables).first
+    first = campaign_page(campaign, section(campaign, tables)).first
     assert first.badge == badge
     if badge[0] == "NO BOUND":
         assert {row["sure"] for row in first.tables[0].rows} == {""}
@@ -60,7 +60,8 @@ def test_the_badge_is_the_verdict(change, badge):
 
 def test_picture_and_conformity_have_the_number_of_excepted_candidates():
     campaign, tables = measured(points=60, budget=40, tolerance_mm=2.0)
-    values = section(campaign, tables).rows()
+    part = section(campaign, tables)
+    values = part.rows()
     assert len(values["every"]) == values["measured"] == 36
     points, about = tables["campaign_points"], tables["campaign_bounds"]
     assert values["largest"][0]["error_mm"] == np.nanmax(points["error_mm"])
@@ -73,9 +74,7 @@ def test_picture_and_conformity_have_the_number_of_excepted_candidates():
     np.testing.assert_array_equal(shown, readings["error_mm"])
     labels = [each.get_text() for each in drawn.findobj(matplotlib.text.Text)]
     assert "bounds, all but 3 candidates" in labels
-    assert "all but 3 of these 60 candidates: **undecided**" in markdown(
-        campaign, tables, "picture"
-    )
+    assert "all but 3 of these 60 candidates: **undecided**" in markdown(part, "picture")
 
 
 def test_reasons_and_names_of_strangers_are_text():
@@ -86,7 +85,8 @@ def test_reasons_and_names_of_strangers_are_text():
         {"kind": "leave_out", "point": unread, "reason": "behind a <b>"},
     )
     campaign, tables = measured(readings=6, extra=entries, names=names)
-    values, shown = section(campaign, tables).rows(), campaign_page(campaign, tables)
+    part = section(campaign, tables)
+    values, shown = part.rows(), campaign_page(campaign, part)
     (struck,), (left_out,) = values["struck"], values["left_out"]
     assert (struck["reading"], struck["struck"]) == (2, reason)
     assert (left_out["point"], left_out["reason"]) == (names[unread], "behind a <b>")

@@ -21,10 +21,11 @@ from kinacc.cli.choice import option, positive
 from kinacc.cli.group import InOrder
 from kinacc.cli.output import Output, answers, require_writable
 from kinacc.cli.process import AGAINST
+from kinacc.cli.rows import joints_given, numbers_given
 from kinacc.errors import InputError, Problem, refuse
+from kinacc.figures.save import render
 from kinacc.measurements.rows import POINTS, read_rows
-from kinacc.measurements.table import numbers_of
-from kinacc.report.campaign import campaign_page, markdown
+from kinacc.report.campaign import campaign_page, markdown, section
 from kinacc.report.rendering import lines as texts
 from kinacc.tables.atomic import write_together
 from kinacc.tables.store import content_of, to_table
@@ -142,12 +143,26 @@ def report(folder: str, to: str | None, out: Output) -> None:
     Example:
       kinacc campaign report check --page check.html
     """
-    opened = _open(folder)
-    into = Path(to or opened.folder / "report")
-    files = _write_report(opened, into, out, out.force or to is None)
-    result = opened.status()
-    lines = [_lines(result)[0], f"{into}: {', '.join(files)}", out.page or ""]
-    answer = {**vars(result), "report": str(into), "files": files, "page": out.page}
+    campaign = _open(folder)
+    opened, into = campaign.opened, Path(to or campaign.folder / "report")
+    if not campaign.state.used:
+        raise InputError(Problem(folder, "no reading was requested and taken yet"))
+    tables, metadata = reports.tables(opened), folders.marks_of(opened)
+    part = section(opened, tables)
+    contents = {
+        f"{name}.parquet": content_of(to_table(name, table, metadata))
+        for name, table in tables.items()
+    }
+    pictures = render(part.figures["bounds"], ("svg", "png"))
+    contents |= {f"campaign.{kind}": content for kind, content in pictures.items()}
+    contents["report.md"] = markdown(part, "campaign.svg").encode()
+    require_writable([into / name for name in contents], out.force or to is None)
+    write_together({into / name: content for name, content in contents.items()})
+    if out.page is not None:
+        out.write_page(campaign_page(opened, part))
+    result = campaign.status()
+    lines = [_lines(result)[0], f"{into}: {', '.join(contents)}", out.page or ""]
+    answer = {**vars(result), "report": str(into), "files": [*contents], "page": out.page}
     out.show(answer, lines=filter(None, lines))
 
 
@@ -177,36 +192,6 @@ def verify(folder: str, sha256: str | None, out: Output) -> None:
         raise SystemExit(AGAINST)
 
 
-def _write_report(opened: Campaign, into: Path, out: Output, force: bool) -> list[str]:
-    """Write the report; the names of its files."""
-    from kinacc.figures.campaign import draw_bounds
-    from kinacc.figures.save import render
-
-    if not opened.state.used:
-        raise InputError(Problem(str(opened.folder), "no reading was requested and taken yet"))
-    plan, tables = opened.plan, reports.tables(opened.opened)
-    metadata = folders.marks_of(opened.opened)
-    figure = draw_bounds(
-        tables["campaign_points"],
-        tables["campaign_bounds"],
-        len(plan.route),
-        plan.limits.tolerance_mm,
-        plan.about["calibration"],
-    )
-    contents = {
-        f"{name}.parquet": content_of(to_table(name, table, metadata))
-        for name, table in tables.items()
-    }
-    pictures = render(figure, ("svg", "png"))
-    contents |= {f"campaign.{kind}": content for kind, content in pictures.items()}
-    contents["report.md"] = markdown(opened.opened, tables, "campaign.svg").encode()
-    require_writable([into / name for name in contents], force)
-    write_together({into / name: content for name, content in contents.items()})
-    if out.page is not None:
-        out.write_page(campaign_page(opened.opened, tables))
-    return [*contents]
-
-
 def _show(summary: CampaignStatus, out: Output) -> None:
     out.show(summary, lines=_lines(summary, out.verbose))
 
@@ -226,7 +211,6 @@ def _open(folder: str) -> Campaign:
 
 
 _COMPUTED = {"predict": "unexplained_mm", "compensate": "solver_residual_mm"}  # columns of theirs
-_OF_ONE = ("point", "joints_deg")
 
 
 @campaign.command("record")
@@ -250,44 +234,25 @@ def record(out: Output, folder: str, file: str | None, **options: Any) -> None:
       kinacc campaign record check --position-mm "812.31,-40.02,655.90"
       kinacc campaign record check readings.csv
     """
-    if (options["position_mm"] is None) == (file is None):
+    position, joints = options["position_mm"], options["joints_deg"]
+    if (position is None) == (file is None):
         message = "is given twice" if file else "is not given"
         raise InputError(Problem("the reading", message, "--position-mm, or a FILE"))
     campaign = Campaign(folder)
     flags = {name: options[name] for name in ("accept_implausible", "again")}
     plan, number = campaign.plan, campaign.state.requested
     requested = None if number is None else plan.points.label[number]
-    if file is None:
-        taken = campaign.add_reading(**_single(options, plan.slides), **flags)
+    if file is not None:
+        taken = campaign.add_readings(_of_file(file, options, campaign), **flags)
     else:
-        rows = _of_file(file, options, campaign)
-        taken = campaign.add_readings(rows, **flags)
+        if joints is not None:
+            joints = joints_given("--joints-deg", joints, plan.slides)
+        position_mm = numbers_given("--position-mm", position, 3)
+        place = options["point"], joints, options["instrument"]
+        taken = campaign.add_reading(position_mm, *place, **flags)
     summary = campaign.status()
     first = texts("recorded.txt", taken=taken, file=file, requested=requested)
     out.show({**vars(taken), "status": summary}, lines=[*first, *_lines(summary)])
-
-
-def _single(options: Mapping[str, Any], slides: np.ndarray) -> dict[str, Any]:
-    """Arguments of ``Campaign.add_reading``."""
-    sizes = {"position_mm": 3, "joints_deg": len(slides)}
-    values = {name: numbers_of(options[name]) for name in sizes if options[name] is not None}
-    refuse(
-        (
-            Problem(_flag(name), repr(options[name]), f"{sizes[name]} numbers")
-            for name, value in values.items()
-            if value.shape != (sizes[name],)
-        ),
-        "Nothing was recorded",
-    )
-    joints = values.get("joints_deg")
-    if joints is not None:
-        joints = joints * np.where(slides, 1.0, np.pi / 180.0)
-    others = {name: options[name] for name in ("point", "instrument")}
-    return {"position_mm": values["position_mm"], "joints": joints, **others}
-
-
-def _flag(name: str) -> str:
-    return f"--{name.replace('_', '-')}"
 
 
 def _of_file(path: str, options: Mapping[str, Any], campaign: Campaign) -> FileOfReadings:
@@ -304,8 +269,8 @@ def _of_file(path: str, options: Mapping[str, Any], campaign: Campaign) -> FileO
         table = table.with_pose_names(pose.column)
     known = [instrument.name for instrument in plan.instruments]
     problems = [
-        Problem(_flag(name), "is given with a file", "a column of the file")
-        for name in _OF_ONE
+        Problem(option, "is given with a file", "a column of the file")
+        for option, name in (("--point", "point"), ("--joints-deg", "joints_deg"))
         if options[name] is not None
     ]
     problems += [

@@ -176,15 +176,11 @@ def _candidates(
     options: Mapping[str, Any], arm: Calibration
 ) -> tuple[np.ndarray, list[str], np.ndarray | None, str]:
     """Joints (m, k), labels, directions (m, k) or None, and the source of the candidates."""
-    path = options["candidates"]
-    if not path.lstrip("-").isdecimal():
-        answered = choice.joint_answers(options)
-        file, joints = rows.candidates(path, arm.robot, _MOST_CANDIDATES, answered)
-        label = list(map(str, file.label))
-        return joints, label, file.directions, f"rows of {Path(path).name}"
-    count = int(path)
-    if not 2 <= count <= _MOST_CANDIDATES:
-        raise InputError(Problem("--candidates", path, f"2 to {_MOST_CANDIDATES}, or a file"))
+    count = rows.candidates(options, arm.robot, _MOST_CANDIDATES)
+    if not isinstance(count, int):
+        file, joints = count
+        source = f"rows of {Path(options['candidates']).name}"
+        return joints, list(map(str, file.label)), file.directions, source
     draw, source = _drawing(options, arm)
     for times in (1, 4, 16, _MOST_DRAWS):
         joints = draw(times * count)

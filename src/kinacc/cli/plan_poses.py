@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import click
@@ -15,11 +14,8 @@ from kinacc.cli.choice import option
 from kinacc.cli.output import Output, answers
 from kinacc.config import schema
 from kinacc.deployment import planning
-from kinacc.errors import InputError, Problem
 from kinacc.geometry import Pose, compose
 from kinacc.kinematics import robot as robots
-from kinacc.kinematics.robot import Robot
-from kinacc.measurements.table import numbers_of
 from kinacc.progress import reporting
 from kinacc.report.rendering import lines
 
@@ -36,7 +32,7 @@ _MOST_CANDIDATES = 100_000
 @option("--tool-mm", help="Measured point in the flange frame. [the robot's tool]")
 @option("--position-only", is_flag=True, help="No measured orientations.")
 @answers(table=True, picture="Index against number of poses: .svg, .png, .pdf.")
-def plan_poses(robot: str, count: int, candidates: str, out: Output, **options: Any) -> None:
+def plan_poses(robot: str, count: int, out: Output, **options: Any) -> None:
     """Choose a D-optimal set of poses, in an order with little travel.
 
     ROBOT is a shipped name or a robot file. Collisions and the view of the instrument are not
@@ -47,20 +43,25 @@ def plan_poses(robot: str, count: int, candidates: str, out: Output, **options: 
       kinacc plan-poses ur10 --poses 50 -o plan.csv --picture index.svg
     """
     arm = robots.load(robot)
-    experiment = _experiment(arm, options)
-    box, inside = spaces.of_options(options, arm)
+    calibration, tool = schema.defaults()["calibration"], robots.carried(arm)
+    if options["tool_mm"] is not None:
+        offset_mm = rows.numbers_given("--tool-mm", options["tool_mm"], 3)
+        tool = compose(arm.flange, Pose(np.eye(3), offset_mm))
+    experiment = planning.Experiment(
+        tool,
+        orientation=not options["position_only"],
+        hayati_joints=hayati_joints(calibration["dh"], arm),
+        rotation_weight_mm_per_rad=float(calibration["rotation_weight_mm_per_rad"]),
+        threshold=calibration["dh"]["truncation"],
+    )
     with reporting("plan-poses"):
-        if not candidates.isdecimal():
-            answered = choice.joint_answers(options)
-            file, joints = rows.candidates(candidates, arm, _MOST_CANDIDATES, answered)
-            label = file.label
+        candidates = rows.candidates(options, arm, _MOST_CANDIDATES)
+        if isinstance(candidates, int):
+            joints = planning.spread(arm, candidates, *spaces.of_options(options, arm), tool)
+            label = np.arange(1, candidates + 1)
         else:
-            number = int(candidates)
-            if not 10 <= number <= _MOST_CANDIDATES:
-                allowed = f"10 to {_MOST_CANDIDATES}, or a file"
-                raise InputError(Problem("--candidates", candidates, allowed))
-            joints = planning.spread(arm, number, box, inside, experiment.tool)
-            label = np.arange(1, number + 1)
+            file, joints = candidates
+            label = file.label
         plan = planning.plan_poses(arm, joints, experiment, count, np.zeros(arm.dh.joints))
     if out.picture is not None:
         from kinacc.figures.campaign import draw_observability
@@ -85,21 +86,3 @@ def plan_poses(robot: str, count: int, candidates: str, out: Output, **options: 
         "rows": table,
     }
     out.show(facts, table, lines("plan_poses.txt", **facts))
-
-
-def _experiment(arm: Robot, options: Mapping[str, Any]) -> planning.Experiment:
-    """What is measured and fitted."""
-    calibration = schema.defaults()["calibration"]
-    tool = robots.carried(arm)
-    if options["tool_mm"] is not None:
-        offset = numbers_of(options["tool_mm"])
-        if len(offset) != 3:
-            raise InputError(Problem("--tool-mm", repr(options["tool_mm"]), "3 numbers, 1,2,3"))
-        tool = compose(arm.flange, Pose(np.eye(3), offset))
-    return planning.Experiment(
-        tool,
-        orientation=not options["position_only"],
-        hayati_joints=hayati_joints(calibration["dh"], arm),
-        rotation_weight_mm_per_rad=float(calibration["rotation_weight_mm_per_rad"]),
-        threshold=calibration["dh"]["truncation"],
-    )

@@ -25,7 +25,7 @@ from kinacc.deployment.compensate import (
 )
 from kinacc.deployment.compensate import compensate as joints_for
 from kinacc.deployment.record import Calibration
-from kinacc.errors import InputError, Problem, first_few, refuse
+from kinacc.errors import InputError, Problem, first_few
 from kinacc.geometry import Pose, rotation_from_quaternion
 from kinacc.kinematics.model import JointState
 from kinacc.measurements.rows import Rows
@@ -36,7 +36,6 @@ from kinacc.report.rendering import lines
 _SHOWN = ("x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz", "std_position_mm",
           "std_orientation_mrad", "unexplained_mm", "undetermined_mm", "status")  # fmt: skip
 _TITLE = "{calibration}: {point} ({orientation} orientation), {frame} frame, {model} model"
-_NUMBERS = "7 numbers: x, y, z in mm, then a unit quaternion w, x, y, z"
 _STATUS = {
     PoseStatus.CONVERGED: "converged",
     PoseStatus.EXTRAPOLATED: "converged, extrapolated: {joints} outside the data's range",
@@ -144,9 +143,9 @@ def compensate(
     if program is None:
         out = replace(out, table=target)
     calibration = choice.calibration_of(folder, model, session)
-    near = None
+    near, slides = None, calibration.robot.dh.prismatic
     if near_deg is not None:
-        near = rows.of_arguments((near_deg,), calibration.robot, "--near-deg")[0]
+        near = rows.joints_given("--near-deg", near_deg, slides)
     if program is not None:
         _correct(calibration, program, near, point, target, options, out)
         return
@@ -185,7 +184,13 @@ def _wanted(
     if path is not None:
         inputs = rows.read(path, calibration.robot, "poses")
     else:
-        inputs = Rows(np.arange(1, len(texts) + 1), pose=_of_arguments(texts))
+        table = np.array([rows.numbers_given("--pose", text, 7) for text in texts])
+        lengths = np.linalg.norm(table[:, 3:], axis=1, keepdims=True)
+        if (np.abs(lengths - 1.0) > 1e-3).any():
+            allowed = "x, y, z in mm, then a unit quaternion w, x, y, z"
+            raise InputError(Problem("--pose", "has no unit quaternion", allowed))
+        wanted = Pose(rotation_from_quaternion(table[:, 3:] / lengths), table[:, :3])
+        inputs = Rows(np.arange(1, len(texts) + 1), pose=wanted)
     joints = inputs.joints
     if joints is None and near is not None:
         joints = np.tile(near, (len(inputs.label), 1))
@@ -194,15 +199,6 @@ def _wanted(
     where = path or "--near-deg"
     rows.require_within_limits(calibration.robot, inputs.label, joints, where)
     return replace(inputs, joints=joints)
-
-
-def _of_arguments(texts: Sequence[str]) -> Pose:
-    numbers = [numbers_of(text) for text in texts]
-    refuse(Problem("--pose", repr(text), _NUMBERS) for text, row in zip(texts, numbers, strict=True)
-           if len(row) != 7 or abs(np.linalg.norm(row[3:]) - 1.0) > 1e-3)  # fmt: skip
-    table = np.array(numbers)
-    unit = table[:, 3:] / np.linalg.norm(table[:, 3:], axis=1, keepdims=True)
-    return Pose(rotation_from_quaternion(unit), table[:, :3])
 
 
 def _table_of(

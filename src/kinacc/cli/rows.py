@@ -8,6 +8,7 @@ from typing import Any
 import click
 import numpy as np
 
+from kinacc.cli.choice import joint_answers
 from kinacc.cli.process import AGAINST
 from kinacc.deployment.record import Calibration
 from kinacc.errors import InputError, Problem, first_few, refuse
@@ -37,13 +38,17 @@ def read_joints(
     return rows, rows.joints
 
 
-def of_arguments(texts: Sequence[str], robot: Robot, option: str) -> np.ndarray:
-    """Joints (n, k) of arguments such as "10,-20,30,0,45,0" in deg; InputError if unfit."""
-    slides, rows = robot.dh.prismatic, [numbers_of(text) for text in texts]
-    allowed = f"{len(slides)} numbers, one per joint of {robot.name}"
-    refuse(Problem(option, repr(text), allowed) for text, row in zip(texts, rows, strict=True)
-           if len(row) != len(slides))  # fmt: skip
-    return np.array(rows) * np.where(slides, 1.0, np.pi / 180.0)
+def numbers_given(option: str, text: str, count: int) -> np.ndarray:
+    """Numbers (count,) of an option such as "1,2,3"; InputError for others."""
+    values = numbers_of(text)
+    if len(values) != count:
+        raise InputError(Problem(option, repr(text), f"{count} numbers"))
+    return values
+
+
+def joints_given(option: str, text: str, slides: np.ndarray) -> np.ndarray:
+    """Joints (k,) of an option such as "10,-20,30,0,45,0" in deg, in mm where one slides (k,)."""
+    return numbers_given(option, text, len(slides)) * np.where(slides, 1.0, np.pi / 180.0)
 
 
 def joints_of(
@@ -59,7 +64,8 @@ def joints_of(
     if path is not None:
         rows, joints = read_joints(path, robot, answers)
     else:
-        joints = of_arguments(in_deg, robot, "--joints-deg")
+        slides = robot.dh.prismatic
+        joints = np.array([joints_given("--joints-deg", text, slides) for text in in_deg])
         rows = Rows(np.arange(1, len(joints) + 1), joints)
     require_within_limits(robot, rows.label, joints, path or "joints")
     return rows, joints
@@ -74,13 +80,18 @@ def joint_columns(prismatic: np.ndarray, joints: np.ndarray) -> dict[str, np.nda
 
 
 def candidates(
-    path: str, robot: Robot, most: int, answers: Mapping[str, Any] | None = None
-) -> tuple[Rows, np.ndarray]:
-    """Rows and joints of a file to choose from; InputError outside limits or for over ``most``."""
-    rows, joints = read_joints(path, robot, answers)
-    require_within_limits(robot, rows.label, joints, path, "Candidates")
+    options: Mapping[str, Any], robot: Robot, most: int
+) -> tuple[Rows, np.ndarray] | int:
+    """Rows and joints of the file of ``--candidates``, or the number to draw, at most ``most``."""
+    text = options["candidates"]
+    if text.lstrip("-").isdecimal():
+        if not 2 <= int(text) <= most:
+            raise InputError(Problem("--candidates", text, f"2 to {most}, or a file"))
+        return int(text)
+    rows, joints = read_joints(text, robot, joint_answers(options))
+    require_within_limits(robot, rows.label, joints, text, "Candidates")
     if len(joints) > most:
-        raise InputError(Problem(path, f"{len(joints)} candidates", f"at most {most}"))
+        raise InputError(Problem(text, f"{len(joints)} candidates", f"at most {most}"))
     return rows, joints
 
 

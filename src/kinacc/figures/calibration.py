@@ -28,8 +28,7 @@ def draw_check(
     ``joints`` has joint, low, high, least, most and unit per joint; ``line`` (n,) and ``left_mm``
     (n,) of the readings, empty where nothing was fitted; ``suspects`` lines by kind.
     """
-    with style.house():
-        figure = style.new_figure(style.DOUBLE_COLUMN_IN, 4.2)
+    with style.new_figure(style.DOUBLE_COLUMN_IN, 4.2) as figure:
         above, below = figure.subplots(2, 1, height_ratios=(1, 2))
         _joints(above, joints)
         if left_mm.size:
@@ -90,8 +89,7 @@ def draw_joint_errors(
     values, std
         Shifts along x, y, z in mm, then turns in mrad, (k, 6, m); ``std`` NaN where unknown.
     """
-    with style.house():
-        figure = style.new_figure(style.DOUBLE_COLUMN_IN, 1.15 * len(joints) + 0.5)
+    with style.new_figure(style.DOUBLE_COLUMN_IN, 1.15 * len(joints) + 0.5) as figure:
         panels = figure.subplots(len(joints), 2, sharey="col", squeeze=False)
         for (joint, kind), ax in np.ndenumerate(panels):
             for axis, (colour, dash) in enumerate(_LINES):
@@ -120,13 +118,12 @@ def draw_comparison(difference: Difference) -> Figure:
     """
     parameters = difference.parameters
     rows = 0 if parameters is None else len(parameters)
-    with style.house():
-        figure = style.new_figure(style.DOUBLE_COLUMN_IN, max(2.6, 0.13 * rows + 0.9))
+    name, height_in = "{1} against {0}".format(*difference.names), max(2.6, 0.13 * rows + 0.9)
+    with style.new_figure(style.DOUBLE_COLUMN_IN, height_in, name) as figure:
         axes = figure.subplots(1, 2 if rows else 1, squeeze=False)[0]
         if parameters is not None and rows:
             _parameters(axes[0], parameters)
         _shifts(axes[-1], difference)
-        style.name_dataset(figure, "{1} against {0}".format(*difference.names))
     return figure
 
 
@@ -175,8 +172,7 @@ def draw_program(table: pd.DataFrame) -> Figure:
         ``corrected`` have no bar.
     """
     moved = table.where(table["status"] == "corrected")
-    with style.house():
-        figure = style.new_figure(7.0, 5.0)
+    with style.new_figure(7.0, 5.0) as figure:
         axes = figure.subplots(2, 1, sharex=True)
         for axis, unit in zip(axes, ("mm", "mrad"), strict=True):
             axis.bar(moved.index, moved.get(f"change_{unit}", 0.0), color="0.5")

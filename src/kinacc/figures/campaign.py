@@ -39,8 +39,7 @@ def draw_bounds(
     name
         Name above the figure.
     """
-    with style.house():
-        figure = style.new_figure(style.DOUBLE_COLUMN_IN, 2.9)
+    with style.new_figure(style.DOUBLE_COLUMN_IN, 2.9, name) as figure:
         left, right = figure.subplots(1, 2, sharey=True)
         if tolerance_mm is not None:
             left.axhline(tolerance_mm, **style.LIMIT)
@@ -48,7 +47,6 @@ def draw_bounds(
         _sizes(left, pd.DataFrame(points))
         _growth(right, pd.DataFrame(bounds), first_visit)
         left.set_ylim(bottom=0.0)
-        style.name_dataset(figure, name)
     return figure
 
 
@@ -57,8 +55,7 @@ def draw_readings(table: Columns, tolerance_mm: float | None = None) -> Figure:
     rows = pd.DataFrame(table)
     rows["instrument"] = rows["instrument"].astype(str).map(style.literal)
     rows.loc[rows["struck"].astype(bool), "instrument"] = "struck"
-    with style.house():
-        figure = style.new_figure(style.DOUBLE_COLUMN_IN, 2.2)
+    with style.new_figure(style.DOUBLE_COLUMN_IN, 2.2) as figure:
         ax = figure.subplots()
         looks = cycle(style.SERIES)
         for name, group in rows.groupby("instrument", sort=False):
@@ -129,8 +126,7 @@ def draw_budgets(
     widths = rows[names].to_numpy(dtype=float)
     top = 1.08 * max(widths[np.isfinite(widths)].max(initial=0.0), wanted_mm or 0.0) or 1.0
     share = "Share with a bound" if power is None else "Share that reach the aim"
-    with style.house():
-        figure = style.new_figure(style.DOUBLE_COLUMN_IN, 3.0)
+    with style.new_figure(style.DOUBLE_COLUMN_IN, 3.0) as figure:
         left, right = figure.subplots(1, 2, sharex=True)
         groups = rows.groupby("errors", sort=False)
         for (name, group), (colour, marker) in zip(groups, cycle(style.SERIES), strict=False):
@@ -166,12 +162,10 @@ def draw_observability(index: np.ndarray, robot: str) -> Figure:
     robot
         Name above the figure.
     """
-    with style.house():
-        figure = style.new_figure(style.SINGLE_COLUMN_IN, 2.6)
+    with style.new_figure(style.SINGLE_COLUMN_IN, 2.6, robot) as figure:
         ax = figure.subplots()
         ax.plot(np.arange(1, len(index) + 1), index, color=style.BLUE, marker="o", ms=3)
         ax.set(
             xlabel="Poses", ylabel="O1 (mm or mrad)", ylim=(0.0, 1.18 * float(index.max()) or 1.0)
         )
-        style.name_dataset(figure, robot)
     return figure

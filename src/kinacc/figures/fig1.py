@@ -46,8 +46,7 @@ def draw() -> Figure:
     Shaded: the part of the candidate's distribution farther from it than the measurement, whose
     area is P_k.
     """
-    with style.house():
-        figure = style.new_figure(style.SINGLE_COLUMN_IN, 3.5)
+    with style.new_figure(style.SINGLE_COLUMN_IN, 3.5) as figure:
         axes = figure.subplots(2, 1, sharex=True)
         for ax, (title, measured) in zip(axes, MEASURED_MM.items(), strict=True):
             _case(ax, measured)

@@ -65,8 +65,7 @@ def draw(
     middle = np.concatenate(edges or [points_mm]).mean(axis=0)
     nearest = np.linalg.norm(points_mm - middle, axis=1).argmin()
     kind = "measured poses of the study" if measured else "operating points"
-    with style.house():
-        figure = style.new_figure(style.SINGLE_COLUMN_IN, 3.5, arranged=False)
+    with style.new_figure(style.SINGLE_COLUMN_IN, 3.5, dataset, arranged=False) as figure:
         place = (-0.04, 0.17, 1.0, 0.83)
         ax: Axes3D = figure.add_axes(place, projection="3d", computed_zorder=False)
         ax.view_init(*VIEW_DEG)
@@ -83,7 +82,6 @@ def draw(
         for name in "xyz":
             getattr(ax, f"set_{name}label")(f"{name} (mm)", labelpad=-1)
         figure.legend(loc="lower left", ncols=2)
-        style.name_dataset(figure, dataset)
     return figure
 
 

@@ -45,8 +45,7 @@ def draw(accuracy_map: Columns, *, dataset: str | None = None) -> Figure:
     width = style.DOUBLE_COLUMN_IN if wide else style.SINGLE_COLUMN_IN
     panel_w = max((width - MARGINS_IN[0]) / slices.size, 0.5)
     panel_h = min(panel_w * float(np.ptp(edges[1]) / np.ptp(edges[0])), 3.2)
-    with style.house():
-        figure = style.new_figure(width, 2 * panel_h + MARGINS_IN[1] + 0.31 * (not wide))
+    with style.new_figure(width, 2 * panel_h + MARGINS_IN[1] + 0.31 * (not wide)) as figure:
         panels = figure.subplots(2, slices.size, sharex=True, sharey=True, squeeze=False)
         for row, (column, label, unit) in enumerate(ROWS):
             low, high = colour_range(cells[column].to_numpy())

@@ -38,8 +38,7 @@ def draw(history: Columns, *, dataset: str | None = None) -> Figure:
     lines.index = pd.Index(lines["date"].to_numpy("datetime64[D]").astype(float))
     warm = lines["temperature_c"].dropna()
     heights = [1.25, 1.0, 0.4][: 3 if len(warm) else 2]
-    with style.house():
-        figure = style.new_figure(style.DOUBLE_COLUMN_IN, 1.75 * sum(heights) + 0.3)
+    with style.new_figure(style.DOUBLE_COLUMN_IN, 1.75 * sum(heights) + 0.3, dataset) as figure:
         panels = figure.subplots(len(heights), 1, sharex=True, height_ratios=heights)
         _errors(panels[0], lines)
         _moved(panels[1], lines)
@@ -57,7 +56,6 @@ def draw(history: Columns, *, dataset: str | None = None) -> Figure:
         form = ConciseDateFormatter(locator, show_offset=False)  # type: ignore[no-untyped-call]
         panels[-1].xaxis.set_major_formatter(form)
         panels[-1].set_xlabel(f"{lines['date'].iloc[0]} to {lines['date'].iloc[-1]}")
-        style.name_dataset(figure, dataset)
     return figure
 
 

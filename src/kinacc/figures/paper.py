@@ -63,8 +63,7 @@ def draw_noise(
     step = float(np.diff(levels).min()) if levels.size > 1 else 50.0
     few, many = table["repetitions"].min(), table["repetitions"].max()
     span = f"{many:.0f}" if few == many else f"{few:.0f} to {many:.0f}"
-    with style.house():
-        figure = style.new_figure(style.SINGLE_COLUMN_IN, 3.1)
+    with style.new_figure(style.SINGLE_COLUMN_IN, 3.1, dataset) as figure:
         ax = figure.subplots()
         for index, (name, (label, colour, marker)) in enumerate(looks.items()):
             rows = table[(table["assessor"] == name) & table["mean_mm"].notna()]
@@ -81,7 +80,6 @@ def draw_noise(
         ax.grid(axis="x", visible=False)
         ax.set_title(f"Mean, smallest and largest of {span} simulations", color=style.MUTED)
         figure.legend(loc="outside lower center", ncols=2, title=taken_as_true)
-        style.name_dataset(figure, dataset)
     return figure
 
 
@@ -105,8 +103,7 @@ def draw_iterations(
     eta_mm, alpha = steps[["eta_mm", "alpha"]].iloc[0]
     true = "“true” {}*" if taken_as_true else "true {}"
     title = _verdict(steps)
-    with style.house():
-        figure = style.new_figure(style.SINGLE_COLUMN_IN, 4.2)
+    with style.new_figure(style.SINGLE_COLUMN_IN, 4.2, dataset) as figure:
         top, bottom = axes = figure.subplots(2, 1, sharex=True, height_ratios=(1.35, 1))
         top.step(steps["iteration"], steps["true_mm"], where="mid", color="#9a9a9a", lw=0.6,
                  label=true.format("error"))  # fmt: skip
@@ -136,7 +133,6 @@ def draw_iterations(
             ax.grid(axis="x", visible=False)
         figure.legend(loc="outside lower center", ncols=2, markerscale=1.6, title=taken_as_true)
         figure.align_ylabels()
-        style.name_dataset(figure, dataset)
     return figure
 
 

@@ -6,8 +6,8 @@ which stay apart for colour-blind readers; a marker or line style carries every 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from contextlib import AbstractContextManager
+from collections.abc import Iterable, Iterator
+from contextlib import AbstractContextManager, contextmanager
 from itertools import cycle
 from pathlib import Path
 from typing import Any
@@ -48,12 +48,22 @@ def house() -> AbstractContextManager[None]:
     return matplotlib.style.context(sheet, after_reset=True)
 
 
-def new_figure(width_in: float, height_in: float, *, arranged: bool = True) -> Figure:
-    """Return an empty figure of the printed size, in inches.
+@contextmanager
+def new_figure(
+    width_in: float, height_in: float, name: str | None = None, *, arranged: bool = True
+) -> Iterator[Figure]:
+    """An empty figure of the printed size, drawn in the house style, with a name small above it.
 
     ``arranged`` leaves the places of axes and labels to the layout engine.
     """
-    return Figure(figsize=(width_in, height_in), layout="constrained" if arranged else None)
+    with house():
+        figure = Figure(figsize=(width_in, height_in), layout="constrained" if arranged else None)
+        if name:
+            figure.suptitle(
+                shortened(name, int(width_in * 15)),
+                x=0.01, ha="left", fontsize=SMALL_PT, color=MUTED, parse_math=False,
+            )  # fmt: skip
+        yield figure
 
 
 def assessor_style(names: Iterable[str]) -> dict[str, tuple[str, str, str]]:
@@ -74,15 +84,6 @@ def shortened(name: str, limit: int) -> str:
 def literal(text: str) -> str:
     """A text that stands in a legend as it is: neither a formula nor, as _text, left out."""
     return f"{' ' * text.startswith('_')}{text.replace('$', chr(92) + '$')}"
-
-
-def name_dataset(figure: Figure, dataset: str | None) -> None:
-    """Write the data set's name small above the figure, where one is given."""
-    if dataset:
-        name = shortened(dataset, int(figure.get_figwidth() * 15))
-        figure.suptitle(
-            name, x=0.01, ha="left", fontsize=SMALL_PT, color=MUTED, parse_math=False
-        )  # fmt: skip
 
 
 def legend_above(axes: Axes, columns: int = 2, title: str | None = None) -> None:

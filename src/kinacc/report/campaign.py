@@ -28,76 +28,62 @@ _LARGEST, _MOST_ROWS = 10, 300
 
 def section(opened: Opened, tables: Mapping[str, Columns]) -> Part:
     """Return a campaign as a section of a page, from the tables of ``campaign.report.tables``."""
-    summary, state, tolerance_mm = status(opened), opened.state, opened.plan.limits.tolerance_mm
-    points = pd.DataFrame(tables["campaign_points"]).dropna(subset="error_mm")
-    readings = pd.DataFrame(tables["campaign_readings"])
-    measured = points.sort_values("error_mm", ascending=False, kind="stable")
+    summary, state, plan = status(opened), opened.state, opened.plan
+    points, readings = (tables[f"campaign_{name}"] for name in ("points", "readings"))
+    measured = pd.DataFrame(points).dropna(subset="error_mm")
+    measured = measured.sort_values("error_mm", ascending=False, kind="stable")
     figures = {}
-    if len(readings):
-        growth = tables["campaign_points"], tables["campaign_bounds"], len(state.plan.route)
-        figures["bounds"] = draw_bounds(*growth, tolerance_mm, summary.calibration)
-        figures["readings"] = draw_readings(tables["campaign_readings"], tolerance_mm)
+    if len(readings["reading"]):
+        growth, tolerance_mm = tables["campaign_bounds"], plan.limits.tolerance_mm
+        figures = {
+            "bounds": draw_bounds(
+                points, growth, len(plan.route), tolerance_mm, summary.calibration
+            ),
+            "readings": draw_readings(readings, tolerance_mm),
+        }
+    taken = pd.DataFrame(readings)
+    sizes_mm = np.array([np.linalg.norm(item.error_mm) for item in state.used])
+    facts = lines(
+        "campaign_facts.txt",
+        opened=opened,
+        state=state,
+        plan=plan,
+        settings=vars(plan.assessor),
+        large=int(np.sum(sizes_mm > plan.limits.implausible_mm)),
+        files={item["file"]: item.get("path") for item in opened.journal.entries if "file" in item},
+        version=__version__,
+    )
     values = {
         "status": summary,
-        "candidates": _population(summary, opened.plan),
+        "candidates": _population(summary, plan),
         "answers": lines("campaign_bounds.txt", s=summary),
         "bounds": [_row(bound) for bound in summary.bounds],
         "largest": measured[:_LARGEST],
         "every": measured[:_MOST_ROWS],
         "measured": len(measured),
         "left_out": [{"point": name, "reason": why} for name, why in summary.left_out.items()],
-        "struck": readings[readings["struck"].notna()],
-        "instruments": _instruments(summary, readings),
+        "struck": taken[taken["struck"].notna()],
+        "instruments": _instruments(summary, taken),
         "assumptions": lines(
             "assumptions.txt",
             status=summary,
-            settings=defaultdict(int, vars(state.plan.assessor)),
-            frames=any(device.frame == INSTRUMENT for device in state.plan.instruments),
+            settings=defaultdict(int, vars(plan.assessor)),
+            frames=any(device.frame == INSTRUMENT for device in plan.instruments),
             percent=percent,
         ),
-        "facts": [
-            dict(zip(("topic", "fact"), line.split(": ", 1), strict=True))
-            for line in lines("campaign_facts.txt", **_facts(opened))
-        ],
+        "facts": [dict(zip(("topic", "fact"), line.split(": ", 1), strict=True)) for line in facts],
     }
     return Part("campaign", values, figures=figures)
 
 
-def markdown(opened: Opened, tables: Mapping[str, Columns], picture: str) -> str:
-    """The report as Markdown, with the values of the page.
-
-    Parameters
-    ----------
-    opened, tables
-        As for ``campaign_page``.
-    picture
-        Path of the picture of the bounds.
-
-    Returns
-    -------
-    str
-        Markdown.
-    """
-    values = section(opened, tables).rows()
+def markdown(part: Part, picture: str) -> str:
+    """The section of a campaign as Markdown; ``picture`` is the path of that of the bounds."""
     template = environment(is_page=False).get_template("campaign.md")
-    return template.render({**values, "picture": picture})
+    return template.render({**part.rows(), "picture": picture})
 
 
-def campaign_page(opened: Opened, tables: Mapping[str, Columns]) -> Page:
-    """The page of a campaign.
-
-    Parameters
-    ----------
-    opened
-        The campaign.
-    tables
-        Its tables, as ``campaign.report.tables`` returns them.
-
-    Returns
-    -------
-    Page
-        Bounds and verdict, then readings, points, assumptions and origin.
-    """
+def campaign_page(opened: Opened, part: Part) -> Page:
+    """The page of a campaign: bounds and verdict, then its section."""
     summary = status(opened)
     main = summary.bound
     answers = lines("campaign_answers.txt", s=summary)
@@ -122,7 +108,7 @@ def campaign_page(opened: Opened, tables: Mapping[str, Columns]) -> Page:
         },
     )
     marks = {name: str(value) for name, value in folder.marks_of(opened).items()}
-    return Page(first, [section(opened, tables)], marks)
+    return Page(first, [part], marks)
 
 
 def _badge(summary: CampaignStatus) -> tuple[str, bool]:
@@ -160,25 +146,6 @@ def _instruments(summary: CampaignStatus, readings: pd.DataFrame) -> pd.DataFram
             }
         )
     return pd.DataFrame(rows)
-
-
-def _facts(opened: Opened) -> dict[str, object]:
-    """What was fixed and taken, as the template of facts takes it."""
-    state = opened.state
-    sizes = np.array([np.linalg.norm(item.error_mm) for item in state.used])
-    return {
-        "opened": opened,
-        "state": state,
-        "plan": state.plan,
-        "settings": vars(state.plan.assessor),
-        "large": int(np.sum(sizes > state.plan.limits.implausible_mm)),
-        "files": {
-            str(entry["file"]): entry.get("path")
-            for entry in opened.journal.entries
-            if "file" in entry
-        },
-        "version": __version__,
-    }
 
 
 def _population(summary: CampaignStatus, plan: Plan) -> str:

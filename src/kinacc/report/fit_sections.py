@@ -46,13 +46,11 @@ def residuals(tables: Tables, summary: CalibrationSummary) -> Part:
     """Position errors of every row before and after calibration."""
     best = summary.selected
     errors = _position_errors(tables, "cross_validated" if summary.is_held_out else "train")
-    large_mm = float(errors[best].quantile(figures.LARGE_SHARE))
+    large_mm = summary.best.quantile_99
     labels = {model: model_name(model) for model in errors}
     labels[best] += ", selected"
-    measured, names = (
-        pd.DataFrame(tables["measurements"]),
-        RowNames.of_columns(tables["measurements"]),
-    )
+    names = RowNames.of_columns(tables["measurements"])
+    measured = pd.DataFrame(tables["measurements"])
     measured = measured.rename(columns={f"{axis}_mm": axis for axis in "xyz"})
     measured["name"] = [
         f"pose {pose}" if np.isnan(line) else names.one(int(line))
@@ -70,11 +68,10 @@ def residuals(tables: Tables, summary: CalibrationSummary) -> Part:
     shown = {model: labels[model] for model in (NOMINAL, best)}
     values = {
         "s": summary,
-        "count": len(errors),
         "share": figures.LARGE_SHARE,
         "large_mm": large_mm,
         "labels": labels,
-        "sizes": errors.agg(["mean", "max"]).T.assign(model=labels),
+        "sizes": summary.position_errors.assign(model=labels),
         "worst": worst,
     }
     return Part(

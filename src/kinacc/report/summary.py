@@ -11,7 +11,7 @@ import pandas as pd
 
 from kinacc.assess.statement import ACCEPT, CANDIDATES, REJECT, UNDECIDED, Statement, decide
 from kinacc.calibration.summary import LARGE_SHARE, Tolerance
-from kinacc.campaign.status import CampaignStatus
+from kinacc.campaign.status import Bound, CampaignStatus
 from kinacc.campaign.status import reason as reason_text
 from kinacc.config.error_models import MEASURED, NOMINAL, model_name
 from kinacc.report.rendering import size
@@ -174,6 +174,11 @@ class CalibrationSummary:
         most = ", the highest tried" if row["order"] == row["highest_order_tried"] else ""
         return f"{model_name(model)}, order {row['order']}{most}"
 
+    @property
+    def bound(self) -> Bound | None:
+        """The bound of the campaign on all candidates, None without a campaign."""
+        return self.campaign.of_all if self.campaign else None
+
     def verdict(self, by: str, tolerance_mm: float | None = None) -> Verdict | None:
         """The verdict ``by`` the bound of the campaign or by held-out errors.
 
@@ -183,12 +188,10 @@ class CalibrationSummary:
         statistic = _TOLERANCE_OF[by]
         if tolerance_mm is not None:
             return self._judged(Tolerance(tolerance_mm, statistic))
-        bound = self.campaign.of_all if self.campaign and by == BOUND else None
-        if bound is not None and bound.tolerance_mm is not None:
-            return self._judged(Tolerance(bound.tolerance_mm, statistic), "the campaign's")
-        return (
-            self.of_configuration() if self.tolerance and self.tolerance.of == statistic else None
-        )
+        if by == BOUND and self.bound and self.bound.tolerance_mm is not None:
+            return self._judged(Tolerance(self.bound.tolerance_mm, statistic), "the campaign's")
+        is_about_it = self.tolerance is not None and self.tolerance.of == statistic
+        return self.of_configuration() if is_about_it else None
 
     def of_configuration(self) -> Verdict | None:
         """The verdict on the tolerance of the configuration, by the statistic it names."""
@@ -196,28 +199,28 @@ class CalibrationSummary:
 
     def _judged(self, allowed: Tolerance, source: str = "") -> Verdict:
         """Whether the statistic of a tolerance is within it."""
-        verdict, reason = (self._by_bound if allowed.of == "bound" else self._by_held_out)(allowed)
-        return Verdict(verdict, reason, allowed.mm, source)
-
-    def _by_bound(self, allowed: Tolerance) -> tuple[str, str]:
-        bound = self.campaign.of_all if self.campaign else None
-        if bound is None:
-            return UNDECIDED, "no campaign bounds the largest error"
-        if self.doubts:
-            return UNDECIDED, "its bound cannot be relied on"
-        limits = (bound.value_mm, bound.lower_mm, bound.upper_mm, bound.confidence)
-        decided = decide(Statement(CANDIDATES, *limits, excepted=bound.excepted), allowed.mm)
-        return decided.verdict, reason_text(decided.reason)
-
-    def _by_held_out(self, allowed: Tolerance) -> tuple[str, str]:
-        best = self.best
-        if not self.is_held_out:
-            return UNDECIDED, "no error is held out"
-        if allowed.of == "mean":
+        best, bound, verdict = self.best, self.bound, UNDECIDED
+        if allowed.of == "bound":
+            reason = "no campaign bounds the largest error"
+            if self.doubts:
+                reason = "its bound cannot be relied on"
+            elif bound is not None:
+                limits = (bound.value_mm, bound.lower_mm, bound.upper_mm, bound.confidence)
+                stated = Statement(CANDIDATES, *limits, excepted=bound.excepted)
+                decided = decide(stated, allowed.mm)
+                verdict, reason = decided.verdict, reason_text(decided.reason)
+        elif not self.is_held_out:
+            reason = "no error is held out"
+        elif allowed.of == "mean":
             verdict = ACCEPT if best.mean <= allowed.mm else REJECT
-            return verdict, f"the mean error held out is {best.mean:.3f} mm"
-        if best.quantile_99 > allowed.mm:
-            return REJECT, "more than 1 % of the errors held out are beyond the tolerance"
-        if best.n < _FEWEST:
-            return UNDECIDED, f"{best.n:.0f} errors are held out, too few to tell of 1 % of them"
-        return ACCEPT, "99 % of the errors held out are within the tolerance"
+            reason = f"the mean error held out is {best.mean:.3f} mm"
+        elif best.quantile_99 > allowed.mm:
+            verdict, reason = (
+                REJECT,
+                "more than 1 % of the errors held out are beyond the tolerance",
+            )
+        elif best.n < _FEWEST:
+            reason = f"{best.n:.0f} errors are held out, too few to tell of 1 % of them"
+        else:
+            verdict, reason = ACCEPT, "99 % of the errors held out are within the tolerance"
+        return Verdict(verdict, reason, allowed.mm, source)

@@ -53,7 +53,16 @@ def print_summary(
     first, *answers = headline(summary, by, tolerance_mm)
     console.print(first, soft_wrap=True)
     console.print("\n".join(answers), end="\n\n")
-    console.print(_error_table(summary))
+    where = "Held-out" if summary.is_held_out else "Training"
+    errors = summary.error_table()
+    table = Table(box=None, pad_edge=False)
+    table.add_column(f"{where} errors ({counted(summary.best.n, 'reading')})", no_wrap=True)
+    for name in errors.columns[1:]:
+        table.add_column(name.replace(", ", "\n"), justify="right", no_wrap=True)
+    table.add_column("", no_wrap=True)
+    for model, row in errors.iterrows():
+        table.add_row(*map(as_seen, row), "<- selected" if model == summary.selected else "")
+    console.print(table)
     grid = Table.grid(padding=(0, 2))
     grid.add_column(no_wrap=True)
     grid.add_column(overflow="fold")
@@ -119,7 +128,7 @@ def fleet_table(
             continue
         best = result.best if result.is_held_out else None
         status = result.campaign
-        bound = status.of_all if status else None
+        bound = result.bound
         verdict = result.verdict(by, tolerance_mm)
         rows.append(
             {
@@ -205,16 +214,3 @@ def _shown(value: object) -> str:
     if not isinstance(value, float):
         return as_seen(str(value))
     return f"{value:.4f}" if abs(value) >= 0.01 or abs(value) < 5e-5 else f"{value:.3g}"
-
-
-def _error_table(summary: CalibrationSummary) -> Table:
-    table = Table(box=None, pad_edge=False)
-    where = "Held-out" if summary.is_held_out else "Training"
-    table.add_column(f"{where} errors ({counted(summary.best.n, 'reading')})", no_wrap=True)
-    errors = summary.error_table()
-    for name in errors.columns[1:]:
-        table.add_column(name.replace(", ", "\n"), justify="right", no_wrap=True)
-    table.add_column("", no_wrap=True)
-    for model, row in errors.iterrows():
-        table.add_row(*map(as_seen, row), "<- selected" if model == summary.selected else "")
-    return table
