@@ -32,7 +32,7 @@ from kinacc.deployment.export import urdf
 from kinacc.deployment.export.controllers import CONTROLLERS
 from kinacc.deployment.export.source import Source
 from kinacc.deployment.record import Calibration as CalibratedModel
-from kinacc.errors import InputError, Problem, refuse, require_type
+from kinacc.errors import Problem, input_error, refuse, require_type
 from kinacc.geometry import Pose, numbers
 from kinacc.kinematics import robot as robots
 from kinacc.kinematics.robot import Robot
@@ -41,7 +41,7 @@ from kinacc.report.summary import CalibrationSummary
 from kinacc.synthetic import source
 from kinacc.tables import store, sums
 from kinacc.tables.atomic import write_together
-from kinacc.tables.columns import Columns
+from kinacc.tables.columns import Columns, Tables
 from kinacc.workflow.code import config_hash
 from kinacc.workflow.data_sets import CALIBRATION, DataSets, data_sets, read_data_sets
 
@@ -153,7 +153,7 @@ class Calibration:
     def table(self, name: str) -> pd.DataFrame:
         """A table of the results by name, such as ``residuals``; InputError for others."""
         if name not in self.tables:
-            raise InputError(Problem(name, "no such table", ", ".join(self.tables)))
+            raise input_error(name, "no such table", ", ".join(self.tables))
         return pd.DataFrame(self.tables[name])
 
     def predict(
@@ -240,7 +240,7 @@ class Calibration:
             For a file that cannot be read, and frames that are missing.
         """
         if not Path(path).is_file():
-            raise InputError(Problem(str(path), "no such file", "a robot program"))
+            raise input_error(str(path), "no such file", "a robot program")
         return programs.compensate_program(self.model, path, **options)
 
     def save(self, folder: str | Path) -> Path:
@@ -324,7 +324,7 @@ class Calibration:
             Old and new values, and the mean errors at held-out poses.
         """
         if controller not in CONTROLLERS:
-            raise InputError(Problem("controller", repr(controller), ", ".join(CONTROLLERS)))
+            raise input_error("controller", repr(controller), ", ".join(CONTROLLERS))
         fitted = "estimated" if self.summary.frames_fitted else "fixed"
         settings = settings or defaults()["calibration"] | {"base_and_tool": fitted}
         return pendants.fit_pendant(self.tables, settings, controller, self.name)
@@ -363,7 +363,7 @@ def read_measurements(
         questions that measured files leave open, with their answers.
     """
     if not paths:
-        raise InputError(Problem("paths", "are not given", "a measured file or FILE.yaml"))
+        raise input_error("paths", "are not given", "a measured file or FILE.yaml")
     for path in paths:
         require_type("path", path, str, Path)
     if all(Path(path).suffix in (".yaml", ".yml") for path in paths):
@@ -378,10 +378,10 @@ def read_measurements(
         described = data_sets(contradictions.load([], {"datasets": content})).settings
     if dataset is None and len(described) > 1:
         where = ", ".join(map(str, paths))
-        raise InputError(Problem(where, "describes several data sets", ", ".join(described)))
+        raise input_error(where, "describes several data sets", ", ".join(described))
     name = dataset or next(iter(described))
     if name not in described:
-        raise InputError(Problem("dataset", f"no data set {name!r}", ", ".join(described)))
+        raise input_error("dataset", f"no data set {name!r}", ", ".join(described))
     settings = described[name]
     table = pd.DataFrame(_as_written(source.run({}, settings))["measurements"])
     return Measurements(name, robots.load(settings["robot"]), table, settings)
@@ -536,7 +536,7 @@ def _of_tables(
     return Calibration(name, model, tables, made_by)
 
 
-def _as_written(tables: Mapping[str, Columns]) -> dict[str, Columns]:
+def _as_written(tables: Tables) -> dict[str, Columns]:
     """Tables held to their schemas, with its columns in its order."""
     return {
         name: store.columns_in(store.to_table(name, columns, _MARKS))

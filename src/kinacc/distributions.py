@@ -8,7 +8,7 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
-from kinacc.errors import InputError, Problem
+from kinacc.errors import input_error
 
 # Below this gap between the logarithm of the mean and the mean logarithm (a relative spread near
 # 1e-6) rounding decides the shape: the sample counts as one repeated value.
@@ -56,13 +56,11 @@ def fit(magnitudes: ArrayLike) -> GammaFit:
     x = np.asarray(magnitudes, dtype=np.float64).ravel()
     if x.size == 0 or not np.all(np.isfinite(x)) or np.any(x <= 0.0):
         sample = "no values" if x.size == 0 else f"smallest {x.min():g}, largest {x.max():g}"
-        raise InputError(
-            Problem(
-                "gamma fit",
-                f"the likelihood has no maximum for this sample ({sample})",
-                "at least one value, all finite and above 0",
-                "leave out exact zeros or use another statistic",
-            )
+        raise input_error(
+            "gamma fit",
+            f"the likelihood has no maximum for this sample ({sample})",
+            "at least one value, all finite and above 0",
+            "leave out exact zeros or use another statistic",
         )
     mean = float(x.mean())
     # Relative to the mean, so that nothing depends on the unit.

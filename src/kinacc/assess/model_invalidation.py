@@ -19,7 +19,7 @@ import pandas as pd
 from scipy.special import chdtrc
 
 from kinacc.assess.world import Assessment, Assessor, World
-from kinacc.errors import InputError, Problem
+from kinacc.errors import input_error
 
 GRID_PER_MM = 1000
 SEARCHES = ("from_above", "from_below", "bisection")
@@ -126,11 +126,9 @@ class ModelInvalidation(Assessor):
 
     def _check_visits(self, world: World) -> None:
         if world.visits < self.measurements:
-            raise InputError(
-                Problem(
-                    "repeats",
-                    f"{world.visits} readings a point for {self.measurements} measurements",
-                    f"{self.measurements} readings a point, for all may fall on one",
-                    "give more repeats or a smaller budget",
-                )
+            raise input_error(
+                "repeats",
+                f"{world.visits} readings a point for {self.measurements} measurements",
+                f"{self.measurements} readings a point, for all may fall on one",
+                "give more repeats or a smaller budget",
             )

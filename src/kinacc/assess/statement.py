@@ -16,7 +16,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from kinacc.assess.limits import visit_mm
-from kinacc.errors import InputError, Problem
+from kinacc.errors import input_error
 
 MEASURED = "measured"
 CANDIDATES = "candidates"
@@ -105,7 +105,7 @@ def decide(statement: Statement, tolerance_mm: float) -> Decision:
     that is not positive.
     """
     if not (tolerance_mm > 0.0 and math.isfinite(tolerance_mm)):
-        raise InputError(Problem("tolerance", f"{tolerance_mm}", "above 0, in mm"))
+        raise input_error("tolerance", f"{tolerance_mm}", "above 0, in mm")
     band = statement.upper_mm - statement.value_mm
     verdict, reason = UNDECIDED, Reason("between")
     if statement.upper_mm < statement.lower_mm or band < 0.0:

@@ -24,7 +24,7 @@ from kinacc.assess.adaptive import AdaptiveAssessor, Campaign, Candidates
 from kinacc.assess.invalidation_kernels import extend, extend_all
 from kinacc.assess.limits import visit_mm
 from kinacc.assess.statement import CANDIDATES, MEASURED, REGION, VISIT, Statement
-from kinacc.errors import InputError, Problem, require_type
+from kinacc.errors import input_error, require_type
 from kinacc.geometry import numbers
 
 
@@ -109,11 +109,11 @@ def checked_errors(error_mm: ArrayLike) -> np.ndarray:
     errors = np.ascontiguousarray(numbers("true errors", error_mm))
     if errors.ndim != 2 or errors.shape[1] != 3 or errors.shape[0] == 0:
         message, allowed = f"shape {errors.shape}", "(m, 3) with m at least 1, in mm"
-        raise InputError(Problem("true errors", message, allowed))
+        raise input_error("true errors", message, allowed)
     bad = np.flatnonzero(~np.isfinite(errors).all(axis=1))
     if bad.size:
         message = f"points {bad[:5].tolist()} are not finite"
-        raise InputError(Problem("true errors", message, "numbers in mm"))
+        raise input_error("true errors", message, "numbers in mm")
     return errors
 
 

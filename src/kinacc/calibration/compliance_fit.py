@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Self
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from kinacc.calibration.frames import ANGLE_UNIT_RAD
 from kinacc.calibration.models import Common, Estimator
 from kinacc.calibration.observations import Observations
 from kinacc.calibration.uncertainty import Uncertainty
+from kinacc.config.records import Settings
 from kinacc.kinematics.compliance import ComplianceModel
 from kinacc.kinematics.robot import Robot
 from kinacc.tables.columns import Columns
@@ -35,7 +36,7 @@ class ComplianceEstimator(Estimator):
     kind: ClassVar[str] = "compliance"
 
     @classmethod
-    def of(cls, calibration: Mapping[str, Any], arm: Robot, every: Observations) -> Self:
+    def of(cls, calibration: Settings, arm: Robot, every: Observations) -> Self:
         """By the ``calibration`` settings; what loads ``every`` row says which terms there are."""
         section = calibration["compliance"]
         gravity = np.array(section["gravity"], dtype=float)
@@ -56,7 +57,7 @@ class ComplianceEstimator(Estimator):
 
     @classmethod
     def contradictions(
-        cls, calibration: Mapping[str, Any], arm: Robot
+        cls, calibration: Settings, arm: Robot
     ) -> Iterator[tuple[tuple[str, ...], str, str]]:
         """Joints the arm has not or that slide, links of another arm, no direction of gravity."""
         section, joints = calibration["compliance"], arm.dh.joints
@@ -95,7 +96,7 @@ class ComplianceEstimator(Estimator):
         return {"compliance_fit": tables.fit_columns("compliance_fit", fitted, known)}
 
 
-def _body(section: Mapping[str, Any]) -> np.ndarray:
+def _body(section: Settings) -> np.ndarray:
     """Mass in kg and centre in mm (4,)."""
     return np.array([section["mass_kg"], *section["centre_mm"]], dtype=float)
 

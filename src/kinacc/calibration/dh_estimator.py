@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Self
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from kinacc.calibration.observations import Observations
 from kinacc.calibration.uncertainty import Uncertainty
 from kinacc.config import parameter_rules
 from kinacc.config.parameter_rules import Rule
+from kinacc.config.records import Settings
 from kinacc.geometry import IDENTITY
 from kinacc.kinematics.dh import PARAMETERS, DHModel
 from kinacc.kinematics.robot import Robot
@@ -141,7 +142,7 @@ class DHEstimator(Estimator):
     kind: ClassVar[str] = "dh"
 
     @classmethod
-    def of(cls, calibration: Mapping[str, Any], arm: Robot, every: Observations) -> Self:
+    def of(cls, calibration: Settings, arm: Robot, every: Observations) -> Self:
         """By the ``calibration`` settings."""
         section = calibration["dh"]
         instead = section["hayati_joints"] == _AUTO
@@ -200,7 +201,7 @@ def _of_one_base(observations: Observations) -> Observations:
     return replace(observations, session=session, session_names=(None,))
 
 
-def hayati_joints(section: Mapping[str, Any], arm: Robot) -> tuple[int, ...]:
+def hayati_joints(section: Settings, arm: Robot) -> tuple[int, ...]:
     """Joints with a Hayati angle.
 
     Parameters

@@ -30,7 +30,7 @@ from kinacc.calibration.least_squares import (
 )
 from kinacc.calibration.observations import Observations
 from kinacc.calibration.uncertainty import TOUCH_SQUARED, scale_of
-from kinacc.errors import InputError, Problem
+from kinacc.errors import input_error
 from kinacc.geometry import Pose, log_so3, skew
 from kinacc.kinematics.model import ErrorModel
 from kinacc.measurements.folds import configurations
@@ -346,7 +346,7 @@ def fit(
             f"for the {needed} free parameters of the {name}"
         )
         allowed = "at least as many components as parameters"
-        raise InputError(Problem("measurements", what, allowed, "measure more poses"))
+        raise input_error("measurements", what, allowed, "measure more poses")
     parameters = placed(observations, nominal, frames, weight, begin)
     place = parameters.size
     system = PoseSystem(observations, nominal, mask, parameters, weight)

@@ -8,7 +8,7 @@ them as independent noise.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import pandas as pd
@@ -16,7 +16,7 @@ import pandas as pd
 from kinacc.calibration.noise import UNKNOWN, Noise, of_measurements
 from kinacc.config.error_models import model_name
 from kinacc.kinematics.robot import Robot
-from kinacc.tables.columns import Columns
+from kinacc.tables.columns import Tables
 
 GIVEN = "valid given the model"
 
@@ -56,7 +56,7 @@ class Misfit:
         return {"valid": "given the model", **known, "noise_freedom": self.noise.freedom}
 
 
-def misfit(tables: Mapping[str, Columns], robot: Robot, model: str) -> Misfit:
+def misfit(tables: Tables, robot: Robot, model: str) -> Misfit:
     """Misfit of one model.
 
     Parameters
@@ -79,7 +79,7 @@ def misfit(tables: Mapping[str, Columns], robot: Robot, model: str) -> Misfit:
     return Misfit(model, float(rms_mm) / math.sqrt(3.0), noise)
 
 
-def misfits(tables: Mapping[str, Columns], robot: Robot) -> list[Misfit]:
+def misfits(tables: Tables, robot: Robot) -> list[Misfit]:
     """Misfit of every model of the table ``model_selection``, in its order; see ``misfit``."""
     return [misfit(tables, robot, str(model)) for model in tables["model_selection"]["model"]]
 

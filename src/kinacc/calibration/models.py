@@ -14,11 +14,12 @@ from kinacc.calibration.uncertainty import Uncertainty
 from kinacc.config import error_models, parameter_rules
 from kinacc.config.error_models import NOMINAL
 from kinacc.config.parameter_rules import Rule
+from kinacc.config.records import Settings
 from kinacc.geometry import IDENTITY, Pose
 from kinacc.kinematics.dh import DHModel
 from kinacc.kinematics.model import ErrorModel
 from kinacc.kinematics.robot import Robot, carried
-from kinacc.tables.columns import Columns
+from kinacc.tables.columns import Columns, Tables
 
 
 @dataclass(frozen=True)
@@ -38,7 +39,7 @@ class Common:
     tool: Pose = IDENTITY
 
     @classmethod
-    def of(cls, calibration: Mapping[str, Any], arm: Robot) -> Self:
+    def of(cls, calibration: Settings, arm: Robot) -> Self:
         """By the ``calibration`` settings."""
         return cls(
             arm.dh,
@@ -82,13 +83,13 @@ class Estimator:
     kind: ClassVar[str]
 
     @classmethod
-    def of(cls, calibration: Mapping[str, Any], arm: Robot, every: Observations) -> Self:
+    def of(cls, calibration: Settings, arm: Robot, every: Observations) -> Self:
         """By the ``calibration`` settings; ``every``: all observations of the data set."""
         raise NotImplementedError
 
     @classmethod
     def contradictions(
-        cls, calibration: Mapping[str, Any], arm: Robot
+        cls, calibration: Settings, arm: Robot
     ) -> Iterator[tuple[tuple[str, ...], str, str]]:
         """Keys of its section that cannot be for ``arm``, what is wrong, and what is allowed."""
         yield from ()
@@ -97,7 +98,7 @@ class Estimator:
         """Tables that say how settings left open were chosen. Raises FitError."""
         return {}
 
-    def chosen(self, tables: Mapping[str, Columns], fold: int | None) -> Self:
+    def chosen(self, tables: Tables, fold: int | None) -> Self:
         """The estimator with what such tables chose without seeing ``fold`` (None: all seen)."""
         return self
 
@@ -112,9 +113,7 @@ class Estimator:
         return {}
 
 
-def estimators(
-    calibration: Mapping[str, Any], arm: Robot, every: Observations
-) -> dict[str, Estimator]:
+def estimators(calibration: Settings, arm: Robot, every: Observations) -> dict[str, Estimator]:
     """The estimators that settings ask for.
 
     Parameters

@@ -12,6 +12,7 @@ from kinacc.calibration.fitting import Fit, ModelFit
 from kinacc.calibration.models import Common, Estimator
 from kinacc.calibration.observations import Observations
 from kinacc.config import error_models
+from kinacc.config.records import Settings
 from kinacc.errors import input_error
 from kinacc.kinematics.model import ErrorModel
 from kinacc.kinematics.robot import Robot
@@ -70,7 +71,7 @@ class OwnEstimator(Estimator):
     model: ClassVar[Any]
 
     @classmethod
-    def of(cls, calibration: Mapping[str, Any], arm: Robot, every: Observations) -> Self:
+    def of(cls, calibration: Settings, arm: Robot, every: Observations) -> Self:
         """By the ``calibration`` settings."""
         return cls(Common.of(calibration, arm))
 

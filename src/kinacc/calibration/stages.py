@@ -21,6 +21,7 @@ from kinacc.config.error_models import (
     Comparison,
     comparisons,
 )
+from kinacc.config.records import Settings
 from kinacc.kinematics import robot
 from kinacc.kinematics import tables as models
 from kinacc.kinematics.robot import Robot
@@ -28,15 +29,15 @@ from kinacc.measurements import folds
 from kinacc.measurements.reader import excluded_lines, read_excluded
 from kinacc.measurements.row_names import RowNames
 from kinacc.progress import with_progress
-from kinacc.tables.columns import Columns
+from kinacc.tables.columns import Columns, Tables
 from kinacc.tables.contract import columns_of
 
 _OFF = ("ex_mm", "ey_mm", "ez_mm", "rx_mrad", "ry_mrad", "rz_mrad")
 
 
 def fit_model(
-    inputs: Mapping[str, Columns],
-    settings: Mapping[str, Any],
+    inputs: Tables,
+    settings: Settings,
     kind: str,
 ) -> dict[str, Columns]:
     """Fit the model of one kind to the training rows.
@@ -92,8 +93,8 @@ def fit_model(
 
 
 def compare_models(
-    inputs: Mapping[str, Columns],
-    settings: Mapping[str, Any],
+    inputs: Tables,
+    settings: Settings,
 ) -> dict[str, Columns]:
     """Errors of every comparison, in sample and held out, and the model selected by them.
 
@@ -158,7 +159,7 @@ def compare_models(
     }
 
 
-def excluded_rows(inputs: Mapping[str, Columns], settings: Mapping[str, Any]) -> dict[str, Columns]:
+def excluded_rows(inputs: Tables, settings: Settings) -> dict[str, Columns]:
     """Errors of the delivered models at the rows left out, which no fit has used.
 
     Parameters
@@ -200,15 +201,13 @@ def excluded_rows(inputs: Mapping[str, Columns], settings: Mapping[str, Any]) ->
     return {"excluded_rows": columns | row_names.columns(columns["line"])}
 
 
-def observed(inputs: Mapping[str, Columns], robot: Robot) -> tuple[Observations, np.ndarray]:
+def observed(inputs: Tables, robot: Robot) -> tuple[Observations, np.ndarray]:
     """All observations of ``measurements`` and the mask (n,) of the rows that train."""
     columns = inputs["measurements"]
     return from_columns(columns, robot), np.asarray(columns["subset"]) == "train"
 
 
-def delivered_fits(
-    inputs: Mapping[str, Columns], robot: Robot, every: Observations
-) -> dict[str, Fit]:
+def delivered_fits(inputs: Tables, robot: Robot, every: Observations) -> dict[str, Fit]:
     """The models ``inputs`` have with their frames, for targets and sessions of ``every``."""
     names, fits = (every.target_names, every.session_names), {}
     for kind, model in models.models(inputs, robot.dh).items():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Self
+from typing import ClassVar, Self
 
 import numpy as np
 import pandas as pd
@@ -16,11 +16,12 @@ from kinacc.calibration.observations import Observations
 from kinacc.calibration.uncertainty import Uncertainty
 from kinacc.calibration.vec_fit import Prior
 from kinacc.config.error_models import NOMINAL
+from kinacc.config.records import Settings
 from kinacc.kinematics import vec
 from kinacc.kinematics.robot import Robot
 from kinacc.kinematics.vec import VECModel
 from kinacc.progress import with_progress
-from kinacc.tables.columns import Columns
+from kinacc.tables.columns import Columns, Tables
 from kinacc.tables.contract import ARTEFACTS
 
 _AUTO = "auto"
@@ -56,7 +57,7 @@ class VECEstimator(Estimator):
     kind: ClassVar[str] = "vec"
 
     @classmethod
-    def of(cls, calibration: Mapping[str, Any], arm: Robot, every: Observations) -> Self:
+    def of(cls, calibration: Settings, arm: Robot, every: Observations) -> Self:
         """By the ``calibration`` settings."""
         section = calibration["vec"]
         angle_rad = 1e-3 * section["prior_std_mrad"]
@@ -96,7 +97,7 @@ class VECEstimator(Estimator):
         names = [column.name for column in ARTEFACTS["vec_orders"].columns]
         return {"vec_orders": {name: table[name].to_numpy() for name in names}}
 
-    def chosen(self, tables: Mapping[str, Columns], fold: int | None) -> Self:
+    def chosen(self, tables: Tables, fold: int | None) -> Self:
         """The estimator with the order and prior that ``vec_orders`` states for one fold."""
         if not self.open:
             return self
@@ -150,7 +151,7 @@ class VECEstimator(Estimator):
 
 
 def _joint_range_rad(
-    section: Mapping[str, Any], arm: Robot, q_rad: np.ndarray
+    section: Settings, arm: Robot, q_rad: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Range (k,), (k,) of the DH joints; those of the data are ``q_rad`` (n, k)."""
     wanted = section["joint_range"]

@@ -20,7 +20,7 @@ from kinacc.config.names import not_in_a_line
 from kinacc.deployment.applicability import LIKE_FITTED, is_measured_there, position_std_mm
 from kinacc.deployment.planning import shortest_path
 from kinacc.deployment.record import Calibration
-from kinacc.errors import InputError, Problem, first_few, refuse
+from kinacc.errors import Problem, first_few, input_error, refuse
 from kinacc.geometry import compose, invert
 from kinacc.kinematics import robot as robots
 from kinacc.kinematics.inverse.limits import travel_unit
@@ -78,7 +78,7 @@ def points_of(
     rows = np.sort(np.unique(places, axis=0, return_index=True)[1])
     if len(rows) < 2:
         message = "only one" if len(joints) == 1 else f"all {len(joints)} are at the same joints"
-        raise InputError(Problem("candidates", message, "at least 2 different points"))
+        raise input_error("candidates", message, "at least 2 different points")
     joints, label = joints[rows], [str(label[i]).strip() for i in rows]
     directions = None if directions is None else directions[rows]
     problems = _outside(arm, joints, label)

@@ -31,7 +31,7 @@ from kinacc.campaign.state import (
 )
 from kinacc.campaign.status import Bound, CampaignStatus, status
 from kinacc.deployment.record import Calibration
-from kinacc.errors import InputError, Problem, refuse
+from kinacc.errors import InputError, Problem, input_error, refuse
 from kinacc.geometry import invert, numbers
 from kinacc.measurements.row_names import RowNames
 
@@ -163,7 +163,7 @@ class Campaign:
         arm = calibration.model
         joints = arm.robot.finite_joints(candidates, "candidates")
         if frame not in (BASE, INSTRUMENT):
-            raise InputError(Problem("frame", repr(frame), f"{BASE}, {INSTRUMENT}"))
+            raise input_error("frame", repr(frame), f"{BASE}, {INSTRUMENT}")
         if tolerance_mm is not None:
             tolerance_mm = float(numbers("tolerance_mm", tolerance_mm, ()))
         text = ",".join(map(repr, numbers("noise_mm", noise_mm).ravel().tolist()))
@@ -290,7 +290,7 @@ class Campaign:
         with self._writing() as opened:
             state, number = opened.state, opened.plan.points.number(point)
             if number is None:
-                raise InputError(Problem(f"point {point}", "is no candidate"))
+                raise input_error(f"point {point}", "is no candidate")
             read, message = sum(item.reading.point == number for item in state.readings), ""
             if read:
                 message = f"has {read} readings: without it a large error could be hidden"

@@ -27,7 +27,7 @@ from kinacc.campaign.beside_results import JOURNAL, PLAN
 from kinacc.campaign.plan import Plan
 from kinacc.campaign.state import Entry, State, restore
 from kinacc.config import json_files
-from kinacc.errors import InputError, MachineError, Problem, refuse, refused
+from kinacc.errors import InputError, MachineError, Problem, input_error, refuse, refused
 from kinacc.tables.atomic import synchronise, taken, write_whole
 
 LOCK = "lock"
@@ -123,7 +123,7 @@ def locked(folder: Path, patience_s: float = _PATIENCE_S) -> Iterator[None]:
         if not held:
             message = "another process is writing to this campaign"
             fix = "wait until it is done, then try again"
-            raise InputError(Problem(str(folder), message, fix=fix))
+            raise input_error(str(folder), message, fix=fix)
         yield
 
 
@@ -134,7 +134,7 @@ def _checksum(seed: str, number: int, entry: Mapping[str, Any]) -> str:
 
 def _damaged(where: str, message: str) -> InputError:
     fix = "nothing was done; bring the file back from a copy"
-    return InputError(Problem(where, message, fix=fix))
+    return input_error(where, message, fix=fix)
 
 
 def _not_written(path: Path, error: OSError) -> MachineError:
@@ -208,7 +208,7 @@ def open_(folder: Path | str) -> Opened:
     path = folder / PLAN
     if not path.is_file():
         fix = "begin one: kinacc campaign start"
-        raise InputError(Problem(str(path), "no such file: no campaign is there", fix=fix))
+        raise input_error(str(path), "no such file: no campaign is there", fix=fix)
     text = json_files.bytes_of(path)
     digest = hashlib.sha256(text).hexdigest()[:_DIGITS]
     begun = plans.from_json(text, str(path))
@@ -231,7 +231,7 @@ def require_method(opened: Opened) -> None:
             f"uses bounds of method {opened.plan.method}; kinacc {__version__} has {plans.METHOD}"
         )
         fix = f"continue it with kinacc {begun}, or begin a new campaign"
-        raise InputError(Problem(str(opened.folder), message, fix=fix))
+        raise input_error(str(opened.folder), message, fix=fix)
 
 
 def marks_of(opened: Opened) -> dict[str, object]:

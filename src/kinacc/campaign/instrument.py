@@ -24,7 +24,7 @@ from kinacc.assess.adaptive import covariance_faults
 from kinacc.assess.noise import ENOUGH, FEWEST
 from kinacc.config import json_files
 from kinacc.config.names import not_in_a_line
-from kinacc.errors import InputError, Problem, gathered, refuse
+from kinacc.errors import Problem, gathered, input_error, refuse
 from kinacc.geometry import Pose
 from kinacc.measurements.table import numbers_of
 
@@ -193,7 +193,7 @@ def instruments(
         with gathered(problems):
             device = _instrument(text, frame, resolution_mm)
             if device.name in devices:
-                raise InputError(Problem(f"instrument {device.name}", "is given twice"))
+                raise input_error(f"instrument {device.name}", "is given twice")
             devices[device.name] = device
     refuse(problems, "These instruments cannot be used")
     return tuple(devices.values())
@@ -202,14 +202,14 @@ def instruments(
 def _instrument(text: str, frame: Frame, resolution_mm: float) -> Instrument:
     name, equals, noise = (part.strip() for part in text.partition("="))
     if not equals or not name:
-        raise InputError(Problem("--instrument", repr(text), f"NAME={_FORMS}"))
+        raise input_error("--instrument", repr(text), f"NAME={_FORMS}")
     refuse(not_in_a_line("--instrument", name))
     where, laser = f"noise of {name}", None
     if not noise.startswith(LASER):
         covariance = covariance_of(noise, where)
     elif frame == BASE:
         message = "a laser tracker's noise depends on where it stands"
-        raise InputError(Problem(where, message, "--frame instrument"))
+        raise input_error(where, message, "--frame instrument")
     else:
         laser = _laser(noise, where)
         covariance = laser.largest_mm(np.zeros(1)) ** 2 * np.eye(3)
@@ -228,10 +228,10 @@ def covariance_of(text: str, where: str) -> np.ndarray:
         refuse(Problem(where, fault, allowed) for _, fault in covariance_faults(covariance[None]))
         return covariance
     if values.size not in (1, 3):
-        raise InputError(Problem(where, repr(text), _FORMS))
+        raise input_error(where, repr(text), _FORMS)
     if not ((values >= _SMALLEST_STD_MM) & (values <= _LARGEST_STD_MM)).all():
         allowed = f"at least {_SMALLEST_STD_MM:g} mm, at most {_LARGEST_STD_MM:g} mm"
-        raise InputError(Problem(where, f"standard deviation {text.strip()} mm", allowed))
+        raise input_error(where, f"standard deviation {text.strip()} mm", allowed)
     return np.diag(np.broadcast_to(values, 3) ** 2)
 
 
@@ -245,7 +245,7 @@ def _laser(text: str, where: str) -> LaserTracker:
     except ValidationError as error:
         wrong += [" ".join(map(str, (*item["loc"], item["msg"]))) for item in error.errors()]
     if wrong:
-        raise InputError(Problem(where, f"{text!r} ({'; '.join(wrong)})", _LASER_FORM))
+        raise input_error(where, f"{text!r} ({'; '.join(wrong)})", _LASER_FORM)
     return tracker
 
 
@@ -295,9 +295,9 @@ def read_repeatability(path: str | Path) -> tuple[np.ndarray, int, list[Problem]
     except (OSError, RecursionError, ValueError) as error:
         is_absent = isinstance(error, OSError)
         message = "no such file" if is_absent else "is no answer of kinacc repeatability"
-        raise InputError(Problem(where, message, fix=fix)) from None
+        raise input_error(where, message, fix=fix) from None
     if test.noise is None:
-        raise InputError(Problem(where, "has no noise: no pose was visited again", fix=fix))
+        raise input_error(where, "has no noise: no pose was visited again", fix=fix)
     covariance, freedom = np.array(test.noise.covariance_mm2), int(test.noise.freedom)
     problems = [Problem(where, fault, fix=fix) for _, fault in covariance_faults(covariance[None])]
     if freedom < FEWEST:

@@ -15,19 +15,20 @@ from kinacc.campaign import folder
 from kinacc.campaign.beside_results import JOURNAL, PLAN
 from kinacc.campaign.plan import Plan
 from kinacc.campaign.status import CampaignStatus, status
+from kinacc.config.records import Settings
 from kinacc.deployment import folder as results
 from kinacc.deployment.history import history as compared
 from kinacc.deployment.history import session_of
 from kinacc.errors import InputError
 from kinacc.kinematics.model import JointState
 from kinacc.tables import store
-from kinacc.tables.columns import Columns
+from kinacc.tables.columns import Columns, Tables
 
 _SAME_MM = 1e-6  # modelled positions that differ by less are of one model
 
 
 def newest(
-    name: str, model: str, tables: Mapping[str, Columns], places: Iterable[Path]
+    name: str, model: str, tables: Tables, places: Iterable[Path]
 ) -> tuple[CampaignStatus | None, tuple[str, ...]]:
     """Return the status of the newest campaign of a calibration, and remarks on others.
 
@@ -53,7 +54,7 @@ def newest(
     return status(fallback) if fallback else None, tuple(remarks)
 
 
-def history(inputs: Mapping[str, Any], settings: Mapping[str, Any]) -> Columns:
+def history(inputs: Mapping[str, Any], settings: Settings) -> Columns:
     """Return table ``history``: calibrations of a series against one another, a row each by date.
 
     Parameters
@@ -87,7 +88,7 @@ def history(inputs: Mapping[str, Any], settings: Mapping[str, Any]) -> Columns:
     return compared(sessions, weight)
 
 
-def finished(tables: Mapping[str, Columns], model: str, places: Iterable[Path]) -> float:
+def finished(tables: Tables, model: str, places: Iterable[Path]) -> float:
     """Return the upper bound (mm) of the campaign on a calibration that was finished last.
 
     ``model``: the one that the campaign is about; ``places``: folders of campaigns. NaN where there
@@ -112,7 +113,7 @@ def _last_reading(place: Path) -> float:
     return (journal if journal.is_file() else place / PLAN).stat().st_mtime
 
 
-def _is_of(plan: Plan, tables: Mapping[str, Columns]) -> bool:
+def _is_of(plan: Plan, tables: Tables) -> bool:
     """Whether the model the campaign judges is the one that the tables hold now."""
     try:
         about = plan.about

@@ -27,7 +27,7 @@ from kinacc.assess.registry import ADAPTIVE
 from kinacc.campaign.instrument import Instrument, finite
 from kinacc.config import json_files
 from kinacc.config.load import problems_of
-from kinacc.errors import InputError, Problem, refuse
+from kinacc.errors import InputError, Problem, input_error, refuse
 from kinacc.geometry import Pose
 
 METHOD = 2  # of the bounds: raised where the same readings give other bounds
@@ -139,7 +139,7 @@ def assessor_of(
         For unknown names and settings, and for values of another type.
     """
     if name not in ADAPTIVE:
-        raise InputError(Problem("--assessor", f"{name!r} is not there", ", ".join(ADAPTIVE)))
+        raise input_error("--assessor", f"{name!r} is not there", ", ".join(ADAPTIVE))
     kind = ADAPTIVE[name]
     allowed = [item.name for item in fields(kind)]
     refuse(
@@ -241,7 +241,7 @@ class Plan(BaseModel):
             return self.instruments[0]
         devices = {device.name: device for device in self.instruments}
         if name not in devices:
-            raise InputError(Problem("instrument", f"{name!r} is not there", ", ".join(devices)))
+            raise input_error("instrument", f"{name!r} is not there", ", ".join(devices))
         return devices[name]
 
     def visiting(self, left_out: frozenset[int]) -> np.ndarray:
@@ -275,5 +275,5 @@ def from_json(text: bytes, where: str) -> Plan:
             raise ValueError("about does not fit the rest")
     except (AttributeError, LookupError, RecursionError, TypeError, ValueError) as error:
         message = f"is no campaign: {' '.join(str(error).split())[:200]}"
-        raise InputError(Problem(where, message, fix="bring it back from a copy")) from None
+        raise input_error(where, message, fix="bring it back from a copy") from None
     return plan

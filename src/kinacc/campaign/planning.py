@@ -14,7 +14,7 @@ from kinacc.assess.adaptive import AdaptiveAssessor, Candidates
 from kinacc.assess.attainable import limits_of
 from kinacc.assess.statement import ACCEPT, CANDIDATES, REJECT, UNDECIDED, decide
 from kinacc.assess.world import carry_on, noisy, truth_mm
-from kinacc.errors import InputError, Problem, refuse
+from kinacc.errors import Problem, input_error, refuse
 from kinacc.progress import with_progress
 from kinacc.study.fields import ErrorField
 
@@ -153,7 +153,7 @@ def simulate(
             stated = [item for item in campaign.statements() if item.target == aim.target]
             if not stated:
                 message = f"{assessor.name} states nothing about {aim.target}"
-                raise InputError(Problem("--assessor", message, fix="choose another, or --target"))
+                raise input_error("--assessor", message, fix="choose another, or --target")
             statement, arm_mm = stated[0], getattr(assessor, "arm_mm", None)
             limits = limits_of(statement, visited, size_mm, sigma_mm, assessor.measurements)
             arm_mm = sigma_mm if arm_mm is None else arm_mm

@@ -29,7 +29,7 @@ from kinacc.assess.adaptive import Campaign
 from kinacc.assess.statement import MEASURED, Reason, Statement
 from kinacc.campaign.instrument import INSTRUMENT, Numbers, covariance_of
 from kinacc.campaign.plan import Plan
-from kinacc.errors import InputError, Problem, gathered
+from kinacc.errors import InputError, Problem, gathered, input_error
 
 _FARTHEST_MM = 1e6  # no instrument measures an arm from a kilometre away
 _USUAL_READINGS = 10  # that show which size is usual
@@ -326,7 +326,7 @@ def restore(
         except (ArithmeticError, InputError, TypeError, ValueError) as error:
             message = f"is no entry of this campaign: {' '.join(str(error).split())[:200]}"
             fix = "bring the file back from a copy"
-            raise InputError(Problem(f"{where}, line {line}", message, fix=fix)) from None
+            raise input_error(f"{where}, line {line}", message, fix=fix) from None
     rows = plan.visiting(frozenset(left_out))
     taken = [Taken(number, row, error_mm(plan, row)) for number, row in enumerate(readings, 1)]
     struck = [(item, void[item.number]) for item in taken if item.number in void]

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -26,15 +25,16 @@ from kinacc.checks.findings import Finding, Report, finding
 from kinacc.checks.readings import Readings
 from kinacc.checks.robust_fit import Fitted
 from kinacc.config.measured import Orientation
+from kinacc.config.records import Settings
 from kinacc.config.settings import OUTSIDE_LIMITS
-from kinacc.errors import InputError, Problem
+from kinacc.errors import InputError, Problem, input_error
 from kinacc.kinematics import robot as robots
 from kinacc.kinematics.robot import Robot, outside_limits
 from kinacc.measurements.faults import LIMIT_SLACK
 from kinacc.measurements.layout import Layout
 from kinacc.measurements.reader import MeasuredFile, read
 from kinacc.tables.allowed import LEFT_OUT
-from kinacc.tables.columns import Columns
+from kinacc.tables.columns import Columns, Tables
 from kinacc.tables.contract import columns_of
 
 _FEWEST_POSES = 6
@@ -43,7 +43,7 @@ _OTHER_LENGTHS = 0.01  # of the arm's: real arms are off their description by a 
 _GROSS = 20.0  # robust spreads per axis: further off is no reading of this arm
 
 
-def run(inputs: Mapping[str, Columns], settings: Mapping[str, Any]) -> dict[str, Columns]:
+def run(inputs: Tables, settings: Settings) -> dict[str, Columns]:
     """``data_check``: every finding with its level and, where it was accepted, the reason.
 
     Raises InputError where findings stop the workflow, one problem each.
@@ -79,7 +79,7 @@ def run(inputs: Mapping[str, Columns], settings: Mapping[str, Any]) -> dict[str,
     return {"data_check": columns_of("data_check", table)}
 
 
-def examined(settings: Mapping[str, Any], dataset: str) -> Report:
+def examined(settings: Settings, dataset: str) -> Report:
     """Check a data set's file, with what its configuration accepts.
 
     Parameters
@@ -111,7 +111,7 @@ def examined(settings: Mapping[str, Any], dataset: str) -> Report:
 @one_thread
 def check(
     reading: MeasuredFile,
-    section: Mapping[str, Any],
+    section: Settings,
     robot: Robot,
     dataset: str,
 ) -> Report:
@@ -119,7 +119,7 @@ def check(
     stated = Layout.of(section).orientation
     every = readings.of_file(reading, robot)
     if (count := len(np.unique(every.pose))) < _FEWEST_POSES:
-        raise InputError(Problem(section["path"], f"{count} poses", f"at least {_FEWEST_POSES}"))
+        raise input_error(section["path"], f"{count} poses", f"at least {_FEWEST_POSES}")
     distances = readings.distances(every)
     by_distances, renamed = moved.by_distances(every, distances)
     single, cell, away_mm = readings.merged(every)

@@ -10,6 +10,7 @@ from typing import Any
 from kinacc.config import load as configuration
 from kinacc.config.error_models import ALWAYS, ERROR_MODELS, asked_for, loaded
 from kinacc.config.parameter_rules import rules, strangers
+from kinacc.config.records import Settings
 from kinacc.config.settings import ROBOTS
 from kinacc.errors import InputError, Problem
 
@@ -46,7 +47,7 @@ def load(
     return configuration.load(paths, overrides, folder, contradictions, source)
 
 
-def contradictions(full: Mapping[str, Any], place: Place, folder: Path) -> Iterator[Problem]:
+def contradictions(full: Settings, place: Place, folder: Path) -> Iterator[Problem]:
     """Contradictions in the full settings of a data set; paths are relative to ``folder``."""
     is_file = full["measurements"]["source"] == "file"
     results = _file(full["measurements"]["file"], folder) if is_file else _synthetic(full)
@@ -54,7 +55,7 @@ def contradictions(full: Mapping[str, Any], place: Place, folder: Path) -> Itera
         yield Problem(place(keys), *text)
 
 
-def _synthetic(full: Mapping[str, Any]) -> Found:
+def _synthetic(full: Settings) -> Found:
     robot = full["robot"]
     if robot != "mh180" and (ROBOTS / f"{robot}.yaml").is_file():
         message = f"synthetic, but there is no synthetic {robot}"
@@ -79,7 +80,7 @@ def _file(file: Mapping[str, Any], folder: Path) -> Found:
         yield (*_FILE, "thousands"), f"{mark!r} is also the decimal mark", "another mark"
 
 
-def _arm(full: Mapping[str, Any], folder: Path) -> Found:
+def _arm(full: Settings, folder: Path) -> Found:
     """Settings of joints the robot does not have; faults of a robot file are its reader's."""
     from kinacc.kinematics.robot import load, shipped
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -14,6 +13,7 @@ from kinacc.calibration.vec_estimator import VECEstimator
 from kinacc.checks.findings import Finding, finding
 from kinacc.checks.readings import Distance, Readings
 from kinacc.checks.robust_fit import Fitted
+from kinacc.config.records import Settings
 from kinacc.geometry import compose
 from kinacc.kinematics import dh
 from kinacc.kinematics.robot import Robot, carried
@@ -110,7 +110,7 @@ def thin(coverage: list[dict[str, Any]]) -> list[Finding]:
     ]
 
 
-def few_poses(columns: Columns, robot: Robot, calibration: Mapping[str, Any]) -> list[Finding]:
+def few_poses(columns: Columns, robot: Robot, calibration: Settings) -> list[Finding]:
     """Whether the VEC model has more coefficients than the poses give independent numbers."""
     observed = from_columns(columns, robot)
     fit = VECEstimator.of(calibration, robot, observed)
@@ -133,7 +133,7 @@ def few_poses(columns: Columns, robot: Robot, calibration: Mapping[str, Any]) ->
     return [few.held_to(())]
 
 
-def fixed_frames(columns: Columns, robot: Robot, calibration: Mapping[str, Any]) -> list[Finding]:
+def fixed_frames(columns: Columns, robot: Robot, calibration: Settings) -> list[Finding]:
     """Whether base and tool are held fixed, and the readings are elsewhere."""
     if calibration["base_and_tool"] != "fixed":
         return []

@@ -13,7 +13,7 @@ from kinacc.calibration.least_squares import one_thread
 from kinacc.checks import check, digits, readings, shipped
 from kinacc.checks.findings import Finding, Report
 from kinacc.config.values import did_you_mean
-from kinacc.errors import InputError, Problem, refuse
+from kinacc.errors import InputError, Problem, input_error, refuse
 from kinacc.kinematics import robot as robots
 from kinacc.kinematics.robot import Robot
 from kinacc.measurements.intake import guess as guesses
@@ -66,15 +66,13 @@ def describe_files(
     if robot is None:
         if not (fit := fitting(guess)):
             fix = "give robot: a name in docs/robots.md, a robot file or a URDF file"
-            raise InputError(
-                Problem(guess.table.path, "no shipped robot fits the readings", fix=fix)
-            )
+            raise input_error(guess.table.path, "no shipped robot fits the readings", fix=fix)
         robot = fit[0]
     name = plain_name(guess.table.path)
     guess, report, _ = corrected(guess, robots.load(robot), name)
     if (coupling := coupling_of(report)) is not None:
         fix = "kinacc init writes the robot file with this joint_map"
-        raise InputError(Problem(f"robot {robot}", coupling.what, fix=fix))
+        raise input_error(f"robot {robot}", coupling.what, fix=fix)
     return {name: dataset_content(robot, guess, int(report.facts["poses"]))}
 
 
@@ -102,7 +100,7 @@ def corrected(guess: Guess, robot: Robot, name: str) -> tuple[Guess, Report, Mea
     """
     if robot.dh.joints != guess.joints:
         message = f"{robot.name} has {robot.dh.joints} joints, the file {guess.joints}"
-        raise InputError(Problem("--robot", message))
+        raise input_error("--robot", message)
     for _ in range(3):
         reading = read(guess.section, robot, strict=False)
         report = check.check(reading, guess.section, robot, name)

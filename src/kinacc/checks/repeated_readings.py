@@ -11,7 +11,7 @@ import pandas as pd
 from kinacc.checks import digits
 from kinacc.checks import repeatability as checks
 from kinacc.checks.repeatability import Noise
-from kinacc.errors import InputError, Problem, first_few, refuse
+from kinacc.errors import Problem, first_few, input_error, refuse
 from kinacc.measurements.layout import listed
 from kinacc.measurements.rows import POINTS, read_rows
 from kinacc.measurements.table import RawTable
@@ -194,7 +194,7 @@ def estimate(file: RepeatedFile) -> Repeatability:
         std = noise.std_mm
         low, high = checks.limits(std, noise.freedom)
         if not (std > _LEAST_MM).all():
-            raise InputError(Problem(table.path, "readings of a pose are equal to the last digit"))
+            raise input_error(table.path, "readings of a pose are equal to the last digit")
     by_pose, ratio = checks.differ_by_pose(rows, file.resolution_mm)
     result = checks.by_side(rows)
     mean_mm, rp_mm = checks.pooled_rp(result)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -17,12 +16,12 @@ from kinacc.campaign.campaign import Campaign, FileOfReadings
 from kinacc.campaign.state import Reading, point_at
 from kinacc.campaign.status import CampaignStatus
 from kinacc.cli import campaign_plan, campaign_start
-from kinacc.cli.choice import option, positive
+from kinacc.cli.choice import Options, option, positive
 from kinacc.cli.group import InOrder
 from kinacc.cli.output import Output, answers, require_writable
 from kinacc.cli.process import AGAINST
 from kinacc.cli.rows import joints_given, numbers_given
-from kinacc.errors import InputError, Problem, refuse
+from kinacc.errors import Problem, input_error, refuse
 from kinacc.figures.save import render
 from kinacc.measurements.rows import POINTS, read_rows
 from kinacc.report.campaign import campaign_page, markdown, section
@@ -146,7 +145,7 @@ def report(folder: str, to: str | None, out: Output) -> None:
     campaign = _open(folder)
     opened, into = campaign.opened, Path(to or campaign.folder / "report")
     if not campaign.state.used:
-        raise InputError(Problem(folder, "no reading was requested and taken yet"))
+        raise input_error(folder, "no reading was requested and taken yet")
     tables, metadata = reports.tables(opened), folders.marks_of(opened)
     part = section(opened, tables)
     contents = {
@@ -181,7 +180,7 @@ def verify(folder: str, sha256: str | None, out: Output) -> None:
     """
     opened = folders.open_(folder)
     if sha256 is not None and len(sha256) != _SHA256:
-        raise InputError(Problem("--sha256", f"{len(sha256)} digits", f"all {_SHA256}"))
+        raise input_error("--sha256", f"{len(sha256)} digits", f"all {_SHA256}")
     checked = folders.verify(opened, sha256)
     against = "FAIL: not the journal of that report; it was shortened or rewritten."
     verdict = "PASS." if checked.continues else against
@@ -237,7 +236,7 @@ def record(out: Output, folder: str, file: str | None, **options: Any) -> None:
     position, joints = options["position_mm"], options["joints_deg"]
     if (position is None) == (file is None):
         message = "is given twice" if file else "is not given"
-        raise InputError(Problem("the reading", message, "--position-mm, or a FILE"))
+        raise input_error("the reading", message, "--position-mm, or a FILE")
     campaign = Campaign(folder)
     flags = {name: options[name] for name in ("accept_implausible", "again")}
     plan, number = campaign.plan, campaign.state.requested
@@ -255,7 +254,7 @@ def record(out: Output, folder: str, file: str | None, **options: Any) -> None:
     out.show({**vars(taken), "status": summary}, lines=[*first, *_lines(summary)])
 
 
-def _of_file(path: str, options: Mapping[str, Any], campaign: Campaign) -> FileOfReadings:
+def _of_file(path: str, options: Options, campaign: Campaign) -> FileOfReadings:
     """The rows of a file as readings, and what is wrong with the others."""
     plan = campaign.plan
     # A cell that is no number spoils its row, not the file: it is named row by row.

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -15,10 +14,10 @@ from kinacc.campaign.begin import noise_doubts, noise_of
 from kinacc.campaign.planning import Aim, plan_budget
 from kinacc.cli import choice
 from kinacc.cli.campaign_start import assessor_of, instruments_of
-from kinacc.cli.choice import calibration_of, option
+from kinacc.cli.choice import Options, calibration_of, option
 from kinacc.cli.output import Output, answers
 from kinacc.deployment.folder import read_tables
-from kinacc.errors import InputError, Problem, refuse
+from kinacc.errors import input_error, refuse
 from kinacc.progress import reporting
 from kinacc.report.rendering import lines
 from kinacc.study import fields
@@ -98,7 +97,7 @@ def plan(out: Output, **options: Any) -> None:
 
 
 def _question(
-    options: Mapping[str, Any],
+    options: Options,
 ) -> tuple[list[ErrorField], np.ndarray, list[AdaptiveAssessor]]:
     """Errors, covariance and assessors of the options."""
     names, points = options["errors"] or DEFAULT_ERRORS, options["candidates"]
@@ -112,7 +111,7 @@ def _question(
     if points * budgets[-1] > _MOST_READINGS:
         message = f"{points} candidates with up to {budgets[-1]} readings each"
         allowed = f"a product of at most {_MOST_READINGS:,}"
-        raise InputError(Problem("--candidates, --budget", message, allowed))
+        raise input_error("--candidates, --budget", message, allowed)
     assessors = [assessor_of(options, budget, points, freedom) for budget in budgets]
     chosen = [errors_of(name, options["point"]) for name in names]
     covariance_mm2 = instruments[0].covariance_mm2
@@ -138,11 +137,11 @@ def errors_of(name: str, point: str | None = None) -> ErrorField:
         return fields.made_up(name)
     if not path.is_dir():
         allowed = f"a results folder, {', '.join(fields.FAMILIES)}"
-        raise InputError(Problem("--errors", f"{name!r} is no folder", allowed))
+        raise input_error("--errors", f"{name!r} is no folder", allowed)
     tables, arm = read_tables(path, needed=("pose_errors",), optional=()), calibration_of(path)
     target, targets = point or arm.default_point, ", ".join(arm.targets)
     if target not in arm.targets:
-        raise InputError(Problem("--point", f"{target!r} is no target", targets))
+        raise input_error("--point", f"{target!r} is no target", targets)
     if len(arm.targets) > 1:
         click.echo(f"{path}: errors of {target} ({targets}); --point names another", err=True)
     return fields.of_measurements(path.resolve().name, tables["pose_errors"], arm.choice, target)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import shlex
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -21,12 +21,12 @@ from kinacc.campaign.instrument import BASE, Instrument, floored, instruments, r
 from kinacc.campaign.plan import Limits
 from kinacc.campaign.status import reason
 from kinacc.cli import choice, rows, spaces
-from kinacc.cli.choice import option
+from kinacc.cli.choice import Options, option
 from kinacc.cli.output import Output, answers
 from kinacc.deployment.applicability import is_measured_there
 from kinacc.deployment.planning import between, spread, tool_positions
 from kinacc.deployment.record import Calibration
-from kinacc.errors import InputError, Problem, refuse
+from kinacc.errors import Problem, input_error, refuse
 from kinacc.kinematics.inverse import limits as ends
 from kinacc.kinematics.model import JointState
 from kinacc.report.rendering import lines
@@ -111,7 +111,7 @@ def start(out: Output, **options: Any) -> None:
 
 
 def instruments_of(
-    options: Mapping[str, Any], results: Sequence[Path] = ()
+    options: Options, results: Sequence[Path] = ()
 ) -> tuple[tuple[Instrument, ...], int, list[Problem]]:
     """Return the instruments of the options of ``start`` and ``plan``.
 
@@ -124,7 +124,7 @@ def instruments_of(
     texts += options.get("instrument", ())
     if options["repeatability"] is not None:
         if texts:
-            raise InputError(Problem("--repeatability", f"is given beside {', '.join(texts)}"))
+            raise input_error("--repeatability", f"is given beside {', '.join(texts)}")
         covariance, freedom, doubts = read_repeatability(options["repeatability"])
         covariance = floored(covariance, resolution_mm)
         used = Instrument("instrument", covariance, frame, None, resolution_mm)
@@ -132,13 +132,11 @@ def instruments_of(
     if not texts:
         scatter = [begin.noise_by_repeats(begin.noise_of(folder)) for folder in results]
         fix = "\n    ".join(filter(None, [begin.WAYS_TO_NOISE, *scatter]))
-        raise InputError(Problem("noise", "is not given", fix=fix))
+        raise input_error("noise", "is not given", fix=fix)
     return instruments(texts, frame, resolution_mm), 0, []
 
 
-def assessor_of(
-    options: Mapping[str, Any], budget: int, points: int, freedom: int
-) -> AdaptiveAssessor:
+def assessor_of(options: Options, budget: int, points: int, freedom: int) -> AdaptiveAssessor:
     """Return the assessor of the options of ``start`` and ``plan`` for so many candidates.
 
     ``freedom``: degrees of freedom of the test of the noise, 0 without one. Raises InputError for
@@ -155,7 +153,7 @@ def assessor_of(
     for text in options["settings"]:
         key, equals, value = text.partition("=")
         if not equals:
-            raise InputError(Problem("--set", repr(text), "NAME=VALUE"))
+            raise input_error("--set", repr(text), "NAME=VALUE")
         try:
             settings[key.strip()] = json.loads(value)
         except (ValueError, RecursionError):
@@ -173,7 +171,7 @@ def _tolerance_mm(tolerance_mm: float | None, results: Path) -> float | None:
 
 
 def _candidates(
-    options: Mapping[str, Any], arm: Calibration
+    options: Options, arm: Calibration
 ) -> tuple[np.ndarray, list[str], np.ndarray | None, str]:
     """Joints (m, k), labels, directions (m, k) or None, and the source of the candidates."""
     count = rows.candidates(options, arm.robot, _MOST_CANDIDATES)
@@ -195,12 +193,10 @@ def _candidates(
     message = (
         f"only {len(joints)} of {_MOST_DRAWS * count} joint values drawn are near measured poses"
     )
-    raise InputError(Problem("candidates", message, f"{count}", "narrow the region"))
+    raise input_error("candidates", message, f"{count}", "narrow the region")
 
 
-def _drawing(
-    options: Mapping[str, Any], arm: Calibration
-) -> tuple[Callable[[int], np.ndarray], str]:
+def _drawing(options: Options, arm: Calibration) -> tuple[Callable[[int], np.ndarray], str]:
     """A function that draws at most so many reported joints (n, k), and where it draws them."""
     robot, target = arm.robot, arm.point(options["point"])
     box, inside = spaces.of_options(options, robot)

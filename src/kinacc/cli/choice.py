@@ -20,6 +20,7 @@ from kinacc.workflow.described import outdated_reason
 CONFIG = "config.yaml"
 Command = Callable[..., Any]
 Decorator = Callable[[Command], Command]
+Options = Mapping[str, Any]  # of a command, by name
 option = partial(click.option, show_default=True)
 MODEL = click.Choice([*SELECTABLE, "nominal"])
 
@@ -182,7 +183,7 @@ campaign_options = together(
 )
 
 
-def joint_answers(options: Mapping[str, Any]) -> dict[str, Any]:
+def joint_answers(options: Options) -> dict[str, Any]:
     """Answers of a command's options to what a file of joints leaves open."""
     return {name: options[name] for name in _JOINT_ANSWERS if options.get(name)}
 

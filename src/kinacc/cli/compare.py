@@ -18,7 +18,7 @@ from kinacc.deployment import compare as comparison
 from kinacc.deployment.folder import read_tables
 from kinacc.deployment.record import Calibration, nominal
 from kinacc.deployment.shared_readings import shared
-from kinacc.errors import InputError, Problem
+from kinacc.errors import input_error
 from kinacc.kinematics import robot as robots
 from kinacc.kinematics.region import points
 from kinacc.kinematics.robot import Robot
@@ -82,7 +82,7 @@ def _calibration(place: str, model: str) -> Calibration:
         return replace(calibration, name=place, misfit=left)
     if path.is_file() or place in robots.shipped():
         return replace(nominal(robots.load(place), place), choice="dh")
-    raise InputError(Problem(place, "no such file or folder", "a results folder, a robot file"))
+    raise input_error(place, "no such file or folder", "a results folder, a robot file")
 
 
 def _joints(arms: Sequence[Robot], measured: Sequence[Columns | None]) -> np.ndarray:

@@ -24,7 +24,7 @@ from kinacc.config import schema
 from kinacc.config.edit import with_added
 from kinacc.config.series import MOVED, SAME
 from kinacc.deployment import adding
-from kinacc.errors import InputError, Problem, first_few, refuse
+from kinacc.errors import InputError, Problem, first_few, input_error, refuse
 from kinacc.kinematics import robot
 from kinacc.measurements.reader import excluded_lines, read
 from kinacc.progress import reporting
@@ -70,7 +70,7 @@ def check_data(
     sections = _sections(files, dataset)
     if out.picture is not None and len(sections) > 1:
         message = "draws one data set, and there are several"
-        raise InputError(Problem("--picture", message, ", ".join(sections), "give --dataset"))
+        raise input_error("--picture", message, ", ".join(sections), "give --dataset")
     code = DONE
     reports: list[Mapping[str, Any]] = []
     following: list[str] = []
@@ -129,7 +129,7 @@ def _sections(files: Sequence[str], wanted: Sequence[str]) -> dict[str, dict[str
         if name not in measured
     )
     if not chosen:
-        raise InputError(Problem(", ".join(files), "no data set is read from a file"))
+        raise input_error(", ".join(files), "no data set is read from a file")
     return {name: full[name] for name in chosen}
 
 
@@ -185,7 +185,7 @@ def _measured_data_set(file: str, dataset: str | None) -> tuple[str, dict[str, A
     name = dataset or (next(iter(measured)) if len(measured) == 1 else "")
     if name not in measured:
         message = f"{name!r} is not a data set of one file" if name else "is not given"
-        raise InputError(Problem("--dataset", message, ", ".join(measured) or "a measured file"))
+        raise input_error("--dataset", message, ", ".join(measured) or "a measured file")
     return name, measured[name]
 
 
@@ -196,7 +196,7 @@ def _numbers(text: str) -> list[int]:
         ends = re.fullmatch(r"(\d{1,9})(?:-(\d{1,9}))?", part)
         first, last = (int(ends[1]), int(ends[2] or ends[1])) if ends else (1, 0)
         if not first <= last < first + _MOST:
-            raise InputError(Problem("--lines", repr(text), "numbers and ranges such as 12,15-18"))
+            raise input_error("--lines", repr(text), "numbers and ranges such as 12,15-18")
         numbers |= {*range(first, last + 1)}
     return sorted(numbers)
 

@@ -19,7 +19,7 @@ from kinacc.cli import choice, rows
 from kinacc.cli.choice import option
 from kinacc.cli.output import Output, answers, require_writable
 from kinacc.config.names import LONGEST
-from kinacc.errors import InputError, Problem
+from kinacc.errors import input_error
 from kinacc.kinematics import robot as robots
 from kinacc.measurements.intake import write
 from kinacc.measurements.intake.groups import listed
@@ -112,12 +112,12 @@ def init(measurement_files: tuple[str, ...], out: Output, **options: Any) -> Non
     if len(measurement_files) > 2:
         message = f"{len(measurement_files)} files"
         allowed = "one file, or one of joints and one of points"
-        raise InputError(Problem(" ".join(measurement_files), message, allowed))
+        raise input_error(" ".join(measurement_files), message, allowed)
     stated = {key: value for key, value in options.items() if value not in (None, ())}
     guess = look(measurement_files, stated)
     name = options["name"] or write.plain_name(guess.table.path)
     if name != write.plain_name(f"{name}.csv"):
-        raise InputError(Problem("--name", name, f"at most {LONGEST} letters, digits, _ and -"))
+        raise input_error("--name", name, f"at most {LONGEST} letters, digits, _ and -")
     dataset = Path(options["folder"], f"{name}.yaml")
     robot_file = dataset.with_name(f"{name}.robot.yaml")
     require_writable([dataset], out.force)

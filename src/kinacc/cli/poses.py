@@ -25,7 +25,7 @@ from kinacc.deployment.compensate import (
 )
 from kinacc.deployment.compensate import compensate as joints_for
 from kinacc.deployment.record import Calibration
-from kinacc.errors import InputError, Problem, first_few
+from kinacc.errors import first_few, input_error
 from kinacc.geometry import Pose, rotation_from_quaternion
 from kinacc.kinematics.model import JointState
 from kinacc.measurements.rows import Rows
@@ -139,7 +139,7 @@ def compensate(
     if program is not None and (poses is not None or texts):
         raise click.UsageError("--program stands alone: give no poses beside it")
     if program is not None and frame != "base":
-        raise InputError(Problem("--frame", "programs are in the robot's own base", "base"))
+        raise input_error("--frame", "programs are in the robot's own base", "base")
     if program is None:
         out = replace(out, table=target)
     calibration = choice.calibration_of(folder, model, session)
@@ -180,7 +180,7 @@ def _wanted(
     if (path is None) != bool(texts):
         message = "is given more than once" if path else "is not given"
         allowed = "a file of poses, --pose, or --program"
-        raise InputError(Problem("the wanted pose", message, allowed))
+        raise input_error("the wanted pose", message, allowed)
     if path is not None:
         inputs = rows.read(path, calibration.robot, "poses")
     else:
@@ -188,7 +188,7 @@ def _wanted(
         lengths = np.linalg.norm(table[:, 3:], axis=1, keepdims=True)
         if (np.abs(lengths - 1.0) > 1e-3).any():
             allowed = "x, y, z in mm, then a unit quaternion w, x, y, z"
-            raise InputError(Problem("--pose", "has no unit quaternion", allowed))
+            raise input_error("--pose", "has no unit quaternion", allowed)
         wanted = Pose(rotation_from_quaternion(table[:, 3:] / lengths), table[:, :3])
         inputs = Rows(np.arange(1, len(texts) + 1), pose=wanted)
     joints = inputs.joints

@@ -20,7 +20,7 @@ from kinacc.cli.output import Output, answers, plain
 from kinacc.cli.process import AGAINST
 from kinacc.config.values import nearest
 from kinacc.deployment.folder import read_tables
-from kinacc.errors import InputError, Problem, first_few
+from kinacc.errors import InputError, Problem, first_few, input_error
 from kinacc.gate import accepted as accepted_runs
 from kinacc.gate import check, outputs
 from kinacc.report import dataset as pages
@@ -62,7 +62,7 @@ def summary(folders: tuple[Path, ...], tolerance_mm: float | None, by: str, out:
     table = terminal.fleet_table(result, by, tolerance_mm)
     if by == HELD_OUT and (table["verdict"] == "").all():
         message = "is not given, and no configuration has a tolerance of quantile_99"
-        raise InputError(Problem("--tolerance-mm", message, "a number, in mm"))
+        raise input_error("--tolerance-mm", message, "a number, in mm")
     if out.table is not None or out.as_json:
         out.show(as_plain(result, by, tolerance_mm), table)
     elif len(result) == 1 and isinstance(result[0], CalibrationSummary):
@@ -147,7 +147,7 @@ def show(path: Path, name: str | None, describe: bool, out: Output) -> None:
         table = content.to_pandas()
     except (ValueError, pa.ArrowException) as error:
         message = f"cannot be shown: {error}"
-        raise InputError(Problem(str(place), message, fix=store.remake(place))) from None
+        raise input_error(str(place), message, fix=store.remake(place)) from None
     known = ARTEFACTS.get(place.stem)
     line = f"{place}: {table.shape[describe]} {'columns' if describe else 'rows'}. "
     line += known.meaning if known else ""
@@ -166,7 +166,7 @@ def _find(path: Path) -> Path:
     there = sorted(item.stem for item in path.parent.glob("[!.]*"))
     close = nearest(path.stem, tuple(there))
     fix = f"did you mean {path.with_name(close)}?" if close else ""
-    raise InputError(Problem(str(path), "no such table or folder", first_few(there, 30), fix))
+    raise input_error(str(path), "no such table or folder", first_few(there, 30), fix)
 
 
 def _listing(folder: Path) -> pd.DataFrame:
@@ -183,7 +183,7 @@ def _listing(folder: Path) -> pd.DataFrame:
         return pd.DataFrame(rows, columns=["table", "rows", "meaning"])
     tables = pd.Series([path.parent.name for path in folder.glob("*/*.parquet")], dtype=object)
     if tables.empty:
-        raise InputError(Problem(str(folder), "holds no table", "the folder of a data set"))
+        raise input_error(str(folder), "holds no table", "the folder of a data set")
     return tables.value_counts().sort_index().rename_axis("folder").reset_index(name="tables")
 
 

@@ -8,10 +8,10 @@ from typing import Any
 import click
 import numpy as np
 
-from kinacc.cli.choice import joint_answers
+from kinacc.cli.choice import Options, joint_answers
 from kinacc.cli.process import AGAINST
 from kinacc.deployment.record import Calibration
-from kinacc.errors import InputError, Problem, first_few, refuse
+from kinacc.errors import Problem, first_few, input_error, refuse
 from kinacc.kinematics.robot import Robot, outside_limits
 from kinacc.measurements.rows import Rows, read_rows
 from kinacc.measurements.table import numbers_of
@@ -42,7 +42,7 @@ def numbers_given(option: str, text: str, count: int) -> np.ndarray:
     """Numbers (count,) of an option such as "1,2,3"; InputError for others."""
     values = numbers_of(text)
     if len(values) != count:
-        raise InputError(Problem(option, repr(text), f"{count} numbers"))
+        raise input_error(option, repr(text), f"{count} numbers")
     return values
 
 
@@ -60,7 +60,7 @@ def joints_of(
     option.
     """
     if (path is None) != bool(in_deg):
-        raise InputError(Problem("joints", "are needed once", "a file, --joints-deg"))
+        raise input_error("joints", "are needed once", "a file, --joints-deg")
     if path is not None:
         rows, joints = read_joints(path, robot, answers)
     else:
@@ -79,19 +79,17 @@ def joint_columns(prismatic: np.ndarray, joints: np.ndarray) -> dict[str, np.nda
     }
 
 
-def candidates(
-    options: Mapping[str, Any], robot: Robot, most: int
-) -> tuple[Rows, np.ndarray] | int:
+def candidates(options: Options, robot: Robot, most: int) -> tuple[Rows, np.ndarray] | int:
     """Rows and joints of the file of ``--candidates``, or the number to draw, at most ``most``."""
     text = options["candidates"]
     if text.lstrip("-").isdecimal():
         if not 2 <= int(text) <= most:
-            raise InputError(Problem("--candidates", text, f"2 to {most}, or a file"))
+            raise input_error("--candidates", text, f"2 to {most}, or a file")
         return int(text)
     rows, joints = read_joints(text, robot, joint_answers(options))
     require_within_limits(robot, rows.label, joints, text, "Candidates")
     if len(joints) > most:
-        raise InputError(Problem(text, f"{len(joints)} candidates", f"at most {most}"))
+        raise input_error(text, f"{len(joints)} candidates", f"at most {most}")
     return rows, joints
 
 

@@ -12,7 +12,7 @@ import click
 from kinacc.cli.choice import CONFIG, option, together
 from kinacc.cli.output import Output, answers
 from kinacc.cli.results import as_plain, written
-from kinacc.errors import InputError, Problem
+from kinacc.errors import input_error
 from kinacc.report.summarise import summarise_all
 from kinacc.report.terminal import FEW, print_summaries
 from kinacc.workflow.data_sets import RESULTS, read_data_sets
@@ -96,7 +96,7 @@ def _carried_out(
     elif not names:
         message = f"no configuration file is given, and there is no {CONFIG} here"
         fix = "kinacc init MEASUREMENTS writes one; then: kinacc calibrate NAME.yaml"
-        raise InputError(Problem("FILE.yaml", message, fix=fix))
+        raise input_error("FILE.yaml", message, fix=fix)
     configs: list[str] = []
     for name in names:
         files = [name]
@@ -106,7 +106,7 @@ def _carried_out(
         if not files:
             fix = "kinacc init MEASUREMENTS --out FOLDER writes one"
             message = "is a folder without configuration files"
-            raise InputError(Problem(name, message, "*.yaml", fix))
+            raise input_error(name, message, "*.yaml", fix)
         configs += files
     data = read_data_sets(configs)
     is_run = {"-n", "--dry-run", "--dryrun", "--lint"}.isdisjoint(options)

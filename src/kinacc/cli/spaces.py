@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import Any
+from collections.abc import Callable
 
 import numpy as np
 
-from kinacc.errors import InputError, Problem
+from kinacc.cli.choice import Options
+from kinacc.errors import input_error
 from kinacc.kinematics import robot as robots
 
 Ends = tuple[np.ndarray, np.ndarray]
@@ -15,7 +15,7 @@ Ends = tuple[np.ndarray, np.ndarray]
 Space = tuple[Ends | None, Callable[[np.ndarray], np.ndarray] | None]
 
 
-def of_options(options: Mapping[str, Any], robot: robots.Robot) -> Space:
+def of_options(options: Options, robot: robots.Robot) -> Space:
     """The space of ``--joints-deg`` and ``--inside-mm``. Raises InputError."""
     joints = _ranges("--joints-deg", options["joints_deg"], robot.dh.joints)
     box = _ranges("--inside-mm", options["inside_mm"], 3)
@@ -35,5 +35,5 @@ def _ranges(option: str, text: str | None, count: int) -> np.ndarray | None:
     except ValueError:
         ends = np.empty(0)
     if ends.shape != (2, count) or not (ends[0] < ends[1]).all():
-        raise InputError(Problem(option, repr(text), f"{count} ranges low:high, apart by commas"))
+        raise input_error(option, repr(text), f"{count} ranges low:high, apart by commas")
     return ends

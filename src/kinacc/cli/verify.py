@@ -16,7 +16,7 @@ from kinacc.cli.process import AGAINST, DONE, UNDECIDED
 from kinacc.deployment import folder as results
 from kinacc.deployment import verify as verification
 from kinacc.deployment.permutation import LEVEL
-from kinacc.errors import InputError, Problem
+from kinacc.errors import InputError, Problem, input_error
 from kinacc.kinematics import robot as robots
 from kinacc.progress import reporting
 from kinacc.report import rendering
@@ -90,5 +90,5 @@ def _settings(readings: Path, folder: str, dataset: str | None) -> tuple[str, Ma
     name = next(iter(settings)) if dataset is None and len(settings) == 1 else dataset
     if name not in settings:
         message = f"{dataset!r} is none of its data sets" if dataset else "is not given"
-        raise InputError(Problem("--dataset", message, ", ".join(settings)))
+        raise input_error("--dataset", message, ", ".join(settings))
     return name, settings[name]

@@ -6,9 +6,11 @@ calibration settings. Modules are named, not imported: a data set depends on the
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from importlib import import_module
 from typing import Any, NamedTuple
+
+from kinacc.config.records import Settings
 
 MEASURED, NOMINAL = "measured", "nominal"  # nominal: the maker's, which nothing was fitted for
 
@@ -94,7 +96,7 @@ def loaded(place: Any) -> Any:
     return getattr(import_module(module), name)
 
 
-def asked_for(calibration: Mapping[str, Any]) -> tuple[str, ...]:
+def asked_for(calibration: Settings) -> tuple[str, ...]:
     """Kinds of models that the ``calibration`` settings ask for, in the order they are fitted."""
     return *OWN, *(
         kind

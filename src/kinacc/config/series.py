@@ -6,13 +6,13 @@ The arm's data set itself is its newest line, with everything a data set has.
 from __future__ import annotations
 
 import datetime
-from collections.abc import Mapping
 from itertools import pairwise
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field
 
 from kinacc.config.fields import Section, Text, refused, setting
+from kinacc.config.records import Settings
 from kinacc.config.values import overlay
 
 SAME, MOVED = "same", "moved"
@@ -55,7 +55,7 @@ def _of_each_other(lines: list[Line]) -> list[Line]:
 Series = Annotated[list[Line], Field(max_length=1000), AfterValidator(_of_each_other)]
 
 
-def expanded(name: str, full: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+def expanded(name: str, full: Settings) -> dict[str, dict[str, Any]]:
     """Full settings of the data set ``name``, its newest line, and of the data set of each line.
 
     The first has its lines under ``series``, without their paths; those of lines have the name of

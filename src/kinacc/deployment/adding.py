@@ -5,13 +5,14 @@ from __future__ import annotations
 import datetime
 import os
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from kinacc.checks.contradictions import load
 from kinacc.config.edit import flow, with_added
+from kinacc.config.records import Settings
 from kinacc.config.series import MOVED
 from kinacc.deployment.shared_readings import known_rows
 from kinacc.errors import first_few, input_error
@@ -20,8 +21,6 @@ from kinacc.measurements.folds import split
 from kinacc.measurements.reader import read as read_measured
 from kinacc.tables.atomic import write_whole
 from kinacc.tables.columns import Columns
-
-Settings = Mapping[str, Any]
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ that is no test of the arm but of the model, and nothing can be told.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -40,7 +40,7 @@ from kinacc.kinematics.inverse.limits import outside
 from kinacc.kinematics.robot import carried
 from kinacc.measurements.folds import SAME_CONFIGURATION_RAD, configurations
 from kinacc.tables.allowed import FIRST, HOLDS, OPEN, RECALIBRATE, SAME
-from kinacc.tables.columns import Columns
+from kinacc.tables.columns import Columns, Tables
 from kinacc.tables.contract import ARTEFACTS, columns_of
 
 LEVEL = 0.005 / 12  # of a decision: monthly calibrations raise a false alarm in 1 year of 200
@@ -73,9 +73,7 @@ class Session:
     tolerance_mm: float = np.nan
 
 
-def session_of(
-    tables: Mapping[str, Columns], name: str, date: str, base: str, tool: str
-) -> Session:
+def session_of(tables: Tables, name: str, date: str, base: str, tool: str) -> Session:
     """A line of a series from the tables of its results."""
     calibration, measured = folder.calibration(tables, name=name), tables["measurements"]
     # A VEC model holds the nominal DH parameters: too far from the arm for a linear comparison.

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d import Axes3D
 
+from kinacc.config.records import Settings
 from kinacc.figures import style
 from kinacc.kinematics import dh, tables
 from kinacc.kinematics import robot as robots
@@ -19,7 +20,7 @@ LINK, JOINT = "#f2a93b", "#5b6470"
 _HALF_JOINT = 0.03  # of the reach
 
 
-def run(inputs: Tables, settings: Mapping[str, Any]) -> Figure:
+def run(inputs: Tables, settings: Settings) -> Figure:
     """Return the figure of the ``dh_model`` among the ``assessment_points``.
 
     The tool centre point is the fitted one, or else the configured one.

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from textwrap import fill
-from typing import Any
 
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from kinacc.config.records import Settings
 from kinacc.figures import fig1, fig2, fig3, style
 from kinacc.tables.columns import Columns, Tables
 
@@ -22,7 +21,7 @@ _EXAMPLES = {"fig5": "rejected", "fig6": "not_rejected"}
 _UM_PER_MM = 1000.0
 
 
-def draw_figure(name: str, inputs: Tables, settings: Mapping[str, Any]) -> Figure:
+def draw_figure(name: str, inputs: Tables, settings: Settings) -> Figure:
     """Draw ``fig1`` to ``fig6`` of the tables of a data set.
 
     The true accuracy (eq. 7) is the largest true error of ``assessment_points``. Of a measured arm

@@ -16,6 +16,7 @@ import pandas as pd
 from kinacc.calibration.summary import held_out_errors, selected
 from kinacc.config.error_models import model_name
 from kinacc.config.gate_rules import ERRORS, FIGURES
+from kinacc.config.records import Settings
 from kinacc.errors import first_few, input_error
 from kinacc.gate.chance import STATISTICS, Sample
 from kinacc.measurements.folds import configurations_of
@@ -90,12 +91,12 @@ class Figure:
         return f"{size:.10g}" if self.unit == "1" else f"{size:.3f} {self.unit}"
 
 
-def sample(tables: RunTables, gate: Mapping[str, Any]) -> Sample:
+def sample(tables: RunTables, gate: Settings) -> Sample:
     """The errors behind a gate's figure of errors."""
     return tables.errors(gate["model"], gate["value"].split(".")[1])
 
 
-def figure(tables: RunTables, gate: Mapping[str, Any]) -> Figure:
+def figure(tables: RunTables, gate: Settings) -> Figure:
     """The figure of a gate. Raises InputError where its table is missing."""
     name = gate["value"]
     unit, meaning = FIGURES[name]
@@ -106,7 +107,7 @@ def figure(tables: RunTables, gate: Mapping[str, Any]) -> Figure:
     return Figure(float(count), unit, meaning)
 
 
-def cell(tables: RunTables, gate: Mapping[str, Any]) -> Figure:
+def cell(tables: RunTables, gate: Settings) -> Figure:
     """The number in the one row and column of a table that a gate names.
 
     Raises InputError where the table is missing, or for another number of rows.
@@ -131,7 +132,7 @@ def cell(tables: RunTables, gate: Mapping[str, Any]) -> Figure:
     return Figure(float(size), unit, called, open="no number" if np.isnan(size) else "")
 
 
-def _of_errors(tables: RunTables, gate: Mapping[str, Any], unit: str, meaning: str) -> Figure:
+def _of_errors(tables: RunTables, gate: Settings, unit: str, meaning: str) -> Figure:
     statistic = gate["value"].rpartition(".")[2]
     sizes, model = sample(tables, gate).sizes, tables.model(gate["model"])
     called = f"{meaning}, held out ({model_name(model)} model)"

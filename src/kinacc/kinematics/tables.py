@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 import pandas as pd
 
 from kinacc.config.error_models import ERROR_MODELS, NOMINAL, OWN, loaded
-from kinacc.errors import InputError, Problem
+from kinacc.errors import input_error
 from kinacc.geometry import Pose, rotation_from_quaternion
 from kinacc.kinematics.dh import DHModel
 from kinacc.kinematics.model import ErrorModel
-from kinacc.tables.columns import Columns
+from kinacc.tables.columns import Columns, Tables
 
 _ROUNDING = 1e-9
 
 
-def models(tables: Mapping[str, Columns], nominal: DHModel) -> dict[str, ErrorModel]:
+def models(tables: Tables, nominal: DHModel) -> dict[str, ErrorModel]:
     """Read every error model of an arm.
 
     Parameters
@@ -49,7 +47,7 @@ def models(tables: Mapping[str, Columns], nominal: DHModel) -> dict[str, ErrorMo
             models[kind] = of_kind(kind).from_columns(tables[f"{kind}_model"], nominal.prismatic)
         except (LookupError, TypeError, ValueError) as error:
             what = f"holds no whole model: {error}"
-            raise InputError(Problem(f"table {kind}_model", what)) from None
+            raise input_error(f"table {kind}_model", what) from None
     return {**models, NOMINAL: nominal}
 
 
@@ -90,7 +88,7 @@ def frame(columns: Columns, model: str, name: str, session: str | None = None) -
         rows = rows[rows["session"] == session]
     if rows.empty:
         known = ", ".join(table["frame"]) or "none"
-        raise InputError(Problem("table frames", f"has no frame {name!r} of model {model}", known))
+        raise input_error("table frames", f"has no frame {name!r} of model {model}", known)
     values = rows[["qw", "qx", "qy", "qz", "x_mm", "y_mm", "z_mm"]].to_numpy(dtype=float)[0]
     return Pose(rotation_from_quaternion(values[:4]), values[4:])
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterator, Mapping
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -12,6 +11,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from kinacc.config.records import Settings
 from kinacc.measurements.reader import UNCERTAINTY
 from kinacc.tables.columns import Columns
 
@@ -92,7 +92,7 @@ def always_trained(
             yield kind, name, np.isin(configuration, of_label)
 
 
-def split(columns: Columns, settings: Mapping[str, Any]) -> Columns:
+def split(columns: Columns, settings: Settings) -> Columns:
     """The columns with ``fold`` and ``subset``: whole configurations held out together.
 
     ``settings``: seed and the ``measurements`` section. Fold null without folds, and for the

@@ -15,7 +15,6 @@ import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -35,6 +34,7 @@ from kinacc.config.measured import (
     Orientation,
     Written,
 )
+from kinacc.config.records import Settings
 from kinacc.errors import Problem
 from kinacc.measurements import column_names
 from kinacc.measurements.column_names import KNOWN, name_of
@@ -61,7 +61,7 @@ class Layout(MeasuredFile):
     """The ``measurements.file`` section of the settings: all there is to know of a file."""
 
     @classmethod
-    def of(cls, section: Mapping[str, Any]) -> Layout:
+    def of(cls, section: Settings) -> Layout:
         """From a section that was validated; a key that is not there is at its default."""
         parts: dict[str, type[Section]] = {
             "orientation": Orientation, "directions": Directions, "joints": JointsFile

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 
 from kinacc.config.measured import QUATERNION, JointsFile
+from kinacc.config.records import Settings
 from kinacc.errors import InputError, Problem, input_error, refuse
 from kinacc.kinematics.model import PAYLOAD_COLUMNS
 from kinacc.kinematics.robot import Robot
@@ -54,7 +55,7 @@ class MeasuredFile:
         return [*unused, *self.notes]
 
 
-def read(section: Mapping[str, Any], robot: Robot, strict: bool = True) -> MeasuredFile:
+def read(section: Settings, robot: Robot, strict: bool = True) -> MeasuredFile:
     """Measurements of the file that ``section`` (``measurements.file``) names.
 
     ``strict``: joints outside their limits and readings that are there twice are refused too.
@@ -65,7 +66,7 @@ def read(section: Mapping[str, Any], robot: Robot, strict: bool = True) -> Measu
     return convert(table.select(used), Layout.of(section), robot, strict)
 
 
-def read_excluded(section: Mapping[str, Any], robot: Robot) -> MeasuredFile | None:
+def read_excluded(section: Settings, robot: Robot) -> MeasuredFile | None:
     """The rows that ``section`` excludes, as far as they can be read; None where no row can be.
 
     Raises InputError where the file itself cannot be read.
@@ -80,12 +81,12 @@ def read_excluded(section: Mapping[str, Any], robot: Robot) -> MeasuredFile | No
     return convert(table.select(rows), layout, robot, strict=False) if readable else None
 
 
-def excluded_lines(section: Mapping[str, Any]) -> dict[int, str]:
+def excluded_lines(section: Settings) -> dict[int, str]:
     """The lines that ``section`` (``measurements.file``) excludes, each with its reason."""
     return {line: item["reason"] for item in section.get("exclude", ()) for line in item["lines"]}
 
 
-def _loaded(section: Mapping[str, Any]) -> RawTable:
+def _loaded(section: Settings) -> RawTable:
     """The whole file. Raises InputError where it excludes lines that hold no reading."""
     table = load(section["path"], Layout.of(section), section.get("source"))
     excluded, where = excluded_lines(section), "measurements.file.exclude"

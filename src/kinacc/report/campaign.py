@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Mapping
 from dataclasses import asdict
 
 import numpy as np
@@ -20,13 +19,13 @@ from kinacc.config.error_models import model_name
 from kinacc.figures.campaign import draw_bounds, draw_readings
 from kinacc.report.page import FirstScreen, Page, Part, Table
 from kinacc.report.rendering import environment, lines
-from kinacc.tables.columns import Columns
+from kinacc.tables.columns import Tables
 
 _VERDICTS = {ACCEPT: "MODEL WITHIN", REJECT: "MODEL BEYOND"}
 _LARGEST, _MOST_ROWS = 10, 300
 
 
-def section(opened: Opened, tables: Mapping[str, Columns]) -> Part:
+def section(opened: Opened, tables: Tables) -> Part:
     """Return a campaign as a section of a page, from the tables of ``campaign.report.tables``."""
     summary, state, plan = status(opened), opened.state, opened.plan
     points, readings = (tables[f"campaign_{name}"] for name in ("points", "readings"))

@@ -10,6 +10,7 @@ import numpy as np
 
 from kinacc.campaign import folder as campaigns
 from kinacc.campaign import report
+from kinacc.config.records import Settings
 from kinacc.deployment import folder
 from kinacc.report import campaign, fit_sections, study_sections, terminal
 from kinacc.report.page import FirstScreen, Page, Table
@@ -25,7 +26,7 @@ _OF_THE_STUDY = (
 )
 
 
-def run(inputs: Mapping[str, Any], settings: Mapping[str, Any]) -> Page:
+def run(inputs: Mapping[str, Any], settings: Settings) -> Page:
     """The page on the tables that are there, and on the campaign of their calibration.
 
     ``settings``: ``dataset``; ``folder`` where the results are not in their usual place,

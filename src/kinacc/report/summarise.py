@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import shlex
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -19,6 +19,7 @@ from kinacc.calibration.summary import Tolerance
 from kinacc.campaign import of_calibration
 from kinacc.campaign.beside_results import PLAN, of_results
 from kinacc.config.error_models import ERROR_MODELS, MEASURED, PLAINEST, Comparison
+from kinacc.config.records import Settings
 from kinacc.deployment import applicability
 from kinacc.deployment import folder as results
 from kinacc.errors import InputError, Problem, input_error, refuse
@@ -213,7 +214,7 @@ def summarise_all(
     return summaries
 
 
-def run(inputs: Tables, settings: Mapping[str, Any]) -> dict[str, Columns]:
+def run(inputs: Tables, settings: Settings) -> dict[str, Columns]:
     """The stage ``summary``: figures of a calibration, one a row."""
     arm = results.robot_of(inputs)
     calibration = results.calibration(inputs)

@@ -13,7 +13,7 @@ import numpy as np
 
 from kinacc.assess.world import checked_errors
 from kinacc.config.error_models import PLAINEST, model_name
-from kinacc.errors import InputError, Problem
+from kinacc.errors import input_error
 from kinacc.study.operating_points import measured_errors, rows_of
 from kinacc.tables.columns import Columns
 
@@ -82,7 +82,7 @@ def of_measurements(
         wanted &= np.asarray(errors["target"]).astype(str) == target
     if not wanted.any():
         message = f"pose_errors holds no held-out errors of the {model_name(model)} model"
-        raise InputError(Problem(f"field {name}", message, fix="set measurements.folds"))
+        raise input_error(f"field {name}", message, fix="set measurements.folds")
     return ErrorField(name, measured_errors(errors, wanted)[1])
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from kinacc.config.error_models import MEASURED, Comparison
-from kinacc.errors import InputError, Problem
+from kinacc.errors import input_error
 from kinacc.geometry import compose
 from kinacc.kinematics import inverse, region
 from kinacc.kinematics.inverse import Status, limits
@@ -72,7 +72,7 @@ def _drawn(
     )
     message = f"only {counts[Status.FOUND]} of {counts.sum()} draws can be assessed ({reasons})"
     fix = "move or enlarge the evaluation space, or fit the VEC model over a wider joint range"
-    raise InputError(Problem("evaluation.cylinder", message, f"{count} points", fix))
+    raise input_error("evaluation.cylinder", message, f"{count} points", fix)
 
 
 def _branches(robot: Robot, wrist: str) -> np.ndarray:
@@ -81,7 +81,7 @@ def _branches(robot: Robot, wrist: str) -> np.ndarray:
     chosen = [i for i, name in enumerate(names) if wrist in ("both", name.rpartition("-")[2])]
     if not chosen:
         message = f"{wrist}, but robot {robot.name} has no branch of that wrist"
-        raise InputError(Problem("evaluation.wrist", message, "both"))
+        raise input_error("evaluation.wrist", message, "both")
     return np.array(chosen)
 
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
-from kinacc.errors import InputError, Problem
+from kinacc.config.records import Settings
+from kinacc.errors import input_error
 from kinacc.geometry import quaternion_from_rotation
 from kinacc.kinematics import dh
 from kinacc.kinematics.region import Attitude
@@ -21,9 +20,7 @@ from kinacc.synthetic.plan import DOWN, Run, calibration_run, measured
 _SAME_ARM_MM = 25.0
 
 
-def measure(
-    robot: Robot, settings: Mapping[str, Any], attitude: Attitude = DOWN
-) -> dict[str, np.ndarray]:
+def measure(robot: Robot, settings: Settings, attitude: Attitude = DOWN) -> dict[str, np.ndarray]:
     """Simulated measurements of an accepted draw of the arm. All chance belongs to the draw.
 
     Parameters
@@ -55,7 +52,7 @@ def measure(
     if not same:
         what = f"is synthetic, but robot {robot.name} is not the arm that was synthesised"
         fix = "give the measurements of this robot in a file (measurements.source: file)"
-        raise InputError(Problem("measurements.source", what, "robot: mh180", fix))
+        raise input_error("measurements.source", what, "robot: mh180", fix)
     stated = {name: settings[name] for name in AS_TUNED._fields if name in settings}
     draw = replace(accepted_draw(int(settings["draw"])), roughness=AS_TUNED._replace(**stated))
     run = calibration_run(robot, int(settings["poses"]), draw.seed, attitude)

@@ -9,7 +9,7 @@ from importlib import resources
 import numpy as np
 import pandas as pd
 
-from kinacc.errors import InputError, Problem
+from kinacc.errors import input_error
 from kinacc.kinematics.dh import DHModel
 from kinacc.synthetic.draw import AS_TUNED, Roughness, Scales
 
@@ -84,4 +84,4 @@ def _require(key: str, count: int) -> None:
     if not 1 <= count <= len(rows()):
         what = f"{count} accepted draws are wanted, there are {len(rows())}"
         fix = "the rule arms of research/Snakefile searches for more"
-        raise InputError(Problem(key, what, "", fix))
+        raise input_error(key, what, "", fix)

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from kinacc.config.records import Settings
 from kinacc.kinematics import region, robot
 from kinacc.measurements.folds import split
 from kinacc.measurements.reader import read
@@ -16,7 +17,7 @@ from kinacc.tables.columns import Columns
 from kinacc.tables.contract import columns_of
 
 
-def run(inputs: Mapping[str, Any], settings: Mapping[str, Any]) -> dict[str, Columns]:
+def run(inputs: Mapping[str, Any], settings: Settings) -> dict[str, Columns]:
     """``measurements`` of the configured source, with fold and subset, and ``robot``."""
     arm, section = robot.load(settings["robot"]), settings["measurements"]
     if section["source"] == "synthetic":
@@ -29,7 +30,7 @@ def run(inputs: Mapping[str, Any], settings: Mapping[str, Any]) -> dict[str, Col
     return {"measurements": split(columns, settings), "robot": _robot(arm)}
 
 
-def attitude(evaluation: Mapping[str, Any]) -> region.Attitude:
+def attitude(evaluation: Settings) -> region.Attitude:
     """The flange's attitude in the ``evaluation`` settings, which a calibration has to cover."""
     euler_rad = np.deg2rad(evaluation["reference_orientation_deg"])
     return region.Attitude(region.reference_rotation(euler_rad), evaluation["reference_frame"])

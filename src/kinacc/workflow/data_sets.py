@@ -10,13 +10,13 @@ from pathlib import Path
 from typing import Any
 
 from kinacc.config.error_models import ERROR_MODELS, asked_for
+from kinacc.config.records import Settings
 from kinacc.errors import Problem, refuse
 from kinacc.tables import sums
 
 RESULTS = "results"
 # What a calibration depends on, and what the rule `summary` hands to its script.
 CALIBRATION = ("seed", "robot", "measurements", "calibration", "tolerance")
-Settings = Mapping[str, Any]
 
 
 @dataclass(frozen=True)
@@ -162,7 +162,7 @@ def _values(value: Any, source: str) -> Any:
     return value_of(value, source) if isinstance(value, str) else value
 
 
-def _in_use(config: Mapping[str, Any]) -> dict[str, Any]:
+def _in_use(config: Settings) -> dict[str, Any]:
     """The settings without the other source of measurements and models that nobody asks for."""
     unused = {"synthetic", "file"} - {config["measurements"]["source"]}
     unused |= {*ERROR_MODELS} - {*asked_for(config["calibration"])}

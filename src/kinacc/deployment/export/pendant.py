@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -15,6 +13,7 @@ from kinacc.calibration.fitting import Fit, ModelFit
 from kinacc.calibration.identifiability import identified, listed
 from kinacc.calibration.observations import Observations
 from kinacc.config.error_models import NOMINAL, PLAINEST, model_name
+from kinacc.config.records import Settings
 from kinacc.deployment.export.controllers import CONTROLLERS, ZEROS, Controller, Numbers
 from kinacc.deployment.folder import Tables, robot_of, selected_model
 from kinacc.deployment.record import POSES
@@ -59,9 +58,7 @@ class Pendant:
     ending: str
 
 
-def fit_pendant(
-    tables: Tables, settings: Mapping[str, Any], controller: str, name: str = ""
-) -> Pendant:
+def fit_pendant(tables: Tables, settings: Settings, controller: str, name: str = "") -> Pendant:
     """The numbers for a controller (a key of ``CONTROLLERS``), fitted to measured poses.
 
     Parameters

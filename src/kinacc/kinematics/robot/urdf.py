@@ -11,7 +11,7 @@ import numpy as np
 from lxml import etree
 from scipy.spatial.transform import Rotation
 
-from kinacc.errors import InputError, Problem
+from kinacc.errors import InputError, Problem, input_error
 from kinacc.geometry import IDENTITY, Pose, compose
 from kinacc.kinematics.robot.axes import Axes, chain_of
 from kinacc.kinematics.robot.record import FEWEST_JOINTS, MOST_JOINTS, Robot
@@ -189,7 +189,7 @@ def _root(path: Path) -> etree._Element:
         with open(path, "rb") as stream:
             text = stream.read(_MOST_BYTES + 1)
     except OSError as error:
-        raise InputError(Problem(place, (error.strerror or "").lower(), "a URDF file")) from None
+        raise input_error(place, (error.strerror or "").lower(), "a URDF file") from None
     if len(text) > _MOST_BYTES:
         allowed = f"at most {_MOST_BYTES // 1_000_000} MB"
         raise _refusal(path, place, "is too large for a robot", allowed)

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from kinacc.config.measured import CONVENTIONS
+from kinacc.config.records import Settings
 from kinacc.errors import Problem, input_error, refuse
 from kinacc.measurements.column_names import Name
 from kinacc.measurements.faults import BEYOND, is_no_coordinate, none_read
@@ -59,7 +60,7 @@ class Guess:
         """Number of joints."""
         return len(self.columns.joints)
 
-    def but(self, settings: Mapping[str, Any]) -> Guess:
+    def but(self, settings: Settings) -> Guess:
         """The guess with other settings; ``orientation`` is taken key by key."""
         turn = self.section["orientation"] | settings.get("orientation", {})
         return replace(self, section=self.section | {**settings, "orientation": turn})
