@@ -31,7 +31,7 @@ def measured(readings=999, points=40, budget=120, tolerance_mm=None, off_mm=None
         return world.reading_mm(row, visit) + off
 
     entries = (entry_of(readings_of(plan, read, limit=readings)),)
-    return status(Opened(Path("check"), plan, folder.Journal(entries, "ab", (), 0), "ab"))
+    return status(Opened(Path("check"), plan, folder.Journal(entries, "ab", (), 0)))
 
 
 def test_every_reason_has_a_text_and_no_text_is_left_over():
@@ -92,7 +92,7 @@ def test_readings_against_an_assumption_withhold_the_bounds(change, code):
 def test_bounds_below_the_estimate_are_doubted_with_the_noise():
     found = measured(assessor="single_shot", texts=("tracker=3",), tolerance_mm=5.0)
     assert found.bound.verdict == "undecided"
-    assert "noise overstated" in found.bound.doubt
+    assert "noise misstated" in found.bound.doubt
     assert "times as far from the predictions as the stated noise" in found.against[0]
 
 

@@ -27,7 +27,7 @@ def opened(readings=99, noise_mm=0.05, tolerance_mm=None, extra=(), **settings):
         plan, lambda row, _: true[row] + rng.normal(0.0, noise_mm, 3), limit=readings
     )
     journal = folder.Journal((entry_of(taken), *extra), "cd", (), 0)
-    return Opened(Path("check"), plan, journal, "ab")
+    return Opened(Path("check"), plan, journal)
 
 
 def measured(**change):

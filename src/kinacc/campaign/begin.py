@@ -77,7 +77,7 @@ def points_of(
     places = joints if directions is None else np.hstack([joints, directions])
     rows = np.sort(np.unique(places, axis=0, return_index=True)[1])
     if len(rows) < 2:
-        message = "only one" if len(joints) == 1 else f"all {len(joints)} are at the same joints"
+        message = f"all {len(joints)} are at the same joints"
         raise input_error("candidates", message, "at least 2 different points")
     joints, label = joints[rows], [str(label[i]).strip() for i in rows]
     directions = None if directions is None else directions[rows]
@@ -90,7 +90,7 @@ def points_of(
     state = JointState(arm.robot.dh_joints(joints), directions)
     where = arm.pose(state, "base", point).position_mm
     slope = arm.joint_jacobian(state, "base", point)[:, :3] @ arm.robot.joint_map
-    return Points(tuple(label), joints, directions, where, slope)
+    return Points(tuple(label), joints, where, slope, directions)
 
 
 def _outside(arm: Calibration, joints: np.ndarray, label: Sequence[str]) -> list[Problem]:
@@ -287,17 +287,6 @@ def noise_of(results: Path) -> Noise | None:
     measured, described = map(store.read, paths)
     arm = robots.of_text(str(described["description"][0]), "robot.parquet")
     return of_measurements(measured, arm)
-
-
-def noise_by_repeats(known: Noise | None) -> str:
-    """Return the scatter of repeated readings of a calibration; empty where there are too few."""
-    if known is None or known.freedom < _FEWEST_FREEDOM or not (known.std_mm > 0.0).all():
-        return ""
-    std_mm = ",".join(f"{std:.2g}" for std in known.std_mm)
-    return (
-        f"{known.readings} readings of the calibration at {known.configurations} configurations "
-        f"scatter by {std_mm} mm along x,y,z of the instrument: a lower limit of the noise"
-    )
 
 
 def _candidate_doubts(arm: Calibration, points: Points, point: str | None) -> list[Problem]:

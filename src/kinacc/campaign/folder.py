@@ -79,8 +79,7 @@ def read_journal(path: Path, seed: str) -> Journal:
                 break  # a machine that lost power may leave zeros where nothing was written yet
             raise _damaged(f"{path}, line {number}", "cannot be read") from None
         if not matches:
-            message = "was changed, or belongs to another campaign"
-            message += f", or {PLAN} was changed" if number == 1 else ""
+            message = f"was changed, or belongs to another {PLAN}"
             raise _damaged(f"{path}, line {number}", message)
         entries.append(entry)
     lines = tuple(whole[: len(entries)])
@@ -97,8 +96,7 @@ def append(path: Path, known: Journal, entry: Mapping[str, Any]) -> None:
     fresh = not path.exists()
     try:
         with open(path, "ab") as file:
-            if known.cut_off:
-                file.truncate(sum(map(len, known.lines)))
+            file.truncate(sum(map(len, known.lines)))
             file.write(line)
             file.flush()
             os.fsync(file.fileno())
@@ -145,12 +143,11 @@ def _not_written(path: Path, error: OSError) -> MachineError:
 
 @dataclass(frozen=True)
 class Opened:
-    """A campaign as read: its folder, plan, journal and the digest of the plan."""
+    """A campaign as read: its folder, plan and journal."""
 
     folder: Path
     plan: Plan
     journal: Journal
-    digest: str
 
     @cached_property
     def state(self) -> State:
@@ -160,6 +157,11 @@ class Opened:
     def watched(self, watch: Callable[[Campaign], None] | None) -> State:
         """The state; ``watch`` as in :func:`kinacc.campaign.state.restore`."""
         return restore(self.plan, self.journal.entries, watch, str(self.folder / JOURNAL))
+
+    @property
+    def version(self) -> str:
+        """The kinacc that it was begun with."""
+        return self.plan.about.get("kinacc_version", "an earlier version")
 
     @property
     def recorded(self) -> tuple[str, ...]:
@@ -211,8 +213,7 @@ def open_(folder: Path | str) -> Opened:
         raise input_error(str(path), "no such file: no campaign is there", fix=fix)
     text = json_files.bytes_of(path)
     digest = hashlib.sha256(text).hexdigest()[:_DIGITS]
-    begun = plans.from_json(text, str(path))
-    return Opened(folder, begun, read_journal(folder / JOURNAL, digest), digest)
+    return Opened(folder, plans.from_json(text, str(path)), read_journal(folder / JOURNAL, digest))
 
 
 @contextmanager
@@ -226,25 +227,25 @@ def writing(folder: Path | str) -> Iterator[Opened]:
 def require_method(opened: Opened) -> None:
     """Raise InputError where this version computes bounds otherwise than the campaign's."""
     if opened.plan.method != plans.METHOD:
-        begun = opened.plan.about.get("kinacc_version", "an earlier version")
         message = (
             f"uses bounds of method {opened.plan.method}; kinacc {__version__} has {plans.METHOD}"
         )
-        fix = f"continue it with kinacc {begun}, or begin a new campaign"
+        fix = f"continue it with kinacc {opened.version}, or begin a new campaign"
         raise input_error(str(opened.folder), message, fix=fix)
 
 
 def marks_of(opened: Opened) -> dict[str, object]:
     """Return the provenance of the tables: plan and journal count as the configuration."""
-    content = f"{opened.digest} {opened.journal.sha256()}".encode()
+    content = f"{opened.journal.seed} {opened.journal.sha256()}".encode()
     config_hash = hashlib.sha256(content).hexdigest()[:_DIGITS]
     return {"kinacc_version": __version__, "config_hash": config_hash, "seed": opened.plan.seed}
 
 
 def doubts(opened: Opened) -> list[str]:
     """Return what is unusual: begun with another version, or a last line that was cut off."""
-    begun = opened.plan.about.get("kinacc_version", "an earlier version")
-    lines = [f"begun with kinacc {begun}, this is {__version__}"] if begun != __version__ else []
+    lines = []
+    if opened.version != __version__:
+        lines.append(f"begun with kinacc {opened.version}, this is {__version__}")
     if opened.journal.cut_off:
         lines.append(
             "the last entry was cut off while written and never confirmed: is the last reading to "
@@ -269,8 +270,7 @@ def verify(opened: Opened, sha256: str | None = None) -> Verification:
 
     Checksums of the lines are checked where a journal is opened.
     """
-    journal = opened.journal
-    count = len(journal.entries)
+    journal, count = opened.journal, len(opened.journal.entries)
     readings = sum(len(entry.get("readings", ())) for entry in journal.entries)
     continues = sha256 is None or sha256 in map(journal.sha256, range(count + 1))
-    return Verification(opened.digest, count, readings, journal.sha256(), continues)
+    return Verification(journal.seed, count, readings, journal.sha256(), continues)

@@ -249,11 +249,8 @@ def _laser(text: str, where: str) -> LaserTracker:
     return tracker
 
 
-_Row = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
-
-
 class _Noise(BaseModel):
-    covariance_mm2: tuple[_Row, _Row, _Row]
+    covariance_mm2: Numbers
     freedom: FiniteFloat
 
 
@@ -292,13 +289,11 @@ def read_repeatability(path: str | Path) -> tuple[np.ndarray, int, list[Problem]
     try:
         content = json_files.values_of(json_files.bytes_of(path), str(path))
         test = _Test.model_validate(content)
-    except (OSError, RecursionError, ValueError) as error:
-        is_absent = isinstance(error, OSError)
-        message = "no such file" if is_absent else "is no answer of kinacc repeatability"
-        raise input_error(where, message, fix=fix) from None
+    except (OSError, RecursionError, ValueError):
+        raise input_error(where, "is no answer of kinacc repeatability", fix=fix) from None
     if test.noise is None:
         raise input_error(where, "has no noise: no pose was visited again", fix=fix)
-    covariance, freedom = np.array(test.noise.covariance_mm2), int(test.noise.freedom)
+    covariance, freedom = test.noise.covariance_mm2, int(test.noise.freedom)
     problems = [Problem(where, fault, fix=fix) for _, fault in covariance_faults(covariance[None])]
     if freedom < FEWEST:
         allowed = f"at least {FEWEST}; {ENOUGH} are wanted"

@@ -51,9 +51,9 @@ class Points:
 
     label: tuple[str, ...]
     joints: np.ndarray
-    directions: np.ndarray | None
     modelled_mm: np.ndarray
     slope: np.ndarray
+    directions: np.ndarray | None = None
 
     def __len__(self) -> int:
         return len(self.label)
@@ -78,15 +78,15 @@ class Points:
         if isinstance(rows, Points):
             return rows
         columns = {item.name: [row[item.name] for row in rows] for item in fields(cls)}
-        arrays = {name: finite(columns[name]) for name in ("joints", "modelled_mm", "slope")}
-        directions = None
-        if columns["directions"][0] is not None:
-            directions = finite(columns["directions"]).astype(np.int8)
+        label, directions = tuple(map(str.strip, columns.pop("label"))), columns.pop("directions")
+        arrays = {name: finite(values) for name, values in columns.items()}
         count, joints = arrays["joints"].shape
         shapes = arrays["modelled_mm"].shape, arrays["slope"].shape
         if shapes != ((count, 3), (count, 3, joints)):
             raise ValueError(f"points of shapes {shapes}")
-        return cls(label=tuple(map(str.strip, columns["label"])), directions=directions, **arrays)
+        if directions[0] is not None:
+            arrays["directions"] = finite(directions).astype(np.int8)
+        return cls(label=label, **arrays)
 
     def rows(self) -> list[dict[str, Any]]:
         """A mapping for each point."""
@@ -165,8 +165,7 @@ def _recorded(value: Any) -> AdaptiveAssessor:
     used = [key for key, former in _FORMER.items() if settings.get(key, former) != former]
     fix = "begin a new campaign; readings can be recorded in it again"
     refuse(Problem(f"setting {key}", "is gone from kinacc", fix=fix) for key in used)
-    known = {key: setting for key, setting in settings.items() if key not in _FORMER}
-    return assessor_of(value["name"], known)
+    return assessor_of(value["name"], {key: settings[key] for key in settings.keys() - _FORMER})
 
 
 def _pose(value: Any) -> Pose:

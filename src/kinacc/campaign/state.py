@@ -58,7 +58,11 @@ class Reading:
         return self.point, self.instrument, *self.position_mm.tolist()
 
 
-class Readings(BaseModel):
+class _Entry(BaseModel):
+    at: AwareDatetime | None = None
+
+
+class Readings(_Entry):
     """Entry of the journal: readings that are taken together.
 
     ``file`` is the digest of their file, ``path`` its place from the campaign's folder.
@@ -68,25 +72,22 @@ class Readings(BaseModel):
     readings: list[Reading]
     file: str | None = None
     path: str | None = None
-    at: AwareDatetime | None = None
 
 
-class LeaveOut(BaseModel):
+class LeaveOut(_Entry):
     """Entry of the journal: a point that is not measured."""
 
     kind: Literal["leave_out"] = "leave_out"
     point: NonNegativeInt
     reason: str
-    at: AwareDatetime | None = None
 
 
-class Strike(BaseModel):
+class Strike(_Entry):
     """Entry of the journal: a reading that is void."""
 
     kind: Literal["strike"] = "strike"
     reading: PositiveInt
     reason: str
-    at: AwareDatetime | None = None
 
 
 Entry = Readings | LeaveOut | Strike
@@ -259,18 +260,17 @@ def sayable(campaign: Campaign) -> tuple[Statement, ...]:
     complete, nothing is stated about points that were not measured. Readings that all equal the
     prediction to the last digit are none: whatever the errors, noise keeps them apart.
     """
-    stated = campaign.statements()
-    if campaign.ledger.taken and not campaign.ledger.sizes_mm().any():
-        reason = Reason("predicted", {"read": campaign.ledger.taken})
-        return tuple(Statement(item.target, share=item.share, withheld=reason) for item in stated)
-    missing = campaign.first - len(campaign.ledger.visited)
-    if missing <= 0:
-        return stated
-    reason = Reason("first_visit_by_travel", {"left": missing})
+    stated, ledger = campaign.statements(), campaign.ledger
+    missing = campaign.first - len(ledger.visited)
+    if ledger.taken and not ledger.sizes_mm().any():
+        reason, spared = Reason("predicted", {"read": ledger.taken}), []
+    else:
+        reason = Reason("first_visit_by_travel", {"left": missing})
+        spared = [
+            item for item in stated if missing <= 0 or item.target == MEASURED or item.withheld
+        ]
     return tuple(
-        item
-        if item.target == MEASURED or item.withheld
-        else Statement(item.target, share=item.share, withheld=reason)
+        item if item in spared else Statement(item.target, share=item.share, withheld=reason)
         for item in stated
     )
 

@@ -150,9 +150,7 @@ def status(opened: Opened, tolerance_mm: float | None = None) -> CampaignStatus:
     tolerance_mm = plan.limits.tolerance_mm if tolerance_mm is None else tolerance_mm
     candidates = len(state.rows)
     near, repeats = size_scatter(state), scatter(state)
-    checked = None if getattr(plan.assessor, "noise", KNOWN) == ESTIMATED else repeats
-    overstated = near is not None and near.too_small
-    bounds = [_bound(item, state, tolerance_mm, overstated) for item in stated]
+    bounds = [_bound(item, state, tolerance_mm) for item in stated]
     bounds.sort(key=lambda item: (math.isnan(item.upper_mm), item.target != plan.limits.target))
     if visited == candidates and len({(b.lower_mm, b.value_mm, b.upper_mm) for b in bounds}) == 1:
         bounds = [item for item in bounds if item.target != MEASURED] or bounds
@@ -166,16 +164,20 @@ def status(opened: Opened, tolerance_mm: float | None = None) -> CampaignStatus:
             "the others there"
             for item in state.campaign.suspicious()
         ]
-    else:
-        if near and near.too_small:
-            against.append(
-                f"readings lie {near.ratio:.2f} times as far from the predictions as the stated "
-                f"noise takes them ({near.freedom} degrees of freedom): noise overstated, or no "
-                "readings"
-            )
+    elif near is not None and near.too_small:
+        against.append(
+            f"readings lie {near.ratio:.2f} times as far from the predictions as the stated noise "
+            f"takes them ({near.freedom} degrees of freedom): noise overstated, or no readings"
+        )
+    elif repeats and getattr(plan.assessor, "noise", KNOWN) != ESTIMATED:
+        notes.append(
+            f"repeated readings scatter {repeats.ratio:.2f} times the stated noise "
+            f"({repeats.freedom} degrees of freedom)"
+            + ": noise overstated, bounds wider than needed"
+            * repeats.too_small
+        )
+    if not alarms:
         against += [item.doubt for item in bounds if item.doubt]
-    if checked and "scatter" not in alarms and not overstated:
-        notes.append(_scattered(checked))
     notes += [item.noise for item in bounds if item.noise]
     return CampaignStatus(
         folder=str(opened.folder),
@@ -206,14 +208,13 @@ def percent(share: float) -> str:
     return f"{100.0 * share:.4g} %"
 
 
-def _bound(stated: Statement, state: State, tolerance_mm: float | None, overstated: bool) -> Bound:
+def _bound(stated: Statement, state: State, tolerance_mm: float | None) -> Bound:
     visited, candidates = len(state.campaign.ledger.visited), len(state.rows)
     judged = _UNJUDGED if tolerance_mm is None else decide(stated, tolerance_mm)
     doubt = ""
     if stated.upper_mm < stated.lower_mm or stated.upper_mm < stated.value_mm:
-        kind = "overstated" if overstated else "understated"
         doubt = (
-            f"the bounds and the estimate contradict each other: noise {kind}, or one of the few "
+            "the bounds and the estimate contradict each other: noise misstated, or one of the few "
             "campaigns that the confidence leaves out"
         )
     fields: dict[str, Any] = {**vars(stated), **_limits(stated, state)._asdict()}
@@ -270,14 +271,6 @@ def _assumes(plan: Plan, bound: Bound) -> str:
         "and a fixed base, tool and instrument",
     ]
     return f"Assumes independent normal readings with {', '.join(filter(None, parts))}."
-
-
-def _scattered(repeats: Scatter) -> str:
-    text = (
-        f"repeated readings scatter {repeats.ratio:.2f} times the stated noise ({repeats.freedom} "
-        "degrees of freedom)"
-    )
-    return f"{text}: noise overstated, bounds wider than needed" if repeats.too_small else text
 
 
 def _findings(state: State) -> Iterable[str]:

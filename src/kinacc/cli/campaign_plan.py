@@ -102,7 +102,7 @@ def _question(
     """Errors, covariance and assessors of the options."""
     names, points = options["errors"] or DEFAULT_ERRORS, options["candidates"]
     folders = [Path(name) for name in names if name not in fields.FAMILIES and Path(name).is_dir()]
-    instruments, freedom, doubts = instruments_of(options, folders)
+    instruments, freedom, doubts = instruments_of(options)
     if not options["sure"]:
         for known in (None, *map(noise_of, folders)):
             doubts += noise_doubts(instruments, known=known)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import shlex
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -80,7 +80,7 @@ def start(out: Output, **options: Any) -> None:
     """
     refuse(folders.in_the_way(options["folder"]), "The campaign was not begun")
     results, point = Path(options["calibration"]), options["point"]
-    used, freedom, doubts = instruments_of(options, [results])
+    used, freedom, doubts = instruments_of(options)
     arm = choice.calibration_of(results, options["model"], options["session"])
     joints, labels, directions, source = _candidates(options, arm)
     points = begin.points_of(arm, joints, labels, directions, point)
@@ -111,12 +111,12 @@ def start(out: Output, **options: Any) -> None:
 
 
 def instruments_of(
-    options: Options, results: Sequence[Path] = ()
+    options: Options,
 ) -> tuple[tuple[Instrument, ...], int, list[Problem]]:
     """Return the instruments of the options of ``start`` and ``plan``.
 
     Also degrees of freedom (0 without ``--repeatability``) and doubts of the test of their noise.
-    Raises InputError without any noise, with the scatter of readings in the folders ``results``.
+    Raises InputError without any noise.
     """
     frame, resolution_mm = options.get("frame", BASE), options["resolution_mm"] or 0.0
     noise_mm = options["noise_mm"]
@@ -130,9 +130,7 @@ def instruments_of(
         used = Instrument("instrument", covariance, frame, None, resolution_mm)
         return (used,), freedom, doubts
     if not texts:
-        scatter = [begin.noise_by_repeats(begin.noise_of(folder)) for folder in results]
-        fix = "\n    ".join(filter(None, [begin.WAYS_TO_NOISE, *scatter]))
-        raise input_error("noise", "is not given", fix=fix)
+        raise input_error("noise", "is not given", fix=begin.WAYS_TO_NOISE)
     return instruments(texts, frame, resolution_mm), 0, []
 
 

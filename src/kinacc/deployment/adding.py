@@ -17,7 +17,6 @@ from kinacc.config.series import MOVED
 from kinacc.deployment.shared_readings import known_rows
 from kinacc.errors import first_few, input_error
 from kinacc.kinematics import robot
-from kinacc.measurements.folds import split
 from kinacc.measurements.reader import read as read_measured
 from kinacc.tables.atomic import write_whole
 from kinacc.tables.columns import Columns
@@ -105,14 +104,11 @@ def _beside(config: str, path: str) -> str:
 
 def _require_alike(path: str, known: Sequence[str], settings: Settings, tool: str) -> None:
     """InputError for a file that is no new line: unreadable, known readings, other targets."""
-    arm = robot.load(settings["robot"])
+    arm, file = robot.load(settings["robot"]), settings["measurements"]["file"]
 
     def measured(name: str) -> Columns:
-        file = {**settings["measurements"]["file"], "path": name}
-        measurements = {**settings["measurements"], "file": file}
         with warnings.catch_warnings(action="ignore"):  # printed when it is calibrated
-            columns = read_measured(file, arm).columns
-            return split(columns, {**settings, "measurements": measurements})
+            return read_measured({**file, "path": name}, arm).columns
 
     new = measured(path)
     for name in known:

@@ -130,8 +130,7 @@ def compare(
         raise input_error(f"{first.name}, {second.name}", message, f"{_FEWEST} or more", fix)
     q_rad = q_rad[covered]
     states = [JointState(item.robot.dh_joints(q_rad)) for item in both]
-    pairs = zip(both, states, strict=True)
-    measured = np.all([is_measured_there(item, at) for item, at in pairs], axis=0)
+    measured = np.all([*map(is_measured_there, both, states)], axis=0)
     names = (Path(first.name).name, Path(second.name).name)
     names = names if names[0] != names[1] else (first.name, second.name)
     first, second = both = counted_once(first, second, shared)
@@ -161,21 +160,33 @@ def compare(
         CHANGED: enough,
         IN_DOUBT: True,
     }
-    as_fitted_mm, aligned_mm = (np.linalg.norm(change[:, :3], axis=1) for change in moved)
+    sizes_mm = [np.linalg.norm(change[:, :3], axis=1) for change in moved]
     poses = {
         "pose": 1 + np.flatnonzero(covered),
         "measured_by_both": measured,
-        "moved_mm": as_fitted_mm,
-        "arm_moved_mm": aligned_mm,
+        "moved_mm": sizes_mm[0],
+        "arm_moved_mm": sizes_mm[1],
     }
-    frames = ("as fitted", "best base and tool")
+    shifts = [
+        {
+            "frames": frames,
+            "rms_mm": _rms(change[:, :3]),
+            "chance_mm": _rms(chance[:, :3]),
+            "largest_mm": size_mm.max(),
+            "rms_mrad": 1e3 * _rms(change[:, 3:]),
+            "chance_mrad": 1e3 * _rms(chance[:, 3:]),
+        }
+        for frames, change, chance, size_mm in zip(
+            ("as fitted", "best base and tool"), moved, scatter, sizes_mm, strict=True
+        )
+    ]
     return Difference(
         names,
         (first.robot.name, second.robot.name),
         first.choice,
         next(verdict for verdict, holds in verdicts.items() if holds),
         *test,
-        pd.DataFrame([_shift(*item) for item in zip(frames, moved, scatter, strict=True)]),
+        pd.DataFrame(shifts),
         parameters,
         pd.DataFrame(poses),
         len(covered),
@@ -192,15 +203,10 @@ def _ratio(calibration: Calibration) -> float:
 def require_alike(first: Calibration, second: Calibration) -> None:
     """InputError where the joints of two arms do not mean the same."""
     before, after = first.robot, second.robot
-    if before.dh.joints != after.dh.joints:
-        message = f"has {after.dh.joints} joints, {first.name} {before.dh.joints}"
-    elif not np.array_equal(before.dh.prismatic, after.dh.prismatic):
-        message = f"has other sliding joints than {first.name}"
-    elif not np.array_equal(before.joint_map, after.joint_map):
-        message = f"has another joint_map than {first.name}"
-    else:
-        return
-    raise input_error(second.name, message, "the same kind of robot")
+    alike = np.array_equal(before.dh.prismatic, after.dh.prismatic)
+    if not alike or not np.array_equal(before.joint_map, after.joint_map):
+        message = f"has other joints than {first.name} (number, sliding joints or joint_map)"
+        raise input_error(second.name, message, "the same kind of robot")
 
 
 class _Knowledge(NamedTuple):
@@ -218,7 +224,7 @@ class _Knowledge(NamedTuple):
         known, count = calibration.known, len(scale)
         if known is None:
             unknown = np.full((count, count), np.nan)
-            return cls(np.zeros(count, dtype=bool), unknown, np.zeros((0, count)))
+            return cls(np.zeros(count, dtype=bool), unknown, unknown[:0])
         names = np.array(calibration.model.names)
         pick = (names[:, None] == np.array(known.names)).astype(float)
         covariance = pick @ known.covariance @ pick.T / np.outer(scale, scale)
@@ -293,28 +299,13 @@ def _scatter(
     """
     if any(item.known is None for item in both):
         return [np.full((len(pose.position_mm), 6, 1), np.nan)] * 2
-    moved = np.concatenate(
-        [
-            sensitivity(item, state, "base", FLANGE) @ item.root
-            for item, state in zip(both, states, strict=True)
-        ],
-        axis=2,
-    )
+    pairs = zip(both, states, strict=True)
+    slopes = [sensitivity(item, state, "base", FLANGE) @ item.root for item, state in pairs]
+    moved = np.concatenate(slopes, axis=2)
     absorbed = scipy.linalg.orth(_frame_slopes(pose, weights), 1e-9)
     flat = (moved * weights[:, None]).reshape(len(absorbed), -1)
     apart = (flat - absorbed @ (absorbed.T @ flat)).reshape(moved.shape) / weights[:, None]
     return [moved, apart]
-
-
-def _shift(frames: str, moved: np.ndarray, scatter: np.ndarray) -> dict[str, object]:
-    return {
-        "frames": frames,
-        "rms_mm": _rms(moved[:, :3]),
-        "chance_mm": _rms(scatter[:, :3]),
-        "largest_mm": float(np.linalg.norm(moved[:, :3], axis=1).max()),
-        "rms_mrad": 1e3 * _rms(moved[:, 3:]),
-        "chance_mrad": 1e3 * _rms(scatter[:, 3:]),
-    }
 
 
 def _rms(moved: np.ndarray) -> float:

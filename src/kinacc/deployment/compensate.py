@@ -26,6 +26,7 @@ ROTATION_TOLERANCE_RAD = newton.ROTATION_TOLERANCE_RAD
 FEW_AXES_TURN_RAD = 0.05  # of an arm of four or five axes; more is another orientation
 SAME_POSTURE_RAD = 0.35  # a calibration moves joints by less, another posture by more
 SAME_RAD = 1e-5
+_SAME_TURN_RAD = 1e-9  # a joint so far beyond its limit stays on its turn
 _NEAR_START_MM = 1.0  # a posture of the plain arm, as a start on the calibrated one
 _STARTS, _FEW_STARTS = 48, 16  # of the search where an arm has no list of branches
 
@@ -110,15 +111,16 @@ def compensate(
     near = np.broadcast_to(0.0 if near_rad is None else near_rad, (len(every), robot.dh.joints))
     like = JointState(robot.dh_joints(near), s, payload)
     arm = _Goals(calibration, goal, near, like, carried)
-    more, tried, least = every, [], PoseStatus.CONVERGED
+    more, tried = every, []
     if near_rad is not None:
-        tried, least = [arm.judged(like.q_rad, every)], PoseStatus.EXTRAPOLATED
+        tried = [arm.judged(like.q_rad, every)]
         close = tried[0]["movement"] <= SAME_POSTURE_RAD
         more = every[~(close & (tried[0]["status"] <= PoseStatus.EXTRAPOLATED))]
     table = pd.concat([*tried, arm.judged(*arm.postures(more))], ignore_index=True)
     hit, status = table["status"] != PoseStatus.NOT_REACHED, table["status"]
     nearest = table[hit].groupby("row")["movement"].min().reindex(every, fill_value=np.inf)
-    table["class"] = np.select([~hit, status > PoseStatus.EXTRAPOLATED, status > least], [3, 2, 1])
+    # Beside joints that are given an extrapolated posture is as good as another.
+    table["class"] = np.array([0, near_rad is None, 2, 2, 2, 3])[status]
     table["cost"] = table["movement"].where(hit, table["off_mm"])
     best = table.sort_values(["class", "cost"]).drop_duplicates("row").set_index("row")
     best = best.reindex(every)
@@ -218,24 +220,11 @@ class _Goals:
         return self._turned(q_dh[near], local[near]), local[near]
 
     def _turned(self, q_dh: np.ndarray, rows: np.ndarray) -> np.ndarray:
-        """Revolute joints on the turn nearest to the given joints that lies within the limits.
-
-        Of several turns one that a bounded model covers.
-        """
-        robot = self.calibration.robot
-        lower, upper = limits.dh_limits(robot)
-        covered = self.calibration.fitted_range_rad
-        if self.calibration.model.domain is not None and covered is not None:
-            low, high = covered
-            cut = np.maximum(lower, low), np.minimum(upper, high)
-            lower, upper = np.where(cut[0] < cut[1], cut, (lower, upper))
-        near = robot.dh_joints(self.near[rows])
-        turn = 2.0 * np.pi * ~robot.dh.prismatic
-        base = q_dh + turn * np.rint((near - q_dh) / (2.0 * np.pi))
-        angles = base + np.array([0, -1, 1, -2, 2])[:, None, None] * turn
-        outside = limits.outside(angles, (lower, upper))
-        cost = (np.abs(angles - near) + 100.0 * outside).round(9)
-        return np.take_along_axis(angles, np.argmin(cost, axis=0)[None], axis=0)[0]
+        """Joints on the turns within limits, and range of a bounded model, near the given ones."""
+        calibration = self.calibration
+        covered = None if calibration.model.domain is None else calibration.fitted_range_rad
+        near = self.like.q_rad[rows]
+        return limits.take_turns(calibration.robot, q_dh, covered, near, _SAME_TURN_RAD)
 
     def _refined(self, model: ErrorModel, start: np.ndarray, rows: np.ndarray) -> np.ndarray:
         """Joints (m, k) refined from ``start`` onto the goals ``rows`` (m,), reached or not."""

@@ -14,7 +14,7 @@ from kinacc.calibration.summary import selected
 from kinacc.calibration.uncertainty import Uncertainty
 from kinacc.config.error_models import ALWAYS, ERROR_MODELS, PLAINEST
 from kinacc.deployment.record import MODELS, Calibration, Residual
-from kinacc.errors import InputError, Problem, gathered, input_error, refuse
+from kinacc.errors import Problem, gathered, input_error, refuse
 from kinacc.kinematics import robot as robots
 from kinacc.kinematics import tables as model_tables
 from kinacc.kinematics.robot import Robot
@@ -108,8 +108,6 @@ def calibration(
     """
     try:
         return _calibration(tables, model, name, session)
-    except InputError:
-        raise
     except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
         message = f"tables cannot be used: {error}"
         raise input_error(f"results {name}", message, fix="run kinacc calibrate") from None
@@ -183,8 +181,8 @@ def _residual(tables: Tables, choice: str) -> Residual | None:
 
     None where the table does not say.
     """
-    names = ("comparison", "subset", "quantity", "fold", "rms")
-    table = pd.DataFrame({name: tables.get("residuals", {}).get(name, []) for name in names})
+    names = ["comparison", "subset", "quantity", "fold", "rms"]
+    table = pd.DataFrame(dict(tables.get("residuals", {})), columns=names)
     pooled = table[(table["comparison"] == f"{choice}_vs_measured") & table["fold"].isna()]
     for item in reversed(SUBSETS):
         rms = pooled[pooled["subset"] == item].set_index("quantity")["rms"]
@@ -198,14 +196,13 @@ def uncertainty(tables: Tables, choice: str) -> Uncertainty | None:
     """Covariance and undetermined directions of a fit; None where the tables lack them."""
     if f"{choice}_covariance" not in tables:
         return None
-    names = ["parameter", "other", "covariance"]
-    table = pd.DataFrame({name: tables[f"{choice}_covariance"][name] for name in names})
+    table = pd.DataFrame(dict(tables[f"{choice}_covariance"]))
     parameters = table["parameter"].unique()
     half = table.pivot(index="parameter", columns="other", values="covariance")
     half = half.reindex(index=parameters, columns=parameters)
     covariance = half.fillna(half.T).fillna(0.0).to_numpy()
     names = ["quantity", "number", "parameter", "value"]
-    fit = pd.DataFrame({name: tables.get(f"{choice}_fit", {}).get(name, []) for name in names})
+    fit = pd.DataFrame(dict(tables.get(f"{choice}_fit", {})), columns=names)
     fit = fit[fit["quantity"] == "undetermined_direction"]
     directions = fit.pivot(index="number", columns="parameter", values="value")
     directions = directions.reindex(columns=parameters).fillna(0.0).to_numpy(float)

@@ -15,13 +15,12 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from kinacc.calibration.fitting import Fit, fit_frames
+from kinacc.calibration.fitting import fit_frames
 from kinacc.calibration.frames import frame_terms, known
 from kinacc.calibration.least_squares import one_thread
 from kinacc.calibration.observations import Observations, from_columns
-from kinacc.calibration.residuals import errors
 from kinacc.calibration.summary import held_out_errors
-from kinacc.config.error_models import MEASURED, PLAINEST, Comparison
+from kinacc.config.error_models import PLAINEST
 from kinacc.deployment import folder, history_model
 from kinacc.deployment.history_model import Setup, joined
 from kinacc.deployment.record import Calibration
@@ -31,6 +30,7 @@ from kinacc.deployment.verify import (
     LEAST_HELD_OUT,
     STATISTICS,
     TOOL,
+    errors_of,
     frames_at,
     statistics,
 )
@@ -118,7 +118,8 @@ def history(
             setup.same_base & (session.base == SAME), setup.same_tool & (session.tool == SAME)
         )
         names = ("date", "digest", "base", "tool", "temperature_c", "bound_mm", "tolerance_mm")
-        row = {name: getattr(session, name) for name in names} | {
+        row: dict[str, Any] = dict.fromkeys(column.name for column in ARTEFACTS["history"].columns)
+        row |= {name: getattr(session, name) for name in names} | {
             "series": session.name,
             "rows": len(session.observations),
             "configurations": _count(session.observations),
@@ -131,8 +132,7 @@ def history(
         rows.append(row)
         if row["verdict"] in (FIRST, RECALIBRATE):
             force, setup = session, Setup(True, True)
-    columns = [column.name for column in ARTEFACTS["history"].columns]
-    return columns_of("history", [[row.get(name) for name in columns] for row in rows])
+    return columns_of("history", rows)
 
 
 @dataclass(frozen=True)
@@ -212,8 +212,8 @@ class _Comparison:
     def _about(self, session: Session, series: Observations, first: int) -> history_model.Pair:
         """The pair about the fitted DH model of a session, with its own base and targets."""
         robot = session.calibration.robot
-        counts = len(series.session_names), len(series.target_names)
         weight = self.rotation_weight_mm_per_rad
+        counts = len(series.session_names), len(series.target_names)
         terms = frame_terms(series, known(robot.base, carried(robot), *counts))
         frames = fit_frames(series, session.dh, rotation_weight_mm_per_rad=weight, frames=terms)
         return history_model.about(session.dh, frames, series, first, weight)
@@ -224,8 +224,8 @@ class _Comparison:
         Base and tool that were moved are fitted to the rows outside each fold, to all without.
         """
         calibration, observed = force.calibration, session.observations
-        kind, model = calibration.choice, calibration.model
-        observed = observed.select(~np.any(outside(observed.q_rad, model.domain), axis=1))
+        beyond = outside(observed.q_rad, calibration.model.domain)
+        observed = observed.select(~np.any(beyond, axis=1))
         moved = [BASE] * (not setup.same_base or len(observed.session_names) > 1)
         moved += [TOOL] * (
             not setup.same_tool or not {*observed.target_names} <= {*calibration.targets}
@@ -236,9 +236,8 @@ class _Comparison:
             train = observed.select(~tried if fold >= 0 else tried)
             if len(train):
                 frames = frames_at(calibration, train, moved, self.rotation_weight_mm_per_rad)
-                off = errors({kind: Fit(model, frames)}, observed.select(tried))
-                position_mm = off[Comparison(MEASURED, kind).name].position_mm
-                sizes.append(np.linalg.norm(position_mm, axis=1))
+                off = errors_of(calibration, frames, observed.select(tried))
+                sizes.append(np.linalg.norm(off.position_mm, axis=1))
         return np.concatenate(sizes)
 
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
+from scipy.spatial import cKDTree
 
 from kinacc.calibration import frames
 from kinacc.calibration.identifiability import STRUCTURAL, LeftOpen, joints_anywhere
@@ -207,17 +208,13 @@ def between(measured: np.ndarray, unit: np.ndarray, count: int, seed: int) -> np
     ``unit`` (k,): movements of the joints that count alike. Raises InputError where all of
     ``measured`` are the same.
     """
-    from scipy.spatial import cKDTree
-
     different = np.unique(measured, axis=0)
     if len(different) < 2:
         message = "all measured poses are at the same joints"
         raise input_error("region", message, "at least 2 different poses")
     random = np.random.default_rng(seed)
-    _, near = cKDTree(different / unit).query(
-        different / unit, min(_NEIGHBOURS + 1, len(different))
-    )
-    near = np.asarray(near)
+    count_near = min(_NEIGHBOURS + 1, len(different))
+    near = np.asarray(cKDTree(different / unit).query(different / unit, count_near)[1])
     start = random.integers(len(different), size=count)
     end = near[start, random.integers(1, near.shape[1], size=count)]
     share = random.random((count, 1))
@@ -322,26 +319,22 @@ def shortest_path(places: np.ndarray) -> np.ndarray:
     """A short open path (n,) from the first of the ``places`` (n, k): nearest neighbour, then 2-opt
     where they are few.
     """
-    count = len(places)
-    remaining, path = np.ones(count, dtype=bool), [0]
-    remaining[0] = False
-    while remaining.any():
-        distance = np.abs(places - places[path[-1]]).max(axis=1)
-        path.append(int(np.argmin(np.where(remaining, distance, np.inf))))
-        remaining[path[-1]] = False
-    order = np.array(path)
-    if count > _IMPROVED:
-        return order
-    distance = distances(places)
-    first, last = np.triu_indices(count, 1)
-    first, last = first[first >= 1], last[first >= 1]
-    after, is_end = np.minimum(last + 1, count - 1), last == count - 1
-    while len(first):
+    count, path, remaining = len(places), [0], np.arange(1, len(places))
+    while len(remaining):
+        nearest = np.argmin(np.abs(places[remaining] - places[path[-1]]).max(axis=1))
+        path.append(remaining[nearest])
+        remaining = np.delete(remaining, nearest)
+    if not 2 < count <= _IMPROVED:
+        return np.array(path)
+    # The end is free: behind it stands a place that is at no distance from any other.
+    order, distance = np.array([*path, count]), np.pad(distances(places), (0, 1))
+    first, last = 1 + np.array(np.triu_indices(count - 1, 1))
+    while True:
         ordered = distance[np.ix_(order, order)]
         gain = ordered[first - 1, first] - ordered[first - 1, last]
-        gain += np.where(is_end, 0.0, ordered[last, after] - ordered[first, after])
+        gain += ordered[last, last + 1] - ordered[first, last + 1]
         best = int(np.argmax(gain))
         if gain[best] <= _SHORTER_RAD:
-            break
-        order[first[best] : last[best] + 1] = order[first[best] : last[best] + 1][::-1]
-    return order
+            return order[:-1]
+        part = slice(first[best], last[best] + 1)
+        order[part] = order[part][::-1]

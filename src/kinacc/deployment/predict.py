@@ -53,12 +53,11 @@ class Prediction:
         absent = np.isnan(self.pose.position_mm[:, 0])
         texts = []
         for missing, outside, near in zip(absent, self.outside, self.near, strict=True):
-            joints = ", ".join(map(str, np.flatnonzero(outside) + 1))
-            message = f"joint {joints} outside the measured range" if joints else ""
-            message = message or ("" if near else "joints unlike those measured")
-            texts.append(
-                f"{'no prediction' if missing else 'extrapolated'}: {message}" if message else "ok"
-            )
+            text = "no prediction" if missing else "extrapolated"
+            if joints := ", ".join(map(str, np.flatnonzero(outside) + 1)):
+                texts.append(f"{text}: joint {joints} outside the measured range")
+            else:
+                texts.append("ok" if near else f"{text}: joints unlike those measured")
         return texts
 
     def table(self) -> pd.DataFrame:
@@ -117,15 +116,15 @@ def predict(
         For an unknown frame or point.
     """
     state = JointState(calibration.robot.dh_joints(np.atleast_2d(q_rad)), s, payload)
-    count, outside = len(state), calibration.outside_range(state.q_rad)
-    rows = np.flatnonzero(~(outside.any(axis=1) & (calibration.model.domain is not None)))
-    part, near = state.select(rows), np.zeros(count, dtype=bool)
-    pose = Pose(np.full((count, 3, 3), np.nan), np.full((count, 3), np.nan))
-    pose.rotation[rows], pose.position_mm[rows] = calibration.pose(part, frame, point)
-    std, undetermined, unexplained = (np.full((count, size), np.nan) for size in (6, 2, 2))
-    std[rows], undetermined[rows] = deviations(calibration, part, frame, point)
+    outside = calibration.outside_range(state.q_rad)
+    with np.errstate(all="ignore"):  # far outside its range a model may be no number
+        pose = calibration.pose(state, frame, point)
+        std, undetermined = deviations(calibration, state, frame, point)
+    unexplained = np.full((len(state), 2), np.nan)
     if calibration.residual is not None:
-        residual = calibration.residual
-        unexplained[rows] = residual.position_mm, residual.orientation_rad
-    near[rows] = is_measured_there(calibration, part, point)
+        unexplained[:] = calibration.residual.position_mm, calibration.residual.orientation_rad
+    if calibration.model.domain is not None:
+        for values in (*pose, std, undetermined, unexplained):
+            values[outside.any(axis=1)] = np.nan
+    near = is_measured_there(calibration, state, point)
     return Prediction(pose, std, undetermined, unexplained, outside, near)

@@ -16,7 +16,7 @@ import pandas as pd
 from kinacc.calibration.fitting import Fit, fit_frames
 from kinacc.calibration.frames import ANGLE_UNIT_RAD, MOTIONS, Frames, frame_terms, stacked
 from kinacc.calibration.observations import Observations, from_columns
-from kinacc.calibration.residuals import errors
+from kinacc.calibration.residuals import Errors, errors
 from kinacc.calibration.summary import LARGE_SHARE, held_out_errors
 from kinacc.calibration.tables import frames_of
 from kinacc.config.error_models import ERROR_MODELS, MEASURED, NOMINAL, Comparison
@@ -142,17 +142,17 @@ def verify(
     if len(observed.session_names) > 1:
         message = "are of several sessions, each with its own base"
         raise input_error("the readings", message, "readings of one session")
-    point = next((name for name in observed.target_names if name in calibration.targets), None)
-    near = is_measured_there(calibration, observed.at, point) if len(observed) else is_known[:0]
     table = model_errors(tables, observed, moved, rotation_weight_mm_per_rad)
-    held_out = _held_out(tables, calibration, observed, moved) if len(observed) else None
+    fitted = "the calibration was fitted to all of these readings"
+    result = Verification(UNDECIDED, fitted, kind, len(is_known), int(is_known.sum()), 0, table)
+    if not len(observed):
+        return result
+    point = next((name for name in observed.target_names if name in calibration.targets), None)
+    near = is_measured_there(calibration, observed.at, point)
+    held_out = _held_out(tables, calibration, observed, moved)
     rows = _whole_configurations(observed, near)
-    result = Verification(
-        UNDECIDED, "", kind, len(is_known), int(is_known.sum()), int(near.sum()), table,
-        held_out and _level(held_out),
-    )  # fmt: skip
+    result = replace(result, near=int(near.sum()), held_out=held_out and _level(held_out))
     obstacles = {
-        "the calibration was fitted to all of these readings": not len(observed),
         SET_UP_MOVED: not moved and table["mean_mm"].min() > _FAR_MM,
         FEW_HELD_OUT: held_out is None or len(held_out.columns) < LEAST_HELD_OUT,
         "no reading near a measured pose": not len(rows),
@@ -164,11 +164,9 @@ def verify(
     new = replace(new, rotation=np.full_like(new.rotation, np.nan))
     calibration = _at_session(tables, kind, new, moved)
     frames = frames_at(calibration, new, moved, rotation_weight_mm_per_rad)
-    off_mm = errors({kind: Fit(model, frames)}, new)[Comparison(MEASURED, kind).name].position_mm
+    off_mm = errors_of(calibration, frames, new).position_mm.reshape(*rows.shape, 3)
     poses = new.select(slice(None, None, rows.shape[1]))
-    fresh = error_columns(
-        model, robot, poses, frames.targets, moved, off_mm.reshape(*rows.shape, 3)
-    )
+    fresh = error_columns(model, robot, poses, frames.targets, moved, off_mm)
     result = replace(result, here=_level(fresh))
     if fresh.columns[..., -1].size <= fresh.rank:
         return replace(result, reason="base and tool explain all that these poses show")
@@ -200,10 +198,9 @@ def model_errors(
     part = observations.select(~np.any(beyond, axis=(0, 2)))
     rows = []
     for kind in sorted(fitted, key=(NOMINAL, *ERROR_MODELS).index) if len(part) else ():
-        model = fitted[kind]
         calibration = _at_session(tables, kind, part, moved)
         frames = frames_at(calibration, part, moved, rotation_weight_mm_per_rad)
-        off = errors({kind: Fit(model, frames)}, part)[Comparison(MEASURED, kind).name]
+        off = errors_of(calibration, frames, part)
         row: list[object] = [kind, len(part)]
         for vectors in (off.position_mm, 1e3 * off.rotation_rad):
             row += statistics(np.linalg.norm(vectors, axis=1))
@@ -302,6 +299,13 @@ def _at_session(
         message, allowed = "have no session, and each has its own base", ", ".join(measured)
         raise input_error("the readings", message, f"one of {allowed}")
     return folder.calibration(tables, kind, session=session)
+
+
+def errors_of(calibration: Calibration, frames: Frames, readings: Observations) -> Errors:
+    """Errors of a calibrated model at ``readings``, with their bases and targets."""
+    fit = Fit(calibration.model, frames)
+    comparison = Comparison(MEASURED, calibration.choice)
+    return errors({calibration.choice: fit}, readings)[comparison.name]
 
 
 def frames_at(

@@ -26,11 +26,10 @@ _SLIDING = "T = Rz(theta_offset) Tz(q + d) Tx(a) Rx(alpha) Ry(beta) where a join
 
 def csv_text(source: Source) -> str:
     """One row per joint, in degrees and mm."""
-    table = source.joints(source.dh)
     columns = [f"{group}{name}" for group in ("", "std_", "nominal_") for name in PARAMETERS]
-    angles = [name for name in columns if name.endswith("_rad")]
+    table = source.joints(source.dh)[["joint", "type", *columns]]
+    angles = table.filter(like="_rad").columns
     table[angles] = np.rad2deg(table[angles])
-    table = table[["joint", "type", *columns]]
     table = table.rename(columns=lambda name: name.replace("_rad", "_deg"))
     return table.to_csv(index=False, float_format="%.12g", lineterminator="\n")
 
@@ -42,6 +41,7 @@ def json_text(source: Source) -> str:
     """
     arm, robot = source.calibration, source.calibration.robot
     dh, remaining = arm.model.dh, arm.residual
+    turn_mrad = 1e3 * remaining.orientation_rad if remaining else np.nan
     content: dict[str, object] = {
         "name": source.name,
         "robot": robot.name,
@@ -55,18 +55,16 @@ def json_text(source: Source) -> str:
         "base_in_instrument": _frame(arm.base),
         "targets_in_last_dh_frame": {name: _frame(pose) for name, pose in arm.targets.items()},
         "orientation_of_targets": {name: arm.orientation_source(name) for name in arm.targets},
-        "residual": None,
+        "residual": remaining
+        and {
+            "subset": remaining.subset,
+            "position_rms_mm": remaining.position_mm,
+            "orientation_rms_mrad": None if np.isnan(turn_mrad) else turn_mrad,
+        },
         "standard_deviations": source.misfit.as_facts(),
         "undetermined": arm.left_open,
         "provenance": source.provenance,
     }
-    if remaining is not None:
-        turn = 1e3 * remaining.orientation_rad
-        content["residual"] = {
-            "subset": remaining.subset,
-            "position_rms_mm": remaining.position_mm,
-            "orientation_rms_mrad": turn if np.isfinite(turn) else None,
-        }
     if arm.model.table is None:
         table = pd.DataFrame(source.tables[f"{arm.choice}_model"])
         content |= {

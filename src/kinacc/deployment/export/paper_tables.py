@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from kinacc.calibration.identifiability import FIXED
-from kinacc.calibration.misfit import in_words, misfit
+from kinacc.calibration.misfit import in_words
 from kinacc.config.error_models import ERROR_MODELS, MEASURED, PLAINEST, Comparison, model_name
 from kinacc.config.names import in_markdown
 from kinacc.deployment.export.source import Source
@@ -92,18 +92,18 @@ def _parameters(source: Source) -> PaperTable:
     shown = PARAMETERS if fitted["beta_rad"].any() else PARAMETERS[:-1]
     cells = pd.DataFrame({"joint": fitted["joint"].astype(str)})
     for name in shown:
-        columns = fitted[["joint", name, f"nominal_{name}", f"std_{name}"]]
-        texts = []
-        for joint, value, nominal, std in columns.itertuples(index=False):
-            if name == "beta_rad" and not np.isfinite(std) and value == nominal:
-                texts.append("-")
-            elif f"j{joint}.{name}" in fixed:
-                texts.append(f"{value:g} (fixed)")
-            else:
-                texts.append(with_deviation(value, std))
-        cells[_HEADS[name]] = texts
-    worth = misfit(source.tables, source.calibration.robot, PLAINEST)
-    notes = [f"One standard deviation behind ±, {in_words([worth])}."]
+        names = "j" + cells["joint"] + f".{name}"
+        cells[_HEADS[name]] = np.select(
+            [
+                (name == "beta_rad")
+                & fitted[f"std_{name}"].isna()
+                & (fitted[name] == fitted[f"nominal_{name}"]),
+                names.isin(fixed),
+            ],
+            ["-", fitted[name].map("{:g} (fixed)".format)],
+            list(map(with_deviation, fitted[name], fitted[f"std_{name}"])),
+        )
+    notes = [f"One standard deviation behind ±, {in_words([source.misfit])}."]
     marks = "".join(cells.to_numpy().ravel())
     if "†" in marks:
         notes.append("† only determined together with others: one of many values that fit as well.")

@@ -45,9 +45,8 @@ class Source:
     @property
     def about(self) -> str:
         """Where the arm comes from."""
-        return (
-            f"calibrated from {self.calibration.robot.name} with data set {self.calibration.name}"
-        )
+        arm = self.calibration
+        return f"calibrated from {arm.robot.name} with data set {arm.name}"
 
     @property
     def dh(self) -> DHModel:
@@ -62,16 +61,17 @@ class Source:
         NaN where there is no standard deviation.
         """
         joint = np.arange(1, dh.joints + 1)
-        fitted = pd.DataFrame(self.tables.get(f"{self.calibration.choice}_model", {}))
-        if "joint" not in fitted:  # no fit, or a registered model
-            fitted = pd.DataFrame({"joint": joint})
-        fitted = fitted.drop_duplicates("joint").set_index("joint").reindex(joint)
         table = {"joint": joint, "type": np.where(dh.prismatic, "prismatic", "revolute")}
         for name in PARAMETERS:
             table[name] = getattr(dh, name)
             table[f"nominal_{name}"] = getattr(self.calibration.robot.dh, name)
-            table[f"std_{name}"] = fitted.get(f"std_{name}", pd.Series(np.nan, joint)).to_numpy()
-        return pd.DataFrame(table)
+        # Columns that a table lacks, as that of no fit or of a registered model, are NaN.
+        fitted = pd.DataFrame(
+            dict(self.tables.get(f"{self.calibration.choice}_model", {})),
+            columns=["joint", *(f"std_{name}" for name in PARAMETERS)],
+        )
+        fitted = fitted.drop_duplicates("joint").set_index("joint").reindex(joint).astype(float)
+        return pd.DataFrame(table).join(fitted.reset_index(drop=True))
 
     @cached_property
     def misfit(self) -> Misfit:

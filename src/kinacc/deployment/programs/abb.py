@@ -120,9 +120,7 @@ def read(sources: Sequence[Source], _: np.ndarray | None) -> Program:
             (tool, base, refused.get(tool) or refused.get(base, ""))
             for tool, base in uses.get(start, {(None, None)})
         }
-        array = [item for item, name in names.items() if name == names.get(start)]
-        index = f"{{{array.index(start) + 1}}}" if len(array) > 1 else ""
-        name = names.get(start, source.line(start)) + index
+        name = names.get(start, source.line(start))
         positions.append(in_use(_position(name, source, start, end), ways))
     return Program(sources, positions, CONVENTION, [*dict.fromkeys(computed)])
 

@@ -178,13 +178,17 @@ def outside(
 
 
 def take_turns(
-    robot: Robot, q_rad: np.ndarray, preferred_rad: tuple[np.ndarray, np.ndarray] | None = None
+    robot: Robot,
+    q_rad: np.ndarray,
+    preferred_rad: tuple[np.ndarray, np.ndarray] | None = None,
+    near_rad: np.ndarray | float = 0.0,
+    slack: float = _ROUND_OFF_RAD,
 ) -> np.ndarray:
-    """Joints moved by whole turns: inside the limits, inside the preferred box, near zero.
+    """Joints moved by whole turns: inside the limits, inside the preferred box, near others.
 
-    Of all turns within the limits the one within ``preferred_rad`` that is nearest to zero is
-    taken; where none lies within both, the one within the limits nearest to zero; where none does,
-    the one in (-pi, pi]. Joints that slide stay.
+    Of all turns within the limits the one within ``preferred_rad`` that is nearest to ``near_rad``
+    is taken; where none lies within both, the one within the limits that is nearest; where none
+    does, the one at most half a turn away. Joints that slide stay.
 
     Parameters
     ----------
@@ -195,6 +199,10 @@ def take_turns(
     preferred_rad : tuple of numpy.ndarray, optional
         Ends (k,), (k,) of the DH joints a model was fitted over: a Chebyshev error differs between
         q and q + 2 pi.
+    near_rad : numpy.ndarray or float
+        DH joints, shape (..., k).
+    slack : float
+        Distance beyond limits and box that is allowed.
 
     Returns
     -------
@@ -202,15 +210,14 @@ def take_turns(
         DH joints, shape (..., k).
     """
     # Half a turn is a tie that round-off must not decide: it counts as +pi.
-    base = q_rad - _TWO_PI * np.rint(q_rad / _TWO_PI)
-    base = np.where(base < -np.pi + _TIE_RAD, base + _TWO_PI, base)
+    apart = q_rad - near_rad
+    apart = apart - _TWO_PI * np.rint(apart / _TWO_PI)
+    apart = np.where(apart < -np.pi + _TIE_RAD, apart + _TWO_PI, apart)
     # These reach every turn a +-720 degree joint has.
-    angle = np.stack([base + turns * _TWO_PI for turns in (0, -1, 1, -2, 2)])
-    cost = np.abs(angle)
-    for weight, box in ((2.0 * _OUTSIDE, dh_limits(robot)), (_OUTSIDE, preferred_rad)):
-        if box is not None:
-            outside = (angle < box[0] - _ROUND_OFF_RAD) | (angle > box[1] + _ROUND_OFF_RAD)
-            cost += weight * outside
+    angle = near_rad + np.stack([apart + turns * _TWO_PI for turns in (0, -1, 1, -2, 2)])
+    cost = np.abs(angle - near_rad)
+    cost += 2.0 * _OUTSIDE * outside(angle, dh_limits(robot), slack)
+    cost += _OUTSIDE * outside(angle, preferred_rad, slack)
     best = np.take_along_axis(angle, cost.argmin(axis=0)[None], axis=0)[0]
     best = np.where(robot.dh.prismatic, q_rad, best)
     # Turns of coupled joints, where a whole turn of a reported joint is one of DH joints too.
