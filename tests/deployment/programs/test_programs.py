@@ -90,6 +90,34 @@ def test_frames_that_are_missing_are_asked_for(tmp_path):
     assert asked == [("base", "1")]
 
 
+def test_joints_are_corrected_where_the_tool_they_name_is(tmp_path):
+    """The same joints of one arm with the same tool, as a table, a listing and a program."""
+    numbers = np.array([30.0, -20.0, 150.0, -29.0, 1.0, 41.0])
+    arm, q_deg = calibrated("irb120"), (20.0, 10.0, 15.0, 30.0, 40.0, 5.0)
+    axes = ", ".join(f"A{axis} {value}" for axis, value in enumerate(q_deg, 1))
+    joints = ", ".join(f"J{axis} = {value} deg" for axis, value in enumerate(q_deg, 1))
+    texts = {
+        "own.csv": f"{','.join(f'q{axis}_deg' for axis in range(1, 7))}\n{str(q_deg)[1:-1]}\n",
+        "own.ls": f"/POS\nP[1]{{\n GP1:\n UF : 1, UT : 1,\n {joints}\n}};",
+        "own.src": f"BAS(#TOOL,1)\nPTP {{{axes}}}",
+    }
+    written = []
+    for name, text in texts.items():
+        (tmp_path / name).write_text(text)
+        given = {"" if name == "own.csv" else "1": numbers}
+        if name == "own.src":
+            given["1"] = np.r_[numbers[:3], numbers[5:2:-1]]  # A, B, C turn about z, y, x
+        found = compensate_program(arm, tmp_path / name, given)
+        (content,) = found.files.values()
+        written.append([float(number) for number in re.findall(rb"-?\d+\.\d+", content)])
+        if name != "own.csv":
+            with pytest.raises(InputError, match="--tool"):
+                compensate_program(arm, tmp_path / name)
+    table, listing, program = written
+    assert listing == pytest.approx(table, abs=1e-3)
+    assert program == pytest.approx(table, abs=1e-4)
+
+
 def test_files_without_positions_are_refused(tmp_path):
     for name, text, message in (
         ("own.txt", "", "no robot language"),

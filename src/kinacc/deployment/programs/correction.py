@@ -311,6 +311,8 @@ def _all_frames(program: Program, options: Options, ask: Ask | None) -> Frames:
     frames, problems = dict(program.frames), []
     poses = [item for item in program.positions if item.has_frames]
     wanted = {(kind, getattr(item, kind) or "") for item in poses for kind in (TOOL, BASE)}
+    # Joints are corrected where their tool is: its name asks for it, and one for all is theirs.
+    wanted |= {(TOOL, item.tool) for item in program.positions if item.tool and not item.refused}
     wanted |= {(TOOL, name) for name in options[TOOL] if not name}
     for kind, name in sorted(wanted - set(frames)):
         numbers = options[kind].get(name, options[kind].get(""))
