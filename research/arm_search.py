@@ -72,7 +72,7 @@ def bench_of(config: Mapping) -> Bench:
     # Poses, folds, joint range and points are those of any arm on the geometry of Table II.
     start = {"measurements": measured(bench, _UNTUNED)}
     made = in_memory.run(acceptance.STAGES, config, start)
-    fitted = vec.VECModel.from_columns(made["vec_model"])
+    fitted = vec.VECModel.from_columns(made["vec_model"], TABLE_II)
     empty = vec.without_errors(TABLE_II, fitted.q_min_rad, fitted.q_max_rad, fitted.order)
     seen = made["measurements"]
     every = from_columns(seen, bench.robot)

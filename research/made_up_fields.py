@@ -113,7 +113,7 @@ def _with_defect(
     start = rng.uniform(0.3, 0.7)
     low, high = np.quantile(angle, [start, start + _DEFECT_SHARE])
     worn = (angle >= low) & (angle < high)
-    lever = dh.joint_jacobian(arm.dh, q_rad)[:, :3, 1]
+    lever = arm.dh.joint_jacobian(JointState(q_rad))[:, :3, 1]
     return error_mm + np.where(worn[:, None], lever * _DEFECT_RAD, 0.0)
 
 

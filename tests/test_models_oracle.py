@@ -9,6 +9,7 @@ import pytest
 from oracles import kinematics as oracle
 
 from kinacc.kinematics import chain, dh, vec
+from kinacc.kinematics.model import JointState
 
 
 def dh_table(rng, joints):
@@ -53,7 +54,7 @@ def test_vec_forward_equals_the_plain_loop(joints, order):
     q = low + (high - low) * place
     model = vec.VECModel(dh.DHModel(*table.T), low, high, series, offsets)
     expected = oracle.vec_forward(table, series, low, high, offsets, q, s)
-    printed = chain.to_pose(vec.walk(model, q[None], s[None]).end)
+    printed = chain.to_pose(model.walk(JointState(q[None], s[None])).end)
     assert_same(printed.rotation[0], printed.position_mm[0], expected)
     pose = vec.pose(model, q[None], s[None])
     assert_same(pose.rotation[0], pose.position_mm[0], oracle.projected(expected))

@@ -39,18 +39,18 @@ class Pose(NamedTuple):
     rotation: np.ndarray
     position_mm: np.ndarray
 
-    def select(self, rows: np.ndarray | slice) -> Pose:
+    def select(self, rows: np.ndarray | slice | int) -> Pose:
         """Select frames of the first axis.
 
         Parameters
         ----------
-        rows : numpy.ndarray or slice
-            Mask (n,), indices (m,) or slice.
+        rows : numpy.ndarray, slice or int
+            Mask (n,), indices (m,), slice, or the number of a single frame.
 
         Returns
         -------
         Pose
-            The m frames, in the same parent frame, mm.
+            The m frames, or the single one, in the same parent frame, mm.
         """
         return Pose(self.rotation[rows], self.position_mm[rows])
 

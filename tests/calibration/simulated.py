@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from kinacc.calibration import fitting
+from kinacc.calibration.frames import Frames
 from kinacc.calibration.observations import Observations
 from kinacc.geometry import Pose, compose, exp_so3
 from kinacc.kinematics import dh
@@ -38,6 +39,10 @@ def far_off(model, free, rng):
 def anywhere(rng, distance_mm, count=None):
     shape = (3,) if count is None else (count, 3)
     return Pose(exp_so3(rng.normal(size=shape)), distance_mm * rng.normal(size=shape))
+
+
+def frames_of(bases, targets):
+    return Frames(Pose(*map(np.concatenate, zip(bases, targets, strict=True))), len(bases[0]))
 
 
 def measure(

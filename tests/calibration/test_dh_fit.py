@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from simulated import POINT, POSE, anywhere, far_off, fit, measure, predicted
+from simulated import POINT, POSE, anywhere, far_off, fit, frames_of, measure, predicted
 
 from kinacc.calibration import frames
 from kinacc.calibration.dh_estimator import free_parameters
@@ -23,7 +23,7 @@ def test_poses_are_found_again_from_five_degrees_and_twenty_mm(name, hayati, mod
         rng = np.random.default_rng(seed)
         true, known = far_off(arm.dh, free, rng), frames.known()
         if mode != "known":
-            known = frames.Frames(anywhere(rng, 2000.0, 1), anywhere(rng, 100.0, 1))
+            known = frames_of(anywhere(rng, 2000.0, 1), anywhere(rng, 100.0, 1))
         q = rng.uniform(-REACH, REACH, (90, 6))
         kind = POINT if mode == POINT else POSE
         seen = measure(true, q, kind, rng, frames=(known.bases, known.targets))

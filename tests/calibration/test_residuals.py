@@ -24,7 +24,7 @@ Q = np.random.default_rng(0).uniform(-0.5, 0.5, (COUNT, 6))
 def test_errors_are_measured_minus_model_in_the_robot_base():
     """Of three models that are the nominal arm; readings are off in the robot base."""
     empty = vec.without_errors(ARM.dh, np.full(6, -1.0), np.full(6, 1.0), 1)
-    frames = Frames(stacked([BASE]), stacked([TOOL]))
+    frames = Frames(stacked([BASE, TOOL]), 1)
     models = {"vec": empty, "dh": ARM.dh, "nominal": ARM.dh}
     fits = {name: Fit(model, frames) for name, model in models.items()}
     shift, turn = np.array([0.5, -0.2, 0.1]), np.array([1e-3, -2e-3, 5e-4])

@@ -30,11 +30,11 @@ def observed(kind=POSE, count=60, seed=0, sessions=1):
 
 
 def fitted(observations, arm_rules=None, frame_rules=None, **settings):
-    arm = dh_estimator.arm_terms(ARM.dh, FREE, rules(arm_rules or {}))
+    arm, free, std = dh_estimator.arm_terms(ARM.dh, FREE, rules(arm_rules or {}))
     count = len(observations.session_names), len(observations.target_names)
     stated = frames.known(ARM.base, robot.carried(ARM), *count)
     terms = frames.frame_terms(observations, stated, rules(frame_rules or {}))
-    return fit(observations, arm.nominal, arm.free, std=arm.std, frames=terms, **settings)
+    return fit(observations, arm, free, std=std, frames=terms, **settings)
 
 
 @pytest.mark.parametrize("kind", [POINT, THREE, POSE])

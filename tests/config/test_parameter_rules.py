@@ -22,12 +22,12 @@ def test_the_rule_that_says_most_holds_in_any_order():
     nominal = load("mh180").dh
     for names in (list(content), list(content)[::-1]):
         rules = joint_rules({name: content[name] for name in names})
-        terms = arm_terms(nominal, free_parameters(6), rules)
-        np.testing.assert_array_equal(terms.free[:, 1], [False, False, True, True, False, False])
-        assert terms.std[2, 1] == 0.5
-        assert np.isinf(np.delete(terms.std, 2, axis=0)).all()
-        assert terms.free[:, [0, 2, 3]].all()
-        assert not terms.free[:, 4].any()
+        _, free, std = arm_terms(nominal, free_parameters(6), rules)
+        np.testing.assert_array_equal(free[:, 1], [False, False, True, True, False, False])
+        assert std[2, 1] == 0.5
+        assert np.isinf(np.delete(std, 2, axis=0)).all()
+        assert free[:, [0, 2, 3]].all()
+        assert not free[:, 4].any()
 
 
 def test_values_are_in_the_units_they_say_and_fix_without_a_prior():
@@ -39,13 +39,13 @@ def test_values_are_in_the_units_they_say_and_fix_without_a_prior():
         }
     )
     nominal = load("mh180").dh
-    terms = arm_terms(nominal, free_parameters(6), rules)
-    assert terms.nominal.alpha_rad[1] == pytest.approx(np.pi / 2)
-    assert not terms.free[1, 3]
-    assert (terms.nominal.d_mm[3], terms.std[3, 1]) == (-1224.0, 2.0)
-    assert terms.free[3, 1]
-    assert terms.std[0, 0] == pytest.approx(3e-3)
-    assert terms.nominal.theta_offset_rad[0] == nominal.theta_offset_rad[0]
+    arm, free, std = arm_terms(nominal, free_parameters(6), rules)
+    assert arm.alpha_rad[1] == pytest.approx(np.pi / 2)
+    assert not free[1, 3]
+    assert (arm.d_mm[3], std[3, 1]) == (-1224.0, 2.0)
+    assert free[3, 1]
+    assert std[0, 0] == pytest.approx(3e-3)
+    assert arm.theta_offset_rad[0] == nominal.theta_offset_rad[0]
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ from small_arms import bent
 from kinacc.deployment.compensate import FEW_AXES_TURN_RAD, PoseStatus, compensate
 from kinacc.deployment.record import nominal
 from kinacc.geometry import Pose, log_so3, rotation_x, skew
-from kinacc.kinematics import dh, robot
+from kinacc.kinematics import robot
 from kinacc.kinematics.model import JointState
 
 SCARA = """
@@ -58,7 +58,7 @@ def test_the_point_is_exact_and_no_joint_turns_it_nearer(name):
     assert turn.max() > 1e-4  # the plain arm's orientation is out of the real one's reach
     # To first order nothing that leaves the point where it is turns it nearer.
     unit = np.where(arm.robot.dh.prismatic, 1e3, 1.0)
-    slopes = dh.joint_jacobian(arm.model, found.q_rad)
+    slopes = arm.model.joint_jacobian(JointState(found.q_rad))
     lever = (
         arm.model.pose(JointState(found.q_rad)).rotation @ arm.point(None).position_mm[:, None]
     )[..., 0]

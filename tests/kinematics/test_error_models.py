@@ -110,7 +110,7 @@ def test_every_parameter_has_a_name_a_slope_and_a_place_in_the_table(model, at):
 
 def test_a_model_comes_back_from_its_table_bit_by_bit(model, at):
     columns = model.to_columns(np.ones(len(model.names)))
-    again = of_kind(model.kind).from_columns(columns, model.dh.prismatic)
+    again = of_kind(model.kind).from_columns(columns, model.dh)
     for one, other in zip(model.pose(at), again.pose(at), strict=True):
         np.testing.assert_array_equal(one, other)
     np.testing.assert_array_equal(model.domain, again.domain)

@@ -59,7 +59,7 @@ def test_differences_have_their_unit_and_standard_deviation():
 def errors(model: dict, slides=False, **tables):
     """Errors and standard deviations of joints by name, j1.eps_z, over the joint's range."""
     arm = robot(slides)
-    of_columns = vec.VECModel.from_columns(model, arm.dh.prismatic)
+    of_columns = vec.VECModel.from_columns(model, arm.dh)
     _, values, std = fit_sections.vec_errors({"vec_model": model} | tables, of_columns, arm)
     names = [f"j{joint}.{error}" for joint in range(1, 5) for error in ERRORS]
     flat = [each.reshape(len(names), -1) for each in (values, std)]
@@ -93,7 +93,7 @@ def test_what_is_left_out_changes_no_pose_where_the_neighbour_takes_it_over(slid
     arm = robot(slides)
     if not slides:
         q = arm.q_max_rad * np.random.default_rng(1).uniform(-1, 1, (20, 4))
-        same = vec.pose(vec.VECModel.from_columns(model, arm.dh.prismatic), q)
+        same = vec.pose(vec.VECModel.from_columns(model, arm.dh), q)
         assert same.position_mm == pytest.approx(forward(arm.dh, q).position_mm, abs=1e-4)
     found, _ = errors(model, slides)
     for error in ERRORS:

@@ -76,7 +76,11 @@ class AdaptiveAssessor(Protocol):
     confidence: float
 
     def begin(self, candidates: Candidates) -> Campaign:
-        """A new campaign without readings."""
+        """A new campaign without readings: here one that reads the first candidates once."""
+        return Campaign(self, candidates)
+
+    def state(self, ledger: Ledger) -> tuple[Statement, ...]:
+        """The statements that the readings of such a campaign allow, the main one first."""
         ...
 
     def shortfall(self, points: int) -> Reason | None:
@@ -94,7 +98,7 @@ class Ledger:
         self.visited: list[int] = []  # in the order of their first readings
         # Every reading in order: its row, its numbers, its covariance where not the planned one.
         self.readings: list[tuple[int, list[float], np.ndarray | None]] = []
-        self._unplanned: set[int] = set()  # rows with readings of other covariance
+        self.unplanned: set[int] = set()  # rows with readings of other covariance
         self.mean_mm = np.zeros((points, 3))
         self.noise_mm = np.full(points, math.inf)  # of the mean, per axis, root mean square
         self._weight = np.zeros((points, 3, 3))  # sum of inverse covariances
@@ -125,7 +129,7 @@ class Ledger:
         self.readings.append((point, reading.tolist(), covariance))
         inverse = self.candidates.inverses[point]
         if covariance is not None:
-            self._unplanned.add(point)
+            self.unplanned.add(point)
             inverse = np.linalg.inv(covariance)
         self._weight[point] += inverse
         self._weighted[point] += inverse @ reading
@@ -139,10 +143,6 @@ class Ledger:
         spread, noise = self.spread_mm2[point], self.noise_mm.item(point)
         uneven = np.abs(spread - noise**2 * np.eye(3)).max() > _SYMMETRY * noise**2
         return spread if uneven else noise
-
-    def as_planned(self, point: int) -> bool:
-        """Whether all readings of a point came with the covariance planned for it."""
-        return point not in self._unplanned
 
     def covariances(self, places: Iterable[int]) -> np.ndarray:
         """Covariances (n, 3, 3) of the readings at these places (0 = first)."""
@@ -175,24 +175,26 @@ class Campaign:
 
     ``first``: rows 0 to ``first`` - 1 are visited whatever is read, each before any other point.
     ``reference_poses``: of these, rows 0 to ``reference_poses`` - 1 come first of all, and are read
-    again by plan. ``ledger``: the readings that count, for others to look at and not to change. A
-    campaign of one's own has ``next`` and ``statements``; the rest is here.
+    again by plan. ``ledger``: the readings that count, for others to look at and not to change.
+    Here each of the first rows is read once; a campaign that decides as it goes has ``next`` and
+    ``statements`` of its own.
     """
 
-    first = 0
     reference_poses = 0
 
     def __init__(self, settings: AdaptiveAssessor, candidates: Candidates) -> None:
         self.settings = settings
         self.ledger = Ledger(candidates)
+        points = candidates.points
+        self.first = min(getattr(settings, "measurements", points), points)
 
     def next(self) -> int | None:
         """The row to measure next; None if no further measurement is wanted."""
-        raise NotImplementedError
+        return self.ledger.taken if self.ledger.taken < self.first else None
 
     def statements(self) -> tuple[Statement, ...]:
         """What the readings so far allow to say, the main statement first."""
-        raise NotImplementedError
+        return self.settings.state(self.ledger)
 
     def visit(self) -> tuple[int, ...]:
         """Rows in the order in which they are read whatever is read, until readings decide."""
@@ -232,36 +234,6 @@ class Campaign:
         """
         error = 1.0 - self.settings.confidence
         return self.ledger.limits_mm(error / max(len(self.ledger.visited), 1), error)
-
-
-class OnceAssessor(AdaptiveAssessor, Protocol):
-    """Reads each of the first points once and makes its statements from the ledger."""
-
-    def state(self, ledger: Ledger) -> tuple[Statement, ...]:
-        """The statements that the readings allow, the main one first."""
-        ...
-
-    def begin(self, candidates: Candidates) -> Campaign:
-        """A new campaign."""
-        return OnceCampaign(self, candidates)
-
-
-class OnceCampaign(Campaign):
-    """One reading each of the first points."""
-
-    settings: OnceAssessor
-
-    def __init__(self, settings: OnceAssessor, candidates: Candidates) -> None:
-        super().__init__(settings, candidates)
-        self.first = min(settings.measurements, candidates.points)
-
-    def next(self) -> int | None:
-        """The next point in order."""
-        return self.ledger.taken if self.ledger.taken < self.first else None
-
-    def statements(self) -> tuple[Statement, ...]:
-        """Those of the assessor."""
-        return self.settings.state(self.ledger)
 
 
 def covariance_faults(covariance_mm2: np.ndarray) -> list[tuple[int, str]]:

@@ -353,7 +353,7 @@ class Looks:
         if self.missing(point):
             return
         ledger, looks = self.ledger, self._seen[point]
-        planned = ledger.as_planned(point)
+        planned = point not in ledger.unplanned
         looks.append(_Look(ledger.mean_mm[point].copy(), ledger.noise(point), planned))
         limit = self._upper_mm(point, len(looks) - 1, self.boundary, self.factor)
         self.upper_mm[point] = min(self.upper_mm[point], limit)

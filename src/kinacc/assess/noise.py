@@ -222,7 +222,7 @@ class CampaignNoise:
         scatter = None
         if not self.estimating and not self.is_bounded:
             tested, margin = self.settings.noise_freedom or math.inf, self.margin
-            false = false_scatter(self.settings.references)
+            false = BESIDE_REFERENCES if self.settings.references else SCATTER
             scatter = scatter_alarm(self.telling, tested=tested, margin=margin, false=false)
         return tuple(alarm for alarm in (scatter, tails) if alarm is not None)
 
@@ -278,11 +278,6 @@ def estimated_factor(
         np.bincount(differences.rows, differences.squares, points) / np.maximum(count, 1)
     )
     return value, np.where(count >= FEWEST, np.maximum(factors, value), value)
-
-
-def false_scatter(references: int) -> float:
-    """Probability that noise as stated is ever called larger, beside so many references."""
-    return BESIDE_REFERENCES if references else SCATTER
 
 
 def scatter_alarm(

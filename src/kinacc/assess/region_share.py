@@ -10,7 +10,7 @@ from pydantic import Field, PositiveInt
 from pydantic.dataclasses import dataclass
 from scipy.special import bdtr, bdtrc, chdtri, ndtr
 
-from kinacc.assess.adaptive import STRICT, Confidence, Ledger, OnceAssessor
+from kinacc.assess.adaptive import STRICT, AdaptiveAssessor, Confidence, Ledger
 from kinacc.assess.statement import CONFIDENCE, REGION, Reason, Statement
 
 _DEVIATIONS = 1.0  # added to a reading for its upper limit
@@ -18,7 +18,7 @@ _LIFTED = 0.01  # probability that noise alone lifts a reading by more than is t
 
 
 @dataclass(frozen=True, config=STRICT)
-class RegionShare(OnceAssessor):
+class RegionShare(AdaptiveAssessor):
     """Read random points once; order statistics bound the size that ``share`` does not exceed.
 
     Upper bound: a reading plus one standard deviation is at least the true size with probability

@@ -8,12 +8,12 @@ from typing import ClassVar
 from pydantic import PositiveInt
 from pydantic.dataclasses import dataclass
 
-from kinacc.assess.adaptive import STRICT, Confidence, Ledger, OnceAssessor
+from kinacc.assess.adaptive import STRICT, AdaptiveAssessor, Confidence, Ledger
 from kinacc.assess.statement import CANDIDATES, CONFIDENCE, MEASURED, Reason, Statement
 
 
 @dataclass(frozen=True, config=STRICT)
-class SingleShot(OnceAssessor):
+class SingleShot(AdaptiveAssessor):
     """Measure each point once, up to ``measurements`` points.
 
     Upper bound: the smallest size such that one reading at a point of that size exceeds what was

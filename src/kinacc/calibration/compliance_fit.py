@@ -8,17 +8,14 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from kinacc.calibration import tables
 from kinacc.calibration.dh_estimator import DHEstimator
 from kinacc.calibration.fitting import Fit, ModelFit, scales
 from kinacc.calibration.frames import ANGLE_UNIT_RAD
 from kinacc.calibration.models import Common, Estimator
 from kinacc.calibration.observations import Observations
-from kinacc.calibration.uncertainty import Uncertainty
 from kinacc.config.records import Settings
 from kinacc.kinematics.compliance import ComplianceModel
 from kinacc.kinematics.robot import Robot
-from kinacc.tables.columns import Columns
 
 _NO_MOMENT = 1e-6  # N m, or mm of lever: far above rounding, far below what bends a joint
 
@@ -75,25 +72,18 @@ class ComplianceEstimator(Estimator):
 
     def fit(self, observations: Observations, others: Mapping[str, Fit]) -> ModelFit:
         """The bent arm closest to the measurements, whatever the DH model follows."""
-        arm = self.dh.arm
-        nominal = replace(self.stiff, dh=arm.nominal)
-        more = len(nominal.names) - arm.free.size
+        nominal = replace(self.stiff, dh=self.dh.nominal)
+        more = len(nominal.names) - self.dh.free.size
         return self.common.fit(
             observations,
             nominal,
-            free=np.concatenate([arm.free.ravel(), np.ones(more, dtype=bool)]),
-            std=np.concatenate([arm.std.ravel(), np.full(more, np.inf)]),
+            free=np.concatenate([self.dh.free.ravel(), np.ones(more, dtype=bool)]),
+            std=np.concatenate([self.dh.std.ravel(), np.full(more, np.inf)]),
             scale=_scales(nominal, observations),
             threshold=self.dh.threshold,
             loss=self.dh.loss,
             name="compliance fit",
         )
-
-    def tables(
-        self, fitted: ModelFit, known: Uncertainty, observations: Observations
-    ) -> dict[str, Columns]:
-        """How the fit went."""
-        return {"compliance_fit": tables.fit_columns("compliance_fit", fitted, known)}
 
 
 def _body(section: Settings) -> np.ndarray:

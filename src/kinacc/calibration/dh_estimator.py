@@ -8,35 +8,19 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from kinacc.calibration import identifiability, tables
 from kinacc.calibration.fitting import Fit, ModelFit, distinct
-from kinacc.calibration.frames import FrameParameters, Frames, ruled, stacked
+from kinacc.calibration.frames import FrameParameters, ruled, stacked
 from kinacc.calibration.models import Common, Estimator
 from kinacc.calibration.observations import Observations
-from kinacc.calibration.uncertainty import Uncertainty
 from kinacc.config import parameter_rules
 from kinacc.config.parameter_rules import Rule
 from kinacc.config.records import Settings
-from kinacc.geometry import IDENTITY
+from kinacc.geometry import IDENTITY, Pose
 from kinacc.kinematics.dh import PARAMETERS, DHModel
 from kinacc.kinematics.robot import Robot
 from kinacc.kinematics.robot.axes import NEARLY_PARALLEL
-from kinacc.tables.columns import Columns
 
 _BETA, _D = PARAMETERS.index("beta_rad"), PARAMETERS.index("d_mm")
-
-
-@dataclass(frozen=True)
-class ArmTerms:
-    """``free`` (k, 5) parameters of an arm and what is known of all beforehand.
-
-    ``nominal``: where the others stay and what priors expect; ``std`` (k, 5) of the priors in mm
-    and rad, inf for none.
-    """
-
-    nominal: DHModel
-    free: np.ndarray
-    std: np.ndarray
 
 
 def parallel_joints(model: DHModel) -> tuple[int, ...]:
@@ -89,8 +73,10 @@ def free_parameters(
     return free
 
 
-def arm_terms(nominal: DHModel, free: np.ndarray, rules: Sequence[Rule] = ()) -> ArmTerms:
-    """Terms of an arm: free by default or by rules.
+def arm_terms(
+    nominal: DHModel, free: np.ndarray, rules: Sequence[Rule] = ()
+) -> tuple[DHModel, np.ndarray, np.ndarray]:
+    """What a fit takes for granted of an arm, by default or by rules.
 
     Parameters
     ----------
@@ -104,13 +90,16 @@ def arm_terms(nominal: DHModel, free: np.ndarray, rules: Sequence[Rule] = ()) ->
 
     Returns
     -------
-    ArmTerms
-        Mask, nominal values and standard deviations of priors, in mm and rad.
+    nominal : DHModel
+        Where parameters that are not free stay and what priors expect.
+    free : numpy.ndarray
+        True where estimated, shape (k, 5).
+    std : numpy.ndarray
+        Of priors, shape (k, 5) in mm and rad, inf for none.
     """
     about = [(name, joint, None) for joint in range(1, len(free) + 1) for name in PARAMETERS]
     chosen, values, std = ruled(rules, about, free.ravel(), nominal.start)
-    shape = free.shape
-    return ArmTerms(nominal.with_parameters(values), chosen.reshape(shape), std.reshape(shape))
+    return nominal.with_parameters(values), chosen.reshape(free.shape), std.reshape(free.shape)
 
 
 _AUTO = "auto"
@@ -126,8 +115,8 @@ class DHEstimator(Estimator):
     ----------
     follows_vec : bool
         The DH model follows the VEC at the measured joints instead of the measurements.
-    arm : ArmTerms
-        What the fit takes for granted of the arm.
+    nominal, free, std
+        See ``arm_terms``.
     loss : str
         squares, huber or tukey.
     threshold : float
@@ -135,7 +124,9 @@ class DHEstimator(Estimator):
     """
 
     follows_vec: bool
-    arm: ArmTerms
+    nominal: DHModel
+    free: np.ndarray
+    std: np.ndarray
     loss: str
     threshold: float
 
@@ -150,19 +141,20 @@ class DHEstimator(Estimator):
         return cls(
             Common.of(calibration, arm),
             section["fit_to"] == "vec",
-            arm_terms(arm.dh, free, parameter_rules.rules(section["parameters"])),
+            *arm_terms(arm.dh, free, parameter_rules.rules(section["parameters"])),
             section["loss"],
             section["truncation"],
         )
 
     def fit(self, observations: Observations, others: Mapping[str, Fit]) -> ModelFit:
         """The DH model; base and targets are those of the VEC model where it follows that."""
-        arm, settings = self.arm, {}
-        free, std, held = arm.free, arm.std, False
+        settings, free, std, held = {}, self.free, self.std, False
         followed = others["vec"] if self.follows_vec else None
         if followed:
-            frames = Frames(stacked([IDENTITY]), followed.frames.targets)
-            observations = _of_one_base(observations)
+            bases = [IDENTITY] * followed.frames.sessions
+            frames = replace(
+                followed.frames, poses=stacked([*bases, *map(Pose, *followed.frames.targets)])
+            )
             at = frames.seen(followed.model, observations)
             observations = replace(observations, position_mm=at.position_mm, rotation=at.rotation)
             settings = {"frames": FrameParameters.none(frames)}
@@ -170,11 +162,11 @@ class DHEstimator(Estimator):
             count = distinct(observations).components
             estimated = self.common.frames(observations).size
             held = count < FEW * (estimated + int(free.sum()))
-            std = np.minimum(std, arm.nominal.prior_std.reshape(free.shape)) if held else std
+            std = np.minimum(std, self.nominal.prior_std.reshape(free.shape)) if held else std
             free = free & (count >= estimated + LEAST)
         fitted = self.common.fit(
             observations,
-            arm.nominal,
+            self.nominal,
             free=free,
             std=std,
             held=held and bool(free.any()),
@@ -183,22 +175,6 @@ class DHEstimator(Estimator):
             **settings,
         )
         return replace(fitted, frames=followed.frames) if followed else fitted
-
-    def tables(
-        self, fitted: ModelFit, known: Uncertainty, observations: Observations
-    ) -> dict[str, Columns]:
-        """How the fit went, and which parameters the observations determine."""
-        observations = _of_one_base(observations) if self.follows_vec else observations
-        return {
-            "dh_fit": tables.fit_columns("dh_fit", fitted, known),
-            "dh_identified": identifiability.identified(fitted, known, observations),
-        }
-
-
-def _of_one_base(observations: Observations) -> Observations:
-    """Observations of a DH model that follows the VEC model: all are in the robot's base."""
-    session = np.zeros(len(observations), dtype=np.int64)
-    return replace(observations, session=session, session_names=(None,))
 
 
 def hayati_joints(section: Settings, arm: Robot) -> tuple[int, ...]:

@@ -10,15 +10,13 @@ import numpy as np
 import scipy
 
 from kinacc.calibration.frames import (
-    MOTIONS,
     FrameParameters,
     Frames,
     closed_form_start,
-    component_names,
     frame_terms,
     inverse_left_jacobians,
     left_jacobians,
-    orientations_measured,
+    places,
 )
 from kinacc.calibration.least_squares import (
     SQUARES,
@@ -80,10 +78,6 @@ class PoseSystem:
         squared = 1.0 if self.root is None else self.root**2
         return float(np.sum(squared * (3 + 3 * self.observations.has_rotation)))
 
-    def weighted(self, root: np.ndarray) -> PoseSystem:
-        """The same residuals times ``root`` (n,) by observation."""
-        return replace(self, root=root)
-
     def residual(self, x: np.ndarray) -> np.ndarray:
         """All residuals (m,), observation by observation."""
         known = FrameParameters.none(self.frames.frames(x[: self.frames.size]))
@@ -128,8 +122,8 @@ class PoseSystem:
                 factor = 1.0 if factors is None else factors[parameter]
                 np.multiply(lifted[of[parameter]], factor, out=columns[place])
             for kind, number, at in self.frames.slots:
-                of_base = kind == "bases"
-                here = np.flatnonzero((part.session if of_base else part.target) == number)
+                of_base = kind == "session"
+                here = np.flatnonzero(getattr(part, kind) == number)
                 ahead = (view.back if of_base else flange.rotation)[here]
                 slopes = np.zeros((len(here), len(view.residual), len(at)))
                 slopes[:, :3, :3] = ahead
@@ -226,9 +220,6 @@ class ModelFit(Fit):
 
     Attributes
     ----------
-    std : numpy.ndarray
-        Standard deviations in the parameters' units, of the shape of ``free``; NaN where
-        undetermined.
     free : numpy.ndarray
         Parameters that were estimated, shape (P,) or (k, 5).
     prior_std : numpy.ndarray
@@ -241,12 +232,18 @@ class ModelFit(Fit):
         Of the rows, where the loss had some.
     """
 
-    std: np.ndarray
     free: np.ndarray
     prior_std: np.ndarray
     solution: Solution
     parameters: FrameParameters
     weights: Weights | None = None
+
+    @property
+    def std(self) -> np.ndarray:
+        """Standard deviations in the parameters' units, shaped as ``free``; NaN: undetermined."""
+        std = np.full(self.free.shape, np.nan)
+        std[self.free] = self.solution.std[self.parameters.size :]
+        return std
 
 
 def once(observations: Observations) -> np.ndarray:
@@ -338,7 +335,7 @@ def fit(
     scale = scales(nominal) if scale is None else scale
     few = held if few is None else few
     estimated = frames is None or frames.size > 0
-    needed = len(component_names(observations)) if estimated else 0
+    needed = len(places(observations)[0]) if estimated else 0
     needed += 0 if few else int(mask.sum())
     if observations.components < max(needed, 1):
         what = (
@@ -352,7 +349,7 @@ def fit(
     system = PoseSystem(observations, nominal, mask, parameters, weight)
     frame_std, least_variance = parameters.std, 1e-8
     if held:
-        system = system.weighted(once(observations))
+        system = replace(system, root=once(observations))
         loose = FRAME_PRIOR_UNITS * parameters.scale
         frame_std = np.where(np.isfinite(frame_std), frame_std, loose)
         if few and observations.components < SURPLUS * system.size:
@@ -368,12 +365,10 @@ def fit(
         least_variance,
     )
     solution, weights = minimise_robust(task, loss)
-    vector, deviation = nominal.start.copy(), np.full(mask.size, np.nan)
-    vector[mask], deviation[mask] = solution.x[place:], solution.std[place:]
-    return ModelFit(
-        nominal.with_parameters(vector), parameters.frames(solution.x[:place]),
-        deviation.reshape(free.shape), free, std, solution, parameters, weights,
-    )  # fmt: skip
+    vector = nominal.start.copy()
+    vector[mask] = solution.x[place:]
+    model, placed_at = nominal.with_parameters(vector), parameters.frames(solution.x[:place])
+    return ModelFit(model, placed_at, free, std, solution, parameters, weights)
 
 
 def scales(model: ErrorModel) -> np.ndarray:
@@ -442,9 +437,8 @@ def placed(
     if start is None:
         start = closed_form_start(observations, arm.pose(observations.at))
         if terms is not None:
-            measured = orientations_measured(observations)[:, None, None]
-            turned = np.where(measured, start.targets.rotation, terms.reference.targets.rotation)
-            start = replace(start, targets=Pose(turned, start.targets.position_mm))
+            unseen = ~np.isin(np.arange(len(start.poses.position_mm)), terms.places[0][terms.angle])
+            start.poses.rotation[unseen] = terms.reference.poses.rotation[unseen]
     terms = frame_terms(observations, start) if terms is None else terms
     coordinates = terms.starting(start)
     still = np.zeros(len(arm.start), dtype=bool)
@@ -458,7 +452,7 @@ def placed(
     hidden = _without_known(hidden, np.isfinite(coordinates.std[keep]))
     if not len(hidden):
         return coordinates
-    of_base = np.arange(coordinates.size) < len(MOTIONS) * start.sessions
+    of_base = coordinates.places[0] < start.sessions
     held = keep[_pivots(hidden, (~of_base & ~coordinates.angle)[keep])]
     free, begin = coordinates.free.copy(), coordinates.begin.copy()
     free[held] = False

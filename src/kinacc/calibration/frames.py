@@ -33,42 +33,34 @@ class Frames:
 
     Attributes
     ----------
-    bases : Pose
-        Robot base of S sessions in the instrument's frame, shape (S, ...) in mm.
-    targets : Pose
-        T targets in the flange frame, shape (T, ...) in mm.
+    poses : Pose
+        Robot base of S sessions in the instrument's frame, then T targets in the flange frame,
+        shape (S + T, ...) in mm.
+    sessions : int
+        Number of sessions S.
     """
 
-    bases: Pose
-    targets: Pose
-
-    @classmethod
-    def split(cls, frames: Pose, sessions: int) -> Frames:
-        """The first ``sessions`` of ``frames`` (S + T, ...) as bases, the others as targets."""
-        bases, targets = zip(*(np.split(part, [sessions]) for part in frames), strict=True)
-        return cls(Pose(*bases), Pose(*targets))
+    poses: Pose
+    sessions: int
 
     @property
-    def joined(self) -> Pose:
-        """Bases, then targets, (S + T, ...)."""
-        return Pose(
-            *(np.concatenate(parts) for parts in zip(self.bases, self.targets, strict=True))
-        )
+    def bases(self) -> Pose:
+        """The bases (S, ...), a view."""
+        return self.poses.select(slice(self.sessions))
+
+    @property
+    def targets(self) -> Pose:
+        """The targets (T, ...), a view."""
+        return self.poses.select(slice(self.sessions, None))
 
     @property
     def base(self) -> Pose:
         """The base of the first session, the only one of most data sets."""
-        return Pose(self.bases.rotation[0], self.bases.position_mm[0])
-
-    @property
-    def sessions(self) -> int:
-        """Number of sessions S."""
-        return len(self.bases.position_mm)
+        return self.poses.select(0)
 
     def at_rows(self, observations: Observations) -> tuple[Pose, Pose]:
         """Base and target (n, ...) of every observation."""
-        bases = Pose(*(part[observations.session] for part in self.bases))
-        return bases, Pose(*(part[observations.target] for part in self.targets))
+        return self.bases.select(observations.session), self.targets.select(observations.target)
 
     def seen(self, model: ErrorModel, observations: Observations) -> Pose:
         """Poses of the targets in the instrument's frame, as a model predicts them.
@@ -91,7 +83,7 @@ class Frames:
     @property
     def tool(self) -> Pose:
         """The first target, the tool centre point of a single-target data set."""
-        return Pose(self.targets.rotation[0], self.targets.position_mm[0])
+        return self.poses.select(self.sessions)
 
 
 def known(
@@ -113,7 +105,7 @@ def known(
     Frames
         Bases (sessions, ...) and targets (targets, ...).
     """
-    return Frames(stacked([base] * sessions), stacked([tool] * targets))
+    return Frames(stacked([base] * sessions + [tool] * targets), sessions)
 
 
 def stacked(poses: Sequence[Pose]) -> Pose:
@@ -129,9 +121,7 @@ def stacked(poses: Sequence[Pose]) -> Pose:
     Pose
         Rotation (n, 3, 3) and position (n, 3).
     """
-    return Pose(
-        np.stack([pose.rotation for pose in poses]), np.stack([pose.position_mm for pose in poses])
-    )
+    return Pose(*map(np.stack, zip(*poses, strict=True)))
 
 
 def frame_terms(
@@ -158,11 +148,11 @@ def frame_terms(
     InputError
         Names every rule about a frame that ``observations`` do not let estimate.
     """
-    names = component_names(observations)
-    parts = [tuple(name.rpartition(".")[::2]) for name in names]
-    frames: dict[str, list[str]] = {}
-    for frame, component in parts:
-        frames.setdefault(frame, []).append(component)
+    frame, axis = places(observations)
+    sessions = [f"{BASE}{i or ''}" for i in (0, *range(2, stated.sessions + 1))]
+    owners = [*sessions, *observations.target_names]
+    about = [(MOTIONS[j], None, owners[i]) for i, j in zip(frame, axis, strict=True)]
+    frames = {owner: [item[0] for item in about if item[2] == owner] for owner in owners}
     refuse(
         [
             Problem(f"{parameter_rules.FRAMES}, {rule.name!r}", message, allowed)
@@ -171,11 +161,12 @@ def frame_terms(
             )
         ]
     )
-    begin = np.zeros(len(names))
-    begin[[name.endswith("_mm") for name in names]] = stated.joined.position_mm.ravel()
-    about = [(component, None, frame) for frame, component in parts]
-    free, value, std = ruled(rules, about, np.ones(len(names), dtype=bool), begin)
-    return FrameParameters(names, stated, value, free, value, std, np.zeros((0, len(names))))
+    position = stated.poses.position_mm
+    begin = np.hstack([position, np.zeros_like(position)])[frame, axis]
+    free, value, std = ruled(rules, about, np.ones(len(begin), dtype=bool), begin)
+    names = tuple(f"{owner}.{component}" for component, _, owner in about)
+    hidden = np.zeros((0, len(names)))
+    return FrameParameters(names, (frame, axis), stated, value, free, value, std, hidden)
 
 
 def ruled(
@@ -199,22 +190,17 @@ def ruled(
     return free, value, std
 
 
-def component_names(observations: Observations) -> tuple[str, ...]:
-    """Names of what can be estimated: a target turns where an orientation of it was measured."""
-    sessions = range(1, len(observations.session_names) + 1)
-    names = [f"{BASE}{i if i > 1 else ''}.{motion}" for i in sessions for motion in MOTIONS]
-    for target, turns in zip(
-        observations.target_names, orientations_measured(observations), strict=True
-    ):
-        names += [f"{target}.{motion}" for motion in (MOTIONS if turns else MOTIONS[:3])]
-    return tuple(names)
+def places(observations: Observations) -> tuple[np.ndarray, np.ndarray]:
+    """Frame and axis (F,) of what can be estimated: bases, then targets; axes as ``MOTIONS``.
 
-
-def orientations_measured(observations: Observations) -> np.ndarray:
-    """True (T,) for targets of which any orientation was measured."""
-    measured = np.zeros(len(observations.target_names), dtype=bool)
-    measured[np.unique(observations.target[observations.has_rotation])] = True
-    return measured
+    A target turns where an orientation of it was measured.
+    """
+    sessions = len(observations.session_names)
+    estimated = np.ones((sessions + len(observations.target_names), len(MOTIONS)), dtype=bool)
+    estimated[sessions:, 3:] = False
+    estimated[sessions + observations.target[observations.has_rotation], 3:] = True
+    frame, axis = np.nonzero(estimated)
+    return frame, axis
 
 
 @dataclass(frozen=True)
@@ -227,6 +213,8 @@ class FrameParameters:
     ----------
     names : tuple of str
         The components.
+    places : tuple of numpy.ndarray
+        Number of the frame and axis of each, shapes (F,).
     reference : Frames
         Whose orientations the rotation vectors turn.
     begin : numpy.ndarray
@@ -241,6 +229,7 @@ class FrameParameters:
     """
 
     names: tuple[str, ...]
+    places: tuple[np.ndarray, np.ndarray]
     reference: Frames
     begin: np.ndarray
     free: np.ndarray
@@ -252,7 +241,8 @@ class FrameParameters:
     def none(cls, frames: Frames) -> FrameParameters:
         """No parameters: base and targets are ``frames``."""
         blank = np.zeros(0)
-        return cls((), frames, blank, blank.astype(bool), blank, blank, np.zeros((0, 0)))
+        nowhere = blank.astype(int), blank.astype(int)
+        return cls((), nowhere, frames, blank, blank.astype(bool), blank, blank, np.zeros((0, 0)))
 
     def starting(self, start: Frames) -> FrameParameters:
         """These from ``start``, or where they are fixed.
@@ -260,16 +250,13 @@ class FrameParameters:
         Rotation vectors turn the stated orientation where one of their components is fixed or has a
         prior, or where no orientation was measured; else that of ``start``.
         """
-        here, turn, turning = start.joined, self.turn, self.turning
-        known, begin = np.isfinite(self.std), np.zeros(self.size)
-        stated = np.ones(len(here.position_mm), dtype=bool)
-        stated[turning] = (~self.free | known)[turn].any(axis=1)
-        rotation = np.where(stated[:, None, None], self.reference.joined.rotation, here.rotation)
-        apart = here.rotation[turning] @ np.swapaxes(rotation[turning], 1, 2)
-        begin[self.place] = here.position_mm
-        begin[turn] = log_so3(apart) * stated[turning][:, None]
-        begin[~self.free] = self.begin[~self.free]
-        reference = Frames.split(Pose(rotation, here.position_mm), start.sessions)
+        here, known = start.poses, np.isfinite(self.std)
+        stated = ~np.all(self.by_frame(self.free & ~known)[:, 3:], axis=1)
+        rotation = np.where(stated[:, None, None], self.reference.poses.rotation, here.rotation)
+        apart = log_so3(here.rotation @ np.swapaxes(rotation, 1, 2)) * stated[:, None]
+        begin = np.hstack([here.position_mm, apart])[self.places]
+        begin = np.where(self.free, begin, self.begin)
+        reference = replace(start, poses=Pose(rotation, here.position_mm))
         mean = np.where(known, self.mean, begin)
         return replace(self, reference=reference, begin=begin, mean=mean)
 
@@ -281,7 +268,7 @@ class FrameParameters:
     @property
     def angle(self) -> np.ndarray:
         """True (F,) for components of rotation vectors."""
-        return np.array([name.endswith("_rad") for name in self.names], dtype=bool)
+        return self.places[1] >= 3
 
     @property
     def scale(self) -> np.ndarray:
@@ -289,44 +276,31 @@ class FrameParameters:
         return np.where(self.angle, ANGLE_UNIT_RAD, 1.0)
 
     @property
-    def place(self) -> np.ndarray:
-        """Indices (S + T, 3) of the components of positions: of the bases, then of the targets."""
-        return np.flatnonzero(~self.angle).reshape(-1, 3)
-
-    @property
-    def turn(self) -> np.ndarray:
-        """Indices (K, 3) of the components of rotation vectors."""
-        return np.flatnonzero(self.angle).reshape(-1, 3)
-
-    @property
-    def turning(self) -> np.ndarray:
-        """Numbers (K,) of the frames that have a rotation vector."""
-        return np.searchsorted(self.place[:, 0], self.turn[:, 0]) - 1
-
-    @property
     def slots(self) -> list[tuple[str, int, np.ndarray]]:
-        """``bases`` or ``targets``, the number of the frame and the indices of its components."""
-        count, turning = self.reference.sessions, self.turning
-        return [
-            (
-                "bases" if frame < count else "targets",
-                frame if frame < count else frame - count,
-                first + np.arange(6 if frame in turning else 3),
-            )
-            for frame, (first, *_) in enumerate(self.place)
-        ]
+        """``session`` or ``target``, its number, and the indices of its components."""
+        frames, count, slots = self.places[0], self.reference.sessions, []
+        for frame in np.unique(frames):
+            at = np.flatnonzero(frames == frame)
+            slots.append(("session", frame, at) if frame < count else ("target", frame - count, at))
+        return slots
+
+    def by_frame(self, c: np.ndarray) -> np.ndarray:
+        """Components ``c`` (F,) as (S + T, 6), zero where there is none."""
+        table = np.zeros((len(self.reference.poses.position_mm), len(MOTIONS)), c.dtype)
+        table[self.places] = c
+        return table
 
     def frames(self, c: np.ndarray) -> Frames:
         """``Frames`` at components ``c`` (F,)."""
         if not self.size:
             return self.reference
-        rotation, turning = self.reference.joined.rotation, self.turning
-        rotation[turning] = exp_so3(c[self.turn]) @ rotation[turning]
-        return Frames.split(Pose(rotation, c[self.place]), self.reference.sessions)
+        position, turn = np.hsplit(self.by_frame(c), 2)
+        rotation = exp_so3(turn) @ self.reference.poses.rotation
+        return replace(self.reference, poses=Pose(rotation, position))
 
     def motions(self, c: np.ndarray) -> np.ndarray:
         """Derivative (F, F) of shifts and turns of the frames in their components at ``c``."""
-        motions, turn = np.eye(self.size), self.turn
+        motions, turn = np.eye(self.size), np.flatnonzero(self.angle).reshape(-1, 3)
         motions[turn[:, :, None], turn[:, None, :]] = left_jacobians(c[turn])
         return motions
 
@@ -379,14 +353,15 @@ def closed_form_start(observations: Observations, flange: Pose) -> Frames:
     sizes = np.bincount(observations.session, minlength=sessions)
     for session in np.argsort(-sizes, kind="stable")[: np.count_nonzero(sizes)]:
         rows = np.flatnonzero(observations.session == session)
-        part, at = observations.select(rows), Pose(*(values[rows] for values in flange))
+        part, at = observations.select(rows), flange.select(rows)
         measured = np.isin(np.arange(names), part.target)
         new = measured & ~placed
         if not placed[measured].any():
             base, points = one_session(part, at)
             start.targets.position_mm[new] = points[new]
         else:
-            base = base_from_targets(part, at, start.targets, placed)
+            seen = placed[part.target]
+            base = base_from_targets(part.select(seen), at.select(seen), start.targets)
             in_base = (part.position_mm - base.position_mm) @ base.rotation - at.position_mm
             points = np.einsum("nji,nj->ni", at.rotation, in_base)
             for target in np.flatnonzero(new):
@@ -461,9 +436,7 @@ def _solved(system: np.ndarray, right: np.ndarray) -> np.ndarray:
     return gram @ (system.T @ right)
 
 
-def base_from_targets(
-    observations: Observations, flange: Pose, targets: Pose, placed: np.ndarray | None = None
-) -> Pose:
+def base_from_targets(observations: Observations, flange: Pose, targets: Pose) -> Pose:
     """Base that best carries targets onto their measured points.
 
     Closed form of absolute orientation by singular values (Arun, Huang and Blostein, PAMI 9, 1987),
@@ -477,22 +450,18 @@ def base_from_targets(
         Flange in the robot base, shape (n, ...) in mm.
     targets : Pose
         Targets in the flange frame, shape (T, ...) in mm.
-    placed : numpy.ndarray, optional
-        True for the targets that are known, shape (T,); all if not given.
 
     Returns
     -------
     Pose
         Robot base in the instrument's frame, mm.
     """
-    rows = np.ones(len(observations), bool) if placed is None else placed[observations.target]
-    at = targets.position_mm[observations.target[rows]]
-    by_arm = flange.position_mm[rows] + (flange.rotation[rows] @ at[..., None])[..., 0]
-    measured = observations.position_mm[rows]
+    at, measured = targets.position_mm[observations.target], observations.position_mm
+    by_arm = flange.position_mm + (flange.rotation @ at[..., None])[..., 0]
     arm_centre, centre = by_arm.mean(axis=0), measured.mean(axis=0)
     # Orientations, where measured, decide what few or collinear points leave open.
     spread = (measured - centre).T @ (by_arm - arm_centre)
-    turned = rows & observations.has_rotation
+    turned = observations.has_rotation
     by_flange = flange.rotation[turned] @ targets.rotation[observations.target[turned]]
     turns = np.einsum("nij,nkj->ik", observations.rotation[turned], by_flange)
     rotation = _nearest_rotation(spread + _LEVER_MM**2 * turns)

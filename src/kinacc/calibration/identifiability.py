@@ -103,11 +103,11 @@ class LeftOpen:
     def _in_robot_axes(self, direction: np.ndarray) -> np.ndarray:
         turned = direction.copy()
         for session, rotation in enumerate(self.frames.bases.rotation):
-            base = f"{BASE}{session + 1 if session else ''}"
-            for motions in (MOTIONS[:3], MOTIONS[3:]):
-                if (names := [f"{base}.{motion}" for motion in motions])[0] in self.names:
-                    place = [self.names.index(name) for name in names]
-                    turned[place] = rotation.T @ direction[place]
+            first = f"{BASE}{session + 1 if session else ''}.{MOTIONS[0]}"
+            if first in self.names:
+                shift = self.names.index(first)
+                moved = direction[shift : shift + 6].reshape(2, 3) @ rotation
+                turned[shift : shift + 6] = moved.ravel()
         return turned
 
 

@@ -9,9 +9,10 @@ robust loss leans less on rows far off, with a scale taken from the data.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from contextlib import ContextDecorator
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy
@@ -25,15 +26,11 @@ from kinacc.errors import FitError
 if TYPE_CHECKING:
     from kinacc.calibration.fitting import PoseSystem
 
-Function = TypeVar("Function", bound=Callable[..., Any])
-_THREADS = ThreadpoolController()
 MOVES_SQUARED = 0.25  # what moves a known frame by half as much as itself is known too
 
 
-def one_thread(function: Function) -> Function:
-    """One BLAS thread while ``function`` runs: matrices are small, more threads only wait."""
-    wrapped: Function = _THREADS.wrap(limits=1, user_api="blas")(function)
-    return wrapped
+# Matrices are small: more BLAS threads than one only wait.
+one_thread: ContextDecorator = ThreadpoolController().wrap(limits=1, user_api="blas")
 
 
 @dataclass(frozen=True)
@@ -289,8 +286,8 @@ def minimise_robust(task: Task, loss: str) -> tuple[Solution, Weights | None]:
         before = solution.x
         scale = weights.scale_mm if weights and number >= SCALE_PASSES else None
         weights = row_weights(loss, task.system.residual(before), observations, scale)
-        weighted = replace(task, system=task.system.weighted(np.sqrt(weights.row)), start=before)
-        solution = _Descent(weighted).run()
+        system = replace(task.system, root=np.sqrt(weights.row))
+        solution = _Descent(replace(task, system=system, start=before)).run()
         moved = float(np.max(np.abs(solution.x - before) / task.scale, initial=0.0))
         if moved <= SETTLED:
             factor = weights.scale_mm**2 / solution.variance if solution.variance > 0.0 else 1.0

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
@@ -10,13 +10,10 @@ from kinacc.calibration import fitting
 from kinacc.calibration.fitting import Fit, ModelFit
 from kinacc.calibration.frames import FrameParameters, Frames, frame_terms, known
 from kinacc.calibration.observations import Observations
-from kinacc.calibration.uncertainty import Uncertainty
 from kinacc.config import error_models, parameter_rules
 from kinacc.config.error_models import NOMINAL
 from kinacc.config.parameter_rules import Rule
 from kinacc.config.records import Settings
-from kinacc.geometry import IDENTITY, Pose
-from kinacc.kinematics.dh import DHModel
 from kinacc.kinematics.model import ErrorModel
 from kinacc.kinematics.robot import Robot, carried
 from kinacc.tables.columns import Columns, Tables
@@ -26,34 +23,29 @@ from kinacc.tables.columns import Columns, Tables
 class Common:
     """What all fits of a data set share; see the ``calibration`` section of the configuration.
 
-    What is None is not stated: a fit that asks for it has not been given its section.
-    ``frames_estimated``: base and tool are unknown; else they are ``base`` and ``tool``, the
-    robot's own. ``frame_rules``: what is known of them beforehand.
+    ``arm``: the nominal one. ``frames_estimated``: base and tool are unknown; else they are those
+    of the arm. ``frame_rules``: what is known of them beforehand.
     """
 
-    nominal: DHModel
+    arm: Robot
     rotation_weight_mm_per_rad: float
     frames_estimated: bool
-    frame_rules: tuple[Rule, ...] = ()
-    base: Pose = IDENTITY
-    tool: Pose = IDENTITY
+    frame_rules: tuple[Rule, ...]
 
     @classmethod
     def of(cls, calibration: Settings, arm: Robot) -> Self:
         """By the ``calibration`` settings."""
         return cls(
-            arm.dh,
+            arm,
             calibration["rotation_weight_mm_per_rad"],
             calibration["base_and_tool"] == "estimated",
             tuple(parameter_rules.rules(calibration["frames"])),
-            arm.base,
-            carried(arm),
         )
 
     def frames(self, observations: Observations) -> FrameParameters:
         """Base and targets from where the robot's description has them; fixed if not estimated."""
         counts = len(observations.session_names), len(observations.target_names)
-        stated = known(self.base, self.tool, *counts)
+        stated = known(self.arm.base, carried(self.arm), *counts)
         if not self.frames_estimated:
             return FrameParameters.none(stated)
         return frame_terms(observations, stated, self.frame_rules)
@@ -70,7 +62,7 @@ class Common:
         if not frames.size:
             return frames.reference
         return fitting.fit_frames(
-            observations, self.nominal, rotation_weight_mm_per_rad=weight, frames=frames
+            observations, self.arm.dh, rotation_weight_mm_per_rad=weight, frames=frames
         )
 
 
@@ -106,12 +98,6 @@ class Estimator:
         """The model of ``observations``; ``others`` are fitted already. Raises FitError."""
         raise NotImplementedError
 
-    def tables(
-        self, fitted: ModelFit, known: Uncertainty, observations: Observations
-    ) -> dict[str, Columns]:
-        """Further tables about the fit."""
-        return {}
-
 
 def estimators(calibration: Settings, arm: Robot, every: Observations) -> dict[str, Estimator]:
     """The estimators that settings ask for.
@@ -138,18 +124,15 @@ def estimators(calibration: Settings, arm: Robot, every: Observations) -> dict[s
     }
 
 
-def fit_all(
-    observations: Observations,
-    estimators: Iterable[Estimator],
-) -> dict[str, Fit]:
+def fit_all(observations: Observations, estimators: Sequence[Estimator]) -> dict[str, Fit]:
     """Fit models of all kinds, and base and targets of the nominal arm.
 
     Parameters
     ----------
     observations : Observations
         Measured points and poses.
-    estimators : iterable of Estimator
-        In the order of fitting.
+    estimators : sequence of Estimator
+        In the order of fitting, at least one.
 
     Returns
     -------
@@ -163,11 +146,8 @@ def fit_all(
     InputError
         There are fewer residuals than parameters.
     """
-    fits: dict[str, Fit] = {}
-    nominal: dict[str, Fit] = {}
+    common, fits = estimators[0].common, dict[str, Fit]()
+    nominal = {NOMINAL: Fit(common.arm.dh, common.nominal_frames(observations))}
     for estimator in estimators:
-        if not nominal:
-            common = estimator.common
-            nominal[NOMINAL] = Fit(common.nominal, common.nominal_frames(observations))
         fits[estimator.kind] = estimator.fit(observations, fits | nominal)
     return fits | nominal

@@ -7,6 +7,7 @@ from dataclasses import dataclass, fields, replace
 from typing import Self
 
 import numpy as np
+import pandas as pd
 
 from kinacc.geometry import Pose, rotation_from_quaternion
 from kinacc.kinematics.model import PAYLOAD_COLUMNS, JointState
@@ -94,10 +95,6 @@ class Observations:
         }
         return replace(self, **columns)
 
-    def without_directions(self) -> Observations:
-        """The same observations with every travel direction unknown."""
-        return replace(self, s=np.zeros_like(self.s))
-
 
 def full_poses(q_rad: np.ndarray, poses: Pose, s: np.ndarray | None = None) -> Observations:
     """Observations of one full-pose target, one row per pose.
@@ -154,9 +151,9 @@ def from_columns(columns: Mapping[str, np.ndarray], robot: Robot) -> Observation
         return np.stack([np.asarray(columns[name], dtype=float) for name in names], axis=1)
 
     count, numbers = len(columns["pose"]), range(1, robot.dh.joints + 1)
-    targets = [str(name) for name in columns["target"]]
+    target, target_names = pd.factorize(np.array(columns["target"], dtype=object).astype(str))
     sessions = list(columns.get("session", [None] * count))
-    target_names, session_names = tuple(dict.fromkeys(targets)), tuple(dict.fromkeys(sessions))
+    session_names = tuple(dict.fromkeys(sessions))
     fold = np.asarray(columns.get("fold", np.full(count, np.nan)), dtype=float)
     return Observations(
         q_rad=robot.dh_joints(stack(*(f"q{i}" for i in numbers))),
@@ -164,10 +161,10 @@ def from_columns(columns: Mapping[str, np.ndarray], robot: Robot) -> Observation
         position_mm=stack("x_mm", "y_mm", "z_mm"),
         rotation=rotation_from_quaternion(stack("qw", "qx", "qy", "qz")),
         pose=np.asarray(columns["pose"]).astype(np.int64),
-        target=np.array([target_names.index(name) for name in targets], dtype=np.int64),
+        target=target,
         repeat=np.asarray(columns["repeat"]).astype(np.int64),
         fold=np.nan_to_num(fold, nan=-1.0).astype(np.int64),
-        target_names=target_names,
+        target_names=tuple(target_names.tolist()),
         session=np.array([session_names.index(name) for name in sessions], dtype=np.int64),
         session_names=session_names,
         payload=stack(*PAYLOAD_COLUMNS)

@@ -59,6 +59,7 @@ def register_error_model(model: type[ErrorModel]) -> type[ErrorModel]:
     for table in (
         replace(of_dh, name=f"{model.kind}_covariance"),
         replace(ARTEFACTS["vec_frames"], name=f"{model.kind}_frames"),
+        replace(ARTEFACTS["vec_fit"], name=f"{model.kind}_fit"),
         Artefact(f"{model.kind}_model", of_dh.topic, "Parameters.", _COLUMNS, ("parameter",)),
     ):
         ARTEFACTS[table.name] = table
@@ -80,7 +81,7 @@ class OwnEstimator(Estimator):
 
         What of a parameter moves the poses by one mm, rms, counts as much as one mm of another.
         """
-        nominal = self.model(self.common.nominal)
+        nominal = self.model(self.common.arm.dh)
         moved = nominal.linearised(observations.at)[1]
         moved[:, 3:] *= self.common.rotation_weight_mm_per_rad
         size_mm = np.sqrt(np.mean(np.sum(moved**2, axis=1), axis=0))

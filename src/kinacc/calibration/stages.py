@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from kinacc.calibration import residuals, tables, uncertainty
+from kinacc.calibration import identifiability, residuals, tables, uncertainty
 from kinacc.calibration.fitting import Fit
 from kinacc.calibration.models import estimators, fit_all
 from kinacc.calibration.observations import Observations, from_columns
@@ -73,23 +73,23 @@ def fit_model(
     estimator = estimator.chosen(choices, int(held_out[0]) if len(held_out) else None)
     observations = every.select(train)
     fitted = estimator.fit(observations, delivered_fits(inputs, arm, every))
-    names, frames = f"{kind}_frames", {kind: fitted.frames}
-    if kind == PLAINEST:
-        names = "frames"
-        frames[NOMINAL] = estimator.common.nominal_frames(observations)
-    columns = tables.frames_columns(frames, every.target_names, every.session_names)
-    if kind == PLAINEST:
-        kinds = [f"{other}_frames" for other in reversed(ERROR_MODELS)]
-        parts = [*(inputs[name] for name in kinds if name in inputs), columns]
-        columns = {name: np.concatenate([part[name] for part in parts]) for name in columns}
-    known = uncertainty.of_fit(fitted)
-    return {
+    names, known = (every.target_names, every.session_names), uncertainty.of_fit(fitted)
+    written = {
         f"{kind}_model": fitted.model.to_columns(fitted.std.ravel()),
-        names: columns,
         f"{kind}_covariance": tables.covariance_columns(known),
-        **estimator.tables(fitted, known, observations),
+        f"{kind}_fit": tables.fit_columns(f"{kind}_fit", fitted, known),
         **choices,
     }
+    frames = {kind: fitted.frames}
+    if kind != PLAINEST:
+        return written | {f"{kind}_frames": tables.frames_columns(frames, *names)}
+    frames[NOMINAL] = estimator.common.nominal_frames(observations)
+    kinds = [f"{other}_frames" for other in reversed(ERROR_MODELS)]
+    parts = [inputs[name] for name in kinds if name in inputs]
+    parts.append(tables.frames_columns(frames, *names))
+    columns = {name: np.concatenate([part[name] for part in parts]) for name in parts[-1]}
+    identified = identifiability.identified(fitted, known, observations)
+    return written | {"frames": columns, "dh_identified": identified}
 
 
 def compare_models(
@@ -186,13 +186,10 @@ def excluded_rows(inputs: Tables, settings: Settings) -> dict[str, Columns]:
         observations = from_columns({name: rows[name].to_numpy() for name in rows}, arm)
         off = errors(delivered_fits(inputs, arm, observations), observations)
     known = rows[["target", "session"]].assign(line=rows["row"].astype(int))
-    stated = pd.DataFrame({"line": sorted(reasons)})
-    stated["reason"] = stated["line"].map(reasons)
+    stated = pd.DataFrame(sorted(reasons.items()), columns=["line", "reason"])
     parts = []
     for comparison in comparisons(models.models(inputs, arm.dh)):
-        item = off.get(comparison.name)
-        components = np.zeros((0, 6)) if item is None else item.components
-        known[list(_OFF)] = components
+        known[list(_OFF)] = off[comparison.name].components if off else np.nan
         parts.append(stated.merge(known, "left", on="line").assign(comparison=comparison.name))
     table = pd.concat(parts).astype(object)
     table = table.where(table.notna(), None)

@@ -149,10 +149,10 @@ def error_statistics(pose_errors: Columns, configuration: np.ndarray) -> pd.Data
 
 def frames_are_fitted(frames: Columns) -> bool:
     """Whether base and tool were fitted: then the models have different ones."""
-    places = np.stack([frames[name] for name in ("x_mm", "y_mm", "z_mm", "qx", "qy", "qz")], axis=1)
-    models = np.asarray(frames["model"])
-    first = models == models[models != NOMINAL][0]
-    return not np.array_equal(places[models == NOMINAL], places[first])
+    table = pd.DataFrame(dict(frames)).set_index("model")
+    places = table[["x_mm", "y_mm", "z_mm", "qx", "qy", "qz"]]
+    fitted = places.index[places.index != NOMINAL][0]
+    return not np.array_equal(places.loc[[NOMINAL]], places.loc[[fitted]])
 
 
 def reported_joints(measurements: Columns, joints: int) -> np.ndarray:

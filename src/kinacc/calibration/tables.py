@@ -25,7 +25,7 @@ def frames_columns(
     names = [*(("base", session) for session in session_names), *((t, None) for t in target_names)]
     rows = []
     for model, item in frames.items():
-        rotation, place = item.joined
+        rotation, place = item.poses
         quaternions = quaternion_from_rotation(rotation)
         rows += [
             (model, *name, *at, *quaternion)
@@ -61,9 +61,9 @@ def frames_of(
     InputError
         The table lacks one.
     """
-    bases = [frame(columns, model, "base", name) for name in session_names]
-    targets = [frame(columns, model, name) for name in target_names]
-    return Frames(stacked(bases), stacked(targets))
+    poses = [frame(columns, model, "base", name) for name in session_names]
+    poses += [frame(columns, model, name) for name in target_names]
+    return Frames(stacked(poses), len(session_names))
 
 
 def fit_columns(name: str, fit: ModelFit, uncertainty: Uncertainty) -> Columns:

@@ -86,12 +86,8 @@ def _change(fit: ModelFit) -> np.ndarray:
     return change
 
 
-# Unit of a parameter by the end of its name, and what of it moves a pose as much as one mm does.
-_UNITS = {
-    "_rad": ("rad", ANGLE_UNIT_RAD),
-    "_rad_per_nm": ("rad/(N m)", 1e-6),
-    "_rad_per_mm": ("rad/mm", 1e-6),
-}
+# Unit of a parameter by the end of its name.
+_UNITS = {"_rad": "rad", "_rad_per_nm": "rad/(N m)", "_rad_per_mm": "rad/mm"}
 
 
 def unit_of(name: str) -> str:
@@ -107,11 +103,13 @@ def unit_of(name: str) -> str:
     str
         mm, rad, or what a coefficient of it is per.
     """
-    return _unit(name)[0]
+    if ".eps_" in name:
+        return "rad"
+    return next((unit for end, unit in _UNITS.items() if name.endswith(end)), "mm")
 
 
 def scale_of(name: str) -> float:
-    """What of a parameter counts as one mm.
+    """What of a parameter moves a pose as much as one mm does.
 
     Parameters
     ----------
@@ -123,7 +121,7 @@ def scale_of(name: str) -> float:
     float
         In the parameter's unit: 1 mm, one mrad, 1e-6 of a coefficient.
     """
-    return _unit(name)[1]
+    return {"mm": 1.0, "rad": ANGLE_UNIT_RAD}.get(unit_of(name), 1e-6)
 
 
 def scaled_unit(name: str) -> str:
@@ -157,12 +155,6 @@ def is_angle(name: str) -> bool:
         True for rad.
     """
     return unit_of(name) == "rad"
-
-
-def _unit(name: str) -> tuple[str, float]:
-    if ".eps_" in name:
-        return _UNITS["_rad"]
-    return next((unit for end, unit in _UNITS.items() if name.endswith(end)), ("mm", 1.0))
 
 
 WORST_CONDITION = 1e6  # of the equations for variances: beyond it they cannot be told apart

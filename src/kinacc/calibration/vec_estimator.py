@@ -9,11 +9,10 @@ from typing import ClassVar, Self
 import numpy as np
 import pandas as pd
 
-from kinacc.calibration import tables, vec_fit
+from kinacc.calibration import vec_fit
 from kinacc.calibration.fitting import Fit, ModelFit, placed
 from kinacc.calibration.models import Common, Estimator
 from kinacc.calibration.observations import Observations
-from kinacc.calibration.uncertainty import Uncertainty
 from kinacc.calibration.vec_fit import Prior
 from kinacc.config.error_models import NOMINAL
 from kinacc.config.records import Settings
@@ -76,7 +75,7 @@ class VECEstimator(Estimator):
     @property
     def size(self) -> int:
         """Number of coefficients."""
-        return 6 * self.common.nominal.joints * (self.order + 1)
+        return 6 * self.common.arm.dh.joints * (self.order + 1)
 
     @property
     def open(self) -> bool:
@@ -122,15 +121,9 @@ class VECEstimator(Estimator):
             few=self.open,
         )
 
-    def tables(
-        self, fitted: ModelFit, known: Uncertainty, observations: Observations
-    ) -> dict[str, Columns]:
-        """How the fit went."""
-        return {"vec_fit": tables.fit_columns("vec_fit", fitted, known)}
-
     def _choice(self, training: Observations, near: pd.DataFrame | None) -> pd.DataFrame:
         common, weight = self.common, self.common.rotation_weight_mm_per_rad
-        arm, frames = common.nominal, common.frames(training)
+        arm, frames = common.arm.dh, common.frames(training)
         parameters = placed(training, arm, frames, weight, common.nominal_frames(training))
         most = vec_fit.highest_order(training, arm.joints, parameters.size)
         orders = [order for order in self.orders if order <= most]
@@ -144,10 +137,12 @@ class VECEstimator(Estimator):
         )
 
     def _empty(self, order: int) -> VECModel:
-        return vec.without_errors(self.common.nominal, *self.joint_range_rad, order)
+        return vec.without_errors(self.common.arm.dh, *self.joint_range_rad, order)
 
     def _wanted(self, observations: Observations) -> Observations:
-        return observations if self.travel_direction else observations.without_directions()
+        """The observations, every travel direction unknown where it does not matter."""
+        s = observations.s if self.travel_direction else np.zeros_like(observations.s)
+        return replace(observations, s=s)
 
 
 def _joint_range_rad(

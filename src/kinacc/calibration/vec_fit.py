@@ -20,7 +20,7 @@ from scipy.linalg import blas, lapack
 
 from kinacc.calibration import fitting
 from kinacc.calibration.fitting import ModelFit, PoseSystem, distinct, once, scales
-from kinacc.calibration.frames import FrameParameters, Frames
+from kinacc.calibration.frames import FrameParameters
 from kinacc.calibration.least_squares import one_thread
 from kinacc.calibration.observations import Observations
 from kinacc.kinematics import vec
@@ -68,10 +68,8 @@ def fit(
     empty: VECModel,
     *,
     prior: Prior,
-    rotation_weight_mm_per_rad: float,
-    frames: FrameParameters | None = None,
-    begin: Frames | None = None,
     few: bool = False,
+    **settings: Any,
 ) -> ModelFit:
     """Fit the coefficients of a VEC model under a prior, and base and targets if not known.
 
@@ -86,14 +84,10 @@ def fit(
         The nominal arm with its joint range and order, all errors zero.
     prior : Prior
         Prior of the coefficients.
-    rotation_weight_mm_per_rad : float
-        Position error that weighs as much as one radian.
-    frames : FrameParameters, optional
-        Base and targets: without components where they are known; all free if not given.
-    begin : Frames, optional
-        Where they start; by a closed form if not given.
     few : bool
         Fewer residuals than parameters are enough.
+    settings
+        ``rotation_weight_mm_per_rad``, ``frames`` and ``begin`` of ``fitting.fit``.
 
     Raises
     ------
@@ -107,12 +101,10 @@ def fit(
         empty,
         free=informed(observations, empty),
         std=prior.std(empty),
-        rotation_weight_mm_per_rad=rotation_weight_mm_per_rad,
-        frames=frames,
-        begin=begin,
         held=True,
         few=few,
         name="VEC fit",
+        **settings,
     )
     return _with_centred_offsets(fitted, observations)
 
@@ -147,9 +139,9 @@ def _with_centred_offsets(fit: ModelFit, observations: Observations) -> ModelFit
         covariance=covariance,
         std=np.sqrt(np.maximum(np.diag(covariance), 0.0)),
     )
-    vector, std = np.zeros(free.size), np.full(free.size, np.nan)
-    vector[free], std[free] = solution.x[frames:], solution.std[frames:]
-    return replace(fit, model=fit.model.with_parameters(vector), std=std, solution=solution)
+    vector = np.zeros(free.size)
+    vector[free] = solution.x[frames:]
+    return replace(fit, model=fit.model.with_parameters(vector), solution=solution)
 
 
 ORDERS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 28, 40)

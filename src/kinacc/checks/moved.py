@@ -84,8 +84,8 @@ def _places(fitted: Fitted) -> list[tuple[int, str]]:
         return []
     few, design, residual, linear = _linearised(fitted)
     slots, places = linear.frames.slots, []
-    for slot, number, position in slots:
-        kind, width = ("session", 6) if slot == "bases" else ("target", 3)
+    for kind, number, position in slots:
+        width = 6 if kind == "session" else 3
         rows = np.flatnonzero(getattr(few, kind) == number)
         if len(rows) < 4 * _FEWEST:
             continue

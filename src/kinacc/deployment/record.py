@@ -128,7 +128,7 @@ class Calibration:
     def joint_jacobian(
         self, at: JointState, frame: str = "base", point: str | None = None
     ) -> np.ndarray:
-        """Jacobian (n, 6, k) of ``pose`` in the DH joints; rows as in ``dh.joint_jacobian``."""
+        """Jacobian (n, 6, k) of ``pose`` in the DH joints; rows as in ``ErrorModel``."""
         slopes = self.model.joint_jacobian(at)
         # A turn of the last frame swings the point: w x arm = -[arm] w.
         arm = self.model.pose(at).rotation @ self.point(point).position_mm

@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 
 from kinacc.calibration.fitting import Fit, fit_frames
-from kinacc.calibration.frames import ANGLE_UNIT_RAD, MOTIONS, Frames, frame_terms, stacked
+from kinacc.calibration.frames import ANGLE_UNIT_RAD, Frames, frame_terms, stacked
 from kinacc.calibration.observations import Observations, from_columns
 from kinacc.calibration.residuals import Errors, errors
 from kinacc.calibration.summary import LARGE_SHARE, held_out_errors
@@ -324,11 +324,11 @@ def frames_at(
         calibration.targets.get(name, tool) if TOOL in moved else calibration.point(name)
         for name in names
     ]
-    frames = Frames(stacked([calibration.base] * sessions), stacked(targets))
+    frames = Frames(stacked([calibration.base] * sessions + targets), sessions)
     if not moved:
         return frames
     terms = frame_terms(readings, frames)
-    of_base = np.arange(len(terms.names)) < len(MOTIONS) * sessions  # these stand first
+    of_base = terms.places[0] < sessions
     terms = replace(terms, free=np.where(of_base, BASE in moved, TOOL in moved))
     weight = rotation_weight_mm_per_rad
     return fit_frames(readings, calibration.model, rotation_weight_mm_per_rad=weight, frames=terms)

@@ -26,7 +26,7 @@ def run(inputs: Tables, settings: Settings) -> Figure:
     The tool centre point is the fitted one, or else the configured one.
     """
     robot = robots.load(settings["robot"])
-    model = dh.DHModel.from_columns(inputs["dh_model"], robot.dh.prismatic)
+    model = dh.DHModel.from_columns(inputs["dh_model"], robot.dh)
     points, evaluation = inputs["assessment_points"], settings["evaluation"]
     reported = np.stack([points[f"q{i + 1}"] for i in range(model.joints)], axis=-1)
     carried = robots.carried(robot)

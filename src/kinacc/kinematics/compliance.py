@@ -139,17 +139,15 @@ class ComplianceModel(ErrorModel):
         return columns | {name: np.full(self.joints, value) for name, value in stated}
 
     @classmethod
-    def from_columns(
-        cls, columns: Mapping[str, np.ndarray], prismatic: np.ndarray | None = None
-    ) -> Self:
-        """The model of a ``compliance_model`` table; ``prismatic`` (k,) is the robot's to say."""
+    def from_columns(cls, columns: Mapping[str, np.ndarray], nominal: DHModel) -> Self:
+        """The model of a ``compliance_model`` table; see ``DHModel.from_columns``."""
         order = np.argsort(columns["joint"], kind="stable")
 
         def of(names: tuple[str, ...]) -> np.ndarray:
             return np.stack([np.asarray(columns[name], float)[order] for name in names], axis=1)
 
         return cls(
-            DHModel.from_columns(columns, prismatic),
+            DHModel.from_columns(columns, nominal),
             of(COEFFICIENTS),
             of(_GRAVITY)[0],
             of(_LINK),

@@ -115,8 +115,12 @@ class DHModel(ErrorModel):
         return forward(self, state.q_rad)
 
     def joint_jacobian(self, state: JointState) -> np.ndarray:
-        """Jacobian (n, 6, k) of ``pose`` in the joints."""
-        return joint_jacobian(self, state.q_rad)
+        """Jacobian (n, 6, k) of ``pose`` in the joints; columns of prismatic ones are per mm."""
+        walk = _chain.Walk(self, state.q_rad)
+        moved = np.empty((self.joints, 6, len(state)))
+        for joint, into in enumerate(moved):
+            walk.by_joint(joint, into)
+        return np.ascontiguousarray(moved.transpose(2, 1, 0))
 
     def motions(self, state: JointState) -> tuple[Pose, np.ndarray, np.ndarray, None]:
         """Motions (5k, 6, n) of the flange by the parameters, exact."""
@@ -132,14 +136,11 @@ class DHModel(ErrorModel):
         return columns | {f"std_{name}": each for name, each in zip(PARAMETERS, stds, strict=True)}
 
     @classmethod
-    def from_columns(
-        cls, columns: Mapping[str, np.ndarray], prismatic: np.ndarray | None = None
-    ) -> Self:
-        """The model of a ``dh_model`` table; ``prismatic`` (k,) is the robot's to say."""
+    def from_columns(cls, columns: Mapping[str, np.ndarray], nominal: DHModel) -> Self:
+        """The model of a ``dh_model`` table; the joints that slide are the robot's to say."""
         order = np.argsort(columns["joint"], kind="stable")
         parameters = {name: np.asarray(columns[name], float)[order] for name in PARAMETERS}
-        slides = np.zeros(len(order), dtype=bool) if prismatic is None else prismatic
-        return cls(**parameters, prismatic=slides)
+        return cls(**parameters, prismatic=nominal.prismatic)
 
 
 def forward(model: DHModel, q_rad: np.ndarray) -> Pose:
@@ -187,27 +188,3 @@ def chain(model: DHModel, q_rad: np.ndarray) -> Pose:
     walk = _chain.Walk(model, np.atleast_2d(np.asarray(q_rad, dtype=float)))
     poses = [_chain.to_pose(frames) for frames in (*walk.before, walk.end)]
     return Pose(*(np.stack(parts, axis=1) for parts in zip(*poses, strict=True)))
-
-
-def joint_jacobian(model: DHModel, q_rad: np.ndarray) -> np.ndarray:
-    """Compute the Jacobian of the flange pose in the joints.
-
-    Parameters
-    ----------
-    model : DHModel
-        Arm of k joints.
-    q_rad : numpy.ndarray
-        DH joints, shape (n, k) or (k,), rad (mm where a joint slides).
-
-    Returns
-    -------
-    numpy.ndarray
-        Shape (n, 6, k), in the first DH frame. Rows 0-2: position, mm/rad. Rows 3-5: rotation
-        vector w with R(q + dq) = exp(w) R(q), rad/rad. Columns of prismatic joints are per mm.
-    """
-    q_rad = np.atleast_2d(np.asarray(q_rad, dtype=float))
-    walk = _chain.Walk(model, q_rad)
-    moved = np.empty((model.joints, 6, len(q_rad)))
-    for joint, into in enumerate(moved):
-        walk.by_joint(joint, into)
-    return np.ascontiguousarray(moved.transpose(2, 1, 0))

@@ -239,17 +239,15 @@ class ErrorModel:
         return {"parameter": names, "value": self.start, "std": std, "unit": units}
 
     @classmethod
-    def from_columns(
-        cls, columns: Mapping[str, np.ndarray], prismatic: np.ndarray | None = None
-    ) -> Self:
+    def from_columns(cls, columns: Mapping[str, np.ndarray], nominal: DHModel) -> Self:
         """Read the model of a table that ``to_columns`` wrote.
 
         Parameters
         ----------
         columns : mapping of numpy.ndarray
             Columns by name.
-        prismatic : numpy.ndarray, optional
-            Joints that slide, shape (k,), as the robot states; none when not given.
+        nominal : DHModel
+            The nominal arm, which states the joints that slide.
 
         Returns
         -------
@@ -261,7 +259,8 @@ class ErrorModel:
         LookupError, TypeError, ValueError
             For a table that lacks columns or rows.
         """
-        raise NotImplementedError
+        start = cls(nominal)  # type: ignore[call-arg]  # a dataclass of one's own
+        return start.with_parameters(np.asarray(columns["value"], dtype=float))
 
 
 def _differences(pose: Callable[[np.ndarray], Pose], x: np.ndarray, step: np.ndarray) -> np.ndarray:

@@ -210,12 +210,12 @@ def orientations(angle_rad: float, rotations: str) -> Orientations:
     combinations = list(product(signs, repeat=3))
     if rotations != "all_27":
         combinations.insert(0, (0, 0, 0))
-    x, y, z = np.array(combinations, dtype=float).T * angle_rad
+    turns = reference_rotation(np.array(combinations, dtype=float) * angle_rad)
     names = (
         " ".join(f"{axis}{'-0+'[sign + 1]}" for axis, sign in zip("XYZ", row, strict=True))
         for row in combinations
     )
-    return Orientations(rotation_x(x) @ rotation_y(y) @ rotation_z(z), tuple(names))
+    return Orientations(turns, tuple(names))
 
 
 def reference_rotation(euler_rad: np.ndarray) -> np.ndarray:
@@ -224,14 +224,15 @@ def reference_rotation(euler_rad: np.ndarray) -> np.ndarray:
     Parameters
     ----------
     euler_rad : numpy.ndarray
-        Angles about x, y, z, shape (3,).
+        Angles about x, y, z, shape (..., 3).
 
     Returns
     -------
     numpy.ndarray
-        Rotation, shape (3, 3).
+        Rotation, shape (..., 3, 3).
     """
-    return rotation_x(euler_rad[0]) @ rotation_y(euler_rad[1]) @ rotation_z(euler_rad[2])
+    x, y, z = np.moveaxis(euler_rad, -1, 0)
+    return rotation_x(x) @ rotation_y(y) @ rotation_z(z)
 
 
 def tool_poses(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from kinacc.config.error_models import ERROR_MODELS, NOMINAL, OWN, loaded
+from kinacc.config.error_models import ERROR_MODELS, NOMINAL, loaded
 from kinacc.errors import input_error
 from kinacc.geometry import Pose, rotation_from_quaternion
 from kinacc.kinematics.dh import DHModel
@@ -39,12 +39,8 @@ def models(tables: Tables, nominal: DHModel) -> dict[str, ErrorModel]:
     for kind in ERROR_MODELS:
         if f"{kind}_model" not in tables:
             continue
-        if kind in OWN:
-            value = np.asarray(tables[f"{kind}_model"]["value"], dtype=float)
-            models[kind] = OWN[kind](nominal).with_parameters(value)
-            continue
         try:
-            models[kind] = of_kind(kind).from_columns(tables[f"{kind}_model"], nominal.prismatic)
+            models[kind] = of_kind(kind).from_columns(tables[f"{kind}_model"], nominal)
         except (LookupError, TypeError, ValueError) as error:
             what = f"holds no whole model: {error}"
             raise input_error(f"table {kind}_model", what) from None

@@ -99,11 +99,21 @@ class VECModel(ErrorModel):
 
     def pose(self, state: JointState) -> Pose:
         """Poses (n, ...) with the rotation projected to SO(3)."""
-        return pose(self, state.q_rad, state.s)
+        return self.walk(state).pose
+
+    def walk(self, state: JointState) -> _chain.Walk:
+        """Walk along the arm: n poses, and how the joints' errors move them (``by_errors``).
+
+        An error is ``sum_n c_n T_n(q)``, that of eps_z with the direction offset beside.
+        """
+        values = _polynomials(self, state.q_rad, self.coefficients)
+        if state.s is not None:
+            values[..., 5] += np.sum(direction_basis(state.s) * self.direction_offsets_rad, axis=-1)
+        return _chain.Walk(self.dh, state.q_rad, np.ascontiguousarray(values.transpose(1, 2, 0)))
 
     def joint_jacobian(self, state: JointState) -> np.ndarray:
         """Jacobian (n, 6, k) of ``pose`` in the joints. Exact."""
-        moving = walk(self, state.q_rad, state.s)
+        moving = self.walk(state)
         slopes = _polynomials(self, state.q_rad, chebyshev.chebder(self.coefficients, axis=-1))
         slopes *= (2.0 / (self.q_max_rad - self.q_min_rad))[:, None]
         moved = np.empty((self.joints, 6, len(state)))
@@ -114,10 +124,10 @@ class VECModel(ErrorModel):
 
     def motions(self, state: JointState) -> tuple[Pose, np.ndarray, np.ndarray, np.ndarray]:
         """The joints' errors (6k, 6, n), spread over their Chebyshev polynomials. Exact."""
-        moving, (joints, count, terms) = walk(self, state.q_rad, state.s), self.coefficients.shape
+        moving, (joints, count, terms) = self.walk(state), self.coefficients.shape
         s = np.zeros(state.q_rad.shape) if state.s is None else state.s
-        basis = chebyshev.chebvander(mapped_joints(self, state.q_rad), self.order)
-        basis = np.repeat(basis.transpose(1, 2, 0), count, axis=0).reshape(-1, len(state))
+        basis = _basis(self, state.q_rad, terms).transpose(1, 2, 0)
+        basis = np.repeat(basis, count, axis=0).reshape(-1, len(state))
         travelled = direction_basis(s).transpose(1, 2, 0).reshape(-1, len(state))
         about_z = count * np.arange(joints) + ERRORS.index("eps_z")
         of = np.append(np.repeat(np.arange(joints * count), terms), np.repeat(about_z, 2))
@@ -145,12 +155,10 @@ class VECModel(ErrorModel):
         return columns | {name: getattr(self.dh, name)[place] for name in PARAMETERS}
 
     @classmethod
-    def from_columns(
-        cls, columns: Mapping[str, np.ndarray], prismatic: np.ndarray | None = None
-    ) -> Self:
+    def from_columns(cls, columns: Mapping[str, np.ndarray], nominal: DHModel) -> Self:
         """The model of a ``vec_model`` table; coefficients it does not list are zero.
 
-        ``prismatic`` (k,): joints that slide, which is the robot's to say.
+        The joints that slide are the robot's to say.
         """
         table = pd.DataFrame(dict(columns))
         arm = table.groupby("joint").first()
@@ -161,8 +169,7 @@ class VECModel(ErrorModel):
         both, value = direction == 0, table["coefficient"]
         coefficients[joint[both], error[both], order[both]] = value[both]
         offsets[joint[~both], (direction[~both] + 1) // 2] = value[~both]
-        slides = np.zeros(len(arm), dtype=bool) if prismatic is None else prismatic
-        dh = DHModel(**{name: arm[name] for name in PARAMETERS}, prismatic=slides)
+        dh = DHModel(**{name: arm[name] for name in PARAMETERS}, prismatic=nominal.prismatic)
         return cls(dh, arm["q_min_rad"], arm["q_max_rad"], coefficients, offsets)
 
 
@@ -189,25 +196,6 @@ def without_errors(
     return VECModel(dh, q_min_rad, q_max_rad, np.zeros(shape), np.zeros((dh.joints, 2)))
 
 
-def mapped_joints(model: VECModel, q_rad: np.ndarray) -> np.ndarray:
-    """Map joints from the fitted range to [-1, 1].
-
-    Parameters
-    ----------
-    model : VECModel
-        Model of k joints.
-    q_rad : numpy.ndarray
-        DH joints, shape (n, k), rad (mm where a joint slides).
-
-    Returns
-    -------
-    numpy.ndarray
-        Mapped joints, shape (n, k); beyond -1 and 1 the model extrapolates.
-    """
-    span = model.q_max_rad - model.q_min_rad
-    return (2.0 * np.asarray(q_rad, dtype=float) - model.q_min_rad - model.q_max_rad) / span
-
-
 def direction_basis(s: np.ndarray) -> np.ndarray:
     """Indicators of the travel directions -1 and +1.
 
@@ -222,29 +210,6 @@ def direction_basis(s: np.ndarray) -> np.ndarray:
         0 or 1, shape (n, k, 2).
     """
     return (np.asarray(s)[..., None] == _DIRECTIONS).astype(float)
-
-
-def errors(model: VECModel, q_rad: np.ndarray, s: np.ndarray | None = None) -> np.ndarray:
-    """Evaluate the errors of every joint: ``sum_n c_n T_n(q)``, and the direction offset for eps_z.
-
-    Parameters
-    ----------
-    model : VECModel
-        Model of k joints.
-    q_rad : numpy.ndarray
-        DH joints, shape (n, k), rad (mm where a joint slides).
-    s : numpy.ndarray, optional
-        Travel directions -1, 0, +1, shape (n, k).
-
-    Returns
-    -------
-    numpy.ndarray
-        Errors as ``ERRORS``, shape (n, k, 6), mm and rad, in the frame in front of the joint.
-    """
-    values = _polynomials(model, np.atleast_2d(q_rad), model.coefficients)
-    if s is not None:
-        values[..., 5] += np.sum(direction_basis(s) * model.direction_offsets_rad, axis=-1)
-    return values
 
 
 def pose(model: VECModel, q_rad: np.ndarray, s: np.ndarray | None = None) -> Pose:
@@ -264,25 +229,17 @@ def pose(model: VECModel, q_rad: np.ndarray, s: np.ndarray | None = None) -> Pos
     Pose
         Poses (n, ...) of the last DH frame in the first one, mm.
     """
-    return walk(model, q_rad, s).pose
-
-
-def walk(model: VECModel, q_rad: np.ndarray, s: np.ndarray | None = None) -> _chain.Walk:
-    """Walk along the arm: poses, and how the joints' errors move them (``by_errors``).
-
-    Parameters are those of ``pose``.
-
-    Returns
-    -------
-    kinacc.kinematics.chain.Walk
-        Frames of n poses in the first DH frame, mm.
-    """
-    q_rad = np.atleast_2d(np.asarray(q_rad, dtype=float))
-    values = errors(model, q_rad, s).transpose(1, 2, 0)
-    return _chain.Walk(model.dh, q_rad, np.ascontiguousarray(values))
+    return model.pose(JointState(np.atleast_2d(np.asarray(q_rad, dtype=float)), s))
 
 
 def _polynomials(model: VECModel, q_rad: np.ndarray, coefficients: np.ndarray) -> np.ndarray:
     """Values (n, k, 6) at joints (n, k) of the polynomials with ``coefficients`` (k, 6, terms)."""
-    basis = chebyshev.chebvander(mapped_joints(model, q_rad), coefficients.shape[-1] - 1)
+    basis = _basis(model, q_rad, coefficients.shape[-1])
     return np.einsum("nkt,ket->nke", basis, coefficients)
+
+
+def _basis(model: VECModel, q_rad: np.ndarray, terms: int) -> np.ndarray:
+    """Chebyshev polynomials (n, k, terms) of joints (n, k) mapped from their range to [-1, 1]."""
+    span = model.q_max_rad - model.q_min_rad
+    mapped = (2.0 * q_rad - model.q_min_rad - model.q_max_rad) / span
+    return chebyshev.chebvander(mapped, terms - 1)

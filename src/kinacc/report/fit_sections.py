@@ -149,7 +149,7 @@ def _rank(fit: Columns | None) -> dict[str, object] | None:
 
 def parameters(tables: Tables, robot: Robot, summary: CalibrationSummary) -> Part:
     """DH parameters against nominal, and what the VEC model adds to them."""
-    model = VECModel.from_columns(tables["vec_model"], robot.dh.prismatic)
+    model = VECModel.from_columns(tables["vec_model"], robot.dh)
     joints, errors, std = vec_errors(tables, model, robot)
     offsets = pd.DataFrame(tables["vec_model"])
     values = {
@@ -169,7 +169,7 @@ def dh_parameters(model: Columns, identified: Columns, robot: Robot) -> pd.DataF
 
     The angle beta is left out of joints that have none.
     """
-    fitted = DHModel.from_columns(model, robot.dh.prismatic)
+    fitted = DHModel.from_columns(model, robot.dh)
     order = np.argsort(model["joint"], kind="stable")
     std = np.stack([np.asarray(model[f"std_{name}"])[order] for name in PARAMETERS], axis=1)
     table = pd.DataFrame({"name": fitted.names, "nominal": robot.dh.start})

@@ -9,15 +9,13 @@ import numpy as np
 from kinacc.config.records import Settings
 from kinacc.errors import input_error
 from kinacc.geometry import quaternion_from_rotation
-from kinacc.kinematics import dh
 from kinacc.kinematics.region import Attitude
 from kinacc.kinematics.robot import Robot
 from kinacc.synthetic.accepted import AcceptedDraw, accepted_draw
-from kinacc.synthetic.draw import AS_TUNED, TABLE_II, physical_robot
+from kinacc.synthetic.draw import AS_TUNED, physical_robot
 from kinacc.synthetic.plan import DOWN, Run, calibration_run, measured
 
-# How far poses of a nominal arm may be from those of Table II: the arm the draws were made for.
-_SAME_ARM_MM = 25.0
+ARM = "mh180"  # whose draws there are
 
 
 def measure(robot: Robot, settings: Settings, attitude: Attitude = DOWN) -> dict[str, np.ndarray]:
@@ -26,7 +24,7 @@ def measure(robot: Robot, settings: Settings, attitude: Attitude = DOWN) -> dict
     Parameters
     ----------
     robot : Robot
-        The nominal arm; only that of the draws can be measured.
+        The nominal arm; only the one named ``ARM`` can be measured.
     settings : mapping
         Those of ``measurements.synthetic``; without a roughness the draw has the one it was
         accepted with.
@@ -44,15 +42,10 @@ def measure(robot: Robot, settings: Settings, attitude: Attitude = DOWN) -> dict
     InputError
         For an unknown draw and for another arm.
     """
-    same = robot.dh.joints == TABLE_II.joints and np.array_equal(robot.joint_map, np.eye(6))
-    if same:
-        q_rad = np.random.default_rng(0).uniform(-1.0, 1.0, (50, 6))
-        nominal, drawn = (dh.forward(arm, q_rad).position_mm for arm in (robot.dh, TABLE_II))
-        same = bool(np.linalg.norm(nominal - drawn, axis=1).max() < _SAME_ARM_MM)
-    if not same:
+    if robot.name != ARM:
         what = f"is synthetic, but robot {robot.name} is not the arm that was synthesised"
         fix = "give the measurements of this robot in a file (measurements.source: file)"
-        raise input_error("measurements.source", what, "robot: mh180", fix)
+        raise input_error("measurements.source", what, f"robot: {ARM}", fix)
     stated = {name: settings[name] for name in AS_TUNED._fields if name in settings}
     draw = replace(accepted_draw(int(settings["draw"])), roughness=AS_TUNED._replace(**stated))
     run = calibration_run(robot, int(settings["poses"]), draw.seed, attitude)

@@ -77,11 +77,6 @@ def physical_robot(
     return PhysicalRobot(geometry, smooth, _beyond(rng, scales, roughness.ripple))
 
 
-def noise_generator(seed: int) -> np.random.Generator:
-    """Generator of everything that differs from visit to visit in draw ``seed``."""
-    return np.random.default_rng([seed, 2])
-
-
 def _smooth(rng: np.random.Generator, scales: Scales, decay: float) -> Smooth:
     size = np.empty((6, 6))
     size[:, :3] = _SHIFT_MM * scales.smooth_arm

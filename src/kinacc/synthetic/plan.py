@@ -12,11 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinacc.geometry import Pose, exp_so3, rotation_x, rotation_y, rotation_z
+from kinacc.geometry import Pose, exp_so3, rotation_x
 from kinacc.kinematics.inverse import closed_form
-from kinacc.kinematics.region import Attitude, Cylinder, fill, tool_poses
+from kinacc.kinematics.region import Attitude, Cylinder, fill, reference_rotation, tool_poses
 from kinacc.kinematics.robot import Robot
-from kinacc.synthetic.draw import noise_generator
 from kinacc.synthetic.physical import PhysicalRobot, Visits, pose
 
 SPACE = Cylinder(1150.0, 1000.0, -50.0, 600.0, np.deg2rad(-5.0), np.deg2rad(65.0))
@@ -75,7 +74,7 @@ class Run:
 def calibration_run(robot: Robot, poses: int, seed: int, attitude: Attitude = DOWN) -> Run:
     """The plan's ``poses`` visited in order, with the chance of draw ``seed``."""
     q_rad = configurations(robot, poses, attitude)
-    rng = noise_generator(seed)
+    rng = np.random.default_rng([seed, 2])  # [seed, 1] draws the arm
     visits = Visits(q_rad, directions(q_rad), time_h(poses), rng.standard_normal((poses, 6)))
     return Run(visits, rng.standard_normal((poses, 3)), rng.standard_normal((poses, 3)))
 
@@ -92,6 +91,5 @@ def _poses(rng: np.random.Generator, attitude: Attitude) -> Pose:
     inside = rng.uniform(-TURN_DEG, TURN_DEG, (_BLOCK, 3))
     corner = rng.uniform(*CORNER_DEG, (_BLOCK, 3)) * rng.choice([-1.0, 1.0], (_BLOCK, 3))
     at_corner = rng.random(_BLOCK) < CORNER_SHARE
-    x, y, z = np.deg2rad(np.where(at_corner[:, None], corner, inside)).T
-    turned = rotation_x(x) @ rotation_y(y) @ rotation_z(z)
+    turned = reference_rotation(np.deg2rad(np.where(at_corner[:, None], corner, inside)))
     return tool_poses(cells, attitude.reference, turned, attitude.frame)

@@ -80,15 +80,15 @@ def fit_pendant(tables: Tables, settings: Settings, controller: str, name: str =
     every, train = stages.observed(tables, robot)
     used = every.select(train)
     estimator = DHEstimator.of(settings, robot, every)
-    fitted = estimator.arm.free
+    fitted = estimator.free
     free = fitted & np.isin(PARAMETERS, maker.takes)
 
     def fit(observations: Observations) -> ModelFit:
         return estimator.common.fit(
             observations,
-            estimator.arm.nominal,
+            estimator.nominal,
             free=free,
-            std=estimator.arm.std,
+            std=estimator.std,
             threshold=estimator.threshold,
             loss=estimator.loss,
             name=f"fit for {maker.name}",

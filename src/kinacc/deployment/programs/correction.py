@@ -44,8 +44,8 @@ from kinacc.deployment.programs.record import (
 from kinacc.deployment.record import FLANGE, MEASURED, Calibration
 from kinacc.errors import InputError, Problem, input_error, refuse
 from kinacc.geometry import IDENTITY, Pose, compose, invert
-from kinacc.kinematics import dh
 from kinacc.kinematics.inverse import limits
+from kinacc.kinematics.model import JointState
 from kinacc.kinematics.robot import Robot, forward
 from kinacc.tables.atomic import write_new
 
@@ -379,7 +379,7 @@ def _corrected(
     new = compose(forward(robot, q_rad), tool)
     shift_mm, turn_rad = inverse.distance(new, wanted)
     known = predict(arm, q_rad, point=target)
-    slopes = dh.joint_jacobian(robot.dh, robot.dh_joints(q_rad))
+    slopes = robot.dh.joint_jacobian(JointState(robot.dh_joints(q_rad)))
     slopes[:, :3] /= np.sum(np.abs(robot.dh.a_mm) + np.abs(robot.dh.d_mm))
     errors_mm = np.nan_to_num([known.unexplained[:, 0], known.std_position_mm])
     return pd.DataFrame(

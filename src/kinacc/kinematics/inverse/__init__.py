@@ -268,7 +268,7 @@ def _beside(dh: _dh.DHModel, q_rad: np.ndarray, first: int) -> tuple[np.ndarray,
     direction of joints, from ``first`` on, that moves the flange least.
     """
     unit = np.where(dh.prismatic, 1e3, 1.0)
-    slopes = _dh.joint_jacobian(dh, q_rad) * np.repeat([1.0, 1e3], 3)[:, None] * unit
+    slopes = dh.joint_jacobian(JointState(q_rad)) * np.repeat([1.0, 1e3], 3)[:, None] * unit
     _, sizes, directions = np.linalg.svd(slopes[..., first:], full_matrices=False)
     weak = np.flatnonzero(sizes[:, -1] < _WEAK_MM)
     step = np.pad(directions[weak, -1], ((0, 0), (first, 0))) * unit
