@@ -25,6 +25,7 @@ from harness import Contender, Work
 from kinacc.geometry import Pose, rotation_x, rotation_y, rotation_z
 from kinacc.kinematics import dh, inverse, robot
 from kinacc.kinematics.inverse import closed_form
+from kinacc.kinematics.model import JointState
 
 POSES, GOALS, FEW_GOALS = 200_000, 20_000, 60
 WORST_CONDITION = 100.0
@@ -40,7 +41,7 @@ def works(smoke: bool) -> list[Work]:
     few = 2 if smoke else FEW_GOALS
 
     def joint_jacobian() -> object:
-        return *dh.forward(model, q_rad), dh.joint_jacobian(model, q_rad)
+        return *dh.forward(model, q_rad), model.joint_jacobian(JointState(q_rad))
 
     return [
         _work("forward kinematics", "pose", poses, lambda: tuple(dh.forward(model, q_rad)),
@@ -125,7 +126,7 @@ def goals(smoke: bool):
     model, q_rad = problem(smoke)
     pose = dh.forward(model, q_rad[: 50 if smoke else GOALS])
     start, found = closed_form.recognise(ARM.dh).solve(pose, closed_form.Start())
-    slopes = dh.joint_jacobian(model, np.nan_to_num(start).reshape(-1, 6))
+    slopes = model.joint_jacobian(JointState(np.nan_to_num(start).reshape(-1, 6)))
     slopes[:, 3:] *= 1000.0
     condition = np.linalg.cond(slopes).reshape(found.shape)
     keep = np.where(found, condition, 0.0).max(axis=1) < WORST_CONDITION
