@@ -6,6 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import compress
 from pathlib import Path
 
 import numpy as np
@@ -23,9 +24,8 @@ from kinacc.deployment.record import Calibration
 from kinacc.errors import Problem, first_few, input_error, refuse
 from kinacc.geometry import compose, invert
 from kinacc.kinematics import robot as robots
-from kinacc.kinematics.inverse.limits import travel_unit
+from kinacc.kinematics.inverse.limits import outside, travel_unit
 from kinacc.kinematics.model import JointState
-from kinacc.kinematics.robot import outside_limits
 from kinacc.tables import store
 
 _MUCH_NOISE = 2.0  # times what the calibration left unexplained, noise included
@@ -94,20 +94,19 @@ def points_of(
 
 
 def _outside(arm: Calibration, joints: np.ndarray, label: Sequence[str]) -> list[Problem]:
-    beyond = [
-        (fault.rows, f"joint {fault.joint} outside the limits of {arm.robot.name}")
-        for fault in outside_limits(arm.robot, joints, 1e-9)
-    ]
-    if arm.model.domain is not None:
-        outside = arm.outside_range(arm.robot.dh_joints(joints))
-        beyond += [
-            (rows, f"joint {joint} outside the range the data cover: no prediction")
-            for joint, column in enumerate(outside.T, 1)
-            if len(rows := np.flatnonzero(column))
-        ]
+    robot, domain = arm.robot, arm.model.domain
+    beyond = {
+        f"the limits of {robot.name}": outside(joints, (robot.q_min_rad, robot.q_max_rad)),
+        "the range the data cover: no prediction": outside(robot.dh_joints(joints), domain),
+    }
     return [
-        Problem(f"candidates {first_few([label[row] for row in rows])}", text)
-        for rows, text in beyond
+        Problem(
+            f"candidates {first_few([*compress(label, column)])}",
+            f"joint {joint} outside {what}",
+        )
+        for what, table in beyond.items()
+        for joint, column in enumerate(table.T, 1)
+        if column.any()
     ]
 
 

@@ -6,7 +6,6 @@ that the model returns to the pose within tolerance the nearest to the given joi
 
 from __future__ import annotations
 
-from contextlib import suppress
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import NamedTuple
@@ -15,7 +14,7 @@ import numpy as np
 import pandas as pd
 
 from kinacc.deployment.record import Calibration
-from kinacc.errors import InputError, input_error
+from kinacc.errors import input_error
 from kinacc.geometry import Pose, compose, invert, log_so3
 from kinacc.kinematics.inverse import few_axes, limits, newton, solve
 from kinacc.kinematics.model import ErrorModel, JointState
@@ -28,7 +27,7 @@ SAME_POSTURE_RAD = 0.35  # a calibration moves joints by less, another posture b
 SAME_RAD = 1e-5
 _SAME_TURN_RAD = 1e-9  # a joint so far beyond its limit stays on its turn
 _NEAR_START_MM = 1.0  # a posture of the plain arm, as a start on the calibrated one
-_STARTS, _FEW_STARTS = 48, 16  # of the search where an arm has no list of branches
+_STARTS = 16  # of the search of an arm of four or five axes, which has no list of branches
 
 
 class PoseStatus(IntEnum):
@@ -205,16 +204,14 @@ class _Goals:
 
     def postures(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Starts (m, k) in every posture of the plain arm at goals ``rows``, and their goals."""
-        robot, plain, count = self.calibration.robot, self.calibration.model.dh, _FEW_STARTS
+        robot, plain = self.calibration.robot, self.calibration.model.dh
         if not self.has_few_axes:
-            count = _STARTS
-            with suppress(InputError):
-                result = solve(robot, plain, self.goal.select(rows)).q_rad
-                local, branch = np.nonzero(np.isfinite(result).all(axis=2))
-                return self._turned(result[local, branch], rows[local]), rows[local]
-        share = points("sobol", count, robot.dh.joints)
+            result = solve(robot, plain, self.goal.select(rows)).q_rad
+            local, branch = np.nonzero(np.isfinite(result).all(axis=2))
+            return self._turned(result[local, branch], rows[local]), rows[local]
+        share = points("sobol", _STARTS, robot.dh.joints)
         starts = robot.dh_joints(robot.q_min_rad + share * (robot.q_max_rad - robot.q_min_rad))
-        local = np.repeat(rows, count)
+        local = np.repeat(rows, _STARTS)
         q_dh = self._refined(plain, np.tile(starts, (len(rows), 1)), local)
         near = self._left(plain, q_dh, local)[0] <= _NEAR_START_MM
         return self._turned(q_dh[near], local[near]), local[near]

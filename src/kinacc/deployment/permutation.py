@@ -50,8 +50,8 @@ class ErrorColumns(NamedTuple):
     def rank(self) -> int:
         """Number of parameters that the fit of what moved determines."""
         motions = self.columns[..., : self.fitted]
-        flat = motions.reshape(motions.shape[0] * motions.shape[1], -1)
-        return int(np.linalg.matrix_rank(flat, tol=1e-6)) if self.fitted else 0
+        flat = motions.reshape(motions.shape[0] * motions.shape[1], self.fitted)
+        return int(np.linalg.matrix_rank(flat, tol=1e-6))
 
 
 @dataclass(frozen=True)
@@ -130,11 +130,9 @@ class _Statistics(NamedTuple):
 def _statistics(sums: np.ndarray, like: ErrorColumns) -> _Statistics:
     """Statistics of mean products (m, q, q) of samples, of configurations ``like`` these."""
     fitted = like.fitted
-    rest = sums[:, fitted:, fitted:]
-    if fitted:
-        cross = sums[:, :fitted, fitted:]
-        rest = rest - np.swapaxes(cross, 1, 2) @ _inverse(sums[:, :fitted, :fitted]) @ cross
-    rest = rest / (like.columns.shape[1] // 3)
+    cross = sums[:, :fitted, fitted:]
+    absorbed = np.swapaxes(cross, 1, 2) @ _inverse(sums[:, :fitted, :fitted]) @ cross
+    rest = (sums[:, fitted:, fitted:] - absorbed) / (like.columns.shape[1] // 3)
     along, joints = rest[:, :-1, -1], rest[:, :-1, :-1]
     offsets = (_inverse(joints, _LEAST_MM**2) @ along[..., None])[..., 0]
     explained = np.sum(offsets * along, axis=1)

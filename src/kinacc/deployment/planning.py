@@ -130,8 +130,7 @@ def plan_poses(
     q_rad = robot.finite_joints(q_rad, "candidates")
     start_rad = robot.finite_joints(np.ravel(start_rad), "start_rad")
     if outside(q_rad, (robot.q_min_rad, robot.q_max_rad)).any():
-        allowed = f"{robot.q_min_rad} to {robot.q_max_rad} rad (mm where a joint slides)"
-        raise input_error("candidates", f"outside the limits of {robot.name}", allowed)
+        raise input_error("candidates", f"outside the limits of {robot.name}")
     if unknown := {*experiment.hayati_joints}.difference(range(1, robot.dh.joints + 1)):
         raise input_error("hayati_joints", f"{sorted(unknown)}", f"1 to {robot.dh.joints}")
     shown = information(robot, q_rad, experiment)

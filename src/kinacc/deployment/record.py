@@ -15,7 +15,7 @@ from kinacc.errors import input_error
 from kinacc.geometry import IDENTITY, Pose, compose, invert, skew
 from kinacc.kinematics.inverse import limits
 from kinacc.kinematics.model import ErrorModel, JointState
-from kinacc.kinematics.robot import Robot
+from kinacc.kinematics.robot import Robot, carried
 from kinacc.tables.allowed import SUBSETS
 
 MODELS = (*ERROR_MODELS, NOMINAL)
@@ -163,5 +163,5 @@ class Calibration:
 
 def nominal(robot: Robot, name: str = "") -> Calibration:
     """A robot as its maker describes it, as a calibration that nothing was learned for."""
-    tool = compose(robot.flange, robot.tool)
-    return Calibration(name or robot.name, robot, NOMINAL, robot.dh, IDENTITY, {TOOL: tool})
+    targets = {TOOL: carried(robot)}
+    return Calibration(name or robot.name, robot, NOMINAL, robot.dh, IDENTITY, targets)

@@ -51,9 +51,7 @@ class Source:
     @property
     def dh(self) -> DHModel:
         """The DH table of the model."""
-        if self.calibration.model.table is None:
-            raise TypeError(f"a {self.calibration.choice} model has no DH table: choose dh")
-        return self.calibration.model.table
+        return self.calibration.model.dh
 
     def joints(self, dh: DHModel) -> pd.DataFrame:
         """A row a joint of a table: joint, type, and value, nominal value and std of parameters.
