@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from kinacc.checks.contradictions import load
 from kinacc.kinematics import robot
+from kinacc.measurements.intake.write import shipped_text
 
 
 @pytest.fixture
@@ -47,6 +48,10 @@ def test_nothing_is_overwritten_unless_forced(foreign, tmp_path):
     assert dataset.read_text() == "mine\n"
     call("init", foreign, "--out", tmp_path, *words, "--force", code=0)
     assert "datasets:" in dataset.read_text()
+    # A robot file of the name that the data set would have stays, also where it is forced.
+    dataset.write_text(shipped_text("irb120"), encoding="utf-8")
+    call("init", foreign, "--out", tmp_path, *words, "--robot", dataset, "--force", code=2)
+    assert robot.load(dataset).dh.joints == 6
 
 
 def test_an_unknown_robot_gets_a_template_to_fill_in(tmp_path):

@@ -120,6 +120,10 @@ def init(measurement_files: tuple[str, ...], out: Output, **options: Any) -> Non
         raise input_error("--name", name, f"at most {LONGEST} letters, digits, _ and -")
     dataset = Path(options["folder"], f"{name}.yaml")
     robot_file = dataset.with_name(f"{name}.robot.yaml")
+    if options["robot"] and dataset.resolve() == Path(options["robot"]).resolve():
+        raise input_error(
+            str(dataset), "is the robot file, and would be overwritten", fix="give --name"
+        )
     require_writable([dataset], out.force)
     robot, chosen = _robot(guess, options["robot"])
     text = _robot_text(robot, guess.joints, name, robot_file.parent)
