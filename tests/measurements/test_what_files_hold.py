@@ -110,6 +110,16 @@ def test_a_sliding_joint_is_read_as_a_length(tmp_path, joints):
     columns = reading(tmp_path, joints | points(), arm=arm).columns
     np.testing.assert_allclose(columns["q3"], joints["q3_m"] * 1000.0)
     np.testing.assert_allclose(columns["q2"], np.deg2rad(joints["q2_deg"]))
+    # Its head states its unit, whatever that of the points.
+    table = joints | {
+        f"{axis.upper()} [in]": values
+        for axis, values in zip("xyz", points().values(), strict=True)
+    }
+    table["Track [mm]"] = 1000.0 * table.pop("q3_m")
+    names = {axis: f"{axis.upper()} [in]" for axis in "xyz"} | {"q3": "Track [mm]"}
+    columns = reading(tmp_path, table, arm=arm, length_unit="inch", columns=names).columns
+    np.testing.assert_allclose(columns["q3"], table["Track [mm]"])
+    np.testing.assert_allclose(columns["x_mm"], 25.4 * table["X [in]"])
 
 
 def test_pulses_of_motors_are_read_by_the_number_per_degree_of_each(tmp_path, joints):

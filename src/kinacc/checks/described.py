@@ -100,7 +100,10 @@ def corrected(guess: Guess, robot: Robot, name: str) -> tuple[Guess, Report, Mea
     """
     if robot.dh.joints != guess.joints:
         message = f"{robot.name} has {robot.dh.joints} joints, the file {guess.joints}"
-        raise input_error("--robot", message)
+        fix = f"joints are J1 .. J{robot.dh.joints} in the robot's order"
+        if unused := ", ".join(guess.unused()):
+            fix += f"; rename theirs among the columns not used: {unused}"
+        raise input_error("--robot", message, fix=fix)
     for _ in range(3):
         reading = read(guess.section, robot, strict=False)
         report = check.check(reading, guess.section, robot, name)
