@@ -164,7 +164,8 @@ def _missing(
             allowed = "one column of joints, of a point or of an orientation"
             yield Problem(f"--take {column}", f"cannot be read{why}", allowed)
     joints = (columns.joints, "no columns of 4 to 7 joints", (JOINTS,), "q1_deg ..")
-    points = (columns.targets, "no columns of a measured point", (POINT, POSE), "x_mm .. (SMR1 X .. of several)")
+    named = "x_mm .. (SMR1 X .. of several)"
+    points = (columns.targets, "no columns of a measured point", (POINT, POSE), named)
     wanted = {JOINTS: (joints,), MEASUREMENTS: (joints, points)}.get(need, (points,))
     for _, message, kinds, names in (quantity for quantity in wanted if not quantity[0]):
         spare = [group for group in columns.aside if group.kind in kinds]
