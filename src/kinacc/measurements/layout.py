@@ -199,7 +199,7 @@ class _Finder:
         """The column of ``name``, if there is one; in two units it has to hold the same twice."""
         units, unit, key = self.kind(name)
         mapped = self.layout.columns.get(name)
-        if mapped in self.table.columns and name in self.slides:  # travel has a unit of its own
+        if mapped and name in self.slides:  # travel has a unit of its own
             unit = _stated_unit(self.table, mapped) or unit
         names = {f"{name}_{u}" if u else name: factor for u, factor in units.items()}
         present = [Place(column, factor) for column, factor in
