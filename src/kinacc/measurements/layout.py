@@ -200,7 +200,8 @@ class _Finder:
         units, unit, key = self.kind(name)
         mapped = self.layout.columns.get(name)
         if mapped and name in self.slides:  # travel has a unit of its own
-            unit = _stated_unit(self.table, mapped) or unit
+            stated = _stated_unit(self.table, mapped)
+            unit = stated if stated in LENGTH else unit
         names = {f"{name}_{u}" if u else name: factor for u, factor in units.items()}
         present = [Place(column, factor) for column, factor in
                    ({mapped: units[unit]} if mapped else names).items()
