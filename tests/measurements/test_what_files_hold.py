@@ -122,8 +122,8 @@ def test_a_sliding_joint_is_read_as_a_length(tmp_path, joints):
     np.testing.assert_allclose(columns["x_mm"], 25.4 * table["X [in]"])
     table["Track [deg]"] = table.pop("Track [mm]")
     names["q3"] = "Track [deg]"
-    message = refused(tmp_path, table, arm=arm, length_unit="inch", columns=names)
-    assert "Track [deg]: says deg" in message
+    with pytest.raises(InputError, match=r"Track \[deg\]: says deg"):
+        reading(tmp_path, table, arm=arm, length_unit="inch", columns=names)
 
 
 def test_pulses_of_motors_are_read_by_the_number_per_degree_of_each(tmp_path, joints):
