@@ -172,10 +172,12 @@ def verify(
         return replace(result, reason="base and tool explain all that these poses show")
     test, (factor, offsets) = compare(held_out, fresh), smallest_changes(held_out, len(rows))
     verdict = FAIL if test.probability <= LEVEL else PASS if factor <= DOUBLED else UNDECIDED
+    few = f"{len(rows)} configurations near measured poses are too few to show errors "
+    few += f"{DOUBLED:g} times as large; measure more"
     return replace(
         result,
         verdict=verdict,
-        reason="too few configurations near measured poses" if verdict == UNDECIDED else "",
+        reason=few if verdict == UNDECIDED else "",
         test=test,
         smallest_factor=factor,
         smallest_offsets=offsets,
