@@ -462,7 +462,7 @@ def verify(
     calibration
         The calibration.
     readings
-        New readings, 5 to 15 configurations.
+        New readings, 10 to 20 configurations.
     base, tool
         Whether instrument and target stand as they did (``same``) or were set up anew
         (``moved``): what moved is fitted to the readings.

@@ -39,7 +39,7 @@ _EXIT = {verification.PASS: DONE, verification.FAIL: AGAINST, verification.UNDEC
 def verify(
     readings: Path, folder: str, base: str, tool: str, dataset: str | None, out: Output
 ) -> None:
-    """Test whether a calibration still holds at 5 to 15 new configurations.
+    """Test whether a calibration still holds at 10 to 20 new configurations.
 
     NEW is a file of readings like those of the calibration, or a .yaml by `kinacc init`. A frame
     that was moved is fitted to the new readings. Exit code 0: PASS; 1: FAIL; 3: UNDECIDED.
