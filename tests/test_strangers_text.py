@@ -29,8 +29,8 @@ ONE = """  arm_{0}:
 
 def test_a_thousand_data_sets_stand_in_one_file(tmp_path):
     (tmp_path / "own.yaml").write_text("datasets:\n" + "".join(map(ONE.format, range(1000))))
-    document, problems = read(tmp_path / "own.yaml")
-    assert not problems
+    document = read(tmp_path / "own.yaml")
+    assert not document.problems
     assert len(document.data["datasets"]) == 1000
 
 

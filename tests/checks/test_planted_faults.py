@@ -9,7 +9,6 @@ from functools import cache
 import numpy as np
 import plants
 import pytest
-import yaml
 from good_files import measured, simulated
 
 from kinacc.measurements.intake.write import shipped_text
@@ -238,7 +237,7 @@ def test_the_joint_map_that_is_advised_mends_a_coupling(tmp_path):
     found = only(file.check(tmp_path), "joint_coupling", EVERY(file))
     assert (found.values["joint"], found.values["other"]) == (3, 2)
     (tmp_path / "own.yaml").write_text(
-        f"{shipped_text('irb120')}\njoint_map: {yaml.safe_load(found.values['map'])}\n"
+        f"{shipped_text('irb120')}\njoint_map: {found.values['joint_map']}\n"
     )
     mended = replace(file, robot=tmp_path / "own.yaml").check(tmp_path)
     # The limits are those of the joints as the robot counts them.

@@ -94,7 +94,7 @@ BAD = [  # text, key path, and what is wrong or nearest
     ("datasets: {12: {robot: mh180}}", "datasets[12]", "valid string"),
     ("datasets: {own: {seed: 1}}", "datasets.own", "has no robot"),
     ("datasets: {own: {robot: mh108}}", "datasets.own.robot", "mh180?"),
-    ("datasets: {own: {robot: my/arm.yaml}}", "datasets.own.robot", "no robot file"),
+    ("datasets: {own: {robot: my/arm.yaml}}", "datasets.own.robot", "no robot 'my/arm"),
     (OWN + "}}}}", "datasets.own.measurements.source", "is not given"),
     (OWN + "path: no.csv}}}}", "datasets.own.measurements.file.path", "'no.csv' does not exist"),
     ("datasets: {own: {robot: ur10}}", "measurements.source", "no synthetic ur10"),

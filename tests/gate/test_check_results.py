@@ -100,13 +100,16 @@ def _edited(path):
         (_edited, "rm results/mh180/dh_model.parquet"),
         (lambda path: path.unlink(), "missing"),
         (lambda path: path.rename(path.with_name("claims.parquet")), "claims.parquet"),
-        (lambda path: column_set(path, "d_mm", [None] * 6), "null in rows 0, 1, 2, 3, 4"),
-        (lambda path: column_set(path, "d_mm", [np.inf] + [0.0] * 5), "inf in row 0"),
+        (lambda path: column_set(path, "d_mm", [None] * 6), "null or NaN in rows 0, 1, 2, 3, 4"),
+        (lambda path: column_set(path, "d_mm", [np.inf] + [0.0] * 5), "infinite in row 0"),
         (lambda path: column_set(path, "joint", [1, 2, 3, 4, 5, 5]), "same key in rows 4, 5"),
         (lambda path: column_set(path, "joint", [1, 2, 3, 4, 5, -6]), "-6 in row 5"),
         (lambda path: column_set(path, "d_mm", [0.0] * 6, unit="m"), "unit or meaning: d_mm"),
-        (lambda path: rewritten(path, pq.read_table(path).drop(["a_mm"])), "unit or meaning: a_mm"),
-        (lambda path: rewritten(path, pq.read_table(path).replace_schema_metadata({})), "metadata"),
+        (lambda path: rewritten(path, pq.read_table(path).drop(["a_mm"])), "column a_mm: missing"),
+        (
+            lambda path: rewritten(path, pq.read_table(path).replace_schema_metadata({})),
+            "provenance",
+        ),
     ],
 )
 def test_a_table_that_is_not_as_its_stage_and_schema_have_it_fails(here, spoil, says):

@@ -81,13 +81,11 @@ def joint_changes(robot: Robot) -> Iterator[Change]:
         for word, sign in (("plus", 1.0), ("minus", -1.0)):
             matrix = unit + sign * np.outer(unit[joint], unit[second])
             joint_map = (robot.joint_map @ matrix + 0.0).tolist()
-            rows = [f"[{', '.join(f'{value:g}' for value in row)}]" for row in joint_map]
             change = finding(
                 "joint_coupling",
                 joint=joint + 1,
                 other=second + 1,
                 sign=word,
-                map=f"[{', '.join(rows)}]",
                 joint_map=joint_map,
             )
             yield _joints(change, robot, matrix)

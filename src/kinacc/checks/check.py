@@ -13,6 +13,7 @@ from kinacc.calibration.noise import of_readings
 from kinacc.checks import (
     coverage,
     digits,
+    distances,
     meanings,
     moved,
     readings,
@@ -103,7 +104,8 @@ def examined(settings: Settings, dataset: str) -> Report:
     reading = read(section, arm, strict=False)
     report = check(reading, section, arm, dataset)
     of_fit = (reading.columns, arm, settings["calibration"])
-    more = (*coverage.few_poses(*of_fit), *coverage.fixed_frames(*of_fit))
+    found = (*coverage.few_poses(*of_fit), *coverage.fixed_frames(*of_fit))
+    more = [item.held_to(()) for item in found]
     accepted = dict(settings["data_check"]["accept"])
     return replace(report, suspicions=(*report.suspicions, *more), accepted=accepted)
 
@@ -120,9 +122,9 @@ def check(
     every = readings.of_file(reading, robot)
     if (count := len(np.unique(every.pose))) < _FEWEST_POSES:
         raise input_error(section["path"], f"{count} poses", f"at least {_FEWEST_POSES}")
-    distances = readings.distances(every)
-    by_distances, renamed = moved.by_distances(every, distances)
-    single, cell, away_mm = readings.merged(every)
+    between = distances.distances(every)
+    by_distances, renamed = distances.compared(every, between)
+    single, away_mm = readings.merged(renamed)
     scatter = of_readings(every, robot.dh)
     fitted, findings = _meant(single, stated, robot)
     kinds = {item.kind for item in findings}
@@ -131,10 +133,6 @@ def check(
         findings += _outside(every, robot)
     gross: list[int] = []
     if fits := "does_not_fit" not in kinds:
-        if renamed is not every:
-            target = renamed.target[np.unique(cell, return_index=True)[1]]
-            named = replace(fitted.readings, target=target, target_names=renamed.target_names)
-            fitted = robust_fit.fit(named, robot.dh)
         fitted, jumps = moved.without_jumps(fitted)
         findings += [*jumps, *_scattered(fitted), *digits.commanded(fitted, robot)]
         findings += [*rows.explained(fitted, robot, stated), *rows.largest(fitted)]
@@ -146,7 +144,7 @@ def check(
             finding("outliers/repeats", every.line[off], count=off.size, largest_mm=largest)
         )
     findings += digits.copies(every, scatter.per_axis_mm)
-    facts = coverage.facts_of(every, robot, scatter, distances, fitted if fits else None)
+    facts = coverage.facts_of(every, robot, scatter, between, fitted if fits else None)
     unread = dict.fromkeys((*reading.notes, *reading.left_out()))
     return Report(
         dataset,
@@ -210,18 +208,17 @@ def _of_other_lengths(single: Readings, fitted: Fitted, robot: Robot) -> Iterato
     """An arm that fits with other lengths alone is another one of the same build."""
     new, old = (np.stack([arm.a_mm, arm.d_mm]) for arm in (fitted.trial.arm.model, robot.dh))
     apart = np.abs(new - old)
-    far = np.argwhere(apart > _OTHER_LENGTHS * np.abs(old).sum())
-    if len(far):
-        lengths = [
-            f"{'ad'[n]} of joint {joint + 1} {new[n, joint]:.4g} for {old[n, joint]:.4g} mm"
-            for n, joint in sorted(far.tolist(), key=lambda place: -apart[*place])
-        ]
+    if (largest_mm := float(apart.max())) > _OTHER_LENGTHS * np.abs(old).sum():
+        number, joint = np.argwhere(apart == largest_mm)[0]
         yield finding(
             "does_not_fit/lengths",
             single.lines(),
             robot=robot.name,
-            lengths=", ".join(lengths),
-            largest_mm=float(apart.max()),
+            length="ad"[number],
+            of=int(joint) + 1,
+            new_mm=float(new[number, joint]),
+            old_mm=float(old[number, joint]),
+            largest_mm=largest_mm,
             shipped=_shipped(single, robot),
         )
 
@@ -248,14 +245,13 @@ def _once(findings: list[Finding], lines: int) -> list[Finding]:
     faults = [e for e in findings if e.kind not in _SYMPTOMS and len(e.lines) < lines]
     named = {line for item in faults for line in item.lines}
     needed: list[Finding] = []
+    known: list[tuple[object, set[int]]] = []
     for item in findings:
-        rows_ = set(item.lines)
-        joint = item.values.get("joint")
-        same = [e for e in needed if (e.kind, e.values.get("joint")) == (item.kind, joint)]
-        rivals = [set(e.lines) for e in same]
+        rows_, values = set(item.lines), item.values
         # A second jump concerns part of the rows of the first and is another one all the same.
-        jump = item.kind in ("base_jump", "target_moved")
-        needless = any(rows_ == rival if jump else rows_ <= rival for rival in rivals)
+        about = item.kind, values.get("joint"), values.get("first_line")
+        needless = any(about == other and rows_ <= more for other, more in known)
         if not needless and not (item.kind in _SYMPTOMS and rows_ <= named):
             needed.append(item)
+            known.append((about, rows_))
     return needed

@@ -10,8 +10,9 @@ import pandas as pd
 from kinacc.calibration.noise import Noise
 from kinacc.calibration.observations import from_columns
 from kinacc.calibration.vec_estimator import VECEstimator
+from kinacc.checks.distances import Distance
 from kinacc.checks.findings import Finding, finding
-from kinacc.checks.readings import Distance, Readings
+from kinacc.checks.readings import Readings
 from kinacc.checks.robust_fit import Fitted
 from kinacc.config.records import Settings
 from kinacc.geometry import compose
@@ -54,8 +55,8 @@ def facts_of(
     if distances:
         facts["target_distances"] = [
             {
-                "from": every.target_names[item.first],
-                "to": every.target_names[item.second],
+                "from": every.target_names[item.ends[0]],
+                "to": every.target_names[item.ends[1]],
                 "mm": item.middle_mm,
                 "std_mm": item.std_mm,
                 "noise_per_target_mm": item.std_mm / np.sqrt(2.0),
@@ -84,7 +85,7 @@ def _covered(q: np.ndarray, robot: Robot, joint: int) -> dict[str, object]:
     """What a joint went through, ``q`` (n,), and may go through."""
     ends = np.array([q.min(), q.max(), robot.q_min_rad[joint], robot.q_max_rad[joint]])
     slides = bool(robot.dh.prismatic[joint])
-    low, high, least, most = (ends if slides else ends * (180.0 / np.pi)).tolist()
+    low, high, least, most = (ends if slides else np.rad2deg(ends)).tolist()
     return {
         "joint": joint + 1,
         "low": low,
@@ -122,15 +123,16 @@ def few_poses(columns: Columns, robot: Robot, calibration: Settings) -> list[Fin
     count = int(numbers.clip(upper=_PER_POSE).sum())
     if count >= frames + (0 if fit.open else fit.size):
         return []
-    few = finding(
-        "few_poses",
-        poses=len(numbers),
-        numbers=count,
-        coefficients=fit.size,
-        order=fit.order,
-        frames=f" and {frames} of base and targets" if frames else "",
-    )
-    return [few.held_to(())]
+    return [
+        finding(
+            "few_poses",
+            poses=len(numbers),
+            numbers=count,
+            coefficients=fit.size,
+            order=fit.order,
+            frames=f" and {frames} of base and targets" if frames else "",
+        )
+    ]
 
 
 def fixed_frames(columns: Columns, robot: Robot, calibration: Settings) -> list[Finding]:
@@ -142,4 +144,4 @@ def fixed_frames(columns: Columns, robot: Robot, calibration: Settings) -> list[
     apart = np.linalg.norm(end.position_mm - observed.position_mm, axis=1)
     if (apart_mm := float(np.median(apart))) < _ELSEWHERE_MM:
         return []
-    return [finding("fixed_frames", apart_mm=apart_mm).held_to(())]
+    return [finding("fixed_frames", apart_mm=apart_mm)]

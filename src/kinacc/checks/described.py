@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from kinacc.calibration.least_squares import one_thread
-from kinacc.checks import check, digits, readings, shipped
+from kinacc.checks import check, readings, shipped
 from kinacc.checks.findings import Finding, Report
 from kinacc.config.values import did_you_mean
 from kinacc.errors import InputError, Problem, input_error, refuse
@@ -19,7 +19,6 @@ from kinacc.kinematics.robot import Robot
 from kinacc.measurements.intake import guess as guesses
 from kinacc.measurements.intake.guess import Guess
 from kinacc.measurements.intake.write import dataset_content, plain_name, template_text
-from kinacc.measurements.layout import ANGLE, LENGTH
 from kinacc.measurements.reader import MeasuredFile, read
 
 ANSWERS = (
@@ -28,7 +27,13 @@ ANSWERS = (
     *("sigma", "direction_unit", "vertical", "horizontal"),
 )
 _CALCULATED_MM = 0.004  # closer to an arm than any instrument measures
-_COARSE_DEG = 0.005  # 0.09 mm at 1 m; less is nothing beside what instruments measure with
+_ABOUT = {  # the setting that a finding contradicts
+    "joint_units": "joint_unit",
+    "length_units": "length_unit",
+    "angle_units": "angle_unit",
+    "euler_convention": "orientation",
+    "left_handed": "horizontal",
+}
 
 
 def describe_files(
@@ -121,31 +126,24 @@ def coupling_of(report: Report) -> Finding | None:
 
 def _set_right(guess: Guess, report: Report) -> Guess:
     """The guess with assumed settings that the readings contradict as they should be."""
-    settings: dict[str, Any] = {}
-    shown: dict[str, str] = {}
     for item in report.suspicions:
-        setting = dict(item.values.get("setting", {}))
-        turn = setting.get("orientation", {})
-        about = next((key for key in ("unit", "order") if key in turn), next(iter(setting), ""))
-        about = "angle_unit" if about == "unit" else about
-        if item.kind == "left_handed" and "horizontal" in guess.assumed:
-            ways, (one, other) = guess.section["directions"], ("clockwise", "counterclockwise")
-            shown = {"horizontal": one if ways["horizontal"] == other else other}
-            settings = {"directions": ways | shown}
-            break
-        if about in guess.assumed:
-            shown[about] = " ".join(map(str, (turn or setting).values()))
-            settings |= setting | {"orientation": settings.get("orientation", {}) | turn}
-    if in_order := settings.pop("e", None):
-        columns, unit = dict(guess.section["columns"]), guess.section["orientation"]["unit"]
-        angles = [columns.pop(name, f"{name}_{unit}") for name in in_order]
-        settings["columns"] = columns | {f"e{n}": column for n, column in enumerate(angles, 1)}
-    if not shown:
-        return guess
-    assumed = {key: text for key, text in guess.assumed.items() if key not in shown}
-    notes = [f"{key.replace('_', ' ')} {value}: found by trying it on the readings"
-             for key, value in shown.items()]  # fmt: skip
-    return replace(guess.but(settings), assumed=assumed, notes=(*guess.notes, *notes))
+        about, setting = _ABOUT.get(item.kind, ""), dict(item.values.get("setting", {}))
+        if about not in guess.assumed:
+            continue
+        if about == "horizontal":
+            ways = guess.section["directions"]
+            is_clockwise = ways["horizontal"] == "clockwise"
+            way = "counterclockwise" if is_clockwise else "clockwise"
+            setting = {"directions": ways | {"horizontal": way}}
+        if in_order := setting.pop("e", None):
+            columns, unit = dict(guess.section["columns"]), guess.section["orientation"]["unit"]
+            angles = [columns.pop(name, f"{name}_{unit}") for name in in_order]
+            setting["columns"] = columns | {f"e{n}": column for n, column in enumerate(angles, 1)}
+        if setting:
+            assumed = {key: text for key, text in guess.assumed.items() if key != about}
+            note = f"{about.replace('_', ' ')} set by the readings: {item.what}"
+            guess = replace(guess.but(setting), assumed=assumed, notes=(*guess.notes, note))
+    return guess
 
 
 @one_thread
@@ -170,36 +168,23 @@ def fitting(guess: Guess) -> list[str]:
     return shipped.fitting(readings.merged(every)[0])
 
 
-def remarks_on(guess: Guess, report: Report) -> Iterator[str]:
-    """Limits of readings that contradict nothing: points that were calculated, rounded joints.
+def remarks_on(report: Report) -> list[str]:
+    """Remarks on readings that contradict nothing: whether the points were calculated.
 
     Parameters
     ----------
-    guess
-        The description of a file.
     report
-        The check of its readings.
+        The check of a file's readings.
 
-    Yields
-    ------
-    str
-        A remark each, with lengths in mm.
+    Returns
+    -------
+    list of str
+        Remarks, with lengths in mm.
     """
-    fit = report.facts.get("quick_fit")
-    if fit and fit["left_per_axis_mm"] <= _CALCULATED_MM:
-        yield (
-            f"the points follow the joints to {fit['left_per_axis_mm']:.1g} mm, closer than "
-            "instruments measure: were they calculated by the controller or a simulation?"
-        )
-    if guess.section.get("pulses_per_deg"):
-        return
-    columns = [guess.table.columns[name.column] for name in guess.columns.joints
-               if name.unit not in LENGTH]  # fmt: skip
-    unit_deg = np.rad2deg(ANGLE[guess.section["joint_unit"]])
-    steps = (digits.step(column, unit_deg, guess.table.decimal) for column in columns)
-    step = min(steps, default=0.0)
-    if step > _COARSE_DEG:
-        yield (
-            f"joints are written in steps of {step:.2g} deg: {1000.0 * np.deg2rad(step):.2g} mm at "
-            "1 m from an axis; export more digits"
-        )
+    left_mm = report.facts.get("quick_fit", {}).get("left_per_axis_mm", np.inf)
+    if left_mm > _CALCULATED_MM:
+        return []
+    return [
+        f"the points follow the joints to {left_mm:.1g} mm, closer than instruments measure: "
+        "were they calculated by the controller or a simulation?"
+    ]

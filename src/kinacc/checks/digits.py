@@ -8,10 +8,11 @@ from dataclasses import replace
 from decimal import Decimal
 
 import numpy as np
+import pandas as pd
 import scipy
 from numpy import ndarray
 
-from kinacc.checks import robust_fit, tails
+from kinacc.checks import robust_fit
 from kinacc.checks.findings import Finding, finding
 from kinacc.checks.readings import Readings, grouped
 from kinacc.checks.robust_fit import Fitted
@@ -22,6 +23,7 @@ _CHANCE = 0.01  # expected number of coincidences above which equal readings tel
 _GRIDS_DEG = (1.0, 0.5, 0.1, 0.05, 0.01)
 _FINER = 10.0  # a read-back value has digits well below the grid of a commanded one
 _FEWEST = 3
+_UNUSUAL = 5.0  # times what commanded and reported joints are apart in the median row
 _WORSE = 1.5  # times the median error of the other rows
 _RANKED = 1e-3  # significance of that
 _EXACT = 1e-6  # of the grid
@@ -37,7 +39,10 @@ def copies(every: Readings, noise_mm: float) -> Iterator[Finding]:
     if not _unlikely(every, noise_mm):
         return
     names = every.row_names
-    line, reading, q = _by_line(every)
+    numbers = np.column_stack([every.position_mm, every.rotation.reshape(-1, 9)])
+    by_target = pd.DataFrame(numbers).groupby([every.line, every.target]).first().unstack()
+    line, reading = by_target.index.to_numpy(), by_target.to_numpy()
+    q = every.q[np.unique(every.line, return_index=True)[1]]
     first = _first_alike(np.column_stack([q, reading]))
     again = np.flatnonzero(first != np.arange(len(line)))
     if again.size:
@@ -63,22 +68,11 @@ def _first_alike(values: ndarray) -> ndarray:
     return np.unique(number, return_index=True)[1][number]
 
 
-def _by_line(every: Readings) -> tuple[ndarray, ndarray, ndarray]:
-    """Lines (m,) of the file, readings of each side by side, and joints (m, k)."""
-    line, first, inverse = np.unique(every.line, return_index=True, return_inverse=True)
-    reading = np.full((len(line), len(every.target_names), 12), np.inf)
-    reading[inverse, every.target, :3] = every.position_mm
-    reading[inverse, every.target, 3:] = np.nan_to_num(every.rotation.reshape(-1, 9), nan=np.inf)
-    return line, reading.reshape(len(line), -1), every.q[first]
-
-
 def _unlikely(every: Readings, noise_mm: float) -> bool:
     """Whether equal digits by chance are to be expected less than ``_CHANCE`` times."""
     if not noise_mm > 0.0:
         return True
-    steps = np.diff(np.unique(every.position_mm))
-    steps = steps[steps > 1e-12 * np.abs(every.position_mm).max(initial=1.0)]
-    digit = steps.min(initial=np.inf) if steps.size else 0.0
+    digit = np.diff(np.unique(np.round(every.position_mm, 9))).min(initial=np.inf)
     per_axis = min(digit / (2.0 * np.sqrt(np.pi) * noise_mm), 1.0)
     numbers = 3 * len(every.target_names) + 3 * bool(every.has_rotation.any())
     counts = np.unique(every.pose, return_counts=True)[1]
@@ -102,9 +96,8 @@ def commanded(fitted: Fitted, robot: Robot) -> Iterator[Finding]:
     read = fitted.residuals.position_mm
     apart = np.linalg.norm(sent - read, axis=1)
     # What is apart everywhere (a following error of a few um) is how the arm is.
-    usual = tails.limit(apart[both], 3) if apart[both].any() else 0.0
-    limit_mm = max(np.nan_to_num(usual, posinf=0.0), fitted.limit_mm)
-    rows = np.flatnonzero(both & (apart > limit_mm))
+    usual_mm = float(np.median(apart[both]))
+    rows = np.flatnonzero(both & (apart > max(_UNUSUAL * usual_mm, fitted.limit_mm)))
     if rows.size:
         lines = observed.lines(rows)
         nearer = np.mean(np.linalg.norm(sent[rows], axis=1) < fitted.left_mm[rows]) > 0.5
@@ -140,7 +133,7 @@ def _round(fitted: Fitted, q_deg: ndarray) -> Iterator[Finding]:
         there = robust_fit.residuals(fitted.trial.arm, moved).predicted.position_mm
         apart = there - fitted.residuals.predicted.position_mm
         rounding = float(np.median(np.linalg.norm(apart, axis=1)))
-        error = float(np.sqrt(np.median(remaining**2)))
+        error = float(np.median(remaining))
         if _FITTED_AWAY < error / rounding < 1.5:
             sizes = {"error": f"{error:.3g}", "rounding": f"{rounding:.3g}"}
             yield finding("commanded_joints/all", observed.lines(), grid_deg=grid, **sizes)

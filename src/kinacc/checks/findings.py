@@ -12,17 +12,14 @@ import yaml
 
 from kinacc.config.settings import OUTSIDE_LIMITS
 from kinacc.measurements.row_names import RowNames
-from kinacc.tables.allowed import LEFT_OUT
 
 STOPS, WARNING, NOTE = "stops", "warning", "note"
 TEXTS: dict[str, list[str]] = yaml.safe_load(
     (files("kinacc.checks") / "findings.yaml").read_text("utf-8")
 )
-_WARN_OF_ROWS = {"target_swapped", "duplicate_rows", "repeated_reading", "outliers"}
-_OF_ROWS = _WARN_OF_ROWS | {OUTSIDE_LIMITS}
-_WARN = _WARN_OF_ROWS | {"commanded_joints"}  # they stop a workflow where a reading is far off
-_NOTES = {"thin_coverage", LEFT_OUT}
-_NEVER_STOP = _NOTES | {"largest_rows"}
+_OF_ROWS = {"target_swapped", "duplicate_rows", "repeated_reading", "outliers", OUTSIDE_LIMITS}
+# These stop a workflow where a reading is far off; all else does, but for the largest rows.
+_WARN = {*_OF_ROWS, "commanded_joints"} - {OUTSIDE_LIMITS}
 VERDICTS = ("clean", "suspicions", "unusable")  # by exit code
 
 
@@ -41,7 +38,7 @@ class Finding:
     lines
         Lines of the file it concerns, in order.
     level
-        Whether it stops a workflow that fits the data, warns, or is a note.
+        Whether it stops a workflow that fits the data, warns, or is a note; a note if not held to.
     row_names
         How the rows at these lines are called.
     """
@@ -51,7 +48,7 @@ class Finding:
     fix: str
     values: Mapping[str, Any]
     lines: tuple[int, ...] = ()
-    level: str = WARNING
+    level: str = NOTE
     row_names: RowNames = field(default_factory=RowNames)
 
     @property
@@ -67,10 +64,8 @@ class Finding:
 
     def held_to(self, gross: Iterable[int]) -> Finding:
         """The finding with its level; rows at the lines ``gross`` are too far off for any fit."""
-        if self.kind in _NEVER_STOP:
-            return self
-        stops = self.kind not in _WARN or not set(gross).isdisjoint(self.lines)
-        return replace(self, level=STOPS if stops else WARNING)
+        mild = self.kind in _WARN and set(gross).isdisjoint(self.lines)
+        return replace(self, level=WARNING if mild or self.kind == "largest_rows" else STOPS)
 
     def commands(self, config: str = "FILE.yaml") -> list[str]:
         """Commands to go on with: exclude the rows, or accept the finding."""
@@ -86,10 +81,7 @@ class Finding:
 def finding(key: str, lines: Iterable[int] = (), **values: Any) -> Finding:
     """The finding ``key`` of ``TEXTS`` at ``lines``, each named once and in order."""
     message, fix = (text.format(**values) for text in TEXTS[key])
-    kind = key.partition("/")[0]
-    return Finding(kind, message, fix, values, level=NOTE if kind in _NOTES else WARNING).of_lines(
-        lines
-    )
+    return Finding(key.partition("/")[0], message, fix, values).of_lines(lines)
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from itertools import chain, combinations, product
+from typing import TypeVar
 
 import numpy as np
+import pandas as pd
 from numpy import ndarray
 from scipy.spatial.transform import Rotation
 
@@ -24,7 +26,7 @@ from kinacc.checks.findings import Finding
 from kinacc.checks.readings import Readings, thinned
 from kinacc.checks.robust_fit import Trial
 from kinacc.config.measured import Orientation
-from kinacc.geometry import Pose, compose
+from kinacc.geometry import compose, invert
 from kinacc.kinematics import dh
 from kinacc.kinematics.robot import Robot
 from kinacc.progress import with_progress
@@ -32,7 +34,6 @@ from kinacc.progress import with_progress
 FAR = 0.02  # of the points' spread: what leaves more explains nothing, of this arm
 BAD_RAD = 0.02  # scatter of orientations that no arm as described leaves, calibrated or not
 _WITHIN = 5.0  # times the spread of the flange, or a fifth: what points of this arm spread over
-_TRIED = "ways to read the columns tried (units, angles, signs)"
 _TRIED_ROWS, _TURNED_ROWS, _FITTED_ROWS = 80, 120, 360
 _GOOD = 0.01  # of the points' spread: what an arm as described may leave, uncalibrated
 _SURE = 0.003  # of the spread: what leaves no more than this needs no rival
@@ -53,6 +54,7 @@ _COMMON = (
 )
 
 Changes = tuple[Change, ...]
+_T = TypeVar("_T")
 
 
 @dataclass(frozen=True)
@@ -76,8 +78,10 @@ class Meaning:
         by_arm = dh.forward(robot.dh, read.q_rad)
         _, base, points = robust_fit.placed(positions, by_arm, [np.arange(len(read))])
         flange = compose(base, by_arm)
-        if len(points) > 1:
-            robust_fit.place_targets(Pose(np.zeros((len(points), 3, 3)), points), positions, flange)
+        if len(points) > 1:  # a part of the readings may be of another target than they say
+            there = compose(invert(flange), read.measured).position_mm
+            medians = pd.DataFrame(there).groupby(read.target).median()
+            points[medians.index] = medians.to_numpy()
         length = robust_fit.distances(read, by_arm, base, points)
         misfit = float(np.quantile(length, _MAJORITY)) / max(spread_mm(read.position_mm), 1e-12)
         return cls(applied, read, flange.rotation, misfit)
@@ -125,11 +129,9 @@ def find(read: Readings, robot: Robot, written: Trial) -> tuple[Readings, list[F
         return read, []
     (_, found_mm, applied), *others = (item for item in fitted if item[0] < _AS_GOOD * least)
     known = {change.finding.what for change in applied}
-    rivals = [[change.finding.what for change in rival] for _, _, rival in others]
-    equal = ", or ".join(
-        " and ".join(text for text in texts if text not in known)
-        for texts in rivals
-        if not known <= {*texts}
+    rivals = [{change.finding.what for change in rival} for _, _, rival in others]
+    equal = next(
+        (" and ".join(sorted(rival - known)) for rival in rivals if not known <= rival), ""
     )
     numbers = {"as_written_mm": written.sigma_mm, "found_mm": found_mm}
     detail = " ({as_written_mm:.3g} mm per axis as written, {found_mm:.3g} mm so{equal})"
@@ -157,11 +159,11 @@ def find_by_turns(
     limit = _AS_GOOD * max(here.misfit, _SHOWN)
     rivals = (Meaning.of(few, robot, (change,)) for change in changes.joint_changes(robot))
     tried = [(item.scatter_rad, item) for item in rivals if item.misfit < limit]
-    least = min((value for value, _ in tried), default=np.inf)
-    if not least <= min(_BETTER * here.scatter_rad, _AS_GOOD * least_rad):
+    if not tried:
         return None
-    # The common changes come first: of those that do about as well, the first.
-    value, best = next(pair for pair in tried if pair[0] < _AS_GOOD * least)
+    least, value, best = _likeliest(tried)
+    if least > min(_BETTER * here.scatter_rad, _AS_GOOD * least_rad):
+        return None
     return changed(read, best.changes), of_turns(best.changes, read, here.scatter_rad, value)[0]
 
 
@@ -180,10 +182,16 @@ def find_orientations(
     single = ((change,) for change in changes.orientations(stated))
     for ways in (single, product(changes.conventions(stated), changes.reversals())):
         tried = [(scatter(flange, changed(few, way)), way) for way in ways]
-        least = min(value for value, _ in tried)
-        if least < _BETTER * here and least < _LARGEST_RAD:
-            return next((way, value, here) for value, way in tried if value < _AS_GOOD * least)
+        least, value, way = _likeliest(tried)
+        if least < min(_BETTER * here, _LARGEST_RAD):
+            return way, value, here
     return (), here, here
+
+
+def _likeliest(tried: list[tuple[float, _T]]) -> tuple[float, float, _T]:
+    """The least scatter, and the first that does about as well: common changes come first."""
+    least = min(value for value, _ in tried)
+    return least, *next(pair for pair in tried if pair[0] < _AS_GOOD * least)
 
 
 def of_turns(
@@ -255,7 +263,9 @@ def _searched(here: Meaning, robot: Robot, good: bool) -> list[Meaning]:
     tried = {_numbers(here.read): here}
     single = [(change,) for change in changes.joint_changes(robot)]
     for rivals in [single] if good else _rounds(here, robot, tried):
-        for applied in with_progress(rivals, _TRIED):
+        for applied in with_progress(
+            rivals, "ways to read the columns tried"
+        ):
             # A meaning that comes again keeps the fewest changes.
             if (numbers := _numbers(changed(here.read, applied))) not in tried:
                 tried[numbers] = Meaning.of(here.read, robot, applied)

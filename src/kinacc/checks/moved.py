@@ -12,9 +12,9 @@ from numpy import ndarray
 
 from kinacc.checks import robust_fit, tails
 from kinacc.checks.findings import Finding, finding
-from kinacc.checks.readings import Distance, Readings
+from kinacc.checks.readings import Readings, parted
 from kinacc.checks.robust_fit import Fitted, Linear, fit
-from kinacc.geometry import Pose, compose, invert, log_so3
+from kinacc.geometry import log_so3
 from kinacc.progress import with_progress
 
 _MOST_SPLITS = 8
@@ -28,7 +28,6 @@ _BETTER_THERE = 0.55  # of what is left of the readings after the split
 _PLAIN = 0.5  # share at which no other place need be tried
 _STEADY = 0.9  # of what jumps explain; of one jump, a steady motion explains 0.75 at most
 _EXCESS = 2.0  # times what chance, or a step along a joint, explains
-_FEWEST_ROWS = 4  # on either side of a change of a distance
 
 Jump = tuple[str, ndarray]  # session (the base) or target, and the readings from there on
 
@@ -43,7 +42,7 @@ def without_jumps(whole: Fitted) -> tuple[Fitted, list[Finding]]:
         best, least = None, _PLAIN if few else 1.0
         for row, likely in _places(fitted):
             for kind in dict.fromkeys([likely, "session", "target"]):
-                split = _parted(fitted, row, kind)
+                split = _jump(fitted, row, kind)
                 share = _share_left(fitted, *split) if split else np.inf
                 if share < least:
                     best, least = split, share
@@ -54,10 +53,6 @@ def without_jumps(whole: Fitted) -> tuple[Fitted, list[Finding]]:
         fitted, jump = best
         jumps.append(jump)
     return fitted, list(_findings(whole, fitted, jumps)) if jumps else []
-
-
-def _names(observed: Readings, kind: str) -> tuple[str | None, ...]:
-    return observed.session_names if kind == "session" else observed.target_names
 
 
 def _linearised(fitted: Fitted) -> tuple[Readings, ndarray, ndarray, Linear]:
@@ -126,40 +121,29 @@ def _gains(
     return np.sum(step * score, axis=(1, 2)), step[..., 0], (across @ step)[..., 0]
 
 
-def _parted(fitted: Fitted, row: int, kind: str) -> tuple[Fitted, Jump] | None:
+def _jump(fitted: Fitted, row: int, kind: str) -> tuple[Fitted, Jump] | None:
     """The fit without a jump near a reading, and the jump; None if there is none.
 
     The jump is before the reading that parts the two frames best.
     """
-    old, new = int(getattr(fitted.readings, kind)[row]), len(_names(fitted.readings, kind))
-    observed, rows = _split(fitted.readings, row, kind)
+    observed, rows = parted(fitted.readings, row, kind)
+    frames = [int(getattr(item, kind)[row]) for item in (fitted.readings, observed)]
     again = fit(observed, fitted.trial.nominal)
-    both = np.flatnonzero(np.isin(getattr(observed, kind), (old, new)))
+    both = np.flatnonzero(np.isin(getattr(observed, kind), frames))
     part, costs = observed.select(both), []
-    for frame in (old, new):
+    for frame in frames:
         label: dict[str, Any] = {kind: np.full(len(both), frame)}
         left = robust_fit.residuals(again.trial.arm, replace(part, **label)).position_mm
         remaining = np.linalg.norm(left, axis=1)
         costs.append(np.append(0.0, np.minimum(remaining, _CAP * again.trial.sigma_mm)))
     first = int(np.argmin(np.cumsum(costs[0]) - np.cumsum(costs[1])))
-    if (
-        min(len(np.unique(part.pose[side])) for side in (slice(first), slice(first, None)))
-        < _FEWEST
-    ):
+    sides = part.pose[:first], part.pose[first:]
+    if min(len(np.unique(side)) for side in sides) < _FEWEST:
         return None
     if both[first] != row:
-        observed, rows = _split(fitted.readings, both[first], kind)
+        observed, rows = parted(fitted.readings, both[first], kind)
         again = fit(observed, fitted.trial.nominal)
     return again, (kind, rows)
-
-
-def _split(observed: Readings, row: int, kind: str) -> tuple[Readings, ndarray]:
-    """Readings whose base or target is another one from ``row`` on, and those from there on."""
-    label, names = getattr(observed, kind), _names(observed, kind)
-    rows = (np.arange(len(observed)) >= row) & (label == label[row])
-    split: dict[str, Any] = {kind: np.where(rows, len(names), label)}
-    split[f"{kind}_names"] = (*names, names[label[row]])
-    return replace(observed, **split), np.flatnonzero(rows)
 
 
 def _share_left(before: Fitted, after: Fitted, jump: Jump) -> float:
@@ -182,19 +166,21 @@ def _findings(whole: Fitted, fitted: Fitted, jumps: list[Jump]) -> Iterator[Find
         yield finding("drift", observed.line[subset], by=_signed(drift), drift_mm=drift.tolist())
     for kind, rows in jumps:
         label = getattr(observed, kind)
-        names = np.array(_names(observed, kind))[label]
+        names = np.array(getattr(observed, f"{kind}_names"))[label]
         name, first = names[rows[0]], int(observed.line[rows[0]])
         is_base = kind == "session"
         if is_base and name in drifts:
             continue
         before = np.flatnonzero(names[: rows[0]] == name)[-1]
         poses = frames.bases if is_base else frames.targets
-        old, new = (Pose(*(e[n] for e in poses)) for n in label[[before, rows[0]]])
-        shift, motion = new.position_mm - old.position_mm, compose(new, invert(old))
+        old, new = label[before], label[rows[0]]
+        shift = poses.position_mm[new] - poses.position_mm[old]
+        turn = poses.rotation[new] @ poses.rotation[old].T
         if is_base:
             # How far points in the middle of the readings went.
             middle = fitted.residuals.predicted.position_mm[rows].mean(axis=0)
-            shift = middle - motion.rotation.T @ (middle - motion.position_mm)
+            arm = middle - poses.position_mm[new]
+            shift = shift + arm - turn.T @ arm
         yield finding(
             "base_jump" if is_base else "target_moved",
             observed.lines(rows),
@@ -203,7 +189,7 @@ def _findings(whole: Fitted, fitted: Fitted, jumps: list[Jump]) -> Iterator[Find
             by=_signed(shift),
             first_line=first,
             shift_mm=shift.tolist(),
-            turn_mrad=1e3 * float(np.linalg.norm(log_so3(motion.rotation))) * is_base,
+            turn_mrad=1e3 * float(np.linalg.norm(log_so3(turn))) * is_base,
         )
 
 
@@ -232,65 +218,3 @@ def _drifts_mm(whole: Fitted, split: Fitted) -> dict[str | None, ndarray]:
                 lever = few.position_mm[rows].mean(axis=0) - at_mm
                 drifts[name] = -motion[0, :3] - np.cross(motion[0, 3:], lever)
     return drifts
-
-
-def by_distances(every: Readings, distances: list[Distance]) -> tuple[list[Finding], Readings]:
-    """Targets that moved against the others, and single rows in which one stood elsewhere.
-
-    Findings, and the readings in which a target that moved counts as another from there on.
-    """
-    moved, line, names = every, every.line, every.target_names
-    moves = [(distance, *_move(distance.length_mm)) for distance in distances]
-    steps, findings = [move for move in moves if move[2]], []
-    while steps:
-        # The target that most of the changed distances have in common.
-        counts = np.zeros(len(names))
-        for distance, _, size in steps:
-            counts[[distance.first, distance.second]] += 1.0 + 1e-3 * min(abs(size), 100.0)
-        target = int(np.argmax(counts))
-        mine = [step for step in steps if target in (step[0].first, step[0].second)]
-        steps = [step for step in steps if step not in mine]
-        distance, place, _ = mine[0]
-        first = int(distance.rows[place, int(distance.second == target)])
-        moved, rows = _split(moved, first, "target")
-        changes = (f"{n:+.3g} mm to {names[d.first + d.second - target]}" for d, _, n in mine)
-        findings.append(
-            finding(
-                "target_moved/distances",
-                line[rows],
-                target=names[target],
-                sure="" if len(names) > 2 else " (or the other of the two)",
-                row=every.row_names.one(int(line[first])),
-                by=", ".join(changes),
-                first_line=int(line[first]),
-                largest_change_mm=max(abs(size) for _, _, size in mine),
-            )
-        )
-    off: list[int] = []
-    largest = 0.0
-    for distance, place, size in moves:
-        length = distance.length_mm - size * (np.arange(len(distance.rows)) >= place)
-        away = np.abs(length - np.median(length))
-        far = away > tails.limit(away, 1, len(away) * len(moves))
-        off += line[distance.rows[far, 0]].tolist()
-        largest = max(largest, float(away[far].max(initial=0.0)))
-    if off:
-        count = len({*off})
-        findings.append(finding("outliers/distances", off, count=count, largest_mm=largest))
-    return findings, moved
-
-
-def _move(length: ndarray) -> tuple[int, float]:
-    """Row at which a distance (n,) changes for good, and by how much; 0 where it does not."""
-    count, place = len(length), np.arange(_FEWEST_ROWS, len(length) - _FEWEST_ROWS + 1)
-    if count < 2 * _FEWEST_ROWS + 2:
-        return count, 0.0
-    clipped = np.clip(length, *np.quantile(length, [0.02, 0.98]))
-    before = np.cumsum(clipped)[place - 1]
-    step = (clipped.sum() - before) / (count - place) - before / place
-    row = int(place[np.argmax(step**2 * place * (count - place))])
-    middles = [float(np.median(side)) for side in np.split(length, [row])]
-    # A distance that only drifts is no move: it must leave what both sides scatter by far.
-    rest = np.abs(length - np.repeat(middles, [row, count - row]))
-    size = middles[1] - middles[0]
-    return (row, size) if abs(size) > tails.limit(rest, 1) else (count, 0.0)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from itertools import combinations
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -18,7 +18,6 @@ from kinacc.measurements.row_names import RowNames
 from kinacc.tables.columns import texts
 
 _SAME_RAD = 1e-4  # joints of repeats differ by less
-_MEDIAN_1D = 0.6744897501960817  # median of |x| of a standard normal number
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,8 +67,8 @@ def of_file(reading: MeasuredFile, robot: Robot) -> Readings:
     )
 
 
-def merged(every: Readings) -> tuple[Readings, ndarray, ndarray]:
-    """One reading per pose and target, the median of its repeats, and its number (n,) for each.
+def merged(every: Readings) -> tuple[Readings, ndarray]:
+    """One reading per pose and target, the median of its repeats.
 
     Readings of a pose whose joints differ stay apart, and so do repeats far from the others. Also
     the distance (n,) of every repeat from their median, mm, NaN where there is one.
@@ -83,22 +82,14 @@ def merged(every: Readings) -> tuple[Readings, ndarray, ndarray]:
     alone = (count > 2) & (away > tails.limit(away[count > 2], 3))
     cell = pd.factorize(np.where(alone, len(cell) + np.arange(len(cell)), cell))[0]
     first = every.select(np.unique(cell, return_index=True)[1])
-    if len(first) == len(every):
-        return first, cell, away
     values = np.column_stack([every.position_mm, every.rotation.reshape(-1, 9)])
     medians = pd.DataFrame(values).groupby(cell).median().to_numpy()
-    several = np.bincount(cell) > 1
-    turned = several & np.isfinite(medians[:, 3])
+    turned = np.isfinite(medians[:, 3])
     rotation = first.rotation.copy()
     rotation[turned] = project_so3(medians[turned, 3:].reshape(-1, 3, 3))
     ends = np.cumsum(np.bincount(cell))[:-1]
-    first = replace(
-        first,
-        position_mm=np.where(several[:, None], medians[:, :3], first.position_mm),
-        rotation=rotation,
-        drawn=texts(np.split(every.line[np.argsort(cell, kind="stable")], ends)),
-    )
-    return first, cell, away
+    drawn = texts(np.split(every.line[np.argsort(cell, kind="stable")], ends))
+    return replace(first, position_mm=medians[:, :3], rotation=rotation, drawn=drawn), away
 
 
 def grouped(*labels: ndarray) -> ndarray:
@@ -107,43 +98,15 @@ def grouped(*labels: ndarray) -> ndarray:
     return frame.groupby(list(frame), sort=False, dropna=False).ngroup().to_numpy()
 
 
-@dataclass(frozen=True)
-class Distance:
-    """Distance between targets ``first`` and ``second``, row by row in the order of the file.
-
-    ``rows`` (m, 2) indices of the two readings, ``length_mm`` (m,); ``middle_mm`` and robust
-    ``std_mm`` over all of them.
-    """
-
-    first: int
-    second: int
-    rows: ndarray
-    length_mm: ndarray
-    middle_mm: float
-    std_mm: float
-
-
-def distances(every: Readings) -> list[Distance]:
-    """Distances of all pairs of targets that were seen together often enough to compare."""
-    number = grouped(every.session, every.pose, every.repeat)
-    place = np.full((number.max() + 1, len(every.target_names)), -1)
-    place[number, every.target] = np.arange(len(every))
-    results = []
-    for first, second in combinations(range(place.shape[1]), 2):
-        rows = place[:, [first, second]]
-        rows = rows[(rows >= 0).all(axis=1)]
-        if len(rows) >= 3:
-            rows = rows[np.argsort(every.line[rows[:, 0]], kind="stable")]
-            ends = every.position_mm[rows]
-            length = np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1)
-            middle = float(np.median(length))
-            std = float(np.median(np.abs(length - middle))) / _MEDIAN_1D
-            results.append(Distance(first, second, rows, length, middle, std))
-    return results
+def parted(observed: Readings, row: int, kind: str) -> tuple[Readings, ndarray]:
+    """Readings whose base or target is another one from ``row`` on, and those from there on."""
+    label, names = getattr(observed, kind), getattr(observed, f"{kind}_names")
+    rows = (np.arange(len(observed)) >= row) & (label == label[row])
+    split: dict[str, Any] = {kind: np.where(rows, len(names), label)}
+    split[f"{kind}_names"] = (*names, names[label[row]])
+    return replace(observed, **split), np.flatnonzero(rows)
 
 
 def thinned(rows: ndarray, most: int) -> ndarray:
     """At most ``most`` of ``rows``, spread evenly."""
-    if len(rows) <= most:
-        return rows
-    return rows[np.linspace(0, len(rows) - 1, most).astype(int)]
+    return rows[np.linspace(0, len(rows) - 1, min(most, len(rows))).astype(int)]

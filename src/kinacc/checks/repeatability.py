@@ -76,31 +76,29 @@ def parts(read: pd.DataFrame) -> Parts:
         By the analysis of variance of unweighted means; degrees of freedom by Welch and
         Satterthwaite.
     """
-    visit_of, side_of, pose_of = _nested(read)
-    position = read[AXES].to_numpy()
-    within, observed = scatter(position, visit_of)
-    visits, per_visit = means(position, visit_of)
-    between, returned = scatter(visits, side_of)
-    middles, per_side = means(visits, side_of)
-    across, sides = scatter(middles, pose_of)
-    # What part of the variance of a level below is in the mean square of each level.
-    below = means(1.0 / per_visit[:, None], side_of)[0][:, 0] / per_side
-    of_visit = _share(1.0 / per_visit, side_of, returned)
-    of_side, of_side_below = (_share(part, pose_of, sides) for part in (1.0 / per_side, below))
-    unknown = np.full((3, 3), np.nan)
-    instrument = within if observed else unknown
-    if not returned:
+    values = read[AXES].to_numpy()
+    shares: list[ndarray] = []
+    squares, variances, degrees = np.zeros((3, 3, 3)), np.zeros((3, 3, 3)), np.zeros(3)
+    combined = np.eye(3)  # of which mean squares each variance is the difference
+    for level, group in enumerate(_nested(read)):
+        squares[level], degrees[level] = scatter(values, group)
+        # What part of the variance of each level below is in the mean square of this one.
+        weight = (1.0 - 1.0 / np.bincount(group)[group]) / max(degrees[level], 1.0)
+        below = np.array([share @ weight for share in shares])
+        lower = np.tensordot(below, variances[:level], 1)
+        variances[level] = _no_less_than_zero(squares[level] - lower)
+        combined[level] -= below @ combined[:level]
+        values, count = means(values, group)
+        shares = [means(share[:, None], group)[0][:, 0] / count for share in shares]
+        shares.append(1.0 / count)
+    unknown, known = np.full((3, 3), np.nan), degrees > 0
+    instrument, side = (variances[level] if known[level] else unknown for level in (0, 2))
+    if not known[1]:
         return Parts(instrument, unknown, unknown, unknown, 0.0)
-    arm = _no_less_than_zero(between - of_visit * within)
-    side = _no_less_than_zero(across - of_side * arm - of_side_below * within)
-    shares = np.array([1.0 - of_visit + of_side * of_visit - of_side_below, 1.0 - of_side, 1.0])
-    terms = shares * [np.trace(square) for square in (within, between, across)]
-    degrees = np.array([observed, returned, sides])
-    terms, degrees = terms[degrees > 0], degrees[degrees > 0]
-    spread = np.sum(terms**2 / degrees)
-    freedom = terms.sum() ** 2 / spread if spread > 0.0 else returned
-    whole = within * bool(observed) + arm + side * bool(sides)
-    return Parts(instrument, arm, side if sides else unknown, whole, float(freedom))
+    terms = (combined.sum(axis=0) * np.trace(squares, axis1=1, axis2=2))[known]
+    spread = np.sum(terms**2 / degrees[known])
+    freedom = terms.sum() ** 2 / spread if spread > 0.0 else degrees[1]
+    return Parts(instrument, variances[1], side, variances[known].sum(axis=0), float(freedom))
 
 
 def noise_of(results: Parts, resolution_mm: ndarray) -> Noise | None:
@@ -147,30 +145,25 @@ def differ_by_axis(covariance_mm2: ndarray, freedom: float) -> float:
 def differ_by_pose(read: pd.DataFrame, resolution_mm: ndarray) -> tuple[float, pd.Series]:
     """Probability that poses scatter so differently by chance (Bartlett), and their scatter.
 
-    Of the visits of every pose from one side, over that of all poses; NaN where a pose tells
-    nothing. Less than the rounding of ``resolution_mm`` (3,) counts as that.
+    Of the visits of every pose from one side, over that of all poses, where a pose tells it. Less
+    than the rounding of ``resolution_mm`` (3,) counts as that.
     """
-    values = read.groupby(VISIT, sort=False)[AXES].mean()
-    groups, poses = (values.groupby(names, sort=False) for names in (SIDE, POSE))
-    square_mm2, pooled = scatter(values.to_numpy(), groups.ngroup().to_numpy())
-    unknown = poses.size() * math.nan
-    if not pooled:
-        return math.nan, unknown
-    rounding = np.diag(resolution_mm**2 / 12.0)
-    root = np.linalg.cholesky(square_mm2 + rounding + 1e-24 * np.eye(3))
-    white = np.linalg.solve(root, (values - groups.transform("mean")).T).T
-    square = pd.Series(np.sum(white**2, axis=1), values.index).groupby(POSE, sort=False).sum()
-    freedom = 3.0 * (groups.size() - 1).groupby(POSE, sort=False).sum()
-    least = np.trace(np.linalg.solve(root, np.linalg.solve(root, rounding).T)) / 3.0
-    s2 = (square / freedom.where(freedom > 0)).clip(lower=max(least, 1e-12)).dropna()
-    nu = freedom[s2.index]
-    middle = np.average(s2, weights=nu) if len(nu) > 1 else 1.0
-    ratio = unknown.fillna(s2 / middle) ** 0.5
+    visits = read.groupby(VISIT, sort=False)[AXES].mean()
+    groups = visits.groupby(SIDE, sort=False)
+    centred = visits - groups.transform("mean")
+    nu = 3.0 * (groups.size() - 1).groupby(POSE, sort=False).sum()
+    nu = nu[nu > 0.0]
     if len(nu) < 2:
-        return math.nan, ratio
-    statistic = nu.sum() * math.log(middle) - float(np.sum(nu * np.log(s2)))
+        return math.nan, nu * math.nan
+    rounding = np.diag(resolution_mm**2 / 12.0 + 1e-24)
+    inverse = np.linalg.inv(3.0 * (centred.T @ centred) / nu.sum() + rounding)
+    square = ((centred @ inverse) * centred.to_numpy()).sum(axis=1)
+    variance = square.groupby(POSE, sort=False).sum()[nu.index] / nu
+    variance = variance.clip(lower=max(np.trace(inverse @ rounding) / 3.0, 1e-12))
+    middle = np.average(variance, weights=nu)
+    statistic = nu.sum() * math.log(middle) - float(np.sum(nu * np.log(variance)))
     correction = 1.0 + (np.sum(1.0 / nu) - 1.0 / nu.sum()) / (3.0 * (len(nu) - 1))
-    return float(chdtrc(len(nu) - 1, statistic / correction)), ratio
+    return float(chdtrc(len(nu) - 1, statistic / correction)), np.sqrt(variance / middle)
 
 
 def by_side(read: pd.DataFrame) -> pd.DataFrame:
@@ -250,12 +243,6 @@ def _nested(read: pd.DataFrame) -> list[ndarray]:
         numbers.append(read.groupby(keys, sort=False).ngroup().to_numpy())
         read = read.drop_duplicates(keys)
     return numbers
-
-
-def _share(part: ndarray, group: ndarray, freedom: int) -> float:
-    """Mean of what each member (n,) of a ``group`` brings to the mean square of its level."""
-    size = np.bincount(group)[group]
-    return float((part * (1.0 - 1.0 / size)).sum()) / max(freedom, 1)
 
 
 def _no_less_than_zero(covariance: ndarray) -> ndarray:

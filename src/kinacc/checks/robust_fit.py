@@ -14,20 +14,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pandas as pd
 from numpy import ndarray
-from scipy.spatial.transform import Rotation
 
 from kinacc.calibration.fitting import PoseSystem
 from kinacc.calibration.frames import (
     FrameParameters,
     Frames,
-    base_from_targets,
     closed_form_start,
     frame_terms,
     one_session,
 )
 from kinacc.checks import tails
 from kinacc.checks.readings import Readings, thinned
-from kinacc.geometry import IDENTITY, Pose, compose, invert, log_so3
+from kinacc.geometry import IDENTITY, Pose, compose, log_so3
 from kinacc.kinematics import dh
 from kinacc.kinematics.dh import DHModel
 
@@ -164,21 +162,21 @@ def sigma_of(vectors: ndarray) -> float:
 def best(observed: Readings, begin: Arm, strengths: tuple[float, ...] = STRENGTHS) -> Trial:
     """The fit whose strength predicts configurations left out best."""
     number = np.unique(observed.pose, return_inverse=True)[1]
-    better: list[tuple[float, Trial]] = []
-    cap, arm = 0.0, begin
+    chosen: Trial | None = None
+    least, cap, arm = np.inf, 0.0, begin
     for strength in strengths:
         trial = reweighted(observed, arm, begin.model, strength, huber=True)
-        if better and _far(trial.arm.model, begin.model):
+        if chosen and _far(trial.arm.model, begin.model):
             continue
         arm, cap = trial.arm, cap or _CAP * trial.sigma_mm
         length = np.minimum(np.linalg.norm(trial.left_out[:, :3], axis=1), cap)
         score = float(np.mean(np.bincount(number, length) / np.bincount(number)))
         # Stronger corrections must pay: noise alone moves the score by a per mille or so.
-        if not better or score < 0.99 * better[-1][0]:
-            better.append((score, trial))
-        elif score > 1.5 * better[-1][0]:
+        if chosen is None or score < 0.99 * least:
+            chosen, least = trial, score
+        elif score > 1.5 * least:
             break
-    chosen = better[-1][1]
+    assert chosen is not None
     corrections = 5 * begin.model.joints if chosen.strength > 0.0 else 0
     frames = 6 * len(observed.session_names) + 3 * len(observed.target_names)
     if 3 * len(observed) < _READ_PER_PARAMETER * (frames + corrections):
@@ -240,11 +238,8 @@ class Linear:
         free = np.full(nominal.start.size, strength > 0.0)
         system = PoseSystem(named, nominal, free, frames, 1.0)
         x = np.concatenate([frames.begin, arm.model.start[free]])
-        blocks = [
-            np.pad(columns, ((0, 0), (0, 6 - columns.shape[1]), (0, 0)))
-            for columns, _ in system.columns(x)
-        ]
-        columns = np.concatenate(blocks, axis=2)
+        ((columns, _),) = system.columns(x)  # few enough readings for one block
+        columns = np.pad(columns, ((0, 0), (0, 6 - columns.shape[1]), (0, 0)))
         design, residual = columns[:-1].transpose(2, 1, 0), columns[-1].T
         weights, sigmas = np.zeros((len(observed), 6)), []
         every = np.ones(len(observed), dtype=bool)
@@ -269,12 +264,8 @@ class Linear:
     def taken(self, arm: Arm) -> tuple[Arm, float]:
         """The arm after the step, and how far it moves: mm of lengths, mm at one metre of turns."""
         of_frames, rest = np.split(self.step, [self.frames.size])
-        model, scale = arm.model, self.frames.scale
-        if rest.size:
-            model, scale = (
-                model.with_parameters(model.start + rest),
-                np.append(scale, _units(model)),
-            )
+        model = arm.model.with_parameters(arm.model.start + rest) if rest.size else arm.model
+        scale = np.append(self.frames.scale, _units(model))[: self.step.size]
         moved = float(np.abs(self.step / scale).max())
         return Arm(model, self.frames.frames(self.frames.begin + of_frames)), moved
 
@@ -287,11 +278,9 @@ class Linear:
         unit = np.nan_to_num(np.repeat([self.sigma_mm, self.sigma_rad], 3), nan=1.0)
         plain, judged = self.residual / unit, self.residual / unit
         scaled, share = self.design / unit[:, None], self.weights * unit**2
-        number = pd.factorize(observed.pose)[0]
-        for size in np.unique(np.bincount(number)):
-            of_size = np.bincount(number)[number] == size
-            rows = np.flatnonzero(of_size)[np.argsort(number[of_size], kind="stable")]
-            rows = rows.reshape(-1, size)
+        poses = [*pd.Series(observed.pose).groupby(observed.pose).indices.values()]
+        for size in {*map(len, poses)}:
+            rows = np.stack([pose for pose in poses if len(pose) == size])
             block = scaled[rows].reshape(len(rows), 6 * size, -1)
             open_there = block @ self.inverse @ np.swapaxes(block, 1, 2)
             # What one configuration alone determines is unknown without it: far, not infinite.
@@ -333,8 +322,9 @@ def start(observed: Readings, model: DHModel) -> Arm:
     Of closed forms on all readings of the largest session, on stretches of it and on random draws,
     the one that fits the better two fifths best.
     """
-    largest = np.argmax(np.bincount(observed.session))
-    part = observed.select(thinned(np.flatnonzero(observed.session == largest), _START_ROWS))
+    session = np.argmax(np.bincount(observed.session))
+    largest = thinned(np.flatnonzero(observed.session == session), _START_ROWS)
+    part = observed.select(largest)
     flange, every = dh.forward(model, part.q_rad), np.arange(len(part))
     poses, rng, pieces = np.unique(part.pose), np.random.default_rng(0), [every]
     if len(poses) > _DRAWN:
@@ -343,18 +333,15 @@ def start(observed: Readings, model: DHModel) -> Arm:
         draws = [rng.choice(poses, _DRAWN, replace=False) for _ in range(_DRAWS)]
         pieces += [np.flatnonzero(np.isin(part.pose, draw)) for draw in draws]
     chosen = placed(part, flange, pieces)[0]
-    frames = closed_form_start(part.select(chosen), flange.select(chosen))
-    if len(observed.target_names) > 1:
-        place_targets(frames.targets, part, compose(frames.at_rows(part)[0], flange))
-    for session in np.unique(observed.session[observed.session != largest]):
-        part = observed.select(observed.session == session)
-        flange, rows = dh.forward(model, part.q_rad), np.arange(len(part))
-        for _ in range(_REFINEMENTS):
-            base = base_from_targets(part.select(rows), flange.select(rows), frames.targets)
-            distance = distances(part, flange, base, frames.targets.position_mm)
-            rows = np.argsort(distance)[: max(int(_TRUSTED * len(part)), min(len(part), 4))]
-        frames.bases.rotation[session], frames.bases.position_mm[session] = base
-    return Arm(model, frames)
+    # Other sessions, and targets that the chosen rows lack, are placed by the better half of each.
+    rows = np.append(largest[chosen], np.flatnonzero(observed.session != session))
+    flange, group = dh.forward(model, observed.q_rad), [observed.session, observed.target]
+    several = len(np.unique(group, axis=1).T) > 1
+    for _ in range(_REFINEMENTS if several else 1):
+        arm = Arm(model, closed_form_start(observed.select(rows), flange.select(rows)))
+        distance = pd.Series(np.linalg.norm(residuals(arm, observed).position_mm, axis=1))
+        rows = np.flatnonzero(distance <= distance.groupby(group).transform("median"))
+    return arm
 
 
 def placed(
@@ -382,17 +369,3 @@ def distances(observed: Readings, flange: Pose, base: Pose, points: ndarray) -> 
     by_arm = flange.position_mm + (flange.rotation @ points[observed.target, :, None])[..., 0]
     predicted = by_arm @ base.rotation.T + base.position_mm
     return np.linalg.norm(predicted - observed.position_mm, axis=1)
-
-
-def place_targets(targets: Pose, observed: Readings, flange: Pose) -> None:
-    """Put targets where the readings have them: a part of those may have been none of theirs.
-
-    ``flange`` (n,) in the instrument's frame.
-    """
-    there = compose(invert(flange), observed.measured)
-    for target in np.unique(observed.target):
-        rows = observed.target == target
-        targets.position_mm[target] = np.median(there.position_mm[rows], axis=0)
-        if (rows := rows & observed.has_rotation).any():
-            mean = Rotation.from_matrix(there.rotation[rows]).mean()
-            targets.rotation[target] = mean.as_matrix()

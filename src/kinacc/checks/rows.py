@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 
 from kinacc.checks import changes, robust_fit, tails
 from kinacc.checks.changes import Change
@@ -73,15 +74,13 @@ def _swapped(observed: Readings, target: int) -> Change:
 def largest(fitted: Fitted) -> Iterator[Finding]:
     """Readings that are no outliers, and stand apart from the others all the same."""
     good = np.flatnonzero(~fitted.bad)
-    number = np.unique(fitted.readings.pose[good], return_inverse=True)[1]
-    worst = np.zeros(number.max(initial=-1) + 1)
-    np.maximum.at(worst, number, fitted.left_mm[good])
+    by_pose = pd.Series(fitted.left_mm[good]).groupby(fitted.readings.pose[good])
+    worst = np.sort(by_pose.max())[::-1]
     if count := tails.detached(worst):
-        ordered = np.sort(worst)[::-1]
         yield finding(
             "largest_rows",
-            fitted.readings.lines(good[worst[number] >= ordered[count - 1]]),
+            fitted.readings.lines(good[by_pose.transform("max") >= worst[count - 1]]),
             count=count,
-            errors=", ".join(f"{value:.3g}" for value in ordered[:count]),
-            next=f"{ordered[count]:.3g}",
+            errors=", ".join(f"{value:.3g}" for value in worst[:count]),
+            next=f"{worst[count]:.3g}",
         )

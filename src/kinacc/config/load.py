@@ -71,10 +71,10 @@ def load(
     problems: list[Problem] = []
     places: dict[KeyPath, str] = {}
     for path in paths:
-        document, wrong = read(path)
+        document = read(path)
         beside = os.path.relpath(Path(path).absolute().parent, folder)
         contents.append(_relocated(document.data, beside, Path(folder)))
-        problems += wrong
+        problems += document.problems
         for keys_ in document.lines:
             if keys_[2:] in _IDENTITY and keys_ in places:
                 message = f"data set {keys_[1]!r} has its measurements given in two files"

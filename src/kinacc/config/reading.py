@@ -27,21 +27,15 @@ _FLOAT = re.compile(r"[-+]?(\d+(\.\d*)?|\.\d+)[eE][-+]?\d+")
 
 @dataclass(frozen=True)
 class Document:
-    """Content of one file: ``data`` as nested plain values, ``lines`` of every key path."""
+    """Content of one file: ``data`` as nested plain values, ``lines`` of every key path.
+
+    ``problems``: keys that are given twice, or why there is no data.
+    """
 
     name: str
-    data: dict[str, Any]
+    data: Any
     lines: dict[KeyPath, int] = field(default_factory=dict)
-
-    def gives(self, path: KeyPath) -> bool:
-        """Whether the file has a value at a key path."""
-        value: Any = self.data
-        try:
-            for step in path:
-                value = value[step]
-        except (TypeError, LookupError):
-            return False
-        return True
+    problems: list[Problem] = field(default_factory=list)
 
     def place(self, path: KeyPath) -> str:
         """File, line and key path; the nearest known line where a key has none."""
@@ -66,12 +60,12 @@ def dotted(path: KeyPath) -> str:
     return "".join(steps).removeprefix(".")
 
 
-def read(path: Path | str) -> tuple[Document, list[Problem]]:
+def read(path: Path | str) -> Document:
     """One YAML file; problems instead of exceptions for all that is wrong with it as YAML."""
     try:
-        return parsed(_text(str(path)), str(path))
+        return mapping(_text(str(path)), str(path))
     except InputError as error:
-        return Document(str(path), {}), [*error.problems]
+        return Document(str(path), {}, problems=[*error.problems])
 
 
 def _text(name: str) -> str:
@@ -88,38 +82,23 @@ def _text(name: str) -> str:
         return content.decode("utf-8-sig")
     except OSError as error:
         raise refused(error, name) from None
-    except UnicodeDecodeError as error:
-        message = f"is not text in UTF-8 (byte {error.start})"
-        raise input_error(name, message, "a YAML file") from None
-    except ValueError as error:  # a name that no file can have
-        raise input_error(name, f"cannot be read: {error}", "a YAML file") from None
+    except ValueError as error:  # or a name that no file can have
+        raise input_error(name, f"is not text in UTF-8: {error}", "a YAML file") from None
 
 
-def parsed(text: str, name: str) -> tuple[Document, list[Problem]]:
-    """A YAML text whose top level is a mapping, and keys that are given twice.
+def mapping(text: str, name: str) -> Document:
+    """A YAML text whose top level is a mapping. Raises InputError where it is anything else."""
+    document = parsed(text, name)
+    if not isinstance(document.data, dict):
+        message = "is empty" if document.data is None else "holds no keys"
+        raise input_error(name, message, "a mapping such as seed: 1")
+    return document
 
-    Raises InputError where it is anything else.
-    """
+
+def parsed(text: str, name: str) -> Document:
+    """A YAML text. Raises InputError where it is not YAML, or too much to be read safely."""
     lines: dict[KeyPath, int] = {}
     problems: list[Problem] = []
-    data = value_of(text, name, lines, problems)
-    if not isinstance(data, dict):
-        message = "is empty" if data is None else "holds no keys"
-        raise input_error(name, message, "a mapping such as seed: 1")
-    return Document(name, data, lines), problems
-
-
-def value_of(
-    text: str,
-    name: str,
-    lines: dict[KeyPath, int] | None = None,
-    problems: list[Problem] | None = None,
-) -> Any:
-    """The value of a YAML text; ``lines`` and ``problems`` take lines of keys and keys given twice.
-
-    Raises InputError for text that is not YAML, or too much to be read safely.
-    """
-    lines, problems = {} if lines is None else lines, [] if problems is None else problems
     count = 0
 
     def plain(node: yaml.Node, path: KeyPath) -> Any:
@@ -133,17 +112,17 @@ def value_of(
         if isinstance(node, yaml.SequenceNode):
             lines.update(((*path, n), e.start_mark.line + 1) for n, e in enumerate(node.value))
             return [plain(item, (*path, number)) for number, item in enumerate(node.value)]
-        mapping: dict[Any, Any] = {}
+        values: dict[Any, Any] = {}
         for key_node, value_node in node.value:
             key = _scalar(key_node) if isinstance(key_node, yaml.ScalarNode) else "<values>"
             here, line = (*path, key), key_node.start_mark.line + 1
-            if key in mapping:
+            if key in values:
                 message = f"{key!r} is given twice, first in line {lines[here]}"
                 problems.append(Problem(f"{name}:{line}, {dotted(here)}", message, "once"))
             else:
                 lines[here] = line
-                mapping[key] = plain(value_node, here)
-        return mapping
+                values[key] = plain(value_node, here)
+        return values
 
     try:
         depth = 0  # nodes within nodes take a step of the stack for each level
@@ -160,7 +139,7 @@ def value_of(
         fix = "indent with blanks, not tabs" if "\\t" in reason else ""
         where = f"{name}:{mark.line + 1}" if mark else name
         raise input_error(where, f"is not YAML: {reason}", fix=fix) from None
-    return None if node is None else plain(node, ())
+    return Document(name, None if node is None else plain(node, ()), lines, problems)
 
 
 def _scalar(node: yaml.ScalarNode) -> Any:

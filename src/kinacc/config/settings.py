@@ -431,10 +431,8 @@ class Settings(Section):
 def _robot(robot: str, info: ValidationInfo) -> str:
     shipped = sorted(item.stem for item in ROBOTS.glob("*.yaml"))
     if robot not in shipped and not ((info.context or {}).get("folder", Path()) / robot).is_file():
-        is_file = robot.endswith((".yaml", ".yml", ".urdf")) or "/" in robot
-        meant = "" if is_file else did_you_mean(robot, shipped)
-        fix = meant or "give a name listed in docs/robots.md or the path of a robot file"
-        raise refused(f"there is no robot {'file ' * is_file}{robot!r}", fix)
+        fix = "give a name listed in docs/robots.md or the path of a robot file"
+        raise refused(f"there is no robot {robot!r}", did_you_mean(robot, shipped) or fix)
     return robot
 
 

@@ -17,8 +17,7 @@ from kinacc.deployment import folder, history
 from kinacc.errors import FitError, InputError, first_few, input_error
 from kinacc.gate import chance
 from kinacc.gate.outcome import FAILED, PASSED, UNDECIDED, Outcome
-from kinacc.gate.values import SELECTED, RunTables
-from kinacc.tables import sums
+from kinacc.gate.values import SELECTED, RunTables, same_measurements
 from kinacc.tables.allowed import MOVED, OPEN, RECALIBRATE, SAME
 from kinacc.tables.atomic import unfinished, write_whole
 from kinacc.tables.comparison import compare_folders
@@ -72,11 +71,10 @@ def compared(now: Path, before: Path, rotation_weight_mm_per_rad: float) -> Iter
         return Outcome(now.name, name, "accepted", verdict, says, fix, figures)
 
     accepting = f'kinacc check-results {now.parent} --accept {before.parent} --reason ".."'
-    measured = [sums.stated(item).get("measurements.parquet") for item in (now, before)]
     if not (before / "measurements.parquet").is_file():
         says = f"no accepted run of {now.name} in {before.parent}"
         yield outcome("accepted run", FAILED, says, accepting)
-    elif measured[0] == measured[1]:
+    elif same_measurements(now, before):
         results = [*compare_folders(before, now)]
         says = "same measurements, and every table agrees within its tolerance"
         if results:

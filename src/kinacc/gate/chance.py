@@ -98,19 +98,15 @@ def _resampled(
 ) -> np.ndarray:
     """Differences of a statistic (about 2000,) between resamples of two samples."""
     draw, results = np.random.default_rng(_SEED), []
-    if paired:
-        both = np.concatenate([now.configuration, before.configuration])
-        first, second = np.split(np.unique(both, return_inverse=True)[1], [len(now.sizes)])
-    else:
-        first, second = (
-            np.unique(item.configuration, return_inverse=True)[1] for item in (now, before)
-        )
-    counts = [number.max() + 1 for number in (first, second)]
-    counts = [max(counts)] if paired else counts
+    apart = 0 if paired else now.configuration.max() + 1
+    both = np.concatenate([now.configuration, before.configuration + apart])
+    number = np.unique(both, return_inverse=True)[1]
+    counts = [number.max() + 1] if paired else [now.count, before.count]
     for _ in range(_RESAMPLES):
-        times = [np.bincount(draw.integers(count, size=count), minlength=count) for count in counts]
-        new = now.sizes.repeat(times[0][first])
-        old = before.sizes.repeat(times[-1][second])
+        parts = [np.bincount(draw.integers(count, size=count), minlength=count) for count in counts]
+        times = np.concatenate(parts)[number]
+        new = now.sizes.repeat(times[: len(now.sizes)])
+        old = before.sizes.repeat(times[len(now.sizes) :])
         if len(new) and len(old):
             results.append(of(new) - of(old))
     return np.array(results)

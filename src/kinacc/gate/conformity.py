@@ -11,8 +11,7 @@ import pyarrow as pa
 
 from kinacc.errors import InputError, Problem, first_few
 from kinacc.tables import store
-from kinacc.tables.columns import JOINTS_MAX, JOINTS_MIN, Artefact, Column, joint_count
-from kinacc.tables.contract import PROVENANCE_KEYS
+from kinacc.tables.columns import Artefact, Column, joint_count
 
 
 def check_file(path: Path, artefact: Artefact) -> list[Problem]:
@@ -33,11 +32,14 @@ def check_file(path: Path, artefact: Artefact) -> list[Problem]:
     try:
         table = store.read_arrow(path)
         frame = table.to_pandas()
+        provenance = {key.decode(): value for key, value in (table.schema.metadata or {}).items()}
+        schema = store.to_table(artefact.name, frame, provenance).schema
     except (InputError, UnicodeDecodeError, pa.ArrowException) as error:
         return [*getattr(error, "problems", [Problem(str(path), f"not readable: {error}")])]
-    problems = list(_structure(path, artefact, table.schema))
-    if problems:
-        return problems
+    if wrong := [e.name for e in schema if not e.equals(table.schema.field(e.name), True)]:
+        message = f"columns of another type, unit or meaning: {first_few(wrong)}"
+        return [Problem(str(path), message)]
+    problems: list[Problem] = []
     for column in artefact.in_file(joint_count(artefact, frame.columns), frame.columns):
         problems += _values(f"{path}, column {column.name}", column, frame[column.name])
     repeated = frame.duplicated([*artefact.key], keep=False)
@@ -49,25 +51,8 @@ def check_file(path: Path, artefact: Artefact) -> list[Problem]:
     return problems
 
 
-def _structure(path: Path, artefact: Artefact, schema: pa.Schema) -> Iterator[Problem]:
-    joints = min(max(joint_count(artefact, schema.names), JOINTS_MIN), JOINTS_MAX)
-    expected = store.arrow_schema(artefact.name, joints, names=schema.names)
-    supplied, wanted = (
-        {item.name: (item.type, item.metadata) for item in each} for each in (schema, expected)
-    )
-    wrong = [name for name in wanted | supplied if supplied.get(name) != wanted.get(name)]
-    if wrong or len(schema) != len(expected):
-        message = f"missing, unknown, or of another type, unit or meaning: {first_few(wrong)}"
-        yield Problem(str(path), f"columns {message}")
-    metadata = schema.metadata or {}
-    if {*metadata} != {key.encode() for key in PROVENANCE_KEYS} or not all(metadata.values()):
-        yield Problem(str(path), f"schema metadata {metadata}", ", ".join(PROVENANCE_KEYS))
-
-
 def _values(where: str, column: Column, values: pd.Series) -> Iterator[Problem]:
     supplied = values.dropna()
-    if len(supplied) < len(values) and not column.nullable:
-        yield Problem(where, f"null in {_rows(values.isna())}", "a value in every row")
     if column.kind == "text":
         good = supplied.str.strip() != ""
         if column.pattern:
@@ -77,7 +62,7 @@ def _values(where: str, column: Column, values: pd.Series) -> Iterator[Problem]:
         slack = 1e-9 * max(abs(column.low or 0.0), abs(column.high or 0.0))
         low = -np.inf if column.low is None else column.low
         high = np.inf if column.high is None else column.high
-        good = np.isfinite(supplied) & supplied.between(low - slack, high + slack)
+        good = supplied.between(low - slack, high + slack)
     if column.choices:
         good &= supplied.isin(column.choices)
     if not good.all():

@@ -14,9 +14,8 @@ from kinacc.config.values import did_you_mean
 from kinacc.errors import InputError
 from kinacc.gate import chance
 from kinacc.gate.outcome import FAILED, PASSED, UNDECIDED, WARNED, Outcome
-from kinacc.gate.values import Figure, RunTables, cell, figure, sample
+from kinacc.gate.values import Figure, RunTables, cell, figure, same_measurements
 from kinacc.report.rendering import history_sentence, lines
-from kinacc.tables import sums
 from kinacc.tables.allowed import FINDING_LEVELS, FIRST, HOLDS, LEFT_OUT, RECALIBRATE
 
 Gate = Mapping[str, Any]
@@ -68,7 +67,8 @@ def of_gate(
                 result = _suspicions(gate, tables)
             case _:
                 result = _history(tables)
-        says = "".join(lines("gate.txt", kind=kind, gate=gate, **result.facts))
+        facts = {**result.figures, **result.facts}
+        says = "".join(lines("gate.txt", kind=kind, gate=gate, **facts))
     except InputError as error:
         first = error.problems[0]
         result, says = Found(FAILED, first.fix), f"{first.where} {first.what}"
@@ -100,8 +100,8 @@ def _limited(result: Figure, limits: Mapping[str, Any]) -> Found:
     undecided = bool(result.open) and (held or np.isnan(result.size))
     verdict = UNDECIDED if undecided else PASSED if held else FAILED
     figures = {f"value{result.key}": result.size, f"{word}{result.key}": limit, **result.about}
-    facts = {"figure": result, "limit": limit, "word": word.replace("_", " ")}
-    return Found(verdict, "", figures, {**facts, "undecided": undecided})
+    facts = {"figure": result, "limit": limit, "word": word, "undecided": undecided}
+    return Found(verdict, "", figures, facts)
 
 
 def _against(gate: Gate, tables: RunTables, accepted: RunTables | None) -> Found:
@@ -110,13 +110,11 @@ def _against(gate: Gate, tables: RunTables, accepted: RunTables | None) -> Found
         return Found(FAILED, fix, facts={"no_run": tables.folder.name})
     (allowed,), confidence = gate["limit"].values(), gate["beyond_chance"]
     now, before = (figure(item, gate) for item in (tables, accepted))
-    first, second = (sample(item, gate) for item in (tables, accepted))
-    measured, measured_before = (
-        sums.stated(item.folder).get("measurements.parquet") for item in (tables, accepted)
-    )
-    paired = measured is not None and measured == measured_before
+    assert now.errors is not None  # the configuration takes figures of errors alone
+    assert before.errors is not None
+    paired = same_measurements(tables.folder, accepted.folder)
     statistic = gate["value"].rpartition(".")[2]
-    results = chance.change(statistic, first, second, paired, confidence)
+    results = chance.change(statistic, now.errors, before.errors, paired, confidence)
     figures = {
         f"value{now.key}": now.size,
         f"accepted{now.key}": before.size,
@@ -127,8 +125,7 @@ def _against(gate: Gate, tables: RunTables, accepted: RunTables | None) -> Found
         "paired": int(paired),
         **now.about,
     }
-    poses = [first.count] if paired else [first.count, second.count]
-    facts = {"now": now, "before": before, "allowed": allowed, "change": results, "poses": poses}
+    facts = {"now": now, "before": before, "allowed": allowed, "change": results}
     if results.open:
         return Found(UNDECIDED, "", figures, facts)
     fix = f"kinacc check-results --against {accepted.folder.parent} lists what changed"
@@ -150,24 +147,18 @@ def _campaign(gate: Gate, tables: RunTables, tolerance_mm: float | None) -> Foun
         fix = f"begin one on it: kinacc campaign start FOLDER --calibration {tables.folder}"
         return Found(FAILED, fix, facts={"judged": None, "remarks": summary.remarks})
     bound = status.of_all
-    is_bounded = bool(np.isfinite(bound.upper_mm))
-    figures = {"tolerance_mm": allowed, "campaign": status.folder, "readings": status.readings}
-    if is_bounded:
-        figures |= {"lower_mm": bound.lower_mm, "confidence": bound.confidence}
-        figures["bound_mm"] = bound.upper_mm
-    too_unsure = is_bounded and bound.confidence < (gate["confidence"] or 0.0) - 1e-9
-    facts = {
-        "judged": judged_as,
-        "bound": bound,
-        "is_bounded": is_bounded,
-        "too_unsure": too_unsure,
-        "allowed": allowed,
-        "remarks": [*summary.remarks, *summary.doubts],
+    figures = {
+        "tolerance_mm": allowed,
+        "campaign": status.folder,
+        "readings": status.readings,
+        "lower_mm": bound.lower_mm,
+        "bound_mm": bound.upper_mm,
+        "confidence": bound.confidence,
     }
-    if too_unsure:
-        fix = "begin a campaign with that confidence, or ask for the campaign's"
-        return Found(FAILED, fix, figures, facts)
+    facts = {"judged": judged_as, "remarks": [*summary.remarks, *summary.doubts]}
     verdict = {ACCEPT: PASSED, REJECT: FAILED}.get(judged_as.verdict, UNDECIDED)
+    if bound.confidence < (gate["confidence"] or 0.0) - 1e-9:
+        verdict, facts["too_unsure"] = FAILED, True
     return Found(verdict, f"kinacc campaign status {place}", figures, facts)
 
 
@@ -183,14 +174,13 @@ def _claims(gate: Gate, tables: RunTables) -> Found:
     agree, remaining = int((verdict == "agrees").sum()), len(lists.get("differs", ()))
     figures = {"claims": len(verdict), "agree": agree, "differ": int((verdict == "differs").sum())}
     figures["differ_not_excepted"] = remaining
-    facts = {**figures, "unknown": (), "lists": {k: v for k, v in lists.items() if k != "agrees"}}
-    return Found(FAILED if remaining else PASSED, fix, figures, facts)
+    return Found(FAILED if remaining else PASSED, fix, figures, {"lists": lists})
 
 
 def _suspicions(gate: Gate, tables: RunTables) -> Found:
     measurements = tables["measurements"]
     if "row" not in measurements or measurements["row"].isna().all():
-        return Found(PASSED, "", {"suspicions": 0}, {"is_measured": False})
+        return Found(PASSED, "", {"suspicions": 0})
     table = tables["data_check"]
     table = table[(table["finding"] != LEFT_OUT) & (table["level"] != FINDING_LEVELS[-1])]
     known = table["accepted"].fillna("").astype(bool)
@@ -198,8 +188,7 @@ def _suspicions(gate: Gate, tables: RunTables) -> Found:
     left = list(remaining["finding"] + ": " + remaining["what"])
     figures = {"suspicions": len(table), "accepted": int(known.sum())}
     fix = "correct the file, or give a reason in data_check.accept and set suspicions: known"
-    facts = {**figures, "is_measured": True, "left": left}
-    return Found(FAILED if left else PASSED, fix, figures, facts)
+    return Found(FAILED if left else PASSED, fix, figures, {"left": left})
 
 
 def _history(tables: RunTables) -> Found:

@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -20,7 +19,7 @@ from kinacc.config.records import Settings
 from kinacc.errors import first_few, input_error
 from kinacc.gate.chance import STATISTICS, Sample
 from kinacc.measurements.folds import configurations_of
-from kinacc.tables import store
+from kinacc.tables import store, sums
 from kinacc.tables.columns import joint_count
 from kinacc.tables.contract import ARTEFACTS
 
@@ -72,7 +71,7 @@ class Figure:
     """A figure of a run, NaN where it is not defined; ``unit`` is 1 for counts.
 
     ``called`` names it within a sentence; ``about`` are further facts by name with unit; ``open``
-    is the reason why it cannot pass a limit, empty where it can.
+    is the reason why it cannot pass a limit, empty where it can; ``errors`` are those behind it.
     """
 
     size: float
@@ -80,6 +79,7 @@ class Figure:
     called: str
     about: Mapping[str, float | int | str] = field(default_factory=dict)
     open: str = ""
+    errors: Sample | None = None
 
     @property
     def key(self) -> str:
@@ -91,20 +91,31 @@ class Figure:
         return f"{size:.10g}" if self.unit == "1" else f"{size:.3f} {self.unit}"
 
 
-def sample(tables: RunTables, gate: Settings) -> Sample:
-    """The errors behind a gate's figure of errors."""
-    return tables.errors(gate["model"], gate["value"].split(".")[1])
+def same_measurements(first: Path, second: Path) -> bool:
+    """Whether the runs in two folders are of the same measurements."""
+    digest = sums.stated(first).get("measurements.parquet")
+    return digest is not None and digest == sums.stated(second).get("measurements.parquet")
 
 
 def figure(tables: RunTables, gate: Settings) -> Figure:
     """The figure of a gate. Raises InputError where its table is missing."""
     name = gate["value"]
     unit, meaning = FIGURES[name]
-    if name in ERRORS:
-        return _of_errors(tables, gate, unit, meaning)
-    pose = tables["measurements"]["pose"]
-    count = len(pose) if name == "data.readings" else pose.nunique()
-    return Figure(float(count), unit, meaning)
+    if name not in ERRORS:
+        pose = tables["measurements"]["pose"]
+        count = len(pose) if name == "data.readings" else pose.nunique()
+        return Figure(float(count), unit, meaning)
+    _, quantity, statistic = name.split(".")
+    model = tables.model(gate["model"])
+    errors = tables.errors(model, quantity)
+    size, count, why = STATISTICS[statistic](errors.sizes), len(errors.sizes), ""
+    if statistic == "p99" and count < FEWEST_OF_QUANTILE:
+        others = "a limit on mean, rms, largest or p99_gamma needs fewer"
+        why = f"{count} rows are too few, {FEWEST_OF_QUANTILE} would do; {others}"
+    if np.isnan(size):
+        why = "an error is exactly zero: no gamma distribution fits"
+    called = f"{meaning}, held out ({model_name(model)} model)"
+    return Figure(size, unit, called, {"model": model, "rows": count}, why, errors)
 
 
 def cell(tables: RunTables, gate: Settings) -> Figure:
@@ -127,20 +138,5 @@ def cell(tables: RunTables, gate: Settings) -> Figure:
     unit = next(item.unit for item in known if item.name == column)
     unit = str(row["unit"]) if unit == "see unit" else unit
     size = pd.to_numeric(row[column], errors="coerce")
-    where = ", ".join(f"{name} {value}" for name, value in gate["row"].items())
-    called = f"{column} of {artefact}" + (f" ({where})" if where else "")
-    return Figure(float(size), unit, called, open="no number" if np.isnan(size) else "")
-
-
-def _of_errors(tables: RunTables, gate: Settings, unit: str, meaning: str) -> Figure:
-    statistic = gate["value"].rpartition(".")[2]
-    sizes, model = sample(tables, gate).sizes, tables.model(gate["model"])
-    called = f"{meaning}, held out ({model_name(model)} model)"
-    about: dict[str, Any] = {"model": model, "rows": len(sizes)}
-    size, why = STATISTICS[statistic](sizes), ""
-    if statistic == "p99" and len(sizes) < FEWEST_OF_QUANTILE:
-        others = "a limit on mean, rms, largest or p99_gamma needs fewer"
-        why = f"{len(sizes)} rows are too few, {FEWEST_OF_QUANTILE} would do; {others}"
-    if np.isnan(size):
-        why = "an error is exactly zero: no gamma distribution fits"
-    return Figure(size, unit, called, about, why)
+    called = [f"{column} of {artefact}", *(f"{name} {gate['row'][name]}" for name in gate["row"])]
+    return Figure(float(size), unit, ", ".join(called), open="no number" if np.isnan(size) else "")

@@ -153,13 +153,13 @@ def data_sets(full: Mapping[str, Mapping[str, Any]], absolute: bool = False) -> 
 
 def _values(value: Any, source: str) -> Any:
     """Texts read as YAML: Snakemake hands numbers inside ``--config a='{b: 1}'`` over as text."""
-    from kinacc.config.reading import value_of
+    from kinacc.config.reading import parsed
 
     if isinstance(value, Mapping):
         return {key: _values(item, source) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
         return [_values(item, source) for item in value]
-    return value_of(value, source) if isinstance(value, str) else value
+    return parsed(value, source).data if isinstance(value, str) else value
 
 
 def _in_use(config: Settings) -> dict[str, Any]:

@@ -26,7 +26,7 @@ from scipy.spatial.transform import Rotation
 from kinacc.config.fields import refused
 from kinacc.config.load import by_line, problems_of
 from kinacc.config.names import not_in_a_line
-from kinacc.config.reading import Document, KeyPath, parsed, read
+from kinacc.config.reading import Document, KeyPath, mapping, read
 from kinacc.config.values import did_you_mean
 from kinacc.errors import InputError, Problem, input_error, refuse
 from kinacc.geometry import (
@@ -267,7 +267,7 @@ def load(name_or_path: str | Path) -> Robot:
     path = _path(name_or_path)
     if path.suffix.lower() in (".urdf", ".xacro", ".xml"):
         return _urdf.load(path)
-    return _described(*read(path), path)
+    return _described(read(path), path)
 
 
 def of_text(text: str, name: str) -> Robot:
@@ -290,7 +290,7 @@ def of_text(text: str, name: str) -> Robot:
     InputError
         As ``load``.
     """
-    return _described(*parsed(text, name), Path(name))
+    return _described(mapping(text, name), Path(name))
 
 
 def files(name_or_path: str | Path) -> list[Path]:
@@ -316,7 +316,7 @@ def files(name_or_path: str | Path) -> list[Path]:
         return []
     if path.suffix.lower() not in (".yaml", ".yml"):
         return [path]
-    inner = read(path)[0].data.get("urdf")
+    inner = read(path).data.get("urdf")
     named = [path.parent / inner] if isinstance(inner, str) else []
     return [path, *(file for file in named if os.path.isfile(file))]
 
@@ -332,9 +332,9 @@ def _path(name_or_path: str | Path) -> Path:
     raise input_error(name, "is neither a shipped robot nor a file", allowed, fix)
 
 
-def _described(document: Document, problems: list[Problem], path: Path) -> Robot:
+def _described(document: Document, path: Path) -> Robot:
     title = f"The robot description {document.name} cannot be used"
-    refuse(problems, title)
+    refuse(document.problems, title)
     try:
         if "urdf" not in document.data:
             return Table.model_validate(document.data).robot()
@@ -365,9 +365,8 @@ def _problems(error: ValidationError, document: Document) -> list[Problem]:
         written: KeyPath = ()
         for part in path:
             names = [part, *(key for key, (name, _) in _OTHER_UNITS.items() if name == part)]
-            written = next(
-                ((*written, name) for name in names if document.gives((*written, name))), written
-            )
+            inner = ((*written, name) for name in names)
+            written = next((item for item in inner if item in document.lines), written)
         return document.place(written)
 
     def meant(path: KeyPath) -> str:

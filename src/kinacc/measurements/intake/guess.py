@@ -293,7 +293,7 @@ class _Guesser:
             self.assumed["orientation"] = text
         if "quat1" in self.first:
             parts = ", ".join(self.first[f"quat{number}"].column for number in range(1, 5))
-            self.assumed["order"] = f"{parts} are w, x, y, z of the quaternion"
+            self.assumed["orientation"] = f"{parts} are w, x, y, z of the quaternion"
         return section
 
     def sigma(self) -> int:
