@@ -33,7 +33,7 @@ def fitted(observations, arm_rules=None, frame_rules=None, **settings):
     arm, free, std = dh_estimator.arm_terms(ARM.dh, FREE, rules(arm_rules or {}))
     count = len(observations.session_names), len(observations.target_names)
     stated = frames.known(ARM.base, robot.carried(ARM), *count)
-    terms = frames.frame_terms(observations, stated, rules(frame_rules or {}))
+    terms = frames.frame_terms(observations, stated, rules(frame_rules or {}, of_frames=True))
     return fit(observations, arm, free, std=std, frames=terms, **settings)
 
 

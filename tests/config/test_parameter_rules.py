@@ -52,7 +52,7 @@ def test_values_are_in_the_units_they_say_and_fix_without_a_prior():
     ("name", "state", "words"),
     [
         ("joint 3 e", "free", "is no parameter"),
-        ("base z", "fixed", "does not belong here"),
+        ("base z", "fixed", "is no parameter"),
         ("d", "loose", "'free' or 'fixed'"),
         ("a", {"prior_std_mrad": 1.0}, "rad is no unit of a_mm"),
         ("alpha", {"prior_std_deg": 1.0, "prior_std_mrad": 1.0}, "two units"),
@@ -72,11 +72,11 @@ def test_a_fault_of_a_rule_is_refused(name, state, words):
 def test_frames_are_named_as_in_the_tables():
     content = {"base": "fixed", "tool.rz_rad": {"prior_std_deg": 1.0}, "mA x": {"value_mm": 3}}
     section = Calibration(frames=content, base_and_tool="estimated").model_dump()
-    found = parameter_rules.rules(section["frames"])
+    found = parameter_rules.rules(section["frames"], of_frames=True)
     assert [(rule.frame, rule.parameter) for rule in found] == [
         ("base", None),
         ("tool", "rz_rad"),
         ("mA", "x_mm"),
     ]
-    with pytest.raises(ValidationError, match="does not belong here"):
+    with pytest.raises(ValidationError, match="is no parameter"):
         Calibration(frames={"joint 3 d": "fixed"}, base_and_tool="estimated")

@@ -154,12 +154,13 @@ def frame_terms(
     about = [(MOTIONS[j], None, owners[i]) for i, j in zip(frame, axis, strict=True)]
     frames = {owner: [item[0] for item in about if item[2] == owner] for owner in owners}
     refuse(
-        [
-            Problem(f"{parameter_rules.FRAMES}, {rule.name!r}", message, allowed)
-            for rule, message, allowed in parameter_rules.strangers(
-                rules, observations.joints, frames
-            )
-        ]
+        Problem(
+            f"{parameter_rules.FRAMES}, {rule.name!r}",
+            f"{rule.parameter or rule.frame} is not estimated",
+            ", ".join(frames.get(rule.frame or "", frames)),
+        )
+        for rule in rules
+        if rule.frame not in frames or rule.parameter not in (None, *frames[rule.frame])
     )
     position = stated.poses.position_mm
     begin = np.hstack([position, np.zeros_like(position)])[frame, axis]

@@ -39,7 +39,7 @@ class Common:
             arm,
             calibration["rotation_weight_mm_per_rad"],
             calibration["base_and_tool"] == "estimated",
-            tuple(parameter_rules.rules(calibration["frames"])),
+            tuple(parameter_rules.rules(calibration["frames"], of_frames=True)),
         )
 
     def frames(self, observations: Observations) -> FrameParameters:

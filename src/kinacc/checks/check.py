@@ -105,7 +105,7 @@ def examined(settings: Settings, dataset: str) -> Report:
     report = check(reading, section, arm, dataset)
     of_fit = (reading.columns, arm, settings["calibration"])
     found = (*coverage.few_poses(*of_fit), *coverage.fixed_frames(*of_fit))
-    more = [item.held_to(()) for item in found]
+    more = [item.held_to((), reading.row_names) for item in found]
     accepted = dict(settings["data_check"]["accept"])
     return replace(report, suspicions=(*report.suspicions, *more), accepted=accepted)
 
@@ -150,10 +150,7 @@ def check(
         dataset,
         section["path"],
         facts,
-        tuple(
-            replace(item.held_to(gross), row_names=reading.row_names)
-            for item in _once(findings, facts["rows"])
-        ),
+        tuple(item.held_to(gross, reading.row_names) for item in _once(findings, facts["rows"])),
         (
             *(finding(LEFT_OUT, words=text) for text in unread),
             *coverage.thin(facts["joint_coverage"]),

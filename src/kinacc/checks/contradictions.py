@@ -9,7 +9,7 @@ from typing import Any
 
 from kinacc.config import load as configuration
 from kinacc.config.error_models import ALWAYS, ERROR_MODELS, asked_for, loaded
-from kinacc.config.parameter_rules import rules, strangers
+from kinacc.config.parameter_rules import rules
 from kinacc.config.records import Settings
 from kinacc.config.settings import ROBOTS
 from kinacc.errors import InputError, Problem
@@ -100,8 +100,10 @@ def _arm(full: Settings, folder: Path) -> Found:
                 calibration, arm
             ):
                 yield ("calibration", kind, *keys), *text
-    for rule, *text in strangers(rules(calibration["dh"]["parameters"]), joints):
-        yield ("calibration", "dh", "parameters", rule.name), *text
+    for rule in rules(calibration["dh"]["parameters"]):
+        if rule.joint is not None and not 1 <= rule.joint <= joints:
+            message = f"there is no joint {rule.joint}"
+            yield ("calibration", "dh", "parameters", rule.name), message, f"1 to {joints}"
     pairs = calibration["vec"]["joint_range"]
     if isinstance(pairs, list) and len(pairs) != joints:
         message = f"{len(pairs)} pairs for the {joints} joints of {robot}"

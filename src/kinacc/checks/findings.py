@@ -39,8 +39,8 @@ class Finding:
         Lines of the file it concerns, in order.
     level
         Whether it stops a workflow that fits the data, warns, or is a note; a note if not held to.
-    row_names
-        How the rows at these lines are called.
+    where
+        These lines in words; empty where it is about no lines.
     """
 
     kind: str
@@ -49,12 +49,7 @@ class Finding:
     values: Mapping[str, Any]
     lines: tuple[int, ...] = ()
     level: str = NOTE
-    row_names: RowNames = field(default_factory=RowNames)
-
-    @property
-    def where(self) -> str:
-        """The lines in words; empty where it is about no lines."""
-        return self.row_names.spans(self.lines) if self.lines else ""
+    where: str = ""
 
     def of_lines(self, lines: Iterable[int], detail: str = "", **values: Any) -> Finding:
         """The finding at these lines, with more numbers; ``detail`` is appended to its message."""
@@ -62,10 +57,14 @@ class Finding:
         message = self.what + detail.format(**values)
         return replace(self, what=message, lines=tuple(np.unique([*lines]).tolist()), values=values)
 
-    def held_to(self, gross: Iterable[int]) -> Finding:
-        """The finding with its level; rows at the lines ``gross`` are too far off for any fit."""
+    def held_to(self, gross: Iterable[int], names: RowNames) -> Finding:
+        """The finding with its level and its lines in words.
+
+        Rows at the lines ``gross`` are too far off for any fit; ``names`` are those of the rows.
+        """
         mild = self.kind in _WARN and set(gross).isdisjoint(self.lines)
-        return replace(self, level=WARNING if mild or self.kind == "largest_rows" else STOPS)
+        level = WARNING if mild or self.kind == "largest_rows" else STOPS
+        return replace(self, level=level, where=names.spans(self.lines) if self.lines else "")
 
     def commands(self, config: str = "FILE.yaml") -> list[str]:
         """Commands to go on with: exclude the rows, or accept the finding."""

@@ -263,9 +263,7 @@ def _searched(here: Meaning, robot: Robot, good: bool) -> list[Meaning]:
     tried = {_numbers(here.read): here}
     single = [(change,) for change in changes.joint_changes(robot)]
     for rivals in [single] if good else _rounds(here, robot, tried):
-        for applied in with_progress(
-            rivals, "ways to read the columns tried"
-        ):
+        for applied in with_progress(rivals, "ways to read the columns tried"):
             # A meaning that comes again keeps the fewest changes.
             if (numbers := _numbers(changed(here.read, applied))) not in tried:
                 tried[numbers] = Meaning.of(here.read, robot, applied)

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
@@ -51,8 +51,8 @@ class Rule:
     std: Mapping[str, float]
 
 
-def rules(content: Mapping[str, Any]) -> list[Rule]:
-    """Rules of a mapping of names to ``free``, ``fixed``, or values and priors by unit.
+def rules(content: Mapping[str, Any], of_frames: bool = False) -> list[Rule]:
+    """Rules about joints, or of frames, of names to ``free``, ``fixed``, or values by unit.
 
     Raises a validation error, at its name, for a rule that states nothing, the same twice, or a
     number that its parameter does not have.
@@ -60,7 +60,7 @@ def rules(content: Mapping[str, Any]) -> list[Rule]:
     results: dict[Any, Rule] = {}
     for name, state in content.items():
         text = " ".join(name.split())
-        match = _OF_JOINTS.fullmatch(text.lower()) or _OF_FRAMES.fullmatch(text)
+        match = _OF_FRAMES.fullmatch(text) if of_frames else _OF_JOINTS.fullmatch(text.lower())
         if match is None:
             raise refused(f"{name!r} is no parameter", _NAMES, name)
         about: dict[str, str | None] = {"joint": None, "frame": None} | match.groupdict()
@@ -89,41 +89,22 @@ def rules(content: Mapping[str, Any]) -> list[Rule]:
     return [*results.values()]
 
 
-def _about(of_frames: bool) -> AfterValidator:
-    """Validator of rules about frames, or about joints."""
+def _about_joints(content: dict[str, Any]) -> dict[str, Any]:
+    rules(content)
+    return content
 
-    def check(content: dict[str, Any]) -> dict[str, Any]:
-        for rule in rules(content):
-            if (rule.frame is not None) != of_frames:
-                raise refused(f"{rule.name!r} does not belong here", _NAMES, rule.name)
-        return content
 
-    return AfterValidator(check)
+def _about_frames(content: dict[str, Any]) -> dict[str, Any]:
+    rules(content, of_frames=True)
+    return content
 
 
 _Key = Annotated[str, Field(pattern="^(value|prior_std)_(mm|rad|mrad|deg)$")]
 # Beyond, squares overflow.
 _Known = dict[_Key, Annotated[float, Field(gt=-1e100, lt=1e100)]]
 _Rules = dict[Text, OrWord[_Known, Literal["free", "fixed"]]]
-JointRules = Annotated[_Rules, _about(of_frames=False)]
-FrameRules = Annotated[_Rules, _about(of_frames=True)]
-
-
-def strangers(
-    results: Sequence[Rule], joints: int, frames: Mapping[str, Sequence[str]] | None = None
-) -> Iterator[tuple[Rule, str, str]]:
-    """Rules about what an arm of ``joints`` has not: the rule, what is wrong, what there is.
-
-    ``frames``: the components of every estimated frame; None where that is not known yet.
-    """
-    for rule in results:
-        if rule.joint is not None and not 1 <= rule.joint <= joints:
-            yield rule, f"there is no joint {rule.joint}", f"joints 1 to {joints}"
-        if rule.frame is None or frames is None:
-            continue
-        if rule.frame not in frames or rule.parameter not in (None, *frames[rule.frame]):
-            there = ", ".join(frames.get(rule.frame, frames))
-            yield rule, f"{rule.parameter or rule.frame} is not estimated", there
+JointRules = Annotated[_Rules, AfterValidator(_about_joints)]
+FrameRules = Annotated[_Rules, AfterValidator(_about_frames)]
 
 
 def rule_for(

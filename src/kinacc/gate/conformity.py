@@ -36,7 +36,8 @@ def check_file(path: Path, artefact: Artefact) -> list[Problem]:
         schema = store.to_table(artefact.name, frame, provenance).schema
     except (InputError, UnicodeDecodeError, pa.ArrowException) as error:
         return [*getattr(error, "problems", [Problem(str(path), f"not readable: {error}")])]
-    if wrong := [e.name for e in schema if not e.equals(table.schema.field(e.name), True)]:
+    stored = {item.name: (item.type, item.metadata) for item in table.schema}
+    if wrong := [e.name for e in schema if stored[e.name] != (e.type, e.metadata)]:
         message = f"columns of another type, unit or meaning: {first_few(wrong)}"
         return [Problem(str(path), message)]
     problems: list[Problem] = []
