@@ -39,9 +39,7 @@ def make_plan(
     chosen = assessor_of(assessor, {"measurements": budget, **settings})
     used = instruments(texts, frame)
     limits = limits or Limits(np.deg2rad(0.02), 10.0)
-    about = {"robot": "mh180", "calibration": "none", "model": "nominal", "point": "tool",
-             "candidates": "drawn"}  # fmt: skip
-    return begin.plan_of(arm, found, chosen, used, limits, about, 3)
+    return begin.plan_of(arm, found, chosen, used, limits, None, "drawn", 3)
 
 
 def readings_of(plan, read, left_out=frozenset(), limit=None):

@@ -51,7 +51,7 @@ def planned(arm, limits):
     points = begin.points_of(arm, spread(arm.robot, 6), [str(number) for number in range(6)])
     assessor = ADAPTIVE["single_shot"](measurements=6)
     used = instruments(["tracker=0.05", "camera=0.01,0.02,0.05"], "instrument")
-    return begin.plan_of(arm, points, assessor, used, limits, {})
+    return begin.plan_of(arm, points, assessor, used, limits, None, "drawn")
 
 
 def shifted(x_mm, y_mm, z_mm, turn_rad):

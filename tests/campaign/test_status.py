@@ -66,7 +66,7 @@ def test_the_verdict_is_the_headline(tolerance_mm, verdict):
     assert headline.startswith(verdict.upper())
     assert f"{tolerance_mm:g} mm" in headline
     if verdict == "accept":
-        assert "the nominal model of none" in headline
+        assert "the nominal model of mh180" in headline
         assert f"upper bound {bound.upper_mm:.3f} mm, 95 % confidence" in headline
 
 

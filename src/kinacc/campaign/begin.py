@@ -116,7 +116,8 @@ def plan_of(
     assessor: AdaptiveAssessor,
     instruments: Sequence[Instrument],
     limits: Limits,
-    about: dict[str, str],
+    point: str | None,
+    source: str,
     seed: int = 0,
 ) -> Plan:
     """Return the plan of a campaign; the order of the candidates follows from ``seed`` alone.
@@ -135,8 +136,10 @@ def plan_of(
         The first is planned with.
     limits : Limits
         Plausible size (infinite: by the residual of the calibration), tolerance and wanted width.
-    about : dict
-        Robot, calibration, model, point and source of the candidates (:func:`about`).
+    point : str or None
+        Target that is measured, the tool for None.
+    source : str
+        Where the candidates come from.
     seed : int
         Seed of the random order.
 
@@ -162,6 +165,14 @@ def plan_of(
     first = _short_path(places[:count], here)
     here = places[first[-1]] if count else here
     route = route[np.concatenate([first, count + _short_path(places[count:], here)])]
+    about = {
+        "robot": arm.robot.name,
+        "calibration": arm.name,
+        "model": arm.choice,
+        "point": point or arm.default_point,
+        "candidates": source,
+        "kinacc_version": __version__,
+    }
     return Plan(
         about=about, assessor=assessor, instruments=used, to_base=to_base, limits=limits,
         arm=Arm(prismatic=arm.robot.dh.prismatic.tolist()), seed=seed, order=order, route=route,
@@ -217,18 +228,6 @@ def start(
     plan = plan.model_copy(update={"overruled": overruled})
     folders.start(folder, plan)
     return plan
-
-
-def about(arm: Calibration, point: str | None, source: str) -> dict[str, str]:
-    """What a campaign is about; ``source`` of its candidates."""
-    return {
-        "robot": arm.robot.name,
-        "calibration": arm.name,
-        "model": arm.choice,
-        "point": point or arm.default_point,
-        "candidates": source,
-        "kinacc_version": __version__,
-    }
 
 
 def _unexplained_mm(arm: Calibration) -> float:

@@ -171,9 +171,8 @@ class Campaign:
         labels = [str(number) for number in range(1, len(joints) + 1)]
         points = begin.points_of(arm, joints, labels, None, point)
         chosen = assessor_of(assessor, {"measurements": budget, **(settings or {})}, len(points))
-        about = begin.about(arm, point, "given as an array")
-        limits = Limits(tolerance_mm=tolerance_mm)
-        plan = begin.plan_of(arm, points, chosen, [instrument], limits, about, seed)
+        limits, source = Limits(tolerance_mm=tolerance_mm), "given as an array"
+        plan = begin.plan_of(arm, points, chosen, [instrument], limits, point, source, seed)
         begin.start(folder, arm, plan)
         return cls(folder)
 

@@ -88,8 +88,7 @@ def start(out: Output, **options: Any) -> None:
     apart_rad = np.deg2rad(options["joint_tolerance_deg"])
     limits = Limits(apart_rad, tolerance_mm=tolerance_mm, target=options["target"])
     assessor = assessor_of(options, options["budget"], len(points), freedom)
-    about = begin.about(arm, point, source)
-    plan = begin.plan_of(arm, points, assessor, used, limits, about, options["seed"])
+    plan = begin.plan_of(arm, points, assessor, used, limits, point, source, options["seed"])
     known = begin.noise_of(results)
     plan = begin.start(options["folder"], arm, plan, doubts, known, options["sure"])
     answer = {
