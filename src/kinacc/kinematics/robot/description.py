@@ -333,8 +333,7 @@ def _path(name_or_path: str | Path) -> Path:
 
 
 def _described(document: Document, path: Path) -> Robot:
-    title = f"The robot description {document.name} cannot be used"
-    refuse(document.problems, title)
+    refuse(document.problems)
     try:
         if "urdf" not in document.data:
             return Table.model_validate(document.data).robot()
@@ -352,9 +351,9 @@ def _described(document: Document, path: Path) -> Robot:
             tool=described.tool.pose(),
         )
     except ValidationError as error:
-        raise InputError(_problems(error, document), title) from None
+        raise InputError(_problems(error, document)) from None
     except ValueError as error:
-        raise InputError(Problem(document.name, str(error)), title) from None
+        raise input_error(document.name, str(error)) from None
 
 
 def _problems(error: ValidationError, document: Document) -> list[Problem]:

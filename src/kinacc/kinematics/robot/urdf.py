@@ -11,7 +11,7 @@ import numpy as np
 from lxml import etree
 from scipy.spatial.transform import Rotation
 
-from kinacc.errors import InputError, Problem, input_error
+from kinacc.errors import input_error
 from kinacc.geometry import IDENTITY, Pose, compose
 from kinacc.kinematics.robot.axes import Axes, chain_of
 from kinacc.kinematics.robot.record import FEWEST_JOINTS, MOST_JOINTS, Robot
@@ -91,12 +91,12 @@ def load(path: str | Path, base_link: str | None = None, tip_link: str | None = 
         low, high = joint.limits
         if joint.mimics:
             fault = f"follows joint {joint.mimics} (mimic)"
-            raise _refusal(path, where, fault, "independent joints")
+            raise input_error(where, fault, "independent joints")
         if size < 1e-9:
-            raise _refusal(path, where, "its axis has no direction", 'e.g. <axis xyz="0 0 1"/>')
+            raise input_error(where, "its axis has no direction", 'e.g. <axis xyz="0 0 1"/>')
         if not low < high:
             fault = f"limits {low:g} to {high:g}"
-            raise _refusal(path, where, fault, '<limit lower=".." upper=".."/>')
+            raise input_error(where, fault, '<limit lower=".." upper=".."/>')
         points.append(here.position_mm)
         directions.append(here.rotation @ (joint.axis / size))
         limits.append(np.multiply(joint.limits, _MM_PER_M if joint.kind == "prismatic" else 1.0))
@@ -141,10 +141,6 @@ def joints_between(
     return _chain(Path(path), base_link, tip_link)[1]
 
 
-def _refusal(path: Path, where: str, fault: str, allowed: str = "", fix: str = "") -> InputError:
-    return InputError(Problem(where, fault, allowed, fix), f"{path} cannot be used as a robot")
-
-
 def _chain(path: Path, base: str | None, tip: str | None) -> tuple[str, list[Joint]]:
     """Name of the robot, and the joints between two links: those stated, or the only choice."""
     place, root = str(path), _root(path)
@@ -153,12 +149,12 @@ def _chain(path: Path, base: str | None, tip: str | None) -> tuple[str, list[Joi
     for kind, key in (("joint", "name"), ("child link", "child")):
         for name, count in Counter(getattr(joint, key) for joint in joints).items():
             if count > 1:
-                raise _refusal(path, place, f"{kind} {name} is given more than once")
+                raise input_error(place, f"{kind} {name} is given more than once")
     above = {joint.child: joint for joint in joints}
     roots = [link for link in links if link not in above]
     if base is None and len(roots) != 1:
         fault = f"has {len(roots)} links without a parent"
-        raise _refusal(path, place, fault, "one root, or base_link", ", ".join(roots or links))
+        raise input_error(place, fault, "one root, or base_link", ", ".join(roots or links))
     base = base or roots[0]
     parents = {joint.parent for joint in joints}
     leaves = [link for link in links if link not in parents]
@@ -179,7 +175,7 @@ def _chain(path: Path, base: str | None, tip: str | None) -> tuple[str, list[Joi
     fault = f"the chain from {base} can end at {len(chains)} links: {ends}"
     allowed = f"one with {FEWEST_JOINTS} to {MOST_JOINTS} moving joints before it"
     fix = f"write a robot YAML with urdf: {path.name}, base_link and tip_link"
-    raise _refusal(path, place, fault, allowed, fix)
+    raise input_error(place, fault, allowed, fix)
 
 
 def _root(path: Path) -> etree._Element:
@@ -192,26 +188,26 @@ def _root(path: Path) -> etree._Element:
         raise input_error(place, (error.strerror or "").lower(), "a URDF file") from None
     if len(text) > _MOST_BYTES:
         allowed = f"at most {_MOST_BYTES // 1_000_000} MB"
-        raise _refusal(path, place, "is too large for a robot", allowed)
+        raise input_error(place, "is too large for a robot", allowed)
     parser = etree.XMLParser(
         remove_comments=True, remove_pis=True, resolve_entities=False, no_network=True
     )
     try:
         root = etree.fromstring(text, parser)
     except etree.XMLSyntaxError as error:
-        raise _refusal(path, f"{place}:{error.lineno or 1}", f"is not XML: {error.msg}") from None
+        raise input_error(f"{place}:{error.lineno or 1}", f"is not XML: {error.msg}") from None
     definitions: Any = root.getroottree().docinfo.internalDTD
     if definitions is not None and any(True for _ in definitions.iterentities()):
-        raise _refusal(path, place, "defines entities", "plain URDF")
+        raise input_error(place, "defines entities", "plain URDF")
     if root.tag != "robot" or not root.get("name"):
-        raise _refusal(path, place, "is no <robot name=..>", "a URDF file")
+        raise input_error(place, "is no <robot name=..>", "a URDF file")
     if any("xacro" in str(element.tag) for element in root.iter("{*}*")):
         fault = "holds xacro macros"
-        raise _refusal(path, place, fault, "plain URDF", "expand it with xacro first")
+        raise input_error(place, fault, "plain URDF", "expand it with xacro first")
     count = len(root.findall("joint"))
     if count > _MOST_JOINTS:
         allowed = f"at most {_MOST_JOINTS}, fixed included"
-        raise _refusal(path, place, f"has {count} joints", allowed)
+        raise input_error(place, f"has {count} joints", allowed)
     return root
 
 
@@ -219,7 +215,7 @@ def _joint(element: etree._Element, path: Path, links: list[str]) -> Joint:
     name, kind = str(element.get("name")), str(element.get("type"))
     where = f"{path}:{element.sourceline}, joint {name}"
     if kind not in (*MOVING, "fixed"):
-        raise _refusal(path, where, f"its type is {kind!r}", ", ".join((*MOVING, "fixed")))
+        raise input_error(where, f"its type is {kind!r}", ", ".join((*MOVING, "fixed")))
 
     def text(tag: str, key: str, default: str) -> str:
         child = element.find(tag)
@@ -232,14 +228,14 @@ def _joint(element: etree._Element, path: Path, links: list[str]) -> Joint:
         except ValueError:
             values = np.array([])
         if len(values) != count or not (np.abs(values) <= most).all():
-            allowed = f"{count} finite number{'s' if count > 1 else ''} of at most {most:g}"
-            raise _refusal(path, where, f"{tag} {key}={value[:60]!r}", allowed)
+            allowed = f"finite numbers ({count}) of at most {most:g}"
+            raise input_error(where, f"{tag} {key}={value[:60]!r}", allowed)
         return values
 
     parent, child = (text(tag, "link", "None") for tag in ("parent", "child"))
     for link in (parent, child):
         if link not in links:
-            raise _refusal(path, where, f"there is no link {link!r}")
+            raise input_error(where, f"there is no link {link!r}")
     turn = Rotation.from_euler("xyz", numbers("origin", "rpy", "0 0 0")).as_matrix()
     origin = Pose(turn, _MM_PER_M * numbers("origin", "xyz", "0 0 0"))
     low, high = (float(numbers("limit", key, "0", _NO_LIMIT)[0]) for key in ("lower", "upper"))
