@@ -151,10 +151,8 @@ class DHEstimator(Estimator):
         settings, free, std, held = {}, self.free, self.std, False
         followed = others["vec"] if self.follows_vec else None
         if followed:
-            bases = [IDENTITY] * followed.frames.sessions
-            frames = replace(
-                followed.frames, poses=stacked([*bases, *map(Pose, *followed.frames.targets)])
-            )
+            bases, targets = [IDENTITY] * followed.frames.sessions, followed.frames.targets
+            frames = replace(followed.frames, poses=stacked([*bases, *map(Pose, *targets)]))
             at = frames.seen(followed.model, observations)
             observations = replace(observations, position_mm=at.position_mm, rotation=at.rotation)
             settings = {"frames": FrameParameters.none(frames)}

@@ -149,8 +149,8 @@ def frame_terms(
         Names every rule about a frame that ``observations`` do not let estimate.
     """
     frame, axis = places(observations)
-    sessions = [f"{BASE}{i or ''}" for i in (0, *range(2, stated.sessions + 1))]
-    owners = [*sessions, *observations.target_names]
+    further = (f"{BASE}{number}" for number in range(2, stated.sessions + 1))
+    owners = [BASE, *further, *observations.target_names]
     about = [(MOTIONS[j], None, owners[i]) for i, j in zip(frame, axis, strict=True)]
     frames = {owner: [item[0] for item in about if item[2] == owner] for owner in owners}
     refuse(
