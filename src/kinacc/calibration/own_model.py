@@ -24,8 +24,8 @@ def register_error_model(model: type[ErrorModel]) -> type[ErrorModel]:
     """Fit models of a class of one's own beside DH and VEC, in this process.
 
     Fits, folds, residuals and the selection of a model go by it from then on: table
-    ``<kind>_model`` (parameter, value, std, unit), ``<kind>_covariance``, comparison
-    ``<kind>_vs_measured``.
+    ``<kind>_model`` (parameter, value, std, unit), ``<kind>_covariance``, ``<kind>_fit``,
+    comparison ``<kind>_vs_measured``.
 
     Parameters
     ----------
