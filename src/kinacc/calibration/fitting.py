@@ -20,8 +20,8 @@ from kinacc.calibration.frames import (
 )
 from kinacc.calibration.least_squares import (
     SQUARES,
+    Descent,
     Solution,
-    Task,
     Weights,
     minimise_robust,
     one_thread,
@@ -354,7 +354,7 @@ def fit(
         frame_std = np.where(np.isfinite(frame_std), frame_std, loose)
         if few and observations.components < SURPLUS * system.size:
             least_variance = LEAST_NOISE_MM**2
-    task = Task(
+    descent = Descent(
         name,
         system,
         np.concatenate([parameters.begin, nominal.start[mask]]),
@@ -364,7 +364,7 @@ def fit(
         None if held else threshold,
         least_variance,
     )
-    solution, weights = minimise_robust(task, loss)
+    solution, weights = minimise_robust(descent, loss)
     vector = nominal.start.copy()
     vector[mask] = solution.x[place:]
     model, placed_at = nominal.with_parameters(vector), parameters.frames(solution.x[:place])

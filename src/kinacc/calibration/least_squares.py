@@ -252,14 +252,47 @@ class Solution:
     scale: np.ndarray
 
 
-@dataclass(frozen=True)
-class Task:
-    """A fit of P parameters: components of ``system.frames`` first, then those of its model.
+def minimise_robust(fit: Descent, loss: str) -> tuple[Solution, Weights | None]:
+    """A ``fit`` under a ``loss`` and, where that is not squares, the rows' weights.
 
-    Priors of standard deviation ``prior_std`` (P,), inf for none, expect ``nominal`` (P,), where
-    directions that are left out stay. ``scale`` (P,): displacements that count as one mm. Singular
-    values below ``threshold`` of the largest are left out; None: priors hold everything.
-    ``least_variance`` of residuals beside priors: at least above rounding.
+    A robust loss is minimised by reweighted squares (see ``row_weights``); ``variance`` is then
+    that of its scale. Raises FitError where the passes do not settle.
+    """
+    solution = fit.run()
+    if loss == SQUARES:
+        return solution, None
+    weights, observations = None, fit.system.observations
+    for number in range(MAX_PASSES):
+        before = solution.x
+        scale = weights.scale_mm if weights and number >= SCALE_PASSES else None
+        weights = row_weights(loss, fit.system.residual(before), observations, scale)
+        system = replace(fit.system, root=np.sqrt(weights.row))
+        solution = replace(fit, system=system, start=before).run()
+        moved = float(np.max(np.abs(solution.x - before) / fit.scale, initial=0.0))
+        if moved <= SETTLED:
+            factor = weights.scale_mm**2 / solution.variance if solution.variance > 0.0 else 1.0
+            scaled = replace(
+                solution,
+                variance=factor * solution.variance,
+                covariance=factor * solution.covariance,
+                std=np.sqrt(factor) * solution.std,
+            )
+            return scaled, weights
+    raise FitError(
+        f"{fit.name}: loss {loss} has not settled after {MAX_PASSES} passes; the last one moved "
+        f"a parameter by {moved:.3g} mm or mrad (wanted {SETTLED:g})"
+    )
+
+
+@dataclass
+class Descent:
+    """A fit of P parameters by Gauss-Newton steps in its scaled active ones.
+
+    Components of ``system.frames`` come first, then those of its model. Priors of standard
+    deviation ``prior_std`` (P,), inf for none, expect ``nominal`` (P,), where directions that are
+    left out stay. ``scale`` (P,): displacements that count as one mm. Singular values below
+    ``threshold`` of the largest are left out; None: priors hold everything. ``least_variance`` of
+    residuals beside priors: at least above rounding.
     """
 
     name: str
@@ -271,53 +304,16 @@ class Task:
     threshold: float | None
     least_variance: float = 1e-8
 
-
-def minimise_robust(task: Task, loss: str) -> tuple[Solution, Weights | None]:
-    """The fit of ``task`` under a ``loss`` and, where that is not squares, the rows' weights.
-
-    A robust loss is minimised by reweighted squares (see ``row_weights``); ``variance`` is then
-    that of its scale. Raises FitError where the passes do not settle.
-    """
-    solution = _Descent(task).run()
-    if loss == SQUARES:
-        return solution, None
-    weights, observations = None, task.system.observations
-    for number in range(MAX_PASSES):
-        before = solution.x
-        scale = weights.scale_mm if weights and number >= SCALE_PASSES else None
-        weights = row_weights(loss, task.system.residual(before), observations, scale)
-        system = replace(task.system, root=np.sqrt(weights.row))
-        solution = _Descent(replace(task, system=system, start=before)).run()
-        moved = float(np.max(np.abs(solution.x - before) / task.scale, initial=0.0))
-        if moved <= SETTLED:
-            factor = weights.scale_mm**2 / solution.variance if solution.variance > 0.0 else 1.0
-            scaled = replace(
-                solution,
-                variance=factor * solution.variance,
-                covariance=factor * solution.covariance,
-                std=np.sqrt(factor) * solution.std,
-            )
-            return scaled, weights
-    raise FitError(
-        f"{task.name}: loss {loss} has not settled after {MAX_PASSES} passes; the last one moved "
-        f"a parameter by {moved:.3g} mm or mrad (wanted {SETTLED:g})"
-    )
-
-
-class _Descent:
-    """Gauss-Newton steps in the scaled active parameters of a task."""
-
-    def __init__(self, task: Task) -> None:
-        self.task, self.x = task, np.array(task.start, dtype=float)
-        self.truncated = task.threshold is not None
-        free = task.system.frames.free
-        self.active = np.append(free, np.ones(task.system.free.sum(), dtype=bool))
-        self.frames, self.scale = int(free.sum()), task.scale[self.active]
+    def __post_init__(self) -> None:
+        self.x = np.array(self.start, dtype=float)
+        self.truncated = self.threshold is not None
+        free = self.system.frames.free
+        self.active = np.append(free, np.ones(self.system.free.sum(), dtype=bool))
+        self.frames, self.unit = int(free.sum()), self.scale[self.active]
         with np.errstate(divide="ignore"):
-            self.weight = self.scale / task.prior_std[self.active]  # for unit variance
-        self.count = float(
-            task.system.observations.components if self.truncated else task.system.weight
-        )
+            self.weight = self.unit / self.prior_std[self.active]  # for unit variance
+        system = self.system
+        self.count = float(system.observations.components if self.truncated else system.weight)
         self.variance = 0.0
         self.ranks: tuple[int, int] | None = None
         self.past: list[tuple[np.ndarray, np.ndarray]] = []
@@ -325,10 +321,10 @@ class _Descent:
 
     def look(self, x: np.ndarray) -> float:
         """Normal equations at ``x`` and the objective there."""
-        keep, unit = np.append(self.active, True), np.append(self.scale, 1.0)
-        self.gram = self.task.system.normal(x)[keep][:, keep] * np.outer(unit, unit)
+        keep, unit = np.append(self.active, True), np.append(self.unit, 1.0)
+        self.gram = self.system.normal(x)[keep][:, keep] * np.outer(unit, unit)
         self.cost = float(self.gram[-1, -1])
-        self.displacement = (x - self.task.nominal)[self.active] / self.scale
+        self.displacement = (x - self.nominal)[self.active] / self.unit
         return self.objective
 
     @property
@@ -339,12 +335,12 @@ class _Descent:
     def split(self, reported: bool = False) -> Split:
         """What the latest normal equations determine under the latest variance."""
         weight = np.sqrt(self.variance) * self.weight
-        if self.task.threshold is None:
-            return Split.held(self.gram, weight, self.task.name)
-        least = max(self.task.threshold if reported else 0.0, FRAME_THRESHOLD)
+        if self.threshold is None:
+            return Split.held(self.gram, weight, self.name)
+        least = max(self.threshold if reported else 0.0, FRAME_THRESHOLD)
         expected = weight if self.variance > 0.0 else self.weight * 0.0
         most = None if reported else self.ranks
-        thresholds = least, self.task.threshold
+        thresholds = least, self.threshold
         return Split.of(self.gram, self.frames, expected, thresholds, most, reported)
 
     def balanced(self, first: bool) -> tuple[Split, np.ndarray]:
@@ -353,7 +349,7 @@ class _Descent:
         From below: started at the variance of the whole misfit, a tight prior could pass for truth
         and everything it forbids for noise.
         """
-        expected, least = self.weight.any(), self.task.least_variance
+        expected, least = self.weight.any(), self.least_variance
         if first and expected:
             self.variance = max(FIRST_VARIANCE * self.cost / self.count, least)
         for _ in range(VARIANCE_STEPS if first else 1):
@@ -378,11 +374,11 @@ class _Descent:
             split, step = self.balanced(iteration == 1)
             size = float(np.max(np.abs(step), initial=0.0))
             if not np.isfinite(size):
-                raise FitError(f"{self.task.name}: a step is not finite at cost {self.cost:.6g}")
+                raise FitError(f"{self.name}: a step is not finite at cost {self.cost:.6g}")
             if iteration > 2:
                 self.ranks = split.ranks  # a rank that has been lost is not taken back
             if size <= STEP_TOLERANCE and abs(self.variance - settled) <= 1e-9 * settled:
-                self.x[self.active] += self.scale * step
+                self.x[self.active] += self.unit * step
                 to = np.append(step, 1.0)
                 self.cost = float(to @ self.gram @ to)
                 return self.solution(iteration, size, True)
@@ -390,7 +386,7 @@ class _Descent:
             moves = [] if self.truncated else [self.accelerated(step)]
             for move in (*moves, *(step / 2**halving for halving in range(MAX_HALVINGS))):
                 self.x = here.copy()
-                self.x[self.active] += self.scale * move
+                self.x[self.active] += self.unit * move
                 after = self.look(self.x)
                 if after <= before * (1.0 + growth) + LEAST_COST:
                     break
@@ -402,7 +398,7 @@ class _Descent:
             if iteration >= patience and abs(before - after) <= least:
                 return self.solution(iteration, size, not self.truncated)
         raise FitError(
-            f"{self.task.name}: not converged after {iteration} iterations; last step {size:.3g} "
+            f"{self.name}: not converged after {iteration} iterations; last step {size:.3g} "
             f"mm or mrad (wanted {STEP_TOLERANCE:g}), cost {self.cost:.6g} over {self.count} "
             "residuals"
         )
@@ -423,16 +419,16 @@ class _Descent:
     def solution(self, iterations: int, size: float, converged: bool) -> Solution:
         """What the latest normal equations say of the parameters."""
         fitted, reported = self.split(), self.split(reported=True)
-        system, frames, active = self.task.system, self.task.system.frames, self.active
+        system, frames, active = self.system, self.system.frames, self.active
         freedom, spectrum = self.count - fitted.effective, None
         variance = self.cost / freedom if freedom > 0 else np.nan
         variance = variance if self.truncated else self.variance
         along = variance * np.eye(reported.root.shape[1])
-        if self.task.threshold is not None and fitted.ranks is not None:
+        if self.threshold is not None and fitted.ranks is not None:
             parts = zip(*system.blocks(self.x), strict=True)
             residual, jacobian = (np.concatenate(part) for part in parts)
-            jacobian = jacobian[:, active] * self.scale
-            values, threshold = _singular_values(jacobian, self.frames), self.task.threshold
+            jacobian = jacobian[:, active] * self.unit
+            values, threshold = _singular_values(jacobian, self.frames), self.threshold
             spectrum = Spectrum(values, threshold, _rank(values, threshold, fitted.ranks[1]))
             if freedom > 0:
                 along = covariance_along(
@@ -440,7 +436,7 @@ class _Descent:
                     fitted.root, reported.root, variance,
                 )  # fmt: skip
         covariance = np.zeros((active.size, active.size))
-        root = self.scale[:, None] * reported.root
+        root = self.unit[:, None] * reported.root
         covariance[np.ix_(active, active)] = root @ along @ root.T
         hidden = np.zeros((len(frames.hidden), active.size))
         hidden[:, : frames.size] = frames.hidden
@@ -452,5 +448,5 @@ class _Descent:
         std[(touched > TOUCH_SQUARED) | ~active] = np.nan
         return Solution(
             self.x, std, covariance, self.cost, self.count, freedom, variance, iterations, size,
-            converged, spectrum, np.concatenate([lost, hidden]), self.task.scale,
+            converged, spectrum, np.concatenate([lost, hidden]), self.scale,
         )  # fmt: skip
