@@ -228,7 +228,7 @@ def _joint(element: etree._Element, path: Path, links: list[str]) -> Joint:
         except ValueError:
             values = np.array([])
         if len(values) != count or not (np.abs(values) <= most).all():
-            allowed = f"finite numbers ({count}) of at most {most:g}"
+            allowed = f"{count} finite, at most {most:g}"
             raise input_error(where, f"{tag} {key}={value[:60]!r}", allowed)
         return values
 
