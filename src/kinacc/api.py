@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -14,10 +14,12 @@ import pandas as pd
 from kinacc import __version__
 from kinacc.calibration import stages
 from kinacc.calibration.misfit import misfit
+from kinacc.calibration.summary import reported_joints
 from kinacc.checks import check, contradictions
 from kinacc.checks.described import describe_files
 from kinacc.config import schema
 from kinacc.config.error_models import PLAINEST, asked_for
+from kinacc.config.records import Settings
 from kinacc.config.schema import defaults
 from kinacc.config.values import overlay
 from kinacc.deployment import compare as comparing
@@ -69,7 +71,7 @@ class Measurements:
     name: str
     robot: Robot
     table: pd.DataFrame
-    settings: Mapping[str, Any]
+    settings: Settings
 
     def __len__(self) -> int:
         return len(self.table)
@@ -108,7 +110,7 @@ class Calibration:
 
     name: str
     model: CalibratedModel
-    tables: Mapping[str, Columns]
+    tables: Tables
     config_hash: str = ""
 
     def __repr__(self) -> str:
@@ -305,9 +307,7 @@ class Calibration:
         """The DH model, whatever model was selected."""
         return Source(results.calibration(self.tables, PLAINEST), self.tables)
 
-    def values_for(
-        self, controller: str, settings: Mapping[str, Any] | None = None
-    ) -> pendants.Pendant:
+    def values_for(self, controller: str, settings: Settings | None = None) -> pendants.Pendant:
         """Numbers to enter into a controller: kuka, abb, fanuc, ur, yaskawa, staubli, ros.
 
         Parameters
@@ -334,7 +334,7 @@ def read_measurements(
     *paths: str | Path,
     robot: str | Path | None = None,
     dataset: str | None = None,
-    settings: Mapping[str, Any] | None = None,
+    settings: Settings | None = None,
     **answers: Any,
 ) -> Measurements:
     """Read measured files, or the measurements that a data set describes.
@@ -516,21 +516,18 @@ def compare(
     """
     require_type("first", first, Calibration)
     require_type("second", second, Calibration)
+    measured = [fit.tables["measurements"] for fit in (first, second)]
     if q_rad is None:
-        names = [f"q{joint + 1}" for joint in range(first.robot.dh.joints)]
         q_rad = np.concatenate(
-            [fit.table("measurements")[names].to_numpy(dtype=float) for fit in (first, second)]
+            [reported_joints(table, first.robot.dh.joints) for table in measured]
         )
     q_rad = first.robot.finite_joints(q_rad, "q_rad")
-    measured = first.tables["measurements"], second.tables["measurements"]
     readings = shared_readings.shared(*measured)
     weight = schema.key("calibration.rotation_weight_mm_per_rad")["default"]
     return comparing.compare(first.model, second.model, q_rad, weight, readings)
 
 
-def _of_tables(
-    name: str, tables: dict[str, Columns], kind: str | None, made_by: str
-) -> Calibration:
+def _of_tables(name: str, tables: Tables, kind: str | None, made_by: str) -> Calibration:
     model = results.calibration(tables, kind, name)
     model = replace(model, misfit=misfit(tables, model.robot, model.choice))
     return Calibration(name, model, tables, made_by)

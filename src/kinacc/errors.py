@@ -94,8 +94,6 @@ class MachineError(InputError):
 _REMEDIES = {
     errno.ENOSPC: "make room, then give the same command again",
     errno.EDQUOT: "make room, then give the same command again",
-    errno.EMFILE: "`ulimit -n` says how many files a process may open",
-    errno.ENFILE: "other programs of this machine hold too many files open",
     errno.ENAMETOOLONG: "give a shorter name",
 }
 
@@ -110,8 +108,6 @@ def refused(error: OSError, where: object = None, what: str = "") -> MachineErro
     if error.errno and (known := os.strerror(error.errno)).lower() in reason.lower():
         reason = known  # a library may say more, in words for programmers
     reason = reason[:1].lower() + reason[1:]
-    if isinstance(where, bytes):
-        where = os.fsdecode(where)
     message = ": ".join(filter(None, [what, reason]))
     place = "this machine" if where is None else str(where)
     return MachineError(Problem(place, message, fix=_REMEDIES.get(error.errno or 0, "")))

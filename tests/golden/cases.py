@@ -113,7 +113,7 @@ def findings(folder: Path, name: str) -> list[dict]:
     told = answer("check-data", folder / f"{name}.yaml", code=None)
     kept = ("kind", "level", "lines")
     found = []
-    for each in told["datasets"][0].get("suspicions", []):
+    for each in told.get("datasets", [{}])[0].get("suspicions", []):
         numbers = {key: value for key, value in each.items() if _is_number(value)}
         found.append({**{key: each[key] for key in kept}, **numbers})
     return found

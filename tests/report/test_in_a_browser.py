@@ -122,7 +122,7 @@ def test_names_that_look_like_code_are_shown_and_never_run(chromium, folder, tmp
     targets = np.resize(np.array(HOSTILE, dtype=object), len(tables["measurements"]["target"]))
     tables["measurements"] = {**tables["measurements"], "target": targets}
     name = " ".join(HOSTILE)
-    made = dataset.run(tables, {"dataset": name, "folder": name})
+    made = dataset.run(tables, name)
     page_file = tmp_path / "hostile.html"
     page_file.write_text(html(made, {"seed": name}), encoding="utf-8")
     with chromium.opened(page_file) as page:

@@ -90,7 +90,7 @@ def test_reasons_and_names_of_strangers_are_text():
     (struck,), (left_out,) = values["struck"], values["left_out"]
     assert (struck["reading"], struck["struck"]) == (2, reason)
     assert (left_out["point"], left_out["reason"]) == (names[unread], "behind a <b>")
-    text = page.html(shown)
+    text = page.html(shown, {})
     assert "<script>alert" not in text
     assert "&lt;script&gt;alert" in text
     assert '<b>"' not in text

@@ -5,5 +5,5 @@ from kinacc.report.page import html
 from kinacc.workflow.script import stage
 
 with stage(snakemake) as job:
-    page = dataset.run(job.inputs, {"dataset": job.dataset, "folder": str(job.folder)})
+    page = dataset.run(job.inputs, str(job.folder))
     job.write_files({"html": html(page, job.marks()).encode()})

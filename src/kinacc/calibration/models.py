@@ -16,7 +16,7 @@ from kinacc.config.parameter_rules import Rule
 from kinacc.config.records import Settings
 from kinacc.kinematics.model import ErrorModel
 from kinacc.kinematics.robot import Robot, carried
-from kinacc.tables.columns import Columns, Tables
+from kinacc.tables.columns import Tables
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ class Estimator:
         """Keys of its section that cannot be for ``arm``, what is wrong, and what is allowed."""
         yield from ()
 
-    def choices(self, every: Observations) -> dict[str, Columns]:
+    def choices(self, every: Observations) -> Tables:
         """Tables that say how settings left open were chosen. Raises FitError."""
         return {}
 

@@ -39,7 +39,7 @@ def fit_model(
     inputs: Tables,
     settings: Settings,
     kind: str,
-) -> dict[str, Columns]:
+) -> Tables:
     """Fit the model of one kind to the training rows.
 
     The plainest kind, which is fitted last, gathers the ``frames`` of all models.
@@ -95,7 +95,7 @@ def fit_model(
 def compare_models(
     inputs: Tables,
     settings: Settings,
-) -> dict[str, Columns]:
+) -> Tables:
     """Errors of every comparison, in sample and held out, and the model selected by them.
 
     Train rows are of the delivered models at the rows they were fitted to. Validation rows are of
@@ -159,7 +159,7 @@ def compare_models(
     }
 
 
-def excluded_rows(inputs: Tables, settings: Settings) -> dict[str, Columns]:
+def excluded_rows(inputs: Tables, settings: Settings) -> Tables:
     """Errors of the delivered models at the rows left out, which no fit has used.
 
     Parameters

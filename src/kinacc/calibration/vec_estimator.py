@@ -20,7 +20,7 @@ from kinacc.kinematics import vec
 from kinacc.kinematics.robot import Robot
 from kinacc.kinematics.vec import VECModel
 from kinacc.progress import with_progress
-from kinacc.tables.columns import Columns, Tables
+from kinacc.tables.columns import Tables
 from kinacc.tables.contract import ARTEFACTS
 
 _AUTO = "auto"
@@ -82,7 +82,7 @@ class VECEstimator(Estimator):
         """Whether order or prior are left to the vec_fit."""
         return len(self.orders) > 1 or not self.prior_stated
 
-    def choices(self, every: Observations) -> dict[str, Columns]:
+    def choices(self, every: Observations) -> Tables:
         """``vec_orders``: orders and priors tried with each fold unseen and with all seen."""
         parts: list[pd.DataFrame] = []
         folds = [None, *(int(fold) for fold in np.unique(every.fold) if fold >= 0)]

@@ -175,16 +175,12 @@ class Opened:
         append(self.folder / JOURNAL, self.journal, content)
 
 
-def in_the_way(folder: Path | str) -> list[Problem]:
-    """Return a problem for each file of a campaign that a folder holds already."""
-    paths = [Path(folder) / name for name in (PLAN, JOURNAL)]
-    message = "a campaign is there already"
-    return [Problem(str(path), message, "a new folder") for path in paths if path.exists()]
-
-
 def start(folder: Path | str, begun: Plan) -> None:
     """Put a new campaign on disk. Raises InputError where the folder holds one already."""
-    refuse(in_the_way(folder), "The campaign was not begun")
+    message = "a campaign is there already"
+    paths = [Path(folder) / name for name in (PLAN, JOURNAL)]
+    problems = [Problem(str(path), message, "a new folder") for path in paths if path.exists()]
+    refuse(problems, "The campaign was not begun")
     write_whole(Path(folder) / PLAN, plans.to_json(begun), on_disk=True)
 
 

@@ -10,13 +10,13 @@ from kinacc.assess.adaptive import Campaign
 from kinacc.campaign.folder import Opened
 from kinacc.campaign.state import State, covariance_mm2, sayable
 from kinacc.campaign.status import reason
-from kinacc.tables.columns import Columns
+from kinacc.tables.columns import Columns, Tables
 from kinacc.tables.contract import columns_of
 
 _MOMENTS = 150  # of a campaign at which bounds are stated, at most
 
 
-def tables(opened: Opened) -> dict[str, Columns]:
+def tables(opened: Opened) -> Tables:
     """Return the tables of a campaign.
 
     Parameters

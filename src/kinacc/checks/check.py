@@ -35,7 +35,7 @@ from kinacc.measurements.faults import LIMIT_SLACK
 from kinacc.measurements.layout import Layout
 from kinacc.measurements.reader import MeasuredFile, read
 from kinacc.tables.allowed import LEFT_OUT
-from kinacc.tables.columns import Columns, Tables
+from kinacc.tables.columns import Tables
 from kinacc.tables.contract import columns_of
 
 _FEWEST_POSES = 6
@@ -44,7 +44,7 @@ _OTHER_LENGTHS = 0.01  # of the arm's: real arms are off their description by a 
 _GROSS = 20.0  # robust spreads per axis: further off is no reading of this arm
 
 
-def run(inputs: Tables, settings: Settings) -> dict[str, Columns]:
+def run(inputs: Tables, settings: Settings) -> Tables:
     """``data_check``: every finding with its level and, where it was accepted, the reason.
 
     Raises InputError where findings stop the workflow, one problem each.

@@ -20,7 +20,7 @@ TEXTS: dict[str, list[str]] = yaml.safe_load(
 _OF_ROWS = {"target_swapped", "duplicate_rows", "repeated_reading", "outliers", OUTSIDE_LIMITS}
 # These stop a workflow where a reading is far off; all else does, but for the largest rows.
 _WARN = {*_OF_ROWS, "commanded_joints"} - {OUTSIDE_LIMITS}
-VERDICTS = ("clean", "suspicions", "unusable")  # by exit code
+VERDICTS = ("clean", "suspicions")  # by exit code
 
 
 @dataclass(frozen=True)

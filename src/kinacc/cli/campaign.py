@@ -16,7 +16,7 @@ from kinacc.campaign.campaign import Campaign, FileOfReadings
 from kinacc.campaign.state import Reading, point_at
 from kinacc.campaign.status import CampaignStatus
 from kinacc.cli import campaign_plan, campaign_start
-from kinacc.cli.choice import Options, option, positive
+from kinacc.cli.choice import FOLDER, PATH, Options, option, positive
 from kinacc.cli.group import InOrder
 from kinacc.cli.output import Output, answers, require_writable
 from kinacc.cli.process import AGAINST
@@ -55,7 +55,7 @@ def campaign() -> None:
 
 
 @campaign.command("next")
-@click.argument("folder", type=click.Path())
+@FOLDER
 @option("--all", "every", is_flag=True, help="All poses that are measured whatever is read.")
 @answers(table=True)
 def next_(folder: str, every: bool, out: Output) -> None:
@@ -78,7 +78,7 @@ def next_(folder: str, every: bool, out: Output) -> None:
 
 
 @campaign.command("leave-out")
-@click.argument("folder", type=click.Path())
+@FOLDER
 @click.argument("point")
 @option("--reason", required=True, help="Reason why it cannot be measured.")
 @answers()
@@ -95,7 +95,7 @@ def leave_out(folder: str, point: str, reason: str, out: Output) -> None:
 
 
 @campaign.command("strike")
-@click.argument("folder", type=click.Path())
+@FOLDER
 @click.argument("number", type=click.IntRange(1))
 @option("--reason", required=True, help="What went wrong with it.")
 @answers()
@@ -114,7 +114,7 @@ def strike(folder: str, number: int, reason: str, out: Output) -> None:
 
 
 @campaign.command("status")
-@click.argument("folder", type=click.Path())
+@FOLDER
 @option("--tolerance-mm", type=positive, help="Largest error allowed. [as started]")
 @answers(verbose=True)
 def status(folder: str, tolerance_mm: float | None, out: Output) -> None:
@@ -128,7 +128,7 @@ def status(folder: str, tolerance_mm: float | None, out: Output) -> None:
 
 
 @campaign.command("report")
-@click.argument("folder", type=click.Path())
+@FOLDER
 @option("--out", "-o", "to", type=click.Path(file_okay=False),
         help="Folder. [report in the campaign's]")  # fmt: skip
 @answers(page="Page for a browser: an .html file.", force=True)
@@ -158,7 +158,7 @@ def report(folder: str, to: str | None, out: Output) -> None:
     require_writable([into / name for name in contents], out.force or to is None)
     write_together({into / name: content for name, content in contents.items()})
     if out.page is not None:
-        out.write_page(campaign_page(opened, part))
+        out.write_page(campaign_page(opened, part), metadata)
     result = campaign.status()
     lines = [_lines(result)[0], f"{into}: {', '.join(contents)}", out.page or ""]
     answer = {**vars(result), "report": str(into), "files": [*contents], "page": out.page}
@@ -166,7 +166,7 @@ def report(folder: str, to: str | None, out: Output) -> None:
 
 
 @campaign.command("verify")
-@click.argument("folder", type=click.Path())
+@FOLDER
 @option("--sha256", help="SHA-256 of the journal, as a report states it.")
 @answers()
 def verify(folder: str, sha256: str | None, out: Output) -> None:
@@ -213,8 +213,8 @@ _COMPUTED = {"predict": "unexplained_mm", "compensate": "solver_residual_mm"}  #
 
 
 @campaign.command("record")
-@click.argument("folder", type=click.Path())
-@click.argument("file", type=click.Path(), required=False)
+@FOLDER
+@click.argument("file", type=PATH, required=False)
 @option("--position-mm", help='Measured position "x,y,z".')
 @option("--point", help="Measured candidate. [the next one]")
 @option("--joints-deg", help="Joints of the controller (mm where a joint slides).")
@@ -282,10 +282,9 @@ def _of_file(path: str, options: Options, campaign: Campaign) -> FileOfReadings:
     usual = plan.instrument(options["instrument"]).name
     refuse(problems, "Nothing was recorded")
     names = table.texts(pose.column) if pose else [""] * len(table)
-    devices = [usual] * len(table)
+    devices = np.full(len(table), usual, dtype=object)
     if "instrument" in table.columns:
-        cells = zip(table.gaps("instrument"), table.texts("instrument"), strict=True)
-        devices = [usual if is_empty else text for is_empty, text in cells]
+        devices = np.where(table.gaps("instrument"), devices, table.texts("instrument"))
     rows, places = [], []
     for i, line in enumerate(table.line):
         place = f"{path}, {table.row_names.one(line)}"

@@ -26,7 +26,6 @@ from kinacc.study.fields import ErrorField
 DEFAULT_ERRORS = ("smooth", "workshop", "defect")
 SHARES = (0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0)  # of the candidates: budgets by default
 _MOST_READINGS = 50_000_000  # a gigabyte: any pose may be read again and again
-_NOISY = 0.5  # of the rms of held-out errors: noise larger than this is reported
 # Columns on the screen, with their heads.
 _SHOWN = {
     "errors": "Errors",
@@ -86,13 +85,8 @@ def plan(out: Output, **options: Any) -> None:
     holding = [f"{row.holding} of {row.judged}" for row in table.itertuples()]
     shown = table.assign(holding=holding)[[*_SHOWN]].drop(columns=absent).rename(columns=_SHOWN)
     budget = budgets.budget or int(table["budget"].max())
-    worst = table[table["budget"] == budget].nsmallest(1, "reached")
-    judged = budgets.rows.dropna(subset="attainable_mm")
-    last = judged[judged["budget"] == judged["budget"].max()].nlargest(1, "excess_mm")
-    limited = next(last.itertuples(), None)
-    texts = lines(
-        "campaign_plan.txt", plan=budgets, aim=aim, worst=next(worst.itertuples()), limited=limited
-    )
+    worst = table[table["budget"] == budget].nsmallest(1, "reached").iloc[0]
+    texts = lines("campaign_plan.txt", plan=budgets, aim=aim, worst=worst)
     out.show(budgets, table, texts, shown)
 
 
@@ -101,10 +95,10 @@ def _question(
 ) -> tuple[list[ErrorField], np.ndarray, list[AdaptiveAssessor]]:
     """Errors, covariance and assessors of the options."""
     names, points = options["errors"] or DEFAULT_ERRORS, options["candidates"]
-    folders = [Path(name) for name in names if name not in fields.FAMILIES and Path(name).is_dir()]
     instruments, freedom, doubts = instruments_of(options)
     if not options["sure"]:
-        for known in (None, *map(noise_of, folders)):
+        measured = (Path(name) for name in names if name not in fields.FAMILIES)
+        for known in (None, *map(noise_of, measured)):
             doubts += noise_doubts(instruments, known=known)
         refuse(dict.fromkeys(doubts), "Nothing was simulated")
     budgets = sorted({*(options["budget"] or [max(round(s * points), 2) for s in SHARES])})
@@ -114,17 +108,7 @@ def _question(
         raise input_error("--candidates, --budget", message, allowed)
     assessors = [assessor_of(options, budget, points, freedom) for budget in budgets]
     chosen = [errors_of(name, options["point"]) for name in names]
-    covariance_mm2 = instruments[0].covariance_mm2
-    noise_mm = math.sqrt(np.trace(covariance_mm2))
-    for field in (item for item in chosen if item.name not in fields.FAMILIES):
-        rms_mm = math.sqrt(np.mean(np.sum(field.error_mm**2, axis=1)))
-        if noise_mm > _NOISY * rms_mm:
-            click.echo(
-                f"warning: errors of {field.name} include reading noise ({noise_mm:.3g} of "
-                f"{rms_mm:.3g} mm rms). The plan counts it as error: real widths can be larger.",
-                err=True,
-            )
-    return chosen, covariance_mm2, assessors
+    return chosen, instruments[0].covariance_mm2, assessors
 
 
 def errors_of(name: str, point: str | None = None) -> ErrorField:
@@ -139,9 +123,7 @@ def errors_of(name: str, point: str | None = None) -> ErrorField:
         allowed = f"a results folder, {', '.join(fields.FAMILIES)}"
         raise input_error("--errors", f"{name!r} is no folder", allowed)
     tables, arm = read_tables(path, needed=("pose_errors",), optional=()), calibration_of(path)
-    target, targets = point or arm.default_point, ", ".join(arm.targets)
+    target = point or arm.default_point
     if target not in arm.targets:
-        raise input_error("--point", f"{target!r} is no target", targets)
-    if len(arm.targets) > 1:
-        click.echo(f"{path}: errors of {target} ({targets}); --point names another", err=True)
+        raise input_error("--point", f"{target!r} is no target", ", ".join(arm.targets))
     return fields.of_measurements(path.resolve().name, tables["pose_errors"], arm.choice, target)

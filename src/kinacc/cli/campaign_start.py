@@ -15,7 +15,6 @@ from kinacc.assess.adaptive import AdaptiveAssessor
 from kinacc.assess.noise import ESTIMATED
 from kinacc.assess.registry import RECOMMENDED
 from kinacc.campaign import begin
-from kinacc.campaign import folder as folders
 from kinacc.campaign import plan as plans
 from kinacc.campaign.instrument import BASE, Instrument, floored, instruments, read_repeatability
 from kinacc.campaign.plan import Limits
@@ -26,29 +25,22 @@ from kinacc.cli.output import Output, answers
 from kinacc.deployment.applicability import is_measured_there
 from kinacc.deployment.planning import between, spread, tool_positions
 from kinacc.deployment.record import Calibration
-from kinacc.errors import Problem, input_error, refuse
+from kinacc.errors import Problem, input_error
 from kinacc.kinematics.inverse import limits as ends
 from kinacc.kinematics.model import JointState
 from kinacc.report.rendering import lines
 from kinacc.report.summarise import tolerance_of
 from kinacc.tables import store
 
-# Settings of assessors by the options that set them.
-_SETTINGS = {
-    "wrong_readings": "wrong_rate",
-    "references": "references",
-    "error": "error_of",
-    "arm_mm": "arm_mm",
-    "allowance_mm": "allowance_mm",
-    "confidence": "confidence",
-}
+# Settings of assessors that have an option.
+_SETTINGS = ("wrong_rate", "references", "error_of", "arm_mm", "allowance_mm", "confidence")
 _MOST_DRAWS = 64  # joint values drawn per candidate before the region is called too wide
 _MOST_CANDIDATES = 20_000
 
 
 @click.command("start")
 @click.argument("folder", type=click.Path(file_okay=False))
-@option("--calibration", required=True, type=click.Path(), help="Results folder of the arm.")
+@option("--calibration", required=True, type=choice.PATH, help="Results folder of the arm.")
 @choice.SELECTED
 @choice.SESSION
 @choice.POINT
@@ -78,7 +70,6 @@ def start(out: Output, **options: Any) -> None:
     Example:
       kinacc campaign start check --calibration results/ur10_d --noise-mm 0.05 --budget 200
     """
-    refuse(folders.in_the_way(options["folder"]), "The campaign was not begun")
     results, point = Path(options["calibration"]), options["point"]
     used, freedom, doubts = instruments_of(options)
     arm = choice.calibration_of(results, options["model"], options["session"])
@@ -109,9 +100,7 @@ def start(out: Output, **options: Any) -> None:
     out.show(answer, lines=lines("campaign_start.txt", **answer, next_command=command))
 
 
-def instruments_of(
-    options: Options,
-) -> tuple[tuple[Instrument, ...], int, list[Problem]]:
+def instruments_of(options: Options) -> tuple[tuple[Instrument, ...], int, list[Problem]]:
     """Return the instruments of the options of ``start`` and ``plan``.
 
     Also degrees of freedom (0 without ``--repeatability``) and doubts of the test of their noise.
@@ -140,7 +129,7 @@ def assessor_of(options: Options, budget: int, points: int, freedom: int) -> Ada
     settings that the assessor does not have.
     """
     settings: dict[str, object] = {
-        name: options[option] for option, name in _SETTINGS.items() if options[option] is not None
+        name: options[name] for name in _SETTINGS if options[name] is not None
     }
     settings["measurements"] = budget
     if options["noise"] == "estimate" or freedom:

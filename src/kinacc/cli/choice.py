@@ -43,6 +43,8 @@ def share(text: str) -> float:
     return float(text.strip().removesuffix("%")) * (0.01 if "%" in text else 1.0)
 
 
+PATH = click.Path()
+FOLDER = click.argument("folder", type=PATH)
 SELECTED = option(
     "--model",
     type=MODEL,
@@ -67,7 +69,7 @@ def together(*options: Decorator) -> Decorator:
 
 
 # Which calibration: its folder, and the model.
-calibration_options = together(click.argument("folder", type=click.Path()), SELECTED)
+calibration_options = together(FOLDER, SELECTED)
 # Which point in which frame.
 point_options = together(
     option(
@@ -133,7 +135,7 @@ campaign_options = together(
     ),
     option(
         "--repeatability",
-        type=click.Path(),
+        type=PATH,
         help="Noise that a repeatability test told, instead of --noise-mm: a .json file of `kinacc "
         "repeatability`.",
     ),
@@ -150,6 +152,7 @@ campaign_options = together(
     ),
     option(
         "--wrong-readings",
+        "wrong_rate",
         type=share,
         help="Largest share of readings that go wrong, e.g. 1%.  [none]",
     ),
@@ -162,6 +165,7 @@ campaign_options = together(
     ),
     option(
         "--error",
+        "error_of",
         type=click.Choice(["mean", "visit"]),
         help="The error that stays when a pose is measured again, or what 95 % of future visits to "
         "the worst pose keep. [mean]",

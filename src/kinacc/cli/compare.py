@@ -10,6 +10,7 @@ import click
 import numpy as np
 
 from kinacc.calibration.misfit import misfit
+from kinacc.calibration.summary import reported_joints
 from kinacc.cli import choice, rows
 from kinacc.cli.choice import option
 from kinacc.cli.output import Output, answers
@@ -32,9 +33,9 @@ _POSES = 500  # at most, of measured ones
 
 
 @click.command("compare")
-@click.argument("first", type=click.Path())
-@click.argument("second", type=click.Path())
-@option("--joints", type=click.Path(), help="File of joints to compare poses at. [as measured]")
+@click.argument("first", type=choice.PATH)
+@click.argument("second", type=choice.PATH)
+@option("--joints", type=choice.PATH, help="File of joints to compare poses at. [as measured]")
 @option("--model", type=choice.MODEL, default="dh", help="Error model.")
 @answers(table=True, picture="Picture: .svg, .png or .pdf.", verbose=True)
 def compare(
@@ -87,8 +88,8 @@ def _calibration(place: str, model: str) -> Calibration:
 
 def _joints(arms: Sequence[Robot], measured: Sequence[Columns | None]) -> np.ndarray:
     """Reported joints (n, k) to compare at: as measured, or all over the limits."""
-    names = [f"q{joint + 1}" for joint in range(arms[0].dh.joints)]
-    tables = [np.stack([table[name] for name in names], axis=1) for table in measured if table]
+    joints = arms[0].dh.joints
+    tables = [reported_joints(table, joints) for table in measured if table]
     if tables:
         share = _POSES // len(tables)
         return np.concatenate([q[np.sort(spread_rows(len(q), share))] for q in tables])

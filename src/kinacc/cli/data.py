@@ -2,37 +2,35 @@
 
 from __future__ import annotations
 
+import math
 import re
 import shlex
 import sys
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from collections.abc import Sequence
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 import pandas as pd
 
 from kinacc.checks.check import examined
 from kinacc.checks.contradictions import load
-from kinacc.checks.findings import VERDICTS, Report
-from kinacc.cli.choice import CONFIG, DATASET, REASON, option
+from kinacc.checks.findings import VERDICTS
+from kinacc.cli.choice import CONFIG, DATASET, PATH, REASON, option
 from kinacc.cli.output import Output, answers
-from kinacc.cli.process import AGAINST, DONE, UNUSABLE
+from kinacc.cli.process import AGAINST, DONE
 from kinacc.config import schema
 from kinacc.config.edit import with_added
 from kinacc.config.series import MOVED, SAME
 from kinacc.deployment import adding
-from kinacc.errors import InputError, Problem, first_few, input_error, refuse
+from kinacc.errors import Problem, first_few, input_error, refuse
+from kinacc.figures.calibration import draw_check
 from kinacc.kinematics import robot
 from kinacc.measurements.reader import excluded_lines, read
 from kinacc.progress import reporting
-from kinacc.report.rendering import environment
+from kinacc.report.rendering import counted, environment
 from kinacc.tables.atomic import write_whole
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 _MOST = 100_000  # lines of a range
 _SETUP = click.Choice([SAME, MOVED])
@@ -42,7 +40,7 @@ _EMPTY_REASON = Problem("--reason", "is empty", "why, in words")
 
 
 @click.command("check-data")
-@click.argument("files", nargs=-1, type=click.Path())
+@click.argument("files", nargs=-1, type=PATH)
 @option("--dataset", multiple=True, help="Data set of the configuration; repeatable. [all]")
 @option("--accept", type=_FINDING, metavar="FINDING",
         help="Finding to go on with, kept in FILE.yaml.")  # fmt: skip
@@ -71,32 +69,26 @@ def check_data(
     if out.picture is not None and len(sections) > 1:
         message = "draws one data set, and there are several"
         raise input_error("--picture", message, ", ".join(sections), "give --dataset")
-    code = DONE
-    reports: list[Mapping[str, Any]] = []
-    following: list[str] = []
+    template = environment(is_page=False).get_template("data_check.txt")
+    reports = []
     for name, settings in sections.items():
-        try:
-            with reporting(f"check-data {name}"):
-                report = examined(settings, name)
-        except InputError as error:
-            code = UNUSABLE
-            path = settings["measurements"]["file"]["path"]
-            problems = [asdict(problem) for problem in error.problems]
-            facts = {"dataset": name, "path": path, "verdict": VERDICTS[code]}
-            reports.append({**facts, "problems": problems})
-            text = str(error)
-        else:
-            code = max(code, AGAINST if report.suspicions else DONE)
-            reports.append(report.as_dict())
-            following += [line for item in report.stopping for line in item.commands(files[0])]
-            text = environment(is_page=False).get_template("data_check.txt").render(report=report)
-            if out.picture is not None:
-                out.draw(_drawn(report))
+        with reporting(f"check-data {name}"):
+            report = examined(settings, name)
+        reports.append(report)
         if not out.as_json:
-            click.echo(f"{text}\n", err="problems" in reports[-1])
+            click.echo(f"{template.render(report=report)}\n")
+        if out.picture is not None:
+            suspects = {item.kind: item.lines for item in report.suspicions}
+            limit_mm = report.facts.get("quick_fit", {}).get("most_expected_mm", math.nan)
+            joints = pd.DataFrame(report.facts["joint_coverage"])
+            out.draw(draw_check(joints, report.line, report.left_mm, limit_mm, suspects))
+    code = AGAINST if any(report.suspicions for report in reports) else DONE
     if out.as_json:
-        out.show({"verdict": VERDICTS[code], "datasets": reports})
-    elif code < UNUSABLE:
+        datasets = [report.as_dict() for report in reports]
+        out.show({"verdict": VERDICTS[code], "datasets": datasets})
+    else:
+        stopping = [item for report in reports for item in report.stopping]
+        following = [line for item in stopping for line in item.commands(files[0])]
         lines = following or [shlex.join(["kinacc", "calibrate", *files])]
         first = "next: correct what is named above and check again, or" if following else "next:"
         click.echo("\n  ".join([first, *lines]))
@@ -133,15 +125,6 @@ def _sections(files: Sequence[str], wanted: Sequence[str]) -> dict[str, dict[str
     return {name: full[name] for name in chosen}
 
 
-def _drawn(report: Report) -> Figure:
-    from kinacc.figures.calibration import draw_check
-
-    suspects = {item.kind: item.lines for item in report.suspicions}
-    limit_mm = report.facts.get("quick_fit", {}).get("most_expected_mm", float("nan"))
-    joints = pd.DataFrame(report.facts["joint_coverage"])
-    return draw_check(joints, report.line, report.left_mm, limit_mm, suspects)
-
-
 @click.command("exclude")
 @click.argument("file", metavar="FILE.yaml")
 @option("--lines", required=True, metavar="12,15-18", help="Lines of the measured file.")
@@ -165,12 +148,8 @@ def exclude(file: str, lines: str, reason: str | None, dataset: str | None, out:
     item = {"lines": numbers, "reason": reason}
     read({**section, "exclude": [*section["exclude"], item]}, robot.load(settings["robot"]))
     _add(file, ("datasets", name, "measurements", "file", "exclude"), [item])
-    count = f"{len(numbers)} line{'s' if len(numbers) > 1 else ''}"
-    text = [
-        f"{file}: {count} of {section['path']} excluded",
-        "next:",
-        f"  kinacc check-data {file}",
-    ]
+    first = f"{file}: {counted(len(numbers), 'line')} of {section['path']} excluded"
+    text = [first, "next:", f"  kinacc check-data {file}"]
     out.show({"file": file, "dataset": name, **item}, lines=text)
 
 
@@ -202,8 +181,8 @@ def _numbers(text: str) -> list[int]:
 
 
 @click.command("add")
-@click.argument("measurement_file", metavar="FILE", type=click.Path())
-@option("--to", "config", required=True, type=click.Path(), help="Configuration file of the arm.")
+@click.argument("measurement_file", metavar="FILE", type=PATH)
+@option("--to", "config", required=True, type=PATH, help="Configuration file of the arm.")
 @DATASET
 @option("--date", type=_DAY, required=True, help="Day of the measurement.")
 @option("--base", type=_SETUP, required=True, help="Robot and instrument since the newest line.")

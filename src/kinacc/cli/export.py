@@ -8,7 +8,7 @@ import click
 
 from kinacc import __version__
 from kinacc.cli import choice
-from kinacc.cli.choice import option
+from kinacc.cli.choice import FOLDER, option
 from kinacc.cli.output import Output, answers
 from kinacc.config.error_models import ERROR_MODELS, PLAINEST
 from kinacc.deployment import folder as results
@@ -21,15 +21,15 @@ from kinacc.workflow.described import calibration_settings
 
 
 @click.command("export")
-@click.argument("folder", type=click.Path())
-@option("--out", "target", type=click.Path(), default=".", help="Folder.")
+@FOLDER
+@option("--out", "target", type=choice.PATH, default=".", help="Folder.")
 @option("--format", "formats", multiple=True, type=click.Choice([*files.FORMATS]),
         help="Formats. [all]")  # fmt: skip
 @option("--for", "maker", type=click.Choice([*CONTROLLERS], case_sensitive=False),
         help="Controller whose values are written, as a page.")  # fmt: skip
 @option("--model", type=click.Choice(list(ERROR_MODELS)), default=PLAINEST,
         help="Error model; one that is no DH table goes into json alone.")  # fmt: skip
-@option("--urdf", type=click.Path(), help="URDF file whose origins are corrected.")
+@option("--urdf", type=choice.PATH, help="URDF file whose origins are corrected.")
 @option("--base-link", help="Link of that file where the arm starts. [its root]")
 @option("--tip-link", help="Link of that file where the arm ends. [the only one it can]")
 @answers(force=True)

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +12,7 @@ import numpy as np
 import pandas as pd
 from scipy.spatial.transform import Rotation
 
+from kinacc.calibration.summary import reported_joints
 from kinacc.checks.described import corrected, coupling_of, fitting, remarks_on
 from kinacc.checks.findings import Report
 from kinacc.cli import choice, rows
@@ -35,54 +35,8 @@ _FIRST_POSES = 3
 _QUATERNION = ["qx", "qy", "qz", "qw"]
 
 
-@dataclass(frozen=True)
-class Description:
-    """What ``kinacc init`` has written.
-
-    Attributes
-    ----------
-    written
-        The robot file, where one was needed, and the data set.
-    robot, robot_because
-        The robot, None for a form to fill in, and how it was chosen.
-    joints, targets
-        Number of joints and names of the targets.
-    file
-        The section ``measurements.file``.
-    assumed
-        What the file does not state, by setting.
-    notes
-        Facts on how the file was read.
-    unused_columns
-        Columns that are not read, with the reason.
-    suspicions
-        Findings of the data check.
-    remarks
-        Limits of the readings that contradict nothing.
-    first_poses
-        A row for each target of the first poses, as understood: joints (deg, mm), position (mm),
-        rotation vector (deg), and number of readings.
-    next
-        The commands that follow.
-    """
-
-    written: list[str]
-    robot: str | None
-    robot_because: str
-    joints: int
-    targets: list[str]
-    file: dict[str, Any]
-    assumed: dict[str, str]
-    notes: tuple[str, ...]
-    unused_columns: dict[str, str]
-    suspicions: list[str]
-    remarks: list[str]
-    first_poses: pd.DataFrame
-    next: list[str]
-
-
 @click.command("init")
-@click.argument("measurement_files", nargs=-1, required=True, type=click.Path())
+@click.argument("measurement_files", nargs=-1, required=True, type=choice.PATH)
 @option("--robot", help="A shipped name, a robot file or a URDF file. [found by fitting]")
 @option("--out", "folder", default=".", help="Folder to write to.")
 @option("--name", help="Name of the data set. [as the file]")
@@ -149,31 +103,36 @@ def init(measurement_files: tuple[str, ...], out: Output, **options: Any) -> Non
     if not out.as_json:
         click.echo("First poses as understood (joints in deg, positions in mm, rotation vectors):")
         print_table(poses.dropna(axis=1, how="all"))
-    texts[dataset] = _dataset(
-        dataset, name, robot if robot and text is None else str(robot_file), guess, report, chosen
-    )
+    how = "assumed" if report is None or report.stopping else "assumed, and the readings agree"
+    unused = guess.unused()
+    unread = {
+        why: ", ".join(column for column in unused if unused[column] == why)
+        for why in unused.values()
+    }
+    head = [f"Written by kinacc init. Robot: {chosen}."]
+    head += [f"{how.capitalize()}: {assumed}." for assumed in guess.assumed.values()]
+    head += [f"Not read: {names} ({why})." for why, names in unread.items() if why]
+    used = robot if robot and text is None else str(robot_file)
+    texts[dataset] = _dataset(dataset, name, used, guess, report, head)
     require_writable(texts, out.force)
     write_together({path: content.encode() for path, content in texts.items()})
-    result = Description(
-        [str(path) for path in texts],
-        robot,
-        chosen,
-        guess.joints,
-        list(guess.columns.targets),
-        guess.section,
-        guess.assumed,
-        guess.notes,
-        guess.unused(),
-        [finding.kind for finding in report.suspicions] if report else [],
-        remarks,
-        poses,
-        [shlex.join(["kinacc", command, str(dataset)]) for command in ("check-data", "calibrate")],
-    )
-    unread, how = _unread(result.unused_columns), _how(report)
-    lines = rendering.lines(
-        "description.txt", d=result, columns=guess.columns, listed=listed, how=how, unread=unread
-    )
-    out.show(result, lines=lines)
+    facts = {
+        "written": [str(path) for path in texts],
+        "robot": robot,
+        "robot_because": chosen,
+        "joints": guess.joints,
+        "targets": list(guess.columns.targets),
+        "file": guess.section,
+        "assumed": guess.assumed,
+        "notes": guess.notes,
+        "unused_columns": unused,
+        "suspicions": [finding.kind for finding in report.suspicions] if report else [],
+        "remarks": remarks,
+        "first_poses": poses,
+        "next": [_command("check-data", dataset), _command("calibrate", dataset)],
+    }
+    about = {"columns": guess.columns, "listed": listed, "how": how, "unread": unread}
+    out.show(facts, lines=rendering.lines("description.txt", d=facts, **about))
 
 
 def _first_poses(reading: MeasuredFile, prismatic: np.ndarray) -> pd.DataFrame:
@@ -182,7 +141,7 @@ def _first_poses(reading: MeasuredFile, prismatic: np.ndarray) -> pd.DataFrame:
     table = table[table["pose"].isin(table["pose"].unique()[:_FIRST_POSES])]
     counts = table.groupby(["pose", "target"], sort=False).size()
     table = table.drop_duplicates(["pose", "target"]).reset_index(drop=True)
-    joints = table[[f"q{joint}" for joint in range(1, len(prismatic) + 1)]].to_numpy(float)
+    joints = reported_joints(table, len(prismatic))
     where = [reading.row_names.one(int(line)) for line in table["row"]]
     first = pd.DataFrame({"where": where, **rows.joint_columns(prismatic, joints)})
     first = first.join(table[["target", "x_mm", "y_mm", "z_mm"]])
@@ -217,31 +176,18 @@ def _robot_text(robot: str | None, joints: int, name: str, folder: Path) -> str 
 
 
 def _dataset(
-    path: Path, name: str, robot: str, guess: Guess, report: Report | None, chosen: str
+    path: Path, name: str, robot: str, guess: Guess, report: Report | None, head: list[str]
 ) -> str:
-    """Text of the data set, which names files from where it stands."""
-    how = _how(report).capitalize()
-    note = [f"Written by kinacc init. Robot: {chosen}."]
-    note += [f"{how}: {text}." for text in guess.assumed.values()]
-    note += [f"Not read: {names} ({why})." for why, names in _unread(guess.unused()) if why]
-    check = shlex.join(["kinacc", "check-data", str(path)])
-    note.append(f"Everything not given here has its default (docs/configuration.md).\n    {check}")
+    """Text of the data set below a ``head``; it names files from where it stands."""
+    check = _command("check-data", path)
+    default = f"Everything not given here has its default (docs/configuration.md).\n    {check}"
     poses = int(report.facts["poses"]) if report else _FOLDS_UNKNOWN
     files = {"path": write.seen_from(path.parent, guess.section["path"])}
     if joints := guess.section.get("joints"):
         files["joints"] = joints | {"path": write.seen_from(path.parent, joints["path"])}
     robot = write.seen_from(path.parent, robot)
-    return write.dataset_text(name, robot, guess.but(files), poses, "\n".join(note))
+    return write.dataset_text(name, robot, guess.but(files), poses, "\n".join([*head, default]))
 
 
-def _how(report: Report | None) -> str:
-    """How far what the file does not state was held against its readings."""
-    return "assumed" if report is None or report.stopping else "assumed, and the readings agree"
-
-
-def _unread(unused: Mapping[str, str]) -> list[tuple[str, str]]:
-    """Reasons, each with the columns that are not read for it."""
-    return [
-        (why, ", ".join(name for name in unused if unused[name] == why))
-        for why in dict.fromkeys(unused.values())
-    ]
+def _command(name: str, dataset: Path) -> str:
+    return shlex.join(["kinacc", name, str(dataset)])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import wraps
 from pathlib import Path
@@ -82,11 +82,11 @@ class Output:
         path = Path(self.picture or "")
         write(figure, {path.suffix[1:]: path})
 
-    def write_page(self, page: Page) -> None:
+    def write_page(self, page: Page, marks: Mapping[str, object]) -> None:
         """Write the page a person reads in a browser."""
         from kinacc.report.page import html
 
-        write_whole(Path(self.page or ""), html(page).encode())
+        write_whole(Path(self.page or ""), html(page, marks).encode())
 
 
 def answers(

@@ -48,7 +48,7 @@ _STATUS = {
 
 @click.command("predict")
 @choice.calibration_options
-@click.argument("joints", type=click.Path(), required=False)
+@click.argument("joints", type=choice.PATH, required=False)
 @option("--joints-deg", multiple=True, help='One configuration, e.g. "0,-20,30,0,45,0".')
 @choice.joint_file_options
 @choice.point_options
@@ -95,21 +95,21 @@ def predict(
 
 @click.command("compensate")
 @choice.calibration_options
-@click.argument("poses", type=click.Path(), required=False)
+@click.argument("poses", type=choice.PATH, required=False)
 @option("--pose", "texts", multiple=True, help='A pose in mm: "x,y,z,qw,qx,qy,qz".')
 @option("--near-deg", help="Joints near the posture, where none is stated.")
-@option("--program", type=click.Path(),
+@option("--program", type=choice.PATH,
         help="Robot program: .src, .mod, .prg, .ls, .script, .jbi or .csv.")  # fmt: skip
 @option("--tool", "tools", multiple=True, help="Tool of a program: [NUMBER=]x,y,z,a,b,c.")
 @option("--base", "bases", multiple=True, help="Base of a program: [NUMBER=]x,y,z,a,b,c.")
-@option("--frames", multiple=True, type=click.Path(), help="File with tools and bases.")
+@option("--frames", multiple=True, type=choice.PATH, help="File with tools and bases.")
 @option("--pulses-per-degree", help="Pulses of a Yaskawa job: one number an axis.")
 @option("--base-is-fixed", is_flag=True, help="No external axis moves the robot's base.")
 @option("--at-most-mm", type=float, default=programs.AT_MOST_MM, help="Largest change of a pose.")
 @option("--dry-run", is_flag=True, help="Corrections without a written program.")
-@option("--table", type=click.Path(), help="Corrections of a program, as a table.")
+@option("--table", type=choice.PATH, help="Corrections of a program, as a table.")
 @choice.point_options
-@option("--out", "-o", "target", type=click.Path(), help="Program, or table of joints.")
+@option("--out", "-o", "target", type=choice.PATH, help="Program, or table of joints.")
 @answers(picture="Corrections of a program, as a picture.", force=True)
 def compensate(
     folder: str,
@@ -136,19 +136,17 @@ def compensate(
       kinacc compensate results/kr6 --program weld.src -o weld_cal.src
       kinacc compensate results/ur10_b target_poses.csv -o joints.csv
     """
-    if program is not None and (poses is not None or texts):
-        raise click.UsageError("--program stands alone: give no poses beside it")
-    if program is not None and frame != "base":
-        raise input_error("--frame", "programs are in the robot's own base", "base")
-    if program is None:
-        out = replace(out, table=target)
-    calibration = choice.calibration_of(folder, model, session)
-    near, slides = None, calibration.robot.dh.prismatic
+    calibration, near = choice.calibration_of(folder, model, session), None
     if near_deg is not None:
-        near = rows.joints_given("--near-deg", near_deg, slides)
+        near = rows.joints_given("--near-deg", near_deg, calibration.robot.dh.prismatic)
     if program is not None:
+        if poses is not None or texts:
+            raise click.UsageError("--program stands alone: give no poses beside it")
+        if frame != "base":
+            raise input_error("--frame", "programs are in the robot's own base", "base")
         _correct(calibration, program, near, point, target, options, out)
         return
+    out = replace(out, table=target)
     inputs = _wanted(calibration, poses, texts, near)
     wanted = inputs.pose
     assert wanted is not None  # read_rows refuses a file without poses
@@ -191,14 +189,12 @@ def _wanted(
             raise input_error("--pose", "has no unit quaternion", allowed)
         wanted = Pose(rotation_from_quaternion(table[:, 3:] / lengths), table[:, :3])
         inputs = Rows(np.arange(1, len(texts) + 1), pose=wanted)
-    joints = inputs.joints
-    if joints is None and near is not None:
-        joints = np.tile(near, (len(inputs.label), 1))
-    if joints is None:
-        return inputs
-    where = path or "--near-deg"
-    rows.require_within_limits(calibration.robot, inputs.label, joints, where)
-    return replace(inputs, joints=joints)
+    if inputs.joints is None and near is not None:
+        inputs = replace(inputs, joints=np.tile(near, (len(inputs.label), 1)))
+    if inputs.joints is not None:
+        where = path or "--near-deg"
+        rows.require_within_limits(calibration.robot, inputs.label, inputs.joints, where)
+    return inputs
 
 
 def _table_of(

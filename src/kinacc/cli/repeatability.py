@@ -9,13 +9,13 @@ import click
 from kinacc.assess.noise import ENOUGH, FEWEST
 from kinacc.calibration.noise import per_axis_mm
 from kinacc.checks.repeated_readings import estimate, read_repeats
-from kinacc.cli.choice import option
+from kinacc.cli.choice import PATH, option
 from kinacc.cli.output import Output, answers
 from kinacc.report.rendering import lines
 
 
 @click.command("repeatability")
-@click.argument("file", type=click.Path())
+@click.argument("file", type=PATH)
 @option("--rows", "rows_are", type=click.Choice(["visits", "stays"]),
         help="Whether the arm left the pose before every row, or stayed.")  # fmt: skip
 @answers(table=True)

@@ -15,7 +15,7 @@ import pyarrow as pa
 
 from kinacc.campaign.beside_results import of_results
 from kinacc.checks.contradictions import load
-from kinacc.cli.choice import CONFIG, REASON, option, positive, print_outdated
+from kinacc.cli.choice import CONFIG, FOLDER, PATH, REASON, option, positive, print_outdated
 from kinacc.cli.output import Output, answers, plain
 from kinacc.cli.process import AGAINST
 from kinacc.config.values import nearest
@@ -82,16 +82,15 @@ def as_plain(
     reported: dict[str, Any] = {}
     for item in calibrations:
         if isinstance(item, Problem):
-            name = Path(item.where.removesuffix("/summary.parquet")).name
-            reported[name] = {"problem": str(item)}
+            reported[Path(item.where).name] = {"problem": str(item)}
         else:
             reported[item.name] = plain(vars(item) | {"verdict": item.verdict(by, tolerance_mm)})
     return reported
 
 
 @click.command("report")
-@click.argument("folder", type=click.Path())
-@option("--out", "-o", "path", type=click.Path(), help=f"Page to write. [FOLDER/{_PAGE}]")
+@FOLDER
+@option("--out", "-o", "path", type=PATH, help=f"Page to write. [FOLDER/{_PAGE}]")
 @answers()
 def report(folder: str, path: str | None, out: Output) -> None:
     """Write one page on the results of a data set in FOLDER, to read, mail and keep.
@@ -116,10 +115,9 @@ def written(folder: str, out: str | None = None) -> Path:
     optional = [name for name in summaries.ON_PAGE if name not in old]
     tables: dict[str, Any] = dict(read_tables(place, needed=needed, optional=optional))
     tables |= {role: Path(path) for role, path in campaign_files(of_results(place)).items()}
-    settings = {"folder": folder, "outdated": sorted(old), "reason": reason}
-    page = pages.run(tables, {"dataset": place.resolve().name, **settings})
+    page = pages.run(tables, folder, sorted(old), reason)
     path = Path(out or place / _PAGE)
-    write_whole(path, html(page).encode())
+    write_whole(path, html(page, {}).encode())
     return path
 
 
@@ -158,11 +156,11 @@ def show(path: Path, name: str | None, describe: bool, out: Output) -> None:
 
 def _find(path: Path) -> Path:
     """The file or folder meant. Raises InputError with what is there instead."""
-    for place in (path, path.with_name(f"{path.name}.parquet") if path.name else path):
-        if place.is_file():
-            return place
-    if path.is_dir():
+    if path.exists():
         return path
+    table = path.with_name(f"{path.name}.parquet")
+    if table.is_file():
+        return table
     there = sorted(item.stem for item in path.parent.glob("[!.]*"))
     close = nearest(path.stem, tuple(there))
     fix = f"did you mean {path.with_name(close)}?" if close else ""

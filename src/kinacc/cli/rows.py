@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 import click
 import numpy as np
@@ -13,15 +12,14 @@ from kinacc.cli.process import AGAINST
 from kinacc.deployment.record import Calibration
 from kinacc.errors import Problem, first_few, input_error, refuse
 from kinacc.kinematics.robot import Robot, outside_limits
+from kinacc.measurements.intake.choices import Answers
 from kinacc.measurements.rows import Rows, read_rows
 from kinacc.measurements.table import numbers_of
 
 _MUCH_MOVED_MM = 0.1  # by a mm or mrad of undetermined parameters
 
 
-def read(
-    path: str, robot: Robot, need: str = "joints", answers: Mapping[str, Any] | None = None
-) -> Rows:
+def read(path: str, robot: Robot, need: str = "joints", answers: Answers | None = None) -> Rows:
     """Rows of a file, as ``read_rows``; notes on how it was read go to the error stream."""
     rows = read_rows(path, robot.dh.prismatic, need, answers)
     for note in rows.notes:
@@ -29,9 +27,7 @@ def read(
     return rows
 
 
-def read_joints(
-    path: str, robot: Robot, answers: Mapping[str, Any] | None = None
-) -> tuple[Rows, np.ndarray]:
+def read_joints(path: str, robot: Robot, answers: Answers | None = None) -> tuple[Rows, np.ndarray]:
     """Rows of a file and their joints (n, k)."""
     rows = read(path, robot, answers=answers)
     assert rows.joints is not None  # read_rows refuses a file without them
@@ -52,7 +48,7 @@ def joints_given(option: str, text: str, slides: np.ndarray) -> np.ndarray:
 
 
 def joints_of(
-    robot: Robot, path: str | None, in_deg: Sequence[str], answers: Mapping[str, Any]
+    robot: Robot, path: str | None, in_deg: Sequence[str], answers: Answers
 ) -> tuple[Rows, np.ndarray]:
     """Rows and joints (n, k) of a file or of arguments.
 

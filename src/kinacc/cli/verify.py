@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import click
 
 from kinacc.checks.contradictions import load
-from kinacc.cli.choice import option
+from kinacc.cli.choice import PATH, option
 from kinacc.cli.output import Output, answers
 from kinacc.cli.process import AGAINST, DONE, UNDECIDED
+from kinacc.config.records import Settings
 from kinacc.deployment import folder as results
 from kinacc.deployment import verify as verification
 from kinacc.deployment.permutation import LEVEL
@@ -31,7 +30,7 @@ _EXIT = {verification.PASS: DONE, verification.FAIL: AGAINST, verification.UNDEC
 
 @click.command("verify")
 @click.argument("readings", type=click.Path(path_type=Path), metavar="NEW")
-@option("--calibration", "folder", type=click.Path(), required=True, help="Results folder.")
+@option("--calibration", "folder", type=PATH, required=True, help="Results folder.")
 @option("--base", type=_SETUP, required=True, help="Instrument since the calibration.")
 @option("--tool", type=_SETUP, required=True, help="Tool or target since the calibration.")
 @option("--dataset", help="Data set of NEW, where NEW is a .yaml. [the only one]")
@@ -82,7 +81,7 @@ def verify(
         raise SystemExit(code)
 
 
-def _settings(readings: Path, folder: str, dataset: str | None) -> tuple[str, Mapping[str, Any]]:
+def _settings(readings: Path, folder: str, dataset: str | None) -> tuple[str, Settings]:
     """Name and settings of the new readings: those of a .yaml, or of the calibration."""
     if readings.suffix.lower() not in _YAML:
         return readings.stem, like_those_of(Path(folder), readings)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -20,9 +20,7 @@ from kinacc.kinematics import tables as model_tables
 from kinacc.kinematics.robot import Robot
 from kinacc.tables import store
 from kinacc.tables.allowed import SUBSETS
-from kinacc.tables.columns import Columns
-
-Tables = Mapping[str, Columns]
+from kinacc.tables.columns import Tables
 
 NEEDED = (*(f"{kind}_model" for kind in ALWAYS), "frames", "robot")
 # Used where they are there, beside those of every kind of model.
@@ -35,7 +33,7 @@ def read_tables(
     *more: str,
     needed: Sequence[str] = NEEDED,
     optional: Sequence[str] | None = None,
-) -> dict[str, Columns]:
+) -> Tables:
     """The tables of a data set's results folder: columns (rows,) by table and name.
 
     Parameters

@@ -22,7 +22,6 @@ from kinacc.calibration.tables import frames_of
 from kinacc.config.error_models import ERROR_MODELS, MEASURED, NOMINAL, Comparison
 from kinacc.deployment import folder
 from kinacc.deployment.applicability import frame_motions, is_measured_there
-from kinacc.deployment.folder import Tables
 from kinacc.deployment.permutation import (
     LEVEL,
     ErrorColumns,
@@ -39,7 +38,7 @@ from kinacc.kinematics.model import ErrorModel
 from kinacc.kinematics.robot import Robot, carried
 from kinacc.kinematics.tables import models
 from kinacc.measurements.folds import configurations
-from kinacc.tables.columns import Columns
+from kinacc.tables.columns import Columns, Tables
 
 BASE, TOOL = "base", "tool"
 PASS, FAIL, UNDECIDED = "pass", "fail", "undecided"

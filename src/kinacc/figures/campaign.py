@@ -41,9 +41,8 @@ def draw_bounds(
     """
     with style.new_figure(style.DOUBLE_COLUMN_IN, 2.9, name) as figure:
         left, right = figure.subplots(1, 2, sharey=True)
-        if tolerance_mm is not None:
-            left.axhline(tolerance_mm, **style.LIMIT)
-            right.axhline(tolerance_mm, **style.LIMIT, label="tolerance")
+        style.draw_limit(left, tolerance_mm)
+        style.draw_limit(right, tolerance_mm, "tolerance")
         _sizes(left, pd.DataFrame(points))
         _growth(right, pd.DataFrame(bounds), first_visit)
         left.set_ylim(bottom=0.0)
@@ -61,8 +60,7 @@ def draw_readings(table: Columns, tolerance_mm: float | None = None) -> Figure:
         for name, group in rows.groupby("instrument", sort=False):
             colour, marker = (style.VERMILION, "x") if name == "struck" else next(looks)
             ax.plot(group["reading"], group["error_mm"], marker, ms=2.5, color=colour, label=name)
-        if tolerance_mm is not None:
-            ax.axhline(tolerance_mm, **style.LIMIT, label="tolerance")
+        style.draw_limit(ax, tolerance_mm, "tolerance")
         ax.set(xlabel="Reading, in the order taken", ylabel="Distance from the model, mm")
         ax.set_ylim(bottom=0.0)
         style.legend_above(ax, 4)
@@ -138,10 +136,8 @@ def draw_budgets(
             look = {"color": colour, "marker": marker, "ms": 3}
             left.plot(group["budget"], middle, label=style.literal(str(name)), **look)
             right.plot(group["budget"], group["share"], **look)
-        if wanted_mm is not None:
-            left.axhline(wanted_mm, **style.LIMIT, label=f"wanted ({wanted_mm:g} mm)")
-        if power is not None:
-            right.axhline(power, **style.LIMIT, label=f"wanted ({power:.0%})")
+        style.draw_limit(left, wanted_mm, f"wanted ({wanted_mm:g} mm)" if wanted_mm else None)
+        style.draw_limit(right, power, f"wanted ({power:.0%})" if power else None)
         if enough is not None:
             left.axvline(enough, color=style.MUTED, lw=0.8, ls=":")
             right.axvline(enough, color=style.MUTED, lw=0.8, ls=":", label=f"{enough} readings")

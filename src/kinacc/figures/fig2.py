@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
 from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d import Axes3D
 
+from kinacc.calibration.summary import reported_joints
 from kinacc.config.records import Settings
 from kinacc.figures import style
 from kinacc.kinematics import dh, tables
@@ -28,7 +26,7 @@ def run(inputs: Tables, settings: Settings) -> Figure:
     robot = robots.load(settings["robot"])
     model = dh.DHModel.from_columns(inputs["dh_model"], robot.dh)
     points, evaluation = inputs["assessment_points"], settings["evaluation"]
-    reported = np.stack([points[f"q{i + 1}"] for i in range(model.joints)], axis=-1)
+    reported = reported_joints(points, model.joints)
     carried = robots.carried(robot)
     tool = tables.fitted_tool(inputs.get("frames"), "dh", carried)
     offset_mm = carried.rotation @ np.asarray(evaluation["tool_mm"], float)
@@ -47,7 +45,7 @@ def draw(
     q_rad: np.ndarray,
     *,
     tool_mm: np.ndarray,
-    cylinder: Mapping[str, Any] | None = None,
+    cylinder: Settings | None = None,
     measured: bool = False,
     dataset: str | None = None,
 ) -> Figure:
@@ -103,7 +101,7 @@ def _arm(ax: Axes3D, model: dh.DHModel, q_rad: np.ndarray, tool_mm: np.ndarray) 
                 zorder=4)  # fmt: skip
 
 
-def _edges(cylinder: Mapping[str, Any]) -> list[np.ndarray]:
+def _edges(cylinder: Settings) -> list[np.ndarray]:
     """Edges of the evaluation space: four arcs and two ends."""
     inner, low = float(cylinder["inner_radius_mm"]), float(cylinder["bottom_mm"])
     outer, high = inner + cylinder["radial_span_mm"], low + cylinder["height_mm"]

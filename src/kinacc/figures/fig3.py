@@ -49,13 +49,11 @@ def draw(accuracy_map: Columns, *, dataset: str | None = None) -> Figure:
         panels = figure.subplots(2, slices.size, sharex=True, sharey=True, squeeze=False)
         for row, (column, label, unit) in enumerate(ROWS):
             low, high = colour_range(cells[column].to_numpy())
+            grids = cells.pivot(index=PLACE[::2], columns="radius_mm", values=column)
             for ax, angle in zip(panels[row], slices, strict=True):
                 of_slice = cells[cells["slice_deg"] == angle]
-                grid = of_slice.pivot(index="height_mm", columns="radius_mm", values=column)
-                grid = grid.reindex(index=heights, columns=radii)
-                mesh = ax.pcolormesh(
-                    *edges, np.ma.masked_invalid(grid), vmin=low, vmax=high, rasterized=True
-                )
+                grid = np.ma.masked_invalid(grids.loc[angle])
+                mesh = ax.pcolormesh(*edges, grid, vmin=low, vmax=high, rasterized=True)
                 title = _marks(ax, of_slice, column, unit)
                 ax.set_title(title if row else f"{angle:g}°\n{title}", loc="center")
             bar = figure.colorbar(

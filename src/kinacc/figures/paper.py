@@ -52,7 +52,6 @@ def draw_noise(
     """Fig. 4: assessed accuracy against noise, one line per assessor, with the true accuracy.
 
     Means of ``study_summary`` joined by lines, bars from the smallest to the largest.
-    ``true_accuracy_mm``: NaN where unknown.
     ``taken_as_true``: footnote where the truth is not known; what the study took for it.
     """
     table = pd.DataFrame(summary).sort_values("noise_mm", kind="stable")
@@ -71,9 +70,8 @@ def draw_noise(
             ax.errorbar(rows["noise_um"] + shift, rows["mean_mm"], np.clip(ends, 0, None),
                         color=colour, marker=marker, label=label)  # fmt: skip
         label = "“True” accuracy*" if taken_as_true else "True accuracy"
-        if np.isfinite(true_accuracy_mm):
-            label = f"{label} {true_accuracy_mm:.3f} mm"
-            ax.axhline(true_accuracy_mm, **style.TRUTH, zorder=1, label=label)
+        label = f"{label} {true_accuracy_mm:.3f} mm"
+        ax.axhline(true_accuracy_mm, **style.TRUTH, zorder=1, label=label)
         ax.set(xlabel="Noise, standard deviation per axis (µm)", ylabel="Assessed accuracy (mm)")
         ax.set_xticks(levels[:: max(-(-levels.size // 8), 1)])
         ax.grid(axis="x", visible=False)
@@ -93,8 +91,8 @@ def draw_iterations(
 
     Above: magnitude of first readings, of the averages after resampling, of the true errors, with
     the bound eta and the true accuracy (largest true error of all operating points, visited or
-    not; NaN where unknown); a dotted line where the largest is first measured. Below: rejection
-    probability and its threshold alpha.
+    not); a dotted line where the largest is first measured. Below: rejection probability and its
+    threshold alpha.
     ``taken_as_true``: footnote where the truth is not known; what the study took for it.
     """
     table = pd.DataFrame(histories)
@@ -114,15 +112,16 @@ def draw_iterations(
         _dots(bottom, steps, column, True, style.ORANGE, "_after resampling, as above")
         bottom.axhline(alpha, color=style.INK, lw=0.9, zorder=1.5)
         bottom.text(1.01, alpha, "α", transform=bottom.get_yaxis_transform(), va="center")
-        if np.isfinite(true_accuracy_mm):
-            label = f"{true.format('accuracy')} {true_accuracy_mm:.3f} mm"
-            top.axhline(true_accuracy_mm, **style.TRUTH, label=label)
-            reached = steps["iteration"][np.isclose(steps["true_mm"], true_accuracy_mm, 0, 1e-9)]
-            for ax in axes if len(reached) else ():
+        label = f"{true.format('accuracy')} {true_accuracy_mm:.3f} mm"
+        top.axhline(true_accuracy_mm, **style.TRUTH, label=label)
+        place = "not measured"
+        reached = steps["iteration"][np.isclose(steps["true_mm"], true_accuracy_mm, 0, 1e-9)]
+        if len(reached):
+            place = f"first measured at k = {reached.iloc[0]} (dotted)"
+            for ax in axes:
                 ax.axvline(reached.iloc[0], color=style.INK, lw=0.8, ls=":", zorder=1.5)
-            place = f"first measured at k = {reached.iloc[0]} (dotted)" if len(reached) else ""
-            title += f"\nlargest {true.format('error')} {place or 'not measured'}"
-        if "rule_met" in steps and not steps["rule_met"].iloc[0]:
+        title += f"\nlargest {true.format('error')} {place}"
+        if not steps["rule_met"].iloc[0]:
             title += "\n" + fill(f"shown: {steps['rule'].iloc[0]}", 56)
         top.set_title(title)
         top.set(ylim=(0.0, None), ylabel="Error magnitude (mm)")

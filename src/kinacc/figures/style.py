@@ -86,6 +86,12 @@ def literal(text: str) -> str:
     return f"{' ' * text.startswith('_')}{text.replace('$', chr(92) + '$')}"
 
 
+def draw_limit(axes: Axes, value: float | None, label: str | None = None) -> None:
+    """Draw a horizontal line at a limit, where there is one."""
+    if value is not None:
+        axes.axhline(value, label=label, **LIMIT)
+
+
 def legend_above(axes: Axes, columns: int = 2, title: str | None = None) -> None:
     """Place a legend above the axes, where it covers nothing; none where nothing is labelled."""
     axes.legend(

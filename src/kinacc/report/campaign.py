@@ -106,8 +106,7 @@ def campaign_page(opened: Opened, part: Part) -> Page:
             "NEXT": lines("campaign_next.txt", s=summary),
         },
     )
-    marks = {name: str(value) for name, value in folder.marks_of(opened).items()}
-    return Page(first, [part], marks)
+    return Page(first, [part])
 
 
 def _badge(summary: CampaignStatus) -> tuple[str, bool]:

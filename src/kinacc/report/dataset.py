@@ -10,8 +10,7 @@ import numpy as np
 
 from kinacc.campaign import folder as campaigns
 from kinacc.campaign import report
-from kinacc.config.records import Settings
-from kinacc.deployment import folder
+from kinacc.deployment.folder import robot_of
 from kinacc.report import campaign, fit_sections, study_sections, terminal
 from kinacc.report.page import FirstScreen, Page, Table
 from kinacc.report.rendering import counted
@@ -26,18 +25,18 @@ _OF_THE_STUDY = (
 )
 
 
-def run(inputs: Mapping[str, Any], settings: Settings) -> Page:
+def run(
+    inputs: Mapping[str, Any], folder: str, left_out: Sequence[str] = (), outdated: str = ""
+) -> Page:
     """The page on the tables that are there, and on the campaign of their calibration.
 
-    ``settings``: ``dataset``; ``folder`` where the results are not in their usual place,
-    ``outdated`` tables that are left out, and ``reason``, why all results are outdated.
+    ``folder`` of the results; ``left_out`` tables made from others than those now there;
+    ``outdated``, why all results are.
     """
     files = {role: path for role, path in inputs.items() if isinstance(path, Path)}
     tables = {role: table for role, table in inputs.items() if role not in files}
     places = [path.parent for role, path in files.items() if role.startswith("campaign_")]
-    place = Path(settings.get("folder", f"results/{settings['dataset']}"))
-    summary = summarise(place, tables, places, settings.get("reason", ""))
-    arm = folder.robot_of(tables)
+    summary, arm = summarise(folder, tables, places, outdated), robot_of(tables)
     sections = [study_sections.history(tables)] if "history" in tables else []
     sections.append(fit_sections.residuals(tables, summary))
     if "accuracy_map" in tables:
@@ -51,10 +50,10 @@ def run(inputs: Mapping[str, Any], settings: Settings) -> Page:
         opened = campaigns.open_(summary.campaign.folder)
         sections.append(campaign.section(opened, report.tables(opened)))
     sections += [make(tables) for needed, make in _OF_THE_STUDY if needed in tables]
-    return Page(first_screen(summary, settings.get("outdated", ())), sections)
+    return Page(first_screen(summary, left_out), sections)
 
 
-def first_screen(summary: CalibrationSummary, left_out: Sequence[str] = ()) -> FirstScreen:
+def first_screen(summary: CalibrationSummary, left_out: Sequence[str]) -> FirstScreen:
     """The answer, the errors before and after, and what is open.
 
     ``left_out``: tables made from others than those now there.
@@ -67,13 +66,19 @@ def first_screen(summary: CalibrationSummary, left_out: Sequence[str] = ()) -> F
     about, *answers = terminal.headline(summary)
     steps = [text for item in summary.next_steps.items() for text in (f"{item[0]}:", item[1])]
     notes = {"Next": steps, **terminal.notes(summary, None)}
+    problems = len(summary.open_findings)
+    badge = f"DATA: {counted(problems, 'problem')}" if problems else "DATA: OK"
+    if summary.synthetic:
+        badge = "SYNTHETIC ARM"
+    elif not summary.checked:
+        badge = "DATA: not checked"
     if left_out:
         made = f"{', '.join(left_out)}: made from other tables than those here, so not shown"
         notes["Left out"] = [made, "kinacc check-results"]
     return FirstScreen(
         summary.name,
         about,
-        _badge(summary),
+        (badge, not summary.synthetic and badge != "DATA: OK"),
         answers,
         [
             Table(
@@ -84,13 +89,3 @@ def first_screen(summary: CalibrationSummary, left_out: Sequence[str] = ()) -> F
         ],
         notes,
     )
-
-
-def _badge(summary: CalibrationSummary) -> tuple[str, bool]:
-    """The result of the data check in two or three words, and whether it is a warning."""
-    if summary.synthetic:
-        return "SYNTHETIC ARM", False
-    if not summary.checked:
-        return "DATA: not checked", True
-    count = len(summary.open_findings)
-    return (f"DATA: {counted(count, 'problem')}", True) if count else ("DATA: OK", False)

@@ -198,11 +198,9 @@ def vec_errors(
     Positions (k, m) in deg or mm, errors (k, 6, m) in mm and mrad, and their standard
     deviations, NaN where the covariance is unknown.
     """
-    places = np.linspace(-1.0, 1.0, _PLACES)
-    low, high = model.domain
-    joints = 0.5 * (low + high)[:, None] + 0.5 * (high - low)[:, None] * places
-    prismatic = np.asarray(robot.dh.prismatic)
-    basis = np.polynomial.chebyshev.chebvander(places, model.order)
+    joints = np.linspace(*model.domain, _PLACES, axis=1)
+    prismatic = robot.dh.prismatic
+    basis = np.polynomial.chebyshev.chebvander(np.linspace(-1.0, 1.0, _PLACES), model.order)
     known, covariance = uncertainty(tables, "vec"), pd.DataFrame()
     if known is not None:
         covariance = pd.DataFrame(known.covariance, index=known.names, columns=known.names)

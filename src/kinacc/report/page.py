@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import base64
+from base64 import b64encode
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,8 +16,6 @@ from kinacc.report.rendering import environment, text_of
 if TYPE_CHECKING:
     from bokeh.models import LayoutDOM
     from matplotlib.figure import Figure
-
-_SCRIPTS = ("bokeh", "bokeh-widgets")
 
 
 @dataclass(frozen=True)
@@ -72,14 +70,13 @@ class FirstScreen:
 
 @dataclass(frozen=True)
 class Page:
-    """A whole page: the answer, then the evidence; ``marks`` are its provenance."""
+    """A whole page: the answer, then the evidence."""
 
     first: FirstScreen
     sections: Sequence[Part]
-    marks: Mapping[str, str] = field(default_factory=dict)
 
 
-def html(page: Page, marks: Mapping[str, object] | None = None) -> str:
+def html(page: Page, marks: Mapping[str, object]) -> str:
     """The page as one file.
 
     Parameters
@@ -87,25 +84,35 @@ def html(page: Page, marks: Mapping[str, object] | None = None) -> str:
     page
         First screen and sections.
     marks
-        Provenance by name, beside that of the page.
+        Provenance by name.
 
     Returns
     -------
     str
         HTML with all styles, pictures and scripts in it.
     """
+    import bokeh
     from bokeh.core.types import ID
     from bokeh.embed import json_item
+
+    from kinacc.figures.save import render
 
     charts = {
         f"chart-{part.key}-{name}": chart
         for part in page.sections
         for name, chart in part.charts.items()
     }
+    scripts, library = Path(bokeh.__file__).parent / "server/static/js", ""
+    if charts:
+        names = ("bokeh.min.js", "bokeh-widgets.min.js")
+        library = "\n".join((scripts / name).read_text("utf-8") for name in names)
     templates = environment()
     sections = []
     for part in page.sections:
-        drawn = {name: _image(figure) for name, figure in part.figures.items()}
+        drawn = {
+            name: f"data:image/svg+xml;base64,{b64encode(render(figure, ('svg',))['svg']).decode()}"
+            for name, figure in part.figures.items()
+        }
         drawn |= {name: f"chart-{part.key}-{name}" for name in part.charts}
         template = templates.get_template(f"{part.key}.html")
         body = template.make_module({**part.rows(), "pictures": drawn})
@@ -113,24 +120,9 @@ def html(page: Page, marks: Mapping[str, object] | None = None) -> str:
     return templates.get_template("page.html").render(
         page=page,
         sections=sections,
-        marks={"kinacc_version": __version__, **page.marks, **(marks or {})},
+        marks={"kinacc_version": __version__, **marks},
         style=text_of("page.css"),
         script=text_of("page.js"),
-        library=_library() if charts else "",
+        library=library,
         charts={name: json_item(chart, ID(name)) for name, chart in charts.items()},
     )
-
-
-def _library() -> str:
-    import bokeh
-
-    folder = Path(bokeh.__file__).parent / "server/static/js"
-    return "\n".join((folder / f"{name}.min.js").read_text("utf-8") for name in _SCRIPTS)
-
-
-def _image(figure: Figure) -> str:
-    """A figure as the address of an image."""
-    from kinacc.figures.save import render
-
-    content = render(figure, ("svg",))["svg"]
-    return "data:image/svg+xml;base64," + base64.b64encode(content).decode()

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
+from kinacc.calibration.summary import reported_joints
 from kinacc.config.error_models import model_name
 from kinacc.figures import history_over_time
 from kinacc.figures.fig3 import cell_size
@@ -48,8 +49,8 @@ def history(tables: Tables) -> Part:
 def accuracy_map(tables: Tables, robot: Robot) -> Part:
     """The cells of ``accuracy_map``."""
     table = pd.DataFrame(tables["accuracy_map"])
-    slides = np.asarray(robot.dh.prismatic)
-    joints = table[[f"q{joint}" for joint in range(1, len(slides) + 1)]].to_numpy()
+    slides = robot.dh.prismatic
+    joints = reported_joints(tables["accuracy_map"], len(slides))
     degrees = joints * np.where(slides, 1.0, 180.0 / np.pi)
     texts = [", ".join(f"{angle:.1f}" for angle in row) for row in degrees]
     reached = (table["solutions"] > 0).to_numpy()

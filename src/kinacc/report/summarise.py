@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import shlex
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -84,7 +83,10 @@ def summarise(
         optional = [name for name in OPTIONAL if name not in old]
         tables = results.read_tables(folder, needed=figures.TABLES, optional=optional)
     arm, selected = results.robot_of(tables), figures.selected(tables["model_selection"])
-    name = folder.resolve().name
+    name, made = folder.resolve().name, folder / "model_selection.parquet"
+    written = ""
+    if made.is_file():
+        written = datetime.fromtimestamp(made.stat().st_mtime, UTC).date().isoformat()
     places = of_results(folder) if campaigns is None else campaigns
     campaign, remarks = of_calibration.newest(name, selected, tables, places)
     measurements, noted = tables["measurements"], findings(tables.get("data_check"))
@@ -99,10 +101,11 @@ def summarise(
     turned = (errors["quantity"] == "orientation") & (errors["reference"] == MEASURED)
     rows = np.asarray(measurements.get("row", [np.nan]), dtype=float)
     synthetic = not np.isfinite(rows).any()
+    stated_mm = [measurements[f"std_{axis}_mm"] for axis in "xyz"]
     return CalibrationSummary(
         name=name,
         folder=str(folder),
-        written=_written(folder / "model_selection.parquet"),
+        written=written,
         measured=_measured(name, tables.get("history")),
         robot=arm.name,
         synthetic=synthetic,
@@ -126,7 +129,7 @@ def summarise(
         excluded=excluded(tables),
         compliance=compliance(tables.get("compliance_model")),
         noise_mm=fits[0].noise.per_axis_mm,
-        stated_noise_mm=_stated_noise_mm(measurements),
+        stated_noise_mm=float(np.sqrt(np.mean(np.square(stated_mm)))),
         held_out_over_noise={fit.model: fit.ratio for fit in fits},
         campaign=campaign,
         remarks=remarks,
@@ -206,15 +209,11 @@ def summarise_all(
                 raise input_error(str(path), what, fix=store.remake(path))
             summaries.append(summarise(folder, outdated=outdated))
         except InputError as error:
-            problem = error.problems[0]
-            if problem.where not in (str(path), str(folder)):
-                what = f"{problem.where}: {problem.what}"
-                problem = replace(problem, where=str(folder), what=what)
-            summaries.append(problem)
+            summaries.append(Problem(str(folder), str(error.problems[0])))
     return summaries
 
 
-def run(inputs: Tables, settings: Settings) -> dict[str, Columns]:
+def run(inputs: Tables, settings: Settings) -> Tables:
     """The stage ``summary``: figures of a calibration, one a row."""
     arm = results.robot_of(inputs)
     calibration = results.calibration(inputs)
@@ -252,18 +251,13 @@ def _error_rows(errors: pd.DataFrame) -> Iterable[tuple[Any, ...]]:
 def _selection(tables: Tables) -> pd.DataFrame:
     names = ["model", "selected", "held_out_rms_mm", "gain_mm2", "gain_std_error_mm2"]
     choice = pd.DataFrame(tables["model_selection"])[names].astype({"selected": bool})
-    rows = [row | _orders(tables, row["model"]) for row in choice.to_dict("records")]
+    rows = choice.to_dict("records")
+    for row in rows:
+        order = tables.get(f"{row['model']}_model", {}).get("order")
+        tried = np.unique(tables.get(f"{row['model']}_orders", {}).get("order", ()))
+        row["order"] = None if order is None else int(np.max(order))
+        row["highest_order_tried"] = int(tried[-1]) if len(tried) > 1 else None
     return pd.DataFrame(rows, dtype=object)
-
-
-def _orders(tables: Tables, model: str) -> dict[str, int | None]:
-    """The order of a model, and the highest where several were tried."""
-    order = tables.get(f"{model}_model", {}).get("order")
-    tried = np.unique(tables.get(f"{model}_orders", {}).get("order", ()))
-    return {
-        "order": None if order is None else int(np.max(order)),
-        "highest_order_tried": int(tried[-1]) if len(tried) > 1 else None,
-    }
 
 
 def joint_ranges(measurements: Columns, arm: Robot) -> pd.DataFrame:
@@ -335,16 +329,10 @@ def tolerance_of(tables: Tables) -> Tolerance | None:
 def _claims(claims: Columns) -> dict[str, Any]:
     table = pd.DataFrame(claims)
     table = table[~table["used_to_choose"].astype(bool)]  # these chose a reading: no evidence
-    counts = {name: int((table["verdict"] == name).sum()) for name in VERDICTS}
-    agree, differ, open_ = counts.values()
+    counts = table["verdict"].value_counts().reindex(VERDICTS, fill_value=0)
+    agree, differ, open_ = counts.tolist()
     differing = tuple(table["claim"][table["verdict"] == VERDICTS[1]])
     return {"agree": agree, "differ": differ, "not_comparable": open_, "differing": differing}
-
-
-def _stated_noise_mm(measurements: Columns) -> float:
-    """Rms over readings and axes of the standard deviations in the file, NaN without any."""
-    axes = [measurements[f"std_{axis}_mm"] for axis in "xyz"]
-    return float(np.sqrt(np.mean(np.square(axes))))
 
 
 def _measured(name: str, history: Columns | None) -> str:
@@ -355,12 +343,6 @@ def _measured(name: str, history: Columns | None) -> str:
     return day[1] if day else ""
 
 
-def _written(path: Path) -> str:
-    if not path.is_file():
-        return ""
-    return datetime.fromtimestamp(path.stat().st_mtime, UTC).date().isoformat()
-
-
 def _next_steps(folder: str, model: str, campaign: Any) -> dict[str, str]:
     place = shlex.quote(folder)
     option = "" if model == PLAINEST else f" --model {model}"
@@ -368,8 +350,7 @@ def _next_steps(folder: str, model: str, campaign: Any) -> dict[str, str]:
     bound = "bound the largest error; NOISE is the standard deviation of a reading in mm"
     first = {bound: start}
     if campaign is not None:
-        ended = campaign.next_point is None
-        first = {f"{'report on' if ended else 'continue'} the campaign": campaign.next_command}
+        first = {"the campaign": campaign.next_command}
     return first | {
         "a robot program, corrected": f"kinacc compensate {place} --program PROGRAM -o CORRECTED",
         "files of the model for simulators": f"kinacc export {place}{option} --out exported",

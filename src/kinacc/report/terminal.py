@@ -34,8 +34,8 @@ class _Console(Console):
         raise BrokenPipeError
 
 
-def screen(width: int | None = None) -> Console:
-    """The standard output, as wide as the terminal by default."""
+def screen(width: int) -> Console:
+    """The standard output, so many characters wide."""
     return _Console(file=sys.stdout, width=width, highlight=False, markup=False, emoji=False)
 
 
@@ -116,15 +116,9 @@ def fleet_table(
     rows: list[dict[str, object]] = []
     for result in results:
         if isinstance(result, Problem):
-            folder = result.where.removesuffix("/summary.parquet")
-            rows.append(
-                {
-                    "data_set": folder.rpartition("/")[2],
-                    "verdict": UNDECIDED,
-                    "reason": str(result),
-                    "folder": folder,
-                }
-            )
+            name, folder = Path(result.where).name, result.where
+            unread = {"verdict": UNDECIDED, "reason": str(result), "folder": folder}
+            rows.append({"data_set": name, **unread})
             continue
         best = result.best if result.is_held_out else None
         status = result.campaign

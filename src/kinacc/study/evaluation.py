@@ -57,7 +57,7 @@ def equipped(inputs: Tables, evaluation: Settings, arm: Robot) -> Models:
     return Models(by_name, np.full(arm.dh.joints, direction) if direction else None)
 
 
-def mapped(inputs: Tables, settings: Settings) -> dict[str, Columns]:
+def mapped(inputs: Tables, settings: Settings) -> Tables:
     """``accuracy_map`` from ``vec_model`` and ``dh_model`` (and ``frames``, if given)."""
     slices_deg = np.array(settings["map"]["slices_deg"], dtype=float)
     wanted = poses_wanted(settings["evaluation"])
@@ -77,7 +77,7 @@ def mapped(inputs: Tables, settings: Settings) -> dict[str, Columns]:
     return {"accuracy_map": columns | _numbered("q", joints)}
 
 
-def points(inputs: Tables, settings: Settings) -> dict[str, Columns]:
+def points(inputs: Tables, settings: Settings) -> Tables:
     """``assessment_points`` of a modelled space, or chosen from what was measured."""
     section, arm = settings["evaluation"], robot.load(settings["robot"])
     if section["space"] == "measured":

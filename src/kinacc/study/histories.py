@@ -135,7 +135,7 @@ def examples(
 def run(
     inputs: Tables,
     settings: Settings,
-) -> dict[str, Columns]:
+) -> Tables:
     """Return ``histories``."""
     points, study = inputs["assessment_points"], settings["study"]
     rows = histories(

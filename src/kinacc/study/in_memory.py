@@ -14,7 +14,7 @@ from kinacc.study import evaluation, histories, monte_carlo
 from kinacc.synthetic import source
 from kinacc.tables.columns import Columns, Tables
 
-RUNS: dict[str, Callable[..., dict[str, Columns]]] = {
+RUNS: dict[str, Callable[..., Tables]] = {
     "measurements": source.run,
     **{kind: partial(stages.fit_model, kind=kind) for kind in ALWAYS},
     "residuals": stages.compare_models,
@@ -26,7 +26,7 @@ RUNS: dict[str, Callable[..., dict[str, Columns]]] = {
 }
 
 
-def run(names: Sequence[str], config: Settings, tables: Tables) -> dict[str, Columns]:
+def run(names: Sequence[str], config: Settings, tables: Tables) -> Tables:
     """``tables`` and all that the stages ``names``, in this order, make of them.
 
     ``config`` is the complete configuration of one data set.
@@ -45,7 +45,7 @@ def without_folds(measurements: Columns) -> dict[str, np.ndarray]:
     return {**measurements, "fold": np.full(len(measurements["pose"]), np.nan)}
 
 
-def lean(name: str, config: Settings, tables: Tables) -> dict[str, Columns]:
+def lean(name: str, config: Settings, tables: Tables) -> Tables:
     """What a stage makes where only claims are wanted: without folds and further readings.
 
     No claim is about held-out poses or other readings than the configured one.

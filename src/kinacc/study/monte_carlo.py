@@ -150,10 +150,6 @@ def simulate(
     return pd.DataFrame(rows).astype({"lower_mm": float, "upper_mm": float})
 
 
-def _can_assess(item: object) -> bool:
-    return not isinstance(item, type) and (hasattr(item, "begin") or hasattr(item, "assess"))
-
-
 def name_of(assessor: object) -> str:
     """Name of an assessor in tables."""
     return str(getattr(assessor, "name", type(assessor).__name__))
@@ -225,7 +221,11 @@ def evaluate_assessors(
         )
         if not isinstance(value, (int, np.integer)) or value < least
     ]
-    if not assessors or not all(map(_can_assess, assessors)):
+    can_assess = (
+        not isinstance(item, type) and (hasattr(item, "begin") or hasattr(item, "assess"))
+        for item in assessors
+    )
+    if not assessors or not all(can_assess):
         problems.append(Problem("assessors", f"{assessors}", "objects with begin(candidates)"))
     if not levels.size or not np.all(np.isfinite(levels) & (levels > 0.0)):
         problems.append(Problem("noise_mm", f"{noise_mm}", "above 0, in mm"))
@@ -298,7 +298,7 @@ def _columns(artefact: str, table: pd.DataFrame) -> Columns:
 def simulated(
     inputs: Tables,
     settings: Settings,
-) -> dict[str, Columns]:
+) -> Tables:
     """Return ``study_chunk`` for ``settings["part"]`` (default: all repetitions).
 
     ``settings["all_readings"]`` false: the reading that ``study`` names alone.
@@ -318,7 +318,7 @@ def simulated(
     return {"study_chunk": _columns("study_chunk", ordered(rows))}
 
 
-def summed_up(inputs: Tables, settings: Settings) -> dict[str, Columns]:
+def summed_up(inputs: Tables, settings: Settings) -> Tables:
     """Return ``study``, ``study_summary`` and ``readings``."""
     true_mm = float(np.max(inputs["assessment_points"]["true_error_mm"]))
     rows = ordered(pd.DataFrame(dict(inputs["study_chunk"])))

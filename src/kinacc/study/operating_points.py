@@ -33,10 +33,14 @@ def in_space(
     Five coordinates per draw: radius, angle and height (even over the volume), orientation,
     branch. Draws without a solution within the limits and the fitted range are passed over.
     ``wrist`` keeps to the branches of one wrist configuration, ``noflip`` or ``flip``. Raises
-    InputError, with the reasons counted, where the space holds too few, and where the arm has no
-    such wrist.
+    InputError where the space holds too few, and where the arm has no such wrist.
     """
-    branches = _branches(robot, wrist)
+    names = inverse.machining_branches(robot)
+    chosen = [i for i, name in enumerate(names) if wrist in ("both", name.rpartition("-")[2])]
+    if not chosen:
+        message = f"{wrist}, but robot {robot.name} has no branch of that wrist"
+        raise input_error("evaluation.wrist", message, "both")
+    branches = np.array(chosen)
 
     def solve(unit: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         cells = region.fill(wanted.cylinder, unit[:, :3])
@@ -58,31 +62,16 @@ def _drawn(
     solve: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]],
 ) -> np.ndarray:
     """The first ``count`` of the joints that ``solve`` finds, with their status, for draws."""
-    blocks, counts, block = [], np.zeros(len(Status), dtype=int), max(count, 256)
+    found, block = np.empty((0, 0)), max(count, 256)
     for first in range(1, _DRAWS_PER_POINT * count + 1, block):
         q_rad, status = solve(region.points(sequence, block, dimensions, first))
-        counts += np.bincount(status, minlength=len(Status))
-        blocks.append(q_rad[status == Status.FOUND])
-        if counts[Status.FOUND] >= count:
-            return np.concatenate(blocks)[:count]
-    reasons = ", ".join(
-        f"{number} {status.name.lower().replace('_', ' ')}"
-        for status, number in zip(Status, counts, strict=True)
-        if status != Status.FOUND and number
-    )
-    message = f"only {counts[Status.FOUND]} of {counts.sum()} draws can be assessed ({reasons})"
+        q_rad = q_rad[status == Status.FOUND]
+        found = np.concatenate([found, q_rad]) if len(found) else q_rad
+        if len(found) >= count:
+            return found[:count]
+    message = f"only {len(found)} of {_DRAWS_PER_POINT * count} draws can be assessed"
     fix = "move or enlarge the evaluation space, or fit the VEC model over a wider joint range"
     raise input_error("evaluation.cylinder", message, f"{count} points", fix)
-
-
-def _branches(robot: Robot, wrist: str) -> np.ndarray:
-    """Numbers of the machining branches that have the ``wrist``."""
-    names = inverse.machining_branches(robot)
-    chosen = [i for i, name in enumerate(names) if wrist in ("both", name.rpartition("-")[2])]
-    if not chosen:
-        message = f"{wrist}, but robot {robot.name} has no branch of that wrist"
-        raise input_error("evaluation.wrist", message, "both")
-    return np.array(chosen)
 
 
 def in_joints(
@@ -91,7 +80,7 @@ def in_joints(
     """DH joint angles (count, k) drawn evenly within the limits of the reported joints.
 
     Only configurations within the range of the reference are kept whose tool (assessed model) lies
-    in the cylinder. Raises InputError, with the reasons counted, where too few qualify.
+    in the cylinder. Raises InputError where too few qualify.
     """
     limited = robot.q_min_rad, robot.q_max_rad
     lower, upper = limits.cut_to_range(robot, *limited, models.range_rad)

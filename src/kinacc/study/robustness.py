@@ -24,7 +24,7 @@ STAGES = (
 )
 
 
-def run(inputs: Tables, settings: Settings) -> dict[str, Columns]:
+def run(inputs: Tables, settings: Settings) -> Tables:
     """Return ``robustness_chunk`` for ``settings["part"]`` (default: all further draws).
 
     Raises InputError where fewer draws were accepted than are wanted.
@@ -58,7 +58,7 @@ def claims_on(draw: int, config: Settings) -> Columns:
     return {"draw": np.full(len(claims["claim"]), draw), **rows}
 
 
-def gathered(inputs: Tables, settings: Settings) -> dict[str, Columns]:
+def gathered(inputs: Tables, settings: Settings) -> Tables:
     """Return ``robustness``: by draw, then in the order of the claims."""
     rows = inputs["robustness_chunk"]
     order = np.argsort(rows["draw"], kind="stable")

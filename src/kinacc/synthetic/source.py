@@ -13,11 +13,11 @@ from kinacc.kinematics import region, robot
 from kinacc.measurements.folds import split
 from kinacc.measurements.reader import read
 from kinacc.synthetic import measure
-from kinacc.tables.columns import Columns
+from kinacc.tables.columns import Columns, Tables
 from kinacc.tables.contract import columns_of
 
 
-def run(inputs: Mapping[str, Any], settings: Settings) -> dict[str, Columns]:
+def run(inputs: Mapping[str, Any], settings: Settings) -> Tables:
     """``measurements`` of the configured source, with fold and subset, and ``robot``."""
     arm, section = robot.load(settings["robot"]), settings["measurements"]
     if section["source"] == "synthetic":

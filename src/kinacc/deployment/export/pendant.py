@@ -15,12 +15,13 @@ from kinacc.calibration.observations import Observations
 from kinacc.config.error_models import NOMINAL, PLAINEST, model_name
 from kinacc.config.records import Settings
 from kinacc.deployment.export.controllers import CONTROLLERS, ZEROS, Controller, Numbers
-from kinacc.deployment.folder import Tables, robot_of, selected_model
+from kinacc.deployment.folder import robot_of, selected_model
 from kinacc.deployment.record import POSES
 from kinacc.errors import input_error
 from kinacc.geometry import Pose, compose, invert
 from kinacc.kinematics.dh import PARAMETERS
 from kinacc.kinematics.robot import Robot
+from kinacc.tables.columns import Tables
 
 
 @dataclass(frozen=True)

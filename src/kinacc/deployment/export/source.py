@@ -17,6 +17,7 @@ from kinacc.deployment import folder as results
 from kinacc.deployment.record import STATED, Calibration
 from kinacc.kinematics.dh import PARAMETERS, DHModel
 from kinacc.tables import store
+from kinacc.tables.columns import Tables
 from kinacc.tables.contract import PROVENANCE_KEYS
 
 CONVENTION = "T = Rz(q + theta_offset) Tz(d) Tx(a) Rx(alpha) Ry(beta) per joint"
@@ -31,7 +32,7 @@ class Source:
     """
 
     calibration: Calibration
-    tables: results.Tables
+    tables: Tables
     provenance: Mapping[str, str] = field(default_factory=dict)
     urdf_file: Path | str | None = None
     links: tuple[str | None, str | None] = (None, None)

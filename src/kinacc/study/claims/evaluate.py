@@ -74,7 +74,7 @@ def _unlike_the_paper(settings: Settings) -> list[str]:
     return [f"{key} {values[key]}" for key in values.index if values[key] != paper[key]]
 
 
-def table_of(inputs: Tables, settings: Settings) -> dict[str, Columns]:
+def table_of(inputs: Tables, settings: Settings) -> Tables:
     """Return ``claims``; numbers of Tables I to III are compared on the paper's arm only.
 
     A share is that of the further draws on which the claim could be judged. Warns of settings
