@@ -209,7 +209,8 @@ def summarise_all(
                 raise input_error(str(path), what, fix=store.remake(path))
             summaries.append(summarise(folder, outdated=outdated))
         except InputError as error:
-            summaries.append(Problem(str(folder), str(error.problems[0])))
+            text = str(error.problems[0]).removeprefix(f"{folder}: ")
+            summaries.append(Problem(str(folder), text))
     return summaries
 
 

@@ -17,7 +17,7 @@ from kinacc.config.error_models import PLAINEST
 from kinacc.errors import Problem, as_seen, first_few
 from kinacc.report.rendering import counted, lines
 from kinacc.report.summarise import summarise, summarise_all
-from kinacc.report.summary import BOUND, CalibrationSummary
+from kinacc.report.summary import BOUND, CalibrationSummary, Verdict
 
 FEW = 4  # data sets whose summaries are printed one after another
 WIDTH = 100
@@ -121,28 +121,23 @@ def fleet_table(
             rows.append({"data_set": name, **unread})
             continue
         best = result.best if result.is_held_out else None
-        status = result.campaign
-        bound = result.bound
-        verdict = result.verdict(by, tolerance_mm)
+        status, bound = result.campaign, result.bound
+        verdict = result.verdict(by, tolerance_mm) or Verdict("", "", math.nan)
         rows.append(
             {
                 "data_set": result.name,
-                "verdict": getattr(verdict, "verdict", ""),
+                "verdict": verdict.verdict,
                 "model": result.selected,
                 "held_out_mean_mm": getattr(best, "mean", math.nan),
                 "held_out_99_mm": getattr(best, "quantile_99", math.nan),
                 "held_out_largest_mm": getattr(best, "largest", math.nan),
-                "held_out_rows": getattr(best, "n", 0),
                 "bound_mm": getattr(bound, "upper_mm", math.nan),
-                "lower_mm": getattr(bound, "lower_mm", math.nan),
                 "confidence": getattr(bound, "confidence", math.nan),
                 "campaign_date": status.recorded[:_DAY] if status else "",
                 "measured": result.measured,
                 "file_date": result.written,
-                "tolerance_mm": getattr(verdict, "tolerance_mm", math.nan),
-                "reason": getattr(verdict, "reason", ""),
-                "open_findings": len(result.open_findings),
-                "campaign": status.folder if status else "",
+                "tolerance_mm": verdict.tolerance_mm,
+                "reason": verdict.reason,
                 "bound_of": f"{bound.about}, {status.point}" if bound and status else "",
                 "assumptions": status.assumes if status else "",
                 "remarks": "; ".join([*result.remarks, *result.doubts]),
