@@ -15,7 +15,7 @@ from kinacc.deployment import folder as results
 from kinacc.deployment.export import files, source
 from kinacc.deployment.export.controllers import CONTROLLERS
 from kinacc.deployment.export.pendant import fit_pendant
-from kinacc.errors import Problem, refuse
+from kinacc.errors import input_error
 from kinacc.report.rendering import environment, lines
 from kinacc.workflow.described import calibration_settings
 
@@ -60,15 +60,11 @@ def export(
       kinacc export results/ur10_b --for ur --out exported
     """
     wanted = formats or files.formats_of(model)
-    about_urdf = {"--base-link": base_link, "--tip-link": tip_link}
-    problems = [
-        Problem(option, "is given without a file of yours", fix="give --urdf as well")
-        for option, value in about_urdf.items()
-        if value is not None and urdf is None
-    ]
+    if urdf is None and (base_link or tip_link):
+        message = "are given without a file of yours"
+        raise input_error("--base-link, --tip-link", message, fix="give --urdf as well")
     if urdf is not None and "urdf" not in wanted:
-        problems.append(Problem("--urdf", f"{urdf} is not wanted", "with --format urdf"))
-    refuse(problems, "Nothing was written")
+        raise input_error("--urdf", f"{urdf} is not wanted", "with --format urdf")
     reason = choice.print_outdated(folder)
     if maker is not None:
         _to_controller(folder, target, maker, out)

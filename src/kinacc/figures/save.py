@@ -41,15 +41,21 @@ def render(figure: Figure, formats: Iterable[str]) -> dict[str, bytes]:
     """
     contents = {}
     with style.house():
-        if engine := figure.get_layout_engine():
-            engine.execute(figure)
-            # Settled once; "none" would leave a placeholder, and matplotlib draw everything twice.
-            figure.set_layout_engine(None)
+        settle(figure)
         for name in formats:
             buffer, (dpi, marks) = BytesIO(), _SAVED[name]
             figure.savefig(buffer, format=name, dpi=dpi, metadata=dict.fromkeys(marks))
             contents[name] = buffer.getvalue()
     return contents
+
+
+def settle(figure: Figure) -> None:
+    """Run the layout once and freeze it, so later drawing neither repeats nor changes it."""
+    engine = figure.get_layout_engine()
+    if engine is not None:
+        engine.execute(figure)
+        # "none" would leave a placeholder, for which matplotlib draws everything twice.
+        figure.set_layout_engine(None)
 
 
 def write(figure: Figure, paths: Mapping[str, Path]) -> None:

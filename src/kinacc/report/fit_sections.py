@@ -119,10 +119,16 @@ def identifiability(tables: Tables, robot: Robot, summary: CalibrationSummary) -
     for column in ("parameter", "other"):
         pairs[column] = pairs[column].map(parameter_name)
     counts = table["status"].map(_STATUSES).value_counts()
+    rank, fit = None, pd.DataFrame(tables.get("dh_fit", {"quantity": (), "value": ()}))
+    known = fit.set_index("quantity")["value"].astype(float)
+    if "singular_value" in known and known["rank"]:
+        share = known.loc[["singular_value"]].to_numpy()
+        limit = known["rank_threshold"]
+        rank = {"rank": int(known["rank"]), "threshold": limit, "share": share / share[0]}
     values = {
         "s": summary,
         "counts": counts.reindex(_STATUSES.values(), fill_value=0).to_dict(),
-        "rank": _rank(tables.get("dh_fit")),
+        "rank": rank,
         "close": int((pairs["correlation"].abs() >= _CLOSE).sum()),
         "limit": _CLOSE,
         "pairs": pairs[:_WORST],
@@ -130,21 +136,6 @@ def identifiability(tables: Tables, robot: Robot, summary: CalibrationSummary) -
         "deviations": in_words([misfit(tables, robot, "dh")]),
     }
     return Part("identifiability", values)
-
-
-def _rank(fit: Columns | None) -> dict[str, object] | None:
-    """Number of fitted directions, the limit, and singular values over the largest."""
-    if fit is None:
-        return None
-    values = pd.Series(np.asarray(fit["value"], dtype=float), index=fit["quantity"])
-    if "singular_value" not in values or not values["rank"]:
-        return None
-    share = values.loc[["singular_value"]].to_numpy()
-    return {
-        "rank": int(values["rank"]),
-        "threshold": values["rank_threshold"],
-        "share": share / share[0],
-    }
 
 
 def parameters(tables: Tables, robot: Robot, summary: CalibrationSummary) -> Part:

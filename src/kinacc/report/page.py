@@ -6,16 +6,18 @@ from base64 import b64encode
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import bokeh
 import pandas as pd
+from bokeh.core.types import ID
+from bokeh.embed import json_item
+from bokeh.models import LayoutDOM
+from matplotlib.figure import Figure
 
 from kinacc import __version__
+from kinacc.figures.save import render
 from kinacc.report.rendering import environment, text_of
-
-if TYPE_CHECKING:
-    from bokeh.models import LayoutDOM
-    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True)
@@ -91,12 +93,6 @@ def html(page: Page, marks: Mapping[str, object]) -> str:
     str
         HTML with all styles, pictures and scripts in it.
     """
-    import bokeh
-    from bokeh.core.types import ID
-    from bokeh.embed import json_item
-
-    from kinacc.figures.save import render
-
     charts = {
         f"chart-{part.key}-{name}": chart
         for part in page.sections
