@@ -30,7 +30,8 @@ def test_headers_of_a_language_are_read(language, tmp_path):
     files = written(tmp_path, m_csv=table(names, IT.q, IT.point + 1.5, IT.point, mark=";"))
     guess = guesses.look(files, {})
     assert_read(guess.section, IT)
-    assert guess.unused() == dict.fromkeys(map(nominal.format, "XYZ"), "nominal")
+    unread = [nominal.format(axis) for axis in "XYZ"]
+    assert guess.reasons(unread) == dict.fromkeys(unread, "nominal")
 
 
 def described_with(tmp_path, *columns, names=(), options=()):

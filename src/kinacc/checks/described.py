@@ -106,7 +106,8 @@ def corrected(guess: Guess, robot: Robot, name: str) -> tuple[Guess, Report, Mea
     if robot.dh.joints != guess.joints:
         message = f"{robot.name} has {robot.dh.joints} joints, the file {guess.joints}"
         fix = f"joints are J1 .. J{robot.dh.joints} in the robot's order"
-        if unused := ", ".join(guess.unused()):
+        read_columns = guess.columns.read()
+        if unused := ", ".join(name for name in guess.table.columns if name not in read_columns):
             fix += f"; rename theirs among the columns not used: {unused}"
         raise input_error("--robot", message, fix=fix)
     for _ in range(3):

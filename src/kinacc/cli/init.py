@@ -104,7 +104,7 @@ def init(measurement_files: tuple[str, ...], out: Output, **options: Any) -> Non
         click.echo("First poses as understood (joints in deg, positions in mm, rotation vectors):")
         print_table(poses.dropna(axis=1, how="all"))
     how = "assumed" if report is None or report.stopping else "assumed, and the readings agree"
-    unused = guess.unused()
+    unused = guess.reasons(reading.unused)
     unread = {
         why: ", ".join(column for column in unused if unused[column] == why)
         for why in unused.values()

@@ -11,7 +11,7 @@ import pyarrow as pa
 
 from kinacc.errors import InputError, Problem, first_few
 from kinacc.tables import store
-from kinacc.tables.columns import Artefact, Column, joint_count
+from kinacc.tables.columns import Artefact, Column
 
 
 def check_file(path: Path, artefact: Artefact) -> list[Problem]:
@@ -41,7 +41,7 @@ def check_file(path: Path, artefact: Artefact) -> list[Problem]:
         message = f"columns of another type, unit or meaning: {first_few(wrong)}"
         return [Problem(str(path), message)]
     problems: list[Problem] = []
-    for column in artefact.in_file(joint_count(artefact, frame.columns), frame.columns):
+    for column in artefact.in_file(frame.columns):
         problems += _values(f"{path}, column {column.name}", column, frame[column.name])
     repeated = frame.duplicated([*artefact.key], keep=False)
     if not len(frame) and not artefact.may_be_empty:

@@ -20,7 +20,6 @@ from kinacc.errors import first_few, input_error
 from kinacc.gate.chance import STATISTICS, Sample
 from kinacc.measurements.folds import configurations_of
 from kinacc.tables import store, sums
-from kinacc.tables.columns import joint_count
 from kinacc.tables.contract import ARTEFACTS
 
 SELECTED = "selected"
@@ -134,7 +133,7 @@ def cell(tables: RunTables, gate: Settings) -> Figure:
         fix = "name more columns in row" if len(table) else "other values in row"
         raise input_error(where, f"has {len(table)} such rows", "one row", fix)
     row = table.iloc[0]
-    known = ARTEFACTS[artefact].for_joints(joint_count(ARTEFACTS[artefact], table.columns))
+    known = ARTEFACTS[artefact].in_file(table.columns)
     unit = next(item.unit for item in known if item.name == column)
     unit = str(row["unit"]) if unit == "see unit" else unit
     size = pd.to_numeric(row[column], errors="coerce")

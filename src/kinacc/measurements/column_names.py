@@ -42,7 +42,7 @@ SPREAD = "an uncertainty"
 OTHER = "another quantity"
 
 _ROLE = {word: role for role, terms in WORDS["roles"].items() for word in terms}
-_COMMANDS = WORDS["roles"][NOMINAL] | WORDS["commands"]
+COMMANDS = WORDS["roles"][NOMINAL] | WORDS["commands"]
 # Types of RAPID: how a value is written, not whether it was wanted or measured.
 _TYPES = frozenset(("jointtarget", "robtarget"))
 _LETTERS_ALONE = {"d": DEVIATION, "δ": DEVIATION, "u": SPREAD, "σ": SPREAD}
@@ -194,11 +194,6 @@ def role(terms: Collection[str]) -> str:
 def decides(term: str) -> bool:
     """Whether a term is about the role of numbers, and so is no part of a target's name."""
     return term in _ROLE and term not in WORDS["reflectors"] | WORDS["frame"]
-
-
-def commands(terms: Collection[str]) -> bool:
-    """Whether terms of joints mean commanded ones."""
-    return role(terms) in (NOMINAL, OPEN) and bool(_COMMANDS & {*terms})
 
 
 def is_controller_pose(terms: Collection[str]) -> bool:

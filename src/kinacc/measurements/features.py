@@ -11,7 +11,7 @@ from itertools import product
 import numpy as np
 import pandas as pd
 
-from kinacc.errors import first_few, input_error
+from kinacc.errors import input_error
 from kinacc.measurements.column_names import (
     DEVIATION,
     MEASURED,
@@ -67,7 +67,7 @@ def by_feature(table: RawTable) -> RawTable:
     cells = table.columns.mask(table.columns.map(table.is_gap), None)
     cells[feature] = cells[feature].ffill()
     axes = table.columns[axis_column].map(axis_of)
-    rows, others = cells[axes != ""], table.columns[axis_column][axes == ""]
+    rows = cells[axes != ""]
     begins, known = list[bool](), set[tuple[str, str]]()
     for row in zip(rows[feature], axes[rows.index], strict=True):
         begins.append(row in known or row[0] not in {name for name, _ in known})
@@ -82,9 +82,8 @@ def by_feature(table: RawTable) -> RawTable:
         of_feature = rows[name].groupby(group)
         if (of_feature.nunique() < 2).all():  # and not of an axis
             columns[name] = of_feature.first()
-    notes = table.notes
-    if len(others):
-        kinds = first_few([*dict.fromkeys(map(str, others))])
-        notes += (f"{len(others)} rows of other quantities than X, Y, Z, not read ({kinds})",)
+    notes, others = table.notes, len(table) - len(rows)
+    if others:
+        notes += (f"{others} rows of other quantities than X, Y, Z, not read",)
     line = table.line[rows.index[begins]]
     return replace(table, columns=frame(columns), line=line, units=units, notes=notes)

@@ -31,36 +31,25 @@ from kinacc.tables import store
 BLANKS = "blanks"
 GROUPS, POINT = ("Collection", "Group"), "Point"  # columns of a list of points without names
 EXCEL = (".xlsx", ".xlsm")
-_OTHERS = {
-    ".xls": "a workbook of the old Excel format",
-    ".xlsb": "a binary workbook",
-    ".ods": "an OpenDocument sheet",
-    ".pdf": "a PDF file",
-    ".docx": "a text document",
-}
+_OTHERS = (".xls", ".xlsb", ".ods", ".pdf", ".docx")
+_LESS = "give the rows and columns of the measurements alone"
 _KINDS = "a CSV, text, Excel (.xlsx) or Parquet file"
 # What is held at once; calibrations are made from some hundred to some ten thousand rows.
 MOST_ROWS, MOST_COLUMNS, MOST_CELLS = 1_000_000, 10_000, 10_000_000
-MOST_BYTES, _MOST_UNPACKED = 500_000_000, 150_000_000  # a sheet of a million cells has some 40 MB
 _MOST_LINES = MOST_ROWS + 10_000  # titles and the like beside
+MOST_BYTES, _MOST_UNPACKED = 500_000_000, 150_000_000  # a sheet of a million cells has some 40 MB
 _WITH_BRACKETS = re.compile(r"(?:\{[^{}]*\}|\[(?:[^\[\]]|\[[^\[\]]*\])*\]|\S)+")
 
 
-def load(path: str | Path, layout: Layout | None = None, source: str | None = None) -> RawTable:
-    """Read a file that is written so. Raises InputError where it is missing, empty or ragged.
-
-    ``source``: where the data comes from, for the message on a missing file.
-    """
-    path, layout = Path(path), layout or Layout()
-    refuse_other_files(path, source)
+def load(path: str | Path, layout: Layout) -> RawTable:
+    """Read a file that is written so. Raises InputError where it is missing, empty or ragged."""
+    path = Path(path)
+    refuse_other_files(path, layout.source)
     if (table := as_it_is(path)) is not None:
         return table
     if path.suffix.lower() in EXCEL:
         with Workbook(path) as book:
             sheet = layout.sheet or book.sheets[0]
-            if sheet not in book.sheets:
-                where = f"{path}: measurements.file.sheet"
-                raise input_error(where, f"no sheet {sheet!r}", ", ".join(book.sheets))
             table = tabled(f"{path}, sheet {sheet!r}", book.rows(sheet), layout, sheet=True)
     else:
         refuse_large(path)
@@ -90,21 +79,26 @@ def refuse_other_files(path: Path, source: str | None = None) -> None:
     if not path.is_file():
         origin = f"the data comes from: {source}" if source else "check measurements.file.path"
         raise input_error(str(path), "no such file", _KINDS, origin)
-    if kind := _OTHERS.get(path.suffix.lower()):
+    if path.suffix.lower() in _OTHERS:
         fix = "save it as .xlsx or export it as CSV"
-        raise input_error(str(path), f"is {kind}, which is not read", _KINDS, fix)
+        raise input_error(str(path), "is of a kind that is not read", _KINDS, fix)
 
 
 def opened(path: Path, encoding: str) -> TextIO:
-    """A text file in one of our encodings; bytes that are none of its characters become U+FFFD."""
-    codec = {"utf-8": "utf-8-sig", "latin-1": "cp1252"}.get(encoding, encoding)
-    return open(path, newline="", encoding=codec, errors="replace")
+    """A text file in one of our encodings, without its byte order mark.
+
+    Bytes that are none of its characters become U+FFFD.
+    """
+    codec = "cp1252" if encoding == "latin-1" else encoding
+    stream = open(path, newline="", encoding=codec, errors="replace")  # noqa: SIM115 the caller's
+    if stream.read(1) != "\ufeff":
+        stream.seek(0)
+    return stream
 
 
 def _refuse_too_much(path: str, amount: str) -> None:
     allowed = f"at most {MOST_ROWS} rows, {MOST_COLUMNS} columns, {MOST_CELLS} cells, 500 MB"
-    fix = "give the rows and columns of the measurements alone"
-    raise input_error(path, amount, allowed, fix)
+    raise input_error(path, amount, allowed, _LESS)
 
 
 def _refuse_shape(path: str, rows: int, columns: int, cells: int) -> None:
@@ -116,9 +110,7 @@ def refuse_large(path: Path) -> None:
     """Raise InputError where a text has too many bytes or lines."""
     if (size := path.stat().st_size) > MOST_BYTES:
         _refuse_too_much(str(path), f"{size / 1e6:.0f} MB")
-    with open(path, "rb") as file:
-        lines = sum(chunk.count(b"\n") for chunk in iter(lambda: file.read(1 << 20), b""))
-    if lines > _MOST_LINES:
+    if (lines := path.read_bytes().count(b"\n")) > _MOST_LINES:
         _refuse_too_much(str(path), f"{lines} lines")
 
 
@@ -126,15 +118,13 @@ def rows_of_lines(lines: Iterable[str], delimiter: str, path: str) -> Iterator[R
     """Rows of the lines of a text, blank ones too."""
     if delimiter == BLANKS:
         for number, line in enumerate(lines, 1):
-            text = line.removeprefix("\ufeff").replace("={", " {")  # P1={E6AXIS: ..}
+            text = line.replace("={", " {")  # P1={E6AXIS: ..}
             brackets = "{" in text or "[" in text
             yield number, _WITH_BRACKETS.findall(text) if brackets else text.split()
         return
     reader = csv.reader(lines, delimiter=delimiter)
     try:
         for cells in reader:
-            if reader.line_num == 1 and cells:
-                cells[0] = cells[0].removeprefix("\ufeff")
             yield reader.line_num, cells
     except csv.Error as error:
         where = f"{path}: line {reader.line_num}"
@@ -181,6 +171,9 @@ class Workbook:
 
     def rows(self, sheet: str, most: int = MOST_ROWS) -> list[Row]:
         """The first rows of a sheet that are not blank, each with its number, of equal length."""
+        if sheet not in self.sheets:
+            message, allowed = f"has no sheet {sheet!r} that is shown", ", ".join(self.sheets)
+            raise input_error(self.path, message, allowed)
         try:
             cells = pd.read_excel(
                 self._file, sheet, header=None, dtype=object, na_filter=False, nrows=most + 1
@@ -189,23 +182,19 @@ class Workbook:
             raise self._unreadable(error) from None
         _refuse_shape(self.path, len(cells) if most == MOST_ROWS else 0, cells.shape[1], cells.size)
         rows = [[_cell(value) for value in row] for row in cells.itertuples(index=False)]
-        width = max((place + 1 for row in rows for place, cell in enumerate(row)
-                     if cell is not None), default=0)  # fmt: skip
-        return [(number, row[:width]) for number, row in enumerate(rows, 1)
-                if any(cell is not None for cell in row)]  # fmt: skip
+        there = np.array([[cell != "" for cell in row] for row in rows], ndmin=2)
+        width = np.flatnonzero(there.any(axis=0)).max(initial=-1) + 1
+        return [(n + 1, rows[n][:width]) for n in np.flatnonzero(there.any(axis=1)).tolist()]
 
     def _unreadable(self, error: Exception) -> InputError:
-        reason = str(error).splitlines()[0][:200] if str(error) else type(error).__name__
-        with open(self.path, "rb") as file:
-            if file.read(4) == b"\xd0\xcf\x11\xe0":
-                reason = "it is locked by a password, or of the old Excel format under a new name"
-        message = f"cannot be read as a workbook: {reason}"
-        return input_error(self.path, message, "an .xlsx file", "save it as .xlsx or CSV")
+        reason = (str(error) or type(error).__name__).splitlines()[0][:200]
+        message, fix = f"cannot be read as a workbook: {reason}", "save it as .xlsx or CSV"
+        return input_error(self.path, message, "an .xlsx file without a password", fix)
 
 
 def _cell(value: object) -> object:
     if isinstance(value, str):
-        return value.strip() or None
+        return value.strip()
     return str(value).upper() if isinstance(value, bool) else value
 
 
@@ -214,8 +203,7 @@ def _of_parquet(path: Path) -> RawTable:
     try:
         table = store.read_arrow(path, any_type=True)
     except InputError as error:
-        fix = "give the rows and columns of the measurements alone"
-        raise InputError([replace(problem, fix=fix) for problem in error.problems]) from None
+        raise InputError([replace(problem, fix=_LESS) for problem in error.problems]) from None
     where, rows = str(path), table.num_rows
     _refuse_shape(where, rows, table.num_columns, rows * table.num_columns)
     names = table.column_names

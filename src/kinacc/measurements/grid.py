@@ -6,12 +6,13 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from kinacc.errors import Problem, refuse
+from kinacc.errors import Problem, and_more, refuse
 from kinacc.measurements.column_names import WORDS
 from kinacc.measurements.layout import Layout
 from kinacc.measurements.row_names import RowNames
@@ -35,29 +36,26 @@ def number_of(cell: str) -> tuple[str, str]:
 
 def filled(cells: Cells) -> list[Any]:
     """The cells that hold something."""
-    return [c for c in cells if (c.strip() if isinstance(c, str) else c is not None)]
+    return [cell for cell in cells if not isinstance(cell, str) or cell.strip()]
 
 
-def is_comment(cells: Cells, delimiter: str = "") -> bool:
+def is_comment(cells: Cells) -> bool:
     """Whether a row is a remark, or a rule of dashes, by its beginning."""
-    first = cells[0].lstrip() if cells and isinstance(cells[0], str) else ""
-    if first.startswith(_COMMENTS) and not (delimiter == ";" and first.startswith(";")):
+    if cells and isinstance(cells[0], str) and cells[0].lstrip().startswith(_COMMENTS):
         return True
-    if delimiter == ";" and not first and len(cells) > 1 and not filled(cells[2:]):
-        return isinstance(cells[1], str) and not cells[1].strip().isdigit()  # "; Units: mm"
     return all(isinstance(cell, str) and _RULE.fullmatch(cell) for cell in cells) and any(
         len(cell.strip()) > 1 for cell in cells
     )
 
 
-def _is_reading(cells: Cells, delimiter: str) -> bool:
+def _is_reading(cells: Cells) -> bool:
     """Whether a row is no remark, and no mean or spread by its label."""
     first = cells[0]
-    if first is not None and (type(first) is not str or first.lstrip("+-−")[:1].isdigit()):
+    if type(first) is not str or first.lstrip("+-−")[:1].isdigit():
         return True
     label = str(filled(cells)[0]).strip(" \t:=").lower()
     known = label in _LABELLED or _FIRST_WORD.split(label, maxsplit=1)[0] in _LABELLED
-    return not is_comment(cells, delimiter) and not (known and len(label) < 60)
+    return not is_comment(cells) and not (known and len(label) < 60)
 
 
 def header_cells(cells: Cells, width: int) -> list[str]:
@@ -65,7 +63,7 @@ def header_cells(cells: Cells, width: int) -> list[str]:
 
     Where blanks part the cells, units in brackets stand behind their name.
     """
-    names = ["" if cell is None else str(cell).strip() for cell in cells]
+    names = [str(cell).strip() for cell in cells]
     if len(names) == width:
         return names
     joined: list[str] = []
@@ -83,25 +81,25 @@ def tabled(path: str, rows: Iterable[Row], layout: Layout, sheet: bool = False) 
     ``sheet``: the rows are those of a sheet.
     """
     rows = [(n, c) for n, c in rows if n > layout.skip_lines and (filled(c[:1]) or filled(c))]
-    line, head = (0, list(layout.names)) if layout.names is not None else (0, [])
+    line, head = 0, list[Any](layout.names or ())
     if not head and rows:
         line, head = rows.pop(0)
     readings: list[Row] = []
     aside: list[Row] = []
     under, skip = list[Any](), layout.skip_under_names
     for row in rows:
-        if skip and not is_comment(row[1], layout.delimiter):
+        if skip and not is_comment(row[1]):
             under, skip = row[1], skip - 1
         else:
-            (readings if _is_reading(row[1], layout.delimiter) else aside).append(row)
+            (readings if _is_reading(row[1]) else aside).append(row)
     names = header_cells(head, max((len(cells) for _, cells in readings[:4]), default=0))
     width = len(names)
     readings = [(n, c if len(c) <= width or filled(c[width:]) else c[:width]) for n, c in readings]
-    again = [row for row in readings if row[1] == names]
+    aside += [row for row in readings if row[1] == names]
     readings = [row for row in readings if row[1] != names]
     while len(readings) > 1 and _is_text(readings[-1][1], width):
-        again.append(readings.pop())
-    aside = sorted([*aside, *again], key=lambda row: row[0])
+        aside.append(readings.pop())
+    aside.sort(key=itemgetter(0))
     for place in reversed(range(width)):
         if not names[place] and not any(filled(row[place : place + 1]) for _, row in readings):
             for single in (names, under, *(cells for _, cells in readings)):
@@ -109,7 +107,7 @@ def tabled(path: str, rows: Iterable[Row], layout: Layout, sheet: bool = False) 
     word = "row" if sheet else "line"
     refuse(_problems(path, names, readings, line, word), f"{path} cannot be read")
     cells = frame(dict(zip(names, zip(*(c for _, c in readings), strict=True), strict=True)))
-    units = {n: str(u) for n, u in zip(names, under, strict=False) if u is not None}
+    units = {name: str(unit) for name, unit in zip(names, under, strict=False)}
     table = RawTable(
         path,
         cells,
@@ -122,9 +120,8 @@ def tabled(path: str, rows: Iterable[Row], layout: Layout, sheet: bool = False) 
     )
     if not aside:
         return table
-    labels = dict.fromkeys(str(filled(row)[0]).strip()[:30] for _, row in aside)
-    lines = table.row_names.spans(table.not_rows)
-    return replace(table, notes=(f"{lines}: not read ({', '.join([*labels][:3])})",))
+    lines, label = table.row_names.spans(table.not_rows), str(filled(aside[0][1])[0]).strip()[:30]
+    return replace(table, notes=(f"{lines}: not read ({label})",))
 
 
 def _is_text(cells: Cells, width: int) -> bool:
@@ -164,9 +161,8 @@ def _problems(path: str, names: list[str], rows: list[Row], line: int, word: str
     ragged = [(number, len(cells)) for number, cells in rows if len(cells) != len(names)]
     if ragged and not problems:
         number, width = ragged[0]
-        more = f" and {len(ragged) - 1} more" if len(ragged) > 1 else ""
+        where = f"{path}: {word} {number}{and_more(len(ragged) - 1)}"
         message = f"{width} cells under {len(names)} column names"
         fix = "check delimiter and decimal mark: decimal commas cannot stand between commas"
-        allowed = f"{len(names)} cells in every row"
-        problems.append(Problem(f"{path}: {word} {number}{more}", message, allowed, fix))
+        problems.append(Problem(where, message, f"{len(names)} cells in every row", fix))
     return problems

@@ -126,7 +126,7 @@ def joint_values(joints: RawTable) -> np.ndarray:
     names = columns.of_table(joints).joints
     if not names:
         return np.full((len(joints), 1), np.inf)
-    q = np.stack([joints.values(name.column) for name in names], axis=1)
+    q = joints.stacked(name.column for name in names)
     small = np.nanmax(np.abs(q), initial=0.0) < 2.1 * np.pi
     return q if names[0].unit == "rad" or (not names[0].unit and small) else np.deg2rad(q)
 

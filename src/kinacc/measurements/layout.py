@@ -18,7 +18,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinacc.config.fields import Section
 from kinacc.config.measured import (
     ANGLES,
     ANGLES_IN_ORDER,
@@ -29,7 +28,6 @@ from kinacc.config.measured import (
     QUATERNION_IN_ORDER,
     STD,
     Directions,
-    JointsFile,
     MeasuredFile,
     Orientation,
     Written,
@@ -63,12 +61,9 @@ class Layout(MeasuredFile):
     @classmethod
     def of(cls, section: Settings) -> Layout:
         """From a section that was validated; a key that is not there is at its default."""
-        parts: dict[str, type[Section]] = {
-            "orientation": Orientation, "directions": Directions, "joints": JointsFile
-        }  # fmt: skip
-        keys = {key: value for key, value in section.items() if key in cls.model_fields}
-        keys |= {k: model.model_construct(**section.get(k) or {}) for k, model in parts.items()}
-        return cls.model_construct(**keys)
+        turn = Orientation.model_construct(**section.get("orientation", {}))
+        ways = Directions.model_construct(**section.get("directions", {}))
+        return cls.model_construct(**{**section, "orientation": turn, "directions": ways})
 
     def but(self, **keys: object) -> Layout:
         """The layout with other values of some keys."""
@@ -203,9 +198,8 @@ class _Finder:
             stated = _stated_unit(self.table, mapped)
             unit = stated if stated in LENGTH else unit
         names = {f"{name}_{u}" if u else name: factor for u, factor in units.items()}
-        present = [Place(column, factor) for column, factor in
-                   ({mapped: units[unit]} if mapped else names).items()
-                   if column in self.table.columns]  # fmt: skip
+        names = {mapped: units[unit]} if mapped else names
+        present = [Place(*pair) for pair in names.items() if pair[0] in self.table.columns]
         if not present:
             return None
         column = present[0].column

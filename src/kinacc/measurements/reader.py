@@ -88,11 +88,11 @@ def excluded_lines(section: Settings) -> dict[int, str]:
 
 def _loaded(section: Settings) -> RawTable:
     """The whole file. Raises InputError where it excludes lines that hold no reading."""
-    table = load(section["path"], Layout.of(section), section.get("source"))
+    table = load(section["path"], Layout.of(section))
     excluded, where = excluded_lines(section), "measurements.file.exclude"
     absent = sorted(set(excluded) - set(table.line.tolist()) - set(table.not_rows))
     if absent:
-        message = f"no reading in line{'s' * (len(absent) > 1)} {', '.join(map(str, absent))}"
+        message = f"no reading in lines {', '.join(map(str, absent))}"
         allowed = f"lines {table.line[0]} to {table.line[-1]} of {table.path}"
         raise input_error(where, message, allowed)
     if len(excluded) == len(table):
@@ -130,7 +130,7 @@ def convert(table: RawTable, layout: Layout, robot: Robot, strict: bool = True) 
     without = [(posed & nothing, "no reading")]
     for target, rows_ in zip(columns.targets, void & posed & ~nothing, strict=True):
         without.append((rows_, f"no reading of {target.name}"))
-    without.append((~posed, "no joints" if nothing[~posed].all() else "not all joints"))
+    without.append((~posed, "not all joints"))
     notes = (*table.notes, *(
         f"{rows.sum()} {'rows hold' if rows.sum() > 1 else 'row holds'} {quantity}: "
         f"{table.rows_in_words(rows)}" for rows, quantity in without if rows.any()
@@ -197,17 +197,6 @@ def _target(
         turn = _whole_rows(table, target.turn, problems)
         if is_quaternion:
             problems += faults.quaternion_problems(table, turn, target.turn)
-    part = {"there": ~gaps.all(axis=1) & ~void, "void": void, "target": target.name}
-    part |= dict(zip(POSITION, position.T, strict=True))
-    part |= dict(zip(QUATERNION, quaternions(turn, layout.orientation).T, strict=True))
-    part |= _uncertainty(table, target, layout, problems)
-    return part | {f"turn {number}": values for number, values in enumerate(turn.T)}
-
-
-def _uncertainty(
-    table: RawTable, target: Target, layout: Layout, problems: list[Problem]
-) -> dict[str, np.ndarray]:
-    """Standard deviations (n,) of a target, NaN where the file has none."""
     std = np.full((len(table), 3), np.nan)
     if target.std:
         std = stacked(table, target.std, problems) / layout.sigma
@@ -215,7 +204,11 @@ def _uncertainty(
         message = f"standard deviation {np.nanmin(values, initial=0.0) / place.factor:g}"
         problems += faults.of_rows(table, [place], values < 0.0, message, "0 or above")
     std = np.where(std > 0.0, std, np.nan)  # a zero states nothing
-    return dict(zip(UNCERTAINTY, std.T, strict=True))
+    part = {"there": ~gaps.all(axis=1) & ~void, "void": void, "target": target.name}
+    part |= dict(zip(POSITION, position.T, strict=True))
+    part |= dict(zip(QUATERNION, quaternions(turn, layout.orientation).T, strict=True))
+    part |= dict(zip(UNCERTAINTY, std.T, strict=True))
+    return part | {f"turn {number}": values for number, values in enumerate(turn.T)}
 
 
 def _shared(
@@ -234,18 +227,17 @@ def _shared(
     for name in ("session", "target"):
         if name in single:
             shared[name] = _labels(table, single[name], problems)
-    for name in ("pose", "repeat"):
-        if name in single and (name == "repeat" or table.is_numbered(single[name].column)):
-            shared[name] = _whole(table, single[name], problems)
-        elif name in single:
-            labels = pd.Series(_labels(table, single[name], problems))
-            labels = (
-                labels.str.replace(AGAIN, "", regex=True) if layout.repeats_in_names else labels
-            )
-            shared[name] = pd.factorize(labels)[0]
-    if "session" in single and "pose" in single:  # every session may count its poses from 0
-        poses = pd.MultiIndex.from_arrays([shared["session"], shared["pose"]])
+    if "repeat" in single:
+        shared["repeat"] = _whole(table, single["repeat"], problems)
+    if "pose" in single and np.isfinite(table.values(single["pose"].column)).any():
+        shared["pose"] = _whole(table, single["pose"], problems)
+    elif "pose" in single:
+        poses = pd.Series(_labels(table, single["pose"], problems))
+        poses = poses.str.replace(AGAIN, "", regex=True) if layout.repeats_in_names else poses
         shared["pose"] = pd.factorize(poses)[0]
+    if "session" in single and "pose" in single:  # every session may count its poses from 0
+        counted = pd.MultiIndex.from_arrays([shared["session"], shared["pose"]])
+        shared["pose"] = pd.factorize(counted)[0]
     ways = travel(table, columns, problems).astype(np.int8)
     shared |= {f"s{joint}": values for joint, values in enumerate(ways.T, 1)}
     if columns.payload:

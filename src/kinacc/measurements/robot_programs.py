@@ -33,6 +33,8 @@ _FLAT = re.compile(rf"p?\[\s*{_NUMBER}(?:\s*,\s*{_NUMBER})+\s*\]")
 _KIND = re.compile(r"\{\s*(\w+)\s*:")
 _LIST = re.compile(r"(?:p?\[.*\]|\{.*\})", re.DOTALL)
 _LISTED = re.compile(rf"(?<![\w.]){_NUMBER}(?![\w.])")
+_INNERMOST = re.compile(r"\[([^\[\]]*)\]")
+_POSE_PARTS = ("trans x", "trans y", "trans z", "rot q1", "rot q2", "rot q3", "rot q4")
 _UNUSED = 9e8  # ABB writes 9E9 for an axis that is not there
 _TARGETS = "cartesian positions, which say where the arm was sent: they are no joints, and not read"
 _HORIZONTAL = (
@@ -119,17 +121,13 @@ def _parts(text: str) -> dict[str, float]:
 def expanded(table: RawTable) -> RawTable:
     """The table with cells such as {A1 10, A2 -90 ..} and [[10,-90,..],[9E9,..]] as columns."""
     columns: dict[str, Iterable[Any]] = {}
-    for name in table.columns:
-        first = str(table.columns[name][0]).strip()
-        of = next((of for shape, of in _SHAPES.items() if re.match(shape, first)), None)
-        texts = table.texts(name) if of else []
-        rows = [of(text) for text in texts] if of and all(map(_LIST.fullmatch, texts)) else [{}]
-        if rows[0] and all(row.keys() == rows[0].keys() for row in rows):
-            columns |= {f"{name} {part}": [repr(row[part]) for row in rows] for part in rows[0]}
+    for name, cells in table.columns.items():
+        first = parts_of(cells[0])
+        rows = [parts_of(cell) for cell in cells] if first else []
+        if rows and all(row.keys() == first.keys() for row in rows):
+            columns |= {f"{name} {part}": [repr(row[part]) for row in rows] for part in first}
         else:
-            columns[name] = table.columns[name]
-    if len(columns) == len(table.columns.columns):
-        return table
+            columns[str(name)] = cells
     return replace(table, columns=frame(columns))
 
 
@@ -139,14 +137,35 @@ def numbers_within(cell: object) -> int:
     return len(_LISTED.findall(text)) if _LIST.fullmatch(text) else 0
 
 
+def parts_of(cell: object) -> dict[str, float]:
+    """Numbers of a cell such as {A1 10, A2 -90}, [[10,-90],[9E9]] or p[0.1,0.2], by their names.
+
+    Those of a list are x, y, z where there are three, else called by their place. An ABB target has
+    joints, [[6],[6]], or a pose, [[3],[4],..]; axes that are not there are left out. Empty for any
+    other cell.
+    """
+    text = cell.strip() if isinstance(cell, str) else ""
+    if not _LIST.fullmatch(text):
+        return {}
+    if text.startswith("{"):
+        return _parts(text)
+    values, *groups = [_floats(group) for group in _INNERMOST.findall(text)] or [[]]
+    if not text.startswith("[["):
+        values = values if _FLAT.fullmatch(text) else []
+        names = [*"xyz"] if len(values) == 3 else [str(n) for n in range(1, len(values) + 1)]
+        return dict(zip(names, values, strict=True))
+    if groups and len(values) == 3 and len(groups[0]) == 4:
+        return dict(zip(_POSE_PARTS, values + groups[0], strict=True))
+    return {f"rax_{n}": value for n, value in enumerate(values, 1) if value < _UNUSED}
+
+
 def names_of_rows(rows: Sequence[Sequence[Any]]) -> tuple[str, ...]:
     """Names of columns whose cells name their parts, as {E6AXIS: A1 10, ..}: by the word before.
 
     A first column of texts names the poses; a frame that no word calls measured is one of the
     controller's. Nothing where a column of numbers has no name.
     """
-    names: list[str] = []
-    word = ""
+    names, word = list[str](), ""
     for place, column in enumerate(zip(*rows, strict=True)):
         matches = [_KIND.match(str(cell).strip()) for cell in column]
         kinds = {match[1].upper() if match else "" for match in matches}
@@ -163,24 +182,7 @@ def names_of_rows(rows: Sequence[Sequence[Any]]) -> tuple[str, ...]:
     return tuple(names) if len({*names}) == len(names) else ()
 
 
-def _of_list(text: str) -> dict[str, float]:
-    """Numbers of [1.2, 0.3, ..] or p[..]: x, y, z where there are three, else by their place."""
-    values = _floats(text) if _FLAT.fullmatch(text) else []
-    names = "xyz" if len(values) == 3 else [str(place + 1) for place in range(len(values))]
-    return dict(zip(names, values, strict=True))
-
-
-def _of_target(text: str) -> dict[str, float]:
-    """Numbers of an ABB target: joints of [[6],[6]], a pose of [[3],[4],..], unused axes aside."""
-    groups = [_floats(group) for group in re.findall(r"\[([^\[\]]*)\]", text)]
-    if len(groups) >= 2 and len(groups[0]) == 3 and len(groups[1]) == 4:
-        names = ("trans x", "trans y", "trans z", "rot q1", "rot q2", "rot q3", "rot q4")
-        return dict(zip(names, [*groups[0], *groups[1]], strict=True))
-    return {f"rax_{n}": v for n, v in enumerate(groups[0] if groups else [], 1) if v < _UNUSED}
-
-
 _NAMES = {
     _of_kuka: [f"A{number} [deg]" for number in range(1, 8)],
     _of_yaskawa: [f"{letter} [pulse]" for letter in "SLURBTE"],
 }
-_SHAPES = {r"\{": _parts, r"\[\[": _of_target, r"p?\[": _of_list}

@@ -48,7 +48,7 @@ class RowNames:
 
     def one(self, line: int) -> str:
         """``line 14 (P12_1) of points.csv``."""
-        return self._named(self.number(line), 1)
+        return self.spans([line])
 
     def number(self, line: int) -> str:
         """``14 (P12_1)``, behind a word that says what it is."""
@@ -61,12 +61,9 @@ class RowNames:
             return f"no {self.word}"
         runs = np.split(numbers, np.flatnonzero(np.diff(numbers) > 1) + 1)
         ranges = ", ".join(self._run(int(run[0]), int(run[-1])) for run in runs[:_RANGES_SHOWN])
-        rest = sum(len(run) for run in runs[_RANGES_SHOWN:])
-        return self._named(ranges + and_more(rest), len(numbers))
-
-    def _named(self, numbers: str, count: int) -> str:
+        rest = and_more(sum(len(run) for run in runs[_RANGES_SHOWN:]))
         file = f" of {self.file}" if self.file else ""
-        return f"{self.word}{'s' * (count > 1)} {numbers}{file}"
+        return f"{self.word}{'s' * (len(numbers) > 1)} {ranges}{rest}{file}"
 
     def _run(self, first: int, last: int) -> str:
         lines = f"{first}" if first == last else f"{first}-{last}"

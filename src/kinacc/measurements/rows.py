@@ -149,7 +149,7 @@ def _label(table: RawTable, columns: FileColumns) -> str | None:
         return columns.single["pose"].column
     for column in columns.unused(table):
         texts = table.texts(column)
-        is_text = not table.is_numbered(column) and not table.gaps(column).any()
+        is_text = not np.isfinite(table.values(column)).any() and not table.gaps(column).any()
         if column != "status" and is_text and len({*texts}) == len(texts) and ":" not in texts[0]:
             return column
     return None

@@ -7,18 +7,18 @@ Counterclockwise ones, as of trackers in the mathematical sense, count from x to
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from kinacc.config.measured import Directions
 from kinacc.errors import Problem, input_error, refuse
-from kinacc.measurements.column_names import MEASURED, PLAIN, REPORTED, WORDS, Name, name_of, role
+from kinacc.measurements.column_names import MEASURED, PLAIN, REPORTED, WORDS, Name, role
 from kinacc.measurements.intake.choices import Answers, Choice, Undecided
+from kinacc.measurements.intake.columns import names_in
 from kinacc.measurements.layout import LENGTH
-from kinacc.measurements.table import RawTable, frame, numbers
+from kinacc.measurements.table import RawTable, numbers
 
 PER_UNIT = {"deg": np.pi / 180.0, "gon": np.pi / 200.0, "rad": 1.0}
 _WORDS = WORDS["spherical"]
@@ -113,15 +113,12 @@ def cartesian(table: RawTable, directions: Directions) -> RawTable:
 
     Raises InputError where there are none, or a cell of them is no number.
     """
-    readings = readings_of([name_of(c, table.units.get(c, "")) for c in table.columns])
-    problems = []
+    readings = readings_of(names_in(table))
     if not readings:
         message = "has no columns of a horizontal angle, a vertical angle and a distance"
-        problems.append(Problem(table.path, message, "such as Hz, V and D"))
-    spent = {name for reading in readings for name in reading.names}
-    columns: dict[str, Iterable[Any]] = {
-        n: table.columns[n] for n in table.columns if n not in spent
-    }
+        raise input_error(table.path, message, "such as Hz, V and D")
+    problems, per_unit = list[Problem](), PER_UNIT[directions.unit]
+    cells = table.columns.drop(columns=[name for reading in readings for name in reading.names])
     for reading in readings:
         column, unit = reading.horizontal.column, reading.distance.unit
         stated = reading.angle_units - {directions.unit}
@@ -129,24 +126,15 @@ def cartesian(table: RawTable, directions: Directions) -> RawTable:
             message = f"says {' and '.join(sorted(stated))}, the configuration {directions.unit}"
             fix = "correct measurements.file.directions.unit"
             problems.append(Problem(table.where(column), message, fix=fix))
-        points = _points(table, reading, directions, problems).T
-        for axis, values in zip("xyz", points.tolist(), strict=True):
-            name = "_".join([*reading.rest, axis, *([unit] if unit in LENGTH else [])])
-            columns[name] = [None if value != value else value for value in values]
+        turn, vertical, distance = (numbers(table, n, problems, gaps=True) for n in reading.names)
+        distance = np.where(distance > 0.0, distance, np.nan)  # 0: nothing was read
+        turn, above = turn * per_unit, vertical * per_unit
+        above = np.pi / 2.0 - above if directions.vertical == "zenith" else above
+        level = np.cos(above) * distance
+        point = {"x": np.cos(turn) * level, "y": np.sin(turn) * level}
+        if directions.horizontal == "clockwise":
+            point = {"x": point["y"], "y": point["x"]}
+        for axis, values in {**point, "z": np.sin(above) * distance}.items():
+            cells["_".join([*reading.rest, axis, *([unit] if unit in LENGTH else [])])] = values
     refuse(problems, f"{table.path} cannot be read")
-    return replace(table, columns=frame(columns))
-
-
-def _points(
-    table: RawTable, reading: Reading, directions: Directions, problems: list[Problem]
-) -> np.ndarray:
-    """Points (n, 3) in the unit of the distance, NaN where one of the three is missing."""
-    turn, vertical, distance = (numbers(table, n, problems, gaps=True) for n in reading.names)
-    distance = np.where(distance > 0.0, distance, np.nan)  # 0: nothing was read
-    turn, above = turn * PER_UNIT[directions.unit], vertical * PER_UNIT[directions.unit]
-    above = np.pi / 2.0 - above if directions.vertical == "zenith" else above
-    level = np.cos(above) * distance
-    along, across = np.cos(turn) * level, np.sin(turn) * level
-    if directions.horizontal == "clockwise":
-        along, across = across, along
-    return np.stack([along, across, np.sin(above) * distance], axis=1)
+    return replace(table, columns=cells)

@@ -70,9 +70,9 @@ class RawTable:
         """Numbers (n,) of a column, NaN where a cell is none."""
         return _converted(self.columns[name].tolist(), self.decimal, self.thousands)
 
-    def is_numbered(self, name: str) -> bool:
-        """Whether a column holds a number."""
-        return bool(np.isfinite(self.values(name)).any())
+    def stacked(self, names: Iterable[str]) -> np.ndarray:
+        """Numbers (n, k) of k columns, NaN where a cell is none."""
+        return np.stack([self.values(name) for name in names], axis=1)
 
     def select(self, rows: np.ndarray) -> RawTable:
         """The table of some rows, by their indices or a mask."""
@@ -115,11 +115,8 @@ def numbers(
     if bad.any():
         cells = table.columns[name][bad].tolist()
         shown = ", ".join(repr(cell)[:60] for cell in cells[:_SHOWN])
-        comma = "," if table.decimal == "." else "."
-        fix = "correct the cells"
-        if np.isfinite(_converted(cells, comma, None)).any():
-            fix += f", or set measurements.file.decimal or .thousands to {comma!r}"
         where, allowed = table.where(name, bad), f"numbers with decimal mark {table.decimal!r}"
+        fix = "correct the cells, or measurements.file.decimal and .thousands"
         problems.append(Problem(where, f"not a finite number: {shown}", allowed, fix))
     return values
 

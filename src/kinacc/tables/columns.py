@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from itertools import groupby
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -17,10 +16,10 @@ JOINTS_MIN, JOINTS_MAX = 4, 7
 # to machine. What an arm is sure of begins at 1e-3 mm; 1e-9 rad is 1e-6 mm at a metre. Pure numbers
 # are held to as much as radians, which are pure numbers too.
 SAME_WITHIN = {
-    **{"mm": 1e-6, "mrad": 1e-6, "rad": 1e-9, "deg": 1e-7, "1": 1e-9, "mm^2": 1e-6},
+    **dict.fromkeys(("mm", "mrad", "mm^2", "mm per mm or mrad", "mm or mrad", "kg", "degC"), 1e-6),
     # Statistics of claims: lengths in mm, shares and ratios.
-    **{"see statement": 1e-6, "see claims": 1e-6, "see factor": 1e-6},
-    **{"kg": 1e-6, "degC": 1e-6, "mm per mm or mrad": 1e-6, "mm or mrad": 1e-6},
+    **dict.fromkeys(("see statement", "see claims", "see factor"), 1e-6),
+    **{"rad": 1e-9, "deg": 1e-7, "1": 1e-9},
 }
 # Among values of several units pure numbers may be as large as thousands of degrees of freedom.
 SAME_AMONG = {**SAME_WITHIN, "1": 1e-6}
@@ -98,24 +97,22 @@ class Artefact:
         """Name of the table's file inside a data set's folder."""
         return f"{self.name}.parquet"
 
-    def in_file(self, joints: int, names: Iterable[str]) -> tuple[Column, ...]:
-        """The columns a file has that is given those of these ``names``."""
-        supplied = set(names)
+    def in_file(self, names: Iterable[str]) -> list[Column]:
+        """The columns a file has that is given those of these ``names``, for as many joints."""
+        supplied, joints = set(names), JOINTS_MIN
+        stem = next((column.name[:-1] for column in self.columns if column.per_joint), "")
+        while joints < JOINTS_MAX and f"{stem}{joints + 1}" in supplied:
+            joints += 1
         every = self.for_joints(joints)
-        return tuple(item for item in every if not item.may_be_absent or item.name in supplied)
+        return [item for item in every if not item.may_be_absent or item.name in supplied]
 
-    def for_joints(self, joints: int) -> tuple[Column, ...]:
+    def for_joints(self, joints: int) -> list[Column]:
         """The columns of an arm with this many joints, in file order."""
-        expanded: list[Column] = []
-        for per_joint, block in groupby(self.columns, key=lambda column: column.per_joint):
-            numbers = range(1, joints + 1) if per_joint else [0]
-            expanded += [item.numbered(n) if n else item for item in block for n in numbers]
-        return tuple(expanded)
-
-    @property
-    def has_joints(self) -> bool:
-        """Whether the number of columns depends on the arm."""
-        return any(column.per_joint for column in self.columns)
+        return [
+            item.numbered(joint) if joint else item
+            for item in self.columns
+            for joint in (range(1, joints + 1) if item.per_joint else [0])
+        ]
 
 
 def texts(cells: Iterable[object]) -> np.ndarray:
@@ -123,17 +120,3 @@ def texts(cells: Iterable[object]) -> np.ndarray:
     import numpy as np
 
     return np.array([*cells, None], dtype=object)[:-1]
-
-
-def joint_count(artefact: Artefact, names: Iterable[str]) -> int:
-    """Number of joints a table's column names speak of; 0 where the table has no joint columns.
-
-    Counts the first per-joint column (``q1``, ``q2``, ...) up to the first gap.
-    """
-    starred = next((column for column in artefact.columns if column.per_joint), None)
-    if starred is None:
-        return 0
-    present, joints = set(names), 0
-    while f"{starred.name[:-1]}{joints + 1}" in present:
-        joints += 1
-    return joints

@@ -15,7 +15,7 @@ import pandas as pd
 
 from kinacc.errors import input_error
 from kinacc.tables import store
-from kinacc.tables.columns import SAME_AMONG, SAME_WITHIN, Column, joint_count
+from kinacc.tables.columns import SAME_AMONG, SAME_WITHIN, Column
 from kinacc.tables.contract import ARTEFACTS
 
 _RELATIVE = 1e-6  # of variances, which have the units of both parameters
@@ -77,8 +77,7 @@ def compare_tables(before: Path, now: Path) -> Iterator[str]:
     old, new = map(store.read_table, (before, now))
     for column in old.columns.symmetric_difference(new.columns):
         yield f"{name}, column {column}: {'missing' if column in old else 'new'}"
-    columns = artefact.for_joints(joint_count(artefact, old.columns)) if artefact else ()
-    known = {item.name: item for item in columns}
+    known = {item.name: item for item in artefact.in_file(old.columns)} if artefact else {}
     key = [item for item in (artefact.key if artefact else ()) if item in old and item in new]
     old, new = (_by_key(table, key, name) for table in (old, new))
     for word, single, second in (("missing", old, new), ("new", new, old)):

@@ -17,7 +17,7 @@ import numpy as np
 import yaml
 
 from kinacc.tables import allowed
-from kinacc.tables.columns import Artefact, Column, Columns, joint_count, texts
+from kinacc.tables.columns import Artefact, Column, Columns, texts
 
 # What all tables of a stage are marked with.
 PROVENANCE_KEYS = ("kinacc_version", "config_hash", "seed")
@@ -66,7 +66,7 @@ def columns_of(artefact: str, rows: Iterable[Mapping[str, Any] | Sequence[Any]])
     records = [row if isinstance(row, Mapping) else dict(zip(names, row, strict=True))
                for row in rows]  # fmt: skip
     names = [*records[0]] if records else names
-    known = {column.name: column for column in contract.for_joints(joint_count(contract, names))}
+    known = {column.name: column for column in contract.in_file(names)}
     columns: Columns = {}
     for name in names:
         cells, column = [record[name] for record in records], known[name]

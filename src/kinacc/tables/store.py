@@ -18,14 +18,7 @@ import pyarrow.parquet as pq
 from kinacc.errors import InputError, Problem, first_few, gathered, input_error, refuse
 from kinacc.tables import sums
 from kinacc.tables.atomic import write_whole
-from kinacc.tables.columns import (
-    JOINTS_MAX,
-    JOINTS_MIN,
-    Column,
-    Columns,
-    joint_count,
-    texts,
-)
+from kinacc.tables.columns import Column, Columns, texts
 from kinacc.tables.contract import ARTEFACTS, PROVENANCE_KEYS
 
 _ARROW_TYPES = {
@@ -84,17 +77,9 @@ def write_table(
 
 
 def arrow_schema(
-    artefact: str,
-    joints: int = 0,
-    provenance: Mapping[str, object] | None = None,
-    names: Iterable[str] | None = None,
+    columns: Iterable[Column], provenance: Mapping[str, object] | None = None
 ) -> pa.Schema:
-    """Arrow schema of an artefact for an arm of ``joints`` joints, unit and meaning included.
-
-    ``names``: of columns there are, where some may be absent.
-    """
-    contract = ARTEFACTS[artefact]
-    columns = contract.for_joints(joints) if names is None else contract.in_file(joints, names)
+    """Arrow schema of columns of an artefact, unit and meaning included."""
     fields = [
         pa.field(
             column.name,
@@ -137,11 +122,7 @@ def to_table(
     if {*provenance} != {*PROVENANCE_KEYS}:
         message = f"has provenance {', '.join(provenance)}"
         problems.append(Problem(where, message, ", ".join(PROVENANCE_KEYS)))
-    joints = joint_count(contract, columns)
-    if contract.has_joints and not JOINTS_MIN <= joints <= JOINTS_MAX:
-        allowed = f"q1.. of {JOINTS_MIN} to {JOINTS_MAX}"
-        problems.append(Problem(where, f"has columns of {joints} joints", allowed))
-    known = contract.in_file(joints, columns)
+    known = contract.in_file(columns)
     names = [column.name for column in known]
     problems += [
         Problem(f"{where}, column {name}", "not in the contract", ", ".join(names))
@@ -155,7 +136,7 @@ def to_table(
             place = f"{where}, column {column.name}"
             arrays.append(_to_arrow(column, columns.get(column.name), count, place))
     refuse(problems, f"{artefact} does not fit its contract")
-    return pa.Table.from_arrays(arrays, schema=arrow_schema(artefact, joints, provenance, columns))
+    return pa.Table.from_arrays(arrays, schema=arrow_schema(known, provenance))
 
 
 def _to_arrow(column: Column, values: Any, count: int, where: str) -> pa.Array:
@@ -216,12 +197,9 @@ def columns_in(table: pa.Table) -> Columns:
 
 
 def _to_numpy(field: pa.Field, column: pa.ChunkedArray) -> np.ndarray:
-    if pa.types.is_boolean(field.type):
-        return np.array(column)
-    if not _is_number(field.type):
-        return texts(column.to_pylist())
-    is_real = field.nullable or column.null_count
-    return np.array(column, np.float64 if is_real else None)
+    if _is_number(field.type):
+        return np.array(column, np.float64 if field.nullable or column.null_count else None)
+    return np.array(column) if pa.types.is_boolean(field.type) else texts(column.to_pylist())
 
 
 def _is_number(kind: pa.DataType) -> bool:

@@ -17,6 +17,7 @@ from kinacc.errors import InputError, Problem
 FOLDER = "sums"
 _READ = "# read "
 _AGAIN = "run the workflow again"
+_CHANGED = "changed since its stage wrote it, or no stage wrote it"
 
 
 class _Line(NamedTuple):
@@ -61,13 +62,8 @@ def hold(path: Path | str, content: bytes) -> None:
     folder = next((item for item in path.parents if (item / FOLDER).is_dir()), None)
     if folder is None:
         return
-    expected = stated(folder).get(path.relative_to(folder).as_posix())
-    if expected != digest(content):
-        missing, changed_ = (
-            f"has no digest in {folder / FOLDER}",
-            "changed since its stage wrote it",
-        )
-        raise InputError(_problem(path, changed_ if expected else missing))
+    if stated(folder).get(path.relative_to(folder).as_posix()) != digest(content):
+        raise InputError(_problem(path, _CHANGED))
 
 
 def changed(folder: Path | str) -> Iterator[Problem]:
@@ -77,7 +73,7 @@ def changed(folder: Path | str) -> Iterator[Problem]:
         if not path.is_file():
             yield Problem(str(path), "missing", fix=_AGAIN)
         elif digest(path.read_bytes()) != expected:
-            yield _problem(path, "changed since its stage wrote it")
+            yield _problem(path, _CHANGED)
 
 
 def _problem(path: Path, message: str) -> Problem:

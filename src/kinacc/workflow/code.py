@@ -43,10 +43,7 @@ def config_hash(settings: Mapping[str, object]) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
-def _placeless(settings: object, files: bool = False) -> object:
+def _placeless(settings: object, is_file: bool = False) -> object:
     if isinstance(settings, Mapping):
-        return {
-            key: _placeless(value, files or key in ("robot", "path"))
-            for key, value in settings.items()
-        }
-    return PurePath(settings).name if files and isinstance(settings, str) else settings
+        return {key: _placeless(item, key in ("robot", "path")) for key, item in settings.items()}
+    return PurePath(settings).name if is_file and isinstance(settings, str) else settings

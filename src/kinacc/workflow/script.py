@@ -114,17 +114,14 @@ def _read(
     problems: list[Problem] = []
     for role, source in paths.items():
         listed = [source] if isinstance(source, str) else list(source)
-        contents = [Path(path).read_bytes() for path in listed]
-        read |= {
-            os.path.relpath(path, folder): sums.digest(content)
-            for path, content in zip(listed, contents, strict=True)
-        }
+        contents = {path: Path(path).read_bytes() for path in listed}
+        read |= {os.path.relpath(path, folder): sums.digest(contents[path]) for path in contents}
         if role.endswith("_file"):
             inputs[role] = Path(listed[0])
             continue
         with gathered(problems):
             parts = []
-            for path, content in zip(listed, contents, strict=True):
+            for path, content in contents.items():
                 sums.hold(path, content)
                 parts.append(store.read_arrow(path, content))
             inputs[role] = store.columns_in(pa.concat_tables(parts))

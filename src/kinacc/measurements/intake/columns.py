@@ -8,9 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from itertools import combinations
-
-import numpy as np
 
 from kinacc.measurements.column_names import (
     CALCULATED,
@@ -35,9 +32,8 @@ from kinacc.measurements.intake.groups import (
     TURN,
     UNCERTAINTY,
     Group,
-    Values,
     all_groups,
-    keeps_distance,
+    keep_distances,
     listed,
     same,
 )
@@ -92,25 +88,14 @@ def names_in(table: RawTable) -> list[Name]:
 
 
 def of_table(table: RawTable, answers: Answers | None = None, wanted: bool = False) -> NamedColumns:
-    """The meaning of the columns of a table; see ``recognise``."""
-    return recognise(names_in(table), lambda n: table.values(n.column), answers, wanted)
+    """The meaning of the columns of a table; no joints or no targets where there are none.
 
-
-def recognise(
-    names: Sequence[Name],
-    values: Values | None = None,
-    answers: Answers | None = None,
-    wanted: bool = False,
-) -> NamedColumns:
-    """The meaning of columns of these names; no joints or no targets where there are none.
-
-    ``values`` gives a column's numbers (n,), NaN where it has none. ``answers`` by option: ``take``
-    (columns whose groups are read whatever their names mean), ``orientation`` ("none" is not read),
-    ``sigma`` (how many standard deviations an uncertainty is; "none" for none that is read).
-    ``wanted``: nominal poses are read, not measured ones.
+    ``answers`` by option: ``take`` (columns whose groups are read whatever their names mean),
+    ``orientation`` ("none" is not read), ``sigma`` (how many standard deviations an uncertainty is;
+    "none" for none that is read). ``wanted``: nominal poses are read, not measured ones.
     """
     answers = answers or {}
-    choice = _Choice(names, values, answers, wanted)
+    choice = _Choice(table, answers, wanted)
     joints = choice.joints()
     points = choice.points(joints)
     turns = choice.turns(points) if answers.get("orientation") != "none" else {}
@@ -131,9 +116,12 @@ def recognise(
     )
     used = result.read()
     single: dict[str, Name] = {}
-    for name in names:
-        if name.column not in used and (quantity := _single_of(name)):
-            single.setdefault(quantity, name)
+    for name in choice.names:
+        terms = {*name.terms} - {"measurement", "c", "id", "number"}
+        for quantity, known in WORDS["single"].items():
+            is_unit = name.unit in ("", "C") or quantity != "temperature"
+            if len(terms) == 1 and terms <= known and is_unit and name.column not in used:
+                single.setdefault(quantity, name)
     aside = tuple(group for group in choice.every if not used & {*group.names})
     return replace(result, single=single, aside=aside)
 
@@ -141,16 +129,10 @@ def recognise(
 class _Choice:
     """Selection among the groups of a file; ``questions`` grow."""
 
-    def __init__(
-        self,
-        names: Sequence[Name],
-        values: Values | None,
-        answers: Answers,
-        wanted: bool,
-    ) -> None:
-        self.values, self.sigma = values, answers.get("sigma", "")
-        self.take = {*answers.get("take", ())}
-        self.every = all_groups(names, values)
+    def __init__(self, table: RawTable, answers: Answers, wanted: bool) -> None:
+        self.table, self.names = table, names_in(table)
+        self.take, self.sigma = {*answers.get("take", ())}, answers.get("sigma", "")
+        self.every = all_groups(table, self.names)
         self.groups = [g for g in self.every if g.kind != POSE and not g.wrong_units]
         if wanted:
             nominal = [*self._of(POINT, NOMINAL, OPEN), *self._of(TURN, NOMINAL, OPEN)]
@@ -159,7 +141,7 @@ class _Choice:
         grouped = {column for group in self.every for column in group.names}
         self.off = any(role(n.terms) == DEVIATION and n.unit not in ANGLE
                        and not WORDS["external"] & {*n.terms}
-                       for n in names if n.column not in grouped)  # fmt: skip
+                       for n in self.names if n.column not in grouped)  # fmt: skip
         self.questions: list[Choice] = []
 
     def _of(self, kind: str, *roles: str) -> list[Group]:
@@ -174,7 +156,7 @@ class _Choice:
         """Without groups of the same numbers; those that state a unit stay."""
         distinct: list[Group] = []
         for group in sorted(candidates, key=lambda g: g.units == {""}):
-            if not any(same(group, before, self.values) for before in distinct):
+            if not any(same(group, before, self.table) for before in distinct):
                 distinct.append(group)
         return [group for group in candidates if group in distinct]
 
@@ -217,35 +199,27 @@ class _Choice:
         record = any({*g.columns["x"].terms} & WORDS["records"] for g in nominal)
         record = record or bool(nominal and deviations)
         by_arm = not record or (joints is not None and joints.role == REPORTED)
-        rules: list[tuple[object, list[Group], str]] = [
-            (measured, measured, ""),
-            (reported and by_arm, [*reported, *plain, *unclear],
-             "cannot tell whether an instrument measured it or the controller computed it"),
-            (reported, reported, ""),
-            (unclear, [*plain, *unclear], "no name states that an instrument measured it"),
-            (plain and (self.off or deviations) and not nominal, plain,
-             "beside a deviation it may be the nominal point"),
-            (plain, plain, ""),
-        ]  # fmt: skip
-        candidates, why = next(((g, why) for fits, g, why in rules if fits and g), ([], ""))
+        candidates, why = measured or reported or plain, ""
+        if not measured and reported and by_arm:
+            candidates = [*reported, *plain, *unclear]
+            why = "cannot tell whether an instrument measured it or the controller computed it"
+        elif not measured and not reported and unclear:
+            candidates = [*plain, *unclear]
+            why = "no name states that an instrument measured it"
+        elif plain and candidates is plain and (self.off or deviations) and not nominal:
+            why = "beside a deviation it may be the nominal point"
         if candidates and not why:
             candidates = self._distinct(candidates)
             if len({group.target for group in candidates}) < len(candidates):
                 why = "several columns may hold it"
-            elif not self._is_rigid(candidates):
+            elif not keep_distances(
+                [self.table.stacked([g.columns[axis].column for axis in "xyz"]) for g in candidates]
+            ):
                 why = "they do not keep the distance of targets on a flange"
         if not why:
             return candidates
         self._ask(f"the names do not tell the measured point ({why})", candidates)
         return _named_apart(candidates)
-
-    def _is_rigid(self, groups: Sequence[Group]) -> bool:
-        """Whether points can be targets of one rigid body."""
-        if self.values is None:
-            return True
-        points = [np.stack([self.values(g.columns[axis]) for axis in "xyz"], axis=1)
-                  for g in groups]  # fmt: skip
-        return all(keeps_distance(a, b) for a, b in combinations(points, 2))
 
     def turns(self, points: Sequence[Group]) -> dict[str, Group]:
         """Orientations by target; the reader takes those of the kind of the first."""
@@ -266,7 +240,7 @@ class _Choice:
         if len(rest) == 1 and rest[0] in same_target:
             # Points of other roles, whose orientation a group without a term may be.
             others = [g for g in self._of(POINT) if g.role not in (SPREAD, OTHER, point.role)]
-            alone = all(same(g, point, self.values) for g in others)
+            alone = all(same(g, point, self.table) for g in others)
             if rest[0].role in (MEASURED, point.role) or (rest[0].role == PLAIN and alone):
                 return rest[0]
         about = f"the names do not tell the orientation measured with {point.target}"
@@ -310,11 +284,3 @@ def _named_apart(groups: list[Group]) -> list[Group]:
         name = next(name for name in names if name not in named)
         named[name] = replace(group, target=name)
     return list(named.values())
-
-
-def _single_of(name: Name) -> str:
-    """pose, repeat, session, target or temperature where the name is one, else nothing."""
-    terms = [t for t in name.terms if t not in ("measurement", "c", "id", "number")]
-    quantities = [q for q, known in WORDS["single"].items() if len(terms) == 1 and terms[0] in known
-                  and (q != "temperature" or name.unit in ("", "C"))]  # fmt: skip
-    return next(iter(quantities), "")

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
-
-import pandas as pd
+from collections.abc import Iterable
 
 from kinacc.measurements.column_names import name_of
-from kinacc.measurements.intake.choices import Choice
+from kinacc.measurements.intake.choices import Answers, Choice, Undecided
+from kinacc.measurements.table import RawTable
 
 _BLANK = "[ \u00a0\u2007\u2009\u202f]"
 _BETWEEN = {" ": _BLANK, "'": "['\u2019]", ",": ",", ".": r"\."}
@@ -39,14 +38,12 @@ def _first(text: str, mark: str, *shapes: str, other: str = ".") -> str:
     return match[0].strip() if match else ""
 
 
-def marks_of(
-    columns: pd.DataFrame, answers: Mapping[str, str], delimiter: str
-) -> tuple[str, str | None, Choice | None]:
-    """The two marks of the text cells of a table, or the question to ask first.
+def marks_of(table: RawTable, answers: Answers, delimiter: str) -> tuple[str, str | None]:
+    """The two marks of the text cells of a table. Raises Undecided where one is open.
 
     ``answers``: decimal and thousands as answered. ``delimiter`` parts the columns.
     """
-    by_column = {str(name): _text(columns[name]) for name in columns}
+    by_column = {str(name): _text(cells) for name, cells in table.columns.items()}
     text = "\n".join(filter(None, by_column.values()))
     decisive: dict[str, str] = {}
     for mark, other in (",.", ".,"):
@@ -56,7 +53,8 @@ def marks_of(
     decimal = answers.get("decimal") or "".join(decisive)
     if len(decimal) > 1:
         about = "some numbers have a decimal point, some a decimal comma; one kind can be read"
-        return ".", None, Choice("--decimal", about, {m: f"as in {decisive[m]}" for m in decisive})
+        meant = {mark: f"as in {decisive[mark]}" for mark in decisive}
+        raise Undecided(table.path, Choice("--decimal", about, meant))
     if not decimal and delimiter == "," and "," not in text:
         decimal = "."  # nobody writes thousands alone by points, between commas
     if not decimal:
@@ -70,22 +68,22 @@ def marks_of(
             meant = {decimal: f"{unclear} is {unclear.replace(decimal, '.')}",
                      point: f"{unclear} is {unclear.replace(decimal, '')}"}  # fmt: skip
             about = f"{unclear} may have decimals or thousands"
-            return ".", None, Choice("--decimal", about, meant)
+            raise Undecided(table.path, Choice("--decimal", about, meant))
     if "thousands" in answers:
-        return decimal, None if answers["thousands"] == "none" else answers["thousands"], None
+        return decimal, None if answers["thousands"] == "none" else answers["thousands"]
     thousands = "," if decimal == "." else "."
     if "decimal" in answers and _first(text, thousands, _EITHER):
-        return decimal, thousands, None  # by the answer it stands between thousands
+        return decimal, thousands  # by the answer it stands between thousands
     for mark in [m for m in _BETWEEN if m != decimal and not (m == " " and delimiter == "blanks")]:
         # Blanks and apostrophes stand between thousands alone.
         alone = [_EITHER] if mark in " '" else []
         if _first(text, mark, *alone, _GROUPED, _BOTH, other=decimal):
-            return decimal, mark, None
+            return decimal, mark
     if cell := _first(text, thousands, _EITHER):
         about = f"the cell {cell} stands where the decimal mark of the file is {decimal}"
         meant = {thousands: f"{cell} is {cell.replace(thousands, '')}", "none": "it is an error"}
-        return decimal, None, Choice("--thousands", about, meant)
-    return decimal, None, None
+        raise Undecided(table.path, Choice("--thousands", about, meant))
+    return decimal, None
 
 
 def _text(cells: Iterable[object]) -> str:

@@ -7,13 +7,15 @@ what a group is.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 
 from kinacc.measurements.column_names import (
     CALCULATED,
+    COMMANDS,
     MEASURED,
     NOMINAL,
     OPEN,
@@ -23,17 +25,16 @@ from kinacc.measurements.column_names import (
     SPREAD,
     WORDS,
     Name,
-    commands,
     decides,
     is_controller_pose,
     role,
 )
 from kinacc.measurements.layout import ANGLE, LENGTH, TOOL
+from kinacc.measurements.table import RawTable
 
 JOINTS, POINT, TURN, POSE, RADIUS = "joints", "a position", "an orientation", "a pose", "a radius"
 UNCERTAINTY = "an uncertainty"
 PULSES = ("pulse", "pulses", "count", "counts", "tick", "ticks")
-Values = Callable[[Name], np.ndarray]
 
 _READ = (PLAIN, OPEN, REPORTED, MEASURED)
 _UNITS = {JOINTS: {**ANGLE, **LENGTH}, POINT: LENGTH, TURN: ANGLE}
@@ -101,9 +102,9 @@ def listed(names: Sequence[str]) -> str:
     return f"{names[0]} .. {names[-1]}" if len(names) > 4 else ", ".join(names)
 
 
-def all_groups(names: Sequence[Name], values: Values | None = None) -> list[Group]:
-    """Every group of the columns."""
-    groups = [*_numbered(names, values), *_named_joints(names), *_by_axis(names)]
+def all_groups(table: RawTable, names: Sequence[Name]) -> list[Group]:
+    """Every group of the columns of a table, by their names."""
+    groups = [*_numbered(table, names), *_named_joints(names), *_by_axis(names)]
     points = {tuple(t for t in g.terms if t != "x") for g in groups if g.kind == POINT}
     for *letters, convention in WORDS["angles"]:
         for terms, _, columns in _alike(names, "|".join(letters)):
@@ -113,10 +114,8 @@ def all_groups(names: Sequence[Name], values: Values | None = None) -> list[Grou
                           for axis, letter in zip("xyz", letters, strict=True)}  # fmt: skip
                 target, turn = _target(columns[letters[0]], terms), ("euler", convention)
                 groups.append(Group(TURN, role(terms), target, turned, turn))
-    for name in names:
-        if WORDS["radius"] & {*name.terms}:
-            groups.append(Group(RADIUS, OTHER, "", {"radius": name}))
-    return groups
+    radii = [name for name in names if WORDS["radius"] & {*name.terms}]
+    return groups + [Group(RADIUS, OTHER, "", {"radius": name}) for name in radii]
 
 
 def _alike(
@@ -146,7 +145,7 @@ def _alike(
             yield terms, stem_, row
 
 
-def _numbered(names: Sequence[Name], values: Values | None) -> Iterator[Group]:
+def _numbered(table: RawTable, names: Sequence[Name]) -> Iterator[Group]:
     """Columns that differ in a number counting from 0 or 1: joints, quaternions, poses."""
     for terms, _, columns in _alike(names, r"\d{1,2}"):
         by_number = {int(number): name for number, name in columns.items()}
@@ -155,7 +154,7 @@ def _numbered(names: Sequence[Name], values: Values | None) -> Iterator[Group]:
             continue
         row = [by_number[number] for number in sorted(by_number)]
         is_joint = bool(about & WORDS["joint"]) and not about & WORDS["external"]
-        if len(row) == 4 and _is_quaternion(row, about, values):
+        if len(row) == 4 and _is_quaternion(table, row, about):
             turned = {f"quat{number}": name for number, name in enumerate(row, 1)}
             known, target = role(about - WORDS["quaternion"]), _target(row[0], None, True)
             yield Group(TURN, known, target, turned, ("quaternion", "XYZ"))
@@ -173,20 +172,20 @@ def _numbered(names: Sequence[Name], values: Values | None) -> Iterator[Group]:
             yield _joints(row, terms, weak=not is_joint)
 
 
-def _is_quaternion(row: list[Name], about: set[str], values: Values | None) -> bool:
+def _is_quaternion(table: RawTable, row: Sequence[Name], about: set[str]) -> bool:
     """Whether four numbered columns are a quaternion, by their terms and their length."""
-    if values is None or not about & (WORDS["quaternion_or_joint"] | WORDS["quaternion"]):
-        return False
-    length = np.sqrt(sum(values(name) ** 2 for name in row))
+    length = np.linalg.norm(table.stacked([name.column for name in row]), axis=1)
     length = length[np.isfinite(length)]
-    return length.size > 0 and bool(np.mean(np.abs(length - 1.0) < _UNIT_LENGTH) > 0.9)
+    is_named = about & (WORDS["quaternion_or_joint"] | WORDS["quaternion"])
+    is_unit = np.abs(length - 1.0) < _UNIT_LENGTH
+    return bool(is_named) and bool(is_unit.sum() > 0.9 * length.size)
 
 
 def _joints(row: Sequence[Name], terms: Sequence[str], weak: bool = False) -> Group:
     rest = [t for t in terms if t not in WORDS["joint"] | WORDS["filling"] and not t.isdigit()]
     rest = [t for t in rest if role([t]) != CALCULATED]
-    known = NOMINAL if commands(rest) else role(rest)
-    known = REPORTED if known == MEASURED else known
+    known = REPORTED if role(rest) == MEASURED else role(rest)
+    known = NOMINAL if known == OPEN and COMMANDS & {*rest} else known
     columns = {f"q{number}": name for number, name in enumerate(row, 1)}
     return Group(JOINTS, known, "", columns, weak=weak)
 
@@ -243,28 +242,31 @@ def _target(name: Name, terms: Sequence[str] | None = None, is_turn: bool = Fals
     return target or TOOL
 
 
-def same(a: Group, b: Group, values: Values | None) -> bool:
+def same(a: Group, b: Group, table: RawTable) -> bool:
     """Whether two groups hold the same numbers, their units aside."""
-    if values is None or {*a.columns} != {*b.columns}:
+    if {*a.columns} != {*b.columns}:
         return False
-    here = np.stack([values(name) for name in a.columns.values()])
-    there = np.stack([values(b.columns[key]) for key in a.columns])
+    here = table.stacked(a.names)
+    there = table.stacked([b.columns[key].column for key in a.columns])
     off = 2e-6 * max(np.nanmax(np.abs(there), initial=0.0), 1e-9)
     factors = (1.0, np.pi / 180.0, 180.0 / np.pi, 1e-3, 1e3)
     return any(np.allclose(here * factor, there, 0.0, off, equal_nan=True) for factor in factors)
 
 
-def keeps_distance(a: np.ndarray, b: np.ndarray) -> bool:
-    """Whether two points (n, 3), NaN where unread, keep their distance and turn about each other.
+def keep_distances(points: Sequence[np.ndarray]) -> bool:
+    """Whether points (n, 3), NaN where unread, keep their distances and turn about each other.
 
     A nominal point beside its measured one is a millimetre off, or in a frame of its own. Fewer
-    than three readings of both are too few.
+    than three readings of two are too few.
     """
-    apart = (a - b)[np.isfinite(a - b).all(axis=1)]
-    if len(apart) < 3:
-        return False
-    length = np.linalg.norm(apart, axis=1)
-    usual = float(np.median(length))
-    off = float(np.median(np.abs(length - usual)))
-    turned = float(np.median(np.linalg.norm(apart - np.median(apart, axis=0), axis=1)))
-    return off <= 0.01 * usual and turned >= max(5.0 * off, 1e-3 * usual)
+    for a, b in combinations(points, 2):
+        apart = (a - b)[np.isfinite(a - b).all(axis=1)]
+        if len(apart) < 3:
+            return False
+        length = np.linalg.norm(apart, axis=1)
+        usual = np.median(length)
+        off = np.median(np.abs(length - usual))
+        turned = np.median(np.linalg.norm(apart - np.median(apart, axis=0), axis=1))
+        if off > 0.01 * usual or turned < max(5.0 * off, 1e-3 * usual):
+            return False
+    return True

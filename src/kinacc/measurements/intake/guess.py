@@ -19,7 +19,7 @@ from kinacc.measurements.intake.choices import TAKE, Answers, Choice, Undecided
 from kinacc.measurements.intake.columns import ABOUT_JOINTS, NamedColumns
 from kinacc.measurements.intake.groups import JOINTS, POINT, POSE, PULSES, listed
 from kinacc.measurements.intake.text import Looked
-from kinacc.measurements.layout import ANGLE, LENGTH, TOOL, Layout, find
+from kinacc.measurements.layout import ANGLE, LENGTH, TOOL
 from kinacc.measurements.table import RawTable, numbers_of
 
 MEASUREMENTS, POINTS, POSES = "measurements", "points", "poses"
@@ -65,17 +65,10 @@ class Guess:
         turn = self.section["orientation"] | settings.get("orientation", {})
         return replace(self, section=self.section | {**settings, "orientation": turn})
 
-    def unused(self) -> dict[str, str]:
-        """Columns that the reader does not use by the section, and why ("" where unknown).
-
-        Raises InputError where the reader cannot follow the section.
-        """
-        problems: list[Problem] = []
-        slides = np.array([name.unit in LENGTH for name in self.columns.joints])
-        read = find(self.table, Layout.of(self.section), slides, problems)
-        refuse(problems, f"{self.table.path} cannot be described")
+    def reasons(self, unused: Sequence[str]) -> dict[str, str]:
+        """Why columns that the reader does not use are not read, by column; "" where unknown."""
         why = {name: g.why_unread for g in self.columns.aside for name in g.names}
-        return {name: why.get(name, "") for name in read.unused(self.table)}
+        return {name: why.get(name, "") for name in unused}
 
 
 def look(path: str | Path | Sequence[str | Path], answers: Answers | None = None) -> Guess:
@@ -189,20 +182,19 @@ class _Guesser:
 
     def stacked(self, names: Sequence[Name]) -> np.ndarray:
         """Numbers (n, len(names)) of columns, NaN where nothing was read."""
-        numbers = np.stack([self.table.values(name.column) for name in names], axis=1)
+        numbers = self.table.stacked(name.column for name in names)
         return np.where(np.isin(numbers, [*self.void]), np.nan, numbers)
 
     def pulses(self) -> list[float]:
         """Pulses of every joint's motor in a degree, empty where joints are angles."""
         answer, joints = self.answers.get("pulses_per_deg"), self.columns.joints
-        if not joints:
-            return []
-        if answer is None:
+        if joints and answer is None:
             most = np.nanmax(np.abs(self.stacked(joints)), initial=0.0)
             if joints[0].unit.lower() in PULSES or (not joints[0].unit and most >= _MOST_DEG):
                 about = f"{listed([name.column for name in joints])} are pulses of the motors"
                 meant = {",".join("ABCDEFG"[: len(joints)]): "pulses of each joint in a degree"}
                 raise Undecided(self.table.path, Choice("--pulses-per-deg", about, meant))
+        if not joints or answer is None:
             return []
         per_deg = numbers_of(answer)
         if len(per_deg) != len(joints) or not per_deg.all():
@@ -256,7 +248,7 @@ class _Guesser:
             return usual
         answer, columns = self.answers.get(setting, ""), [name.column for name in names]
         units = ({name.unit for name in names} | {answer}) - {""}
-        units = units or {*filter(None, [self.looked.stated.get(setting.removesuffix("_unit"))])}
+        units = units or {self.looked.stated.get(setting.removesuffix("_unit"), "")} - {""}
         most = np.nanmax(np.abs(self.stacked(names)), initial=0.0)
         if not units:
             unit = small if most <= largest else usual
@@ -264,17 +256,13 @@ class _Guesser:
             self.assumed[setting] = text
             return unit
         unit = min(units)
-        if len(units) > 1:
-            option = f" (--{setting.replace('_', '-')} {answer})" if answer else ""
-            wrong = f"are in {' and '.join(sorted(units))}{option}", "one unit for all"
-        elif unit not in known:
-            wrong = f"are in {unit}", " or ".join(known)
-        elif unit == "m" and most > largest:
-            wrong = f"are in m, and the largest number is {most:.4g}", f"at most {largest:g} m"
-        else:
+        if len(units) == 1 and unit in known and (unit != "m" or most <= largest):
             return unit
+        option = f" (--{setting.replace('_', '-')} {answer})" if answer else ""
+        message = f"are in {' and '.join(sorted(units))}{option}; the largest number is {most:.4g}"
+        allowed = f"one unit for all: {' or '.join(known)}, at most {_LARGEST_M:g} m"
         where = f"{self.table.path}: columns {', '.join(columns)}"
-        self.problems.append(Problem(where, *wrong))
+        self.problems.append(Problem(where, message, allowed))
         return usual
 
     def orientation(self, angle_unit: str) -> dict[str, str]:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import accumulate
 
 from kinacc.measurements.column_names import UNITS, plain
 from kinacc.measurements.grid import Cells, Row, filled, header_cells, is_comment, number_of
@@ -57,12 +58,12 @@ def most_numbers(rows: Sequence[Row]) -> tuple[int, int]:
     return max(((count, width) for width, count in counts.items()), default=(0, 0))
 
 
-def head_of(rows: Sequence[Row], delimiter: str, sheet: bool = False) -> Head | None:
+def head_of(rows: Sequence[Row], sheet: bool = False) -> Head | None:
     """Where the names of the rows are; None where there are no rows of numbers.
 
     ``sheet``: the rows are those of a sheet, of any width.
     """
-    counts = [0 if is_comment(cells, delimiter) else numbers_in(cells) for _, cells in rows]
+    counts = [0 if is_comment(cells) else numbers_in(cells) for _, cells in rows]
     widths = {number: len(rows[number][1]) for number, count in enumerate(counts) if count > 1}
     if not widths:
         return None
@@ -71,33 +72,31 @@ def head_of(rows: Sequence[Row], delimiter: str, sheet: bool = False) -> Head | 
     usual = sorted(counts[number] for number in many)[len(many) // 2]
     first = next(number for number in many if 2 * counts[number] >= usual)
     above = [n for n in range(first)
-             if _can_name(rows[n][1], rows[first][1], width, delimiter, sheet)]  # fmt: skip
+             if _can_name(rows[n][1], rows[first][1], width, sheet)]  # fmt: skip
     under = 0
     while above and _are_units(rows[above[-1]][1]):
         above.pop()
         under += 1
     if not above:
-        return Head(0, first, 0, width, _in_remark(rows[:first], width, delimiter))
-    most = max(len(filled(rows[number][1])) for number in above)
-    place = max(number for number in above if 2 * len(filled(rows[number][1])) >= most)
+        return Head(0, first, 0, width, _in_remark(rows[:first], width))
+    names_in = {number: len(filled(rows[number][1])) for number in above}
+    place = max(number for number in above if 2 * names_in[number] >= max(names_in.values()))
     line, cells = rows[place][0], header_cells(rows[place][1], width)
     over = rows[place - 1][1] if place else []
     names = None
-    if len({*filled(cells)}) < len(filled(cells)) and not is_comment(over, delimiter):
+    if len({*filled(cells)}) < len(filled(cells)) and not is_comment(over):
         # Names under those of groups: Measured over X, Y, Z.
-        texts = [str(cell or "").strip() for cell in (*over, *[""] * width)]
-        groups = [""]
-        for text in texts:
-            groups.append(text or groups[-1])
-        both = [f"{group} {name}".strip() for group, name in zip(groups[1:], cells, strict=False)]
+        texts = [str(cell).strip() for cell in (*over, *[""] * width)]
+        groups: Iterator[str] = accumulate(texts, lambda before, text: text or before)
+        both = [f"{group} {name}".strip() for group, name in zip(groups, cells, strict=False)]
         names = tuple(both) if len({*both}) == len(both) else None
     return Head(line, first, under, width, names)
 
 
-def _in_remark(rows: Sequence[Row], width: int, delimiter: str) -> tuple[str, ...] | None:
+def _in_remark(rows: Sequence[Row], width: int) -> tuple[str, ...] | None:
     """Names that stand behind a sign of remarks in the last lines above the numbers."""
     for _, cells in rows[::-1][:3]:
-        if not is_comment(cells, delimiter):
+        if not is_comment(cells):
             continue
         first = cells[0].lstrip(" #%/!")
         names = header_cells([first, *cells[1:]] if first else cells[1:], width)
@@ -109,19 +108,19 @@ def _in_remark(rows: Sequence[Row], width: int, delimiter: str) -> tuple[str, ..
     return None
 
 
-def _can_name(cells: Cells, numbers: Cells, width: int, delimiter: str, sheet: bool) -> bool:
-    if not filled(cells) or is_comment(cells, delimiter) or numbers_in(cells) > 1:
+def _can_name(cells: Cells, numbers: Cells, width: int, sheet: bool) -> bool:
+    if not filled(cells) or is_comment(cells) or numbers_in(cells) > 1:
         return False
     if sheet:
-        beside = [name for name, cell in zip(cells, numbers, strict=False) if cell is not None]
-        return 2 * sum(isinstance(name, str) for name in beside) >= len(filled(numbers))
+        beside = [name for name, cell in zip(cells, numbers, strict=False) if cell != ""]
+        return 2 * sum(isinstance(name, str) for name in filled(beside)) >= len(filled(numbers))
     count = max(place + 1 for place, cell in enumerate(cells) if cell.strip())
     fits = len(header_cells(cells, width)) == width
     return fits or count in (width, width - (not numbers[-1].strip()))
 
 
 def _are_units(cells: Cells) -> bool:
-    texts = [str(cell).strip() for cell in cells if cell is not None and str(cell).strip("-/ ")]
+    texts = [str(cell).strip() for cell in cells if str(cell).strip("-/ ")]
     units = [plain(text.strip("[](){}<> ")) for text in texts]
     return bool(texts) and all(unit in UNITS or unit == "in" for unit in units)
 

@@ -27,6 +27,7 @@ from kinacc.measurements.joining import (
     rows_by_name,
 )
 from kinacc.measurements.layout import ANGLE, LENGTH
+from kinacc.measurements.table import numbers_of
 from kinacc.measurements.times import offsets, seconds, standstills
 
 _SHARE = 0.5  # of the points: fewer in common are no key
@@ -52,8 +53,7 @@ def look(path: str | Path | Sequence[str | Path], answers: Answers, wanted: bool
 def _sheets(path: Path, answers: Answers) -> list[str]:
     """The sheets of a workbook that holds joints on one and points on another, else none."""
     if path.suffix.lower() in EXCEL and "sheet" not in answers and path.is_file():
-        sheets = {sheet: columns.recognise([*map(name_of, names)])
-                  for sheet, names in text.names_of_sheets(path).items()}  # fmt: skip
+        sheets = {sheet: columns.of_table(names) for sheet, names in text.sheets_of(path).items()}
         joints = [sheet for sheet, meaning in sheets.items() if meaning.joints]
         points = [sheet for sheet, meaning in sheets.items() if meaning.targets]
         if len(joints) == len(points) == 1 and joints != points:
@@ -94,42 +94,41 @@ def _together(files: Sequence[Looked], answers: Answers) -> Looked:
 
 def _join(joints: Looked, points: Looked, answers: Answers) -> tuple[JointsFile, tuple[str, ...]]:
     """How the rows belong together, as answered or as the files leave no doubt."""
-    answer = answers.get("join")
+    answer = answers.get("join", "")
     if answer == ORDER:
         return JointsFile(by="order"), ()
-    if answer and answer != TIME:
-        key, _, key_of_points = answer.partition("=")
-        return _by_name(key, key_of_points or key), ()
-    if answer != TIME and (keys := _by_names(joints, points)):
-        note = f"joined where {keys[0]} of the joints is {keys[1]} of the points"
-        return _by_name(*keys), (note,)
+    key, _, key_of_points = answer.partition("=") if answer != TIME else ("", "", "")
+    notes: tuple[str, ...] = ()
+    if not answer and (keys := _by_names(joints, points)):
+        key, key_of_points = keys
+        notes = (f"joined where {key} of the joints is {key_of_points} of the points",)
+    if key:
+        key_of_points = key_of_points or key
+        return JointsFile.model_construct(by="name", key=key, key_of_points=key_of_points), notes
     times = _times(joints), _times(points)
     if all(times):
         return _by_clock(joints, points, *times, answers)
     raise _undecided(joints, points, [])
 
 
-def _by_name(key: str, key_of_points: str) -> JointsFile:
-    return JointsFile.model_construct(by="name", key=key, key_of_points=key_of_points)
-
-
 def _by_names(joints: Looked, points: Looked) -> tuple[str, str] | None:
     """The columns whose names of poses are those of the other file. Asks where several differ."""
-    ways: list[tuple[tuple[str, str], bytes, bool]] = []
+    certain: dict[tuple[str, str], bytes] = {}
+    counted: list[tuple[str, str]] = []
     as_many = len(joints.table) == len(points.table)
     for keys in product(_keys(joints), _keys(points)):
         with gathered([]):
             row = rows_by_name(points.table, joints.table, *keys)
             count = int(np.sum(row >= 0))
             if count >= max(_SHARE * min(len(row), len(joints.table)), 2):
-                counts = all(_counts_rows(file, key, as_many)
-                             for file, key in zip((joints, points), keys, strict=True))  # fmt: skip
-                ways.append((keys, row.tobytes(), counts))
-    # A count of rows is no name: a point that was left out shifts all behind it.
-    certain = [(keys, rows) for keys, rows, counts in ways if not counts]
-    if ways and len({rows for _, rows in certain}) != 1:
-        raise _undecided(joints, points, [keys for keys, *_ in certain or ways])
-    return certain[0][0] if certain else None
+                # A count of rows is no name: a point that was left out shifts all behind it.
+                if all(map(_counts_rows, (joints, points), keys, (as_many, as_many))):
+                    counted.append(keys)
+                else:
+                    certain[keys] = row.tobytes()
+    if len({*certain.values()}) > 1 or (counted and not certain):
+        raise _undecided(joints, points, [*certain] or counted)
+    return next(iter(certain), None)
 
 
 def _keys(file: Looked) -> list[str]:
@@ -181,12 +180,11 @@ def _by_clock(
             raise Undecided(points.table.path, Choice("--clock-offset", about, meant))
         answer, where = ways[0], points.table.path
         notes.append(f"joined by time: {answer:g} s are added to {key_of_points} of {where}")
-    try:
-        offset_s = float(answer)
-    except ValueError:
-        raise input_error("--clock-offset", repr(answer), "seconds") from None
+    offset_s = numbers_of(str(answer)).tolist()
+    if len(offset_s) != 1:
+        raise input_error("--clock-offset", repr(answer), "seconds")
     how = JointsFile.model_construct(
-        by="time", key=key, key_of_points=key_of_points, clock_offset_s=offset_s, within_s=within
+        by="time", key=key, key_of_points=key_of_points, clock_offset_s=offset_s[0], within_s=within
     )
     return how, tuple(notes)
 
@@ -195,8 +193,7 @@ def _undecided(joints: Looked, points: Looked, ways: Sequence[tuple[str, str]]) 
     """The question which rows belong together; the order is an answer where there are as many."""
     count, others = len(points.table), len(joints.table)
     answers = {f"{key}={other}": f"{key} of the joints is {other}" for key, other in ways}
-    if count == others:
-        answers[ORDER] = "the first row belongs to the first, and so on"
+    answers |= {ORDER: "the first row belongs to the first, and so on"} if count == others else {}
     answers = answers or {"A=B": "columns A of the joints and B of the points name the poses"}
     about = f"nothing decides which of {others} rows of joints belong to {count} points"
     return Undecided(points.table.path, Choice("--join", about, answers))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import combinations
 
 import numpy as np
 import pandas as pd
@@ -11,7 +10,7 @@ import pandas as pd
 from kinacc.errors import input_error
 from kinacc.measurements.column_names import WORDS, name_of
 from kinacc.measurements.intake.columns import NamedColumns
-from kinacc.measurements.intake.groups import RADIUS, keeps_distance
+from kinacc.measurements.intake.groups import RADIUS, keep_distances
 from kinacc.measurements.joining import AGAIN
 from kinacc.measurements.table import RawTable
 
@@ -36,7 +35,7 @@ def with_targets(
     if "session" in columns.single:
         keys["session"] = table.texts(columns.single["session"].column)
     pose = keys.groupby([*keys.columns], sort=False).ngroup().fillna(-1).to_numpy(int)
-    target = columns.single.get("target")
+    target, names = columns.single.get("target"), list[str]()
     radius = next((g.names[0] for g in columns.aside if g.kind == RADIUS), "")
     size = np.nan_to_num(table.values(radius)) if radius else np.zeros(len(table))
     if np.ptp(size) > _SAME_RADIUS * np.max(size):
@@ -49,23 +48,21 @@ def with_targets(
         if wrong:
             message = "the radius of the reflectors changes, so that their centres lie elsewhere"
             raise input_error(table.where(radius), message, _ALLOWED)
-        return columns if target else _with_target(columns, radius)
-    if target or not _are_apart(point_mm, pose):
+        names = [radius]
+    elif not target and _are_apart(point_mm, pose):
+        ways: dict[tuple[int, ...], str] = {}
+        for column in (name for name in table.columns if name not in columns.read()):
+            labels = np.array(table.texts(column), dtype=object)
+            if _names_targets(labels, point_mm, pose):
+                ways.setdefault(tuple(pd.factorize(labels)[0]), column)
+        names = [*ways.values()]
+        if len(names) != 1:
+            known = f"{' and '.join(names)} may name" if names else "no column names"
+            message = f"rows of equal joints lie over {_APART_MM:g} mm apart, {known} their target"
+            raise input_error(table.path, message, _ALLOWED, "a column session names set-ups")
+    if target or not names:
         return columns
-    ways: dict[tuple[int, ...], str] = {}
-    for column in (name for name in table.columns if name not in columns.read()):
-        labels = np.array(table.texts(column), dtype=object)
-        if _names_targets(labels, point_mm, pose):
-            ways.setdefault(tuple(pd.factorize(labels)[0]), column)
-    if len(ways) != 1:
-        known = f"{' and '.join(ways.values())} may name" if ways else "no column names"
-        message = f"rows of equal joints lie over {_APART_MM:g} mm apart, and {known} their target"
-        raise input_error(table.path, message, _ALLOWED, "a column session names set-ups")
-    return _with_target(columns, *ways.values())
-
-
-def _with_target(columns: NamedColumns, column: str) -> NamedColumns:
-    return replace(columns, single=columns.single | {"target": name_of(column)})
+    return replace(columns, single=columns.single | {"target": name_of(names[0])})
 
 
 def _spans(values: np.ndarray, group: np.ndarray) -> np.ndarray:
@@ -89,8 +86,9 @@ def _names_targets(labels: np.ndarray, point_mm: np.ndarray, pose: np.ndarray) -
     if (by_label.max() - by_label.min()).max().max() > _APART_MM:
         return False
     first = by_label.first().unstack()
-    places = [first.xs(label, axis=1, level=1).to_numpy() for label in {*labels[rows]}]
-    return all(keeps_distance(a, b) for a, b in combinations(places, 2))
+    return keep_distances(
+        [first.xs(label, axis=1, level=1).to_numpy() for label in {*labels[rows]}]
+    )
 
 
 def counts_readings(table: RawTable, columns: NamedColumns, q_rad: np.ndarray) -> bool:

@@ -11,6 +11,8 @@ from io import StringIO
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from kinacc.errors import first_few, input_error
 from kinacc.measurements import robot_programs
 from kinacc.measurements.column_names import name_of
@@ -36,7 +38,7 @@ from kinacc.measurements.intake.columns import NamedColumns, names_in
 from kinacc.measurements.intake.heads import Head
 from kinacc.measurements.layout import FEATURES, SPHERICAL, Layout
 from kinacc.measurements.spherical import directions_of, readings_of
-from kinacc.measurements.table import RawTable
+from kinacc.measurements.table import RawTable, frame
 
 DELIMITERS = (";", "\t", ",", BLANKS)
 _LINES, _CHARACTERS = 400, 1_000_000  # looked at
@@ -65,13 +67,13 @@ class Looked:
     joints: dict[str, Any] | None = None
 
 
-def look(path: str | Path, answers: Answers | None = None) -> Looked:
+def look(path: str | Path, answers: Answers) -> Looked:
     """How the file at ``path`` is written, and its table.
 
     ``answers`` to the choices of an :class:`Undecided`, by key. Raises that where the file can be
     read in more than one way, InputError where it is no table of numbers.
     """
-    path, answers = Path(path), answers or {}
+    path = Path(path)
     refuse_other_files(path)
     if (table := as_it_is(path)) is not None:
         return Looked(str(path), Layout(), table)
@@ -79,16 +81,14 @@ def look(path: str | Path, answers: Answers | None = None) -> Looked:
     written, head, rows, notes = (_workbook if is_workbook else _text)(path, answers)
     first_line = head.line or rows[head.first][0]
     above = [
-        " ".join(str(cell) for cell in cells if cell is not None)
+        " ".join(map(str, cells))
         for line, cells in rows
         if line < first_line or str(next(iter(cells), "")).lstrip().startswith((*"#/;%",))
     ]
     stated = heads.stated_above(above)
     written = written.but(**_names_of(path, head, rows, stated, answers))
     table = load(path, written)
-    decimal, thousands, choice = decimals.marks_of(table.columns, answers, written.delimiter)
-    if choice:
-        raise Undecided(str(path), choice)
+    decimal, thousands = decimals.marks_of(table, answers, written.delimiter)
     written = written.but(decimal=decimal, thousands=thousands)
     table = replace(table, decimal=decimal, thousands=thousands)
     if head.line > 1 and head.names is None:
@@ -114,7 +114,7 @@ def _text(path: Path, answers: Answers) -> _Written:
     refuse_large(path)
     encoding = answers.get("encoding") or encoding_of(path)
     with opened(path, encoding) as stream:
-        text = stream.read(_CHARACTERS).removeprefix("\ufeff")
+        text = stream.read(_CHARACTERS)
     lines = list(StringIO(text, newline=""))
     is_cut = len(text) == _CHARACTERS and len(lines) > 1
     lines = lines[: len(lines) - is_cut][:_LINES]
@@ -130,7 +130,7 @@ def _text(path: Path, answers: Answers) -> _Written:
     scores = {delimiter: heads.most_numbers(rows) for delimiter, rows in split.items()}
     near = _NEAR * max(scores.values())[0]
     tops = {d: head for d, (count, _) in scores.items() if count > near
-            and (head := heads.head_of(split[d], d)) is not None and head.width > 1}  # fmt: skip
+            and (head := heads.head_of(split[d])) is not None and head.width > 1}  # fmt: skip
     if not tops:
         message = "no line of column names above rows of numbers was found"
         raise input_error(str(path), message, "columns parted by ; , tab or blanks")
@@ -183,12 +183,14 @@ def _workbook(path: Path, answers: Answers) -> _Written:
 
 def _names(head: Head, rows: Sequence[Row]) -> list[str]:
     cells = next((cells for line, cells in rows if line == head.line), [])
-    return list(head.names or [str(cell) for cell in cells if cell is not None])
+    return [*(head.names or map(str, filled(cells)))]
 
 
-def names_of_sheets(path: Path) -> dict[str, list[str]]:
-    """Names of the columns of every sheet of a workbook that holds rows of numbers."""
-    return {sheet: _names(*table) for sheet, table in _tables_of(path)[1].items()}
+def sheets_of(path: Path) -> dict[str, RawTable]:
+    """The sheets of a workbook that hold rows of numbers, each by its names and without rows."""
+    tables = _tables_of(path)[1]
+    return {sheet: RawTable(sheet, frame(dict.fromkeys(_names(*table), ())), np.zeros(0))
+            for sheet, table in tables.items()}  # fmt: skip
 
 
 def _tables_of(
@@ -197,11 +199,9 @@ def _tables_of(
     """The sheets of a workbook; where the names are, and the first rows, of those with numbers."""
     tables: dict[str, tuple[Head, list[Row]]] = {}
     with Workbook(path) as book:
-        if wanted is not None and wanted not in book.sheets:
-            raise input_error(f"--sheet {wanted}", "is not there", ", ".join(book.sheets))
         for sheet in [wanted] if wanted else book.sheets:
             rows = book.rows(sheet, _LINES)
-            head = heads.head_of(rows, "", sheet=True)
+            head = heads.head_of(rows, sheet=True)
             if head is not None and head.width > 1:
                 tables[sheet] = head, rows
         return book.sheets, tables
@@ -216,27 +216,26 @@ def _names_of(
 ) -> dict[str, Any]:
     """The lines around the names; or the names, where the file has no line of them."""
     cells = [cells for _, cells in rows[head.first :] if len(cells) == head.width]
-    names: Sequence[str] | None
+    names: Sequence[str]
     if answer := answers.get("names"):
         names = [name.strip() for name in answer.split(",")]
         if len(names) != head.width:
             message = f"{len(names)} names for {head.width} columns"
             raise input_error(f"--names {answer}", message, f"{head.width} names")
     elif head.line:
-        names = [*head.names] if head.names else None
-        skipped = head.line if names else head.line - 1
-        return {"names": names, "skip_lines": skipped, "skip_under_names": head.under}
+        return {
+            "names": head.names and [*head.names],
+            "skip_lines": head.line - (not head.names),
+            "skip_under_names": head.under,
+        }
     else:
         names = head.names or _point_names(cells, stated) or robot_programs.names_of_rows(cells)
     if names:
         return {"names": [*names], "skip_lines": rows[head.first][0] - 1}
-    for line, row in rows[: head.first]:
-        if len(row) > 3 and len(filled(row)) == len(row) and not heads.numbers_in(row):
-            message = f"{len(row)} names above rows of {head.width} cells"
-            fix = "export decimal commas with ; or tab between the columns"
-            raise input_error(f"{path}: line {line}", message, "as many names", fix)
-    fix = f"write a line of names above the numbers, or give --names with {head.width} names"
-    raise input_error(str(path), "the columns have no names", "one line of names", fix)
+    fix = f"write a line of names above the numbers, or give --names with {head.width} names; "
+    fix += "export decimal commas with ; or tab between the columns"
+    message = f"the columns have no names, or not one for each of {head.width}"
+    raise input_error(str(path), message, "one line of names", fix)
 
 
 def _point_names(rows: Sequence[Cells], stated: Mapping[str, str]) -> list[str]:
