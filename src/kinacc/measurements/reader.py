@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -43,11 +43,11 @@ class MeasuredFile:
     """
 
     columns: Columns
-    unused: tuple[str, ...] = ()
-    notes: tuple[str, ...] = ()
-    commanded: np.ndarray | None = None
-    turns: np.ndarray | None = None
-    row_names: RowNames = field(default_factory=RowNames)
+    unused: tuple[str, ...]
+    notes: tuple[str, ...]
+    commanded: np.ndarray | None
+    turns: np.ndarray
+    row_names: RowNames
 
     def left_out(self) -> list[str]:
         """All that was not used, in words."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -52,8 +52,8 @@ class Guess:
     section: dict[str, Any]
     table: RawTable
     columns: NamedColumns
-    assumed: dict[str, str] = field(default_factory=dict)
-    notes: tuple[str, ...] = ()
+    assumed: dict[str, str]
+    notes: tuple[str, ...]
 
     @property
     def joints(self) -> int:

@@ -30,11 +30,11 @@ class Head:
     at; ``under``: rows between; ``width`` of the rows; ``names`` where two lines make them.
     """
 
-    line: int = 0
-    first: int = 0
-    under: int = 0
-    width: int = 0
-    names: tuple[str, ...] | None = None
+    line: int
+    first: int
+    under: int
+    width: int
+    names: tuple[str, ...] | None
 
 
 def is_number(cell: object) -> bool:
