@@ -27,7 +27,11 @@ def test_equal_readings_are_no_copies_where_the_digits_are_coarse(tmp_path):
     names = ["x_mm", "y_mm", "z_mm"]
     assert not file.but(**file.columns[names].round(1)).check(tmp_path).suspicions
     copied = file.rows([*range(51), 50, *range(52, 600)])
-    assert [finding.kind for finding in copied.check(tmp_path).suspicions] == ["duplicate_rows"]
+    found = copied.check(tmp_path)
+    assert [finding.kind for finding in found.suspicions] == ["duplicate_rows"]
+    # A copy is no repeated reading.
+    without = file.rows([*range(51), *range(52, 600)]).check(tmp_path)
+    assert found.facts["noise"] == without.facts["noise"]
 
 
 def test_a_drift_is_how_far_the_points_went_where_a_turn_of_the_base_carries_them(tmp_path):

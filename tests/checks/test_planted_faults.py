@@ -82,6 +82,11 @@ def targets_exchanged(file, rows):
     return plants.exchanged(file, "mA", "mB", rows)
 
 
+def readings_in_turn(file, rows):
+    names = [*plants.points(file), *plants.ANGLES]
+    return plants.put(file, names, rows, plants.taken(file, names, np.roll(rows, 1)))
+
+
 def commanded(file, rows):
     return plants.rounded(file, rows, 0)
 
@@ -113,6 +118,7 @@ FAULTS = [
     ("base_jump", base_moved, "ur10", LATE),
     ("base_jump", far_base_moved, "fanuc", from_150),
     ("target_swapped", targets_exchanged, "three", SOME),
+    ("rows_exchanged", readings_in_turn, "arm", SOME),
     ("commanded_joints", commanded, "ur10", twelve),
 ]
 

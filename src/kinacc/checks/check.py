@@ -143,7 +143,10 @@ def check(
         findings.append(
             finding("outliers/repeats", every.line[off], count=off.size, largest_mm=largest)
         )
-    findings += digits.copies(every, scatter.per_axis_mm)
+    copies = [*digits.copies(every, scatter.per_axis_mm)]
+    if again := [line for item in copies if item.kind == "duplicate_rows" for line in item.lines]:
+        scatter = of_readings(every.select(~np.isin(every.line, again)), robot.dh)
+    findings += copies
     facts = coverage.facts_of(every, robot, scatter, between, fitted if fits else None)
     unread = dict.fromkeys((*reading.notes, *reading.left_out()))
     return Report(

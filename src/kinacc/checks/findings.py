@@ -17,7 +17,14 @@ STOPS, WARNING, NOTE = "stops", "warning", "note"
 TEXTS: dict[str, list[str]] = yaml.safe_load(
     (files("kinacc.checks") / "findings.yaml").read_text("utf-8")
 )
-_OF_ROWS = {"target_swapped", "duplicate_rows", "repeated_reading", "outliers", OUTSIDE_LIMITS}
+_OF_ROWS = {
+    "target_swapped",
+    "rows_exchanged",
+    "duplicate_rows",
+    "repeated_reading",
+    "outliers",
+    OUTSIDE_LIMITS,
+}
 # These stop a workflow where a reading is far off; all else does, but for the largest rows.
 _WARN = {*_OF_ROWS, "commanded_joints"} - {OUTSIDE_LIMITS}
 VERDICTS = ("clean", "suspicions")  # by exit code

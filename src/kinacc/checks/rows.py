@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pandas as pd
+from scipy.spatial import cKDTree
 
 from kinacc.checks import changes, robust_fit, tails
 from kinacc.checks.changes import Change
@@ -57,6 +58,7 @@ def _explanations(
     yield from changes.orientations(stated) if observed.has_rotation.any() else ()
     yield from changes.wrong_axes()
     yield from (_swapped(fitted.readings, n) for n in np.unique(fitted.readings.target))
+    yield Change(finding("rows_exchanged"), lambda read: _of_other_rows(fitted, read))
     yield from changes.joint_signs(robot)
 
 
@@ -69,6 +71,13 @@ def _swapped(observed: Readings, target: int) -> Change:
         return replace(read, position_mm=position_mm, target=np.full_like(read.target, target))
 
     return Change(finding("target_swapped", target=observed.target_names[target]), of)
+
+
+def _of_other_rows(fitted: Fitted, read: Readings) -> Readings:
+    """Joints with the reading, of another row, that is nearest to where they put the target."""
+    predicted = robust_fit.residuals(fitted.trial.arm, read).predicted
+    nearest = cKDTree(read.position_mm).query(predicted.position_mm)[1]
+    return replace(read, position_mm=read.position_mm[nearest], rotation=read.rotation[nearest])
 
 
 def largest(fitted: Fitted) -> Iterator[Finding]:
