@@ -26,6 +26,7 @@ from kinacc.study.fields import ErrorField
 DEFAULT_ERRORS = ("smooth", "workshop", "defect")
 SHARES = (0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0)  # of the candidates: budgets by default
 _MOST_READINGS = 50_000_000  # a gigabyte: any pose may be read again and again
+_NOISY = 0.5  # of the rms of held-out errors: noise larger than this is reported
 # Columns on the screen, with their heads.
 _SHOWN = {
     "errors": "Errors",
@@ -108,7 +109,17 @@ def _question(
         raise input_error("--candidates, --budget", message, allowed)
     assessors = [assessor_of(options, budget, points, freedom) for budget in budgets]
     chosen = [errors_of(name, options["point"]) for name in names]
-    return chosen, instruments[0].covariance_mm2, assessors
+    covariance_mm2 = instruments[0].covariance_mm2
+    noise_mm = math.sqrt(np.trace(covariance_mm2))
+    for field in (item for item in chosen if item.name not in fields.FAMILIES):
+        rms_mm = math.sqrt(np.mean(np.sum(field.error_mm**2, axis=1)))
+        if noise_mm > _NOISY * rms_mm:
+            click.echo(
+                f"warning: errors of {field.name} include reading noise ({noise_mm:.3g} of "
+                f"{rms_mm:.3g} mm rms). The plan counts it as error: real widths can be larger.",
+                err=True,
+            )
+    return chosen, covariance_mm2, assessors
 
 
 def errors_of(name: str, point: str | None = None) -> ErrorField:
