@@ -39,7 +39,7 @@ def options(program, folder):
         return ["--frames", file]
     if program.maker == "yaskawa":
         pulses = ",".join(map(str, programs.PULSES))
-        return ["--tool", frames[0], "--base", frames[1], "--pulses-per-degree", pulses]
+        return ["--tool", frames[0], "--base", frames[1], "--pulses-per-deg", pulses]
     return []
 
 

@@ -103,7 +103,7 @@ def predict(
 @option("--tool", "tools", multiple=True, help="Tool of a program: [NUMBER=]x,y,z,a,b,c.")
 @option("--base", "bases", multiple=True, help="Base of a program: [NUMBER=]x,y,z,a,b,c.")
 @option("--frames", multiple=True, type=choice.PATH, help="File with tools and bases.")
-@option("--pulses-per-degree", help="Pulses of a Yaskawa job: one number an axis.")
+@option("--pulses-per-deg", help="Pulses of a Yaskawa job: one number an axis.")
 @option("--base-is-fixed", is_flag=True, help="No external axis moves the robot's base.")
 @option("--at-most-mm", type=float, default=programs.AT_MOST_MM, help="Largest change of a pose.")
 @option("--dry-run", is_flag=True, help="Corrections without a written program.")
@@ -242,7 +242,7 @@ def _correct(
     out: Output,
 ) -> None:
     """Correct a program, write it, and print its corrections; exit code 1 where one is refused."""
-    pulses = options["pulses_per_degree"]
+    pulses = options["pulses_per_deg"]
     answer = programs.compensate_program(
         calibration,
         program,

@@ -102,8 +102,8 @@ def like_those_of(folder: Path, readings: Path) -> dict[str, Any]:
         file = {**measurements["file"], "path": str(readings), "source": None, "exclude": []}
         if measurements["source"] == "file" and not file["joints"]["path"]:
             return {**settings, "measurements": {**measurements, "folds": None, "file": file}}
-    message = f"no configuration beside the results reads {folder.name} from one such file"
-    fix = f"`kinacc init {readings}` writes a .yaml that describes it: give that in its place"
+    message = f"no configuration beside the results states how one file of {folder.name} is read"
+    fix = f"describe it: kinacc init {readings}; then give its .yaml in place of {readings}"
     raise input_error(str(readings), message, fix=fix)
 
 

@@ -49,7 +49,7 @@ def corrected(name, folder=EXAMPLES, **options):
     if name == "joints.csv":
         options = {"tools": {"": np.array([30.0, -20.0, 150.0, *ANGLES])}, **options}
     arm = calibrated(ARMS[name])
-    return compensate_program(arm, folder / name, pulses_per_degree=pulses, **options)
+    return compensate_program(arm, folder / name, pulses_per_deg=pulses, **options)
 
 
 def without_numbers(content: bytes) -> str:

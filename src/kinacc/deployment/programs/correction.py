@@ -103,7 +103,7 @@ class CorrectedProgram:
 def read_program(
     path: Path | str,
     frame_files: Iterable[Path | str] = (),
-    pulses_per_degree: np.ndarray | None = None,
+    pulses_per_deg: np.ndarray | None = None,
 ) -> tuple[Language, Program]:
     """Positions of a program and of the files that belong to it, and its language.
 
@@ -127,7 +127,7 @@ def read_program(
         frames |= (
             frames_of_yaml(source, language.convention) if is_yaml else language.frames(source)
         )
-    program = language.read(sources, pulses_per_degree)
+    program = language.read(sources, pulses_per_deg)
     program = replace(program, frames=frames | program.frames)
     if not program.positions:
         message = "is computed, incomplete or defined elsewhere"
@@ -143,7 +143,7 @@ def compensate_program(
     bases: Mapping[str, np.ndarray] | None = None,
     frame_files: Iterable[Path | str] = (),
     near_rad: np.ndarray | None = None,
-    pulses_per_degree: np.ndarray | None = None,
+    pulses_per_deg: np.ndarray | None = None,
     point: str | None = None,
     at_most_mm: float = AT_MOST_MM,
     base_is_fixed: bool = False,
@@ -173,7 +173,7 @@ def compensate_program(
     InputError
         For a file that cannot be read, frames that are missing, a program compensated before.
     """
-    language, program = read_program(path, frame_files, pulses_per_degree)
+    language, program = read_program(path, frame_files, pulses_per_deg)
     _refuse_second_time(program)
     options = {TOOL: tools or {}, BASE: bases or {}}
     program = _in_use(program, options)

@@ -148,7 +148,7 @@ class Program:
 class Language:
     """One language: how its programs are read and its numbers are meant.
 
-    ``read(sources, pulses_per_degree)`` gives a Program; ``frames(source)`` the tools and
+    ``read(sources, pulses_per_deg)`` gives a Program; ``frames(source)`` the tools and
     bases that a file holds. ``partners``: endings of files written together with the program;
     ``frame_files``: names, in lower case, of files with frames beside it. ``posture``: what the
     controller calls the posture, from the sides (front, elbow up, wrist of joint 5 positive) and

@@ -88,7 +88,7 @@ def _position(
 ) -> Position:
     if state.get("unit") != "RECTAN":
         if pulses is None:
-            fix = "give --pulses-per-degree, one number an axis (S, L, U, R, B, T)"
+            fix = "give --pulses-per-deg, one number an axis (S, L, U, R, B, T)"
             raise input_error(str(source.path), "positions are in pulses", fix=fix)
         return Position(name, source, places[: len(pulses)], 0, pulses)
     reference, rconf = state.get("POSTYPE", "").upper(), state.get("RCONF")
