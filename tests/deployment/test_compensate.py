@@ -61,6 +61,17 @@ def test_a_posture_outside_the_limits_is_left_for_another_and_that_is_said():
     assert np.isnan(found.q_rad).all()
 
 
+def test_joints_given_beyond_the_measured_range_keep_their_posture_in_a_dh_model():
+    arm, q_rad = calibrated("mh180", "dh"), np.array([[0.1, 0.2, 0.3, 0.2, 0.5, 0.4]])
+    wanted = predict(arm, q_rad).pose
+    beyond = np.array([[0.1, 0.2, 0.3, 0.2 + np.pi, -0.5, 0.4 - np.pi]])
+    # Too far from it to be that posture at once, and nearer to it than to the measured one.
+    found = compensate(arm, wanted, beyond + np.array([0.0, 0.0, 0.0, -0.5, 0.0, 0.5]))
+    assert found.status[0] == PoseStatus.EXTRAPOLATED
+    np.testing.assert_allclose(found.q_rad, beyond, atol=0.02)
+    assert compensate(arm, wanted).status[0] == PoseStatus.CONVERGED
+
+
 def test_a_vec_model_gives_no_joints_outside_its_range():
     arm = calibrated("mh180", "vec")
     by_dh = calibrated("mh180", "dh")
