@@ -153,7 +153,10 @@ def test_rows_of_one_pose_after_another_are_asked_about(tmp_path):
     ],
 )
 def test_the_time_at_a_pose_is_known_from_several_columns(tmp_path, header, stamps, hours):
-    result = estimated(tmp_path / "time.csv", visits(FIVE[None], **{header: stamps}))
+    read = visits(FIVE[None], **{header: stamps})
+    # A pose that is read once has no time between its readings.
+    read = pd.concat([read, *(read.tail(1).assign(pose=name) for name in ("once", "too"))])
+    result = estimated(tmp_path / "time.csv", read)
     assert result["hours_at_a_pose"] == pytest.approx(hours)
 
 
