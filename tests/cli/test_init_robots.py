@@ -40,10 +40,17 @@ def described_with(tmp_path, *columns, names=(), options=()):
     return described(written(tmp_path, m_csv=text), *options)[1]
 
 
-def test_points_that_were_calculated_are_remarked_on(tmp_path):
-    for point, count in ((np.round(IT.controller, 2), 1), (IT.point, 0)):
-        remarks = described_with(tmp_path, IT.q, point)["remarks"]
-        assert len([text for text in remarks if "closer than instruments" in text]) == count
+def test_remarks_are_those_of_joints_and_points_that_are_rounded_or_calculated(tmp_path):
+    arm = tracked(digits=2)
+    rounded, calculated, usual = (
+        described_with(tmp_path, q, point)["remarks"]
+        for q, point in (
+            (arm.q, arm.point), (IT.q, np.round(IT.controller, 2)), (IT.q, IT.point),
+        )
+    )  # fmt: skip
+    assert rounded[-1].startswith("joints are written in steps of 0.01 deg: 0.17 mm at 1 m")
+    assert "closer than instruments measure" in calculated[0]
+    assert usual == []
 
 
 def test_the_first_poses_are_shown_as_understood(tmp_path):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from kinacc.calibration.least_squares import one_thread
-from kinacc.checks import check, readings, shipped
+from kinacc.checks import check, digits, readings, shipped
 from kinacc.checks.findings import Finding, Report
 from kinacc.config.values import did_you_mean
 from kinacc.errors import InputError, Problem, input_error, refuse
@@ -19,6 +19,7 @@ from kinacc.kinematics.robot import Robot
 from kinacc.measurements.intake import guess as guesses
 from kinacc.measurements.intake.guess import Guess
 from kinacc.measurements.intake.write import dataset_content, plain_name, template_text
+from kinacc.measurements.layout import ANGLE, LENGTH
 from kinacc.measurements.reader import MeasuredFile, read
 
 ANSWERS = (
@@ -27,6 +28,7 @@ ANSWERS = (
     *("sigma", "direction_unit", "vertical", "horizontal"),
 )
 _CALCULATED_MM = 0.004  # closer to an arm than any instrument measures
+_COARSE_DEG = 0.005  # 0.09 mm at 1 m; less is nothing beside what instruments measure with
 _ABOUT = {  # the setting that a finding contradicts
     "joint_units": "joint_unit",
     "length_units": "length_unit",
@@ -169,23 +171,36 @@ def fitting(guess: Guess) -> list[str]:
     return shipped.fitting(readings.merged(every)[0])
 
 
-def remarks_on(report: Report) -> list[str]:
-    """Remarks on readings that contradict nothing: whether the points were calculated.
+def remarks_on(guess: Guess, report: Report) -> Iterator[str]:
+    """Limits of readings that contradict nothing: points that were calculated, rounded joints.
 
     Parameters
     ----------
+    guess
+        The description of a file.
     report
-        The check of a file's readings.
+        The check of its readings.
 
-    Returns
-    -------
-    list of str
-        Remarks, with lengths in mm.
+    Yields
+    ------
+    str
+        A remark each, with lengths in mm.
     """
-    left_mm = report.facts.get("quick_fit", {}).get("left_per_axis_mm", np.inf)
-    if left_mm > _CALCULATED_MM:
-        return []
-    return [
-        f"the points follow the joints to {left_mm:.1g} mm, closer than instruments measure: "
-        "were they calculated by the controller or a simulation?"
-    ]
+    fit = report.facts.get("quick_fit")
+    if fit and fit["left_per_axis_mm"] <= _CALCULATED_MM:
+        yield (
+            f"the points follow the joints to {fit['left_per_axis_mm']:.1g} mm, closer than "
+            "instruments measure: were they calculated by the controller or a simulation?"
+        )
+    if guess.section.get("pulses_per_deg"):
+        return
+    columns = [guess.table.columns[name.column] for name in guess.columns.joints
+               if name.unit not in LENGTH]  # fmt: skip
+    unit_deg = np.rad2deg(ANGLE[guess.section["joint_unit"]])
+    steps = (digits.step(column, unit_deg, guess.table.decimal) for column in columns)
+    step = min(steps, default=0.0)
+    if step > _COARSE_DEG:
+        yield (
+            f"joints are written in steps of {step:.2g} deg: {1000.0 * np.deg2rad(step):.2g} mm at "
+            "1 m from an axis; export more digits"
+        )

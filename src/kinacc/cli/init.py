@@ -98,7 +98,7 @@ def init(measurement_files: tuple[str, ...], out: Output, **options: Any) -> Non
                 arm = replace(arm, joint_map=np.array(matrix, dtype=float))
                 guess = replace(guess, notes=(*guess.notes, note))
                 guess, report, reading = corrected(guess, arm, name)
-        remarks = remarks_on(report)
+        remarks = list(remarks_on(guess, report))
     poses = _first_poses(reading, arm.dh.prismatic)
     if not out.as_json:
         click.echo("First poses as understood (joints in deg, positions in mm, rotation vectors):")
