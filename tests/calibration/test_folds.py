@@ -44,10 +44,10 @@ def test_rows_of_one_configuration_share_a_fold_or_a_block_of_time(plan, count, 
 
 
 def test_a_label_of_one_fold_alone_must_train():
-    fold = np.array([0, 0, 1, 1, 1, 1, 1, 1, 1])
-    label = np.array(["a", "a", "a", "a", "a", "b", "b", "b", "b"])
-    same = np.array([0, 1, 2, 3, 4, 5, 6, 7, 4])  # the last is the fifth visited again
-    found = [*folds.always_trained(fold, {"session": np.zeros(9), "target": label}, same)]
+    fold = np.array([0, 0, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 1, 1, 1])
+    label = np.array(["a"] * 5 + ["b"] * 4 + ["c"] * 6)  # of c three are left without either fold
+    same = np.array([0, 1, 2, 3, 4, 5, 6, 7, 4, 8, 9, 10, 11, 12, 13])  # the ninth is the fifth
+    found = [*folds.always_trained(fold, {"session": np.zeros(15), "target": label}, same)]
     assert [names for *names, _ in found] == [["target", "a"], ["target", "b"]]
-    np.testing.assert_array_equal(found[0][2], [1, 1, 1, 1, 1, 0, 0, 0, 1])
-    np.testing.assert_array_equal(found[1][2], [0, 0, 0, 0, 1, 1, 1, 1, 1])
+    np.testing.assert_array_equal(np.flatnonzero(found[0][2]), [0, 1, 2, 3, 4, 8])
+    np.testing.assert_array_equal(np.flatnonzero(found[1][2]), [4, 5, 6, 7, 8])
