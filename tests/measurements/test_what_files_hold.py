@@ -54,6 +54,7 @@ def test_half_a_point_is_no_reading_of_its_target(tmp_path, joints):
     one["mA_y_mm"][2] = ""
     found = reading(tmp_path, joints | one | points("mB_"))
     assert found.left_out() == ["1 row holds no reading of mA: line 4"]
+    assert not found.columns["repeat"].any()  # two targets of a pose are no repeats
     read_of = {name: found.columns["row"][found.columns["target"] == name] for name in ("mA", "mB")}
     assert 4 not in read_of["mA"]
     assert 4 in read_of["mB"]
