@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 from kinacc import geometry
 from kinacc.config.schema import defaults
 from kinacc.errors import InputError
-from kinacc.kinematics import dh, region, robot, vec
+from kinacc.kinematics import dh, inverse, region, robot, vec
 from kinacc.kinematics.inverse import limits
 from kinacc.study import accuracy_map, evaluation, operating_points
 from kinacc.synthetic.draw import TABLE_II
@@ -106,6 +106,22 @@ def test_errors_at_joints_are_true_minus_model_tool(arms, models):
         gap = true[:3, 3] - model[:3, 3]
         spin = oracle.rotation_vector(true[:3, :3] @ model[:3, :3].T)
         np.testing.assert_allclose(errors[i], [*gap, *spin], rtol=0, atol=1e-9)
+
+
+def test_joints_of_a_model_in_a_base_of_its_own_reach_the_wanted_poses(models):
+    turn = Rotation.from_rotvec([0.02, -0.01, 0.03]).as_matrix()
+    base = geometry.Pose(turn, np.array([5.0, -3.0, 8.0]))
+    placed = models.by_name["dh"]._replace(base=base)
+    wanted = placed.tool_poses(
+        np.random.default_rng(4).uniform(0.6 * LOW, 0.6 * HIGH, (5, 6)), None
+    )
+    moved = models._replace(by_name=models.by_name | {"dh": placed})
+    found = accuracy_map.joints_of(ARM, moved, wanted, "dh")
+    usable = found.status == inverse.Status.FOUND
+    assert usable.any(axis=1).all()
+    again = placed.tool_poses(found.q_rad[usable], None)
+    rows = np.nonzero(usable)[0]
+    np.testing.assert_allclose(again.position_mm, wanted.position_mm[rows], atol=1e-6)
 
 
 @pytest.mark.parametrize("sequence", ["sobol", "halton"])
