@@ -95,17 +95,13 @@ def test_fig4_bars_reach_from_the_smallest_to_the_largest_beside_the_truth(table
     assert f"True accuracy {implied:.3f} mm" in said(figure)
 
 
-def example(tables, rows=200, **columns):
-    own = {name: column[:rows].copy() for name, column in tables["histories"].items()}
-    return own | {name: np.full(rows, value) for name, value in columns.items()}
-
-
 @pytest.mark.parametrize(("rows", "met", "probability"), [(1, 1, 0.61), (5, 0, 0.6), (200, 0, 0.7)])
 def test_history_states_outcome_largest_error_and_a_rule_that_was_not_met(
     tables, rows, met, probability
 ):
     rule = "first simulation; none searched rejects at eta"
-    table = example(tables, rows, rule_met=met, rule=rule)
+    table = {name: column[:rows].copy() for name, column in tables["histories"].items()}
+    table |= {"rule_met": np.full(rows, met), "rule": np.full(rows, rule)}
     table["rejection_probability"][-1] = probability
     largest = table["true_mm"].max()
     figure = paper.draw_iterations(table, "rejected", largest)
