@@ -15,13 +15,13 @@ from kinacc.campaign.campaign import Campaign
 
 STARTED = ("--model", "dh", "--noise-mm", 0.05, "--frame", "base", "--budget", 8, "--sure")
 FILES = ("plan-poses.csv", "campaign next.csv", "predict.csv", "compensate.csv",
-         "campaign_points.parquet", "measurements.parquet")  # fmt: skip
-READERS = ("predict", "plan-poses --candidates", "campaign start --candidates", "compare --joints")
-# One reader takes every form; the others share its reading.
+         "campaign_points.parquet", "measurements.parquet", "plan-poses.json",
+         "plan-poses.parquet")  # fmt: skip
+OTHERS = ("plan-poses --candidates", "campaign start --candidates", "compare --joints")
+# One reader takes every file and form; the others share its reading.
 PAIRS = [
-    *product(READERS, FILES),
-    ("predict", "plan-poses.json"),
-    ("predict", "plan-poses.parquet"),
+    *product(["predict"], FILES),
+    *product(OTHERS, ["predict.csv", "campaign_points.parquet"]),
 ]
 
 
