@@ -122,7 +122,6 @@ def test_results_without_a_calibration_are_named_and_the_others_summarised(fleet
     assert "line_c" in found["line_c"]["problem"]
     assert "summary.parquet" in found["line_d"]["problem"]
     assert found["line_a"]["selected"]
-    call("summary", "nowhere", code=2)
 
 
 def test_a_joint_bends_where_either_of_its_coefficients_was_fitted():
