@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from small_arms import calibrated, joints, measured, measured_at, results_of
 
-from kinacc.deployment.applicability import is_measured_there, share_of_box
+from kinacc.deployment.applicability import is_measured_there, position_std_mm, share_of_box
 from kinacc.deployment.folder import calibration
+from kinacc.deployment.predict import predict
 from kinacc.kinematics.model import JointState
 
 
@@ -32,3 +33,15 @@ def test_a_box_that_was_measured_everywhere_is_where_it_was_measured():
     assert share_of_box(found, low, high) > 0.9
     beyond = found.robot.dh_joints(np.stack([low, high + 1.0]))
     assert not is_measured_there(found, JointState(beyond))[1]
+
+
+def test_what_the_poses_left_open_counts_with_a_millimetre_of_each_direction():
+    """Joint 5 stood still, so that poses with another joint 5 are known less well."""
+    still = joints("ur10", 80)
+    still[:, 4] = -1.0
+    arm = calibration(results_of("ur10", measured_at("ur10", still), False), "dh", "ur10")
+    there = predict(arm, joints("ur10", 20, seed=9), frame="instrument")
+    at = JointState(arm.robot.dh_joints(joints("ur10", 20, seed=9)))
+    assert (there.undetermined[:, 0] > 1.0).any()
+    wanted = np.hypot(there.std_position_mm, there.undetermined[:, 0])
+    np.testing.assert_allclose(position_std_mm(arm, at), wanted, rtol=1e-9)
