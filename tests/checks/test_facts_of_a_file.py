@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from good_files import simulated
 
-from kinacc.checks import repeatability
+from kinacc.checks import digits, repeatability
 
 
 def test_the_noise_between_two_targets_is_the_noise_of_a_reading(tmp_path):
@@ -58,3 +58,9 @@ def test_axes_that_scatter_alike_are_called_different_as_often_as_stated(freedom
     for level in (0.05, 0.2):  # within four standard deviations
         wide = 4.0 * np.sqrt(level * (1.0 - level) / 3000)
         assert np.mean(np.array(chance) < level) == pytest.approx(level, abs=wide)
+
+
+def test_the_step_of_a_column_is_the_largest_that_all_its_numbers_share():
+    assert digits.step(["0,005", "\u22120,010", "12,345"], 1.0, ",") == pytest.approx(0.005)
+    assert digits.step(["1.0", "1.0"], 2.0, ".") == pytest.approx(0.2)
+    assert digits.step(["1.5", "x"], 1.0, ".") == 0.0
