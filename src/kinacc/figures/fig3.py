@@ -21,6 +21,7 @@ ROWS = (("position_max_mm", "Position", "mm"), ("orientation_max_mrad", "Orienta
 HEAD = "Map error, DH to VEC, in slices at these angles about the robot's first axis"
 DEFAULT_CELL_MM = 25.0
 RING, PARTLY = "largest in the slice", "some poses not reachable"
+EVERYWHERE = "in every cell some poses are not reachable"
 MARGINS_IN = (1.6, 1.7)  # of all panels together: beside them, and above and below
 _HATCHED: dict[str, Any] = {
     "facecolor": "#e2e2e2",
@@ -34,11 +35,13 @@ def draw(accuracy_map: Columns, *, dataset: str | None = None) -> Figure:
     """Draw ``accuracy_map``: a column per slice, position above orientation.
 
     One colour scale per row; unreachable cells are hatched, and those reached in some but not all
-    orientations and branches dotted; the largest value of each slice is ringed and stated. The
-    legend lists the marks that are there.
+    orientations and branches dotted, unless all are; the largest value of each slice is ringed and
+    stated. The legend lists the marks that are there.
     """
     cells = pd.DataFrame(accuracy_map)
     cells[PLACE] = cells[PLACE].round(3)
+    partly = (cells["solutions"] > 0) & (cells["solutions"] < cells["wanted"])
+    cells["dotted"] = partly & ~partly.all()
     slices, radii, heights = (np.unique(cells[name]) for name in PLACE)
     edges = _edges(radii), _edges(heights)
     wide = slices.size > 2
@@ -71,7 +74,9 @@ def draw(accuracy_map: Columns, *, dataset: str | None = None) -> Figure:
         figure.suptitle(f"{name}\n{head}" if name else head, parse_math=False)
         rings = [line for ax in panels.flat for line in ax.lines if line.get_label() == RING]
         marks: dict[str, Artist] = {RING: rings[-1]} if rings else {}
-        if _partly_reached(cells).any():
+        if partly.all():
+            marks[EVERYWHERE] = Patch(fc="none")
+        elif partly.any():
             marks[PARTLY] = Patch(fc="#21918c", ec="white", hatch="...", lw=0)
         if (cells["solutions"] > 0).sum() < slices.size * radii.size * heights.size:
             marks["not reachable"] = Patch(**_HATCHED)
@@ -99,14 +104,10 @@ def colour_range(values: np.ndarray) -> tuple[float, float]:
     return (low, high) if high - low > 1e-3 * abs(high) else (0.9 * low, 1.1 * high + 1e-3)
 
 
-def _partly_reached(cells: pd.DataFrame) -> pd.Series:
-    return (cells["solutions"] > 0) & (cells["solutions"] < cells["wanted"])
-
-
 def _marks(ax: Axes, cells: pd.DataFrame, column: str, unit: str) -> str:
     """Dot cells that are partly reached, ring the largest value; return it in words."""
-    partly = cells[_partly_reached(cells)]
-    ax.plot(partly["radius_mm"], partly["height_mm"], ".", ms=1.6, mew=0, color="white",
+    dotted = cells[cells["dotted"]]
+    ax.plot(dotted["radius_mm"], dotted["height_mm"], ".", ms=1.6, mew=0, color="white",
             rasterized=True, label=PARTLY)  # fmt: skip
     if cells[column].isna().all():
         return "none reached"
