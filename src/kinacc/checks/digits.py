@@ -12,7 +12,7 @@ import pandas as pd
 import scipy
 from numpy import ndarray
 
-from kinacc.checks import robust_fit
+from kinacc.checks import robust_fit, tails
 from kinacc.checks.findings import Finding, finding
 from kinacc.checks.readings import Readings, grouped
 from kinacc.checks.robust_fit import Fitted
@@ -23,7 +23,6 @@ _CHANCE = 0.01  # expected number of coincidences above which equal readings tel
 _GRIDS_DEG = (1.0, 0.5, 0.1, 0.05, 0.01)
 _FINER = 10.0  # a read-back value has digits well below the grid of a commanded one
 _FEWEST = 3
-_UNUSUAL = 5.0  # times what commanded and reported joints are apart in the median row
 _WORSE = 1.5  # times the median error of the other rows
 _RANKED = 1e-3  # significance of that
 _EXACT = 1e-6  # of the grid
@@ -96,8 +95,9 @@ def commanded(fitted: Fitted, robot: Robot) -> Iterator[Finding]:
     read = fitted.residuals.position_mm
     apart = np.linalg.norm(sent - read, axis=1)
     # What is apart everywhere (a following error of a few um) is how the arm is.
-    usual_mm = float(np.median(apart[both]))
-    rows = np.flatnonzero(both & (apart > max(_UNUSUAL * usual_mm, fitted.limit_mm)))
+    usual = tails.limit(apart[both], 3) if apart[both].any() else 0.0
+    limit_mm = max(np.nan_to_num(usual, posinf=0.0), fitted.limit_mm)
+    rows = np.flatnonzero(both & (apart > limit_mm))
     if rows.size:
         lines = observed.lines(rows)
         nearer = np.mean(np.linalg.norm(sent[rows], axis=1) < fitted.left_mm[rows]) > 0.5
