@@ -77,7 +77,7 @@ def points_of(
     places = joints if directions is None else np.hstack([joints, directions])
     rows = np.sort(np.unique(places, axis=0, return_index=True)[1])
     if len(rows) < 2:
-        message = f"all {len(joints)} are at the same joints"
+        message = "only one" if len(joints) == 1 else f"all {len(joints)} are at the same joints"
         raise input_error("candidates", message, "at least 2 different points")
     joints, label = joints[rows], [str(label[i]).strip() for i in rows]
     directions = None if directions is None else directions[rows]

@@ -366,7 +366,7 @@ def _record(opened: folders.Opened, file: FileOfReadings, most_mm: float, again:
         problems.append(Problem(where, message, fix=fix))
     if not good and not problems:
         message = f"holds no new reading: {_NAMES.spans(known)} recorded before"
-        problems.append(Problem(where, message, fix=_AGAIN))
+        problems.append(Problem(where, message, fix="" if again or file.path else _AGAIN))
     refuse(problems, _NOTHING)
     opened.write(Readings(readings=good, file=file.digest, path=file.path))
     return Recorded(

@@ -289,7 +289,9 @@ def read_repeatability(path: str | Path) -> tuple[np.ndarray, int, list[Problem]
     try:
         content = json_files.values_of(json_files.bytes_of(path), str(path))
         test = _Test.model_validate(content)
-    except (OSError, RecursionError, ValueError):
+    except OSError:
+        raise input_error(where, "no such file", fix=fix) from None
+    except (RecursionError, ValueError):
         raise input_error(where, "is no answer of kinacc repeatability", fix=fix) from None
     if test.noise is None:
         raise input_error(where, "has no noise: no pose was visited again", fix=fix)

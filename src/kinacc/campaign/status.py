@@ -170,11 +170,10 @@ def status(opened: Opened, tolerance_mm: float | None = None) -> CampaignStatus:
             f"takes them ({near.freedom} degrees of freedom): noise overstated, or no readings"
         )
     elif repeats and getattr(plan.assessor, "noise", KNOWN) != ESTIMATED:
+        consequence = ": noise overstated, bounds wider than needed" if repeats.too_small else ""
         notes.append(
             f"repeated readings scatter {repeats.ratio:.2f} times the stated noise "
-            f"({repeats.freedom} degrees of freedom)"
-            + ": noise overstated, bounds wider than needed"
-            * repeats.too_small
+            f"({repeats.freedom} degrees of freedom){consequence}"
         )
     if not alarms:
         against += [item.doubt for item in bounds if item.doubt]
