@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +33,52 @@ from kinacc.tables.atomic import write_together
 _FOLDS_UNKNOWN = 60
 _FIRST_POSES = 3
 _QUATERNION = ["qx", "qy", "qz", "qw"]
+
+
+@dataclass(frozen=True)
+class Description:
+    """What ``kinacc init`` has written.
+
+    Attributes
+    ----------
+    written
+        The robot file, where one was needed, and the data set.
+    robot, robot_because
+        The robot, None for a form to fill in, and how it was chosen.
+    joints, targets
+        Number of joints and names of the targets.
+    file
+        The section ``measurements.file``.
+    assumed
+        What the file does not state, by setting.
+    notes
+        Facts on how the file was read.
+    unused_columns
+        Columns that are not read, with the reason.
+    suspicions
+        Findings of the data check.
+    remarks
+        Limits of the readings that contradict nothing.
+    first_poses
+        A row for each target of the first poses, as understood: joints (deg, mm), position (mm),
+        rotation vector (deg), and number of readings.
+    next
+        The commands that follow.
+    """
+
+    written: list[str]
+    robot: str | None
+    robot_because: str
+    joints: int
+    targets: list[str]
+    file: dict[str, Any]
+    assumed: dict[str, str]
+    notes: tuple[str, ...]
+    unused_columns: dict[str, str]
+    suspicions: list[str]
+    remarks: list[str]
+    first_poses: pd.DataFrame
+    next: list[str]
 
 
 @click.command("init")
@@ -116,23 +162,23 @@ def init(measurement_files: tuple[str, ...], out: Output, **options: Any) -> Non
     texts[dataset] = _dataset(dataset, name, used, guess, report, head)
     require_writable(texts, out.force)
     write_together({path: content.encode() for path, content in texts.items()})
-    facts = {
-        "written": [str(path) for path in texts],
-        "robot": robot,
-        "robot_because": chosen,
-        "joints": guess.joints,
-        "targets": list(guess.columns.targets),
-        "file": guess.section,
-        "assumed": guess.assumed,
-        "notes": guess.notes,
-        "unused_columns": unused,
-        "suspicions": [finding.kind for finding in report.suspicions] if report else [],
-        "remarks": remarks,
-        "first_poses": poses,
-        "next": [_command("check-data", dataset), _command("calibrate", dataset)],
-    }
+    result = Description(
+        written=[str(path) for path in texts],
+        robot=robot,
+        robot_because=chosen,
+        joints=guess.joints,
+        targets=list(guess.columns.targets),
+        file=guess.section,
+        assumed=guess.assumed,
+        notes=guess.notes,
+        unused_columns=unused,
+        suspicions=[finding.kind for finding in report.suspicions] if report else [],
+        remarks=remarks,
+        first_poses=poses,
+        next=[_command("check-data", dataset), _command("calibrate", dataset)],
+    )
     about = {"columns": guess.columns, "listed": listed, "how": how, "unread": unread}
-    out.show(facts, lines=rendering.lines("description.txt", d=facts, **about))
+    out.show(result, lines=rendering.lines("description.txt", d=result, **about))
 
 
 def _first_poses(reading: MeasuredFile, prismatic: np.ndarray) -> pd.DataFrame:
