@@ -110,6 +110,15 @@ def _edited(path):
             lambda path: rewritten(path, pq.read_table(path).replace_schema_metadata({})),
             "provenance",
         ),
+        (
+            lambda path: rewritten(
+                path,
+                pq.read_table(path).replace_schema_metadata(
+                    dict.fromkeys(pq.read_schema(path).metadata, "")
+                ),
+            ),
+            "schema metadata",
+        ),
     ],
 )
 def test_a_table_that_is_not_as_its_stage_and_schema_have_it_fails(here, spoil, says):

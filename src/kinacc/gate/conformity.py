@@ -41,6 +41,8 @@ def check_file(path: Path, artefact: Artefact) -> list[Problem]:
         message = f"columns of another type, unit or meaning: {first_few(wrong)}"
         return [Problem(str(path), message)]
     problems: list[Problem] = []
+    if not all(provenance.values()):
+        problems.append(Problem(str(path), f"schema metadata {provenance}", "a value for each"))
     for column in artefact.in_file(frame.columns):
         problems += _values(f"{path}, column {column.name}", column, frame[column.name])
     repeated = frame.duplicated([*artefact.key], keep=False)
