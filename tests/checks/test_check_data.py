@@ -42,3 +42,13 @@ def test_what_cannot_be_used_ends_with_2(good, tmp_path):
     assert report(config, 2)["problems"]
     config.write_text("datasets: {mh180: {robot: mh180}}\n")
     call("check-data", config, code=2)
+
+
+def test_files_that_cannot_be_used_are_all_named_and_the_others_checked(good, tmp_path):
+    configs = [good.write(tmp_path, name) for name in ("a", "b", "c")]
+    for name in ("a", "c"):
+        good.columns.head(3).to_csv(tmp_path / f"{name}.csv", index=False)
+    problems = json.loads(call("check-data", *configs, "--json", code=2).stdout)["problems"]
+    files = {problem["where"].split(",")[0] for problem in problems}
+    assert files == {str(tmp_path / "a.csv"), str(tmp_path / "c.csv")}
+    assert "b:" in call("check-data", *configs, code=2).stdout

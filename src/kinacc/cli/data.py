@@ -24,7 +24,7 @@ from kinacc.config import schema
 from kinacc.config.edit import with_added
 from kinacc.config.series import MOVED, SAME
 from kinacc.deployment import adding
-from kinacc.errors import Problem, first_few, input_error, refuse
+from kinacc.errors import Problem, first_few, gathered, input_error, refuse
 from kinacc.figures.calibration import draw_check
 from kinacc.kinematics import robot
 from kinacc.measurements.reader import excluded_lines, read
@@ -71,17 +71,20 @@ def check_data(
         raise input_error("--picture", message, ", ".join(sections), "give --dataset")
     template = environment(is_page=False).get_template("data_check.txt")
     reports = []
+    problems: list[Problem] = []
     for name, settings in sections.items():
-        with reporting(f"check-data {name}"):
-            report = examined(settings, name)
-        reports.append(report)
-        if not out.as_json:
-            click.echo(f"{template.render(report=report)}\n")
-        if out.picture is not None:
-            suspects = {item.kind: item.lines for item in report.suspicions}
-            limit_mm = report.facts.get("quick_fit", {}).get("most_expected_mm", math.nan)
-            joints = pd.DataFrame(report.facts["joint_coverage"])
-            out.draw(draw_check(joints, report.line, report.left_mm, limit_mm, suspects))
+        with gathered(problems):
+            with reporting(f"check-data {name}"):
+                report = examined(settings, name)
+            reports.append(report)
+            if not out.as_json:
+                click.echo(f"{template.render(report=report)}\n")
+            if out.picture is not None:
+                suspects = {item.kind: item.lines for item in report.suspicions}
+                limit_mm = report.facts.get("quick_fit", {}).get("most_expected_mm", math.nan)
+                joints = pd.DataFrame(report.facts["joint_coverage"])
+                out.draw(draw_check(joints, report.line, report.left_mm, limit_mm, suspects))
+    refuse(problems)
     code = AGAINST if any(report.suspicions for report in reports) else DONE
     if out.as_json:
         datasets = [report.as_dict() for report in reports]
