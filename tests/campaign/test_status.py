@@ -20,13 +20,17 @@ from kinacc.campaign.status import ADVICE, REASONS, status
 from kinacc.report.rendering import lines
 
 
-def measured(readings=999, points=40, budget=120, tolerance_mm=None, off_mm=None, **settings):
+def measured(
+    readings=999, points=40, budget=120, tolerance_mm=None, off_mm=None, exact=None, **settings
+):
     """The status of a campaign with so many readings of a world."""
     limits = Limits(np.deg2rad(0.02), 10.0, tolerance_mm)
     plan = make_plan(points=points, budget=budget, limits=limits, **settings)
     world, taken = world_of(plan), count()
 
     def read(row, visit):
+        if exact is not None:
+            return exact[row]
         off = off_mm(next(taken)) if off_mm else 0.0
         return world.reading_mm(row, visit) + off
 
@@ -50,6 +54,16 @@ def test_limits_of_a_finished_campaign_are_those_of_the_true_errors():
         assert each.proven_mm == pytest.approx(true.proven_mm, rel=0.15)
         assert each.attainable_lower_mm == pytest.approx(true.attainable_lower_mm, rel=1e-3)
         assert each.lower_mm <= sizes.max() <= each.upper_mm
+
+
+def test_the_noise_of_three_axes_is_taken_off_the_sizes_that_limits_go_by():
+    sizes = np.linspace(0.1, 0.6, 40)
+    exact = np.array([[1.0, 2.0, 2.0]]) / 3.0 * np.sqrt(sizes**2 + 3.0 * 0.05**2)[:, None]
+    found = measured(readings=40, exact=exact)
+    true = width_limits(sizes, 0.05, 40, 0.05)
+    for each in found.bounds:
+        assert each.attainable_mm == pytest.approx(true.attainable_mm, rel=1e-6)
+        assert each.proven_mm == pytest.approx(true.proven_mm, rel=1e-6)
 
 
 @pytest.mark.parametrize(
