@@ -11,7 +11,7 @@ from collections.abc import Mapping
 
 from kinacc.config.error_models import ALWAYS
 from kinacc.study import in_memory
-from kinacc.study.claims.claim import Claim, number_claims
+from kinacc.study.claims.claim import Claim, number_claims, number_values
 
 # Numbers may differ in the last digits between machines: accepted arms keep off the edge.
 SHARE_OF_TOLERANCE = 0.97
@@ -26,8 +26,8 @@ def judged() -> list[Claim]:
 def numbers(config: Mapping, measurements: Mapping) -> dict[str, float]:
     """Reproduced number of every judged claim, by claim id, for ``measurements`` columns."""
     start = {"measurements": in_memory.without_folds(measurements)}
-    tables = in_memory.run(STAGES, config, start)
-    return {claim.id: claim.compute(tables) for claim in judged()}
+    values = number_values(in_memory.run(STAGES, config, start))
+    return {claim.id: values[claim.id] for claim in judged()}
 
 
 def excess(found: Mapping[str, float]) -> dict[str, float]:

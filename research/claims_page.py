@@ -8,9 +8,8 @@ import numpy as np
 import pandas as pd
 
 from kinacc.config.schema import defaults
-from kinacc.study.claims.claim import number_claims
+from kinacc.study.claims.claim import number_claims, sentences
 from kinacc.study.claims.evaluate import all_claims
-from kinacc.study.claims.study_sentences import study_claims
 from research import reasons
 from research.dotted import value_at
 from research.judged_runs import ABOUT
@@ -123,7 +122,7 @@ def _beside_noise(choices: pd.DataFrame, factors: pd.DataFrame) -> str:
     agrees, values = reasons.table_of(choices, factors, ALL_AND_ARM)
     middle = values["largest_mm"].median()
     paper_mm = next(claim.paper for claim in number_claims() if claim.id == "true_accuracy")
-    held = agrees[[claim.id for claim in study_claims()]]
+    held = agrees[[claim.id for claim in sentences()["study"]]]
     small, large = (
         np.nanmean(held[side].to_numpy())
         for side in (values["largest_mm"] <= middle, values["largest_mm"] > middle)

@@ -15,8 +15,8 @@ import pandas as pd
 
 from kinacc.config.error_models import ALWAYS
 from kinacc.study import in_memory
-from kinacc.study.claims.claim import verdict
-from kinacc.study.claims.map_sentences import map_claims
+from kinacc.study.claims.claim import sentences, verdict
+from kinacc.study.claims.map_sentences import map_values
 from research import arm_search
 from research.open_choices import ORIENTATIONS_DEG
 
@@ -45,7 +45,7 @@ READINGS = tuple(
         ("slice", "base"), ORIENTATIONS_DEG, ("signs_and_zero", "all_27")
     )
 )
-SENTENCES = tuple(claim.id for claim in map_claims())
+SENTENCES = tuple(claim.id for claim in sentences()["map"])
 
 
 def judged_arms(reading: Reading, config: Mapping, arms: int, seeds: int) -> Iterator[dict]:
@@ -60,8 +60,9 @@ def judged_arms(reading: Reading, config: Mapping, arms: int, seeds: int) -> Ite
         start = {"measurements": in_memory.without_folds(arm_search.measured(bench, each.draw))}
         tables = in_memory.run((*ALWAYS, "accuracy_map"), own, start)
         drawn = tables["accuracy_map"]
-        for claim in map_claims():
-            value = claim.compute(tables)
+        values = map_values(drawn)
+        for claim in sentences()["map"]:
+            value = values[claim.id]
             yield {
                 "reference_frame": reading.reference_frame,
                 "reference_orientation": reading.orientation,

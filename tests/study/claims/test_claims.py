@@ -10,6 +10,7 @@ import pytest
 
 from kinacc.study.claims import all_claims, evaluate
 from kinacc.study.claims.claim import verdict
+from kinacc.study.claims.evaluate import values_of
 from kinacc.study.histories import KEPT, LARGER, REJECTED
 from kinacc.synthetic.draw import TABLE_II
 
@@ -25,7 +26,7 @@ CURVES = {
 
 
 def judged(tables, claim: str) -> str:
-    return verdict(CLAIMS[claim], float(CLAIMS[claim].compute(tables)))
+    return verdict(CLAIMS[claim], values_of(tables)[claim])
 
 
 def summary(changed: str = "", *changes) -> dict[str, pd.DataFrame]:
@@ -78,7 +79,7 @@ def test_few_points_near_the_limit_counts_points():
     errors[:9] = 0.89
     errors[0] = 0.9
     few = {"assessment_points": {"true_error_mm": errors}}
-    assert CLAIMS["few_points_near_limit"].compute(few) == pytest.approx(9 / 200)
+    assert values_of(few)["few_points_near_limit"] == pytest.approx(9 / 200)
     assert judged(few, "few_points_near_limit") == "agrees"
     errors[:11] = 0.89
     assert judged(few, "few_points_near_limit") == "differs"

@@ -11,18 +11,33 @@ import pandas as pd
 from kinacc.config.records import Settings
 from kinacc.config.schema import defaults
 from kinacc.errors import first_few
-from kinacc.study.claims.claim import Claim, number_claims, verdict
-from kinacc.study.claims.map_sentences import map_claims
-from kinacc.study.claims.study_sentences import history_claims, study_claims
+from kinacc.study.claims.claim import Claim, number_claims, number_values, sentences, verdict
+from kinacc.study.claims.map_sentences import map_values
+from kinacc.study.claims.study_sentences import history_values, points_values, study_values
 from kinacc.tables.columns import Columns, Tables
 from kinacc.tables.contract import columns_of
 
 SECTIONS = ("measurements", "calibration", "evaluation", "map", "study", "histories")
+_VALUES = {
+    "accuracy_map": map_values,
+    "assessment_points": points_values,
+    "study_summary": study_values,
+    "histories": history_values,
+}
 
 
 def all_claims() -> list[Claim]:
     """Every claim, in the order of the paper."""
-    return [*number_claims(), *map_claims(), *study_claims(), *history_claims()]
+    return [*number_claims(), *(claim for claims in sentences().values() for claim in claims)]
+
+
+def values_of(tables: Tables) -> dict[str, float]:
+    """Values of the claims whose evidence is there, by claim; NaN where one cannot be computed."""
+    values = number_values(tables)
+    for evidence, compute in _VALUES.items():
+        if evidence in tables:
+            values |= compute(tables[evidence])
+    return values
 
 
 def evaluate(
@@ -44,10 +59,10 @@ def evaluate(
     dict
         Columns of ``claims``. A claim without its evidence is ``not comparable``.
     """
-    rows = []
+    rows, values = [], values_of(tables)
     for claim in all_claims():
-        judged = claim.evidence in tables and (paper_arm or not claim.arm_specific)
-        value = float(claim.compute(tables)) if judged else math.nan
+        judged = paper_arm or not claim.arm_specific
+        value = float(values.get(claim.id, math.nan)) if judged else math.nan
         rows.append(
             {
                 "claim": claim.id,

@@ -1,155 +1,111 @@
-"""Sentences of section IV-B about the accuracy maps (Fig. 3)."""
+"""Sentences of section IV-B about the accuracy maps (Fig. 3).
+
+They chose the reading of Fig. 3 (research, rule ``map_choice``).
+"""
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 from scipy.ndimage import distance_transform_edt
 from scipy.spatial.distance import pdist
 
-from kinacc.study.claims.claim import Claim, sentences
-from kinacc.tables.columns import Tables
+from kinacc.tables.columns import Columns
 
 _JUMP_SHARE = 0.05  # the largest steps between neighbouring cells that count as discontinuities
 _TOP_SHARE = 0.01  # the largest cells of a map
 _OUTER_DEG = (0.0, 60.0)
 _INNER_DEG = (15.0, 30.0, 45.0)
-_QUANTITIES = {
-    "position": ("position_max_mm", "worst_branch"),
-    "orientation": ("orientation_max_mrad", "orientation_worst_branch"),
-}
+_PLACE = ["slice_deg", "height_mm", "radius_mm"]
+_POSITION, _ORIENTATION = "position_max_mm", "orientation_max_mrad"
 
 
-class _Maps(NamedTuple):
-    """Heat maps (slices, heights, radii); unreachable cells are NaN, their branch None."""
-
-    value: np.ndarray
-    branch: np.ndarray
-    solutions: np.ndarray
-
-    def worst(self) -> np.ndarray:
-        """Places (slices, 2) of the largest values as fractions of a slice: (height, radius)."""
-        slices, *shape = self.value.shape
-        place = np.zeros(0, int)
-        if slices:
-            place = np.nanargmax(self.value.reshape(slices, -1), axis=1)
-        return np.transpose(np.unravel_index(place, shape)) / np.maximum(np.array(shape) - 1, 1)
-
-
-def map_claims() -> list[Claim]:
-    """Claims about where the largest errors lie and where the maps break.
-
-    They chose the reading of Fig. 3 (research, rule ``map_choice``).
-    """
-    return sentences(
-        "map",
-        {
-            "map_nonlinear": _nonlinear,
-            "map_largest_changes_location": _changes_location,
-            "map_position_outer_reaches": _outer_reaches,
-            "map_position_less_predictable_inside": _less_predictable_inside,
-            "map_orientation_less_predictable": _orientation_less_predictable,
-            "map_orientation_near_discontinuities": _near_discontinuities,
-            "map_discontinuities_at_wrist_changes": _at_wrist_changes,
-        },
-    )
+def map_values(accuracy_map: Columns) -> dict[str, float]:
+    """Values of the sentences about where the largest errors lie and where the maps break."""
+    cells = pd.DataFrame(dict(accuracy_map)).sort_values(_PLACE, ignore_index=True)
+    cells["row"], cells["column"] = (cells[_PLACE[1:]].rank(method="dense") - 1.0).to_numpy().T
+    flat, worst = {}, {}
+    for quantity in (_POSITION, _ORIENTATION):
+        slices = cells.dropna(subset=quantity).groupby("slice_deg")
+        flat[quantity] = float(np.mean([_plane_share(own, quantity) for _, own in slices]))
+        worst[quantity] = cells.loc[slices[quantity].idxmax()].set_index("slice_deg")
+    apart = {quantity: _distances(cells, places) for quantity, places in worst.items()}
+    outer = worst[_POSITION][worst[_POSITION].index.isin(_OUTER_DEG)]
+    inner = worst[_POSITION][worst[_POSITION].index.isin(_INNER_DEG)]
+    inside, outside = _distances(cells, inner), _distances(cells, outer)
+    less_predictable = math.nan
+    if inside.size and outside.size:
+        # Equal places at 0 and 60 deg are the most predictable there is: the ratio has no bound.
+        less_predictable = float(inside.mean()) / max(float(outside.mean()), 1e-9)
+    of_orientation = math.nan
+    if apart[_POSITION].any():
+        of_orientation = float(apart[_ORIENTATION].mean() / apart[_POSITION].mean())
+    jumps = _discontinuities(cells)
+    return {
+        "map_nonlinear": max(flat.values()),
+        "map_largest_changes_location": min(np.concatenate([*apart.values()]), default=math.nan),
+        "map_position_outer_reaches": float((outer["column"] / _last(cells, "column")).min()),
+        "map_position_less_predictable_inside": less_predictable,
+        "map_orientation_less_predictable": of_orientation,
+        "map_orientation_near_discontinuities": _near_discontinuities(cells, jumps),
+        "map_discontinuities_at_wrist_changes": _at_wrist_changes(cells, jumps),
+    }
 
 
-def _maps(tables: Tables, quantity: str, angles_deg: tuple[float, ...] = ()) -> _Maps:
-    """The maps of the slices at these angles, by default all, that have a value."""
-    place, columns = ["slice_deg", "height_mm", "radius_mm"], [*_QUANTITIES[quantity], "solutions"]
-    rows = pd.DataFrame({name: tables["accuracy_map"][name] for name in (*place, *columns)})
-    rows = rows[rows["slice_deg"].isin(angles_deg or rows["slice_deg"])].sort_values(place)
-    value, branch, solutions = (
-        rows[name].to_numpy().reshape(rows[place].nunique().to_list()) for name in columns
-    )
-    reached = np.isfinite(value.astype(float)).any(axis=(1, 2))
-    return _Maps(value.astype(float)[reached], branch[reached], solutions[reached])
-
-
-def _nonlinear(tables: Tables) -> float:
-    def plane_share(value: np.ndarray) -> float:
-        """Share of the variance that a plane explains."""
-        rows, columns = np.nonzero(np.isfinite(value))
-        values = value[rows, columns]
-        if values.size < 4 or np.ptp(values) == 0.0:
-            return math.nan
-        design = np.column_stack([np.ones_like(values), rows, columns])
-        fitted = design @ np.linalg.lstsq(design, values, rcond=None)[0]
-        return 1.0 - float(np.var(values - fitted) / np.var(values))
-
-    return max(
-        float(np.mean([plane_share(value) for value in _maps(tables, quantity).value]))
-        for quantity in _QUANTITIES
-    )
-
-
-def _distances(tables: Tables, quantity: str, angles_deg: tuple[float, ...] = ()) -> np.ndarray:
-    """Distances between the places of the largest values of every two slices."""
-    places = _maps(tables, quantity, angles_deg).worst()
-    return pdist(places) if len(places) > 1 else np.empty(0)
-
-
-def _changes_location(tables: Tables) -> float:
-    both = [_distances(tables, quantity) for quantity in _QUANTITIES]
-    return float(min(np.concatenate(both), default=math.nan))
-
-
-def _outer_reaches(tables: Tables) -> float:
-    return float(min(_maps(tables, "position", _OUTER_DEG).worst()[:, 1], default=math.nan))
-
-
-def _less_predictable_inside(tables: Tables) -> float:
-    inside, outside = (_distances(tables, "position", deg) for deg in (_INNER_DEG, _OUTER_DEG))
-    if not inside.size or not outside.size:
+def _plane_share(cells: pd.DataFrame, quantity: str) -> float:
+    """Share of the variance in a slice that a plane explains."""
+    values = cells[quantity].to_numpy()
+    if values.size < 4 or np.ptp(values) == 0.0:
         return math.nan
-    # Equal places at 0 and 60 deg are the most predictable there is: the ratio has no bound.
-    return float(inside.mean()) / max(float(outside.mean()), 1e-9)
+    design = np.column_stack([np.ones_like(values), cells[["row", "column"]]])
+    fitted = design @ np.linalg.lstsq(design, values, rcond=None)[0]
+    return 1.0 - float(np.var(values - fitted) / np.var(values))
 
 
-def _orientation_less_predictable(tables: Tables) -> float:
-    position, orientation = (_distances(tables, quantity) for quantity in _QUANTITIES)
-    return float(orientation.mean() / position.mean()) if position.any() else math.nan
+def _last(cells: pd.DataFrame, name: str) -> float:
+    return max(cells[name].max(), 1.0)
 
 
-def _discontinuities(value: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Cells (n, 3), (n, 3) on both sides of the largest steps: slice, row, column."""
-    steps = []
-    for axis in (1, 2):
-        size = np.abs(np.diff(value, axis=axis))
-        cell = np.argwhere(np.isfinite(size))
-        steps.append(np.column_stack([size[tuple(cell.T)], cell, cell + np.eye(3)[axis]]))
-    rows = np.concatenate(steps)
-    rows = rows[np.argsort(-rows[:, 0], kind="stable")]
-    cells = rows[: max(1, round(_JUMP_SHARE * len(rows))), 1:].astype(int)
-    return cells[:, :3], cells[:, 3:]
+def _distances(cells: pd.DataFrame, places: pd.DataFrame) -> np.ndarray:
+    """Distances between every two places, as fractions of a slice."""
+    shares = places[["row", "column"]] / [_last(cells, "row"), _last(cells, "column")]
+    return pdist(shares) if len(places) else np.empty(0)
 
 
-def _near_discontinuities(tables: Tables) -> float:
-    value = _maps(tables, "orientation").value
-    broken = np.zeros(value.shape, bool)
-    for cells in _discontinuities(value):
-        broken[tuple(cells.T)] = True
-    if not broken.any():
+def _discontinuities(cells: pd.DataFrame) -> np.ndarray:
+    """Rows (n, 2) of the cells on both sides of the largest steps in orientation."""
+    index = np.arange(len(cells)).reshape(cells[_PLACE].nunique().to_list())
+    across = [index[:, :-1], index[:, 1:]], [index[:, :, :-1], index[:, :, 1:]]
+    sides = np.concatenate([np.reshape(pair, (2, -1)).T for pair in across])
+    step = np.abs(np.diff(cells[_ORIENTATION].to_numpy()[sides], axis=1))[:, 0]
+    sides, step = sides[np.isfinite(step)], step[np.isfinite(step)]
+    count = max(1, round(_JUMP_SHARE * len(step)))
+    return sides[np.argsort(-step, kind="stable")[:count]]
+
+
+def _near_discontinuities(cells: pd.DataFrame, jumps: np.ndarray) -> float:
+    """Median distance of the largest cells to a discontinuity, over that of all cells."""
+    if not len(jumps):
         return math.nan
-    slices = broken.any(axis=(1, 2))
-    finite = np.isfinite(value[slices])
-    away = np.array([distance_transform_edt(~part) for part in broken[slices]])
-    distance, values = away[finite], value[slices][finite]
-    top = values >= np.quantile(values, 1.0 - _TOP_SHARE)
-    typical = float(np.median(distance))
+    shape = cells[_PLACE].nunique().to_list()
+    broken = np.zeros(len(cells), bool)
+    broken[jumps] = True
+    # A slice without a discontinuity is infinitely far from one, and is left out.
+    parts = broken.reshape(shape)
+    away = [np.where(part.any(), distance_transform_edt(~part), np.nan) for part in parts]
+    known = cells.assign(away=np.ravel(away)).dropna(subset=["away", _ORIENTATION])
+    top = known[known[_ORIENTATION] >= known[_ORIENTATION].quantile(1.0 - _TOP_SHARE)]
+    typical = known["away"].median()
     # With half of all cells touching a discontinuity there is no "near" to speak of.
-    return float(np.median(distance[top])) / typical if typical else math.nan
+    return float(top["away"].median() / typical) if typical else math.nan
 
 
-def _at_wrist_changes(tables: Tables) -> float:
-    maps = _maps(tables, "orientation")
-    sides = _discontinuities(maps.value)
+def _at_wrist_changes(cells: pd.DataFrame, jumps: np.ndarray) -> float:
+    """Share of the discontinuities where the wrist or the number of solutions changes."""
     # The wrist is the part of a branch name after its last comma.
-    wrists = [[name.rpartition(",")[2].strip() for name in maps.branch[tuple(s.T)]] for s in sides]
-    reached = [maps.solutions[tuple(side.T)] for side in sides]
-    changed = (np.array(wrists[0]) != np.array(wrists[1])) | (reached[0] != reached[1])
-    return float(np.mean(changed)) if changed.size else math.nan
+    wrist = cells["orientation_worst_branch"].str.rpartition(",")[2].str.strip().to_numpy()[jumps]
+    solutions = cells["solutions"].to_numpy()[jumps]
+    changed = (wrist[:, 0] != wrist[:, 1]) | (solutions[:, 0] != solutions[:, 1])
+    return float(changed.mean()) if changed.size else math.nan

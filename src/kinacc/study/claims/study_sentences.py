@@ -3,164 +3,109 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 
-from kinacc.study.claims.claim import Claim, Statistic, sentences
 from kinacc.study.histories import KEPT, LARGER, REJECTED
-from kinacc.tables.columns import Tables
+from kinacc.tables.columns import Columns
 
-MAXIMUM, OUTLIER, INVALIDATION = "maximum", "outlier_rejection", "model_invalidation"
-CONVENTIONAL = [MAXIMUM, OUTLIER]
-ASSESSORS = [*CONVENTIONAL, INVALIDATION]
+_PRINTED = ["mean_mm", "min_mm", "max_mm", "bias_mm"]
 
 
-class _Curves(NamedTuple):
-    """The lines of Fig. 4, mm: a row a noise, rising, a column an assessor."""
+def study_values(study_summary: Columns) -> dict[str, float]:
+    """Values of the sentences about the lines of Fig. 4, by claim.
 
-    mean: pd.DataFrame
-    low: pd.DataFrame
-    high: pd.DataFrame
-    bias: pd.DataFrame
-
-    @property
-    def spread(self) -> pd.DataFrame:
-        return self.high - self.low
-
-    @property
-    def log_skew(self) -> pd.Series:
-        """Mean over noise of log((max - mean) / (mean - min)); 0 is even, positive upward."""
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return np.log((self.high - self.mean) / (self.mean - self.low)).mean(skipna=False)
-
-
-def study_claims() -> list[Claim]:
-    """Claims that Fig. 4 and the text around it make."""
-    curves: dict[str, Callable[[_Curves], float]] = {
-        "all_affected_by_noise": _unequally_affected,
-        "maximum_overestimates": lambda c: c.bias[MAXIMUM].min(),
-        "maximum_much_larger": lambda c: c.bias[MAXIMUM].mean() / (c.mean - c.bias)[MAXIMUM].mean(),
-        "maximum_grows_with_noise": lambda c: c.mean[MAXIMUM].diff().min(),
-        "maximum_skewed_upward": lambda c: c.log_skew[MAXIMUM],
-        "outlier_rejection_grows_with_noise": lambda c: c.mean[OUTLIER].diff().min(),
-        "outlier_rejection_below_at_low_noise": lambda c: c.bias[OUTLIER].iloc[0],
-        "outlier_rejection_above_at_high_noise": lambda c: c.bias[OUTLIER].iloc[-1],
-        "outlier_rejection_smaller_spread": lambda c: (c.spread[OUTLIER] / c.spread[MAXIMUM]).max(),
-        "outlier_rejection_more_even": lambda c: (
-            abs(c.log_skew[OUTLIER]) - abs(c.log_skew[MAXIMUM])
-        ),
-        "outlier_rejection_equally_bad": lambda c: (c.bias[OUTLIER] / c.bias[MAXIMUM]).abs().max(),
-        "model_invalidation_varies_least": lambda c: _over_others(c.mean.max() - c.mean.min()),
-        "model_invalidation_even_spread": lambda c: c.log_skew[INVALIDATION],
-        "model_invalidation_larger_spread": _larger_spread,
-        "model_invalidation_performs_well": lambda c: _over_others(c.bias.abs().max()),
-        "model_invalidation_less_sensitive": _less_sensitive,
+    Lines are tables with a row a noise, rising, and a column an assessor, mm.
+    """
+    table = pd.DataFrame(dict(study_summary)).pivot(
+        index="noise_mm", columns="assessor", values=_PRINTED
+    )
+    mean, low, high, bias = (table[name].astype(float) for name in _PRINTED)
+    spread, truth = high - low, (mean - bias)["maximum"].mean()
+    with np.errstate(divide="ignore", invalid="ignore"):
+        # 0 is even, positive upward.
+        skew = np.log((high - mean) / (mean - low)).mean(skipna=False)
+    assessors = ["maximum", "outlier_rejection", "model_invalidation"]
+    change = (mean.iloc[-1] - mean.iloc[0])[assessors].abs()
+    noise = mean.index.to_numpy()
+    maximum, outlier, invalidation = assessors
+    upper = spread.iloc[len(spread) // 2 :]
+    return {
+        "all_affected_by_noise": _ratio(change.max(), change.min()),
+        "maximum_overestimates": bias[maximum].min(),
+        "maximum_much_larger": bias[maximum].mean() / truth,
+        "maximum_grows_with_noise": mean[maximum].diff().min(),
+        "maximum_skewed_upward": skew[maximum],
+        "outlier_rejection_grows_with_noise": mean[outlier].diff().min(),
+        "outlier_rejection_below_at_low_noise": bias[outlier].iloc[0],
+        "outlier_rejection_above_at_high_noise": bias[outlier].iloc[-1],
+        "outlier_rejection_smaller_spread": (spread[outlier] / spread[maximum]).max(),
+        "outlier_rejection_more_even": abs(skew[outlier]) - abs(skew[maximum]),
+        "outlier_rejection_equally_bad": (bias[outlier] / bias[maximum]).abs().max(),
+        "model_invalidation_varies_least": _over_others(mean.max() - mean.min()),
+        "model_invalidation_even_spread": skew[invalidation],
+        "model_invalidation_larger_spread": (upper[invalidation] / upper[outlier]).mean(),
+        "model_invalidation_performs_well": _over_others(bias.abs().max()),
+        "model_invalidation_less_sensitive": _over_others(((noise - noise.mean()) @ mean).abs()),
     }
-    compute = {name: _of_curves(curve) for name, curve in curves.items()}
-    return sentences("study", {"few_points_near_limit": _near_limit, **compute})
 
 
-def _of_curves(compute: Callable[[_Curves], float]) -> Statistic:
-    def value(tables: Tables) -> float:
-        columns = ["mean_mm", "min_mm", "max_mm", "bias_mm"]
-        table = pd.DataFrame(dict(tables["study_summary"])).pivot(
-            index="noise_mm", columns="assessor", values=columns
-        )
-        return float(compute(_Curves(*(table[name].astype(float) for name in columns))))
-
-    return value
+def _ratio(value: float, other: float) -> float:
+    return value / other if other > 0.0 else math.nan
 
 
 def _over_others(sizes: pd.Series) -> float:
-    """Model invalidation's over the smaller of the conventional ones; NaN where that is 0."""
-    least = sizes[CONVENTIONAL].min()
-    return sizes[INVALIDATION] / least if least > 0.0 else math.nan
+    """Model invalidation's over the smaller of the conventional ones."""
+    return _ratio(sizes["model_invalidation"], sizes[["maximum", "outlier_rejection"]].min())
 
 
-def _unequally_affected(curves: _Curves) -> float:
-    changes = (curves.mean.iloc[-1] - curves.mean.iloc[0])[ASSESSORS].abs()
-    return changes.max() / changes.min() if changes.min() > 0.0 else math.nan
+def points_values(assessment_points: Columns) -> dict[str, float]:
+    """Share of the operating points whose error is near the largest."""
+    errors = np.asarray(assessment_points["true_error_mm"], dtype=float)
+    return {"few_points_near_limit": float(np.mean(errors > 0.9 * errors.max()))}
 
 
-def _larger_spread(curves: _Curves) -> float:
-    upper = curves.spread.iloc[len(curves.spread) // 2 :]
-    return (upper[INVALIDATION] / upper[OUTLIER]).mean()
+def history_values(histories: Columns) -> dict[str, float]:
+    """Values of the sentences about the simulations of Figs. 5 and 6 that are there, by claim."""
+    table = pd.DataFrame(dict(histories)).sort_values("iteration")
+    rows = {name: own.reset_index(drop=True) for name, own in table.groupby("example")}
+    values = {}
+    for claim, example in (
+        ("fig5_rejected", REJECTED),
+        ("fig5_larger_eta_not_rejected", LARGER),
+        ("fig6_not_rejected", KEPT),
+    ):
+        if example in rows:
+            last = rows[example].iloc[-1]
+            values[claim] = last["rejection_probability"] - last["alpha"]
+    if REJECTED in rows:
+        values |= _rejected_values(rows[REJECTED])
+    if KEPT in rows:
+        values |= _kept_values(rows[KEPT])
+    return values
 
 
-def _less_sensitive(curves: _Curves) -> float:
-    noise = curves.mean.index.to_numpy()
-    return _over_others(((noise - noise.mean()) @ curves.mean).abs())
+def _rejected_values(rows: pd.DataFrame) -> dict[str, float]:
+    near, beyond = rows["rejection_probability"] >= 0.8 * rows["alpha"], rows["eta_mm"]
+    is_above, first = rows["true_mm"] > beyond, rows["true_mm"].argmax()
+    is_worst = rows["point"] == rows["point"][first]
+    average_above = rows["averaged_mm"] - beyond
+    return {
+        "fig5_approaches_alpha": rows["iteration"][near].min(),
+        "fig5_few_true_errors_above": is_above[:first][~rows["point"][:first].duplicated()].mean(),
+        "fig5_worst_point_resampled": is_worst[first + 1 :].mean(),
+        "fig5_average_stays_above": average_above[is_worst].iloc[-1],
+        "fig5_prioritises_bad_points": is_above[rows["repeat"] > 1].mean(),
+    }
 
 
-def _near_limit(tables: Tables) -> float:
-    errors = np.asarray(tables["assessment_points"]["true_error_mm"], dtype=float)
-    return float(np.mean(errors > 0.9 * errors.max()))
-
-
-def history_claims() -> list[Claim]:
-    """Claims about a simulation that invalidates the model and one that cannot."""
-    return sentences(
-        "history",
-        {
-            "fig5_rejected": _on(REJECTED, _beyond_alpha),
-            "fig5_approaches_alpha": _on(
-                REJECTED,
-                lambda r: r["iteration"][r["rejection_probability"] >= 0.8 * r["alpha"]].min(),
-            ),
-            "fig5_few_true_errors_above": _on(REJECTED, _share_above),
-            "fig5_worst_point_resampled": _on(REJECTED, _worst_resampled),
-            "fig5_average_stays_above": _on(REJECTED, _average_above),
-            "fig5_prioritises_bad_points": _on(
-                REJECTED, lambda r: (r["true_mm"] > r["eta_mm"])[r["repeat"] > 1].mean()
-            ),
-            "fig5_larger_eta_not_rejected": _on(LARGER, _beyond_alpha),
-            "fig6_not_rejected": _on(KEPT, _beyond_alpha),
-            "fig6_resampling_by_noise": _on(KEPT, _only_noise),
-            "fig6_recovers": _on(KEPT, _recovers),
-        },
-    )
-
-
-def _on(example: str, compute: Callable[[pd.DataFrame], float]) -> Statistic:
-    """The statistic of the rows of one example, in order; NaN where it is not there."""
-
-    def value(tables: Tables) -> float:
-        rows = pd.DataFrame(dict(tables["histories"]))
-        rows = rows[rows["example"] == example].sort_values("iteration", ignore_index=True)
-        return math.nan if rows.empty else float(compute(rows))
-
-    return value
-
-
-def _beyond_alpha(rows: pd.DataFrame) -> float:
-    return (rows["rejection_probability"] - rows["alpha"]).iloc[-1]
-
-
-def _share_above(rows: pd.DataFrame) -> float:
-    before = rows[: rows["true_mm"].argmax()].drop_duplicates("point")
-    return (before["true_mm"] > before["eta_mm"]).mean()
-
-
-def _worst_resampled(rows: pd.DataFrame) -> float:
-    first = rows["true_mm"].argmax()
-    return (rows["point"][first + 1 :] == rows["point"][first]).mean()
-
-
-def _average_above(rows: pd.DataFrame) -> float:
-    at_worst = rows[rows["point"] == rows["point"][rows["true_mm"].argmax()]]
-    return (at_worst["averaged_mm"] - at_worst["eta_mm"]).iloc[-1]
-
-
-def _only_noise(rows: pd.DataFrame) -> float:
+def _kept_values(rows: pd.DataFrame) -> dict[str, float]:
     excess = (rows["true_mm"] - rows["eta_mm"]).max()
-    return excess if (rows["repeat"] > 1).any() else max(excess, 0.0)
-
-
-def _recovers(rows: pd.DataFrame) -> float:
     exceeding = rows["rejection_probability"] > rows["alpha"]
     starts = (exceeding & ~exceeding.shift(fill_value=False)).sum()
-    # Of all stretches above alpha only the last one can still be above it at the end.
-    return 1.0 - exceeding.iloc[-1] / starts if starts else math.nan
+    return {
+        "fig6_resampling_by_noise": excess if (rows["repeat"] > 1).any() else max(excess, 0.0),
+        # Of all stretches above alpha only the last one can still be above it at the end.
+        "fig6_recovers": 1.0 - _ratio(exceeding.iloc[-1], starts),
+    }
