@@ -20,6 +20,7 @@ from good_files import File, simulated  # noqa: E402
 from stages_by_hand import made  # noqa: E402
 
 from kinacc.campaign import folder as campaigns  # noqa: E402
+from kinacc.campaign.state import unplanned_mm2  # noqa: E402
 from kinacc.tables import store  # noqa: E402
 from kinacc.workflow.data_sets import DataSets, read_data_sets  # noqa: E402
 
@@ -127,9 +128,11 @@ def _is_number(value: object) -> bool:
 def campaign_course() -> dict:
     """Points asked for, statements after every reading and limits of points of the campaign."""
     course = []
-    opened = campaigns.open_(GOLDEN / "campaign")
-
-    def watch(campaign) -> None:
+    state = campaigns.open_(GOLDEN / "campaign").state
+    campaign = state.plan.assessor.begin(state.plan.candidates(state.rows))
+    for item in state.used:
+        unplanned = unplanned_mm2(state.plan, item.reading)
+        campaign.record(campaign.next(), item.error_mm, unplanned)
         said = [
             {
                 "target": each.target,
@@ -139,10 +142,6 @@ def campaign_course() -> dict:
             }
             for each in campaign.statements()
         ]
-        course.append({"said": said})
-
-    state = opened.watched(watch)
-    for each, item in zip(course, state.used, strict=True):
-        each |= {"reading": item.number, "point": item.reading.point}
+        course.append({"said": said, "reading": item.number, "point": item.reading.point})
     limits = {str(row): list(each) for row, each in state.campaign.point_limits().items()}
-    return {"course": course, "limits_mm": limits, "struck": [e.number for e, _ in state.struck]}
+    return {"course": course, "limits_mm": limits, "struck": [e.number for e in state.struck]}

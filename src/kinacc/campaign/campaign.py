@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import math
-from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+import os
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,21 +18,12 @@ from kinacc.campaign import begin
 from kinacc.campaign import folder as folders
 from kinacc.campaign.instrument import BASE, INSTRUMENT, Frame, Instrument, covariance_of
 from kinacc.campaign.plan import Limits, Plan, assessor_of
-from kinacc.campaign.state import (
-    LeaveOut,
-    Reading,
-    Readings,
-    State,
-    Strike,
-    error_mm,
-    most_plausible_mm,
-    problems_of,
-)
+from kinacc.campaign.recording import NOTHING, Recorded, read_readings, record
+from kinacc.campaign.state import LeaveOut, Reading, State, Strike
 from kinacc.campaign.status import Bound, CampaignStatus, status
 from kinacc.deployment.record import Calibration
 from kinacc.errors import InputError, Problem, input_error, refuse
 from kinacc.geometry import invert, numbers
-from kinacc.measurements.row_names import RowNames
 
 
 @dataclass(frozen=True)
@@ -51,34 +41,6 @@ class NextPose:
     expected_mm: np.ndarray
     frame: str
     times_read: int
-
-
-@dataclass(frozen=True)
-class Recorded:
-    """Readings taken: their ``numbers``, ``points`` and sizes ``error_mm`` of their errors.
-
-    ``known``: numbers of readings that rows of the file repeat.
-    """
-
-    numbers: tuple[int, ...]
-    points: tuple[str, ...]
-    error_mm: tuple[float, ...]
-    known: tuple[int, ...]
-
-
-@dataclass(frozen=True)
-class FileOfReadings:
-    """Rows of a file with their ``places`` in words, and ``problems`` of its other rows.
-
-    ``digest`` of the file and its ``path`` from the folder of the campaign, None of a single
-    reading.
-    """
-
-    rows: Sequence[Reading]
-    places: Sequence[str]
-    problems: Sequence[Problem] = ()
-    digest: str | None = None
-    path: str | None = None
 
 
 class CalibratedRobot(Protocol):
@@ -255,22 +217,21 @@ class Campaign:
             For a reading that is refused; nothing is written.
         """
         with self._writing() as opened:
-            plan, state = opened.plan, opened.state
-            number = state.requested if point is None else plan.points.number(point)
+            plan = opened.plan
+            number = opened.state.requested if point is None else plan.points.number(point)
             if number is None:
                 message = "no further reading is needed"
                 message = message if point is None else f"{point!r} is unknown"
-                raise InputError(Problem("point", message, fix="name a candidate"), _NOTHING)
-            name = plan.instrument(instrument).name
+                raise InputError(Problem("point", message, fix="name a candidate"), NOTHING)
             values = numbers("position_mm", position_mm).reshape(-1)
             reported = None if joints is None else np.asarray(joints, dtype=float).reshape(-1)
-            reading = Reading(number, values, name, reported)
-            most_mm = math.inf if accept_implausible else most_plausible_mm(state)
-            return _record(opened, FileOfReadings([reading], ["the reading"]), most_mm, again)
+            reading = Reading(number, values, plan.instrument(instrument).name, reported)
+            return record(opened, {"the reading": reading}, [], None, accept_implausible, again)
 
     def add_readings(
         self,
-        file: FileOfReadings,
+        path: Path | str,
+        instrument: str | None = None,
         accept_implausible: bool = False,
         again: bool = False,
     ) -> Recorded:
@@ -280,9 +241,9 @@ class Campaign:
         row is wrong, where none is new, and where readings of the same file have no row any more.
         """
         with self._writing() as opened:
-            plausible_mm = most_plausible_mm(opened.state, file.rows)
-            most_mm = math.inf if accept_implausible else plausible_mm
-            return _record(opened, file, most_mm, again)
+            rows, problems = read_readings(path, opened.plan, instrument)
+            place = os.path.relpath(Path(path).resolve(), self.folder.resolve())
+            return record(opened, rows, problems, place, accept_implausible, again)
 
     def leave_out(self, point: str, reason: str) -> None:
         """Leave a point without readings out, for a reason that is not its error."""
@@ -304,10 +265,10 @@ class Campaign:
         """Declare a reading void, for a reason that is not its size."""
         with self._writing() as opened:
             state, message = opened.state, ""
-            if number in {item.number for item, _ in state.struck}:
+            if number in {item.number for item in state.struck}:
                 message = "was struck before"
-            elif not 1 <= number <= state.numbered:
-                message = f"does not exist ({state.numbered} readings)"
+            elif not 1 <= number <= len(state.taken):
+                message = f"does not exist ({len(state.taken)} readings)"
             _refuse(f"reading {number}", message, reason)
             opened.write(Strike(reading=number, reason=reason.strip()))
 
@@ -332,49 +293,6 @@ class Campaign:
             return modelled
         back = invert(self.plan.to_base)
         return modelled @ back.rotation.T + back.position_mm
-
-
-_NOTHING = "Nothing was recorded"
-_NAMES = RowNames(word="reading")
-_AGAIN = "--again takes it as a reading of its own"
-
-
-def _record(opened: folders.Opened, file: FileOfReadings, most_mm: float, again: bool) -> Recorded:
-    plan, state, where = opened.plan, opened.state, file.path or file.places[0]
-    good, known, problems = list[Reading](), list[int](), [*file.problems]
-    imported = state.imports.get(file.path, set())
-    # A row that equals a reading is known, each reading once; ``again``: of the same file alone.
-    recorded, digits = defaultdict[object, list[int]](list), set[object]()
-    for item in state.taken:
-        if item.number in imported or not again:
-            recorded[item.reading.digits].append(item.number)
-    for row, place in zip(file.rows, file.places, strict=True):
-        if numbers := recorded[row.digits]:
-            known.append(numbers.pop(0))
-        elif wrong := problems_of(state, row, place, most_mm):
-            problems += wrong
-        elif row.digits in digits and not again:
-            message = "equals an earlier row to the last digit"
-            problems.append(Problem(place, message, fix=_AGAIN))
-        else:
-            good.append(row)
-        digits.add(row.digits)
-    missing = imported.intersection(item.number for item in state.readings).difference(known)
-    if missing and not again:
-        message = f"does not hold {_NAMES.spans(missing)} any more, recorded from it before"
-        fix = "bring the rows back, strike the readings, or give --again"
-        problems.append(Problem(where, message, fix=fix))
-    if not good and not problems:
-        message = f"holds no new reading: {_NAMES.spans(known)} recorded before"
-        problems.append(Problem(where, message, fix="" if again or file.path else _AGAIN))
-    refuse(problems, _NOTHING)
-    opened.write(Readings(readings=good, file=file.digest, path=file.path))
-    return Recorded(
-        tuple(range(state.numbered + 1, state.numbered + 1 + len(good))),
-        tuple(plan.points.label[row.point] for row in good),
-        tuple(float(np.linalg.norm(error_mm(plan, row))) for row in good),
-        tuple(sorted(known)),
-    )
 
 
 def _refuse(where: str, message: str, reason: str) -> None:

@@ -12,7 +12,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -21,7 +21,6 @@ from pathlib import Path
 from typing import Any
 
 from kinacc import __version__
-from kinacc.assess.adaptive import Campaign
 from kinacc.campaign import plan as plans
 from kinacc.campaign.beside_results import JOURNAL, PLAN
 from kinacc.campaign.plan import Plan
@@ -152,11 +151,7 @@ class Opened:
     @cached_property
     def state(self) -> State:
         """Readings of the journal as the assessor has them."""
-        return self.watched(None)
-
-    def watched(self, watch: Callable[[Campaign], None] | None) -> State:
-        """The state; ``watch`` as in :func:`kinacc.campaign.state.restore`."""
-        return restore(self.plan, self.journal.entries, watch, str(self.folder / JOURNAL))
+        return restore(self.plan, self.journal.entries, str(self.folder / JOURNAL))
 
     @property
     def version(self) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 
 from kinacc.assess.adaptive import Campaign
 from kinacc.campaign.folder import Opened
-from kinacc.campaign.state import State, covariance_mm2, sayable
+from kinacc.campaign.state import State, covariance_mm2, sayable, unplanned_mm2
 from kinacc.campaign.status import reason
 from kinacc.tables.columns import Columns, Tables
 from kinacc.tables.contract import columns_of
@@ -29,17 +29,17 @@ def tables(opened: Opened) -> Tables:
     dict
         Columns of campaign_points, campaign_readings and campaign_bounds, in mm.
     """
-    total = len(opened.state.used)
+    plan, state = opened.plan, opened.state
+    total = len(state.used)
     pause = max(-(-total // _MOMENTS), 1)
     rows: list[tuple[object, ...]] = []
-
-    def watch(campaign: Campaign) -> None:
-        count = campaign.ledger.taken
+    campaign = plan.assessor.begin(plan.candidates(state.rows))
+    for count, item in enumerate(state.used, start=1):
+        row = campaign.next()
+        assert row is not None  # it requested this reading
+        campaign.record(row, item.error_mm, unplanned_mm2(plan, item.reading))
         if count % pause == 0 or count == total:
-            rows.extend(_bounds(campaign))
-
-    opened.watched(watch)
-    state = opened.state
+            rows += _bounds(campaign)
     return {
         "campaign_points": _points(state),
         "campaign_readings": _readings(state),
@@ -90,7 +90,6 @@ def _points(state: State) -> Columns:
 def _readings(state: State) -> Columns:
     plan = state.plan
     used = {item.number: place for place, item in enumerate(state.used, start=1)}
-    void = {item.number: why for item, why in state.struck}
     rows = [
         (
             item.number,
@@ -102,7 +101,7 @@ def _readings(state: State) -> Columns:
             *item.error_mm,
             float(np.linalg.norm(item.error_mm)),
             math.sqrt(float(np.trace(covariance_mm2(plan, item.reading))) / 3.0),
-            void.get(item.number),
+            item.struck,
         )
         for item in state.taken
     ]

@@ -9,9 +9,8 @@ from __future__ import annotations
 
 import math
 from collections import Counter, defaultdict, deque
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from itertools import chain
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -29,7 +28,7 @@ from kinacc.assess.adaptive import Campaign
 from kinacc.assess.statement import MEASURED, Reason, Statement
 from kinacc.campaign.instrument import INSTRUMENT, Numbers, covariance_of
 from kinacc.campaign.plan import Plan
-from kinacc.errors import InputError, Problem, gathered, input_error
+from kinacc.errors import InputError, Problem, gathered, input_error, refuse
 
 _FARTHEST_MM = 1e6  # no instrument measures an arm from a kilometre away
 _USUAL_READINGS = 10  # that show which size is usual
@@ -46,7 +45,7 @@ class Reading:
     reading is not the instrument's.
     """
 
-    point: int
+    point: NonNegativeInt
     position_mm: Numbers
     instrument: str
     joints: Numbers | None = None
@@ -65,12 +64,11 @@ class _Entry(BaseModel):
 class Readings(_Entry):
     """Entry of the journal: readings that are taken together.
 
-    ``file`` is the digest of their file, ``path`` its place from the campaign's folder.
+    ``path`` is the place of their file from the campaign's folder, None of a single reading.
     """
 
     kind: Literal["readings"] = "readings"
     readings: list[Reading]
-    file: str | None = None
     path: str | None = None
 
 
@@ -151,11 +149,17 @@ def _tolerance(plan: Plan) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Taken:
-    """A reading: its number in the journal (from 1) and its error (3,)."""
+    """A reading in the journal: its number (from 1) and its error (3,).
+
+    ``path`` of its file, None of a single reading; ``struck``: why it is void, None where it is
+    not.
+    """
 
     number: int
     reading: Reading
     error_mm: np.ndarray
+    path: str | None
+    struck: str | None = None
 
 
 @dataclass
@@ -163,36 +167,27 @@ class State:
     """A campaign with its readings.
 
     ``rows`` are points in the order in which the assessor numbers them. ``requested`` is the point
-    it requests next, None for none. ``used`` are the readings it used, ``waiting`` those it has not
-    requested, ``struck`` those declared void, with the reason. ``imports``: numbers of readings by
-    the path of their file, from the folder of the campaign.
+    it requests next, None for none. ``taken`` are all readings in the journal, ``used`` those that
+    the assessor requested, in its order. ``left_out``: points with the reason.
     """
 
     plan: Plan
     campaign: Campaign
     rows: np.ndarray
+    taken: list[Taken]
     used: list[Taken]
-    waiting: list[Taken]
     requested: int | None
     left_out: Mapping[int, str]
-    struck: list[tuple[Taken, str]]
-    imports: Mapping[str | None, set[int]]
 
     @property
     def readings(self) -> list[Taken]:
-        """Readings taken, without those struck: the used ones first."""
-        return [*self.used, *self.waiting]
+        """Readings taken, without those struck."""
+        return [item for item in self.taken if item.struck is None]
 
     @property
-    def taken(self) -> list[Taken]:
-        """All readings in the journal, by number."""
-        every = [*self.readings, *(item for item, _ in self.struck)]
-        return sorted(every, key=lambda item: item.number)
-
-    @property
-    def numbered(self) -> int:
-        """Number of the last reading in the journal."""
-        return len(self.readings) + len(self.struck)
+    def struck(self) -> list[Taken]:
+        """Readings declared void."""
+        return [item for item in self.taken if item.struck is not None]
 
     def statements(self) -> tuple[Statement, ...]:
         """Return the statements that the readings support."""
@@ -239,7 +234,7 @@ def problems_of(state: State, reading: Reading, where: str, most_mm: float) -> l
     return problems
 
 
-def most_plausible_mm(state: State, rows: Sequence[Reading] = ()) -> float:
+def most_plausible_mm(state: State, rows: Iterable[Reading] = ()) -> float:
     """Return the largest error that is plausible after the readings taken, and further ``rows``."""
     plan = state.plan
     with np.errstate(over="ignore", invalid="ignore"):
@@ -275,12 +270,7 @@ def sayable(campaign: Campaign) -> tuple[Statement, ...]:
     )
 
 
-def restore(
-    plan: Plan,
-    entries: Iterable[Mapping[str, Any]],
-    watch: Callable[[Campaign], None] | None = None,
-    where: str = "journal",
-) -> State:
+def restore(plan: Plan, entries: Iterable[Mapping[str, Any]], where: str = "journal") -> State:
     """Return the state after the entries of a journal; the assessor gets readings as it requests.
 
     Parameters
@@ -289,8 +279,6 @@ def restore(
         What the campaign fixes.
     entries : iterable of mapping
         Entries of its journal.
-    watch : callable, optional
-        Called with the assessor's campaign after every reading.
     where : str
         Name of the journal in problems.
 
@@ -303,36 +291,32 @@ def restore(
     InputError
         Naming the line of an entry that cannot be read.
     """
-    readings: list[Reading] = []
+    taken: list[Taken] = []
     left_out: dict[int, str] = {}
-    void: dict[int, str] = {}
-    imports = defaultdict[str | None, set[int]](set)
     for line, content in enumerate(entries, start=1):
         try:
             entry = _ENTRY.validate_python(content)
             if isinstance(entry, Readings):
-                before = len(readings)
-                readings += [_of_campaign(plan, reading) for reading in entry.readings]
-                if entry.file:
-                    imports[entry.path].update(range(before + 1, len(readings) + 1))
+                for reading in entry.readings:
+                    refuse(faults_of(plan, reading, f"point {reading.point}"))
+                    taken.append(
+                        Taken(len(taken) + 1, reading, error_mm(plan, reading), entry.path)
+                    )
             elif isinstance(entry, LeaveOut):
                 if entry.point >= len(plan.points):
                     raise ValueError(f"point {entry.point}")
                 left_out[entry.point] = entry.reason
             else:
-                if entry.reading > len(readings):
-                    raise ValueError(f"reading {entry.reading}")
-                void[entry.reading] = entry.reason
-        except (ArithmeticError, InputError, TypeError, ValueError) as error:
+                place = entry.reading - 1
+                taken[place] = replace(taken[place], struck=entry.reason)
+        except (ArithmeticError, InputError, LookupError, TypeError, ValueError) as error:
             message = f"is no entry of this campaign: {' '.join(str(error).split())[:200]}"
             fix = "bring the file back from a copy"
             raise input_error(f"{where}, line {line}", message, fix=fix) from None
     rows = plan.visiting(frozenset(left_out))
-    taken = [Taken(number, row, error_mm(plan, row)) for number, row in enumerate(readings, 1)]
-    struck = [(item, void[item.number]) for item in taken if item.number in void]
     waiting = defaultdict[int, deque[Taken]](deque)
     for item in taken:
-        if item.number not in void:
+        if item.struck is None:
             waiting[item.reading.point].append(item)
     campaign = plan.assessor.begin(plan.candidates(rows))
     used: list[Taken] = []
@@ -340,19 +324,8 @@ def restore(
     while (row := campaign.next()) is not None and (queue := waiting[int(rows[row])]):
         used.append(item := queue.popleft())
         campaign.record(row, item.error_mm, unplanned_mm2(plan, item.reading))
-        if watch is not None:
-            watch(campaign)
     requested = None if row is None else int(rows[row])
-    rest = sorted(chain(*waiting.values()), key=lambda item: item.number)
-    return State(plan, campaign, rows, used, rest, requested, left_out, struck, imports)
-
-
-def _of_campaign(plan: Plan, reading: Reading) -> Reading:
-    """The reading, where its numbers, point and instrument are of this campaign."""
-    if not 0 <= reading.point < len(plan.points) or faults_of(plan, reading, ""):
-        raise ValueError(f"no reading of this campaign: {reading}")
-    plan.instrument(reading.instrument)
-    return reading
+    return State(plan, campaign, rows, taken, used, requested, left_out)
 
 
 @dataclass(frozen=True)

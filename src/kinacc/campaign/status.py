@@ -188,7 +188,7 @@ def status(opened: Opened, tolerance_mm: float | None = None) -> CampaignStatus:
         candidates=candidates,
         points_measured=visited,
         left_out={label[point]: why for point, why in state.left_out.items()},
-        struck={item.number: why for item, why in state.struck},
+        struck={item.number: item.struck or "" for item in state.struck},
         next_point=None if state.requested is None else label[state.requested],
         recorded=max(opened.recorded, default=""),
         noise={device.name: device.noise for device in plan.instruments},
@@ -284,9 +284,9 @@ def _findings(state: State) -> Iterable[str]:
         )
     for point, why in state.left_out.items():
         yield f"point {label[point]} was left out: {why}"
-    for item, why in state.struck:
+    for item in state.struck:
         place = f"{np.linalg.norm(item.error_mm):.3f} mm at {label[item.reading.point]}"
-        yield f"reading {item.number} ({place}) was struck: {why}"
+        yield f"reading {item.number} ({place}) was struck: {item.struck}"
 
 
 # Texts of the codes of assessors.

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import os
 from pathlib import Path
 from typing import Any
 
@@ -12,18 +10,16 @@ import numpy as np
 
 from kinacc.campaign import folder as folders
 from kinacc.campaign import report as reports
-from kinacc.campaign.campaign import Campaign, FileOfReadings
-from kinacc.campaign.state import Reading, point_at
+from kinacc.campaign.campaign import Campaign
 from kinacc.campaign.status import CampaignStatus
 from kinacc.cli import campaign_plan, campaign_start
-from kinacc.cli.choice import FOLDER, PATH, Options, option, positive
+from kinacc.cli.choice import FOLDER, PATH, option, positive
 from kinacc.cli.group import InOrder
 from kinacc.cli.output import Output, answers, require_writable
 from kinacc.cli.process import AGAINST
 from kinacc.cli.rows import joints_given, numbers_given
-from kinacc.errors import Problem, input_error, refuse
+from kinacc.errors import input_error
 from kinacc.figures.save import render
-from kinacc.measurements.rows import POINTS, read_rows
 from kinacc.report.campaign import campaign_page, markdown, section
 from kinacc.report.rendering import lines as texts
 from kinacc.tables.atomic import write_together
@@ -209,9 +205,6 @@ def _open(folder: str) -> Campaign:
     return opened
 
 
-_COMPUTED = {"predict": "unexplained_mm", "compensate": "solver_residual_mm"}  # columns of theirs
-
-
 @campaign.command("record")
 @FOLDER
 @click.argument("file", type=PATH, required=False)
@@ -233,78 +226,26 @@ def record(out: Output, folder: str, file: str | None, **options: Any) -> None:
       kinacc campaign record check --position-mm "812.31,-40.02,655.90"
       kinacc campaign record check readings.csv
     """
-    position, joints = options["position_mm"], options["joints_deg"]
+    position, point, joints = (options[name] for name in ("position_mm", "point", "joints_deg"))
     if (position is None) == (file is None):
         message = "is given twice" if file else "is not given"
         raise input_error("the reading", message, "--position-mm, or a FILE")
     campaign = Campaign(folder)
-    flags = {name: options[name] for name in ("accept_implausible", "again")}
+    flags = {name: options[name] for name in ("instrument", "accept_implausible", "again")}
     plan, number = campaign.plan, campaign.state.requested
     requested = None if number is None else plan.points.label[number]
     if file is not None:
-        taken = campaign.add_readings(_of_file(file, options, campaign), **flags)
+        if (point, joints) != (None, None):
+            raise input_error("--point, --joints-deg", "are columns of a file")
+        taken = campaign.add_readings(file, **flags)
     else:
         if joints is not None:
             joints = joints_given("--joints-deg", joints, plan.slides)
         position_mm = numbers_given("--position-mm", position, 3)
-        place = options["point"], joints, options["instrument"]
-        taken = campaign.add_reading(position_mm, *place, **flags)
+        taken = campaign.add_reading(position_mm, point, joints, **flags)
     summary = campaign.status()
     first = texts("recorded.txt", taken=taken, file=file, requested=requested)
     out.show({**vars(taken), "status": summary}, lines=[*first, *_lines(summary)])
-
-
-def _of_file(path: str, options: Options, campaign: Campaign) -> FileOfReadings:
-    """The rows of a file as readings, and what is wrong with the others."""
-    plan = campaign.plan
-    # A cell that is no number spoils its row, not the file: it is named row by row.
-    read = read_rows(path, plan.slides, POINTS, spoilt=[])
-    table, columns, joints, position_mm = read.table, read.columns, read.joints, read.position_mm
-    assert table is not None  # a file has them all, or read_rows refuses it
-    assert columns is not None
-    assert position_mm is not None
-    pose = columns.single.get("pose")
-    if pose:
-        table = table.with_pose_names(pose.column)
-    known = [instrument.name for instrument in plan.instruments]
-    problems = [
-        Problem(option, "is given with a file", "a column of the file")
-        for option, name in (("--point", "point"), ("--joints-deg", "joints_deg"))
-        if options[name] is not None
-    ]
-    problems += [
-        Problem(path, f"holds positions that kinacc {command} computed", "measured positions")
-        for command, column in _COMPUTED.items()
-        if column in table.columns
-    ]
-    if not pose and joints is None and not problems:
-        problems.append(Problem(path, "has no column pose and no joints", "pose, q1_deg"))
-    usual = plan.instrument(options["instrument"]).name
-    refuse(problems, "Nothing was recorded")
-    names = table.texts(pose.column) if pose else [""] * len(table)
-    devices = np.full(len(table), usual, dtype=object)
-    if "instrument" in table.columns:
-        devices = np.where(table.gaps("instrument"), devices, table.texts("instrument"))
-    rows, places = [], []
-    for i, line in enumerate(table.line):
-        place = f"{path}, {table.row_names.one(line)}"
-        at_rad = joints[i] if joints is not None and np.isfinite(joints[i]).all() else None
-        point, subject = plan.points.number(names[i]), f"{names[i]!r} is"
-        if not pose:
-            point, subject = None if at_rad is None else point_at(plan, at_rad), "its joints are"
-        if point is None:
-            problems.append(Problem(place, f"{subject} no candidate"))
-        elif devices[i] not in known:
-            text = f"instrument {devices[i]!r} is unknown"
-            problems.append(Problem(place, text, ", ".join(known)))
-        else:
-            std = read.std_mm
-            noise = None if std is None else ",".join(map(repr, std[i].tolist()))
-            rows.append(Reading(point, position_mm[i], devices[i], at_rad, noise))
-            places.append(place)
-    digest = hashlib.sha256(Path(path).read_bytes()).hexdigest()[:16]
-    relative = os.path.relpath(Path(path).resolve(), campaign.folder.resolve())
-    return FileOfReadings(rows, places, problems, digest, Path(relative).as_posix())
 
 
 campaign.add_command(campaign_plan.plan)

@@ -46,10 +46,11 @@ def section(opened: Opened, tables: Tables) -> Part:
         "campaign_facts.txt",
         opened=opened,
         state=state,
+        waiting=len(state.readings) - len(state.used),
         plan=plan,
         settings=vars(plan.assessor),
         large=int(np.sum(sizes_mm > plan.limits.implausible_mm)),
-        files={item["file"]: item.get("path") for item in opened.journal.entries if "file" in item},
+        files=dict.fromkeys(item.path for item in state.taken if item.path),
         version=__version__,
     )
     values = {
