@@ -44,7 +44,7 @@ WAYS_TO_NOISE = """give it in one of three ways:
 def points_of(
     arm: Calibration,
     joints: np.ndarray,
-    label: Sequence[str],
+    label: Sequence[object] | np.ndarray,
     directions: np.ndarray | None = None,
     point: str | None = None,
 ) -> Points:
@@ -56,8 +56,8 @@ def points_of(
         Calibrated model whose errors are bounded.
     joints : (m, k) array
         Reported joints, rad (mm where a joint slides).
-    label : sequence of str
-        Names of the candidates.
+    label : sequence
+        Names of the candidates, or numbers.
     directions : (m, k) array, optional
         Directions of travel on arrival: -1, 0 (unknown), 1.
     point : str, optional
@@ -79,18 +79,18 @@ def points_of(
     if len(rows) < 2:
         message = "only one" if len(joints) == 1 else f"all {len(joints)} are at the same joints"
         raise input_error("candidates", message, "at least 2 different points")
-    joints, label = joints[rows], [str(label[i]).strip() for i in rows]
+    joints, names = joints[rows], [str(label[i]).strip() for i in rows]
     directions = None if directions is None else directions[rows]
-    problems = _outside(arm, joints, label)
-    problems += [fault for name in label for fault in not_in_a_line("candidates, pose", name)]
-    if doubled := sorted(name for name, count in Counter(label).items() if count > 1):
+    problems = _outside(arm, joints, names)
+    problems += [fault for name in names for fault in not_in_a_line("candidates, pose", name)]
+    if doubled := sorted(name for name, count in Counter(names).items() if count > 1):
         message = f"names given to different joints: {', '.join(doubled[:5])}"
         problems.append(Problem("candidates", message, "one name per point"))
     refuse(problems, "These candidates cannot be measured against the model")
     state = JointState(arm.robot.dh_joints(joints), directions)
     where = arm.pose(state, "base", point).position_mm
     slope = arm.joint_jacobian(state, "base", point)[:, :3] @ arm.robot.joint_map
-    return Points(tuple(label), joints, where, slope, directions)
+    return Points(tuple(names), joints, where, slope, directions)
 
 
 def _outside(arm: Calibration, joints: np.ndarray, label: Sequence[str]) -> list[Problem]:

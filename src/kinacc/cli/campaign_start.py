@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import shlex
-from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -73,8 +73,14 @@ def start(out: Output, **options: Any) -> None:
     results, point = Path(options["calibration"]), options["point"]
     used, freedom, doubts = instruments_of(options)
     arm = choice.calibration_of(results, options["model"], options["session"])
-    joints, labels, directions, source = _candidates(options, arm)
-    points = begin.points_of(arm, joints, labels, directions, point)
+    draw = partial(_drawn, options, arm)
+    inputs, joints = rows.candidates(options, arm.robot, _MOST_CANDIDATES, draw)
+    points = begin.points_of(arm, joints, inputs.label, inputs.directions, point)
+    source = "drawn between neighbouring measured poses"
+    if inputs.table is not None:
+        source = f"rows of {Path(inputs.table.path).name}"
+    elif options["joints_deg"] is not None:
+        source = "drawn evenly from the joints the calibration covers"
     tolerance_mm = _tolerance_mm(options["tolerance_mm"], results)
     apart_rad = np.deg2rad(options["joint_tolerance_deg"])
     limits = Limits(apart_rad, tolerance_mm=tolerance_mm, target=options["target"])
@@ -156,51 +162,29 @@ def _tolerance_mm(tolerance_mm: float | None, results: Path) -> float | None:
     return stated.mm if stated is not None and stated.of == "bound" else None
 
 
-def _candidates(
-    options: Options, arm: Calibration
-) -> tuple[np.ndarray, list[str], np.ndarray | None, str]:
-    """Joints (m, k), labels, directions (m, k) or None, and the source of the candidates."""
-    count = rows.candidates(options, arm.robot, _MOST_CANDIDATES)
-    if not isinstance(count, int):
-        file, joints = count
-        source = f"rows of {Path(options['candidates']).name}"
-        return joints, list(map(str, file.label)), file.directions, source
-    draw, source = _drawing(options, arm)
+def _drawn(options: Options, arm: Calibration, count: int) -> np.ndarray:
+    """Reported joints (count, k) that the calibration covers, by the options of the command."""
+    if arm.fitted is None or arm.fitted_range_rad is None:
+        raise input_error("candidates", "the results hold no measurements", "a file of joints")
+    robot, target = arm.robot, arm.point(options["point"])
+    box, inside = spaces.of_options(options, robot)
+    poses = ends.reported_joints(robot, arm.fitted.q_rad)
     for times in (1, 4, 16, _MOST_DRAWS):
-        joints = draw(times * count)
-        state = JointState(arm.robot.dh_joints(joints))
-        if options["joints_deg"] is None:
+        if box is not None:
+            cut = ends.cut_to_range(robot, *box, arm.fitted_range_rad)
+            joints = spread(robot, times * count, cut, inside, target)
+            # Coupled joints have no box of their own.
+            joints = joints[~arm.outside_range(robot.dh_joints(joints)).any(axis=1)]
+        else:
+            joints = between(poses, ends.travel_unit(robot), times * count, options["seed"])
+            joints = joints[ends.within(joints, robot.q_min_rad, robot.q_max_rad)]
+            if inside is not None:
+                joints = joints[inside(tool_positions(robot, joints, target))]
+            state = JointState(robot.dh_joints(joints))
             joints = joints[is_measured_there(arm, state, options["point"])]
-        elif arm.model.domain is not None:  # coupled joints have no box of their own
-            joints = joints[~arm.outside_range(state.q_rad).any(axis=1)]
         if len(joints) >= count:
-            labels = [str(number) for number in range(1, count + 1)]
-            return joints[:count], labels, None, source
+            return joints[:count]
     message = (
         f"only {len(joints)} of {_MOST_DRAWS * count} joint values drawn are near measured poses"
     )
     raise input_error("candidates", message, f"{count}", "narrow the region")
-
-
-def _drawing(options: Options, arm: Calibration) -> tuple[Callable[[int], np.ndarray], str]:
-    """A function that draws at most so many reported joints (n, k), and where it draws them."""
-    robot, target = arm.robot, arm.point(options["point"])
-    box, inside = spaces.of_options(options, robot)
-    low, high = robot.q_min_rad, robot.q_max_rad
-    if box is None and arm.fitted is not None:
-        poses = ends.reported_joints(robot, arm.fitted.q_rad)
-
-        def draw(count: int) -> np.ndarray:
-            drawn = between(poses, ends.travel_unit(robot), count, options["seed"])
-            usable = ends.within(drawn, low, high)
-            if inside is not None:
-                usable &= inside(tool_positions(robot, drawn, target))
-            return drawn[usable]
-
-        return draw, "drawn between neighbouring measured poses"
-    if arm.fitted_range_rad is not None:
-        low, high = ends.cut_to_range(robot, low, high, arm.fitted_range_rad)
-    if box is not None:
-        low, high = np.maximum(low, box[0]), np.minimum(high, box[1])
-    source = "drawn evenly from the joints the calibration covers"
-    return lambda count: spread(robot, count, (low, high), inside, target), source

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import click
@@ -55,13 +56,9 @@ def plan_poses(robot: str, count: int, out: Output, **options: Any) -> None:
         threshold=calibration["dh"]["truncation"],
     )
     with reporting("plan-poses"):
-        candidates = rows.candidates(options, arm, _MOST_CANDIDATES)
-        if isinstance(candidates, int):
-            joints = planning.spread(arm, candidates, *spaces.of_options(options, arm), tool)
-            label = np.arange(1, candidates + 1)
-        else:
-            file, joints = candidates
-            label = file.label
+        box, inside = spaces.of_options(options, arm)
+        draw = partial(planning.spread, arm, box_rad=box, inside=inside, tool=tool)
+        candidates, joints = rows.candidates(options, arm, _MOST_CANDIDATES, draw)
         plan = planning.plan_poses(arm, joints, experiment, count, np.zeros(arm.dh.joints))
     if out.picture is not None:
         from kinacc.figures.campaign import draw_observability
@@ -71,7 +68,7 @@ def plan_poses(robot: str, count: int, out: Output, **options: Any) -> None:
         "order": np.arange(1, count + 1),
         **rows.joint_columns(arm.dh.prismatic, joints[plan.chosen]),
         "move_deg": np.rad2deg(plan.moves_rad),
-        "candidate": label[plan.chosen],
+        "candidate": candidates.label[plan.chosen],
     })  # fmt: skip
     facts = {
         "robot": arm.name,

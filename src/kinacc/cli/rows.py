@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import click
 import numpy as np
@@ -75,23 +75,24 @@ def joint_columns(prismatic: np.ndarray, joints: np.ndarray) -> dict[str, np.nda
     }
 
 
-def candidates(options: Options, robot: Robot, most: int) -> tuple[Rows, np.ndarray] | int:
-    """Rows and joints of the file of ``--candidates``, or the number to draw, at most ``most``."""
+def candidates(
+    options: Options, robot: Robot, most: int, draw: Callable[[int], np.ndarray]
+) -> tuple[Rows, np.ndarray]:
+    """Rows and joints (n, k) of the file of ``--candidates``, or as many as it states, drawn."""
     text = options["candidates"]
     if text.lstrip("-").isdecimal():
         if not 2 <= int(text) <= most:
             raise input_error("--candidates", text, f"2 to {most}, or a file")
-        return int(text)
+        joints = draw(int(text))
+        return Rows(np.arange(1, len(joints) + 1), joints), joints
     rows, joints = read_joints(text, robot, joint_answers(options))
-    require_within_limits(robot, rows.label, joints, text, "Candidates")
+    require_within_limits(robot, rows.label, joints, text)
     if len(joints) > most:
         raise input_error(text, f"{len(joints)} candidates", f"at most {most}")
     return rows, joints
 
 
-def require_within_limits(
-    robot: Robot, label: np.ndarray, joints: np.ndarray, where: str, title: str = "Joints"
-) -> None:
+def require_within_limits(robot: Robot, label: np.ndarray, joints: np.ndarray, where: str) -> None:
     """Raise InputError with every joint of which a row lies outside the robot's limits."""
     problems = []
     for fault in outside_limits(robot, joints, 1e-9):
@@ -102,7 +103,7 @@ def require_within_limits(
         problems.append(
             Problem(place, value, fault.allowed, fix if fault.looks_like_degrees else "")
         )
-    refuse(problems, f"{title} outside the robot's limits")
+    refuse(problems, "Joints outside the robot's limits")
 
 
 def print_remarks(
