@@ -43,6 +43,11 @@ STUDIED = (
 )
 
 
+def tables_in(folder: Path) -> dict:
+    """All tables of a folder, by name."""
+    return {path.stem: store.read(path) for path in folder.glob("*.parquet")}
+
+
 def made(name: str, tables: dict, settings: dict) -> dict:
     """Tables that a stage makes of others."""
     if name == "study":
@@ -62,12 +67,11 @@ def run_stages(
     settings, folder = data.settings[dataset], results / dataset
     folder.mkdir(parents=True, exist_ok=True)
     for name in names:
-        tables = {path.stem: store.read(path) for path in folder.glob("*.parquet")}
         own = data.chosen(dataset, *CALIBRATION) if name == "summary" else settings
         marks = {"kinacc_version": "0", "config_hash": config_hash(own), "seed": settings["seed"]}
         contents = {
             f"{table}.parquet": store.content_of(store.to_table(table, columns, marks))
-            for table, columns in made(name, tables, settings).items()
+            for table, columns in made(name, tables_in(folder), settings).items()
         }
         left = {folder / file: content for file, content in contents.items()}
         write_together({**left, folder / "sums" / f"{name}.sha256": sums.text_of(contents, {})})

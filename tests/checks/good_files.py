@@ -82,9 +82,8 @@ def simulated(
     """
     rng, arm = np.random.default_rng(seed), robots.load(robot)
     errors = off * rng.normal(size=(4, arm.dh.joints)) * [[1e-3], [0.5], [0.5], [1e-3]]
-    names = ("theta_offset_rad", "d_mm", "a_mm", "alpha_rad")
-    there = {name: getattr(arm.dh, name) + by for name, by in zip(names, errors, strict=True)}
-    arm = replace(arm, dh=replace(arm.dh, **there))
+    there = arm.dh.start.reshape(-1, 5) + np.pad(errors.T, ((0, 0), (0, 1)))
+    arm = replace(arm, dh=arm.dh.with_parameters(there.ravel()))
     low, high = np.maximum(arm.q_min_rad, -np.pi), np.minimum(arm.q_max_rad, np.pi)
     middle, half = (low + high) / 2, (high - low) / 2 * share
     q = rng.uniform(middle - half, middle + half, (poses, len(low)))

@@ -48,9 +48,24 @@ def scaled(file, names, factor, rows):
     return put(file, list(names), rows, taken(file, list(names), rows) * factor)
 
 
-def in_radians(file, names, rows):
-    """Angles in radians under columns that say degrees."""
-    return scaled(file, names, np.pi / 180.0, rows)
+def joints_in_radians(file, rows):
+    """Joints in radians under columns that say degrees."""
+    return scaled(file, joints(file), np.pi / 180.0, rows)
+
+
+def angles_in_radians(file, rows):
+    """Orientations in radians under columns that say degrees."""
+    return scaled(file, ANGLES, np.pi / 180.0, rows)
+
+
+def in_metres(file, rows):
+    """Positions in metres under columns that say millimetres."""
+    return scaled(file, points(file), 1e-3, rows)
+
+
+def reversed_joint(file, rows, joint=3):
+    """A joint that counts the other way."""
+    return scaled(file, [f"q{joint}_deg"], -1.0, rows)
 
 
 def rotations(file):
@@ -74,13 +89,13 @@ def transposed(file, rows):
     return turned(file, np.swapaxes(rotations(file), 1, 2), rows)
 
 
-def of_another_convention(file):
+def of_another_convention(file, rows):
     """Euler angles ZYX where XYZ is stated, each angle in the column of its axis."""
     angles = Rotation.from_matrix(rotations(file)).as_euler("ZYX", degrees=True)
-    return put(file, ANGLES, every(file), angles[:, ::-1])
+    return put(file, ANGLES, rows, angles[rows, ::-1])
 
 
-def mirrored(file, axis, rows):
+def mirrored(file, rows, axis="y"):
     """Positions in left-handed coordinates."""
     return scaled(file, [n for n in points(file) if n.endswith(f"{axis}_mm")], -1.0, rows)
 
@@ -102,7 +117,7 @@ def shifted(file, names, by_mm, rows):
     return put(file, list(names), rows, taken(file, list(names), rows) + by_mm)
 
 
-def jumped(file, by_mm, turn_mrad, rows):
+def jumped(file, rows, by_mm=(1.0, -0.5, 0.7), turn_mrad=1.0):
     """The base frame elsewhere: positions and orientations moved and turned about vertical."""
     turn, names = Rotation.from_rotvec([0.0, 0.0, 1e-3 * turn_mrad]), points(file)
     other = file
@@ -129,12 +144,12 @@ def on_the_flange(file, flange, by_mm, rows, prefix=""):
     return shifted(file, names, (flange @ np.asarray(by_mm, dtype=float))[rows], rows)
 
 
-def exchanged(file, one, other, rows):
+def exchanged(file, rows):
     """Readings of two targets taken for one another."""
-    names = [[f"{name}_{axis}_mm" for axis in "xyz"] for name in (one, other)]
+    names = [[f"{name}_{axis}_mm" for axis in "xyz"] for name in ("mA", "mB")]
     return put(file, names[0] + names[1], rows, taken(file, names[1] + names[0], rows))
 
 
-def rounded(file, rows, digits=1):
+def rounded(file, rows, digits=0):
     """Joints as commanded, on round numbers, where the arm was a little off them."""
     return put(file, joints(file), rows, np.round(taken(file, joints(file), rows), digits))

@@ -4,7 +4,7 @@ Measured files are used where real errors of an arm could hide or feign a fault.
 """
 
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 import plants
@@ -38,31 +38,11 @@ def only(report, kind, rows, unsure=0):
     return report.suspicions[0]
 
 
-def joints_in_radians(file, rows):
-    return plants.in_radians(file, plants.joints(file), rows)
-
-
-def metres(file, rows):
-    return plants.scaled(file, plants.points(file), 1e-3, rows)
-
-
-def angles_in_radians(file, rows):
-    return plants.in_radians(file, plants.ANGLES, rows)
-
-
-def positions_mirrored(file, rows):
-    return plants.mirrored(file, "y", rows)
-
-
 def frames_mirrored(file, rows):
     mirror = np.diag([1.0, -1.0, 1.0])
     return plants.turned(
-        positions_mirrored(file, rows), mirror @ plants.rotations(file) @ mirror, rows
+        plants.mirrored(file, rows), mirror @ plants.rotations(file) @ mirror, rows
     )
-
-
-def convention(file, _):
-    return plants.of_another_convention(file)
 
 
 def slips(file, rows):
@@ -70,56 +50,33 @@ def slips(file, rows):
     return plants.shifted(file, plants.points(file)[:3], by_mm, rows)
 
 
-def base_moved(file, rows):
-    return plants.jumped(file, (1.0, -0.5, 0.7), 1.0, rows)
-
-
-def far_base_moved(file, rows):
-    return plants.jumped(file, (5.0, 0.0, 0.0), 0.0, rows)
-
-
-def targets_exchanged(file, rows):
-    return plants.exchanged(file, "mA", "mB", rows)
-
-
 def readings_in_turn(file, rows):
     names = [*plants.points(file), *plants.ANGLES]
     return plants.put(file, names, rows, plants.taken(file, names, np.roll(rows, 1)))
 
 
-def commanded(file, rows):
-    return plants.rounded(file, rows, 0)
-
-
-def twelve(file):
-    return SOME(file, 12)
-
-
-def from_150(file):
-    return np.arange(150, len(file))
-
-
-def third_joint_reversed(file, rows):
-    return plants.scaled(file, ["q3_deg"], -1.0, rows)
-
-
 # Faults in all rows of a simulated arm are golden (tests/golden/faults), with their sizes.
 FAULTS = [
-    ("joint_units", joints_in_radians, "fanuc", SOME),
-    ("length_units", metres, "arm", SOME),
-    ("joint_sign", third_joint_reversed, "arm", SOME),
-    ("left_handed", positions_mirrored, "arm", SOME),
+    ("joint_units", plants.joints_in_radians, "fanuc", SOME),
+    ("length_units", plants.in_metres, "arm", SOME),
+    ("joint_sign", plants.reversed_joint, "arm", SOME),
+    ("left_handed", plants.mirrored, "arm", SOME),
     ("left_handed", frames_mirrored, "arm", EVERY),
     ("transposed_rotation", plants.transposed, "arm", SOME),
-    ("angle_units", angles_in_radians, "arm", SOME),
-    ("euler_convention", convention, "ur10", EVERY),
+    ("angle_units", plants.angles_in_radians, "arm", SOME),
+    ("euler_convention", plants.of_another_convention, "ur10", EVERY),
     ("joint_coupling", plants.coupled, "fanuc", EVERY),
     ("outliers", slips, "ur10", SOME),
-    ("base_jump", base_moved, "ur10", LATE),
-    ("base_jump", far_base_moved, "fanuc", from_150),
-    ("target_swapped", targets_exchanged, "three", SOME),
+    ("base_jump", plants.jumped, "ur10", LATE),
+    (
+        "base_jump",
+        partial(plants.jumped, by_mm=(5.0, 0.0, 0.0), turn_mrad=0.0),
+        "fanuc",
+        partial(LATE, share=0.5),
+    ),
+    ("target_swapped", plants.exchanged, "three", SOME),
     ("rows_exchanged", readings_in_turn, "arm", SOME),
-    ("commanded_joints", commanded, "ur10", twelve),
+    ("commanded_joints", plants.rounded, "ur10", partial(SOME, count=12)),
 ]
 
 
@@ -132,7 +89,7 @@ def test_a_planted_fault_is_named_with_its_rows(kind, fault, name, which, tmp_pa
 @pytest.mark.parametrize(("name", "joint"), [("arm", 1), ("ur10", 5)])
 def test_a_joint_that_counts_the_other_way_is_named(name, joint, tmp_path):
     file = good(name)
-    bad = plants.scaled(file, [f"q{joint}_deg"], -1.0, EVERY(file))
+    bad = plants.reversed_joint(file, EVERY(file), joint)
     assert only(bad.check(tmp_path), "joint_sign", EVERY(file)).values["joint"] == joint
 
 
@@ -145,14 +102,15 @@ def test_a_joint_that_counts_from_another_zero_is_found_with_its_sign(tmp_path):
 
 def test_joints_in_radians_of_which_two_count_the_other_way_are_all_named(tmp_path):
     file = good("arm").rows(slice(0, 40))
-    for names, factor in ((["q2_deg", "q3_deg"], -1.0), (plants.joints(file), np.pi / 180.0)):
-        file = plants.scaled(file, names, factor, EVERY(file))
+    rows = EVERY(file)
+    file = plants.reversed_joint(plants.reversed_joint(file, rows, 2), rows, 3)
+    file = plants.joints_in_radians(file, rows)
     found = [(each.kind, each.values.get("joint")) for each in file.check(tmp_path).suspicions]
     assert sorted(found) == [("joint_sign", 2), ("joint_sign", 3), ("joint_units", None)]
 
 
 def test_positions_mirrored_beside_good_orientations_are_mended_alone(tmp_path):
-    bad = plants.mirrored(good("arm"), "x", EVERY(good("arm")))
+    bad = plants.mirrored(good("arm"), EVERY(good("arm")), "x")
     found = only(bad.check(tmp_path), "left_handed", EVERY(bad))
     assert found.fix.startswith("negate x of the positions;")
 
@@ -177,7 +135,7 @@ def test_one_of_three_targets_that_moved(name, tmp_path):
 def test_two_jumps_have_sizes_of_their_own(tmp_path):
     file = simulated("irb120", poses=90)
     for begin in (30, 60):
-        file = plants.jumped(file, (1.5, 0.0, 0.0), 0.0, np.arange(begin, 90))
+        file = plants.jumped(file, np.arange(begin, 90), (1.5, 0.0, 0.0), 0.0)
     found = file.check(tmp_path).suspicions
     assert [set(each.lines) for each in found] == [lines(range(b, 90)) for b in (30, 60)]
     for each in found:
@@ -188,7 +146,7 @@ def test_commanded_joints_that_part_from_those_read_back(tmp_path):
     file = good("arm").rows(slice(0, 50))
     sent = {n.replace("_deg", "_cmd_deg"): file.columns[n] + 1e-4 for n in plants.joints(file)}
     assert file.but(**sent).check(tmp_path).suspicions == ()
-    bad = plants.rounded(file, SOME(file), 0).but(**sent)
+    bad = plants.rounded(file, SOME(file)).but(**sent)
     only(bad.check(tmp_path), "commanded_joints", SOME(file))
 
 

@@ -9,15 +9,13 @@ import sys
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-import numpy as np
-
 TESTS = Path(__file__).parents[1]
 sys.path[:0] = [str(TESTS), *(str(TESTS / name) for name in ("checks", "cli", "campaign"))]
 
 import plants  # noqa: E402
 from command_line import answer  # noqa: E402
 from good_files import File, simulated  # noqa: E402
-from stages_by_hand import made  # noqa: E402
+from stages_by_hand import made, tables_in  # noqa: E402
 
 from kinacc.campaign import folder as campaigns  # noqa: E402
 from kinacc.campaign.state import unplanned_mm2  # noqa: E402
@@ -28,24 +26,7 @@ GOLDEN = Path(__file__).parent
 ROOT = GOLDEN.parents[1]
 RESULTS = GOLDEN / "results"
 MARKS = {"kinacc_version": "golden", "config_hash": "golden", "seed": "0"}
-MODELS = ("vec_model", "dh_model", "frames")
-
-# The golden tables that a stage reads.
-READS: dict[str, tuple[str, ...]] = {
-    "measurements": (),
-    "fit_vec": ("measurements",),
-    "fit_dh": ("measurements", "vec_model", "vec_frames"),
-    "residuals": ("measurements", *MODELS, "vec_orders"),
-    "summary": ("measurements", "robot", *MODELS, "dh_identified", "pose_errors", "model_selection",
-                "vec_fit", "vec_covariance", "dh_fit", "dh_covariance", "vec_orders"),
-    "accuracy_map": MODELS,
-    "assessment_points": ("measurements", *MODELS, "pose_errors"),
-    "study": ("study_chunk", "assessment_points"),
-    "histories": ("assessment_points",),
-    "claims": ("residuals", "dh_model", "assessment_points", "study", "study_summary", "readings",
-               "histories", "accuracy_map"),
-}  # fmt: skip
-CALIBRATION = ("measurements", "fit_vec", "fit_dh", "residuals", "summary")
+CALIBRATION = ("measurements", "vec", "dh", "residuals", "summary")
 PAPER = (*CALIBRATION, "accuracy_map", "assessment_points", "study", "histories", "claims")
 DATA_SETS = {
     "mh180": PAPER,
@@ -73,9 +54,7 @@ def write_simulated_files() -> None:
 
 def run_stage(data: DataSets, dataset: str, stage: str, folder: Path) -> dict[str, Mapping]:
     """Tables that one stage makes of the tables in a folder."""
-    paths = {name: folder / f"{name}.parquet" for name in READS[stage]}
-    tables = {name: store.read(path) for name, path in paths.items() if path.is_file()}
-    return made(stage.removeprefix("fit_"), tables, data.settings[dataset])
+    return made(stage, tables_in(folder), data.settings[dataset])
 
 
 def write_tables(tables: Mapping[str, Mapping], folder: Path) -> None:
@@ -89,24 +68,23 @@ def faults() -> Iterator[tuple[str, File]]:
     """Files of a simulated arm with one fault each."""
     good = simulated("irb120", poses=60, turned=True, seed=2)
     every, some, late = plants.every(good), plants.some(good), plants.late(good)
-    joints, points = plants.joints(good), plants.points(good)
     yield "none", good
-    yield "joints_in_radians", plants.in_radians(good, joints, every)
-    yield "some_joints_in_radians", plants.in_radians(good, joints, some)
-    yield "metres", plants.scaled(good, points, 1e-3, every)
-    yield "left_handed", plants.mirrored(good, "y", every)
+    yield "joints_in_radians", plants.joints_in_radians(good, every)
+    yield "some_joints_in_radians", plants.joints_in_radians(good, some)
+    yield "metres", plants.in_metres(good, every)
+    yield "left_handed", plants.mirrored(good, every)
     yield "transposed", plants.transposed(good, every)
-    yield "angles_in_radians", plants.in_radians(good, plants.ANGLES, every)
+    yield "angles_in_radians", plants.angles_in_radians(good, every)
     for joint in (2, 4, 6):
-        yield f"sign_of_joint_{joint}", plants.scaled(good, [f"q{joint}_deg"], -1.0, every)
+        yield f"sign_of_joint_{joint}", plants.reversed_joint(good, every, joint)
     yield "coupled_joints", plants.coupled(good, every)
     columns = {"q4_deg": good.columns["q5_deg"], "q5_deg": good.columns["q4_deg"]}
     yield "joints_exchanged", good.but(**columns)
     yield "rows_twice", plants.copied(good, some)[0]
-    yield "outliers", plants.shifted(good, points[:3], np.array([15.0, -9.0, 12.0]), some)
-    yield "base_jump", plants.jumped(good, (1.0, -0.5, 0.7), 1.0, late)
+    yield "outliers", plants.shifted(good, plants.points(good), (15.0, -9.0, 12.0), some)
+    yield "base_jump", plants.jumped(good, late)
     yield "tool_moved", plants.on_the_flange(good, plants.rotations(good), (0.5, -0.5, 0.4), late)
-    yield "commanded_joints", plants.rounded(good, every, 0)
+    yield "commanded_joints", plants.rounded(good, every)
 
 
 def findings(folder: Path, name: str) -> list[dict]:

@@ -3,7 +3,6 @@
 import json
 
 import cases
-import numpy as np
 import pytest
 
 from kinacc.deployment.export.files import contents
@@ -32,24 +31,22 @@ def test_a_stage_makes_its_golden_tables(name, stage, data, tmp_path):
     assert not differences, "\n".join(map(str, differences))
 
 
-def same(found: object, golden: object) -> bool:
-    """Whether two values agree: numbers to 1e-6, all else exactly."""
-    if isinstance(golden, dict):
-        return found.keys() == golden.keys() and all(same(found[k], golden[k]) for k in golden)
-    if isinstance(golden, list):
-        return len(found) == len(golden) and all(map(same, found, golden))
-    if isinstance(golden, float):
-        return np.isclose(found, golden, rtol=1e-6, atol=1e-6, equal_nan=True)
-    return found == golden
+def close(number):
+    """What equals a number to 1e-6."""
+    return pytest.approx(float(number), rel=1e-6, abs=1e-6, nan_ok=True)
 
 
-FINDINGS = json.loads((cases.GOLDEN / "faults" / "findings.json").read_text())
+def golden(path):
+    """The content of a golden file, to whose numbers others are equal where they are close."""
+    return json.loads(path.read_text(), parse_float=close, parse_constant=close)
+
+
+FINDINGS = golden(cases.GOLDEN / "faults" / "findings.json")
 
 
 @pytest.mark.parametrize("name", FINDINGS)
 def test_a_planted_fault_is_found_with_its_rows_and_size(name):
-    found = json.loads(json.dumps(cases.findings(cases.GOLDEN / "faults", name)))
-    assert same(found, FINDINGS[name])
+    assert json.loads(json.dumps(cases.findings(cases.GOLDEN / "faults", name))) == FINDINGS[name]
 
 
 def test_every_planted_fault_but_none_has_a_finding():
@@ -62,16 +59,16 @@ def test_exports_are_as_before(model, formats):
     folder = cases.RESULTS / "ur10_d"
     made = contents(read_source(folder, model), formats)
     for name, text in made.items():
-        golden = (cases.GOLDEN / "exports" / name).read_text()
+        path = cases.GOLDEN / "exports" / name
         if name.endswith(".json"):
-            assert same(json.loads(text), json.loads(golden))
+            assert json.loads(text) == golden(path)
         else:
-            assert text == golden
+            assert text == path.read_text()
 
 
 def test_a_campaign_makes_its_golden_statements():
-    golden = json.loads((cases.GOLDEN / "campaign" / "course.json").read_text())
-    assert same(json.loads(json.dumps(cases.campaign_course())), golden)
+    course = json.loads(json.dumps(cases.campaign_course()))
+    assert course == golden(cases.GOLDEN / "campaign" / "course.json")
 
 
 def test_golden_files_are_small():
