@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 from oracles import kinematics as oracle
+from pose_checks import assert_same, of_matrices
 
 from kinacc.kinematics import chain, dh, vec
 from kinacc.kinematics.model import JointState
@@ -18,11 +19,6 @@ def dh_table(rng, joints):
     return np.column_stack([angle[:, :1], length, angle[:, 1:]])
 
 
-def assert_same(rotation, position_mm, expected) -> None:
-    np.testing.assert_allclose(rotation, expected[..., :3, :3], rtol=0, atol=1e-12)
-    np.testing.assert_allclose(position_mm, expected[..., :3, 3], rtol=0, atol=1e-9)
-
-
 # --- DH, eqs. 1-4 ---------------------------------------------------------------------------------
 
 
@@ -30,9 +26,8 @@ def assert_same(rotation, position_mm, expected) -> None:
 def test_dh_chain_equals_the_plain_loop(seed):
     rng = np.random.default_rng(seed)
     table, q = dh_table(rng, 5), rng.uniform(-2 * math.pi, 2 * math.pi, (2, 5))
-    frames = dh.chain(dh.DHModel(*table.T), q)
-    expected = np.array([[*oracle.dh_frames(table, row)] for row in q])
-    assert_same(frames.rotation, frames.position_mm, expected)
+    expected = of_matrices([oracle.dh_frames(table, row) for row in q])
+    assert_same(dh.chain(dh.DHModel(*table.T), q), expected, 1e-9, 1e-12)
 
 
 # --- VEC, eqs. 5-6 --------------------------------------------------------------------------------
@@ -55,6 +50,6 @@ def test_vec_forward_equals_the_plain_loop(joints, order):
     model = vec.VECModel(dh.DHModel(*table.T), low, high, series, offsets)
     expected = oracle.vec_forward(table, series, low, high, offsets, q, s)
     printed = chain.to_pose(model.walk(JointState(q[None], s[None])).end)
-    assert_same(printed.rotation[0], printed.position_mm[0], expected)
+    assert_same(printed, of_matrices(expected[None]), 1e-9, 1e-12)
     pose = vec.pose(model, q[None], s[None])
-    assert_same(pose.rotation[0], pose.position_mm[0], oracle.projected(expected))
+    assert_same(pose, of_matrices(oracle.projected(expected)[None]), 1e-9, 1e-12)

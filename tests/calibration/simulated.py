@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from kinacc.calibration import fitting
 from kinacc.calibration.frames import Frames
-from kinacc.calibration.observations import Observations
+from kinacc.calibration.observations import full_poses
 from kinacc.geometry import Pose, compose, exp_so3
 from kinacc.kinematics import dh
+from kinacc.kinematics.model import JointState
 
 POINT, THREE, POSE = "point", "three", "pose"  # what the instrument sees of every pose
 ORIENTATION_NOISE_RAD = 1e-4
@@ -48,7 +51,7 @@ def frames_of(bases, targets):
 def measure(
     model, q_rad, kind, rng, noise_mm=0.05, sessions=1, frames=None, noise_rad=ORIENTATION_NOISE_RAD
 ):
-    """Observations of ``kind`` of an arm ``model`` at DH joints (n, k), dealt over sessions.
+    """Observations of ``kind`` of an arm of any model at DH joints (n, k), dealt over sessions.
 
     ``frames``: poses of bases and targets, anywhere if not stated.
     """
@@ -56,21 +59,17 @@ def measure(
     bases, tools = frames or (anywhere(rng, 1500.0, sessions), anywhere(rng, 80.0, targets))
     pose, target = np.repeat(np.arange(poses), targets), np.tile(np.arange(targets), poses)
     session = pose % sessions
-    flange = dh.forward(model, q_rad[pose])
+    flange = model.pose(JointState(q_rad[pose]))
     carried = compose(flange, Pose(tools.rotation[target], tools.position_mm[target]))
     seen = compose(Pose(bases.rotation[session], bases.position_mm[session]), carried)
     rotation = np.full((len(pose), 3, 3), np.nan)
     if kind == POSE:
         rotation = exp_so3(noise_rad * rng.normal(size=(len(pose), 3))) @ seen.rotation
-    return Observations(
-        q_rad=q_rad[pose],
-        s=np.zeros((len(pose), q_rad.shape[1]), np.int8),
-        position_mm=seen.position_mm + noise_mm * rng.normal(size=(len(pose), 3)),
-        rotation=rotation,
+    position_mm = seen.position_mm + noise_mm * rng.normal(size=(len(pose), 3))
+    return replace(
+        full_poses(q_rad[pose], Pose(rotation, position_mm)),
         pose=pose,
         target=target,
-        payload=np.full((len(pose), 4), np.nan),
-        repeat=np.zeros(len(pose), dtype=int),
         fold=pose % 5,
         target_names=tuple(f"t{number}" for number in range(targets)),
         session=session,

@@ -6,11 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from pose_checks import assert_same
 from simulated import POINT, POSE, THREE, anywhere, measure
 
 from kinacc.calibration.frames import base_from_targets, closed_form_start
 from kinacc.calibration.observations import full_poses
-from kinacc.geometry import Pose, compose, exp_so3, log_so3
+from kinacc.geometry import Pose, compose, exp_so3
 from kinacc.kinematics import dh, robot
 
 ARM = robot.load("ur10")
@@ -26,9 +27,7 @@ def exact(kind, count, sessions=1, seed=0):
 
 
 def assert_close(pose, wanted):
-    np.testing.assert_allclose(pose.position_mm, wanted.position_mm, atol=1e-5)
-    turn = log_so3(pose.rotation @ np.swapaxes(wanted.rotation, 1, 2))
-    np.testing.assert_allclose(turn, 0.0, atol=1e-8)
+    assert_same(pose, wanted, 1e-5, 1e-8)
 
 
 @pytest.mark.parametrize("kind", [POSE, POINT])

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import simulated
+from pose_checks import movement
 
 from kinacc.calibration import fitting, vec_fit
 from kinacc.calibration.fitting import PoseSystem
 from kinacc.calibration.frames import FrameParameters, frame_terms
-from kinacc.geometry import log_so3
 from kinacc.kinematics import robot, vec
 
 ARM, WEIGHT = robot.load("mh180"), 350.0
@@ -74,10 +74,6 @@ def test_motions_of_frames_are_their_finite_differences():
     motions, step = parameters.motions(c), 1e-6
     for column in range(c.size):
         low, high = (parameters.frames(c + way * np.eye(c.size)[column]) for way in (-step, step))
-        wanted = []
-        for kind in ("bases", "targets"):
-            ahead, behind = getattr(high, kind), getattr(low, kind)
-            shift = ahead.position_mm - behind.position_mm
-            turn = log_so3(ahead.rotation @ np.swapaxes(behind.rotation, 1, 2))
-            wanted.append(np.concatenate([shift, turn], axis=1).ravel() / (2 * step))
-        np.testing.assert_allclose(motions[:, column], np.concatenate(wanted), atol=2e-6)
+        moved = [movement(low.bases, high.bases), movement(low.targets, high.targets)]
+        wanted = np.concatenate(moved).ravel() / (2 * step)
+        np.testing.assert_allclose(motions[:, column], wanted, atol=2e-6)

@@ -4,6 +4,7 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
+from pose_checks import movement
 from small_arms import BASE, TOOL, calibrated, joints, measured, moved, results_of, truth
 
 from kinacc.config import schema
@@ -12,7 +13,7 @@ from kinacc.deployment.folder import calibration
 from kinacc.deployment.predict import predict
 from kinacc.deployment.record import nominal
 from kinacc.deployment.shared_readings import NONE_SHARED, SharedReadings
-from kinacc.geometry import compose, log_so3
+from kinacc.geometry import compose
 from kinacc.kinematics import dh, robot
 
 
@@ -92,10 +93,9 @@ def test_a_planted_change_is_found_under_its_name(parameter, size):
     assert abs(largest["sigmas"]) > 5.0
     assert found.shifts["rms_mm"][1] > 3.0 * found.shifts["chance_mm"][1]
     one, other = (predict(arm, joints("mh180", 60), point="flange") for arm in (before, after))
-    gap_mm = other.pose.position_mm - one.pose.position_mm
-    turn = 1e3 * log_so3(other.pose.rotation @ np.swapaxes(one.pose.rotation, 1, 2))
+    gap_mm, turn = np.split(movement(one.pose, other.pose), 2, axis=1)
     variance = one.std**2 + other.std**2
-    squares = [gap_mm**2, variance[:, :3], turn**2, 1e6 * variance[:, 3:]]
+    squares = [gap_mm**2, variance[:, :3], 1e6 * turn**2, 1e6 * variance[:, 3:]]
     stated = found.shifts.drop(columns=["frames", "largest_mm"]).loc[0].tolist()
     assert stated == pytest.approx([np.sqrt(each.sum() / 60) for each in squares])
     most_mm = pytest.approx(np.linalg.norm(gap_mm, axis=1).max())

@@ -4,13 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from pose_checks import movement
 from small_arms import BASE, calibrated, joints, moved
 
 from kinacc.deployment.compensate import PoseStatus, compensate
 from kinacc.deployment.predict import predict
 from kinacc.deployment.record import nominal
 from kinacc.errors import InputError
-from kinacc.geometry import Pose, compose, invert, log_so3
+from kinacc.geometry import Pose, compose, invert
 from kinacc.kinematics import robot
 from kinacc.kinematics.model import JointState
 
@@ -18,9 +19,7 @@ from kinacc.kinematics.model import JointState
 def left(arm, q_rad, wanted, frame="base"):
     """What the forward model says is left of the wanted poses, mm and rad."""
     seen = predict(arm, q_rad, None, frame).pose
-    off = np.linalg.norm(seen.position_mm - wanted.position_mm, axis=1)
-    turn = log_so3(seen.rotation @ np.swapaxes(wanted.rotation, 1, 2))
-    return off.max(), np.linalg.norm(turn, axis=1).max()
+    return np.linalg.norm(movement(wanted, seen).reshape(-1, 2, 3), axis=2).max(axis=0)
 
 
 @pytest.mark.parametrize("name", ["mh180", "ur10"])

@@ -4,21 +4,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from pose_checks import movement
 from small_arms import BASE, calibrated, joints, moved
 
 from kinacc.calibration.uncertainty import is_angle
 from kinacc.deployment.applicability import sensitivity
 from kinacc.deployment.predict import predict
-from kinacc.geometry import log_so3
 from kinacc.kinematics import robot
 from kinacc.kinematics.model import JointState
 
 
 def slope(pose_at, step):
     """Central difference (n, 6) of poses ``pose_at(step)`` by ``step``, mm and rad."""
-    low, high = pose_at(-step), pose_at(step)
-    turn = log_so3(high.rotation @ np.swapaxes(low.rotation, 1, 2))
-    return np.hstack([high.position_mm - low.position_mm, turn]) / (2 * step)
+    return movement(pose_at(-step), pose_at(step)) / (2 * step)
 
 
 @pytest.mark.parametrize("model", ["dh", "vec"])

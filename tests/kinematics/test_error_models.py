@@ -6,10 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from pose_checks import assert_same, movement
 
 from kinacc.calibration.uncertainty import scale_of
 from kinacc.config.error_models import ERROR_MODELS
-from kinacc.geometry import log_so3
+from kinacc.geometry import Pose
 from kinacc.kinematics import compliance, dh, robot, vec
 from kinacc.kinematics.model import JointState
 from kinacc.kinematics.tables import of_kind
@@ -80,11 +81,6 @@ def at(model):
     return JointState(q, rng.integers(-1, 2, (COUNT, 6)), payload)
 
 
-def movement(before, after):
-    turn = log_so3(after.rotation @ np.swapaxes(before.rotation, 1, 2))
-    return np.concatenate([after.position_mm - before.position_mm, turn], axis=1)
-
-
 def test_slopes_in_the_joints_are_those_of_the_pose(model, at):
     slopes = model.joint_jacobian(at)
     for joint, step in enumerate(np.where(model.dh.prismatic, 1e-3, 1e-6)):
@@ -126,8 +122,7 @@ def test_a_pose_does_not_depend_on_the_batch_it_is_in():
     q = np.random.default_rng(5).uniform(-7.0, 7.0, (9000, 6))
     q[17] = np.nan
     model, rows = dh_example(), [0, 18, 4095, 4096, 8999]
-    pose = dh.forward(model, q)
+    rotation, position_mm = dh.forward(model, q)
     for row in rows:
         alone = dh.forward(model, q[row])
-        np.testing.assert_allclose(pose.position_mm[row], alone.position_mm[0], atol=1e-9)
-        np.testing.assert_allclose(pose.rotation[row], alone.rotation[0], atol=1e-14)
+        assert_same(Pose(rotation[[row]], position_mm[[row]]), alone, 1e-9, 1e-14)

@@ -7,8 +7,10 @@ import math
 
 import numpy as np
 import pytest
+from pose_checks import assert_same
 from scipy.spatial.transform import Rotation
 
+from kinacc.geometry import Pose
 from kinacc.kinematics import region
 
 CYLINDER = region.Cylinder(1200.0, 900.0, 0.0, 500.0, 0.0, math.radians(60))
@@ -72,9 +74,7 @@ def test_tool_poses_turn_with_the_slice():
     poses = region.tool_poses(cells, turned, relative.as_matrix())
     turn = Rotation.from_euler("z", cells.angle_rad[:, None])
     place = turn.apply(np.column_stack([cells.radius_mm, np.zeros(2), cells.height_mm]))
-    wanted = (turn * reference * relative).as_matrix()
-    np.testing.assert_allclose(poses.rotation, wanted, atol=1e-14)
-    np.testing.assert_allclose(poses.position_mm, place, atol=1e-10)
+    assert_same(poses, Pose((turn * reference * relative).as_matrix(), place), 1e-10, 1e-14)
 
 
 def test_sequences_start_at_one_and_can_be_taken_in_pieces():

@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from measurements.scoring import measured
+from pose_checks import assert_same
 from scipy.spatial.transform import Rotation
 
 from kinacc.errors import InputError
@@ -53,9 +54,7 @@ def test_wanted_poses_in_every_convention_and_by_a_quaternion_with_its_scalar_fi
         else TURNED.as_quat(scalar_first=True)
     )
     path = table(tmp_path, [*axes, *turn], POSE.position_mm / unit_mm, turned)
-    found = read_rows(path, SLIDES, "poses").pose
-    np.testing.assert_allclose(found.position_mm, POSE.position_mm, atol=1e-5)
-    np.testing.assert_allclose(found.rotation, POSE.rotation, atol=1e-6)
+    assert_same(read_rows(path, SLIDES, "poses").pose, POSE, 1e-5, 1e-6)
 
 
 def test_what_is_open_is_asked_about(tmp_path):

@@ -6,6 +6,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from oracles import kinematics as oracle
+from pose_checks import assert_same, of_matrices
 from scipy.spatial.transform import Rotation
 
 from kinacc.kinematics.dh import DHModel
@@ -22,13 +23,11 @@ def test_errors_stand_in_front_of_their_joints_as_true_rotations(seed):
     q = rng.uniform(LOW, HIGH, (2, 6))
     errors = rng.normal(size=(2, 6, 6)) * [1, 1, 1, 5e-3, 5e-3, 5e-3]
     pose = physical.chain(DHModel(*table.T), q, errors)
-    for n in range(2):
-        frame = np.eye(4)
-        for i in range(6):
-            error = oracle.frame(*errors[n, i, :3], Rotation.from_rotvec(errors[n, i, 3:]))
-            frame = frame @ error @ oracle.dh_forward(table[[i]], q[n, [i]])
-        np.testing.assert_allclose(pose.position_mm[n], frame[:3, 3], rtol=0, atol=1e-9)
-        np.testing.assert_allclose(pose.rotation[n], frame[:3, :3], rtol=0, atol=1e-12)
+    frames = np.tile(np.eye(4), (2, 1, 1))
+    for n, i in np.ndindex(2, 6):
+        error = oracle.frame(*errors[n, i, :3], Rotation.from_rotvec(errors[n, i, 3:]))
+        frames[n] = frames[n] @ error @ oracle.dh_forward(table[[i]], q[n, [i]])
+    assert_same(pose, of_matrices(frames), 1e-9, 1e-12)
 
 
 @settings(max_examples=30)

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from pose_checks import assert_same
 
 from kinacc.errors import InputError
 from kinacc.kinematics import dh, robot
@@ -31,9 +32,7 @@ def visits(q_rad: np.ndarray, s: int = 1, time_h: float = 0.0) -> Visits:
 def test_an_arm_without_errors_is_its_geometry(arm):
     run = calibration_run(arm, 30, seed=3)
     seen = measured(physical_robot(3, NOTHING), run, tracker_noise_mm=0.0)
-    plain = dh.forward(TABLE_II, run.visits.q_rad)
-    assert np.abs(seen.position_mm - plain.position_mm).max() < 1e-9
-    assert np.abs(seen.rotation - plain.rotation).max() < 1e-12
+    assert_same(seen, dh.forward(TABLE_II, run.visits.q_rad), 1e-9, 1e-12)
 
 
 def test_backlash_follows_travel_and_closes_under_load():

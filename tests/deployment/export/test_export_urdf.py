@@ -1,10 +1,14 @@
 """URDF of a calibrated arm: forward kinematics against pinocchio reading the same file."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pinocchio as pin
+import pose_checks
 import pytest
+from by_pinocchio import seen_by_pinocchio
+from calibration.simulated import disturbed
 
 from kinacc.calibration.frames import closed_form_start
 from kinacc.calibration.observations import full_poses
@@ -17,7 +21,6 @@ from kinacc.kinematics import dh, robot
 from kinacc.kinematics.model import JointState
 
 TOOL_POSE = Pose(exp_so3(np.array([0.3, -0.2, 0.9])), np.array([12.0, -40.0, 180.0]))
-CLOSE_MM, CLOSE = 1e-6, 1e-9
 
 # A file whose links sit elsewhere on their axes than DH frames do, with fixed joints between.
 UR10_FILE = """<?xml version="1.0"?>
@@ -69,35 +72,13 @@ def of(arm, path=None, tip=None):
 
 def bent(arm, seed=0, size=1.0):
     """The arm with every DH parameter off, Hayati angles too, and a tool."""
-    rng = np.random.default_rng(seed)
-    vector = arm.dh.start
-    off = rng.normal(0.0, size, vector.size) * np.tile([2e-3, 0.5, 0.5, 2e-3, 1e-3], arm.dh.joints)
+    sizes = size * np.array([1.0, 1.0, 1.0, 1.0, 0.5])
     return replace(
         nominal(arm, "test"),
         choice="dh",
-        model=arm.dh.with_parameters(vector + off),
+        model=disturbed(arm.dh, sizes, np.random.default_rng(seed), 2e-3, 0.5),
         targets={TOOL: compose(arm.flange, TOOL_POSE)},
     )
-
-
-def pose_of(ends):
-    """Poses (n, ...) of matrices (n, 4, 4)."""
-    return Pose(np.array(ends)[:, :3, :3], np.array(ends)[:, :3, 3])
-
-
-def seen_by_pinocchio(model, tip, q_rad, slides, names, base="base_link"):
-    """Tip frames (n, ...) in mm at joints (n, k), rad and mm."""
-    data = model.createData()
-    order = [model.joints[model.getJointId(name)].idx_v for name in names]
-    ends = []
-    for row in q_rad * np.where(slides, 1e-3, 1.0):
-        step = np.zeros(model.nv)
-        step[order] = row
-        pin.framesForwardKinematics(model, data, pin.integrate(model, pin.neutral(model), step))
-        first, last = (data.oMf[model.getFrameId(link, pin.FrameType.BODY)] for link in (base, tip))
-        ends.append(first.inverse() * last)
-    found = pose_of([end.homogeneous for end in ends])
-    return found._replace(position_mm=1e3 * found.position_mm)
 
 
 def some_joints(arm):
@@ -105,9 +86,7 @@ def some_joints(arm):
     return arm.q_min_rad + share * (arm.q_max_rad - arm.q_min_rad)
 
 
-def assert_same(ours, theirs):
-    assert np.abs(ours.position_mm - theirs.position_mm).max() < CLOSE_MM
-    assert np.abs(ours.rotation - theirs.rotation).max() < CLOSE
+assert_close = partial(pose_checks.assert_same, mm=1e-6, matrix=1e-9)
 
 
 @pytest.mark.parametrize("name", robot.shipped())
@@ -123,7 +102,7 @@ def test_a_generated_file_moves_as_the_calibrated_arm(name):
     for link in ("tool", "flange"):
         shown = q_dh if coupled else q_rad
         theirs = seen_by_pinocchio(model, link, shown, arm.robot.dh.prismatic, names)
-        assert_same(arm.pose(JointState(q_dh), "base", link), theirs)
+        assert_close(arm.pose(JointState(q_dh), "base", link), theirs)
 
 
 @pytest.mark.parametrize("robot_from", ["file", "shipped"])
@@ -144,12 +123,12 @@ def test_a_file_of_ones_own_is_corrected_in_place(tmp_path, robot_from, tail):
     ends = dh.forward(base_robot.dh, q_rad)
     start = closed_form_start(full_poses(q_rad, before), ends)
     base, carried = start.base, start.tool
-    assert_same(compose(base, compose(ends, carried)), before)
+    assert_close(compose(base, compose(ends, carried)), before)
     wanted = compose(base, compose(arm.model.pose(JointState(q_rad)), carried))
     if robot_from == "file":
-        assert_same(arm.pose(JointState(q_rad), "base", "flange"), wanted)
+        assert_close(arm.pose(JointState(q_rad), "base", "flange"), wanted)
     end = tip if tail else f"{tip}_calibrated"
-    assert_same(
+    assert_close(
         wanted, seen_by_pinocchio(pin.buildModelFromXML(done), end, q_rad, slides, names, "world")
     )
     assert "<!-- kept as it is -->" in done

@@ -5,8 +5,9 @@ import importlib.util
 import pytest
 from oracles.controllers.arms import frame
 from oracles.kinematics import rot_x, rot_z, trans
+from pose_checks import of_matrices
 from scipy.spatial.transform import Rotation
-from test_export_urdf import assert_same, bent, of, pose_of, some_joints
+from test_export_urdf import assert_close, bent, of, some_joints
 
 from kinacc.deployment.export import urdf
 from kinacc.kinematics import robot
@@ -31,7 +32,7 @@ def test_modified_dh_reaches_the_same_poses(name, size):
             step = step @ rot_x(alpha) @ trans(a, 0, 0) @ rot_z(theta + q * (not slides))
             step = step @ trans(0, 0, d + q * slides)
         ends.append(step @ end)
-    assert_same(arm.pose(JointState(q_rad)), pose_of(ends))
+    assert_close(arm.pose(JointState(q_rad)), of_matrices(ends))
 
 
 @pytest.mark.skipif(not importlib.util.find_spec("pybotics"), reason="pybotics is not installed")
@@ -41,4 +42,4 @@ def test_pybotics_reaches_the_same_poses(name):
     q_rad = arm.robot.dh_joints(some_joints(arm.robot))
     theirs = urdf.to_pybotics(of(arm), "flange")
     ends = [theirs.fk(row) for row in q_rad]
-    assert_same(arm.pose(JointState(q_rad), "base", "flange"), pose_of(ends))
+    assert_close(arm.pose(JointState(q_rad), "base", "flange"), of_matrices(ends))

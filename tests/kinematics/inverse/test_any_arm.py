@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from oracles import inverse as brute
 from oracles import kinematics as oracle
+from pose_checks import assert_same, of_matrices
 
 from kinacc.errors import InputError
 from kinacc.geometry import Pose
@@ -55,11 +56,8 @@ def test_closed_forms_return_to_the_pose_and_name_branches_by_posture(model):
     found, reached = closed_form.recognise(model).solve(pose)
     rows, columns = np.nonzero(reached)
     back = dh.forward(model, found[rows, columns])
-    assert np.abs(back.position_mm - pose.position_mm[rows]).max() < 1e-8
-    assert np.abs(back.rotation - pose.rotation[rows]).max() < 1e-11
-    gap = found - q[:, None]
-    gap = np.abs(gap - 2 * np.pi * np.rint(gap / (2 * np.pi))).max(axis=2)
-    nearest = np.where(reached, gap, np.inf).min(axis=1)
+    assert_same(back, arms.pick(pose, rows), 1e-8, 1e-11)
+    nearest = np.where(reached, arms.apart(model, found, q[:, None]), np.inf).min(axis=1)
     assert np.quantile(nearest, 0.99) < 1e-9
     assert nearest.max() < 1e-6  # beside a singular posture angles lose digits, the pose does not
     if closed_form.recognise(model).parallel:  # whose elbow is bent towards axis 4
@@ -120,8 +118,7 @@ def test_brute_force_finds_all_that_is_listed_and_nothing_more(arm, off_mm):
     table = model.start.reshape(-1, 5)
     for q in arms.joints_within(arm, 4, seed=3):
         target = oracle.dh_forward(table, q)
-        pose = Pose(target[None, :3, :3], target[None, :3, 3])
-        solved = inverse.solve(arm, model, pose).q_rad[0]
+        solved = inverse.solve(arm, model, of_matrices(target[None])).q_rad[0]
         listed = solved[np.isfinite(solved[:, 0])]
         found = brute.all_solutions(table, target, rng.uniform(-np.pi, np.pi, (400, 6)))
         distance = arms.apart(arm, np.array(found)[:, None], listed[None])

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from oracles.kinematics import trans, turn
+from pose_checks import assert_same, of_matrices
 
 from kinacc.errors import InputError
 from kinacc.geometry import Pose, compose, exp_so3, rotation_x, rotation_z
@@ -70,9 +71,7 @@ def test_base_flange_and_tool_frames_are_read(arm):
     q = np.array([[0.1, 0.2, 30.0, 0.4]])
     base = Pose(rotation_z(np.pi / 2), np.array([0, 0, 500.0]))
     wanted = compose(base, compose(robot.forward(arm(GOOD), q), Pose(base.rotation, np.zeros(3))))
-    pose = robot.forward(framed, q)
-    assert np.allclose(pose.position_mm, wanted.position_mm)
-    assert np.allclose(pose.rotation, wanted.rotation)
+    assert_same(robot.forward(framed, q), wanted, 1e-9, 1e-12)
     assert np.allclose(robot.carried(framed).rotation, rotation_z(np.pi * 0.75))
 
 
@@ -111,11 +110,8 @@ def test_a_modified_table_is_the_same_arm(seed, count):
     chain, base = from_modified(table)
     arm = robot.Robot("any", chain, -np.ones(count), np.ones(count), np.eye(count), "", base=base)
     q = rng.uniform(-3, 3, (5, count))
-    pose = robot.forward(arm, q)
-    for row in range(5):
-        wanted = craig(table, q[row])
-        assert np.abs(pose.position_mm[row] - wanted[:3, 3]).max() < 1e-9
-        assert np.abs(pose.rotation[row] - wanted[:3, :3]).max() < 1e-12
+    wanted = of_matrices([craig(table, row) for row in q])
+    assert_same(robot.forward(arm, q), wanted, 1e-9, 1e-12)
 
 
 def test_a_modified_file_with_a_hayati_term_is_converted(arm):

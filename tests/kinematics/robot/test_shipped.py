@@ -17,6 +17,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from oracles.kinematics import frame
+from pose_checks import assert_same, of_matrices
 from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 
@@ -35,8 +36,8 @@ COUPLED["fanuc_r2000ic_165f"] = 0.0  # its measured data counts joint 3 from the
 REACH = pd.read_csv(Path(__file__).with_name("reach.csv"), index_col="robot")
 
 
-def by_urdf(name: str, q_rad: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Flange position (mm) and rotation in the controller's base at controller joints ``q_rad``."""
+def by_urdf(name: str, q_rad: np.ndarray) -> np.ndarray:
+    """Flange (4, 4) in the controller's base at controller joints ``q_rad``."""
     turned = q_rad.copy()
     turned[2] += COUPLED.get(name, 0.0) * q_rad[1]
     place = np.eye(4)
@@ -51,15 +52,12 @@ def by_urdf(name: str, q_rad: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         if row.joint != "tool0":
             angle = turned[int(row.joint) - 1]
             place = place @ frame(turned=Rotation.from_rotvec(angle * AXES[row.axis]))
-    return place[:3, 3], place[:3, :3]
+    return place
 
 
 def assert_published(name: str, arm: robot.Robot, q_rad: np.ndarray) -> None:
     """The arm stands at joints as its URDF has it."""
-    position, rotation = by_urdf(name, q_rad)
-    pose = robot.forward(arm, q_rad)
-    assert np.abs(pose.position_mm[0] - position).max() < 1e-6
-    assert np.abs(pose.rotation[0] - rotation).max() < 1e-9
+    assert_same(robot.forward(arm, q_rad), of_matrices([by_urdf(name, q_rad)]), 1e-6, 1e-9)
 
 
 def test_every_shipped_robot_is_held_here_and_names_its_source():

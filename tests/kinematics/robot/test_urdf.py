@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pinocchio as pin
+import pose_checks
 import pytest
+from by_pinocchio import seen_by_pinocchio
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -45,19 +47,11 @@ def text_of(joints, extra: str = "") -> str:
 
 def assert_same(path, arm: robot.Robot, tip: str, seed: int, count: int = 20, base: str = "l0"):
     """The arm stands at random joints as pinocchio has it."""
-    model = pin.buildModelFromUrdf(str(path))
-    data = model.createData()
-    order = [model.joints[model.getJointId(name)].idx_v for name in arm.joint_names]
-    q = np.random.default_rng(seed).uniform(-3, 3, (count, len(order)))
-    ours = robot.forward(arm, np.where(arm.dh.prismatic, 1e3, 1.0) * q)
-    for row in range(count):
-        step = np.zeros(model.nv)
-        step[order] = q[row]
-        pin.framesForwardKinematics(model, data, pin.integrate(model, pin.neutral(model), step))
-        frames = [data.oMf[model.getFrameId(link, pin.FrameType.BODY)] for link in (base, tip)]
-        theirs = frames[0].inverse() * frames[1]
-        assert np.abs(ours.position_mm[row] - theirs.translation * 1e3).max() < 1e-9
-        assert np.abs(ours.rotation[row] - theirs.rotation).max() < 1e-12
+    model, slides = pin.buildModelFromUrdf(str(path)), arm.dh.prismatic
+    q = np.random.default_rng(seed).uniform(-3, 3, (count, arm.dh.joints))
+    q *= np.where(slides, 1e3, 1.0)
+    theirs = seen_by_pinocchio(model, tip, q, slides, arm.joint_names, base)
+    pose_checks.assert_same(robot.forward(arm, q), theirs, 1e-9, 1e-12)
 
 
 EXACT = ["0", "1.5707963267948966", "-1.5707963267948966", "3.141592653589793"]
