@@ -17,9 +17,7 @@ from test_few_poses import settings
 from kinacc.calibration import models, vec_fit
 from kinacc.calibration.fitting import PoseSystem
 from kinacc.calibration.frames import FrameParameters, known
-from kinacc.calibration.observations import full_poses
 from kinacc.calibration.vec_fit import Prior
-from kinacc.geometry import Pose, exp_so3
 from kinacc.kinematics import robot, vec
 
 ARM = robot.load("mh180")
@@ -35,12 +33,10 @@ def observed(order, prior=WAVY):
     empty = vec.without_errors(ARM.dh, LOW, HIGH, order)
     spread = prior.std(empty)
     true = empty.with_parameters(spread * rng.normal(size=spread.size))
-    q = rng.uniform(LOW, HIGH, (POSES, 6))
-    seen = vec.pose(true, q)
-    turn = exp_so3(NOISE_MM / WEIGHT * rng.normal(size=(POSES, 3)))
-    moved = seen.position_mm + NOISE_MM * rng.normal(size=(POSES, 3))
-    observed = full_poses(q, Pose(turn @ seen.rotation, moved))
-    return replace(observed, fold=np.arange(POSES) % 5)
+    q, placed = rng.uniform(LOW, HIGH, (POSES, 6)), (known().bases, known().targets)
+    return simulated.measure(
+        true, q, simulated.POSE, rng, NOISE_MM, frames=placed, noise_rad=NOISE_MM / WEIGHT
+    )
 
 
 def choose(seen, orders=(1, 2, 3, 4, 6), stated=None):

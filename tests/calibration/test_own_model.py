@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 import pytest
@@ -75,19 +75,15 @@ def registered():
 
 def test_a_registered_model_is_fitted_held_out_and_selected(registered):
     arm, rng = robot.load("mh180"), np.random.default_rng(0)
-    true = Ripple(arm.dh, 1e-3 * rng.normal(size=(6, 2)))
-    q = simulated.joints(arm, 80, rng)
-    turned = q + true.waves[:, 0] * np.sin(q) + true.waves[:, 1] * np.cos(q)
-    off = np.tile([0.0, 0.5, 0.5, 0.0, 0.0], 6) * rng.normal(size=30)  # mm
-    built = arm.dh.with_parameters(arm.dh.start + off)
-    seen = replace(simulated.measure(built, turned, simulated.POSE, rng, 0.03), q_rad=q)
+    waves, q = 1e-3 * rng.normal(size=(6, 2)), simulated.joints(arm, 80, rng)
+    built = simulated.disturbed(arm.dh, np.array([0.0, 1.0, 1.0, 0.0, 0.0]), rng)
+    seen = simulated.measure(Ripple(built, waves), q, simulated.POSE, rng, 0.03)
     every = models.estimators(settings(), arm, seen)
     assert next(iter(every)) == "ripple"
     pair = [every["ripple"], every["dh"]]
     found = pair[0].fit(seen, {})
-    waves = found.model.waves
     # Of the first and last joints some is base and tool.
-    np.testing.assert_allclose(waves[1:5], true.waves[1:5], atol=1e-4)
+    np.testing.assert_allclose(found.model.waves[1:5], waves[1:5], atol=1e-4)
     loose = type("Of", (OwnEstimator,), {"kind": "loose", "model": Loose})(pair[0].common)
     variance = loose.fit(seen, {}).solution.variance
     assert variance == pytest.approx(found.solution.variance, rel=0.2)

@@ -7,20 +7,21 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
+from calibration.simulated import POSE, disturbed, fit, measure
 
 from kinacc.calibration import fitting, tables, uncertainty, vec_fit
 from kinacc.calibration.dh_estimator import free_parameters
-from kinacc.calibration.frames import MOTIONS
-from kinacc.calibration.observations import Observations, full_poses
+from kinacc.calibration.frames import MOTIONS, known
+from kinacc.calibration.observations import Observations
 from kinacc.calibration.vec_fit import Prior
 from kinacc.deployment.folder import calibration
 from kinacc.deployment.record import Calibration
-from kinacc.geometry import Pose, compose, exp_so3
+from kinacc.geometry import Pose, exp_so3
 from kinacc.kinematics import dh, robot, vec
 
 BASE = Pose(exp_so3(np.array([0.3, -1.1, 2.0])), np.array([2500.0, -900.0, 400.0]))
 TOOL = Pose(exp_so3(np.array([-0.4, 0.2, 0.7])), np.array([30.0, -20.0, 150.0]))
-WEIGHT = 500.0
+WEIGHT, NOISE_MM = 500.0, 0.03
 HAYATI = {"ur10": (2, 3)}
 RMS_MM = {"vec": 0.3, "dh": 0.05, "nominal": 1.0}
 RESIDUALS = {
@@ -33,9 +34,7 @@ RESIDUALS = {
 
 def bent(model: dh.DHModel, seed: int) -> dh.DHModel:
     """The model with axes askew by a milliradian and lengths off by tenths of a millimetre."""
-    errors = np.tile([1e-3, 0.3, 0.3, 1e-3, 0.0], model.joints)
-    errors *= np.random.default_rng(seed).normal(size=errors.size)
-    return model.with_parameters(model.start + errors)
+    return disturbed(model, np.arange(5) < 4, np.random.default_rng(seed), 1e-3, 0.3)
 
 
 def truth(name: str) -> dh.DHModel:
@@ -50,21 +49,22 @@ def joints(name: str, count: int, seed: int = 2, part: float = 0.36) -> np.ndarr
     return arm.q_min_rad + share * (arm.q_max_rad - arm.q_min_rad)
 
 
-def measured(name: str, count: int = 80, noise_mm: float = 0.03, seed: int = 3) -> Observations:
+def measured(name: str, count: int = 80, seed: int = 3) -> Observations:
     """Poses of the real arm seen by an instrument, joints of the robot's DH table."""
-    q_rad = joints(name, count, part=0.4) @ robot.load(name).joint_map.T
-    return measured_at(name, q_rad, noise_mm, seed)
+    return measured_at(name, joints(name, count, part=0.4) @ robot.load(name).joint_map.T, seed)
 
 
-def measured_at(
-    name: str, q_rad: np.ndarray, noise_mm: float = 0.03, seed: int = 3
-) -> Observations:
+def measured_at(name: str, q_rad: np.ndarray, seed: int = 3) -> Observations:
     """The real arm seen by an instrument at joints (count, k) of the robot's DH table."""
-    rng, count = np.random.default_rng(seed), len(q_rad)
-    seen = compose(BASE, compose(dh.forward(truth(name), q_rad), TOOL))
-    turn = exp_so3(rng.normal(0.0, noise_mm / WEIGHT, (count, 3)))
-    noise = rng.normal(0.0, noise_mm, (count, 3))
-    return full_poses(q_rad, Pose(turn @ seen.rotation, seen.position_mm + noise))
+    return seen_of(truth(name), q_rad, seed)
+
+
+def seen_of(model: dh.DHModel, q_rad: np.ndarray, seed: int = 3) -> Observations:
+    """Any arm seen by an instrument at joints (count, k) of its DH table."""
+    rng, placed = np.random.default_rng(seed), known(BASE, TOOL)
+    frames = placed.bases, placed.targets
+    seen = measure(model, q_rad, POSE, rng, NOISE_MM, 1, frames, NOISE_MM / WEIGHT)
+    return replace(seen, target_names=("tool",))
 
 
 @cache
@@ -76,13 +76,7 @@ def results(name: str, count: int, seed: int, with_vec: bool) -> dict:
 def results_of(name: str, seen: Observations, with_vec: bool = False) -> dict:
     """The tables of what was seen of an arm; without a fit the VEC model has no errors."""
     arm = robot.load(name)
-    dh_found = fitting.fit(
-        seen,
-        arm.dh,
-        free=free_parameters(arm.dh.joints, HAYATI.get(name, ())),
-        rotation_weight_mm_per_rad=WEIGHT,
-        threshold=1e-3,
-    )
+    dh_found = fit(seen, arm.dh, free_parameters(arm.dh.joints, HAYATI.get(name, ())))
     low, high = seen.q_rad.min(axis=0) - 0.02, seen.q_rad.max(axis=0) + 0.02
     plain = vec.without_errors(arm.dh, low, high, 2)
     of = dict.fromkeys(("vec", "dh", "nominal"), dh_found.frames)
@@ -101,14 +95,14 @@ def results_of(name: str, seen: Observations, with_vec: bool = False) -> dict:
             "vec_model": vec_found.model.to_columns(vec_found.std),
             "vec_covariance": tables.covariance_columns(uncertainty.of_fit(vec_found)),
         }
-    known = uncertainty.of_fit(dh_found)
+    covariance = uncertainty.of_fit(dh_found)
     return {
         **tables_of_vec,
         "robot": {"description": [robot.as_yaml(arm)]},
         "dh_model": dh_found.model.to_columns(dh_found.std.ravel()),
         "frames": tables.frames_columns(of, ("tool",)),
-        "dh_fit": tables.fit_columns("dh_fit", dh_found, known),
-        "dh_covariance": tables.covariance_columns(known),
+        "dh_fit": tables.fit_columns("dh_fit", dh_found, covariance),
+        "dh_covariance": tables.covariance_columns(covariance),
         "residuals": RESIDUALS,
     }
 

@@ -3,17 +3,15 @@
 import json
 import re
 import shutil
-import sys
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
+from deployment.small_arms import TOOL, calibrated
 from oracles.kinematics import dh_forward
+from pose_checks import movement, of_matrices
 from scipy.spatial.transform import Rotation
-
-sys.path.insert(0, str(Path(__file__).parents[1]))
-from small_arms import TOOL, calibrated
 
 from kinacc.deployment.programs import abb, compensate_program, kuka, read_program
 from kinacc.deployment.programs.orientation import (
@@ -373,17 +371,14 @@ def test_postures_near_singularities_are_flagged(tmp_path):
     names = [f"q{i}_deg" for i in range(1, 7)]
     pd.DataFrame(np.rad2deg(q).round(3), columns=names).to_csv(tmp_path / "joints.csv", index=False)
     flagged = corrected("joints.csv", tmp_path).table["is_near_singular"].to_numpy(bool)
-    table = arm.dh.start.reshape(6, 5)
-    reach_mm, step = np.abs(table[:, 1:3]).sum(), 1e-6
-    smallest = []
-    for joints in q:
-        moved = [dh_forward(table, joints + step * axis) for axis in np.eye(6)]
-        start = dh_forward(table, joints)
-        turns = [(pose[:3, :3] @ start[:3, :3].T)[(2, 0, 1), (1, 2, 0)] for pose in moved]
-        shifts = [pose[:3, 3] - start[:3, 3] for pose in moved]
-        slopes = np.column_stack([np.divide(shifts, reach_mm), turns]) / step
-        smallest.append(np.linalg.svd(slopes, compute_uv=False)[-1])
-    clear = np.abs(np.log(np.divide(smallest, 0.02))) > 0.1
+    table, step = arm.dh.start.reshape(6, 5), 1e-6
+    reach_mm = np.abs(table[:, 1:3]).sum()
+    start = of_matrices(dh_forward(table, q))
+    moved = [of_matrices(dh_forward(table, q + step * axis)) for axis in np.eye(6)]
+    slopes = np.stack([movement(start, each) for each in moved], axis=2) / step
+    slopes[:, :3] /= reach_mm
+    smallest = np.linalg.svd(slopes, compute_uv=False)[:, -1]
+    clear = np.abs(np.log(smallest / 0.02)) > 0.1
     assert clear.sum() > 50
-    np.testing.assert_array_equal(flagged[clear], np.array(smallest)[clear] < 0.02)
+    np.testing.assert_array_equal(flagged[clear], smallest[clear] < 0.02)
     assert 5 < flagged.sum() < 40
