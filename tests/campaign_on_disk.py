@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 from command_line import answer, call
@@ -12,6 +13,7 @@ from kinacc.assess.world import carry_on, drawn_world, key_of
 from kinacc.campaign import begin
 from kinacc.campaign import folder as campaigns
 from kinacc.campaign.campaign import Campaign
+from kinacc.campaign.folder import Opened
 from kinacc.campaign.instrument import instruments
 from kinacc.campaign.plan import Limits, Plan, assessor_of
 from kinacc.campaign.state import Reading, Readings
@@ -30,15 +32,15 @@ def mh180():
 
 def make_plan(
     assessor="search_and_confirm", points=40, budget=40, texts=("tracker=0.05",), frame="base",
-    limits=None, names=None, **settings,
+    tolerance_mm=None, names=None, **settings,
 ) -> Plan:  # fmt: skip
     """A plan of a campaign over ``points`` candidates."""
-    arm = mh180()
-    labels = names or [f"p{i}" for i in range(points)]
-    found = begin.points_of(arm, spread(arm.robot, points), labels)
+    arm, labels = mh180(), names or [f"p{i}" for i in range(points)]
+    joints = spread(arm.robot, points)
+    found = begin.points_of(arm, joints, labels, np.sign(joints).astype(np.int8))
     chosen = assessor_of(assessor, {"measurements": budget, **settings})
     used = instruments(texts, frame)
-    limits = limits or Limits(np.deg2rad(0.02), 10.0)
+    limits = Limits(np.deg2rad(0.02), 10.0, tolerance_mm)
     return begin.plan_of(arm, found, chosen, used, limits, None, "drawn", 3)
 
 
@@ -59,6 +61,12 @@ def readings_of(plan, read, left_out=frozenset(), limit=None):
 def entry_of(readings):
     """The entry of a journal with these readings."""
     return Readings(readings=readings).model_dump(exclude_none=True)
+
+
+def opened(plan, read, limit=None, extra=()):
+    """A campaign with readings of ``read(row, visit)`` and further entries in its journal."""
+    entries = entry_of(readings_of(plan, read, limit=limit)), *extra
+    return Opened(Path("check"), plan, campaigns.Journal(entries, "ab", (), 0))
 
 
 def errors_mm(points):

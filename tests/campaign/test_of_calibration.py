@@ -36,26 +36,26 @@ def test_the_newest_campaign_counts_and_the_others_are_named(begun, study):
 
 def test_the_bound_of_a_finished_campaign_on_the_model_is_taken(begun, study, monkeypatch):
     tables = read_tables(study, "robot")
-    folder = begun("--noise-mm", SIGMA_MM, "--frame", "base")
-    recorded(folder, Arm(folder), 19)
-    assert math.isnan(finished(tables, "dh", [folder]))
-    folder = begun("--noise-mm", SIGMA_MM, "--frame", "base")
-    recorded(folder, Arm(folder), 20)
+
+    def taken(readings=20, sigma_mm=SIGMA_MM, **plan):
+        folder = begun("--noise-mm", SIGMA_MM, "--frame", "base", **plan)
+        recorded(folder, Arm(folder, sigma_mm), readings)
+        return folder
+
+    assert math.isnan(finished(tables, "dh", [taken(19)]))
+    folder = taken()
     assert Campaign(folder).next_pose() is None
     assert "no further reading is needed" in refused(
         folder, "record", folder, "--position-mm", "1,2,3"
     )
     bound_mm = finished(tables, "dh", [folder])
     assert bound_mm == standing(folder)["bounds"][0]["upper_mm"]
-    later = begun("--noise-mm", SIGMA_MM, "--frame", "base")
     tomorrow = datetime.now(UTC) + timedelta(days=1)
     monkeypatch.setattr("kinacc.campaign.folder.datetime", SimpleNamespace(now=lambda _: tomorrow))
-    recorded(later, Arm(later, 0.5 * SIGMA_MM), 20)
+    later = taken(sigma_mm=0.5 * SIGMA_MM)
     last_mm = finished(tables, "dh", [later])
     assert finished(tables, "dh", [later, folder]) == last_mm != bound_mm
     assert math.isnan(finished(tables, "vec", [folder]))
-    some = begun("--noise-mm", SIGMA_MM, "--frame", "base", points=40)  # bounds all but a few
-    recorded(some, Arm(some), 20)
-    assert math.isnan(finished(tables, "dh", [some]))
+    assert math.isnan(finished(tables, "dh", [taken(points=40)]))  # bounds all but a few
     (folder / "readings.jsonl").write_text("no journal")
     assert math.isnan(finished(tables, "dh", [folder]))

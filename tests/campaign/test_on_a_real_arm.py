@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pandas as pd
 import pytest
+import shared_data
 from campaign_on_disk import standing
 from command_line import call
 
 from kinacc.campaign import folder as campaigns
 from kinacc.tables import store
 
-RESULTS = Path(__file__).parents[1] / "golden" / "results" / "ur10_d"
+RESULTS = shared_data.RESULTS / "ur10_d"
 SIGMA_MM = 0.05
 
 

@@ -9,23 +9,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from campaign_on_disk import entry_of, errors_mm, make_plan, readings_of, world_of
+from campaign_on_disk import errors_mm, make_plan, opened, world_of
 
 import kinacc
 from kinacc.assess.attainable import width_limits
-from kinacc.campaign import folder
-from kinacc.campaign.folder import Opened
-from kinacc.campaign.plan import Limits
 from kinacc.campaign.status import ADVICE, REASONS, status
 from kinacc.report.rendering import lines
 
 
-def measured(
-    readings=999, points=40, budget=120, tolerance_mm=None, off_mm=None, exact=None, **settings
-):
+def measured(readings=999, points=40, budget=120, off_mm=None, exact=None, **settings):
     """The status of a campaign with so many readings of a world."""
-    limits = Limits(np.deg2rad(0.02), 10.0, tolerance_mm)
-    plan = make_plan(points=points, budget=budget, limits=limits, **settings)
+    plan = make_plan(points=points, budget=budget, **settings)
     world, taken = world_of(plan), count()
 
     def read(row, visit):
@@ -34,8 +28,7 @@ def measured(
         off = off_mm(next(taken)) if off_mm else 0.0
         return world.reading_mm(row, visit) + off
 
-    entries = (entry_of(readings_of(plan, read, limit=readings)),)
-    return status(Opened(Path("check"), plan, folder.Journal(entries, "ab", (), 0)))
+    return status(opened(plan, read, readings))
 
 
 def test_every_reason_has_a_text_and_no_text_is_left_over():

@@ -2,37 +2,28 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import matplotlib.text
 import numpy as np
 import pytest
-from campaign_on_disk import entry_of, make_plan, readings_of
+from campaign_on_disk import make_plan, opened
 
-from kinacc.campaign import folder, report
-from kinacc.campaign.folder import Opened
-from kinacc.campaign.plan import Limits
+from kinacc.campaign import report
 from kinacc.figures.campaign import draw_bounds, draw_readings
 from kinacc.report import page
 from kinacc.report.campaign import campaign_page, markdown, section
 
 
-def opened(readings=99, noise_mm=0.05, tolerance_mm=None, extra=(), **settings):
+def of_plan(readings=99, noise_mm=0.05, extra=(), **settings):
     """A campaign of an arm whose errors are known; ``settings`` of its plan."""
-    limits = Limits(np.deg2rad(0.02), 10.0, tolerance_mm)
-    plan = make_plan(**{"points": 12, "budget": 16, "limits": limits, **settings})
+    plan = make_plan(**{"points": 12, "budget": 16, **settings})
     rng, rows = np.random.default_rng(4), plan.visiting(frozenset())
     true = np.random.default_rng(5).normal(0.0, 0.2, (len(rows), 3))[rows]
-    taken = readings_of(
-        plan, lambda row, _: true[row] + rng.normal(0.0, noise_mm, 3), limit=readings
-    )
-    journal = folder.Journal((entry_of(taken), *extra), "cd", (), 0)
-    return Opened(Path("check"), plan, journal)
+    return opened(plan, lambda row, _: true[row] + rng.normal(0.0, noise_mm, 3), readings, extra)
 
 
 def measured(**change):
     """A campaign and its tables."""
-    campaign = opened(**change)
+    campaign = of_plan(**change)
     return campaign, report.tables(campaign)
 
 
@@ -79,7 +70,7 @@ def test_picture_and_conformity_have_the_number_of_excepted_candidates():
 
 def test_reasons_and_names_of_strangers_are_text():
     reason, names = '<script>alert("x")</script>', [f'<b>"{i}' for i in range(12)]
-    unread = int(opened(readings=6).state.rows[-1])
+    unread = int(of_plan(readings=6).state.rows[-1])
     entries = (
         {"kind": "strike", "reading": 2, "reason": reason},
         {"kind": "leave_out", "point": unread, "reason": "behind a <b>"},
