@@ -1,4 +1,4 @@
-"""Measured data sets: shipped in examples/data, or expected beside the project.
+"""Measured data sets: shipped in examples/data, or expected beside the project; golden results.
 
 Tests that need one whose licence is not stated, and which is absent, are skipped. How many were
 skipped, and where the data is expected, stands at the end of pytest's report.
@@ -12,6 +12,7 @@ import pytest
 
 SHIPPED = Path(__file__).resolve().parents[1] / "examples" / "data"
 FOLDER = Path(__file__).resolve().parents[2] / "shared" / "data"
+RESULTS = Path(__file__).parent / "golden" / "results"
 ABSENT = "measured data absent: "
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from kinacc.calibration import summary
@@ -11,16 +12,8 @@ from kinacc.kinematics import robot
 
 def pose_errors(*rows):
     """A table of (comparison, estimate, row, position error along x, orientation error)."""
-    comparison, estimate, row, ex, rx = zip(*rows, strict=True)
-    zero = np.zeros(len(rows))
-    columns = {"ex_mm": ex, "ey_mm": zero, "ez_mm": zero}
-    columns |= {"rx_mrad": rx, "ry_mrad": zero, "rz_mrad": zero}
-    return {
-        "comparison": np.array(comparison),
-        "estimate": np.array(estimate),
-        "row": np.array(row),
-        **{name: np.array(values, dtype=float) for name, values in columns.items()},
-    }
+    table = pd.DataFrame(rows, columns=["comparison", "estimate", "row", "ex_mm", "rx_mrad"])
+    return table.assign(**dict.fromkeys(["ey_mm", "ez_mm", "ry_mrad", "rz_mrad"], 0.0))
 
 
 def test_models_are_compared_at_rows_that_all_of_them_were_tried_on():

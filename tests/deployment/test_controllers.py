@@ -7,9 +7,10 @@ import pandas as pd
 import pytest
 import yaml
 from command_line import answer, call
+from oracles import tables
 from oracles.controllers import judge, measured, programs
 from oracles.controllers.arms import ARMS, frame
-from oracles.kinematics import dh_forward, rot_x, rot_y, rot_z, trans
+from oracles.kinematics import apart, dh_forward, rot_x, rot_y, rot_z, trans
 from oracles.pendants.controllers import MAKERS, joints_for, shifted_arm
 from scipy.spatial.transform import Rotation
 from simulated_cells import calibrated
@@ -54,10 +55,7 @@ def judged(folder, results, language, arm):
     files = "-o", out, "--table", folder / "changes.csv"
     call("compensate", results, "--program", path, *files, *options(program, folder), code=0)
     assert path.read_bytes() == before
-    frames = pd.read_parquet(results / "frames.parquet")
-    row = frames[(frames["model"] == "dh") & (frames["frame"] == "base")].iloc[0]
-    turn = Rotation.from_quat(row[["qw", "qx", "qy", "qz"]].astype(float), scalar_first=True)
-    base = frame(*row[["x_mm", "y_mm", "z_mm"]].astype(float), turn)
+    base = tables.models(results).frames["dh", "base"]
     as_written = judge.misses(program, [float(each) for each in program.numbers], base)
     corrected = judge.misses(program, program.read(folder, "weld_cal"), base)
     residuals = pd.read_parquet(results / "residuals.parquet")
@@ -103,9 +101,7 @@ def test_values_typed_into_a_controller_err_by_no_more_than_the_page_states(tmp_
     for near in arm.draw(np.random.default_rng(6), POSES):
         goal = measured.BASE @ arm.pose(near) @ measured.TOOL
         shown = joints_for(maker, arm, typed, tmp_path / f"arm_{maker}", goal, near)
-        there = measured.seen(arm, shown)
-        turn = Rotation.from_matrix(goal[:3, :3].T @ there[:3, :3]).magnitude()
-        misses.append((np.linalg.norm(goal[:3, 3] - there[:3, 3]), 1e3 * turn))
+        misses.append(apart(goal, measured.seen(arm, shown)))
     mean, (stated, best, _) = np.mean(misses, axis=0), told["errors"]
     assert mean[0] <= FACTOR * stated["position_mm"]
     assert mean[1] <= FACTOR * stated["orientation_mrad"] < 9.0

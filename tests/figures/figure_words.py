@@ -2,30 +2,23 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
+import shared_data
 from matplotlib.figure import Figure
 from matplotlib.text import Text
+from stages_by_hand import tables_in
 
 from kinacc.config.schema import defaults
 from kinacc.figures import save
 from kinacc.figures.paper import draw_figure
-from kinacc.tables import store
 
-RESULTS = Path(__file__).parents[1] / "golden" / "results" / "mh180"
+RESULTS = shared_data.RESULTS / "mh180"
 NAMES = ("fig1", "fig2", "fig3", "fig4", "fig5", "fig6")
-ROLES = ("dh_model", "frames", "assessment_points", "study_summary", "histories", "accuracy_map")
-
-
-def golden() -> dict[str, dict]:
-    """The tables that figures are drawn of."""
-    return {name: store.read(RESULTS / f"{name}.parquet") for name in ROLES}
 
 
 def figures(dataset: str, names=NAMES) -> dict[str, Figure]:
     """Each figure as its stage draws it."""
-    tables, settings = golden(), defaults() | {"dataset": dataset, "robot": "mh180"}
+    tables, settings = tables_in(RESULTS), defaults() | {"dataset": dataset, "robot": "mh180"}
     return {name: draw_figure(name, tables, settings) for name in names}
 
 

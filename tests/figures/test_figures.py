@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from figure_words import figures, golden, problems, said, words
+from figure_words import RESULTS, figures, problems, said, words
 from scipy.special import gammainc
+from stages_by_hand import tables_in
 
 from kinacc.figures import fig1, fig2, fig3, paper, style
 from kinacc.figures.calibration import draw_joint_errors
@@ -16,7 +17,7 @@ LONG_NAME = "laser tracker campaign of the second machining cell, $spring$_{a}, 
 
 @pytest.fixture
 def tables():
-    return golden()
+    return tables_in(RESULTS)
 
 
 def test_no_word_overlaps_another_leaves_the_figure_or_is_too_small():

@@ -1,10 +1,9 @@
 """Outcomes of gates by the tables of a run, as a pipeline meets them."""
 
-from pathlib import Path
-
 import numpy as np
 import pandas as pd
 import pytest
+from shared_data import RESULTS
 
 from kinacc.config.load import load
 from kinacc.gate.gates import of_gate
@@ -12,7 +11,6 @@ from kinacc.gate.outcome import FAILED, PASSED, UNDECIDED, WARNED
 from kinacc.gate.values import RunTables, figure
 from kinacc.tables import sums
 
-RESULTS = Path(__file__).parents[1] / "golden" / "results"
 MEAN = "value: residuals.position.mean"
 SINCE = f"{MEAN}, against: accepted"
 

@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 import re
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
 import pytest
+import shared_data
 from parsed import as_page, read, table
+from stages_by_hand import tables_in
 
 from kinacc.calibration import noise
 from kinacc.calibration.identifiability import POORLY_DETERMINED
 from kinacc.kinematics import robot as robots
 from kinacc.report import fit_sections
 from kinacc.report.summarise import joint_ranges, summarise
-from kinacc.tables import store
 
-RESULTS = Path(__file__).parents[1] / "golden" / "results" / "ur10_d"
+RESULTS = shared_data.RESULTS / "ur10_d"
 FINDING = ("finding", "level", "what", "lines", "fix", "accepted", "rows")
 ALWAYS = "theta of joint 1 +1 mrad, base rz -1 mrad: no pose separates these"
 ROBOT = robots.load("ur10")
@@ -26,7 +26,7 @@ ROBOT = robots.load("ur10")
 
 @pytest.fixture
 def tables():
-    return {path.stem: dict(store.read(path)) for path in RESULTS.glob("*.parquet")}
+    return {name: dict(table) for name, table in tables_in(RESULTS).items()}
 
 
 def identified(tables, **parameters: tuple) -> dict:

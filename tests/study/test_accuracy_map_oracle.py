@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from oracles import kinematics as oracle
-from oracles import maps
+from oracles import maps, tables
 from scipy.spatial.transform import Rotation
+from shared_data import RESULTS
+from stages_by_hand import tables_in
 
 from kinacc import geometry
 from kinacc.config.schema import defaults
@@ -19,7 +20,6 @@ from kinacc.kinematics import dh, inverse, region, robot, vec
 from kinacc.kinematics.inverse import limits
 from kinacc.study import accuracy_map, evaluation, operating_points
 from kinacc.synthetic.draw import TABLE_II
-from kinacc.tables import store
 
 REFERENCE = np.diag([1.0, -1.0, -1.0])
 TURN = math.radians(45)
@@ -234,20 +234,10 @@ def test_a_configured_tool_stands_on_the_flange_as_that_is_turned():
 
 def test_the_base_of_a_fitted_vec_model_stands_in_that_of_the_dh_model():
     """A reading is at one place of the instrument's frame, whichever model predicts it."""
-    results = Path(__file__).parents[1] / "golden" / "results" / "ur10_d"
-    names = ("dh_model", "vec_model", "frames")
-    tables = {name: store.read(results / f"{name}.parquet") for name in names}
-    models = evaluation.equipped(tables, defaults()["evaluation"], robot.load("ur10"))
-    frames = store.read_table(results / "frames.parquet").query("frame == 'base'")
-    at = frames.set_index("model")
-
-    def in_instrument(name, point_mm):
-        turn = Rotation.from_quat(at.loc[name, ["qx", "qy", "qz", "qw"]].to_numpy(float))
-        return turn.apply(point_mm) + at.loc[name, ["x_mm", "y_mm", "z_mm"]].to_numpy(float)
-
+    results = RESULTS / "ur10_d"
+    models = evaluation.equipped(tables_in(results), defaults()["evaluation"], robot.load("ur10"))
+    frames, base = tables.models(results).frames, models.by_name["vec"].base
     point_mm = np.array([700.0, -300.0, 500.0])  # in the first frame of the VEC model
-    base = models.by_name["vec"].base
-    found = in_instrument("dh", base.rotation @ point_mm + base.position_mm)
-    wanted = in_instrument("vec", point_mm)
-    np.testing.assert_allclose(found, wanted, atol=1e-9)
+    found = frames["dh", "base"] @ [*(base.rotation @ point_mm + base.position_mm), 1.0]
+    np.testing.assert_allclose(found, frames["vec", "base"] @ [*point_mm, 1.0], atol=1e-9)
     assert models.by_name["dh"].base is None

@@ -110,22 +110,14 @@ def test_antiparallel_lengths_are_judged_by_their_difference_alone():
 
 
 def history(example: str, true_mm, probability, eta_mm: float, repeat=None, point=None):
-    count = len(true_mm)
-    return {
-        "example": np.full(count, example, dtype=object),
-        "alpha": np.full(count, 0.6),
-        "iteration": np.arange(1, count + 1),
-        "point": np.arange(count) if point is None else np.asarray(point),
-        "repeat": np.ones(count, int) if repeat is None else np.asarray(repeat),
-        "eta_mm": np.full(count, eta_mm),
-        "averaged_mm": np.asarray(true_mm, dtype=float),
-        "true_mm": np.asarray(true_mm, dtype=float),
-        "rejection_probability": np.asarray(probability, dtype=float),
-    }
+    numbers = range(len(true_mm))
+    rows = {"true_mm": true_mm, "averaged_mm": true_mm, "rejection_probability": probability}
+    rows |= {"point": point or numbers, "repeat": repeat or 1, "iteration": numbers}
+    return pd.DataFrame(rows | {"example": example, "alpha": 0.6, "eta_mm": eta_mm})
 
 
 def joined(*parts):
-    return {"histories": {k: np.concatenate([p[k] for p in parts]) for k in parts[0]}}
+    return {"histories": pd.concat(parts, ignore_index=True)}
 
 
 GOOD_HISTORIES = joined(
