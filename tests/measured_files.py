@@ -9,6 +9,15 @@ import pandas as pd
 from scipy.spatial.transform import Rotation
 
 
+def write_noisy(
+    path: Path, q_rad: np.ndarray, poses: np.ndarray, rng, noise_mm: float, noise_rad: float, **more
+) -> Path:
+    """As ``write_readings``, of poses (n, 4, 4) that are read with noise."""
+    noise = rng.normal(size=(len(poses), 6))
+    turned = Rotation.from_rotvec(noise_rad * noise[:, :3]) * Rotation.from_matrix(poses[:, :3, :3])
+    return write_readings(path, q_rad, poses[:, :3, 3] + noise_mm * noise[:, 3:], turned, **more)
+
+
 def write_readings(
     path: Path, q_rad: np.ndarray, position_mm: np.ndarray, turned: Rotation | None = None, **more
 ) -> Path:

@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from command_line import answer, call
+from read_columns import joints_of, points_of, turns_of
 from scipy.spatial.transform import Rotation
 
 from kinacc.checks.contradictions import load
@@ -91,14 +92,11 @@ def assert_read(section, arm, rows=None):
     rows = np.arange(len(arm.q)) if rows is None else np.asarray(rows)
     columns = read(section, robot.load(arm.name), strict=False).columns
     columns = {name: values[columns["target"] == "tool"] for name, values in columns.items()}
-    q = np.rad2deg(np.stack([columns[f"q{i}"] for i in range(1, arm.q.shape[1] + 1)], axis=1))
-    point = np.stack([columns[f"{axis}_mm"] for axis in "xyz"], axis=1)
-    np.testing.assert_allclose(q, arm.q[rows], atol=1e-4)
-    np.testing.assert_allclose(point, arm.point[rows], atol=1e-3)
+    np.testing.assert_allclose(np.rad2deg(joints_of(columns)), arm.q[rows], atol=1e-4)
+    np.testing.assert_allclose(points_of(columns), arm.point[rows], atol=1e-3)
     return columns
 
 
 def assert_turned(columns, arm):
     """The orientations are those of the target."""
-    found = np.stack([columns[f"q{part}"] for part in "xyzw"], axis=1)
-    assert (Rotation.from_quat(found) * arm.turn.inv()).magnitude().max() < 1e-5
+    assert (turns_of(columns) * arm.turn.inv()).magnitude().max() < 1e-5

@@ -16,7 +16,7 @@ import pandas as pd
 import pytest
 import yaml
 from command_line import call
-from measured_files import write_readings
+from measured_files import write_noisy
 from oracles import compliant_arm
 from oracles.compliant_arm import Arm, Body
 from oracles.controllers.arms import shipped
@@ -84,13 +84,11 @@ def arm_in_a_cell(name: str, arm: Arm, seed: int, loads: Sequence[Body]) -> Cell
 
 def written(path: Path, cell: Cell, seed: int, with_payload: bool = False) -> Path:
     """The file of a tracker that sees full poses, with noise."""
-    noise = NOISE_MM * np.random.default_rng([seed, 1]).normal(size=(POSES, 6))
-    poses = cell.tool_poses(cell.joints_deg, cell.payloads)
-    turn = Rotation.from_rotvec(noise[:, :3] / WEIGHT) * Rotation.from_matrix(poses[:, :3, :3])
+    rng, poses = np.random.default_rng([seed, 1]), cell.tool_poses(cell.joints_deg, cell.payloads)
     names = ("payload_kg", "payload_x_mm", "payload_y_mm", "payload_z_mm") if with_payload else ()
     loads = np.transpose([[load.mass_kg, *load.centre_mm] for load in cell.payloads])
-    position, payloads = poses[:, :3, 3] + noise[:, 3:], dict(zip(names, loads, strict=False))
-    return write_readings(path, np.radians(cell.joints_deg), position, turn, **payloads)
+    payloads, q_rad = dict(zip(names, loads, strict=False)), np.radians(cell.joints_deg)
+    return write_noisy(path, q_rad, poses, rng, NOISE_MM, NOISE_MM / WEIGHT, **payloads)
 
 
 def stated(body: Body) -> dict:

@@ -7,11 +7,11 @@ import re
 import numpy as np
 import pandas as pd
 import pytest
+from read_columns import joints_of, points_of, turns_of
 from scipy.spatial.transform import Rotation
 
 from kinacc.config.schema import defaults
 from kinacc.errors import InputError
-from kinacc.geometry import rotation_from_quaternion
 from kinacc.kinematics import dh, robot
 from kinacc.measurements.reader import read
 
@@ -50,12 +50,9 @@ def problems_of(folder, table, **section) -> str:
 
 def assert_is_truth(columns, truth):
     q_rad, pose = truth
-    found = np.stack([columns[f"q{i}"] for i in range(1, 7)], axis=1)
-    np.testing.assert_allclose(found, q_rad, atol=1e-12)
-    position = np.stack([columns[f"{axis}_mm"] for axis in "xyz"], axis=1)
-    np.testing.assert_allclose(position, pose.position_mm, atol=1e-9)
-    quaternion = np.stack([columns[f"q{part}"] for part in "wxyz"], axis=1)
-    np.testing.assert_allclose(rotation_from_quaternion(quaternion), pose.rotation, atol=1e-9)
+    np.testing.assert_allclose(joints_of(columns), q_rad, atol=1e-12)
+    np.testing.assert_allclose(points_of(columns), pose.position_mm, atol=1e-9)
+    np.testing.assert_allclose(turns_of(columns).as_matrix(), pose.rotation, atol=1e-9)
 
 
 @pytest.mark.parametrize("order", ["wxyz", "xyzw"])

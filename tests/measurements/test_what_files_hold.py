@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from read_columns import turns_of
 from scipy.spatial.transform import Rotation
 
 from kinacc.checks.contradictions import load
 from kinacc.config.schema import defaults
 from kinacc.errors import InputError
-from kinacc.geometry import rotation_from_quaternion
 from kinacc.kinematics import robot
 from kinacc.measurements.reader import UNCERTAINTY, read
 
@@ -70,8 +70,8 @@ def test_euler_angles_by_axis_and_in_order(tmp_path, joints, convention, axes):
         table = joints | points() | dict(zip(names, angles, strict=True))
         orientation = {"convention": convention}
         columns = reading(tmp_path, table, kind="euler", orientation=orientation).columns
-        found = np.stack([columns[f"q{part}"] for part in "wxyz"], axis=1)
-        np.testing.assert_allclose(rotation_from_quaternion(found), turn.as_matrix(), atol=1e-9)
+        found = turns_of(columns).as_matrix()
+        np.testing.assert_allclose(found, turn.as_matrix(), atol=1e-9)
 
 
 def test_a_stated_standard_deviation_of_zero_says_nothing(tmp_path, joints):

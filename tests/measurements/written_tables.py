@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from cli.tracked_arm import tracked
+from read_columns import joints_of, points_of
 
 from kinacc.kinematics import robot
 from kinacc.measurements.intake import guess
@@ -15,7 +16,6 @@ from kinacc.measurements.reader import read
 
 IT = tracked(poses=14)
 ROWS, POINT_MM, Q_DEG = len(IT.q), np.round(IT.point, 3), np.round(IT.q, 3)
-AXES = "xyz"
 JOINTS = [f"J{number} [deg]" for number in range(1, 7)]
 XYZ = ["X [mm]", "Y [mm]", "Z [mm]"]
 NO_UNITS = [*(f"J{number}" for number in range(1, 7)), *"XYZ"]
@@ -66,10 +66,8 @@ def reading(path, **answers):
 
 def assert_is_truth(found, rows=slice(None), atol=2e-3):
     """Joints and points are those of the cell at ``rows``, in their order."""
-    q = np.rad2deg(np.stack([found.columns[f"q{i}"] for i in range(1, 7)], axis=1))
-    point = np.stack([found.columns[f"{axis}_mm"] for axis in AXES], axis=1)
-    np.testing.assert_allclose(q, Q_DEG[rows], atol=atol)
-    np.testing.assert_allclose(point, POINT_MM[rows], atol=atol)
+    np.testing.assert_allclose(np.rad2deg(joints_of(found.columns)), Q_DEG[rows], atol=atol)
+    np.testing.assert_allclose(points_of(found.columns), POINT_MM[rows], atol=atol)
 
 
 def undecided(path, **answers) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from measured_files import write_readings
+from measured_files import write_noisy
 from scipy.spatial.transform import Rotation
 
 from oracles.controllers.arms import Arm
@@ -27,10 +27,7 @@ def write(folder: Path, arm: Arm, poses: int = 90, order: int = 1) -> Path:
     rng = np.random.default_rng(11)
     shown = arm.draw(rng, poses)
     there = np.array([seen(arm, each) for each in shown])
-    noise = rng.normal(size=(poses, 6))
-    turned = Rotation.from_rotvec(NOISE_RAD * noise[:, :3]) * Rotation.from_matrix(there[:, :3, :3])
-    place = there[:, :3, 3] + NOISE_MM * noise[:, 3:]
-    write_readings(folder / "poses.csv", shown, place, turned)
+    write_noisy(folder / "poses.csv", shown, there, rng, NOISE_MM, NOISE_RAD)
     (folder / "robot.yaml").write_text(arm.description())
     config = folder / "arm.yaml"
     config.write_text(

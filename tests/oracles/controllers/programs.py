@@ -301,34 +301,42 @@ def abb(arm: Arm, points: np.ndarray, tool: np.ndarray, base: np.ndarray) -> Pro
     return program
 
 
+FANUC = """/PROG  WELD
+/ATTR
+OWNER\t\t= MNEDITOR;
+COMMENT\t\t= "X = 1.0 mm";
+DEFAULT_GROUP\t= 1,*,*,*,*;
+/MN
+   1:  UFRAME_NUM=1 ;
+   2:  UTOOL_NUM=1 ;
+%s
+/POS
+%s
+/END
+"""
+FANUC_POSE = """\tUF : 1, UT : 1,\t\tCONFIG : '%s',
+\tX =%s  mm,\tY =%s  mm,\tZ =%s  mm,
+\tW =%s  deg,\tP =%s  deg,\tR =%s  deg"""
+FANUC_JOINTS = """\tUF : 1, UT : 1,\t
+\tJ1=%s deg,\tJ2=%s deg,\tJ3=%s deg,
+\tJ4=%s deg,\tJ5=%s deg,\tJ6=%s deg"""
+
+
 def fanuc(arm: Arm, points: np.ndarray, tool: np.ndarray, base: np.ndarray) -> Program:
     """LS: Cartesian and joint positions; frames are in a file of their own."""
-    program, lines, moves = Program(arm, "fanuc", tool, base), [], []
+    program, positions, moves = Program(arm, "fanuc", tool, base), [], []
     for number, q in enumerate(points, 1):
         of_joints = number % 4 == 0
         values = [each.rjust(9) for each in program.add(q, of_joints)]
-        lines += [f"P[{number}]{{", "   GP1:"]
-        if of_joints:
-            lines.append("\tUF : 1, UT : 1,\t")
-            named = [f"J{i}={value} deg" for i, value in enumerate(values, 1)]
-        else:
-            behind, above = posture(arm, q)
-            turns = [int(np.floor((np.rad2deg(q[axis]) + 180.0) / 360.0)) for axis in (0, 3, 5)]
-            letters = "F" if q[4] > 0.0 else "N", "UD"[not above], "TB"[behind]
-            config = f"{' '.join(letters)}, {', '.join(map(str, turns))}"
-            lines.append(f"\tUF : 1, UT : 1,\t\tCONFIG : '{config}',")
-            units = ["mm"] * 3 + ["deg"] * 3
-            named = [
-                f"{a} ={value}  {unit}"
-                for a, value, unit in zip("XYZWPR", values, units, strict=True)
-            ]
-        lines += ["\t" + ",\t".join(named[:3]) + ",", "\t" + ",\t".join(named[3:]), "};"]
+        behind, above = posture(arm, q)
+        turns = [int(np.floor((np.rad2deg(q[axis]) + 180.0) / 360.0)) for axis in (0, 3, 5)]
+        letters = "F" if q[4] > 0.0 else "N", "UD"[not above], "TB"[behind]
+        config = f"{' '.join(letters)}, {', '.join(map(str, turns))}"
+        text = FANUC_JOINTS % (*values,) if of_joints else FANUC_POSE % (config, *values)
+        positions.append(f"P[{number}]{{\n   GP1:\n{text}\n}};")
         word, speed = ("J", "50%") if of_joints or number == 1 else ("L", "200mm/sec")
         moves.append(f"{number + 2:4d}:{word} P[{number}] {speed} CNT50    ;")
-    head = ["/PROG  WELD", "/ATTR", "OWNER\t\t= MNEDITOR;", 'COMMENT\t\t= "X = 1.0 mm";',
-            "DEFAULT_GROUP\t= 1,*,*,*,*;", "/MN", "   1:  UFRAME_NUM=1 ;",
-            "   2:  UTOOL_NUM=1 ;", *moves, "/POS"]  # fmt: skip
-    program.files = {".ls": "\n".join([*head, *lines, "/END"]) + "\n"}
+    program.files = {".ls": FANUC % ("\n".join(moves), "\n".join(positions))}
     return program
 
 
