@@ -15,12 +15,17 @@ def away(rng, sizes):
     return way * (sizes / np.linalg.norm(way, axis=1))[:, None]
 
 
+def equal(points, noise_mm=0.1):
+    """So many candidates with one noise."""
+    return Candidates.with_equal_noise(np.full(points, noise_mm))
+
+
 def conducted(rng, errors_mm, measurements, shift=None, noise_mm=1.0, stated=1.0, **settings):
     """A campaign to its end; ``shift(number, error)`` is added to the reading of that number.
 
     ``stated``: the noise stated over the true one.
     """
-    candidates = Candidates.with_equal_noise(np.full(len(errors_mm), stated * noise_mm))
+    candidates = equal(len(errors_mm), stated * noise_mm)
     campaign = SearchAndConfirm(measurements, **settings).begin(candidates)
 
     def reading_mm(row, _):

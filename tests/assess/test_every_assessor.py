@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 from scipy.stats import binom, chi2, ncx2, norm
-from simulated_campaigns import away
+from simulated_campaigns import away, equal
 
 from kinacc.assess.adaptive import Candidates, Ledger
 from kinacc.assess.region_share import RegionShare
@@ -63,7 +63,7 @@ def test_every_assessor_keeps_its_budget_and_says_something_at_the_end(assessor,
     ],
 )
 def test_a_reading_that_cannot_be_used_changes_nothing(wrong):
-    campaign = SearchAndConfirm(40).begin(Candidates.with_equal_noise(np.full(30, 0.1)))
+    campaign = SearchAndConfirm(40).begin(equal(30))
     with pytest.raises(InputError):
         campaign.record(*wrong)
     assert (campaign.ledger.taken, campaign.next()) == (0, 0)
@@ -85,7 +85,7 @@ def test_covariances_that_are_none_are_refused_with_their_point(covariance, said
 
 
 def test_unequal_noise_is_weighted_as_least_squares_would():
-    ledger = Ledger(Candidates.with_equal_noise(np.full(2, 0.1)))
+    ledger = Ledger(equal(2))
     rng = np.random.default_rng(6)
     readings = rng.normal(size=(5, 3))
     spreads = [np.diag(rng.uniform(0.5, 2.0, 3)) + 0.2 for _ in readings]
@@ -186,7 +186,7 @@ def test_a_tolerance_is_held_to_both_bounds(said, tolerance, verdict, reason):
 
 
 def test_the_lower_bound_of_single_readings_counts_every_point():
-    campaign = SingleShot(40).begin(Candidates.with_equal_noise(np.full(40, 0.1)))
+    campaign = SingleShot(40).begin(equal(40))
     for row in range(40):
         campaign.record(row, [0.1 * row, 0.0, 0.0])
     for lower_mm in (campaign.statements()[0].lower_mm, campaign.point_limits()[39][0]):

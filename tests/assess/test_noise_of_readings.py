@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 from scipy.stats import binom, chi2, f, kstest, multivariate_t, norm, t
-from simulated_campaigns import away, conducted
+from simulated_campaigns import away, conducted, equal
 
 from kinacc.assess.adaptive import Candidates, Ledger
 from kinacc.assess.limits import visit_mm
@@ -25,10 +25,6 @@ from kinacc.assess.noise import (
 )
 from kinacc.assess.search_and_confirm import SearchAndConfirm
 from kinacc.assess.world import carry_on
-
-
-def equal(points):
-    return Candidates.with_equal_noise(np.full(points, 0.1))
 
 
 def of_values(values):

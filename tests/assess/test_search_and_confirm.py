@@ -12,9 +12,8 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from scipy.stats import chi2
-from simulated_campaigns import away, conducted
+from simulated_campaigns import away, conducted, equal
 
-from kinacc.assess.adaptive import Candidates
 from kinacc.assess.search_and_confirm import SearchAndConfirm
 from kinacc.assess.world import conduct, drawn_world
 
@@ -106,9 +105,7 @@ def test_a_point_whose_readings_differ_in_noise_keeps_its_bound():
     errors = away(chance, np.array([1.0, 0.01, 0.01, 0.01]))
     too_small = too_large = 0
     for _ in range(draws):
-        campaign = SearchAndConfirm(16, noise_margin=1.0).begin(
-            Candidates.with_equal_noise(np.full(4, SIGMA_MM))
-        )
+        campaign = SearchAndConfirm(16, noise_margin=1.0).begin(equal(4, SIGMA_MM))
         while (row := campaign.next()) is not None:
             own = SIGMA_MM * chance.choice([0.3, 1.0, 3.0])
             reading = errors[row] + own * chance.normal(size=3)

@@ -2,19 +2,55 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
+import pandas as pd
 
 from kinacc.calibration import fitting
 from kinacc.calibration.frames import Frames
 from kinacc.calibration.observations import full_poses
-from kinacc.geometry import Pose, compose, exp_so3
+from kinacc.geometry import Pose, compose, exp_so3, quaternion_from_rotation
 from kinacc.kinematics import dh
-from kinacc.kinematics.model import JointState
+from kinacc.kinematics.dh import DHModel
+from kinacc.kinematics.model import ErrorModel, JointState
 
 POINT, THREE, POSE = "point", "three", "pose"  # what the instrument sees of every pose
 ORIENTATION_NOISE_RAD = 1e-4
+
+
+@dataclass(frozen=True)
+class Ripple(ErrorModel):
+    """DH parameters, and a sine and a cosine of every joint's angle added to it."""
+
+    dh: DHModel
+    waves: np.ndarray = field(default_factory=lambda: np.zeros((6, 2)))
+    kind = "ripple"
+
+    @property
+    def names(self):
+        waves = [f"j{i}.{name}_rad" for i in range(1, 7) for name in ("sine", "cosine")]
+        return (*self.dh.names, *waves)
+
+    @property
+    def units(self):
+        return (*self.dh.units, *["rad"] * 12)
+
+    @property
+    def start(self):
+        return np.concatenate([self.dh.start, self.waves.ravel()])
+
+    @property
+    def prior_std(self):
+        return np.concatenate([self.dh.prior_std, np.full(12, 1e-3)])
+
+    def with_parameters(self, x):
+        return type(self)(self.dh.with_parameters(x[:-12]), x[-12:].reshape(6, 2))
+
+    def pose(self, at):
+        q = at.q_rad
+        turned = self.waves[:, 0] * np.sin(q) + self.waves[:, 1] * np.cos(q)
+        return self.dh.pose(at.moved(q + turned))
 
 
 def joints(arm, count, rng):
@@ -75,6 +111,19 @@ def measure(
         session=session,
         session_names=(None,) if sessions == 1 else tuple(f"s{i}" for i in range(sessions)),
     )
+
+
+def columns_of(seen):
+    """The columns of ``measurements``, by name, of an arm whose joints are those of its table."""
+    joints = [f"{letter}{number}" for letter in "qs" for number in range(1, seen.joints + 1)]
+    turned = quaternion_from_rotation(seen.rotation)
+    table = pd.DataFrame(
+        np.hstack([seen.q_rad, seen.s, seen.position_mm, turned]),
+        columns=[*joints, "x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz"],
+    )
+    names = np.array(seen.target_names, dtype=object)[seen.target]
+    table = table.assign(pose=seen.pose, repeat=seen.repeat, target=names, subset="train")
+    return {name: column.to_numpy() for name, column in table.items()}
 
 
 def fit(observations, nominal, free, **settings):

@@ -88,17 +88,11 @@ def test_every_model_of_an_automatic_calibration_ends(size):
 def test_a_pose_gives_six_numbers_at_most_whatever_it_carries(targets, numbers):
     arm, stated = robot.load("ur10"), settings()
     stated["vec"] |= {"order": 2, "prior": "stated"}
-    names = [*"abc"][:targets]
-    frames = 6 + 3 * targets
+    frames, rng = 6 + 3 * targets, np.random.default_rng(2)
 
     def found(poses):
-        q_rad = np.repeat(np.random.default_rng(2).uniform(-1.0, 1.0, (poses, 6)), targets, axis=0)
-        columns = {f"q{i + 1}": q_rad[:, i] for i in range(6)}
-        nothing = ["s1", "s2", "s3", "s4", "s5", "s6", "x_mm", "y_mm", "z_mm", "repeat"]
-        columns |= dict.fromkeys(nothing, np.zeros(len(q_rad)))
-        columns |= dict.fromkeys(["qw", "qx", "qy", "qz"], np.full(len(q_rad), np.nan))
-        columns |= {"pose": np.repeat(np.arange(poses), targets), "target": names * poses}
-        return few_poses(columns, arm, stated)
+        seen = simulated.measure(arm.dh, simulated.joints(arm, poses, rng), simulated.THREE, rng)
+        return few_poses(simulated.columns_of(seen.select(seen.target < targets)), arm, stated)
 
     enough = -(-(frames + 6 * 6 * 3) // numbers)  # orders 0, 1 and 2 of six errors of six joints
     assert not found(enough)

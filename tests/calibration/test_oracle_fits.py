@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from oracles import fits
 from oracles import kinematics as oracle
+from pose_checks import of_matrices
 from scipy.spatial.transform import Rotation
 from simulated import anywhere
 
@@ -30,7 +31,7 @@ def measured(matrices, rng, noise_mm, noise_rad):
     seen, count = matrices.real.copy(), len(matrices)
     seen[:, :3, :3] = geometry.exp_so3(noise_rad * rng.normal(size=(count, 3))) @ seen[:, :3, :3]
     seen[:, :3, 3] += noise_mm * rng.normal(size=(count, 3))
-    return seen, geometry.Pose(seen[:, :3, :3], seen[:, :3, 3])
+    return seen, of_matrices(seen)
 
 
 def matrix(pose):

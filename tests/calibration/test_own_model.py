@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-
 import numpy as np
 import pytest
 import simulated
+from simulated import Ripple
 from test_few_poses import settings
 
 import kinacc
@@ -16,43 +15,7 @@ from kinacc.calibration.residuals import cross_validated
 from kinacc.calibration.stages import selection
 from kinacc.config import error_models
 from kinacc.kinematics import robot
-from kinacc.kinematics.dh import DHModel
-from kinacc.kinematics.model import ErrorModel
 from kinacc.tables.contract import ARTEFACTS
-
-
-@dataclass(frozen=True)
-class Ripple(ErrorModel):
-    """DH parameters, and a sine and a cosine of every joint's angle added to it."""
-
-    dh: DHModel
-    waves: np.ndarray = field(default_factory=lambda: np.zeros((6, 2)))
-    kind = "ripple"
-
-    @property
-    def names(self):
-        waves = [f"j{i}.{name}_rad" for i in range(1, 7) for name in ("sine", "cosine")]
-        return (*self.dh.names, *waves)
-
-    @property
-    def units(self):
-        return (*self.dh.units, *["rad"] * 12)
-
-    @property
-    def start(self):
-        return np.concatenate([self.dh.start, self.waves.ravel()])
-
-    @property
-    def prior_std(self):
-        return np.concatenate([self.dh.prior_std, np.full(12, 1e-3)])
-
-    def with_parameters(self, x):
-        return type(self)(self.dh.with_parameters(x[:-12]), x[-12:].reshape(6, 2))
-
-    def pose(self, at):
-        q = at.q_rad
-        turned = self.waves[:, 0] * np.sin(q) + self.waves[:, 1] * np.cos(q)
-        return self.dh.pose(at.moved(q + turned))
 
 
 class Loose(Ripple):

@@ -72,7 +72,7 @@ FAULTS = [
         "base_jump",
         partial(plants.jumped, by_mm=(5.0, 0.0, 0.0), turn_mrad=0.0),
         "fanuc",
-        partial(LATE, share=0.5),
+        partial(LATE, share=0.625),
     ),
     ("target_swapped", plants.exchanged, "three", SOME),
     ("rows_exchanged", readings_in_turn, "arm", SOME),

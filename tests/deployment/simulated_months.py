@@ -10,13 +10,13 @@ from __future__ import annotations
 import numpy as np
 from oracles.controllers.arms import ARMS
 from oracles.kinematics import dh_forward, rot_x, rot_y, rot_z, trans
+from pose_checks import of_matrices
 from scipy.spatial.transform import Rotation
 from small_arms import WEIGHT, results_of
 
 from kinacc.calibration.observations import Observations, full_poses
 from kinacc.deployment.folder import calibration
 from kinacc.deployment.history import Session
-from kinacc.geometry import Pose
 from kinacc.tables.allowed import SAME
 
 POSES = 50
@@ -51,8 +51,7 @@ def month(
         at[:3, :3] = turn.as_matrix() @ at[:3, :3]
         at[:3, 3] += chance.normal(0.0, NOISE_MM, 3)
         poses.append(at)
-    seen = np.array(poses)
-    return full_poses(q_rad, Pose(seen[:, :3, :3], seen[:, :3, 3]))
+    return full_poses(q_rad, of_matrices(poses))
 
 
 def session(seen: Observations, number: int, base: str = SAME) -> Session:

@@ -9,6 +9,7 @@ import pandas as pd
 import pytest
 import scipy.stats
 import shared_data
+from calibration.simulated import columns_of
 from simulated_months import month, session
 from small_arms import results_of
 
@@ -16,10 +17,10 @@ from kinacc.calibration.observations import full_poses
 from kinacc.deployment import history as histories
 from kinacc.deployment.history import LEVEL, session_of
 from kinacc.deployment.history_model import Moved, Setup, misfit_factor, understated
-from kinacc.geometry import Pose, quaternion_from_rotation
+from kinacc.geometry import Pose
 from kinacc.kinematics import robot as robots
 from kinacc.measurements.orientation import euler
-from kinacc.tables.allowed import MOVED, SAME, SUBSETS
+from kinacc.tables.allowed import MOVED, SAME
 
 FAR_RAD = 0.02 * np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
 KNOCK_RAD = np.array([0.0, 0.0, 2e-3, 0.0, 0.0, 0.0])
@@ -127,19 +128,10 @@ def tables_as_the_workflow_gives_them(seen):
     """A VEC model is selected; covariances are not among the tables that a history is made of."""
     made = results_of("ur10", seen, with_vec=True)
     names = ("robot", "frames", "dh_model", "vec_model")
-    quaternion = quaternion_from_rotation(seen.rotation)
-    measured = {
-        **{f"q{joint + 1}": column for joint, column in enumerate(seen.q_rad.T)},
-        **{f"s{joint + 1}": column for joint, column in enumerate(seen.s.T)},
-        **dict(zip(("x_mm", "y_mm", "z_mm"), seen.position_mm.T, strict=True)),
-        **dict(zip(("qw", "qx", "qy", "qz"), quaternion.T, strict=True)),
-        **{"pose": seen.pose, "repeat": seen.repeat, "target": np.full(len(seen), "tool")},
-        "subset": np.full(len(seen), SUBSETS[0]),
-    }
     none = dict.fromkeys(("estimate", "comparison", "row", "ex_mm", "ey_mm", "ez_mm"), np.zeros(0))
     choice = {"model": np.array(["dh", "vec"]), "selected": np.array([False, True])}
     return {name: made[name] for name in names} | {
-        "measurements": measured, "pose_errors": none, "model_selection": choice
+        "measurements": columns_of(seen), "pose_errors": none, "model_selection": choice
     }  # fmt: skip
 
 

@@ -6,13 +6,13 @@ import json
 
 import numpy as np
 import pytest
+from calibration.simulated import POINT, Ripple, disturbed, measure
 from command_line import answer, call
 from measured_files import write_readings
 from stages_by_hand import run_stages
 
 from kinacc.calibration.misfit import misfit
-from kinacc.geometry import exp_so3
-from kinacc.kinematics import dh, robot
+from kinacc.kinematics import robot
 from kinacc.report.summarise import summarise
 from kinacc.tables import store
 
@@ -30,15 +30,11 @@ def written(folder):
     q = np.deg2rad(rng.uniform(-70, 70, (POSES, 6)))
     q = np.concatenate([q, *[q[:AGAIN]] * (TIMES - 1)])
     q = q + np.deg2rad(0.01) * rng.uniform(-0.5, 0.5, q.shape)
-    parameters = arm.dh.start.reshape(-1, 5) + rng.normal(size=(6, 5)) * [
-        5e-4, 0.3, 0.3, 5e-4, 0.0,
-    ]  # fmt: skip
-    turned = q + GEARS_RAD * np.sin(q + rng.uniform(0, 6, 6))
-    flange = dh.forward(arm.dh.with_parameters(parameters.ravel()), turned)
-    point = flange.position_mm + flange.rotation @ [30.0, -20.0, 60.0]
-    point = point @ exp_so3(np.array([0.3, -0.2, 1.1])).T + [1500.0, 200.0, -400.0]
-    point = point + rng.normal(size=point.shape) * NOISE_MM
-    path = write_readings(folder / "arm.csv", q, point)
+    phase = rng.uniform(0, 6, 6)
+    waves = GEARS_RAD * np.column_stack([np.cos(phase), np.sin(phase)])
+    built = Ripple(disturbed(arm.dh, np.arange(5) < 4, rng, 5e-4, 0.3), waves)
+    seen = measure(built, q, POINT, rng, NOISE_MM)
+    path = write_readings(folder / "arm.csv", q, seen.position_mm)
     config = path.with_suffix(".yaml")
     config.write_text(
         f"datasets: {{arm: {{robot: irb120, measurements: {{source: file, file: {{path: {path}, "
