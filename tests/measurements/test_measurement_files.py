@@ -178,7 +178,6 @@ def test_a_fault_is_named_with_its_place(tmp_path, good, case):
     [
         ({"columns": {"q1": "base_joint"}}, "column base_joint: is not there"),
         ({"columns": {"q1": "q2_deg"}}, "column q2_deg: is taken for 2 quantities, q1 among them"),
-        ({"targets": []}, "no target is asked for"),
     ],
 )
 def test_settings_that_do_not_fit_the_file_are_named(tmp_path, good, section, said):

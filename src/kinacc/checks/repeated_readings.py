@@ -12,8 +12,9 @@ from kinacc.checks import digits
 from kinacc.checks import repeatability as checks
 from kinacc.checks.repeatability import Noise
 from kinacc.errors import Problem, first_few, input_error, refuse
+from kinacc.measurements.intake.columns import POINTS
 from kinacc.measurements.layout import listed
-from kinacc.measurements.rows import POINTS, read_rows
+from kinacc.measurements.rows import read_rows
 from kinacc.measurements.table import RawTable
 from kinacc.measurements.times import seconds
 

@@ -32,11 +32,22 @@ def is_no_coordinate(number: float) -> bool:
 
 
 def of_rows(
-    table: RawTable, places: Sequence[Place], bad: np.ndarray, message: str, allowed: str
+    table: RawTable,
+    places: Sequence[Place],
+    bad: np.ndarray,
+    message: str,
+    allowed: str,
+    values: np.ndarray | None = None,
 ) -> list[Problem]:
-    """A problem with columns in the rows where ``bad`` (n,) is True; none where it nowhere is."""
+    """A problem with columns in the rows where ``bad`` (n,) is True; none where it nowhere is.
+
+    ``message`` is a format for the first of the bad ``values`` (n,).
+    """
+    if not bad.any():
+        return []
     names = ", ".join(place.column for place in places)
-    return [Problem(table.where(names, bad), message, allowed)] if bad.any() else []
+    first = [] if values is None else values[bad][:1]
+    return [Problem(table.where(names, bad), message.format(*first), allowed)]
 
 
 def quaternion_problems(
@@ -45,8 +56,8 @@ def quaternion_problems(
     """Quaternions (n, 4) whose length is not 1."""
     length = np.linalg.norm(quaternion, axis=1)
     bad = np.abs(length - 1.0) > _UNIT_QUATERNION
-    message = f"quaternion of length {next(iter(length[bad]), 1.0):.6g}"
-    return of_rows(table, places, bad, message, f"length 1 within {_UNIT_QUATERNION:g}")
+    allowed = f"length 1 within {_UNIT_QUATERNION:g}"
+    return of_rows(table, places, bad, "quaternion of length {:.6g}", allowed, length)
 
 
 def limit_problems(

@@ -68,12 +68,11 @@ def by_feature(table: RawTable) -> RawTable:
     cells[feature] = cells[feature].ffill()
     axes = table.columns[axis_column].map(axis_of)
     rows = cells[axes != ""]
-    begins, known = list[bool](), set[tuple[str, str]]()
-    for row in zip(rows[feature], axes[rows.index], strict=True):
-        begins.append(row in known or row[0] not in {name for name, _ in known})
-        known = {row} if begins[-1] else known | {row}
-    group = np.cumsum(begins) - 1
-    of_axes = rows[values].groupby([group, axes[rows.index].to_numpy()]).first().unstack()
+    axes = axes[rows.index]
+    # In the order of AXES, whose letters are in order.
+    begins = (rows[feature] != rows[feature].shift()) | (axes <= axes.shift(fill_value=""))
+    group = begins.to_numpy().cumsum() - 1
+    of_axes = rows[values].groupby([group, axes.to_numpy()]).first().unstack()
     columns, units = {feature: rows[feature][begins]}, dict(table.units)
     for value, axis in product(values, AXES):
         columns[f"{value} {axis}"] = of_axes[value, axis]

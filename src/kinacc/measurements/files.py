@@ -48,9 +48,8 @@ def load(path: str | Path, layout: Layout) -> RawTable:
     if (table := as_it_is(path)) is not None:
         return table
     if path.suffix.lower() in EXCEL:
-        with Workbook(path) as book:
-            sheet = layout.sheet or book.sheets[0]
-            table = tabled(f"{path}, sheet {sheet!r}", book.rows(sheet), layout, sheet=True)
+        sheet, sheet_rows = next(iter(rows_of_sheets(path, layout.sheet).items()))
+        table = tabled(f"{path}, sheet {sheet!r}", sheet_rows, layout, sheet=True)
     else:
         refuse_large(path)
         with opened(path, layout.encoding) as stream:
@@ -141,55 +140,50 @@ def _limited(rows: Iterable[Row], path: str) -> Iterator[Row]:
         yield row
 
 
-class Workbook:
-    """A workbook that is open to be read; ``sheets`` are the names of those that are shown.
+def rows_of_sheets(
+    path: Path, wanted: str | None = None, most: int = MOST_ROWS
+) -> dict[str, list[Row]]:
+    """The first rows of the sheets of a workbook that are shown, or of one of them.
 
-    Raises InputError where it is none, is locked, or is too large when unpacked.
+    Raises InputError where the file is none, is locked, or is too large when unpacked.
     """
-
-    def __init__(self, path: Path) -> None:
-        self.path = str(path)
-        try:
-            with zipfile.ZipFile(path) as archive:
-                size = sum(part.file_size for part in archive.infolist())
-            if size <= _MOST_UNPACKED:
-                self._file = pd.ExcelFile(path, engine="openpyxl")
-        except Exception as error:  # a damaged part of a workbook raises whatever it meets
-            raise self._unreadable(error) from None
+    where = str(path)
+    try:
+        with zipfile.ZipFile(path) as archive:
+            size = sum(part.file_size for part in archive.infolist())
         if size > _MOST_UNPACKED:
-            _refuse_too_much(self.path, f"{size / 1e6:.0f} MB")
-        sheets = self._file.book.worksheets
-        self.sheets = [sheet.title for sheet in sheets if sheet.sheet_state == "visible"]
-        if not self.sheets:
-            raise input_error(self.path, "has no sheet with cells", "a sheet with a table")
-
-    def __enter__(self) -> Workbook:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._file.close()
-
-    def rows(self, sheet: str, most: int = MOST_ROWS) -> list[Row]:
-        """The first rows of a sheet that are not blank, each with its number, of equal length."""
-        if sheet not in self.sheets:
-            message, allowed = f"has no sheet {sheet!r} that is shown", ", ".join(self.sheets)
-            raise input_error(self.path, message, allowed)
-        try:
+            _refuse_too_much(where, f"{size / 1e6:.0f} MB")
+        with pd.ExcelFile(path, engine="openpyxl") as book:
+            sheets = [s.title for s in book.book.worksheets if s.sheet_state == "visible"]
+            if not sheets:
+                raise input_error(where, "has no sheet with cells", "a sheet with a table")
+            if wanted and wanted not in sheets:
+                message = f"has no sheet {wanted!r} that is shown"
+                raise input_error(where, message, ", ".join(sheets))
             cells = pd.read_excel(
-                self._file, sheet, header=None, dtype=object, na_filter=False, nrows=most + 1
+                book,
+                [wanted] if wanted else sheets,
+                header=None,
+                dtype=object,
+                na_filter=False,
+                nrows=most + 1,
             )
-        except Exception as error:
-            raise self._unreadable(error) from None
-        _refuse_shape(self.path, len(cells) if most == MOST_ROWS else 0, cells.shape[1], cells.size)
-        rows = [[_cell(value) for value in row] for row in cells.itertuples(index=False)]
-        there = np.array([[cell != "" for cell in row] for row in rows], ndmin=2)
-        width = np.flatnonzero(there.any(axis=0)).max(initial=-1) + 1
-        return [(n + 1, rows[n][:width]) for n in np.flatnonzero(there.any(axis=1)).tolist()]
-
-    def _unreadable(self, error: Exception) -> InputError:
+    except InputError:
+        raise
+    except Exception as error:  # a damaged part of a workbook raises whatever it meets
         reason = (str(error) or type(error).__name__).splitlines()[0][:200]
         message, fix = f"cannot be read as a workbook: {reason}", "save it as .xlsx or CSV"
-        return input_error(self.path, message, "an .xlsx file without a password", fix)
+        raise input_error(where, message, "an .xlsx file without a password", fix) from None
+    return {sheet: _rows_of_sheet(where, table) for sheet, table in cells.items()}
+
+
+def _rows_of_sheet(where: str, cells: pd.DataFrame) -> list[Row]:
+    """The rows of a sheet that are not blank, each with its number, of equal length."""
+    _refuse_shape(where, len(cells), cells.shape[1], cells.size)
+    rows = [[_cell(value) for value in row] for row in cells.itertuples(index=False)]
+    there = np.array([[cell != "" for cell in row] for row in rows], ndmin=2)
+    width = np.flatnonzero(there.any(axis=0)).max(initial=-1) + 1
+    return [(n + 1, rows[n][:width]) for n in np.flatnonzero(there.any(axis=1)).tolist()]
 
 
 def _cell(value: object) -> object:

@@ -5,8 +5,6 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
-from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -84,22 +82,19 @@ def tabled(path: str, rows: Iterable[Row], layout: Layout, sheet: bool = False) 
     line, head = 0, list[Any](layout.names or ())
     if not head and rows:
         line, head = rows.pop(0)
-    readings: list[Row] = []
-    aside: list[Row] = []
-    under, skip = list[Any](), layout.skip_under_names
-    for row in rows:
-        if skip and not is_comment(row[1]):
-            under, skip = row[1], skip - 1
-        else:
-            (readings if _is_reading(row[1]) else aside).append(row)
+    under = list[Any]()
+    for _ in range(layout.skip_under_names):
+        place = next((n for n, row in enumerate(rows) if not is_comment(row[1])), None)
+        under = [] if place is None else rows.pop(place)[1]
+    readings = [row for row in rows if _is_reading(row[1])]
     names = header_cells(head, max((len(cells) for _, cells in readings[:4]), default=0))
     width = len(names)
     readings = [(n, c if len(c) <= width or filled(c[width:]) else c[:width]) for n, c in readings]
-    aside += [row for row in readings if row[1] == names]
     readings = [row for row in readings if row[1] != names]
     while len(readings) > 1 and _is_text(readings[-1][1], width):
-        aside.append(readings.pop())
-    aside.sort(key=itemgetter(0))
+        readings.pop()
+    lines = dict(readings)
+    aside = {number: cells for number, cells in rows if number not in lines}
     for place in reversed(range(width)):
         if not names[place] and not any(filled(row[place : place + 1]) for _, row in readings):
             for single in (names, under, *(cells for _, cells in readings)):
@@ -108,20 +103,18 @@ def tabled(path: str, rows: Iterable[Row], layout: Layout, sheet: bool = False) 
     refuse(_problems(path, names, readings, line, word), f"{path} cannot be read")
     cells = frame(dict(zip(names, zip(*(c for _, c in readings), strict=True), strict=True)))
     units = {name: str(unit) for name, unit in zip(names, under, strict=False)}
-    table = RawTable(
+    label = [str(filled(first)[0]).strip()[:30] for first in aside.values()][:1]
+    return RawTable(
         path,
         cells,
-        np.array([number for number, _ in readings], dtype=np.int64),
+        np.array([*lines], dtype=np.int64),
         layout.decimal,
         layout.thousands,
         units | _units_behind(cells, units),
-        not_rows=tuple(number for number, _ in aside),
-        row_names=RowNames(word=word),
+        tuple(f"{RowNames(word=word).spans(aside)}: not read ({text})" for text in label),
+        tuple(aside),
+        RowNames(word=word),
     )
-    if not aside:
-        return table
-    lines, label = table.row_names.spans(table.not_rows), str(filled(aside[0][1])[0]).strip()[:30]
-    return replace(table, notes=(f"{lines}: not read ({label})",))
 
 
 def _is_text(cells: Cells, width: int) -> bool:

@@ -34,8 +34,7 @@ from kinacc.config.measured import (
 )
 from kinacc.config.records import Settings
 from kinacc.errors import Problem
-from kinacc.measurements import column_names
-from kinacc.measurements.column_names import KNOWN, name_of
+from kinacc.measurements.column_names import KNOWN, MEASURED, OPEN, PLAIN, REPORTED, name_of, role
 from kinacc.measurements.table import RawTable
 
 TOOL = "tool"  # name of the target whose columns carry no name
@@ -52,7 +51,7 @@ JOINTS = "joints"
 # The longest quantity counts: mA_std_x is no x of a target named mA_std.
 _OF_TARGET = re.compile(rf"(?:(.*?)_)??({'|'.join(POINT)})", re.DOTALL)
 _NAMES = ("pose", "repeat", "target", "session")
-_READ = (column_names.MEASURED, column_names.REPORTED, column_names.PLAIN)
+_READ = (MEASURED, REPORTED, PLAIN)
 
 
 class Layout(MeasuredFile):
@@ -257,10 +256,10 @@ class _Finder:
             target, part = split(ours)
             if part == "x" and unit in LENGTH:
                 points[target or TOOL] = column
-        roles = {name: column_names.role(name_of(f"{name} x").terms) for name in points}
+        roles = {name: role(name_of(f"{name} x").terms) for name in points}
         read = [name for name in points if roles[name] in _READ or name in named]
-        unclear = [n for n in points if n not in read and roles[n] == column_names.OPEN]
-        unclear = unclear if read or named else unclear or [*points]
+        nothing = not read and not named
+        unclear = [n for n in points if n not in read and (nothing or roles[n] == OPEN)]
         if unclear:
             fix = f"name those measured in measurements.file.targets, of {', '.join(points)}"
             message = "the name does not say that this was measured"

@@ -32,9 +32,4 @@ def rotations(turns: np.ndarray, orientation: Orientation) -> np.ndarray:
         return rotation_from_quaternion(turns / np.linalg.norm(turns, axis=1, keepdims=True))
     if orientation.kind == "rotation_vector":
         return exp_so3(turns)
-    return euler(turns, orientation.convention)
-
-
-def euler(angles_rad: np.ndarray, convention: str) -> np.ndarray:
-    """Rotations (n, 3, 3) of angles (n, 3); capitals intrinsic, small letters extrinsic."""
-    return Rotation.from_euler(convention, angles_rad).as_matrix().reshape(-1, 3, 3)
+    return Rotation.from_euler(orientation.convention, turns).as_matrix().reshape(-1, 3, 3)

@@ -109,8 +109,6 @@ def convert(table: RawTable, layout: Layout, robot: Robot, strict: bool = True) 
     problems: list[Problem] = []
     title = f"{table.path} cannot be used"
     columns = find(table, layout, robot.dh.prismatic, problems)
-    if not columns.targets and not problems:
-        problems.append(Problem(table.path, "no target is asked for", "measurements.file.targets"))
     refuse(problems, title)
     if "pose" in columns.single and not table.row_names.pose:
         table = table.with_pose_names(columns.single["pose"].column)
@@ -120,21 +118,22 @@ def convert(table: RawTable, layout: Layout, robot: Robot, strict: bool = True) 
     shared |= {f"q{i + 1}": values for i, values in enumerate(q_rad.T)}
     parts = [_target(table, target, layout, problems) for target in columns.targets]
     there, void = (np.array([part.pop(key) for part in parts]) for key in ("there", "void"))
-    posed = np.isfinite(q_rad).all(axis=1)
-    nothing = ~np.array(there.any(axis=0))
-    missing = ~nothing & ~posed
-    if missing.sum() > _MOST_WITHOUT_JOINTS * (~nothing).sum() and not problems:
-        message = f"empty beside {missing.sum()} of {(~nothing).sum()} points"
+    posed, measured = np.isfinite(q_rad).all(axis=1), there.any(axis=0)
+    missing = measured & ~posed
+    if missing.sum() > _MOST_WITHOUT_JOINTS * measured.sum() and not problems:
+        message = f"empty beside {missing.sum()} of {measured.sum()} points"
         allowed = "joints in every row"
         problems += faults.of_rows(table, columns.joints, missing, message, allowed)
-    without = [(posed & nothing, "no reading")]
-    for target, rows_ in zip(columns.targets, void & posed & ~nothing, strict=True):
-        without.append((rows_, f"no reading of {target.name}"))
-    without.append((~posed, "not all joints"))
-    notes = (*table.notes, *(
+    without = {"no reading": posed & ~measured}
+    for target, half in zip(columns.targets, void & posed & measured, strict=True):
+        without[f"no reading of {target.name}"] = half
+    without["not all joints"] = ~posed
+    notes = [
         f"{rows.sum()} {'rows hold' if rows.sum() > 1 else 'row holds'} {quantity}: "
-        f"{table.rows_in_words(rows)}" for rows, quantity in without if rows.any()
-    ))  # fmt: skip
+        f"{table.rows_in_words(rows)}"
+        for quantity, rows in without.items()
+        if rows.any()
+    ]
     there &= posed
     if not there.any() and not problems:
         problems.append(Problem(table.path, "no target was measured in any row", "positions"))
@@ -155,13 +154,15 @@ def convert(table: RawTable, layout: Layout, robot: Robot, strict: bool = True) 
             message = f"pose {first['pose']}, repeat {first['repeat']} is given again"
             problems.append(Problem(where, message, "one row per pose, repeat and target"))
     turns = rows.filter(like="turn ")
-    measured = {name: rows[name].to_numpy() for name in rows if name not in turns}
-    measured["row"] = table.line[order]
-    measured |= table.row_names.columns(measured["row"])
+    readings = {name: rows[name].to_numpy() for name in rows if name not in turns}
+    readings["row"] = table.line[order]
+    readings |= table.row_names.columns(readings["row"])
     refuse(problems, title)
     unused = tuple(name for name in columns.unused(table) if name != table.key)
     commanded = None if commanded is None else commanded[order]
-    return MeasuredFile(measured, unused, notes, commanded, turns.to_numpy(), table.row_names)
+    return MeasuredFile(
+        readings, unused, (*table.notes, *notes), commanded, turns.to_numpy(), table.row_names
+    )
 
 
 def stacked(
@@ -201,8 +202,8 @@ def _target(
     if target.std:
         std = stacked(table, target.std, problems) / layout.sigma
     for place, values in zip(target.std, std.T, strict=False):
-        message = f"standard deviation {np.nanmin(values, initial=0.0) / place.factor:g}"
-        problems += faults.of_rows(table, [place], values < 0.0, message, "0 or above")
+        message, stated = "standard deviation {:g}", values / place.factor
+        problems += faults.of_rows(table, [place], stated < 0.0, message, "0 or above", stated)
     std = np.where(std > 0.0, std, np.nan)  # a zero states nothing
     part = {"there": ~gaps.all(axis=1) & ~void, "void": void, "target": target.name}
     part |= dict(zip(POSITION, position.T, strict=True))
@@ -216,12 +217,7 @@ def _shared(
 ) -> dict[str, np.ndarray]:
     """Columns (n,) that the targets of a row have in common; without poses every row is one."""
     count, single = len(table), columns.single
-    shared = {
-        "pose": np.arange(count),
-        "repeat": np.zeros(count, dtype=np.int64),
-        "session": np.full(count, None, dtype=object),
-        "temperature_c": np.full(count, np.nan),
-    }
+    shared = {"pose": np.arange(count)}
     if "temperature" in single:
         shared["temperature_c"] = numbers(table, single["temperature"].column, problems, gaps=True)
     for name in ("session", "target"):
@@ -252,8 +248,7 @@ def travel(table: RawTable, columns: FileColumns, problems: list[Problem]) -> np
     for joint, place in columns.directions.items():
         values = np.nan_to_num(numbers(table, place.column, problems, gaps=True))
         bad = ~np.isin(values, (-1, 0, 1))
-        message = f"{next(iter(values[bad]), 0.0):g}"
-        problems += faults.of_rows(table, [place], bad, message, "-1, 0 or 1")
+        problems += faults.of_rows(table, [place], bad, "{:g}", "-1, 0 or 1", values)
         directions[:, joint] = np.where(bad, 0, values)
     return directions
 
@@ -264,9 +259,8 @@ def payload(
     """Mass and centre (n, 4) of the payload in kg and mm; a mass alone hangs at the last frame."""
     read = _whole_rows if gaps else partial(stacked, gaps=False)
     load = read(table, columns.payload, problems)
-    mass = load[:, 0]
-    message = f"a mass of {np.nanmin(mass, initial=0.0):g} kg"
-    problems += faults.of_rows(table, columns.payload[:1], mass < 0.0, message, "0 or above")
+    mass, message = load[:, 0], "a mass of {:g} kg"
+    problems += faults.of_rows(table, columns.payload[:1], mass < 0.0, message, "0 or above", mass)
     return load if load.shape[1] > 1 else load * np.array([1.0, 0.0, 0.0, 0.0])
 
 
@@ -280,6 +274,5 @@ def _whole(table: RawTable, place: Place, problems: list[Problem]) -> np.ndarray
     """Whole numbers (n,)."""
     values = numbers(table, place.column, problems)
     bad = np.isfinite(values) & ((values < 0) | (values > _LARGEST_WHOLE) | (values % 1 != 0))
-    message = f"{next(iter(values[bad]), 0.0):g}"
-    problems += faults.of_rows(table, [place], bad, message, "whole numbers from 0")
+    problems += faults.of_rows(table, [place], bad, "{:g}", "whole numbers from 0", values)
     return np.where(np.isfinite(values) & ~bad, values, 0).astype(np.int64)

@@ -32,7 +32,6 @@ _FANUC_JOINT = re.compile(rf"\bJ(\d)\s*=\s*({_NUMBER})\s*(?:deg|mm)?", re.IGNORE
 _FLAT = re.compile(rf"p?\[\s*{_NUMBER}(?:\s*,\s*{_NUMBER})+\s*\]")
 _KIND = re.compile(r"\{\s*(\w+)\s*:")
 _LIST = re.compile(r"(?:p?\[.*\]|\{.*\})", re.DOTALL)
-_LISTED = re.compile(rf"(?<![\w.]){_NUMBER}(?![\w.])")
 _INNERMOST = re.compile(r"\[([^\[\]]*)\]")
 _POSE_PARTS = ("trans x", "trans y", "trans z", "rot q1", "rot q2", "rot q3", "rot q4")
 _UNUSED = 9e8  # ABB writes 9E9 for an axis that is not there
@@ -129,12 +128,6 @@ def expanded(table: RawTable) -> RawTable:
         else:
             columns[str(name)] = cells
     return replace(table, columns=frame(columns))
-
-
-def numbers_within(cell: object) -> int:
-    """How many numbers a cell such as {A1 10, A2 -90}, [[10,-90],[9E9]] or p[0.1,0.2] lists."""
-    text = cell.strip() if isinstance(cell, str) else ""
-    return len(_LISTED.findall(text)) if _LIST.fullmatch(text) else 0
 
 
 def parts_of(cell: object) -> dict[str, float]:

@@ -16,6 +16,7 @@ from kinacc.geometry import Pose
 from kinacc.measurements import faults
 from kinacc.measurements.intake import pairs
 from kinacc.measurements.intake.choices import Answers
+from kinacc.measurements.intake.columns import POINTS, POSES
 from kinacc.measurements.intake.guess import described
 from kinacc.measurements.layout import (
     JOINTS,
@@ -29,7 +30,6 @@ from kinacc.measurements.orientation import rotations
 from kinacc.measurements.reader import payload, stacked, travel
 from kinacc.measurements.table import RawTable
 
-POINTS, POSES = "points", "poses"
 _FIRST_NAMES = {  # of a file under our names
     JOINTS: r"q1_(?:deg|rad|mm|m)",
     POINTS: r"e?x_(?:mm|m)",
@@ -160,14 +160,15 @@ def open_table(
 ) -> tuple[RawTable, Layout, tuple[str, ...]]:
     """A file of ``need``, the meaning of its columns, and notes on how it was understood."""
     answers = {key: value for key, value in (answers or {}).items() if value}
-    looked = pairs.look(path, answers, wanted=need == POSES)
+    looked = pairs.look(path, answers, need)
     if any(re.fullmatch(_FIRST_NAMES[need], name) for name in looked.table.columns):
         # Texts of a CSV have an apostrophe that keeps them from being a formula.
         cells = looked.table.columns.map(lambda c: of_csv(c) if isinstance(c, str) else c)
         table = replace(looked.table, columns=cells)
         return table, _plain_layout(table, need), looked.notes
     guess = described(looked, answers, need)
-    notes = (*guess.notes, *guess.assumed.values(), *guess.columns.lines())
+    columns = ", ".join(f"{name} is {column}" for name, column in guess.section["columns"].items())
+    notes = (*guess.notes, *guess.assumed.values(), columns)
     return guess.table, Layout.of(guess.section), notes
 
 

@@ -34,7 +34,6 @@ from kinacc.measurements.intake.groups import (
     Group,
     all_groups,
     keep_distances,
-    listed,
     same,
 )
 from kinacc.measurements.layout import ANGLE, TOOL
@@ -42,7 +41,8 @@ from kinacc.measurements.table import RawTable
 
 _WRONG = (DEVIATION, SPREAD, OTHER)
 _NOT_MEASURED = (NOMINAL, CALCULATED, *_WRONG)
-ABOUT_JOINTS = "the names do not tell the joints"
+# What a file is read for: joints and points, or one of joints, measured points and wanted poses.
+MEASUREMENTS, POINTS, POSES = "measurements", "points", "poses"
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,8 @@ class NamedColumns:
     ``joints`` q1 ..; ``commanded`` the same as commanded, may be empty; ``targets`` by name, each a
     mapping of x, rx, qw, quat1, std_x and the like; ``turn`` kind and convention of the
     orientations as their names have it; ``single`` pose, repeat, session, target, temperature.
-    ``aside``: groups that are not read; ``questions``: open choices.
+    ``aside``: groups that are not read; ``on_joints`` and ``questions``: open choices on the joints
+    and on the rest.
     """
 
     joints: tuple[Name, ...] = ()
@@ -61,25 +62,22 @@ class NamedColumns:
     turn: tuple[str, str] = ("none", "XYZ")
     single: dict[str, Name] = field(default_factory=dict)
     aside: tuple[Group, ...] = ()
+    on_joints: tuple[Choice, ...] = ()
     questions: tuple[Choice, ...] = ()
+
+    def by_our_names(self) -> dict[str, Name]:
+        """The columns that are read, by our names."""
+        names = {f"q{n}{suffix}": name
+                 for suffix, row in (("", self.joints), ("_cmd", self.commanded))
+                 for n, name in enumerate(row, 1)}  # fmt: skip
+        for target, parts in self.targets.items():
+            prefix = "" if target == TOOL else f"{target}_"
+            names |= {f"{prefix}{quantity}": name for quantity, name in parts.items()}
+        return names | self.single
 
     def read(self) -> set[str]:
         """Names of the columns that are read."""
-        groups = (self.joints, self.commanded, *(t.values() for t in self.targets.values()))
-        return {name.column for group in (*groups, self.single.values()) for name in group}
-
-    def lines(self) -> list[str]:
-        """What the joints, the first point and its orientation were read as, a line each."""
-        kind, convention = self.turn
-        target = next(iter(self.targets.values()), {})
-        turned = f"w, x, y, z of a {kind}" if kind == "quaternion" else f"{kind} {convention}"
-        parts = {
-            "joints": self.joints,
-            "point": [target[axis] for axis in "xyz" if target],
-            turned: [name for quantity, name in target.items() if quantity[0] in "qr"],
-        }
-        return [f"{listed([name.column for name in names])}: read as {text}"
-                for text, names in parts.items() if names]  # fmt: skip
+        return {name.column for name in self.by_our_names().values()}
 
 
 def names_in(table: RawTable) -> list[Name]:
@@ -87,17 +85,23 @@ def names_in(table: RawTable) -> list[Name]:
     return [name_of(column, table.units.get(column, "")) for column in table.columns]
 
 
-def of_table(table: RawTable, answers: Answers | None = None, wanted: bool = False) -> NamedColumns:
+def of_table(
+    table: RawTable, answers: Answers | None = None, need: str = MEASUREMENTS
+) -> NamedColumns:
     """The meaning of the columns of a table; no joints or no targets where there are none.
 
     ``answers`` by option: ``take`` (columns whose groups are read whatever their names mean),
     ``orientation`` ("none" is not read), ``sigma`` (how many standard deviations an uncertainty is;
-    "none" for none that is read). ``wanted``: nominal poses are read, not measured ones.
+    "none" for none that is read). ``need``: what the table is read for; joints come along with
+    points where they are certain, nominal poses are read where poses are wanted.
     """
     answers = answers or {}
-    choice = _Choice(table, answers, wanted)
+    choice = _Choice(table, answers, need)
     joints = choice.joints()
-    points = choice.points(joints)
+    on_joints, choice.questions = choice.questions, []
+    if need in (POINTS, POSES) and on_joints:
+        joints, on_joints = None, []
+    points = choice.points(joints) if need != JOINTS else []
     turns = choice.turns(points) if answers.get("orientation") != "none" else {}
     spreads = choice.spreads(points)
     targets = {
@@ -106,12 +110,13 @@ def of_table(table: RawTable, answers: Answers | None = None, wanted: bool = Fal
         | spreads.get(point.target, {})
         for point in points
     }
-    commanded = choice.commanded(joints)
+    commanded = choice.commanded(joints) if need == MEASUREMENTS else None
     result = NamedColumns(
         tuple(joints.columns.values()) if joints else (),
         tuple(commanded.columns.values()) if commanded else (),
         targets,
         next((turn.turn for turn in turns.values()), ("none", "XYZ")),
+        on_joints=tuple(on_joints),
         questions=tuple(choice.questions),
     )
     used = result.read()
@@ -129,12 +134,12 @@ def of_table(table: RawTable, answers: Answers | None = None, wanted: bool = Fal
 class _Choice:
     """Selection among the groups of a file; ``questions`` grow."""
 
-    def __init__(self, table: RawTable, answers: Answers, wanted: bool) -> None:
-        self.table, self.names = table, names_in(table)
+    def __init__(self, table: RawTable, answers: Answers, need: str) -> None:
+        self.table, self.names, self.need = table, names_in(table), need
         self.take, self.sigma = {*answers.get("take", ())}, answers.get("sigma", "")
         self.every = all_groups(table, self.names)
         self.groups = [g for g in self.every if g.kind != POSE and not g.wrong_units]
-        if wanted:
+        if need == POSES:
             nominal = [*self._of(POINT, NOMINAL, OPEN), *self._of(TURN, NOMINAL, OPEN)]
             self.take |= {group.names[0] for group in nominal}
         # Whether a column by itself is a deviation: error, 3D deviation.
@@ -162,7 +167,8 @@ class _Choice:
 
     def _ask(self, about: str, groups: Sequence[Group], without: bool = False) -> Group:
         answers = {group.names[0]: group.text for group in groups}
-        self.questions.append(Choice(TAKE, about, answers, without))
+        if len(answers) > 1 or self.need == MEASUREMENTS:
+            self.questions.append(Choice(TAKE, about, answers, without))
         return groups[0]
 
     def joints(self) -> Group | None:
@@ -179,7 +185,8 @@ class _Choice:
             return certain[0]
         best = reported or (plain and [*plain, *unclear])
         best = best or [*unclear, *(group for group in every if group.weak)] or nominal
-        return self._ask(f"{ABOUT_JOINTS} as they were read back", best) if best else None
+        about = "the names do not tell the joints as they were read back"
+        return self._ask(about, best) if best else None
 
     def commanded(self, joints: Group | None) -> Group | None:
         """The joints as commanded beside ``joints``, where there is one such group."""
@@ -216,6 +223,8 @@ class _Choice:
                 [self.table.stacked([g.columns[axis].column for axis in "xyz"]) for g in candidates]
             ):
                 why = "they do not keep the distance of targets on a flange"
+        if not why and len(candidates) > 1 and self.need != MEASUREMENTS:
+            why = "there are several"
         if not why:
             return candidates
         self._ask(f"the names do not tell the measured point ({why})", candidates)

@@ -19,7 +19,6 @@ from kinacc.measurements.column_names import (
     MEASURED,
     NOMINAL,
     OPEN,
-    OTHER,
     PLAIN,
     REPORTED,
     SPREAD,
@@ -32,7 +31,7 @@ from kinacc.measurements.column_names import (
 from kinacc.measurements.layout import ANGLE, LENGTH, TOOL
 from kinacc.measurements.table import RawTable
 
-JOINTS, POINT, TURN, POSE, RADIUS = "joints", "a position", "an orientation", "a pose", "a radius"
+JOINTS, POINT, TURN, POSE = "joints", "a position", "an orientation", "a pose"
 UNCERTAINTY = "an uncertainty"
 PULSES = ("pulse", "pulses", "count", "counts", "tick", "ticks")
 
@@ -114,8 +113,7 @@ def all_groups(table: RawTable, names: Sequence[Name]) -> list[Group]:
                           for axis, letter in zip("xyz", letters, strict=True)}  # fmt: skip
                 target, turn = _target(columns[letters[0]], terms), ("euler", convention)
                 groups.append(Group(TURN, role(terms), target, turned, turn))
-    radii = [name for name in names if WORDS["radius"] & {*name.terms}]
-    return groups + [Group(RADIUS, OTHER, "", {"radius": name}) for name in radii]
+    return groups
 
 
 def _alike(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -15,14 +15,13 @@ from kinacc.errors import Problem, input_error, refuse
 from kinacc.measurements.column_names import Name
 from kinacc.measurements.faults import BEYOND, is_no_coordinate, none_read
 from kinacc.measurements.intake import pairs, targets_in_rows
-from kinacc.measurements.intake.choices import TAKE, Answers, Choice, Undecided
-from kinacc.measurements.intake.columns import ABOUT_JOINTS, NamedColumns
+from kinacc.measurements.intake.choices import Answers, Choice, Undecided
+from kinacc.measurements.intake.columns import MEASUREMENTS, NamedColumns
 from kinacc.measurements.intake.groups import JOINTS, POINT, POSE, PULSES, listed
 from kinacc.measurements.intake.text import Looked
-from kinacc.measurements.layout import ANGLE, LENGTH, TOOL
+from kinacc.measurements.layout import ANGLE, LENGTH
 from kinacc.measurements.table import RawTable, numbers_of
 
-MEASUREMENTS, POINTS, POSES = "measurements", "points", "poses"
 _FULL_TURN_RAD = 2.0 * np.pi * 1.05
 _LARGEST_M = 50.0  # no instrument stands further away
 _MOST_DEG = 7200.0  # no joint turns further
@@ -89,12 +88,8 @@ def described(looked: Looked, answers: Answers, need: str = MEASUREMENTS) -> Gue
     columns are missing, where units contradict each other, and where ``take`` names columns that
     cannot be read.
     """
-    table, columns = looked.table, _needed(looked.columns, need)
-    questions = list(columns.questions)
-    if need in (POINTS, POSES) and len(columns.targets) > 1 and not questions:
-        meant = {t["x"].column: name for name, t in columns.targets.items()}
-        questions = [Choice(TAKE, f"several points: {', '.join(columns.targets)}", meant)]
-    if questions:
+    table, columns = looked.table, looked.columns
+    if questions := (*columns.on_joints, *columns.questions):
         raise Undecided(table.path, *questions)
     refuse(_missing(looked, columns, answers.get("take", ()), need),
            f"{looked.path} cannot be described")  # fmt: skip
@@ -122,25 +117,12 @@ def described(looked: Looked, answers: Answers, need: str = MEASUREMENTS) -> Gue
         "length_unit": length_unit,
         "orientation": guesser.orientation(angle_unit),
         "targets": list(columns.targets),
-        "columns": _mapping(columns, (joint_unit, length_unit, angle_unit)),
+        "columns": {ours: name.column for ours, name in columns.by_our_names().items()},
     }
     section |= {"pulses_per_deg": per_deg} if per_deg else {}
     section |= {"joints": looked.joints} if looked.joints else {}
     notes = dict.fromkeys((*looked.notes, *table.notes))
     return Guess(section, table, columns, guesser.assumed, tuple(notes))
-
-
-def _needed(columns: NamedColumns, need: str) -> NamedColumns:
-    """The columns that are needed, with the questions on them; others come along if certain."""
-    if need == MEASUREMENTS:
-        return columns
-    on_joints = [q for q in columns.questions if q.about.startswith(ABOUT_JOINTS)]
-    rest = [q for q in columns.questions if q not in on_joints]
-    questions = [q for q in (on_joints if need == JOINTS else rest) if len(q.answers) > 1]
-    columns = replace(columns, questions=tuple(questions))
-    if need == JOINTS:
-        return replace(columns, targets={}, turn=("none", "XYZ"), commanded=())
-    return replace(columns, joints=(), commanded=()) if on_joints else columns
 
 
 def _missing(
@@ -156,11 +138,13 @@ def _missing(
             why = next((f": {g.why_unread}" for g in columns.aside if column in g.names), "")
             allowed = "one column of joints, of a point or of an orientation"
             yield Problem(f"--take {column}", f"cannot be read{why}", allowed)
-    joints = (columns.joints, "no columns of 4 to 7 joints", (JOINTS,), "q1_deg ..")
-    named = "x_mm .. (SMR1 X .. of several)"
-    points = (columns.targets, "no columns of a measured point", (POINT, POSE), named)
-    wanted = {JOINTS: (joints,), MEASUREMENTS: (joints, points)}.get(need, (points,))
-    for _, message, kinds, names in (quantity for quantity in wanted if not quantity[0]):
+    missing: list[tuple[str, Sequence[str], str]] = []
+    if need in (JOINTS, MEASUREMENTS) and not columns.joints:
+        missing.append(("no columns of 4 to 7 joints", (JOINTS,), "q1_deg .."))
+    if need != JOINTS and not columns.targets:
+        named = "x_mm .. (SMR1 X .. of several)"
+        missing.append(("no columns of a measured point", (POINT, POSE), named))
+    for message, kinds, names in missing:
         spare = [group for group in columns.aside if group.kind in kinds]
         why = "; ".join(f"{group.text}: {group.why_unread}" for group in spare)
         why = f" ({why})" if why else f" in {', '.join(table.columns)}"
@@ -298,23 +282,3 @@ class _Guesser:
             fix = "give --sigma none, which reads none of them"
             raise input_error(where, message, "one number for all of them", fix)
         return max(numbers, default=1)
-
-
-def _mapping(columns: NamedColumns, units: Collection[str]) -> dict[str, str]:
-    """The file's name by ours, of every column that is read, but those that our own name tells.
-
-    ``units`` are those of the settings, which a column that is mapped must have.
-    """
-    names = {f"q{n}{suffix}": name
-             for suffix, row in (("", columns.joints), ("_cmd", columns.commanded))
-             for n, name in enumerate(row, 1)}  # fmt: skip
-    for target, parts in columns.targets.items():
-        prefix = "" if target == TOOL else f"{target}_"
-        names |= {f"{prefix}{quantity}": name for quantity, name in parts.items()}
-    return {
-        ours: name.column
-        for ours, name in (names | columns.single).items()
-        if name.unit not in {**ANGLE, **LENGTH}
-        or name.unit in units
-        or name.column != f"{ours}_{name.unit}"
-    }

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import accumulate
+from operator import itemgetter
 
 from kinacc.measurements.column_names import UNITS, plain
 from kinacc.measurements.grid import Cells, Row, filled, header_cells, is_comment, number_of
 from kinacc.measurements.intake.decimals import shaped_as_number
 from kinacc.measurements.layout import ANGLE, LENGTH
-from kinacc.measurements.robot_programs import numbers_within
+from kinacc.measurements.robot_programs import parts_of
 
 _UNITS = re.compile(
     r"\b(?:units?|einheit(?:en)?|unit[eéà]s?|unidad(?:es)?|単位)\b[^:=\n]{0,20}[:=]\s*([^;\n#]+)"
@@ -27,13 +28,15 @@ class Head:
     """Where the names are.
 
     ``line`` of the names, 0 where there are none; ``first`` row of numbers among the rows looked
-    at; ``under``: rows between; ``width`` of the rows; ``names`` where two lines make them.
+    at; ``under``: rows between; ``width`` of the rows and ``count`` of the numbers in them;
+    ``names`` where two lines make them.
     """
 
     line: int
     first: int
     under: int
     width: int
+    count: int
     names: tuple[str, ...] | None
 
 
@@ -46,39 +49,29 @@ def is_number(cell: object) -> bool:
 
 def numbers_in(cells: Cells) -> int:
     """How many numbers a row holds, those within cells such as {A1 10, A2 -90} included."""
-    return sum(is_number(cell) or numbers_within(cell) for cell in cells)
+    return sum(is_number(cell) or len(parts_of(cell)) for cell in cells)
 
 
-def most_numbers(rows: Sequence[Row]) -> tuple[int, int]:
-    """How many cells are numbers in rows of the width that has most of them, and that width."""
-    counts = Counter[int]()
-    for _, cells in rows:
-        count = numbers_in(cells)
-        counts[len(cells)] += count if count > 1 else 0
-    return max(((count, width) for width, count in counts.items()), default=(0, 0))
-
-
-def head_of(rows: Sequence[Row], sheet: bool = False) -> Head | None:
-    """Where the names of the rows are; None where there are no rows of numbers.
-
-    ``sheet``: the rows are those of a sheet, of any width.
-    """
+def head_of(rows: Sequence[Row]) -> Head | None:
+    """Where the names of the rows are; None where there are no rows of numbers."""
     counts = [0 if is_comment(cells) else numbers_in(cells) for _, cells in rows]
     widths = {number: len(rows[number][1]) for number, count in enumerate(counts) if count > 1}
-    if not widths:
+    totals = Counter[int]()
+    for number, width in widths.items():
+        totals[width] += counts[number]
+    if not totals:
         return None
-    width = max(widths.values()) if sheet else Counter(widths.values()).most_common(1)[0][0]
-    many = [number for number in widths if sheet or widths[number] == width]
+    width, count = max(totals.items(), key=itemgetter(1, 0))
+    many = [number for number in widths if widths[number] == width]
     usual = sorted(counts[number] for number in many)[len(many) // 2]
     first = next(number for number in many if 2 * counts[number] >= usual)
-    above = [n for n in range(first)
-             if _can_name(rows[n][1], rows[first][1], width, sheet)]  # fmt: skip
+    above = [n for n in range(first) if _can_name(rows[n][1], rows[first][1], width)]
     under = 0
     while above and _are_units(rows[above[-1]][1]):
         above.pop()
         under += 1
     if not above:
-        return Head(0, first, 0, width, _in_remark(rows[:first], width))
+        return Head(0, first, 0, width, count, _in_remark(rows[:first], width))
     names_in = {number: len(filled(rows[number][1])) for number in above}
     place = max(number for number in above if 2 * names_in[number] >= max(names_in.values()))
     line, cells = rows[place][0], header_cells(rows[place][1], width)
@@ -90,7 +83,7 @@ def head_of(rows: Sequence[Row], sheet: bool = False) -> Head | None:
         groups: Iterator[str] = accumulate(texts, lambda before, text: text or before)
         both = [f"{group} {name}".strip() for group, name in zip(groups, cells, strict=False)]
         names = tuple(both) if len({*both}) == len(both) else None
-    return Head(line, first, under, width, names)
+    return Head(line, first, under, width, count, names)
 
 
 def _in_remark(rows: Sequence[Row], width: int) -> tuple[str, ...] | None:
@@ -108,15 +101,12 @@ def _in_remark(rows: Sequence[Row], width: int) -> tuple[str, ...] | None:
     return None
 
 
-def _can_name(cells: Cells, numbers: Cells, width: int, sheet: bool) -> bool:
+def _can_name(cells: Cells, numbers: Cells, width: int) -> bool:
     if not filled(cells) or is_comment(cells) or numbers_in(cells) > 1:
         return False
-    if sheet:
-        beside = [name for name, cell in zip(cells, numbers, strict=False) if cell != ""]
-        return 2 * sum(isinstance(name, str) for name in filled(beside)) >= len(filled(numbers))
-    count = max(place + 1 for place, cell in enumerate(cells) if cell.strip())
+    count = max(place + 1 for place, cell in enumerate(cells) if filled([cell]))
     fits = len(header_cells(cells, width)) == width
-    return fits or count in (width, width - (not numbers[-1].strip()))
+    return fits or count in (width, width - (not filled(numbers[-1:])))
 
 
 def _are_units(cells: Cells) -> bool:
@@ -125,7 +115,7 @@ def _are_units(cells: Cells) -> bool:
     return bool(texts) and all(unit in UNITS or unit == "in" for unit in units)
 
 
-def stated_above(texts: Sequence[str]) -> dict[str, str]:
+def stated_above(texts: Iterable[str]) -> dict[str, str]:
     """Units of lengths and angles that the lines around the rows state."""
     stated: dict[str, str] = {}
     for text in texts:

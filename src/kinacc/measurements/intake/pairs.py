@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from kinacc.config.measured import JointsFile, Written
-from kinacc.errors import Problem, gathered, input_error, refuse
+from kinacc.errors import Problem, first_few, gathered, input_error, refuse
 from kinacc.measurements.column_names import WORDS, Name, name_of
-from kinacc.measurements.files import EXCEL
+from kinacc.measurements.files import EXCEL, refuse_other_files
 from kinacc.measurements.intake import columns, text
 from kinacc.measurements.intake.choices import Answers, Choice, Undecided
 from kinacc.measurements.intake.text import Looked
@@ -33,32 +33,49 @@ from kinacc.measurements.times import offsets, seconds, standstills
 _SHARE = 0.5  # of the points: fewer in common are no key
 
 
-def look(path: str | Path | Sequence[str | Path], answers: Answers, wanted: bool = False) -> Looked:
+def look(
+    path: str | Path | Sequence[str | Path], answers: Answers, need: str = columns.MEASUREMENTS
+) -> Looked:
     """One view of a file, of two files, or of two sheets of a workbook, with their columns.
 
-    ``wanted``: nominal poses are read. Raises InputError where the files cannot be joined,
+    ``need``: what of one table is read. Raises InputError where the files cannot be joined,
     Undecided where a choice is open.
     """
     paths = [path] if isinstance(path, (str, Path)) else [*path]
-    sheets = _sheets(Path(paths[0]), answers) if len(paths) == 1 else []
+    for name in paths:
+        refuse_other_files(Path(name))
+    sheets, notes = _sheets(Path(paths[0]), answers) if len(paths) == 1 else ([], ())
     sources = [(paths[0], {**answers, "sheet": sheet}) for sheet in sheets]
+    sources = sources or [(name, {**answers}) for name in paths]
+    need = need if len(sources) == 1 else columns.MEASUREMENTS
     files = []
-    for name, stated in sources or [(name, {**answers}) for name in paths]:
+    for name, stated in sources:
         looked = text.look(name, stated)
-        meaning = columns.of_table(looked.table, answers, wanted)
-        files.append(replace(looked, columns=meaning))
+        meaning = columns.of_table(looked.table, answers, need)
+        files.append(replace(looked, columns=meaning, notes=(*notes, *looked.notes)))
     return files[0] if len(files) == 1 else _together(files, answers)
 
 
-def _sheets(path: Path, answers: Answers) -> list[str]:
-    """The sheets of a workbook that holds joints on one and points on another, else none."""
-    if path.suffix.lower() in EXCEL and "sheet" not in answers and path.is_file():
-        sheets = {sheet: columns.of_table(names) for sheet, names in text.sheets_of(path).items()}
-        joints = [sheet for sheet, meaning in sheets.items() if meaning.joints]
-        points = [sheet for sheet, meaning in sheets.items() if meaning.targets]
-        if len(joints) == len(points) == 1 and joints != points:
-            return [*joints, *points]
-    return []
+def _sheets(path: Path, answers: Answers) -> tuple[list[str], tuple[str, ...]]:
+    """The sheets of a workbook to read, one of joints and one of points or one of both.
+
+    Also a note on the others. No sheet where there is no other.
+    """
+    tables = text.sheets_of(path) if path.suffix.lower() in EXCEL and "sheet" not in answers else {}
+    if len(tables) < 2:
+        return [], ()
+    held = {sheet: columns.of_table(table) for sheet, table in tables.items()}
+    joints = [sheet for sheet in tables if held[sheet].joints]
+    points = [sheet for sheet in tables if held[sheet].targets]
+    likely = [sheet for sheet in points if sheet in joints] or points or joints
+    likely = likely or [sheet for sheet, table in tables.items() if len(table.columns.columns)]
+    if len(joints) == len(points) == 1:
+        likely = [*dict.fromkeys((*joints, *points))]
+    elif len(likely) > 1:
+        meant = {sheet: first_few([*tables[sheet].columns], 12) for sheet in likely}
+        raise Undecided(str(path), Choice("--sheet", "several sheets hold tables", meant))
+    others = [sheet for sheet in tables if sheet not in likely]
+    return likely, (f"sheets not read: {first_few(others)}",) if others else ()
 
 
 def _together(files: Sequence[Looked], answers: Answers) -> Looked:
@@ -75,15 +92,13 @@ def _together(files: Sequence[Looked], answers: Answers) -> Looked:
     def beside(name: Name) -> Name:
         return replace(name, column=beside_name(name.column, points.table))
 
-    questions = [q for file in (joints, points) for q in file.columns.questions
-                 if q.about.startswith(columns.ABOUT_JOINTS) == (file is joints)]  # fmt: skip
     pose = {"pose": beside(name_of(how.key))} if how.by == NAME and how.key else {}
     meaning = replace(
         points.columns,
         joints=tuple(map(beside, joints.columns.joints)),
         commanded=tuple(map(beside, joints.columns.commanded)),
         single=points.columns.single | pose,
-        questions=tuple(questions),
+        on_joints=joints.columns.on_joints,
     )
     written = joints.written.model_dump(include={*Written.model_fields})
     section = {**how.model_dump(), **written, "path": joints.path}

@@ -9,8 +9,8 @@ import pandas as pd
 
 from kinacc.errors import input_error
 from kinacc.measurements.column_names import WORDS, name_of
-from kinacc.measurements.intake.columns import NamedColumns
-from kinacc.measurements.intake.groups import RADIUS, keep_distances
+from kinacc.measurements.intake.columns import NamedColumns, names_in
+from kinacc.measurements.intake.groups import keep_distances
 from kinacc.measurements.joining import AGAIN
 from kinacc.measurements.table import RawTable
 
@@ -36,7 +36,7 @@ def with_targets(
         keys["session"] = table.texts(columns.single["session"].column)
     pose = keys.groupby([*keys.columns], sort=False).ngroup().fillna(-1).to_numpy(int)
     target, names = columns.single.get("target"), list[str]()
-    radius = next((g.names[0] for g in columns.aside if g.kind == RADIUS), "")
+    radius = next((n.column for n in names_in(table) if WORDS["radius"] & {*n.terms}), "")
     size = np.nan_to_num(table.values(radius)) if radius else np.zeros(len(table))
     if np.ptp(size) > _SAME_RADIUS * np.max(size):
         # A reflector of another radius has its centre elsewhere in the same nest.
