@@ -21,8 +21,9 @@ from kinacc.campaign.state import (
     problems_of,
 )
 from kinacc.errors import Problem, refuse
+from kinacc.measurements.intake.columns import POINTS
 from kinacc.measurements.row_names import RowNames
-from kinacc.measurements.rows import POINTS, read_rows
+from kinacc.measurements.rows import read_rows
 
 NOTHING = "Nothing was recorded"
 _NAMES = RowNames(word="reading")
