@@ -32,8 +32,7 @@ def outlier_limit(magnitudes: Sequence[float], rule: str) -> float:
     if rule == "normal":
         return float(values.mean() + 1.96 * values.std())
     if rule == "gamma":
-        shape, _, scale = gamma_fit(values)
-        return float(stats.gamma.ppf(0.99, shape, scale=scale))
+        return gamma99(values)
     if rule == "iqr":
         low, high = np.percentile(values, [25, 75])
         return float(high + 1.5 * (high - low))
@@ -45,9 +44,10 @@ def outlier_rejection(magnitudes: Sequence[float], rule: str) -> float:
     return max(value for value in magnitudes if not value > limit)
 
 
-def gamma_fit(values: Sequence[float]) -> tuple[float, float, float]:
-    """Maximum likelihood with the location held at 0: (shape, 0, scale)."""
-    return stats.gamma.fit(np.asarray(values, float), floc=0)
+def gamma99(values: Sequence[float]) -> float:
+    """The 99 % quantile of a gamma distribution from 0, fitted by maximum likelihood."""
+    shape, _, scale = stats.gamma.fit(np.asarray(values, float), floc=0)
+    return float(stats.gamma.ppf(0.99, shape, scale=scale))
 
 
 # --- model invalidation (eqs. 15-24) --------------------------------------------------------------

@@ -11,10 +11,10 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow.parquet as pq
-from scipy import stats
 from scipy.spatial.transform import Rotation
 
 from . import kinematics
+from .assessors import gamma99
 
 Row = dict
 
@@ -101,10 +101,9 @@ def magnitudes(
 
 def statistics(values: list[float]) -> dict[str, float]:
     """Mean, max, rms and the 99 % quantile of a gamma fitted by maximum likelihood."""
-    shape, _, scale = stats.gamma.fit(np.asarray(values), floc=0)
     return {
         "mean": math.fsum(values) / len(values),
         "max": max(values),
         "rms": math.sqrt(math.fsum(v * v for v in values) / len(values)),
-        "gamma99": float(stats.gamma.ppf(0.99, shape, scale=scale)),
+        "gamma99": gamma99(values),
     }

@@ -374,28 +374,47 @@ def ur(arm: Arm, points: np.ndarray, tool: np.ndarray, base: np.ndarray) -> Prog
     return program
 
 
+JBI = """/JOB
+//NAME WELD
+//POS
+///NPOS %d,0,0,0,0,0
+///TOOL 1
+///POSTYPE PULSE
+///PULSE
+%s
+///USER 1
+///POSTYPE USER
+///RECTAN\x20
+%s
+//INST
+///DATE 2026/11/25 10:50
+///ATTR SC,RW
+///GROUP1 RB1
+NOP
+%s
+END
+"""
+
+
 def yaskawa(arm: Arm, points: np.ndarray, tool: np.ndarray, base: np.ndarray) -> Program:
     """JBI: pulses, and Cartesian positions in a user frame; --tool and --base say the frames."""
-    program, p = Program(arm, "yaskawa", tool, base), list(points)
-    lines = ["/JOB", "//NAME WELD", "//POS", f"///NPOS {len(p)},0,0,0,0,0", "///TOOL 1",
-             "///POSTYPE PULSE", "///PULSE"]  # fmt: skip
-    for number, q in enumerate(p[:8]):
-        lines.append(f"C{number:05d}={','.join(program.add(q, True))}")
-    lines += ["///USER 1", "///POSTYPE USER", "///RECTAN "]
-    stated = None
-    for number, q in enumerate(p[8:], 8):
+    program, pulses, poses, stated = Program(arm, "yaskawa", tool, base), [], [], None
+    for number, q in enumerate(points):
+        name = f"C{number:05d}"
+        if number < 8:
+            pulses.append(f"{name}={','.join(program.add(q, True))}")
+            continue
         behind, above = posture(arm, q)
         turned = (np.rad2deg(q[3]) + 180.0) % 360.0 - 180.0
         conf = f"{int(not -90.0 < turned <= 90.0)},{int(not above)},{int(behind)},0,0,0,0,0"
         if conf != stated:
-            lines.append(f"///RCONF {conf}")
+            poses.append(f"///RCONF {conf}")
             stated = conf
-        lines.append(f"C{number:05d}={','.join(program.add(q))}")
-    lines += ["//INST", "///DATE 2026/11/25 10:50", "///ATTR SC,RW", "///GROUP1 RB1", "NOP"]
-    for number in range(len(p)):
-        move = f"MOVJ C{number:05d} VJ=10.00" if number < 8 else f"MOVL C{number:05d} V=100.0"
-        lines.append(move)
-    program.files = {".JBI": "\r\n".join([*lines, "END"]) + "\r\n"}
+        poses.append(f"{name}={','.join(program.add(q))}")
+    moves = ["MOVJ C%05d VJ=10.00"] * 8 + ["MOVL C%05d V=100.0"] * (len(points) - 8)
+    moves = [move % number for number, move in enumerate(moves)]
+    parts = ("\n".join(lines) for lines in (pulses, poses, moves))
+    program.files = {".JBI": (JBI % (len(points), *parts)).replace("\n", "\r\n")}
     return program
 
 
