@@ -67,6 +67,14 @@ def disturbed(model, free, rng, angle_rad=1e-3, length_mm=0.5):
     return model.with_parameters((table + free * size * rng.normal(size=table.shape)).ravel())
 
 
+def wavy(plain, rng):
+    """A VEC model without errors, given some of a tenth of a millimetre and of a milliradian."""
+    size = np.array([0.1] * 3 + [1e-4] * 3)[:, None]
+    coefficients = size * rng.normal(size=plain.coefficients.shape)
+    offsets = 1e-4 * rng.normal(size=plain.direction_offsets_rad.shape)
+    return replace(plain, coefficients=coefficients, direction_offsets_rad=offsets)
+
+
 def far_off(model, free, rng):
     """Free (k, 5) parameters up to 5 degrees and 20 mm off; parallel axes (Hayati) a degree."""
     size = np.array([np.deg2rad(5.0), 20.0, 20.0, np.deg2rad(5.0), np.deg2rad(5.0)])

@@ -4,36 +4,27 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from simulated import POINT, POSE, fit, measure
+from kinematics.inverse.arms import SCARA
+from simulated import POINT, POSE, disturbed, fit, joints, measure
 
 from kinacc.calibration import fitting
 from kinacc.calibration.dh_estimator import free_parameters
 from kinacc.geometry import Pose, exp_so3
-from kinacc.kinematics.dh import DHModel
 
-SCARA = DHModel(
-    np.zeros(4),
-    [300.0, 0.0, 0.0, 50.0],
-    [350.0, 250.0, 0.0, 0.0],
-    np.radians([0.0, 180.0, 0.0, 0.0]),
-    np.zeros(4),
-    [False, False, True, False],
-)
 BASE = Pose(exp_so3(np.array([[0.3, -1.1, 2.0]])), np.array([[900.0, 20.0, 950.0]]))
-LOW, HIGH = np.array([-2.4, -2.5, 0.0, -6.0]), np.array([2.4, 2.5, 200.0, 6.0])
 
 
 @pytest.mark.parametrize(("kind", "tool_z_mm"), [(POINT, 0.0), (POINT, 200.0), (POSE, 0.0)])
 def test_base_and_tool_stay_along_the_axes_all_joints_share(kind, tool_z_mm):
     """Fit of the nominal arm and of all DH parameters to the same 300 readings of an arm askew."""
     rng = np.random.default_rng(4)
-    errors = np.tile([1e-3, 0.3, 0.3, 1e-3, 1e-3], 4) * rng.normal(size=20)
-    errors[-1] = 0.0  # beta of the last joint is a turn of the tool
-    arm = SCARA.with_parameters(SCARA.start + errors)
+    off = np.ones((4, 5))
+    off[-1, -1] = 0.0  # beta of the last joint is a turn of the tool
+    arm = disturbed(SCARA.dh, off, rng, 1e-3, 0.3)
     tool = Pose(np.eye(3)[None], np.array([[40.0, 30.0, tool_z_mm]]))
-    seen = measure(arm, rng.uniform(LOW, HIGH, (300, 4)), kind, rng, frames=(BASE, tool))
-    found = fit(seen, SCARA, free_parameters(4, (1, 2, 3)), threshold=1e-2)
-    nominal = fitting.fit_frames(seen, SCARA, rotation_weight_mm_per_rad=500.0)
+    seen = measure(arm, joints(SCARA, 300, rng), kind, rng, frames=(BASE, tool))
+    found = fit(seen, SCARA.dh, free_parameters(4, (1, 2, 3)), threshold=1e-2)
+    nominal = fitting.fit_frames(seen, SCARA.dh, rotation_weight_mm_per_rad=500.0)
     assert abs(nominal.tool.position_mm[2]) < 1e-6
     assert abs(found.frames.tool.position_mm[2]) < 2.0
     moved = found.frames.base.position_mm - nominal.base.position_mm

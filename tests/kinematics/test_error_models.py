@@ -6,6 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from calibration.simulated import wavy
+from kinematics.inverse.arms import STANFORD
 from pose_checks import assert_same, movement
 
 from kinacc.calibration.uncertainty import scale_of
@@ -16,14 +18,6 @@ from kinacc.kinematics.model import JointState
 from kinacc.kinematics.tables import of_kind
 
 ARM = robot.load("mh180")
-STANFORD = dh.DHModel(
-    np.zeros(6),
-    [412.0, 154.0, 0.0, 0.0, 0.0, 263.0],
-    np.zeros(6),
-    np.deg2rad([-90, 90, 0, -90, 90, 0]),
-    np.zeros(6),
-    [False, False, True, False, False, False],
-)
 COUNT = 8
 
 
@@ -34,14 +28,7 @@ def dh_example(arm=ARM.dh):
 
 def vec_example(arm=ARM.dh):
     span = np.where(arm.prismatic, 600.0, 2.0)
-    empty = vec.without_errors(arm, -span, span, 3)
-    size = np.array([0.1] * 3 + [1e-4] * 3)[:, None]
-    rng = np.random.default_rng(1)
-    return replace(
-        empty,
-        coefficients=size * rng.normal(size=empty.coefficients.shape),
-        direction_offsets_rad=1e-4 * rng.normal(size=(6, 2)),
-    )
+    return wavy(vec.without_errors(arm, -span, span, 3), np.random.default_rng(1))
 
 
 def compliance_example(arm=ARM.dh):
@@ -65,7 +52,7 @@ def compliance_example(arm=ARM.dh):
 EXAMPLES = {"dh": dh_example, "vec": vec_example, "compliance": compliance_example}
 
 
-@pytest.fixture(params=[(kind, arm) for kind in ERROR_MODELS for arm in (ARM.dh, STANFORD)])
+@pytest.fixture(params=[(kind, arm) for kind in ERROR_MODELS for arm in (ARM.dh, STANFORD.dh)])
 def model(request):
     kind, arm = request.param
     return EXAMPLES[kind](arm)

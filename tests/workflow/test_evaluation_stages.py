@@ -6,6 +6,7 @@ from importlib.resources import files
 
 import numpy as np
 import pytest
+from calibration.simulated import wavy
 
 from kinacc.config.load import overlay
 from kinacc.config.schema import defaults
@@ -33,10 +34,7 @@ LOW, HIGH = np.deg2rad([[-20, -40, -90, -190, -130, -190], [80, 70, 30, 190, 130
 
 @pytest.fixture(scope="module")
 def model():
-    rng = np.random.default_rng(4)
-    scale = np.array([0.05] * 3 + [1e-4] * 3)[:, None]
-    offsets = rng.normal(size=(6, 2)) * 1e-4
-    return vec.VECModel(ARM.dh, LOW, HIGH, rng.normal(size=(6, 6, 4)) * scale, offsets)
+    return wavy(vec.without_errors(ARM.dh, LOW, HIGH, 3), np.random.default_rng(4))
 
 
 @pytest.fixture(scope="module")

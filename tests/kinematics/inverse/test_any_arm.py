@@ -7,6 +7,7 @@ from dataclasses import replace
 import arms
 import numpy as np
 import pytest
+from calibration import simulated
 from oracles import inverse as brute
 from oracles import kinematics as oracle
 from pose_checks import assert_same, of_matrices
@@ -20,7 +21,7 @@ from kinacc.synthetic.draw import TABLE_II
 
 MH180, UR10, IIWA = (robot.load(name) for name in ("mh180", "ur10", "iiwa14"))
 FANUC = robot.load("fanuc_r2000ic_165f").dh
-COUNTS = {"nominal": 25, "vec": 35}
+COUNT = 15
 SEARCHED = [
     arms.OFFSET_WRIST,
     arms.GENERAL,
@@ -45,8 +46,7 @@ def sideways(model: dh.DHModel) -> dh.DHModel:
 def wavy(arm: robot.Robot, q: np.ndarray) -> vec.VECModel:
     """A VEC model of the calibrated arm, over the range of joints (n, k)."""
     plain = vec.without_errors(arms.calibrated(arm), q.min(axis=0), q.max(axis=0), 3)
-    noise = np.random.default_rng(2).normal(size=plain.coefficients.shape)
-    return replace(plain, coefficients=noise * np.array([0.1] * 3 + [1e-4] * 3)[:, None])
+    return simulated.wavy(plain, np.random.default_rng(2))
 
 
 @pytest.mark.parametrize("model", [MH180.dh, FANUC, UR10.dh, *map(sideways, (MH180.dh, FANUC))])
@@ -75,7 +75,7 @@ def test_closed_forms_return_to_the_pose_and_name_branches_by_posture(model):
     ids=lambda value: getattr(value, "name", value),
 )
 def test_what_is_found_is_verified_and_own_postures_are_among_it(arm, kind):
-    q = arms.joints_within(arm, 2 if arm.dh.joints == 7 else COUNTS[kind])
+    q = arms.joints_within(arm, 2 if arm.dh.joints == 7 else COUNT)
     model = arm.dh if kind == "nominal" else wavy(arm, q)
     pose = model.pose(JointState(q))
     solved = inverse.solve(arm, model, pose)
