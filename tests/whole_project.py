@@ -15,7 +15,7 @@ import pytest
 import shared_work
 import yaml
 from measured_files import write_readings
-from preloaded import python
+from preloaded import commands, python
 from scipy.spatial.transform import Rotation
 
 from kinacc.config.load import overlay
@@ -52,23 +52,24 @@ class Project:
         shutil.copytree(self.folder, folder, symlinks=True)
         return Project(folder)
 
-    def snakemake(self, *targets: str, options: tuple[str, ...] = (), ok: bool = True) -> str:
+    def snakemake(self, *targets: str, options: tuple[str, ...] = (), code: int = 0) -> str:
         """What ``snakemake`` prints; fails the test unless it ends as expected."""
         command = [python(), "-m", "snakemake", "--cores", "2", "--nocolor", *options]
-        return self.run([*command, "--configfile", *CONFIGS, "--", *targets], ok)
+        return self.run([*command, "--configfile", *CONFIGS, "--", *targets], code)
 
     def kinacc(self, *words: str) -> str:
         """What ``kinacc`` prints."""
         return self.run([python(), "-m", "kinacc", *words])
 
-    def run(self, command: list[str], ok: bool = True, cwd: Path | None = None, **more: str) -> str:
+    def run(self, command: list[str], code: int = 0, cwd: Path | None = None) -> str:
         """Output and errors of a command started in a folder, the project's if none is named."""
-        settings = os.environ | {"PYTHONPATH": str(self.folder / "src")} | more
+        path = f"{commands()}:{os.environ['PATH']}"
+        settings = os.environ | {"PYTHONPATH": str(self.folder / "src"), "PATH": path}
         done = subprocess.run(
             command, cwd=cwd or self.folder, env=settings, capture_output=True, text=True
         )
         text = done.stdout + done.stderr
-        assert (done.returncode == 0) == ok, text
+        assert done.returncode == code, text
         return text
 
     def to_do(self) -> set[str]:

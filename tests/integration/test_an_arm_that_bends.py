@@ -21,6 +21,7 @@ from oracles import compliant_arm
 from oracles.compliant_arm import Arm, Body
 from oracles.controllers.arms import shipped
 from oracles.kinematics import frame
+from read_columns import Q_DEG, XYZ_MM
 from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 from stages_by_hand import run_stages
@@ -117,10 +118,8 @@ def calibrated(
     }
     config = folder / "cell.yaml"
     config.write_text(yaml.safe_dump(settings))
-    held_out = ("dh", "residuals", "summary") if folds else ()
-    return run_stages(
-        ("measurements", "vec", "compliance", *held_out), [config], folder / "results"
-    )
+    held_out = ("vec", "dh", "residuals", "summary") if folds else ()
+    return run_stages(("measurements", "compliance", *held_out), [config], folder / "results")
 
 
 def fanuc(seed: int, loads: Sequence[Body], compliance=BENT) -> Cell:
@@ -224,8 +223,7 @@ def new_joints(count: int) -> np.ndarray:
     return low + share * (high - low)
 
 
-JOINT_NAMES = [f"q{i}_deg" for i in range(1, 7)]
-POSE_NAMES = ["x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz"]
+POSE_NAMES = [*XYZ_MM, "qw", "qx", "qy", "qz"]
 
 
 def answered(
@@ -242,13 +240,13 @@ def test_predicted_poses_are_those_of_the_bent_arm(finished, tmp_path):
     cell, folder = finished
     joints = new_joints(12)
     truth = cell.tool_poses(joints, [GRIPPER] * len(joints))
-    plan = pd.DataFrame(joints, columns=JOINT_NAMES)
+    plan = pd.DataFrame(joints, columns=Q_DEG)
     by = {
         model: answered("predict", folder, plan, tmp_path / "plan.csv", model)
         for model in ("compliance", "dh")
     }
     off = {
-        model: np.linalg.norm(poses[POSE_NAMES[:3]] - truth[:, :3, 3], axis=1)
+        model: np.linalg.norm(poses[XYZ_MM] - truth[:, :3, 3], axis=1)
         for model, poses in by.items()
     }
     assert (off["compliance"] < 4.0 * by["compliance"]["std_position_mm"]).all()
@@ -261,7 +259,7 @@ def test_compensated_joints_bring_the_bent_arm_to_the_wanted_pose(finished, tmp_
     program = new_joints(8)
     wanted = replace(cell, arm=Arm(FANUC.table)).tool_poses(program, [NONE] * len(program))
     turned = Rotation.from_matrix(wanted[:, :3, :3]).as_quat(scalar_first=True)
-    columns = [*POSE_NAMES, *JOINT_NAMES]
+    columns = [*POSE_NAMES, *Q_DEG]
     rows = pd.DataFrame(np.hstack([wanted[:, :3, 3], turned, program]), columns=columns)
     corrected = answered("compensate", folder, rows, tmp_path / "wanted.csv", "compliance")
     assert corrected["status"].str.startswith("converged").all()
@@ -270,5 +268,5 @@ def test_compensated_joints_bring_the_bent_arm_to_the_wanted_pose(finished, tmp_
         there = cell.tool_poses(joints, [GRIPPER] * len(joints))
         return np.linalg.norm(there[:, :3, 3] - wanted[:, :3, 3], axis=1)
 
-    assert off(corrected[JOINT_NAMES].to_numpy()).max() < 0.1
+    assert off(corrected[Q_DEG].to_numpy()).max() < 0.1
     assert np.median(off(program)) > 1.0

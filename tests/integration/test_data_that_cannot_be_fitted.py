@@ -15,7 +15,7 @@ def test_a_slip_of_80_mm_in_one_row(project):
     cells = lines[21].split(",")
     lines[21] = ",".join([*cells[:7], f"{float(cells[7]) + 80.0:.9f}", *cells[8:]])
     path.write_text("\n".join(lines) + "\n")
-    text = project.snakemake(SUMMARY, ok=False)
+    text = project.snakemake(SUMMARY, code=1)
     for word in ("outliers", "line 22", "exclude", "--accept"):
         assert word in text
     assert "Traceback" not in text

@@ -15,7 +15,7 @@ import pyarrow.parquet as pq
 import pytest
 from command_line import call
 from preloaded import python
-from whole_project import copy, write_poses
+from whole_project import Project, copy, write_poses
 
 RUN = ("snakemake", "-c1", "--nocolor", "--configfile", "config.yaml", "small.yaml", "--")
 FIT = (*RUN, "results/own/vec_model.parquet")
@@ -54,9 +54,7 @@ def started(folder: Path, words: tuple[str, ...]) -> subprocess.Popen:
 
 def ended(folder: Path, words: tuple[str, ...], code: int = 0) -> str:
     """Output of a command that ends with ``code``, without a traceback."""
-    process = started(folder, words)
-    text, _ = process.communicate(timeout=300)
-    assert process.returncode == code, text
+    text = Project(folder).run([python(), "-m", *words], code)
     assert "Traceback" not in text
     return text
 

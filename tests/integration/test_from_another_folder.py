@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 import sysconfig
 import venv
 from pathlib import Path
 
-import preloaded
 import pytest
 
 from kinacc.tables.store import digest_of, read
@@ -23,10 +21,9 @@ def cell(project, tmp_path) -> Path:
     return folder
 
 
-def started(project, folder: Path, command: list[str], ok: bool = True) -> str:
+def started(project, folder: Path, command: list[str], code: int = 0) -> str:
     """Output of a command started in a folder, with the project's code."""
-    path = f"{preloaded.commands()}:{os.environ['PATH']}"
-    text = project.run(command, ok, cwd=folder, PATH=path)
+    text = project.run(command, code, cwd=folder)
     assert "Traceback" not in text
     return text
 
@@ -38,7 +35,7 @@ def snakemake(project, *options: str) -> list[str]:
 def test_a_configuration_of_ones_own_folder_goes_before_the_projects(project, cell):
     robot = "results/mh180/robot.parquet"
     (cell / "config.yaml").write_text("datasets: {here: {robot: mh180}}\n")
-    text = started(project, cell, snakemake(project, "-n", robot), ok=False)
+    text = started(project, cell, snakemake(project, "-n", robot), 1)
     assert "results/mh180/robot.parquet" in text
     started(project, cell, snakemake(project, "-n", "results/here/robot.parquet"))
 

@@ -11,7 +11,7 @@ def test_a_stage_that_fails(project):
         "src/kinacc/study/histories.py",
         "def run(inputs, settings):\n    raise ArithmeticError('the world ended')",
     )
-    text = project.snakemake("results/mh180/histories.parquet", ok=False)
+    text = project.snakemake("results/mh180/histories.parquet", code=1)
     log = (project.folder / "results/mh180/logs/histories.log").read_text()
     for place in (text, log):
         assert "ArithmeticError: the world ended" in place
@@ -31,7 +31,7 @@ def test_a_row_that_cannot_be_right(project):
     lines[3] = ",".join(fields)
     path.write_text("\n".join(lines) + "\n")
     for _ in range(2):  # the second run must not take the earlier table for this file's
-        text = project.snakemake(TABLE, ok=False)
+        text = project.snakemake(TABLE, code=1)
         assert "x_mm" in text
         assert "poses.csv" in text
         assert "Traceback" not in text
