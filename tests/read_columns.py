@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 from scipy.spatial.transform import Rotation
 
+Q_DEG = [f"q{i}_deg" for i in range(1, 7)]
 XYZ_MM = ["x_mm", "y_mm", "z_mm"]
 
 

@@ -12,12 +12,13 @@ import openpyxl
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from read_columns import Q_DEG, XYZ_MM
 
 from kinacc.errors import InputError
 from kinacc.tables import store
 
 _SECONDS, _BYTES = 15, 3 << 30
-COLUMNS = [f"q{joint}_deg" for joint in range(1, 7)] + ["x_mm", "y_mm", "z_mm"]
+COLUMNS = [*Q_DEG, *XYZ_MM]
 BRACKETS = "[" * 100_000
 LAUGHS = "a0: &a0 [1, 1, 1, 1, 1, 1, 1, 1, 1, 1]\n" + "".join(
     f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 10)}]\n" for i in range(1, 10)

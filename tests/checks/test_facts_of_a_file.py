@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from good_files import simulated
+from read_columns import XYZ_MM
 
 from kinacc.checks import digits, repeatability
 
@@ -24,8 +25,7 @@ def test_the_noise_between_two_targets_is_the_noise_of_a_reading(tmp_path):
 
 def test_equal_readings_are_no_copies_where_the_digits_are_coarse(tmp_path):
     file = simulated(poses=60, noise_mm=0.05, repeats=10)
-    names = ["x_mm", "y_mm", "z_mm"]
-    assert not file.but(**file.columns[names].round(1)).check(tmp_path).suspicions
+    assert not file.but(**file.columns[XYZ_MM].round(1)).check(tmp_path).suspicions
     copied = file.rows([*range(51), 50, *range(52, 600)])
     found = copied.check(tmp_path)
     assert [finding.kind for finding in found.suspicions] == ["duplicate_rows"]
@@ -36,14 +36,13 @@ def test_equal_readings_are_no_copies_where_the_digits_are_coarse(tmp_path):
 
 def test_a_drift_is_how_far_the_points_went_where_a_turn_of_the_base_carries_them(tmp_path):
     file = simulated(poses=60, noise_mm=0.02)
-    names = ["x_mm", "y_mm", "z_mm"]
-    at = file.columns[names].to_numpy()
+    at = file.columns[XYZ_MM].to_numpy()
     middle = at.mean(axis=0)
     # By 1 mm in the middle, about an axis through the origin of the readings, metres away.
     turn = np.cross(middle, [0.6, 0.0, 0.8])
     turn /= np.linalg.norm(np.cross(turn, middle))
     moved = at + np.linspace(0.0, 1.0, len(at))[:, None] * np.cross(turn, at)
-    columns = {name: moved[:, i] for i, name in enumerate(names)}
+    columns = {name: moved[:, i] for i, name in enumerate(XYZ_MM)}
     (found,) = file.but(**columns).check(tmp_path).suspicions
     assert found.kind == "drift"
     np.testing.assert_allclose(found.values["drift_mm"], np.cross(turn, middle), atol=0.15)

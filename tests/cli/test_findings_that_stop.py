@@ -7,7 +7,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 from command_line import answer, call
-from tracked_arm import NAMES, table, tracked
+from tracked_arm import init_seen, tracked
 
 from kinacc.checks.contradictions import load
 
@@ -22,8 +22,7 @@ def described(tmp_path_factory):
     folder = tmp_path_factory.mktemp("described")
     arm = tracked(poses=60)
     arm.point[4:6] += [0.0, 25.0, 0.0]
-    (folder / "seen.csv").write_text(table(NAMES, arm.q, arm.point))
-    call("init", folder / "seen.csv", "--robot", "ur10", "--out", folder, code=0)
+    init_seen(folder, arm)
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
         return folder, next_commands(printed("check-data", "seen.yaml", code=1))

@@ -3,6 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
+from read_columns import XYZ_MM
 from tracked_arm import XYZ, Q, assert_read, described, table, tracked, written
 
 from kinacc.measurements.intake import guess as guesses
@@ -59,7 +60,7 @@ def test_the_first_poses_are_shown_as_understood(tmp_path):
     told = described_with(tmp_path, IT.q, IT.point, turn, names=names, options=options)
     shown = pd.DataFrame(told["first_poses"])
     assert list(shown["where"]) == ["line 2", "line 3", "line 4"]
-    np.testing.assert_allclose(shown[[f"q{i}_deg" for i in range(1, 7)]], IT.q[:3], atol=1e-4)
-    np.testing.assert_allclose(shown[["x_mm", "y_mm", "z_mm"]], IT.point[:3], atol=1e-6)
+    np.testing.assert_allclose(shown[Q], IT.q[:3], atol=1e-4)
+    np.testing.assert_allclose(shown[XYZ_MM], IT.point[:3], atol=1e-6)
     vector = IT.turn[:3].as_rotvec(degrees=True)
     np.testing.assert_allclose(shown[["rvx_deg", "rvy_deg", "rvz_deg"]], vector, atol=1e-4)

@@ -5,7 +5,7 @@ import json
 import pytest
 from command_line import call
 from stages_by_hand import run_stages
-from tracked_arm import NAMES, table, tracked
+from tracked_arm import init_seen, quickened, tracked
 
 from kinacc.workflow.start import run_workflow
 
@@ -20,14 +20,11 @@ COMMANDS = {
 @pytest.fixture(scope="module")
 def calibrated(tmp_path_factory):
     """A folder with a calibration; the workflow itself read its files, stages by hand fitted it."""
-    folder, arm = tmp_path_factory.mktemp("cell"), tracked(poses=60)
-    (folder / "seen.csv").write_text(table(NAMES, arm.q, arm.point))
+    folder = tmp_path_factory.mktemp("cell")
+    init_seen(folder, tracked(poses=60))
+    quickened(folder / "seen.yaml")
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
-        call("init", "seen.csv", "--robot", "ur10", code=0)
-        path = folder / "seen.yaml"
-        text = path.read_text().replace("order: auto", "order: 1").replace("folds: 5", "folds: 2")
-        path.write_text(text)
         assert run_workflow("results/seen/measurements.parquet", ["seen.yaml"], 1) == 0
         run_stages(("vec", "dh", "residuals", "summary"), ["seen.yaml"])
     return folder

@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 import scipy.stats
 from command_line import answer, call
+from read_columns import XYZ_MM
 
 FIVE = np.array(
     [(0.0, 0.0, 0.0), (0.3, 0.0, 0.0), (0.0, -0.4, 0.0), (0.0, 0.0, 0.1), (-0.1, 0.2, 0.2)]
@@ -24,7 +25,7 @@ def visits(position_mm, **columns):
     poses, times, _ = position_mm.shape
     rows = pd.DataFrame({"pose": np.repeat([f"P{i}" for i in range(poses)], times), **columns})
     rows["visit"] = np.arange(poses * times)
-    return rows.join(pd.DataFrame(position_mm.reshape(-1, 3), columns=["x_mm", "y_mm", "z_mm"]))
+    return rows.join(pd.DataFrame(position_mm.reshape(-1, 3), columns=XYZ_MM))
 
 
 def test_pose_repeatability_is_that_of_iso_9283_worked_by_hand(tmp_path):
@@ -50,7 +51,7 @@ def test_instrument_visits_and_sides_are_separated_as_by_the_analysis_of_varianc
     position = rng.uniform(-900, 900, (12, 1, 1, 1, 3)) + rng.normal(0.0, 0.02, (*shape, 3))
     position += rng.normal(0.0, 0.05, (12, 2, 3, 1, 3)) + rng.normal(0.0, 0.08, (12, 2, 1, 1, 3))
     rows = pd.DataFrame(np.argwhere(np.ones(shape))[:, :3], columns=["pose", "side", "visit"])
-    rows[["x_mm", "y_mm", "z_mm"]] = position.reshape(-1, 3)
+    rows[XYZ_MM] = position.reshape(-1, 3)
     result = estimated(tmp_path / "all.csv", rows)
     within = position.var(axis=3, ddof=1).mean(axis=(0, 1, 2))
     between = position.mean(axis=3).var(axis=2, ddof=1).mean(axis=(0, 1))

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 from command_line import call
 from stages_by_hand import run_stages
+from tracked_arm import quickened
 
 import kinacc
 
@@ -90,10 +91,8 @@ def outputs(tmp_path_factory):
 
 def prepare() -> None:
     """Results of two fits, with models that take no second, and a data set of later poses."""
-    path = Path("arm.yaml")
-    text = path.read_text().replace("order: auto", "order: 1").replace("folds: 5", "folds: 2")
-    path.write_text(text)
-    later = path.read_text().replace("  arm:", "  later:").replace("arm.csv", "new.csv")
+    text = quickened(Path("arm.yaml"))
+    later = text.replace("  arm:", "  later:").replace("arm.csv", "new.csv")
     Path("new.yaml").write_text(later)
     for config, stages in (("arm.yaml", STAGES), ("new.yaml", STAGES[:1] + STAGES[2:])):
         run_stages(stages, [config])

@@ -4,7 +4,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from command_line import answer, call
-from read_columns import joints_of, points_of, turns_of
+from read_columns import Q_DEG as Q
+from read_columns import XYZ_MM, joints_of, points_of, turns_of
 from scipy.spatial.transform import Rotation
 
 from kinacc.checks.contradictions import load
@@ -12,9 +13,8 @@ from kinacc.kinematics import robot
 from kinacc.measurements.intake import guess as guesses
 from kinacc.measurements.reader import read
 
-Q = [f"q{i}_deg" for i in range(1, 7)]
 XYZ = ["X [mm]", "Y [mm]", "Z [mm]"]
-NAMES = [*Q, "x_mm", "y_mm", "z_mm"]
+NAMES = [*Q, *XYZ_MM]
 
 
 @dataclass(frozen=True)
@@ -53,6 +53,19 @@ def table(names, *columns, mark=","):
         for row in np.hstack(blocks)
     ]
     return "\n".join([mark.join(names), *rows]) + "\n"
+
+
+def init_seen(folder, arm):
+    """A file seen.csv of the arm, and what init makes of it beside it."""
+    (folder / "seen.csv").write_text(table(NAMES, arm.q, arm.point))
+    call("init", folder / "seen.csv", "--robot", "ur10", "--out", folder, code=0)
+
+
+def quickened(path):
+    """A configuration as init writes it, with models and folds that take no second; its text."""
+    text = path.read_text().replace("order: auto", "order: 1").replace("folds: 5", "folds: 2")
+    path.write_text(text)
+    return text
 
 
 def written(folder, **texts):

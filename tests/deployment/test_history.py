@@ -10,6 +10,7 @@ import pytest
 import scipy.stats
 import shared_data
 from calibration.simulated import columns_of
+from read_columns import Q_DEG, XYZ_MM
 from simulated_months import month, session
 from small_arms import results_of
 
@@ -162,9 +163,9 @@ def ur10_series(name, number):
     """A third of a series of one UR10, tracker and tool set up anew for each."""
     path = shared_data.path_of(f"ur10_tmac/series_{name}.csv")
     table = pd.read_csv(path)[::3]
-    q = np.deg2rad(table[[f"q{i}_deg" for i in range(1, 7)]].to_numpy())
+    q = np.deg2rad(table[Q_DEG].to_numpy())
     turns = np.deg2rad(table[["rx_deg", "ry_deg", "rz_deg"]].to_numpy())
-    at = table[["x_mm", "y_mm", "z_mm"]].to_numpy()
+    at = table[XYZ_MM].to_numpy()
     seen = full_poses(robots.load("ur10").dh_joints(q), Pose(euler(turns, "XYZ"), at))
     return replace(session(seen, number, MOVED), tool=MOVED)
 

@@ -10,6 +10,7 @@ import pandas as pd
 import pytest
 from command_line import call, small_study
 from held_out_errors import held_out_mm
+from read_columns import XYZ_MM
 
 from kinacc.calibration.observations import from_columns, full_poses
 from kinacc.deployment.folder import calibration, read_tables, robot_of
@@ -21,7 +22,7 @@ from kinacc.geometry import Pose, compose, exp_so3
 from kinacc.kinematics import dh, robot
 
 ELSEWHERE = Pose(exp_so3(np.array([1.2, 0.3, -0.8])), np.array([-700.0, 3100.0, 250.0]))
-JOINTS, PLACE = [f"q{i}" for i in range(1, 7)], ["x_mm", "y_mm", "z_mm"]
+JOINTS = [f"q{i}" for i in range(1, 7)]
 SAME, MOVED = (("--base", each, "--tool", each) for each in ("same", "moved"))
 
 
@@ -97,14 +98,14 @@ def folder(tmp_path_factory):
     base = tmp_path_factory.mktemp("verify")
     found = small_study(base)
     table = pd.read_parquet(found / "measurements.parquet")
-    elsewhere = np.hstack([table[JOINTS], table[PLACE] @ ELSEWHERE.rotation.T + 2000.0])
+    elsewhere = np.hstack([table[JOINTS], table[XYZ_MM] @ ELSEWHERE.rotation.T + 2000.0])
     written(base, "moved", elsewhere)
     written(base, "other_target", elsewhere, target="ball_")
     return base, found
 
 
 def written(base, name, rows, target=""):
-    header = [*(f"{name}_rad" for name in JOINTS), *(target + name for name in PLACE)]
+    header = [*(f"{name}_rad" for name in JOINTS), *(target + name for name in XYZ_MM)]
     np.savetxt(base / f"{name}.csv", rows, "%.17g", ",", header=",".join(header), comments="")
     (base / f"{name}.yaml").write_text(
         f"datasets: {{{name}: {{robot: mh180}}}}\nmeasurements: {{source: file, folds: 5, file:"
@@ -177,7 +178,7 @@ def later(folder, tmp_path_factory):
         seen = seen + grown * off[rng.integers(len(off), size=count)]
         q_rad[:, 2] += offset_rad
         rows = np.tile(np.hstack([q_rad, seen]), (times, 1))
-        rows = np.vstack([rows, measured[JOINTS + PLACE][:known]])
+        rows = np.vstack([rows, measured[JOINTS + XYZ_MM][:known]])
         return written(tmp_path_factory.mktemp("later"), "today", rows)
 
     return write

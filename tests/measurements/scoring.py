@@ -16,11 +16,14 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 from command_line import call
-from scipy.optimize import least_squares
+from read_columns import XYZ_MM
 from scipy.spatial.transform import Rotation
 from stages_by_hand import run_stages
 
+from kinacc.calibration import fitting
+from kinacc.calibration.observations import from_columns
 from kinacc.errors import KinaccError
+from kinacc.geometry import Pose, compose
 from kinacc.kinematics import robot
 
 RELATIVE = 1e-6
@@ -43,7 +46,6 @@ WORDS = {
     "sheet": r"sheet",
     "sigma": r"sigma|standard deviation|\bk ?= ?[12]|coverage",
 }
-XYZ = ["x_mm", "y_mm", "z_mm"]
 STD = ["std_x_mm", "std_y_mm", "std_z_mm"]
 FOREIGN = Path(__file__).parent / "foreign"
 FILES = sorted(path.name for path in FOREIGN.iterdir())
@@ -104,7 +106,9 @@ def difference(measured: SimpleNamespace, results: Path) -> str:
     found = pd.read_parquet(results / "measurements.parquet")
     parts = []
     for target, points in measured.points_mm.items():
-        part = pd.DataFrame(points, columns=XYZ).assign(target=target, reading=range(len(points)))
+        part = pd.DataFrame(points, columns=XYZ_MM).assign(
+            target=target, reading=range(len(points))
+        )
         part[[f"q{i + 1}" for i in range(measured.joints_rad.shape[1])]] = measured.joints_rad
         part[STD] = measured.std_mm[target] if measured.std_mm else np.nan
         parts.append(part.dropna(subset=["x_mm"]))
@@ -113,10 +117,10 @@ def difference(measured: SimpleNamespace, results: Path) -> str:
     if len(found) != len(true) or [n for n in found if re.fullmatch(r"q\d", n)] != joints:
         return f"{len(found)} readings of {len(true)}, or another number of joints"
     # Row of each true reading, by position, or by joints where axes are free.
-    by = joints if measured.any_frame else XYZ
+    by = joints if measured.any_frame else XYZ_MM
     apart = np.abs(true[by].to_numpy()[:, None] - found[by].to_numpy(float)[None]).max(axis=2)
     found = found.iloc[apart.argmin(axis=1)].reset_index(drop=True)
-    seen, wanted = found[XYZ].to_numpy(float), true[XYZ].to_numpy()
+    seen, wanted = found[XYZ_MM].to_numpy(float), true[XYZ_MM].to_numpy()
     if measured.any_frame:
         turn, _ = Rotation.align_vectors(wanted - wanted.mean(0), seen - seen.mean(0))
         seen = turn.apply(seen - seen.mean(0)) + wanted.mean(0)
@@ -133,7 +137,7 @@ def difference(measured: SimpleNamespace, results: Path) -> str:
         "standard deviations": np.allclose(
             found[STD].to_numpy(float), true[STD].to_numpy(float), RELATIVE, 1e-9, equal_nan=True
         ),
-        "reach of the robot as described": _reach_mm(found, joints, results) < REACHED_MM,
+        "reach of the robot as described": _reach_mm(found, results) < REACHED_MM,
     }
     return ", ".join(name for name, right in checks.items() if not right)
 
@@ -152,18 +156,12 @@ def _rotations_right(measured: SimpleNamespace, true: pd.DataFrame, found: pd.Da
     return np.allclose(seen, np.array(measured.rotations)[true["reading"]], atol=RELATIVE)
 
 
-def _reach_mm(found: pd.DataFrame, joints: list[str], results: Path) -> float:
-    """Rms distance of the points of the first target from the arm's, over every base and target."""
+def _reach_mm(found: pd.DataFrame, results: Path) -> float:
+    """Rms distance of the points from those of the arm, base and targets fitted."""
     text = pd.read_parquet(results / "robot.parquet")["description"][0]
-    first = found[found["target"] == found["target"].iloc[0]]
-    pose = robot.forward(robot.of_text(text, "arm.yaml"), first[joints].to_numpy(float))
-    seen = (first[XYZ] - first[XYZ].mean()).to_numpy(float)
-
-    def off(target: np.ndarray) -> np.ndarray:
-        reached = pose.rotation @ target + pose.position_mm
-        reached -= reached.mean(axis=0)
-        base, _ = Rotation.align_vectors(seen, reached)
-        return np.linalg.norm(base.apply(reached) - seen, axis=1)
-
-    least = least_squares(off, np.zeros(3), x_scale=100.0)
-    return float(np.sqrt(np.mean(least.fun**2)))
+    arm = robot.of_text(text, "arm.yaml")
+    seen = from_columns(found, arm)
+    frames = fitting.fit_frames(seen, arm.dh, rotation_weight_mm_per_rad=500.0)
+    targets = Pose(*(part[seen.target] for part in frames.targets))
+    reached = compose(frames.base, compose(arm.dh.pose(seen.at), targets))
+    return float(np.sqrt(np.mean((reached.position_mm - seen.position_mm) ** 2) * 3.0))

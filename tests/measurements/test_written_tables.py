@@ -6,6 +6,7 @@ import re
 
 import numpy as np
 import pytest
+from read_columns import Q_DEG, XYZ_MM
 from written_tables import (
     JOINTS,
     NO_UNITS,
@@ -32,7 +33,7 @@ WRITTEN = {
         [["---"] * 9, *cells()], NO_UNITS, "\t"
     ),
     "a mark at the end of the rows alone": lines([[*row, ""] for row in cells()], mark=";"),
-    "names behind a hash": "# " + lines(cells(), (*(f"q{i}_deg" for i in range(1, 7)), *"XYZ")),
+    "names behind a hash": "# " + lines(cells(), (*Q_DEG, *"XYZ")),
     "units in the cells": lines(
         [
             [*(f"{c} °" for c in row[:6]), *(f"{c} mm" for c in row[6:])]
@@ -147,5 +148,4 @@ def test_a_file_without_names_is_read_by_the_names_given(tmp_path):
     path = file(tmp_path, lines(cells(), None))
     with pytest.raises(InputError, match="--names with 9 names"):
         looked(path)
-    assert_is_truth(reading(path, names=",".join([*(f"q{i}_deg" for i in range(1, 7)),
-                                                  "x_mm", "y_mm", "z_mm"])))  # fmt: skip
+    assert_is_truth(reading(path, names=",".join([*Q_DEG, *XYZ_MM])))

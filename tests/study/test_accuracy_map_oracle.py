@@ -23,6 +23,7 @@ from kinacc.synthetic.draw import TABLE_II
 
 REFERENCE = np.diag([1.0, -1.0, -1.0])
 TURN = math.radians(45)
+BOX_LOW = np.deg2rad([-10.0, 0, -30, 5, -10, -10])
 CYLINDER = region.Cylinder(1200.0, 900.0, 0.0, 500.0, 0.0, math.radians(60))
 LOW, HIGH = oracle.MEASURED_RAD
 ARM = robot.load("mh180")
@@ -159,7 +160,7 @@ def test_points_of_one_wrist_have_joint_5_on_one_side(models):
 def test_a_box_of_coupled_joints_is_in_reported_angles(models):
     coupling = np.diag([1.0, 1, 1, -1, 1, 1])
     coupling[2, 1] = -1.0
-    box = np.deg2rad([-10.0, 0, -30, 5, -10, -10]), np.deg2rad([10.0, 40, 0, 20, 10, 10])
+    box = BOX_LOW, np.deg2rad([10.0, 40, 0, 20, 10, 10])
     arm = replace(ARM, joint_map=coupling, q_min_rad=box[0], q_max_rad=box[1])
     everywhere = region.Cylinder(0.0, 1e5, -1e5, 2e5, -np.pi, np.pi)
     q = operating_points.in_joints(arm, models, "sobol", 60, everywhere)
@@ -169,7 +170,7 @@ def test_a_box_of_coupled_joints_is_in_reported_angles(models):
 
 
 def test_a_region_of_joint_draws_is_in_the_base_frame_of_the_arm(models):
-    box = np.deg2rad([-10.0, 0, -30, 5, -10, -10]), np.deg2rad([60.0, 40, 0, 20, 10, 10])
+    box = BOX_LOW, np.deg2rad([60.0, 40, 0, 20, 10, 10])
     arm = replace(ARM, q_min_rad=box[0], q_max_rad=box[1])
     lifted = replace(arm, base=geometry.Pose(np.eye(3), np.array([0.0, 0.0, 2000.0])))
     higher = replace(CYLINDER, bottom_mm=CYLINDER.bottom_mm + 2000.0)

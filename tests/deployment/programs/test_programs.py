@@ -11,6 +11,7 @@ import pytest
 from deployment.small_arms import TOOL, calibrated
 from oracles.kinematics import dh_forward
 from pose_checks import movement, of_matrices
+from read_columns import Q_DEG
 from scipy.spatial.transform import Rotation
 
 from kinacc.deployment.programs import abb, compensate_program, kuka, read_program
@@ -368,8 +369,7 @@ def test_moves_to_positions_that_are_not_there_are_listed(name, text, expected):
 def test_postures_near_singularities_are_flagged(tmp_path):
     arm, rng = robot.load("irb120"), np.random.default_rng(1)
     q = rng.uniform(0.9 * arm.q_min_rad, 0.9 * arm.q_max_rad, (60, 6))
-    names = [f"q{i}_deg" for i in range(1, 7)]
-    pd.DataFrame(np.rad2deg(q).round(3), columns=names).to_csv(tmp_path / "joints.csv", index=False)
+    pd.DataFrame(np.rad2deg(q).round(3), columns=Q_DEG).to_csv(tmp_path / "joints.csv", index=False)
     flagged = corrected("joints.csv", tmp_path).table["is_near_singular"].to_numpy(bool)
     table, step = arm.dh.start.reshape(6, 5), 1e-6
     reach_mm = np.abs(table[:, 1:3]).sum()
