@@ -10,9 +10,11 @@ from pathlib import Path
 
 import pytest
 
-SHIPPED = Path(__file__).resolve().parents[1] / "examples" / "data"
-FOLDER = Path(__file__).resolve().parents[2] / "shared" / "data"
-RESULTS = Path(__file__).parent / "golden" / "results"
+ROOT = Path(__file__).resolve().parents[1]
+EXAMPLES = ROOT / "examples"
+SHIPPED = EXAMPLES / "data"
+FOLDER = ROOT.parent / "shared" / "data"
+RESULTS = ROOT / "tests" / "golden" / "results"
 ABSENT = "measured data absent: "
 
 

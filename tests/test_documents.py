@@ -12,13 +12,13 @@ import click
 import pytest
 import yaml
 from page_blocks import blocks
+from shared_data import ROOT
 
 from kinacc.cli.group import main
 from kinacc.config.load import load
 from kinacc.kinematics import robot as robots
 from kinacc.kinematics.robot import as_yaml
 
-ROOT = Path(__file__).parents[1]
 PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").rglob("*.md"))]
 every_page = pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 PLACE = re.compile(r"`((?:src|tests|tools|workflow|docs|examples|benchmarks)/[\w./-]+)`")

@@ -12,8 +12,8 @@ import pytest
 from command_line import call
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from shared_data import EXAMPLES
 
-EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
 DATA = "data/ur10_tmac/series_B.csv"
 SERIES = "".join((EXAMPLES / DATA).read_text().splitlines(keepends=True)[:11])
 CONFIG = (EXAMPLES / "ur10.yaml").read_text().partition("  ur10_d:")[0]

@@ -1,13 +1,11 @@
 """The notebooks in examples/: their cells run in order, and give what their texts say."""
 
 import json
-from pathlib import Path
 
 import matplotlib
 import numpy as np
 import pytest
-
-EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
+from shared_data import EXAMPLES
 
 
 def run(name, monkeypatch):

@@ -10,8 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import preloaded
-
-ROOT = Path(__file__).resolve().parents[1]
+from shared_data import ROOT
 
 
 @dataclass(frozen=True)

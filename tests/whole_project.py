@@ -17,11 +17,11 @@ import yaml
 from measured_files import write_readings
 from preloaded import commands, python
 from scipy.spatial.transform import Rotation
+from shared_data import ROOT
 
 from kinacc.config.load import overlay
 from kinacc.kinematics import dh, robot
 
-ROOT = Path(__file__).resolve().parents[1]
 CONFIGS = ("config.yaml", "small.yaml")
 PARTS = ("Snakefile", "workflow", "profiles", "config.yaml", "src")
 

@@ -6,13 +6,12 @@ from contextlib import chdir
 from pathlib import Path
 
 import yaml
+from shared_data import ROOT
 
 from kinacc.calibration.observations import from_columns
 from kinacc.kinematics import robot
 from kinacc.synthetic import source
 from kinacc.workflow.data_sets import read_data_sets
-
-ROOT = Path(__file__).resolve().parents[2]
 
 
 def measured_arm(name):

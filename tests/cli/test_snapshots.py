@@ -11,13 +11,14 @@ from pathlib import Path
 
 import pytest
 from command_line import call
+from shared_data import SHIPPED
 from stages_by_hand import run_stages
 from tracked_arm import quickened
 
 import kinacc
 
 HERE = Path(__file__).resolve().parent / "snapshots"
-SERIES = Path(__file__).resolve().parents[2] / "examples/data/ur10_tmac/series_B.csv"
+SERIES = SHIPPED / "ur10_tmac/series_B.csv"
 FIT, LATER = "results/arm", "results/later"
 STAGES = ("measurements", "data_check", "vec", "dh", "residuals", "summary")
 NOISE = ("--noise-mm", "0.1")

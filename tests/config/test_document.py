@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 import yaml
+from shared_data import ROOT
 
 from kinacc.config.gate_rules import KINDS
 from kinacc.config.schema import defaults, json_schema
 from kinacc.config.settings import Configuration
 
-ROOT = Path(__file__).parents[2]
 DEFINED = json_schema(Configuration)["$defs"]
 KEYS = [
     (section, name)

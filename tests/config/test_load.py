@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 from complaints import complaints
+from shared_data import ROOT
 
 from kinacc.checks.contradictions import load
 from kinacc.config.schema import defaults
 
-ROOT = Path(__file__).parents[2]
 PAPER = ROOT / "config.yaml"
 UR10 = ROOT / "examples" / "ur10.yaml"
 

@@ -9,13 +9,13 @@ from pathlib import Path
 
 import pytest
 from command_line import call
+from shared_data import SHIPPED
 
 from kinacc.checks.contradictions import load
 from kinacc.config.edit import with_added
 from kinacc.errors import InputError
 
-ROOT = Path(__file__).parents[2]
-MEASURED = ROOT / "examples" / "data" / "ur10_tmac" / "series_B.csv"
+MEASURED = SHIPPED / "ur10_tmac" / "series_B.csv"
 HERE = """\
 # One arm, measured with a tracker.
 datasets:

@@ -16,11 +16,12 @@ import numpy as np
 import pytest
 from command_line import call
 from preloaded import python
+from shared_data import SHIPPED
 from shared_work import once
 
 from kinacc.tables.store import digest_of, read
 
-MEASURED = Path(__file__).parents[2] / "examples" / "data" / "ur10_tmac"
+MEASURED = SHIPPED / "ur10_tmac"
 # Series D has another base and another tool than B.
 FILES = {"march": ("B", 0, 80), "may": ("B", 300, 90), "june": ("D", 0, 100)}
 LINES = {

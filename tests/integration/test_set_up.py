@@ -4,11 +4,9 @@ import re
 import subprocess
 import sys
 import tomllib
-from pathlib import Path
 
 import yaml
-
-ROOT = Path(__file__).resolve().parents[2]
+from shared_data import ROOT
 
 
 def find_python(*candidates: str) -> subprocess.CompletedProcess:

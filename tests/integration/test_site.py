@@ -8,8 +8,8 @@ import sys
 from pathlib import Path
 
 import pytest
+from shared_data import ROOT
 
-ROOT = Path(__file__).resolve().parents[2]
 # What a browser loads while it shows a page: an attribute, or the address of a link in the head.
 LOADED = re.compile(r'\b(?:src|srcset|poster|data)="([^"]*)"|<link\b[^>]*\bhref="([^"]*)"')
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 from read_columns import turns_of
 from scipy.spatial.transform import Rotation
+from shared_data import ROOT
 
 from kinacc.checks.contradictions import load
 from kinacc.config.schema import defaults
@@ -17,7 +17,6 @@ from kinacc.errors import InputError
 from kinacc.kinematics import robot
 from kinacc.measurements.reader import UNCERTAINTY, read
 
-ROOT = Path(__file__).parents[2]
 ARM = robot.load("ur10")
 COUNT = 8
 

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from pathlib import Path
 
 import pandas as pd
-
-TOP = Path(__file__).parents[2]
+from shared_data import ROOT
 
 
 def snakemake(*arguments: str) -> None:
     command = [sys.executable, "-m", "snakemake", "-c1", "-s", "research/Snakefile", "--nolock"]
-    done = subprocess.run([*command, *arguments], cwd=TOP, capture_output=True, text=True)
+    done = subprocess.run([*command, *arguments], cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
 
 

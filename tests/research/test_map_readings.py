@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pandas as pd
 import pytest
+from shared_data import ROOT
 
 from kinacc.config.schema import defaults
 from kinacc.study import robustness
 from kinacc.synthetic import accepted
 from research.map_readings import READINGS, SENTENCES, judged_arms
 
-CHOICE = Path(__file__).parents[2] / "research" / "data" / "map_choice.csv"
+CHOICE = ROOT / "research" / "data" / "map_choice.csv"
 
 
 @pytest.fixture(scope="module")

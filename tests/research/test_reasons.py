@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pandas as pd
 import pytest
+from shared_data import ROOT
 
 from research import reasons
 from research.claims_page import claims_page
@@ -76,9 +75,8 @@ def test_where_a_claim_holds_follows_from_its_shares_over_arms_and_choices(agree
 
 
 def test_the_page_in_the_documentation_is_what_its_tables_say():
-    top = Path(__file__).parents[2]
     tables = (
-        top / "research" / "data" / f"{name}.parquet" for name in ("choices", "choices_factors")
+        ROOT / "research" / "data" / f"{name}.parquet" for name in ("choices", "choices_factors")
     )
-    page = (top / "docs" / "claims.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "claims.md").read_text(encoding="utf-8")
     assert page == claims_page(*map(pd.read_parquet, tables))

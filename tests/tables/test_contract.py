@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 
 from kinacc.tables import store
 from kinacc.tables.contract import ARTEFACTS
-
-ROOT = Path(__file__).parents[2]
 
 
 @pytest.mark.parametrize("name", ARTEFACTS)

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pandas as pd
 import pytest
+from shared_data import ROOT
 
 from kinacc.config.load import overlay
 from kinacc.study.in_memory import run
 from kinacc.synthetic import source
 from kinacc.workflow.data_sets import read_data_sets
 
-ROOT = Path(__file__).resolve().parents[2]
 POSES = 150
 SETTINGS = overlay(
     read_data_sets([ROOT / "config.yaml"]).settings["mh180"],

@@ -2,13 +2,13 @@
 
 import json
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from oracles.controllers.arms import frame
 from oracles.kinematics import dh_forward
 from scipy.spatial.transform import Rotation
+from shared_data import RESULTS
 
 from kinacc.deployment.export.files import FORMATS, contents, write
 from kinacc.deployment.export.paper_tables import with_deviation
@@ -38,7 +38,7 @@ def test_values_carry_two_digits_of_their_deviation(value, std, text):
 
 def test_tables_of_a_paper_show_the_selected_model_deviations_and_what_is_left_open():
     """Of a UR10 whose flange pointed one way; the other formats are golden."""
-    folder = Path(__file__).parents[2] / "golden" / "results" / "ur10_d"
+    folder = RESULTS / "ur10_d"
     source = read_source(folder)
     markdown, latex = contents(source, ("markdown", "latex")).values()
     for text, signs in ((markdown, "± †"), (latex, r"$\pm$ $^\dagger$")):

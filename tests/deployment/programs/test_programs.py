@@ -13,6 +13,7 @@ from oracles.kinematics import dh_forward
 from pose_checks import movement, of_matrices
 from read_columns import Q_DEG
 from scipy.spatial.transform import Rotation
+from shared_data import EXAMPLES
 
 from kinacc.deployment.programs import abb, compensate_program, kuka, read_program
 from kinacc.deployment.programs.orientation import (
@@ -28,8 +29,8 @@ from kinacc.errors import InputError
 from kinacc.geometry import Pose, exp_so3
 from kinacc.kinematics import robot
 
-EXAMPLES = Path(__file__).parents[3] / "examples" / "programs"
-KR6 = str(EXAMPLES / "kr6.yaml")
+PROGRAMS = EXAMPLES / "programs"
+KR6 = str(PROGRAMS / "kr6.yaml")
 ARMS = {
     "weld.src": KR6,
     "weld.mod": "irb120",
@@ -43,7 +44,7 @@ ANGLES = np.rad2deg(Rotation.from_matrix(TOOL.rotation).as_euler("xyz"))
 LEFT = {"weld.src": 1, "weld.mod": 1, "weld.ls": 1, "weld.script": 1}
 
 
-def corrected(name, folder=EXAMPLES, **options):
+def corrected(name, folder=PROGRAMS, **options):
     pulses = PULSES if name.endswith("JBI") else None
     if name == "joints.csv":
         options = {"tools": {"": np.array([30.0, -20.0, 150.0, *ANGLES])}, **options}
@@ -69,7 +70,7 @@ def test_every_example_is_corrected_and_only_its_numbers_change(name):
 
 
 def test_frames_that_are_missing_are_asked_for(tmp_path):
-    shutil.copy(EXAMPLES / "weld.ls", tmp_path / "weld.ls")
+    shutil.copy(PROGRAMS / "weld.ls", tmp_path / "weld.ls")
     arm = calibrated(ARMS["weld.ls"], "dh")
     with pytest.raises(InputError, match="--tool"):
         compensate_program(arm, tmp_path / "weld.ls")
@@ -141,7 +142,7 @@ def test_a_program_is_corrected_once_and_files_are_kept(tmp_path):
     found.write(out, force=True)
     facts = json.loads((tmp_path / "weld_cal.src.kinacc.json").read_text())
     assert facts["from"] == ["weld.src", "weld.dat"]
-    shutil.copy(EXAMPLES / "$config.dat", tmp_path)
+    shutil.copy(PROGRAMS / "$config.dat", tmp_path)
     for ending in ("src", "dat"):
         (tmp_path / f"weld_cal.{ending}").rename(tmp_path / f"again.{ending}")
     with pytest.raises(InputError, match="compensated before"):
@@ -286,7 +287,7 @@ def test_positions_are_in_the_order_of_the_moves(tmp_path):
 
 
 def test_poses_that_no_move_uses_are_left_alone(tmp_path):
-    text = (EXAMPLES / "weld.mod").read_text()
+    text = (PROGRAMS / "weld.mod").read_text()
     stale = "CONST robtarget stale:=[[500,0,600],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];"
     text = text.replace("CONST robtarget", f"{stale}\n  CONST robtarget", 1)
     (tmp_path / "weld.mod").write_text(text)

@@ -20,6 +20,7 @@ from oracles.kinematics import frame
 from pose_checks import assert_same, of_matrices
 from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
+from shared_data import ROOT
 
 from kinacc.kinematics import dh, robot
 from kinacc.measurements.intake.write import template_text
@@ -62,7 +63,7 @@ def assert_published(name: str, arm: robot.Robot, q_rad: np.ndarray) -> None:
 
 def test_every_shipped_robot_is_held_here_and_names_its_source():
     assert set(robot.shipped()) == set(URDF)
-    page = (Path(__file__).parents[3] / "docs" / "robots.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "robots.md").read_text(encoding="utf-8")
     assert [name for name in URDF if f"`{name}`" not in page] == []
     assert len(URDF) >= 45
     for name in robot.shipped():
