@@ -96,9 +96,7 @@ class Arm:
         """What halves of a series say of the misfit; nothing where all poses are shared."""
         if self.plans == SAME:
             return 1.0
-        alone = history_model.about(self.true.dh, known(), series, len(series), WEIGHT_MM_PER_RAD)
-        cuts = history_model.halves(alone, np.repeat(series.q_rad, 6, axis=0), SETUP)
-        return history_model.understated(cuts)
+        return history_model.understated(self.pair(*half) for half in history_model.halves(series))
 
 
 # Names of DH parameters by the error they are: (of this joint or the next, place among ERRORS).
@@ -139,8 +137,8 @@ def _seen(found: history_model.Moved, chance_mm: float) -> tuple[np.ndarray, np.
     for number, (joint, name) in enumerate(CHANGES):
         after, error = PARAMETERS[name]
         if joint + after < JOINTS:
-            units[6 * (joint + after) + error, number] = history_model.UNITS[error]
-    along = found.along(units)
+            units[6 * (joint + after) + error, number] = 1.0
+    along = found.by_error @ units
     size = np.linalg.norm(along, axis=0)
     unit = along / np.where(size > UNSEEN_MM, size, np.inf)
     weighted = found.precision @ unit

@@ -72,8 +72,8 @@ def session(seen: Observations, name: str) -> Session:
         held_out_mm[out] = np.linalg.norm(seen.position_mm - at.position_mm, axis=1)[out]
     whole = fit(seen)
     own = Calibration(name, ARM, "dh", whole.model, whole.frames.base, {"tool": whole.frames.tool})
-    return Session(name, name, "", SAME if name == "1" else "moved", SAME, own,
-                         whole.model, seen, held_out_mm, *[np.nan] * 3)  # fmt: skip
+    base = SAME if name == "1" else "moved"
+    return Session(name, name, base, SAME, own, whole.model, seen, held_out_mm)
 
 
 def verdict(seed: int, changed: bool, poses: int) -> str:

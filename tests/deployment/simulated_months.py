@@ -60,4 +60,4 @@ def session(seen: Observations, number: int, base: str = SAME) -> Session:
     at = arm.pose(seen.at, "instrument")
     sizes = np.linalg.norm(seen.position_mm - at.position_mm, axis=1)
     date = f"2026-{number:02}-01"
-    return Session(f"ur-{date}", date, "", base, SAME, arm, arm.model.dh, seen, sizes)
+    return Session(f"ur-{date}", date, base, SAME, arm, arm.model.dh, seen, sizes)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import shlex
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -65,7 +64,6 @@ def history(inputs: Mapping[str, Any], settings: Settings) -> Columns:
     settings : mapping
         Settings of the data set.
     """
-    allowed_mm = settings["tolerance"]["mm"]
     campaigns = [value.parent for role, value in sorted(inputs.items()) if "/campaign_" in role]
     sessions = []
     for line in settings["series"]:
@@ -75,14 +73,15 @@ def history(inputs: Mapping[str, Any], settings: Settings) -> Columns:
             for role, value in inputs.items()
             if role.startswith(start) and not isinstance(value, Path)
         }
-        session = session_of(tables, line["name"], line["date"], line["base"], line["tool"])
+        digest = store.digest_of("measurements", tables["measurements"])
+        bound_mm = finished(tables, results.selected_model(tables), campaigns)
+        facts = {
+            "digest": digest,
+            "bound_mm": bound_mm,
+            "tolerance_mm": settings["tolerance"]["mm"],
+        }
         sessions.append(
-            replace(
-                session,
-                digest=store.digest_of("measurements", tables["measurements"]),
-                bound_mm=finished(tables, session.calibration.choice, campaigns),
-                tolerance_mm=np.nan if allowed_mm is None else allowed_mm,
-            )
+            session_of(tables, line["name"], line["date"], line["base"], line["tool"], **facts)
         )
     weight = settings["calibration"]["rotation_weight_mm_per_rad"]
     return compared(sessions, weight)

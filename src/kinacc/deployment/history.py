@@ -8,8 +8,8 @@ that is no test of the arm but of the model, and nothing can be told.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -56,24 +56,21 @@ class Session:
     which series are compared. ``observations``: all its rows in the order they were measured.
     ``held_out_mm`` (m,): position errors of the selected model at held-out rows, empty without
     folds. ``base``, ``tool``: SAME or MOVED since the line before (of the first: whatever is
-    written there). ``temperature_c``, ``bound_mm``, ``tolerance_mm``: NaN where not known.
+    written there). ``facts``: further columns of its row in the history.
     """
 
     name: str
     date: str
-    digest: str
     base: str
     tool: str
     calibration: Calibration
     dh: DHModel
     observations: Observations
     held_out_mm: np.ndarray
-    temperature_c: float = np.nan
-    bound_mm: float = np.nan
-    tolerance_mm: float = np.nan
+    facts: Mapping[str, Any] = field(default_factory=dict)
 
 
-def session_of(tables: Tables, name: str, date: str, base: str, tool: str) -> Session:
+def session_of(tables: Tables, name: str, date: str, base: str, tool: str, **facts: Any) -> Session:
     """A line of a series from the tables of its results."""
     calibration, measured = folder.calibration(tables, name=name), tables["measurements"]
     # A VEC model holds the nominal DH parameters: too far from the arm for a linear comparison.
@@ -81,10 +78,9 @@ def session_of(tables: Tables, name: str, date: str, base: str, tool: str) -> Se
     observed = from_columns(measured, calibration.robot)
     held_out = held_out_errors(tables["pose_errors"], calibration.choice)
     held_out_mm = np.linalg.norm(held_out[["ex_mm", "ey_mm", "ez_mm"]], axis=1)
-    temperature_c = float(pd.Series(measured.get("temperature_c", []), dtype=float).mean())
-    return Session(
-        name, date, "", base, tool, calibration, dh, observed, held_out_mm, temperature_c
-    )
+    temperature_c = pd.Series(measured.get("temperature_c", []), dtype=float).mean()
+    facts = {"temperature_c": temperature_c} | facts
+    return Session(name, date, base, tool, calibration, dh, observed, held_out_mm, facts)
 
 
 def history(
@@ -110,17 +106,19 @@ def history(
     Columns
         The table ``history``: one row a session.
     """
-    comparison = _Comparison(rotation_weight_mm_per_rad, level, {})
     rows: list[dict[str, Any]] = []
     force, setup = None, Setup(True, True)
     for session in sorted(sessions, key=lambda session: session.date):
         setup = Setup(
-            setup.same_base & (session.base == SAME), setup.same_tool & (session.tool == SAME)
+            setup.same_base and session.base == SAME, setup.same_tool and session.tool == SAME
         )
-        names = ("date", "digest", "base", "tool", "temperature_c", "bound_mm", "tolerance_mm")
         row: dict[str, Any] = dict.fromkeys(column.name for column in ARTEFACTS["history"].columns)
-        row |= {name: getattr(session, name) for name in names} | {
+        row |= session.facts
+        row |= {
             "series": session.name,
+            "date": session.date,
+            "base": session.base,
+            "tool": session.tool,
             "rows": len(session.observations),
             "configurations": _count(session.observations),
             "model": session.calibration.choice,
@@ -128,117 +126,110 @@ def history(
             **_sizes("held_out", session.held_out_mm),
         }
         if force is not None:
-            row |= {"in_force": force.name} | comparison.row(force, session, setup)
+            row |= {"in_force": force.name} | _compared(
+                force, session, setup, rotation_weight_mm_per_rad, level
+            )
         rows.append(row)
         if row["verdict"] in (FIRST, RECALIBRATE):
             force, setup = session, Setup(True, True)
     return columns_of("history", rows)
 
 
-@dataclass(frozen=True)
-class _Comparison:
-    """How sessions are compared; ``known``: what halves of a series showed, by name and setup."""
+def _compared(
+    force: Session, session: Session, setup: Setup, weight: float, level: float
+) -> dict[str, Any]:
+    """What a row says of ``session`` while the calibration of ``force`` was in force.
 
-    rotation_weight_mm_per_rad: float
-    level: float
-    known: dict[tuple[str, Setup], float]
+    Readings that the session in force holds as well are left out.
+    """
+    series = (session.observations, force.observations)
+    shared = known_readings(*([item.q_rad, item.position_mm] for item in series))
+    session = replace(session, observations=session.observations.select(~shared))
+    row: dict[str, Any] = {}
+    try:
+        row |= _sizes("in_force", _errors_mm(force, session, setup, weight))
+        for item in (force, session):
+            if _count(item.observations) < LEAST_HELD_OUT:
+                message = f"fewer than {LEAST_HELD_OUT} configurations in {item.name}"
+                return row | {"verdict": OPEN, "reason": message}
+        return row | _moved(force, session, setup, weight, level)
+    except (FitError, InputError) as problem:
+        return row | {"verdict": OPEN, "reason": str(problem)}
 
-    def row(self, force: Session, session: Session, setup: Setup) -> dict[str, Any]:
-        """What a row says of ``session`` while the calibration of ``force`` was in force.
 
-        Readings that the session in force holds as well are left out.
-        """
-        series = (session.observations, force.observations)
-        shared = known_readings(*([item.q_rad, item.position_mm] for item in series))
-        session = replace(session, observations=session.observations.select(~shared))
-        row: dict[str, Any] = {}
-        try:
-            row |= _sizes("in_force", self.errors_mm(force, session, setup))
-            for item in (force, session):
-                if _count(item.observations) < LEAST_HELD_OUT:
-                    message = f"fewer than {LEAST_HELD_OUT} configurations in {item.name}"
-                    return row | {"verdict": OPEN, "reason": message}
-            return row | self.moved(force, session, setup)
-        except (FitError, InputError) as problem:
-            return row | {"verdict": OPEN, "reason": str(problem)}
-
-    @one_thread
-    def moved(self, force: Session, session: Session, setup: Setup) -> dict[str, Any]:
-        """What moved, what chance shows, and the verdict. Raises FitError."""
-        prismatic = session.calibration.robot.dh.prismatic
-        first, second = _thinned(force.observations), _thinned(session.observations)
-        pair = self._about(force, joined(first, second, setup), len(first))
-        misfit = 1.0
-        if pair.has_other_poses:
-            halves = [self.understated(item, setup) for item in (force, session)]
-            misfit = history_model.misfit_factor(*halves)
-        movement = history_model.moved(pair, misfit)
-        moved_mm = movement.moved_mm
-        probability, chance_mm = movement.test(self.level)
-        row = {
-            "moved_mm": moved_mm,
-            "chance_mm": chance_mm,
-            "beyond_mm": max(0.0, moved_mm - chance_mm),
-            "probability": probability,
-        }
-        inside = _share_inside(session.observations.q_rad, force.observations.q_rad, prismatic)
-        if inside < ENOUGH:
-            message = f"only {inside:.0%} of the readings lie in the joint ranges of {force.name}"
-            return row | {"verdict": OPEN, "reason": message}
-        if moved_mm > chance_mm:
-            joint = history_model.joint_of(movement, prismatic)
-            return row | {"verdict": RECALIBRATE, "joint": joint}
-        held_out_mm = float(np.mean(force.held_out_mm)) if len(force.held_out_mm) else np.inf
-        if chance_mm > held_out_mm:
-            message = (
-                f"a change below {chance_mm:.2f} mm would not be seen; the mean held-out error of "
-                f"the calibration in force is {held_out_mm:.2f} mm"
+@one_thread
+def _moved(
+    force: Session, session: Session, setup: Setup, weight: float, level: float
+) -> dict[str, Any]:
+    """What moved, what chance shows, and the verdict. Raises FitError."""
+    prismatic = session.calibration.robot.dh.prismatic
+    first, second = _thinned(force.observations), _thinned(session.observations)
+    pair, misfit = _pair(force, first, second, setup, weight), 1.0
+    if not pair.in_both.all():
+        misfit = history_model.misfit_factor(*(
+            history_model.understated(
+                _pair(item, *half, setup, weight) for half in history_model.halves(series)
             )
-            return row | {"verdict": OPEN, "reason": message}
-        return row | {"verdict": HOLDS}
-
-    @one_thread
-    def understated(self, session: Session, setup: Setup) -> float:
-        """What halves of a series say of the misfit (``history_model.understated``)."""
-        key = session.name, setup
-        if key not in self.known:
-            series = _thinned(session.observations)
-            alone = self._about(session, series, len(series))
-            q_rad = np.repeat(series.q_rad, 3 + 3 * series.has_rotation, axis=0)
-            cuts = history_model.halves(alone, q_rad, setup)
-            self.known[key] = history_model.understated(cuts)
-        return self.known[key]
-
-    def _about(self, session: Session, series: Observations, first: int) -> history_model.Pair:
-        """The pair about the fitted DH model of a session, with its own base and targets."""
-        robot = session.calibration.robot
-        weight = self.rotation_weight_mm_per_rad
-        counts = len(series.session_names), len(series.target_names)
-        terms = frame_terms(series, known(robot.base, carried(robot), *counts))
-        frames = fit_frames(series, session.dh, rotation_weight_mm_per_rad=weight, frames=terms)
-        return history_model.about(session.dh, frames, series, first, weight)
-
-    def errors_mm(self, force: Session, session: Session, setup: Setup) -> np.ndarray:
-        """Position errors (n,) of the calibration in force where its model covers the joints.
-
-        Base and tool that were moved are fitted to the rows outside each fold, to all without.
-        """
-        calibration, observed = force.calibration, session.observations
-        beyond = outside(observed.q_rad, calibration.model.domain)
-        observed = observed.select(~np.any(beyond, axis=1))
-        moved = [BASE] * (not setup.same_base or len(observed.session_names) > 1)
-        moved += [TOOL] * (
-            not setup.same_tool or not {*observed.target_names} <= {*calibration.targets}
+            for item, series in ((force, first), (session, second))
+        ))  # fmt: skip
+    movement = history_model.moved(pair, misfit)
+    moved_mm = movement.moved_mm
+    probability, chance_mm = movement.test(level)
+    row = {
+        "moved_mm": moved_mm,
+        "chance_mm": chance_mm,
+        "beyond_mm": max(0.0, moved_mm - chance_mm),
+        "probability": probability,
+    }
+    inside = _share_inside(session.observations.q_rad, force.observations.q_rad, prismatic)
+    if inside < ENOUGH:
+        message = f"only {inside:.0%} of the readings lie in the joint ranges of {force.name}"
+        return row | {"verdict": OPEN, "reason": message}
+    if moved_mm > chance_mm:
+        joint = history_model.joint_of(movement, prismatic)
+        return row | {"verdict": RECALIBRATE, "joint": joint}
+    held_out_mm = float(np.mean(force.held_out_mm)) if len(force.held_out_mm) else np.inf
+    if chance_mm > held_out_mm:
+        message = (
+            f"a change below {chance_mm:.2f} mm would not be seen; the mean held-out error of "
+            f"the calibration in force is {held_out_mm:.2f} mm"
         )
-        sizes = [np.zeros(0)]
-        for fold in np.unique(observed.fold):
-            tried = observed.fold == fold
-            train = observed.select(~tried if fold >= 0 else tried)
-            if len(train):
-                frames = frames_at(calibration, train, moved, self.rotation_weight_mm_per_rad)
-                off = errors_of(calibration, frames, observed.select(tried))
-                sizes.append(np.linalg.norm(off.position_mm, axis=1))
-        return np.concatenate(sizes)
+        return row | {"verdict": OPEN, "reason": message}
+    return row | {"verdict": HOLDS}
+
+
+def _pair(
+    session: Session, first: Observations, second: Observations, setup: Setup, weight: float
+) -> history_model.Pair:
+    """Two series about the fitted DH model of a session, with their bases and targets."""
+    robot, both = session.calibration.robot, joined(first, second, setup)
+    counts = len(both.session_names), len(both.target_names)
+    terms = frame_terms(both, known(robot.base, carried(robot), *counts))
+    frames = fit_frames(both, session.dh, rotation_weight_mm_per_rad=weight, frames=terms)
+    return history_model.about(session.dh, frames, both, len(first), weight)
+
+
+def _errors_mm(force: Session, session: Session, setup: Setup, weight: float) -> np.ndarray:
+    """Position errors (n,) of the calibration in force where its model covers the joints.
+
+    Base and tool that were moved are fitted to the rows outside each fold, to all without.
+    """
+    calibration, observed = force.calibration, session.observations
+    beyond = outside(observed.q_rad, calibration.model.domain)
+    observed = observed.select(~np.any(beyond, axis=1))
+    moved = [BASE] * (not setup.same_base or len(observed.session_names) > 1)
+    moved += [TOOL] * (
+        not setup.same_tool or not {*observed.target_names} <= {*calibration.targets}
+    )
+    sizes = [np.zeros(0)]
+    for fold in np.unique(observed.fold):
+        tried = observed.fold == fold
+        train = observed.select(~tried if fold >= 0 else tried)
+        if len(train):
+            frames = frames_at(calibration, train, moved, weight)
+            off = errors_of(calibration, frames, observed.select(tried))
+            sizes.append(np.linalg.norm(off.position_mm, axis=1))
+    return np.concatenate(sizes)
 
 
 def _thinned(observations: Observations) -> Observations:

@@ -42,10 +42,11 @@ from kinacc.measurements.folds import configurations
 ORDER = 8  # of the polynomials of the misfit; finer misfit differs between configurations
 CUTS = 2  # of one series into halves, across the widest directions of its joints
 DRAWS = 100_000  # of the statistic by chance
-UNITS = (1.0, 1.0, 1.0, 1e-3, 1e-3, 1e-3)  # of joint errors: what counts as much as one mm
+_UNITS = (1.0, 1.0, 1.0, 1e-3, 1e-3, 1e-3)  # of joint errors: what counts as much as one mm
 _NARROW_RAD = 1e-3
 _SEEN = 1e-3  # of the best seen movement; what moves less is no direction of the arm
-_ROUNDS, _SETTLED = 15, 0.1  # of the variances; relative change
+_ROUNDS = 15  # of the variances
+_FREE = 0  # group of what has no variance
 _FIRM = 1e-9  # of the largest diagonal: what base, tool and joints share stays where it is
 _LEAST_MM = 1e-4  # standard deviation of misfit: less is none
 _START_MM = 0.1
@@ -65,19 +66,16 @@ class Setup(NamedTuple):
 class Pair:
     """m residual components (mm) of two series about one DH model, and what may explain them.
 
-    ``frames`` (m, F): motions of bases and targets, ``is_base`` (F,) says which; ``own`` (F,) marks
-    those only the second series has. ``constant`` (m, 6k): errors in front of every joint,
-    ``ERRORS`` joint by joint in mm and rad; ``longer`` (6k,) of them make all lengths 1e-3 longer.
-    ``misfit`` (m, Q): errors growing with the joints, of prior proportions; ``joint`` (Q,) says of
-    which (0-based; one more: by travel direction). ``residual`` (m,) is measured minus model.
-    ``second``, ``position`` (m,): of the second series, of a position. ``cluster`` (m,):
+    ``frames`` (m, F): motions of bases and targets. ``constant`` (m, 6k): errors of one mm or mrad
+    in front of every joint, ``ERRORS`` joint by joint; ``longer`` (6k,) of them make all lengths
+    1e-3 longer. ``misfit`` (m, Q): errors growing with the joints, of prior proportions; ``joint``
+    (Q,) says of which (1-based; one more: by travel direction). ``residual`` (m,) is measured minus
+    model. ``second``, ``position`` (m,): of the second series, of a position. ``cluster`` (m,):
     configuration, alike in both. ``late`` (m,): order of measuring within a series, of mean 0 and
     variance 1.
     """
 
     frames: np.ndarray
-    is_base: np.ndarray
-    own: np.ndarray
     constant: np.ndarray
     longer: np.ndarray
     misfit: np.ndarray
@@ -89,10 +87,11 @@ class Pair:
     late: np.ndarray
 
     @property
-    def has_other_poses(self) -> bool:
-        """Whether a configuration of one series is none of the other."""
-        clusters, later = (np.unique(self.cluster[self.second == item]) for item in (False, True))
-        return not np.array_equal(clusters, later)
+    def in_both(self) -> np.ndarray:
+        """Whether each configuration, by number, is one of both series."""
+        number = np.unique(self.cluster)
+        earlier, later = self.cluster[~self.second], self.cluster[self.second]
+        return np.isin(number, earlier) & np.isin(number, later)
 
 
 def about(
@@ -127,12 +126,10 @@ def about(
     late = np.concatenate([_late(first), _late(len(both) - first)])
     return Pair(
         frames=of_frames,
-        is_base=np.arange(coords.size) < 6 * frames.sessions,
-        own=~np.any(of_frames[row < first] != 0.0, axis=0),
-        constant=errors[:, order == 0],
+        constant=errors[:, order == 0] * np.tile(_UNITS, model.joints),
         longer=1e-3 * longer.ravel(),
         misfit=(errors / np.where(size > 0.0, size, 1.0))[:, order > 0],
-        joint=joint[order > 0],
+        joint=1 + joint[order > 0],
         residual=-residual,
         second=row >= first,
         position=axis < 3,
@@ -144,31 +141,22 @@ def about(
 def _late(count: int) -> np.ndarray:
     """Order of measuring (count,), of mean 0 and variance 1."""
     order = np.arange(count) - 0.5 * (count - 1)
-    return order / max(np.sqrt(np.mean(order**2)), 0.5) if count else order
+    return order / np.sqrt(np.mean(order**2)) if count > 1 else order
 
 
-def halves(series: Pair, q_rad: np.ndarray, setup: Setup) -> Iterator[Pair]:
-    """A series (a pair without a second one) as pairs of halves that lie apart in the joints.
+def halves(series: Observations) -> Iterator[tuple[Observations, Observations]]:
+    """A series in halves that lie apart in the joints.
 
-    Each is cut at the median of one of the ``CUTS`` principal coordinates of the joints (m, k) of
-    the components. Frames that ``setup`` does not have in common are free in both halves.
+    Cut at the median of each of the ``CUTS`` first principal coordinates of the joints.
     """
-    turned = np.concatenate([np.sin(q_rad), np.cos(q_rad)], axis=1)
+    turned = np.concatenate([np.sin(series.q_rad), np.cos(series.q_rad)], axis=1)
     turned = turned - turned.mean(axis=0)
-    axes = np.linalg.svd(turned, full_matrices=False)[2][:CUTS]
-    anew = ~(series.is_base & setup.same_base | ~series.is_base & setup.same_tool)
-    for along in (turned @ axes.T).T:
+    cluster = configurations(series.pose, series.q_rad)
+    for axis in np.linalg.svd(turned, full_matrices=False)[2][:CUTS]:
         # Whole configurations: their mean decides.
-        mean = np.bincount(series.cluster, along) / np.bincount(series.cluster)
-        second = (mean > np.median(mean))[series.cluster]
-        frames = [series.frames, series.frames[:, anew] * second[:, None]]
-        yield replace(
-            series,
-            frames=np.concatenate(frames, axis=1),
-            is_base=np.append(series.is_base, series.is_base[anew]),
-            own=np.append(np.zeros(len(anew), bool), np.ones(anew.sum(), bool)),
-            second=second,
-        )
+        mean = np.bincount(cluster, turned @ axis) / np.bincount(cluster)
+        is_second = (mean > np.median(mean))[cluster]
+        yield series.select(~is_second), series.select(is_second)
 
 
 def joined(first: Observations, second: Observations, setup: Setup) -> Observations:
@@ -191,7 +179,7 @@ def joined(first: Observations, second: Observations, setup: Setup) -> Observati
 class Moved(NamedTuple):
     """Movement of the arm between two series, over the poses of the second.
 
-    ``directions`` (d, 6k): joint errors (mm and rad) that move these by 1 mm rms each, after the
+    ``directions`` (d, 6k): joint errors (mm and mrad) that move these by 1 mm rms each, after the
     best growth of all lengths, and base and tool where these were set up anew; ``change`` (d,) in
     mm along them; ``covariance`` (d, d), mm^2: of the changes that an unchanged arm shows.
     """
@@ -200,10 +188,10 @@ class Moved(NamedTuple):
     change: np.ndarray
     covariance: np.ndarray
 
-    def along(self, constant: np.ndarray) -> np.ndarray:
-        """What joint errors (6k, n) in mm and rad are in mm along the directions, (d, n)."""
-        units = np.tile(UNITS, constant.shape[0] // 6)[:, None]
-        return np.linalg.pinv(self.directions.T / units) @ (constant / units)
+    @property
+    def by_error(self) -> np.ndarray:
+        """What one mm or mrad of every joint error is in mm along the directions, (d, 6k)."""
+        return np.linalg.pinv(self.directions.T)
 
     @property
     def moved_mm(self) -> float:
@@ -259,35 +247,39 @@ def moved(pair: Pair, misfit: float) -> Moved:
 
     ``misfit``: factor on the deviations of the misfit that the series do not share, 1 or more.
     """
-    absorbed = _absorbed(pair)
-    directions = _seen_directions(pair, absorbed)
+    anew = pair.second
+    grown = pair.constant @ pair.longer * anew
+    # What base and tool of the second series alone, and growth, can explain is no change.
+    own = ~np.any(pair.frames[~anew], axis=0)
+    apart = np.column_stack([pair.frames[anew][:, own], grown[anew]])
+    apart = scipy.linalg.orth(_unit(apart), _FIRM)
+    change = pair.constant * anew[:, None]
+    change[anew] -= apart @ (apart.T @ change[anew])
+    directions = _seen_directions(change[anew & pair.position])
     count = len(directions)
-    change = pair.constant @ directions.T
-    drift = change * pair.late[:, None]
-    grown = pair.constant @ pair.longer * pair.second
+    drift = pair.constant @ directions.T * pair.late[:, None]
     firm = _unit(np.column_stack([pair.frames, pair.constant, grown]))
-    # Their part along base, tool and growth can be a thousand times as large as the rest.
-    anew = change[pair.second]
-    moves = np.zeros_like(change)
-    moves[pair.second] = anew - absorbed @ (absorbed.T @ anew)
-    free = np.concatenate([firm, moves], axis=1)
-    states = [drift * (pair.second == item)[:, None] for item in (False, True)]
-    warming = int(pair.joint.max(initial=-1)) + 1
-    group = np.concatenate([pair.joint, np.full(2 * count, warming)])
-    columns = np.concatenate([free, pair.misfit, *states], axis=1)
-    gram, observed = columns.T @ columns, columns.T @ pair.residual
-    split = free.shape[1]
-    gram[np.diag_indices(split)] += _FIRM * gram[:split, :split].diagonal().max()
-    noise, prior = _variances(gram, observed, pair, split, group)
-    inverse = _inverse(gram + np.diag(np.append(np.zeros(split), noise / prior[group])))
-    result, changes = inverse @ observed, slice(split - count, split)
-    scores = _shares(pair, columns, result, inverse, changes)
-    blurred = (inverse[changes] @ gram[:, split:]) * np.sqrt(prior[group])
-    both = np.intersect1d(pair.cluster[pair.second], pair.cluster[~pair.second])
-    scores[~np.isin(np.unique(pair.cluster), both)] *= misfit
+    parts = [
+        change @ directions.T,
+        firm,
+        pair.misfit,
+        drift * ~anew[:, None],
+        drift * anew[:, None],
+    ]
+    columns = np.concatenate(parts, axis=1)
+    warming = 1 + int(pair.joint.max())
+    free = np.full(count + firm.shape[1], _FREE)
+    group = np.concatenate([free, pair.joint, np.full(2 * count, warming)])
+    inverse, variance = _fit(columns, pair.residual, group)
+    scores = _shares(pair, columns, inverse)[:, :count]
+    scores[~pair.in_both] *= misfit
+    random = group != _FREE
+    blurred = inverse[:count] @ (columns.T @ columns[:, random])
+    blurred *= misfit * np.sqrt(variance[group[random]])
     # Between two series a state may differ by both their states.
-    smooth = misfit**2 * blurred @ blurred.T + 2.0 * prior[warming] * np.eye(count)
-    return Moved(directions, result[changes], scores.T @ scores + smooth)
+    states = 2.0 * variance[warming] * np.eye(count)
+    result = inverse[:count] @ (columns.T @ pair.residual)
+    return Moved(directions, result, scores.T @ scores + blurred @ blurred.T + states)
 
 
 def _unit(columns: np.ndarray) -> np.ndarray:
@@ -295,77 +287,51 @@ def _unit(columns: np.ndarray) -> np.ndarray:
     return columns / np.where(size > 0.0, size, 1.0)
 
 
-def _absorbed(pair: Pair) -> np.ndarray:
-    """Orthonormal movements (n, r) of the second series by its own base and tool, and growth."""
-    rows = pair.second
-    local = np.column_stack([pair.frames[rows][:, pair.own], pair.constant[rows] @ pair.longer])
-    return scipy.linalg.orth(_unit(local), _FIRM)
+def _seen_directions(shifts: np.ndarray) -> np.ndarray:
+    """Directions (d, 6k) of joint errors, by what these shift (3n, 6k), that shift by 1 mm rms.
 
-
-def _seen_directions(pair: Pair, absorbed: np.ndarray) -> np.ndarray:
-    """Directions (d, 6k) of joint errors, each moving the second series by 1 mm rms.
-
-    After the best growth of all lengths, and base and tool where these are its own; orthogonal as
-    movements, so that the root of summed squares along them is the rms movement.
+    Orthogonal as movements, so that the root of summed squares along them is the rms movement.
     """
-    rows = pair.second
-    constant = pair.constant[rows]
-    state = (constant - absorbed @ (absorbed.T @ constant))[pair.position[rows]]
-    units = np.tile(UNITS, state.shape[1] // 6)
-    _, values, right = np.linalg.svd(state * units, full_matrices=False)
-    retained = values > _SEEN * values[0]
-    return right[retained] * units / values[retained, None] * np.sqrt(len(state) / 3.0)
+    _, values, right = np.linalg.svd(shifts, full_matrices=False)
+    seen = values > _SEEN * values[0]
+    return right[seen] / values[seen, None] * np.sqrt(len(shifts) / 3.0)
 
 
-def _variances(
-    gram: np.ndarray, observed: np.ndarray, pair: Pair, split: int, group: np.ndarray
-) -> tuple[float, np.ndarray]:
-    """Variance of noise, and of every group of random effects, by the evidence."""
-    beside = np.column_stack([gram[:split, split:], observed[:split]])
-    free = np.linalg.solve(gram[:split, :split], beside)
-    inner = gram[split:, split:] - gram[split:, :split] @ free[:, :-1]
-    right = observed[split:] - gram[split:, :split] @ free[:, -1]
-    square = float(pair.residual @ pair.residual - observed[:split] @ free[:, -1])
-    remaining = len(pair.residual) - split
-    prior, noise = np.full(group.max() + 1, _START_MM**2), 0.3 * square / remaining
+def _fit(
+    columns: np.ndarray, residual: np.ndarray, group: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Inverse (p, p) of the normal matrix, and variances of groups (p,) by the evidence.
+
+    The variance of the group ``_FREE`` is infinite.
+    """
+    gram, observed = columns.T @ columns, columns.T @ residual
+    free = np.flatnonzero(group == _FREE)
+    gram[free, free] += _FIRM * gram[free, free].max()
+    variance = np.full(group.max() + 1, _START_MM**2)
+    variance[_FREE], noise = np.inf, _START_MM**2
     for _ in range(_ROUNDS):
-        held = noise / prior[group]
-        spread = _inverse(inner + np.diag(held))
-        result = spread @ right
-        informed = 1.0 - held * spread.diagonal()
-        unexplained = square - 2.0 * result @ right + result @ inner @ result
-        noise = unexplained / max(remaining - informed.sum(), 1.0)
-        reported = np.bincount(group, informed, len(prior))
-        new = np.bincount(group, result**2, len(prior)) / np.maximum(reported, np.finfo(float).tiny)
-        new = np.maximum(new, _LEAST_MM**2)
-        # What is no more than a hundredth of the noise settles nothing.
-        counts = np.maximum(new, prior) > 1e-4 * noise
-        change = np.abs(np.log(new / prior))[counts].max(initial=0.0)
-        prior = new
-        if change < _SETTLED:
-            break
-    return noise, prior
+        held = noise / variance[group]
+        inverse = np.linalg.inv(gram + np.diag(held))
+        result = inverse @ observed
+        informed = 1.0 - held * inverse.diagonal()
+        unexplained = np.sum((residual - columns @ result) ** 2)
+        noise = unexplained / max(len(residual) - informed.sum(), 1.0)
+        reported = np.maximum(np.bincount(group, informed), np.finfo(float).tiny)
+        variance = np.maximum(np.bincount(group, result**2) / reported, _LEAST_MM**2)
+        variance[_FREE] = np.inf
+    return inverse, variance
 
 
-def _inverse(matrix: np.ndarray) -> np.ndarray:
-    """Inverse of a symmetric, positive definite matrix, twice as fast as that of any."""
-    lower, _ = scipy.linalg.lapack.dpotrf(matrix, lower=1)
-    half, _ = scipy.linalg.lapack.dpotri(lower, lower=1)
-    return half + np.tril(half, -1).T
-
-
-def _shares(
-    pair: Pair, columns: np.ndarray, solution: np.ndarray, inverse: np.ndarray, changes: slice
-) -> np.ndarray:
-    """Share (c, d) of every configuration in the change, by residuals of a fit without it."""
-    remaining, pull = pair.residual - columns @ solution, columns @ inverse
+def _shares(pair: Pair, columns: np.ndarray, inverse: np.ndarray) -> np.ndarray:
+    """Share (c, p) of every configuration in the result, by residuals of a fit without it."""
+    pull = columns @ inverse
+    remaining = pair.residual - pull @ (columns.T @ pair.residual)
     shares = []
     for label in np.unique(pair.cluster):
         rows = np.flatnonzero(pair.cluster == label)
-        values, vectors = np.linalg.eigh(np.eye(len(rows)) - pull[rows] @ columns[rows].T)
         # A direction that one configuration alone decides has no residual, with or without it.
-        along = vectors.T @ remaining[rows] / np.where(values > _FIRM, values, 1.0)
-        shares.append(vectors @ along @ pull[rows, changes])
+        without = np.linalg.pinv(np.eye(len(rows)) - pull[rows] @ columns[rows].T, _FIRM, True)
+        shares.append(without @ remaining[rows] @ pull[rows])
     return np.array(shares)
 
 
@@ -379,16 +345,16 @@ def joint_of(movement: Moved, prismatic: np.ndarray) -> int | None:
     floor = 1e-12 * chance * np.eye(len(movement.change))
     whiten = np.linalg.inv(scipy.linalg.cholesky(movement.covariance + floor, lower=True))
     slide, turn, along, about_ = map(ERRORS.index, ("delta_z", "eps_z", "delta_x", "eps_x"))
-    count, size = len(prismatic), len(ERRORS)
-    units = np.diag(np.tile(UNITS, count))
-    for whole in (False, True):
-        explained, remaining = np.zeros((2, count))
-        for joint in range(count):
-            link = [size + along, size + about_] if joint + 1 < count else []  # else the tool's
-            local = [slide, turn, *link] if whole else [slide if prismatic[joint] else turn]
-            ways = movement.along(units[:, [size * joint + item for item in local]])
-            ways = ways[:, np.linalg.norm(ways, axis=0) > _UNSEEN_MM]
-            fitted = ways @ np.linalg.lstsq(whiten @ ways, whiten @ movement.change)[0]
+    errors = movement.by_error.reshape(len(floor), len(prismatic), len(ERRORS))
+    errors = np.where(np.linalg.norm(errors, axis=0) > _UNSEEN_MM, errors, 0.0)
+    offset = np.where(prismatic[:, None], errors[..., [slide]], errors[..., [turn]])
+    # Errors in front of the next joint are those of this joint's link; the last link is the tool's.
+    link = np.pad(errors[:, 1:, [along, about_]], ((0, 0), (0, 1), (0, 0)))
+    for ways in (offset, np.concatenate([errors[..., [slide, turn]], link], axis=2)):
+        explained, remaining = np.zeros((2, len(prismatic)))
+        for joint in range(len(prismatic)):
+            local = ways[:, joint]
+            fitted = local @ np.linalg.lstsq(whiten @ local, whiten @ movement.change)[0]
             explained[joint] = (whiten @ movement.change) @ (whiten @ fitted)
             remaining[joint] = np.sum((movement.change - fitted) ** 2)
         best = int(np.argmax(explained))
