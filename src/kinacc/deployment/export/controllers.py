@@ -135,19 +135,30 @@ def standard_chain(model: DHModel) -> tuple[Pose, DHModel]:
     return first, DHModel(**rows, prismatic=model.prismatic)
 
 
+def origins(model: DHModel, d_ahead: bool = False) -> tuple[list[Pose], Pose]:
+    """The chain cut at its axes: k joints in the links before them, the last DH frame in its link.
+
+    A joint turns about (or slides along) the z axis of its origin, so the arm is
+    ``origin_1 Rz(q_1) origin_2 Rz(q_2) .. end``; ``d_ahead``: d goes before its joint, not behind.
+    """
+    result, before = [], IDENTITY
+    for joint in range(model.joints):
+        along = np.array([0.0, 0.0, model.d_mm[joint]])
+        turn = Pose(rotation_z(model.theta_offset_rad[joint]), along * d_ahead)
+        result.append(compose(before, turn))
+        tilt = rotation_x(model.alpha_rad[joint]) @ rotation_y(model.beta_rad[joint])
+        before = Pose(tilt, np.array([model.a_mm[joint], 0.0, 0.0]) + along * (not d_ahead))
+    return result, before
+
+
 def _ros(robot: Robot, model: DHModel) -> Numbers:
     """Origins of the joints, each in the link before it, d in front of the joint as UR has it."""
     names = _UR_LINKS if model.joints == len(_UR_LINKS) else robot.joint_names
-    numbers: Numbers = {}
-    before = IDENTITY
-    for joint, name in enumerate(names):
-        along = np.array([0.0, 0.0, model.d_mm[joint]])
-        origin = compose(before, Pose(rotation_z(model.theta_offset_rad[joint]), along))
-        parts = _ros_frame(origin).items()
-        numbers |= {f"{name.replace(' ', '_')} {key}": value for key, value in parts}
-        tilt = rotation_x(model.alpha_rad[joint]) @ rotation_y(model.beta_rad[joint])
-        before = Pose(tilt, np.array([model.a_mm[joint], 0.0, 0.0]))
-    return numbers
+    return {
+        f"{name.replace(' ', '_')} {key}": value
+        for name, origin in zip(names, origins(model, d_ahead=True)[0], strict=False)
+        for key, value in _ros_frame(origin).items()
+    }
 
 
 _ros_frame = _frame("x y z roll pitch yaw", FIXED, "m", "rad")

@@ -18,21 +18,12 @@ from lxml import etree
 
 from kinacc.calibration.frames import closed_form_start
 from kinacc.calibration.observations import full_poses
-from kinacc.deployment.export.controllers import standard_chain
+from kinacc.deployment.export.controllers import origins, standard_chain
 from kinacc.deployment.export.source import Source
 from kinacc.deployment.record import TOOL
 from kinacc.errors import input_error
-from kinacc.geometry import (
-    IDENTITY,
-    Pose,
-    compose,
-    invert,
-    rotation_x,
-    rotation_y,
-    rotation_z,
-)
+from kinacc.geometry import IDENTITY, Pose, compose, invert, rotation_x, rotation_y, rotation_z
 from kinacc.kinematics import dh as _dh
-from kinacc.kinematics.dh import DHModel
 from kinacc.kinematics.robot import Robot, forward
 from kinacc.kinematics.robot.urdf import MOVING, Joint, joints_between, load
 
@@ -193,21 +184,6 @@ def _digits(value: float) -> str:
 
 def _name(text: str) -> str:
     return text.replace(" ", "_")
-
-
-def origins(dh: DHModel) -> tuple[list[Pose], Pose]:
-    """The chain cut at its axes: k joints in the links before them, the last DH frame in its link.
-
-    Link i is what follows joint i: it turns about (or slides along) the z axis of its origin, so
-    the arm is ``origin_1 Rz(q_1) origin_2 Rz(q_2) .. end``.
-    """
-    result, before = [], IDENTITY
-    for joint in range(dh.joints):
-        turn = Pose(rotation_z(dh.theta_offset_rad[joint]), np.zeros(3))
-        result.append(compose(before, turn))
-        tilt = rotation_x(dh.alpha_rad[joint]) @ rotation_y(dh.beta_rad[joint])
-        before = Pose(tilt, np.array([dh.a_mm[joint], 0.0, dh.d_mm[joint]]))
-    return result, before
 
 
 def to_pinocchio(source: Source) -> Any:
