@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections import defaultdict
-from collections.abc import Iterable, Sequence
+from collections.abc import Hashable, Iterable, Sequence
 
 import numpy as np
 
@@ -17,12 +16,11 @@ from kinacc.deployment.programs.record import (
     TOOL,
     Frames,
     Language,
+    Moves,
     Position,
     Program,
     Source,
-    Use,
     blanked,
-    in_use,
 )
 from kinacc.geometry import compose
 
@@ -75,54 +73,45 @@ def frames_of(source: Source) -> Frames:
 def read(sources: Sequence[Source], _: np.ndarray | None) -> Program:
     """Positions of a module."""
     (source,) = sources
-    text = _plain(source)
-    ends = {target.start(): target.end() for target in _TARGET.finditer(text)}
-    names: dict[int, str] = {}
-    uses: dict[int, set[tuple[str | None, str | None]]] = defaultdict(set)
-    refused: dict[str | None, str] = {}
-    computed: list[str] = []
-    moves: list[tuple[str, set[str]]] = []
-    assigned: list[tuple[str, str]] = []
+    text, moves = _plain(source), Moves()
     for data in _FRAME_DATA.finditer(text):
         holds, programmed = data[3].upper(), data[1] or (data[4] or "").upper()
         if holds == ("FALSE" if data[1] else "TRUE") or programmed == "FALSE":
-            refused[data[2].upper()] = STILL
-    for part in re.finditer(r"[^;\s][^;]*", text):
-        statement, line = part[0], source.statement(part.start(), part[0])
-        here = [start for start in ends if part.start() <= start < part.end()]
-        if named := _TARGET_DATA.search(statement):
-            names |= dict.fromkeys(here, named[1])
-        elif _MOVE.match(statement):
-            bare = re.sub(r"\[.*?\](?=\s*[,\\])|\(.*\)", "", statement, flags=re.S).upper()
+            moves.refused |= dict.fromkeys(_frames(data[2]), STILL)
+    statements = [*re.finditer(r"[^;\s][^;]*", text)]
+    for statement in statements:
+        if data := _TARGET_DATA.search(statement[0]):
+            for target in _TARGET.finditer(text, *statement.span()):
+                position = _position(data[1], source, *target.span())
+                moves.positions.append((data[1].upper(), position))
+    declared = {name for name, _ in moves.positions}
+    for statement in statements:
+        words = statement[0]
+        assigned = re.match(r"\s*(\w+)\s*(?:\{[^}]*\}\s*)?:=", words)
+        is_lost = assigned and assigned[1].upper() in declared
+        if _MOVE.match(words):
+            bare = re.sub(r"\[.*?\](?=\s*[,\\])|\(.*\)", "", words, flags=re.S).upper()
             tool = re.match(r"\s*(\w+)", bare.split(",")[-1])
-            work = re.search(r"\\WOBJ\s*:=\s*(\w+)", statement.upper())
-            names_used = {*re.findall(r"(?<!\\)\b[A-Z]\w*", bare)}
-            if not here and not _COMPUTED.search(statement):
-                moves.append((line, names_used))
-            here += [start for start, name in names.items() if name.upper() in names_used]
-            for start in here:
-                way = tool and tool[1], work[1] if work else "WOBJ0"
-                uses[start].add(way)
-        else:
-            ends = {start: end for start, end in ends.items() if start not in here}
-            if target := re.match(r"\s*(\w+)\s*(?:\{[^}]*\}\s*)?:=", statement):
-                assigned.append((line, target[1].upper()))
-        if _COMPUTED.search(statement):
-            computed.append(line)
-        if changed := _SET.match(statement):
-            refused[changed[1].upper()] = CHANGED
-    defined = {name.upper() for name in names.values()}
-    computed += [line for line, words in moves if not words & defined]
-    computed += [line for line, name in assigned if name in defined]
-    positions = []
-    for start, end in ends.items():
-        ways: set[Use] = {
-            (tool, base, refused.get(tool) or refused.get(base, ""))
-            for tool, base in uses.get(start, {(None, None)})
-        }
-        name = names.get(start, source.line(start))
-        positions.append(in_use(_position(name, source, start, end), ways))
-    return Program(sources, positions, CONVENTION, [*dict.fromkeys(computed)])
+            work = re.search(r"\\WOBJ\s*:=\s*(\w+)", words.upper())
+            used: list[Hashable] = []
+            for target in _TARGET.finditer(text, *statement.span()):
+                used.append(target.start())
+                position = _position(source.line(target.start()), source, *target.span())
+                moves.positions.append((target.start(), position))
+            used += [name for name in re.findall(r"(?<!\\)\b[A-Z]\w*", bare) if name in declared]
+            for key in used:
+                moves.use(key, tool and tool[1], work[1] if work else "WOBJ0")
+            is_lost = not used
+        if is_lost or _COMPUTED.search(words):
+            moves.not_corrected.append(source.statement(statement.start(), words))
+        if changed := _SET.match(words):
+            moves.refused |= dict.fromkeys(_frames(changed[1]), CHANGED)
+    return moves.program(sources, CONVENTION)
+
+
+def _frames(name: str) -> list[tuple[str, str]]:
+    """Keys of a frame that may be a tool or a work object."""
+    return [(kind, name.upper()) for kind in (TOOL, BASE)]
 
 
 def _position(name: str, source: Source, start: int, end: int) -> Position:

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
-from dataclasses import replace
 
 import numpy as np
 
@@ -17,15 +15,16 @@ from kinacc.deployment.programs.record import (
     NUMBER,
     STILL,
     TOOL,
+    UNUSED,
     Frames,
     Language,
+    Moves,
     Place,
     Position,
     Program,
     Source,
     Use,
     blanked,
-    in_use,
 )
 
 CONVENTION = Convention(KUKA)
@@ -51,7 +50,6 @@ _SIDES = (
     ("elbow down", "elbow up"),
     ("wrist positive", "wrist negative"),
 )
-_UNUSED: Use = (None, None, "")
 Parts = dict[str, tuple[str, Place]]
 
 
@@ -68,57 +66,53 @@ def frames_of(source: Source) -> Frames:
 
 def read(sources: Sequence[Source], _: np.ndarray | None) -> Program:
     """Positions of a KRL program."""
-    data: dict[str, Use] = {}
-    positions: dict[str, Position] = {}
-    uses: dict[str, set[Use]] = defaultdict(set)
-    changed, computed, moves = set(), [], []
+    moves, data = Moves(), dict[str, Use]()
+    targets: list[tuple[str, list[str]]] = []
+    assigned: set[str] = set()
     for source in sorted(sources, key=lambda source: source.path.suffix.lower()):  # .dat first
-        use = _UNUSED
+        use = UNUSED
         for offset, text in _lines(source.text):
             statement, aggregates = source.statement(offset, text), list(_aggregates(offset, text))
             use = _in_force(use, text, data, source.where(offset))
-            changed |= {(kind.lower(), str(int(n))) for kind, n in _CHANGED.findall(text)}
+            for kind, number in _CHANGED.findall(text):
+                moves.refused[kind.lower(), str(int(number))] = CHANGED
             if motion := _MOTION.match(text):
-                inline = {
-                    source.line(offset) + " end" * number: _position(source, parts)
+                written = [
+                    _position(source, source.line(offset) + " end" * number, parts)
                     for number, parts in enumerate(aggregates[: 2 if motion[1] else 1])
-                }
+                ]
+                inline = [(position.name, position) for position in written if position]
                 target = re.split(r"\bWITH\b|\bC_\w+", re.sub(r"\{[^}]*\}", "", motion[3]))[0]
-                written = {name: position for name, position in inline.items() if position}
-                if motion[2] or ":" in target or len(written) < len(inline):
-                    computed.append(statement)
+                if motion[2] or ":" in target or len(inline) < len(written):
+                    moves.not_corrected.append(statement)
                     continue
-                positions |= written
+                moves.positions += inline
                 target = re.sub(r"\[.*?\]", "", target.upper())
                 names = [name for name in re.findall(r"\$?\b[A-Z_]\w*", target) if name != "CA"]
-                moves.append((statement, names))
+                targets.append((statement, names))
                 in_line = (data[word] for word in re.findall(r"\w+", text.upper()) if word in data)
                 way = next(in_line, use)
-                for name in (*names, *inline):
-                    uses[name].add(way)
+                for name in (*names, *dict(inline)):
+                    moves.use(name, *way)
             elif _COMPONENT.match(text):
-                computed.append(statement)
-            elif aggregates and (assigned := _ASSIGNED.match(text)):
-                name, parts = re.sub(r"\s", "", assigned[1].upper()), aggregates[0]
+                moves.not_corrected.append(statement)
+            elif aggregates and (variable := _ASSIGNED.match(text)):
+                name, parts = re.sub(r"\s", "", variable[1].upper()), aggregates[0]
                 if {"TOOL_NO", "BASE_NO"} <= set(parts):
                     still = "#TCP" in parts.get("IPO_FRAME", ("",))[0].upper()
                     data[name] = parts["TOOL_NO"][0], parts["BASE_NO"][0], STILL if still else ""
-                elif "_DATA" not in name and (position := _position(source, parts)):
-                    if name in positions or re.search(r"\}\s*:|:\s*\{", text):
-                        computed.append(statement)
+                elif "_DATA" not in name and (position := _position(source, name, parts)):
+                    if name in assigned or re.search(r"\}\s*:|:\s*\{", text):
+                        moves.not_corrected.append(statement)
                     else:
-                        positions[name] = position
-    defined = {name.split("[")[0] for name in positions}
-    result, order = [], {name: number for number, name in enumerate(uses)}  # of the moves
-    for name in sorted(positions, key=lambda item: order.get(item.split("[")[0], len(order))):
-        ways = {
-            (tool, base, CHANGED if {(TOOL, tool), (BASE, base)} & changed else reason)
-            for tool, base, reason in uses.get(name.split("[")[0])
-            or [data.get(f"F{name[1:]}", _UNUSED)]
-        }
-        result.append(in_use(replace(positions[name], name=name), ways))
-    computed += [statement for statement, names in moves if not defined.issuperset(names)]
-    return Program(sources, result, CONVENTION, computed)
+                        assigned.add(name)
+                        moves.positions.append((name.split("[")[0], position))
+    defined = {name for name, _ in moves.positions}
+    moves.not_corrected += [text for text, names in targets if not defined.issuperset(names)]
+    for name, _unused in moves.positions:
+        if name not in moves.uses:
+            moves.use(name, *data.get(f"F{str(name)[1:]}", UNUSED))
+    return moves.program(sources, CONVENTION)
 
 
 def posture(sides: Sequence[bool], q_deg: np.ndarray) -> tuple[str, ...]:
@@ -160,7 +154,7 @@ def _places(parts: Parts, keys: Sequence[str]) -> list[Place]:
 def _in_force(use: Use, text: str, data: dict[str, Use], where: str) -> Use:
     """The frames after a line that may set them."""
     if active := re.search(r"\bFDAT_ACT\s*=\s*(\w+)", text, re.I):
-        return data.get(active[1].upper(), _UNUSED)
+        return data.get(active[1].upper(), UNUSED)
     *frames, reason = use
     if mode := re.search(r"\bIPO_MODE\s*=\s*#(TCP|BASE)\b", text, re.I):
         reason = STILL if mode[1].upper() == "TCP" else ""
@@ -169,16 +163,16 @@ def _in_force(use: Use, text: str, data: dict[str, Use], where: str) -> Use:
         if number or variable.upper() == "$NULLFRAME":
             frames[column] = str(int(number or 0))
         elif named:
-            frames[column] = data.get(named.upper(), _UNUSED)[column]
+            frames[column] = data.get(named.upper(), UNUSED)[column]
         else:
             frames[column] = variable or where
     return frames[0], frames[1], CHANGED if _MOVED.search(text) else reason
 
 
-def _position(source: Source, parts: Parts) -> Position | None:
+def _position(source: Source, name: str, parts: Parts) -> Position | None:
     """The position of an aggregate; None where some of its numbers are missing."""
     if places := _places(parts, _AXES):
-        return Position("", source, places, 4, 1.0)
+        return Position(name, source, places, 4, 1.0)
     if not (places := _places(parts, _FRAME)):
         return None
     status, turn = (_whole(parts[key][0]) if key in parts else 0 for key in "ST")
@@ -187,7 +181,7 @@ def _position(source: Source, parts: Parts) -> Position | None:
     outer = [parts[key][0] for key in parts if re.fullmatch(r"E[1-6]", key)]
     moves = any(re.fullmatch(NUMBER, text) and float(text) for text in outer)
     stated = _stated(status, turn) if {*"ST"} <= set(parts) else ()
-    return Position("", source, places, 4, posture=stated, moves_outside=moves)
+    return Position(name, source, places, 4, posture=stated, moves_outside=moves)
 
 
 def _whole(text: str) -> int | None:

@@ -7,7 +7,7 @@ comes back unchanged, whatever the encoding and the line ends.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -108,16 +108,6 @@ class Position:
         return self.source.where(self.places[0][0])
 
 
-Use = tuple[str | None, str | None, str]  # tool, base, and why these cannot be corrected
-
-
-def in_use(position: Position, uses: Collection[Use]) -> Position:
-    """The position with the frames of its uses; refused where these differ."""
-    tool, base, reason = next(iter(uses))
-    reason = SEVERAL if len(uses) > 1 else reason
-    return replace(position, tool=tool, base=base, refused=reason)
-
-
 @dataclass(frozen=True)
 class Program:
     """A program as read.
@@ -142,6 +132,41 @@ class Program:
         place = self.convention.pose(position.numbers, position.where)
         tool = invert(self.frame(TOOL, position))
         return compose(compose(self.frame(BASE, position), place), tool)
+
+
+Use = tuple[str | None, str | None, str]  # tool, base, and why these cannot be corrected
+UNUSED: Use = (None, None, "")
+
+
+class Moves:
+    """Positions of a program as they are read, and the frames of the moves that use them.
+
+    ``positions``: with the key that moves have for them; ``uses``: by key, in the order of the
+    moves; ``refused``: why positions with a frame, by kind and name, cannot be corrected.
+    """
+
+    def __init__(self) -> None:
+        self.positions: list[tuple[Hashable, Position]] = []
+        self.uses: dict[Hashable, set[Use]] = {}
+        self.refused: dict[tuple[str, str | None], str] = {}
+        self.not_corrected: list[str] = []
+        self.frames: Frames = {}
+
+    def use(self, key: Hashable, tool: str | None, base: str | None, reason: str = "") -> None:
+        """A move that uses the positions of a key."""
+        self.uses.setdefault(key, set()).add((tool, base, reason))
+
+    def program(self, sources: Sequence[Source], convention: Convention) -> Program:
+        """The program, its positions in the order of the moves, with the frames of these."""
+        keys = dict.fromkeys([*self.uses, *dict(self.positions)])
+        order, positions = {key: number for number, key in enumerate(keys)}, []
+        for key, position in sorted(self.positions, key=lambda item: order[item[0]]):
+            uses = self.uses.get(key, {UNUSED})
+            tool, base, reason = next(iter(uses))
+            reason = self.refused.get((TOOL, tool)) or self.refused.get((BASE, base)) or reason
+            reason = SEVERAL if len(uses) > 1 else reason
+            positions.append(replace(position, tool=tool, base=base, refused=reason))
+        return Program(sources, positions, convention, self.not_corrected, self.frames)
 
 
 @dataclass(frozen=True)

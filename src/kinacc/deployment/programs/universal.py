@@ -13,15 +13,13 @@ from kinacc.deployment.programs.record import (
     NUMBER,
     ROBOT,
     TOOL,
-    Frames,
     Language,
+    Moves,
     Place,
     Position,
     Program,
     Source,
-    Use,
     blanked,
-    in_use,
 )
 
 CONVENTION = Convention(VECTOR, 1e3, 180.0 / np.pi)
@@ -41,9 +39,7 @@ def read(sources: Sequence[Source], _: np.ndarray | None) -> Program:
     named: dict[str, list[Place]] = defaultdict(list)
     for place, name in names.items():
         named[name].append(place)
-    frames: Frames = {}
-    uses: dict[Place, set[Use]] = defaultdict(set)
-    tool, near, computed = None, {}, []
+    moves, tool, near = Moves(), None, {}
     for call in _CALL.finditer(text):
         start = call.end()
         for _number in range(2 if call[1] == "movec" else 1):
@@ -55,23 +51,22 @@ def read(sources: Sequence[Source], _: np.ndarray | None) -> Program:
             if call[1] == "set_tcp":
                 tool = f"set_tcp in {source.line(call.start())}" if spans else "set_tcp"
                 if len(spans) == 1:
-                    frames[TOOL, tool] = CONVENTION.pose(source.values(source.numbers(*spans[0])))
-                break
-            if not spans:
+                    frame = CONVENTION.pose(source.values(source.numbers(*spans[0])))
+                    moves.frames[TOOL, tool] = frame
+            elif not spans:
                 line = text[call.start() :].splitlines()[0]
-                computed.append(source.statement(call.start(), line))
+                moves.not_corrected.append(source.statement(call.start(), line))
                 break
-            for span in spans:
-                uses[span].add((tool, ROBOT, ""))
+            for span in spans if call[1] != "set_tcp" else ():
+                moves.use(span, tool, ROBOT)
                 if argument and argument[1] and argument[4] in named:
                     near[span] = source.values(source.numbers(*named[argument[4]][-1]))
-    positions = []
-    for span in uses:  # in the order of the moves
+    for span in moves.uses:
         scale = None if text[span[0]] == "p" else np.pi / 180.0
         name, places = names.get(span, source.line(span[0])), source.numbers(*span)
         position = Position(name, source, places, 6, scale, near_rad=near.get(span))
-        positions.append(in_use(position, uses[span]))
-    return Program(sources, positions, CONVENTION, computed, frames)
+        moves.positions.append((span, position))
+    return moves.program(sources, CONVENTION)
 
 
 LANGUAGE = Language("URScript", (".script", ".urscript"), CONVENTION, read)
