@@ -35,7 +35,7 @@ from kinacc.calibration.frames import known
 from kinacc.calibration.observations import Observations, full_poses
 from kinacc.deployment import history_model
 from kinacc.deployment.history import LEVEL
-from kinacc.deployment.history_model import Pair, Setup
+from kinacc.deployment.history_model import Pair
 from kinacc.kinematics import robot as robots
 from kinacc.synthetic import plan
 from kinacc.synthetic.accepted import accepted_draw, rows
@@ -45,7 +45,7 @@ from kinacc.synthetic.physical import PhysicalRobot, Visits
 POSES, MONTHS = 100, 12
 NOISE_MM, WEIGHT_MM_PER_RAD = 0.02, 500.0
 HALL_K, GROWTH_PER_K = 5.0, 1.2e-5  # standard deviation of months; of steel
-SETUP = Setup(same_base=False, same_tool=True)
+MOVED = {"base"}
 SAME, OTHER = "same", "other"
 POOL = 20_000
 
@@ -88,7 +88,7 @@ class Arm:
 
     def pair(self, first: Observations, second: Observations) -> Pair:
         """Both, about the arm's geometry."""
-        both = history_model.joined(first, second, SETUP)
+        both = history_model.joined(first, second, MOVED)
         frames = known(sessions=len(both.session_names))
         return history_model.about(self.true.dh, frames, both, len(first), WEIGHT_MM_PER_RAD)
 

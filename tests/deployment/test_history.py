@@ -17,7 +17,7 @@ from small_arms import results_of
 from kinacc.calibration.observations import full_poses
 from kinacc.deployment import history as histories
 from kinacc.deployment.history import LEVEL, session_of
-from kinacc.deployment.history_model import Moved, Setup, misfit_factor, understated
+from kinacc.deployment.history_model import Moved, misfit_factor, understated
 from kinacc.geometry import Pose
 from kinacc.kinematics import robot as robots
 from kinacc.measurements.orientation import euler
@@ -117,7 +117,7 @@ def test_what_was_moved_counts_since_the_line_in_force_and_not_before_it():
 
 def test_readings_of_the_line_in_force_are_not_compared_with_themselves():
     old, new = month(1), month(2, KNOCK_RAD)
-    both = histories.joined(new, old, Setup(True, True))
+    both = histories.joined(new, old, set())
     first, second = session(old, 1), session(new, 2)
     alone, grown = (history(first, replace(second, observations=each)) for each in (new, both))
     assert grown["verdict"][1] == "recalibrate"

@@ -8,7 +8,7 @@ that is no test of the arm but of the model, and nothing can be told.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -22,7 +22,7 @@ from kinacc.calibration.observations import Observations, from_columns
 from kinacc.calibration.summary import held_out_errors
 from kinacc.config.error_models import PLAINEST
 from kinacc.deployment import folder, history_model
-from kinacc.deployment.history_model import Setup, joined
+from kinacc.deployment.history_model import joined
 from kinacc.deployment.record import Calibration
 from kinacc.deployment.shared_readings import known_readings
 from kinacc.deployment.verify import (
@@ -107,11 +107,9 @@ def history(
         The table ``history``: one row a session.
     """
     rows: list[dict[str, Any]] = []
-    force, setup = None, Setup(True, True)
+    force, moved = None, set[str]()
     for session in sorted(sessions, key=lambda session: session.date):
-        setup = Setup(
-            setup.same_base and session.base == SAME, setup.same_tool and session.tool == SAME
-        )
+        moved |= {frame for frame in (BASE, TOOL) if getattr(session, frame) != SAME}
         row: dict[str, Any] = dict.fromkeys(column.name for column in ARTEFACTS["history"].columns)
         row |= session.facts
         row |= {
@@ -127,16 +125,16 @@ def history(
         }
         if force is not None:
             row |= {"in_force": force.name} | _compared(
-                force, session, setup, rotation_weight_mm_per_rad, level
+                force, session, moved, rotation_weight_mm_per_rad, level
             )
         rows.append(row)
         if row["verdict"] in (FIRST, RECALIBRATE):
-            force, setup = session, Setup(True, True)
+            force, moved = session, set()
     return columns_of("history", rows)
 
 
 def _compared(
-    force: Session, session: Session, setup: Setup, weight: float, level: float
+    force: Session, session: Session, moved: Set[str], weight: float, level: float
 ) -> dict[str, Any]:
     """What a row says of ``session`` while the calibration of ``force`` was in force.
 
@@ -147,28 +145,28 @@ def _compared(
     session = replace(session, observations=session.observations.select(~shared))
     row: dict[str, Any] = {}
     try:
-        row |= _sizes("in_force", _errors_mm(force, session, setup, weight))
+        row |= _sizes("in_force", _errors_mm(force, session, moved, weight))
         for item in (force, session):
             if _count(item.observations) < LEAST_HELD_OUT:
                 message = f"fewer than {LEAST_HELD_OUT} configurations in {item.name}"
                 return row | {"verdict": OPEN, "reason": message}
-        return row | _moved(force, session, setup, weight, level)
+        return row | _change(force, session, moved, weight, level)
     except (FitError, InputError) as problem:
         return row | {"verdict": OPEN, "reason": str(problem)}
 
 
 @one_thread
-def _moved(
-    force: Session, session: Session, setup: Setup, weight: float, level: float
+def _change(
+    force: Session, session: Session, moved: Set[str], weight: float, level: float
 ) -> dict[str, Any]:
     """What moved, what chance shows, and the verdict. Raises FitError."""
     prismatic = session.calibration.robot.dh.prismatic
     first, second = _thinned(force.observations), _thinned(session.observations)
-    pair, misfit = _pair(force, first, second, setup, weight), 1.0
+    pair, misfit = _pair(force, first, second, moved, weight), 1.0
     if not pair.in_both.all():
         misfit = history_model.misfit_factor(*(
             history_model.understated(
-                _pair(item, *half, setup, weight) for half in history_model.halves(series)
+                _pair(item, *half, moved, weight) for half in history_model.halves(series)
             )
             for item, series in ((force, first), (session, second))
         ))  # fmt: skip
@@ -199,37 +197,31 @@ def _moved(
 
 
 def _pair(
-    session: Session, first: Observations, second: Observations, setup: Setup, weight: float
+    session: Session, first: Observations, second: Observations, moved: Set[str], weight: float
 ) -> history_model.Pair:
     """Two series about the fitted DH model of a session, with their bases and targets."""
-    robot, both = session.calibration.robot, joined(first, second, setup)
+    robot, both = session.calibration.robot, joined(first, second, moved)
     counts = len(both.session_names), len(both.target_names)
     terms = frame_terms(both, known(robot.base, carried(robot), *counts))
     frames = fit_frames(both, session.dh, rotation_weight_mm_per_rad=weight, frames=terms)
     return history_model.about(session.dh, frames, both, len(first), weight)
 
 
-def _errors_mm(force: Session, session: Session, setup: Setup, weight: float) -> np.ndarray:
+def _errors_mm(force: Session, session: Session, moved: Set[str], weight: float) -> np.ndarray:
     """Position errors (n,) of the calibration in force where its model covers the joints.
 
-    Base and tool that were moved are fitted to the rows outside each fold, to all without.
+    Base and tool that were moved are fitted.
     """
     calibration, observed = force.calibration, session.observations
-    beyond = outside(observed.q_rad, calibration.model.domain)
-    observed = observed.select(~np.any(beyond, axis=1))
-    moved = [BASE] * (not setup.same_base or len(observed.session_names) > 1)
-    moved += [TOOL] * (
-        not setup.same_tool or not {*observed.target_names} <= {*calibration.targets}
-    )
-    sizes = [np.zeros(0)]
-    for fold in np.unique(observed.fold):
-        tried = observed.fold == fold
-        train = observed.select(~tried if fold >= 0 else tried)
-        if len(train):
-            frames = frames_at(calibration, train, moved, weight)
-            off = errors_of(calibration, frames, observed.select(tried))
-            sizes.append(np.linalg.norm(off.position_mm, axis=1))
-    return np.concatenate(sizes)
+    observed = observed.select(~outside(observed.q_rad, calibration.model.domain).any(axis=1))
+    if not len(observed):
+        return np.zeros(0)
+    if len(observed.session_names) > 1:
+        moved = {*moved, BASE}
+    if not {*observed.target_names} <= {*calibration.targets}:
+        moved = {*moved, TOOL}
+    frames = frames_at(calibration, observed, moved, weight)
+    return np.linalg.norm(errors_of(calibration, frames, observed).position_mm, axis=1)
 
 
 def _thinned(observations: Observations) -> Observations:

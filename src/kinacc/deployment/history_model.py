@@ -23,7 +23,7 @@ readings of one configuration go together, in both series.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Set
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -32,8 +32,8 @@ import scipy
 
 from kinacc.calibration import vec_fit
 from kinacc.calibration.fitting import PoseSystem
-from kinacc.calibration.frames import Frames, frame_terms
-from kinacc.calibration.observations import Observations
+from kinacc.calibration.frames import BASE, Frames, frame_terms
+from kinacc.calibration.observations import TOOL, Observations
 from kinacc.kinematics import vec
 from kinacc.kinematics.dh import DHModel
 from kinacc.kinematics.vec import ERRORS
@@ -53,13 +53,6 @@ _START_MM = 0.1
 _CLEAR = 0.95  # probability that it is this joint, if it is one and each is as likely before
 _MOST = 0.5  # of the squared movement beyond chance
 _UNSEEN_MM = 1e-3  # by one mm or mrad: base or tool would take it up
-
-
-class Setup(NamedTuple):
-    """Whether base and tool of the second series are those of the first."""
-
-    same_base: bool
-    same_tool: bool
 
 
 @dataclass(frozen=True)
@@ -159,15 +152,18 @@ def halves(series: Observations) -> Iterator[tuple[Observations, Observations]]:
         yield series.select(~is_second), series.select(is_second)
 
 
-def joined(first: Observations, second: Observations, setup: Setup) -> Observations:
-    """Both series as one; sessions and targets of the second are those of the first if the same."""
+def joined(first: Observations, second: Observations, moved: Set[str]) -> Observations:
+    """Both series as one; sessions and targets of the second are those of the first by name.
+
+    Unless base or tool, or both, were ``moved`` between the series.
+    """
     names = ("q_rad", "s", "position_mm", "rotation", "repeat", "fold", "payload")
     columns: dict[str, Any] = {
         name: np.concatenate([getattr(first, name), getattr(second, name)]) for name in names
     }
-    for name, same in (("session", setup.same_base), ("target", setup.same_tool)):
+    for name, frame in (("session", BASE), ("target", TOOL)):
         before, after = (getattr(item, f"{name}_names") for item in (first, second))
-        if not same:
+        if frame in moved:
             after = [f"{item}, second series" if item in before else item for item in after]
         every = tuple(dict.fromkeys([*before, *after]))
         number = np.array([every.index(item) for item in after])[getattr(second, name)]

@@ -8,21 +8,23 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from itertools import compress
 
 import numpy as np
 import scipy
 from scipy.spatial import cKDTree
 
 from kinacc.calibration import frames
+from kinacc.calibration.dh_estimator import free_parameters
+from kinacc.calibration.fitting import PoseSystem
 from kinacc.calibration.identifiability import STRUCTURAL, LeftOpen, joints_anywhere
-from kinacc.calibration.uncertainty import Uncertainty
-from kinacc.deployment.applicability import BLOCK, sensitivity
-from kinacc.deployment.record import TOOL, Calibration, nominal
+from kinacc.calibration.observations import full_poses
+from kinacc.calibration.uncertainty import scale_of
 from kinacc.errors import Problem, input_error, refuse, require_type
 from kinacc.geometry import Pose, compose
 from kinacc.kinematics import dh
+from kinacc.kinematics.dh import DHModel
 from kinacc.kinematics.inverse.limits import outside, travel_unit
-from kinacc.kinematics.model import JointState
 from kinacc.kinematics.region import points
 from kinacc.kinematics.robot import Robot
 
@@ -228,35 +230,34 @@ def tool_positions(robot: Robot, joints: np.ndarray, tool: Pose | None) -> np.nd
 
 def information(robot: Robot, q_rad: np.ndarray, experiment: Experiment) -> Information:
     """Information of poses at reported joints (n, k), rad and mm."""
-    beta = {f"j{joint}.beta_rad" for joint in experiment.hayati_joints}
-    names = tuple(item for item in robot.dh.names if not item.endswith("beta_rad") or item in beta)
-    motions = frames.MOTIONS if experiment.orientation else frames.MOTIONS[:3]
-    base = [f"{frames.BASE}.{motion}" for motion in frames.MOTIONS]
-    names = (*base, *(f"{TOOL}.{motion}" for motion in motions), *names)
-    blank = Uncertainty(names, np.eye(len(names)), np.zeros((0, len(names))))
-    arm = replace(nominal(robot), targets={TOOL: experiment.tool}, known=blank)
-    slopes = _slopes(arm, robot.dh_joints(np.atleast_2d(q_rad)), experiment)
+    slopes, names = _slopes(robot.dh, robot.dh_joints(np.atleast_2d(q_rad)), experiment)
     flat = slopes.reshape(-1, len(names))
     _, values, right = np.linalg.svd(flat, full_matrices=len(flat) < len(names))
     rank = int(np.sum(values > experiment.threshold * values[0]))
-    lost, known = right[rank:], frames.known(arm.base, experiment.tool)
-    anywhere = _slopes(arm, joints_anywhere(arm.robot.dh), experiment).reshape(-1, len(names))
-    _, everywhere, axes = np.linalg.svd(anywhere)
+    lost = right[rank:]
+    anywhere, _ = _slopes(robot.dh, joints_anywhere(robot.dh), experiment)
+    _, everywhere, axes = np.linalg.svd(anywhere.reshape(-1, len(names)))
     hidden = axes[int(np.sum(everywhere > STRUCTURAL * everywhere[0])) :]
-    left_open = LeftOpen.of(hidden if len(lost) else lost, lost, names, known)
+    stated = frames.known(tool=experiment.tool)
+    left_open = LeftOpen.of(hidden if len(lost) else lost, lost, names, stated)
     return Information(slopes @ right[:rank].T, rank, left_open)
 
 
-def _slopes(arm: Calibration, q_dh: np.ndarray, experiment: Experiment) -> np.ndarray:
-    """Movement (n, m, P) of what is measured at DH joints (n, k), per mm or mrad."""
-    weight = np.array([1.0, 1.0, 1.0, *[experiment.rotation_weight_mm_per_rad] * 3])
-    observed = 6 if experiment.orientation else 3
-    slopes = np.empty((len(q_dh), observed, len(arm.units)))
-    for begin in range(0, len(q_dh), BLOCK):
-        block = slice(begin, begin + BLOCK)
-        part = sensitivity(arm, JointState(q_dh[block]), "instrument", TOOL)
-        slopes[block] = (part * weight[:, None])[:, :observed] * arm.units
-    return slopes
+def _slopes(
+    model: DHModel, q_dh: np.ndarray, experiment: Experiment
+) -> tuple[np.ndarray, tuple[str, ...]]:
+    """Movement (n, m, P) of what is measured at DH joints (n, k), per mm or mrad of parameters."""
+    observed = full_poses(q_dh, compose(dh.forward(model, q_dh), experiment.tool))
+    if not experiment.orientation:
+        observed = replace(observed, rotation=np.full_like(observed.rotation, np.nan))
+    terms = frames.frame_terms(observed, frames.known(tool=experiment.tool))
+    free = free_parameters(model.joints, experiment.hayati_joints).ravel()
+    system = PoseSystem(observed, model, free, terms, experiment.rotation_weight_mm_per_rad)
+    start = np.concatenate([terms.begin, model.start[free]])
+    slopes = np.concatenate([jacobian for _, jacobian in system.blocks(start)])
+    names = (*terms.names, *compress(model.names, free))
+    units = [scale_of(name) for name in names]
+    return slopes.reshape(len(q_dh), -1, len(names)) * units, names
 
 
 def choose(rows: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:

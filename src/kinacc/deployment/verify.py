@@ -7,7 +7,7 @@ errors of the selected model with its held-out errors.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -312,7 +312,7 @@ def errors_of(calibration: Calibration, frames: Frames, readings: Observations) 
 def frames_at(
     calibration: Calibration,
     readings: Observations,
-    moved: Sequence[str],
+    moved: Collection[str],
     rotation_weight_mm_per_rad: float,
 ) -> Frames:
     """Bases and targets of ``readings``: those of the calibration, or fitted to it where ``moved``.
