@@ -85,7 +85,8 @@ def test_columns_are_those_of_what_was_moved_and_of_the_joints_as_reported():
         return (flange.position_mm[:, None] + turned).reshape(5, 6)
 
     seen = full_poses(arm.dh_joints(q), dh.forward(arm.dh, arm.dh_joints(q)))
-    found = error_columns(arm.dh, arm, seen, points, ("base", "tool"), np.zeros((5, 2, 3)))
+    seen = replace(seen.select(np.repeat(np.arange(5), 2)), target=np.tile([0, 1], 5))
+    found = error_columns(arm.dh, arm, seen, points, ("base", "tool"), np.zeros((10, 3)))
     assert found.fitted == 12
     for number, step in enumerate(0.1 * np.eye(18)):
         per_unit = (at(step) - at(-step)) / 0.2

@@ -163,9 +163,8 @@ def verify(
     new = replace(new, rotation=np.full_like(new.rotation, np.nan))
     calibration = _at_session(tables, kind, new, moved)
     frames = frames_at(calibration, new, moved, rotation_weight_mm_per_rad)
-    off_mm = errors_of(calibration, frames, new).position_mm.reshape(*rows.shape, 3)
-    poses = new.select(slice(None, None, rows.shape[1]))
-    fresh = error_columns(model, robot, poses, frames.targets, moved, off_mm)
+    off_mm = errors_of(calibration, frames, new).position_mm
+    fresh = error_columns(model, robot, new, frames.targets, moved, off_mm)
     result = replace(result, here=_level(fresh))
     if fresh.columns[..., -1].size <= fresh.rank:
         return replace(result, reason="base and tool explain all that these poses show")
@@ -241,38 +240,39 @@ def _held_out(
     if not len(rows):
         return None
     targets = frames_of(tables["frames"], kind, names, measured.session_names).targets
-    return error_columns(model, robot, measured.select(rows[:, 0]), targets, moved, vectors[rows])
+    every = rows.ravel()
+    return error_columns(model, robot, named.select(every), targets, moved, vectors[every])
 
 
 def error_columns(
     model: ErrorModel,
     robot: Robot,
-    at: Observations,
+    readings: Observations,
     targets: Pose,
     moved: Sequence[str],
     off_mm: np.ndarray,
 ) -> ErrorColumns:
-    """Motions of what moved, offsets of reported joints, errors ``off_mm`` (n, K, 3) in the base.
+    """Motions of what moved, offsets of reported joints, errors ``off_mm`` (n K, 3) in the base.
 
-    A joint stands at the reported position plus its offset.
+    ``readings`` are those of all K ``targets``, configuration by configuration. A joint stands at
+    the reported position plus its offset.
     """
-    flange = model.pose(at.at)
+    flange = model.pose(readings.at)
+    arm = (flange.rotation @ targets.position_mm[readings.target][..., None])[..., 0]
     units = np.where(model.dh.prismatic, 1.0, ANGLE_UNIT_RAD)
-    slopes = model.joint_jacobian(at.at) @ robot.joint_map * units
-    count, kinds, parts = *off_mm.shape[:2], []
-    turned = np.repeat(flange.rotation, kinds, axis=0)
-    arm = (turned @ np.tile(targets.position_mm, (count, 1))[..., None])[..., 0]
+    slopes = model.joint_jacobian(readings.at) @ robot.joint_map * units
+    motions = [np.zeros((len(arm), 3, 0))]
     if BASE in moved:
-        place = np.repeat(flange.position_mm, kinds, axis=0) + arm
         scale = np.repeat([1.0, ANGLE_UNIT_RAD], 3)
-        parts.append(frame_motions(np.eye(3), place)[:, :3] * scale)
+        motions.append(frame_motions(np.eye(3), flange.position_mm + arm)[:, :3] * scale)
+    kinds = np.eye(len(targets.position_mm))
     if TOOL in moved:
-        shifts = np.einsum("nij,nk->nikj", turned, np.tile(np.eye(kinds), (count, 1)))
-        parts.append(shifts.reshape(len(shifts), 3, -1))
-    fitted = sum(part.shape[2] for part in parts)
-    slopes = np.repeat(slopes, kinds, axis=0)
-    parts += [slopes[:, :3] - skew(arm) @ slopes[:, 3:], off_mm.reshape(-1, 3, 1)]
-    return ErrorColumns(np.concatenate(parts, axis=2).reshape(count, 3 * kinds, -1), fitted)
+        shifts = np.einsum("nij,nk->nikj", flange.rotation, kinds[readings.target])
+        motions.append(shifts.reshape(len(arm), 3, -1))
+    fitted = np.concatenate(motions, axis=2)
+    parts = [fitted, slopes[:, :3] - skew(arm) @ slopes[:, 3:], off_mm[:, :, None]]
+    columns = np.concatenate(parts, axis=2)
+    return ErrorColumns(columns.reshape(-1, 3 * len(kinds), columns.shape[2]), fitted.shape[2])
 
 
 def _level(of: ErrorColumns) -> Level:
