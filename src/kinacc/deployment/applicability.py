@@ -81,17 +81,12 @@ def sensitivity(
     """
     name, names = point or calibration.default_point, list(calibration.parameters)
     target, origin = calibration.point(name), calibration.origin(frame)
-    end = calibration.model.pose(at)
+    end, of_model = calibration.model.linearised(at)
     slopes = np.zeros((len(at), 6, len(names)))
     numbers = pd.Index(calibration.model.names).get_indexer(names)
     of_arm = numbers >= 0
-    slopes[:, :, of_arm] = calibration.model.linearised(at)[1][:, :, numbers[of_arm]]
-    # A turn of the last frame moves the point: w x arm = -[arm] w.
-    lever_mm = (end.rotation @ target.position_mm[:, None])[..., 0]
-    slopes[:, :3] -= skew(lever_mm) @ slopes[:, 3:]
-    slopes[:, :3] = origin.rotation @ slopes[:, :3]
-    slopes[:, 3:] = origin.rotation @ slopes[:, 3:]
-    moved = {name: frame_motions(origin.rotation @ end.rotation, np.zeros_like(lever_mm))}
+    slopes[:, :, of_arm] = calibration.of_point(of_model[:, :, numbers[of_arm]], end, frame, name)
+    moved = {name: frame_motions(origin.rotation @ end.rotation, np.zeros_like(end.position_mm))}
     if frame == "instrument" or calibration.anchor is not None:
         # Motions of the base are about the instrument's axes, as in ``frame``.
         turn = origin.rotation @ calibration.base.rotation.T

@@ -129,12 +129,15 @@ class Calibration:
         self, at: JointState, frame: str = "base", point: str | None = None
     ) -> np.ndarray:
         """Jacobian (n, 6, k) of ``pose`` in the DH joints; rows as in ``ErrorModel``."""
-        slopes = self.model.joint_jacobian(at)
+        return self.of_point(self.model.joint_jacobian(at), self.model.pose(at), frame, point)
+
+    def of_point(self, slopes: np.ndarray, end: Pose, frame: str, point: str | None) -> np.ndarray:
+        """Jacobian (n, 6, P) of a point in ``frame``, from that of the last DH frame at ``end``."""
         # A turn of the last frame swings the point: w x arm = -[arm] w.
-        arm = self.model.pose(at).rotation @ self.point(point).position_mm
-        slopes[:, :3] -= skew(arm) @ slopes[:, 3:]
+        arm = (end.rotation @ self.point(point).position_mm[:, None])[..., 0]
         turn = self.origin(frame).rotation
-        return np.concatenate([turn @ slopes[:, :3], turn @ slopes[:, 3:]], axis=1)
+        moved = (slopes[:, :3] - skew(arm) @ slopes[:, 3:], slopes[:, 3:])
+        return np.concatenate([turn @ part for part in moved], axis=1)
 
     @cached_property
     def root(self) -> np.ndarray:
