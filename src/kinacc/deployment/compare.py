@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -131,8 +130,6 @@ def compare(
     q_rad = q_rad[covered]
     states = [JointState(item.robot.dh_joints(q_rad)) for item in both]
     measured = np.all([*map(is_measured_there, both, states)], axis=0)
-    names = (Path(first.name).name, Path(second.name).name)
-    names = names if names[0] != names[1] else (first.name, second.name)
     first, second = both = counted_once(first, second, shared)
     # Coefficients of two series depend on their ranges and orders.
     parametric = {first.model.kind, second.model.kind} <= _BY_PARAMETERS
@@ -181,7 +178,7 @@ def compare(
         )
     ]
     return Difference(
-        names,
+        (first.name, second.name),
         (first.robot.name, second.robot.name),
         first.choice,
         next(verdict for verdict, holds in verdicts.items() if holds),

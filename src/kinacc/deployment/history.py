@@ -213,7 +213,8 @@ def _errors_mm(force: Session, session: Session, moved: Set[str], weight: float)
     Base and tool that were moved are fitted.
     """
     calibration, observed = force.calibration, session.observations
-    observed = observed.select(~outside(observed.q_rad, calibration.model.domain).any(axis=1))
+    beyond = outside(observed.q_rad, calibration.model.domain)
+    observed = observed.select(~np.any(beyond, axis=1))
     if not len(observed):
         return np.zeros(0)
     if len(observed.session_names) > 1:

@@ -28,6 +28,7 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
+import pandas as pd
 import scipy
 
 from kinacc.calibration import vec_fit
@@ -162,12 +163,13 @@ def joined(first: Observations, second: Observations, moved: Set[str]) -> Observ
         name: np.concatenate([getattr(first, name), getattr(second, name)]) for name in names
     }
     for name, frame in (("session", BASE), ("target", TOOL)):
-        before, after = (getattr(item, f"{name}_names") for item in (first, second))
-        if frame in moved:
-            after = [f"{item}, second series" if item in before else item for item in after]
-        every = tuple(dict.fromkeys([*before, *after]))
-        number = np.array([every.index(item) for item in after])[getattr(second, name)]
-        columns |= {name: np.append(getattr(first, name), number), f"{name}_names": every}
+        before, after = (
+            np.array(getattr(item, f"{name}_names"), dtype=str)[getattr(item, name)]
+            for item in (first, second)
+        )
+        after = np.char.add(after, ", second series") if frame in moved else after
+        number, every = pd.factorize(np.append(before, after))
+        columns |= {name: number, f"{name}_names": tuple(every)}
     pose = np.append(first.pose, second.pose + first.pose.max() + 1 - second.pose.min())
     return replace(first, **columns, pose=pose)
 
@@ -356,6 +358,6 @@ def joint_of(movement: Moved, prismatic: np.ndarray) -> int | None:
         best = int(np.argmax(explained))
         most = remaining[best] - chance <= (1.0 - _MOST) * (movement.moved_mm**2 - chance)
         clear = np.sum(np.exp(0.5 * (explained - explained[best]))) <= 1.0 / _CLEAR
-        if most and clear and explained[best] > 0.0:
+        if most and clear:
             return best + 1
     return None

@@ -95,8 +95,10 @@ def compare(held_out: ErrorColumns, new: ErrorColumns) -> PermutationTest:
 def smallest_changes(held_out: ErrorColumns, count: int) -> tuple[float, np.ndarray]:
     """Smallest changes detected in 80 % of samples of ``count`` configurations.
 
-    A factor on all errors, and an offset (k,) of each joint in mrad or mm; inf where none is.
+    A factor on all errors, and an offset (k,) of each joint in mrad or mm; inf where none is. Of
+    more configurations than are held out it is that of as many.
     """
+    count = min(count, len(held_out.columns))
     drawn, factor = _statistics(_samples(held_out.products, count), held_out), 1.0
     copies = np.tile(held_out.products, (_COPIES, 1, 1))
     some = np.random.default_rng(1).integers(len(copies), size=_COPIES * count)
@@ -140,14 +142,11 @@ def _statistics(sums: np.ndarray, like: ErrorColumns) -> _Statistics:
 
 
 def _samples(products: np.ndarray, size: int) -> np.ndarray:
-    """Mean products (draws, q, q) of random samples, without repeats where there are enough."""
+    """Mean products (draws, q, q) of random samples without repeats."""
     rng, total = np.random.default_rng(0), len(products)
-    if size > total:
-        weight = rng.multinomial(size, np.full(total, 1.0 / total), _DRAWS).astype(float)
-    else:
-        weight = np.zeros((_DRAWS, total))
-        chosen = np.argpartition(rng.random((_DRAWS, total)), size - 1, axis=1)[:, :size]
-        np.put_along_axis(weight, chosen, 1.0, axis=1)
+    weight = np.zeros((_DRAWS, total))
+    chosen = np.argpartition(rng.random((_DRAWS, total)), size - 1, axis=1)[:, :size]
+    np.put_along_axis(weight, chosen, 1.0, axis=1)
     return (weight @ products.reshape(total, -1)).reshape(_DRAWS, *products.shape[1:]) / size
 
 

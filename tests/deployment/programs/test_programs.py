@@ -247,9 +247,9 @@ def test_frames_that_a_program_changes_are_refused(tmp_path):
       MoveL {target.replace("9E9]", "900]")},v50,fine,tool0;
       MoveL twice,v50,fine,tool0;
       MoveL twice,v50,fine,tool0\\WObj:=wobj1;""")  # fmt: skip
-    refused = [SEVERAL, CHANGED, STILL, STILL, ""]
+    refused = [CHANGED, STILL, STILL, "", SEVERAL]
     assert [each.refused for each in program.positions] == refused
-    assert [each.moves_outside for each in program.positions] == [False] * 4 + [True]
+    assert [each.moves_outside for each in program.positions] == [False] * 3 + [True, False]
     frame = "{X 1,Y 2,Z 3,A 0,B 0,C 0}"
     program = _read(
         tmp_path,

@@ -27,7 +27,7 @@ _SLIDING = "T = Rz(theta_offset) Tz(q + d) Tx(a) Rx(alpha) Ry(beta) where a join
 def csv_text(source: Source) -> str:
     """One row per joint, in degrees and mm."""
     columns = [f"{group}{name}" for group in ("", "std_", "nominal_") for name in PARAMETERS]
-    table = source.joints(source.dh)[["joint", "type", *columns]]
+    table = source.joints[["joint", "type", *columns]]
     angles = table.filter(like="_rad").columns
     table[angles] = np.rad2deg(table[angles])
     table = table.rename(columns=lambda name: name.replace("_rad", "_deg"))
@@ -48,7 +48,7 @@ def json_text(source: Source) -> str:
         "calibration": arm.name,
         "convention": CONVENTION + (f"; {_SLIDING}" if dh.prismatic.any() else ""),
         "units": {"length": "mm", "angle": "rad", "quaternion": "w, x, y, z"},
-        "joints": _with_null(source.joints(dh)).to_dict("records"),
+        "joints": _with_null(source.joints).to_dict("records"),
         "joint_map": robot.joint_map.tolist(),
         "first_dh_frame_in_base": _frame(robot.base),
         "flange_in_last_dh_frame": _frame(robot.flange),

@@ -84,7 +84,7 @@ def _residuals(source: Source, comparison: str, name: str, caption: str) -> Pape
 
 
 def _parameters(source: Source) -> PaperTable:
-    fitted = source.joints(source.dh)
+    fitted = source.joints
     reported = pd.DataFrame(
         source.tables.get(f"{PLAINEST}_identified", {}), columns=["parameter", "status"]
     )

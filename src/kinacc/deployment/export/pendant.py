@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
 
 from kinacc.calibration import residuals, stages, uncertainty
 from kinacc.calibration.dh_estimator import DHEstimator
-from kinacc.calibration.fitting import Fit, ModelFit
+from kinacc.calibration.fitting import Fit
 from kinacc.calibration.identifiability import identified, listed
 from kinacc.calibration.observations import Observations
 from kinacc.config.error_models import NOMINAL, PLAINEST, model_name
@@ -80,37 +80,26 @@ def fit_pendant(tables: Tables, settings: Settings, controller: str, name: str =
     _require_fitting(robot, maker)
     every, train = stages.observed(tables, robot)
     used = every.select(train)
-    estimator = DHEstimator.of(settings, robot, every)
+    estimator = replace(DHEstimator.of(settings, robot, every), follows_vec=False)
     fitted = estimator.free
-    free = fitted & np.isin(PARAMETERS, maker.takes)
-
-    def fit(observations: Observations) -> ModelFit:
-        return estimator.common.fit(
-            observations,
-            estimator.nominal,
-            free=free,
-            std=estimator.std,
-            threshold=estimator.threshold,
-            loss=estimator.loss,
-            name=f"fit for {maker.name}",
-        )
-
-    def refit(observations: Observations, _fold: int = -1) -> dict[str, Fit]:
-        return {PLAINEST: fit(observations)}
-
+    taken = fitted & np.isin(PARAMETERS, maker.takes)
+    taken_fit = replace(estimator, free=taken).fit(used, {})
     # Joint 1 moves as the base does, the last joint as the tool: where these are fitted, it stays.
     ends = np.isin(np.arange(robot.dh.joints), (0, robot.dh.joints - 1))[:, None]
-    free = free & ~(ends & np.isnan(fit(used).std))
-    final = fit(used)
-    models: dict[str, Fit] = {
-        NOMINAL: Fit(robot.dh, estimator.common.nominal_frames(used)),
-        PLAINEST: final,
-    }
+    free = taken & ~(ends & np.isnan(taken_fit.std))
+    estimator = replace(estimator, free=free)
+    final = estimator.fit(used, {})
+    nominal = Fit(robot.dh, estimator.common.nominal_frames(used))
+    models: dict[str, Fit] = {NOMINAL: nominal, PLAINEST: final}
+
+    def refit(observations: Observations, _fold: int) -> dict[str, Fit]:
+        return {PLAINEST: estimator.fit(observations, {})}
+
     folds = np.unique(every.fold[every.fold >= 0])
     if len(folds):
         errors = residuals.cross_validated(every, refit, folds, [PLAINEST])[0]
     else:
-        errors = residuals.errors({PLAINEST: models[PLAINEST]}, used)
+        errors = residuals.errors({PLAINEST: final}, used)
     old, new = (_numbers(maker, robot, models[kind], every) for kind in (NOMINAL, PLAINEST))
     values = [
         (group, key, unit, *(round(float(x), 12) + 0.0 for x in (old[group][key][0], value)))

@@ -54,12 +54,14 @@ class Source:
         """The DH table of the model."""
         return self.calibration.model.dh
 
-    def joints(self, dh: DHModel) -> pd.DataFrame:
-        """A row a joint of a table: joint, type, and value, nominal value and std of parameters.
+    @property
+    def joints(self) -> pd.DataFrame:
+        """A row a joint of the DH table: joint, type, and value, nominal value and std of
+        parameters.
 
         NaN where there is no standard deviation.
         """
-        joint = np.arange(1, dh.joints + 1)
+        dh, joint = self.dh, np.arange(1, self.dh.joints + 1)
         table = {"joint": joint, "type": np.where(dh.prismatic, "prismatic", "revolute")}
         for name in PARAMETERS:
             table[name] = getattr(dh, name)

@@ -80,10 +80,10 @@ def read(sources: Sequence[Source], _: np.ndarray | None) -> Program:
             moves.refused |= dict.fromkeys(_frames(data[2]), STILL)
     statements = [*re.finditer(r"[^;\s][^;]*", text)]
     for statement in statements:
-        if data := _TARGET_DATA.search(statement[0]):
+        if named := _TARGET_DATA.search(statement[0]):
             for target in _TARGET.finditer(text, *statement.span()):
-                position = _position(data[1], source, *target.span())
-                moves.positions.append((data[1].upper(), position))
+                position = _position(named[1], source, *target.span())
+                moves.positions.append((named[1].upper(), position))
     declared = {name for name, _ in moves.positions}
     for statement in statements:
         words = statement[0]

@@ -176,7 +176,6 @@ def compensate_program(
     language, program = read_program(path, frame_files, pulses_per_deg)
     _refuse_second_time(program)
     options = {TOOL: tools or {}, BASE: bases or {}}
-    program = _in_use(program, options)
     program = replace(program, frames=_all_frames(program, options, ask))
     robot, positions, new = calibration.robot, program.positions, {}
     starts, reasons = _starts(robot, language, program, near_rad, base_is_fixed)
@@ -293,17 +292,6 @@ def _refuse_second_time(program: Program) -> None:
         if digest in record.read_text(errors="replace"):
             fix = "give the program it was made from"
             raise input_error(str(path), f"was compensated before ({record.name})", fix=fix)
-
-
-def _in_use(program: Program, options: Options) -> Program:
-    """The program without poses that no move uses, unless a frame for all of them is given."""
-    idle = [item for item in program.positions
-            if item.has_frames and item.tool is None and item.base is None]  # fmt: skip
-    used = [item for item in program.positions if item not in idle]
-    if "" in {*options[TOOL], *options[BASE]} or not used:
-        return program
-    lines = [f"{item.where}: {item.name}, which no move uses" for item in idle]
-    return replace(program, positions=used, not_corrected=[*program.not_corrected, *lines])
 
 
 def _all_frames(program: Program, options: Options, ask: Ask | None) -> Frames:

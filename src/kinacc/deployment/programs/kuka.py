@@ -110,8 +110,8 @@ def read(sources: Sequence[Source], _: np.ndarray | None) -> Program:
     defined = {name for name, _ in moves.positions}
     moves.not_corrected += [text for text, names in targets if not defined.issuperset(names)]
     for name, _unused in moves.positions:
-        if name not in moves.uses:
-            moves.use(name, *data.get(f"F{str(name)[1:]}", UNUSED))
+        if name not in moves.uses and (use_data := data.get(f"F{str(name)[1:]}")):
+            moves.use(name, *use_data)
     return moves.program(sources, CONVENTION)
 
 

@@ -157,16 +157,22 @@ class Moves:
         self.uses.setdefault(key, set()).add((tool, base, reason))
 
     def program(self, sources: Sequence[Source], convention: Convention) -> Program:
-        """The program, its positions in the order of the moves, with the frames of these."""
-        keys = dict.fromkeys([*self.uses, *dict(self.positions)])
-        order, positions = {key: number for number, key in enumerate(keys)}, []
-        for key, position in sorted(self.positions, key=lambda item: order[item[0]]):
+        """The program, its positions in the order of the moves, with the frames of these.
+
+        Positions that no move uses are not corrected, unless none is used.
+        """
+        positions, idle = [], []
+        order = {key: number for number, key in enumerate(self.uses)}
+        for key, position in sorted(self.positions, key=lambda item: order.get(item[0], 0)):
             uses = self.uses.get(key, {UNUSED})
             tool, base, reason = next(iter(uses))
             reason = self.refused.get((TOOL, tool)) or self.refused.get((BASE, base)) or reason
             reason = SEVERAL if len(uses) > 1 else reason
-            positions.append(replace(position, tool=tool, base=base, refused=reason))
-        return Program(sources, positions, convention, self.not_corrected, self.frames)
+            position = replace(position, tool=tool, base=base, refused=reason)
+            (positions if key in self.uses else idle).append(position)
+        lines = [f"{item.where}: {item.name}, which no move uses" for item in idle if positions]
+        not_corrected = [*self.not_corrected, *lines]
+        return Program(sources, positions or idle, convention, not_corrected, self.frames)
 
 
 @dataclass(frozen=True)

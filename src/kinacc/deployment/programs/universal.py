@@ -39,7 +39,7 @@ def read(sources: Sequence[Source], _: np.ndarray | None) -> Program:
     named: dict[str, list[Place]] = defaultdict(list)
     for place, name in names.items():
         named[name].append(place)
-    moves, tool, near = Moves(), None, {}
+    moves, tool = Moves(), None
     for call in _CALL.finditer(text):
         start = call.end()
         for _number in range(2 if call[1] == "movec" else 1):
@@ -58,15 +58,21 @@ def read(sources: Sequence[Source], _: np.ndarray | None) -> Program:
                 moves.not_corrected.append(source.statement(call.start(), line))
                 break
             for span in spans if call[1] != "set_tcp" else ():
+                if span not in moves.uses:
+                    near = named.get(argument[4]) if argument and argument[1] else None
+                    moves.positions.append((span, _position(source, span, names.get(span), near)))
                 moves.use(span, tool, ROBOT)
-                if argument and argument[1] and argument[4] in named:
-                    near[span] = source.values(source.numbers(*named[argument[4]][-1]))
-    for span in moves.uses:
-        scale = None if text[span[0]] == "p" else np.pi / 180.0
-        name, places = names.get(span, source.line(span[0])), source.numbers(*span)
-        position = Position(name, source, places, 6, scale, near_rad=near.get(span))
-        moves.positions.append((span, position))
     return moves.program(sources, CONVENTION)
+
+
+def _position(
+    source: Source, span: Place, name: str | None, near: Sequence[Place] | None
+) -> Position:
+    """The position written at ``span``; ``near``: where joints near to it are written."""
+    near_rad = source.values(source.numbers(*near[-1])) if near else None
+    scale = None if source.text[span[0]] == "p" else np.pi / 180.0
+    places = source.numbers(*span)
+    return Position(name or source.line(span[0]), source, places, 6, scale, near_rad=near_rad)
 
 
 LANGUAGE = Language("URScript", (".script", ".urscript"), CONVENTION, read)
