@@ -51,16 +51,6 @@ _FAR_MM = 10.0
 
 
 @dataclass(frozen=True)
-class Level:
-    """Position errors of a model: number of readings and configurations, mean and 99 %."""
-
-    readings: int
-    configurations: int
-    mean_mm: float
-    quantile_99_mm: float
-
-
-@dataclass(frozen=True)
 class Verification:
     """Result of a verification.
 
@@ -75,8 +65,8 @@ class Verification:
         remaining ones near measured poses, which alone count.
     errors
         A row for each model at the readings that all models cover.
-    here, held_out
-        Position errors that count, and held-out ones.
+    configurations, held_out
+        Number of configurations that count, and of held-out ones.
     test
         The permutation test of both; None where it was not possible.
     smallest_factor, smallest_offsets
@@ -91,8 +81,8 @@ class Verification:
     known: int
     near: int
     errors: pd.DataFrame
-    held_out: Level | None = None
-    here: Level | None = None
+    configurations: int = 0
+    held_out: int = 0
     test: PermutationTest | None = None
     smallest_factor: float = np.inf
     smallest_offsets: np.ndarray | None = None
@@ -150,14 +140,15 @@ def verify(
     near = is_measured_there(calibration, observed.at, point)
     held_out = _held_out(tables, calibration, observed, moved)
     rows = _whole_configurations(observed, near)
-    result = replace(result, near=int(near.sum()), held_out=held_out and _level(held_out))
+    counts = {"configurations": len(rows), "held_out": len(held_out.columns)}
+    result = replace(result, near=int(near.sum()), **counts)
     obstacles = {
         SET_UP_MOVED: not moved and table["mean_mm"].min() > _FAR_MM,
-        FEW_HELD_OUT: held_out is None or len(held_out.columns) < LEAST_HELD_OUT,
+        FEW_HELD_OUT: len(held_out.columns) < LEAST_HELD_OUT,
         "no reading near a measured pose": not len(rows),
     }
     obstacle = next((text for text, holds in obstacles.items() if holds), "")
-    if obstacle or held_out is None:
+    if obstacle:
         return replace(result, reason=obstacle)
     new = observed.select(rows.ravel())
     new = replace(new, rotation=np.full_like(new.rotation, np.nan))
@@ -165,7 +156,6 @@ def verify(
     frames = frames_at(calibration, new, moved, rotation_weight_mm_per_rad)
     off_mm = errors_of(calibration, frames, new).position_mm
     fresh = error_columns(model, robot, new, frames.targets, moved, off_mm)
-    result = replace(result, here=_level(fresh))
     if fresh.columns[..., -1].size <= fresh.rank:
         return replace(result, reason="base and tool explain all that these poses show")
     test, (factor, offsets) = compare(held_out, fresh), smallest_changes(held_out, len(rows))
@@ -223,10 +213,10 @@ def _whole_configurations(readings: Observations, counted: np.ndarray) -> np.nda
 
 def _held_out(
     tables: Tables, calibration: Calibration, readings: Observations, moved: Sequence[str]
-) -> ErrorColumns | None:
-    """Held-out errors of configurations with the targets of ``readings``; None where none are."""
+) -> ErrorColumns:
+    """Held-out errors of configurations with the targets of ``readings``."""
     if not {"pose_errors", "measurements"} <= set(tables):
-        return None
+        return ErrorColumns(np.zeros((0, 3, 1)), 0)
     kind, model, robot = calibration.choice, calibration.model, calibration.robot
     measured, names = from_columns(tables["measurements"], robot), readings.target_names
     if TOOL in moved:
@@ -237,8 +227,6 @@ def _held_out(
     vectors[held_out["row"].to_numpy(int)] = held_out[["ex_mm", "ey_mm", "ez_mm"]]
     named = replace(measured, target=target, target_names=names)
     rows = _whole_configurations(named, np.isfinite(vectors).all(axis=1) & (target >= 0))
-    if not len(rows):
-        return None
     targets = frames_of(tables["frames"], kind, names, measured.session_names).targets
     every = rows.ravel()
     return error_columns(model, robot, named.select(every), targets, moved, vectors[every])
@@ -273,11 +261,6 @@ def error_columns(
     parts = [fitted, slopes[:, :3] - skew(arm) @ slopes[:, 3:], off_mm[:, :, None]]
     columns = np.concatenate(parts, axis=2)
     return ErrorColumns(columns.reshape(-1, 3 * len(kinds), columns.shape[2]), fitted.shape[2])
-
-
-def _level(of: ErrorColumns) -> Level:
-    sizes = np.linalg.norm(of.columns[..., -1].reshape(-1, 3), axis=1)
-    return Level(len(sizes), len(of.columns), *statistics(sizes)[:2])
 
 
 def statistics(errors: np.ndarray) -> list[float]:
