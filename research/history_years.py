@@ -92,11 +92,13 @@ class Arm:
         frames = known(sessions=len(both.session_names))
         return history_model.about(self.true.dh, frames, both, len(first), WEIGHT_MM_PER_RAD)
 
-    def understated(self, series: Observations) -> float:
-        """What halves of a series say of the misfit; nothing where all poses are shared."""
+    def misfit_factor(self, *every: Observations) -> float:
+        """What halves of series say of the misfit; nothing where all poses are shared."""
         if self.plans == SAME:
             return 1.0
-        return history_model.understated(self.pair(*half) for half in history_model.halves(series))
+        return history_model.misfit_factor(
+            self.pair(*half) for series in every for half in history_model.halves(series)
+        )
 
 
 # Names of DH parameters by the error they are: (of this joint or the next, place among ERRORS).
@@ -110,12 +112,10 @@ SIZES_MM = np.arange(0.0, 1.001, 0.02)
 def year(arm: Arm) -> tuple[list[dict], np.ndarray, np.ndarray]:
     """Decisions; how often CHANGES of SIZES_MM were seen; rms mm of CHANGES by one mm or mrad."""
     force = arm.series()
-    wide = arm.understated(force)
     decisions, seen, size = [], np.zeros((len(CHANGES), len(SIZES_MM))), []
     for month in range(1, MONTHS):
         series = arm.series()
-        own = arm.understated(series)
-        factor = history_model.misfit_factor(wide, own)
+        factor = arm.misfit_factor(force, series)
         found = history_model.moved(arm.pair(force, series), factor)
         probability, chance_mm = found.test(LEVEL)
         alarm = found.moved_mm > chance_mm
@@ -128,7 +128,7 @@ def year(arm: Arm) -> tuple[list[dict], np.ndarray, np.ndarray]:
         seen += hits
         size.append(sizes)
         if alarm:
-            force, wide = series, own
+            force = series
     return decisions, seen, np.mean(size, axis=0)
 
 

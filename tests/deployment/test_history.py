@@ -17,7 +17,7 @@ from small_arms import results_of
 from kinacc.calibration.observations import full_poses
 from kinacc.deployment import history as histories
 from kinacc.deployment.history import LEVEL, session_of
-from kinacc.deployment.history_model import Moved, misfit_factor, understated
+from kinacc.deployment.history_model import Moved, misfit_factor
 from kinacc.geometry import Pose
 from kinacc.kinematics import robot as robots
 from kinacc.measurements.orientation import euler
@@ -82,14 +82,14 @@ def test_chance_along_all_directions_alike_is_that_of_chi_square(monkeypatch):
     assert chance_mm == pytest.approx(0.1 * scipy.stats.chi2.isf(0.005, 4) ** 0.5, rel=0.01)
     monkeypatch.setattr(histories.history_model, "moved", lambda half, _: half)
     still = moved._replace(change=np.zeros(4))
-    assert understated([moved, still]) == pytest.approx(0.5 * 12.25 / 4.0)
-    assert misfit_factor(3.0, 5.0) == 2.0
+    assert misfit_factor([moved, still]) == pytest.approx((0.5 * 12.25 / 4.0) ** 0.5)
+    assert misfit_factor([still]) == 1.0
 
 
 def test_misfit_that_differs_between_halves_widens_the_limit_at_other_poses(monkeypatch):
     lines = [session(month(n, other_poses=True), n) for n in (1, 2)]
     usual = history(*lines)
-    monkeypatch.setattr(histories.history_model, "understated", lambda halves: 9.0)
+    monkeypatch.setattr(histories.history_model, "misfit_factor", lambda halves: 3.0)
     wide = history(*lines)
     assert wide["chance_mm"][1] == pytest.approx(3.0 * usual["chance_mm"][1], rel=0.15)
     assert wide["moved_mm"][1] == usual["moved_mm"][1]

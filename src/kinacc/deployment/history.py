@@ -164,12 +164,11 @@ def _change(
     first, second = _thinned(force.observations), _thinned(session.observations)
     pair, misfit = _pair(force, first, second, moved, weight), 1.0
     if not pair.in_both.all():
-        misfit = history_model.misfit_factor(*(
-            history_model.understated(
-                _pair(item, *half, moved, weight) for half in history_model.halves(series)
-            )
+        misfit = history_model.misfit_factor(
+            _pair(item, *half, moved, weight)
             for item, series in ((force, first), (session, second))
-        ))  # fmt: skip
+            for half in history_model.halves(series)
+        )
     movement = history_model.moved(pair, misfit)
     moved_mm = movement.moved_mm
     probability, chance_mm = movement.test(level)

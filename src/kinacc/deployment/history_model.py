@@ -8,7 +8,7 @@ The null hypothesis: between two series nothing happened at the arm. That does n
    smoothly with that joint, of a size that both series show, joint by joint (variance components by
    the evidence, MacKay 1992), and beside these whatever differs from configuration to
    configuration. Misfit may go further from one part of the joints to another than that: how much,
-   halves of one series say, between which nothing happened either (``understated``).
+   halves of one series say, between which nothing happened either (``misfit_factor``).
 2. The arm warms up, each time differently. What changes with the order of measuring inside the
    series is a state of the arm in which a series may be as a whole.
 3. At another temperature all lengths of the arm have grown alike. That is no change of the arm: it
@@ -225,19 +225,16 @@ class Moved(NamedTuple):
         return float(probability), self.moved_mm * float(np.sqrt(limit))
 
 
-def understated(cuts: Iterable[Pair]) -> float:
-    """Mean square movement between halves of one series, over that by chance: 1 if that is right.
+def misfit_factor(cuts: Iterable[Pair]) -> float:
+    """Factor on deviations of misfit that is not shared, from halves of both series; 1 or more.
 
     Nothing happens to an arm between halves of a series, but they lie apart in the joints: what
-    they show beyond chance is misfit that poses of one part do not foretell of another.
+    they show beyond chance, in the mean square, is misfit that poses of one part do not foretell of
+    another.
     """
     results = [moved(item, 1.0) for item in cuts]
-    return float(np.mean([item.moved_mm**2 / np.trace(item.covariance) for item in results]))
-
-
-def misfit_factor(first: float, second: float) -> float:
-    """On deviations of misfit that is not shared, by what halves of both series showed."""
-    return float(np.sqrt(max(1.0, 0.5 * (first + second))))
+    ratios = [item.moved_mm**2 / np.trace(item.covariance) for item in results]
+    return float(np.sqrt(max(1.0, np.mean(ratios))))
 
 
 def moved(pair: Pair, misfit: float) -> Moved:
