@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
@@ -13,7 +13,6 @@ import pandas as pd
 
 from kinacc import __version__
 from kinacc.calibration import stages
-from kinacc.calibration.misfit import misfit
 from kinacc.calibration.summary import reported_joints
 from kinacc.checks import check, contradictions
 from kinacc.checks.described import describe_files
@@ -529,7 +528,6 @@ def compare(
 
 def _of_tables(name: str, tables: Tables, kind: str | None, made_by: str) -> Calibration:
     model = results.calibration(tables, kind, name)
-    model = replace(model, misfit=misfit(tables, model.robot, model.choice))
     return Calibration(name, model, tables, made_by)
 
 

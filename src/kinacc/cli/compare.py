@@ -9,14 +9,12 @@ from pathlib import Path
 import click
 import numpy as np
 
-from kinacc.calibration.misfit import misfit
 from kinacc.calibration.summary import reported_joints
 from kinacc.cli import choice, rows
 from kinacc.cli.choice import option
 from kinacc.cli.output import Output, answers
 from kinacc.config import schema
 from kinacc.deployment import compare as comparison
-from kinacc.deployment.folder import read_tables
 from kinacc.deployment.record import Calibration, nominal
 from kinacc.deployment.shared_readings import shared
 from kinacc.errors import input_error
@@ -78,9 +76,7 @@ def _calibration(place: str, model: str) -> Calibration:
     """The calibration of a results folder, or the robot of a file."""
     path = Path(place)
     if path.is_dir():
-        calibration = choice.calibration_of(path, model)
-        left = misfit(read_tables(path), calibration.robot, calibration.choice)
-        return replace(calibration, name=place, misfit=left)
+        return replace(choice.calibration_of(path, model), name=place)
     if path.is_file() or place in robots.shipped():
         return replace(nominal(robots.load(place), place), choice="dh")
     raise input_error(place, "no such file or folder", "a results folder, a robot file")

@@ -9,13 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 import scipy
 
-from kinacc.calibration.uncertainty import scale_of, scaled_unit, unit_of
+from kinacc.calibration.uncertainty import Uncertainty, scale_of, scaled_unit, unit_of
 from kinacc.deployment.applicability import frame_motions, is_measured_there, sensitivity
 from kinacc.deployment.record import FLANGE, Calibration
 from kinacc.deployment.shared_readings import NONE_SHARED, SharedReadings, counted_once
@@ -137,7 +136,7 @@ def compare(
     if parametric:
         scale = np.array([scale_of(name) for name in first.model.names])
         before_, after_ = (item.model.start / scale for item in both)
-        known = [_Knowledge.of(item, scale) for item in both]
+        known = [_of_model(item, scale) for item in both]
         test = _test(after_ - before_, known)
         parameters = _parameters(first.model.names, before_, after_, known)
     before, after = (item.pose(at, "base", FLANGE) for item, at in zip(both, states, strict=True))
@@ -189,12 +188,8 @@ def compare(
         len(covered),
         apart_mm,
         shared,
-        (_ratio(first), _ratio(second)),
+        (first.misfit.ratio, second.misfit.ratio),
     )
-
-
-def _ratio(calibration: Calibration) -> float:
-    return calibration.misfit.ratio if calibration.misfit else np.nan
 
 
 def require_alike(first: Calibration, second: Calibration) -> None:
@@ -206,31 +201,20 @@ def require_alike(first: Calibration, second: Calibration) -> None:
         raise input_error(second.name, message, "the same kind of robot")
 
 
-class _Knowledge(NamedTuple):
-    """What a fit knows of the P parameters of a model, mm and mrad.
-
-    ``fitted`` (P,), ``covariance`` (P, P), undetermined unit directions (u, P).
-    """
-
-    fitted: np.ndarray
-    covariance: np.ndarray
-    undetermined: np.ndarray
-
-    @classmethod
-    def of(cls, calibration: Calibration, scale: np.ndarray) -> _Knowledge:
-        known, count = calibration.known, len(scale)
-        if known is None:
-            unknown = np.full((count, count), np.nan)
-            return cls(np.zeros(count, dtype=bool), unknown, unknown[:0])
-        names = np.array(calibration.model.names)
-        pick = (names[:, None] == np.array(known.names)).astype(float)
-        covariance = pick @ known.covariance @ pick.T / np.outer(scale, scale)
-        unit = known.undetermined / np.linalg.norm(known.undetermined, axis=1, keepdims=True)
-        return cls(pick.any(axis=1), covariance, unit @ pick.T)
+def _of_model(calibration: Calibration, scale: np.ndarray) -> Uncertainty:
+    """What a fit knows of all P parameters of its model, mm and mrad; covariance NaN if nothing."""
+    known, names = calibration.known, calibration.model.names
+    if known is None:
+        unknown = np.full((len(names), len(names)), np.nan)
+        return Uncertainty(names, unknown, unknown[:0])
+    pick = (np.array(names)[:, None] == np.array(known.names)).astype(float)
+    covariance = pick @ known.covariance @ pick.T / np.outer(scale, scale)
+    unit = known.undetermined / np.linalg.norm(known.undetermined, axis=1, keepdims=True)
+    return Uncertainty(names, covariance, unit @ pick.T)
 
 
 def _parameters(
-    names: tuple[str, ...], first: np.ndarray, second: np.ndarray, known: list[_Knowledge]
+    names: tuple[str, ...], first: np.ndarray, second: np.ndarray, known: list[Uncertainty]
 ) -> pd.DataFrame:
     """Parameters ``first`` and ``second`` (P,) in mm and mrad, and what is known of them."""
     hidden = [np.sum(item.undetermined**2, axis=0) > _TOUCHED for item in known]
@@ -248,11 +232,11 @@ def _parameters(
         "sigmas": np.divide(second - first, std, out=np.full(len(std), np.nan), where=std > 0.0),
         "undetermined": np.array(["", "first", "second", "both"])[hidden[0] + 2 * hidden[1]],
     })  # fmt: skip
-    fitted = known[0].fitted | known[1].fitted
+    fitted = np.any([*hidden, *(np.diag(item.covariance) > 0.0 for item in known)], axis=0)
     return table[fitted | (np.abs(second - first) > ROUNDING)].reset_index(drop=True)
 
 
-def _test(difference: np.ndarray, known: list[_Knowledge]) -> tuple[float, int, float]:
+def _test(difference: np.ndarray, known: list[Uncertainty]) -> tuple[float, int, float]:
     """Squared distance, number of directions and probability, over what both determine."""
     total = known[0].covariance + known[1].covariance
     if not np.isfinite(total).all():

@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from kinacc.calibration import identifiability
+from kinacc.calibration.misfit import misfit
 from kinacc.calibration.observations import from_columns
 from kinacc.calibration.summary import selected
 from kinacc.calibration.uncertainty import Uncertainty
@@ -152,6 +153,7 @@ def _calibration(tables: Tables, model: str | None, name: str, session: str | No
         fitted_range_rad=bounded.domain,
         fitted=fitted,
         orientation_measured=turned,
+        misfit=misfit(tables, robot, choice),
     )
 
 

@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from kinacc.calibration.misfit import Misfit
+from kinacc.calibration.noise import UNKNOWN
 from kinacc.calibration.uncertainty import Uncertainty, scale_of
 from kinacc.config.error_models import ERROR_MODELS, NOMINAL
 from kinacc.errors import input_error
@@ -23,6 +24,7 @@ FRAMES = ("base", "instrument")
 POSES = dict(zip(SUBSETS, ("training poses", "held-out poses"), strict=True))
 FLANGE, TOOL = "flange", "tool"
 MEASURED, STATED = "measured", "stated"  # where an orientation comes from
+_NO_MISFIT = Misfit(NOMINAL, np.nan, UNKNOWN)
 _LEAST_SHARE = 1e-14  # of the largest eigenvalue: below it is rounding
 
 
@@ -52,7 +54,7 @@ class Calibration:
     ``orientation_measured`` are the targets with a measured orientation; the others, and without
     any the flange too, have the orientation that the robot file states. ``outdated`` is why the
     calibration is not that of the files and settings there now; empty where it is. ``misfit``: what
-    the standard deviations of ``known`` are worth; None where nothing was fitted, or nobody asked.
+    the standard deviations of ``known`` are worth.
     """
 
     name: str
@@ -70,7 +72,7 @@ class Calibration:
     left_open: tuple[str, ...] | None = None
     orientation_measured: frozenset[str] = frozenset()
     outdated: str = ""
-    misfit: Misfit | None = None
+    misfit: Misfit = _NO_MISFIT
 
     def orientation_source(self, point: str | None = None) -> str:
         """``measured`` or ``stated`` (by the robot file), of a target by name or the flange."""

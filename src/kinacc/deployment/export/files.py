@@ -61,7 +61,7 @@ def json_text(source: Source) -> str:
             "position_rms_mm": remaining.position_mm,
             "orientation_rms_mrad": None if np.isnan(turn_mrad) else turn_mrad,
         },
-        "standard_deviations": source.misfit.as_facts(),
+        "standard_deviations": arm.misfit.as_facts(),
         "undetermined": arm.left_open,
         "provenance": source.provenance,
     }

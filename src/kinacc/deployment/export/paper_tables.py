@@ -103,7 +103,7 @@ def _parameters(source: Source) -> PaperTable:
             ["-", fitted[name].map("{:g} (fixed)".format)],
             list(map(with_deviation, fitted[name], fitted[f"std_{name}"])),
         )
-    notes = [f"One standard deviation behind ±, {in_words([source.misfit])}."]
+    notes = [f"One standard deviation behind ±, {in_words([source.calibration.misfit])}."]
     marks = "".join(cells.to_numpy().ravel())
     if "†" in marks:
         notes.append("† only determined together with others: one of many values that fit as well.")

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
 from kinacc.calibration import identifiability
-from kinacc.calibration.misfit import Misfit, misfit
 from kinacc.config.error_models import PLAINEST, model_name
 from kinacc.deployment import folder as results
 from kinacc.deployment.record import STATED, Calibration
@@ -73,11 +71,6 @@ class Source:
         )
         fitted = fitted.drop_duplicates("joint").set_index("joint").reindex(joint).astype(float)
         return pd.DataFrame(table).join(fitted.reset_index(drop=True))
-
-    @cached_property
-    def misfit(self) -> Misfit:
-        """What the standard deviations are worth."""
-        return misfit(self.tables, self.calibration.robot, self.calibration.choice)
 
     @property
     def coupled_lines(self) -> list[str]:
