@@ -140,11 +140,11 @@ def verify(
     near = is_measured_there(calibration, observed.at, point)
     held_out = _held_out(tables, calibration, observed, moved)
     rows = _whole_configurations(observed, near)
-    counts = {"configurations": len(rows), "held_out": len(held_out.columns)}
-    result = replace(result, near=int(near.sum()), **counts)
+    near_count, held_out_count = int(near.sum()), len(held_out.columns)
+    result = replace(result, near=near_count, configurations=len(rows), held_out=held_out_count)
     obstacles = {
         SET_UP_MOVED: not moved and table["mean_mm"].min() > _FAR_MM,
-        FEW_HELD_OUT: len(held_out.columns) < LEAST_HELD_OUT,
+        FEW_HELD_OUT: held_out_count < LEAST_HELD_OUT,
         "no reading near a measured pose": not len(rows),
     }
     obstacle = next((text for text, holds in obstacles.items() if holds), "")

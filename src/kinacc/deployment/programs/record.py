@@ -161,7 +161,8 @@ class Moves:
 
         Positions that no move uses are not corrected, unless none is used.
         """
-        positions, idle = [], []
+        positions: list[Position] = []
+        idle: list[Position] = []
         order = {key: number for number, key in enumerate(self.uses)}
         for key, position in sorted(self.positions, key=lambda item: order.get(item[0], 0)):
             uses = self.uses.get(key, {UNUSED})
