@@ -110,32 +110,27 @@ def about(
     )
     row, axis = both.places
     of_frames, errors = np.split(jacobian, [coords.size], axis=1)
-    # Coefficients by joint, error and order; behind them offsets by travel direction.
-    joint, order = np.divmod(np.arange(errors.shape[1]), len(ERRORS) * (ORDER + 1))
-    order = np.where(joint < model.joints, order % (ORDER + 1), 1)
-    size = np.sqrt(np.mean(errors**2, axis=0)) * order
+    # Coefficients by joint, error and degree; behind them offsets by travel direction.
+    joint, degree = np.divmod(np.arange(errors.shape[1]), len(ERRORS) * (ORDER + 1))
+    degree = np.where(joint < model.joints, degree % (ORDER + 1), 1)
+    smooth = degree > 0
     longer = np.zeros((model.joints, len(ERRORS)))  # the last link's own length goes with the tool
     longer[:, ERRORS.index("delta_z")] = np.where(model.prismatic, 0.0, model.d_mm)
     longer[1:, ERRORS.index("delta_x")] = model.a_mm[:-1]
-    late = np.concatenate([_late(first), _late(len(both) - first)])
+    order = np.arange(len(both))
+    late = pd.Series(order).groupby(order >= first).transform(scipy.stats.zscore)
     return Pair(
         frames=of_frames,
-        constant=errors[:, order == 0] * np.tile(_UNITS, model.joints),
+        constant=errors[:, ~smooth] * np.tile(_UNITS, model.joints),
         longer=1e-3 * longer.ravel(),
-        misfit=(errors / np.where(size > 0.0, size, 1.0))[:, order > 0],
-        joint=1 + joint[order > 0],
+        misfit=_unit(errors[:, smooth]) * np.sqrt(len(errors)) / degree[smooth],
+        joint=1 + joint[smooth],
         residual=-residual,
         second=row >= first,
         position=axis < 3,
         cluster=configurations(both.pose, both.q_rad)[row],
-        late=late[row],
+        late=late.to_numpy()[row],
     )
-
-
-def _late(count: int) -> np.ndarray:
-    """Order of measuring (count,), of mean 0 and variance 1."""
-    order = np.arange(count) - 0.5 * (count - 1)
-    return order / np.sqrt(np.mean(order**2)) if count > 1 else order
 
 
 def halves(series: Observations) -> Iterator[tuple[Observations, Observations]]:
@@ -336,24 +331,22 @@ def joint_of(movement: Moved, prismatic: np.ndarray) -> int | None:
     Offsets first, as belts, encoders and collisions change these; then all DH parameters of a
     joint. Clear: it explains most beyond chance, and is it with the probability ``_CLEAR``.
     """
-    chance = float(np.trace(movement.covariance))
-    floor = 1e-12 * chance * np.eye(len(movement.change))
+    change, chance = movement.change, float(np.trace(movement.covariance))
+    floor = 1e-12 * chance * np.eye(len(change))
     whiten = np.linalg.inv(scipy.linalg.cholesky(movement.covariance + floor, lower=True))
     slide, turn, along, about_ = map(ERRORS.index, ("delta_z", "eps_z", "delta_x", "eps_x"))
-    errors = movement.by_error.reshape(len(floor), len(prismatic), len(ERRORS))
-    errors = np.where(np.linalg.norm(errors, axis=0) > _UNSEEN_MM, errors, 0.0)
-    offset = np.where(prismatic[:, None], errors[..., [slide]], errors[..., [turn]])
+    errors = movement.by_error.reshape(len(change), len(prismatic), len(ERRORS))
+    errors = np.where(np.linalg.norm(errors, axis=0) > _UNSEEN_MM, errors, 0.0).swapaxes(0, 1)
+    offset = np.where(prismatic[:, None, None], errors[..., [slide]], errors[..., [turn]])
     # Errors in front of the next joint are those of this joint's link; the last link is the tool's.
-    link = np.pad(errors[:, 1:, [along, about_]], ((0, 0), (0, 1), (0, 0)))
+    link = np.pad(errors[1:, :, [along, about_]], ((0, 1), (0, 0), (0, 0)))
     for ways in (offset, np.concatenate([errors[..., [slide, turn]], link], axis=2)):
-        explained, remaining = np.zeros((2, len(prismatic)))
-        for joint in range(len(prismatic)):
-            local = ways[:, joint]
-            fitted = local @ np.linalg.lstsq(whiten @ local, whiten @ movement.change)[0]
-            explained[joint] = (whiten @ movement.change) @ (whiten @ fitted)
-            remaining[joint] = np.sum((movement.change - fitted) ** 2)
+        best_fits = [np.linalg.lstsq(whiten @ way, whiten @ change)[0] for way in ways]
+        fitted = np.array([way @ fit for way, fit in zip(ways, best_fits, strict=True)])
+        explained = fitted @ whiten.T @ whiten @ change
         best = int(np.argmax(explained))
-        most = remaining[best] - chance <= (1.0 - _MOST) * (movement.moved_mm**2 - chance)
+        remaining = np.sum((change - fitted[best]) ** 2) - chance
+        most = remaining <= (1.0 - _MOST) * (movement.moved_mm**2 - chance)
         clear = np.sum(np.exp(0.5 * (explained - explained[best]))) <= 1.0 / _CLEAR
         if most and clear:
             return best + 1
