@@ -131,6 +131,7 @@ def tables_as_the_workflow_gives_them(seen):
     names = ("robot", "frames", "dh_model", "vec_model")
     none = dict.fromkeys(("estimate", "comparison", "row", "ex_mm", "ey_mm", "ez_mm"), np.zeros(0))
     choice = {"model": np.array(["dh", "vec"]), "selected": np.array([False, True])}
+    choice["held_out_rms_mm"] = np.ones(2)
     return {name: made[name] for name in names} | {
         "measurements": columns_of(seen), "pose_errors": none, "model_selection": choice
     }  # fmt: skip
