@@ -95,8 +95,8 @@ def commanded(fitted: Fitted, robot: Robot) -> Iterator[Finding]:
     read = fitted.residuals.position_mm
     apart = np.linalg.norm(sent - read, axis=1)
     # What is apart everywhere (a following error of a few um) is how the arm is.
-    usual = tails.limit(apart[both], 3) if apart[both].any() else 0.0
-    limit_mm = max(np.nan_to_num(usual, posinf=0.0), fitted.limit_mm)
+    usual = tails.limit(apart[both], 3)
+    limit_mm = max(usual, fitted.limit_mm) if np.isfinite(usual) else fitted.limit_mm
     rows = np.flatnonzero(both & (apart > limit_mm))
     if rows.size:
         lines = observed.lines(rows)

@@ -105,7 +105,7 @@ def find(read: Readings, robot: Robot, written: Trial) -> tuple[Readings, list[F
     ``written`` is the fit of the readings as they stand.
     """
     # One session: each has its own base, and a meaning holds for all of them.
-    part = _largest_session(read, np.arange(len(read)))
+    part = largest_session(read, np.arange(len(read)))
     spread = spread_mm(part.position_mm)
     if len(np.unique(part.pose)) < _FEWEST or spread == 0.0:
         return read, []
@@ -119,11 +119,11 @@ def find(read: Readings, robot: Robot, written: Trial) -> tuple[Readings, list[F
     # Of meanings that do equally well, the one that changes least comes first.
     close = sorted((item for item in tried if item.misfit < limit), key=_simplicity)
     many = part.select(thinned(np.arange(len(part)), _FITTED_ROWS))
-    likely = [item.changes for item in close[:_FITTED]]
-    fitted = [
-        (*_fitted(many, robot, applied), applied)
-        for applied in with_progress(likely, "likely ways to read the columns fitted")
-    ]
+    fitted = []
+    for item in with_progress(close[:_FITTED], "likely ways to read the columns fitted"):
+        meant = changed(many, item.changes)
+        sigma_mm = robust_fit.best(meant, robust_fit.start(meant, robot.dh)).sigma_mm
+        fitted.append((sigma_mm / spread_mm(meant.position_mm), sigma_mm, item.changes))
     least = min(share for share, _, _ in fitted)
     if least >= _BETTER * written.sigma_mm / spread or least > FAR:
         return read, []
@@ -153,7 +153,7 @@ def find_by_turns(
     A joint near the target turns it without moving it much. ``least_rad`` is what other readings
     of the orientations leave: a change of the joints is preferred where it does about as well.
     """
-    part = _largest_session(read, np.flatnonzero(read.has_rotation))
+    part = largest_session(read, np.flatnonzero(read.has_rotation))
     few = part.select(thinned(np.arange(len(part)), _TURNED_ROWS))
     here = Meaning.of(few, robot, ())
     limit = _AS_GOOD * max(here.misfit, _SHOWN)
@@ -233,7 +233,7 @@ def spread_mm(points: ndarray) -> float:
     return float(np.sqrt(np.median(np.sum(centred**2, axis=1))))
 
 
-def _largest_session(read: Readings, rows: ndarray) -> Readings:
+def largest_session(read: Readings, rows: ndarray) -> Readings:
     """The readings ``rows`` of the session with most of them."""
     part = read.select(rows)
     largest = np.argmax(np.bincount(part.session))
@@ -246,13 +246,6 @@ def _simplicity(meaning: Meaning) -> tuple[int, int, float]:
     """Few changes before many, common ones before rare ones, then the better."""
     kinds = [_COMMON.index(change.finding.kind) for change in meaning.changes]
     return len(kinds), sum(kinds), meaning.misfit
-
-
-def _fitted(read: Readings, robot: Robot, applied: Changes) -> tuple[float, float]:
-    """What the corrected arm leaves: a share of the points' spread, and mm per axis."""
-    meant = changed(read, applied)
-    sigma_mm = robust_fit.best(meant, robust_fit.start(meant, robot.dh)).sigma_mm
-    return sigma_mm / spread_mm(meant.position_mm), sigma_mm
 
 
 def _searched(here: Meaning, robot: Robot, good: bool) -> list[Meaning]:

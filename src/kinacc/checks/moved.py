@@ -13,7 +13,7 @@ from numpy import ndarray
 from kinacc.checks import robust_fit, tails
 from kinacc.checks.findings import Finding, finding
 from kinacc.checks.readings import Readings, parted
-from kinacc.checks.robust_fit import Fitted, Linear, fit
+from kinacc.checks.robust_fit import Fitted, Trial, fit
 from kinacc.geometry import log_so3
 from kinacc.progress import with_progress
 
@@ -29,46 +29,41 @@ _PLAIN = 0.5  # share at which no other place need be tried
 _STEADY = 0.9  # of what jumps explain; of one jump, a steady motion explains 0.75 at most
 _EXCESS = 2.0  # times what chance, or a step along a joint, explains
 
-Jump = tuple[str, ndarray]  # session (the base) or target, and the readings from there on
-
 
 def without_jumps(whole: Fitted) -> tuple[Fitted, list[Finding]]:
     """The fit with every jump of base or target taken out, one after the other, and these."""
     fitted = whole
-    jumps: list[Jump] = []
     # Poses of equal joints are one: read often, they make no jump any surer.
     few = len(np.unique(np.round(whole.readings.q_rad, 6), axis=0)) < _FEW
     for _ in with_progress(range(_MOST_SPLITS), "searches for a moved instrument or target"):
-        best, least = None, _PLAIN if few else 1.0
-        for row, likely in _places(fitted):
-            for kind in dict.fromkeys([likely, "session", "target"]):
-                split = _jump(fitted, row, kind)
-                share = _share_left(fitted, *split) if split else np.inf
+        best, least = fitted, _PLAIN if few else 1.0
+        for row in _places(fitted):
+            for kind in ("session", "target"):
+                share, split = _split(fitted, row, kind)
                 if share < least:
                     best, least = split, share
             if least < _PLAIN:
                 break
-        if best is None:
+        if best is fitted:
             break
-        fitted, jump = best
-        jumps.append(jump)
-    return fitted, list(_findings(whole, fitted, jumps)) if jumps else []
+        fitted = best
+    return fitted, [] if fitted is whole else [*_findings(whole, fitted)]
 
 
-def _linearised(fitted: Fitted) -> tuple[Readings, ndarray, ndarray, Linear]:
+def _linearised(fitted: Fitted) -> tuple[Readings, ndarray, ndarray, Trial]:
     """The readings that were fitted, under Huber's loss, with what is free of the fit taken out.
 
     Weighted design (m, 6, P), residuals (m, 6), and the linearisation itself.
     """
     trial, few = fitted.trial, fitted.readings.select(fitted.chosen)
-    linear = Linear.of(few, trial.arm, trial.nominal, trial.strength, huber=True)
-    root = np.sqrt(linear.weights)
-    design = linear.design * root[..., None]
-    return few, design, linear.residual * root + design @ linear.step, linear
+    trial = Trial.of(few, trial.arm, trial.nominal, trial.strength, huber=True)
+    root = np.sqrt(trial.weights)
+    design = trial.design * root[..., None]
+    return few, design, trial.residual * root + design @ trial.step, trial
 
 
-def _places(fitted: Fitted) -> list[tuple[int, str]]:
-    """Readings before which a base (session) or target may have moved, likely places first.
+def _places(fitted: Fitted) -> list[int]:
+    """Readings before which a base or target may have moved, likely places first.
 
     A step is judged by how much of the residuals it explains (score test of further frames, under
     Huber's loss, with the parameters of the fit free). Residuals of real arms vary smoothly with
@@ -78,7 +73,8 @@ def _places(fitted: Fitted) -> list[tuple[int, str]]:
     if fitted.trial.sigma_mm < tails.ROUNDING:
         return []
     few, design, residual, linear = _linearised(fitted)
-    slots, places = linear.frames.slots, []
+    slots = linear.frames.slots
+    places: dict[int, float] = {}
     for kind, number, position in slots:
         width = 6 if kind == "session" else 3
         rows = np.flatnonzero(getattr(few, kind) == number)
@@ -98,8 +94,8 @@ def _places(fitted: Fitted) -> list[tuple[int, str]]:
             reference = max(reference, steps_along[inside].max())
         if gains[place] > _EXCESS * reference:
             row = int(fitted.chosen[rows[place]])
-            places.append((gains[place] / reference, (row, kind)))
-    return [place for _, place in sorted(places, key=lambda pair: -pair[0])[:_TRIED]]
+            places[row] = max(gains[place] / reference, places.get(row, 0.0))
+    return sorted(places, key=places.__getitem__, reverse=True)[:_TRIED]
 
 
 def _gains(
@@ -121,10 +117,11 @@ def _gains(
     return np.sum(step * score, axis=(1, 2)), step[..., 0], (across @ step)[..., 0]
 
 
-def _jump(fitted: Fitted, row: int, kind: str) -> tuple[Fitted, Jump] | None:
-    """The fit without a jump near a reading, and the jump; None if there is none.
+def _split(fitted: Fitted, row: int, kind: str) -> tuple[float, Fitted]:
+    """The fit without a jump near a reading: before the one that parts the two frames best.
 
-    The jump is before the reading that parts the two frames best.
+    Also what it leaves over what it may leave at most to be believed, overall or where it is, by
+    the fits' own lengths, each cut at ten sigma so that gross errors do not decide.
     """
     observed, rows = parted(fitted.readings, row, kind)
     frames = [int(getattr(item, kind)[row]) for item in (fitted.readings, observed)]
@@ -139,58 +136,50 @@ def _jump(fitted: Fitted, row: int, kind: str) -> tuple[Fitted, Jump] | None:
     first = int(np.argmin(np.cumsum(costs[0]) - np.cumsum(costs[1])))
     sides = part.pose[:first], part.pose[first:]
     if min(len(np.unique(side)) for side in sides) < _FEWEST:
-        return None
+        return np.inf, again
     if both[first] != row:
         observed, rows = parted(fitted.readings, both[first], kind)
         again = fit(observed, fitted.trial.nominal)
-    return again, (kind, rows)
+    before, after = (np.minimum(e.left_mm, _CAP * fitted.trial.sigma_mm) for e in (fitted, again))
+    near = rows[:_NEAR]
+    everywhere, there = after.mean() / before.mean(), after[near].mean() / before[near].mean()
+    return min(everywhere / _BETTER, max(there / _BETTER_THERE, everywhere)), again
 
 
-def _share_left(before: Fitted, after: Fitted, jump: Jump) -> float:
-    """What a split leaves, over what it may leave at most to be believed: overall, or where it is.
-
-    The fits' own lengths are compared, each cut at ten sigma so that gross errors do not decide.
-    """
-    lengths = [np.minimum(e.left_mm, _CAP * before.trial.sigma_mm) for e in (before, after)]
-    parts = (slice(None), jump[1][:_NEAR])
-    everywhere, there = (float(lengths[1][part].mean() / lengths[0][part].mean()) for part in parts)
-    return min(everywhere / _BETTER, max(there / _BETTER_THERE, everywhere))
-
-
-def _findings(whole: Fitted, fitted: Fitted, jumps: list[Jump]) -> Iterator[Finding]:
+def _findings(whole: Fitted, fitted: Fitted) -> Iterator[Finding]:
     """Jumps of base and targets; a drift in place of the jumps of a base that drifts."""
     observed, frames = fitted.readings, fitted.trial.arm.frames
     drifts = _drifts_mm(whole, fitted)
-    for name, drift in drifts.items():
-        subset = [observed.session_names[item] == name for item in observed.session]
-        yield finding("drift", observed.line[subset], by=_signed(drift), drift_mm=drift.tolist())
-    for kind, rows in jumps:
-        label = getattr(observed, kind)
-        names = np.array(getattr(observed, f"{kind}_names"))[label]
-        name, first = names[rows[0]], int(observed.line[rows[0]])
+    for kind, poses in (("session", frames.bases), ("target", frames.targets)):
         is_base = kind == "session"
-        if is_base and name in drifts:
-            continue
-        before = np.flatnonzero(names[: rows[0]] == name)[-1]
-        poses = frames.bases if is_base else frames.targets
-        old, new = label[before], label[rows[0]]
-        shift = poses.position_mm[new] - poses.position_mm[old]
-        turn = poses.rotation[new] @ poses.rotation[old].T
-        if is_base:
-            # How far points in the middle of the readings went.
-            middle = fitted.residuals.predicted.position_mm[rows].mean(axis=0)
-            arm = middle - poses.position_mm[new]
-            shift = shift + arm - turn.T @ arm
-        yield finding(
-            "base_jump" if is_base else "target_moved",
-            observed.lines(rows),
-            row=observed.row_names.one(first),
-            target=str(name or ""),
-            by=_signed(shift),
-            first_line=first,
-            shift_mm=shift.tolist(),
-            turn_mrad=1e3 * float(np.linalg.norm(log_so3(turn))) * is_base,
-        )
+        label, names = getattr(observed, kind), getattr(observed, f"{kind}_names")
+        for name in dict.fromkeys(names):
+            mine = np.flatnonzero(np.array(names)[label] == name)
+            if is_base and name in drifts:
+                by, drift_mm = _signed(drifts[name]), drifts[name].tolist()
+                yield finding("drift", observed.line[mine], by=by, drift_mm=drift_mm)
+                continue
+            known = np.diff(getattr(whole.readings, kind)[mine]) != 0
+            for place in np.flatnonzero((np.diff(label[mine]) != 0) & ~known):
+                rows, first = mine[place + 1 :], int(observed.line[mine[place + 1]])
+                old, new = label[mine[place]], label[rows[0]]
+                shift = poses.position_mm[new] - poses.position_mm[old]
+                turn = poses.rotation[new] @ poses.rotation[old].T
+                if is_base:
+                    # How far points in the middle of the readings went.
+                    middle = fitted.residuals.predicted.position_mm[rows].mean(axis=0)
+                    arm = middle - poses.position_mm[new]
+                    shift = shift + arm - turn.T @ arm
+                yield finding(
+                    "base_jump" if is_base else "target_moved",
+                    observed.lines(rows),
+                    row=observed.row_names.one(first),
+                    target=str(name or ""),
+                    by=_signed(shift),
+                    first_line=first,
+                    shift_mm=shift.tolist(),
+                    turn_mrad=1e3 * float(np.linalg.norm(log_so3(turn))) * is_base,
+                )
 
 
 def _signed(vector: ndarray) -> str:

@@ -31,7 +31,7 @@ from kinacc.kinematics.dh import DHModel
 
 BIWEIGHT = 7.0  # readings beyond this many sigma (of a 3-D magnitude) have no weight in the end
 HUBER = 3.0  # beyond this many sigma a reading pulls no harder, while the strength is sought
-STRENGTHS = (0.0, 0.3, 3.0, 30.0, 100.0)  # mm and mrad the corrections may have
+STRENGTHS = (0.3, 3.0, 30.0, 100.0)  # mm and mrad the corrections may have, if any
 # Sigma from a quantile below the median: two fifths of the readings may be wrong together.
 _QUANTILE, _QUANTILE_3D = 0.35, 1.2797  # of the norm of three standard normal numbers
 _LEAST_SIGMA = 1e-7  # of what is fitted exactly: rounding
@@ -79,24 +79,6 @@ class Residuals:
 
 
 @dataclass(frozen=True)
-class Trial:
-    """A fit: the arm, and robust standard deviations per axis of what it leaves.
-
-    ``left_out`` (n, 6), mm and rad: residuals of the fitted readings when their configuration is
-    left out, to first order; ``judged``: the same over what the fit without it leaves open there.
-    ``nominal`` is the model the corrections lean on, by ``strength``.
-    """
-
-    arm: Arm
-    nominal: DHModel
-    sigma_mm: float
-    sigma_rad: float
-    strength: float
-    left_out: ndarray
-    judged: ndarray
-
-
-@dataclass(frozen=True)
 class Fitted:
     """The fit of all readings ``readings``, ``chosen`` (m,) of them, and what it leaves.
 
@@ -125,11 +107,11 @@ def fit(observed: Readings, model: DHModel) -> Fitted:
     few = observed.select(chosen)
     trial = best(few, start(few, model))
     remaining = residuals(trial.arm, observed)
+    left_out, judged = trial.left_out(few), trial.left_out(few, judged=True)
     lengths = []
     for part, residual in zip(_PARTS, (remaining.position_mm, remaining.turn_rad), strict=True):
         length, without, over = (
-            np.linalg.norm(item, axis=1)
-            for item in (residual, trial.left_out[:, part], trial.judged[:, part])
+            np.linalg.norm(item, axis=1) for item in (residual, left_out[:, part], judged[:, part])
         )
         # A reading that alone determines something lies anywhere without it, however sound it is:
         # it is far only where it is so too over what the fit without it leaves open.
@@ -151,38 +133,28 @@ def residuals(arm: Arm, observed: Readings) -> Residuals:
     return Residuals(predicted.position_mm - observed.position_mm, turn, predicted, flange.rotation)
 
 
-def sigma_of(vectors: ndarray) -> float:
-    """Standard deviation per axis of vectors (n, 3), from the shorter ones."""
-    length = np.linalg.norm(vectors[np.isfinite(vectors[:, 0])], axis=1)
-    if not length.size:
-        return np.nan
-    return max(float(np.quantile(length, _QUANTILE)) / _QUANTILE_3D, _LEAST_SIGMA)
-
-
-def best(observed: Readings, begin: Arm, strengths: tuple[float, ...] = STRENGTHS) -> Trial:
+def best(observed: Readings, begin: Arm) -> Trial:
     """The fit whose strength predicts configurations left out best."""
-    number = np.unique(observed.pose, return_inverse=True)[1]
-    chosen: Trial | None = None
-    least, cap, arm = np.inf, 0.0, begin
-    for strength in strengths:
-        trial = reweighted(observed, arm, begin.model, strength, huber=True)
-        if chosen and _far(trial.arm.model, begin.model):
-            continue
-        arm, cap = trial.arm, cap or _CAP * trial.sigma_mm
-        length = np.minimum(np.linalg.norm(trial.left_out[:, :3], axis=1), cap)
-        score = float(np.mean(np.bincount(number, length) / np.bincount(number)))
-        # Stronger corrections must pay: noise alone moves the score by a per mille or so.
-        if chosen is None or score < 0.99 * least:
-            chosen, least = trial, score
-        elif score > 1.5 * least:
+    nominal, number = begin.model, np.unique(observed.pose, return_inverse=True)[1]
+    trial = chosen = reweighted(observed, begin, nominal, 0.0, huber=True)
+    cap = _CAP * trial.sigma_mm
+
+    def score(trial: Trial) -> float:
+        length = np.minimum(np.linalg.norm(trial.left_out(observed)[:, :3], axis=1), cap)
+        return float(np.mean(np.bincount(number, length) / np.bincount(number)))
+
+    least = score(trial)
+    for strength in STRENGTHS:
+        trial = reweighted(observed, trial.arm, nominal, strength, huber=True)
+        if _far(trial) or (now := score(trial)) > 1.5 * least:
             break
-    assert chosen is not None
-    corrections = 5 * begin.model.joints if chosen.strength > 0.0 else 0
-    frames = 6 * len(observed.session_names) + 3 * len(observed.target_names)
-    if 3 * len(observed) < _READ_PER_PARAMETER * (frames + corrections):
+        # Stronger corrections must pay: noise alone moves the score by a per mille or so.
+        if now < 0.99 * least:
+            chosen, least = trial, now
+    if 3 * len(observed) < _READ_PER_PARAMETER * chosen.step.size:
         return chosen
-    final = reweighted(observed, chosen.arm, begin.model, chosen.strength)
-    return chosen if _far(final.arm.model, begin.model) else final
+    final = reweighted(observed, chosen.arm, nominal, chosen.strength)
+    return chosen if _far(final) else final
 
 
 def reweighted(
@@ -192,32 +164,30 @@ def reweighted(
 
     Tukey's biweight, which gives gross errors no say, or Huber's loss, which needs no good start.
     """
-    arm = begin
+    trial = Trial.of(observed, begin, nominal, strength, huber)
     for _ in range(_ITERATIONS):
-        step = Linear.of(observed, arm, nominal, strength, huber)
-        arm, moved = step.taken(arm)
-        if moved < _SETTLED * min(step.sigma_mm, 1.0):
+        arm, moved = trial.taken()
+        settled = moved < _SETTLED * min(trial.sigma_mm, 1.0)
+        trial = Trial.of(observed, arm, nominal, strength, huber)
+        if settled:
             break
-    step = Linear.of(observed, arm, nominal, strength, huber)
-    plain, judged = step.left_out(observed)
-    return Trial(arm, nominal, step.sigma_mm, step.sigma_rad, strength, plain, judged)
-
-
-def _far(model: DHModel, nominal: DHModel) -> bool:
-    moved = np.abs(model.start - nominal.start).reshape(-1, 5)
-    return bool(moved[:, _IS_ANGLE].max() > _FAR_RAD or moved[:, ~_IS_ANGLE].max() > _FAR_MM)
+    return trial
 
 
 @dataclass(frozen=True)
-class Linear:
-    """Weighted design of n readings at an arm, and the solution of its normal equations.
+class Trial:
+    """An arm that leans on ``nominal`` by ``strength``, and one step of its fit to n readings.
 
     ``design`` (n, 6, P), ``residual`` (n, 6) in the robot's base, mm and rad, and ``weights``
     (n, 6): zero where an orientation was not measured. Columns: components of ``frames``, then the
     corrections of the DH parameters where the strength is above zero. ``inverse`` (P, P) of the
-    normal equations and their ``step`` (P,).
+    normal equations and their ``step`` (P,). ``sigma_mm`` and ``sigma_rad``: robust standard
+    deviations per axis of what the arm leaves.
     """
 
+    arm: Arm
+    nominal: DHModel
+    strength: float
     design: ndarray
     residual: ndarray
     weights: ndarray
@@ -230,8 +200,8 @@ class Linear:
     @classmethod
     def of(
         cls, observed: Readings, arm: Arm, nominal: DHModel, strength: float, huber: bool
-    ) -> Linear:
-        """The linearisation of an arm that leans on ``nominal``."""
+    ) -> Trial:
+        """The arm, linearised."""
         # A target that moved has two numbers and one name.
         named = replace(observed, target_names=tuple(map(str, range(len(observed.target_names)))))
         frames = frame_terms(named, arm.frames)
@@ -241,14 +211,17 @@ class Linear:
         ((columns, _),) = system.columns(x)  # few enough readings for one block
         columns = np.pad(columns, ((0, 0), (0, 6 - columns.shape[1]), (0, 0)))
         design, residual = columns[:-1].transpose(2, 1, 0), columns[-1].T
-        weights, sigmas = np.zeros((len(observed), 6)), []
+        weights, sigmas = np.zeros((len(observed), 6)), [np.nan, np.nan]
         every = np.ones(len(observed), dtype=bool)
-        for part, there in zip(_PARTS, (every, observed.has_rotation), strict=True):
-            vectors = residual[there, part]
-            sigmas.append(sigma := sigma_of(vectors))
-            if len(vectors):
-                weights[there, part] = _weight(vectors, sigma, huber) / sigma**2
-        lean = np.append(np.zeros(frames.size), (strength * _units(nominal))[free] ** -2.0)
+        for place, there in enumerate((every, observed.has_rotation)):
+            if there.any():
+                length = np.linalg.norm(residual[there, _PARTS[place]], axis=1)
+                sigma = max(float(np.quantile(length, _QUANTILE)) / _QUANTILE_3D, _LEAST_SIGMA)
+                weights[there, _PARTS[place]] = _weight(length, sigma, huber)[:, None] / sigma**2
+                sigmas[place] = sigma
+        lean = np.append(
+            np.zeros(frames.size), (strength * _by_kind(nominal, 1e-3, 1.0))[free] ** -2
+        )
         moved = np.append(np.zeros(frames.size), (arm.model.start - nominal.start)[free])
         flat = columns.reshape(len(columns), -1)
         normal = (flat[:-1] * weights.T.ravel()) @ flat.T
@@ -259,24 +232,27 @@ class Linear:
         both = np.outer(scale, scale)
         inverse = np.linalg.pinv(gram * both, rcond=1e-12, hermitian=True) * both
         step = -inverse @ (normal[:, -1] + lean * moved)
-        return cls(design, residual, weights, inverse, step, frames, *sigmas)
+        return cls(
+            arm, nominal, strength, design, residual, weights, inverse, step, frames, *sigmas
+        )
 
-    def taken(self, arm: Arm) -> tuple[Arm, float]:
+    def taken(self) -> tuple[Arm, float]:
         """The arm after the step, and how far it moves: mm of lengths, mm at one metre of turns."""
         of_frames, rest = np.split(self.step, [self.frames.size])
-        model = arm.model.with_parameters(arm.model.start + rest) if rest.size else arm.model
-        scale = np.append(self.frames.scale, _units(model))[: self.step.size]
+        model = self.arm.model
+        model = model.with_parameters(model.start + rest) if rest.size else model
+        scale = np.append(self.frames.scale, _by_kind(model, 1e-3, 1.0))[: self.step.size]
         moved = float(np.abs(self.step / scale).max())
         return Arm(model, self.frames.frames(self.frames.begin + of_frames)), moved
 
-    def left_out(self, observed: Readings) -> tuple[ndarray, ndarray]:
+    def left_out(self, observed: Readings, judged: bool = False) -> ndarray:
         """Residuals (n, 6), mm and rad, of every reading with its configuration left out.
 
-        Then the same over what the fit without it leaves open there: as wide as ``sigma`` for a
-        sound reading, whether others determine it or it alone does. NaN where not measured.
+        To first order; NaN where not measured. ``judged``: over what the fit without it leaves open
+        there, as wide as ``sigma`` for a sound reading, whether others determine it or it alone.
         """
         unit = np.nan_to_num(np.repeat([self.sigma_mm, self.sigma_rad], 3), nan=1.0)
-        plain, judged = self.residual / unit, self.residual / unit
+        result = self.residual / unit
         scaled, share = self.design / unit[:, None], self.weights * unit**2
         poses = [*pd.Series(observed.pose).groupby(observed.pose).indices.values()]
         for size in {*map(len, poses)}:
@@ -288,32 +264,36 @@ class Linear:
                 len(rows), 1, -1
             )
             rest = np.linalg.pinv(rest, rcond=1e-12)
-            remaining = rest @ plain[rows].reshape(len(rows), -1, 1)
-            spread = rest @ open_there
-            value, axes = np.linalg.eigh(0.5 * (spread + np.swapaxes(spread, 1, 2)))
-            over = np.sqrt(1.0 + np.maximum(value, 0.0))[:, :, None]
-            within = axes @ (np.swapaxes(axes, 1, 2) @ remaining / over)
-            plain[rows], judged[rows] = (e.reshape(*rows.shape, 6) for e in (remaining, within))
-        unit = np.tile(unit, (len(observed), 1))
-        unit[~observed.has_rotation, 3:] = np.nan
-        return plain * unit, judged * unit
+            remaining = rest @ result[rows].reshape(len(rows), -1, 1)
+            if judged:
+                spread = rest @ open_there
+                value, axes = np.linalg.eigh(0.5 * (spread + np.swapaxes(spread, 1, 2)))
+                over = np.sqrt(1.0 + np.maximum(value, 0.0))[:, :, None]
+                remaining = axes @ (np.swapaxes(axes, 1, 2) @ remaining / over)
+            result[rows] = remaining.reshape(*rows.shape, 6)
+        result[~observed.has_rotation, 3:] = np.nan
+        return result * unit
 
 
-def _units(model: DHModel) -> ndarray:
-    """One mm or mrad (5k,) of every DH parameter."""
-    return np.where(np.tile(_IS_ANGLE, model.joints), 1e-3, 1.0)
+def _by_kind(model: DHModel, angle: float, length: float) -> ndarray:
+    """One number for every angle of the DH parameters (5k,), another for every length."""
+    return np.where(np.tile(_IS_ANGLE, model.joints), angle, length)
 
 
-def _weight(vectors: ndarray, sigma: float, huber: bool) -> ndarray:
-    """Weights (n, 1) of vectors (n, 3)."""
-    length = np.linalg.norm(vectors, axis=1)
+def _far(trial: Trial) -> bool:
+    moved = np.abs(trial.arm.model.start - trial.nominal.start)
+    return bool((moved > _by_kind(trial.nominal, _FAR_RAD, _FAR_MM)).any())
+
+
+def _weight(length: ndarray, sigma: float, huber: bool) -> ndarray:
+    """Weights (n,) of residuals of these lengths."""
     if huber:
         weight = HUBER * sigma / np.maximum(length, HUBER * sigma)
         # Where a quarter or more is that far off, the start is to blame and not the readings.
         limit = max(_GROSS * sigma, 3.0 * np.quantile(length, 0.75))
-        return np.where(length < limit, weight, 0.0)[:, None]
+        return np.where(length < limit, weight, 0.0)
     share = np.minimum(length / (BIWEIGHT * sigma), 1.0)
-    return ((1.0 - share**2) ** 2)[:, None]
+    return (1.0 - share**2) ** 2
 
 
 def start(observed: Readings, model: DHModel) -> Arm:

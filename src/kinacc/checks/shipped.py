@@ -6,15 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from kinacc.checks import robust_fit
-from kinacc.checks.meanings import Meaning, spread_mm
+from kinacc.checks.meanings import Meaning, largest_session
 from kinacc.checks.readings import Readings, thinned
 from kinacc.kinematics import robot as robots
 from kinacc.progress import with_progress
 
 _ROWS = 240
-_TRIED = 4  # robots that base and target alone put first
-SURE = 0.005  # of the points' spread: what an arm that is the one leaves, uncalibrated
+SURE = 0.01  # of the points' spread: what an arm that is the one leaves, uncalibrated
 _NEXT = 0.2  # of what the next best leaves
 _SAME_ARM = 1e-6  # of the misfit: two names of one geometry
 
@@ -24,16 +22,13 @@ def misfits(merged: Readings) -> list[tuple[float, str]]:
 
     The arms are taken as described: corrected, an arm of similar build would fit as well.
     """
-    few = merged.select(thinned(np.arange(len(merged)), _ROWS))
-    spread = max(spread_mm(few.position_mm), 1e-9)
+    part = largest_session(merged, np.arange(len(merged)))
+    few = part.select(thinned(np.arange(len(part)), _ROWS))
     arms = [arm for arm in map(robots.load, robots.shipped()) if arm.dh.joints == few.joints]
-    rivals = [(arm, replace(few, q_rad=arm.dh_joints(few.q))) for arm in arms]
-    rivals.sort(key=lambda pair: Meaning.of(pair[1], pair[0], ()).misfit)
     shares = []
-    for arm, observed in with_progress(rivals[:_TRIED], "shipped robots tried"):
-        begin = robust_fit.start(observed, arm.dh)
-        fit = robust_fit.best(observed, begin, strengths=(0.0,))
-        shares.append((fit.sigma_mm / spread, arm.name))
+    for arm in with_progress(arms, "shipped robots tried"):
+        observed = replace(few, q_rad=arm.dh_joints(few.q))
+        shares.append((Meaning.of(observed, arm, ()).misfit, arm.name))
     return sorted(shares)
 
 

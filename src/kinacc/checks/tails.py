@@ -8,12 +8,14 @@ the limit. Never lighter tails than ten degrees of freedom: nothing measured is 
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import scipy
 
 FAMILY_WISE = 0.01
 ROUNDING = 1e-6  # mm and rad: what is nearer is equal, as readings without noise are
-_MOST_FREEDOM, _LEAST_FREEDOM = 10.0, 4.0
+_FREEDOM = np.linspace(10.0, 4.0, 2001)  # degrees from light tails to heavy ones
 _BULK = 0.9
 _APART = 1.25  # of the next: what is less makes no difference to the largest
 
@@ -30,7 +32,7 @@ def limit(lengths: np.ndarray, dimensions: int, count: int | None = None) -> flo
     count = lengths.size if count is None else count
     if middle <= 0.0:
         return np.inf
-    freedom = _freedom(outer / middle, dimensions)
+    freedom: np.ndarray = np.interp(outer / middle, _ratios(dimensions), _FREEDOM)
     tail = _length(1.0 - FAMILY_WISE / max(count, 1), dimensions, freedom)
     return max(float(middle * tail / _length(0.5, dimensions, freedom)), ROUNDING)
 
@@ -56,16 +58,12 @@ def detached(lengths: np.ndarray) -> int:
     return 0
 
 
-def _length(probability: float, dimensions: int, freedom: float) -> float:
+@cache
+def _ratios(dimensions: int) -> np.ndarray:
+    """The bulk quantile in medians, for every one of ``_FREEDOM``."""
+    return _length(_BULK, dimensions, _FREEDOM) / _length(0.5, dimensions, _FREEDOM)
+
+
+def _length(probability: float, dimensions: int, freedom: np.ndarray) -> np.ndarray:
     """Quantile of the length of a standard t vector."""
-    return float(np.sqrt(dimensions * scipy.special.fdtri(dimensions, freedom, probability)))
-
-
-def _freedom(ratio: float, dimensions: int) -> float:
-    """Degrees of freedom at which the bulk quantile is ``ratio`` medians, within bounds."""
-
-    def of(freedom: float) -> float:
-        return _length(_BULK, dimensions, freedom) / _length(0.5, dimensions, freedom)
-
-    ratio = float(np.clip(ratio, of(_MOST_FREEDOM), of(_LEAST_FREEDOM)))
-    return float(scipy.optimize.brentq(lambda f: of(f) - ratio, _LEAST_FREEDOM, _MOST_FREEDOM))
+    return np.sqrt(dimensions * scipy.special.fdtri(dimensions, freedom, probability))
