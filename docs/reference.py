@@ -62,7 +62,7 @@ def tables():
     parts, same = [], {0.0: "equal", None: "by the row's unit"}
     for each in ARTEFACTS.values():
         key = ", ".join(f"`{name}`" for name in each.key)
-        parts.append(f"## {each.file_name}\n\n{each.meaning} Key: {key}.\n")
+        parts.append(f"## {each.name}.parquet\n\n{each.meaning} Key: {key}.\n")
         rows = (
             (f"`{column.name}`", column.kind, column.unit or "-", column.limits or "any",
              same.get(column.same_within, str(column.same_within)), column.meaning)

@@ -14,8 +14,8 @@ import yaml
 from page_blocks import blocks
 from shared_data import ROOT
 
+from kinacc.checks.configuration import load
 from kinacc.cli.group import main
-from kinacc.config.load import load
 from kinacc.kinematics import robot as robots
 from kinacc.kinematics.robot import as_yaml
 

@@ -19,7 +19,7 @@ from preloaded import commands, python
 from scipy.spatial.transform import Rotation
 from shared_data import ROOT
 
-from kinacc.config.load import overlay
+from kinacc.config.values import overlay
 from kinacc.kinematics import dh, robot
 
 CONFIGS = ("config.yaml", "small.yaml")

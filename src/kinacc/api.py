@@ -14,7 +14,7 @@ import pandas as pd
 from kinacc import __version__
 from kinacc.calibration import stages
 from kinacc.calibration.summary import reported_joints
-from kinacc.checks import check, contradictions
+from kinacc.checks import check, configuration
 from kinacc.checks.described import describe_files
 from kinacc.config import schema
 from kinacc.config.error_models import PLAINEST, asked_for
@@ -374,7 +374,7 @@ def read_measurements(
     else:
         files = describe_files(paths, None if robot is None else str(robot), answers)
         content = {name: overlay(item, settings or {}) for name, item in files.items()}
-        described = data_sets(contradictions.load([], {"datasets": content})).settings
+        described = data_sets(configuration.load([], {"datasets": content})).settings
     if dataset is None and len(described) > 1:
         where = ", ".join(map(str, paths))
         raise input_error(where, "describes several data sets", ", ".join(described))

@@ -87,9 +87,6 @@ def input_error(where: str, what: str, allowed: str = "", fix: str = "") -> Inpu
 class MachineError(InputError):
     """The machine did not do what was asked of it: a disk that is full, a file that is closed."""
 
-    def __str__(self) -> str:
-        return "; ".join(map(str, self.problems))
-
 
 _REMEDIES = {
     errno.ENOSPC: "make room, then give the same command again",
@@ -104,9 +101,8 @@ def refused(error: OSError, where: object = None, what: str = "") -> MachineErro
     ``where`` is the file the system names where that is not given.
     """
     where = error.filename if where is None else where
-    reason = error.strerror or str(error) or type(error).__name__
-    if error.errno and (known := os.strerror(error.errno)).lower() in reason.lower():
-        reason = known  # a library may say more, in words for programmers
+    # A library may say more than the system, in words for programmers.
+    reason = os.strerror(error.errno) if error.errno else str(error) or type(error).__name__
     reason = reason[:1].lower() + reason[1:]
     message = ": ".join(filter(None, [what, reason]))
     place = "this machine" if where is None else str(where)

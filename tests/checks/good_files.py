@@ -9,7 +9,7 @@ import shared_data
 from scipy.spatial.transform import Rotation
 
 from kinacc.checks.check import check
-from kinacc.checks.contradictions import load
+from kinacc.checks.configuration import load
 from kinacc.kinematics import robot as robots
 from kinacc.kinematics.robot import forward
 from kinacc.measurements.reader import read
@@ -54,7 +54,7 @@ class File:
         """What check-data finds in it."""
         settings = load((self.write(folder),))["file"]
         arm, section = robots.load(settings["robot"]), settings["measurements"]["file"]
-        return check(read(section, arm, strict=False), section, arm, "file")
+        return check(read(section, arm, strict=False), section, arm)
 
 
 def measured(name: str) -> File:

@@ -9,7 +9,7 @@ import pytest
 from command_line import answer, call
 from tracked_arm import init_seen, tracked
 
-from kinacc.checks.contradictions import load
+from kinacc.checks.configuration import load
 
 
 def printed(*words, code=0):

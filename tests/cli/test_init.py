@@ -8,7 +8,7 @@ import pytest
 from command_line import answer, call
 from scipy.spatial.transform import Rotation
 
-from kinacc.checks.contradictions import load
+from kinacc.checks.configuration import load
 from kinacc.kinematics import robot
 from kinacc.measurements.intake.write import shipped_text
 

@@ -7,7 +7,7 @@ import pytest
 from command_line import call
 from tracked_arm import assert_read, assert_turned, described, looked, refused, table, tracked
 
-from kinacc.checks.contradictions import load
+from kinacc.checks.configuration import load
 from kinacc.errors import InputError
 from kinacc.kinematics import robot
 from kinacc.measurements.intake import guess as guesses

@@ -8,7 +8,7 @@ from read_columns import Q_DEG as Q
 from read_columns import XYZ_MM, joints_of, points_of, turns_of
 from scipy.spatial.transform import Rotation
 
-from kinacc.checks.contradictions import load
+from kinacc.checks.configuration import load
 from kinacc.kinematics import robot
 from kinacc.measurements.intake import guess as guesses
 from kinacc.measurements.reader import read

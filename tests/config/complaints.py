@@ -2,7 +2,7 @@
 
 import pytest
 
-from kinacc.checks.contradictions import load
+from kinacc.checks.configuration import load
 from kinacc.errors import InputError
 
 

@@ -3,7 +3,7 @@
 import pytest
 from complaints import complaints
 
-from kinacc.checks.contradictions import load
+from kinacc.checks.configuration import load
 
 END = "datasets: {mh180: {robot: mh180}, other: {robot: mh180}}\n"
 

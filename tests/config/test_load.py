@@ -9,7 +9,7 @@ import pytest
 from complaints import complaints
 from shared_data import ROOT
 
-from kinacc.checks.contradictions import load
+from kinacc.checks.configuration import load
 from kinacc.config.schema import defaults
 
 PAPER = ROOT / "config.yaml"

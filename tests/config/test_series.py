@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from complaints import complaints
 
-from kinacc.checks.contradictions import load
+from kinacc.checks.configuration import load
 
 MARCH, MAY, JUNE = (f"tracker-2026-0{month}" for month in ("3-01", "5-04", "6-02"))
 SERIES = """\

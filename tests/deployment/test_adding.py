@@ -11,7 +11,7 @@ import pytest
 from command_line import call
 from shared_data import SHIPPED
 
-from kinacc.checks.contradictions import load
+from kinacc.checks.configuration import load
 from kinacc.config.edit import with_added
 from kinacc.errors import InputError
 

@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 from shared_data import RESULTS
 
-from kinacc.config.load import load
+from kinacc.checks.configuration import load
 from kinacc.gate.gates import of_gate
 from kinacc.gate.outcome import FAILED, PASSED, UNDECIDED, WARNED
 from kinacc.gate.values import RunTables, figure

@@ -61,7 +61,9 @@ def write_tables(tables: Mapping[str, Mapping], folder: Path) -> None:
     """Tables of a stage as files, without what differs from version to version."""
     folder.mkdir(parents=True, exist_ok=True)
     for name, columns in tables.items():
-        store.write_table(folder / f"{name}.parquet", name, columns, MARKS)
+        (folder / f"{name}.parquet").write_bytes(
+            store.content_of(store.to_table(name, columns, MARKS))
+        )
 
 
 def faults() -> Iterator[tuple[str, File]]:

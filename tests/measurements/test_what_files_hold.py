@@ -11,7 +11,7 @@ from read_columns import turns_of
 from scipy.spatial.transform import Rotation
 from shared_data import ROOT
 
-from kinacc.checks.contradictions import load
+from kinacc.checks.configuration import load
 from kinacc.config.schema import defaults
 from kinacc.errors import InputError
 from kinacc.kinematics import robot

@@ -7,6 +7,7 @@ from assessed_points import points
 
 from kinacc.errors import InputError
 from kinacc.tables import store
+from kinacc.tables.atomic import write_whole
 from kinacc.tables.comparison import compare_folders, compare_tables
 
 MARKS = {"kinacc_version": "0", "config_hash": "c", "seed": 1}
@@ -14,8 +15,9 @@ ROWS = 12
 
 
 def written(folder, artefact, columns):
-    store.write_table(folder / f"{artefact}.parquet", artefact, columns, MARKS)
-    return folder / f"{artefact}.parquet"
+    path = folder / f"{artefact}.parquet"
+    write_whole(path, store.content_of(store.to_table(artefact, columns, MARKS)))
+    return path
 
 
 def differences(tmp_path, before, now):

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 from shared_data import ROOT
 
-from kinacc.config.load import overlay
+from kinacc.config.values import overlay
 from kinacc.study.in_memory import run
 from kinacc.synthetic import source
 from kinacc.workflow.data_sets import read_data_sets

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from calibration.simulated import wavy
 
-from kinacc.config.load import overlay
 from kinacc.config.schema import defaults
+from kinacc.config.values import overlay
 from kinacc.kinematics import dh, robot, vec
 from kinacc.kinematics.inverse import limits
 from kinacc.study import evaluation

@@ -26,7 +26,7 @@ from kinacc.assess.adaptive import AdaptiveAssessor, Candidates
 from kinacc.assess.registry import ADAPTIVE
 from kinacc.campaign.instrument import Instrument, finite
 from kinacc.config import json_files
-from kinacc.config.load import problems_of
+from kinacc.config.problems import problems_of
 from kinacc.errors import InputError, Problem, input_error, refuse
 from kinacc.geometry import Pose
 

@@ -49,7 +49,7 @@ def run(inputs: Tables, settings: Settings) -> Tables:
 
     Raises InputError where findings stop the workflow, one problem each.
     """
-    report = examined(settings, "")
+    report = examined(settings)
     if report.stopping:
         title = f"{report.path} is not ready to be fitted"
         raise InputError(
@@ -80,15 +80,13 @@ def run(inputs: Tables, settings: Settings) -> Tables:
     return {"data_check": columns_of("data_check", table)}
 
 
-def examined(settings: Settings, dataset: str) -> Report:
+def examined(settings: Settings) -> Report:
     """Check a data set's file, with what its configuration accepts.
 
     Parameters
     ----------
     settings
         ``robot`` and the sections ``measurements``, ``calibration`` and ``data_check``.
-    dataset
-        Its name in the report.
 
     Returns
     -------
@@ -102,7 +100,7 @@ def examined(settings: Settings, dataset: str) -> Report:
     """
     arm, section = robots.load(settings["robot"]), settings["measurements"]["file"]
     reading = read(section, arm, strict=False)
-    report = check(reading, section, arm, dataset)
+    report = check(reading, section, arm)
     of_fit = (reading.columns, arm, settings["calibration"])
     found = (*coverage.few_poses(*of_fit), *coverage.fixed_frames(*of_fit))
     more = [item.held_to((), reading.row_names) for item in found]
@@ -111,12 +109,7 @@ def examined(settings: Settings, dataset: str) -> Report:
 
 
 @one_thread
-def check(
-    reading: MeasuredFile,
-    section: Settings,
-    robot: Robot,
-    dataset: str,
-) -> Report:
+def check(reading: MeasuredFile, section: Settings, robot: Robot) -> Report:
     """Report on what was read as in ``section``. Raises InputError for too few poses."""
     stated = Layout.of(section).orientation
     every = readings.of_file(reading, robot)
@@ -150,7 +143,6 @@ def check(
     facts = coverage.facts_of(every, robot, scatter, between, fitted if fits else None)
     unread = dict.fromkeys((*reading.notes, *reading.left_out()))
     return Report(
-        dataset,
         section["path"],
         facts,
         tuple(item.held_to(gross, reading.row_names) for item in _once(findings, facts["rows"])),

@@ -76,14 +76,14 @@ def describe_files(
             raise input_error(guess.table.path, "no shipped robot fits the readings", fix=fix)
         robot = fit[0]
     name = plain_name(guess.table.path)
-    guess, report, _ = corrected(guess, robots.load(robot), name)
+    guess, report, _ = corrected(guess, robots.load(robot))
     if (coupling := coupling_of(report)) is not None:
         fix = "kinacc init writes the robot file with this joint_map"
         raise input_error(f"robot {robot}", coupling.what, fix=fix)
     return {name: dataset_content(robot, guess, int(report.facts["poses"]))}
 
 
-def corrected(guess: Guess, robot: Robot, name: str) -> tuple[Guess, Report, MeasuredFile]:
+def corrected(guess: Guess, robot: Robot) -> tuple[Guess, Report, MeasuredFile]:
     """Correct assumed settings of a file where its readings contradict them.
 
     Parameters
@@ -92,8 +92,6 @@ def corrected(guess: Guess, robot: Robot, name: str) -> tuple[Guess, Report, Mea
         Settings of the file, of which some are assumed.
     robot
         The arm that was measured.
-    name
-        Name of the data set in the report.
 
     Returns
     -------
@@ -114,7 +112,7 @@ def corrected(guess: Guess, robot: Robot, name: str) -> tuple[Guess, Report, Mea
         raise input_error("--robot", message, fix=fix)
     for _ in range(3):
         reading = read(guess.section, robot, strict=False)
-        report = check.check(reading, guess.section, robot, name)
+        report = check.check(reading, guess.section, robot)
         guess = replace(guess, notes=tuple(dict.fromkeys((*guess.notes, *reading.notes))))
         before, guess = guess, _set_right(guess, report)
         if guess is before:

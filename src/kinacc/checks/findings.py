@@ -107,7 +107,6 @@ class Report:
         Reasons of the configuration to go on with findings, by their code.
     """
 
-    dataset: str
     path: str
     facts: Mapping[str, Any]
     suspicions: tuple[Finding, ...]
@@ -125,7 +124,6 @@ class Report:
         """For JSON: every finding with all its lines."""
         keys = ("kind", "level", "what", "fix", "lines")
         return {
-            "dataset": self.dataset,
             "path": self.path,
             "verdict": VERDICTS[bool(self.suspicions)],
             "facts": self.facts,

@@ -15,14 +15,14 @@ from kinacc.campaign.status import CampaignStatus
 from kinacc.cli import campaign_plan, campaign_start
 from kinacc.cli.choice import FOLDER, PATH, option, positive
 from kinacc.cli.group import InOrder
-from kinacc.cli.output import Output, answers, require_writable
+from kinacc.cli.output import Output, answers
 from kinacc.cli.process import AGAINST
 from kinacc.cli.rows import joints_given, numbers_given
 from kinacc.errors import input_error
 from kinacc.figures.save import render
 from kinacc.report.campaign import campaign_page, markdown, section
 from kinacc.report.rendering import lines as texts
-from kinacc.tables.atomic import write_together
+from kinacc.tables.atomic import require_writable, write_together
 from kinacc.tables.store import content_of, to_table
 
 _SHA256 = 64  # hexadecimal digits

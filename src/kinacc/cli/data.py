@@ -15,7 +15,7 @@ import click
 import pandas as pd
 
 from kinacc.checks.check import examined
-from kinacc.checks.contradictions import load
+from kinacc.checks.configuration import load
 from kinacc.checks.findings import VERDICTS
 from kinacc.cli.choice import CONFIG, DATASET, PATH, REASON, option
 from kinacc.cli.output import Output, answers
@@ -70,27 +70,27 @@ def check_data(
         message = "draws one data set, and there are several"
         raise input_error("--picture", message, ", ".join(sections), "give --dataset")
     template = environment(is_page=False).get_template("data_check.txt")
-    reports = []
+    reports = {}
     problems: list[Problem] = []
     for name, settings in sections.items():
         with gathered(problems):
             with reporting(f"check-data {name}"):
-                report = examined(settings, name)
-            reports.append(report)
+                report = examined(settings)
+            reports[name] = report
             if not out.as_json:
-                click.echo(f"{template.render(report=report)}\n")
+                click.echo(f"{template.render(dataset=name, report=report)}\n")
             if out.picture is not None:
                 suspects = {item.kind: item.lines for item in report.suspicions}
                 limit_mm = report.facts.get("quick_fit", {}).get("most_expected_mm", math.nan)
                 joints = pd.DataFrame(report.facts["joint_coverage"])
                 out.draw(draw_check(joints, report.line, report.left_mm, limit_mm, suspects))
     refuse(problems)
-    code = AGAINST if any(report.suspicions for report in reports) else DONE
+    code = AGAINST if any(report.suspicions for report in reports.values()) else DONE
     if out.as_json:
-        datasets = [report.as_dict() for report in reports]
+        datasets = [{"dataset": name, **report.as_dict()} for name, report in reports.items()]
         out.show({"verdict": VERDICTS[code], "datasets": datasets})
     else:
-        stopping = [item for report in reports for item in report.stopping]
+        stopping = [item for report in reports.values() for item in report.stopping]
         following = [line for item in stopping for line in item.commands(files[0])]
         lines = following or [shlex.join(["kinacc", "calibrate", *files])]
         first = "next: correct what is named above and check again, or" if following else "next:"

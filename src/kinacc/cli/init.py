@@ -17,7 +17,7 @@ from kinacc.checks.described import corrected, coupling_of, fitting, remarks_on
 from kinacc.checks.findings import Report
 from kinacc.cli import choice, rows
 from kinacc.cli.choice import option
-from kinacc.cli.output import Output, answers, require_writable
+from kinacc.cli.output import Output, answers
 from kinacc.config.names import LONGEST
 from kinacc.errors import input_error
 from kinacc.kinematics import robot as robots
@@ -28,7 +28,7 @@ from kinacc.measurements.reader import MeasuredFile, read
 from kinacc.progress import reporting
 from kinacc.report import rendering
 from kinacc.report.terminal import print_table
-from kinacc.tables.atomic import write_together
+from kinacc.tables.atomic import require_writable, write_together
 
 _FOLDS_UNKNOWN = 60
 _FIRST_POSES = 3
@@ -135,7 +135,7 @@ def init(measurement_files: tuple[str, ...], out: Output, **options: Any) -> Non
     else:
         arm = robots.load(robot)
         with reporting(f"init {name}"):
-            guess, report, reading = corrected(guess, arm, name)
+            guess, report, reading = corrected(guess, arm)
             if text is not None and (coupling := coupling_of(report)) is not None:
                 matrix = coupling.values["joint_map"]
                 why = f"found by trying it on the readings: {coupling.what}"
@@ -143,7 +143,7 @@ def init(measurement_files: tuple[str, ...], out: Output, **options: Any) -> Non
                 note = f"joint_map of the robot file that is written couples joints, {why}"
                 arm = replace(arm, joint_map=np.array(matrix, dtype=float))
                 guess = replace(guess, notes=(*guess.notes, note))
-                guess, report, reading = corrected(guess, arm, name)
+                guess, report, reading = corrected(guess, arm)
         remarks = list(remarks_on(guess, report))
     poses = _first_poses(reading, arm.dh.prismatic)
     if not out.as_json:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, fields
 from functools import wraps
 from pathlib import Path
@@ -16,9 +16,9 @@ import pandas as pd
 from pydantic_core import to_jsonable_python
 
 from kinacc.config.names import in_csv
-from kinacc.errors import Problem, as_seen, refuse
+from kinacc.errors import as_seen
 from kinacc.report.terminal import print_table
-from kinacc.tables.atomic import write_whole
+from kinacc.tables.atomic import require_writable, write_whole
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -156,18 +156,3 @@ def _plain(value: Any) -> Any:
     if isinstance(value, pd.DataFrame):
         return value.to_dict("records")
     return value.tolist() if isinstance(value, (np.ndarray, np.generic)) else str(value)
-
-
-def require_writable(
-    paths: Iterable[Path | str | None], force: bool, kinds: Sequence[str] = ()
-) -> None:
-    """Raise InputError where a file could not or should not be written."""
-    problems = []
-    for path in [Path(item) for item in paths if item is not None]:
-        if path.is_dir():
-            problems.append(Problem(str(path), "is a folder", "a file"))
-        elif kinds and path.suffix not in kinds:
-            problems.append(Problem(str(path), f"ends in {path.suffix!r}", ", ".join(kinds)))
-        elif path.exists() and not force:
-            problems.append(Problem(str(path), "is there already", fix="give --force"))
-    refuse(problems, "Nothing was written")

@@ -14,7 +14,7 @@ import pandas as pd
 import pyarrow as pa
 
 from kinacc.campaign.beside_results import of_results
-from kinacc.checks.contradictions import load
+from kinacc.checks.configuration import load
 from kinacc.cli.choice import CONFIG, FOLDER, PATH, REASON, option, positive, print_outdated
 from kinacc.cli.output import Output, answers, plain
 from kinacc.cli.process import AGAINST
@@ -141,7 +141,6 @@ def show(path: Path, name: str | None, describe: bool, out: Output) -> None:
         return
     content = store.read_arrow(place, any_type=True)
     try:
-        content.validate(full=True)
         table = content.to_pandas()
     except (ValueError, pa.ArrowException) as error:
         message = f"cannot be shown: {error}"

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from kinacc.checks.contradictions import load
+from kinacc.checks.configuration import load
 from kinacc.cli.choice import PATH, option
 from kinacc.cli.output import Output, answers
 from kinacc.cli.process import AGAINST, DONE, UNDECIDED

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import os
 from collections import Counter
-from collections.abc import Callable, Collection, Iterable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable
 from typing import Annotated, Any, TypeVar
 
 from pydantic import (
@@ -13,11 +13,11 @@ from pydantic import (
     ConfigDict,
     Discriminator,
     Field,
-    GetCoreSchemaHandler,
     Tag,
+    ValidationInfo,
     model_validator,
 )
-from pydantic_core import PydanticCustomError, core_schema
+from pydantic_core import PydanticCustomError
 
 from kinacc.errors import first_few
 
@@ -57,6 +57,11 @@ def refused(message: str, fix: str = "", *keys: str | int) -> PydanticCustomErro
     return PydanticCustomError("refused", "{what}", {"what": message, "fix": fix, "keys": keys})
 
 
+def is_there(path: str, info: ValidationInfo) -> bool:
+    """Whether there is such a file, as seen from the folder that the context of loading names."""
+    return os.path.isfile(os.path.join((info.context or {}).get("folder", ""), path))
+
+
 def distinct(parts: Callable[[Any], Iterable[Any]]) -> AfterValidator:
     """Validator of values, none of whose ``parts`` may stand there more than once."""
 
@@ -72,18 +77,6 @@ def _rising(values: list[float]) -> list[float]:
     if values != sorted(set(values)):
         raise refused(f"{values} is not rising", "put smaller numbers first, each once")
     return values
-
-
-@dataclass(frozen=True)
-class OneOf:
-    """What a text may be: one of these words, which stand elsewhere."""
-
-    words: Collection[str]
-
-    def __get_pydantic_core_schema__(
-        self, source: Any, handler: GetCoreSchemaHandler
-    ) -> core_schema.CoreSchema:
-        return core_schema.literal_schema([*self.words])
 
 
 Text = Annotated[str, Field(min_length=1)]

@@ -14,7 +14,7 @@ from pydantic import (
     model_validator,
 )
 
-from kinacc.config.fields import Distinct, OneOf, Section, Text, distinct, refused, setting
+from kinacc.config.fields import Distinct, Section, Text, distinct, refused, setting
 from kinacc.config.names import not_in_a_line
 
 _STATISTICS = {
@@ -75,7 +75,7 @@ class OfFigure(Gate):
     """What gates of a figure have; a limit is in the unit of the figure."""
 
     limit_word: ClassVar[str] = "at_most"
-    value: Annotated[str, OneOf(FIGURES)] = setting(..., "the figure")
+    value: Literal[*FIGURES] = setting(..., "the figure")  # type: ignore[valid-type]
     model: Literal["selected", "dh", "vec", "compliance", "nominal"] = setting(
         "selected", "error model whose held-out errors are meant"
     )
@@ -119,7 +119,7 @@ class Against(OfFigure):
     """A figure of the errors not worse than that of the accepted run, beyond chance."""
 
     limit_word = "allow"
-    value: Annotated[str, OneOf(ERRORS)] = setting(..., "the figure")
+    value: Literal[*ERRORS] = setting(..., "the figure")  # type: ignore[valid-type]
     against: Literal["accepted"] = setting(..., "the run it is held against")
     allow_mm: float | None = setting(
         None, "by how much it may be worse, of positions", "mm", ge=0, le=1000

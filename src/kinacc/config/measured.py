@@ -4,9 +4,17 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import BeforeValidator, Field, ValidationInfo, model_validator
 
-from kinacc.config.fields import Distinct, OneOf, Section, Text, distinct, refused, setting
+from kinacc.config.fields import (
+    Distinct,
+    Section,
+    Text,
+    distinct,
+    is_there,
+    refused,
+    setting,
+)
 from kinacc.config.values import did_you_mean, shown
 
 # Names that a column of a measured file has for kinacc; those of POINT may have a target in front.
@@ -93,7 +101,7 @@ class Orientation(Section):
         "euler",
         "none for position only",
     )
-    convention: Annotated[str, OneOf(CONVENTIONS)] = setting(
+    convention: Literal[*CONVENTIONS] = setting(  # type: ignore[valid-type]
         "XYZ",
         "Euler sequence of the angles about the axes rx, ry, rz, or e1, e2, e3 in order; "
         "capitals intrinsic, small letters extrinsic",
@@ -139,6 +147,13 @@ class Written(Section):
     )
     sheet: Text | None = setting(None, "sheet of an Excel workbook; null for the first")
     names: Names | None = setting(None, "names of the columns of a file that has no line of names")
+
+    @model_validator(mode="after")
+    def _marks_differ(self) -> Self:
+        # A delimiter within numbers may be quoted; elsewhere it makes rows of too many cells.
+        if self.thousands == self.decimal:
+            raise refused(f"{self.thousands!r} is also the decimal mark", "", "thousands")
+        return self
 
 
 class JointsFile(Written):
@@ -269,4 +284,13 @@ class Measurements(Section):
         if self.validation_fold is not None and self.validation_fold >= (self.folds or 0):
             message = f"there is no fold {self.validation_fold}, with folds: {shown(self.folds)}"
             raise refused(message, "folds count from 0; null for none", "validation_fold")
+        return self
+
+    @model_validator(mode="after")
+    def _files_are_there(self, info: ValidationInfo) -> Self:
+        file, source = self.file, self.file.source
+        for path, *keys in (file.path, "path"), (file.joints.path, "joints", "path"):
+            if self.source == "file" and path is not None and not is_there(path, info):
+                fix = f"the data comes from: {' '.join(source.split())}" if source else ""
+                raise refused(f"{path!r} does not exist", fix, "file", *keys)
         return self

@@ -9,9 +9,9 @@ import datetime
 from itertools import pairwise
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, Field, ValidationInfo
 
-from kinacc.config.fields import Section, Text, refused, setting
+from kinacc.config.fields import Section, Text, is_there, refused, setting
 from kinacc.config.records import Settings
 from kinacc.config.values import overlay
 
@@ -23,10 +23,18 @@ FLAGS = {
 Moved = Literal["same", "moved"] | None
 
 
+def _existing(path: str, info: ValidationInfo) -> str:
+    if not is_there(path, info):
+        raise refused(f"{path!r} does not exist")
+    return path
+
+
 class Line(Section):
     """One file of a series; whether base and tool moved is since the line before it by date."""
 
-    path: Text = setting(..., "measured file, relative to the folder of the file this stands in")
+    path: Annotated[Text, AfterValidator(_existing)] = setting(
+        ..., "measured file, relative to the folder of the file this stands in"
+    )
     date: Annotated[datetime.date, Field(strict=False)] = setting(
         ..., "day it was measured", allowed="a day as 2026-03-01"
     )

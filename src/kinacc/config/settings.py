@@ -15,12 +15,12 @@ from pydantic import AfterValidator, Field, ValidationInfo, model_validator
 
 from kinacc.config.fields import (
     Distinct,
-    OneOf,
     OrWord,
     Pair,
     Rising,
     Section,
     Text,
+    is_there,
     refused,
     setting,
 )
@@ -32,6 +32,7 @@ from kinacc.config.series import Series
 from kinacc.config.values import did_you_mean
 
 ROBOTS = Path(__file__).parents[1] / "kinematics" / "robots"
+SHIPPED = sorted(item.stem for item in ROBOTS.glob("*.yaml"))
 
 JointNumbers = Annotated[list[Annotated[int, Field(ge=1, le=7)]], Field(max_length=7), Distinct]
 JointPairs = Annotated[list[Pair], Field(min_length=4, max_length=7)]
@@ -44,7 +45,7 @@ _RULES = "to free, fixed or {value_mm: .., prior_std_mm: ..}, with mm, mrad, rad
 _FINDINGS = Path(__file__).parents[1] / "checks" / "findings.yaml"
 _KINDS = {*re.findall(r"^\w+", _FINDINGS.read_text("utf-8"), re.MULTILINE)}
 OUTSIDE_LIMITS = "outside_limits"  # the finding of rows that no fit reads, accepted or not
-Finding = Annotated[str, OneOf(sorted(_KINDS - {OUTSIDE_LIMITS}))]
+Finding = Literal[*sorted(_KINDS - {OUTSIDE_LIMITS})]  # type: ignore[valid-type]
 
 
 class Link(Section):
@@ -57,7 +58,7 @@ class Link(Section):
 class DataCheck(Section):
     """What the check of a measured file found and the workflow goes on with."""
 
-    accept: dict[Finding, Text] = setting(
+    accept: dict[Finding, Text] = setting(  # type: ignore[valid-type]
         {},
         "findings that would stop the workflow, each with the reason to go on",
     )
@@ -429,10 +430,9 @@ class Settings(Section):
 
 
 def _robot(robot: str, info: ValidationInfo) -> str:
-    shipped = sorted(item.stem for item in ROBOTS.glob("*.yaml"))
-    if robot not in shipped and not ((info.context or {}).get("folder", Path()) / robot).is_file():
+    if robot not in SHIPPED and not is_there(robot, info):
         fix = "give a name listed in docs/robots.md or the path of a robot file"
-        raise refused(f"there is no robot {robot!r}", did_you_mean(robot, shipped) or fix)
+        raise refused(f"there is no robot {robot!r}", did_you_mean(robot, SHIPPED) or fix)
     return robot
 
 
@@ -447,9 +447,18 @@ class DataSet(Settings):
     @model_validator(mode="after")
     def _of_one_kind(self) -> Self:
         source, file = self.measurements.source, self.measurements.file
+        of_source = ("measurements", "source")
         if self.series and source == "synthetic":
-            message = "synthetic, but a series is of measured files"
-            raise refused(message, "write file", "measurements", "source")
+            raise refused("synthetic, but a series is of measured files", "write file", *of_source)
+        if source == "synthetic" and self.robot in SHIPPED and self.robot != "mh180":
+            fix = "robot: mh180, or a measured file"
+            raise refused(f"synthetic, but there is no synthetic {self.robot}", fix, *of_source)
+        if source == "synthetic" and self.calibration.base_and_tool == "estimated":
+            message = "estimated, but the synthetic arm is measured in its own base frame"
+            raise refused(message, "write fixed", "calibration", "base_and_tool")
+        if source == "file" and file.path is None and not self.series:
+            fix = "path of a CSV, text, Excel or Parquet file"
+            raise refused("file, but measurements.file.path is not given", fix, *of_source)
         other = file.path not in (None, *(line.path for line in self.series))
         if self.series and (other or file.exclude or file.joints.path):
             message = "path, exclude or joints.path of another file, beside a series of files"

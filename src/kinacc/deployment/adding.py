@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from kinacc.checks.contradictions import load
+from kinacc.checks.configuration import load
 from kinacc.config.edit import flow, with_added
 from kinacc.config.records import Settings
 from kinacc.config.series import MOVED

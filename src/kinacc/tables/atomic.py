@@ -5,7 +5,7 @@ from __future__ import annotations
 import fcntl
 import os
 import time
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 
@@ -95,17 +95,25 @@ def write_together(contents: Mapping[Path | str, bytes], on_disk: bool = False) 
 
 
 def write_new(contents: Mapping[Path | str, bytes], force: bool) -> list[str]:
-    """Write files together; InputError naming those already there, unless ``force``."""
-    refuse(
-        [
-            Problem(str(path), "is there already", fix="give --force to replace it")
-            for path in contents
-            if Path(path).exists() and not force
-        ],
-        "Nothing was written",
-    )
+    """Write files together, after :func:`require_writable`; their paths as text."""
+    require_writable(contents, force)
     write_together(contents)
     return [*map(str, contents)]
+
+
+def require_writable(
+    paths: Iterable[Path | str | None], force: bool, kinds: Sequence[str] = ()
+) -> None:
+    """Raise InputError where a file could not or should not be written."""
+    problems = []
+    for path in [Path(item) for item in paths if item is not None]:
+        if path.is_dir():
+            problems.append(Problem(str(path), "is a folder", "a file"))
+        elif kinds and path.suffix not in kinds:
+            problems.append(Problem(str(path), f"ends in {path.suffix!r}", ", ".join(kinds)))
+        elif path.exists() and not force:
+            problems.append(Problem(str(path), "is there already", fix="give --force"))
+    refuse(problems, "Nothing was written")
 
 
 def synchronise(path: Path) -> None:

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    import numpy as np
+import numpy as np
 
-Columns = dict[str, "np.ndarray"]  # a table in memory: a null number is NaN, a null text None
+Columns = dict[str, np.ndarray]  # a table in memory: a null number is NaN, a null text None
 Tables = Mapping[str, Columns]  # by their names
 JOINTS_MIN, JOINTS_MAX = 4, 7
 # Two runs of one work may differ by so much, by the unit of a column: rounding differs from machine
@@ -92,11 +90,6 @@ class Artefact:
     key: tuple[str, ...]
     may_be_empty: bool = False
 
-    @property
-    def file_name(self) -> str:
-        """Name of the table's file inside a data set's folder."""
-        return f"{self.name}.parquet"
-
     def in_file(self, names: Iterable[str]) -> list[Column]:
         """The columns a file has that is given those of these ``names``, for as many joints."""
         supplied, joints = set(names), JOINTS_MIN
@@ -117,6 +110,4 @@ class Artefact:
 
 def texts(cells: Iterable[object]) -> np.ndarray:
     """Cells (n,) as objects, each as it is: None for null, and none spread over a row."""
-    import numpy as np
-
     return np.array([*cells, None], dtype=object)[:-1]

@@ -88,16 +88,13 @@ def compare_tables(before: Path, now: Path) -> Iterator[str]:
     old, new = old.loc[common], new.loc[common]
     for column in old.columns.intersection(new.columns).difference(key, sort=False):
         single, second, text = old[column], new[column], ""
-        differs = (single.isna() != second.isna()).to_numpy()
-        both = (single.notna() & second.notna()).to_numpy()
+        same = (single == second) | (single.isna() & second.isna())
         if single.dtype.kind in "fiu" and second.dtype.kind in "fiu":
-            apart = np.abs(second.to_numpy(float) - single.to_numpy(float))
-            beyond = both & ~(apart <= _tolerance(known.get(column), old))
+            apart = (second.astype(float) - single.astype(float)).abs()
+            same |= apart <= _tolerance(known.get(column), old)
             unit = known[column].unit if column in known else ""
-            text = f", at most {np.max(apart[beyond], initial=0.0):.3g} {unit}"
-        else:
-            beyond = both & (single.to_numpy(object) != second.to_numpy(object))
-        rows = np.flatnonzero(differs | beyond)
+            text = f", at most {apart[~same].fillna(0.0).max():.3g} {unit}"
+        rows = np.flatnonzero(~same)
         if rows.size:
             pair = f"{single.iloc[rows[0]]!r} -> {second.iloc[rows[0]]!r}"
             first = f"first {_row(key, common[rows[0]])}: {pair}{text}"

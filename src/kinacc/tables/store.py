@@ -17,7 +17,6 @@ import pyarrow.parquet as pq
 
 from kinacc.errors import InputError, Problem, first_few, gathered, input_error, refuse
 from kinacc.tables import sums
-from kinacc.tables.atomic import write_whole
 from kinacc.tables.columns import Column, Columns, texts
 from kinacc.tables.contract import ARTEFACTS, PROVENANCE_KEYS
 
@@ -51,29 +50,6 @@ def read_table(path: Path | str) -> pd.DataFrame:
         Where the file is absent, damaged, no Parquet or too large.
     """
     return read_arrow(path).to_pandas()
-
-
-def write_table(
-    path: Path | str,
-    artefact: str,
-    table: pd.DataFrame | Mapping[str, Any],
-    provenance: Mapping[str, object],
-) -> None:
-    """Hold a table to the schema of an artefact and write it whole, or leave what was there.
-
-    Parameters
-    ----------
-    path
-        The Parquet file.
-    artefact, table, provenance
-        As of :func:`to_table`.
-
-    Raises
-    ------
-    InputError
-        As :func:`to_table`.
-    """
-    write_whole(path, content_of(to_table(artefact, table, provenance)))
 
 
 def arrow_schema(
@@ -184,11 +160,7 @@ def content_of(table: pa.Table) -> bytes:
 
 def read(path: Path | str) -> Columns:
     """Columns of a table as arrays, see :func:`columns_in`. Raises InputError as `read_table`."""
-    try:
-        return columns_in(read_arrow(path))
-    except (OverflowError, ValueError) as error:  # bytes that are no text
-        message = f"not a readable Parquet file: {error}"
-        raise input_error(str(path), message, fix=remake(path)) from None
+    return columns_in(read_arrow(path))
 
 
 def columns_in(table: pa.Table) -> Columns:
@@ -231,7 +203,9 @@ def read_arrow(path: Path | str, content: bytes | None = None, any_type: bool = 
             if held > _MOST_BYTES:
                 message = f"holds more than {_MOST_BYTES // 1_000_000} MB"
                 raise input_error(str(path), message, "a smaller table")
-        return pa.Table.from_batches(batches, schema)
+        table = pa.Table.from_batches(batches, schema)
+        table.validate(full=True)  # texts may hold bytes that are no text
+        return table
 
 
 def remake(path: Path | str) -> str:

@@ -116,8 +116,7 @@ def read_data_sets(
     InputError
         Listing every problem in them.
     """
-    from kinacc.checks.contradictions import load
-    from kinacc.config.load import COMMAND_LINE
+    from kinacc.checks.configuration import COMMAND_LINE, load
 
     source = "config of the module" if absolute else COMMAND_LINE
     overrides = _values(overrides or {}, source)

@@ -11,7 +11,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from kinacc.checks.contradictions import load
+from kinacc.checks.configuration import load
 from kinacc.config.schema import defaults
 from kinacc.errors import InputError, first_few, input_error
 from kinacc.tables import store, sums
@@ -130,15 +130,10 @@ def outdated_reason(folder: Path | str) -> str:
     except (InputError, OSError):
         return ""  # whoever reads the results reports what is wrong with them
     if changed:
-        again = shlex.join(["kinacc", "calibrate", *(path for path, _ in known[:1])])
-        return f"changed since the calibration: {first_few(changed, 3)}; run {again}"
-    others = [path for path, is_other in known if is_other]
-    if not others:
+        reason = f"changed since the calibration: {first_few(changed, 3)}"
+        paths = [path for path, _ in known]
+    elif paths := [path for path, is_other in known if is_other]:
+        reason = f"{paths[0]} has other settings than the calibration"
+    else:
         return ""
-    again = shlex.join(["kinacc", "calibrate", others[0]])
-    if len(others) == len(known):
-        return f"settings in {others[0]} changed since the calibration; run {again}"
-    return (
-        f"made with the settings of {known[0][0]}; {others[0]} has other settings for "
-        f"{folder.name}; to use these run {again}"
-    )
+    return f"{reason}; run {shlex.join(['kinacc', 'calibrate', *paths[:1]])}"

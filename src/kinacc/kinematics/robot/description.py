@@ -24,8 +24,8 @@ from pydantic import (
 from scipy.spatial.transform import Rotation
 
 from kinacc.config.fields import refused
-from kinacc.config.load import by_line, problems_of
 from kinacc.config.names import not_in_a_line
+from kinacc.config.problems import by_line, problems_of
 from kinacc.config.reading import Document, KeyPath, mapping, read
 from kinacc.config.values import did_you_mean
 from kinacc.errors import InputError, Problem, input_error, refuse
