@@ -237,13 +237,9 @@ def _once(findings: list[Finding], lines: int) -> list[Finding]:
     faults = [e for e in findings if e.kind not in _SYMPTOMS and len(e.lines) < lines]
     named = {line for item in faults for line in item.lines}
     needed: list[Finding] = []
-    known: list[tuple[object, set[int]]] = []
     for item in findings:
-        rows_, values = set(item.lines), item.values
-        # A second jump concerns part of the rows of the first and is another one all the same.
-        about = item.kind, values.get("joint"), values.get("first_line")
-        needless = any(about == other and rows_ <= more for other, more in known)
-        if not needless and not (item.kind in _SYMPTOMS and rows_ <= named):
+        is_shown = item.kind in _SYMPTOMS and named.issuperset(item.lines)
+        is_repeated = any(e.about == item.about and {*e.lines} >= {*item.lines} for e in needed)
+        if not is_shown and not is_repeated:
             needed.append(item)
-            known.append((about, rows_))
     return needed

@@ -12,8 +12,9 @@ import yaml
 
 from kinacc.config.settings import OUTSIDE_LIMITS
 from kinacc.measurements.row_names import RowNames
+from kinacc.tables.allowed import FINDING_LEVELS
 
-STOPS, WARNING, NOTE = "stops", "warning", "note"
+STOPS, WARNING, NOTE = FINDING_LEVELS
 TEXTS: dict[str, list[str]] = yaml.safe_load(
     (files("kinacc.checks") / "findings.yaml").read_text("utf-8")
 )
@@ -57,6 +58,11 @@ class Finding:
     lines: tuple[int, ...] = ()
     level: str = NOTE
     where: str = ""
+
+    @property
+    def about(self) -> tuple[object, ...]:
+        """What it is about: a second jump concerns rows of the first and is another one."""
+        return self.kind, self.values.get("joint"), self.values.get("first_line")
 
     def of_lines(self, lines: Iterable[int], detail: str = "", **values: Any) -> Finding:
         """The finding at these lines, with more numbers; ``detail`` is appended to its message."""

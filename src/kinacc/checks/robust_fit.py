@@ -9,7 +9,7 @@ reading with its configuration left out; the fits of the calibration do neither.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
@@ -202,11 +202,9 @@ class Trial:
         cls, observed: Readings, arm: Arm, nominal: DHModel, strength: float, huber: bool
     ) -> Trial:
         """The arm, linearised."""
-        # A target that moved has two numbers and one name.
-        named = replace(observed, target_names=tuple(map(str, range(len(observed.target_names)))))
-        frames = frame_terms(named, arm.frames)
+        frames = frame_terms(observed, arm.frames)
         free = np.full(nominal.start.size, strength > 0.0)
-        system = PoseSystem(named, nominal, free, frames, 1.0)
+        system = PoseSystem(observed, nominal, free, frames, 1.0)
         x = np.concatenate([frames.begin, arm.model.start[free]])
         ((columns, _),) = system.columns(x)  # few enough readings for one block
         columns = np.pad(columns, ((0, 0), (0, 6 - columns.shape[1]), (0, 0)))

@@ -16,7 +16,7 @@ from kinacc.gate import chance
 from kinacc.gate.outcome import FAILED, PASSED, UNDECIDED, WARNED, Outcome
 from kinacc.gate.values import Figure, RunTables, cell, figure, same_measurements
 from kinacc.report.rendering import history_sentence, lines
-from kinacc.tables.allowed import FINDING_LEVELS, FIRST, HOLDS, LEFT_OUT, RECALIBRATE
+from kinacc.tables.allowed import FINDING_LEVELS, FIRST, HOLDS, RECALIBRATE
 
 Gate = Mapping[str, Any]
 # What a configuration calls a verdict, and the verdict.
@@ -182,7 +182,7 @@ def _suspicions(gate: Gate, tables: RunTables) -> Found:
     if "row" not in measurements or measurements["row"].isna().all():
         return Found(PASSED, "", {"suspicions": 0})
     table = tables["data_check"]
-    table = table[(table["finding"] != LEFT_OUT) & (table["level"] != FINDING_LEVELS[-1])]
+    table = table[table["level"] != FINDING_LEVELS[-1]]
     known = table["accepted"].fillna("").astype(bool)
     remaining = table if gate["suspicions"] == "none" else table[~known]
     left = list(remaining["finding"] + ": " + remaining["what"])
