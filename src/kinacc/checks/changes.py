@@ -53,7 +53,7 @@ def length_units() -> Iterator[Change]:
 
 def left_handed() -> Change:
     """Left-handed coordinates: any mirror will do, the base takes up the rest."""
-    return _mirrored(finding("left_handed"), _MIRRORS["y"])
+    return _mirrored(finding("left_handed"), _MIRRORS["y"], _MIRRORS["y"])
 
 
 def wrong_axes() -> Iterator[Change]:
@@ -61,7 +61,7 @@ def wrong_axes() -> Iterator[Change]:
     for axis, mirror in _MIRRORS.items():
         change = finding("left_handed/axis", axis=axis)
         yield _positions(change, mirror)
-        yield _mirrored(change, mirror)
+        yield _mirrored(change, mirror, mirror)
 
 
 def joint_signs(robot: Robot) -> list[Change]:
@@ -117,7 +117,7 @@ def reversals() -> Iterator[Change]:
     change = finding("transposed_rotation")
     yield Change(change, lambda read: replace(read, rotation=np.swapaxes(read.rotation, 1, 2)))
     for axis, mirror in _MIRRORS.items():
-        yield _mirrored(finding("left_handed/turns", axis=axis), mirror, of_positions=np.ones(3))
+        yield _mirrored(finding("left_handed/turns", axis=axis), mirror, of_positions=1.0)
 
 
 def conventions(stated: Orientation) -> Iterator[Change]:
@@ -176,13 +176,12 @@ def _positions(change: Finding, factor: ndarray | float) -> Change:
     return Change(change, lambda read: replace(read, position_mm=read.position_mm * factor))
 
 
-def _mirrored(change: Finding, mirror: ndarray, of_positions: ndarray | None = None) -> Change:
-    """Orientations mirrored, and positions unless they have a factor of their own."""
-    factor = mirror if of_positions is None else of_positions
+def _mirrored(change: Finding, mirror: ndarray, of_positions: ndarray | float) -> Change:
+    """Orientations mirrored, and positions times a factor of their own."""
 
     def of(read: Readings) -> Readings:
         rotation = read.rotation * np.outer(mirror, mirror)
-        return replace(read, position_mm=read.position_mm * factor, rotation=rotation)
+        return replace(read, position_mm=read.position_mm * of_positions, rotation=rotation)
 
     return Change(change, of)
 

@@ -64,27 +64,7 @@ def load(
     InputError
         Listing every problem in all files.
     """
-    contents: list[dict[str, Any]] = []
-    problems: list[Problem] = []
-    places: dict[KeyPath, str] = {}
-    for path in paths:
-        document = read(path)
-        beside = os.path.relpath(Path(path).absolute().parent, folder)
-        contents.append(_relocated(document.data, beside, Path(folder)))
-        problems += document.problems
-        for keys_ in document.lines:
-            if keys_[2:] in _IDENTITY and keys_ in places:
-                message = f"data set {keys_[1]!r} has its measurements given in two files"
-                fix = "give the second data set a name of its own"
-                allowed = f"once; first in {places[keys_]}"
-                problems.append(Problem(document.place(keys_), message, allowed, fix))
-        places |= {keys_: f"{path}:{line}" for keys_, line in document.lines.items()}
-    if overrides:
-        contents.append(dict(overrides))
-        places |= dict.fromkeys(paths_of(overrides), source)
-    if not contents:
-        raise input_error("configuration", "no file given", fix="give config.yaml")
-    merged = reduce(overlay, contents)
+    merged, places, problems = _merged(paths, overrides or {}, Path(folder), source)
     shared = {key: value for key, value in merged.items() if key != "datasets"}
     datasets = merged.get("datasets")
     resolved: dict[str, dict[str, Any]] = {}
@@ -127,6 +107,33 @@ def load(
     problems = sorted(dict.fromkeys(problems), key=by_line)[:MOST_PROBLEMS]
     refuse(problems, f"{len(problems)} problems in the configuration" if problems[1:] else "")
     return resolved
+
+
+def _merged(
+    paths: Sequence[Path | str], overrides: Mapping[str, Any], folder: Path, source: str
+) -> tuple[dict[str, Any], dict[KeyPath, str], list[Problem]]:
+    """What files and ``overrides`` hold, where each key was given last, and problems of files."""
+    contents: list[dict[str, Any]] = []
+    problems: list[Problem] = []
+    places: dict[KeyPath, str] = {}
+    for path in paths:
+        document = read(path)
+        beside = os.path.relpath(Path(path).absolute().parent, folder)
+        contents.append(_relocated(document.data, beside, folder))
+        problems += document.problems
+        for keys_ in document.lines:
+            if keys_[2:] in _IDENTITY and keys_ in places:
+                message = f"data set {keys_[1]!r} has its measurements given in two files"
+                fix = "give the second data set a name of its own"
+                allowed = f"once; first in {places[keys_]}"
+                problems.append(Problem(document.place(keys_), message, allowed, fix))
+        places |= {keys_: f"{path}:{line}" for keys_, line in document.lines.items()}
+    if overrides:
+        contents.append({**overrides})
+        places |= dict.fromkeys(paths_of(overrides), source)
+    if not contents:
+        raise input_error("configuration", "no file given", fix="give config.yaml")
+    return reduce(overlay, contents), places, problems
 
 
 def _relocated(value: Any, beside: str, folder: Path, key: Any = None) -> Any:

@@ -50,7 +50,7 @@ def check_file(path: Path, artefact: Artefact) -> list[Problem]:
         problems.append(Problem(str(path), "has no rows", "at least one row"))
     if repeated.any():
         allowed = f"one row per {', '.join(artefact.key)}"
-        problems.append(Problem(str(path), f"same key in {_rows(repeated)}", allowed))
+        problems.append(Problem(str(path), f"same key in {store.rows(repeated)}", allowed))
     return problems
 
 
@@ -70,9 +70,5 @@ def _values(where: str, column: Column, values: pd.Series) -> Iterator[Problem]:
         good &= supplied.isin(column.choices)
     if not good.all():
         wrong = (~good).reindex(values.index, fill_value=False)
-        message = f"{values[wrong].iloc[0]} in {_rows(wrong)}"
+        message = f"{values[wrong].iloc[0]} in {store.rows(wrong)}"
         yield Problem(where, message, f"{column.limits} {column.unit}".strip())
-
-
-def _rows(mask: pd.Series) -> str:
-    return store.rows(mask.to_numpy())
