@@ -130,36 +130,33 @@ def conventions(stated: Orientation) -> Iterator[Change]:
         return
     is_euler = stated.kind == "euler"
     names = in_order_of(stated.convention) if is_euler else ANGLES
+    before = f"of convention {stated.convention}" if is_euler else "rotation vectors"
+
+    def euler(convention: str, order: list[int], text: str) -> Change:
+        """Euler angles of a convention, of which ``order`` are the columns as written."""
+        columns = [names[number] for number in order]
+        meant = {"kind": "euler", "convention": convention}
+        setting: dict[str, object] = {"orientation": meant}
+        setting |= {} if columns == list(in_order_of(convention)) else {"e": columns}
+        change = finding(
+            "euler_convention", convention=convention, order=text, stated=before, setting=setting
+        )
+        return _turns(change, stated.model_copy(update=meant), order)
+
     if is_euler and len(set(stated.convention.lower())) == 3:
         # Angles about x, y, z as named, taken in another sequence.
         for convention in CONVENTIONS[:6]:
             if convention not in (stated.convention, stated.convention[::-1].upper()):
                 order = [names.index(name) for name in in_order_of(convention)]
-                yield _euler(stated, convention, order, f" (or {convention[::-1].lower()})")
+                yield euler(convention, order, f" (or {convention[::-1].lower()})")
     for convention in CONVENTIONS:
         if not (is_euler and convention == stated.convention):
-            yield _euler(stated, convention, [0, 1, 2], " in the columns' order")
+            yield euler(convention, [0, 1, 2], " in the columns' order")
     if is_euler:
         setting = {"orientation": {"kind": "rotation_vector"}}
         change = finding("euler_convention/vector", setting=setting)
         vector = stated.model_copy(update={"kind": "rotation_vector"})
         yield _turns(change, vector, [names.index(name) for name in ANGLES])
-
-
-def _euler(stated: Orientation, convention: str, order: list[int], text: str) -> Change:
-    """Euler angles of a convention, of which ``order`` are the columns as written."""
-    is_euler = stated.kind == "euler"
-    here = in_order_of(stated.convention) if is_euler else ANGLES
-    columns = [here[number] for number in order]
-    setting: dict[str, object] = {"orientation": {"kind": "euler", "convention": convention}}
-    setting |= {} if columns == list(in_order_of(convention)) else {"e": columns}
-    before = f"of convention {stated.convention}" if is_euler else "rotation vectors"
-    change = finding(
-        "euler_convention", convention=convention, order=text, stated=before, setting=setting
-    )
-    return _turns(
-        change, stated.model_copy(update={"kind": "euler", "convention": convention}), order
-    )
 
 
 def _joints(change: Finding, robot: Robot, matrix: ndarray, zero: ndarray | float = 0.0) -> Change:

@@ -129,7 +129,7 @@ def _round(fitted: Fitted, q_deg: ndarray) -> Iterator[Finding]:
     grid = next((item for item in _GRIDS_DEG[:4] if _on(q_deg, item).all()), 0.0)
     if grid:
         off = np.random.default_rng(0).uniform(-0.5, 0.5, observed.q_rad.shape) * np.deg2rad(grid)
-        moved = replace(observed, q_rad=observed.q_rad + off * ~fitted.trial.nominal.prismatic)
+        moved = replace(observed, q_rad=observed.q_rad + off * ~fitted.trial.arm.model.prismatic)
         there = robust_fit.residuals(fitted.trial.arm, moved).predicted.position_mm
         apart = there - fitted.residuals.predicted.position_mm
         rounding = float(np.median(np.linalg.norm(apart, axis=1)))

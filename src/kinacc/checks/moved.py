@@ -56,7 +56,7 @@ def _linearised(fitted: Fitted) -> tuple[Readings, ndarray, ndarray, Trial]:
     Weighted design (m, 6, P), residuals (m, 6), and the linearisation itself.
     """
     trial, few = fitted.trial, fitted.readings.select(fitted.chosen)
-    trial = Trial.of(few, trial.arm, trial.nominal, trial.strength, huber=True)
+    trial = Trial.of(few, trial.arm, trial.strength, huber=True)
     root = np.sqrt(trial.weights)
     design = trial.design * root[..., None]
     return few, design, trial.residual * root + design @ trial.step, trial
@@ -125,7 +125,7 @@ def _split(fitted: Fitted, row: int, kind: str) -> tuple[float, Fitted]:
     """
     observed, rows = parted(fitted.readings, row, kind)
     frames = [int(getattr(item, kind)[row]) for item in (fitted.readings, observed)]
-    again = fit(observed, fitted.trial.nominal)
+    again = fit(observed, fitted.trial.arm.nominal)
     both = np.flatnonzero(np.isin(getattr(observed, kind), frames))
     part, costs = observed.select(both), []
     for frame in frames:
@@ -139,7 +139,7 @@ def _split(fitted: Fitted, row: int, kind: str) -> tuple[float, Fitted]:
         return np.inf, again
     if both[first] != row:
         observed, rows = parted(fitted.readings, both[first], kind)
-        again = fit(observed, fitted.trial.nominal)
+        again = fit(observed, fitted.trial.arm.nominal)
     before, after = (np.minimum(e.left_mm, _CAP * fitted.trial.sigma_mm) for e in (fitted, again))
     near = rows[:_NEAR]
     everywhere, there = after.mean() / before.mean(), after[near].mean() / before[near].mean()

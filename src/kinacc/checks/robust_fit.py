@@ -57,9 +57,13 @@ _START_ROWS = 600
 
 @dataclass(frozen=True)
 class Arm:
-    """A DH model with its bases in the instrument's frame and targets in the flange frame."""
+    """A DH model with its bases in the instrument's frame and targets in the flange frame.
+
+    ``nominal`` is the model that its corrections lean on.
+    """
 
     model: DHModel
+    nominal: DHModel
     frames: Frames
 
 
@@ -135,8 +139,8 @@ def residuals(arm: Arm, observed: Readings) -> Residuals:
 
 def best(observed: Readings, begin: Arm) -> Trial:
     """The fit whose strength predicts configurations left out best."""
-    nominal, number = begin.model, np.unique(observed.pose, return_inverse=True)[1]
-    trial = chosen = reweighted(observed, begin, nominal, 0.0, huber=True)
+    number = np.unique(observed.pose, return_inverse=True)[1]
+    trial = chosen = reweighted(observed, begin, 0.0, huber=True)
     cap = _CAP * trial.sigma_mm
 
     def score(trial: Trial) -> float:
@@ -145,7 +149,7 @@ def best(observed: Readings, begin: Arm) -> Trial:
 
     least = score(trial)
     for strength in STRENGTHS:
-        trial = reweighted(observed, trial.arm, nominal, strength, huber=True)
+        trial = reweighted(observed, trial.arm, strength, huber=True)
         if _far(trial) or (now := score(trial)) > 1.5 * least:
             break
         # Stronger corrections must pay: noise alone moves the score by a per mille or so.
@@ -153,22 +157,20 @@ def best(observed: Readings, begin: Arm) -> Trial:
             chosen, least = trial, now
     if 3 * len(observed) < _READ_PER_PARAMETER * chosen.step.size:
         return chosen
-    final = reweighted(observed, chosen.arm, nominal, chosen.strength)
+    final = reweighted(observed, chosen.arm, chosen.strength)
     return chosen if _far(final) else final
 
 
-def reweighted(
-    observed: Readings, begin: Arm, nominal: DHModel, strength: float, huber: bool = False
-) -> Trial:
+def reweighted(observed: Readings, begin: Arm, strength: float, huber: bool = False) -> Trial:
     """Robust fit from ``begin`` with corrections of about ``strength`` (mm, mrad) to nominal.
 
     Tukey's biweight, which gives gross errors no say, or Huber's loss, which needs no good start.
     """
-    trial = Trial.of(observed, begin, nominal, strength, huber)
+    trial = Trial.of(observed, begin, strength, huber)
     for _ in range(_ITERATIONS):
         arm, moved = trial.taken()
         settled = moved < _SETTLED * min(trial.sigma_mm, 1.0)
-        trial = Trial.of(observed, arm, nominal, strength, huber)
+        trial = Trial.of(observed, arm, strength, huber)
         if settled:
             break
     return trial
@@ -176,7 +178,7 @@ def reweighted(
 
 @dataclass(frozen=True)
 class Trial:
-    """An arm that leans on ``nominal`` by ``strength``, and one step of its fit to n readings.
+    """An arm that leans on its nominal model by ``strength``, and a step of its fit to n readings.
 
     ``design`` (n, 6, P), ``residual`` (n, 6) in the robot's base, mm and rad, and ``weights``
     (n, 6): zero where an orientation was not measured. Columns: components of ``frames``, then the
@@ -186,7 +188,6 @@ class Trial:
     """
 
     arm: Arm
-    nominal: DHModel
     strength: float
     design: ndarray
     residual: ndarray
@@ -198,13 +199,11 @@ class Trial:
     sigma_rad: float
 
     @classmethod
-    def of(
-        cls, observed: Readings, arm: Arm, nominal: DHModel, strength: float, huber: bool
-    ) -> Trial:
+    def of(cls, observed: Readings, arm: Arm, strength: float, huber: bool) -> Trial:
         """The arm, linearised."""
         frames = frame_terms(observed, arm.frames)
-        free = np.full(nominal.start.size, strength > 0.0)
-        system = PoseSystem(observed, nominal, free, frames, 1.0)
+        free = np.full(arm.model.start.size, strength > 0.0)
+        system = PoseSystem(observed, arm.model, free, frames, 1.0)
         x = np.concatenate([frames.begin, arm.model.start[free]])
         ((columns, _),) = system.columns(x)  # few enough readings for one block
         columns = np.pad(columns, ((0, 0), (0, 6 - columns.shape[1]), (0, 0)))
@@ -218,9 +217,9 @@ class Trial:
                 weights[there, _PARTS[place]] = _weight(length, sigma, huber)[:, None] / sigma**2
                 sigmas[place] = sigma
         lean = np.append(
-            np.zeros(frames.size), (strength * _by_kind(nominal, 1e-3, 1.0))[free] ** -2
+            np.zeros(frames.size), (strength * _by_kind(arm.model, 1e-3, 1.0))[free] ** -2
         )
-        moved = np.append(np.zeros(frames.size), (arm.model.start - nominal.start)[free])
+        moved = np.append(np.zeros(frames.size), (arm.model.start - arm.nominal.start)[free])
         flat = columns.reshape(len(columns), -1)
         normal = (flat[:-1] * weights.T.ravel()) @ flat.T
         gram = normal[:, :-1] + np.diag(lean)
@@ -230,9 +229,7 @@ class Trial:
         both = np.outer(scale, scale)
         inverse = np.linalg.pinv(gram * both, rcond=1e-12, hermitian=True) * both
         step = -inverse @ (normal[:, -1] + lean * moved)
-        return cls(
-            arm, nominal, strength, design, residual, weights, inverse, step, frames, *sigmas
-        )
+        return cls(arm, strength, design, residual, weights, inverse, step, frames, *sigmas)
 
     def taken(self) -> tuple[Arm, float]:
         """The arm after the step, and how far it moves: mm of lengths, mm at one metre of turns."""
@@ -241,7 +238,8 @@ class Trial:
         model = model.with_parameters(model.start + rest) if rest.size else model
         scale = np.append(self.frames.scale, _by_kind(model, 1e-3, 1.0))[: self.step.size]
         moved = float(np.abs(self.step / scale).max())
-        return Arm(model, self.frames.frames(self.frames.begin + of_frames)), moved
+        frames = self.frames.frames(self.frames.begin + of_frames)
+        return Arm(model, self.arm.nominal, frames), moved
 
     def left_out(self, observed: Readings, judged: bool = False) -> ndarray:
         """Residuals (n, 6), mm and rad, of every reading with its configuration left out.
@@ -279,8 +277,9 @@ def _by_kind(model: DHModel, angle: float, length: float) -> ndarray:
 
 
 def _far(trial: Trial) -> bool:
-    moved = np.abs(trial.arm.model.start - trial.nominal.start)
-    return bool((moved > _by_kind(trial.nominal, _FAR_RAD, _FAR_MM)).any())
+    arm = trial.arm
+    moved = np.abs(arm.model.start - arm.nominal.start)
+    return bool((moved > _by_kind(arm.model, _FAR_RAD, _FAR_MM)).any())
 
 
 def _weight(length: ndarray, sigma: float, huber: bool) -> ndarray:
@@ -316,7 +315,7 @@ def start(observed: Readings, model: DHModel) -> Arm:
     flange, group = dh.forward(model, observed.q_rad), [observed.session, observed.target]
     several = len(np.unique(group, axis=1).T) > 1
     for _ in range(_REFINEMENTS if several else 1):
-        arm = Arm(model, closed_form_start(observed.select(rows), flange.select(rows)))
+        arm = Arm(model, model, closed_form_start(observed.select(rows), flange.select(rows)))
         distance = pd.Series(np.linalg.norm(residuals(arm, observed).position_mm, axis=1))
         rows = np.flatnonzero(distance <= distance.groupby(group).transform("median"))
     return arm
