@@ -11,6 +11,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from kinacc.config import series
+from kinacc.config.edit import with_added
 from kinacc.config.error_models import ALWAYS, ERROR_MODELS, asked_for, loaded
 from kinacc.config.parameter_rules import rules
 from kinacc.config.problems import MOST_PROBLEMS, by_line, problems_of
@@ -20,6 +21,7 @@ from kinacc.config.settings import SHIPPED, Configuration
 from kinacc.config.values import overlay
 from kinacc.errors import InputError, Problem, input_error, refuse
 from kinacc.kinematics import robot as robots
+from kinacc.tables.atomic import write_whole
 
 COMMAND_LINE = "command line"
 _MOST_DATASETS = 5_000
@@ -107,6 +109,15 @@ def load(
     problems = sorted(dict.fromkeys(problems), key=by_line)[:MOST_PROBLEMS]
     refuse(problems, f"{len(problems)} problems in the configuration" if problems[1:] else "")
     return resolved
+
+
+def add_to(file: str, path: Sequence[str], value: Any) -> None:
+    """Join a value to what a configuration file has at a path of keys, see :func:`with_added`."""
+    place = Path(os.path.realpath(file))
+    text = place.read_bytes().decode("utf-8")  # as bytes: line ends stay
+    mode = place.stat().st_mode
+    write_whole(place, with_added(text, path, value, file).encode("utf-8"), on_disk=True)
+    place.chmod(mode & 0o7777)
 
 
 def _merged(

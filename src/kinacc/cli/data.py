@@ -8,20 +8,18 @@ import shlex
 import sys
 from collections.abc import Sequence
 from datetime import datetime
-from pathlib import Path
 from typing import Any
 
 import click
 import pandas as pd
 
 from kinacc.checks.check import examined
-from kinacc.checks.configuration import load
+from kinacc.checks.configuration import add_to, load
 from kinacc.checks.findings import VERDICTS
 from kinacc.cli.choice import CONFIG, DATASET, PATH, REASON, option
 from kinacc.cli.output import Output, answers
 from kinacc.cli.process import AGAINST, DONE
 from kinacc.config import schema
-from kinacc.config.edit import with_added
 from kinacc.config.series import MOVED, SAME
 from kinacc.deployment import adding
 from kinacc.errors import Problem, first_few, gathered, input_error, refuse
@@ -30,7 +28,6 @@ from kinacc.kinematics import robot
 from kinacc.measurements.reader import excluded_lines, read
 from kinacc.progress import reporting
 from kinacc.report.rendering import counted, environment
-from kinacc.tables.atomic import write_whole
 
 _MOST = 100_000  # lines of a range
 _SETUP = click.Choice([SAME, MOVED])
@@ -104,12 +101,7 @@ def _accept(files: Sequence[str], dataset: Sequence[str], kind: str, reason: str
     problems += [] if len(files) == 1 else [Problem("--accept", "needs one FILE.yaml")]
     refuse(problems)
     name, _ = _measured_data_set(files[0], next(iter(dataset), None))
-    _add(files[0], ("datasets", name, "data_check", "accept"), {kind: reason})
-
-
-def _add(file: str, path: Sequence[str], content: object) -> None:
-    """Add ``content`` to a configuration file below the keys of ``path``."""
-    write_whole(file, with_added(Path(file).read_text("utf-8"), path, content, file).encode())
+    add_to(files[0], ("datasets", name, "data_check", "accept"), {kind: reason})
 
 
 def _sections(files: Sequence[str], wanted: Sequence[str]) -> dict[str, dict[str, Any]]:
@@ -150,7 +142,7 @@ def exclude(file: str, lines: str, reason: str | None, dataset: str | None, out:
     refuse(problems)
     item = {"lines": numbers, "reason": reason}
     read({**section, "exclude": [*section["exclude"], item]}, robot.load(settings["robot"]))
-    _add(file, ("datasets", name, "measurements", "file", "exclude"), [item])
+    add_to(file, ("datasets", name, "measurements", "file", "exclude"), [item])
     first = f"{file}: {counted(len(numbers), 'line')} of {section['path']} excluded"
     text = [first, "next:", f"  kinacc check-data {file}"]
     out.show({"file": file, "dataset": name, **item}, lines=text)

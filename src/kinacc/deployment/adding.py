@@ -10,15 +10,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from kinacc.checks.configuration import load
-from kinacc.config.edit import flow, with_added
+from kinacc.checks.configuration import add_to, load
+from kinacc.config.edit import flow
 from kinacc.config.records import Settings
 from kinacc.config.series import MOVED
 from kinacc.deployment.shared_readings import known_rows
 from kinacc.errors import first_few, input_error
 from kinacc.kinematics import robot
 from kinacc.measurements.reader import read as read_measured
-from kinacc.tables.atomic import write_whole
 from kinacc.tables.columns import Columns
 
 
@@ -86,12 +85,7 @@ def add(
     ]
     if not lines:
         new.insert(0, {"path": _beside(config, known[0]), "date": last})
-    place = Path(os.path.realpath(config))
-    text = place.read_bytes().decode("utf-8")  # as bytes: line ends stay
-    changed = with_added(text, ("datasets", name, "series"), new, config)
-    mode = place.stat().st_mode
-    write_whole(place, changed.encode("utf-8"), on_disk=True)
-    place.chmod(mode & 0o7777)
+    add_to(config, ("datasets", name, "series"), new)
     return Added(config, name, tuple(flow(line) for line in new))
 
 
