@@ -144,7 +144,7 @@ def show(path: Path, name: str | None, describe: bool, out: Output) -> None:
         table = content.to_pandas()
     except (ValueError, pa.ArrowException) as error:
         message = f"cannot be shown: {error}"
-        raise input_error(str(place), message, fix=store.remake(place)) from None
+        raise input_error(str(place), message, fix=sums.remake(place)) from None
     known = ARTEFACTS.get(place.stem)
     line = f"{place}: {table.shape[describe]} {'columns' if describe else 'rows'}. "
     line += known.meaning if known else ""

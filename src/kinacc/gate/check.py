@@ -75,7 +75,7 @@ def check_files(folder: Path, data: DataSets | None = None) -> Outcome:
 
     A warning where files or settings (``data``, where the data set is in it) have changed since.
     """
-    verdict, fix, figures = WARNED, "run the workflow again", {}
+    verdict, fix, figures = WARNED, sums.AGAIN, {}
     if problems := list(_problems(folder)):
         shown = "\n".join(map(str, problems[:_SHOWN]))
         says = shown + and_more(len(problems) - _SHOWN).replace(" ", "\n", 1)
@@ -116,4 +116,4 @@ def _problems(folder: Path) -> Iterator[Problem]:
     lists = sorted((folder / sums.FOLDER).glob("*.sha256"))
     if whole.is_file() and whole.read_bytes() != b"".join(path.read_bytes() for path in lists):
         message = f"is not what {sums.FOLDER}/*.sha256 hold"
-        yield Problem(str(whole), message, fix=f"rm {whole}, then run the workflow again")
+        yield Problem(str(whole), message, fix=sums.remake(whole))

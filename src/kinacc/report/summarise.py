@@ -27,7 +27,7 @@ from kinacc.measurements.folds import configurations_of
 from kinacc.measurements.row_names import RowNames
 from kinacc.report.rendering import history_sentence
 from kinacc.report.summary import CalibrationSummary
-from kinacc.tables import store, sums
+from kinacc.tables import sums
 from kinacc.tables.allowed import FINDING_LEVELS, LEFT_OUT, SUBSETS, VERDICTS
 from kinacc.tables.columns import Columns, Tables
 from kinacc.tables.contract import columns_of
@@ -206,7 +206,7 @@ def summarise_all(
         try:
             if path.is_file() and path.name in sums.outdated(folder):
                 what = "was made from other tables than those now beside it"
-                raise input_error(str(path), what, fix=store.remake(path))
+                raise input_error(str(path), what, fix=sums.remake(path))
             summaries.append(summarise(folder, outdated=outdated))
         except InputError as error:
             text = str(error.problems[0]).removeprefix(f"{folder}: ")

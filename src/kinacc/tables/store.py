@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shlex
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
@@ -208,11 +207,6 @@ def read_arrow(path: Path | str, content: bytes | None = None, any_type: bool = 
         return table
 
 
-def remake(path: Path | str) -> str:
-    """What to do about an artefact that is of no use, for the message of who came upon it."""
-    return f"rm {shlex.quote(str(path))}, then run the workflow again"
-
-
 def row_count(path: Path | str) -> int:
     """Number of rows of a table's file; InputError if absent or not Parquet."""
     with _opened(path) as file:
@@ -239,13 +233,14 @@ def _opened(path: Path | str, content: bytes | None = None) -> Iterator[pq.Parqu
         with pq.ParquetFile(source, page_checksum_verification=True) as file:
             yield file
     except InputError as error:
-        raise InputError([replace(item, fix=remake(path)) for item in error.problems]) from None
+        fix = sums.remake(path)
+        raise InputError([replace(item, fix=fix) for item in error.problems]) from None
     except FileNotFoundError:
         raise input_error(str(path), "no such file", "a Parquet file") from None
     except (pa.ArrowException, OSError, ValueError, OverflowError) as error:
         reason = (str(error) or type(error).__name__).splitlines()[0]
         message = f"not a readable Parquet file: {reason}"
-        raise input_error(str(path), message, fix=remake(path)) from None
+        raise input_error(str(path), message, fix=sums.remake(path)) from None
 
 
 def rows(mask: np.ndarray) -> str:

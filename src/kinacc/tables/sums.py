@@ -8,15 +8,16 @@ from __future__ import annotations
 
 import hashlib
 import os
+import shlex
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
-from kinacc.errors import InputError, Problem
+from kinacc.errors import Problem, input_error
 
 FOLDER = "sums"
 _READ = "# read "
-_AGAIN = "run the workflow again"
+AGAIN = "run the workflow again"
 _CHANGED = "changed since its stage wrote it, or no stage wrote it"
 
 
@@ -63,7 +64,7 @@ def hold(path: Path | str, content: bytes) -> None:
     if folder is None:
         return
     if stated(folder).get(path.relative_to(folder).as_posix()) != digest(content):
-        raise InputError(_problem(path, _CHANGED))
+        raise input_error(str(path), _CHANGED, fix=remake(path))
 
 
 def changed(folder: Path | str) -> Iterator[Problem]:
@@ -71,13 +72,14 @@ def changed(folder: Path | str) -> Iterator[Problem]:
     for name, expected in stated(folder).items():
         path = Path(folder) / name
         if not path.is_file():
-            yield Problem(str(path), "missing", fix=_AGAIN)
+            yield Problem(str(path), "missing", fix=AGAIN)
         elif digest(path.read_bytes()) != expected:
-            yield _problem(path, _CHANGED)
+            yield Problem(str(path), _CHANGED, fix=remake(path))
 
 
-def _problem(path: Path, message: str) -> Problem:
-    return Problem(str(path), message, fix=f"rm {path}, then {_AGAIN}")
+def remake(path: Path | str) -> str:
+    """What to do about a file of results that is of no use."""
+    return f"rm {shlex.quote(str(path))}, then {AGAIN}"
 
 
 def _changed_reads(folder: Path | str) -> list[_Line]:
@@ -95,7 +97,8 @@ def _lines(folder: Path | str) -> list[_Line]:
         for line in path.read_text("utf-8", errors="replace").splitlines():
             value, separator, name = line.partition("  ")
             if not separator:
-                raise InputError(_problem(path, f"is not a list of digests: {line[:60]!r}"))
+                message = f"is not a list of digests: {line[:60]!r}"
+                raise input_error(str(path), message, fix=remake(path))
             is_read = value.startswith(_READ)
             lines.append(_Line(path.name, name, value.removeprefix(_READ), is_read))
     return lines
