@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -45,7 +45,7 @@ class Readings(Observations):
     turns: ndarray
     line: ndarray
     drawn: ndarray
-    row_names: RowNames = field(default_factory=RowNames)
+    row_names: RowNames
 
     def lines(self, rows: ndarray | slice = slice(None)) -> list[int]:
         """All lines of the file that ``rows`` were read from, each once, in order."""
